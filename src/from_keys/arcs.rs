@@ -3,20 +3,17 @@
 // Loops over lanes index many arrays at once.
 #![allow(clippy::needless_range_loop)]
 
-use crate::fit::arc_lanes::{self, LANES as ARC_LANES, whole};
+use crate::fit::arc_lanes::{self, LANES, whole};
 use crate::fit::constant_velocity::arc_component;
 use crate::math::canonical::canonical;
 use crate::shader::{Form, IS_KEY, KeySample};
 use crate::simd::dispatch::InLanes;
-use crate::simd::lanes::{self, Lanes, Number};
+use crate::simd::lanes::{Lanes, canonical as canonical_rotations};
 use crate::twin::arc_between::arc_between;
 use crate::twin::evaluate_arc::{norm_squared, on_arc};
 use crate::twin::evaluate_polynomial::polynomial;
 
-/// Samples that are evaluated together.
-pub(crate) const LANES: usize = ARC_LANES;
-
-/// Samples that are gathered to be evaluated together; they are consecutive in the result.
+/// Samples that are gathered to be evaluated together, at most `LANES`; they are consecutive in the result.
 pub(crate) struct TwoKeyBlock {
     pub(crate) form: Form,
     /// The keys before and after each sample, with continued signs. A sample that is a key itself
@@ -84,12 +81,7 @@ impl TwoKeyBlock {
                 lanes[j] = canonical(polynomial(own, self.parameters[j]));
             }
         }
-        self.keep(&found);
-    }
-
-    /// Turns arrays of components into rotations.
-    #[inline(always)]
-    fn keep(&mut self, [x, y, z, w]: &[[f32; LANES]; 4]) {
+        let [x, y, z, w] = &found;
         let mut rotations = [[0.0; 4]; LANES];
         for j in 0..whole(self.count) {
             rotations[j] = [x[j], y[j], z[j], w[j]];
@@ -125,24 +117,16 @@ impl<L: Lanes> Arcs<L> {
         self.tangents[vector % VECTORS] = tangent;
     }
 
-    /// The rotations on the arcs of a vector, times `sign`.
+    /// The rotations on the arcs of a vector, times `sign`, which is 1 or -1.
     #[inline(always)]
     fn at(&self, vector: usize, sign: L, parameter: L) -> [L; 4] {
-        let (middle, tangent) = (
-            self.middles[vector % VECTORS],
-            self.tangents[vector % VECTORS],
-        );
-        at(middle, tangent, sign, parameter)
+        let middle = self.middles[vector % VECTORS];
+        let tangent = self.tangents[vector % VECTORS];
+        let [x, y, z, w] = on_arc(middle, tangent, norm_squared(tangent), parameter);
+        // Keys of the other sign would only flip the sign of every intermediate result, so the sign
+        // may come last.
+        canonical_rotations([x * sign, y * sign, z * sign, w * sign])
     }
-}
-
-/// The rotation on an arc, times `sign`, which is 1 or -1.
-#[inline(always)]
-fn at<N: Number>(middle: [N; 4], tangent: [N; 4], sign: N, parameter: N) -> [N; 4] {
-    let [x, y, z, w] = on_arc(middle, tangent, norm_squared(tangent), parameter);
-    // Keys of the other sign would only flip the sign of every intermediate result, so the sign
-    // may come last.
-    lanes::canonical([x * sign, y * sign, z * sign, w * sign])
 }
 
 /// Samples of one track on arcs between keys that share one continued sign, evaluated straight

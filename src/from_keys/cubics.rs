@@ -2,9 +2,8 @@
 // Loops over lanes index many arrays at once.
 #![allow(clippy::needless_range_loop)]
 
-use crate::fit::arc_lanes::whole;
+use crate::fit::arc_lanes::{LANES, whole};
 use crate::fit::tangent_weights::UNKNOWN;
-use crate::from_keys::arcs::LANES;
 use crate::math::canonical::canonical;
 use crate::shader::TangentWeights;
 use crate::simd::dispatch::InLanes;
