@@ -6,12 +6,12 @@
 use crate::fit::constant_velocity::arc_component;
 use crate::shader::{Form, IS_KEY, KeySample};
 use crate::simd::dispatch::InLanes;
-use crate::simd::lanes::{self, Lanes, Number};
+use crate::simd::lanes::{Lanes, canonical as canonical_rotations};
 use crate::twin::arc_between::arc_between;
 use crate::twin::evaluate_arc::{norm_squared, on_arc};
 use crate::twin::evaluate_polynomial::polynomial;
 
-/// Samples that are evaluated together.
+/// The most samples that are evaluated together.
 pub(crate) const LANES: usize = 64;
 
 /// Samples that are gathered to be evaluated together; they are consecutive in the result.
@@ -102,23 +102,22 @@ impl<L: Lanes> Arcs<L> {
         self.tangents[vector % VECTORS] = tangent;
     }
 
-    /// The rotations on the arcs of a vector, times `sign`.
+    /// The rotations on the arcs of a vector, times `sign`, which is 1 or -1.
     #[inline(always)]
     fn at(&self, vector: usize, sign: L, parameter: L) -> [L; 4] {
-        let (middle, tangent) = (
-            self.middles[vector % VECTORS],
-            self.tangents[vector % VECTORS],
-        );
-        at(middle, tangent, sign, parameter)
+        let middle = self.middles[vector % VECTORS];
+        let tangent = self.tangents[vector % VECTORS];
+        let [x, y, z, w] = on_arc(middle, tangent, norm_squared(tangent), parameter);
+        // Keys of the other sign would only flip the sign of every intermediate result, so the sign
+        // may come last.
+        canonical_rotations([x * sign, y * sign, z * sign, w * sign])
     }
 
     /// The same by the arcs' polynomials.
     #[inline(always)]
     fn at_as_polynomials(&self, vector: usize, parameter: L) -> [L; 4] {
-        let (mut found, tangent) = (
-            self.middles[vector % VECTORS],
-            self.tangents[vector % VECTORS],
-        );
+        let mut found = self.middles[vector % VECTORS];
+        let tangent = self.tangents[vector % VECTORS];
         let square = norm_squared(tangent);
         for c in 0..4 {
             let own = arc_component(found[c], tangent[c], square);
@@ -126,15 +125,6 @@ impl<L: Lanes> Arcs<L> {
         }
         found
     }
-}
-
-/// The rotation on an arc, times `sign`, which is 1 or -1.
-#[inline(always)]
-fn at<N: Number>(middle: [N; 4], tangent: [N; 4], sign: N, parameter: N) -> [N; 4] {
-    let [x, y, z, w] = on_arc(middle, tangent, norm_squared(tangent), parameter);
-    // Keys of the other sign would only flip the sign of every intermediate result, so the sign
-    // may come last.
-    lanes::canonical([x * sign, y * sign, z * sign, w * sign])
 }
 
 /// Samples of one track on arcs between keys that share one continued sign, evaluated straight

@@ -170,7 +170,7 @@ impl Set<'_> {
         device: &VulkanEngine,
         output: &mut [[f32; 4]],
     ) -> Result<(), Error> {
-        let (limit, radius) = (device.pass_limit().max(2), pass.weights.len());
+        let (limit, radius) = (device.window().max(2), pass.weights.len());
         let detail = u32::from(pass.are_rotations);
         let dispatch = |count: usize, detail: u32| PoseDispatch {
             count: count as u32,
