@@ -93,41 +93,23 @@ pub(crate) struct FitBlock {
 
 /// Samples of curves: the rotations at the middle, and for each pair of nodes `-s` and `s` the
 /// differences from the middle, as their sum (`even`) and their difference (`odd`).
-pub(crate) struct Samples<N, const PAIRS: usize> {
-    pub(crate) middle: [N; 4],
-    pub(crate) even: [[N; 4]; PAIRS],
-    pub(crate) odd: [[N; 4]; PAIRS],
+pub(crate) struct Samples<L, const PAIRS: usize> {
+    pub(crate) middle: [L; 4],
+    pub(crate) even: [[L; 4]; PAIRS],
+    pub(crate) odd: [[L; 4]; PAIRS],
 }
 
-impl<N: Copy, const PAIRS: usize> Samples<N, PAIRS> {
+impl<L: Lanes, const PAIRS: usize> Samples<L, PAIRS> {
     /// Samples that all have the same value.
     #[inline(always)]
-    pub(crate) fn all(number: N) -> Self {
+    pub(crate) fn all(number: L) -> Self {
         Self {
             middle: [number; 4],
             even: [[number; 4]; PAIRS],
             odd: [[number; 4]; PAIRS],
         }
     }
-}
 
-impl<const PAIRS: usize> Samples<Lane32, PAIRS> {
-    /// The samples of one vector's lanes, from `lane` on.
-    #[inline(always)]
-    pub(crate) fn at<L: Lanes>(&self, lane: usize) -> Samples<L, PAIRS> {
-        let mut own = Samples::all(L::all(0.0));
-        for c in 0..4 {
-            own.middle[c] = L::load(&self.middle[c][lane..]);
-            for k in 0..PAIRS {
-                own.even[k][c] = L::load(&self.even[k][c][lane..]);
-                own.odd[k][c] = L::load(&self.odd[k][c][lane..]);
-            }
-        }
-        own
-    }
-}
-
-impl<L: Lanes, const PAIRS: usize> Samples<L, PAIRS> {
     /// Sets the samples of the `k`th pair of nodes from the differences of the rotations before
     /// and after the middle from the one at the middle.
     #[inline(always)]

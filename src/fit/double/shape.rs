@@ -15,7 +15,7 @@ use crate::fit::double::intervals::{load, put, rounded, store};
 use crate::fit::nodes::{FULL_NODES, Nodes, SMALL_ANGLE_NODES};
 use crate::math::dual::{Dual, Near};
 use crate::math::quaternion::{Quaternion, Real};
-use crate::shader::PolynomialSegment;
+use crate::shader::{POWERS, PolynomialSegment};
 use crate::simd::dispatch::{InLanes, in_lanes};
 use crate::simd::lanes::{Doubles, Lanes};
 
@@ -116,9 +116,6 @@ impl<S: Sampling> InLanes for Fit<'_, S> {
     }
 }
 
-/// The most pairs of nodes of a fit.
-const MOST_PAIRS: usize = 5;
-
 /// Samples curves by the formula itself, in f64.
 struct Directly<F>(PhantomData<F>);
 
@@ -139,7 +136,7 @@ impl<F: Formula> Sampling for Directly<F> {
             let width = L::Doubles::load(&block.widths[lane..]);
             // One loop over all nodes: the formula is compiled once, and what does not change along
             // a curve is computed once.
-            let mut found = [[zero; 4]; 2 * MOST_PAIRS + 1];
+            let mut found = [[zero; 4]; POWERS];
             let mut doubt = zero;
             for (i, found) in found[..=2 * PAIRS].iter_mut().enumerate() {
                 let t = at + L::Doubles::all(nodes.offset(i)) * width;

@@ -2,14 +2,14 @@
 //! second order, and the results are fitted like the rotations themselves.
 
 use crate::curve::options::{Axes, Quantity};
-use crate::fit::double::fit::{FitBlock, Lane32, Samples};
-use crate::fit::double::intervals::LANES;
+use crate::fit::double::fit::{FitBlock, MOST, Samples};
+use crate::fit::double::intervals::{LANES, load, put};
 use crate::fit::double::shape::Sampling;
 use crate::fit::nodes::Nodes;
 use crate::math::dual::Dual;
 use crate::math::quaternion::{Quaternion, rotated, step};
-use crate::shader::PolynomialSegment;
-use crate::simd::lanes::Lanes;
+use crate::shader::{POWERS, PolynomialSegment};
+use crate::simd::lanes::{Doubles as _, Lanes};
 
 /// The quantity asked for, from a rotation and its derivatives by the parameter; `rate` is the
 /// parameter's change per second. The result is a quaternion, or a vector with 0 in the place of w.
@@ -43,50 +43,55 @@ impl Sampling for Motion {
         nodes: &Nodes<PAIRS>,
         segments: &mut [PolynomialSegment],
     ) {
-        let count = block.whole();
-        let mut samples = Samples::all([0.0; LANES]);
         let mut scales = [1.0; LANES];
-        for (lane, scale) in scales[..count].iter_mut().enumerate() {
-            *scale = sample(block, lane, nodes, &mut samples);
-        }
-        for lane in (0..count).step_by(L::COUNT) {
-            block.interpolate(lane, nodes, &samples.at::<L>(lane), segments);
+        for lane in (0..block.whole()).step_by(L::COUNT) {
+            let mut found = [[[0.0; MOST]; 4]; POWERS];
+            let mut units = [1.0; MOST];
+            for own in lane..block.count.min(lane + L::COUNT) {
+                let unit = sample(block, own, nodes, own - lane, &mut found);
+                (units[own - lane], scales[own]) = (unit, unit as f32);
+            }
+            let unit = L::Doubles::load(&units);
+            let middle = load::<L, _, _>(&found[0], 0);
+            let mut samples = Samples::all(L::all(0.0));
+            for c in 0..4 {
+                samples.middle[c] = L::rounded(middle[c] / unit);
+                for k in 0..PAIRS {
+                    let [before, after] = [1 + k, 1 + PAIRS + k].map(|i| &found[i][c]);
+                    let rise = (L::Doubles::load(after) - middle[c]) / unit;
+                    let fall = (L::Doubles::load(before) - middle[c]) / unit;
+                    samples.even[k][c] = L::rounded(rise + fall);
+                    samples.odd[k][c] = L::rounded(rise - fall);
+                }
+            }
+            block.interpolate(lane, nodes, &samples, segments);
         }
         block.scale(&scales, segments);
     }
 }
 
-/// Samples the curve in a lane in a unit near its largest value, and returns that unit. It is a
-/// power of two, so that multiplying by it rounds nothing.
+/// Samples the curve in a lane into the `j`th lane of the vectors found, and returns a unit near
+/// its largest value. It is a power of two, so that dividing by it rounds nothing.
 fn sample<const PAIRS: usize>(
     block: &FitBlock,
     lane: usize,
     nodes: &Nodes<PAIRS>,
-    Samples { middle, even, odd }: &mut Samples<Lane32, PAIRS>,
-) -> f32 {
+    j: usize,
+    found: &mut [[[f64; MOST]; 4]],
+) -> f64 {
     let curve = block.curve(lane);
     let (at, width) = (block.middles[lane], block.widths[lane]);
-    let between = curve.value_at(at);
-    let pairs = nodes.at.map(|node| {
-        let reach = f64::from(node) * width;
-        [curve.value_at(at - reach), curve.value_at(at + reach)]
-    });
-    let largest = (pairs.as_flattened().as_flattened().iter())
-        .chain(&between)
-        .fold(0.0f64, |largest, component| largest.max(component.abs()));
-    let unit = if largest > 1e-30 {
+    let mut largest = 0.0f64;
+    for (i, found) in found[..=2 * PAIRS].iter_mut().enumerate() {
+        let value = curve.value_at(at + nodes.offset(i) * width);
+        largest = value
+            .iter()
+            .fold(largest, |largest, c| largest.max(c.abs()));
+        put(found, j, value);
+    }
+    if largest > 1e-30 {
         f64::from_bits(largest.to_bits() & (0x7ff << 52))
     } else {
         1.0
-    };
-    for c in 0..4 {
-        middle[c][lane] = (between[c] / unit) as f32;
-        for (k, [before, after]) in pairs.iter().enumerate() {
-            let rise = (after[c] - between[c]) / unit;
-            let cosine_minus_one = (before[c] - between[c]) / unit;
-            even[k][c][lane] = (rise + cosine_minus_one) as f32;
-            odd[k][c][lane] = (rise - cosine_minus_one) as f32;
-        }
     }
-    unit as f32
 }
