@@ -71,30 +71,31 @@ impl ArcPreparation {
         let last_key = first_key + intervals.len() as u32;
         let own = &keys[intervals.start..=intervals.end];
         prepared.constants.extend_from_slice(own);
-        // Every span has one segment.
-        let segments = (prepared.segments.len() + self.count) as u32;
         match self.path {
             Path::Shortest => {
-                (prepared.spans).begin(&times[intervals.clone()], first_key);
+                let segments = (prepared.segments.len() + self.count) as u32;
+                let places = segments..segments + intervals.len() as u32;
+                let spans = &mut prepared.spans;
+                spans.starts.extend_from_slice(&times[intervals.clone()]);
+                spans.sources.extend(places.map(Source::Segment));
+                spans.keys.extend(first_key..last_key);
                 self.push(prepared, keys, set.signs(index), intervals.clone());
             }
             Path::AsAuthored => {
                 for (key, constant) in intervals.clone().zip(first_key..) {
                     let [start, end] = [times[key], times[key + 1]];
-                    let [mut from, to] = [keys[key], keys[key + 1]];
-                    prepared.spans.begin(&[start], constant);
+                    let [from, to] = [keys[key], keys[key + 1]];
                     if let Some(middle) = middle_of_long([from, to]) {
-                        (prepared.spans).begin(&[start + (end - start) * 0.5], NONE);
-                        self.push_arc(prepared, from, middle);
-                        from = middle;
+                        let halfway = start + (end - start) * 0.5;
+                        self.push_arc(prepared, start, constant, [from, middle]);
+                        self.push_arc(prepared, halfway, NONE, [middle, to]);
+                    } else {
+                        self.push_arc(prepared, start, constant, [from, to]);
                     }
-                    self.push_arc(prepared, from, to);
                 }
             }
         }
         let spans = first_span..prepared.spans.len();
-        let sources = (segments..segments + spans.len() as u32).map(Source::Segment);
-        prepared.spans.sources.extend(sources);
         prepared.push_part(index, times, &intervals, spans, [first_key, last_key]);
     }
 
@@ -121,10 +122,19 @@ impl ArcPreparation {
         }
     }
 
-    fn push_arc(&mut self, prepared: &mut Prepared, from: [f32; 4], to: [f32; 4]) {
+    /// Takes one arc as the next span.
+    fn push_arc(
+        &mut self,
+        prepared: &mut Prepared,
+        start: f64,
+        key: u32,
+        [from, to]: [[f32; 4]; 2],
+    ) {
         if self.count == LANES {
             self.finish(prepared);
         }
+        let place = (prepared.segments.len() + self.count) as u32;
+        prepared.push_span(start, Source::Segment(place), key);
         (self.from[self.count], self.to[self.count]) = (from, to);
         self.count += 1;
     }

@@ -276,19 +276,15 @@ impl Rest {
         places: &[Place],
     ) {
         let first = stretch.intervals.start + (lanes.start - stretch.lane);
+        // The only interval of a track has no neighbours.
+        let beside = usize::from(stretch.all > 1);
         self.stretches.push(Stretch {
-            lane: self.intervals.count + 1,
+            lane: self.intervals.count + beside,
             intervals: first..first + lanes.len(),
             ..stretch.clone()
         });
-        if stretch.all == 1 {
-            self.intervals.push_nothing();
-            self.intervals.push_from(intervals, lanes);
-            self.intervals.push_nothing();
-        } else {
-            let context = lanes.start - 1..lanes.end + 1;
-            self.intervals.push_from(intervals, context);
-        }
+        let lanes = lanes.start - beside..lanes.end + beside;
+        self.intervals.push_from(intervals, lanes);
         self.places.extend(places);
     }
 

@@ -294,8 +294,8 @@ impl SmoothPreparation {
 
     /// Whether an interval stands still.
     fn holds(&self, stretch: &Stretch, lane: usize) -> bool {
-        let at_end = stretch.first() == Some(lane) || stretch.last() == Some(lane);
-        self.is_frozen() && at_end && stretch.all > 1
+        let at_end = || stretch.first() == Some(lane) || stretch.last() == Some(lane);
+        self.is_frozen() && stretch.all > 1 && at_end()
     }
 
     /// Whether tracks are extrapolated on a side with this wrap mode. A track that stands still in

@@ -84,17 +84,6 @@ impl Spans {
         self.starts.len()
     }
 
-    /// Adds spans that start at these times, with the constants `key`, `key + 1` and so on at their
-    /// starts, or with none. The caller adds their sources.
-    #[inline]
-    pub(crate) fn begin(&mut self, starts: &[f64], key: u32) {
-        self.starts.extend_from_slice(starts);
-        match key {
-            NONE => self.keys.resize(self.keys.len() + starts.len(), NONE),
-            first => self.keys.extend(first..first + starts.len() as u32),
-        }
-    }
-
     pub(crate) fn reserve(&mut self, count: usize) {
         self.starts.reserve(count);
         self.sources.reserve(count);
