@@ -40,10 +40,7 @@ impl Clip {
     /// # Errors
     /// When they do not fit it.
     pub fn timeline(&self, frames: &Frames) -> Result<Timeline, FramesError> {
-        frames.resolve(
-            self.uploaded.data.track_count(),
-            self.uploaded.data.time_span(),
-        )
+        frames.resolve(self.track_count(), self.uploaded.data.time_span)
     }
 
     /// The rotation of every track at every sample, `[track][frame]`.

@@ -197,7 +197,10 @@ fn a_refusal_costs_no_more_than_was_read() {
             Code::Boxes,
             Box::new(repeated("# 99999999999999999999 1\n", "0\n")),
         ),
-        (Code::LineTooLong, Box::new(repeated("# 1 1\n0 ", "1111111111111111"))),
+        (
+            Code::LineTooLong,
+            Box::new(repeated("# 1 1\n0 ", "1111111111111111")),
+        ),
     ];
     for (code, make) in cases {
         let mut input = Lines::new(make);

@@ -10,7 +10,7 @@ use crate::simd::lanes::Lanes;
 use crate::time::frame_clock::FrameClock;
 use crate::time::frames::{FramesError, Ticks, Timeline};
 use crate::time::interval_blocks::{IntervalBlock, IntervalBlocks};
-use crate::time::runs::{Distance, Emit, Run, RunSource};
+use crate::time::runs::{Distance, Emit, Parameter, Run, RunSource};
 use crate::time::spans::{NONE, Source};
 use crate::time::wrap::TrackCopy;
 use crate::twin::evaluate::Evaluate;

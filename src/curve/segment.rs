@@ -40,11 +40,10 @@ impl Segments {
     /// those ([`Evaluate::is_canonical`](crate::twin::evaluate::Evaluate::is_canonical)).
     #[inline(always)]
     pub(crate) fn may_be_tiny(&self, index: u32) -> bool {
-        let is_canonical = match self.form {
-            Form::Arc => self.arcs[index as usize].is_canonical(),
-            Form::Polynomial => self.polynomials[index as usize].is_canonical(),
-        };
-        !is_canonical
+        match self.form {
+            Form::Arc => !self.arcs[index as usize].is_canonical(),
+            Form::Polynomial => !self.polynomials[index as usize].is_canonical(),
+        }
     }
 
     pub(crate) fn as_bytes(&self) -> &[u8] {

@@ -2,7 +2,6 @@
 //! The methods are built on this folder; it knows none of them. `prepare` applies methods to
 //! tracks.
 
-pub(crate) mod arc_lanes;
 pub(crate) mod constant_velocity;
 pub(crate) mod double;
 pub(crate) mod motion;

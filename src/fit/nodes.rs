@@ -74,6 +74,16 @@ impl<const PAIRS: usize> Nodes<PAIRS> {
         nodes
     }
 
+    /// The `i`th of all nodes: the middle, then those before it, then those after it.
+    #[inline(always)]
+    pub(crate) fn offset(&self, i: usize) -> f64 {
+        match i {
+            0 => 0.0,
+            _ if i <= PAIRS => f64::from(-self.at[i - 1]),
+            _ => f64::from(self.at[i - 1 - PAIRS]),
+        }
+    }
+
     /// The coefficients of s, s³, … and of s², s⁴, … of component `c`. Divided differences give
     /// Newton's polynomials in s² through the samples; these are then expanded in powers.
     #[inline(always)]
@@ -194,8 +204,8 @@ mod tests {
                     let derivative = 2.0 * n * libm::sin(angle);
                     // From Chebyshev's differential equation.
                     let second = -4.0 * n * n * libm::cos(angle);
-                    let halves = of_components(0.5 * second);
-                    samples.set_middle(of_components(derivative), halves);
+                    samples.odd[0] = of_components(derivative);
+                    samples.even[0] = of_components(0.5 * second);
                 } else if comes_again {
                     samples.set_slopes(before, after);
                 } else {

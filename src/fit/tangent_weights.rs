@@ -118,16 +118,13 @@ struct Between<'a> {
 impl InLanes for Between<'_> {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
-        let inner = self.times.len().saturating_sub(2);
-        let (before, own, after) = (
-            &self.times[..inner],
-            &self.times[self.times.len().min(1)..][..inner],
-            &self.times[self.times.len() - inner..],
-        );
-        let start = self.weights.len().min(1);
-        let weights = &mut self.weights[start..][..inner];
-        for j in 0..inner {
-            weights[j] = self.rule.between(own[j] - before[j], after[j] - own[j]);
+        let ([_, inner @ .., _], [_, own @ ..]) = (&mut *self.weights, self.times) else {
+            return;
+        };
+        let count = inner.len();
+        let (before, own, after) = (&self.times[..count], &own[..count], &own[1..][..count]);
+        for j in 0..count {
+            inner[j] = self.rule.between(own[j] - before[j], after[j] - own[j]);
         }
     }
 }

@@ -3,18 +3,16 @@
 // Loops over lanes index many arrays at once.
 #![allow(clippy::needless_range_loop)]
 
-use crate::fit::arc_lanes::{self, LANES as ARC_LANES, whole};
 use crate::fit::constant_velocity::arc_component;
-use crate::math::canonical::canonical;
 use crate::shader::{Form, IS_KEY, KeySample};
 use crate::simd::dispatch::InLanes;
-use crate::simd::lanes::{self, Lanes, Number};
+use crate::simd::lanes::{Lanes, canonical as canonical_rotations};
 use crate::twin::arc_between::arc_between;
 use crate::twin::evaluate_arc::{norm_squared, on_arc};
 use crate::twin::evaluate_polynomial::polynomial;
 
-/// Samples that are evaluated together.
-pub(crate) const LANES: usize = ARC_LANES;
+/// The most samples that are evaluated together.
+pub(crate) const LANES: usize = 64;
 
 /// Samples that are gathered to be evaluated together; they are consecutive in the result.
 pub(crate) struct TwoKeyBlock {
@@ -48,15 +46,15 @@ impl InLanes for TwoKeyBlock {
         // Smooth methods join a track's only two keys by an arc, which is evaluated as a
         // polynomial like their other curves.
         match self.form {
-            Form::Arc => self.arcs::<L>(),
-            Form::Polynomial => self.polynomials::<L>(),
+            Form::Arc => self.evaluate::<L, false>(),
+            Form::Polynomial => self.evaluate::<L, true>(),
         }
     }
 }
 
 impl TwoKeyBlock {
     #[inline(always)]
-    fn arcs<L: Lanes>(&mut self) {
+    fn evaluate<L: Lanes, const AS_POLYNOMIALS: bool>(&mut self) {
         let mut arcs = Arcs::<L>::new();
         for first in (0..self.count).step_by(VECTORS * L::COUNT) {
             let end = self.count.min(first + VECTORS * L::COUNT);
@@ -66,35 +64,14 @@ impl TwoKeyBlock {
             }
             for (vector, j) in (first..end).step_by(L::COUNT).enumerate() {
                 let parameter = L::load(&self.parameters[j..]);
-                let rotations = &mut self.rotations[j..j + L::COUNT];
-                L::store_rotations(arcs.at(vector, L::all(1.0), parameter), rotations);
+                let found = if AS_POLYNOMIALS {
+                    arcs.at_as_polynomials(vector, parameter)
+                } else {
+                    arcs.at(vector, L::all(1.0), parameter)
+                };
+                L::store_rotations(found, &mut self.rotations[j..j + L::COUNT]);
             }
         }
-    }
-
-    #[inline(always)]
-    fn polynomials<L: Lanes>(&mut self) {
-        let arcs = arc_lanes::arcs::<L>(&self.from, &self.to, self.count);
-        let squares = arcs.squares();
-        let mut found = [[0.0; LANES]; 4];
-        for c in 0..4 {
-            let (middle, tangent, lanes) = (&arcs.middles[c], &arcs.tangents[c], &mut found[c]);
-            for j in 0..LANES {
-                let own = arc_component(middle[j], tangent[j], squares[j]);
-                lanes[j] = canonical(polynomial(own, self.parameters[j]));
-            }
-        }
-        self.keep(&found);
-    }
-
-    /// Turns arrays of components into rotations.
-    #[inline(always)]
-    fn keep(&mut self, [x, y, z, w]: &[[f32; LANES]; 4]) {
-        let mut rotations = [[0.0; 4]; LANES];
-        for j in 0..whole(self.count) {
-            rotations[j] = [x[j], y[j], z[j], w[j]];
-        }
-        self.rotations = rotations;
     }
 }
 
@@ -125,24 +102,29 @@ impl<L: Lanes> Arcs<L> {
         self.tangents[vector % VECTORS] = tangent;
     }
 
-    /// The rotations on the arcs of a vector, times `sign`.
+    /// The rotations on the arcs of a vector, times `sign`, which is 1 or -1.
     #[inline(always)]
     fn at(&self, vector: usize, sign: L, parameter: L) -> [L; 4] {
-        let (middle, tangent) = (
-            self.middles[vector % VECTORS],
-            self.tangents[vector % VECTORS],
-        );
-        at(middle, tangent, sign, parameter)
+        let middle = self.middles[vector % VECTORS];
+        let tangent = self.tangents[vector % VECTORS];
+        let [x, y, z, w] = on_arc(middle, tangent, norm_squared(tangent), parameter);
+        // Keys of the other sign would only flip the sign of every intermediate result, so the sign
+        // may come last.
+        canonical_rotations([x * sign, y * sign, z * sign, w * sign])
     }
-}
 
-/// The rotation on an arc, times `sign`, which is 1 or -1.
-#[inline(always)]
-fn at<N: Number>(middle: [N; 4], tangent: [N; 4], sign: N, parameter: N) -> [N; 4] {
-    let [x, y, z, w] = on_arc(middle, tangent, norm_squared(tangent), parameter);
-    // Keys of the other sign would only flip the sign of every intermediate result, so the sign
-    // may come last.
-    lanes::canonical([x * sign, y * sign, z * sign, w * sign])
+    /// The same by the arcs' polynomials.
+    #[inline(always)]
+    fn at_as_polynomials(&self, vector: usize, parameter: L) -> [L; 4] {
+        let mut found = self.middles[vector % VECTORS];
+        let tangent = self.tangents[vector % VECTORS];
+        let square = norm_squared(tangent);
+        for c in 0..4 {
+            let own = arc_component(found[c], tangent[c], square);
+            found[c] = polynomial(own, parameter).canonical();
+        }
+        found
+    }
 }
 
 /// Samples of one track on arcs between keys that share one continued sign, evaluated straight

@@ -49,100 +49,83 @@ pub(crate) fn card(name: &str) -> Card {
     let computes = Q::COMPUTE | Q::TRANSFER | Q::SPARSE_BINDING;
     let copies = Q::TRANSFER | Q::SPARSE_BINDING;
     let video = Q::TRANSFER | Q::VIDEO_DECODE_KHR;
-    let (none, local) = (M::empty(), M::DEVICE_LOCAL);
-    let host = M::HOST_VISIBLE | M::HOST_COHERENT;
+    let (local, host) = (M::DEVICE_LOCAL, M::HOST_VISIBLE | M::HOST_COHERENT);
     let cached = host | M::HOST_CACHED;
-    let nvidia = |heaps: &[(u64, bool)], bar| {
+    let nvidia = |bar| {
         let types = [
-            (none, 1),
+            (M::empty(), 1),
             (local, 0),
             (host, 1),
             (cached, 1),
             (local | host, bar),
         ];
-        memory(heaps, &types)
+        types.to_vec()
     };
-    let geforce = [
-        (draws, 16),
-        (copies, 2),
-        (computes, 8),
-        (video, 1),
-        (Q::TRANSFER | Q::OPTICAL_FLOW_NV, 1),
-    ];
-    let radeon = |heaps: &[(u64, bool)], [vram, gtt, visible]: [u32; 3]| {
+    let radeon = |[vram, gtt, visible]: [u32; 3]| {
         let coherent = M::DEVICE_COHERENT_AMD | M::DEVICE_UNCACHED_AMD;
-        let types = [
+        vec![
             (local, vram),
             (host, gtt),
             (local | host, visible),
             (cached, gtt),
             (local | coherent, vram),
             (local | host | coherent, visible),
-        ];
-        memory(heaps, &types)
+        ]
     };
+    let h200 = [(draws, 16), (copies, 2), (computes, 8), (video, 7)];
+    let flow = Q::TRANSFER | Q::OPTICAL_FLOW_NV;
+    let geforce = [
+        (draws, 16),
+        (copies, 2),
+        (computes, 8),
+        (video, 1),
+        (flow, 1),
+    ];
     let radv = [(draws, 1), (computes, 4), (Q::VIDEO_DECODE_KHR, 1)];
-    let (families_of, memory) = match name {
-        "H200" => {
-            let all = [(draws, 16), (copies, 2), (computes, 8), (video, 7)];
-            (
-                families(&all),
-                nvidia(&[(143_771, true), (96_000, false)], 0),
-            )
-        }
-        "RTX 4060" => {
-            let heaps = [(8188, true), (24_000, false)];
-            (families(&geforce), nvidia(&heaps, 0))
-        }
+    let windows = [(draws, 1), (computes, 2), (copies, 2)];
+    let arc = [(draws, 1), (computes, 1), (Q::TRANSFER, 1)];
+    let plain = [(Q::GRAPHICS | Q::COMPUTE | Q::TRANSFER, 1); 4];
+    let (own, heaps, types): (&[_], &[_], _) = match name {
+        "H200" => (&h200, &[(143_771, true), (96_000, false)], nvidia(0)),
+        "RTX 4060" => (&geforce, &[(8188, true), (24_000, false)], nvidia(0)),
         "RTX 4060, no resizable BAR" => {
-            let heaps = [(8188, true), (24_000, false), (246, true)];
-            (families(&geforce), nvidia(&heaps, 2))
+            let heaps = &[(8188, true), (24_000, false), (246, true)];
+            (&geforce, heaps, nvidia(2))
         }
         "RX 7900 XTX, RADV" => {
-            let heaps = [(24_560, true), (32_000, false)];
-            (families(&radv), radeon(&heaps, [0, 1, 0]))
+            let heaps = &[(24_560, true), (32_000, false)];
+            (&radv, heaps, radeon([0, 1, 0]))
         }
         "RX 7900 XTX, no resizable BAR" => {
-            let heaps = [(24_304, true), (32_000, false), (256, true)];
-            (families(&radv), radeon(&heaps, [0, 1, 2]))
+            let heaps = &[(24_304, true), (32_000, false), (256, true)];
+            (&radv, heaps, radeon([0, 1, 2]))
         }
         "RX 7900 XTX, AMD's driver" => {
-            let all = [(draws, 1), (computes, 2), (copies, 2)];
-            let heaps = [(24_560, true), (32_000, false)];
-            (families(&all), radeon(&heaps, [0, 1, 0]))
+            let heaps = &[(24_560, true), (32_000, false)];
+            (&windows, heaps, radeon([0, 1, 0]))
         }
         "Steam Deck" => {
-            let heaps = [(5_000, false), (10_000, true)];
-            (families(&radv[..2]), radeon(&heaps, [1, 0, 1]))
+            let heaps = &[(5_000, false), (10_000, true)];
+            (&radv[..2], heaps, radeon([1, 0, 1]))
         }
         "Arc A770, Mesa 23" | "Arc A770, Mesa 24" => {
-            let all = [(draws, 1), (computes, 1), (Q::TRANSFER, 1)];
             let count = if name.ends_with("24") { 3 } else { 1 };
-            let types = [(local, 0), (local | host, 0), (cached, 1)];
-            let memory = memory(&[(16_256, true), (32_000, false)], &types);
-            (families(&all[..count]), memory)
+            let types = vec![(local, 0), (local | host, 0), (cached, 1)];
+            (&arc[..count], &[(16_256, true), (32_000, false)], types)
         }
         "Apple M2, MoltenVK" => {
-            let plain = Q::GRAPHICS | Q::COMPUTE | Q::TRANSFER;
-            let types = [
-                (local, 0),
-                (local | cached, 0),
-                (local | M::LAZILY_ALLOCATED, 0),
-            ];
-            (
-                families(&[(plain, 1); 4]),
-                memory(&[(16_384, true)], &types),
-            )
+            let lazy = local | M::LAZILY_ALLOCATED;
+            let types = vec![(local, 0), (local | cached, 0), (lazy, 0)];
+            (&plain, &[(16_384, true)], types)
         }
         "lavapipe" | "SwiftShader" => {
-            let plain = Q::GRAPHICS | Q::COMPUTE | Q::TRANSFER;
-            let types = [(local | cached, 0)];
-            (families(&[(plain, 1)]), memory(&[(2_048, true)], &types))
+            let types = vec![(local | cached, 0)];
+            (&plain[..1], &[(2_048, true)], types)
         }
         _ => panic!("no card is called {name}"),
     };
     Card {
-        families: families_of,
-        memory,
+        families: families(own),
+        memory: memory(heaps, &types),
     }
 }

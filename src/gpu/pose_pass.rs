@@ -6,12 +6,7 @@ use crate::gpu::error::VulkanError;
 use crate::shader::{Kernel, PoseDispatch};
 
 impl VulkanEngine {
-    /// The most values of 16 bytes that one pass takes.
-    pub(crate) fn pass_limit(&self) -> usize {
-        self.window()
-    }
-
-    /// Runs a kernel with these inputs.
+    /// Runs a kernel with these inputs, of at most as many values of 16 bytes as a window has rotations.
     pub(crate) fn pass(
         &self,
         kernel: Kernel,
@@ -19,13 +14,8 @@ impl VulkanEngine {
         pass: PoseDispatch,
         output: &mut [u8],
     ) -> Result<(), VulkanError> {
-        let limit = self.device.physical.info.max_storage_buffer_range;
-        let lengths = inputs.iter().map(|input| input.len());
-        for bytes in lengths.chain([output.len()]).map(|bytes| bytes as u64) {
-            if bytes > limit {
-                let what = "poses";
-                return Err(VulkanError::TooLarge { what, bytes, limit });
-            }
+        for bytes in inputs.iter().copied().chain([&*output]) {
+            self.check_size("poses", bytes)?;
         }
         let (pipeline, groups) = (self.pipeline(kernel)?, self.workgroups(pass.count));
         pipeline.run_once(inputs, bytemuck::bytes_of(&pass), groups, output)

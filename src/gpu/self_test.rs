@@ -46,7 +46,7 @@ pub(crate) fn run(engine: &VulkanEngine) -> Result<Vec<SelfTestReport>, VulkanEr
     ] {
         let set = hostile_set();
         let wanted = Wanted {
-            group_bytes: Some(engine.group_bytes()),
+            group_bytes: Some(engine.group_bytes),
             ..Wanted::all(&set)
         };
         let clip = ClipData::new(&set, method.into(), wanted).expect("the set suits every method");
@@ -62,7 +62,7 @@ pub(crate) fn run(engine: &VulkanEngine) -> Result<Vec<SelfTestReport>, VulkanEr
             Frames::at(vec![0.0, 0.017, 1.3, 1.31, 4.9, 5.0, 5.0001]),
         ] {
             let timeline = frames
-                .resolve(clip.track_count(), clip.time_span())
+                .resolve(clip.track_count(), clip.time_span)
                 .expect("a few frames");
             let whole = Window::whole(clip.track_count(), timeline.len(), Layout::TrackMajor);
             let mut expected = vec![Quat::IDENTITY; whole.len()];
@@ -117,12 +117,9 @@ fn expressions(
     let mut replies = vec![Reply::zeroed(); probes.len()];
     let pipeline = Pipeline::new(device, Kernel::SelfTest, exactness)?;
     let dispatch = Dispatch {
-        first_item: 0,
         item_count: probes.len() as u32,
         stride: 1,
-        detail: 0,
-        first_output: 0,
-        idle: 0,
+        ..Dispatch::zeroed()
     };
     pipeline.run_once(
         &[bytemuck::cast_slice(&probes)],
@@ -143,20 +140,16 @@ fn expressions(
         ("arc tangent", |reply| reply.arc_tangent),
     ];
     let expected: Vec<Reply> = probes.iter().map(|&probe| reply(probe)).collect();
-    let count = |value: Value| {
+    let reports = self_tests.map(|(name, value)| {
         let pairs = expected.iter().zip(&replies);
-        pairs
-            .filter(|(a, b)| value(a).to_bits() != value(b).to_bits())
-            .count()
-    };
-    Ok(self_tests
-        .into_iter()
-        .map(|(name, value)| SelfTestReport {
+        let differing = pairs.filter(|(a, b)| value(a).to_bits() != value(b).to_bits());
+        SelfTestReport {
             name,
             total: probes.len(),
-            differing: count(value),
-        })
-        .collect())
+            differing: differing.count(),
+        }
+    });
+    Ok(reports.into())
 }
 
 /// Values of ordinary size in no order, and sums that lie half way between floats.

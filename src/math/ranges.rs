@@ -174,7 +174,7 @@ const ARC_SQUARE: [f64; 16] = [
 /// `1 + x (c₀ + c₁ x + …)`, four coefficients at a time, so that the chain of dependent operations
 /// is a quarter as long. The number of coefficients is a multiple of four.
 #[inline(always)]
-fn one_plus<R: Real, const N: usize>(c: &[f64; N], x: R) -> R {
+pub(crate) fn one_plus<R: Real, const N: usize>(c: &[f64; N], x: R) -> R {
     let square = x * x;
     let fourth = square * square;
     let mut sum = R::all(0.0);

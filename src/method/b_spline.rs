@@ -79,14 +79,15 @@ pub(crate) fn basis([before_that, before, after, after_that]: [f64; 4]) -> [[f64
 }
 
 fn curves(intervals: &mut Intervals, stretches: &[Stretch], ends: Ends) {
+    let [start, end] = ends.both();
     for stretch in stretches {
         if matches!(ends, Ends::Loop) && stretch.all > 1 {
             continue; // the context already has the neighbours across the seam
         }
         let alone = stretch.all == 1 || matches!(ends, Ends::Frozen);
-        let (first, last) = (stretch.first(), stretch.last());
-        let before = first.map(|lane| (lane - 1, before_first(intervals, lane, ends, alone)));
-        let after = last.map(|lane| (lane + 1, after_last(intervals, lane, ends, alone)));
+        let before = |lane| (lane - 1, before_first(intervals, lane, start, alone));
+        let after = |lane| (lane + 1, after_last(intervals, lane, end, alone));
+        let (before, after) = (stretch.first().map(before), stretch.last().map(after));
         for (lane, log) in [before, after].into_iter().flatten() {
             intervals.set_log(lane, log);
         }
@@ -99,13 +100,13 @@ fn curves(intervals: &mut Intervals, stretches: &[Stretch], ends: Ends) {
 }
 
 /// The logarithm that continues the curve before the first interval.
-fn before_first(intervals: &Intervals, lane: usize, ends: Ends, alone: bool) -> Vector {
+fn before_first(intervals: &Intervals, lane: usize, end: End, alone: bool) -> Vector {
     let own = intervals.log(lane);
     if alone {
         return own; // two keys: constant velocity
     }
     let [[_, slope1, ..], [value2, slope2, bend2, _], _] = basis(intervals.outward(lane));
-    let turn = match ends.start() {
+    let turn = match end {
         End::Parabolic => return extrapolated(intervals, lane, lane + 1),
         // B₁'' = -2 B₁' at t = 0.
         End::Natural => return scaled(own, bend2 / slope1),
@@ -117,14 +118,14 @@ fn before_first(intervals: &Intervals, lane: usize, ends: Ends, alone: bool) -> 
 }
 
 /// The logarithm that continues the curve after the last interval.
-fn after_last(intervals: &Intervals, lane: usize, ends: Ends, alone: bool) -> Vector {
+fn after_last(intervals: &Intervals, lane: usize, end: End, alone: bool) -> Vector {
     let own = intervals.log(lane);
     if alone {
         return own;
     }
     let [_, [_, c1, c2, c3], [.., value3]] = basis(intervals.outward(lane));
     let slope3 = 3.0 * value3;
-    let turn = match ends.end() {
+    let turn = match end {
         End::Parabolic => return extrapolated(intervals, lane, lane - 1),
         End::Natural => return scaled(own, -(c2 + 3.0 * c3) / slope3),
         End::Secant => own,

@@ -78,20 +78,16 @@ fn velocities(
     intervals: Range<usize>,
     interpolation: &Interpolation,
 ) -> Vec<Vector> {
-    let mut velocities = Vec::with_capacity(intervals.len() + 1);
-    let mut key = intervals.start;
-    while key <= intervals.end {
-        let window = key / WINDOW * WINDOW;
+    let (first, end) = (intervals.start, intervals.end + 1);
+    let windows = (first / WINDOW * WINDOW..end).step_by(WINDOW);
+    let own = |window: usize| {
+        let keys = first.max(window)..end.min(window + WINDOW);
         let from = window as isize - MARGIN as isize;
         let to = (window + WINDOW + MARGIN) as isize;
-        let (first, solved) = solve(track, signs, from..to, interpolation);
-        while key <= intervals.end && key < window + WINDOW {
-            let place = (key as isize - first) as usize;
-            velocities.push(solved[place].to_array());
-            key += 1;
-        }
-    }
-    velocities
+        let (first_solved, solved) = solve(track, signs, from..to, interpolation);
+        keys.map(move |key| solved[(key as isize - first_solved) as usize].to_array())
+    };
+    windows.flat_map(own).collect()
 }
 
 /// The velocities at a window of keys, and the place of the window's first key.
@@ -116,8 +112,9 @@ fn solve(
         true => end,
         false => End::Secant,
     };
-    let start = end_at(!closed && first == 0, interpolation.ends.start());
-    let end = end_at(!closed && last == all, interpolation.ends.end());
+    let [start, end] = interpolation.ends.both();
+    let start = end_at(!closed && first == 0, start);
+    let end = end_at(!closed && last == all, end);
     (first, Spline::new(&steps, [start, end]).velocities())
 }
 

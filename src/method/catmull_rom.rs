@@ -40,11 +40,8 @@ impl HandleRule for Rule {
         // The half-angle of both steps together may approach pi, so its sign is not changed to the
         // nearer one.
         let two_step = product(before.step, after.step);
-        let toward = sum(before.log, after.log);
-        let handle = scaled(
-            algebra.log_toward(two_step, toward),
-            A::Number::all(1.0 / 6.0),
-        );
+        let log = algebra.log_toward(two_step, sum(before.log, after.log));
+        let handle = scaled(log, A::Number::all(1.0 / 6.0));
         Handles {
             incoming: handle,
             outgoing: handle,

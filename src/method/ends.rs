@@ -3,12 +3,14 @@
 
 use std::marker::PhantomData;
 
+use glam::DVec3;
+
 use crate::curve::options::Ends;
 use crate::fit::double::handles::{
     BetweenHandles, ControlRotations, EndHandle, EndInterval, HandleRule, KeyHandles,
 };
 use crate::fit::double::intervals::{Intervals, Stretch};
-use crate::math::quaternion::{Quaternion, Vector, exp, log, product, scaled};
+use crate::math::quaternion::{self, Quaternion, Vector, exp, product, scaled};
 use crate::simd::dispatch::in_lanes;
 
 /// Curves in cumulative form, for a method with that rule for handles.
@@ -37,16 +39,12 @@ fn handles<R: HandleRule>(intervals: &mut Intervals, stretches: &[Stretch], ends
         stretches,
         rule: PhantomData,
     });
+    let [start, end] = ends.both();
     for stretch in stretches {
-        let (first, last) = (stretch.first(), stretch.last());
-        if let (Some(lane), 1) = (first, stretch.all) {
+        if let (Some(lane), 1) = (stretch.first(), stretch.all) {
             // Two keys: the handles of constant velocity.
-            let log = intervals.log(lane);
-            let alone = EndInterval {
-                log,
-                other: [0.0; 3],
-            };
-            let handle = R::end(alone, EndHandle::Turn(log));
+            let (log, other) = (intervals.log(lane), [0.0; 3]);
+            let handle = R::end(EndInterval { log, other }, EndHandle::Turn(log));
             intervals.set_outgoing(lane, handle);
             intervals.set_incoming(lane + 1, handle);
             continue;
@@ -54,16 +52,16 @@ fn handles<R: HandleRule>(intervals: &mut Intervals, stretches: &[Stretch], ends
         if matches!(ends, Ends::Loop) {
             continue;
         }
-        if let Some(lane) = first {
+        if let Some(lane) = stretch.first() {
             let other = intervals.incoming(lane + 1);
             let without = |back| product(intervals.step(lane), back);
-            let handle = end_handle::<R>(intervals, lane, other, without, ends.start());
+            let handle = end_handle::<R>(intervals, lane, other, without, start);
             intervals.set_outgoing(lane, handle);
         }
-        if let Some(lane) = last {
+        if let Some(lane) = stretch.last() {
             let other = intervals.outgoing(lane);
             let without = |back| product(back, intervals.step(lane));
-            let handle = end_handle::<R>(intervals, lane, other, without, ends.end());
+            let handle = end_handle::<R>(intervals, lane, other, without, end);
             intervals.set_incoming(lane + 1, handle);
         }
     }
@@ -80,27 +78,14 @@ pub(crate) enum End {
 }
 
 impl Ends {
-    /// What happens at the first key.
-    pub(crate) fn start(self) -> End {
+    /// What happens at the first and at the last key.
+    pub(crate) fn both(self) -> [End; 2] {
+        let clamped = |rate: DVec3| End::Clamped(scaled(rate.to_array(), 0.5));
         match self {
-            Self::Clamped { start, .. } => End::Clamped(scaled(start.to_array(), 0.5)),
-            _ => self.either(),
-        }
-    }
-
-    /// What happens at the last key.
-    pub(crate) fn end(self) -> End {
-        match self {
-            Self::Clamped { end, .. } => End::Clamped(scaled(end.to_array(), 0.5)),
-            _ => self.either(),
-        }
-    }
-
-    fn either(self) -> End {
-        match self {
-            Self::Natural => End::Natural,
-            Self::Secant => End::Secant,
-            Self::Parabolic | Self::Clamped { .. } | Self::Loop | Self::Frozen => End::Parabolic,
+            Self::Clamped { start, end } => [clamped(start), clamped(end)],
+            Self::Natural => [End::Natural; 2],
+            Self::Secant => [End::Secant; 2],
+            Self::Parabolic | Self::Loop | Self::Frozen => [End::Parabolic; 2],
         }
     }
 }
@@ -115,16 +100,15 @@ fn end_handle<R: HandleRule>(
     without: impl Fn(Quaternion) -> Quaternion,
     end: End,
 ) -> Vector {
-    let step_log = intervals.log(lane);
-    let interval = EndInterval {
-        log: step_log,
-        other,
-    };
+    let log = intervals.log(lane);
     let handle = match end {
         End::Parabolic => EndHandle::Parabolic,
-        End::Natural => EndHandle::Natural(log(without(exp(scaled(other, -1.0))))),
-        End::Secant => EndHandle::Turn(step_log),
+        End::Natural => {
+            let rest = without(exp(scaled(other, -1.0)));
+            EndHandle::Natural(quaternion::log(rest))
+        }
+        End::Secant => EndHandle::Turn(log),
         End::Clamped(half) => EndHandle::Turn(scaled(half, intervals.duration(lane))),
     };
-    R::end(interval, handle)
+    R::end(EndInterval { log, other }, handle)
 }

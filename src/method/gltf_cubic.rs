@@ -47,10 +47,8 @@ fn curves(intervals: &mut Intervals, stretches: &[Stretch], _: Ends) {
         let outgoing = intervals.outward(lane).map(|c| c * duration);
         let incoming = intervals.inward(lane + 1).map(|c| c * duration);
         let (start, end) = (intervals.key(lane), intervals.end_key(lane));
-        intervals.set_numbers(lane, 0, &start);
-        intervals.set_numbers(lane, 4, &outgoing);
-        intervals.set_numbers(lane, 8, &incoming);
-        intervals.set_numbers(lane, 12, &end);
+        let numbers = [start, outgoing, incoming, end];
+        intervals.set_numbers(lane, 0, numbers.as_flattened());
         // An estimate of the squared extent: the component of a tangent along its key changes only
         // the quaternion's length.
         let log = intervals.log(lane);

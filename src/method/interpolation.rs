@@ -70,14 +70,11 @@ impl Interpolation {
 
     /// The smooth curves as keyed on the shortest path, if these are what is asked for.
     fn plain(&self) -> Option<Smooth> {
+        let is_plain = self.path == Path::Shortest
+            && self.quantity == Quantity::Rotation
+            && self.speed == Speed::AsKeyed;
         match *self.method.curves {
-            Curves::Smooth(smooth)
-                if self.path == Path::Shortest
-                    && self.quantity == Quantity::Rotation
-                    && self.speed == Speed::AsKeyed =>
-            {
-                Some(smooth)
-            }
+            Curves::Smooth(smooth) if is_plain => Some(smooth),
             _ => None,
         }
     }

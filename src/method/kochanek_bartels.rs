@@ -34,11 +34,7 @@ static CURVES: Curves = Curves::Smooth(
 
 /// Tension, continuity and bias of the key that an interval starts with.
 fn numbers(track: Track, interval: usize, interpolation: &Interpolation) -> [[f64; 4]; 2] {
-    let tcb = track
-        .tcb
-        .get(interval)
-        .copied()
-        .unwrap_or(interpolation.tcb);
+    let tcb = track.tcb.get(interval).unwrap_or(&interpolation.tcb);
     [[tcb.tension, tcb.continuity, tcb.bias, 0.0], [0.0; 4]]
 }
 

@@ -46,15 +46,16 @@ use std::fmt;
 use std::ops::Range;
 use std::str::FromStr;
 
-use crate::fit::double::handles::HandleRule;
+use crate::fit::double::handles::{HandleRule, Steps};
 use crate::fit::double::intervals::{Intervals, Stretch};
 use crate::fit::double::shape::Shape;
-use crate::fit::single::long_tangents::LongTangents;
+use crate::fit::single::handles::HandlesF32;
 use crate::fit::tangent_weights::WeightRule;
 use crate::math::quaternion::Vector;
 use crate::reference;
 use crate::reference::curve::Definition;
 use crate::shader::Form;
+use crate::simd::dispatch::in_lanes;
 use crate::tracks::set::Track;
 use crate::tracks::signs::Signs;
 
@@ -173,8 +174,8 @@ pub(crate) struct Smooth {
 pub(crate) struct FromKeys {
     /// The rule for the tangent weights.
     pub(crate) weights: WeightRule,
-    /// Finds, in f64, the handles of keys whose tangents are too long for f32's formulas.
-    pub(crate) find_long: fn(&mut LongTangents),
+    /// Sets, in f64, the handles of keys whose tangents are too long for f32's formulas.
+    pub(crate) set_long: fn(&mut HandlesF32, &[usize], &Intervals),
 }
 
 /// The numbers that a method has for an interval beside its keys.
@@ -203,7 +204,7 @@ impl Smooth {
         Self {
             direct: Some(FromKeys {
                 weights,
-                find_long: LongTangents::find::<R>,
+                set_long: HandlesF32::set_long::<R>,
             }),
             ..self
         }
@@ -218,6 +219,12 @@ impl Smooth {
 
     const fn with(self, given: Given) -> Self {
         Self { given, ..self }
+    }
+
+    /// Computes the curves of a block's intervals.
+    pub(crate) fn find_curves(&self, intervals: &mut Intervals, stretches: &[Stretch], ends: Ends) {
+        in_lanes(&mut Steps(intervals));
+        (self.curves)(intervals, stretches, ends);
     }
 }
 
@@ -312,14 +319,10 @@ impl Eq for Method {}
 
 /// The error for a name that no method has.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("there is no method `{name}`; there are {}", method_names())]
+#[error("there is no method `{name}`; there are {}", METHODS.map(|own| own.name).join(", "))]
 pub struct UnknownMethod {
     /// The name given.
     pub name: String,
-}
-
-fn method_names() -> String {
-    METHODS.map(|method| method.name).join(", ")
 }
 
 impl FromStr for Method {

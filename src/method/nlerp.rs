@@ -1,10 +1,9 @@
 //! Normalised linear interpolation.
 
-use crate::fit::double::handles::{BothSides, EndHandle, EndInterval, HandleRule, Handles};
+use crate::curve::options::Ends;
+use crate::fit::double::intervals::{Intervals, Stretch};
 use crate::fit::double::shape::Shape;
-use crate::math::quaternion::{Real as _, Vector};
-use crate::math::ranges::Algebra;
-use crate::method::{Continuity, Cost, Curves, Keys, Method, Smooth, USUAL, ends};
+use crate::method::{Continuity, Cost, Curves, Keys, Method, Smooth, USUAL};
 use crate::reference;
 
 /// Nlerp: the straight line between neighbouring keys, normalised. It follows the path of slerp at
@@ -24,21 +23,13 @@ pub const NLERP: Method = Method {
     ..USUAL
 };
 
-static CURVES: Curves = Curves::Smooth(Smooth::new(Shape::LINEAR, ends::controls::<Rule>));
+static CURVES: Curves = Curves::Smooth(Smooth::new(Shape::LINEAR, curves));
 
-/// All handles are 0; the formula does not use them.
-struct Rule;
-
-impl HandleRule for Rule {
-    #[inline(always)]
-    fn handles<A: Algebra>(_: &mut A, _: BothSides<A>) -> Handles<A::Number> {
-        Handles {
-            incoming: [A::Number::all(0.0); 3],
-            outgoing: [A::Number::all(0.0); 3],
-        }
-    }
-
-    fn end(_: EndInterval, _: EndHandle) -> Vector {
-        [0.0; 3]
+fn curves(intervals: &mut Intervals, stretches: &[Stretch], _: Ends) {
+    for lane in stretches.iter().flat_map(Stretch::lanes) {
+        let (start, end) = (intervals.key(lane), intervals.end_key(lane));
+        intervals.set_numbers(lane, 0, &start);
+        intervals.set_numbers(lane, 12, &end);
+        intervals.set_squared_extent(lane, [intervals.log(lane), [0.0; 3], [0.0; 3]]);
     }
 }

@@ -50,11 +50,8 @@ impl<const DIVISOR: u8> HandleRule for Bisector<DIVISOR> {
         let scale = norm.up_to(none, zero, one / norm);
         let w = norm.up_to(none, one, both[3] * scale);
         let bisector = [both[0] * scale, both[1] * scale, both[2] * scale, w];
-        let toward = sum(before.log, after.log);
-        let handle = scaled(
-            algebra.log_toward(bisector, toward),
-            A::Number::all(1.0 / f64::from(DIVISOR)),
-        );
+        let log = algebra.log_toward(bisector, sum(before.log, after.log));
+        let handle = scaled(log, A::Number::all(1.0 / f64::from(DIVISOR)));
         Handles {
             incoming: handle,
             outgoing: handle,

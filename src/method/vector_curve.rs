@@ -72,11 +72,6 @@ impl<'a> Curves<'a> {
         own
     }
 
-    /// Whether the curve passes through its keys.
-    pub(crate) fn meets_keys(&self) -> bool {
-        self.method != VectorMethod::BSpline
-    }
-
     /// Whether an interval is held at its first key.
     pub(crate) fn is_held(&self, i: usize) -> bool {
         let last = self.track.keys.len() - 1;

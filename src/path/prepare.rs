@@ -3,7 +3,6 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use glam::Vec3;
 use rayon::prelude::*;
 
 use crate::curve::options::{Axes, Quantity};
@@ -20,7 +19,7 @@ use crate::path::sample::{Kind, Sampler, Span};
 use crate::prepare::clip_data::ClipData;
 use crate::prepare::prepared::Prepared;
 use crate::prepare::vectors;
-use crate::time::spans::{NONE, Part, Source};
+use crate::time::spans::{NONE, Source};
 use crate::tracks::set::TrackSet;
 use crate::tracks::vectors::{Channel, VectorTrack};
 
@@ -247,8 +246,7 @@ impl Adding<'_> {
                     Kind::Vector => vectors::add(
                         prepared,
                         track,
-                        Some(self.points[path]),
-                        Vec3::ZERO,
+                        self.points[path],
                         follow.method,
                         self.interpolation,
                     ),
@@ -308,15 +306,8 @@ fn add_part(
     if let Some(key) = prepared.spans.keys.get_mut(from) {
         *key = before;
     }
-    prepared.parts.push(Part {
-        track: track as u32,
-        first_key: 0,
-        spans: from..prepared.spans.len(),
-        end: times[times.len() - 1],
-        before,
-        after,
-        beyond: None,
-    });
+    let spans = from..prepared.spans.len();
+    prepared.push_part(track, times, &(0..times.len() - 1), spans, [before, after]);
 }
 
 #[cfg(test)]

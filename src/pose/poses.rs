@@ -208,7 +208,7 @@ const CPU_PASS: usize = 1 << 20;
 
 /// The most values of 16 bytes that one pass takes.
 fn limit(device: Option<&VulkanEngine>) -> usize {
-    device.map_or(CPU_PASS, VulkanEngine::pass_limit)
+    device.map_or(CPU_PASS, VulkanEngine::window)
 }
 
 /// Rotations and positions in the world, `[frame][track]`.

@@ -171,7 +171,7 @@ impl Set<'_> {
         device: &VulkanEngine,
         output: &mut [[f32; 4]],
     ) -> Result<(), Error> {
-        let (limit, radius) = (device.pass_limit().max(2), pass.weights.len());
+        let (limit, radius) = (device.window().max(2), pass.weights.len());
         let detail = usize::from(pass.are_rotations);
         let stride = self.samples - 1 + 2 * radius;
         // Between rows that are smoothed at once the kernel runs over what lies beyond their ends too:

@@ -21,7 +21,7 @@ use crate::time::frames::{Ticks, Timeline};
 use crate::time::spans::Part;
 use crate::time::wrap::{TrackCopy, WrapMode};
 use crate::tracks::set::TrackSet;
-use crate::tracks::vectors::Channel;
+use crate::tracks::vectors::{Channel, VectorTrack};
 
 /// The number of tracks whose vectors are prepared as one piece of work.
 const VECTOR_BATCH: usize = 256;
@@ -34,7 +34,8 @@ pub(crate) struct ClipData {
     parts: Vec<(u32, u32)>,
     /// The start of each track's parts in `parts`, and the end of the last track's.
     tracks: Vec<usize>,
-    span: Option<(f64, f64)>,
+    /// When the first key of the set is, and the last.
+    pub(crate) time_span: Option<(f64, f64)>,
 }
 
 /// A part and the prepared group whose lists it points into.
@@ -148,6 +149,13 @@ impl ClipData {
             Channel::Translation => Vec3::ZERO,
             Channel::Scale => Vec3::ONE,
         };
+        // Where a track without vectors is held.
+        let still = VectorTrack {
+            times: vec![0.0],
+            keys: vec![rest],
+            tangents: Vec::new(),
+            ups: Vec::new(),
+        };
         // As a velocity, a vector is refused where an output is for rotations only.
         let interpolation = Interpolation {
             quantity: Quantity::Velocity(Axes::Parent),
@@ -157,8 +165,8 @@ impl ClipData {
         let batch = |first: usize| {
             let mut prepared = Prepared::new(&interpolation);
             for index in first..set.track_count().min(first + VECTOR_BATCH) {
-                let track = set.vectors(channel, index);
-                vectors::add(&mut prepared, index, track, rest, method, &interpolation);
+                let track = set.vectors(channel, index).unwrap_or(&still);
+                vectors::add(&mut prepared, index, track, method, &interpolation);
             }
             prepared
         };
@@ -191,7 +199,7 @@ impl ClipData {
             groups,
             parts,
             tracks,
-            span: set.time_span(),
+            time_span: set.time_span(),
         }
     }
 
@@ -205,8 +213,10 @@ impl ClipData {
         self.tracks.len() - 1
     }
 
-    pub(crate) fn time_span(&self) -> Option<(f64, f64)> {
-        self.span
+    /// The places of a track's parts, in order of time.
+    #[inline(always)]
+    fn places(&self, track: usize) -> &[(u32, u32)] {
+        &self.parts[self.tracks[track]..self.tracks[track + 1]]
     }
 
     /// The parts of one track that may contain any of `samples`, which are samples of the track
@@ -218,15 +228,17 @@ impl ClipData {
         timeline: &Timeline,
         samples: Range<usize>,
     ) -> impl Iterator<Item = PartRef<'_>> {
-        let all = &self.parts[self.tracks[track]..self.tracks[track + 1]];
+        let all = self.places(track);
         let own = match timeline.ticks {
             Ticks::Frames { .. } if all.len() > 2 && !samples.is_empty() => {
                 let first = timeline.time_at(track, samples.start);
                 let last = timeline.time_at(track, samples.end - 1);
+                // A part starts where the one before it ends.
+                let end = |&place: &(u32, u32)| self.part(place).part.end;
+                let from = all.partition_point(|place| end(place) < first);
+                let to = all.partition_point(|place| end(place) <= last) + 1;
                 // One more part on either side: a time within rounding of a boundary may lie on
                 // the other side of it.
-                let from = all.partition_point(|&place| self.part(place).part.end < first);
-                let to = all.partition_point(|&place| self.part(place).start() <= last);
                 &all[from.saturating_sub(1).min(all.len() - 1)..(to + 1).min(all.len())]
             }
             _ => all,
@@ -237,11 +249,9 @@ impl ClipData {
     /// The part of a track that has exactly one part.
     #[inline(always)]
     pub(crate) fn only_part(&self, track: usize) -> Option<PartRef<'_>> {
-        let places = self.tracks[track]..self.tracks[track + 1];
-        if places.len() == 1 {
-            Some(self.part(self.parts[places.start]))
-        } else {
-            None
+        match self.places(track) {
+            &[only] => Some(self.part(only)),
+            _ => None,
         }
     }
 
@@ -251,12 +261,11 @@ impl ClipData {
         track: usize,
         copy: &TrackCopy,
     ) -> impl Iterator<Item = PartRef<'_>> {
-        let all = self.tracks[track]..self.tracks[track + 1];
-        let count = all.len();
+        let all = self.places(track);
         let backwards = copy.sign < 0.0;
-        (0..count).map(move |i| {
-            let place = if backwards { count - 1 - i } else { i };
-            self.part(self.parts[all.start + place])
+        (0..all.len()).map(move |i| {
+            let place = if backwards { all.len() - 1 - i } else { i };
+            self.part(all[place])
         })
     }
 
@@ -268,18 +277,13 @@ impl ClipData {
         samples: Range<usize>,
     ) -> impl Iterator<Item = TrackCopy> {
         let wrap = self.interpolation.wrap();
-        let span = match wrap.repeats() {
-            true => self.track_span(track),
-            false => None,
-        };
-        wrap.copies(span, timeline, samples)
+        wrap.copies(self.track_span(track), timeline, samples)
     }
 
     /// The first and the last key time of a track, if its wrap mode needs them.
     fn track_span(&self, track: usize) -> Option<(f64, f64)> {
-        let &first = self.parts.get(self.tracks[track])?;
-        let beyond = self.part(first).part.beyond.as_ref()?;
-        Some(beyond.span)
+        let first = self.part(*self.places(track).first()?);
+        Some(first.part.beyond.as_ref()?.span)
     }
 
     /// The timeline with explicit times folded into the time range of their track's keys, if the
@@ -305,14 +309,6 @@ impl ClipData {
             prepared,
             part: &prepared.parts[part as usize],
         }
-    }
-}
-
-impl PartRef<'_> {
-    /// The start of its first span, in seconds.
-    fn start(self) -> f64 {
-        let starts = &self.prepared.spans.starts[self.part.spans.clone()];
-        starts.first().copied().unwrap_or(self.part.end)
     }
 }
 

@@ -11,70 +11,46 @@ use crate::prepare::fitting::Fitting;
 use crate::prepare::prepared::Prepared;
 use crate::time::spans::{NONE, Part, Source};
 
-/// The place of an interval in its track and in time.
-pub(crate) struct Place {
+/// An interval that waits until all of its track is there.
+pub(crate) struct Waiting {
     /// Its part of the prepared tracks.
     pub(crate) part: usize,
     /// When it starts as keyed, in seconds.
     pub(crate) start: f64,
     /// The constant to store at exactly the start, or [`NONE`].
     pub(crate) key: u32,
+    /// `None` if it stands still.
+    pub(crate) curve: Option<Curve>,
 }
 
-/// The intervals that wait, in order. Those without a curve stand still.
-#[derive(Default)]
-pub(crate) struct Waiting(Vec<(Place, Option<Curve>)>);
-
-impl Waiting {
-    pub(crate) fn push(&mut self, place: Place, curve: Option<Curve>) {
-        self.0.push((place, curve));
-    }
-
-    /// Gives the curves of every track their times, and hands them over to be fitted.
-    pub(crate) fn finish(&mut self, prepared: &mut Prepared, fitting: &mut Fitting) {
-        let mut waiting = std::mem::take(&mut self.0);
-        while let Some((Place { part, .. }, _)) = waiting.first() {
-            let part = *part;
-            let own = waiting
-                .iter()
-                .take_while(|(place, _)| place.part == part)
-                .count();
-            let others = waiting.split_off(own);
-            let first_span = prepared.spans.len();
-            retime(prepared, fitting, waiting, part);
-            prepared.parts[part].spans = first_span..prepared.spans.len();
-            waiting = others;
-        }
+/// Gives the curves of every track their times, and hands them over to be fitted.
+pub(crate) fn retime(prepared: &mut Prepared, waiting: &mut [Waiting], fitting: &mut Fitting) {
+    for own in waiting.chunk_by_mut(|own, next| own.part == next.part) {
+        let (part, first_span) = (own[0].part, prepared.spans.len());
+        retime_track(prepared, own, part, fitting);
+        prepared.parts[part].spans = first_span..prepared.spans.len();
     }
 }
 
-fn retime(
+fn retime_track(
     prepared: &mut Prepared,
-    fitting: &mut Fitting,
-    intervals: Vec<(Place, Option<Curve>)>,
+    intervals: &mut [Waiting],
     part: usize,
+    fitting: &mut Fitting,
 ) {
-    let (start, end) = (intervals[0].0.start, prepared.parts[part].end);
-    let mut paced: Vec<(Place, Curve, f64)> = Vec::new();
-    let mut total = 0.0;
-    let mut still = None;
-    for (place, curve) in intervals {
-        if let Some(mut curve) = curve {
-            let pace = Arc::new(Pace::new(&curve));
-            let own = pace.total();
-            if own > 0.0 && own.is_finite() {
-                total += own;
-                curve.pace = Some(pace);
-                paced.push((place, curve, own));
-                continue;
-            }
-        }
-        still.get_or_insert(place);
-    }
-    if let (true, Some(place)) = (paced.is_empty(), still) {
+    let (start, first_key) = (intervals[0].start, intervals[0].key);
+    let paced = |own: &mut Waiting| {
+        let mut curve = own.curve.take()?;
+        let pace = Pace::new(&curve);
+        let length = pace.total();
+        curve.pace = Some(Arc::new(pace));
+        (length > 0.0 && length.is_finite()).then_some((own.key, curve, length))
+    };
+    let paced: Vec<(u32, Curve, f64)> = intervals.iter_mut().filter_map(paced).collect();
+    if paced.is_empty() {
         // The track does not move at all.
         let Part { before, beyond, .. } = &prepared.parts[part];
-        let held = match (*before, place.key) {
+        let held = match (*before, first_key) {
             (NONE, NONE) => {
                 let from_before = beyond.as_ref().map_or(0, |beyond| beyond.from_before);
                 let value = prepared.exact[from_before as usize].value(0.0);
@@ -86,26 +62,27 @@ fn retime(
         prepared.push_span(start, Source::Constant(held), NONE);
         return;
     }
-    let (seconds, count) = (end - start, paced.len());
+    let total: f64 = paced.iter().map(|&(_, _, length)| length).sum();
+    let (end, count) = (prepared.parts[part].end, paced.len());
+    let seconds = end - start;
     let mut done = 0.0;
-    for (i, (place, mut curve, own)) in paced.into_iter().enumerate() {
+    for (i, (key, mut curve, length)) in paced.into_iter().enumerate() {
         let from = start + seconds * (done / total);
-        done += own;
-        let last = i + 1 == count;
-        let to = if last {
+        done += length;
+        let is_last = i + 1 == count;
+        let to = if is_last {
             end
         } else {
             start + seconds * (done / total)
         };
         curve.rate = 1.0 / (to - from);
-        if let (true, Some(beyond)) = (last, &prepared.parts[part].beyond)
+        if let (true, Some(beyond)) = (is_last, &prepared.parts[part].beyond)
             && beyond.at_end != NONE
         {
             prepared.constants[beyond.at_end as usize] = round_quat(curve.value_at(1.0));
         }
         if from < to {
-            let source = fitting.take_curve(prepared, curve);
-            prepared.push_span(from, source, place.key);
+            fitting.take_curve(prepared, curve, from, key);
         }
     }
     let Some(beyond) = &prepared.parts[part].beyond else {

@@ -4,55 +4,45 @@
 
 use std::ops::Range;
 
+use bytemuck::Zeroable as _;
+
 use crate::curve::options::Ends;
-use crate::fit::double::handles::Steps;
+use crate::fit::double::fit::{MOST, Samples};
 use crate::fit::double::intervals::{Intervals, LANES, ROOM, Stretch};
 use crate::fit::single::fit_range::{FEW_POWERS, LONGEST_OF_FEW, LONGEST_WHOLE, WHOLE};
-use crate::fit::single::handles::{FindCurves, FindHandles, HandlesF32, LONGEST_DIRECT};
-use crate::fit::single::hermite_fit::Halves;
-use crate::fit::single::key_steps::{FindSteps, KeySteps};
+use crate::fit::single::handles::{
+    CurveNumbers, FindCurves, FindSteps, HandlesF32, LONGEST_DIRECT,
+};
+use crate::fit::single::hermite_fit::{BetweenKeys, Halves, KeyFit};
 use crate::fit::single::key_weights::KeyWeights;
-use crate::fit::single::long_tangents::LongTangents;
 use crate::fit::single::small_angle::SmallAngleLanes;
 use crate::method::{FromKeys, Smooth};
 use crate::prepare::fitting::Fitting;
-use crate::prepare::lane_lists::{List, fit};
-use crate::prepare::prepared::Prepared;
-use crate::simd::dispatch::in_lanes;
+use crate::prepare::prepared::{Place, Prepared};
+use crate::prepare::smooth::CONTEXT;
+use crate::shader::PolynomialSegment;
+use crate::simd::dispatch::{InLanes, in_lanes};
+use crate::simd::lanes::Lanes;
 use crate::time::spans::NONE;
-
-/// If more than one in this many intervals of a block is left over, the whole block is computed in
-/// f64: in a block of its own each would bring two neighbours as context.
-const MOST_ALONE: usize = 3;
-
-/// The most spans that the lanes of a block become. A power of two, for a cheap modulo.
-const SPANS: usize = 2 * LANES;
 
 /// Prepares the curves of a block straight from keys.
 pub(crate) struct Direct {
-    steps: KeySteps,
     weights: KeyWeights,
     small_angle: SmallAngleLanes,
     whole: HandlesF32,
-    /// The span and the segment that each lane becomes; the first of the two if it is cut.
-    spans: [u32; ROOM],
-    places: [u32; ROOM],
+    /// Where the curve of each lane goes; of one that is split, the first half.
+    places: [Place; ROOM],
     /// Lanes that are fitted whole by degree 10.
-    usual: List,
+    usual: Vec<u32>,
     /// Lanes that are fitted with degree 8, and lanes whose curve is split at its middle.
-    few_powers: List,
-    halves: List,
-    /// 1 if a lane becomes two spans, else 0.
-    cut: [u32; ROOM],
-    /// The start times of new spans, in seconds, and the constants there.
-    starts: [f64; SPANS],
-    keys: [u32; SPANS],
+    few_powers: Vec<u32>,
+    halves: Vec<u32>,
     /// Lanes that f32 cannot prepare.
-    left_over: List,
+    left_over: Vec<u32>,
     /// Intervals that f32 cannot prepare wait here; made for the first one.
     rest: Option<Box<Rest>>,
     /// See [`FromKeys`].
-    find_long: fn(&mut LongTangents),
+    set_long: fn(&mut HandlesF32, &[usize], &Intervals),
     smooth: Smooth,
     ends: Ends,
 }
@@ -60,21 +50,19 @@ pub(crate) struct Direct {
 impl Direct {
     pub(crate) fn new(how: FromKeys, smooth: Smooth, ends: Ends) -> Self {
         Self {
-            steps: KeySteps::new(),
             weights: KeyWeights::new(how.weights, ends),
             small_angle: SmallAngleLanes::new(),
             whole: HandlesF32::new(),
-            spans: [0; ROOM],
-            places: [0; ROOM],
-            usual: List::new(),
-            few_powers: List::new(),
-            halves: List::new(),
-            cut: [0; ROOM],
-            starts: [0.0; SPANS],
-            keys: [NONE; SPANS],
-            left_over: List::new(),
+            places: [Place {
+                span: 0,
+                segment: 0,
+            }; ROOM],
+            usual: Vec::new(),
+            few_powers: Vec::new(),
+            halves: Vec::new(),
+            left_over: Vec::new(),
             rest: None,
-            find_long: how.find_long,
+            set_long: how.set_long,
             smooth,
             ends,
         }
@@ -83,100 +71,53 @@ impl Direct {
     /// Finds the steps, handles and curves of a block's intervals, and the small-angle cubics.
     pub(crate) fn find_curves(&mut self, intervals: &Intervals, stretches: &[Stretch]) {
         in_lanes(&mut FindSteps {
-            steps: &mut self.steps,
+            lanes: &mut self.whole,
             intervals,
         });
         self.weights.bring(intervals, stretches);
-        self.small_angle.look(&self.steps, stretches);
-        if self.small_angle.may_hold() {
-            (self.small_angle).prepare(intervals, &self.weights, stretches);
-        }
-        self.whole.wanted = self.small_angle.holds.map(|is_small_angle| !is_small_angle);
-        in_lanes(&mut FindHandles {
-            lanes: &mut self.whole,
-            steps: &self.steps,
-            weights: &self.weights,
-            intervals,
-            find_long: self.find_long,
-        });
+        let chords = &self.whole.chords;
+        (self.small_angle).find(chords, intervals, &self.weights, stretches);
         in_lanes(&mut FindCurves {
             lanes: &mut self.whole,
-            steps: &self.steps,
             weights: &self.weights,
             intervals,
+            known: &self.small_angle.holds,
+            set_long: self.set_long,
         });
     }
 
-    /// Takes the curves in some lanes: they become the next spans, the first with the constant
-    /// `key` at its start.
+    /// Takes the curve in a lane: it becomes the next span, with the constant `key` at its start,
+    /// or the next two if it is split at its middle.
+    #[inline]
     pub(crate) fn take(
         &mut self,
         prepared: &mut Prepared,
         intervals: &Intervals,
-        lanes: Range<usize>,
+        lane: usize,
         key: u32,
     ) {
-        if self.small_angle.may_hold() {
-            for lane in lanes.clone().filter(|&lane| self.small_angle.holds[lane]) {
-                // A negative squared extent puts the lane on no list.
-                self.whole.energies[lane] = -1.0;
-            }
+        let start = intervals.starts[lane];
+        let place = prepared.push_segment(start, PolynomialSegment::zeroed(), key);
+        self.places[lane] = place;
+        if self.small_angle.holds[lane] {
+            let segment = &mut prepared.segments.polynomials[place.segment];
+            self.small_angle.write(lane, segment);
+            return;
         }
-        self.list(lanes.clone());
-        self.begin(prepared, intervals, lanes.clone(), key);
-        if self.small_angle.may_hold() {
-            for lane in lanes.filter(|&lane| self.small_angle.holds[lane]) {
-                let place = self.places[lane] as usize;
-                self.small_angle
-                    .write(lane, &mut prepared.segments.polynomials[place]);
-            }
-        }
-    }
-
-    /// Puts lanes on the list of the fit for their squared extent.
-    fn list(&mut self, lanes: Range<usize>) {
-        let energies = &self.whole.energies[lanes.clone()];
-        let [few, whole, direct] =
-            [LONGEST_OF_FEW, LONGEST_WHOLE, LONGEST_DIRECT].map(|most| most as f32);
-        let is_usual = |squared_extent: f32| squared_extent > few && squared_extent <= whole;
-        (self.usual).push_where(lanes.clone(), energies, is_usual);
-        let takes_few = |squared_extent: f32| squared_extent >= 0.0 && squared_extent <= few;
-        (self.few_powers).push_where(lanes.clone(), energies, takes_few);
-        let is_cut = |squared_extent: f32| squared_extent > whole && squared_extent <= direct;
-        for (cut, &squared_extent) in self.cut[lanes.clone()].iter_mut().zip(energies) {
-            *cut = u32::from(is_cut(squared_extent));
-        }
-        (self.halves).push_where(lanes.clone(), energies, is_cut);
-        let is_left = |squared_extent: f32| squared_extent > direct || squared_extent.is_nan();
-        (self.left_over).push_where(lanes, energies, is_left);
-    }
-
-    /// Adds the spans and the segments that lanes become.
-    fn begin(
-        &mut self,
-        prepared: &mut Prepared,
-        intervals: &Intervals,
-        lanes: Range<usize>,
-        key: u32,
-    ) {
-        let first_place = prepared.segments.polynomials.len() as u32;
-        let first_span = prepared.spans.sources.len() as u32;
-        let mut next = 0;
-        for (i, lane) in lanes.clone().enumerate() {
-            self.spans[lane] = first_span + next as u32;
-            self.places[lane] = first_place + next as u32;
-            let (start, end) = (intervals.starts[lane], intervals.ends[lane]);
-            let own = if key == NONE { NONE } else { key + i as u32 };
-            // Both halves are always written; the next lane overwrites the second if it is not cut.
-            let second = (next + 1) % SPANS;
-            (self.starts[next % SPANS], self.keys[next % SPANS]) = (start, own);
-            (self.starts[second], self.keys[second]) = (start + (end - start) * 0.5, NONE);
-            next += 1 + self.cut[lane] as usize;
-        }
-        let spans = &mut prepared.spans;
-        spans.starts.extend_from_slice(&self.starts[..next]);
-        spans.keys.extend_from_slice(&self.keys[..next]);
-        prepared.new_segments(next);
+        let squared_extent = self.whole.energies[lane];
+        let list = if squared_extent <= LONGEST_OF_FEW as f32 {
+            &mut self.few_powers
+        } else if squared_extent <= LONGEST_WHOLE as f32 {
+            &mut self.usual
+        } else if squared_extent <= LONGEST_DIRECT as f32 {
+            let middle = start + (intervals.ends[lane] - start) * 0.5;
+            prepared.push_segment(middle, PolynomialSegment::zeroed(), NONE);
+            &mut self.halves
+        } else {
+            // NaN comes here too.
+            &mut self.left_over
+        };
+        list.push(lane as u32);
     }
 
     /// Fits the curves that were taken. Those left over wait, here or in `fitting`. `is_exact` says
@@ -184,7 +125,7 @@ impl Direct {
     pub(crate) fn fit(
         &mut self,
         prepared: &mut Prepared,
-        intervals: &mut Intervals,
+        intervals: &Intervals,
         stretches: &[Stretch],
         is_exact: bool,
         fitting: &mut Fitting,
@@ -193,14 +134,10 @@ impl Direct {
         fit(&WHOLE, &mut self.usual, numbers, places, prepared);
         fit(&FEW_POWERS, &mut self.few_powers, numbers, places, prepared);
         fit(&Halves, &mut self.halves, numbers, places, prepared);
-        let are_many = MOST_ALONE * self.left_over.count > intervals.count;
-        if are_many && !is_exact {
-            in_lanes(&mut Steps(intervals));
-            (self.smooth.curves)(intervals, stretches, self.ends);
-        }
-        if are_many || is_exact {
-            for lane in self.left_over.iter() {
-                fitting.queue(prepared, intervals, lane, self.spans[lane] as usize);
+        if is_exact {
+            for &lane in &self.left_over {
+                let lane = lane as usize;
+                fitting.take(intervals, lane, self.places[lane]);
             }
         } else {
             self.leave(prepared, intervals, stretches, fitting);
@@ -208,7 +145,8 @@ impl Direct {
         self.left_over.clear();
     }
 
-    /// Moves intervals that are left over to `rest`, with their neighbours as context.
+    /// Moves intervals that are left over to `rest`, each run of them between its neighbours as
+    /// context.
     fn leave(
         &mut self,
         prepared: &mut Prepared,
@@ -216,21 +154,21 @@ impl Direct {
         stretches: &[Stretch],
         fitting: &mut Fitting,
     ) {
-        let mut left_over = self.left_over.iter().peekable();
+        let mut left_over = &self.left_over[..];
         for stretch in stretches {
             let end = stretch.lanes().end;
-            while let Some(first) = left_over.next_if(|&lane| lane < end) {
-                let mut lanes = first..first + 1;
-                while lanes.end < end && left_over.next_if_eq(&lanes.end).is_some() {
-                    lanes.end += 1;
-                }
+            let own = left_over.partition_point(|&lane| (lane as usize) < end);
+            let (own, others) = left_over.split_at(own);
+            for run in own.chunk_by(|&lane, &next| lane + 1 == next) {
+                let lanes = run[0] as usize..run[0] as usize + run.len();
                 let new = || Box::new(Rest::new(self.smooth, self.ends));
                 let rest = self.rest.get_or_insert_with(new);
-                if !rest.has_room(lanes.len()) {
+                if rest.intervals.count + lanes.len() + CONTEXT > LANES {
                     rest.flush(prepared, fitting);
                 }
-                rest.push(intervals, stretch, lanes.clone(), &self.spans[lanes]);
+                rest.push(intervals, stretch, lanes.clone(), &self.places[lanes]);
             }
+            left_over = others;
         }
     }
 
@@ -242,11 +180,78 @@ impl Direct {
     }
 }
 
+/// Fits the curves in the listed lanes into the segments at their places, and empties the list.
+fn fit<const PAIRS: usize>(
+    how: &impl KeyFit<PAIRS>,
+    lanes: &mut Vec<u32>,
+    curves: &CurveNumbers,
+    places: &[Place; ROOM],
+    prepared: &mut Prepared,
+) {
+    if lanes.is_empty() {
+        return;
+    }
+    let count = lanes.len();
+    lanes.resize(count.next_multiple_of(MOST), 0);
+    let segments = &mut prepared.segments.polynomials;
+    let all = segments.len();
+    // The lanes of the last vector that have no curve write to two extra segments.
+    segments.extend([PolynomialSegment::zeroed(); 2]);
+    in_lanes(&mut Fit::<_, PAIRS> {
+        how,
+        lanes,
+        count,
+        curves,
+        places,
+        segments,
+    });
+    segments.truncate(all);
+    lanes.clear();
+}
+
+struct Fit<'a, F, const PAIRS: usize> {
+    how: &'a F,
+    /// The listed lanes, and others up to whole vectors.
+    lanes: &'a [u32],
+    count: usize,
+    curves: &'a CurveNumbers,
+    places: &'a [Place; ROOM],
+    /// All segments, and two extra ones at the end.
+    segments: &'a mut [PolynomialSegment],
+}
+
+impl<F: KeyFit<PAIRS>, const PAIRS: usize> InLanes for Fit<'_, F, PAIRS> {
+    #[inline(always)]
+    fn run<L: Lanes>(&mut self) {
+        // Made outside the loop, so that they are cleared only once.
+        let mut samples = Samples::<L, PAIRS>::all(L::all(0.0));
+        for i in (0..self.count).step_by(L::COUNT) {
+            let lanes = &self.lanes[i..i + L::COUNT];
+            let own = &lanes[..L::COUNT.min(self.count - i)];
+            let [starts, firsts, seconds, thirds, ends] = self.curves;
+            let start = L::gather_rotations(starts, lanes);
+            let [x1, y1, z1, _] = L::gather_rotations(firsts, lanes);
+            let [x2, y2, z2, _] = L::gather_rotations(seconds, lanes);
+            let [x3, y3, z3, _] = L::gather_rotations(thirds, lanes);
+            let curves = BetweenKeys {
+                start,
+                vectors: [[x1, y1, z1], [x2, y2, z2], [x3, y3, z3]],
+                end: L::gather_rotations(ends, lanes),
+            };
+            let mut places = [self.segments.len() - 2; MOST];
+            for (place, &lane) in places.iter_mut().zip(own) {
+                *place = self.places[lane as usize].segment;
+            }
+            self.how.fit(&mut samples, &curves, &places, self.segments);
+        }
+    }
+}
+
 /// Intervals that are left over, each run of them between its neighbours as context.
 struct Rest {
     intervals: Intervals,
     stretches: Vec<Stretch>,
-    spans: Vec<u32>,
+    places: Vec<Place>,
     smooth: Smooth,
     ends: Ends,
 }
@@ -256,56 +261,44 @@ impl Rest {
         Self {
             intervals: Intervals::new(smooth.shape.own),
             stretches: Vec::new(),
-            spans: Vec::new(),
+            places: Vec::new(),
             smooth,
             ends,
         }
     }
 
-    /// Whether there is room for `count` consecutive intervals and their context.
-    fn has_room(&self, count: usize) -> bool {
-        self.intervals.count + count + 2 <= LANES
-    }
-
-    /// Takes some intervals of a stretch, which become these spans; there must be room for them.
+    /// Takes some intervals of a stretch, whose curves go to these places; there must be room for them.
     fn push(
         &mut self,
         intervals: &Intervals,
         stretch: &Stretch,
         lanes: Range<usize>,
-        spans: &[u32],
+        places: &[Place],
     ) {
         let first = stretch.intervals.start + (lanes.start - stretch.lane);
+        // The only interval of a track has no neighbours.
+        let beside = usize::from(stretch.all > 1);
         self.stretches.push(Stretch {
-            lane: self.intervals.count + 1,
+            lane: self.intervals.count + beside,
             intervals: first..first + lanes.len(),
             ..stretch.clone()
         });
-        if stretch.all == 1 {
-            self.intervals.push_nothing();
-            self.intervals.push_from(intervals, lanes);
-            self.intervals.push_nothing();
-        } else {
-            let context = lanes.start - 1..lanes.end + 1;
-            self.intervals.push_from(intervals, context);
-        }
-        self.spans.extend(spans);
+        let lanes = lanes.start - beside..lanes.end + beside;
+        self.intervals.push_from(intervals, lanes);
+        self.places.extend(places);
     }
 
     /// Computes the curves of all intervals in f64, and queues them to be fitted.
     fn flush(&mut self, prepared: &mut Prepared, fitting: &mut Fitting) {
-        if self.spans.is_empty() {
-            return;
+        let (intervals, stretches) = (&mut self.intervals, &mut self.stretches);
+        self.smooth.find_curves(intervals, stretches, self.ends);
+        let lanes = stretches.iter().flat_map(Stretch::lanes);
+        for (lane, &place) in lanes.zip(&self.places) {
+            fitting.take(intervals, lane, place);
         }
-        in_lanes(&mut Steps(&mut self.intervals));
-        (self.smooth.curves)(&mut self.intervals, &self.stretches, self.ends);
-        let lanes = self.stretches.iter().flat_map(Stretch::lanes);
-        for (lane, &span) in lanes.zip(&self.spans) {
-            fitting.queue(prepared, &self.intervals, lane, span as usize);
-        }
-        fitting.bring(prepared, &self.intervals);
-        self.intervals.clear();
-        self.stretches.clear();
-        self.spans.clear();
+        fitting.bring(prepared, intervals);
+        intervals.clear();
+        stretches.clear();
+        self.places.clear();
     }
 }

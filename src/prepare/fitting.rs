@@ -1,34 +1,22 @@
-//! Fits curves into segments. Curves wait until they fill a block. Each becomes one span at once;
+//! Fits curves into segments. Curves wait until they fill a block. Each has one span at once;
 //! that span is replaced by several if the curve has to be cut.
 
-use std::ops::Range;
-
-use bytemuck::Zeroable;
-
 use crate::curve::options::Quantity;
-use crate::fit::constant_velocity::SteadyBlock;
 use crate::fit::double::curve::Curve;
-use crate::fit::double::cut::{Cutter, Subcurve};
+use crate::fit::double::cut::Cutter;
 use crate::fit::double::fit::{FitBlock, Tier, tier};
-use crate::fit::double::intervals::{Intervals, LANES};
+use crate::fit::double::intervals::Intervals;
 use crate::fit::double::shape::Shape;
-use crate::prepare::prepared::Prepared;
-use crate::shader::PolynomialSegment;
-use crate::simd::dispatch::in_lanes;
-use crate::time::spans::{NONE, Part, Source, Spans};
+use crate::prepare::prepared::{Place, Prepared};
+use crate::time::spans::{NONE, Source};
 
-/// Fits curves in blocks, whose memory is kept. A curve that is taken belongs to the next span,
-/// which is the first without a source.
+/// Fits curves in blocks, whose memory is kept.
 pub(crate) struct Fitting {
     shape: &'static Shape,
     quantity: Quantity,
     small_angle: Queue,
     full: Queue,
-    /// Made for the first track of two keys.
-    steady: Option<Box<SteadyBlock>>,
     cutter: Cutter,
-    /// The spans as they were before the curves among them were cut.
-    uncut: Spans,
 }
 
 /// Curves of one tier that wait to fill a block.
@@ -38,8 +26,8 @@ struct Queue {
     block: Option<Box<FitBlock>>,
     /// The lanes of curves that are not copied into the block yet.
     lanes: Vec<u8>,
-    /// The spans of the curves: of those in the block, then of those in `lanes`.
-    spans: Vec<usize>,
+    /// Where the curves go: those in the block, then those in `lanes`.
+    places: Vec<Place>,
 }
 
 impl Queue {
@@ -48,7 +36,7 @@ impl Queue {
             tier,
             block: None,
             lanes: Vec::new(),
-            spans: Vec::new(),
+            places: Vec::new(),
         }
     }
 }
@@ -60,52 +48,24 @@ impl Fitting {
             quantity,
             small_angle: Queue::new(Tier::SmallAngle),
             full: Queue::new(Tier::Full),
-            steady: None,
             cutter: Cutter::new(shape, quantity),
-            uncut: Spans::default(),
         }
     }
 
-    /// Takes the curves in some lanes of `curves`: each becomes the next span, the first with the
-    /// constant `key` at its start. [`Fitting::bring`] must copy them before the lanes of `curves`
-    /// change.
+    /// Takes the curve in a lane of `curves`, whose span and segment are there already.
+    /// [`Fitting::bring`] must copy it before the lanes of `curves` change.
     #[inline]
-    pub(crate) fn take(
-        &mut self,
-        prepared: &mut Prepared,
-        curves: &Intervals,
-        lanes: Range<usize>,
-        key: u32,
-    ) {
-        (prepared.spans).begin(&curves.starts[lanes.clone()], key);
-        let first_span = prepared.new_segments(lanes.len());
-        for (span, lane) in (first_span..).zip(lanes) {
-            self.queue(prepared, curves, lane, span);
-        }
-    }
-
-    /// Takes, as [`Fitting::take`] does, the curve of a span that has its segment already.
-    #[inline]
-    pub(crate) fn queue(
-        &mut self,
-        prepared: &Prepared,
-        curves: &Intervals,
-        lane: usize,
-        span: usize,
-    ) {
+    pub(crate) fn take(&mut self, curves: &Intervals, lane: usize, place: Place) {
         let queue = match tier(curves.energies[lane]) {
             Tier::SmallAngle => &mut self.small_angle,
             Tier::Full => &mut self.full,
             Tier::Piece => {
                 let curve = curves.curve(lane, self.shape, self.quantity);
-                if let Source::Segment(place) = prepared.spans.sources[span] {
-                    self.cutter.push(span, curve, place as usize);
-                }
-                return;
+                return self.cutter.push(place.span, curve, Some(place.segment));
             }
         };
         queue.lanes.push(lane as u8);
-        queue.spans.push(span);
+        queue.places.push(place);
     }
 
     /// Copies the curves that were taken into blocks, and fits the blocks that are full.
@@ -118,7 +78,7 @@ impl Fitting {
                 let (own, others) = lanes.split_at(block.room().min(lanes.len()));
                 block.push_from(curves, own);
                 if block.room() == 0 {
-                    run(block, &mut queue.spans, &mut self.cutter, prepared);
+                    run(block, &mut queue.places, &mut self.cutter, prepared);
                 }
                 lanes = others;
             }
@@ -126,24 +86,17 @@ impl Fitting {
         }
     }
 
-    /// Takes the only two keys of a track, which are joined at constant velocity.
-    pub(crate) fn take_steady(&mut self, prepared: &mut Prepared, keys: [[f32; 4]; 2]) -> Source {
-        let (source, segment) = new_segment(prepared);
-        let new = || Box::new(SteadyBlock::new());
-        let block = self.steady.get_or_insert_with(new);
-        block.push(keys, segment as u32);
-        if block.is_full() {
-            in_lanes(&mut **block);
-            block.write(&mut prepared.segments.polynomials);
-        }
-        source
-    }
-
-    /// Takes a curve of any length as the next span. [`Fitting::finish`] fits it, and cuts it if
-    /// necessary.
-    pub(crate) fn take_curve(&mut self, prepared: &Prepared, curve: Curve) -> Source {
-        self.cutter.push_whole(prepared.spans.sources.len(), curve);
-        UNTRIED
+    /// Takes a curve of any length as the next span, with this constant at its start.
+    /// [`Fitting::finish`] fits it, and cuts it if necessary; until then it has no segment.
+    pub(crate) fn take_curve(
+        &mut self,
+        prepared: &mut Prepared,
+        curve: Curve,
+        start: f64,
+        key: u32,
+    ) {
+        self.cutter.push(prepared.spans.len(), curve, None);
+        prepared.push_span(start, Source::Segment(NONE), key);
     }
 
     /// Fits the curves that still wait, and replaces the spans of cut curves by those of their
@@ -151,137 +104,71 @@ impl Fitting {
     pub(crate) fn finish(&mut self, prepared: &mut Prepared) {
         for queue in [&mut self.small_angle, &mut self.full] {
             if let Some(block) = &mut queue.block {
-                run(block, &mut queue.spans, &mut self.cutter, prepared);
+                run(block, &mut queue.places, &mut self.cutter, prepared);
             }
         }
-        if let Some(block) = &mut self.steady {
-            in_lanes(&mut **block);
-            block.write(&mut prepared.segments.polynomials);
-        }
         self.cutter.cut(&mut prepared.segments.polynomials);
-        prepared.put_subcurves(&self.cutter, &mut self.uncut);
+        prepared.put_subcurves(&self.cutter);
         self.cutter.clear();
     }
 }
 
-/// Fits the curves of a block, which belong to the first of the `spans`.
-fn run(block: &mut FitBlock, spans: &mut Vec<usize>, cutter: &mut Cutter, prepared: &mut Prepared) {
-    let own = &spans[..block.count];
-    let sources = &prepared.spans.sources;
-    let places = own.iter().filter_map(|&span| match sources[span] {
-        Source::Segment(place) => Some(place as usize),
-        _ => None,
-    });
+/// Fits the curves of a block, which go to the first of the `places`.
+fn run(
+    block: &mut FitBlock,
+    places: &mut Vec<Place>,
+    cutter: &mut Cutter,
+    prepared: &mut Prepared,
+) {
+    let count = block.count;
     let segments = &mut prepared.segments.polynomials;
-    block.run(segments, places);
-    if !block.is_trusted() {
-        for (lane, &span) in own.iter().enumerate() {
-            if !block.fits(lane, segments) {
-                cutter.push(span, block.curve(lane), block.places[lane]);
-            }
+    block.run(segments, places.iter().map(|place| place.segment));
+    let is_trusted = block.is_trusted();
+    for (lane, place) in places.drain(..count).enumerate() {
+        if !is_trusted && !block.fits(lane, segments) {
+            cutter.push(place.span, block.curve(lane), Some(place.segment));
         }
     }
-    spans.drain(..block.count);
     block.clear();
 }
 
-/// Zeroed segments for curves that are not fitted yet. New segments are copied from this constant,
-/// all at once.
-static ZERO: [PolynomialSegment; 2 * LANES] = [PolynomialSegment {
-    coefficients: [[0.0; 4]; 11],
-}; 2 * LANES];
-
-/// The source of a span whose curve the cutter fits; it has no segment yet.
-const UNTRIED: Source = Source::Segment(NONE);
-
-/// Adds a zeroed segment, and returns it as a source and by its place.
-pub(crate) fn new_segment(prepared: &mut Prepared) -> (Source, usize) {
-    let segments = &mut prepared.segments.polynomials;
-    let place = segments.len();
-    segments.push(PolynomialSegment::zeroed());
-    (Source::Segment(place as u32), place)
-}
-
 impl Prepared {
-    /// Adds `count` zeroed segments (at most two for each lane of a block), each as the source of
-    /// the next span, and returns the first of these spans.
-    #[inline]
-    pub(crate) fn new_segments(&mut self, count: usize) -> usize {
-        let segments = &mut self.segments.polynomials;
-        let places = segments.len()..segments.len() + count;
-        segments.extend_from_slice(&ZERO[..count]);
-        let sources = &mut self.spans.sources;
-        let first_span = sources.len();
-        sources.extend(places.map(|place| Source::Segment(place as u32)));
-        first_span
-    }
-
     /// Replaces the spans of curves that were cut by those of their parts.
-    fn put_subcurves(&mut self, cutter: &Cutter, uncut: &mut Spans) {
+    fn put_subcurves(&mut self, cutter: &Cutter) {
         let mut cut = cutter.subcurves();
-        let Some(first) = cut.first().map(|part| part.span) else {
+        if cut.is_empty() {
             return;
-        };
-        std::mem::swap(&mut self.spans, uncut);
-        self.spans.clear();
-        self.spans.extend(uncut, 0..first);
+        }
+        let uncut = std::mem::take(&mut self.spans);
+        self.spans.reserve(uncut.len() + cut.len());
         for part in 0..self.parts.len() {
-            let Part { spans, end, .. } = &self.parts[part];
-            let (spans, end) = (spans.clone(), *end);
-            if spans.end <= first {
-                continue;
-            }
-            let start = if spans.start > first {
-                self.spans.len()
-            } else {
-                spans.start
-            };
-            let mut next = spans.start.max(first);
-            while next < spans.end {
-                let to = cut
-                    .first()
-                    .map_or(spans.end, |part| part.span.min(spans.end));
-                self.spans.extend(uncut, next..to);
-                next = to;
-                if next < spans.end {
-                    next += 1;
-                    let is_last = next == spans.end;
-                    let end = if is_last { end } else { uncut.starts[next] };
-                    cut = self.put_first(cutter, cut, uncut, to, end);
+            let (spans, first_span) = (self.parts[part].spans.clone(), self.spans.len());
+            for span in spans.clone() {
+                let (start, key) = (uncut.starts[span], uncut.keys[span]);
+                let end = match span + 1 < spans.end {
+                    true => uncut.starts[span + 1],
+                    false => self.parts[part].end,
+                };
+                let own = cut.partition_point(|subcurve| subcurve.span <= span);
+                let (own, others) = cut.split_at(own);
+                if own.is_empty() {
+                    self.push_span(start, uncut.sources[span], key);
                 }
-            }
-            self.parts[part].spans = start..self.spans.len();
-        }
-    }
-
-    /// Adds the spans of the first curve's parts; the curve's own span ends at `end`. Returns the
-    /// parts of the other curves.
-    fn put_first<'c>(
-        &mut self,
-        cutter: &Cutter,
-        parts: &'c [Subcurve],
-        uncut: &Spans,
-        span: usize,
-        end: f64,
-    ) -> &'c [Subcurve] {
-        let (start, key) = (uncut.starts[span], uncut.keys[span]);
-        let count = (parts.iter())
-            .take_while(|part| part.span == parts[0].span)
-            .count();
-        let (own, others) = parts.split_at(count);
-        for part in own {
-            let (from, _) = part.piece.extent();
-            let start = start + (end - start) * from;
-            let key = if from == 0.0 { key } else { NONE };
-            let source = match part.segment {
-                Some(place) => Source::Segment(place as u32),
-                None => {
-                    self.exact.push(cutter.curve(part));
-                    Source::Exact(self.exact.len() as u32 - 1)
+                for subcurve in own {
+                    let (from, _) = subcurve.piece.extent();
+                    let key = if from == 0.0 { key } else { NONE };
+                    let source = match subcurve.segment {
+                        Some(place) => Source::Segment(place as u32),
+                        None => {
+                            self.exact.push(cutter.curve(subcurve));
+                            Source::Exact(self.exact.len() as u32 - 1)
+                        }
+                    };
+                    self.push_span(start + (end - start) * from, source, key);
                 }
-            };
-            self.push_span(start, source, key);
+                cut = others;
+            }
+            self.parts[part].spans = first_span..self.spans.len();
         }
-        others
     }
 }

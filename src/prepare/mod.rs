@@ -12,7 +12,6 @@ pub(crate) mod constant_speed;
 pub(crate) mod direct;
 pub(crate) mod error;
 pub(crate) mod fitting;
-pub(crate) mod lane_lists;
 pub(crate) mod preparation;
 pub(crate) mod prepared;
 pub(crate) mod request;

@@ -1,5 +1,4 @@
-//! The trait by which key intervals become segments, and the choice of its implementation for a
-//! method.
+//! Prepares tracks in the way of their method: key intervals become segments.
 
 use std::ops::Range;
 
@@ -9,43 +8,39 @@ use crate::method::interpolation::Interpolation;
 use crate::prepare::arcs::ArcPreparation;
 use crate::prepare::prepared::Prepared;
 use crate::prepare::smooth::SmoothPreparation;
-use crate::prepare::steps::StepPreparation;
-use crate::time::frame_rate::FrameRate;
+use crate::prepare::steps;
 use crate::time::frames::{Ticks, Timeline};
 use crate::tracks::set::TrackSet;
 
-/// Makes segments from key intervals, in blocks that may hold intervals of several tracks.
-pub(crate) trait Prepare: Send {
-    /// Adds some intervals of the `index`th track of a set, as a part of their own.
-    fn add(
-        &mut self,
-        prepared: &mut Prepared,
-        set: &TrackSet,
-        index: usize,
-        intervals: Range<usize>,
-    ) -> Result<(), InterpolationError>;
-
-    /// Finishes the segments of all intervals that were added.
-    fn finish(&mut self, prepared: &mut Prepared);
-
-    /// From now on only intervals that contain a frame need segments, given the frames' rate and
-    /// start; with `None` all need them.
-    fn only_frames(&mut self, _frames: Option<(FrameRate, f64)>) {}
+/// Prepares tracks by an interpolation; its memory is reused.
+pub(crate) struct Preparation {
+    interpolation: Interpolation,
+    way: Way,
 }
 
-/// Prepares tracks by the implementation of [`Prepare`] for their method; its memory is reused.
-pub(crate) struct Preparation(Box<dyn Prepare>);
+/// How intervals become segments: in blocks that may hold intervals of several tracks, but for
+/// steps, which have no segments.
+enum Way {
+    Steps,
+    Arcs(Box<ArcPreparation>),
+    Smooth(Box<SmoothPreparation>),
+}
 
 impl Preparation {
     pub(crate) fn new(interpolation: &Interpolation) -> Self {
-        Self(match *interpolation.method.curves {
-            Curves::Arcs(moving) if interpolation.is_by_formula() => {
-                Box::new(SmoothPreparation::new(interpolation, moving))
+        let way = match *interpolation.method.curves {
+            Curves::Steps => Way::Steps,
+            Curves::Arcs(_) if !interpolation.is_by_formula() => {
+                Way::Arcs(Box::new(ArcPreparation::new(interpolation.path)))
             }
-            Curves::Arcs(_) => Box::new(ArcPreparation::new(interpolation)),
-            Curves::Steps => Box::new(StepPreparation(*interpolation)),
-            Curves::Smooth(smooth) => Box::new(SmoothPreparation::new(interpolation, smooth)),
-        })
+            Curves::Arcs(smooth) | Curves::Smooth(smooth) => {
+                Way::Smooth(Box::new(SmoothPreparation::new(interpolation, smooth)))
+            }
+        };
+        Self {
+            interpolation: *interpolation,
+            way,
+        }
     }
 
     /// From now on intervals without a sample of this timeline may be left out, which is done if
@@ -53,10 +48,12 @@ impl Preparation {
     /// other timeline.
     pub(crate) fn only_for(&mut self, timeline: &Timeline, set: &TrackSet) {
         let keys = set.key_count() / set.track_count().max(1);
-        self.0.only_frames(match timeline.ticks {
-            Ticks::Frames { rate, start } if timeline.len() < keys => Some((rate, start)),
-            _ => None,
-        });
+        if let Way::Smooth(smooth) = &mut self.way {
+            smooth.frames = match timeline.ticks {
+                Ticks::Frames { rate, start } if timeline.len() < keys => Some((rate, start)),
+                _ => None,
+            };
+        }
     }
 
     /// Prepares intervals of a set's tracks; each range of intervals becomes a part.
@@ -66,10 +63,27 @@ impl Preparation {
         set: &TrackSet,
         intervals: impl Iterator<Item = (usize, Range<usize>)>,
     ) -> Result<(), InterpolationError> {
-        for (track, intervals) in intervals {
-            self.0.add(prepared, set, track, intervals)?;
+        let Self { interpolation, way } = self;
+        // Steps have no path, and a method with a path of its own also defines the curve between
+        // opposite keys.
+        let has_path = !matches!(way, Way::Steps) && interpolation.method.path.is_none();
+        for (track, own) in intervals {
+            let (_, keys) = set.times_and_keys(track);
+            interpolation.ends.check(keys, track)?;
+            if has_path {
+                interpolation.path.check(keys, own.clone(), track)?;
+            }
+            match way {
+                Way::Steps => steps::add(prepared, set, track, own, interpolation.quantity),
+                Way::Arcs(arcs) => arcs.add(prepared, set, track, own),
+                Way::Smooth(smooth) => smooth.add(prepared, set, track, own),
+            }
         }
-        self.0.finish(prepared);
+        match way {
+            Way::Steps => {}
+            Way::Arcs(arcs) => arcs.finish(prepared),
+            Way::Smooth(smooth) => smooth.finish(prepared),
+        }
         Ok(())
     }
 }
@@ -139,12 +153,17 @@ mod tests {
             let times: Vec<f64> = (0..23)
                 .map(|i| f64::from(i) + uneven * f64::from(i % 2))
                 .collect();
-            let keys: Vec<Quat> = (0..23)
+            let mut keys: Vec<Quat> = (0..23)
                 .map(|i| {
                     let turn = step * (i as f32 + (i as f32).sin());
                     Quat::from_rotation_y(turn) * Quat::from_rotation_x(0.3 * turn.cos())
                 })
                 .collect();
+            if track == 13 {
+                keys[7] = keys[6]; // no plane
+                keys[9] = Quat::IDENTITY; // half a turn to the next
+                keys[10] = Quat::from_xyzw(1.0, 0.0, 0.0, 0.0);
+            }
             set.push("", &times, &keys).unwrap();
         }
         for method in METHODS {

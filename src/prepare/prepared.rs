@@ -6,12 +6,12 @@ use crate::curve::segment::Segments;
 use crate::fit::double::curve::Curve;
 use crate::math::canonical::round_quat;
 use crate::method::interpolation::Interpolation;
+use crate::shader::PolynomialSegment;
 use crate::time::frames::{Ticks, Timeline};
 use crate::time::runs::Parameter;
 use crate::time::spans::{Beyond, NONE, Part, Source, Spans};
 use crate::time::wrap::{TrackCopy, Wrap};
 use crate::tracks::check::LATEST;
-use crate::tracks::set::Track;
 
 /// Segments of some tracks, with what is needed to find the segment of a sample.
 #[derive(Debug, Clone)]
@@ -26,6 +26,13 @@ pub(crate) struct Prepared {
     pub(crate) parts: Vec<Part>,
     /// The wrap modes before the first key and after the last.
     pub(crate) wrap: Wrap,
+}
+
+/// Where a curve goes: its span, and the segment of that.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Place {
+    pub(crate) span: usize,
+    pub(crate) segment: usize,
 }
 
 impl Prepared {
@@ -124,23 +131,24 @@ impl Prepared {
         self.wrap.copies(span, timeline, samples)
     }
 
-    /// Adds a part: these intervals of a track, the `index`th of its set, with these spans. What
-    /// is held before and after the keys are constants, used only where the intervals reach the
-    /// first or the last key.
+    /// Adds a part: these intervals of a track with keys at these times, the `index`th of its set,
+    /// with these spans. What is held before and after the keys are constants, used only where the
+    /// intervals reach the first or the last key.
     pub(crate) fn push_part(
         &mut self,
-        (index, track): (usize, Track),
+        index: usize,
+        times: &[f64],
         intervals: &Range<usize>,
         spans: Range<usize>,
         [before, after]: [u32; 2],
     ) {
-        let is_last = intervals.end + 1 == track.keys.len();
-        let new_beyond = || Box::new(Beyond::new(track.times));
+        let is_last = intervals.end + 1 == times.len();
+        let new_beyond = || Box::new(Beyond::new(times));
         self.parts.push(Part {
             track: index as u32,
             first_key: intervals.start as u32,
             spans,
-            end: track.times[intervals.end],
+            end: times[intervals.end],
             before: if intervals.start == 0 { before } else { NONE },
             after: if is_last { after } else { NONE },
             beyond: self.wrap.repeats().then(new_beyond),
@@ -150,6 +158,23 @@ impl Prepared {
     pub(crate) fn constant(&mut self, value: [f32; 4]) -> u32 {
         self.constants.push(value);
         self.constants.len() as u32 - 1
+    }
+
+    /// Adds a span with a segment of its own.
+    #[inline]
+    pub(crate) fn push_segment(
+        &mut self,
+        start: f64,
+        segment: PolynomialSegment,
+        key: u32,
+    ) -> Place {
+        let (span, place) = (self.spans.len(), self.segments.polynomials.len());
+        self.segments.polynomials.push(segment);
+        self.push_span(start, Source::Segment(place as u32), key);
+        Place {
+            span,
+            segment: place,
+        }
     }
 
     pub(crate) fn push_span(&mut self, start: f64, source: Source, key: u32) {

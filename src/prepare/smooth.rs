@@ -3,18 +3,22 @@
 
 use std::ops::Range;
 
-use crate::curve::options::{Ends, InterpolationError, Quantity, Speed};
-use crate::fit::double::handles::{FramesHeld, Steps};
+use bytemuck::Zeroable as _;
+
+use crate::curve::options::{Ends, Quantity, Speed};
+use crate::fit::constant_velocity::arc_polynomial;
+use crate::fit::double::curve::Curve;
+use crate::fit::double::handles::FramesHeld;
 use crate::fit::double::intervals::{Intervals, LANES, Stretch};
 use crate::math::canonical::round_quat;
 use crate::math::quaternion::Vector;
 use crate::method::interpolation::Interpolation;
 use crate::method::{Given, Smooth};
-use crate::prepare::constant_speed::{Place, Waiting};
+use crate::prepare::constant_speed::{Waiting, retime};
 use crate::prepare::direct::Direct;
 use crate::prepare::fitting::Fitting;
-use crate::prepare::preparation::Prepare;
 use crate::prepare::prepared::Prepared;
+use crate::shader::PolynomialSegment;
 use crate::simd::dispatch::in_lanes;
 use crate::time::frame_clock::FrameClock;
 use crate::time::frame_rate::FrameRate;
@@ -27,11 +31,7 @@ use crate::tracks::signs::Signs;
 const STILL: [f32; 4] = [0.0; 4];
 
 /// The lanes of context that a stretch needs beside those of its intervals.
-const CONTEXT: usize = 2;
-
-/// No stretch with fewer intervals than this is begun at the end of a block, unless
-/// it is all that is left of its track.
-const SHORTEST: usize = 8;
+pub(crate) const CONTEXT: usize = 2;
 
 /// Prepares smooth curves; its blocks are made once for many tracks.
 pub(crate) struct SmoothPreparation {
@@ -43,54 +43,40 @@ pub(crate) struct SmoothPreparation {
     /// Prepares curves straight from keys in f32, if method and options allow it.
     direct: Option<Box<Direct>>,
     /// Curves that are traversed at constant speed, until their whole track is there.
-    waiting: Waiting,
+    waiting: Vec<Waiting>,
     /// The frames' rate and start, if only intervals that contain a frame are wanted.
-    frames: Option<(FrameRate, f64)>,
+    pub(crate) frames: Option<(FrameRate, f64)>,
 }
 
 impl SmoothPreparation {
     pub(crate) fn new(interpolation: &Interpolation, smooth: Smooth) -> Self {
-        let path = interpolation.method.path.unwrap_or(interpolation.path);
         let suits =
             interpolation.quantity == Quantity::Rotation && interpolation.speed == Speed::AsKeyed;
         let direct = smooth.direct.filter(|_| suits);
         Self {
             direct: direct.map(|how| Box::new(Direct::new(how, smooth, interpolation.ends))),
-            interpolation: Interpolation {
-                path,
-                ..*interpolation
-            },
+            interpolation: *interpolation,
             smooth,
             intervals: Intervals::new(smooth.shape.own),
             stretches: Vec::new(),
             fitting: Fitting::new(smooth.shape, interpolation.quantity),
-            waiting: Waiting::default(),
+            waiting: Vec::new(),
             frames: None,
         }
     }
-}
 
-impl Prepare for SmoothPreparation {
-    fn only_frames(&mut self, frames: Option<(FrameRate, f64)>) {
-        self.frames = frames;
-    }
-
-    fn add(
+    /// Adds some intervals of the `index`th track of a set, as a part of their own.
+    pub(crate) fn add(
         &mut self,
         prepared: &mut Prepared,
         set: &TrackSet,
         index: usize,
         intervals: Range<usize>,
-    ) -> Result<(), InterpolationError> {
+    ) {
         let track = set.track(index);
-        self.interpolation.ends.check(track.keys, index)?;
-        // A method with a path of its own also defines the curve between opposite keys.
-        if self.interpolation.method.path.is_none() {
-            self.interpolation
-                .path
-                .check(track.keys, intervals.clone(), index)?;
-        }
-        let signs = self.interpolation.path.signs(set, index);
+        let path = self.interpolation.method.path;
+        let path = path.unwrap_or(self.interpolation.path);
+        let signs = path.signs(set, index);
         let all = track.keys.len() - 1;
         let first_key = prepared.constants.len() as u32;
         let of_rotations = self.interpolation.quantity == Quantity::Rotation;
@@ -115,8 +101,7 @@ impl Prepare for SmoothPreparation {
             held(last_key, self.interpolation.after),
         ];
         let part = prepared.parts.len();
-        prepared.push_part((index, track), &intervals, 0..0, held);
-        let looped = matches!(self.interpolation.ends, Ends::Loop);
+        prepared.push_part(index, track.times, &intervals, 0..0, held);
         // Two keys are joined by constant velocity, whatever lies beside them.
         let alone = all == 1 && self.interpolation.method.interpolates;
         let context = if alone { 0 } else { CONTEXT };
@@ -126,20 +111,13 @@ impl Prepare for SmoothPreparation {
         };
         let mut from = intervals.start;
         while from < intervals.end {
-            let left = intervals.end - from;
-            if self.intervals.count + context + left.min(SHORTEST) > LANES {
+            if self.intervals.count + context >= LANES {
                 self.flush(prepared);
             }
-            let to = from + left.min(LANES - context - self.intervals.count);
-            // Across the seam of a loop, keys are multiplied by the last key's sign, so that they
-            // continue the signs on this side.
-            let beyond = signs.sign(all);
+            let room = LANES - context - self.intervals.count;
+            let to = intervals.end.min(from + room);
             if context > 0 {
-                match from.checked_sub(1) {
-                    Some(before) => self.push(track, signs, before..before + 1, None),
-                    None if looped => self.push_beyond(track, signs, all - 1, beyond),
-                    None => self.intervals.push_nothing(),
-                }
+                self.push_context(track, signs, from.checked_sub(1), all - 1);
             }
             let own_key = first_key + (from - intervals.start) as u32;
             self.stretches.push(Stretch {
@@ -152,36 +130,45 @@ impl Prepare for SmoothPreparation {
                 still: if self.is_frozen() { own_key } else { NONE },
             });
             let own = velocities.get(from - intervals.start..);
-            self.push(track, signs, from..to, own);
+            self.push(track, signs, from..to, own.unwrap_or_default());
             if context > 0 {
-                match to < all {
-                    true => self.push(track, signs, to..to + 1, None),
-                    false if looped => self.push_beyond(track, signs, 0, beyond),
-                    false => self.intervals.push_nothing(),
-                }
+                self.push_context(track, signs, (to < all).then_some(to), 0);
             }
             from = to;
         }
-        Ok(())
     }
 
-    fn finish(&mut self, prepared: &mut Prepared) {
+    /// Finishes the segments of all intervals that were added.
+    pub(crate) fn finish(&mut self, prepared: &mut Prepared) {
         self.flush(prepared);
         if let Some(direct) = &mut self.direct {
             direct.finish(prepared, &mut self.fitting);
         }
-        self.waiting.finish(prepared, &mut self.fitting);
+        retime(prepared, &mut self.waiting, &mut self.fitting);
+        self.waiting.clear();
         self.fitting.finish(prepared);
     }
-}
 
-impl SmoothPreparation {
-    /// Adds an interval from the other side of a loop's seam as context, with its keys multiplied
-    /// by `sign`.
-    fn push_beyond(&mut self, track: Track, signs: Signs<'_>, interval: usize, sign: f32) {
+    /// Adds an interval of a track as context. Where the track ends it is the one on the `other`
+    /// side of a loop's seam, or an empty lane.
+    fn push_context(
+        &mut self,
+        track: Track,
+        signs: Signs<'_>,
+        interval: Option<usize>,
+        other: usize,
+    ) {
         let lane = self.intervals.count;
-        self.push(track, signs, interval..interval + 1, None);
-        self.intervals.turn(lane, sign);
+        match interval {
+            Some(own) => self.push(track, signs, own..own + 1, &[]),
+            None if self.interpolation.ends == Ends::Loop => {
+                self.push(track, signs, other..other + 1, &[]);
+                // Across the seam, keys are multiplied by the last key's sign, so that they continue
+                // the signs on this side.
+                self.intervals.turn(lane, signs.sign(track.keys.len() - 1));
+            }
+            None => self.intervals.push_nothing(),
+        }
     }
 
     /// Adds some intervals of a track. `velocities` starts with the velocity at the first
@@ -191,62 +178,36 @@ impl SmoothPreparation {
         track: Track,
         signs: Signs<'_>,
         intervals: Range<usize>,
-        velocities: Option<&[Vector]>,
+        velocities: &[Vector],
     ) {
         let first = self.intervals.count;
         self.intervals.push(track, signs, intervals.clone());
         for (i, interval) in intervals.enumerate() {
-            let velocities = velocities.and_then(|all| all.get(i..));
-            let Some([outward, inward]) = self.given(track, interval, velocities) else {
-                break; // the method has no numbers of its own for any interval
+            let [outward, inward] = match (self.smooth.given, velocities.get(i..i + 2)) {
+                (Given::Numbers(numbers), _) => numbers(track, interval, &self.interpolation),
+                (Given::Velocities(_), Some(both)) => {
+                    [both[0], both[1]].map(|[x, y, z]| [x, y, z, 0.0])
+                }
+                _ => break, // the method has no numbers of its own for any interval
             };
             self.intervals.set_given(first + i, outward, inward);
         }
     }
 
-    /// The method's own numbers for an interval. `velocities` starts with the velocity at its first
-    /// key.
-    fn given(
-        &self,
-        track: Track,
-        interval: usize,
-        velocities: Option<&[Vector]>,
-    ) -> Option<[[f64; 4]; 2]> {
-        match (self.smooth.given, velocities) {
-            (Given::Numbers(numbers), _) => Some(numbers(track, interval, &self.interpolation)),
-            (Given::Velocities(_), Some([first, second, ..])) => {
-                Some([first, second].map(|&[x, y, z]| [x, y, z, 0.0]))
-            }
-            _ => None,
-        }
-    }
-
     /// Computes the curves of the intervals that wait, and has them fitted.
     fn flush(&mut self, prepared: &mut Prepared) {
-        let is_exact = self.curves();
+        let is_exact = self.find_curves();
         let stretches = std::mem::take(&mut self.stretches);
         for stretch in &stretches {
-            self.end_values(prepared, stretch);
-            self.beyond(prepared, stretch);
-            let latest = prepared.parts[stretch.part].end;
-            let holds_frame = self.frames.map(|(rate, start)| {
-                let mut held = FramesHeld {
-                    clock: FrameClock::new(rate, start, latest),
-                    intervals: &self.intervals,
-                    lanes: stretch.lanes(),
-                    held: [true; LANES],
-                };
-                in_lanes(&mut held);
-                held.held
-            });
+            self.add_ends(prepared, stretch);
             if self.interpolation.speed == Speed::Constant {
                 self.wait(stretch);
             } else {
-                self.push_spans(prepared, stretch, holds_frame.as_ref());
+                self.push_spans(prepared, stretch);
             }
         }
         if let Some(direct) = &mut self.direct {
-            let (intervals, fitting) = (&mut self.intervals, &mut self.fitting);
+            let (intervals, fitting) = (&self.intervals, &mut self.fitting);
             direct.fit(prepared, intervals, &stretches, is_exact, fitting);
         }
         self.fitting.bring(prepared, &self.intervals);
@@ -255,56 +216,73 @@ impl SmoothPreparation {
         self.stretches.clear();
     }
 
+    /// Computes the curves of the intervals that wait. Returns whether they are there in f64.
+    fn find_curves(&mut self) -> bool {
+        if let Some(direct) = &mut self.direct {
+            direct.find_curves(&self.intervals, &self.stretches);
+            // Extrapolation needs the derivatives at the ends.
+            let Interpolation { before, after, .. } = self.interpolation;
+            if !self.goes_on(before) && !self.goes_on(after) {
+                return false;
+            }
+        }
+        let (intervals, ends) = (&mut self.intervals, self.interpolation.ends);
+        self.smooth.find_curves(intervals, &self.stretches, ends);
+        true
+    }
+
+    /// The curve in a lane, in f64.
+    fn curve(&self, lane: usize) -> Curve {
+        let (shape, quantity) = (self.smooth.shape, self.interpolation.quantity);
+        self.intervals.curve(lane, shape, quantity)
+    }
+
     /// Lets the curves of a stretch wait until all of its track is there.
     fn wait(&mut self, stretch: &Stretch) {
         for (i, lane) in stretch.lanes().enumerate() {
-            let place = Place {
+            let moves = !self.holds(stretch, lane);
+            self.waiting.push(Waiting {
                 part: stretch.part,
                 start: self.intervals.starts[lane],
                 key: stretch.key_at(i),
-            };
-            let quantity = self.interpolation.quantity;
-            let moves = !self.holds(stretch, lane);
-            let curve = moves.then(|| self.intervals.curve(lane, self.smooth.shape, quantity));
-            self.waiting.push(place, curve);
+                curve: moves.then(|| self.curve(lane)),
+            });
         }
     }
 
     /// Makes the intervals of a stretch into spans.
-    fn push_spans(
-        &mut self,
-        prepared: &mut Prepared,
-        stretch: &Stretch,
-        holds_frame: Option<&[bool; LANES]>,
-    ) {
+    fn push_spans(&mut self, prepared: &mut Prepared, stretch: &Stretch) {
         let first_span = prepared.spans.len();
         let is_steady = stretch.all == 1 && self.interpolation.is_steady_alone();
-        let lanes = stretch.lanes();
-        let holds_frame = |lane: usize| holds_frame.is_none_or(|held| held[lane]);
-        let all_hold = lanes.clone().all(holds_frame);
-        let fits_alike = !is_steady && !self.is_frozen() && all_hold;
-        if fits_alike {
-            self.take(prepared, stretch, lanes.clone());
+        let mut holds_frame = [true; LANES];
+        if let Some((rate, start)) = self.frames {
+            let mut frames = FramesHeld {
+                clock: FrameClock::new(rate, start, prepared.parts[stretch.part].end),
+                intervals: &self.intervals,
+                lanes: stretch.lanes(),
+                held: holds_frame,
+            };
+            in_lanes(&mut frames);
+            holds_frame = frames.held;
         }
-        for (i, lane) in lanes.enumerate().filter(|_| !fits_alike) {
-            let source = if !holds_frame(lane) {
-                Source::Constant(NONE)
+        for (i, lane) in stretch.lanes().enumerate() {
+            let (start, key) = (self.intervals.starts[lane], stretch.key_at(i));
+            if !holds_frame[lane] {
+                prepared.push_span(start, Source::Constant(NONE), NONE);
+            } else if self.holds(stretch, lane) {
+                let constant = match self.interpolation.quantity {
+                    Quantity::Rotation => stretch.still + i as u32,
+                    _ => prepared.constant(STILL),
+                };
+                prepared.push_span(start, Source::Constant(constant), NONE);
             } else if is_steady {
-                let keys = self.intervals.keys(lane);
-                self.fitting.take_steady(prepared, keys)
-            } else if !self.holds(stretch, lane) {
-                self.take(prepared, stretch, lane..lane + 1);
-                continue;
-            } else if self.interpolation.quantity == Quantity::Rotation {
-                Source::Constant(stretch.still + i as u32)
+                prepared.push_segment(start, arc_polynomial(self.intervals.keys(lane)), key);
+            } else if let Some(direct) = &mut self.direct {
+                direct.take(prepared, &self.intervals, lane, key);
             } else {
-                Source::Constant(prepared.constant(STILL))
-            };
-            let key = match source {
-                Source::Constant(_) => NONE,
-                _ => stretch.key_at(i),
-            };
-            prepared.push_span(self.intervals.starts[lane], source, key);
+                let place = prepared.push_segment(start, PolynomialSegment::zeroed(), key);
+                self.fitting.take(&self.intervals, lane, place);
+            }
         }
         let end = prepared.spans.len();
         let spans = &mut prepared.parts[stretch.part].spans;
@@ -314,35 +292,10 @@ impl SmoothPreparation {
         spans.end = end;
     }
 
-    /// Takes the curves in some lanes of a stretch: they become the next spans.
-    fn take(&mut self, prepared: &mut Prepared, stretch: &Stretch, lanes: Range<usize>) {
-        let key = stretch.key_at(lanes.start - stretch.lane);
-        match &mut self.direct {
-            Some(direct) => direct.take(prepared, &self.intervals, lanes, key),
-            None => self.fitting.take(prepared, &self.intervals, lanes, key),
-        }
-    }
-
-    /// Computes the curves of the intervals that wait. Returns whether they are there in f64.
-    fn curves(&mut self) -> bool {
-        if let Some(direct) = &mut self.direct {
-            direct.find_curves(&self.intervals, &self.stretches);
-            let sides = [self.interpolation.before, self.interpolation.after];
-            let is_wanted = sides.into_iter().any(|side| self.goes_on(side)) || self.is_frozen();
-            if !is_wanted {
-                return false;
-            }
-        }
-        in_lanes(&mut Steps(&mut self.intervals));
-        let ends = self.interpolation.ends;
-        (self.smooth.curves)(&mut self.intervals, &self.stretches, ends);
-        true
-    }
-
     /// Whether an interval stands still.
     fn holds(&self, stretch: &Stretch, lane: usize) -> bool {
-        let at_end = stretch.first() == Some(lane) || stretch.last() == Some(lane);
-        self.is_frozen() && at_end && stretch.all > 1
+        let at_end = || stretch.first() == Some(lane) || stretch.last() == Some(lane);
+        self.is_frozen() && stretch.all > 1 && at_end()
     }
 
     /// Whether tracks are extrapolated on a side with this wrap mode. A track that stands still in
@@ -353,67 +306,44 @@ impl SmoothPreparation {
 
     fn is_frozen(&self) -> bool {
         let uses_ends = self.interpolation.method.uses_neighbours;
-        uses_ends && matches!(self.interpolation.ends, Ends::Frozen)
+        uses_ends && self.interpolation.ends == Ends::Frozen
     }
 
-    /// Adds the curves that extrapolate a track at the angular velocity of its ends, where the wrap
-    /// mode asks for it.
-    fn beyond(&self, prepared: &mut Prepared, stretch: &Stretch) {
-        let sides = [
-            (stretch.first(), self.interpolation.before, 0.0),
-            (stretch.last(), self.interpolation.after, 1.0),
-        ];
-        for (lane, outside, t) in sides {
-            let (Some(lane), true) = (lane, self.goes_on(outside)) else {
-                continue;
-            };
-            let quantity = self.interpolation.quantity;
-            let curve = self.intervals.curve(lane, self.smooth.shape, quantity);
-            prepared.exact.push(curve.beyond(t));
-            let place = prepared.exact.len() as u32 - 1;
-            let beyond = prepared.parts[stretch.part].beyond(stretch.span);
-            if t == 0.0 {
-                beyond.from_before = place;
-            } else {
-                beyond.from_after = place;
-            }
-        }
-    }
-
-    /// Adds the constants held outside a curve that does not pass through its keys: its own end
+    /// Adds what lies at a track's ends, where a stretch reaches them, and outside: the curves that
+    /// extrapolate the track at the angular velocity of its ends, where the wrap mode asks for it,
+    /// and what a curve that does not pass through its keys holds instead of them: its own end
     /// values for rotations, 0 for velocities and accelerations.
-    fn end_values(&self, prepared: &mut Prepared, stretch: &Stretch) {
-        if stretch.key != NONE {
-            return;
-        }
-        let quantity = self.interpolation.quantity;
-        let value =
-            |constants: &[[f32; 4]], lane: usize, end: usize| match (self.is_frozen(), quantity) {
-                (true, Quantity::Rotation) => {
-                    let place = stretch.still as usize + (lane - stretch.lane) + end;
-                    constants[place]
-                }
-                (true, _) => STILL,
-                _ => {
-                    let curve = self.intervals.curve(lane, self.smooth.shape, quantity);
-                    round_quat(curve.value(end as f64))
-                }
-            };
-        let held = |value| match quantity {
-            Quantity::Rotation => value,
-            _ => STILL,
-        };
-        if let (Some(lane), false) = (stretch.first(), self.goes_on(self.interpolation.before)) {
-            let at_start = value(&prepared.constants, lane, 0);
-            prepared.parts[stretch.part].before = prepared.constant(held(at_start));
-        }
-        if let Some(lane) = stretch.last() {
-            let at_end = value(&prepared.constants, lane, 1);
-            if !self.goes_on(self.interpolation.after) {
-                let after = prepared.constant(held(at_end));
-                prepared.parts[stretch.part].after = after;
+    fn add_ends(&self, prepared: &mut Prepared, stretch: &Stretch) {
+        let Interpolation { before, after, .. } = self.interpolation;
+        let of_rotations = self.interpolation.quantity == Quantity::Rotation;
+        let sides = [(stretch.first(), before, 0), (stretch.last(), after, 1)];
+        for (lane, outside, end) in sides {
+            let Some(lane) = lane else { continue };
+            let goes_on = self.goes_on(outside);
+            if goes_on {
+                prepared.exact.push(self.curve(lane).beyond(end as f64));
+                let place = prepared.exact.len() as u32 - 1;
+                let beyond = prepared.parts[stretch.part].beyond(stretch.span);
+                *[&mut beyond.from_before, &mut beyond.from_after][end] = place;
             }
-            if quantity != Quantity::Rotation {
+            if stretch.key != NONE {
+                continue;
+            }
+            let own = || round_quat(self.curve(lane).value(end as f64));
+            if !goes_on {
+                let held = match of_rotations {
+                    true if self.is_frozen() => {
+                        prepared.constants[stretch.still as usize + (lane - stretch.lane) + end]
+                    }
+                    true => own(),
+                    false => STILL,
+                };
+                let held = prepared.constant(held);
+                let part = &mut prepared.parts[stretch.part];
+                *[&mut part.before, &mut part.after][end] = held;
+            }
+            if !of_rotations && end == 1 {
+                let at_end = if self.is_frozen() { STILL } else { own() };
                 let at_end = prepared.constant(at_end);
                 prepared.parts[stretch.part].beyond(stretch.span).at_end = at_end;
             }

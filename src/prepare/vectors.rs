@@ -5,7 +5,7 @@ use bytemuck::Zeroable;
 use glam::{DVec3, Vec3};
 
 use crate::curve::options::Quantity;
-use crate::fit::double::curve::{Curve, Piece};
+use crate::fit::double::curve::Curve;
 use crate::fit::double::shape::Shape;
 use crate::math::canonical::{canonical, round_f32, round_quat};
 use crate::math::quaternion::ratio;
@@ -14,100 +14,66 @@ use crate::method::vector_curve::{Cubic, Curves};
 use crate::method::vector_method::VectorMethod;
 use crate::prepare::prepared::Prepared;
 use crate::shader::PolynomialSegment;
-use crate::time::spans::{Beyond, NONE, Part, Source};
+use crate::time::spans::{NONE, Source};
 use crate::time::wrap::WrapMode;
 use crate::tracks::vectors::VectorTrack;
 
-/// Adds the vectors of the `index`th track; a track without vectors is held at `rest`.
+/// Adds the vectors of the `index`th track.
 pub(crate) fn add(
     prepared: &mut Prepared,
     index: usize,
-    track: Option<&VectorTrack>,
-    rest: Vec3,
+    track: &VectorTrack,
     method: VectorMethod,
     interpolation: &Interpolation,
 ) {
-    let still = VectorTrack {
-        times: vec![0.0],
-        keys: vec![rest],
-        tangents: Vec::new(),
-        ups: Vec::new(),
-    };
-    let track = track.unwrap_or(&still);
     let last = track.keys.len() - 1;
     let first_key = prepared.constants.len() as u32;
     let stored = |key: &Vec3| [canonical(key.x), canonical(key.y), canonical(key.z), 0.0];
     prepared.constants.extend(track.keys.iter().map(stored));
     let first_span = prepared.spans.len();
     let curves = Curves::new(track, method, interpolation.ends);
-    let mut beyond = [NONE; 2];
-    let mut held_keys = [first_key, first_key + last as u32];
+    // A B-spline passes near its keys.
+    let meets_keys = method != VectorMethod::BSpline;
+    let mut held = [first_key, first_key + last as u32];
+    let mut lines = [NONE; 2];
     for i in 0..last {
-        let key = first_key + i as u32;
+        let (start, key) = (track.times[i], first_key + i as u32);
         if curves.is_held(i) {
-            prepared.push_span(track.times[i], Source::Constant(key), NONE);
+            prepared.push_span(start, Source::Constant(key), NONE);
             continue;
         }
         let curve = curves.of(i);
-        let Cubic {
-            start,
-            leaving,
-            arriving,
-            end,
-        } = curve;
-        let segments = &mut prepared.segments.polynomials;
-        let source = Source::Segment(segments.len() as u32);
-        segments.push(segment(&curve));
-        let meets_key = curves.meets_keys();
-        prepared.push_span(track.times[i], source, if meets_key { key } else { NONE });
-        if !meets_key {
-            for (at_end, held, value) in [(i == 0, 0, start), (i + 1 == last, 1, end)] {
-                if at_end {
-                    held_keys[held] =
-                        prepared.constant(round_quat([value.x, value.y, value.z, 0.0]));
-                }
-            }
-        }
-        let rate = ratio(1.0, track.times[i + 1] - track.times[i]);
+        prepared.push_segment(start, segment(&curve), if meets_keys { key } else { NONE });
+        let rate = ratio(1.0, track.times[i + 1] - start);
+        let (before, after) = (interpolation.before, interpolation.after);
         let sides = [
-            (i == 0, interpolation.before, start, leaving),
-            (i + 1 == last, interpolation.after, end, arriving),
+            (i == 0, before, curve.start, curve.leaving),
+            (i + 1 == last, after, curve.end, curve.arriving),
         ];
-        for (beyond, (at_end, outside, from, slope)) in beyond.iter_mut().zip(sides) {
-            if at_end && outside == WrapMode::Extrapolate {
-                *beyond = prepared.exact.len() as u32;
-                prepared.exact.push(line(from, slope * rate));
+        for (side, (is_at_end, outside, value, slope)) in sides.into_iter().enumerate() {
+            if is_at_end && outside == WrapMode::Extrapolate {
+                lines[side] = prepared.exact.len() as u32;
+                prepared.exact.push(line(value, slope * rate));
+                held[side] = NONE;
+            } else if is_at_end && !meets_keys {
+                held[side] = prepared.constant(round_quat([value.x, value.y, value.z, 0.0]));
             }
         }
     }
-    let held = |beyond: u32, key: u32| if beyond == NONE { key } else { NONE };
-    let times = (track.times[0], track.times[last]);
-    let goes_on = beyond != [NONE; 2];
-    prepared.parts.push(Part {
-        track: index as u32,
-        first_key: 0,
-        spans: first_span..first_span + last,
-        end: track.times[last],
-        before: held(beyond[0], held_keys[0]),
-        after: held(beyond[1], held_keys[1]),
-        beyond: (goes_on || prepared.wrap.repeats()).then(|| {
-            Box::new(Beyond {
-                from_before: beyond[0],
-                from_after: beyond[1],
-                ..Beyond::new(&[times.0, times.1])
-            })
-        }),
-    });
+    let spans = first_span..first_span + last;
+    prepared.push_part(index, &track.times, &(0..last), spans, held);
+    if lines != [NONE; 2]
+        && let Some(part) = prepared.parts.last_mut()
+    {
+        let beyond = part.beyond((track.times[0], track.times[last]));
+        [beyond.from_before, beyond.from_after] = lines;
+    }
 }
 
 /// A cubic in powers about its middle.
 fn segment(cubic: &Cubic) -> PolynomialSegment {
-    let &Cubic {
-        start,
-        leaving,
-        arriving,
-        end,
-    } = cubic;
+    let (start, end) = (cubic.start, cubic.end);
+    let (leaving, arriving) = (cubic.leaving, cubic.arriving);
     let rise = end - start;
     let powers = [
         (start + end) * 0.5 + (leaving - arriving) * 0.125,
@@ -128,12 +94,5 @@ fn line(from: DVec3, slope: DVec3) -> Curve {
     let mut numbers = shape.shared;
     numbers[..3].copy_from_slice(&from.to_array());
     numbers[4..7].copy_from_slice(&slope.to_array());
-    Curve {
-        shape,
-        numbers,
-        piece: Piece::WHOLE,
-        quantity: Quantity::Rotation,
-        rate: 1.0,
-        pace: None,
-    }
+    Curve::new(shape, numbers, Quantity::Rotation, 1.0)
 }

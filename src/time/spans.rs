@@ -93,25 +93,6 @@ impl Spans {
         self.starts.len()
     }
 
-    /// Adds spans that start at these times, with the constants `key`, `key + 1` and so on at their
-    /// starts, or with none. The caller adds their sources.
-    #[inline]
-    pub(crate) fn begin(&mut self, starts: &[f64], key: u32) {
-        self.starts.extend_from_slice(starts);
-        match key {
-            NONE => self.keys.resize(self.keys.len() + starts.len(), NONE),
-            first => self.keys.extend(first..first + starts.len() as u32),
-        }
-    }
-
-    /// Appends a range of other spans.
-    pub(crate) fn extend(&mut self, other: &Self, range: Range<usize>) {
-        self.starts.extend_from_slice(&other.starts[range.clone()]);
-        self.sources
-            .extend_from_slice(&other.sources[range.clone()]);
-        self.keys.extend_from_slice(&other.keys[range]);
-    }
-
     pub(crate) fn reserve(&mut self, count: usize) {
         self.starts.reserve(count);
         self.sources.reserve(count);

@@ -12,11 +12,9 @@ use glam::{DQuat, DVec3, Quat};
 
 use crate::from_keys::KeyCurve;
 use crate::from_keys::dispatches::KeyJob;
-use crate::from_keys::upload::Keys;
 use crate::gpu::grid::{GridRows, write_blocks};
-use crate::gpu::in_flight::write;
 use crate::gpu::sample_list::SampleList;
-use crate::gpu::work_list::{Cut, GroupWork, work};
+use crate::gpu::work_list::{Cut, GroupWork, work, write};
 use crate::method::Method;
 use crate::method::bessel_overhauser::BESSEL_OVERHAUSER;
 use crate::method::interpolation::Interpolation;
@@ -301,9 +299,7 @@ fn of_clip(set: &TrackSet, frames: &Frames, method: Method, layout: Layout, cut:
         ..Wanted::all(set)
     };
     let clip = ClipData::new(set, method.into(), wanted).unwrap();
-    let timeline = frames
-        .resolve(clip.track_count(), clip.time_span())
-        .unwrap();
+    let timeline = frames.resolve(clip.track_count(), clip.time_span).unwrap();
     let window = Window::whole(clip.track_count(), timeline.len(), layout);
     let [group] = &clip.groups[..] else {
         panic!("one group");
@@ -325,7 +321,7 @@ fn of_clip(set: &TrackSet, frames: &Frames, method: Method, layout: Layout, cut:
                 source: 0,
                 parameter: 0.0
             };
-            list.count()
+            window.len()
         ];
         list.write(&mut samples, 0).unwrap();
         globals.push(("samples", cells(bytemuck::cast_slice(&samples))));
@@ -403,14 +399,14 @@ fn of_keys(set: &TrackSet, frames: &Frames, method: Method) -> Launch {
     };
     let dispatch = job.dispatches().next(1 << 21).unwrap().unwrap();
     let rows = dispatch.rows(true);
-    let [keys, samples, _, weights] = dispatch.bytes();
+    let [keys, samples, weights] = dispatch.bytes();
     let mut keys = vec![[0u32; 4]; keys / 16];
     let mut samples: Vec<KeySample> =
         vec![bytemuck::Zeroable::zeroed(); samples / size_of::<KeySample>()];
     let mut weights: Vec<TangentWeights> =
         vec![bytemuck::Zeroable::zeroed(); weights / size_of::<TangentWeights>()];
     dispatch
-        .write(Keys::Copied(&mut keys), &mut samples, &mut weights)
+        .write(None, &mut keys, &mut samples, &mut weights)
         .unwrap();
     let kernel = match curve {
         KeyCurve::Arcs => "from_keys_arcs",

@@ -1,4 +1,4 @@
-//! Curves in the four components, normalised: straight lines, and the cubics of glTF.
+//! Curves in the four components: straight lines, and the cubics of glTF.
 
 use crate::curve::formula::{Formula, NUMBERS, normalised, quaternion, weighted};
 use crate::math::dual::Scalar;
@@ -16,6 +16,17 @@ impl Formula for Linear {
             quaternion(numbers, 12),
             t,
         ))
+    }
+}
+
+/// A straight line, not normalised. Numbers: its value at 0, and its slope.
+pub(crate) struct Line;
+
+impl Formula for Line {
+    #[inline(always)]
+    fn rotation<S: Scalar>(numbers: &[S::Constant; NUMBERS], t: S) -> [S; 4] {
+        let start = quaternion(numbers, 0);
+        weighted(start, S::all(1.0), quaternion(numbers, 4), t)
     }
 }
 

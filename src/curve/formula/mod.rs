@@ -6,7 +6,6 @@
 
 pub(crate) mod de_casteljau;
 pub(crate) mod hermite;
-pub(crate) mod line;
 pub(crate) mod product;
 pub(crate) mod rotation_vector;
 pub(crate) mod squad;

@@ -14,20 +14,18 @@ impl Product {
     pub(crate) const VECTORS: usize = 4;
     pub(crate) const BASIS: usize = 13;
 
-    /// The numbers of a curve with the cumulative Bernstein basis, `1-(1-t)³`, `t²(3-2t)`, `t³`;
-    /// base and vectors are still 0.
-    pub(crate) const BERNSTEIN: Numbers = {
+    /// The cumulative Bernstein basis, `1-(1-t)³`, `t²(3-2t)`, `t³`.
+    pub(crate) const BERNSTEIN: [[f64; 4]; 3] = [
+        [0.0, 3.0, -3.0, 1.0],
+        [0.0, 0.0, 3.0, -2.0],
+        [0.0, 0.0, 0.0, 1.0],
+    ];
+
+    /// The numbers of a curve with that basis; base and vectors are still 0.
+    pub(crate) const WITH_BERNSTEIN: Numbers = {
         let mut numbers = [0.0; NUMBERS];
-        let basis = [
-            [0.0, 3.0, -3.0, 1.0],
-            [0.0, 0.0, 3.0, -2.0],
-            [0.0, 0.0, 0.0, 1.0],
-        ];
-        let mut i = 0;
-        while i < 12 {
-            numbers[Self::BASIS + i] = basis[i / 4][i % 4];
-            i += 1;
-        }
+        let (_, basis) = numbers.split_at_mut(Self::BASIS);
+        basis.copy_from_slice(Self::BERNSTEIN.as_flattened());
         numbers
     };
 }

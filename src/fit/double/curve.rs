@@ -11,7 +11,7 @@ use crate::math::dual::Dual;
 use crate::math::quaternion::{Quaternion, dot};
 
 /// The curve of one key interval, or a piece of it.
-#[derive(Clone)]
+#[derive(Debug, Clone)]
 pub(crate) struct Curve {
     pub(crate) shape: &'static Shape,
     pub(crate) numbers: Numbers,
@@ -56,6 +56,23 @@ impl Piece {
 }
 
 impl Curve {
+    /// A whole curve, traversed as the key times say.
+    pub(crate) fn new(
+        shape: &'static Shape,
+        numbers: Numbers,
+        quantity: Quantity,
+        rate: f64,
+    ) -> Self {
+        Self {
+            shape,
+            numbers,
+            piece: Piece::WHOLE,
+            quantity,
+            rate,
+            pace: None,
+        }
+    }
+
     /// The value of the curve's quantity at `t`, which runs from 0 to 1 over its piece.
     pub(crate) fn value(&self, t: f64) -> Quaternion {
         let (start, width) = self.piece.extent();
@@ -91,27 +108,11 @@ impl Curve {
         let mut numbers = shape.shared;
         numbers[..4].copy_from_slice(&rotation.map(|dual| dual.value));
         numbers[4..7].copy_from_slice(&half);
-        Self {
-            shape,
-            numbers,
-            piece: Piece::WHOLE,
-            quantity: self.quantity,
-            rate: 1.0,
-            pace: None,
-        }
+        Self::new(shape, numbers, self.quantity, 1.0)
     }
 
     /// The rotation and its derivatives, as dual numbers.
     pub(crate) fn moving(&self, parameter: Dual) -> [Dual; 4] {
         (self.shape.moving)(&self.numbers, parameter)
-    }
-}
-
-impl std::fmt::Debug for Curve {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Curve")
-            .field("numbers", &&self.numbers[..self.shape.own])
-            .field("piece", &self.piece)
-            .finish_non_exhaustive()
     }
 }

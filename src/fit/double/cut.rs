@@ -37,20 +37,15 @@ pub(crate) struct Subcurve {
 impl Subcurve {
     /// Both halves. The first keeps the segment of the whole, so that segments lie nearly in the
     /// order in which they are evaluated.
-    fn halves(self) -> [Self; 2] {
-        let [first, second] = self.piece.halves();
+    fn halves(mut self) -> [Self; 2] {
+        let [first, piece] = self.piece.halves();
+        self.piece = first;
         let second = Self {
-            piece: second,
+            piece,
             segment: None,
             ..self
         };
-        [
-            Self {
-                piece: first,
-                ..self
-            },
-            second,
-        ]
+        [self, second]
     }
 }
 
@@ -66,27 +61,20 @@ impl Cutter {
         }
     }
 
-    /// Adds the curve of a span that has a segment. It is cut into at least two subcurves.
-    pub(crate) fn push(&mut self, span: usize, curve: Curve, segment: usize) {
-        let whole = self.subcurve(span, &curve, Some(segment));
-        self.waiting.extend(whole.halves());
-        self.curves.push(curve);
-    }
-
-    /// Adds the curve of a span, which is cut only if it does not fit as a whole.
-    pub(crate) fn push_whole(&mut self, span: usize, curve: Curve) {
-        self.waiting.push(self.subcurve(span, &curve, None));
-        self.curves.push(curve);
-    }
-
-    /// The subcurve that is the whole of the curve added next.
-    fn subcurve(&self, span: usize, curve: &Curve, segment: Option<usize>) -> Subcurve {
-        Subcurve {
+    /// Adds the curve of a span. If the span has a segment, the curve is known not to fit as a whole
+    /// and is cut into at least two subcurves; else it is cut only if it does not fit.
+    pub(crate) fn push(&mut self, span: usize, curve: Curve, segment: Option<usize>) {
+        let whole = Subcurve {
             span,
             curve: self.curves.len(),
             piece: curve.piece,
             segment,
+        };
+        match segment {
+            Some(_) => self.waiting.extend(whole.halves()),
+            None => self.waiting.push(whole),
         }
+        self.curves.push(curve);
     }
 
     /// Cuts and fits the curves that were added.

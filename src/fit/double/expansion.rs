@@ -1,9 +1,8 @@
 //! Samples cubics in cumulative form at the nodes, in vector lanes: the first half of a fit.
 
-use crate::curve::formula::Numbers;
 use crate::curve::formula::product::Product;
 use crate::fit::double::fit::{FitBlock, Lane64, MOST, Samples, Tier};
-use crate::fit::double::intervals::{LANES, load, load3, load4, rounded};
+use crate::fit::double::intervals::{at, load, put, rounded, store};
 use crate::fit::double::shape::Sampling;
 use crate::fit::nodes::Nodes;
 use crate::math::quaternion::{
@@ -16,7 +15,7 @@ use crate::twin::sine_cosine::{sine_cosm1, sine_cosm1_quarter};
 use crate::twin::small_angle::{FromIdentity, inverse_rotated};
 
 /// Samples a cubic by its expansion about the middle, in f32. With `OWN_BASIS` each curve has basis
-/// functions of its own; without it all share those of their shape.
+/// functions of its own; without it all have Bernstein's.
 pub(crate) struct Expansion<const OWN_BASIS: bool>;
 
 impl<const OWN_BASIS: bool> Sampling for Expansion<OWN_BASIS> {
@@ -41,15 +40,13 @@ fn fit<L: Lanes, const PAIRS: usize, const OWN_BASIS: bool, const WHOLE: bool>(
     nodes: &Nodes<PAIRS>,
     segments: &mut [PolynomialSegment],
 ) {
-    // A copy, as the compiler could not rule out that the writes below change a referenced value.
-    let shared = block.shape.shared;
     for lane in (0..block.whole()).step_by(L::COUNT) {
-        let first = Factor::<L>::new::<OWN_BASIS, WHOLE>(block, &shared, lane, 0);
-        let second = Factor::<L>::new::<OWN_BASIS, WHOLE>(block, &shared, lane, 1);
-        let third = Factor::<L>::new::<OWN_BASIS, WHOLE>(block, &shared, lane, 2);
+        let first = Factor::<L>::new::<OWN_BASIS, WHOLE>(block, lane, 0);
+        let second = Factor::<L>::new::<OWN_BASIS, WHOLE>(block, lane, 1);
+        let third = Factor::<L>::new::<OWN_BASIS, WHOLE>(block, lane, 2);
         let reach = third.reach.larger(second.reach.larger(first.reach));
         reach.store(&mut block.reaches[lane..]);
-        let base = load4::<L, LANES>(from(&block.numbers, 0), lane);
+        let base = load::<L, _, _>(from(&block.numbers, 0), lane);
         let samples = Expanded::new(base, [first, second, third]).sample::<PAIRS, WHOLE>(nodes);
         block.interpolate(lane, nodes, &samples, segments);
     }
@@ -74,30 +71,24 @@ impl<L: Lanes> Factor<L> {
     #[inline(always)]
     fn new<const OWN_BASIS: bool, const WHOLE: bool>(
         block: &FitBlock,
-        shared: &Numbers,
         lane: usize,
         j: usize,
     ) -> Self {
-        let place = Product::BASIS + 4 * j;
         let [c0, c1, c2, c3] = if OWN_BASIS {
-            load4::<L, LANES>(from(&block.numbers, place), lane)
+            load::<L, _, _>(from(&block.numbers, Product::BASIS + 4 * j), lane)
         } else {
-            [
-                all::<L>(shared[place]),
-                all::<L>(shared[place + 1]),
-                all::<L>(shared[place + 2]),
-                all::<L>(shared[place + 3]),
-            ]
+            let [c0, c1, c2, c3] = Product::BERNSTEIN[j];
+            [all::<L>(c0), all::<L>(c1), all::<L>(c2), all::<L>(c3)]
         };
         let (middle, width) = if WHOLE {
             (all::<L>(0.5), all::<L>(1.0))
         } else {
             (
-                load::<L>(&block.middles, lane),
-                load::<L>(&block.widths, lane),
+                L::Doubles::load(&block.middles[lane..]),
+                L::Doubles::load(&block.widths[lane..]),
             )
         };
-        let vector = load3::<L, LANES>(from(&block.numbers, Product::VECTORS + 3 * j), lane);
+        let vector = load::<L, _, _>(from(&block.numbers, Product::VECTORS + 3 * j), lane);
         let squared = square(vector);
         let weight = ((c3 * middle + c2) * middle + c1) * middle + c0;
         // B_j(middle + s width) - B_j(middle), in powers of s.
@@ -112,12 +103,8 @@ impl<L: Lanes> Factor<L> {
         let (before, after) = (odd - even, odd + even);
         let far = (before * before).larger(after * after);
         Self {
-            turn: exp_in_lanes::<L::Doubles, WHOLE>(scaled(vector, weight)),
-            vector: [
-                L::rounded(vector[0]),
-                L::rounded(vector[1]),
-                L::rounded(vector[2]),
-            ],
+            turn: exp_in_lanes::<L, WHOLE>(scaled(vector, weight)),
+            vector: rounded(vector),
             square: L::rounded(squared),
             powers: [L::rounded(linear), L::rounded(quadratic), L::rounded(cubic)],
             reach: squared * far,
@@ -128,7 +115,7 @@ impl<L: Lanes> Factor<L> {
 /// The exponentials of half-rotation vectors by polynomials; lanes whose vector is too long for
 /// them are computed over the full range.
 #[inline(always)]
-fn exp_in_lanes<D: Doubles, const SHORT: bool>(vector: [D; 3]) -> [D; 4] {
+fn exp_in_lanes<L: Lanes, const SHORT: bool>(vector: [L::Doubles; 3]) -> [L::Doubles; 4] {
     let squared = square(vector);
     let (limit, waves) = if SHORT {
         (SHORT_SQUARE, short_waves(squared))
@@ -139,46 +126,24 @@ fn exp_in_lanes<D: Doubles, const SHORT: bool>(vector: [D; 3]) -> [D; 4] {
     if squared.are_at_most(limit) {
         return turn;
     }
-    let mut lanes = Turns {
-        vectors: lanes(vector),
-        turns: lanes(turn),
-    };
-    lanes.beyond(limit);
-    let [x, y, z, w] = &lanes.turns;
-    [D::load(x), D::load(y), D::load(z), D::load(w)]
+    let (mut vectors, mut turns) = ([[0.0; MOST]; 3], [[0.0; MOST]; 4]);
+    store(&mut vectors, 0, vector);
+    store(&mut turns, 0, turn);
+    exp_beyond(limit, &vectors, &mut turns);
+    load::<L, _, _>(&turns, 0)
 }
 
-/// Half-rotation vectors and their exponentials.
-struct Turns {
-    vectors: [[f64; MOST]; 3],
-    turns: [[f64; MOST]; 4],
-}
-
-impl Turns {
-    /// Computes the exponentials of vectors whose squares exceed `limit`, over the full range.
-    #[inline(never)]
-    fn beyond(&mut self, limit: f64) {
-        for lane in 0..MOST {
-            let vector = self.vectors.map(|lanes| lanes[lane]);
-            let squared = square(vector);
-            if squared > limit || squared.is_nan() {
-                let turn = quaternion::exp(vector);
-                for (lanes, component) in self.turns.iter_mut().zip(turn) {
-                    lanes[lane] = component;
-                }
-            }
+/// Computes the exponentials of half-rotation vectors whose squares exceed `limit`, over the full
+/// range.
+#[inline(never)]
+fn exp_beyond(limit: f64, vectors: &[[f64; MOST]; 3], turns: &mut [[f64; MOST]; 4]) {
+    for lane in 0..MOST {
+        let vector = at(vectors, lane);
+        let squared = square(vector);
+        if squared > limit || squared.is_nan() {
+            put(turns, lane, quaternion::exp(vector));
         }
     }
-}
-
-/// Each vector's lanes.
-#[inline(always)]
-fn lanes<D: Doubles, const N: usize>(vectors: [D; N]) -> [[f64; MOST]; N] {
-    let mut lanes = [[0.0; MOST]; N];
-    for (lanes, vector) in lanes.iter_mut().zip(vectors) {
-        vector.store(lanes);
-    }
-    lanes
 }
 
 /// The sine of an angle divided by the length of its vector, and the angle's cosine minus one.
@@ -253,7 +218,7 @@ impl<L: Lanes> Expanded<L> {
         let v1 = inverse_rotated(inverse_rotated(first.vector, r2), r3);
         let v2 = inverse_rotated(second.vector, r3);
         Self {
-            curve: AboutMiddle::new(rounded::<L>(middle), [v1, v2, third.vector]),
+            curve: AboutMiddle::new(rounded(middle), [v1, v2, third.vector]),
             squares: [first.square, second.square, third.square],
             powers: [first.powers, second.powers, third.powers],
         }

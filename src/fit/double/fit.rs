@@ -5,19 +5,17 @@
 //! enter as differences from it, for which f32 is precise enough. Divided differences come first
 //! and powers last, which keeps the rounding errors of f32 small.
 
-use std::array;
 use std::sync::Arc;
 
 use bytemuck::Zeroable;
 
 use crate::curve::formula::Numbers;
-use crate::curve::formula::product::Product;
 use crate::curve::options::Quantity;
 use crate::fit::double::curve::{Curve, Piece};
-use crate::fit::double::intervals::{Intervals, LANES, Lane};
-use crate::fit::double::shape::Shape;
+use crate::fit::double::intervals::{Intervals, LANES};
+use crate::fit::double::shape::{self, Shape};
 use crate::fit::motion::arc_length::Pace;
-use crate::fit::motion::derivatives as motion;
+use crate::fit::motion::derivatives::Motion;
 use crate::fit::nodes::{Nodes, tail};
 use crate::shader::{POWERS, PolynomialSegment};
 use crate::simd::lanes::{Lanes, canonical};
@@ -81,7 +79,7 @@ pub(crate) struct FitBlock {
     rates: Lane64,
     /// The arc lengths of curves traversed at constant speed; either every curve of a block has
     /// them or none.
-    paces: Vec<Option<Arc<Pace>>>,
+    paces: Vec<Arc<Pace>>,
     pub(crate) quantity: Quantity,
     /// How many curves it has.
     pub(crate) count: usize,
@@ -95,41 +93,23 @@ pub(crate) struct FitBlock {
 
 /// Samples of curves: the rotations at the middle, and for each pair of nodes `-s` and `s` the
 /// differences from the middle, as their sum (`even`) and their difference (`odd`).
-pub(crate) struct Samples<N, const PAIRS: usize> {
-    pub(crate) middle: [N; 4],
-    pub(crate) even: [[N; 4]; PAIRS],
-    pub(crate) odd: [[N; 4]; PAIRS],
+pub(crate) struct Samples<L, const PAIRS: usize> {
+    pub(crate) middle: [L; 4],
+    pub(crate) even: [[L; 4]; PAIRS],
+    pub(crate) odd: [[L; 4]; PAIRS],
 }
 
-impl<N: Copy, const PAIRS: usize> Samples<N, PAIRS> {
+impl<L: Lanes, const PAIRS: usize> Samples<L, PAIRS> {
     /// Samples that all have the same value.
     #[inline(always)]
-    pub(crate) fn all(number: N) -> Self {
+    pub(crate) fn all(number: L) -> Self {
         Self {
             middle: [number; 4],
             even: [[number; 4]; PAIRS],
             odd: [[number; 4]; PAIRS],
         }
     }
-}
 
-impl<const WIDTH: usize, const PAIRS: usize> Samples<[f32; WIDTH], PAIRS> {
-    /// The samples of one vector's lanes, from `lane` on.
-    #[inline(always)]
-    pub(crate) fn at<L: Lanes>(&self, lane: usize) -> Samples<L, PAIRS> {
-        let mut own = Samples::all(L::all(0.0));
-        for c in 0..4 {
-            own.middle[c] = L::load(&self.middle[c][lane..]);
-            for k in 0..PAIRS {
-                own.even[k][c] = L::load(&self.even[k][c][lane..]);
-                own.odd[k][c] = L::load(&self.odd[k][c][lane..]);
-            }
-        }
-        own
-    }
-}
-
-impl<L: Lanes, const PAIRS: usize> Samples<L, PAIRS> {
     /// Sets the samples of the `k`th pair of nodes from the differences of the rotations before
     /// and after the middle from the one at the middle.
     #[inline(always)]
@@ -148,14 +128,6 @@ impl<L: Lanes, const PAIRS: usize> Samples<L, PAIRS> {
         }
     }
 
-    /// Sets the first derivative by s at the middle, and half of the second. The first node of
-    /// these fits is s = 0.
-    #[inline(always)]
-    pub(crate) fn set_middle(&mut self, derivative: [L; 4], half_second: [L; 4]) {
-        self.odd[0] = derivative;
-        self.even[0] = half_second;
-    }
-
     /// Sets the derivatives by s at the ends, which are the last pair of nodes and are there twice.
     /// Each is stored as a second sample, whose difference from the first is the derivative by s²
     /// that the divided differences of [`Nodes::powers`] need there.
@@ -168,20 +140,6 @@ impl<L: Lanes, const PAIRS: usize> Samples<L, PAIRS> {
             self.even[PAIRS - 1][c] = (after[c] - before[c]) - L::all(3.0) * even;
             self.odd[PAIRS - 1][c] = (after[c] + before[c]) - odd;
         }
-    }
-
-    /// The samples with each vector's lanes in an array.
-    #[inline(always)]
-    pub(crate) fn lanes(&self) -> Samples<[f32; MOST], PAIRS> {
-        let mut lanes = Samples::all([0.0; MOST]);
-        for c in 0..4 {
-            self.middle[c].store(&mut lanes.middle[c][..L::COUNT]);
-            for k in 0..PAIRS {
-                self.even[k][c].store(&mut lanes.even[k][c][..L::COUNT]);
-                self.odd[k][c].store(&mut lanes.odd[k][c][..L::COUNT]);
-            }
-        }
-        lanes
     }
 }
 
@@ -227,9 +185,7 @@ impl FitBlock {
             lanes[lane] = number;
         }
         self.rates[lane] = curve.rate;
-        if curve.pace.is_some() {
-            self.paces.push(curve.pace.clone());
-        }
+        self.paces.extend(curve.pace.clone());
         let (start, width) = piece.extent();
         self.widths[lane] = width;
         self.middles[lane] = start + 0.5 * width;
@@ -239,19 +195,9 @@ impl FitBlock {
     /// Adds the curves in some lanes of `intervals`; the block must have room for them.
     pub(crate) fn push_from(&mut self, intervals: &Intervals, lanes: &[u8]) {
         let own = self.count..self.count + lanes.len();
-        let (to, from) = (&mut self.numbers[..], &intervals.numbers[..]);
-        // With a count known at compile time all numbers of a lane are copied at once, which takes
-        // half the instructions.
-        if let (Ok(to), Ok(from)) = (to.try_into(), from.try_into()) {
-            copy::<{ Product::BASIS }>(to, own.start, from, lanes);
-        } else {
-            for (numbers, all) in self.numbers.iter_mut().zip(&intervals.numbers) {
-                copy(
-                    array::from_mut(numbers),
-                    own.start,
-                    array::from_ref(all),
-                    lanes,
-                );
+        for (numbers, all) in self.numbers.iter_mut().zip(&intervals.numbers) {
+            for (number, &lane) in numbers[own.clone()].iter_mut().zip(lanes) {
+                *number = all[usize::from(lane) % LANES];
             }
         }
         for (rate, &lane) in self.rates[own.clone()].iter_mut().zip(lanes) {
@@ -263,21 +209,17 @@ impl FitBlock {
         self.count = own.end;
     }
 
-    /// The own numbers of the curve in a lane, followed by zeros.
+    /// All numbers of the curve in a lane.
     pub(crate) fn numbers_of(&self, lane: usize) -> Numbers {
-        let own = &self.numbers[..];
-        array::from_fn(|i| own.get(i).map_or(0.0, |lanes| lanes[lane]))
+        self.shape.with(|i| self.numbers[i][lane])
     }
 
     /// The whole curve in a lane.
     pub(crate) fn curve(&self, lane: usize) -> Curve {
+        let (numbers, rate) = (self.numbers_of(lane), self.rates[lane]);
         Curve {
-            shape: self.shape,
-            numbers: self.shape.with(|i| self.numbers[i][lane]),
-            piece: Piece::WHOLE,
-            quantity: self.quantity,
-            rate: self.rates[lane],
-            pace: self.paces.get(lane).cloned().flatten(),
+            pace: self.paces.get(lane).cloned(),
+            ..Curve::new(self.shape, numbers, self.quantity, rate)
         }
     }
 
@@ -297,7 +239,7 @@ impl FitBlock {
         match self.quantity {
             _ if self.count == 0 => {}
             Quantity::Rotation if self.paces.is_empty() => (self.shape.fit)(self, segments),
-            _ => motion::fit(self, segments),
+            _ => shape::fit::<Motion>(self, segments),
         }
         segments.pop();
     }
@@ -386,14 +328,4 @@ pub(crate) fn coefficients<L: Lanes, const PAIRS: usize>(
         }
     }
     (powers, tails)
-}
-
-/// Copies the numbers of some lanes to consecutive lanes from `start` on.
-#[inline(always)]
-fn copy<const N: usize>(to: &mut [Lane64; N], start: usize, from: &[Lane; N], lanes: &[u8]) {
-    for (place, &lane) in (start..).zip(lanes) {
-        for c in 0..N {
-            to[c][place % LANES] = from[c][usize::from(lane) % LANES];
-        }
-    }
 }

@@ -6,9 +6,9 @@ use std::ops::Range;
 use crate::curve::formula::product::Product;
 use crate::fit::double::fit::MOST;
 use crate::fit::double::intervals::{
-    Intervals, LANES, Lane, ROOM, Stretch, at, load, load3, load4, put, squared_extent, store,
+    Intervals, LANES, Lane, ROOM, Stretch, at, load, put, squared_extent, store, widened,
 };
-use crate::math::quaternion::{self, Quaternion, Real, Vector, normalised, product, scaled, sum};
+use crate::math::quaternion::{self, Real, Vector, normalised, product, scaled, sum};
 use crate::math::ranges::{Algebra, FullRange, PrincipalRange};
 use crate::simd::dispatch::InLanes;
 use crate::simd::lanes::{Doubles, Lanes};
@@ -28,36 +28,33 @@ impl InLanes for Steps<'_> {
             let log = near.log(step);
             store(&mut own.steps, lane, step);
             store(&mut own.logs, lane, log);
-            if near.is_in_doubt() {
-                for j in near.lanes(lane, own.count) {
-                    put(&mut own.logs, j, quaternion::log(at(&own.steps, j)));
-                }
-            }
+            near.redo(lane, own.count, |j| {
+                put(&mut own.logs, j, quaternion::log(at(&own.steps, j)));
+            });
         }
     }
 }
 
 impl<D: Doubles> PrincipalRange<D> {
+    /// Calls `redo` for the lanes outside the principal range, among those from `lane` on and before
+    /// `end`; most vectors have none.
     #[inline(always)]
-    fn is_in_doubt(&self) -> bool {
-        !self.doubt.are_at_most(0.0)
-    }
-
-    /// The lanes outside the principal range, among those from `lane` on and before `end`.
-    #[inline(never)]
-    fn lanes(&self, lane: usize, end: usize) -> impl Iterator<Item = usize> + use<D> {
+    fn redo(&self, lane: usize, end: usize, redo: impl FnMut(usize)) {
+        if self.doubt.are_at_most(0.0) {
+            return;
+        }
         let mut doubts = [0.0; MOST];
         self.doubt.store(&mut doubts);
         let lanes = (lane..end).zip(doubts);
-        lanes.filter_map(|(lane, doubt)| (doubt != 0.0).then_some(lane))
+        let in_doubt = lanes.filter_map(|(lane, doubt)| (doubt != 0.0).then_some(lane));
+        in_doubt.for_each(redo);
     }
 }
 
 /// Keys in f64, normalised.
 #[inline(always)]
 fn units<L: Lanes>(keys: &[[f32; 4]; ROOM], lane: usize) -> [L::Doubles; 4] {
-    let [x, y, z, w] = L::load_rotations(&keys[lane..]);
-    normalised([x.widened(), y.widened(), z.widened(), w.widened()])
+    normalised(widened(L::load_rotations(&keys[lane..])))
 }
 
 /// Finds for each interval of some lanes whether a frame lies in it.
@@ -160,16 +157,13 @@ impl<R: HandleRule> InLanes for KeyHandles<'_, R> {
             let handles = R::handles(&mut near, [before, after]);
             store(&mut own.incoming, lane + 1, handles.incoming);
             store(&mut own.outgoing, lane + 1, handles.outgoing);
-            if near.is_in_doubt() {
+            near.redo(lane + 1, own.count, |j| {
                 // The context lanes of two neighbouring stretches do not share a key.
-                let is_key = |j: &usize| {
-                    let mut stretches = self.stretches.iter().map(Stretch::lanes);
-                    stretches.any(|lanes| (lanes.start..=lanes.end).contains(j))
-                };
-                for j in near.lanes(lane + 1, own.count).filter(is_key) {
+                let mut stretches = self.stretches.iter().map(Stretch::lanes);
+                if stretches.any(|lanes| (lanes.start..=lanes.end).contains(&j)) {
                     own.handles_full_range::<R>(j);
                 }
-            }
+            });
         }
     }
 }
@@ -178,10 +172,10 @@ impl Intervals {
     #[inline(always)]
     fn intervals<L: Lanes>(&self, lane: usize) -> Interval<L::Doubles> {
         Interval {
-            duration: load::<L>(&self.durations, lane),
-            step: load4::<L, ROOM>(&self.steps, lane),
-            log: load3::<L, ROOM>(&self.logs, lane),
-            key: load4::<L, ROOM>(&self.outward, lane),
+            duration: L::Doubles::load(&self.durations[lane..]),
+            step: load::<L, _, _>(&self.steps, lane),
+            log: load::<L, _, _>(&self.logs, lane),
+            key: load::<L, _, _>(&self.outward, lane),
         }
     }
 
@@ -209,25 +203,31 @@ impl InLanes for BetweenHandles<'_> {
     fn run<L: Lanes>(&mut self) {
         let own = &mut *self.0;
         for lane in (0..own.whole()).step_by(L::COUNT) {
-            let first = load3::<L, ROOM>(&own.outgoing, lane);
-            let step = load4::<L, ROOM>(&own.steps, lane);
-            let last = load3::<L, ROOM>(&own.incoming, lane + 1);
+            let first = load::<L, _, _>(&own.outgoing, lane);
+            let step = load::<L, _, _>(&own.steps, lane);
+            let last = load::<L, _, _>(&own.incoming, lane + 1);
             let mut near = PrincipalRange::new();
             let middle = between(&mut near, first, step, last);
-            let (bases, vectors) = product_numbers(&mut own.numbers);
-            store(bases, lane, units::<L>(&own.from, lane));
-            store_vectors(vectors, lane, [first, middle, last]);
-            squared_extent([first, middle, last]).store(&mut own.energies[lane..]);
-            if near.is_in_doubt() {
-                for j in near.lanes(lane, own.count) {
-                    own.between_full_range(j);
-                }
-            }
+            own.store_product(lane, units::<L>(&own.from, lane), [first, middle, last]);
+            near.redo(lane, own.count, |j| own.between_full_range(j));
         }
     }
 }
 
 impl Intervals {
+    /// Stores the bases and the vectors of [`Product`], and the squared extents, from `lane` on.
+    #[inline(always)]
+    fn store_product<D: Doubles>(&mut self, lane: usize, base: [D; 4], vectors: [[D; 3]; 3]) {
+        let numbers: &mut [Lane; Product::BASIS] =
+            (self.numbers.first_chunk_mut()).expect("a base and three vectors");
+        let ([x, y, z, w], [a, b, c]) = (base, vectors);
+        let own = [
+            x, y, z, w, a[0], a[1], a[2], b[0], b[1], b[2], c[0], c[1], c[2],
+        ];
+        store(numbers, lane, own);
+        squared_extent(vectors).store(&mut self.energies[lane..]);
+    }
+
     /// Computes the curve of a lane between its handles, over the full range.
     #[inline(never)]
     fn between_full_range(&mut self, lane: usize) {
@@ -237,23 +237,6 @@ impl Intervals {
         self.set_numbers(lane, Product::VECTORS, vectors.as_flattened());
         self.set_squared_extent(lane, vectors);
     }
-}
-
-/// The bases and the vectors among the numbers of [`Product`].
-#[inline(always)]
-fn product_numbers(numbers: &mut [Lane]) -> (&mut [Lane; 4], &mut [Lane; 9]) {
-    let (bases, others) = numbers.split_at_mut(Product::VECTORS);
-    let vectors = &mut others[..Product::BASIS - Product::VECTORS];
-    (
-        bases.try_into().expect("a quaternion"),
-        vectors.try_into().expect("three vectors"),
-    )
-}
-
-#[inline(always)]
-fn store_vectors<D: Doubles>(lanes: &mut [Lane; 9], lane: usize, [a, b, c]: [[D; 3]; 3]) {
-    let all = [a[0], a[1], a[2], b[0], b[1], b[2], c[0], c[1], c[2]];
-    store(lanes, lane, all);
 }
 
 /// `log(a⁻¹ b)`.
@@ -277,38 +260,22 @@ pub(crate) struct ControlRotations<'a>(pub(crate) &'a mut Intervals);
 impl InLanes for ControlRotations<'_> {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
-        let whole = self.0.whole();
-        let Intervals {
-            from,
-            steps,
-            logs,
-            incoming,
-            outgoing,
-            numbers,
-            energies,
-            ..
-        } = &mut *self.0;
-        let key = |j: usize| quaternion::unit(from[j]);
-        let handles = |j: usize| (at(outgoing, j), at(steps, j), at(incoming, j + 1));
-        let log = |j: usize| at(logs, j);
-        let controls = (&mut numbers[..16]).try_into().expect("four rotations");
-        control_lanes(whole, key, handles, log, controls, energies);
+        // Taken out, so that what is read and what is written are arguments of their own: the
+        // compiler then knows that they do not overlap, and makes vectors of the loop.
+        let mut numbers = std::mem::take(&mut self.0.numbers);
+        let mut energies = self.0.energies;
+        let controls = numbers.first_chunk_mut().expect("four rotations");
+        control_lanes(self.0, controls, &mut energies);
+        (self.0.numbers, self.0.energies) = (numbers, energies);
     }
 }
 
 #[inline(always)]
-fn control_lanes(
-    count: usize,
-    key: impl Fn(usize) -> Quaternion,
-    handles: impl Fn(usize) -> (Vector, Quaternion, Vector),
-    log: impl Fn(usize) -> Vector,
-    controls: &mut [Lane; 16],
-    energies: &mut Lane,
-) {
-    for j in 0..count {
-        let (first, step, last) = handles(j);
-        let start = key(j);
-        let end = product(start, step);
+fn control_lanes(own: &Intervals, controls: &mut [Lane; 16], energies: &mut Lane) {
+    for j in 0..own.whole() {
+        let (first, last) = (at(&own.outgoing, j), at(&own.incoming, j + 1));
+        let start = own.key(j);
+        let end = product(start, at(&own.steps, j));
         let a = product(start, quaternion::exp(first));
         let b = product(end, quaternion::exp(scaled(last, -1.0)));
         for (place, control) in [start, a, b, end].into_iter().enumerate() {
@@ -316,7 +283,7 @@ fn control_lanes(
                 controls[4 * place + c][j] = control[c];
             }
         }
-        energies[j] = squared_extent([first, log(j), last]);
+        energies[j] = squared_extent([first, at(&own.logs, j), last]);
     }
 }
 
@@ -329,23 +296,18 @@ impl InLanes for BetweenNeighbours<'_> {
     fn run<L: Lanes>(&mut self) {
         let own = &mut *self.0;
         for lane in (0..own.whole()).step_by(L::COUNT) {
-            let before = load3::<L, ROOM>(&own.logs, lane);
-            let log = load3::<L, ROOM>(&own.logs, lane + 1);
-            let after = load3::<L, ROOM>(&own.logs, lane + 2);
+            let before = load::<L, _, _>(&own.logs, lane);
+            let log = load::<L, _, _>(&own.logs, lane + 1);
+            let after = load::<L, _, _>(&own.logs, lane + 2);
             let mut near = PrincipalRange::new();
             let back = near.exp(scaled(before, L::Doubles::all(-1.0)));
             let base = product(units::<L>(&own.from, lane + 1), back);
-            let (bases, vectors) = product_numbers(&mut own.numbers);
-            store(bases, lane + 1, base);
-            store_vectors(vectors, lane + 1, [before, log, after]);
-            squared_extent([before, log, after]).store(&mut own.energies[lane + 1..]);
-            if near.is_in_doubt() {
-                for j in near.lanes(lane + 1, own.count) {
-                    let back = quaternion::exp(scaled(own.log(j - 1), -1.0));
-                    let base = product(own.key(j), back);
-                    own.set_numbers(j, 0, &base);
-                }
-            }
+            own.store_product(lane + 1, base, [before, log, after]);
+            near.redo(lane + 1, own.count, |j| {
+                let back = quaternion::exp(scaled(own.log(j - 1), -1.0));
+                let base = product(own.key(j), back);
+                own.set_numbers(j, 0, &base);
+            });
         }
     }
 }

@@ -9,9 +9,9 @@
 use std::ops::Range;
 
 use crate::curve::options::Quantity;
-use crate::fit::double::curve::{Curve, Piece};
+use crate::fit::double::curve::Curve;
 use crate::fit::double::shape::Shape;
-use crate::math::quaternion::{self, Arithmetic, Quaternion, Vector, square};
+use crate::math::quaternion::{self, Arithmetic, Quaternion, Real as _, Vector, square};
 use crate::simd::lanes::{Doubles, Lanes};
 use crate::time::spans::NONE;
 use crate::tracks::set::Track;
@@ -252,14 +252,8 @@ impl Intervals {
 
     /// The curve of an interval.
     pub(crate) fn curve(&self, lane: usize, shape: &'static Shape, quantity: Quantity) -> Curve {
-        Curve {
-            shape,
-            numbers: shape.with(|i| self.numbers[i][lane]),
-            piece: Piece::WHOLE,
-            quantity,
-            rate: self.rate(lane),
-            pace: None,
-        }
+        let numbers = shape.with(|i| self.numbers[i][lane]);
+        Curve::new(shape, numbers, quantity, self.rate(lane))
     }
 
     /// The keys at both ends of an interval.
@@ -308,35 +302,34 @@ pub(crate) fn squared_extent<N: Arithmetic>([a, b, c]: [[N; 3]; 3]) -> N {
 
 /// The numbers of a vector's lanes from `lane` on.
 #[inline(always)]
-pub(crate) fn load<L: Lanes>(numbers: &[f64], lane: usize) -> L::Doubles {
-    L::Doubles::load(&numbers[lane..])
-}
-
-// Written out: closures are not always inlined.
-#[inline(always)]
-pub(crate) fn load3<L: Lanes, const WIDTH: usize>(
-    [x, y, z]: &[[f64; WIDTH]; 3],
+pub(crate) fn load<L: Lanes, const N: usize, const WIDTH: usize>(
+    lanes: &[[f64; WIDTH]; N],
     lane: usize,
-) -> [L::Doubles; 3] {
-    [load::<L>(x, lane), load::<L>(y, lane), load::<L>(z, lane)]
+) -> [L::Doubles; N] {
+    // A loop: closures are not always inlined.
+    let mut own = [L::Doubles::all(0.0); N];
+    for c in 0..N {
+        own[c] = L::Doubles::load(&lanes[c][lane..]);
+    }
+    own
 }
 
 #[inline(always)]
-pub(crate) fn load4<L: Lanes, const WIDTH: usize>(
-    [x, y, z, w]: &[[f64; WIDTH]; 4],
-    lane: usize,
-) -> [L::Doubles; 4] {
-    [
-        load::<L>(x, lane),
-        load::<L>(y, lane),
-        load::<L>(z, lane),
-        load::<L>(w, lane),
-    ]
+pub(crate) fn rounded<L: Lanes, const N: usize>(numbers: [L::Doubles; N]) -> [L; N] {
+    let mut own = [L::all(0.0); N];
+    for c in 0..N {
+        own[c] = L::rounded(numbers[c]);
+    }
+    own
 }
 
 #[inline(always)]
-pub(crate) fn rounded<L: Lanes>([x, y, z, w]: [L::Doubles; 4]) -> [L; 4] {
-    [L::rounded(x), L::rounded(y), L::rounded(z), L::rounded(w)]
+pub(crate) fn widened<L: Lanes, const N: usize>(numbers: [L; N]) -> [L::Doubles; N] {
+    let mut own = [L::Doubles::all(0.0); N];
+    for c in 0..N {
+        own[c] = numbers[c].widened();
+    }
+    own
 }
 
 /// Stores numbers to the lanes from `lane` on.

@@ -4,23 +4,23 @@
 use std::marker::PhantomData;
 
 use crate::curve::formula::de_casteljau::DeCasteljau;
-use crate::curve::formula::hermite::{Hermite, Linear};
-use crate::curve::formula::line::Line;
+use crate::curve::formula::hermite::{Hermite, Line, Linear};
 use crate::curve::formula::product::Product;
 use crate::curve::formula::rotation_vector::RotationVector;
 use crate::curve::formula::squad::Squad;
 use crate::curve::formula::{Formula, NUMBERS, Numbers};
 use crate::fit::double::expansion::Expansion;
 use crate::fit::double::fit::{FitBlock, MOST, Samples, Tier};
-use crate::fit::double::intervals::{load, rounded};
+use crate::fit::double::intervals::{load, put, rounded, store};
 use crate::fit::nodes::{FULL_NODES, Nodes, SMALL_ANGLE_NODES};
 use crate::math::dual::{Dual, Near};
 use crate::math::quaternion::{Quaternion, Real};
-use crate::shader::PolynomialSegment;
+use crate::shader::{POWERS, PolynomialSegment};
 use crate::simd::dispatch::{InLanes, in_lanes};
-use crate::simd::lanes::{Doubles as _, Lanes};
+use crate::simd::lanes::{Doubles, Lanes};
 
 /// A formula, and how its curves are sampled.
+#[derive(Debug)]
 pub(crate) struct Shape {
     /// The count of numbers that differ from curve to curve.
     pub(crate) own: usize,
@@ -58,13 +58,11 @@ impl Shape {
         }
         numbers
     }
-}
 
-impl Shape {
     /// [`Product`] with Bernstein's basis.
     pub(crate) const BERNSTEIN: &'static Self = &Self {
         own: Product::BASIS,
-        shared: Product::BERNSTEIN,
+        shared: Product::WITH_BERNSTEIN,
         entire: true,
         fit: fit::<Expansion<false>>,
         ..Self::of::<Product>(NUMBERS)
@@ -75,20 +73,14 @@ impl Shape {
         fit: fit::<Expansion<true>>,
         ..Self::of::<Product>(NUMBERS)
     };
-    /// [`DeCasteljau`].
     pub(crate) const DE_CASTELJAU: &'static Self = &Self::of::<DeCasteljau>(16);
-    /// [`Squad`].
     pub(crate) const SQUAD: &'static Self = &Self::of::<Squad>(16);
-    /// [`Linear`].
     pub(crate) const LINEAR: &'static Self = &Self::of::<Linear>(16);
-    /// [`Hermite`].
     pub(crate) const HERMITE: &'static Self = &Self::of::<Hermite>(16);
-    /// [`Line`].
     pub(crate) const LINE: &'static Self = &Self {
         is_unit: false,
         ..Self::of::<Line>(8)
     };
-    /// [`RotationVector`].
     pub(crate) const ROTATION_VECTOR: &'static Self = &Self::of::<RotationVector>(13);
 }
 
@@ -103,7 +95,7 @@ pub(crate) trait Sampling: 'static {
 }
 
 /// Fits the curves of a block.
-fn fit<S: Sampling>(block: &mut FitBlock, segments: &mut [PolynomialSegment]) {
+pub(crate) fn fit<S: Sampling>(block: &mut FitBlock, segments: &mut [PolynomialSegment]) {
     in_lanes(&mut Fit::<S>(block, segments, PhantomData));
 }
 
@@ -124,9 +116,6 @@ impl<S: Sampling> InLanes for Fit<'_, S> {
     }
 }
 
-/// The most pairs of nodes of a fit.
-const MOST_PAIRS: usize = 5;
-
 /// Samples curves by the formula itself, in f64.
 struct Directly<F>(PhantomData<F>);
 
@@ -137,30 +126,35 @@ impl<F: Formula> Sampling for Directly<F> {
         nodes: &Nodes<PAIRS>,
         segments: &mut [PolynomialSegment],
     ) {
+        let zero = L::Doubles::all(0.0);
         for lane in (0..block.whole()).step_by(L::COUNT) {
-            let mut numbers = [L::Doubles::all(0.0); NUMBERS];
+            let mut numbers = [zero; NUMBERS];
             for (own, lanes) in numbers.iter_mut().zip(&block.numbers) {
-                *own = load::<L>(lanes, lane);
+                *own = L::Doubles::load(&lanes[lane..]);
             }
-            let at = load::<L>(&block.middles, lane);
-            let width = load::<L>(&block.widths, lane);
+            let at = L::Doubles::load(&block.middles[lane..]);
+            let width = L::Doubles::load(&block.widths[lane..]);
             // One loop over all nodes: the formula is compiled once, and what does not change along
             // a curve is computed once.
-            let mut found = [[L::Doubles::all(0.0); 4]; 2 * MOST_PAIRS + 1];
-            let mut doubt = L::Doubles::all(0.0);
+            let mut found = [[zero; 4]; POWERS];
+            let mut doubt = zero;
             for (i, found) in found[..=2 * PAIRS].iter_mut().enumerate() {
-                let node = match i {
-                    0 => 0.0,
-                    _ if i <= PAIRS => -nodes.at[i - 1],
-                    _ => nodes.at[i - 1 - PAIRS],
-                };
-                let t = at + L::Doubles::all(f64::from(node)) * width;
-                *found = rotation::<F, _>(&numbers, t);
-                doubt = doubt + self::doubt(*found);
+                let t = at + L::Doubles::all(nodes.offset(i)) * width;
+                let [Near(x), Near(y), Near(z), Near(w)] = F::rotation(&numbers, Near(t));
+                *found = [x, y, z, w];
+                // NaN if any component is NaN or infinite, else 0.
+                doubt = doubt + (x + y + z + w) * zero;
+            }
+            if !doubt.are_at_most(0.0) {
+                let mut doubts = [0.0; MOST];
+                doubt.store(&mut doubts);
+                for j in (0..L::COUNT).filter(|&j| doubts[j].is_nan()) {
+                    sample_full_range::<F, L, PAIRS>(block, lane + j, nodes, j, &mut found);
+                }
             }
             let middle = found[0];
             let mut samples = Samples::all(L::all(0.0));
-            samples.middle = rounded::<L>(middle);
+            samples.middle = rounded(middle);
             for k in 0..PAIRS {
                 let (before, after) = (found[1 + k], found[1 + PAIRS + k]);
                 for c in 0..4 {
@@ -169,55 +163,28 @@ impl<F: Formula> Sampling for Directly<F> {
                     samples.odd[k][c] = L::rounded(after[c] - before[c]);
                 }
             }
-            if !doubt.are_at_most(0.0) {
-                let mut doubts = [0.0; MOST];
-                doubt.store(&mut doubts);
-                let mut lanes = samples.lanes();
-                for j in (0..L::COUNT).filter(|&j| doubts[j].is_nan()) {
-                    sample_full_range::<F, PAIRS>(block, lane + j, nodes, &mut lanes, j);
-                }
-                samples = lanes.at(0);
-            }
             block.interpolate(lane, nodes, &samples, segments);
         }
     }
 }
 
-#[inline(always)]
-fn rotation<F: Formula, R: Real>(numbers: &[R; NUMBERS], t: R) -> [R; 4] {
-    let [x, y, z, w] = F::rotation(numbers, Near(t));
-    [x.0, y.0, z.0, w.0]
-}
-
-/// NaN if any of a rotation's components is NaN or infinite, else 0.
-#[inline(always)]
-fn doubt<R: Real>([x, y, z, w]: [R; 4]) -> R {
-    (x + y + z + w) * R::all(0.0)
-}
-
 /// Samples the curve in a lane over the full range, because its angles are too long for [`Near`],
-/// into the `j`th place of the sample arrays.
+/// into the `j`th lane of the vectors found.
 #[inline(never)]
-fn sample_full_range<F: Formula, const PAIRS: usize>(
+fn sample_full_range<F: Formula, L: Lanes, const PAIRS: usize>(
     block: &FitBlock,
     lane: usize,
     nodes: &Nodes<PAIRS>,
-    Samples { middle, even, odd }: &mut Samples<[f32; MOST], PAIRS>,
     j: usize,
+    found: &mut [[L::Doubles; 4]],
 ) {
     let numbers = block.numbers_of(lane);
-    let between: Quaternion = F::rotation(&numbers, block.middles[lane]);
-    for c in 0..4 {
-        middle[c][j] = between[c] as f32;
-    }
-    for (k, &node) in nodes.at.iter().enumerate() {
-        let reach = f64::from(node) * block.widths[lane];
-        let before: Quaternion = F::rotation(&numbers, block.middles[lane] - reach);
-        let after: Quaternion = F::rotation(&numbers, block.middles[lane] + reach);
-        for c in 0..4 {
-            let sum = (after[c] - between[c]) + (before[c] - between[c]);
-            even[k][c][j] = sum as f32;
-            odd[k][c][j] = (after[c] - before[c]) as f32;
-        }
+    let (at, width) = (block.middles[lane], block.widths[lane]);
+    for (i, found) in found[..=2 * PAIRS].iter_mut().enumerate() {
+        let mut lanes = [[0.0; MOST]; 4];
+        store(&mut lanes, 0, *found);
+        let t = at + nodes.offset(i) * width;
+        put(&mut lanes, j, F::rotation(&numbers, t));
+        *found = load::<L, _, _>(&lanes, 0);
     }
 }

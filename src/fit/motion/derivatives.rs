@@ -2,15 +2,15 @@
 //! second order, and the results are fitted like the rotations themselves.
 
 use crate::curve::options::{Axes, Quantity};
-use crate::fit::double::fit::{FitBlock, Lane32, Samples, Tier};
-use crate::fit::double::intervals::LANES;
-use crate::fit::nodes::{FULL_NODES, Nodes, SMALL_ANGLE_NODES};
+use crate::fit::double::fit::{FitBlock, MOST, Samples};
+use crate::fit::double::intervals::{LANES, load, put};
+use crate::fit::double::shape::Sampling;
+use crate::fit::nodes::Nodes;
 use crate::math::canonical::power_of_two;
 use crate::math::dual::Dual;
 use crate::math::quaternion::{Quaternion, rotated, step};
-use crate::shader::PolynomialSegment;
-use crate::simd::dispatch::{InLanes, in_lanes};
-use crate::simd::lanes::Lanes;
+use crate::shader::{POWERS, PolynomialSegment};
+use crate::simd::lanes::{Doubles as _, Lanes};
 
 /// The quantity asked for, from a rotation and its derivatives by the parameter; `rate` is the
 /// parameter's change per second. The result is a quaternion, or a vector with 0 in the place of w.
@@ -23,7 +23,9 @@ pub(crate) fn value(quantity: Quantity, rotation: [Dual; 4], rate: f64) -> Quate
     };
     // ω = 2 q⁻¹ q', and its derivative is the vector part of 2 q⁻¹ q''.
     let [x, y, z, _] = step(at, derivative);
-    let body = [x, y, z].map(|c| finite(2.0 * scale * c));
+    // Between keys at almost the same time velocities would overflow f32.
+    let largest = 0.25 * f64::from(f32::MAX);
+    let body = [x, y, z].map(|c| (2.0 * scale * c).clamp(-largest, largest));
     let [x, y, z] = match axes {
         Axes::Body => body,
         // This holds for accelerations too: ω × ω = 0.
@@ -32,74 +34,61 @@ pub(crate) fn value(quantity: Quantity, rotation: [Dual; 4], rate: f64) -> Quate
     [x, y, z, 0.0]
 }
 
-/// Limits a value to a quarter of f32's range: between keys at almost the same time velocities
-/// would overflow.
-fn finite(value: f64) -> f64 {
-    let largest = 0.25 * f64::from(f32::MAX);
-    value.clamp(-largest, largest)
-}
+/// Samples velocities or accelerations, curve by curve.
+pub(crate) struct Motion;
 
-/// Fits a block's velocities or accelerations.
-pub(crate) fn fit(block: &mut FitBlock, segments: &mut [PolynomialSegment]) {
-    in_lanes(&mut Fit(block, segments));
-}
-
-struct Fit<'a>(&'a mut FitBlock, &'a mut [PolynomialSegment]);
-
-impl InLanes for Fit<'_> {
+impl Sampling for Motion {
     #[inline(always)]
-    fn run<L: Lanes>(&mut self) {
-        match self.0.tier {
-            Tier::SmallAngle => self.fit::<L, _>(&SMALL_ANGLE_NODES),
-            Tier::Full | Tier::Piece => self.fit::<L, _>(&FULL_NODES),
-        }
-    }
-}
-
-impl Fit<'_> {
-    #[inline(always)]
-    fn fit<L: Lanes, const PAIRS: usize>(&mut self, nodes: &Nodes<PAIRS>) {
-        let count = self.0.whole();
-        let mut samples = Samples::all([0.0; LANES]);
+    fn fit<L: Lanes, const PAIRS: usize>(
+        block: &mut FitBlock,
+        nodes: &Nodes<PAIRS>,
+        segments: &mut [PolynomialSegment],
+    ) {
         let mut scales = [1.0; LANES];
-        for (lane, scale) in scales[..count].iter_mut().enumerate() {
-            *scale = sample(self.0, lane, nodes, &mut samples);
+        for lane in (0..block.whole()).step_by(L::COUNT) {
+            let mut found = [[[0.0; MOST]; 4]; POWERS];
+            let mut units = [1.0; MOST];
+            for own in lane..block.count.min(lane + L::COUNT) {
+                let unit = sample(block, own, nodes, own - lane, &mut found);
+                (units[own - lane], scales[own]) = (unit, unit as f32);
+            }
+            let unit = L::Doubles::load(&units);
+            let middle = load::<L, _, _>(&found[0], 0);
+            let mut samples = Samples::all(L::all(0.0));
+            for c in 0..4 {
+                samples.middle[c] = L::rounded(middle[c] / unit);
+                for k in 0..PAIRS {
+                    let [before, after] = [1 + k, 1 + PAIRS + k].map(|i| &found[i][c]);
+                    let rise = (L::Doubles::load(after) - middle[c]) / unit;
+                    let fall = (L::Doubles::load(before) - middle[c]) / unit;
+                    samples.even[k][c] = L::rounded(rise + fall);
+                    samples.odd[k][c] = L::rounded(rise - fall);
+                }
+            }
+            block.interpolate(lane, nodes, &samples, segments);
         }
-        for lane in (0..count).step_by(L::COUNT) {
-            self.0
-                .interpolate(lane, nodes, &samples.at::<L>(lane), self.1);
-        }
-        self.0.scale(&scales, self.1);
+        block.scale(&scales, segments);
     }
 }
 
-/// Samples the curve in a lane in a unit near its largest value, and returns that unit. It is a
-/// power of two, so that multiplying by it rounds nothing.
+/// Samples the curve in a lane into the `j`th lane of the vectors found, and returns a unit near
+/// its largest value. It is a power of two, so that dividing by it rounds nothing.
 fn sample<const PAIRS: usize>(
     block: &FitBlock,
     lane: usize,
     nodes: &Nodes<PAIRS>,
-    Samples { middle, even, odd }: &mut Samples<Lane32, PAIRS>,
-) -> f32 {
+    j: usize,
+    found: &mut [[[f64; MOST]; 4]],
+) -> f64 {
     let curve = block.curve(lane);
     let (at, width) = (block.middles[lane], block.widths[lane]);
-    let between = curve.value_at(at);
-    let pairs = nodes.at.map(|node| {
-        let reach = f64::from(node) * width;
-        [curve.value_at(at - reach), curve.value_at(at + reach)]
-    });
-    let largest = (pairs.as_flattened().as_flattened().iter())
-        .chain(&between)
-        .fold(0.0f64, |largest, component| largest.max(component.abs()));
-    let unit = power_of_two(largest);
-    for c in 0..4 {
-        middle[c][lane] = (between[c] / unit) as f32;
-        for (k, [before, after]) in pairs.iter().enumerate() {
-            let rise = (after[c] - between[c]) / unit;
-            let cosine_minus_one = (before[c] - between[c]) / unit;
-            even[k][c][lane] = (rise + cosine_minus_one) as f32;
-            odd[k][c][lane] = (rise - cosine_minus_one) as f32;
-        }
+    let mut largest = 0.0f64;
+    for (i, found) in found[..=2 * PAIRS].iter_mut().enumerate() {
+        let value = curve.value_at(at + nodes.offset(i) * width);
+        largest = value
+            .iter()
+            .fold(largest, |largest, c| largest.max(c.abs()));
+        put(found, j, value);
     }
-    unit as f32
+    power_of_two(largest)
 }

@@ -1,6 +1,6 @@
 //! Exponentials and logarithms in f32 vector lanes, and rows of f32 numbers.
 
-use crate::fit::double::intervals::ROOM;
+use crate::fit::double::intervals::{ROOM, widened};
 use crate::math::quaternion::{Real as _, exp_by, scaled, square, sum};
 use crate::math::ranges::medium_waves;
 use crate::simd::lanes::{Lanes, Number};
@@ -57,19 +57,9 @@ fn exp_from_identity<N: Number>(v: [N; 3], (sinc, cosm1): (N, N)) -> FromIdentit
 /// The exponential of `times` a vector, in f64: within 7e-9 for squared lengths up to
 /// [`MEDIUM_SQUARE`](crate::math::ranges::MEDIUM_SQUARE).
 #[inline(always)]
-pub(crate) fn medium_exp<L: Lanes>([x, y, z]: [L; 3], times: f32) -> [L::Doubles; 4] {
-    let times = L::Doubles::all(f64::from(times));
-    let vector = [
-        x.widened() * times,
-        y.widened() * times,
-        z.widened() * times,
-    ];
+pub(crate) fn medium_exp<L: Lanes>(v: [L; 3], times: f32) -> [L::Doubles; 4] {
+    let vector = scaled(widened(v), L::Doubles::all(f64::from(times)));
     exp_by(vector, medium_waves(square(vector)))
-}
-
-#[inline(always)]
-pub(crate) fn widened<L: Lanes>([x, y, z, w]: [L; 4]) -> [L::Doubles; 4] {
-    [x.widened(), y.widened(), z.widened(), w.widened()]
 }
 
 /// The logarithm, by [`LOG`] or [`LONG_LOG`], each within its range.

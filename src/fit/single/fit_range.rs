@@ -19,7 +19,7 @@ pub(crate) struct FitRange<const SAMPLED: usize, const PAIRS: usize> {
     pub(crate) bends: [f32; 3],
     /// The differences of the basis functions at `-s` and at `s` from the middle, for each node
     /// `s` that is sampled.
-    pub(crate) gains: [[[Gain; 3]; 2]; SAMPLED],
+    pub(crate) gains: [[[f32; 3]; 2]; SAMPLED],
     /// The factor from a half-rotation vector at a key to the derivative there, by the range's
     /// parameter.
     pub(crate) slope: f32,
@@ -70,7 +70,7 @@ impl<const SAMPLED: usize, const PAIRS: usize> FitRange<SAMPLED, PAIRS> {
                 ((3.0 - 6.0 * m) * square) as f32,
                 (3.0 * m * square) as f32,
             ],
-            gains: [[[Gain::new(0.0); 3]; 2]; SAMPLED],
+            gains: [[[0.0; 3]; 2]; SAMPLED],
             slope: (3.0 * width) as f32,
         };
         let mut k = 0;
@@ -102,28 +102,11 @@ const fn backward<N: Copy>([first, second, third]: [N; 3]) -> [N; 3] {
 }
 
 /// The differences `Bᵢ(m + d) - Bᵢ(m)` of the three basis functions.
-const fn gains(m: f64, d: f64) -> [Gain; 3] {
+const fn gains(m: f64, d: f64) -> [f32; 3] {
     let n = 1.0 - m;
     [
-        Gain::new(((d - 3.0 * n) * d + 3.0 * n * n) * d),
-        Gain::new(((3.0 - 6.0 * m - 2.0 * d) * d + 6.0 * m * n) * d),
-        Gain::new(((d + 3.0 * m) * d + 3.0 * m * m) * d),
+        (((d - 3.0 * n) * d + 3.0 * n * n) * d) as f32,
+        (((3.0 - 6.0 * m - 2.0 * d) * d + 6.0 * m * n) * d) as f32,
+        (((d + 3.0 * m) * d + 3.0 * m * m) * d) as f32,
     ]
-}
-
-/// The difference of a basis function from its value at the middle, and the square of it.
-#[derive(Clone, Copy)]
-pub(crate) struct Gain {
-    pub(crate) gain: f32,
-    pub(crate) squared: f32,
-}
-
-impl Gain {
-    const fn new(gain: f64) -> Self {
-        let gain = gain as f32;
-        Self {
-            gain,
-            squared: gain * gain,
-        }
-    }
 }

@@ -1,24 +1,21 @@
-//! Handles and curves in vector lanes of f32, straight from four keys; the Hermite fit then fits
-//! them whole or in two halves.
+//! Steps, handles and curves in vector lanes of f32, straight from four keys; the Hermite fit then
+//! fits the curves whole or in two halves.
 //!
 //! Steps come from the differences of neighbouring keys, which are as exact in f32 as the keys,
 //! and rotations are stored as their difference from the identity: rounding errors are then small
 //! where the curve turns little. Only the vector between the handles is computed in f64, because
 //! the rounding errors of all others would add up in it.
 
-use crate::fit::double::intervals::{Intervals, ROOM, squared_extent};
-use crate::fit::single::exp_log::{
-    LONG_LOG, Row, load3, log, long_exp, medium_exp, store, widened,
-};
-use crate::fit::single::key_steps::{KeySteps, LONGEST_CHORD};
+use crate::fit::double::intervals::{Intervals, ROOM, rounded, squared_extent, widened};
+use crate::fit::single::exp_log::{LOG, LONG_LOG, Row, load3, log, long_exp, medium_exp, store};
 use crate::fit::single::key_weights::KeyWeights;
-use crate::fit::single::long_tangents::{AT_ONCE, LongTangents};
+use crate::fit::single::long_tangents::AT_ONCE;
 use crate::math::quaternion::{self, Real as _, dot, minus, product, scaled, square, sum};
-use crate::math::ranges::MEDIUM_SQUARE;
+use crate::math::ranges::{MEDIUM_SQUARE, one_plus};
 use crate::shader::KEY_INNER;
 use crate::simd::dispatch::InLanes;
 use crate::simd::lanes::Lanes;
-use crate::twin::small_angle::composed;
+use crate::twin::small_angle::{FromIdentity, chord_of, composed, step_vector};
 
 /// The coefficients of `(x / sin(x) - 1) / u` in powers of u = 1 - cos(x), up to
 /// [`LARGEST_COSINE_MINUS_ONE`]; from Chebyshev nodes, within 5e-10.
@@ -37,92 +34,8 @@ const MEDIUM_LOG: [f64; 8] = [
 /// a squared extent of at most [`LONGEST_DIRECT`].
 const LARGEST_COSINE_MINUS_ONE: f32 = 0.5645;
 
-/// The largest square of the half-rotation vectors of which a tangent is made, and of their sum.
-/// Up to it no other branch of the tangent's logarithm is nearer than the principal one.
-const LONGEST_TANGENT_PART: f32 = 1.5 * 1.5;
-
-/// The first key of each curve, its three half-rotation vectors, and its last key.
-pub(crate) type CurveNumbers = [[[f32; 4]; ROOM]; 5];
-
-/// The handles and curves of a block's intervals, in f32.
-pub(crate) struct HandlesF32 {
-    /// The lanes whose curves are asked for.
-    pub(crate) wanted: [bool; ROOM],
-    /// Handles at the key that the interval starts with, towards the interval before it
-    /// and towards this one.
-    pub(crate) incoming: [Row; 3],
-    pub(crate) outgoing: [Row; 3],
-    /// The largest ratio of a quantity in the tangent to its limit. Up to 1 the f32 handles hold.
-    pub(crate) far: Row,
-    pub(crate) numbers: CurveNumbers,
-    /// The squared extent of each curve. It is above [`LONGEST_DIRECT`] where the f32 numbers do
-    /// not hold, and -1 where the small-angle cubic is taken instead.
-    pub(crate) energies: Row,
-}
-
-impl HandlesF32 {
-    pub(crate) fn new() -> Self {
-        Self {
-            wanted: [false; ROOM],
-            incoming: [[0.0; ROOM]; 3],
-            outgoing: [[0.0; ROOM]; 3],
-            far: [0.0; ROOM],
-            numbers: [[[0.0; 4]; ROOM]; 5],
-            energies: [f32::INFINITY; ROOM],
-        }
-    }
-}
-
-/// Finds the handles of the keys between intervals.
-pub(crate) struct FindHandles<'a> {
-    pub(crate) lanes: &'a mut HandlesF32,
-    pub(crate) steps: &'a KeySteps,
-    pub(crate) weights: &'a KeyWeights,
-    pub(crate) intervals: &'a Intervals,
-    /// Finds the handles for which the range of f32's formulas is too short, in f64.
-    pub(crate) find_long: fn(&mut LongTangents),
-}
-
-impl InLanes for FindHandles<'_> {
-    #[inline(always)]
-    fn run<L: Lanes>(&mut self) {
-        let (steps, weights, intervals) = (self.steps, self.weights, self.intervals);
-        let own = &mut *self.lanes;
-        let (mut long_tangents, mut far_count) = ([0; ROOM], 0);
-        for lane in (0..intervals.whole32()).step_by(L::COUNT) {
-            let key = lane + 1;
-            if !own.wanted[lane..key + L::COUNT].contains(&true) {
-                continue;
-            }
-            let before = L::load(&weights.before[key..]);
-            let after = L::load(&weights.after[key..]);
-            let to_end = L::load(&weights.outgoing[key..]);
-            let left = scaled(load3::<L>(&steps.logs, lane), before);
-            let right = scaled(load3::<L>(&steps.logs, key), after);
-            let turn = composed(long_exp(left), long_exp(right));
-            let tangent = log(turn, &LONG_LOG);
-            let to_start = L::all(THIRD) - to_end;
-            store(&mut own.incoming, key, scaled(tangent, to_start));
-            store(&mut own.outgoing, key, scaled(tangent, to_end));
-            // `KEY_UNKNOWN` becomes 4/3, which is beyond the limit of 1.
-            let kind = L::load(&weights.kinds[key..]) * L::all(2.0 / 3.0);
-            let parts = square(left).larger(square(right).larger(square(sum(left, right))));
-            let far = parts * L::all(1.0 / LONGEST_TANGENT_PART);
-            let far = far.larger(kind).larger(-turn.cosm1);
-            far.store(&mut own.far[key..key + L::COUNT]);
-            if (-far).any_at_most(-1.0) {
-                for key in key..key + L::COUNT {
-                    let is_far = own.far[key] >= 1.0 && weights.kinds[key] == KEY_INNER;
-                    long_tangents[far_count] = key;
-                    far_count += usize::from(is_far);
-                }
-            }
-        }
-        for keys in long_tangents[..far_count].chunks(AT_ONCE) {
-            own.set_far(keys, intervals, self.find_long);
-        }
-    }
-}
+/// The largest squared chord between keys for which [`LOG`] holds.
+const LONGEST_CHORD: f32 = 1.0;
 
 /// The largest squared extent of a curve whose f32 numbers hold.
 pub(crate) const LONGEST_DIRECT: f64 = MEDIUM_SQUARE;
@@ -134,39 +47,153 @@ const _: () = assert!(IN_DOUBT > LONGEST_DIRECT);
 const THIRD: f32 = 1.0 / 3.0;
 const TWO_THIRDS: f32 = 2.0 / 3.0;
 
-/// Finds the curves between handles.
+/// The largest square of the half-rotation vectors of which a tangent is made, and of their sum.
+/// Up to it no other branch of the tangent's logarithm is nearer than the principal one.
+const LONGEST_TANGENT_PART: f32 = 1.5 * 1.5;
+
+/// The first key of each curve, its three half-rotation vectors, and its last key.
+pub(crate) type CurveNumbers = [[[f32; 4]; ROOM]; 5];
+
+/// The steps, handles and curves of a block's intervals, in f32.
+pub(crate) struct HandlesF32 {
+    /// The squares of the differences of keys.
+    pub(crate) chords: Row,
+    /// The steps' logarithms.
+    logs: [Row; 3],
+    /// Handles at the key that the interval starts with, towards the interval before it
+    /// and towards this one.
+    pub(crate) incoming: [Row; 3],
+    pub(crate) outgoing: [Row; 3],
+    /// The largest ratio of a quantity in the tangent to its limit. Up to 1 the f32 handles hold.
+    pub(crate) far: Row,
+    pub(crate) numbers: CurveNumbers,
+    /// The squared extent of each curve. It is above [`LONGEST_DIRECT`] where the f32 numbers do
+    /// not hold.
+    pub(crate) energies: Row,
+}
+
+impl HandlesF32 {
+    pub(crate) fn new() -> Self {
+        Self {
+            chords: [0.0; ROOM],
+            logs: [[0.0; ROOM]; 3],
+            incoming: [[0.0; ROOM]; 3],
+            outgoing: [[0.0; ROOM]; 3],
+            far: [0.0; ROOM],
+            numbers: [[[0.0; 4]; ROOM]; 5],
+            energies: [f32::INFINITY; ROOM],
+        }
+    }
+}
+
+/// Finds the steps between keys.
+pub(crate) struct FindSteps<'a> {
+    pub(crate) lanes: &'a mut HandlesF32,
+    pub(crate) intervals: &'a Intervals,
+}
+
+impl InLanes for FindSteps<'_> {
+    #[inline(always)]
+    fn run<L: Lanes>(&mut self) {
+        let Intervals { from, to, .. } = self.intervals;
+        let own = &mut *self.lanes;
+        for lane in (0..self.intervals.whole32()).step_by(L::COUNT) {
+            let start = L::load_rotations(&from[lane..]);
+            let chord = chord_of(start, L::load_rotations(&to[lane..]));
+            let chord_square = dot(chord, chord);
+            let step = FromIdentity {
+                vector: step_vector(start, chord),
+                cosm1: chord_square * L::all(-0.5),
+            };
+            chord_square.store(&mut own.chords[lane..lane + L::COUNT]);
+            store(&mut own.logs, lane, log(step, &LOG));
+        }
+    }
+}
+
+/// Finds the handles of the keys between intervals, and the curves between handles.
 pub(crate) struct FindCurves<'a> {
     pub(crate) lanes: &'a mut HandlesF32,
-    pub(crate) steps: &'a KeySteps,
     pub(crate) weights: &'a KeyWeights,
     pub(crate) intervals: &'a Intervals,
+    /// Whether a lane has its curve already.
+    pub(crate) known: &'a [bool; ROOM],
+    /// Sets the handles for which the range of f32's formulas is too short, in f64:
+    /// [`HandlesF32::set_long`].
+    pub(crate) set_long: fn(&mut HandlesF32, &[usize], &Intervals),
 }
 
 impl InLanes for FindCurves<'_> {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
-        let (steps, kinds, intervals) = (self.steps, &self.weights.kinds, self.intervals);
+        self.handles::<L>();
+        self.curves::<L>();
+    }
+}
+
+impl FindCurves<'_> {
+    #[inline(always)]
+    fn handles<L: Lanes>(&mut self) {
+        let (weights, intervals) = (self.weights, self.intervals);
+        let own = &mut *self.lanes;
+        let (mut long_tangents, mut far_count) = ([0; ROOM], 0);
+        for lane in (0..intervals.whole32()).step_by(L::COUNT) {
+            let key = lane + 1;
+            if !self.known[lane..key + L::COUNT].contains(&false) {
+                continue;
+            }
+            let [before, after, to_end, kind] = weights.load::<L>(key);
+            let left = scaled(load3::<L>(&own.logs, lane), before);
+            let right = scaled(load3::<L>(&own.logs, key), after);
+            let turn = composed(long_exp(left), long_exp(right));
+            let tangent = log(turn, &LONG_LOG);
+            let to_start = L::all(THIRD) - to_end;
+            store(&mut own.incoming, key, scaled(tangent, to_start));
+            store(&mut own.outgoing, key, scaled(tangent, to_end));
+            // `KEY_UNKNOWN` becomes 4/3, which is beyond the limit of 1.
+            let kind = kind * L::all(2.0 / 3.0);
+            let parts = square(left).larger(square(right).larger(square(sum(left, right))));
+            let far = parts * L::all(1.0 / LONGEST_TANGENT_PART);
+            let far = far.larger(kind).larger(-turn.cosm1);
+            far.store(&mut own.far[key..key + L::COUNT]);
+            if (-far).any_at_most(-1.0) {
+                for key in key..key + L::COUNT {
+                    let is_far = own.far[key] >= 1.0 && weights.keys[key].kind == KEY_INNER;
+                    long_tangents[far_count] = key;
+                    far_count += usize::from(is_far);
+                }
+            }
+        }
+        for keys in long_tangents[..far_count].chunks(AT_ONCE) {
+            (self.set_long)(own, keys, intervals);
+        }
+    }
+
+    #[inline(always)]
+    fn curves<L: Lanes>(&mut self) {
+        let (weights, intervals) = (self.weights, self.intervals);
         let whole = &mut *self.lanes;
         for lane in (0..intervals.whole32()).step_by(L::COUNT) {
             let (own, next) = (lane + 1, lane + 2);
-            if !whole.wanted[own..own + L::COUNT].contains(&true) {
+            if !self.known[own..own + L::COUNT].contains(&false) {
                 continue;
             }
-            let log = load3::<L>(&steps.logs, own);
+            let log = load3::<L>(&whole.logs, own);
             let outgoing = load3::<L>(&whole.outgoing, own);
             let incoming = load3::<L>(&whole.incoming, next);
             // At a track's ends the handle is 0 so far; there it becomes the parabola's.
             let parabola = scaled(log, L::all(TWO_THIRDS));
-            let at_first = at_end(L::load(&kinds[own..]));
-            let at_last = at_end(L::load(&kinds[next..]));
+            let [_, _, _, first] = weights.load::<L>(own);
+            let [_, _, _, last] = weights.load::<L>(next);
+            let (at_first, at_last) = (at_end(first), at_end(last));
             let w1 = sum(outgoing, scaled(minus(parabola, incoming), at_first));
             let w3 = sum(incoming, scaled(minus(parabola, outgoing), at_last));
             let start = L::load_rotations(&intervals.from[own..]);
             let end = L::load_rotations(&intervals.to[own..]);
             let (w2, cosine_minus_one) = between::<L>(w1, [start, end], w3);
-            let chord = L::load(&steps.chords[own..]);
-            let before = L::load(&steps.chords[lane..]);
-            let after = L::load(&steps.chords[next..]);
+            let chord = L::load(&whole.chords[own..]);
+            let before = L::load(&whole.chords[lane..]);
+            let after = L::load(&whole.chords[next..]);
             let chords = before.larger(chord.larger(after)) * L::all(1.0 / LONGEST_CHORD);
             let far = L::load(&whole.far[own..]).larger(L::load(&whole.far[next..]));
             let far = far
@@ -203,18 +230,8 @@ fn between<L: Lanes>(w1: [L; 3], [start, end]: [[L; 4]; 2], w3: [L; 3]) -> ([L; 
     let step = [x * scale, y * scale, z * scale, w * scale];
     let [x, y, z, w] = product(product(medium_exp(w1, -1.0), step), medium_exp(w3, -1.0));
     let u = all(1.0) - w;
-    let [c0, c1, c2, c3, c4, c5, c6, c7] = MEDIUM_LOG;
-    let uu = u * u;
-    let (first, second) = (all(c1) * u + all(c0), all(c3) * u + all(c2));
-    let (third, fourth) = (all(c5) * u + all(c4), all(c7) * u + all(c6));
-    let tail = (fourth * uu + third) * (uu * uu) + (second * uu + first);
-    let scale = tail * u + all(1.0);
-    let vector = [
-        L::rounded(x * scale),
-        L::rounded(y * scale),
-        L::rounded(z * scale),
-    ];
-    (vector, L::rounded(-u))
+    let vector = scaled([x, y, z], one_plus(&MEDIUM_LOG, u));
+    (rounded(vector), L::rounded(-u))
 }
 
 /// 1 for `KEY_AT_END`, 0 for `KEY_INNER` and `KEY_UNKNOWN`.

@@ -4,9 +4,9 @@
 
 use crate::fit::double::expansion::{AboutMiddle, SineCosm1};
 use crate::fit::double::fit::{MOST, Samples, interpolate};
-use crate::fit::double::intervals::rounded;
-use crate::fit::single::exp_log::{long_exp, medium_exp, short_exp, widened};
-use crate::fit::single::fit_range::{FitRange, Gain, HALF, LAST_HALF, Place, SEAM};
+use crate::fit::double::intervals::{rounded, widened};
+use crate::fit::single::exp_log::{long_exp, medium_exp, short_exp};
+use crate::fit::single::fit_range::{FitRange, HALF, LAST_HALF, Place, SEAM};
 use crate::math::quaternion::{
     cross3, normalised, product, product_with_vector, scaled, square, sum,
 };
@@ -132,7 +132,7 @@ impl<L: Lanes> Moment<L> {
             // Curves that are halved turn farther; f32 would round too much in this product.
             let turn = product(medium_exp(w1, b1), medium_exp(w2, b2));
             let turn = product(turn, medium_exp(w3, b3));
-            rounded::<L>(product(normalised(widened(start)), turn))
+            rounded(product(normalised(widened(start)), turn))
         } else {
             let turn = composed(short_exp(scaled(w1, L::all(b1))), second_turn);
             let [x, y, z] = turn.vector;
@@ -218,13 +218,14 @@ fn set_middle<L: Lanes, const SAMPLED: usize, const PAIRS: usize>(
     let turning = sum(cross3(u1, rate), cross3(u2, u3));
     let [x, y, z, w] = product_with_vector(m, sum(bend, turning));
     let half = square(rate) * L::all(0.5);
-    let half_second = [
+    // The first node of these fits is s = 0.
+    samples.odd[0] = product_with_vector(m, rate);
+    samples.even[0] = [
         x - m[0] * half,
         y - m[1] * half,
         z - m[2] * half,
         w - m[3] * half,
     ];
-    samples.set_middle(product_with_vector(m, rate), half_second);
 }
 
 /// Coefficients of `(sin(x)/x - 1) / x²` and of `(cos(x) - 1) / x²` in powers of x², for x²
@@ -235,7 +236,7 @@ const COSINE_MINUS_ONE: [f32; 3] = [-0.5, 0.041_666_105, -0.001_381_43];
 /// For each of three vectors with these squares, the sine over the length and the cosine minus one
 /// of its angle, by its gain.
 #[inline(always)]
-fn turns<L: Lanes>(gains: &[Gain; 3], [first, second, third]: [L; 3]) -> [SineCosm1<L>; 3] {
+fn turns<L: Lanes>(gains: &[f32; 3], [first, second, third]: [L; 3]) -> [SineCosm1<L>; 3] {
     // Written out: closures are not always inlined.
     [
         turned(gains[0], first),
@@ -245,8 +246,8 @@ fn turns<L: Lanes>(gains: &[Gain; 3], [first, second, third]: [L; 3]) -> [SineCo
 }
 
 #[inline(always)]
-fn turned<N: Number>(Gain { gain, squared }: Gain, square: N) -> (N, N) {
-    let (gain, z) = (N::all(gain), square * N::all(squared));
+fn turned<N: Number>(gain: f32, square: N) -> (N, N) {
+    let (gain, z) = (N::all(gain), square * N::all(gain * gain));
     let sinc = ((N::all(SINC[2]) * z + N::all(SINC[1])) * z + N::all(SINC[0])) * z;
     let cosine_minus_one = ((N::all(COSINE_MINUS_ONE[2]) * z + N::all(COSINE_MINUS_ONE[1])) * z
         + N::all(COSINE_MINUS_ONE[0]))
@@ -280,7 +281,7 @@ mod tests {
             let gains = gains.as_flattened().as_flattened();
             let most = gains
                 .iter()
-                .fold(0.0f32, |most, gain| most.max(gain.squared));
+                .fold(0.0f32, |most, gain| most.max(gain * gain));
             assert!(f64::from(most) * longest < LARGEST);
         }
     }

@@ -3,8 +3,8 @@
 
 use std::marker::PhantomData;
 
-use crate::fit::double::handles::{HandleRule, Handles, Interval};
-use crate::fit::double::intervals::Intervals;
+use crate::fit::double::handles::{HandleRule, Interval};
+use crate::fit::double::intervals::{Intervals, at, put};
 use crate::fit::single::handles::HandlesF32;
 use crate::math::quaternion::{log, normalised, step};
 use crate::math::ranges::FullRange;
@@ -17,13 +17,14 @@ pub(crate) const AT_ONCE: usize = 8;
 /// One number for each key.
 type Row = [f64; AT_ONCE];
 
-/// Keys with long tangents, and their handles.
-pub(crate) struct LongTangents {
+/// Keys with long tangents, and their handles by a rule.
+struct LongTangents<R> {
     /// The intervals on both sides.
     before: Side,
     after: Side,
     incoming: [Row; 3],
     outgoing: [Row; 3],
+    rule: PhantomData<R>,
 }
 
 /// The intervals on one side of the keys.
@@ -33,36 +34,18 @@ struct Side {
     durations: Row,
 }
 
-impl LongTangents {
-    /// Finds their handles by a rule.
-    pub(crate) fn find<R: HandleRule>(&mut self) {
-        in_lanes(&mut Find::<R> {
-            keys: self,
-            rule: PhantomData,
-        });
-    }
-}
-
 impl HandlesF32 {
-    /// Sets the handles of a few keys, as `find` finds them.
+    /// Sets the handles of at most [`AT_ONCE`] keys by a rule.
     #[inline(never)]
-    pub(crate) fn set_far(
-        &mut self,
-        keys: &[usize],
-        intervals: &Intervals,
-        find: fn(&mut LongTangents),
-    ) {
-        let mut far = LongTangents {
-            before: Side::none(),
-            after: Side::none(),
+    pub(crate) fn set_long<R: HandleRule>(&mut self, keys: &[usize], intervals: &Intervals) {
+        let mut far = LongTangents::<R> {
+            before: Side::new(intervals, keys.iter().map(|key| key - 1)),
+            after: Side::new(intervals, keys.iter().copied()),
             incoming: [[0.0; AT_ONCE]; 3],
             outgoing: [[0.0; AT_ONCE]; 3],
+            rule: PhantomData,
         };
-        for (i, &key) in keys.iter().enumerate() {
-            far.before.set(i, intervals, key - 1);
-            far.after.set(i, intervals, key);
-        }
-        find(&mut far);
+        in_lanes(&mut far);
         for (i, &key) in keys.iter().enumerate() {
             for c in 0..3 {
                 self.incoming[c][key] = far.incoming[c][i] as f32;
@@ -74,30 +57,24 @@ impl HandlesF32 {
 }
 
 impl Side {
-    fn none() -> Self {
-        Self {
+    fn new(intervals: &Intervals, lanes: impl Iterator<Item = usize>) -> Self {
+        let mut side = Self {
             from: [[0.0; AT_ONCE]; 4],
             to: [[0.0; AT_ONCE]; 4],
             durations: [1.0; AT_ONCE],
+        };
+        for (i, lane) in lanes.enumerate() {
+            let [from, to] = intervals.keys(lane);
+            put(&mut side.from, i, from.map(f64::from));
+            put(&mut side.to, i, to.map(f64::from));
+            side.durations[i] = intervals.durations[lane];
         }
-    }
-
-    fn set(&mut self, i: usize, intervals: &Intervals, lane: usize) {
-        let [from, to] = intervals.keys(lane);
-        for c in 0..4 {
-            self.from[c][i] = f64::from(from[c]);
-            self.to[c][i] = f64::from(to[c]);
-        }
-        self.durations[i] = intervals.durations[lane];
+        side
     }
 
     #[inline(always)]
     fn interval(&self, i: usize) -> Interval<f64> {
-        let [x0, y0, z0, w0] = &self.from;
-        let [x1, y1, z1, w1] = &self.to;
-        let from = normalised([x0[i], y0[i], z0[i], w0[i]]);
-        let to = normalised([x1[i], y1[i], z1[i], w1[i]]);
-        let step = step(from, to);
+        let step = step(normalised(at(&self.from, i)), normalised(at(&self.to, i)));
         Interval {
             duration: self.durations[i],
             step,
@@ -107,29 +84,23 @@ impl Side {
     }
 }
 
-struct Find<'a, R> {
-    keys: &'a mut LongTangents,
-    rule: PhantomData<R>,
-}
-
-impl<R: HandleRule> InLanes for Find<'_, R> {
+impl<R: HandleRule> InLanes for LongTangents<R> {
     // The compiler vectorises this loop.
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
-        let LongTangents {
+        let Self {
             before,
             after,
             incoming,
             outgoing,
-        } = &mut *self.keys;
+            ..
+        } = self;
         for i in 0..AT_ONCE {
             let found = R::handles(&mut FullRange, [before.interval(i), after.interval(i)]);
-            let Handles {
-                incoming: [x0, y0, z0],
-                outgoing: [x1, y1, z1],
-            } = found;
-            (incoming[0][i], incoming[1][i], incoming[2][i]) = (x0, y0, z0);
-            (outgoing[0][i], outgoing[1][i], outgoing[2][i]) = (x1, y1, z1);
+            for c in 0..3 {
+                incoming[c][i] = found.incoming[c];
+                outgoing[c][i] = found.outgoing[c];
+            }
         }
     }
 }

@@ -3,28 +3,19 @@
 // Loops over lanes index many arrays at once.
 #![allow(clippy::needless_range_loop)]
 
+use crate::fit::double::fit::MOST;
 use crate::fit::double::intervals::{Intervals, LANES, ROOM, Stretch};
-use crate::fit::single::key_steps::KeySteps;
 use crate::fit::single::key_weights::KeyWeights;
 use crate::shader::{KEY_INNER, LONGEST_STEP, PolynomialSegment};
 use crate::simd::dispatch::{InLanes, in_lanes};
 use crate::simd::lanes::Lanes;
 use crate::twin::small_angle::{SmallAngleCubic, small_angle_cubic};
 
-/// The lanes of the widest vectors.
-const VECTOR: usize = 16;
-
 /// Up to this many curves are computed one by one: in vectors most lanes would be wasted.
 const FEW: usize = 6;
 
 /// The small-angle curves of a block's intervals.
 pub(crate) struct SmallAngleLanes {
-    /// Whether the squared chords of the interval and of both its neighbours are at most
-    /// [`LONGEST_STEP`].
-    near: [bool; ROOM],
-    /// The number of lanes to compute, rounded up to whole vectors; no lane beyond has such a
-    /// curve.
-    wanted: usize,
     powers: [[[f32; 4]; ROOM]; 7],
     /// Whether a lane's curve turns through small angles only, so that `powers` are its
     /// coefficients.
@@ -34,44 +25,38 @@ pub(crate) struct SmallAngleLanes {
 impl SmallAngleLanes {
     pub(crate) fn new() -> Self {
         Self {
-            near: [false; ROOM],
-            wanted: 0,
             powers: [[[0.0; 4]; ROOM]; 7],
             holds: [false; ROOM],
         }
     }
 
-    /// Finds the intervals whose steps are short enough.
-    pub(crate) fn look(&mut self, steps: &KeySteps, stretches: &[Stretch]) {
-        for j in 1..LANES {
-            let chords = [steps.chords[j - 1], steps.chords[j], steps.chords[j + 1]];
-            self.near[j] = (chords[0] <= LONGEST_STEP)
-                & (chords[1] <= LONGEST_STEP)
-                & (chords[2] <= LONGEST_STEP);
-        }
-        self.holds = [false; ROOM];
-        let mut last = None;
-        for lanes in stretches.iter().map(Stretch::lanes) {
-            let place = self.near[lanes.clone()].iter().rposition(|&near| near);
-            last = place.map(|place| lanes.start + place).or(last);
-        }
-        // Step j of the loop computes the curve of lane j + 1, so `last` steps reach lane `last`.
-        self.wanted = last.map_or(0, |last| last.next_multiple_of(VECTOR));
-    }
-
-    /// Computes the curves of the intervals that [`SmallAngleLanes::look`] found.
-    pub(crate) fn prepare(
+    /// Computes the curves of the intervals whose squared chords, and those of both neighbours, are at
+    /// most [`LONGEST_STEP`].
+    pub(crate) fn find(
         &mut self,
+        chords: &[f32; ROOM],
         intervals: &Intervals,
         weights: &KeyWeights,
         stretches: &[Stretch],
     ) {
+        let mut near = [false; ROOM];
+        for j in 1..LANES {
+            near[j] = (chords[j - 1] <= LONGEST_STEP)
+                & (chords[j] <= LONGEST_STEP)
+                & (chords[j + 1] <= LONGEST_STEP);
+        }
+        self.holds = [false; ROOM];
         let own = stretches.iter().flat_map(Stretch::lanes);
-        let near: Vec<usize> = own.filter(|&lane| self.near[lane]).collect();
+        let near: Vec<usize> = own.filter(|&lane| near[lane]).collect();
+        let Some(last) = near.last() else {
+            return;
+        };
         let mut curves = Curves {
             lanes: self,
             intervals,
             weights,
+            // Step j of the loop computes the curve of lane j + 1, so `last` steps reach lane `last`.
+            count: last.next_multiple_of(MOST),
         };
         if near.len() > FEW {
             in_lanes(&mut curves);
@@ -87,11 +72,6 @@ impl SmallAngleLanes {
         }
     }
 
-    /// Whether any lane may have such a curve.
-    pub(crate) fn may_hold(&self) -> bool {
-        self.wanted > 0
-    }
-
     /// Writes a lane's coefficients to a segment.
     #[inline]
     pub(crate) fn write(&self, lane: usize, segment: &mut PolynomialSegment) {
@@ -105,6 +85,8 @@ struct Curves<'a> {
     lanes: &'a mut SmallAngleLanes,
     intervals: &'a Intervals,
     weights: &'a KeyWeights,
+    /// The number of lanes to compute, rounded up to whole vectors.
+    count: usize,
 }
 
 impl Curves<'_> {
@@ -112,7 +94,7 @@ impl Curves<'_> {
     #[inline(always)]
     fn curve(&self, j: usize, [before, after]: [[f32; 4]; 2]) -> SmallAngleCubic {
         let Intervals { from, to, .. } = self.intervals;
-        let (first, last) = (self.weights.at(j + 1), self.weights.at(j + 2));
+        let (first, last) = (self.weights.keys[j + 1], self.weights.keys[j + 2]);
         small_angle_cubic([before, from[j + 1], to[j + 1], after], first, last)
     }
 
@@ -120,7 +102,7 @@ impl Curves<'_> {
     #[inline(always)]
     fn neighbours(&self, j: usize) -> [[f32; 4]; 2] {
         let Intervals { from, to, .. } = self.intervals;
-        let (first, last) = (self.weights.at(j + 1), self.weights.at(j + 2));
+        let (first, last) = (self.weights.keys[j + 1], self.weights.keys[j + 2]);
         [
             either(first.kind == KEY_INNER, from[j], from[j + 1]),
             either(last.kind == KEY_INNER, to[j + 2], to[j + 1]),
@@ -134,7 +116,7 @@ impl InLanes for Curves<'_> {
         let mut powers = [[[0.0; ROOM]; 4]; 7];
         let mut holds = [false; ROOM];
         // Lane 0 is always context, so the first curve is in lane 1.
-        let count = self.lanes.wanted.min(LANES);
+        let count = self.count.min(LANES);
         // Chosen in a loop of their own: a choice between two keys in memory would keep the
         // compiler from making vectors of the loop behind it, which then costs twice as much.
         let mut neighbours = [[[0.0; 4]; 2]; LANES];

@@ -1,10 +1,11 @@
 //! Paths are followed together.
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 
 use super::*;
 use crate::path::options::PathSpeed;
 use crate::simd::dispatch::tests::same_at_every_width;
+use crate::time::spans::Part;
 
 /// Of each span of each track when it starts, and the numbers that give its values.
 type Values = Vec<Vec<(u64, Vec<[u32; 4]>)>>;
