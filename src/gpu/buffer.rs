@@ -50,10 +50,6 @@ impl Residence {
         }
     }
 
-    fn is_mapped(self) -> bool {
-        !matches!(self, Self::Device | Self::Results)
-    }
-
     /// Whether kernels read it, as texels where they read those.
     fn is_read_by_kernels(self) -> bool {
         matches!(self, Self::Upload | Self::Direct | Self::Device)
@@ -95,10 +91,7 @@ pub(crate) struct Buffer {
     pub(crate) raw: vk::Buffer,
     /// A view of it as texels of 16 bytes; null unless kernels read it as a texel buffer.
     pub(crate) view: vk::BufferView,
-    /// Memory of its own; null where it has a share of some.
-    memory: vk::DeviceMemory,
-    share: Option<Share>,
-    mapped: Option<NonNull<u8>>,
+    memory: Share,
     size: u64,
 }
 
@@ -141,29 +134,10 @@ impl Buffer {
             })?;
         let kind = Kind {
             memory_type,
-            mapped: residence.is_mapped(),
+            mapped: required.contains(vk::MemoryPropertyFlags::HOST_VISIBLE),
         };
-        if let Some(share) = device.shared.take(&device.raw, kind, &needs)? {
-            buffer.share = Some(share);
-            buffer.mapped = share.mapped;
-            buffer.bind(share.memory, share.offset, is_texels, name)?;
-            return Ok(buffer);
-        }
-        let allocate = vk::MemoryAllocateInfo::default()
-            .allocation_size(needs.size)
-            .memory_type_index(memory_type);
-        buffer.give_memory(&allocate, is_texels, name)?;
-        if residence.is_mapped() {
-            let flags = vk::MemoryMapFlags::empty();
-            // SAFETY: the memory is host-visible and not mapped yet.
-            let pointer = unsafe {
-                device
-                    .raw
-                    .map_memory(buffer.memory, 0, vk::WHOLE_SIZE, flags)
-            }
-            .named("vkMapMemory")?;
-            buffer.mapped = NonNull::new(pointer.cast());
-        }
+        let memory = device.shared.take(&device.raw, kind, &needs)?;
+        buffer.bind(memory, is_texels, name)?;
         Ok(buffer)
     }
 
@@ -199,12 +173,18 @@ impl Buffer {
         let mut import = vk::ImportMemoryHostPointerInfoEXT::default()
             .handle_type(LENT)
             .host_pointer(pages);
-        let allocate = vk::MemoryAllocateInfo::default()
+        let info = vk::MemoryAllocateInfo::default()
             .allocation_size(size)
             .memory_type_index(memory_type)
             .push_next(&mut import);
-        let fits = needs.size <= size;
-        (fits && buffer.give_memory(&allocate, is_texels, name).is_ok()).then_some(buffer)
+        if needs.size > size {
+            return None;
+        }
+        // SAFETY: a valid size and memory type, and the pages are there.
+        let memory = unsafe { device.raw.allocate_memory(&info, None) }.ok()?;
+        let memory = Share::whole(memory, size);
+        buffer.bind(memory, is_texels, name).ok()?;
+        Some(buffer)
     }
 
     fn without_memory(
@@ -234,38 +214,16 @@ impl Buffer {
             device: Arc::clone(device),
             raw,
             view: vk::BufferView::null(),
-            memory: vk::DeviceMemory::null(),
-            share: None,
-            mapped: None,
+            memory: Share::default(),
             size,
         })
     }
 
-    fn give_memory(
-        &mut self,
-        allocate: &vk::MemoryAllocateInfo<'_>,
-        is_texels: bool,
-        name: &str,
-    ) -> Result<(), VulkanError> {
+    fn bind(&mut self, memory: Share, is_texels: bool, name: &str) -> Result<(), VulkanError> {
         let device = &self.device.raw;
-        // SAFETY: a valid size and memory type.
-        self.memory =
-            unsafe { device.allocate_memory(allocate, None) }.named("vkAllocateMemory")?;
-        self.bind(self.memory, 0, is_texels, name)?;
-        self.device.name(self.memory, name);
-        Ok(())
-    }
-
-    fn bind(
-        &mut self,
-        memory: vk::DeviceMemory,
-        offset: u64,
-        is_texels: bool,
-        name: &str,
-    ) -> Result<(), VulkanError> {
-        let device = &self.device.raw;
+        self.memory = memory; // goes with the buffer, also when a later step fails
         // SAFETY: memory of a type that the buffer allows, of which nothing else uses this part.
-        unsafe { device.bind_buffer_memory(self.raw, memory, offset) }
+        unsafe { device.bind_buffer_memory(self.raw, memory.memory, memory.offset) }
             .named("vkBindBufferMemory")?;
         if is_texels {
             let info = vk::BufferViewCreateInfo::default()
@@ -288,12 +246,12 @@ impl Buffer {
 
     /// Whether the host sees its bytes.
     pub(crate) fn is_mapped(&self) -> bool {
-        self.mapped.is_some()
+        self.memory.mapped.is_some()
     }
 
     /// Some of the mapped bytes; empty where the buffer is not mapped, or shorter.
     pub(crate) fn bytes(&self, range: Range<usize>) -> &[u8] {
-        match self.mapped {
+        match self.memory.mapped {
             // SAFETY: mapped with at least this size for the life of the buffer.
             // Callers read only after the fence of the work that writes the range.
             Some(pointer) if range.start <= range.end && range.end as u64 <= self.size => unsafe {
@@ -305,7 +263,7 @@ impl Buffer {
 
     /// Some of the mapped bytes, to write.
     pub(crate) fn bytes_mut(&mut self, range: Range<usize>) -> &mut [u8] {
-        match self.mapped {
+        match self.memory.mapped {
             // SAFETY: as in `bytes`, and `&mut self` makes this the host's only
             // reference; the device works on other ranges.
             Some(pointer) if range.start <= range.end && range.end as u64 <= self.size => unsafe {
@@ -325,10 +283,7 @@ impl Drop for Buffer {
             unsafe {
                 self.device.raw.destroy_buffer_view(self.view, None);
                 self.device.raw.destroy_buffer(self.raw, None);
-                match self.share {
-                    Some(share) => self.device.shared.give_back(&self.device.raw, share),
-                    None => self.device.raw.free_memory(self.memory, None),
-                }
+                self.device.shared.give_back(&self.device.raw, self.memory);
             }
         }
     }
