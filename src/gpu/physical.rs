@@ -7,7 +7,7 @@ use ash::{ext, khr, vk};
 
 use crate::gpu::error::{Named, VulkanError};
 use crate::gpu::instance::Instance;
-use crate::gpu::memory_types::{Placing, direct, is_unified};
+use crate::gpu::memory_types::is_unified;
 use crate::gpu::options::{EngineOptions, Mapping, Reads, Transfer};
 use crate::gpu::queues::{Copies, compute_family, copies};
 use crate::shader::spirv::FloatControls;
@@ -164,15 +164,15 @@ impl PhysicalDevice {
         unsafe { vk_instance.get_physical_device_properties2(raw, &mut all) };
         // SAFETY: as above.
         let memory = unsafe { vk_instance.get_physical_device_memory_properties(raw) };
-        // SAFETY: as above.
-        let features = unsafe { vk_instance.get_physical_device_features(raw) };
         let mut timelines = vk::PhysicalDeviceTimelineSemaphoreFeatures::default();
+        let mut features = vk::PhysicalDeviceFeatures2::default();
         let reports_timelines = core_1_2 || has(khr::timeline_semaphore::NAME);
         if reports_timelines {
-            let mut all = vk::PhysicalDeviceFeatures2::default().push_next(&mut timelines);
-            // SAFETY: Vulkan 1.1; the device knows the structure that is chained.
-            unsafe { vk_instance.get_physical_device_features2(raw, &mut all) };
+            features = features.push_next(&mut timelines);
         }
+        // SAFETY: Vulkan 1.1; the device knows the structure that is chained.
+        unsafe { vk_instance.get_physical_device_features2(raw, &mut features) };
+        let has_int64 = features.features.shader_int64 == vk::TRUE;
         let float_controls = FloatControls {
             preserve_signed_zero_inf_nan: controls.shader_signed_zero_inf_nan_preserve_float32
                 == vk::TRUE,
@@ -216,7 +216,7 @@ impl PhysicalDevice {
             memory,
             has_timelines: timelines.timeline_semaphore == vk::TRUE,
             timelines_extension: reports_timelines && !core_1_2,
-            has_int64: features.shader_int64 == vk::TRUE,
+            has_int64,
             max_texel_buffer_elements: limits.max_texel_buffer_elements,
             lent_alignment: borrows.then_some(imported.min_imported_host_pointer_alignment),
             info,
@@ -271,15 +271,6 @@ impl PhysicalDevice {
             options.read_back,
             is_software,
         )
-    }
-
-    /// The rule by which uploads are placed.
-    pub(crate) fn placing(&self, options: &EngineOptions) -> Placing {
-        Placing {
-            uploads: options.uploads,
-            in_place: self.in_place(options.transfer),
-            direct: direct(&self.memory),
-        }
     }
 
     /// Valid bits of a time stamp of its queue; 0 where there are none.
