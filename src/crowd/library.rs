@@ -2,7 +2,7 @@
 
 use glam::{Affine3A, Vec3};
 
-use crate::crowd::clip_tables::{ClipMethods, ClipTables};
+use crate::crowd::clip_tables::ClipTables;
 use crate::crowd::error::{CrowdError, MOST_CLIPS, MOST_MASKS, MOST_TICKS};
 use crate::math::canonical::{canonical, round_f32};
 use crate::memory::reserved;
@@ -166,12 +166,9 @@ impl CrowdLibrary {
         if clip == MOST_CLIPS {
             return Err(CrowdError::TooManyClips);
         }
-        let methods = ClipMethods {
-            rotations: interpolation.into(),
-            vectors,
-        };
+        let (ticks, offsets) = (self.ticks_per_second, &self.offsets);
         self.tables
-            .push(set, methods, self.ticks_per_second, &self.offsets)?;
+            .push(set, interpolation.into(), vectors, ticks, offsets)?;
         let pose = self.tables.pose(joints, clip, 0);
         self.references.extend(pose.map(reciprocal_scale));
         Ok(clip)

@@ -156,9 +156,8 @@ fn rotations<L: Lanes>(
     let first = instance * context.layers as usize;
     let clip = context.entries[first].clip_and_weight & 0xffff;
     for run in &tables.runs[clip as usize] {
-        let joints = run.first_joint..run.first_joint + run.count;
-        let own = &mut output[joints.start as usize..joints.end as usize];
-        let place = ((clip * context.joints + joints.start) * CHANNELS) as usize;
+        let own = &mut output[run.start as usize..run.end as usize];
+        let place = ((clip * context.joints + run.start) * CHANNELS) as usize;
         let channel = &context.channels[place];
         let base = (channel.form_and_base & 0x00ff_ffff) as usize;
         let stands = context.places[first * context.bases as usize + base];
@@ -169,7 +168,7 @@ fn rotations<L: Lanes>(
             arcs::<L>(cells(middle), cells(tangent), stands.parameter, own);
             continue;
         }
-        for (joint, value) in joints.zip(own) {
+        for (joint, value) in run.clone().zip(own) {
             let entry = &context.entries[first];
             *value = context.layer_value(first as u32, entry, joint, ROTATION);
         }
