@@ -193,11 +193,8 @@ impl Crowd {
     /// When there is no such instance or layer.
     pub fn get(&self, instance: usize, layer: usize) -> Result<CrowdLayer, CrowdError> {
         let entry = &self.instances.entries()[self.place(instance, layer)?];
-        Ok(CrowdLayer::unpacked(
-            entry,
-            &self.library.tables.clips,
-            self.clock(),
-        ))
+        let (clips, clock) = (&self.library.tables.clips, self.clock());
+        Ok(CrowdLayer::moved(entry, clips, clock, clock))
     }
 
     /// The tick of its clip at which a layer of an instance is evaluated now, from 0 to the clip's
