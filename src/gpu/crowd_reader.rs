@@ -2,12 +2,13 @@
 
 use std::sync::Arc;
 
-use crate::gpu::crowd::{CrowdSteps, DeviceCrowd};
+use crate::gpu::crowd::DeviceCrowd;
 use crate::gpu::crowd_target::CrowdTarget;
 use crate::gpu::device::Lane;
 use crate::gpu::error::VulkanError;
 use crate::gpu::read_back::ReadBack;
 use crate::gpu::submission::Submission;
+use crate::output::crowd::CrowdOutput;
 use crate::shader::CrowdEntry;
 
 /// A target whose result the host reads.
@@ -16,21 +17,19 @@ pub(crate) struct CrowdReader {
     submission: Submission,
     results: ReadBack,
     target: CrowdTarget,
-    crowd: Arc<DeviceCrowd>,
     bytes: u64,
 }
 
 impl CrowdReader {
-    pub(crate) fn new(crowd: &Arc<DeviceCrowd>, steps: CrowdSteps) -> Result<Self, VulkanError> {
+    pub(crate) fn new(crowd: &Arc<DeviceCrowd>, output: CrowdOutput) -> Result<Self, VulkanError> {
         let engine = &crowd.engine;
-        let bytes = CrowdTarget::bytes(crowd, steps);
+        let bytes = crowd.bytes(output);
         let mut results = ReadBack::default();
-        let output = results.room(&engine.device, bytes, !engine.in_place)?.raw;
+        let buffer = results.room(&engine.device, bytes, !engine.in_place)?.raw;
         Ok(Self {
             submission: Submission::new(&engine.device, Lane::Kernels)?,
             results,
-            target: CrowdTarget::new(crowd, steps, output, 0)?,
-            crowd: Arc::clone(crowd),
+            target: CrowdTarget::new(crowd, output, buffer, 0)?,
             bytes,
         })
     }
@@ -43,8 +42,7 @@ impl CrowdReader {
     ) -> Result<(), VulkanError> {
         self.submission.begin(0)?;
         let commands = self.submission.commands();
-        // SAFETY: the command buffer is this submission's, in recording, and submitted below.
-        unsafe { self.crowd.record(&self.target, commands, clock, changes) };
+        self.target.record(commands, clock, changes);
         self.results.submit(&mut self.submission, self.bytes)
     }
 

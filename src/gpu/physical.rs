@@ -273,6 +273,15 @@ impl PhysicalDevice {
         )
     }
 
+    /// Refuses what kernels cannot see as one buffer.
+    pub(crate) fn check_range(&self, what: &'static str, bytes: u64) -> Result<(), VulkanError> {
+        let limit = self.info.max_storage_buffer_range;
+        match bytes > limit {
+            true => Err(VulkanError::TooLarge { what, bytes, limit }),
+            false => Ok(()),
+        }
+    }
+
     /// Valid bits of a time stamp of its queue; 0 where there are none.
     fn timestamp_bits(&self) -> u32 {
         let family = self.families.get(self.queue_family as usize);
