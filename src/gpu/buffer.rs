@@ -87,7 +87,7 @@ pub(crate) fn may_be_imported(physical: &PhysicalDevice, is_texels: bool) -> boo
 
 /// A storage buffer. One that the host touches stays mapped for as long as it lives.
 pub(crate) struct Buffer {
-    device: Arc<LogicalDevice>,
+    pub(crate) device: Arc<LogicalDevice>,
     pub(crate) raw: vk::Buffer,
     /// A view of it as texels of 16 bytes; null unless kernels read it as a texel buffer.
     pub(crate) view: vk::BufferView,
@@ -118,9 +118,7 @@ impl Buffer {
         // Both families may use what is copied on another queue, without a change of owners.
         let is_copied = matches!(residence, Residence::Results | Residence::Readback);
         let families = device.two_families().filter(|_| is_copied);
-        let mut buffer = Self::without_memory(device, size, is_texels, families, None)?;
-        // SAFETY: the buffer was just created.
-        let needs = unsafe { device.raw.get_buffer_memory_requirements(buffer.raw) };
+        let (mut buffer, needs) = Self::without_memory(device, size, is_texels, families, None)?;
         let (required, preferred) = residence.properties();
         let allowed = match (residence, device.placing.direct) {
             (Residence::Direct, Some(direct)) => needs.memory_type_bits & 1 << direct.memory_type,
@@ -147,7 +145,6 @@ impl Buffer {
     /// The pages must stay allocated until the buffer is dropped and no submitted work uses it.
     pub(crate) unsafe fn around(
         device: &Arc<LogicalDevice>,
-        name: &str,
         pages: NonNull<u8>,
         size: u64,
     ) -> Option<Self> {
@@ -159,14 +156,10 @@ impl Buffer {
             let call = borrows.fp().get_memory_host_pointer_properties_ext;
             call(borrows.device(), LENT, pages, &raw mut properties)
         };
-        known
-            .result()
-            .named("vkGetMemoryHostPointerPropertiesEXT")
-            .ok()?;
-        let is_texels = device.reads_texels;
-        let mut buffer = Self::without_memory(device, size, is_texels, None, Some(LENT)).ok()?;
-        // SAFETY: the buffer was just created.
-        let needs = unsafe { device.raw.get_buffer_memory_requirements(buffer.raw) };
+        known.result().ok()?;
+        let (is_texels, lent) = (device.reads_texels, Some(LENT));
+        let made = Self::without_memory(device, size, is_texels, None, lent);
+        let (mut buffer, needs) = made.ok().filter(|(_, needs)| needs.size <= size)?;
         let (required, preferred) = Residence::Readback.properties();
         let allowed = needs.memory_type_bits & properties.memory_type_bits;
         let memory_type = device.physical.memory_type(allowed, required, preferred)?;
@@ -177,23 +170,25 @@ impl Buffer {
             .allocation_size(size)
             .memory_type_index(memory_type)
             .push_next(&mut import);
-        if needs.size > size {
-            return None;
-        }
         // SAFETY: a valid size and memory type, and the pages are there.
         let memory = unsafe { device.raw.allocate_memory(&info, None) }.ok()?;
-        let memory = Share::whole(memory, size);
-        buffer.bind(memory, is_texels, name).ok()?;
+        let memory = Share {
+            memory,
+            size,
+            ..Share::default()
+        };
+        buffer.bind(memory, is_texels, "tumble lent").ok()?;
         Some(buffer)
     }
 
+    /// A buffer that has no memory yet, and what memory it needs.
     fn without_memory(
         device: &Arc<LogicalDevice>,
         size: u64,
         is_texels: bool,
         families: Option<[u32; 2]>,
         external: Option<vk::ExternalMemoryHandleTypeFlags>,
-    ) -> Result<Self, VulkanError> {
+    ) -> Result<(Self, vk::MemoryRequirements), VulkanError> {
         let mut kinds = vk::ExternalMemoryBufferCreateInfo::default()
             .handle_types(external.unwrap_or_default());
         let mut info = vk::BufferCreateInfo::default()
@@ -210,13 +205,16 @@ impl Buffer {
         // SAFETY: the device is alive, here and below; what is created is destroyed
         // in `drop`, also when a later step fails.
         let raw = unsafe { device.raw.create_buffer(&info, None) }.named("vkCreateBuffer")?;
-        Ok(Self {
+        // SAFETY: the buffer was just created.
+        let needs = unsafe { device.raw.get_buffer_memory_requirements(raw) };
+        let buffer = Self {
             device: Arc::clone(device),
             raw,
             view: vk::BufferView::null(),
             memory: Share::default(),
             size,
-        })
+        };
+        Ok((buffer, needs))
     }
 
     fn bind(&mut self, memory: Share, is_texels: bool, name: &str) -> Result<(), VulkanError> {

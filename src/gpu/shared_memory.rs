@@ -32,21 +32,9 @@ pub(crate) struct Kind {
 pub(crate) struct Share {
     pub(crate) memory: vk::DeviceMemory,
     pub(crate) offset: u64,
-    size: u64,
+    pub(crate) size: u64,
     /// Where the host sees the first byte.
     pub(crate) mapped: Option<NonNull<u8>>,
-}
-
-impl Share {
-    /// All of an allocation.
-    pub(crate) fn whole(memory: vk::DeviceMemory, size: u64) -> Self {
-        Self {
-            memory,
-            offset: 0,
-            size,
-            mapped: None,
-        }
-    }
 }
 
 struct Block {
@@ -145,7 +133,11 @@ fn allocate(device: &ash::Device, kind: Kind, size: u64) -> Result<Share, Vulkan
         .memory_type_index(kind.memory_type);
     // SAFETY: the device is alive, and has this type of memory.
     let memory = unsafe { device.allocate_memory(&info, None) }.named("vkAllocateMemory")?;
-    let mut share = Share::whole(memory, size);
+    let mut share = Share {
+        memory,
+        size,
+        ..Share::default()
+    };
     if kind.mapped {
         let flags = vk::MemoryMapFlags::empty();
         // SAFETY: the memory is visible to the host and not mapped yet; freeing it unmaps it.
