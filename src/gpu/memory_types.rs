@@ -93,13 +93,12 @@ pub(crate) struct Placing {
 impl Placing {
     /// Where an upload goes if there is room.
     pub(crate) fn place(&self, bytes: u64, reads: KernelReads) -> Place {
-        let largest = match (self.uploads, self.direct) {
-            (Uploads::Staged, _) => return Place::Staged,
-            (_, None) => return self.without_direct(reads),
-            (Uploads::Direct, Some(_)) => u64::MAX,
-            (Uploads::Automatic, Some(direct)) => direct.largest,
+        let fits = match self.uploads {
+            Uploads::Staged => return Place::Staged,
+            Uploads::Direct => self.direct.is_some(),
+            Uploads::Automatic => self.direct.is_some_and(|own| bytes <= own.largest),
         };
-        match bytes <= largest {
+        match fits {
             true => Place::Direct,
             false => self.without_direct(reads),
         }

@@ -100,7 +100,9 @@ pub(crate) fn list(validation: bool) -> Result<Vec<PhysicalDevice>, VulkanError>
     let instance = Instance::new(validation)?;
     let mut devices = Vec::new();
     let mut failed = None;
-    for raw in instance.physical_devices()? {
+    // SAFETY: the instance is alive.
+    let all = unsafe { instance.raw.enumerate_physical_devices() };
+    for raw in all.named("vkEnumeratePhysicalDevices")? {
         match PhysicalDevice::new(&instance, raw) {
             Ok(device) => devices.extend(device),
             // The others may be sound.
@@ -183,14 +185,10 @@ impl PhysicalDevice {
             name.map(|name| name.to_string_lossy().into_owned())
                 .unwrap_or_default()
         };
-        let driver = format!(
-            "{} {}",
-            text(driver.driver_name_as_c_str()),
-            text(driver.driver_info_as_c_str())
-        );
+        let driver = [driver.driver_name_as_c_str(), driver.driver_info_as_c_str()];
         let info = DeviceInfo {
             name: text(properties.device_name_as_c_str()),
-            driver: driver.trim().to_owned(),
+            driver: driver.map(text).join(" ").trim().to_owned(),
             kind: kind(properties.device_type),
             api_version: version(properties.api_version),
             vendor_id: properties.vendor_id,
@@ -314,8 +312,9 @@ impl PhysicalDevice {
                 allowed & (1 << i) != 0 && types[i as usize].property_flags.contains(wanted)
             })
         };
-        let mut preferred = preferred.iter().map(|flags| find(required | *flags));
-        preferred.find_map(|found| found).or_else(|| find(required))
+        let mut preferred = preferred.iter();
+        let found = preferred.find_map(|&flags| find(required | flags));
+        found.or_else(|| find(required))
     }
 }
 
