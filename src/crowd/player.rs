@@ -37,7 +37,7 @@ pub struct Crowd {
     /// A submission that was not taken yet. On the CPU it has its values already.
     submitted: Option<(CrowdOutput, Option<Vec<[f32; 4]>>)>,
     /// What evaluates on the device for the host, for the output that was asked for last.
-    reader: Option<(CrowdOutput, CrowdReader)>,
+    reader: Option<CrowdReader>,
 }
 
 impl Engine {
@@ -267,11 +267,10 @@ impl Crowd {
             self.submitted = Some((output, Some(found)));
             return Ok(());
         };
-        let reader = match self.reader.take() {
-            Some((own, reader)) if own == output => reader,
-            _ => CrowdReader::new(device, output)?,
-        };
-        let (_, reader) = self.reader.insert((output, reader));
+        let kept = self.reader.take();
+        let kept = kept.filter(|reader| reader.target.output() == output);
+        let reader = kept.map_or_else(|| CrowdReader::new(device, output), Ok)?;
+        let reader = self.reader.insert(reader);
         let clock = self.instances.clock();
         if let Err(error) = reader.submit(clock, self.instances.take_changes()) {
             // What was recorded may never have reached the device.
@@ -296,7 +295,7 @@ impl Crowd {
     pub fn poll(&self) -> Result<bool, CrowdError> {
         match (&self.submitted, &self.reader) {
             (Some((_, Some(_))), _) => Ok(true),
-            (Some((_, None)), Some((_, reader))) => Ok(reader.is_done()?),
+            (Some((_, None)), Some(reader)) => Ok(reader.is_done()?),
             _ => Err(CrowdError::NothingSubmitted),
         }
     }
@@ -337,7 +336,7 @@ impl Crowd {
             }
             return Ok(());
         }
-        let Some((_, reader)) = &mut self.reader else {
+        let Some(reader) = &mut self.reader else {
             return Err(CrowdError::NothingSubmitted);
         };
         let read = reader.wait_into(bytemuck::cast_slice_mut(output));
@@ -373,14 +372,7 @@ impl Crowd {
     }
 
     fn on_cpu(&self, values: CrowdValues, output: &mut [[f32; 4]]) {
-        let CrowdDispatch {
-            joints,
-            layers,
-            bases,
-            masks,
-            references,
-            ..
-        } = self.arguments;
+        let own = &self.arguments;
         let scene = Scene {
             library: &self.library,
             values,
@@ -390,11 +382,11 @@ impl Crowd {
                 channels: &self.library.tables.channels,
                 cells: &self.cells,
                 places: &[],
-                joints,
-                layers,
-                bases,
-                masks,
-                references,
+                joints: own.joints,
+                layers: own.layers,
+                bases: own.bases,
+                masks: own.masks,
+                references: own.references,
             },
         };
         if let Backend::Cpu(engine) = &*self.engine.backend {

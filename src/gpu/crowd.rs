@@ -74,10 +74,10 @@ impl DeviceCrowd {
         tables: CrowdTables,
     ) -> Result<Self, VulkanError> {
         let device = &engine.device;
-        let CrowdDispatch { joints, layers, .. } = shape.arguments;
-        let entries = u64::from(shape.instances) * u64::from(layers);
+        let own = &shape.arguments;
+        let entries = u64::from(shape.instances) * u64::from(own.layers);
         let entries = entries * size_of::<CrowdEntry>() as u64;
-        let poses = LEAST_WINDOW * MATRIX * u64::from(joints);
+        let poses = LEAST_WINDOW * MATRIX * u64::from(own.joints);
         let physical = &device.physical;
         physical.check_range("a crowd's instances", entries)?;
         physical.check_range("a window of a crowd's poses", poses)?;
@@ -95,18 +95,18 @@ impl DeviceCrowd {
         joints * output.bytes() as u64
     }
 
+    /// Bytes of the places where the layers of an instance stand.
+    pub(crate) fn place_bytes(&self) -> u64 {
+        let own = &self.shape.arguments;
+        size_of::<CrowdPlace>() as u64 * u64::from(own.layers) * u64::from(own.bases)
+    }
+
     /// Instances that are evaluated at once: as many as their results fit the device's limits, and the
     /// memory budget.
     pub(crate) fn window(&self) -> u32 {
-        let CrowdDispatch {
-            joints,
-            layers,
-            bases,
-            ..
-        } = self.shape.arguments;
+        let own = &self.shape.arguments;
         let info = &self.engine.device.physical.info;
-        let places = size_of::<CrowdPlace>() as u64 * u64::from(layers * bases);
-        let bytes = places.max(MATRIX * u64::from(joints));
+        let bytes = self.place_bytes().max(MATRIX * u64::from(own.joints));
         let range = info
             .max_storage_buffer_range
             .min(info.max_memory_allocation_size);

@@ -16,8 +16,7 @@ pub(crate) struct CrowdReader {
     // These two go first: they wait for what uses the rest.
     submission: Submission,
     results: ReadBack,
-    target: CrowdTarget,
-    bytes: u64,
+    pub(crate) target: CrowdTarget,
 }
 
 impl CrowdReader {
@@ -30,7 +29,6 @@ impl CrowdReader {
             submission: Submission::new(&engine.device, Lane::Kernels)?,
             results,
             target: CrowdTarget::new(crowd, output, buffer, 0)?,
-            bytes,
         })
     }
 
@@ -43,7 +41,8 @@ impl CrowdReader {
         self.submission.begin(0)?;
         let commands = self.submission.commands();
         self.target.record(commands, clock, changes);
-        self.results.submit(&mut self.submission, self.bytes)
+        let bytes = self.target.crowd.bytes(self.target.output());
+        self.results.submit(&mut self.submission, bytes)
     }
 
     pub(crate) fn is_done(&self) -> Result<bool, VulkanError> {

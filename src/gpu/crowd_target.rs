@@ -13,7 +13,7 @@ use crate::gpu::error::VulkanError;
 use crate::gpu::pipeline::Pipeline;
 use crate::gpu::submission::{Access, Binding};
 use crate::output::crowd::CrowdOutput;
-use crate::shader::{CROWD_WORKGROUP, CrowdDispatch, CrowdEntry, CrowdPlace, Kernel, WORKGROUP};
+use crate::shader::{CROWD_WORKGROUP, CrowdDispatch, CrowdEntry, Kernel, WORKGROUP};
 
 /// The most bytes that one command may write into a buffer.
 const UPDATE: usize = 1 << 16;
@@ -44,24 +44,15 @@ impl CrowdTarget {
         offset: u64,
     ) -> Result<Self, VulkanError> {
         let engine = &crowd.engine;
-        let CrowdDispatch {
-            joints,
-            layers,
-            bases,
-            ..
-        } = crowd.shape.arguments;
         let (window, instances) = (crowd.window(), crowd.shape.instances);
+        let joints = u64::from(crowd.shape.arguments.joints);
         let new = |name, each: u64| {
             let size = u64::from(window) * each;
             Buffer::new(&engine.device, name, size, Residence::Device)
         };
-        let place = size_of::<CrowdPlace>() as u64;
-        let places = new(
-            "tumble crowd places",
-            place * u64::from(layers) * u64::from(bases),
-        )?;
+        let places = new("tumble crowd places", crowd.place_bytes())?;
         // Values of a window before they are rounded to 16 bits.
-        let values = u64::from(joints) * output.vectors() as u64 * 16;
+        let values = joints * output.vectors() as u64 * 16;
         let whole = (output.is_half).then(|| new("tumble crowd values", values));
         let whole = whole.transpose()?;
         let pipelines = crowd
@@ -75,7 +66,7 @@ impl CrowdTarget {
         let mut windows = Vec::new();
         for first in (0..instances).step_by(window as usize) {
             let own = window.min(instances - first);
-            let each = u64::from(joints) * output.bytes() as u64;
+            let each = joints * output.bytes() as u64;
             let start = offset + u64::from(first) * each;
             let range = Binding::range(buffer, start, u64::from(own) * each);
             let values = whole.as_ref().map_or(range, Binding::whole);
