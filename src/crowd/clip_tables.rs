@@ -8,6 +8,7 @@ use glam::Vec3;
 
 use crate::crowd::error::{CrowdError, MOST_TICKS};
 use crate::curve::options::Quantity;
+use crate::math::canonical::round_f32;
 use crate::memory::reserved;
 use crate::method::interpolation::Interpolation;
 use crate::method::vector_method::VectorMethod;
@@ -15,7 +16,7 @@ use crate::prepare::clip_data::{ClipData, Wanted};
 use crate::prepare::prepared::Prepared;
 use crate::shader::{
     CHANNELS, CrowdBase, CrowdChannel, CrowdClip, CrowdSpan, FORM_ARC, FORM_CONSTANT, FORM_CUBIC,
-    FORM_POLYNOMIAL, Form, ON_KEY, POWERS,
+    FORM_POLYNOMIAL, Form, ON_KEY, POWERS, SCALE,
 };
 use crate::time::frame_clock::{FrameClock, in_frames};
 use crate::time::frame_rate::FrameRate;
@@ -133,18 +134,13 @@ fn curve(data: &ClipData, track: usize, form: u32, clock: ClipClock) -> Result<C
         let (prepared, part) = (own.prepared, own.part);
         let frames = FrameClock::new(clock.rate, clock.start, part.end);
         let constant = |index: u32| prepared.constants[index as usize];
-        let spans = part.spans.clone();
-        let begin = prepared.spans.starts[spans.clone()].first();
-        let begin = frames.boundary(begin.copied().unwrap_or(part.end));
+        let starts = &prepared.spans.starts[part.spans.clone()];
+        let begin = frames.boundary(*starts.first().unwrap_or(&part.end));
         if part.before != NONE && begin.first > 0.0 {
             curve.hold(0, constant(part.before), None);
         }
-        for place in spans.clone() {
-            let start = prepared.spans.starts[place];
-            let end = match place + 1 < spans.end {
-                true => prepared.spans.starts[place + 1],
-                false => part.end,
-            };
+        let ends = starts.iter().skip(1).chain([&part.end]);
+        for ((place, &start), &end) in part.spans.clone().zip(starts).zip(ends) {
             let (from, to) = (frames.boundary(start), frames.boundary(end));
             if from.first >= to.first || from.first > last_tick {
                 continue; // no tick lies in it
@@ -352,13 +348,14 @@ impl ClipTables {
             .collect()
     }
 
-    /// Every channel of a clip at a tick, and its kind, `[joint][kind]`.
-    pub(crate) fn pose(
+    /// Every channel of a clip at a tick, `[joint][kind]`, as reference poses hold it: of scales the
+    /// reciprocals, where 0 counts as 1.
+    pub(crate) fn reference(
         &self,
         joints: usize,
         clip: usize,
         tick: u32,
-    ) -> impl Iterator<Item = (u32, [f32; 4])> {
+    ) -> impl Iterator<Item = [f32; 4]> {
         let own = &self.clips[clip];
         let tick = tick.min(own.period);
         let bases = &self.bases[own.first_base as usize..][..own.bases as usize];
@@ -369,7 +366,14 @@ impl ClipTables {
         let channels = &self.channels[clip * each..][..each];
         (0..).zip(channels).map(move |(place, channel)| {
             let own = places[(channel.form_and_base & 0x00ff_ffff) as usize];
-            (place % CHANNELS, sampled(&self.cells, channel, own))
+            let value = sampled(&self.cells, channel, own);
+            match place % CHANNELS {
+                SCALE => value.map(|scale| match scale == 0.0 {
+                    true => 1.0,
+                    false => round_f32(1.0 / f64::from(scale)),
+                }),
+                _ => value,
+            }
         })
     }
 }

@@ -5,12 +5,12 @@ use glam::{Affine3A, Vec3};
 
 use crate::crowd::clip_tables::{ClipTables, MOST_PLACES};
 use crate::crowd::error::{CrowdError, MOST_CLIPS, MOST_MASKS, MOST_TICKS};
-use crate::math::canonical::{canonical, round_f32};
+use crate::math::canonical::canonical;
 use crate::memory::reserved;
 use crate::method::interpolation::Interpolation;
 use crate::method::vector_method::VectorMethod;
 use crate::pose::skeleton::Skeleton;
-use crate::shader::{CHANNELS, CrowdDispatch, CrowdLink, ROOT, SCALE};
+use crate::shader::{CHANNELS, CrowdDispatch, CrowdLink, ROOT};
 use crate::tracks::set::TrackSet;
 use crate::twin::crowd_matrices::Rows;
 
@@ -170,8 +170,8 @@ impl CrowdLibrary {
         let (ticks, offsets) = (self.ticks_per_second, &self.offsets);
         self.tables
             .push(set, interpolation.into(), vectors, ticks, offsets)?;
-        let pose = self.tables.pose(joints, clip, 0);
-        self.references.extend(pose.map(reciprocal_scale));
+        self.references
+            .extend(self.tables.reference(joints, clip, 0));
         Ok(clip)
     }
 
@@ -186,10 +186,12 @@ impl CrowdLibrary {
             let what = "clip";
             return Err(CrowdError::Missing { what, given, count });
         }
-        let pose = self.tables.pose(joints, from, tick).map(reciprocal_scale);
         let own = &mut self.references[clip * joints * CHANNELS as usize..];
-        for (reference, value) in own.iter_mut().zip(pose) {
-            *reference = value;
+        for (own, value) in own
+            .iter_mut()
+            .zip(self.tables.reference(joints, from, tick))
+        {
+            *own = value;
         }
         Ok(())
     }
@@ -272,16 +274,5 @@ impl CrowdLibrary {
             references: (masks + self.masks.len()) as u32,
             ..CrowdDispatch::zeroed()
         }
-    }
-}
-
-/// A channel's value as reference poses hold it.
-fn reciprocal_scale((kind, value): (u32, [f32; 4])) -> [f32; 4] {
-    match kind {
-        SCALE => value.map(|scale| match scale == 0.0 {
-            true => 1.0,
-            false => round_f32(1.0 / f64::from(scale)),
-        }),
-        _ => value,
     }
 }
