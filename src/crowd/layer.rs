@@ -204,37 +204,4 @@ mod tests {
             }
         }
     }
-
-    #[test]
-    fn impossible_layers_are_refused_by_name() {
-        let clips = [CrowdClip {
-            period: 10,
-            first_base: 0,
-            bases: 0,
-        }];
-        let refused = |layer: CrowdLayer| layer.packed(&clips, 1, 0).unwrap_err();
-        let one = CrowdLayer::new(0);
-        for weight in [f32::NAN, -0.1, 1.1] {
-            let error = refused(CrowdLayer { weight, ..one });
-            assert!(matches!(error, CrowdError::Weight { .. }));
-        }
-        for speed in [f32::NAN, f32::INFINITY, -128.0] {
-            let error = refused(CrowdLayer { speed, ..one });
-            assert!(matches!(error, CrowdError::Speed { .. }));
-        }
-        let mask = Some(1);
-        assert!(matches!(
-            refused(CrowdLayer { mask, ..one }),
-            CrowdError::Missing { what: "mask", .. }
-        ));
-        assert!(matches!(
-            refused(CrowdLayer::new(1)),
-            CrowdError::Missing { what: "clip", .. }
-        ));
-        let wrap = WrapMode::Extrapolate;
-        assert_eq!(
-            refused(CrowdLayer { wrap, ..one }),
-            CrowdError::Wrap { wrap }
-        );
-    }
 }
