@@ -123,55 +123,49 @@ impl CrowdTarget {
                 clock_high: (clock >> 32) as u32,
                 ..shape.arguments
             };
-            for ((kernel, pipeline), &set) in self.pipelines.iter().zip(sets) {
-                let dispatch = |count, arguments| {
-                    self.dispatch(
-                        commands,
-                        pipeline,
-                        set,
-                        CrowdDispatch { count, ..arguments },
-                    );
-                };
-                let joints = instances * arguments.joints;
-                match kernel {
-                    Kernel::CrowdTimes => {
-                        dispatch(instances * arguments.layers * arguments.bases, arguments);
-                    }
-                    Kernel::CrowdWalk => {
-                        for level in shape.levels.windows(2) {
-                            let own = CrowdDispatch {
-                                joints: level[1] - level[0],
-                                layers: arguments.joints,
-                                first_link: level[0],
-                                ..arguments
-                            };
-                            dispatch(instances * own.joints, own);
-                        }
-                    }
-                    Kernel::CrowdSkin => dispatch(3 * joints, arguments),
-                    Kernel::CrowdHalf => {
-                        dispatch(joints * self.output.vectors() as u32, arguments);
-                    }
-                    _ => dispatch(joints, arguments),
-                }
-            }
+            self.record_window(commands, sets, instances, arguments);
         }
         commands.barrier(Access::Kernel, Access::Any);
     }
 
-    /// Records a dispatch, and that the next one sees what it wrote.
-    fn dispatch(
+    /// Records the dispatches of a window, each of which sees what the one before it wrote.
+    fn record_window(
         &self,
         commands: Commands<'_>,
-        pipeline: &Pipeline,
-        set: vk::DescriptorSet,
+        sets: &[vk::DescriptorSet],
+        instances: u32,
         arguments: CrowdDispatch,
     ) {
         const _: () = assert!(CROWD_WORKGROUP == WORKGROUP);
-        if arguments.count > 0 {
-            let groups = self.crowd.engine.workgroups(arguments.count);
-            commands.dispatch(pipeline, set, bytemuck::bytes_of(&arguments), groups);
-            commands.barrier(Access::Kernel, Access::Kernel);
+        let joints = instances * arguments.joints;
+        for ((kernel, pipeline), &set) in self.pipelines.iter().zip(sets) {
+            let dispatch = |count, arguments| {
+                if count > 0 {
+                    let arguments = CrowdDispatch { count, ..arguments };
+                    let groups = self.crowd.engine.workgroups(count);
+                    commands.dispatch(pipeline, set, bytemuck::bytes_of(&arguments), groups);
+                    commands.barrier(Access::Kernel, Access::Kernel);
+                }
+            };
+            let count = match kernel {
+                Kernel::CrowdTimes => instances * arguments.layers * arguments.bases,
+                Kernel::CrowdSkin => 3 * joints,
+                Kernel::CrowdHalf => joints * self.output.vectors() as u32,
+                Kernel::CrowdWalk => {
+                    for level in self.crowd.shape.levels.windows(2) {
+                        let own = CrowdDispatch {
+                            joints: level[1] - level[0],
+                            layers: arguments.joints,
+                            first_link: level[0],
+                            ..arguments
+                        };
+                        dispatch(instances * own.joints, own);
+                    }
+                    continue;
+                }
+                _ => joints,
+            };
+            dispatch(count, arguments);
         }
     }
 }
