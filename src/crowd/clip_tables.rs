@@ -254,7 +254,7 @@ impl ClipTables {
         }
         let mut known: HashMap<Vec<u8>, u32> = HashMap::new();
         // Channels of one kind, one form and one time base lie side by side.
-        let mut sides: BTreeMap<(u32, u32, u32), Vec<(usize, &Curve)>> = BTreeMap::new();
+        let mut sides = BTreeMap::<_, Vec<(usize, &Curve)>>::new();
         for (place, curve) in curves.iter().enumerate() {
             let mut base = 0;
             if curve.form != FORM_CONSTANT {

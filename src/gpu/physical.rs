@@ -281,14 +281,9 @@ impl PhysicalDevice {
     }
 
     /// Valid bits of a time stamp of its queue; 0 where there are none.
-    fn timestamp_bits(&self) -> u32 {
+    pub(crate) fn timestamp_bits(&self) -> u32 {
         let family = self.families.get(self.queue_family as usize);
         family.map_or(0, |own| own.timestamp_valid_bits)
-    }
-
-    /// Whether its queue can take time stamps.
-    pub(crate) fn has_timestamps(&self) -> bool {
-        self.timestamp_bits() > 0
     }
 
     /// The time between two stamps.

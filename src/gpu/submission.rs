@@ -101,7 +101,7 @@ impl Submission {
         // SAFETY: as above.
         submission.fence = unsafe { raw.create_fence(&vk::FenceCreateInfo::default(), None) }
             .named("vkCreateFence")?;
-        if lane == Lane::Kernels && device.physical.has_timestamps() {
+        if lane == Lane::Kernels && device.physical.timestamp_bits() > 0 {
             let info = vk::QueryPoolCreateInfo::default()
                 .query_type(vk::QueryType::TIMESTAMP)
                 .query_count(2);
