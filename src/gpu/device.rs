@@ -116,67 +116,54 @@ impl LogicalDevice {
         // SAFETY: the physical device belongs to the instance and has these families.
         let raw =
             unsafe { instance.create_device(physical.raw, &info, None) }.named("vkCreateDevice")?;
-        let queue = |QueuePlace { family, index }| {
-            // SAFETY: this queue was just created.
-            Queue::new(unsafe { raw.get_device_queue(family, index) }, family)
-        };
-        let first = queue(QueuePlace {
-            family: own,
-            index: 0,
+        // SAFETY: these queues were just created.
+        let queue = |family, index| unsafe { raw.get_device_queue(family, index) };
+        let copy_queue = beside.map(|QueuePlace { family, index }| VulkanQueue {
+            queue: queue(family, index),
+            family,
         });
+        let first = queue(own, 0);
         let borrows = borrows.then(|| ext::external_memory_host::Device::new(instance, &raw));
-        let queues = (first, beside.map(queue), copies_apart);
-        Ok(Self::wrap(physical, raw, queues, options, borrows, true))
+        let mut device = Self::borrowed(physical, raw, first, copy_queue, options);
+        (device.owned, device.borrows) = (true, borrows);
+        device.copies_apart = copies_apart;
+        Ok(Arc::new(device))
     }
 
-    /// An application's device; it stays the application's to destroy. Results are copied by
-    /// `copy_queue` where it names one.
+    /// An application's device; it stays the application's to destroy. Results that are staged are copied
+    /// by `copy_queue` where there is one.
     pub(crate) fn borrowed(
         physical: PhysicalDevice,
         raw: ash::Device,
         queue: vk::Queue,
         copy_queue: Option<VulkanQueue>,
         options: &EngineOptions,
-    ) -> Arc<Self> {
-        let stay = physical.in_place(options.transfer) || options.read_back == ReadBack::SameQueue;
+    ) -> Self {
+        let in_place = physical.in_place(options.transfer);
+        let stay = in_place || options.read_back == ReadBack::SameQueue;
         let named = copy_queue.filter(|_| !stay);
-        let beside = named.map(|named| Queue::new(named.queue, named.family));
-        let queue = Queue::new(queue, physical.queue_family);
-        let copies_apart = beside.is_some();
-        let queues = (queue, beside, copies_apart);
-        Self::wrap(physical, raw, queues, options, None, false)
-    }
-
-    fn wrap(
-        physical: PhysicalDevice,
-        raw: ash::Device,
-        (queue, copy_queue, copies_apart): (Queue, Option<Queue>, bool),
-        options: &EngineOptions,
-        borrows: Option<ext::external_memory_host::Device>,
-        owned: bool,
-    ) -> Arc<Self> {
         let instance = &physical.instance;
         let names = instance
             .debug_utils
             .then(|| ext::debug_utils::Device::new(&instance.raw, &raw));
-        Arc::new(Self {
+        Self {
             raw,
             reads_texels: physical.reads_texels(options.reads),
             placing: Placing {
                 uploads: options.uploads,
-                in_place: physical.in_place(options.transfer),
+                in_place,
                 direct: direct(&physical.memory),
             },
+            queue: Queue::new(queue, physical.queue_family),
+            copy_queue: named.map(|named| Queue::new(named.queue, named.family)),
+            copies_apart: named.is_some(),
             physical,
-            queue,
-            copy_queue,
-            copies_apart,
             names,
-            borrows,
-            owned,
+            borrows: None,
+            owned: false,
             shared: SharedMemory::default(),
             hung: AtomicBool::new(false),
-        })
+        }
     }
 
     /// The queue of a lane, for one user at a time.
