@@ -64,10 +64,8 @@ impl SharedMemory {
             // Where there is no room for a block there may be some for the buffer alone.
             if let Ok(whole) = allocate(device, kind, BLOCK) {
                 let free = Free::new(BLOCK);
-                let mut block = Block { kind, whole, free };
-                let share = block.share(needs);
-                blocks.push(block);
-                if let Some(share) = share {
+                blocks.push(Block { kind, whole, free });
+                if let Some(share) = blocks.last_mut().and_then(|block| block.share(needs)) {
                     return Ok(share);
                 }
             }
