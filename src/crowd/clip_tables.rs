@@ -1,11 +1,14 @@
 //! A clip of a library: the curves of its joints as tables of constants that kernels read.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
+use std::ops::Range;
 
+use bytemuck::Zeroable as _;
 use glam::Vec3;
 
 use crate::crowd::error::{CrowdError, MOST_TICKS};
 use crate::curve::options::Quantity;
+use crate::math::canonical::round_f32;
 use crate::memory::reserved;
 use crate::method::interpolation::Interpolation;
 use crate::method::vector_method::VectorMethod;
@@ -13,7 +16,7 @@ use crate::prepare::clip_data::{ClipData, Wanted};
 use crate::prepare::prepared::Prepared;
 use crate::shader::{
     CHANNELS, CrowdBase, CrowdChannel, CrowdClip, CrowdSpan, FORM_ARC, FORM_CONSTANT, FORM_CUBIC,
-    FORM_POLYNOMIAL, Form, ON_KEY, POWERS,
+    FORM_POLYNOMIAL, Form, ON_KEY, POWERS, SCALE,
 };
 use crate::time::frame_clock::{FrameClock, in_frames};
 use crate::time::frame_rate::FrameRate;
@@ -25,7 +28,7 @@ use crate::twin::crowd_layers::sampled;
 use crate::twin::crowd_times::place_at;
 
 /// Places in a table are counted in 32 bits, with some to spare.
-const MOST_PLACES: usize = 1 << 31;
+pub(crate) const MOST_PLACES: usize = 1 << 31;
 
 /// The tables of all clips.
 #[derive(Debug, Clone, Default)]
@@ -37,18 +40,13 @@ pub(crate) struct ClipTables {
     pub(crate) channels: Vec<CrowdChannel>,
     /// Constants of segments, and keys.
     pub(crate) cells: Vec<[f32; 4]>,
-    /// Rotations of consecutive joints that lie side by side, `runs[clip]`.
-    pub(crate) runs: Vec<Vec<JointRun>>,
-}
-
-/// Consecutive joints whose rotations are of one form and one time base, and lie side by side.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct JointRun {
-    pub(crate) first_joint: u32,
-    pub(crate) count: u32,
+    /// Consecutive joints whose rotations are of one form and one time base, and lie side by side,
+    /// `runs[clip]`.
+    pub(crate) runs: Vec<Vec<Range<u32>>>,
 }
 
 /// One channel before it has its place: its spans, and what it is in each.
+#[derive(Default)]
 struct Curve {
     form: u32,
     spans: Vec<CrowdSpan>,
@@ -69,19 +67,12 @@ pub(crate) fn constants_of(form: u32) -> usize {
 }
 
 impl Curve {
-    fn new(form: u32) -> Self {
-        Self {
-            form,
-            spans: Vec::new(),
-            constants: Vec::new(),
-            keys: Vec::new(),
-        }
-    }
-
     fn constant(value: [f32; 4]) -> Self {
-        let mut curve = Self::new(FORM_CONSTANT);
-        curve.constants.push(value);
-        curve
+        Self {
+            form: FORM_CONSTANT,
+            constants: vec![value],
+            ..Self::default()
+        }
     }
 
     /// Adds a span in which the value stays. A curve whose other constants are 0 gives it, bit for bit.
@@ -89,20 +80,21 @@ impl Curve {
         let span = CrowdSpan {
             start,
             whole: start as i32,
-            scale: 0.0,
-            offset: 0.0,
+            ..CrowdSpan::zeroed()
         };
         let mut constants = [[0.0; 4]; POWERS];
         constants[0] = value;
-        self.push(span, &constants[..constants_of(self.form)], key);
+        self.push(span, &constants, key);
     }
 
-    fn push(&mut self, mut span: CrowdSpan, constants: &[[f32; 4]], key: Option<[f32; 4]>) {
+    /// Adds a span with as many of the constants as the form has.
+    fn push(&mut self, mut span: CrowdSpan, constants: &[[f32; 4]; POWERS], key: Option<[f32; 4]>) {
         if key.is_some() {
             span.start |= ON_KEY;
         }
         self.spans.push(span);
-        self.constants.extend_from_slice(constants);
+        self.constants
+            .extend_from_slice(&constants[..constants_of(self.form)]);
         self.keys.push(key.unwrap_or_default());
     }
 }
@@ -116,51 +108,39 @@ struct ClipClock {
     period: u32,
 }
 
-/// How the curves of a clip follow from its keys.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct ClipMethods {
-    pub(crate) rotations: Interpolation,
-    pub(crate) vectors: VectorMethod,
-}
-
 /// The constants of one segment, power by power.
-fn segment(prepared: &Prepared, index: u32, form: u32, constants: &mut Vec<[f32; 4]>) {
+fn segment(prepared: &Prepared, index: u32, form: u32) -> [[f32; 4]; POWERS] {
     let segments = &prepared.segments;
-    constants.clear();
     match form {
         FORM_ARC => {
             let arc = &segments.arcs[index as usize];
-            constants.extend([arc.middle, arc.tangent]);
+            let mut constants = [[0.0; 4]; POWERS];
+            [constants[0], constants[1]] = [arc.middle, arc.tangent];
+            constants
         }
-        _ => {
-            let all = &segments.polynomials[index as usize].coefficients;
-            constants.extend_from_slice(&all[..constants_of(form)]);
-        }
+        _ => segments.polynomials[index as usize].coefficients,
     }
 }
 
 /// The curve of one track, as evaluation at frames has it: a frame is a tick.
 fn curve(data: &ClipData, track: usize, form: u32, clock: ClipClock) -> Result<Curve, CrowdError> {
-    let mut curve = Curve::new(form);
-    let mut constants = Vec::new();
+    let mut curve = Curve {
+        form,
+        ..Curve::default()
+    };
     let whole = TrackCopy::own(0..0);
     let last_tick = f64::from(clock.period);
     for own in data.parts_in(track, &whole) {
         let (prepared, part) = (own.prepared, own.part);
         let frames = FrameClock::new(clock.rate, clock.start, part.end);
         let constant = |index: u32| prepared.constants[index as usize];
-        let spans = part.spans.clone();
-        let begin = prepared.spans.starts[spans.clone()].first();
-        let begin = frames.boundary(begin.copied().unwrap_or(part.end));
+        let starts = &prepared.spans.starts[part.spans.clone()];
+        let begin = frames.boundary(*starts.first().unwrap_or(&part.end));
         if part.before != NONE && begin.first > 0.0 {
             curve.hold(0, constant(part.before), None);
         }
-        for place in spans.clone() {
-            let start = prepared.spans.starts[place];
-            let end = match place + 1 < spans.end {
-                true => prepared.spans.starts[place + 1],
-                false => part.end,
-            };
+        let ends = starts.iter().skip(1).chain([&part.end]);
+        for ((place, &start), &end) in part.spans.clone().zip(starts).zip(ends) {
             let (from, to) = (frames.boundary(start), frames.boundary(end));
             if from.first >= to.first || from.first > last_tick {
                 continue; // no tick lies in it
@@ -171,14 +151,13 @@ fn curve(data: &ClipData, track: usize, form: u32, clock: ClipClock) -> Result<C
             match prepared.spans.sources[place] {
                 Source::Segment(index) => {
                     let along = in_frames(from.frame, to.frame, 1.0);
-                    segment(prepared, index, form, &mut constants);
                     let span = CrowdSpan {
                         start: first,
                         whole: along.whole as i32,
                         scale: along.scale,
                         offset: along.offset,
                     };
-                    curve.push(span, &constants, key);
+                    curve.push(span, &segment(prepared, index, form), key);
                 }
                 Source::Constant(index) => curve.hold(first, constant(index), key),
                 Source::Exact(_) => {
@@ -205,19 +184,16 @@ fn curve(data: &ClipData, track: usize, form: u32, clock: ClipClock) -> Result<C
     })
 }
 
-/// Channels of one kind, one form and one time base, which lie side by side.
-type Side = (u32, u32, u32);
-
 impl ClipTables {
     /// Adds a clip. `offsets` are where joints without translations hang.
     pub(crate) fn push(
         &mut self,
         set: &TrackSet,
-        methods: ClipMethods,
+        mut interpolation: Interpolation,
+        vectors: VectorMethod,
         ticks_per_second: u32,
         offsets: &[Vec3],
     ) -> Result<(), CrowdError> {
-        let mut interpolation = methods.rotations;
         if interpolation.quantity != Quantity::Rotation {
             return Err(CrowdError::NotRotations);
         }
@@ -243,10 +219,8 @@ impl ClipTables {
             Form::Arc => FORM_ARC,
             Form::Polynomial => FORM_POLYNOMIAL,
         };
-        let vectors =
-            |channel| ClipData::of_vectors(set, channel, methods.vectors, &interpolation, None);
-        let translations = vectors(Channel::Translation);
-        let scales = vectors(Channel::Scale);
+        let [translations, scales] = [Channel::Translation, Channel::Scale]
+            .map(|channel| ClipData::of_vectors(set, channel, vectors, &interpolation, None));
         let mut curves = reserved(joints * CHANNELS as usize, "a clip of a crowd")?;
         for (joint, offset) in offsets.iter().enumerate() {
             curves.push(curve(&rotations, joint, form, clock)?);
@@ -279,95 +253,50 @@ impl ClipTables {
             self.cells.push([0.0; 4]); // kernels use the first cell as 0
         }
         let mut known: HashMap<Vec<u8>, u32> = HashMap::new();
-        let mut sides: HashMap<Side, Vec<usize>> = HashMap::new();
-        let mut order: Vec<Side> = Vec::new();
+        // Channels of one kind, one form and one time base lie side by side.
+        let mut sides = BTreeMap::<_, Vec<(usize, &Curve)>>::new();
         for (place, curve) in curves.iter().enumerate() {
-            let base = match curve.form {
-                FORM_CONSTANT => 0,
-                _ => {
-                    let bytes = bytemuck::cast_slice::<_, u8>(&curve.spans).to_vec();
-                    *known.entry(bytes).or_insert_with(|| {
-                        self.bases.push(CrowdBase {
-                            first: self.spans.len() as u32,
-                            count: curve.spans.len() as u32,
-                            step: match curve.spans.len() {
-                                ..2 => 0,
-                                count => 1 << (count - 1).ilog2(),
-                            },
-                        });
-                        self.spans.extend_from_slice(&curve.spans);
-                        (self.bases.len() - 1 - first_base) as u32
-                    })
-                }
-            };
+            let mut base = 0;
+            if curve.form != FORM_CONSTANT {
+                let bytes = bytemuck::cast_slice(&curve.spans).to_vec();
+                base = *known.entry(bytes).or_insert_with(|| {
+                    self.push_base(&curve.spans);
+                    (self.bases.len() - 1 - first_base) as u32
+                });
+            }
             let side = (place as u32 % CHANNELS, curve.form, base);
-            sides
-                .entry(side)
-                .or_insert_with(|| {
-                    order.push(side);
-                    Vec::new()
-                })
-                .push(place);
+            sides.entry(side).or_default().push((place, curve));
         }
         if self.bases.len() == first_base {
             // Entries always stand somewhere.
-            self.bases.push(CrowdBase {
-                first: self.spans.len() as u32,
-                count: 1,
-                step: 0,
-            });
-            self.spans.push(CrowdSpan {
-                start: 0,
-                whole: 0,
-                scale: 0.0,
-                offset: 0.0,
-            });
+            self.push_base(&[CrowdSpan::zeroed()]);
         }
         let first_channel = self.channels.len();
-        let none = CrowdChannel {
-            first: 0,
-            count: 0,
-            form_and_base: 0,
-            keys: 0,
-        };
+        let none = CrowdChannel::zeroed();
         self.channels.resize(first_channel + curves.len(), none);
-        for side in order {
-            let members = &sides[&side];
-            let (_, form, base) = side;
-            if form == FORM_CONSTANT {
-                for &place in members {
-                    let cell = self.cells.len() as u32;
-                    self.cells.push(curves[place].constants[0]);
-                    self.channels[first_channel + place] = CrowdChannel {
-                        first: cell,
-                        count: 0,
-                        form_and_base: form << 24,
-                        keys: cell,
-                    };
+        for ((_, form, base), members) in sides {
+            let mut lay_out = |column: fn(&Curve) -> &[[f32; 4]]| {
+                let first = self.cells.len();
+                for place in 0..column(members[0].1).len() {
+                    let own = members.iter().map(|(_, curve)| column(curve)[place]);
+                    self.cells.extend(own);
                 }
-                continue;
-            }
-            let first = self.cells.len();
-            let parts = constants_of(form);
-            let spans = curves[members[0]].spans.len();
-            for span in 0..spans {
-                for part in 0..parts {
-                    let own = |&place: &usize| curves[place].constants[span * parts + part];
-                    self.cells.extend(members.iter().map(own));
-                }
-            }
-            let keys = self.cells.len();
-            let of_base = &curves[members[0]].spans;
-            if of_base.iter().any(|span| span.start & ON_KEY != 0) {
-                for span in 0..spans {
-                    self.cells
-                        .extend(members.iter().map(|&place| curves[place].keys[span]));
-                }
-            }
-            for (slot, &place) in members.iter().enumerate() {
+                first
+            };
+            let first = lay_out(|curve| &curve.constants);
+            let mut spans = members[0].1.spans.iter();
+            let keys = match spans.any(|span| span.start & ON_KEY != 0) {
+                true => lay_out(|curve| &curve.keys),
+                false => first,
+            };
+            let count = match form {
+                FORM_CONSTANT => 0,
+                _ => members.len() as u32,
+            };
+            for (slot, (place, _)) in members.into_iter().enumerate() {
                 self.channels[first_channel + place] = CrowdChannel {
                     first: (first + slot) as u32,
-                    count: members.len() as u32,
+                    count,
                     form_and_base: form << 24 | base,
                     keys: (keys + slot) as u32,
                 };
@@ -381,6 +310,18 @@ impl ClipTables {
         self.runs.push(self.runs_from(first_channel));
     }
 
+    fn push_base(&mut self, spans: &[CrowdSpan]) {
+        self.bases.push(CrowdBase {
+            first: self.spans.len() as u32,
+            count: spans.len() as u32,
+            step: match spans.len() {
+                ..2 => 0,
+                count => 1 << (count - 1).ilog2(),
+            },
+        });
+        self.spans.extend_from_slice(spans);
+    }
+
     /// Whether no rotation is anything but an arc or a constant.
     pub(crate) fn has_only_arcs(&self) -> bool {
         let rotations = self.channels.iter().step_by(CHANNELS as usize);
@@ -389,37 +330,32 @@ impl ClipTables {
     }
 
     /// The runs of rotations among the channels from here on.
-    fn runs_from(&self, first_channel: usize) -> Vec<JointRun> {
-        let rotations = self.channels[first_channel..]
-            .iter()
-            .step_by(CHANNELS as usize);
-        let mut runs: Vec<JointRun> = Vec::new();
-        let mut before: Option<&CrowdChannel> = None;
-        for (joint, own) in (0..).zip(rotations) {
-            let goes_on = before.is_some_and(|before| {
+    fn runs_from(&self, first_channel: usize) -> Vec<Range<u32>> {
+        let channels = self.channels[first_channel..].iter();
+        let rotations: Vec<_> = channels.step_by(CHANNELS as usize).collect();
+        let mut end = 0;
+        rotations
+            .chunk_by(|before, own| {
                 before.form_and_base == own.form_and_base
                     && before.first + 1 == own.first
                     && before.count == own.count
-            });
-            before = Some(own);
-            match runs.last_mut() {
-                Some(run) if goes_on => run.count += 1,
-                _ => runs.push(JointRun {
-                    first_joint: joint,
-                    count: 1,
-                }),
-            }
-        }
-        runs
+            })
+            .map(|run| {
+                let first = end;
+                end += run.len() as u32;
+                first..end
+            })
+            .collect()
     }
 
-    /// Every channel of a clip at a tick, and its kind, `[joint][kind]`.
-    pub(crate) fn pose(
+    /// Every channel of a clip at a tick, `[joint][kind]`, as reference poses hold it: of scales the
+    /// reciprocals, where 0 counts as 1.
+    pub(crate) fn reference(
         &self,
         joints: usize,
         clip: usize,
         tick: u32,
-    ) -> impl Iterator<Item = (u32, [f32; 4])> {
+    ) -> impl Iterator<Item = [f32; 4]> {
         let own = &self.clips[clip];
         let tick = tick.min(own.period);
         let bases = &self.bases[own.first_base as usize..][..own.bases as usize];
@@ -430,7 +366,14 @@ impl ClipTables {
         let channels = &self.channels[clip * each..][..each];
         (0..).zip(channels).map(move |(place, channel)| {
             let own = places[(channel.form_and_base & 0x00ff_ffff) as usize];
-            (place % CHANNELS, sampled(&self.cells, channel, own))
+            let value = sampled(&self.cells, channel, own);
+            match place % CHANNELS {
+                SCALE => value.map(|scale| match scale == 0.0 {
+                    true => 1.0,
+                    false => round_f32(1.0 / f64::from(scale)),
+                }),
+                _ => value,
+            }
         })
     }
 }

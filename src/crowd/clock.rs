@@ -42,11 +42,10 @@ impl Crowd {
     /// # Errors
     /// When the seconds are negative or no number, and as [`Crowd::set_clock`].
     pub fn advance(&mut self, seconds: f64) -> Result<(), CrowdError> {
-        let ticks = (seconds * f64::from(self.library.ticks_per_second())).round();
-        if !(0.0..FARTHEST).contains(&ticks) {
-            return Err(CrowdError::Seconds { seconds });
+        match u64::try_from(self.ticks_of(seconds)?) {
+            Ok(ticks) => self.advance_ticks(ticks),
+            Err(_) => Err(CrowdError::Seconds { seconds }),
         }
-        self.advance_ticks(ticks as u64)
     }
 
     /// The ticks nearest to a time in seconds, for [`CrowdLayer::time`](crate::crowd::layer::CrowdLayer::time).

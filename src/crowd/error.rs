@@ -2,7 +2,6 @@
 
 use crate::curve::options::InterpolationError;
 use crate::gpu::error::VulkanError;
-use crate::gpu::recovery::OfDevice;
 use crate::memory::OutOfMemory;
 use crate::time::wrap::WrapMode;
 
@@ -212,13 +211,4 @@ pub enum CrowdError {
     /// There is not the memory.
     #[error(transparent)]
     OutOfMemory(#[from] OutOfMemory),
-}
-
-impl OfDevice for CrowdError {
-    fn vulkan(&self) -> Option<&VulkanError> {
-        match self {
-            Self::Vulkan(error) => Some(error),
-            _ => None,
-        }
-    }
 }

@@ -26,20 +26,18 @@ impl Instances {
         still: CrowdEntry,
     ) -> Result<Self, OutOfMemory> {
         let count = instances * layers;
-        let mut entries: Vec<CrowdEntry> = zeroed(count, "a crowd")?;
-        let changed = zeroed(count.div_ceil(64), "a crowd")?;
-        for (place, entry) in entries.iter_mut().enumerate() {
+        let mut own = Self {
+            entries: zeroed(count, "a crowd")?,
+            changed: zeroed(count.div_ceil(64), "a crowd")?,
+            clock: 0,
+            since: 0,
+        };
+        for (place, entry) in own.entries.iter_mut().enumerate() {
             *entry = still;
             if place % layers > 0 {
                 entry.clip_and_weight &= 0xffff;
             }
         }
-        let mut own = Self {
-            entries,
-            changed,
-            clock: 0,
-            since: 0,
-        };
         own.forget();
         Ok(own)
     }
@@ -75,13 +73,19 @@ impl Instances {
         self.clock = clock;
     }
 
-    /// The ranges of entries that changed, which then count as known.
-    pub(crate) fn take_changes(&mut self) -> Changes<'_> {
-        Changes {
-            entries: &self.entries,
-            changed: &mut self.changed,
-            next: 0,
-        }
+    /// The ranges of entries that changed, which count as known when all have been taken.
+    pub(crate) fn take_changes(&mut self) -> impl Iterator<Item = (usize, &[CrowdEntry])> {
+        let (entries, changed) = (&self.entries, &mut self.changed);
+        let (count, mut end) = (entries.len(), 0);
+        std::iter::from_fn(move || {
+            let first = first_that(changed, end, count, true);
+            if first == count {
+                changed.fill(0);
+                return None;
+            }
+            end = first_that(changed, first, count, false);
+            Some((first, &entries[first..end]))
+        })
     }
 
     /// From now on the device knows nothing.
@@ -90,48 +94,18 @@ impl Instances {
     }
 }
 
-/// Walks over what changed.
-pub(crate) struct Changes<'a> {
-    entries: &'a [CrowdEntry],
-    changed: &'a mut Vec<u64>,
-    next: usize,
-}
-
-impl Changes<'_> {
-    /// The first entry from `from` on whose bit is `wanted`; the number of entries if there is none.
-    fn first_that(&self, from: usize, wanted: bool) -> usize {
-        let mut place = from;
-        while place < self.entries.len() {
-            let word = self.changed[place / 64];
-            let word = if wanted { word } else { !word };
-            let left = word >> (place % 64);
-            if left != 0 {
-                return (place + left.trailing_zeros() as usize).min(self.entries.len());
-            }
-            place = (place / 64 + 1) * 64;
+/// The first place from `place` on whose bit is `wanted`; `count` if none of so many is.
+fn first_that(changed: &[u64], mut place: usize, count: usize, wanted: bool) -> usize {
+    while place < count {
+        let word = changed[place / 64];
+        let word = if wanted { word } else { !word };
+        let left = word >> (place % 64);
+        if left != 0 {
+            return (place + left.trailing_zeros() as usize).min(count);
         }
-        self.entries.len()
+        place = (place / 64 + 1) * 64;
     }
-}
-
-impl<'a> Iterator for Changes<'a> {
-    type Item = (usize, &'a [CrowdEntry]);
-
-    fn next(&mut self) -> Option<Self::Item> {
-        let first = self.first_that(self.next, true);
-        if first == self.entries.len() {
-            return None;
-        }
-        let end = self.first_that(first, false);
-        self.next = end;
-        Some((first, &self.entries[first..end]))
-    }
-}
-
-impl Drop for Changes<'_> {
-    fn drop(&mut self) {
-        self.changed.fill(0);
-    }
+    count
 }
 
 #[cfg(test)]

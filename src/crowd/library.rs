@@ -1,15 +1,16 @@
 //! A library of clips for one skeleton, prepared for crowds.
 
+use bytemuck::Zeroable as _;
 use glam::{Affine3A, Vec3};
 
-use crate::crowd::clip_tables::{ClipMethods, ClipTables};
+use crate::crowd::clip_tables::{ClipTables, MOST_PLACES};
 use crate::crowd::error::{CrowdError, MOST_CLIPS, MOST_MASKS, MOST_TICKS};
-use crate::math::canonical::{canonical, round_f32};
+use crate::math::canonical::canonical;
 use crate::memory::reserved;
 use crate::method::interpolation::Interpolation;
 use crate::method::vector_method::VectorMethod;
 use crate::pose::skeleton::Skeleton;
-use crate::shader::{CHANNELS, CrowdLink, ROOT, SCALE};
+use crate::shader::{CHANNELS, CrowdDispatch, CrowdLink, ROOT};
 use crate::tracks::set::TrackSet;
 use crate::twin::crowd_matrices::Rows;
 
@@ -166,14 +167,11 @@ impl CrowdLibrary {
         if clip == MOST_CLIPS {
             return Err(CrowdError::TooManyClips);
         }
-        let methods = ClipMethods {
-            rotations: interpolation.into(),
-            vectors,
-        };
+        let (ticks, offsets) = (self.ticks_per_second, &self.offsets);
         self.tables
-            .push(set, methods, self.ticks_per_second, &self.offsets)?;
-        let pose = self.tables.pose(joints, clip, 0);
-        self.references.extend(pose.map(reciprocal_scale));
+            .push(set, interpolation.into(), vectors, ticks, offsets)?;
+        self.references
+            .extend(self.tables.reference(joints, clip, 0));
         Ok(clip)
     }
 
@@ -188,10 +186,12 @@ impl CrowdLibrary {
             let what = "clip";
             return Err(CrowdError::Missing { what, given, count });
         }
-        let pose: Vec<_> = self.tables.pose(joints, from, tick).collect();
         let own = &mut self.references[clip * joints * CHANNELS as usize..];
-        for (reference, value) in own.iter_mut().zip(pose) {
-            *reference = reciprocal_scale(value);
+        for (own, value) in own
+            .iter_mut()
+            .zip(self.tables.reference(joints, from, tick))
+        {
+            *own = value;
         }
         Ok(())
     }
@@ -246,42 +246,33 @@ impl CrowdLibrary {
         }
     }
 
-    /// Constants of segments and keys, then the masks, then the reference poses.
-    pub(crate) fn cells(&self) -> Result<Cells, CrowdError> {
+    /// All constants that kernels read: those of segments and keys, then the masks, then the reference
+    /// poses.
+    pub(crate) fn cells(&self) -> Result<Vec<[f32; 4]>, CrowdError> {
         let own = &self.tables.cells;
-        let masks = own.len();
-        let references = masks + self.masks.len();
-        let count = references + self.references.len();
-        if count > 1 << 31 {
+        let count = own.len() + self.masks.len() + self.references.len();
+        if count > MOST_PLACES {
             return Err(CrowdError::TooLarge);
         }
-        let mut all = reserved(count, "a crowd's library")?;
-        all.extend_from_slice(own);
-        all.extend(self.masks.iter().map(|&weight| [weight, 0.0, 0.0, 0.0]));
-        all.extend_from_slice(&self.references);
-        Ok(Cells {
-            all,
-            masks: masks as u32,
-            references: references as u32,
-        })
+        let mut cells = reserved(count, "a crowd's library")?;
+        cells.extend_from_slice(own);
+        cells.extend(self.masks.iter().map(|&weight| [weight, 0.0, 0.0, 0.0]));
+        cells.extend_from_slice(&self.references);
+        Ok(cells)
     }
-}
 
-/// All constants that kernels read, and where masks and reference poses start.
-#[derive(Debug)]
-pub(crate) struct Cells {
-    pub(crate) all: Vec<[f32; 4]>,
-    pub(crate) masks: u32,
-    pub(crate) references: u32,
-}
-
-/// A channel's value as reference poses hold it.
-fn reciprocal_scale((kind, value): (u32, [f32; 4])) -> [f32; 4] {
-    match kind {
-        SCALE => value.map(|scale| match scale == 0.0 {
-            true => 1.0,
-            false => round_f32(1.0 / f64::from(scale)),
-        }),
-        _ => value,
+    /// What kernels are told of a crowd with so many layers: its sizes, and where masks and reference
+    /// poses start among the cells.
+    pub(crate) fn arguments(&self, layers: usize) -> CrowdDispatch {
+        let masks = self.tables.cells.len();
+        let bases = self.tables.clips.iter().map(|clip| clip.bases).max();
+        CrowdDispatch {
+            joints: self.joints() as u32,
+            layers: layers as u32,
+            bases: bases.unwrap_or(1),
+            masks: masks as u32,
+            references: (masks + self.masks.len()) as u32,
+            ..CrowdDispatch::zeroed()
+        }
     }
 }

@@ -8,6 +8,5 @@ pub(crate) mod instances;
 pub(crate) mod layer;
 pub(crate) mod library;
 pub(crate) mod on_cpu;
-pub(crate) mod output;
 pub(crate) mod own_device;
 pub(crate) mod player;

@@ -4,11 +4,9 @@ use bytemuck::Zeroable as _;
 use rayon::prelude::*;
 
 use crate::crowd::clip_tables::ClipTables;
-use crate::crowd::library::{Cells, CrowdLibrary};
-use crate::crowd::output::{CrowdOutput, CrowdValues};
-use crate::shader::{
-    CHANNELS, CrowdEntry, CrowdPlace, FORM_ARC, ON_KEY, ROTATION, SCALE, TRANSLATION,
-};
+use crate::crowd::library::CrowdLibrary;
+use crate::output::crowd::{CrowdOutput, CrowdValues};
+use crate::shader::{CHANNELS, CrowdPlace, FORM_ARC, ON_KEY, ROTATION, SCALE, TRANSLATION};
 use crate::simd::dispatch::{InLanes, VectorWidth, in_lanes_of};
 use crate::simd::lanes::{Lanes, canonical};
 use crate::twin::crowd_layers::Layers;
@@ -23,26 +21,24 @@ const TASK: usize = 32;
 #[derive(Clone, Copy)]
 pub(crate) struct Scene<'a> {
     pub(crate) library: &'a CrowdLibrary,
-    pub(crate) cells: &'a Cells,
-    /// `[instance][layer]`
-    pub(crate) entries: &'a [CrowdEntry],
-    pub(crate) layers: usize,
-    pub(crate) bases: usize,
-    pub(crate) clock: u64,
     pub(crate) values: CrowdValues,
+    pub(crate) clock: u64,
+    /// With all entries, and without places: these are found here.
+    pub(crate) context: Layers<'a>,
 }
 
 /// Evaluates all instances into vectors of four numbers, on rayon's current threads.
 pub(crate) fn evaluate(scene: Scene<'_>, width: VectorWidth, output: &mut [[f32; 4]]) {
-    let each = scene.library.joints() * scene.vectors();
-    let tasks = output.par_chunks_mut(each * TASK);
-    let entries = scene.entries.par_chunks(scene.layers * TASK);
+    let context = scene.context;
+    let tasks = output.par_chunks_mut(scene.vectors() * TASK);
+    let entries = context.entries.par_chunks(context.layers as usize * TASK);
     tasks.zip(entries).for_each_init(
         || (Vec::new(), Vec::new()),
         |(places, rotations), (output, entries)| {
-            places.resize(entries.len() * scene.bases, CrowdPlace::zeroed());
+            places.resize(entries.len() * context.bases as usize, CrowdPlace::zeroed());
             rotations.resize(scene.library.joints(), [0.0; 4]);
-            let scene = Scene { entries, ..scene };
+            let context = Layers { entries, ..context };
+            let scene = Scene { context, ..scene };
             in_lanes_of(
                 width,
                 &mut Task {
@@ -67,32 +63,21 @@ struct Task<'a, 'b> {
 impl InLanes for Task<'_, '_> {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
-        let Scene {
-            library,
-            entries,
-            layers,
-            bases,
-            ..
-        } = self.scene;
-        let tables = &library.tables;
-        let all = entries.iter().zip(self.places.chunks_exact_mut(bases));
-        for (place, (entry, own)) in all.enumerate() {
+        let (scene, context) = (self.scene, self.scene.context);
+        let tables = &scene.library.tables;
+        let (layers, bases) = (context.layers as usize, context.bases as usize);
+        let own = self.places.chunks_exact_mut(bases);
+        for (place, (entry, own)) in context.entries.iter().zip(own).enumerate() {
             if place.is_multiple_of(layers) || entry.clip_and_weight >> 16 != 0 {
-                let clock = self.scene.clock;
-                places(
-                    entry,
-                    clock,
-                    &tables.clips,
-                    &tables.bases,
-                    &tables.spans,
-                    own,
-                );
+                let (clips, bases, spans) = (&tables.clips, &tables.bases, &tables.spans);
+                places(entry, scene.clock, clips, bases, spans, own);
             }
         }
-        let scene = self.scene;
-        let context = scene.layers(self.places);
-        let each = library.joints() * scene.vectors();
-        for (instance, output) in self.output.chunks_exact_mut(each).enumerate() {
+        let context = Layers {
+            places: &self.places[..],
+            ..context
+        };
+        for (instance, output) in self.output.chunks_exact_mut(scene.vectors()).enumerate() {
             if scene.values == CrowdValues::Rotations {
                 rotations::<L>(&context, tables, instance, output);
                 continue;
@@ -105,26 +90,10 @@ impl InLanes for Task<'_, '_> {
     }
 }
 
-impl<'a> Scene<'a> {
+impl Scene<'_> {
+    /// Vectors of an instance.
     fn vectors(&self) -> usize {
-        CrowdOutput::from(self.values).vectors()
-    }
-
-    fn layers<'p>(&self, places: &'p [CrowdPlace]) -> Layers<'p>
-    where
-        'a: 'p,
-    {
-        Layers {
-            entries: self.entries,
-            channels: &self.library.tables.channels,
-            cells: &self.cells.all,
-            places,
-            joints: self.library.joints() as u32,
-            layers: self.layers as u32,
-            bases: self.bases as u32,
-            masks: self.cells.masks,
-            references: self.cells.references,
-        }
+        self.library.joints() * CrowdOutput::from(self.values).vectors()
     }
 
     /// Makes matrices in the model of those in the parents' frames, and skinning matrices of these.
@@ -156,9 +125,8 @@ fn rotations<L: Lanes>(
     let first = instance * context.layers as usize;
     let clip = context.entries[first].clip_and_weight & 0xffff;
     for run in &tables.runs[clip as usize] {
-        let joints = run.first_joint..run.first_joint + run.count;
-        let own = &mut output[joints.start as usize..joints.end as usize];
-        let place = ((clip * context.joints + joints.start) * CHANNELS) as usize;
+        let own = &mut output[run.start as usize..run.end as usize];
+        let place = ((clip * context.joints + run.start) * CHANNELS) as usize;
         let channel = &context.channels[place];
         let base = (channel.form_and_base & 0x00ff_ffff) as usize;
         let stands = context.places[first * context.bases as usize + base];
@@ -169,7 +137,7 @@ fn rotations<L: Lanes>(
             arcs::<L>(cells(middle), cells(tangent), stands.parameter, own);
             continue;
         }
-        for (joint, value) in joints.zip(own) {
+        for (joint, value) in run.clone().zip(own) {
             let entry = &context.entries[first];
             *value = context.layer_value(first as u32, entry, joint, ROTATION);
         }

@@ -2,36 +2,16 @@
 //! functions are unsafe, because the compiler cannot check what the application promises.
 #![allow(unsafe_code)]
 
+use std::sync::Arc;
+
 use ash::vk;
 
 use crate::crowd::error::{CrowdError, OFFSET_STEP};
-use crate::crowd::output::CrowdOutput;
 use crate::crowd::player::Crowd;
-use crate::gpu::crowd_target::CrowdTarget as DeviceTarget;
+use crate::gpu::commands::Commands;
+use crate::gpu::crowd_target::CrowdTarget;
 use crate::gpu::handles::VulkanBuffer;
-
-/// A range of an application's buffer that a crowd is evaluated into
-/// ([`Crowd::target`]), with all that recording needs.
-pub struct CrowdTarget {
-    own: DeviceTarget,
-    output: CrowdOutput,
-}
-
-impl CrowdTarget {
-    /// What is left there.
-    #[must_use]
-    pub fn output(&self) -> CrowdOutput {
-        self.output
-    }
-}
-
-impl std::fmt::Debug for CrowdTarget {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("CrowdTarget")
-            .field("output", &self.output)
-            .finish_non_exhaustive()
-    }
-}
+use crate::output::crowd::CrowdOutput;
 
 impl Crowd {
     /// Makes ready what it takes to evaluate into a range of a buffer of the application's own, on the
@@ -55,7 +35,7 @@ impl Crowd {
         let device = self.device.as_ref().ok_or(CrowdError::OtherDevice)?;
         self.check(output)?;
         let (offset, size) = (buffer.offset, buffer.size);
-        let needed = DeviceTarget::bytes(device, output.steps());
+        let needed = device.bytes(output);
         if !offset.is_multiple_of(OFFSET_STEP) || size < needed {
             return Err(CrowdError::Buffer {
                 offset,
@@ -63,8 +43,7 @@ impl Crowd {
                 needed,
             });
         }
-        let own = DeviceTarget::new(device, output.steps(), buffer.buffer, offset)?;
-        Ok(CrowdTarget { own, output })
+        Ok(CrowdTarget::new(device, output, buffer.buffer, offset)?)
     }
 
     /// Records an evaluation at the clock's time into the application's command buffer: 16 bytes for
@@ -87,19 +66,20 @@ impl Crowd {
         target: &CrowdTarget,
         commands: vk::CommandBuffer,
     ) -> Result<(), CrowdError> {
-        let device = self.device.clone().ok_or(CrowdError::OtherDevice)?;
-        if !target.own.is_of(&device) {
+        let own = self.device.as_ref();
+        let Some(device) = own.filter(|own| Arc::ptr_eq(own, &target.crowd)) else {
             return Err(CrowdError::OtherDevice);
-        }
-        let (clock, changes) = self.changes();
+        };
         // SAFETY: promised by the caller.
-        unsafe { device.record(&target.own, commands, clock, changes) };
+        let commands = unsafe { Commands::new(&device.engine.device, commands) };
+        let clock = self.instances.clock();
+        target.record(commands, clock, self.instances.take_changes());
         Ok(())
     }
 
     /// Takes back that anything was recorded since the instances were last known to be on the device:
     /// the next evaluation writes all of them. For an application that threw a recorded frame away.
     pub fn forget_recorded(&mut self) {
-        self.forget();
+        self.instances.forget();
     }
 }

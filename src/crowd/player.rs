@@ -2,18 +2,21 @@
 
 use std::sync::Arc;
 
+use bytemuck::Pod;
+
 use crate::crowd::error::{CrowdError, MOST_INSTANCES, MOST_LAYERS};
 use crate::crowd::instances::Instances;
 use crate::crowd::layer::{CrowdLayer, tick};
-use crate::crowd::library::{Cells, CrowdLibrary};
+use crate::crowd::library::CrowdLibrary;
 use crate::crowd::on_cpu::{self, Scene};
-use crate::crowd::output::{CrowdOutput, CrowdValues};
 use crate::engine::Engine;
 use crate::evaluate::backend::Backend;
-use crate::gpu::crowd::{CrowdShape, CrowdSource, DeviceCrowd};
+use crate::gpu::crowd::{CrowdShape, CrowdTables, DeviceCrowd};
 use crate::gpu::crowd_reader::CrowdReader;
 use crate::memory::zeroed;
-use crate::shader::CrowdEntry;
+use crate::output::crowd::{CrowdOutput, CrowdValues};
+use crate::shader::{CrowdDispatch, CrowdEntry};
+use crate::twin::crowd_layers::Layers;
 use crate::twin::crowd_matrices::to_any_half;
 
 /// Many instances of a library's skeleton, each of which plays clips at its own time and speed.
@@ -26,22 +29,15 @@ use crate::twin::crowd_matrices::to_any_half;
 pub struct Crowd {
     engine: Engine,
     pub(crate) library: CrowdLibrary,
-    cells: Cells,
+    cells: Vec<[f32; 4]>,
     pub(crate) instances: Instances,
-    layers: usize,
-    bases: usize,
+    /// What all dispatches are told.
+    arguments: CrowdDispatch,
     pub(crate) device: Option<Arc<DeviceCrowd>>,
-    /// What is in flight, or was evaluated and not taken yet.
-    submitted: Option<Submitted>,
+    /// A submission that was not taken yet. On the CPU it has its values already.
+    submitted: Option<(CrowdOutput, Option<Vec<[f32; 4]>>)>,
     /// What evaluates on the device for the host, for the output that was asked for last.
-    reader: Option<(CrowdOutput, CrowdReader)>,
-}
-
-/// A submission that was not taken yet.
-enum Submitted {
-    /// On the CPU it is evaluated when it is taken, as everything stood when it was submitted.
-    OnCpu(CrowdOutput, Vec<[f32; 4]>),
-    OnDevice(CrowdOutput),
+    reader: Option<CrowdReader>,
 }
 
 impl Engine {
@@ -73,13 +69,11 @@ impl Engine {
             ..CrowdLayer::new(0)
         };
         let still = still.packed(&library.tables.clips, 0, 0)?;
-        let bases = library.tables.clips.iter().map(|clip| clip.bases).max();
         let mut crowd = Crowd {
             engine: self.clone(),
             library: library.clone(),
             instances: Instances::new(instances, layers, still)?,
-            layers,
-            bases: bases.unwrap_or(1) as usize,
+            arguments: library.arguments(layers),
             device: None,
             submitted: None,
             reader: None,
@@ -96,39 +90,37 @@ impl Crowd {
         let Backend::Vulkan(opened) = &*self.engine.backend else {
             return Ok(None);
         };
-        let (tables, library) = (&self.library.tables, &self.library);
-        let source = CrowdSource {
-            clips: bytemuck::cast_slice(&tables.clips),
-            bases: bytemuck::cast_slice(&tables.bases),
-            spans: bytemuck::cast_slice(&tables.spans),
-            channels: bytemuck::cast_slice(&tables.channels),
-            cells: bytemuck::cast_slice(&self.cells.all),
-            links: bytemuck::cast_slice(&library.links),
-            bind: bytemuck::cast_slice(&library.bind),
-            shape: CrowdShape {
-                instances: self.instances() as u32,
-                layers: self.layers as u32,
-                joints: library.joints() as u32,
-                bases: self.bases as u32,
-                levels: library.levels.clone(),
-                masks: self.cells.masks,
-                references: self.cells.references,
-                only_arcs: tables.has_only_arcs(),
-            },
+        let (engine, library) = (opened.engine(), &self.library);
+        let own = &library.tables;
+        let tables = CrowdTables {
+            clips: engine.crowd_table("tumble crowd clips", &own.clips)?,
+            bases: engine.crowd_table("tumble crowd time bases", &own.bases)?,
+            spans: engine.crowd_table("tumble crowd spans", &own.spans)?,
+            channels: engine.crowd_table("tumble crowd channels", &own.channels)?,
+            cells: engine.crowd_table("tumble crowd cells", &self.cells)?,
+            links: engine.crowd_table("tumble crowd links", &library.links)?,
+            bind: engine.crowd_table("tumble crowd inverse bind", &library.bind)?,
         };
-        Ok(Some(Arc::new(DeviceCrowd::new(&opened.engine(), source)?)))
+        let shape = CrowdShape {
+            instances: self.instances() as u32,
+            levels: library.levels.clone(),
+            only_arcs: own.has_only_arcs(),
+            arguments: self.arguments,
+        };
+        let crowd = DeviceCrowd::new(engine, shape, tables)?;
+        Ok(Some(Arc::new(crowd)))
     }
 
     /// Number of instances.
     #[must_use]
     pub fn instances(&self) -> usize {
-        self.instances.entries().len() / self.layers
+        self.instances.entries().len() / self.layers()
     }
 
     /// Layers of an instance.
     #[must_use]
     pub fn layers(&self) -> usize {
-        self.layers
+        self.arguments.layers as usize
     }
 
     /// The library that it was made of.
@@ -193,11 +185,8 @@ impl Crowd {
     /// When there is no such instance or layer.
     pub fn get(&self, instance: usize, layer: usize) -> Result<CrowdLayer, CrowdError> {
         let entry = &self.instances.entries()[self.place(instance, layer)?];
-        Ok(CrowdLayer::unpacked(
-            entry,
-            &self.library.tables.clips,
-            self.clock(),
-        ))
+        let (clips, clock) = (&self.library.tables.clips, self.clock());
+        Ok(CrowdLayer::moved(entry, clips, clock, clock))
     }
 
     /// The tick of its clip at which a layer of an instance is evaluated now, from 0 to the clip's
@@ -213,13 +202,13 @@ impl Crowd {
     fn place(&self, instance: usize, layer: usize) -> Result<usize, CrowdError> {
         for (what, given, count) in [
             ("instance", instance, self.instances()),
-            ("layer", layer, self.layers),
+            ("layer", layer, self.layers()),
         ] {
             if given >= count {
                 return Err(CrowdError::Missing { what, given, count });
             }
         }
-        Ok(instance * self.layers + layer)
+        Ok(instance * self.layers() + layer)
     }
 
     /// Vectors of four numbers of a result, `[instance][joint]`.
@@ -244,10 +233,7 @@ impl Crowd {
             self.submit(values)?;
             return self.wait_into(output);
         }
-        self.check(values.into())?;
-        if self.submitted.is_some() {
-            return Err(CrowdError::StillSubmitted);
-        }
+        self.check_idle(values.into())?;
         self.on_cpu(values, output);
         Ok(())
     }
@@ -274,21 +260,17 @@ impl Crowd {
     /// As [`Crowd::evaluate_into`], and when the result of the submission before was not taken.
     pub fn submit(&mut self, output: impl Into<CrowdOutput>) -> Result<(), CrowdError> {
         let output = output.into();
-        self.check(output)?;
-        if self.submitted.is_some() {
-            return Err(CrowdError::StillSubmitted);
-        }
+        self.check_idle(output)?;
         let Some(device) = &self.device else {
             let mut found = zeroed(self.output_len(output), "a crowd's poses")?;
             self.on_cpu(output.values, &mut found);
-            self.submitted = Some(Submitted::OnCpu(output, found));
+            self.submitted = Some((output, Some(found)));
             return Ok(());
         };
-        let reader = match self.reader.take() {
-            Some((own, reader)) if own == output => reader,
-            _ => CrowdReader::new(device, output.steps())?,
-        };
-        let (_, reader) = self.reader.insert((output, reader));
+        let kept = self.reader.take();
+        let kept = kept.filter(|reader| reader.target.output() == output);
+        let reader = kept.map_or_else(|| CrowdReader::new(device, output), Ok)?;
+        let reader = self.reader.insert(reader);
         let clock = self.instances.clock();
         if let Err(error) = reader.submit(clock, self.instances.take_changes()) {
             // What was recorded may never have reached the device.
@@ -296,17 +278,14 @@ impl Crowd {
             self.reader = None;
             return Err(error.into());
         }
-        self.submitted = Some(Submitted::OnDevice(output));
+        self.submitted = Some((output, None));
         Ok(())
     }
 
     /// What was submitted and not taken yet.
     #[must_use]
     pub fn submitted(&self) -> Option<CrowdOutput> {
-        match &self.submitted {
-            None => None,
-            Some(Submitted::OnCpu(output, _) | Submitted::OnDevice(output)) => Some(*output),
-        }
+        self.submitted.as_ref().map(|(output, _)| *output)
     }
 
     /// Whether what was submitted is done, so that [`Crowd::wait_into`] does not wait.
@@ -315,8 +294,8 @@ impl Crowd {
     /// When nothing was submitted, or the device fails.
     pub fn poll(&self) -> Result<bool, CrowdError> {
         match (&self.submitted, &self.reader) {
-            (Some(Submitted::OnCpu(..)), _) => Ok(true),
-            (Some(Submitted::OnDevice(_)), Some((_, reader))) => Ok(reader.is_done()?),
+            (Some((_, Some(_))), _) => Ok(true),
+            (Some((_, None)), Some(reader)) => Ok(reader.is_done()?),
             _ => Err(CrowdError::NothingSubmitted),
         }
     }
@@ -327,12 +306,7 @@ impl Crowd {
     /// When nothing was submitted, it was in 16 bits, `output` is not as long as the result, or the
     /// device fails.
     pub fn wait_into(&mut self, output: &mut [[f32; 4]]) -> Result<(), CrowdError> {
-        let found = self.taken(output.len(), false)?;
-        match found {
-            Some(found) => output.copy_from_slice(&found),
-            None => self.read(bytemuck::cast_slice_mut(output))?,
-        }
-        Ok(())
+        self.take_into(false, output, |value| value)
     }
 
     /// Waits for what was submitted in 16 bits, and takes its result.
@@ -340,37 +314,32 @@ impl Crowd {
     /// # Errors
     /// As [`Crowd::wait_into`].
     pub fn wait_half_into(&mut self, output: &mut [[u16; 4]]) -> Result<(), CrowdError> {
-        let found = self.taken(output.len(), true)?;
-        match found {
-            Some(found) => {
-                for (half, value) in output.iter_mut().zip(found) {
-                    *half = value.map(to_any_half);
-                }
-            }
-            None => self.read(bytemuck::cast_slice_mut(output))?,
-        }
-        Ok(())
+        self.take_into(true, output, |value| value.map(to_any_half))
     }
 
-    /// Takes a submission for memory of this length: its values, or `None` where the device has them.
-    fn taken(&mut self, given: usize, half: bool) -> Result<Option<Vec<[f32; 4]>>, CrowdError> {
-        let output = self.submitted().ok_or(CrowdError::NothingSubmitted)?;
-        if output.is_half != half {
-            let is_half = output.is_half;
+    /// Takes what was submitted; `stored` makes of the CPU's values what a device would leave.
+    fn take_into<T: Pod>(
+        &mut self,
+        is_half: bool,
+        output: &mut [T],
+        stored: impl Fn([f32; 4]) -> T,
+    ) -> Result<(), CrowdError> {
+        let submitted = self.submitted().ok_or(CrowdError::NothingSubmitted)?;
+        if submitted.is_half != is_half {
+            let is_half = submitted.is_half;
             return Err(CrowdError::Precision { is_half });
         }
-        self.check_len(given, output)?;
-        Ok(match self.submitted.take() {
-            Some(Submitted::OnCpu(_, found)) => Some(found),
-            _ => None,
-        })
-    }
-
-    fn read(&mut self, output: &mut [u8]) -> Result<(), CrowdError> {
-        let Some((_, reader)) = &mut self.reader else {
+        self.check_len(output.len(), submitted)?;
+        if let Some((_, Some(found))) = self.submitted.take() {
+            for (own, value) in output.iter_mut().zip(found) {
+                *own = stored(value);
+            }
+            return Ok(());
+        }
+        let Some(reader) = &mut self.reader else {
             return Err(CrowdError::NothingSubmitted);
         };
-        let read = reader.wait_into(output);
+        let read = reader.wait_into(bytemuck::cast_slice_mut(output));
         if read.is_err() {
             self.instances.forget();
             self.reader = None;
@@ -393,28 +362,36 @@ impl Crowd {
         }
     }
 
+    /// Whether an evaluation can start.
+    fn check_idle(&self, output: CrowdOutput) -> Result<(), CrowdError> {
+        self.check(output)?;
+        match self.submitted {
+            Some(_) => Err(CrowdError::StillSubmitted),
+            None => Ok(()),
+        }
+    }
+
     fn on_cpu(&self, values: CrowdValues, output: &mut [[f32; 4]]) {
+        let own = &self.arguments;
         let scene = Scene {
             library: &self.library,
-            cells: &self.cells,
-            entries: self.instances.entries(),
-            layers: self.layers,
-            bases: self.bases,
-            clock: self.clock(),
             values,
+            clock: self.clock(),
+            context: Layers {
+                entries: self.instances.entries(),
+                channels: &self.library.tables.channels,
+                cells: &self.cells,
+                places: &[],
+                joints: own.joints,
+                layers: own.layers,
+                bases: own.bases,
+                masks: own.masks,
+                references: own.references,
+            },
         };
         if let Backend::Cpu(engine) = &*self.engine.backend {
             engine.on_threads(|| on_cpu::evaluate(scene, engine.width, output));
         }
-    }
-
-    pub(crate) fn forget(&mut self) {
-        self.instances.forget();
-    }
-
-    /// What changed since the last evaluation, and the clock, for one that is recorded.
-    pub(crate) fn changes(&mut self) -> (u64, impl Iterator<Item = (usize, &[CrowdEntry])>) {
-        (self.instances.clock(), self.instances.take_changes())
     }
 }
 
@@ -423,7 +400,7 @@ impl std::fmt::Debug for Crowd {
         f.debug_struct("Crowd")
             .field("engine", &self.engine)
             .field("instances", &self.instances())
-            .field("layers", &self.layers)
+            .field("layers", &self.layers())
             .field("clock", &self.clock())
             .finish_non_exhaustive()
     }

@@ -50,10 +50,6 @@ impl Residence {
         }
     }
 
-    fn is_mapped(self) -> bool {
-        !matches!(self, Self::Device | Self::Results)
-    }
-
     /// Whether kernels read it, as texels where they read those.
     fn is_read_by_kernels(self) -> bool {
         matches!(self, Self::Upload | Self::Direct | Self::Device)
@@ -91,14 +87,11 @@ pub(crate) fn may_be_imported(physical: &PhysicalDevice, is_texels: bool) -> boo
 
 /// A storage buffer. One that the host touches stays mapped for as long as it lives.
 pub(crate) struct Buffer {
-    device: Arc<LogicalDevice>,
+    pub(crate) device: Arc<LogicalDevice>,
     pub(crate) raw: vk::Buffer,
     /// A view of it as texels of 16 bytes; null unless kernels read it as a texel buffer.
     pub(crate) view: vk::BufferView,
-    /// Memory of its own; null where it has a share of some.
-    memory: vk::DeviceMemory,
-    share: Option<Share>,
-    mapped: Option<NonNull<u8>>,
+    memory: Share,
     size: u64,
 }
 
@@ -125,9 +118,7 @@ impl Buffer {
         // Both families may use what is copied on another queue, without a change of owners.
         let is_copied = matches!(residence, Residence::Results | Residence::Readback);
         let families = device.two_families().filter(|_| is_copied);
-        let mut buffer = Self::without_memory(device, size, is_texels, families, None)?;
-        // SAFETY: the buffer was just created.
-        let needs = unsafe { device.raw.get_buffer_memory_requirements(buffer.raw) };
+        let (mut buffer, needs) = Self::without_memory(device, size, is_texels, families, None)?;
         let (required, preferred) = residence.properties();
         let allowed = match (residence, device.placing.direct) {
             (Residence::Direct, Some(direct)) => needs.memory_type_bits & 1 << direct.memory_type,
@@ -141,29 +132,10 @@ impl Buffer {
             })?;
         let kind = Kind {
             memory_type,
-            mapped: residence.is_mapped(),
+            mapped: required.contains(vk::MemoryPropertyFlags::HOST_VISIBLE),
         };
-        if let Some(share) = device.shared.take(&device.raw, kind, &needs)? {
-            buffer.share = Some(share);
-            buffer.mapped = share.mapped;
-            buffer.bind(share.memory, share.offset, is_texels, name)?;
-            return Ok(buffer);
-        }
-        let allocate = vk::MemoryAllocateInfo::default()
-            .allocation_size(needs.size)
-            .memory_type_index(memory_type);
-        buffer.give_memory(&allocate, is_texels, name)?;
-        if residence.is_mapped() {
-            let flags = vk::MemoryMapFlags::empty();
-            // SAFETY: the memory is host-visible and not mapped yet.
-            let pointer = unsafe {
-                device
-                    .raw
-                    .map_memory(buffer.memory, 0, vk::WHOLE_SIZE, flags)
-            }
-            .named("vkMapMemory")?;
-            buffer.mapped = NonNull::new(pointer.cast());
-        }
+        let memory = device.shared.take(&device.raw, kind, &needs)?;
+        buffer.bind(memory, is_texels, name)?;
         Ok(buffer)
     }
 
@@ -173,7 +145,6 @@ impl Buffer {
     /// The pages must stay allocated until the buffer is dropped and no submitted work uses it.
     pub(crate) unsafe fn around(
         device: &Arc<LogicalDevice>,
-        name: &str,
         pages: NonNull<u8>,
         size: u64,
     ) -> Option<Self> {
@@ -185,35 +156,39 @@ impl Buffer {
             let call = borrows.fp().get_memory_host_pointer_properties_ext;
             call(borrows.device(), LENT, pages, &raw mut properties)
         };
-        known
-            .result()
-            .named("vkGetMemoryHostPointerPropertiesEXT")
-            .ok()?;
-        let is_texels = device.reads_texels;
-        let mut buffer = Self::without_memory(device, size, is_texels, None, Some(LENT)).ok()?;
-        // SAFETY: the buffer was just created.
-        let needs = unsafe { device.raw.get_buffer_memory_requirements(buffer.raw) };
+        known.result().ok()?;
+        let (is_texels, lent) = (device.reads_texels, Some(LENT));
+        let made = Self::without_memory(device, size, is_texels, None, lent);
+        let (mut buffer, needs) = made.ok().filter(|(_, needs)| needs.size <= size)?;
         let (required, preferred) = Residence::Readback.properties();
         let allowed = needs.memory_type_bits & properties.memory_type_bits;
         let memory_type = device.physical.memory_type(allowed, required, preferred)?;
         let mut import = vk::ImportMemoryHostPointerInfoEXT::default()
             .handle_type(LENT)
             .host_pointer(pages);
-        let allocate = vk::MemoryAllocateInfo::default()
+        let info = vk::MemoryAllocateInfo::default()
             .allocation_size(size)
             .memory_type_index(memory_type)
             .push_next(&mut import);
-        let fits = needs.size <= size;
-        (fits && buffer.give_memory(&allocate, is_texels, name).is_ok()).then_some(buffer)
+        // SAFETY: a valid size and memory type, and the pages are there.
+        let memory = unsafe { device.raw.allocate_memory(&info, None) }.ok()?;
+        let memory = Share {
+            memory,
+            size,
+            ..Share::default()
+        };
+        buffer.bind(memory, is_texels, "tumble lent").ok()?;
+        Some(buffer)
     }
 
+    /// A buffer that has no memory yet, and what memory it needs.
     fn without_memory(
         device: &Arc<LogicalDevice>,
         size: u64,
         is_texels: bool,
         families: Option<[u32; 2]>,
         external: Option<vk::ExternalMemoryHandleTypeFlags>,
-    ) -> Result<Self, VulkanError> {
+    ) -> Result<(Self, vk::MemoryRequirements), VulkanError> {
         let mut kinds = vk::ExternalMemoryBufferCreateInfo::default()
             .handle_types(external.unwrap_or_default());
         let mut info = vk::BufferCreateInfo::default()
@@ -230,42 +205,23 @@ impl Buffer {
         // SAFETY: the device is alive, here and below; what is created is destroyed
         // in `drop`, also when a later step fails.
         let raw = unsafe { device.raw.create_buffer(&info, None) }.named("vkCreateBuffer")?;
-        Ok(Self {
+        // SAFETY: the buffer was just created.
+        let needs = unsafe { device.raw.get_buffer_memory_requirements(raw) };
+        let buffer = Self {
             device: Arc::clone(device),
             raw,
             view: vk::BufferView::null(),
-            memory: vk::DeviceMemory::null(),
-            share: None,
-            mapped: None,
+            memory: Share::default(),
             size,
-        })
+        };
+        Ok((buffer, needs))
     }
 
-    fn give_memory(
-        &mut self,
-        allocate: &vk::MemoryAllocateInfo<'_>,
-        is_texels: bool,
-        name: &str,
-    ) -> Result<(), VulkanError> {
+    fn bind(&mut self, memory: Share, is_texels: bool, name: &str) -> Result<(), VulkanError> {
         let device = &self.device.raw;
-        // SAFETY: a valid size and memory type.
-        self.memory =
-            unsafe { device.allocate_memory(allocate, None) }.named("vkAllocateMemory")?;
-        self.bind(self.memory, 0, is_texels, name)?;
-        self.device.name(self.memory, name);
-        Ok(())
-    }
-
-    fn bind(
-        &mut self,
-        memory: vk::DeviceMemory,
-        offset: u64,
-        is_texels: bool,
-        name: &str,
-    ) -> Result<(), VulkanError> {
-        let device = &self.device.raw;
+        self.memory = memory; // goes with the buffer, also when a later step fails
         // SAFETY: memory of a type that the buffer allows, of which nothing else uses this part.
-        unsafe { device.bind_buffer_memory(self.raw, memory, offset) }
+        unsafe { device.bind_buffer_memory(self.raw, memory.memory, memory.offset) }
             .named("vkBindBufferMemory")?;
         if is_texels {
             let info = vk::BufferViewCreateInfo::default()
@@ -288,12 +244,12 @@ impl Buffer {
 
     /// Whether the host sees its bytes.
     pub(crate) fn is_mapped(&self) -> bool {
-        self.mapped.is_some()
+        self.memory.mapped.is_some()
     }
 
     /// Some of the mapped bytes; empty where the buffer is not mapped, or shorter.
     pub(crate) fn bytes(&self, range: Range<usize>) -> &[u8] {
-        match self.mapped {
+        match self.memory.mapped {
             // SAFETY: mapped with at least this size for the life of the buffer.
             // Callers read only after the fence of the work that writes the range.
             Some(pointer) if range.start <= range.end && range.end as u64 <= self.size => unsafe {
@@ -305,7 +261,7 @@ impl Buffer {
 
     /// Some of the mapped bytes, to write.
     pub(crate) fn bytes_mut(&mut self, range: Range<usize>) -> &mut [u8] {
-        match self.mapped {
+        match self.memory.mapped {
             // SAFETY: as in `bytes`, and `&mut self` makes this the host's only
             // reference; the device works on other ranges.
             Some(pointer) if range.start <= range.end && range.end as u64 <= self.size => unsafe {
@@ -325,10 +281,7 @@ impl Drop for Buffer {
             unsafe {
                 self.device.raw.destroy_buffer_view(self.view, None);
                 self.device.raw.destroy_buffer(self.raw, None);
-                match self.share {
-                    Some(share) => self.device.shared.give_back(&self.device.raw, share),
-                    None => self.device.raw.free_memory(self.memory, None),
-                }
+                self.device.shared.give_back(&self.device.raw, self.memory);
             }
         }
     }

@@ -2,32 +2,29 @@
 
 use std::sync::Arc;
 
-use crate::gpu::crowd::{CrowdSteps, DeviceCrowd};
+use crate::gpu::crowd::DeviceCrowd;
 use crate::gpu::crowd_target::CrowdTarget;
 use crate::gpu::error::VulkanError;
 use crate::gpu::read_back::ReadBack;
+use crate::output::crowd::CrowdOutput;
 use crate::shader::CrowdEntry;
 
 /// A target whose result the host reads.
 pub(crate) struct CrowdReader {
     // It goes first: it waits for what uses the rest.
     results: ReadBack,
-    target: CrowdTarget,
-    crowd: Arc<DeviceCrowd>,
-    bytes: u64,
+    pub(crate) target: CrowdTarget,
 }
 
 impl CrowdReader {
-    pub(crate) fn new(crowd: &Arc<DeviceCrowd>, steps: CrowdSteps) -> Result<Self, VulkanError> {
+    pub(crate) fn new(crowd: &Arc<DeviceCrowd>, output: CrowdOutput) -> Result<Self, VulkanError> {
         let engine = &crowd.engine;
-        let bytes = CrowdTarget::bytes(crowd, steps);
+        let bytes = crowd.bytes(output);
         let mut results = ReadBack::new(&engine.device)?;
-        let output = results.room(&engine.device, bytes, !engine.in_place)?.raw;
+        let buffer = results.room(&engine.device, bytes, !engine.in_place)?.raw;
         Ok(Self {
             results,
-            target: CrowdTarget::new(crowd, steps, output, 0)?,
-            crowd: Arc::clone(crowd),
-            bytes,
+            target: CrowdTarget::new(crowd, output, buffer, 0)?,
         })
     }
 
@@ -39,9 +36,9 @@ impl CrowdReader {
     ) -> Result<(), VulkanError> {
         self.results.kernels.begin(0)?;
         let commands = self.results.kernels.commands();
-        // SAFETY: the command buffer is this submission's, in recording, and submitted below.
-        unsafe { self.crowd.record(&self.target, commands, clock, changes) };
-        self.results.submit(Some(self.bytes))
+        self.target.record(commands, clock, changes);
+        let bytes = self.target.crowd.bytes(self.target.output());
+        self.results.submit(Some(bytes))
     }
 
     pub(crate) fn is_done(&self) -> Result<bool, VulkanError> {

@@ -1,177 +1,179 @@
-//! Where a crowd's results go on a device: a buffer, with the descriptor sets that lead there.
+//! Where a crowd's results go on a device: each evaluation records what changed and the dispatches,
+//! without waiting and without allocating.
 
 use std::sync::Arc;
 
 use ash::vk;
 
 use crate::gpu::buffer::{Buffer, Residence};
-use crate::gpu::crowd::{CrowdPipelines, CrowdSets, CrowdSteps, DeviceCrowd};
-use crate::gpu::error::{Named, VulkanError};
+use crate::gpu::commands::Commands;
+use crate::gpu::crowd::DeviceCrowd;
+use crate::gpu::descriptors::DescriptorPool;
+use crate::gpu::error::VulkanError;
 use crate::gpu::pipeline::Pipeline;
-use crate::gpu::submission::Binding;
-use crate::shader::CrowdPlace;
+use crate::gpu::submission::{Access, Binding};
+use crate::output::crowd::CrowdOutput;
+use crate::shader::{CROWD_WORKGROUP, CrowdDispatch, CrowdEntry, Kernel, WORKGROUP};
 
-/// The most sets that a window needs, and the most buffers of each.
-const SETS: u32 = 5;
-const BINDINGS: u32 = 5;
+/// The most bytes that one command may write into a buffer.
+const UPDATE: usize = 1 << 16;
 
-/// A buffer that results are written to, and all that an evaluation into it needs: nothing is made
-/// while it is recorded.
-pub(crate) struct CrowdTarget {
+/// A range of an application's buffer that a crowd is evaluated into
+/// ([`Crowd::target`](crate::crowd::player::Crowd::target)), with all that recording needs.
+pub struct CrowdTarget {
     /// What it was made for; its buffers are in the sets.
-    crowd: Arc<DeviceCrowd>,
-    pub(crate) steps: CrowdSteps,
-    pub(crate) pipelines: CrowdPipelines,
+    pub(crate) crowd: Arc<DeviceCrowd>,
+    output: CrowdOutput,
+    pipelines: Vec<(Kernel, Arc<Pipeline>)>,
     /// Instances of a window.
-    pub(crate) window: u32,
-    pub(crate) windows: Vec<CrowdSets>,
-    pool: vk::DescriptorPool,
-    /// Where each layer of a window's instances stands.
-    places: Buffer,
-    /// Values of a window before they are rounded to 16 bits.
-    whole: Option<Buffer>,
+    window: u32,
+    /// The descriptor sets of each window, one for each kernel.
+    windows: Vec<Vec<vk::DescriptorSet>>,
+    // What the sets are made of and lead to. Whoever records promises that no work that uses it is in
+    // flight when the target is dropped.
+    _pool: DescriptorPool,
+    _buffers: (Buffer, Option<Buffer>),
 }
 
 impl CrowdTarget {
-    /// Bytes of a result.
-    pub(crate) fn bytes(crowd: &DeviceCrowd, steps: CrowdSteps) -> u64 {
-        let vectors = u64::from(crowd.shape.joints) * u64::from(steps.vectors());
-        u64::from(crowd.shape.instances) * vectors * steps.vector_bytes()
-    }
-
     /// For a range of a buffer from `offset` on, which is as long as the result.
     pub(crate) fn new(
         crowd: &Arc<DeviceCrowd>,
-        steps: CrowdSteps,
+        output: CrowdOutput,
         buffer: vk::Buffer,
         offset: u64,
     ) -> Result<Self, VulkanError> {
-        let (engine, shape) = (&crowd.engine, &crowd.shape);
-        let window = crowd.window();
-        let count = shape.instances.div_ceil(window);
-        let device = &engine.device;
+        let engine = &crowd.engine;
+        let (window, instances) = (crowd.window(), crowd.shape.instances);
+        let joints = u64::from(crowd.shape.arguments.joints);
         let new = |name, each: u64| {
-            Buffer::new(device, name, u64::from(window) * each, Residence::Device)
+            let size = u64::from(window) * each;
+            Buffer::new(&engine.device, name, size, Residence::Device)
         };
-        let vectors = u64::from(shape.joints) * u64::from(steps.vectors());
-        let place = size_of::<CrowdPlace>() as u64;
-        let places = new(
-            "tumble crowd places",
-            place * u64::from(shape.layers) * u64::from(shape.bases),
-        )?;
-        let whole = match steps.half {
-            true => Some(new("tumble crowd values", vectors * 16)?),
-            false => None,
-        };
-        let mut target = Self {
-            crowd: Arc::clone(crowd),
-            steps,
-            pipelines: CrowdPipelines::new(crowd, steps)?,
-            window,
-            windows: Vec::new(),
-            pool: vk::DescriptorPool::null(),
-            places,
-            whole,
-        };
-        let sizes = [
-            vk::DescriptorType::STORAGE_BUFFER,
-            vk::DescriptorType::UNIFORM_TEXEL_BUFFER,
-        ]
-        .map(|kind| {
-            vk::DescriptorPoolSize::default()
-                .ty(kind)
-                .descriptor_count(count * SETS * BINDINGS)
-        });
-        let info = vk::DescriptorPoolCreateInfo::default()
-            .max_sets(count * SETS)
-            .pool_sizes(&sizes);
-        // SAFETY: the device is alive; the pool is destroyed in `drop`.
-        target.pool = unsafe { device.raw.create_descriptor_pool(&info, None) }
-            .named("vkCreateDescriptorPool")?;
-        for place in 0..count {
-            let first = u64::from(place * window);
-            let own = u64::from(window).min(u64::from(shape.instances) - first);
-            let each = vectors * steps.vector_bytes();
-            let output = Binding::range(buffer, offset + first * each, own * each);
-            let sets = target.sets(output)?;
-            target.windows.push(sets);
+        let places = new("tumble crowd places", crowd.place_bytes())?;
+        // Values of a window before they are rounded to 16 bits.
+        let values = joints * output.vectors() as u64 * 16;
+        let whole = (output.is_half).then(|| new("tumble crowd values", values));
+        let whole = whole.transpose()?;
+        let pipelines = crowd
+            .kernels(output)
+            .into_iter()
+            .map(|kernel| Ok((kernel, engine.pipeline(kernel)?)))
+            .collect::<Result<Vec<_>, VulkanError>>()?;
+        let count = instances.div_ceil(window);
+        let mut pool = DescriptorPool::new(&engine.device);
+        pool.make_room(count * pipelines.len() as u32)?;
+        let mut windows = Vec::new();
+        for first in (0..instances).step_by(window as usize) {
+            let own = window.min(instances - first);
+            let each = joints * output.bytes() as u64;
+            let start = offset + u64::from(first) * each;
+            let range = Binding::range(buffer, start, u64::from(own) * each);
+            let values = whole.as_ref().map_or(range, Binding::whole);
+            let bound = [Binding::whole(&places), values, range];
+            let sets = pipelines
+                .iter()
+                .map(|(kernel, pipeline)| pool.set(pipeline, &crowd.bindings(*kernel, bound)))
+                .collect::<Result<_, _>>()?;
+            windows.push(sets);
         }
-        Ok(target)
-    }
-
-    /// The crowd that it belongs to.
-    pub(crate) fn is_of(&self, crowd: &Arc<DeviceCrowd>) -> bool {
-        Arc::ptr_eq(&self.crowd, crowd)
-    }
-
-    /// The sets of a window whose result goes into a range.
-    fn sets(&self, output: Binding) -> Result<CrowdSets, VulkanError> {
-        let crowd = &self.crowd;
-        let whole = Binding::whole;
-        let places = whole(&self.places);
-        let values = self.whole.as_ref().map_or(output, whole);
-        let own = &self.pipelines;
-        let if_there = |pipeline: &Option<Arc<Pipeline>>, bindings: &[Binding]| match pipeline {
-            Some(pipeline) => self.set(pipeline, bindings),
-            None => Ok(vk::DescriptorSet::null()),
-        };
-        let (entries, cells) = (whole(&crowd.entries), whole(&crowd.cells));
-        let [clips, bases, spans] = [&crowd.clips, &crowd.bases, &crowd.spans].map(whole);
-        Ok(CrowdSets {
-            times: self.set(&own.times, &[entries, clips, bases, spans, places])?,
-            joints: self.set(
-                &own.joints,
-                &[entries, whole(&crowd.channels), cells, places, values],
-            )?,
-            walk: if_there(&own.walk, &[whole(&crowd.links), values])?,
-            skin: if_there(&own.skin, &[whole(&crowd.bind), values])?,
-            half: if_there(&own.half, &[values, output])?,
+        Ok(Self {
+            crowd: Arc::clone(crowd),
+            output,
+            pipelines,
+            window,
+            windows,
+            _pool: pool,
+            _buffers: (places, whole),
         })
     }
 
-    fn set(
+    /// What is left there.
+    #[must_use]
+    pub fn output(&self) -> CrowdOutput {
+        self.output
+    }
+
+    /// Records an evaluation at a time of the clock: the entries that changed, then the dispatches.
+    /// `changes` are ranges of entries, with the entries themselves. What is recorded must be submitted
+    /// in the order of the calls.
+    pub(crate) fn record<'e>(
         &self,
-        pipeline: &Pipeline,
-        bindings: &[Binding],
-    ) -> Result<vk::DescriptorSet, VulkanError> {
-        debug_assert_eq!(bindings.len(), pipeline.bindings as usize);
-        let raw = &self.crowd.engine.device.raw;
-        let layouts = [pipeline.set_layout];
-        let info = vk::DescriptorSetAllocateInfo::default()
-            .descriptor_pool(self.pool)
-            .set_layouts(&layouts);
-        // SAFETY: the pool was made with room for this set.
-        let set =
-            unsafe { raw.allocate_descriptor_sets(&info) }.named("vkAllocateDescriptorSets")?[0];
-        for (place, binding) in (0..).zip(bindings) {
-            let info = [vk::DescriptorBufferInfo::default()
-                .buffer(binding.buffer)
-                .offset(binding.offset)
-                .range(binding.size)];
-            let views = [binding.view];
-            let kind = pipeline.kind(place);
-            let write = vk::WriteDescriptorSet::default()
-                .dst_set(set)
-                .dst_binding(place)
-                .descriptor_type(kind);
-            let write = match kind {
-                vk::DescriptorType::STORAGE_BUFFER => write.buffer_info(&info),
-                _ => write.texel_buffer_view(&views),
-            };
-            // SAFETY: nothing uses the set yet, and the buffers are alive.
-            unsafe { raw.update_descriptor_sets(&[write], &[]) };
+        commands: Commands<'_>,
+        clock: u64,
+        changes: impl Iterator<Item = (usize, &'e [CrowdEntry])>,
+    ) {
+        let shape = &self.crowd.shape;
+        commands.barrier(Access::Any, Access::Any);
+        let each = size_of::<CrowdEntry>();
+        for (first, entries) in changes {
+            let places = (first..).step_by(UPDATE / each);
+            for (place, part) in places.zip(entries.chunks(UPDATE / each)) {
+                let bytes = bytemuck::cast_slice(part);
+                commands.update(self.crowd.entries.raw, (place * each) as u64, bytes);
+            }
         }
-        Ok(set)
+        commands.barrier(Access::Copy, Access::Kernel);
+        let firsts = (0..shape.instances).step_by(self.window as usize);
+        for (first_instance, sets) in firsts.zip(&self.windows) {
+            let instances = self.window.min(shape.instances - first_instance);
+            let arguments = CrowdDispatch {
+                first_instance,
+                clock_low: clock as u32,
+                clock_high: (clock >> 32) as u32,
+                ..shape.arguments
+            };
+            self.record_window(commands, sets, instances, arguments);
+        }
+        commands.barrier(Access::Kernel, Access::Any);
+    }
+
+    /// Records the dispatches of a window, each of which sees what the one before it wrote.
+    fn record_window(
+        &self,
+        commands: Commands<'_>,
+        sets: &[vk::DescriptorSet],
+        instances: u32,
+        arguments: CrowdDispatch,
+    ) {
+        const _: () = assert!(CROWD_WORKGROUP == WORKGROUP);
+        let joints = instances * arguments.joints;
+        for ((kernel, pipeline), &set) in self.pipelines.iter().zip(sets) {
+            let dispatch = |count, arguments| {
+                if count > 0 {
+                    let arguments = CrowdDispatch { count, ..arguments };
+                    let groups = self.crowd.engine.workgroups(count);
+                    commands.dispatch(pipeline, set, bytemuck::bytes_of(&arguments), groups);
+                    commands.barrier(Access::Kernel, Access::Kernel);
+                }
+            };
+            let count = match kernel {
+                Kernel::CrowdTimes => instances * arguments.layers * arguments.bases,
+                Kernel::CrowdSkin => 3 * joints,
+                Kernel::CrowdHalf => joints * self.output.vectors() as u32,
+                Kernel::CrowdWalk => {
+                    for level in self.crowd.shape.levels.windows(2) {
+                        let own = CrowdDispatch {
+                            joints: level[1] - level[0],
+                            layers: arguments.joints,
+                            first_link: level[0],
+                            ..arguments
+                        };
+                        dispatch(instances * own.joints, own);
+                    }
+                    continue;
+                }
+                _ => joints,
+            };
+            dispatch(count, arguments);
+        }
     }
 }
 
-impl Drop for CrowdTarget {
-    fn drop(&mut self) {
-        let device = &self.crowd.engine.device;
-        if device.may_destroy() {
-            // SAFETY: created from this device; whoever records promises that no work that uses the
-            // target is in flight when it is dropped. Null is allowed.
-            unsafe { device.raw.destroy_descriptor_pool(self.pool, None) };
-        }
+impl std::fmt::Debug for CrowdTarget {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("CrowdTarget")
+            .field("output", &self.output)
+            .finish_non_exhaustive()
     }
 }

@@ -11,7 +11,7 @@ use crate::gpu::buffer::may_be_imported;
 use crate::gpu::engine::lock;
 use crate::gpu::error::{Named, VulkanError};
 use crate::gpu::handles::VulkanQueue;
-use crate::gpu::memory_types::Placing;
+use crate::gpu::memory_types::{Placing, direct};
 use crate::gpu::options::{EngineOptions, ReadBack};
 use crate::gpu::physical::{DeviceKind, PhysicalDevice};
 use crate::gpu::queues::{Copies, QueuePlace};
@@ -50,9 +50,10 @@ pub(crate) struct LogicalDevice {
     /// Where what the host writes for kernels goes.
     pub(crate) placing: Placing,
     queue: Queue,
-    copies: Copies,
     /// The queue of [`Lane::Copies`], where that is another one.
     copy_queue: Option<Queue>,
+    /// Whether staged results are copied in submissions of their own.
+    copies_apart: bool,
     names: Option<ext::debug_utils::Device>,
     /// The extension that imports the caller's memory, where it is used.
     pub(crate) borrows: Option<ext::external_memory_host::Device>,
@@ -76,29 +77,31 @@ impl LogicalDevice {
                 .queue_family_index(family)
                 .queue_priorities(&priorities[..count])
         };
-        let queues = match copies {
-            Copies::Together | Copies::Apart => vec![of_family(own, 1)],
-            Copies::Beside(place) if place.family == own => vec![of_family(own, 2)],
-            Copies::Beside(place) => vec![of_family(own, 1), of_family(place.family, 1)],
+        let beside = match copies {
+            Copies::Together | Copies::Apart => None,
+            Copies::Beside(place) => Some(place),
         };
-        let controls = physical.float_controls_extension;
-        let mut extensions: Vec<_> = controls
-            .then_some(khr::shader_float_controls::NAME.as_ptr())
-            .into_iter()
-            .collect();
+        let queues: Vec<_> = match beside {
+            Some(place) if place.family == own => vec![of_family(own, 2)],
+            Some(place) => vec![of_family(own, 1), of_family(place.family, 1)],
+            None => vec![of_family(own, 1)],
+        };
         // Memory is imported on software devices only. They work in threads of this process: a
         // wait for them ends, and afterwards none of them touches memory that its owner may free.
         let reads_texels = physical.reads_texels(options.reads);
         let borrows = physical.info.kind == DeviceKind::Cpu
             && physical.lent_alignment.is_some()
             && may_be_imported(&physical, reads_texels);
-        if borrows {
-            extensions.push(ext::external_memory_host::NAME.as_ptr());
-        }
-        let has_timelines = copies != Copies::Together;
-        if has_timelines && physical.timelines_extension {
-            extensions.push(khr::timeline_semaphore::NAME.as_ptr());
-        }
+        let copies_apart = copies != Copies::Together;
+        let timelines = copies_apart && physical.timelines_extension;
+        let controls = physical.float_controls_extension;
+        let extensions = [
+            (controls, khr::shader_float_controls::NAME),
+            (borrows, ext::external_memory_host::NAME),
+            (timelines, khr::timeline_semaphore::NAME),
+        ];
+        let wanted = extensions.iter().filter(|(wanted, _)| *wanted);
+        let extensions: Vec<_> = wanted.map(|(_, name)| name.as_ptr()).collect();
         let features = vk::PhysicalDeviceFeatures::default().shader_int64(reads_texels);
         let mut timelines =
             vk::PhysicalDeviceTimelineSemaphoreFeatures::default().timeline_semaphore(true);
@@ -106,77 +109,61 @@ impl LogicalDevice {
             .enabled_features(&features)
             .queue_create_infos(&queues)
             .enabled_extension_names(&extensions);
-        if has_timelines {
+        if copies_apart {
             info = info.push_next(&mut timelines);
         }
         let instance = &physical.instance.raw;
         // SAFETY: the physical device belongs to the instance and has these families.
         let raw =
             unsafe { instance.create_device(physical.raw, &info, None) }.named("vkCreateDevice")?;
-        let queue = |QueuePlace { family, index }| {
-            // SAFETY: this queue was just created.
-            Queue::new(unsafe { raw.get_device_queue(family, index) }, family)
-        };
-        let first = queue(QueuePlace {
-            family: own,
-            index: 0,
+        // SAFETY: these queues were just created.
+        let queue = |family, index| unsafe { raw.get_device_queue(family, index) };
+        let copy_queue = beside.map(|QueuePlace { family, index }| VulkanQueue {
+            queue: queue(family, index),
+            family,
         });
-        let beside = match copies {
-            Copies::Together | Copies::Apart => None,
-            Copies::Beside(place) => Some(queue(place)),
-        };
+        let first = queue(own, 0);
         let borrows = borrows.then(|| ext::external_memory_host::Device::new(instance, &raw));
-        let queues = (first, copies, beside);
-        Ok(Self::wrap(physical, raw, queues, options, borrows, true))
+        let mut device = Self::borrowed(physical, raw, first, copy_queue, options);
+        (device.owned, device.borrows) = (true, borrows);
+        device.copies_apart = copies_apart;
+        Ok(Arc::new(device))
     }
 
-    /// An application's device; it stays the application's to destroy. Results are copied by
-    /// `copy_queue` where it names one.
+    /// An application's device; it stays the application's to destroy. Results that are staged are copied
+    /// by `copy_queue` where there is one.
     pub(crate) fn borrowed(
         physical: PhysicalDevice,
         raw: ash::Device,
         queue: vk::Queue,
         copy_queue: Option<VulkanQueue>,
         options: &EngineOptions,
-    ) -> Arc<Self> {
-        let stay = physical.in_place(options.transfer) || options.read_back == ReadBack::SameQueue;
+    ) -> Self {
+        let in_place = physical.in_place(options.transfer);
+        let stay = in_place || options.read_back == ReadBack::SameQueue;
         let named = copy_queue.filter(|_| !stay);
-        let copies = named.map_or(Copies::Together, |named| {
-            let (family, index) = (named.family, 0);
-            Copies::Beside(QueuePlace { family, index })
-        });
-        let beside = named.map(|named| Queue::new(named.queue, named.family));
-        let queue = Queue::new(queue, physical.queue_family);
-        let queues = (queue, copies, beside);
-        Self::wrap(physical, raw, queues, options, None, false)
-    }
-
-    fn wrap(
-        physical: PhysicalDevice,
-        raw: ash::Device,
-        (queue, copies, copy_queue): (Queue, Copies, Option<Queue>),
-        options: &EngineOptions,
-        borrows: Option<ext::external_memory_host::Device>,
-        owned: bool,
-    ) -> Arc<Self> {
         let instance = &physical.instance;
         let names = instance
             .debug_utils
             .then(|| ext::debug_utils::Device::new(&instance.raw, &raw));
-        Arc::new(Self {
+        Self {
             raw,
             reads_texels: physical.reads_texels(options.reads),
-            placing: physical.placing(options),
+            placing: Placing {
+                uploads: options.uploads,
+                in_place,
+                direct: direct(&physical.memory),
+            },
+            queue: Queue::new(queue, physical.queue_family),
+            copy_queue: named.map(|named| Queue::new(named.queue, named.family)),
+            copies_apart: named.is_some(),
             physical,
-            queue,
-            copies,
-            copy_queue,
             names,
-            borrows,
-            owned,
+            borrows: None,
+            owned: false,
             shared: SharedMemory::default(),
             hung: AtomicBool::new(false),
-        })
+        }
     }
 
     /// The queue of a lane, for one user at a time.
@@ -198,7 +185,7 @@ impl LogicalDevice {
 
     /// Whether staged results are copied in submissions of their own.
     pub(crate) fn copies_apart(&self) -> bool {
-        self.copies != Copies::Together
+        self.copies_apart
     }
 
     /// The families that use staged results, where they are two.

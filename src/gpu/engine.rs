@@ -203,11 +203,7 @@ impl VulkanEngine {
 
     /// Refuses what is longer than a kernel can bind.
     pub(crate) fn check_size(&self, what: &'static str, bytes: &[u8]) -> Result<(), VulkanError> {
-        let limit = self.device.physical.info.max_storage_buffer_range;
-        match bytes.len() as u64 {
-            bytes if bytes > limit => Err(VulkanError::TooLarge { what, bytes, limit }),
-            _ => Ok(()),
-        }
+        (self.device.physical).check_range(what, bytes.len() as u64)
     }
 
     /// Whether buffers belong to this device; those from before it was opened again do not.
@@ -263,7 +259,7 @@ impl VulkanEngine {
         let resident = Buffer::new(&self.device, name, size, Residence::Device)?;
         let mut submission = Submission::new(&self.device, Lane::Kernels)?;
         submission.begin(0)?;
-        submission.copy(&upload, &resident, 0, upload.size());
+        submission.copy(&upload, &resident, upload.size());
         submission.barrier(Access::Copy, Access::Kernel);
         submission.submit()?;
         submission.wait()?;

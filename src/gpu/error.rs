@@ -2,10 +2,7 @@
 
 use ash::vk;
 
-use crate::curve::options::InterpolationError;
-use crate::memory::OutOfMemory;
 use crate::prepare::error::SetError;
-use crate::time::frames::FramesError;
 
 /// Why a Vulkan device could not be used, or stopped working.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -153,23 +150,11 @@ pub(crate) enum EvaluateError {
     #[error(transparent)]
     Vulkan(#[from] VulkanError),
     #[error(transparent)]
-    Set(#[from] SetError),
+    Set(SetError),
 }
 
-impl From<FramesError> for EvaluateError {
-    fn from(error: FramesError) -> Self {
-        Self::Set(error.into())
-    }
-}
-
-impl From<OutOfMemory> for EvaluateError {
-    fn from(error: OutOfMemory) -> Self {
-        Self::Set(error.into())
-    }
-}
-
-impl From<InterpolationError> for EvaluateError {
-    fn from(error: InterpolationError) -> Self {
+impl<E: Into<SetError>> From<E> for EvaluateError {
+    fn from(error: E) -> Self {
         Self::Set(error.into())
     }
 }

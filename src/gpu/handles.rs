@@ -1,5 +1,7 @@
 //! Vulkan objects of an application's own.
 
+use std::sync::Arc;
+
 use ash::vk;
 
 use crate::gpu::device::LogicalDevice;
@@ -86,6 +88,6 @@ impl VulkanEngine {
             handles.copy_queue,
             options,
         );
-        Self::with_device(device, options)
+        Self::with_device(Arc::new(device), options)
     }
 }

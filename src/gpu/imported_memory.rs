@@ -19,7 +19,6 @@ const PAGE: usize = 4096;
 
 /// Imported memory: the caller's, which a device may read or write as long as this lives.
 pub(crate) struct ImportedMemory<'a> {
-    device: Arc<LogicalDevice>,
     /// The pages that it lies in.
     buffer: Buffer,
     /// Where it starts in them.
@@ -65,9 +64,8 @@ impl<'a> ImportedMemory<'a> {
         let first = NonNull::new(memory.as_ptr().wrapping_sub(start))?;
         // SAFETY: pages that hold a byte of the process's memory are its own as a whole, and
         // this keeps the memory borrowed until nothing works on it any more.
-        let buffer = unsafe { Buffer::around(device, "tumble lent", first, pages as u64) }?;
+        let buffer = unsafe { Buffer::around(device, first, pages as u64) }?;
         Some(Self {
-            device: Arc::clone(device),
             buffer,
             start,
             memory,
@@ -111,7 +109,7 @@ impl Drop for ImportedMemory<'_> {
     fn drop(&mut self) {
         // After an error or a panic, submitted work may not have ended.
         if !self.is_idle {
-            self.device.wait_in_any_case();
+            self.buffer.device.wait_in_any_case();
         }
     }
 }

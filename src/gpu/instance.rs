@@ -5,6 +5,7 @@ use std::sync::{Arc, Mutex};
 
 use ash::{ext, vk};
 
+use crate::gpu::engine::lock;
 use crate::gpu::error::{Named, VulkanError};
 
 const VALIDATION: &CStr = c"VK_LAYER_KHRONOS_validation";
@@ -36,29 +37,21 @@ impl Instance {
         // SAFETY: no requirements beyond a loaded entry.
         let layers = unsafe { entry.enumerate_instance_layer_properties() }
             .named("vkEnumerateInstanceLayerProperties")?;
-        let has_layer = |name| layers.iter().any(|l| l.layer_name_as_c_str() == Ok(name));
-        if validation && !has_layer(VALIDATION) {
+        let mut layers = layers.iter();
+        if validation && !layers.any(|layer| layer.layer_name_as_c_str() == Ok(VALIDATION)) {
             return Err(VulkanError::NoValidation);
         }
-        let layer_names: Vec<_> = validation
-            .then_some(VALIDATION.as_ptr())
-            .into_iter()
-            .collect();
         let has_extension = |layer: Option<&CStr>, wanted: &CStr| -> Result<bool, VulkanError> {
             // SAFETY: the layer's name is a valid string.
             let found = unsafe { entry.enumerate_instance_extension_properties(layer) }
                 .named("vkEnumerateInstanceExtensionProperties")?;
-            Ok(found
-                .iter()
-                .any(|e| e.extension_name_as_c_str() == Ok(wanted)))
+            let mut found = found.iter();
+            Ok(found.any(|own| own.extension_name_as_c_str() == Ok(wanted)))
         };
         let debug_utils = has_extension(None, ext::debug_utils::NAME)?
             || validation && has_extension(Some(VALIDATION), ext::debug_utils::NAME)?;
-        let extensions: Vec<_> = debug_utils
-            .then_some(ext::debug_utils::NAME.as_ptr())
-            .into_iter()
-            .collect();
-
+        let layers = [VALIDATION.as_ptr()];
+        let extensions = [ext::debug_utils::NAME.as_ptr()];
         let application = vk::ApplicationInfo::default()
             .application_name(c"tumble")
             .engine_name(c"tumble")
@@ -80,8 +73,8 @@ impl Instance {
             vk::ValidationFeaturesEXT::default().enabled_validation_features(&synchronization);
         let mut info = vk::InstanceCreateInfo::default()
             .application_info(&application)
-            .enabled_layer_names(&layer_names)
-            .enabled_extension_names(&extensions);
+            .enabled_layer_names(&layers[..usize::from(validation)])
+            .enabled_extension_names(&extensions[..usize::from(debug_utils)]);
         if validation {
             info = info.push_next(&mut features).push_next(&mut messenger_info);
         }
@@ -121,19 +114,10 @@ impl Instance {
         })
     }
 
-    /// Every physical device, in the loader's order.
-    pub(crate) fn physical_devices(&self) -> Result<Vec<vk::PhysicalDevice>, VulkanError> {
-        // SAFETY: the instance is alive.
-        unsafe { self.raw.enumerate_physical_devices() }.named("vkEnumeratePhysicalDevices")
-    }
-
     /// What the validation layer has said so far.
     pub(crate) fn validation_messages(&self) -> Vec<String> {
-        let messages = self.messenger.as_ref().map(|messenger| &messenger.messages);
-        messages
-            .and_then(|m| m.lock().ok())
-            .map(|m| m.clone())
-            .unwrap_or_default()
+        let messenger = self.messenger.as_ref();
+        messenger.map_or_else(Vec::new, |own| lock(&own.messages).clone())
     }
 }
 
@@ -169,8 +153,6 @@ unsafe extern "system" fn record_message(
         let text = (*data).message_as_c_str().unwrap_or(c"");
         (messages, text.to_string_lossy().into_owned())
     };
-    if let Ok(mut messages) = messages.lock() {
-        messages.push(text);
-    }
+    lock(messages).push(text);
     vk::FALSE
 }

@@ -39,15 +39,12 @@ pub(crate) fn direct(memory: &vk::PhysicalDeviceMemoryProperties) -> Option<Dire
     let local = |h: &&vk::MemoryHeap| h.flags.contains(vk::MemoryHeapFlags::DEVICE_LOCAL);
     let all = heaps.iter().filter(local).map(|h| h.size).max()?;
     let types = (0..).zip(memory.memory_types_as_slice());
-    let mut found: Option<(u32, u64)> = None;
-    for (place, own) in types {
-        let flags = own.property_flags;
-        let is_direct = flags.contains(DIRECT) && !flags.intersects(SPECIAL);
-        if is_direct && found.is_none_or(|(_, most)| size(own) > most) {
-            found = Some((place, size(own)));
-        }
-    }
-    let (memory_type, size) = found?;
+    let is_direct =
+        |flags: vk::MemoryPropertyFlags| flags.contains(DIRECT) && !flags.intersects(SPECIAL);
+    let (memory_type, size) = types
+        .filter(|(_, own)| is_direct(own.property_flags))
+        .map(|(place, own)| (place, size(own)))
+        .reduce(|largest, own| if own.1 > largest.1 { own } else { largest })?;
     let largest = if size >= all { u64::MAX } else { size / SMALL };
     Some(DirectMemory {
         memory_type,
@@ -96,13 +93,12 @@ pub(crate) struct Placing {
 impl Placing {
     /// Where an upload goes if there is room.
     pub(crate) fn place(&self, bytes: u64, reads: KernelReads) -> Place {
-        let largest = match (self.uploads, self.direct) {
-            (Uploads::Staged, _) => return Place::Staged,
-            (_, None) => return self.without_direct(reads),
-            (Uploads::Direct, Some(_)) => u64::MAX,
-            (Uploads::Automatic, Some(direct)) => direct.largest,
+        let fits = match self.uploads {
+            Uploads::Staged => return Place::Staged,
+            Uploads::Direct => self.direct.is_some(),
+            Uploads::Automatic => self.direct.is_some_and(|own| bytes <= own.largest),
         };
-        match bytes <= largest {
+        match fits {
             true => Place::Direct,
             false => self.without_direct(reads),
         }

@@ -5,9 +5,11 @@
 pub(crate) mod buffer;
 #[cfg(test)]
 pub(crate) mod cards;
+pub(crate) mod commands;
 pub(crate) mod crowd;
 pub(crate) mod crowd_reader;
 pub(crate) mod crowd_target;
+pub(crate) mod descriptors;
 pub(crate) mod device;
 pub(crate) mod engine;
 pub(crate) mod error;

@@ -7,7 +7,7 @@ use ash::{ext, khr, vk};
 
 use crate::gpu::error::{Named, VulkanError};
 use crate::gpu::instance::Instance;
-use crate::gpu::memory_types::{Placing, direct, is_unified};
+use crate::gpu::memory_types::is_unified;
 use crate::gpu::options::{EngineOptions, Mapping, Reads, Transfer};
 use crate::gpu::queues::{Copies, compute_family, copies};
 use crate::shader::spirv::FloatControls;
@@ -100,7 +100,9 @@ pub(crate) fn list(validation: bool) -> Result<Vec<PhysicalDevice>, VulkanError>
     let instance = Instance::new(validation)?;
     let mut devices = Vec::new();
     let mut failed = None;
-    for raw in instance.physical_devices()? {
+    // SAFETY: the instance is alive.
+    let all = unsafe { instance.raw.enumerate_physical_devices() };
+    for raw in all.named("vkEnumeratePhysicalDevices")? {
         match PhysicalDevice::new(&instance, raw) {
             Ok(device) => devices.extend(device),
             // The others may be sound.
@@ -164,15 +166,15 @@ impl PhysicalDevice {
         unsafe { vk_instance.get_physical_device_properties2(raw, &mut all) };
         // SAFETY: as above.
         let memory = unsafe { vk_instance.get_physical_device_memory_properties(raw) };
-        // SAFETY: as above.
-        let features = unsafe { vk_instance.get_physical_device_features(raw) };
         let mut timelines = vk::PhysicalDeviceTimelineSemaphoreFeatures::default();
+        let mut features = vk::PhysicalDeviceFeatures2::default();
         let reports_timelines = core_1_2 || has(khr::timeline_semaphore::NAME);
         if reports_timelines {
-            let mut all = vk::PhysicalDeviceFeatures2::default().push_next(&mut timelines);
-            // SAFETY: Vulkan 1.1; the device knows the structure that is chained.
-            unsafe { vk_instance.get_physical_device_features2(raw, &mut all) };
+            features = features.push_next(&mut timelines);
         }
+        // SAFETY: Vulkan 1.1; the device knows the structure that is chained.
+        unsafe { vk_instance.get_physical_device_features2(raw, &mut features) };
+        let has_int64 = features.features.shader_int64 == vk::TRUE;
         let float_controls = FloatControls {
             preserve_signed_zero_inf_nan: controls.shader_signed_zero_inf_nan_preserve_float32
                 == vk::TRUE,
@@ -183,14 +185,10 @@ impl PhysicalDevice {
             name.map(|name| name.to_string_lossy().into_owned())
                 .unwrap_or_default()
         };
-        let driver = format!(
-            "{} {}",
-            text(driver.driver_name_as_c_str()),
-            text(driver.driver_info_as_c_str())
-        );
+        let driver = [driver.driver_name_as_c_str(), driver.driver_info_as_c_str()];
         let info = DeviceInfo {
             name: text(properties.device_name_as_c_str()),
-            driver: driver.trim().to_owned(),
+            driver: driver.map(text).join(" ").trim().to_owned(),
             kind: kind(properties.device_type),
             api_version: version(properties.api_version),
             vendor_id: properties.vendor_id,
@@ -216,7 +214,7 @@ impl PhysicalDevice {
             memory,
             has_timelines: timelines.timeline_semaphore == vk::TRUE,
             timelines_extension: reports_timelines && !core_1_2,
-            has_int64: features.shader_int64 == vk::TRUE,
+            has_int64,
             max_texel_buffer_elements: limits.max_texel_buffer_elements,
             lent_alignment: borrows.then_some(imported.min_imported_host_pointer_alignment),
             info,
@@ -273,24 +271,19 @@ impl PhysicalDevice {
         )
     }
 
-    /// The rule by which uploads are placed.
-    pub(crate) fn placing(&self, options: &EngineOptions) -> Placing {
-        Placing {
-            uploads: options.uploads,
-            in_place: self.in_place(options.transfer),
-            direct: direct(&self.memory),
+    /// Refuses what kernels cannot see as one buffer.
+    pub(crate) fn check_range(&self, what: &'static str, bytes: u64) -> Result<(), VulkanError> {
+        let limit = self.info.max_storage_buffer_range;
+        match bytes > limit {
+            true => Err(VulkanError::TooLarge { what, bytes, limit }),
+            false => Ok(()),
         }
     }
 
     /// Valid bits of a time stamp of its queue; 0 where there are none.
-    fn timestamp_bits(&self) -> u32 {
+    pub(crate) fn timestamp_bits(&self) -> u32 {
         let family = self.families.get(self.queue_family as usize);
         family.map_or(0, |own| own.timestamp_valid_bits)
-    }
-
-    /// Whether its queue can take time stamps.
-    pub(crate) fn has_timestamps(&self) -> bool {
-        self.timestamp_bits() > 0
     }
 
     /// The time between two stamps.
@@ -314,8 +307,9 @@ impl PhysicalDevice {
                 allowed & (1 << i) != 0 && types[i as usize].property_flags.contains(wanted)
             })
         };
-        let mut preferred = preferred.iter().map(|flags| find(required | *flags));
-        preferred.find_map(|found| found).or_else(|| find(required))
+        let mut preferred = preferred.iter();
+        let found = preferred.find_map(|&flags| find(required | flags));
+        found.or_else(|| find(required))
     }
 }
 

@@ -25,12 +25,9 @@ pub(crate) enum Copies {
 /// What the families of engines for other work can do besides.
 const OTHER_WORK: vk::QueueFlags = vk::QueueFlags::from_raw(
     vk::QueueFlags::VIDEO_DECODE_KHR.as_raw()
-        | VIDEO_ENCODE.as_raw()
+        | vk::QueueFlags::VIDEO_ENCODE_KHR.as_raw()
         | vk::QueueFlags::OPTICAL_FLOW_NV.as_raw(),
 );
-
-/// `VK_QUEUE_VIDEO_ENCODE_BIT_KHR`.
-const VIDEO_ENCODE: vk::QueueFlags = vk::QueueFlags::from_raw(0x40);
 
 /// The family of the queue that computes: the first that can.
 pub(crate) fn compute_family(families: &[vk::QueueFamilyProperties]) -> Option<u32> {

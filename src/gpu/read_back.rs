@@ -70,14 +70,14 @@ impl ReadBack {
         let size = size.max(4); // no copy may be of nothing, and no buffer is shorter
         let Some(CopyApart { submission, done }) = &mut self.apart else {
             kernels.barrier(Access::Kernel, Access::Copy);
-            kernels.copy(output, host, 0, size);
+            kernels.copy(output, host, size);
             kernels.barrier(Access::Copy, Access::Host);
             return kernels.submit();
         };
         // The semaphore orders the copy and makes the kernels' writes visible to it: there is no
         // barrier in between, and none that the next kernels would wait for.
         submission.begin(0)?;
-        submission.copy(output, host, 0, size);
+        submission.copy(output, host, size);
         submission.barrier(Access::Copy, Access::Host);
         let point = done.advance();
         kernels.submit_between(None, Some(point))?;

@@ -1,5 +1,5 @@
-//! Memory that small buffers share. Drivers allow a few thousand allocations, and each takes at least a
-//! page; a clip has several buffers.
+//! Memory of buffers, which small ones share. Drivers allow a few thousand allocations, and each takes at
+//! least a page; a clip has several buffers.
 
 use std::ops::Range;
 use std::ptr::NonNull;
@@ -27,20 +27,19 @@ pub(crate) struct Kind {
     pub(crate) mapped: bool,
 }
 
-/// A part of a block.
-#[derive(Debug, Clone, Copy)]
+/// Memory of one buffer: a part of a block, or an allocation of its own.
+#[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Share {
     pub(crate) memory: vk::DeviceMemory,
     pub(crate) offset: u64,
-    size: u64,
+    pub(crate) size: u64,
     /// Where the host sees the first byte.
     pub(crate) mapped: Option<NonNull<u8>>,
 }
 
 struct Block {
-    memory: vk::DeviceMemory,
     kind: Kind,
-    mapped: Option<NonNull<u8>>,
+    whole: Share,
     free: Free,
 }
 
@@ -49,48 +48,29 @@ struct Block {
 unsafe impl Send for Block {}
 
 impl SharedMemory {
-    /// Room for a buffer; `None` for one that is better off with memory of its own.
+    /// Memory for a buffer.
     pub(crate) fn take(
         &self,
         device: &ash::Device,
         kind: Kind,
         needs: &vk::MemoryRequirements,
-    ) -> Result<Option<Share>, VulkanError> {
-        if needs.size > LARGEST {
-            return Ok(None);
+    ) -> Result<Share, VulkanError> {
+        if needs.size <= LARGEST {
+            let mut blocks = lock(&self.0);
+            let mut own = blocks.iter_mut().filter(|block| block.kind == kind);
+            if let Some(share) = own.find_map(|block| block.share(needs)) {
+                return Ok(share);
+            }
+            // Where there is no room for a block there may be some for the buffer alone.
+            if let Ok(whole) = allocate(device, kind, BLOCK) {
+                let free = Free::new(BLOCK);
+                blocks.push(Block { kind, whole, free });
+                if let Some(share) = blocks.last_mut().and_then(|block| block.share(needs)) {
+                    return Ok(share);
+                }
+            }
         }
-        let mut blocks = lock(&self.0);
-        let mut own = blocks.iter_mut().filter(|block| block.kind == kind);
-        if let Some(share) = own.find_map(|block| block.share(needs)) {
-            return Ok(Some(share));
-        }
-        let info = vk::MemoryAllocateInfo::default()
-            .allocation_size(BLOCK)
-            .memory_type_index(kind.memory_type);
-        // SAFETY: the device is alive, and has this type of memory.
-        let allocated = unsafe { device.allocate_memory(&info, None) };
-        let Ok(memory) = allocated else {
-            return Ok(None); // there may be room for the buffer alone
-        };
-        let mut block = Block {
-            memory,
-            kind,
-            mapped: None,
-            free: Free::new(BLOCK),
-        };
-        if kind.mapped {
-            let flags = vk::MemoryMapFlags::empty();
-            // SAFETY: the memory is visible to the host and not mapped yet; freeing it unmaps it.
-            let mapped = unsafe { device.map_memory(memory, 0, vk::WHOLE_SIZE, flags) };
-            let mapped = mapped.named("vkMapMemory").inspect_err(|_| {
-                // SAFETY: nothing uses it.
-                unsafe { device.free_memory(memory, None) }
-            })?;
-            block.mapped = NonNull::new(mapped.cast());
-        }
-        let share = block.share(needs);
-        blocks.push(block);
-        Ok(share)
+        allocate(device, kind, needs.size)
     }
 
     /// Takes back what a buffer had. A block that nobody uses is kept if it is the only one of its
@@ -100,7 +80,10 @@ impl SharedMemory {
     /// Nothing may use the memory any more.
     pub(crate) unsafe fn give_back(&self, device: &ash::Device, share: Share) {
         let mut blocks = lock(&self.0);
-        let Some(place) = blocks.iter().position(|block| block.memory == share.memory) else {
+        let is_own = |block: &Block| block.whole.memory == share.memory;
+        let Some(place) = blocks.iter().position(is_own) else {
+            // SAFETY: promised by the caller; null is allowed.
+            unsafe { device.free_memory(share.memory, None) };
             return;
         };
         blocks[place]
@@ -111,7 +94,7 @@ impl SharedMemory {
         if blocks[place].free.is_whole() && blocks.iter().filter(is_spare).count() > 1 {
             let block = blocks.swap_remove(place);
             // SAFETY: no buffer has a part of it, and the caller promises that no work does.
-            unsafe { device.free_memory(block.memory, None) };
+            unsafe { device.free_memory(block.whole.memory, None) };
         }
     }
 
@@ -122,7 +105,7 @@ impl SharedMemory {
     pub(crate) unsafe fn free(&self, device: &ash::Device) {
         for block in lock(&self.0).drain(..) {
             // SAFETY: promised by the caller.
-            unsafe { device.free_memory(block.memory, None) };
+            unsafe { device.free_memory(block.whole.memory, None) };
         }
     }
 }
@@ -130,17 +113,40 @@ impl SharedMemory {
 impl Block {
     fn share(&mut self, needs: &vk::MemoryRequirements) -> Option<Share> {
         let offset = self.free.take(needs.size, needs.alignment)?;
-        let mapped = self.mapped.and_then(|first| {
-            // SAFETY: the offset lies within the block, which is mapped as a whole.
-            NonNull::new(unsafe { first.as_ptr().add(offset as usize) })
-        });
+        // SAFETY: the offset lies within the block, which is mapped as a whole.
+        let at_offset = |first: NonNull<u8>| unsafe { first.add(offset as usize) };
         Some(Share {
-            memory: self.memory,
             offset,
             size: needs.size,
-            mapped,
+            mapped: self.whole.mapped.map(at_offset),
+            ..self.whole
         })
     }
+}
+
+/// An allocation, which stays mapped where the host sees it.
+fn allocate(device: &ash::Device, kind: Kind, size: u64) -> Result<Share, VulkanError> {
+    let info = vk::MemoryAllocateInfo::default()
+        .allocation_size(size)
+        .memory_type_index(kind.memory_type);
+    // SAFETY: the device is alive, and has this type of memory.
+    let memory = unsafe { device.allocate_memory(&info, None) }.named("vkAllocateMemory")?;
+    let mut share = Share {
+        memory,
+        size,
+        ..Share::default()
+    };
+    if kind.mapped {
+        let flags = vk::MemoryMapFlags::empty();
+        // SAFETY: the memory is visible to the host and not mapped yet; freeing it unmaps it.
+        let mapped = unsafe { device.map_memory(memory, 0, vk::WHOLE_SIZE, flags) };
+        let mapped = mapped.named("vkMapMemory").inspect_err(|_| {
+            // SAFETY: nothing uses it.
+            unsafe { device.free_memory(memory, None) }
+        })?;
+        share.mapped = NonNull::new(mapped.cast());
+    }
+    Ok(share)
 }
 
 /// The free parts of a block, in order, no two of which touch.
@@ -177,20 +183,17 @@ impl Free {
         Some(start)
     }
 
-    fn give(&mut self, mut range: Range<u64>) {
-        let mut place = self.ranges.partition_point(|own| own.start < range.start);
-        if place > 0 && self.ranges[place - 1].end == range.start {
-            place -= 1;
-            range.start = self.ranges.remove(place).start;
-        }
-        if self
-            .ranges
-            .get(place)
-            .is_some_and(|next| next.start == range.end)
-        {
-            range.end = self.ranges.remove(place).end;
-        }
-        self.ranges.insert(place, range);
+    fn give(&mut self, range: Range<u64>) {
+        self.ranges.push(range);
+        self.ranges.sort_by_key(|range| range.start);
+        // What touches becomes one.
+        self.ranges.dedup_by(|next, own| {
+            let touches = own.end == next.start;
+            if touches {
+                own.end = next.end;
+            }
+            touches
+        });
     }
 }
 

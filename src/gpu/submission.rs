@@ -6,6 +6,8 @@ use std::time::{Duration, Instant};
 use ash::vk;
 
 use crate::gpu::buffer::Buffer;
+use crate::gpu::commands::Commands;
+use crate::gpu::descriptors::DescriptorPool;
 use crate::gpu::device::{Lane, LogicalDevice};
 use crate::gpu::error::{Named, VulkanError};
 use crate::gpu::pipeline::Pipeline;
@@ -14,9 +16,6 @@ use crate::gpu::semaphore::Point;
 /// A dispatch takes milliseconds; a device that needs this long has hung.
 const TIMEOUT_SECONDS: u64 = 60;
 
-/// The most buffers that a kernel binds.
-const MOST_BINDINGS: u32 = 6;
-
 /// Command buffer, fence and descriptor pool, used again and again.
 pub(crate) struct Submission {
     device: Arc<LogicalDevice>,
@@ -24,9 +23,7 @@ pub(crate) struct Submission {
     pool: vk::CommandPool,
     commands: vk::CommandBuffer,
     fence: vk::Fence,
-    descriptors: vk::DescriptorPool,
-    /// Sets that the descriptor pool can hold.
-    capacity: u32,
+    descriptors: DescriptorPool,
     /// Two time stamps, around all that a submission does; null where the queue
     /// takes none, and for copies beside kernels: time that both share must not count twice.
     stamps: vk::QueryPool,
@@ -85,8 +82,7 @@ impl Submission {
             pool: vk::CommandPool::null(),
             commands: vk::CommandBuffer::null(),
             fence: vk::Fence::null(),
-            descriptors: vk::DescriptorPool::null(),
-            capacity: 0,
+            descriptors: DescriptorPool::new(device),
             stamps: vk::QueryPool::null(),
             submitted: None,
         };
@@ -105,7 +101,7 @@ impl Submission {
         // SAFETY: as above.
         submission.fence = unsafe { raw.create_fence(&vk::FenceCreateInfo::default(), None) }
             .named("vkCreateFence")?;
-        if lane == Lane::Kernels && device.physical.has_timestamps() {
+        if lane == Lane::Kernels && device.physical.timestamp_bits() > 0 {
             let info = vk::QueryPoolCreateInfo::default()
                 .query_type(vk::QueryType::TIMESTAMP)
                 .query_count(2);
@@ -121,9 +117,10 @@ impl Submission {
         Ok(submission)
     }
 
-    /// Where commands are recorded.
-    pub(crate) fn commands(&self) -> vk::CommandBuffer {
-        self.commands
+    /// Where commands are recorded, after `begin`. The caller keeps what they use until `wait`.
+    pub(crate) fn commands(&self) -> Commands<'_> {
+        // SAFETY: the command buffer is this device's, and recording is on.
+        unsafe { Commands::new(&self.device, self.commands) }
     }
 
     /// Whether submitted work has ended, as far as a look tells.
@@ -140,33 +137,8 @@ impl Submission {
     /// Must not be called while work is pending.
     pub(crate) fn begin(&mut self, sets: u32) -> Result<(), VulkanError> {
         debug_assert!(self.submitted.is_none());
+        self.descriptors.make_room(sets)?;
         let raw = &self.device.raw;
-        if sets > self.capacity {
-            let sizes = [
-                vk::DescriptorType::STORAGE_BUFFER,
-                vk::DescriptorType::UNIFORM_TEXEL_BUFFER,
-            ]
-            .map(|kind| {
-                vk::DescriptorPoolSize::default()
-                    .ty(kind)
-                    .descriptor_count(sets * MOST_BINDINGS)
-            });
-            let info = vk::DescriptorPoolCreateInfo::default()
-                .max_sets(sets)
-                .pool_sizes(&sizes);
-            // SAFETY: nothing is pending, so the old pool is not in use.
-            unsafe { raw.destroy_descriptor_pool(self.descriptors, None) };
-            (self.descriptors, self.capacity) = (vk::DescriptorPool::null(), 0);
-            // SAFETY: the device is alive.
-            self.descriptors = unsafe { raw.create_descriptor_pool(&info, None) }
-                .named("vkCreateDescriptorPool")?;
-            self.capacity = sets;
-        } else if self.capacity > 0 {
-            let flags = vk::DescriptorPoolResetFlags::empty();
-            // SAFETY: nothing is pending, so no set is in use.
-            unsafe { raw.reset_descriptor_pool(self.descriptors, flags) }
-                .named("vkResetDescriptorPool")?;
-        }
         // SAFETY: nothing is pending, so the command buffer is not in use.
         unsafe { raw.reset_command_pool(self.pool, vk::CommandPoolResetFlags::empty()) }
             .named("vkResetCommandPool")?;
@@ -193,58 +165,15 @@ impl Submission {
         constants: &[u8],
         groups: [u32; 3],
     ) -> Result<(), VulkanError> {
-        debug_assert_eq!(bindings.len(), pipeline.bindings as usize);
-        let raw = &self.device.raw;
-        let layouts = [pipeline.set_layout];
-        let info = vk::DescriptorSetAllocateInfo::default()
-            .descriptor_pool(self.descriptors)
-            .set_layouts(&layouts);
-        // SAFETY: `begin` made room for this set.
-        let set =
-            unsafe { raw.allocate_descriptor_sets(&info) }.named("vkAllocateDescriptorSets")?[0];
-        let infos: Vec<_> = bindings
-            .iter()
-            .map(|binding| {
-                [vk::DescriptorBufferInfo::default()
-                    .buffer(binding.buffer)
-                    .offset(binding.offset)
-                    .range(binding.size)]
-            })
-            .collect();
-        let views: Vec<_> = bindings.iter().map(|binding| [binding.view]).collect();
-        let writes: Vec<_> = (0..)
-            .zip(infos.iter().zip(&views))
-            .map(|(binding, (info, view))| {
-                let kind = pipeline.kind(binding);
-                let write = vk::WriteDescriptorSet::default()
-                    .dst_set(set)
-                    .dst_binding(binding)
-                    .descriptor_type(kind);
-                match kind {
-                    vk::DescriptorType::STORAGE_BUFFER => write.buffer_info(info),
-                    _ => write.texel_buffer_view(view),
-                }
-            })
-            .collect();
-        let commands = self.commands;
-        let compute = vk::PipelineBindPoint::COMPUTE;
-        let stage = vk::ShaderStageFlags::COMPUTE;
-        // SAFETY: recording is on (`begin`); set, pipeline and buffers belong to this
-        // device, and the caller keeps them until `wait`.
-        unsafe {
-            raw.update_descriptor_sets(&writes, &[]);
-            raw.cmd_bind_pipeline(commands, compute, pipeline.raw);
-            raw.cmd_bind_descriptor_sets(commands, compute, pipeline.layout, 0, &[set], &[]);
-            raw.cmd_push_constants(commands, pipeline.layout, stage, 0, constants);
-            raw.cmd_dispatch(commands, groups[0], groups[1], groups[2]);
-        }
+        let set = self.descriptors.set(pipeline, bindings)?;
+        self.commands().dispatch(pipeline, set, constants, groups);
         Ok(())
     }
 
     /// Records a copy of `size` bytes.
-    pub(crate) fn copy(&mut self, from: &Buffer, to: &Buffer, to_offset: u64, size: u64) {
-        let region = [vk::BufferCopy::default().dst_offset(to_offset).size(size)];
-        // SAFETY: as in `dispatch`; both ranges lie within their buffers.
+    pub(crate) fn copy(&mut self, from: &Buffer, to: &Buffer, size: u64) {
+        let region = [vk::BufferCopy::default().size(size)];
+        // SAFETY: recording is on, and both ranges lie within their buffers.
         unsafe {
             self.device
                 .raw
@@ -254,34 +183,12 @@ impl Submission {
 
     /// Records that some bytes, a multiple of 4, are written into a buffer.
     pub(crate) fn update(&mut self, to: vk::Buffer, offset: u64, bytes: &[u8]) {
-        // SAFETY: as in `copy`; the bytes are few, and copied into the commands.
-        unsafe {
-            self.device
-                .raw
-                .cmd_update_buffer(self.commands, to, offset, bytes);
-        }
+        self.commands().update(to, offset, bytes);
     }
 
     /// Records a barrier: what `from` wrote before it is visible to `to` after it.
     pub(crate) fn barrier(&mut self, from: Access, to: Access) {
-        let (source_stage, source_access) = from.scope(true);
-        let (destination_stage, destination_access) = to.scope(false);
-        let memory = [vk::MemoryBarrier::default()
-            .src_access_mask(source_access)
-            .dst_access_mask(destination_access)];
-        let none = vk::DependencyFlags::empty();
-        // SAFETY: recording is on.
-        unsafe {
-            self.device.raw.cmd_pipeline_barrier(
-                self.commands,
-                source_stage,
-                destination_stage,
-                none,
-                &memory,
-                &[],
-                &[],
-            );
-        }
+        self.commands().barrier(from, to);
     }
 
     /// Ends recording and hands the work to the queue.
@@ -393,7 +300,7 @@ pub(crate) enum Access {
 }
 
 impl Access {
-    fn scope(self, writes: bool) -> (vk::PipelineStageFlags, vk::AccessFlags) {
+    pub(crate) fn scope(self, writes: bool) -> (vk::PipelineStageFlags, vk::AccessFlags) {
         use vk::{AccessFlags as A, PipelineStageFlags as S};
         match (self, writes) {
             (Self::Kernel, true) => (S::COMPUTE_SHADER, A::SHADER_WRITE),
@@ -419,7 +326,6 @@ impl Drop for Submission {
             // SAFETY: created from this device, not in use; null is allowed.
             unsafe {
                 raw.destroy_query_pool(self.stamps, None);
-                raw.destroy_descriptor_pool(self.descriptors, None);
                 raw.destroy_fence(self.fence, None);
                 raw.destroy_command_pool(self.pool, None);
             }

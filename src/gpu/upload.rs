@@ -63,7 +63,7 @@ impl Upload {
                 && upload.used > 0
             {
                 let size = (upload.used as u64).next_multiple_of(4);
-                submission.copy(from, to, 0, size);
+                submission.copy(from, to, size);
                 any = true;
             }
         }

@@ -3,7 +3,7 @@
 use glam::{Affine3A, Quat, Vec3};
 use tumble::{
     Axes, CrowdError, CrowdLayer, CrowdLibrary, CrowdValues, Interpolation, Quantity, Skeleton,
-    TrackSet, VectorMethod, method,
+    TrackSet, VectorMethod, WrapMode, method,
 };
 
 use super::{bits, clip, cpu, evaluated, library};
@@ -96,31 +96,31 @@ fn crowds_refuse_what_is_not_there_and_stay_as_they_were() {
     crowd.set(1, 1, CrowdLayer::new(0)).unwrap();
     let before = bits(&evaluated(&mut crowd, CrowdValues::Skinning));
     let plays = CrowdLayer::new(0);
+    let at_speed = |speed| CrowdLayer { speed, ..plays };
+    let weighing = |weight| CrowdLayer { weight, ..plays };
+    let mask = Some(7);
+    let wrap = WrapMode::Extrapolate;
     let hostile = [
-        CrowdLayer::new(1),
-        CrowdLayer {
-            speed: f32::NAN,
-            ..plays
-        },
-        CrowdLayer {
-            speed: f32::INFINITY,
-            ..plays
-        },
-        CrowdLayer {
-            weight: f32::NAN,
-            ..plays
-        },
-        CrowdLayer {
-            weight: -1.0,
-            ..plays
-        },
-        CrowdLayer {
-            mask: Some(7),
-            ..plays
-        },
+        ("clip", CrowdLayer::new(1)),
+        ("speed", at_speed(f32::NAN)),
+        ("speed", at_speed(f32::INFINITY)),
+        ("speed", at_speed(-128.0)),
+        ("weight", weighing(f32::NAN)),
+        ("weight", weighing(-0.1)),
+        ("weight", weighing(1.1)),
+        ("mask", CrowdLayer { mask, ..plays }),
+        ("wrap", CrowdLayer { wrap, ..plays }),
     ];
-    for plays in hostile {
-        let reason = crowd.set(1, 1, plays).unwrap_err().to_string();
+    for (what, plays) in hostile {
+        let reason = crowd.set(1, 1, plays).unwrap_err();
+        let found = match reason {
+            CrowdError::Missing { what, .. } => what,
+            CrowdError::Speed { .. } => "speed",
+            CrowdError::Weight { .. } => "weight",
+            CrowdError::Wrap { .. } => "wrap",
+            _ => "something else",
+        };
+        assert_eq!(found, what, "{reason}");
         let good = CrowdLayer::new(0).at(5_555);
         let refused = crowd.set_all(&[(0, 0, good), (1, 1, plays), (9, 9, good)]);
         let refused = refused.unwrap_err().to_string();

@@ -1,7 +1,5 @@
 //! What a crowd's evaluation leaves, and how large it is.
 
-use crate::gpu::crowd::CrowdSteps;
-
 /// What is left of every joint of every instance, `[instance][joint]`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum CrowdValues {
@@ -50,17 +48,6 @@ impl CrowdOutput {
         match self.values {
             CrowdValues::Rotations => 1,
             _ => 3,
-        }
-    }
-
-    /// The kernels that run for it.
-    pub(crate) fn steps(self) -> CrowdSteps {
-        use CrowdValues::{Model, Rotations, Skinning};
-        CrowdSteps {
-            matrices: self.values != Rotations,
-            walk: matches!(self.values, Model | Skinning),
-            skin: self.values == Skinning,
-            half: self.is_half,
         }
     }
 
