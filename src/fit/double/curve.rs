@@ -106,12 +106,3 @@ impl Curve {
         (self.shape.moving)(&self.numbers, parameter)
     }
 }
-
-impl std::fmt::Debug for Curve {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Curve")
-            .field("numbers", &&self.numbers[..self.shape.own])
-            .field("piece", &self.piece)
-            .finish_non_exhaustive()
-    }
-}
