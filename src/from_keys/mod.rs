@@ -49,7 +49,7 @@ impl KeyCurve {
                 interpolation.is_steady_alone().then_some(Self::TwoKeys)
             }
             Form::Polynomial => {
-                let weights = interpolation.small_angle_weights()?;
+                let weights = interpolation.plain()?.direct?.weights;
                 turns_little(set).then_some(Self::Cubics(weights))
             }
         }

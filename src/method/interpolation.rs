@@ -1,7 +1,6 @@
 //! A method with its options.
 
 use crate::curve::options::{Ends, Path, Quantity, Speed};
-use crate::fit::tangent_weights::WeightRule;
 use crate::method::{Curves, Method, Smooth};
 use crate::reference::curve::Curve;
 use crate::shader::Form;
@@ -69,7 +68,7 @@ impl Interpolation {
     }
 
     /// The smooth curves as keyed on the shortest path, if these are what is asked for.
-    fn plain(&self) -> Option<Smooth> {
+    pub(crate) fn plain(&self) -> Option<Smooth> {
         let is_plain = self.path == Path::Shortest
             && self.quantity == Quantity::Rotation
             && self.speed == Speed::AsKeyed;
@@ -82,12 +81,6 @@ impl Interpolation {
     /// Whether tracks of two keys turn about one axis at constant speed.
     pub(crate) fn is_steady_alone(&self) -> bool {
         self.plain().is_some_and(|smooth| smooth.steady_alone)
-    }
-
-    /// The rule for the tangent weights of small-angle curves straight from keys, if method and
-    /// options allow such curves.
-    pub(crate) fn small_angle_weights(&self) -> Option<WeightRule> {
-        Some(self.plain()?.direct?.weights)
     }
 
     /// Whether arcs are prepared by their formula, as other curves are: velocities, accelerations,

@@ -20,8 +20,8 @@ pub(crate) struct Fitting {
 }
 
 /// Curves of one tier that wait to fill a block.
+#[derive(Default)]
 struct Queue {
-    tier: Tier,
     /// Made for the first curve: making a block takes longer than fitting a few curves.
     block: Option<Box<FitBlock>>,
     /// The lanes of curves that are not copied into the block yet.
@@ -30,24 +30,13 @@ struct Queue {
     places: Vec<Place>,
 }
 
-impl Queue {
-    fn new(tier: Tier) -> Self {
-        Self {
-            tier,
-            block: None,
-            lanes: Vec::new(),
-            places: Vec::new(),
-        }
-    }
-}
-
 impl Fitting {
     pub(crate) fn new(shape: &'static Shape, quantity: Quantity) -> Self {
         Self {
             shape,
             quantity,
-            small_angle: Queue::new(Tier::SmallAngle),
-            full: Queue::new(Tier::Full),
+            small_angle: Queue::default(),
+            full: Queue::default(),
             cutter: Cutter::new(shape, quantity),
         }
     }
@@ -70,10 +59,11 @@ impl Fitting {
 
     /// Copies the curves that were taken into blocks, and fits the blocks that are full.
     pub(crate) fn bring(&mut self, prepared: &mut Prepared, curves: &Intervals) {
-        for queue in [&mut self.small_angle, &mut self.full] {
+        let (small_angle, full) = (&mut self.small_angle, &mut self.full);
+        for (tier, queue) in [(Tier::SmallAngle, small_angle), (Tier::Full, full)] {
             let mut lanes = &queue.lanes[..];
             while !lanes.is_empty() {
-                let new = || Box::new(FitBlock::new(self.shape, self.quantity, queue.tier));
+                let new = || Box::new(FitBlock::new(self.shape, self.quantity, tier));
                 let block = queue.block.get_or_insert_with(new);
                 let (own, others) = lanes.split_at(block.room().min(lanes.len()));
                 block.push_from(curves, own);

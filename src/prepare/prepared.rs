@@ -14,7 +14,6 @@ use crate::time::wrap::{TrackCopy, Wrap};
 use crate::tracks::check::LATEST;
 
 /// Segments of some tracks, with what is needed to find the segment of a sample.
-#[derive(Debug, Clone)]
 pub(crate) struct Prepared {
     pub(crate) segments: Segments,
     /// Rotations that are stored as they are: keys and end values.
