@@ -120,9 +120,10 @@ impl<'a> KeyEvaluator<'a> {
                 }
             }
             Block::Cubics(block, weights) => {
-                let keys = CubicKeys::new(keys, weights);
+                let weights = weights.of(keys.times, keys.first_key, keys.all);
+                let keys = SignedKeys::new(keys);
                 for &sample in samples {
-                    block.push(keys, sample, output);
+                    block.push(keys, weights, sample, output);
                 }
             }
         }
@@ -144,9 +145,10 @@ impl<'a> KeyEvaluator<'a> {
                 }
             }
             Block::Cubics(block, weights) => {
-                let keys = CubicKeys::new(keys, weights);
+                let weights = weights.of(keys.times, keys.first_key, keys.all);
+                let keys = SignedKeys::new(keys);
                 for &time in times {
-                    block.push(keys, next(time), output);
+                    block.push(keys, weights, next(time), output);
                 }
             }
         }
@@ -197,22 +199,6 @@ impl<'a> SignedKeys<'a> {
     }
 }
 
-/// The keys of a track, and their tangent weights.
-#[derive(Clone, Copy)]
-struct CubicKeys<'a> {
-    keys: SignedKeys<'a>,
-    weights: &'a [TangentWeights],
-}
-
-impl<'a> CubicKeys<'a> {
-    fn new<'t: 'a>(keys: TrackKeys<'t>, weights: &'a mut TrackWeights<'t>) -> Self {
-        Self {
-            keys: SignedKeys::new(keys),
-            weights: weights.of(keys.times, keys.first_key, keys.all),
-        }
-    }
-}
-
 /// The rotations that are still to be written.
 type Output<'a> = std::slice::IterMut<'a, [f32; 4]>;
 
@@ -248,11 +234,16 @@ impl TwoKeyBlock {
 }
 
 impl CubicBlock {
-    /// As [`TwoKeyBlock::push`].
+    /// As [`TwoKeyBlock::push`], with the tangent weights of the keys.
     #[inline(always)]
-    fn push(&mut self, from: CubicKeys<'_>, sample: KeySample, output: &mut Output<'_>) {
+    fn push(
+        &mut self,
+        keys: SignedKeys<'_>,
+        weights: &[TangentWeights],
+        sample: KeySample,
+        output: &mut Output<'_>,
+    ) {
         let lane = self.count;
-        let CubicKeys { keys, weights } = from;
         let key = (sample.key & !IS_KEY) as usize;
         if sample.key & IS_KEY == 0 {
             let (first, last) = (weights[key], weights[key + 1]);
