@@ -117,12 +117,9 @@ fn expressions(
     let mut replies = vec![Reply::zeroed(); probes.len()];
     let pipeline = Pipeline::new(device, Kernel::SelfTest, exactness)?;
     let dispatch = Dispatch {
-        first_item: 0,
         item_count: probes.len() as u32,
         stride: 1,
-        detail: 0,
-        first_output: 0,
-        idle: 0,
+        ..Dispatch::zeroed()
     };
     pipeline.run_once(
         &[bytemuck::cast_slice(&probes)],
@@ -143,20 +140,16 @@ fn expressions(
         ("arc tangent", |reply| reply.arc_tangent),
     ];
     let expected: Vec<Reply> = probes.iter().map(|&probe| reply(probe)).collect();
-    let count = |value: Value| {
+    let reports = self_tests.map(|(name, value)| {
         let pairs = expected.iter().zip(&replies);
-        pairs
-            .filter(|(a, b)| value(a).to_bits() != value(b).to_bits())
-            .count()
-    };
-    Ok(self_tests
-        .into_iter()
-        .map(|(name, value)| SelfTestReport {
+        let differing = pairs.filter(|(a, b)| value(a).to_bits() != value(b).to_bits());
+        SelfTestReport {
             name,
             total: probes.len(),
-            differing: count(value),
-        })
-        .collect())
+            differing: differing.count(),
+        }
+    });
+    Ok(reports.into())
 }
 
 /// Values of ordinary size in no order, and sums that lie half way between floats.
