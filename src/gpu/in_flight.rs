@@ -214,7 +214,7 @@ impl InFlight {
         maps_samples: bool,
     ) -> Result<Work, EvaluateError> {
         if let Some(list) = SampleList::new(clip, timeline, window) {
-            let bytes = list.count() * size_of::<ListedSample>();
+            let bytes = window.len() * size_of::<ListedSample>();
             let place = self.items.room(device, bytes)?;
             return Ok(list.write(bytemuck::cast_slice_mut(place), shift)?);
         }

@@ -48,35 +48,21 @@ impl<'a> SampleList<'a> {
         if !are_rows || clip.interpolation.wrap().repeats() {
             return None;
         }
-        let (mut spans, mut parts, mut groups) = (0, 0, Vec::new());
-        for (group, prepared) in clip.groups.iter().enumerate() {
-            let own = parts_in(prepared, window);
-            if own.is_empty() {
-                continue;
-            }
-            // An estimate: spans need not lie in the order of the parts, which have about equally
-            // many.
-            spans += prepared.spans.starts.len() * own.len() / prepared.parts.len();
-            parts += own.len();
-            groups.push((group, prepared, own));
-        }
-        let is_dense = timeline.len().saturating_mul(window.tracks.len()) <= spans;
-        let are_told = match timeline.ticks {
-            Ticks::Frames { .. } => is_dense,
-            // Explicit times may alternate between the parts of a track: each must have only one.
-            Ticks::Times { .. } => parts == window.tracks.len() && (is_dense || samples <= FEW),
-        };
-        if !are_told {
-            return None;
-        }
         let mut all = Self {
             timeline,
             window,
-            groups: Vec::with_capacity(groups.len()),
+            groups: Vec::new(),
         };
+        let (mut spans, mut part_count) = (0, 0);
         let mut before: Option<&Part> = None;
-        for (group, prepared, parts) in groups {
-            let first = all.start(prepared, &parts[0], before);
+        for (group, prepared) in clip.groups.iter().enumerate() {
+            let parts = parts_in(prepared, window);
+            let [part, ..] = parts else { continue };
+            // An estimate: spans need not lie in the order of the parts, which have about equally
+            // many.
+            spans += prepared.spans.starts.len() * parts.len() / prepared.parts.len();
+            part_count += parts.len();
+            let first = all.start(prepared, part, before);
             before = parts.last();
             all.groups.push(GroupParts {
                 group,
@@ -85,13 +71,17 @@ impl<'a> SampleList<'a> {
                 first,
             });
         }
+        let is_dense = timeline.len().saturating_mul(window.tracks.len()) <= spans;
+        let are_listed = match timeline.ticks {
+            Ticks::Frames { .. } => is_dense,
+            // Explicit times may alternate between the parts of a track: each must have only one.
+            Ticks::Times { .. } => {
+                part_count == window.tracks.len() && (is_dense || samples <= FEW)
+            }
+        };
         let starts = all.groups.iter().map(|group| group.first);
-        (starts.clone().next() == Some(0) && starts.is_sorted()).then_some(all)
-    }
-
-    /// How many samples are listed.
-    pub(crate) fn count(&self) -> usize {
-        self.window.len()
+        let are_in_order = starts.clone().next() == Some(0) && starts.is_sorted();
+        (are_listed && are_in_order).then_some(all)
     }
 
     /// Where the samples of a part begin in the window; `before` is the part listed before it.
@@ -130,22 +120,18 @@ impl<'a> SampleList<'a> {
             });
             let each = parts_per_chunk(self.window);
             let mut first = own.first;
-            for from in (0..own.parts.len()).step_by(each) {
-                let (parts, others) = own.parts[from..].split_at(each.min(own.parts.len() - from));
-                let next = match others.first() {
-                    Some(next) => self.start(own.prepared, next, parts.last()).max(first),
-                    None => end,
-                };
-                let next = next.min(end);
-                let (own_list, other_list) = list.split_at_mut(next - first);
-                list = other_list;
+            for (parts, next) in own.parts.chunks(each).zip((each..).step_by(each)) {
+                let next = own.parts.get(next);
+                let next = next.map_or(end, |next| self.start(own.prepared, next, parts.last()));
+                let next = next.max(first).min(end);
                 chunks.push(SampleChunk {
                     all: self,
                     prepared: own.prepared,
                     parts,
                     first,
-                    list: own_list,
-                    told: 0,
+                    list: list.split_off_mut(..next - first).unwrap_or_default(),
+                    track: 0,
+                    listed: 0,
                     patches: Vec::new(),
                     result: Ok(()),
                 });
@@ -179,8 +165,10 @@ struct SampleChunk<'a> {
     /// The place of its first sample in the window.
     first: usize,
     list: &'a mut [ListedSample],
-    /// How many of them are written.
-    told: usize,
+    /// The track whose runs are met.
+    track: usize,
+    /// How many of the samples are listed.
+    listed: usize,
     patches: Vec<Patch>,
     result: Result<(), FramesError>,
 }
@@ -191,25 +179,22 @@ impl InLanes for SampleChunk<'_> {
         let SampleList {
             timeline, window, ..
         } = *self.all;
-        let (prepared, samples) = (self.prepared, window.samples.clone());
         if let Ticks::Times { times, stride } = &timeline.ticks
-            && samples.len() <= FEW
+            && window.samples.len() <= FEW
         {
-            return self.tell_few(times, *stride);
+            return self.list_sparse_times(times, *stride);
         }
-        for part in self.parts {
-            let copy = TrackCopy::own(samples.clone());
-            let mut list = PartSamples {
-                chunk: self,
-                track: part.track as usize,
-            };
-            let told = prepared.spans.runs(part, timeline, &copy, &mut list);
-            if told.is_err() {
-                self.result = told;
+        let (prepared, parts) = (self.prepared, self.parts);
+        let copy = TrackCopy::own(window.samples.clone());
+        for part in parts {
+            self.track = part.track as usize;
+            let listed = prepared.spans.runs(part, timeline, &copy, self);
+            if listed.is_err() {
+                self.result = listed;
                 return;
             }
         }
-        self.list[self.told..].fill(NOTHING);
+        self.list[self.listed..].fill(NOTHING);
     }
 }
 
@@ -224,30 +209,18 @@ const fn held(constant: u32) -> ListedSample {
     }
 }
 
-/// The samples of one part.
-struct PartSamples<'p, 'a> {
-    chunk: &'p mut SampleChunk<'a>,
-    track: usize,
-}
-
-impl Emit for PartSamples<'_, '_> {
-    #[inline(always)]
-    fn run(&mut self, run: Run) {
-        self.chunk.tell(self.track, run);
-    }
-}
-
-impl SampleChunk<'_> {
+impl Emit for SampleChunk<'_> {
     /// Lists the samples of a run that belong to this chunk and are not listed yet.
     #[inline(always)]
-    fn tell(&mut self, track: usize, run: Run) {
+    fn run(&mut self, run: Run) {
         let SampleList {
             timeline, window, ..
         } = *self.all;
+        let track = self.track;
         let place = window.place(track, run.sample);
         // A sample within rounding of the boundary between two parts may come from both: the first
         // one counts.
-        let skipped = (self.first + self.told).saturating_sub(place);
+        let skipped = (self.first + self.listed).saturating_sub(place);
         let from = (place + skipped - self.first).min(self.list.len());
         let to = (place + run.count)
             .saturating_sub(self.first)
@@ -255,10 +228,10 @@ impl SampleChunk<'_> {
         if from >= to {
             return;
         }
-        if self.told < from {
-            self.list[self.told..from].fill(NOTHING);
+        if self.listed < from {
+            self.list[self.listed..from].fill(NOTHING);
         }
-        self.told = to;
+        self.listed = to;
         let own = &mut self.list[from..to];
         let first_sample = run.sample + skipped;
         match run.source {
@@ -281,11 +254,13 @@ impl SampleChunk<'_> {
             }
         }
     }
+}
 
+impl SampleChunk<'_> {
     /// Lists sparse times, a block at a time: first each sample is looked up, then the parameters
     /// of all are computed in lanes.
     #[inline(always)]
-    fn tell_few(&mut self, times: &[f64], stride: usize) {
+    fn list_sparse_times(&mut self, times: &[f64], stride: usize) {
         let samples = self.all.window.samples.clone();
         let mut found = TimeLanes::new();
         for parts in self.parts.chunks(TimeLanes::LEN / samples.len().max(1)) {
@@ -298,12 +273,12 @@ impl SampleChunk<'_> {
                 }
             }
             let parameters = found.parameters();
-            let own = &mut self.list[self.told..][..found.count];
+            let own = &mut self.list[self.listed..][..found.count];
             for (lane, single) in own.iter_mut().enumerate() {
                 let (source, parameter) = (found.sources[lane], parameters[lane]);
                 *single = ListedSample { source, parameter };
             }
-            self.told += found.count;
+            self.listed += found.count;
         }
     }
 
@@ -321,17 +296,14 @@ impl SampleChunk<'_> {
                 Source::Exact(_) => {}
             }
         }
-        (
-            self.tell_outside(part, times, sample) | IS_CONSTANT,
-            0.0,
-            1.0,
-        )
+        let constant = self.constant_outside(part, times, sample);
+        (constant | IS_CONSTANT, 0.0, 1.0)
     }
 
     /// The constant of a sample outside the keys, or 0 for one that the host computes in f64. A
     /// function of its own, so that the usual path stays small.
     #[inline(never)]
-    fn tell_outside(&mut self, part: &Part, times: &[f64], sample: usize) -> u32 {
+    fn constant_outside(&mut self, part: &Part, times: &[f64], sample: usize) -> u32 {
         let (all, track) = (self.all, part.track as usize);
         let mut found = Vec::new();
         (self.prepared.spans).runs_of_times(part, times, sample..sample + 1, &mut found);

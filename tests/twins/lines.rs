@@ -325,7 +325,7 @@ fn of_clip(set: &TrackSet, frames: &Frames, method: Method, layout: Layout, cut:
                 source: 0,
                 parameter: 0.0
             };
-            list.count()
+            window.len()
         ];
         list.write(&mut samples, 0).unwrap();
         globals.push(("samples", cells(bytemuck::cast_slice(&samples))));
