@@ -91,7 +91,7 @@ impl Backend {
         let key_bytes = segment_size(request.interpolation.form()) + size_of::<Quat>();
         let result = set.track_count() * timeline.len() * size_of::<Quat>();
         let is_dense = (set.key_count() * key_bytes) / 4 > result;
-        let budget = opened.engine().clip_bytes().unwrap_or(usize::MAX);
+        let budget = opened.engine().clip_bytes.unwrap_or(usize::MAX);
         let limit = match is_dense {
             true => budget.min(DENSE_BYTES),
             false => budget,

@@ -145,7 +145,7 @@ impl Backend {
     pub(crate) fn group_bytes(&self) -> Option<usize> {
         match self {
             Self::Cpu(_) => None,
-            Self::Vulkan(opened) => Some(opened.engine().group_bytes()),
+            Self::Vulkan(opened) => Some(opened.engine().group_bytes),
         }
     }
 }

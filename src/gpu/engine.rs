@@ -54,11 +54,11 @@ pub(crate) struct VulkanEngine {
     /// Whether the caller's memory is imported where the device can.
     pub(crate) lends: bool,
     /// Rotations of one window.
-    window: AtomicUsize,
+    pub(crate) window: AtomicUsize,
     /// Bytes that the segments of one buffer may take.
-    group_bytes: u64,
-    /// Bytes that the segments of one clip may take; `None` without a memory budget.
-    clip_bytes: Option<u64>,
+    pub(crate) group_bytes: usize,
+    /// Bytes that the segments of one clip may take on the device; `None` without a memory budget.
+    pub(crate) clip_bytes: Option<usize>,
     free: FreeBuffers,
     pub(crate) timings: Mutex<Timings>,
 }
@@ -133,14 +133,14 @@ impl VulkanEngine {
             .min(info.max_memory_allocation_size);
         // A window may need as many items as it has rotations.
         let mut window = WINDOW.min(largest / size_of::<Item>() as u64 / 2);
-        let mut group_bytes = largest;
-        if let Some(budget) = options.memory {
+        let half = options.memory.map(|budget| budget / 2);
+        if let Some(half) = half {
             let each = (size_of::<Item>() + 2 * Encoding::F32.bytes()) as u64;
-            window = window.min(budget / 2 / in_flight_count as u64 / each);
-            group_bytes = group_bytes.min(budget / 2);
+            window = window.min(half / in_flight_count as u64 / each);
         }
         // Windows start at aligned offsets where their length allows.
         let window = (window / 64 * 64).max(64) as usize;
+        let bytes = |bytes| usize::try_from(bytes).unwrap_or(usize::MAX);
         Ok(Self {
             pipelines: Mutex::new([const { None }; KERNELS.len()]),
             in_flight: Mutex::default(),
@@ -150,8 +150,8 @@ impl VulkanEngine {
             maps_samples: device.physical.maps_samples(options.mapping),
             lends: options.transfer == Transfer::Automatic,
             window: AtomicUsize::new(window),
-            group_bytes,
-            clip_bytes: options.memory.map(|budget| budget / 2),
+            group_bytes: bytes(half.map_or(largest, |half| half.min(largest))),
+            clip_bytes: half.map(bytes),
             free: Arc::default(),
             timings: Mutex::default(),
             device,
@@ -169,17 +169,6 @@ impl VulkanEngine {
         Ok(Arc::clone(kept.insert(Arc::new(pipeline))))
     }
 
-    /// Bytes of segments that go into one buffer.
-    pub(crate) fn group_bytes(&self) -> usize {
-        usize::try_from(self.group_bytes).unwrap_or(usize::MAX)
-    }
-
-    /// Bytes of segments that one clip may hold on the device.
-    pub(crate) fn clip_bytes(&self) -> Option<usize> {
-        self.clip_bytes
-            .map(|bytes| usize::try_from(bytes).unwrap_or(usize::MAX))
-    }
-
     /// Copies a clip's segments to the device. The buffers of `spare`, which are no longer needed,
     /// are used again where they are large enough.
     pub(crate) fn upload(
@@ -192,19 +181,14 @@ impl VulkanEngine {
         let spare = spare.into_iter().flat_map(|buffers| buffers.groups);
         let (mut segments_of, mut constants_of): (Vec<Buffer>, Vec<Buffer>) =
             spare.map(|group| (group.segments, group.constants)).unzip();
-        let limit = self.device.physical.info.max_storage_buffer_range;
         let groups = clip
             .groups
             .iter()
             .map(|group| {
                 let segments = group.segments.as_bytes();
                 let constants = bytemuck::cast_slice(&group.constants);
-                for (what, bytes) in [("segments", segments), ("keys", constants)] {
-                    let bytes = bytes.len() as u64;
-                    if bytes > limit {
-                        return Err(VulkanError::TooLarge { what, bytes, limit });
-                    }
-                }
+                self.check_size("segments", segments)?;
+                self.check_size("keys", constants)?;
                 Ok(GroupBuffers {
                     segments: self.resident("tumble segments", segments, &mut segments_of)?,
                     constants: self.resident("tumble constants", constants, &mut constants_of)?,
@@ -217,19 +201,18 @@ impl VulkanEngine {
         })
     }
 
+    /// Refuses what is longer than a kernel can bind.
+    pub(crate) fn check_size(&self, what: &'static str, bytes: &[u8]) -> Result<(), VulkanError> {
+        let limit = self.device.physical.info.max_storage_buffer_range;
+        match bytes.len() as u64 {
+            bytes if bytes > limit => Err(VulkanError::TooLarge { what, bytes, limit }),
+            _ => Ok(()),
+        }
+    }
+
     /// Whether buffers belong to this device; those from before it was opened again do not.
     pub(crate) fn holds(&self, buffers: &ClipBuffers) -> bool {
         Arc::ptr_eq(&self.device, &buffers.device)
-    }
-
-    /// The same device opened again; `None` for an application's own, which only it can open.
-    pub(crate) fn reopened(&self, options: &EngineOptions) -> Result<Option<Self>, VulkanError> {
-        if !self.device.is_owned() {
-            return Ok(None);
-        }
-        let engine = Self::new(self.device.physical.clone(), options)?;
-        engine.window.store(self.window(), Ordering::Relaxed);
-        Ok(Some(engine))
     }
 
     /// Rotations of one window.

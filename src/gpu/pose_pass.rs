@@ -19,13 +19,8 @@ impl VulkanEngine {
         pass: PoseDispatch,
         output: &mut [u8],
     ) -> Result<(), VulkanError> {
-        let limit = self.device.physical.info.max_storage_buffer_range;
-        let lengths = inputs.iter().map(|input| input.len());
-        for bytes in lengths.chain([output.len()]).map(|bytes| bytes as u64) {
-            if bytes > limit {
-                let what = "poses";
-                return Err(VulkanError::TooLarge { what, bytes, limit });
-            }
+        for bytes in inputs.iter().copied().chain([&*output]) {
+            self.check_size("poses", bytes)?;
         }
         let (pipeline, groups) = (self.pipeline(kernel)?, self.workgroups(pass.count));
         pipeline.run_once(inputs, bytemuck::bytes_of(&pass), groups, output)

@@ -1,9 +1,10 @@
 //! An opened device, and recovery from its errors: a lost device is opened again, and work that
 //! runs out of memory is repeated in smaller windows.
 
-use std::sync::{Arc, PoisonError, RwLock};
+use std::sync::atomic::Ordering;
+use std::sync::{Arc, Mutex};
 
-use crate::gpu::engine::{ClipBuffers, VulkanEngine};
+use crate::gpu::engine::{ClipBuffers, VulkanEngine, lock};
 use crate::gpu::error::{EvaluateError, VulkanError};
 use crate::gpu::options::EngineOptions;
 use crate::gpu::physical::{DeviceInfo, PhysicalDevice};
@@ -16,7 +17,7 @@ const REOPENINGS: usize = 3;
 /// An open Vulkan device, and what is known of it.
 pub(crate) struct Opened {
     /// Replaced when the device is lost.
-    current: RwLock<Arc<VulkanEngine>>,
+    current: Mutex<Arc<VulkanEngine>>,
     options: EngineOptions,
     pub(crate) self_tests: Vec<SelfTestReport>,
     pub(crate) info: DeviceInfo,
@@ -49,15 +50,14 @@ impl Opened {
         physical: &PhysicalDevice,
         options: &EngineOptions,
     ) -> Result<Self, VulkanError> {
-        let mut losses = 0;
-        loop {
-            let opened = VulkanEngine::new(physical.clone(), options)
-                .and_then(|engine| Self::trusted(engine, options));
-            match opened {
-                Err(error) if error.is_lost() && losses < REOPENINGS => losses += 1,
+        let open = || Self::trusted(VulkanEngine::new(physical.clone(), options)?, options);
+        for _ in 0..REOPENINGS {
+            match open() {
+                Err(error) if error.is_lost() => {}
                 opened => return opened,
             }
         }
+        open()
     }
 
     /// As [`Opened::new`], for a device that is open already.
@@ -68,13 +68,13 @@ impl Opened {
         Ok(Self {
             self_tests: trust(&engine, options)?,
             info: engine.device.physical.info.clone(),
-            current: RwLock::new(Arc::new(engine)),
+            current: Mutex::new(Arc::new(engine)),
             options: options.clone(),
         })
     }
 
     pub(crate) fn engine(&self) -> Arc<VulkanEngine> {
-        Arc::clone(&self.current.read().unwrap_or_else(PoisonError::into_inner))
+        Arc::clone(&lock(&self.current))
     }
 
     /// Runs `work`. When the device is lost, opens it again and repeats the work, at most three
@@ -142,13 +142,15 @@ impl Opened {
     /// Opens a lost device again and replaces it; false for an application's own, which only the
     /// application can open.
     fn reopen(&self, lost: &Arc<VulkanEngine>) -> Result<bool, VulkanError> {
-        let mut current = (self.current.write()).unwrap_or_else(PoisonError::into_inner);
+        let mut current = lock(&self.current);
         if !Arc::ptr_eq(&current, lost) {
             return Ok(true); // another thread was faster
         }
-        let Some(engine) = lost.reopened(&self.options)? else {
+        if !lost.device.is_owned() {
             return Ok(false);
-        };
+        }
+        let engine = VulkanEngine::new(lost.device.physical.clone(), &self.options)?;
+        engine.window.store(lost.window(), Ordering::Relaxed);
         trust(&engine, &self.options)?;
         *current = Arc::new(engine);
         Ok(true)

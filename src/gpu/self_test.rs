@@ -46,7 +46,7 @@ pub(crate) fn run(engine: &VulkanEngine) -> Result<Vec<SelfTestReport>, VulkanEr
     ] {
         let set = hostile_set();
         let wanted = Wanted {
-            group_bytes: Some(engine.group_bytes()),
+            group_bytes: Some(engine.group_bytes),
             ..Wanted::all(&set)
         };
         let clip = ClipData::new(&set, method.into(), wanted).expect("the set suits every method");
