@@ -9,7 +9,7 @@ use crate::evaluate::backend::Backend;
 use crate::gpu::engine::{Job, VulkanEngine};
 use crate::gpu::error::VulkanError;
 use crate::gpu::handles::{VulkanBuffer, VulkanHandles};
-use crate::gpu::in_flight::External;
+use crate::gpu::in_flight::Target;
 use crate::gpu::options::EngineOptions;
 use crate::gpu::recovery::Opened;
 use crate::output::encoding::Encoding;
@@ -73,14 +73,10 @@ impl Clip {
                 needed,
             }));
         }
-        let external = External {
-            raw: buffer.buffer,
-            offset: buffer.offset,
-        };
         let done = opened.attempt_smaller(|engine| {
             let buffers = self.uploaded.buffers_on(engine)?;
             let job = Job::new(&self.uploaded.data, &buffers, &timeline, encoding);
-            engine.evaluate_to(job, layout, external)
+            engine.run(job, &job.whole(layout), Target::External(buffer))
         });
         Ok(done?)
     }

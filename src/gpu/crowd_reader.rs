@@ -4,16 +4,13 @@ use std::sync::Arc;
 
 use crate::gpu::crowd::{CrowdSteps, DeviceCrowd};
 use crate::gpu::crowd_target::CrowdTarget;
-use crate::gpu::device::Lane;
 use crate::gpu::error::VulkanError;
 use crate::gpu::read_back::ReadBack;
-use crate::gpu::submission::Submission;
 use crate::shader::CrowdEntry;
 
 /// A target whose result the host reads.
 pub(crate) struct CrowdReader {
-    // These two go first: they wait for what uses the rest.
-    submission: Submission,
+    // It goes first: it waits for what uses the rest.
     results: ReadBack,
     target: CrowdTarget,
     crowd: Arc<DeviceCrowd>,
@@ -24,10 +21,9 @@ impl CrowdReader {
     pub(crate) fn new(crowd: &Arc<DeviceCrowd>, steps: CrowdSteps) -> Result<Self, VulkanError> {
         let engine = &crowd.engine;
         let bytes = CrowdTarget::bytes(crowd, steps);
-        let mut results = ReadBack::default();
+        let mut results = ReadBack::new(&engine.device)?;
         let output = results.room(&engine.device, bytes, !engine.in_place)?.raw;
         Ok(Self {
-            submission: Submission::new(&engine.device, Lane::Kernels)?,
             results,
             target: CrowdTarget::new(crowd, steps, output, 0)?,
             crowd: Arc::clone(crowd),
@@ -41,20 +37,20 @@ impl CrowdReader {
         clock: u64,
         changes: impl Iterator<Item = (usize, &'e [CrowdEntry])>,
     ) -> Result<(), VulkanError> {
-        self.submission.begin(0)?;
-        let commands = self.submission.commands();
+        self.results.kernels.begin(0)?;
+        let commands = self.results.kernels.commands();
         // SAFETY: the command buffer is this submission's, in recording, and submitted below.
         unsafe { self.crowd.record(&self.target, commands, clock, changes) };
-        self.results.submit(&mut self.submission, self.bytes)
+        self.results.submit(Some(self.bytes))
     }
 
     pub(crate) fn is_done(&self) -> Result<bool, VulkanError> {
-        self.results.is_done(&self.submission)
+        self.results.is_done()
     }
 
     /// Waits, and copies the result, of which `output` has as many bytes.
     pub(crate) fn wait_into(&mut self, output: &mut [u8]) -> Result<(), VulkanError> {
-        self.results.wait(&mut self.submission)?;
+        self.results.wait()?;
         output.copy_from_slice(self.results.bytes(0..output.len()));
         Ok(())
     }

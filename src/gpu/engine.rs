@@ -6,9 +6,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use crate::gpu::buffer::{Buffer, Residence};
 use crate::gpu::device::{Lane, LogicalDevice};
 use crate::gpu::error::{EvaluateError, VulkanError};
-use crate::gpu::from_keys::KeysInFlight;
-use crate::gpu::imported_memory::ImportedMemory;
-use crate::gpu::in_flight::{External, InFlight, Target, copy};
+use crate::gpu::from_keys::KeyUploads;
+use crate::gpu::in_flight::{InFlight, Target, copy};
 use crate::gpu::mapped::{FreeBuffers, MappedQuats};
 use crate::gpu::memory_types::KernelReads;
 use crate::gpu::options::{EngineOptions, Timings, Transfer};
@@ -16,6 +15,7 @@ use crate::gpu::physical::PhysicalDevice;
 use crate::gpu::pipeline::{Exactness, Pipeline};
 use crate::gpu::submission::{Access, Submission};
 use crate::gpu::upload::writable;
+use crate::gpu::work_list::WorkLists;
 use crate::output::buffer::OutputBuffer;
 use crate::output::encoding::Encoding;
 use crate::output::rotations::{Layout, Storage};
@@ -42,8 +42,8 @@ pub(crate) struct VulkanEngine {
     pub(crate) device: Arc<LogicalDevice>,
     /// Made when they are first needed.
     pipelines: Mutex<[Option<Arc<Pipeline>>; KERNELS.len()]>,
-    pub(crate) in_flight: Mutex<Vec<InFlight>>,
-    pub(crate) keys_in_flight: Mutex<Vec<KeysInFlight>>,
+    pub(crate) in_flight: Mutex<Vec<InFlight<WorkLists>>>,
+    pub(crate) keys_in_flight: Mutex<Vec<InFlight<KeyUploads>>>,
     /// Windows in flight at once.
     pub(crate) in_flight_count: usize,
     /// Whether kernels write into memory that the host reads; else results are copied out of the
@@ -52,7 +52,7 @@ pub(crate) struct VulkanEngine {
     /// Whether neighbouring invocations take neighbouring samples; else each takes a run of them.
     pub(crate) maps_samples: bool,
     /// Whether the caller's memory is imported where the device can.
-    pub(crate) lends: bool,
+    pub(crate) imports: bool,
     /// Rotations of one window.
     pub(crate) window: AtomicUsize,
     /// Bytes that the segments of one buffer may take.
@@ -104,7 +104,7 @@ impl<'a> Job<'a> {
     }
 
     /// All of the result.
-    fn whole(&self, layout: Layout) -> Window {
+    pub(crate) fn whole(&self, layout: Layout) -> Window {
         Window::whole(self.clip.track_count(), self.timeline.len(), layout)
     }
 }
@@ -148,7 +148,7 @@ impl VulkanEngine {
             in_flight_count,
             in_place: device.placing.in_place,
             maps_samples: device.physical.maps_samples(options.mapping),
-            lends: options.transfer == Transfer::Automatic,
+            imports: options.transfer == Transfer::Automatic,
             window: AtomicUsize::new(window),
             group_bytes: bytes(half.map_or(largest, |half| half.min(largest))),
             clip_bytes: half.map(bytes),
@@ -307,25 +307,9 @@ impl VulkanEngine {
         window: &Window,
         output: &mut [u8],
     ) -> Result<(), EvaluateError> {
-        let target = match self.lends {
-            true => ImportedMemory::to_write(&self.device, output, job.encoding.bytes()),
-            false => Err(output),
-        };
-        self.run(
-            job,
-            window,
-            target.map_or_else(Target::Slice, Target::ImportedMemory),
-        )
-    }
-
-    /// Evaluates into a buffer of the caller's device, where it stays.
-    pub(crate) fn evaluate_to(
-        &self,
-        job: Job<'_>,
-        layout: Layout,
-        buffer: External,
-    ) -> Result<(), EvaluateError> {
-        self.run(job, &job.whole(layout), Target::External(buffer))
+        let each = job.encoding.bytes();
+        let target = Target::of(&self.device, self.imports, output, each);
+        self.run(job, window, target)
     }
 
     /// A buffer that was given back, when one fits closely, else a new one.

@@ -1,6 +1,8 @@
 //! The grid of a window, for devices on which neighbouring invocations take neighbouring samples:
 //! blocks of samples say which item each of them belongs to, so that nothing is searched.
 
+use std::ops::Range;
+
 use crate::gpu::work_list::GroupWork;
 use crate::output::window::Window;
 use crate::shader::{
@@ -31,7 +33,7 @@ impl GridRows {
     }
 
     /// The row and the position in it of a place in the output.
-    fn cell(self, place: u32) -> (u32, u32) {
+    pub(crate) fn cell(self, place: u32) -> (u32, u32) {
         match self.stride {
             1 => (0, place),
             stride => {
@@ -39,11 +41,6 @@ impl GridRows {
                 (place % stride, place / stride)
             }
         }
-    }
-
-    /// The position of a place in the output.
-    pub(crate) fn position(self, place: u32) -> u32 {
-        self.cell(place).1
     }
 
     /// The grids of all groups, whose blocks follow each other. `None` as in
@@ -146,26 +143,21 @@ impl GroupGrid {
             1 => self.first_output,
             _ => 0,
         };
-        let place = |row: u32, block: u32| (block * self.rows + row) as usize;
-        let mut next = 0; // the first block of the row that is not written
-        let mut row = None;
-        let mut last = first_item;
+        let end = self.samples.div_ceil(BLOCK_SAMPLES);
+        // The row, the first of its blocks that is not written, and the last item that began in it.
+        let (mut row, mut next, mut last) = (0, 0, nothing);
         for (index, item) in (first_item..).zip(items(list)) {
             let (own, position) = self.all.cell(item.output);
             let (own, position) = (own - self.first_row, position - base);
-            if row != Some(own) {
-                if let Some(row) = row {
-                    self.write_rest(row, next, last, blocks);
-                }
+            if own != row || index == first_item {
+                self.go_on(row, next..end, last, blocks);
                 // Positions before the row's first item belong to it and lie before it.
-                (row, next, last) = (Some(own), 0, index);
+                (row, next, last) = (own, 0, index);
             }
             let block = position / BLOCK_SAMPLES;
-            while next <= block {
-                blocks[place(own, next)].first = last;
-                next += 1;
-            }
-            let found = &mut blocks[place(own, block)];
+            self.go_on(row, next..block + 1, last, blocks);
+            next = block + 1;
+            let found = &mut blocks[self.place(row, block)];
             match position % BLOCK_SAMPLES {
                 0 => found.first = index,
                 _ if index == last => {}
@@ -173,16 +165,19 @@ impl GroupGrid {
             }
             last = index;
         }
-        if let Some(row) = row {
-            self.write_rest(row, next, last, blocks);
+        self.go_on(row, next..end, last, blocks);
+    }
+
+    /// Blocks of a row in which an item from before goes on.
+    fn go_on(&self, row: u32, places: Range<u32>, item: u32, blocks: &mut [Block]) {
+        for block in places {
+            blocks[self.place(row, block)].first = item;
         }
     }
 
-    /// Blocks of a row in which no item begins.
-    fn write_rest(&self, row: u32, next: u32, last: u32, blocks: &mut [Block]) {
-        for block in next..self.samples.div_ceil(BLOCK_SAMPLES) {
-            blocks[(block * self.rows + row) as usize].first = last;
-        }
+    /// Where a block of a row lies among all.
+    fn place(&self, row: u32, block: u32) -> usize {
+        (block * self.rows + row) as usize
     }
 
     /// What comes with its dispatch.
@@ -266,7 +261,7 @@ mod tests {
                 let mut found = 0;
                 for row in 0..grid.rows {
                     for position in 0..grid.samples {
-                        let block = blocks[(position / BLOCK_SAMPLES * grid.rows + row) as usize];
+                        let block = blocks[grid.place(row, position / BLOCK_SAMPLES)];
                         let begun = block.starts << (!position & (BLOCK_SAMPLES - 1));
                         let index = block.first + begun.count_ones();
                         let place = match rows.stride {

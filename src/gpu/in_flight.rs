@@ -1,55 +1,42 @@
-//! What one window in flight needs, and what is done when it has been computed.
+//! Work in flight: the host starts one piece of it while the device works on those before, and does
+//! what is left to do when they have been computed.
 
-use std::sync::Arc;
+use std::ops::Range;
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use ash::vk;
-use bytemuck::Zeroable as _;
 use rayon::prelude::*;
 
 use crate::gpu::buffer::Buffer;
-use crate::gpu::device::{Lane, LogicalDevice};
+use crate::gpu::device::LogicalDevice;
 use crate::gpu::engine::{VulkanEngine, lock};
 use crate::gpu::error::{EvaluateError, VulkanError};
-use crate::gpu::grid::{GridRows, GroupGrid, write_blocks};
+use crate::gpu::handles::VulkanBuffer;
 use crate::gpu::imported_memory::ImportedMemory;
-use crate::gpu::memory_types::KernelReads;
 use crate::gpu::options::Timings;
 use crate::gpu::read_back::ReadBack;
-use crate::gpu::sample_list::SampleList;
-use crate::gpu::submission::{Spent, Submission};
-use crate::gpu::upload::Upload;
-use crate::gpu::work_list::{Cut, GroupItems, GroupWork, Patch, Work, WorkChunk, work};
+use crate::gpu::submission::Spent;
+use crate::gpu::work_list::Patch;
 use crate::output::encoding::Encoding;
-use crate::output::window::Window;
-use crate::prepare::clip_data::ClipData;
-use crate::shader::{Block, Item, List, ListedSample};
-use crate::time::frames::{Ticks, Timeline};
 
-/// What one window in flight needs. The submissions are the first fields: dropped first, they wait for
-/// their work to end before the buffers are freed.
-pub(crate) struct InFlight {
-    pub(crate) submission: Submission,
-    /// A window's rotations on their way to the host.
+/// What one piece of work in flight needs; `U` are its uploads.
+pub(crate) struct InFlight<U> {
+    // It goes first: it waits for its work to end before the buffers are freed.
     pub(crate) results: ReadBack,
-    pub(crate) items: Upload,
-    pub(crate) distances: Upload,
-    /// The blocks of a grid.
-    pub(crate) blocks: Upload,
+    pub(crate) uploads: U,
     pub(crate) done: Option<Finish>,
-    /// Emptied work lists, whose memory is used again.
-    pub(crate) spare: Vec<WorkChunk>,
-    /// Blocks before they are uploaded.
-    listed_blocks: Vec<Block>,
     /// Whether the kernel had run before: some drivers compile at the first dispatch, which then
     /// does not count as slow.
     pub(crate) compiled: bool,
 }
 
-/// What is left to do when a window has been computed.
+/// What is left to do when a piece of work has been computed.
 pub(crate) struct Finish {
-    pub(crate) window: Window,
+    /// The bytes of the whole result that it makes.
+    pub(crate) output: Range<usize>,
     pub(crate) encoding: Encoding,
+    /// Rotations that the host computed, by their places among those of the piece.
     pub(crate) patches: Vec<Patch>,
 }
 
@@ -99,42 +86,70 @@ pub(crate) enum Target<'a> {
     ImportedMemory(ImportedMemory<'a>),
     /// Through a window's own buffer into the caller's memory.
     Slice(&'a mut [u8]),
-    /// Into a buffer of the caller's.
-    External(External),
+    /// Into a buffer that the application made on this device.
+    External(VulkanBuffer),
 }
 
-/// A range of a buffer that the application made on this device.
-#[derive(Clone, Copy)]
-pub(crate) struct External {
-    pub(crate) raw: vk::Buffer,
-    /// Where it starts, bytes.
-    pub(crate) offset: u64,
-}
+impl<'a> Target<'a> {
+    /// The caller's memory, for values of `each` bytes: imported if that is wanted and possible.
+    pub(crate) fn of(
+        device: &Arc<LogicalDevice>,
+        imports: bool,
+        output: &'a mut [u8],
+        each: usize,
+    ) -> Self {
+        if !imports {
+            return Self::Slice(output);
+        }
+        ImportedMemory::to_write(device, output, each)
+            .map_or_else(Self::Slice, Self::ImportedMemory)
+    }
 
-/// Work in flight.
-pub(crate) trait Flight {
-    /// Waits for it, if there is any, and does what is left to do then.
-    fn finish(
-        &mut self,
-        target: &mut Target<'_>,
-        stopwatch: &mut Stopwatch,
-    ) -> Result<(), VulkanError>;
+    /// The buffer that kernels write into and where the result starts in it, bytes; `None` where each
+    /// piece of work has a buffer of its own.
+    pub(crate) fn place(&self) -> Option<(vk::Buffer, u64)> {
+        match self {
+            Self::Buffer(buffer) => Some((buffer.raw, 0)),
+            Self::ImportedMemory(memory) => Some((memory.raw(), memory.start() as u64)),
+            Self::External(range) => Some((range.buffer, range.offset)),
+            Self::Slice(_) => None,
+        }
+    }
 }
 
 impl VulkanEngine {
-    /// Finishes all that is in flight after the `last`th was started, the oldest first; also after
-    /// an error, because work that was submitted uses the caller's buffers.
-    pub(crate) fn land(
+    /// Starts pieces of work one after another, and finishes all that is in flight, also after an
+    /// error: work that was submitted uses the caller's buffers. Where a piece takes long, windows are
+    /// halved before `work` is asked for more.
+    pub(crate) fn fly<U: Default, W>(
         &self,
-        in_flight: &mut Vec<impl Flight>,
-        last: usize,
+        in_flight: &Mutex<Vec<InFlight<U>>>,
         target: &mut Target<'_>,
-        mut stopwatch: Stopwatch,
-        mut result: Result<(), EvaluateError>,
+        mut work: impl Iterator<Item = Result<W, EvaluateError>>,
+        mut start: impl FnMut(&mut InFlight<U>, &Target<'_>, W) -> Result<(), EvaluateError>,
     ) -> Result<(), EvaluateError> {
+        let mut in_flight = lock(in_flight);
+        let mut stopwatch = Stopwatch::default();
+        let mut next = 0;
+        let mut result = work.try_for_each(|work| {
+            if next == in_flight.len() {
+                in_flight.push(InFlight::new(&self.device)?);
+            }
+            let own = &mut in_flight[next];
+            next = (next + 1) % self.in_flight_count;
+            own.finish(target, &mut stopwatch)?;
+            if stopwatch.is_slow() {
+                self.halve_windows();
+            }
+            let listing = Instant::now();
+            let started = start(own, target, work?);
+            stopwatch.timings.work_lists += listing.elapsed();
+            started
+        });
         let count = in_flight.len();
-        for i in 1..=count {
-            let finished = in_flight[(last + i) % count].finish(target, &mut stopwatch);
+        for i in 0..count {
+            let oldest = &mut in_flight[(next + i) % count];
+            let finished = oldest.finish(target, &mut stopwatch);
             result = result.and(finished.map_err(EvaluateError::from));
         }
         if let (Target::ImportedMemory(memory), Ok(())) = (target, &result) {
@@ -151,190 +166,48 @@ impl VulkanEngine {
     }
 }
 
-impl Flight for InFlight {
+impl<U: Default> InFlight<U> {
+    fn new(device: &Arc<LogicalDevice>) -> Result<Self, VulkanError> {
+        Ok(Self {
+            results: ReadBack::new(device)?,
+            uploads: U::default(),
+            done: None,
+            compiled: false,
+        })
+    }
+
+    /// Waits for the work, if there is any, and does what is left to do then.
     fn finish(
         &mut self,
         target: &mut Target<'_>,
         stopwatch: &mut Stopwatch,
     ) -> Result<(), VulkanError> {
-        if let Some(spent) = self.results.wait(&mut self.submission)? {
+        if let Some(spent) = self.results.wait()? {
             stopwatch.ran(spent, self.compiled);
         }
-        let copying = Instant::now();
         let Some(done) = self.done.take() else {
             return Ok(());
         };
-        let (window, encoding) = (done.window, done.encoding);
-        let rotation = encoding.bytes();
-        let all = window.start * rotation..(window.start + window.len()) * rotation;
+        let copying = Instant::now();
         let output: &mut [u8] = match target {
-            Target::Buffer(buffer) => buffer.bytes_mut(all),
-            Target::ImportedMemory(memory) => memory.bytes_mut(all),
+            Target::Buffer(buffer) => buffer.bytes_mut(done.output),
+            Target::ImportedMemory(memory) => memory.bytes_mut(done.output),
             Target::External(_) => &mut [],
             Target::Slice(slice) => {
-                let output = &mut slice[all];
+                let output = &mut slice[done.output];
                 copy(output, self.results.bytes(0..output.len()));
                 output
             }
         };
+        let rotation = done.encoding.bytes();
         for (place, value) in done.patches {
             let place = place * rotation;
-            encoding.encode_all(&[value], &mut output[place..place + rotation]);
+            let own = &mut output[place..place + rotation];
+            done.encoding.encode_all(&[value], own);
         }
         stopwatch.timings.read_back += copying.elapsed();
         Ok(())
     }
-}
-
-impl InFlight {
-    pub(crate) fn new(device: &Arc<LogicalDevice>) -> Result<Self, VulkanError> {
-        Ok(Self {
-            submission: Submission::new(device, Lane::Kernels)?,
-            results: ReadBack::default(),
-            items: Upload::new("tumble items", KernelReads::Often),
-            distances: Upload::new("tumble distances", KernelReads::Often),
-            blocks: Upload::new("tumble blocks", KernelReads::Often),
-            done: None,
-            spare: Vec::new(),
-            listed_blocks: Vec::new(),
-            compiled: false,
-        })
-    }
-
-    /// Writes the work list of a window into its buffers, one group after another; `shift`
-    /// is added to every place in the output. With `maps_samples` neighbouring invocations take
-    /// neighbouring samples, where that can be.
-    pub(crate) fn list(
-        &mut self,
-        device: &Arc<LogicalDevice>,
-        clip: &ClipData,
-        timeline: &Timeline,
-        window: &Window,
-        shift: u32,
-        maps_samples: bool,
-    ) -> Result<Work, EvaluateError> {
-        if let Some(list) = SampleList::new(clip, timeline, window) {
-            let bytes = window.len() * size_of::<ListedSample>();
-            let place = self.items.room(device, bytes)?;
-            return Ok(list.write(bytemuck::cast_slice_mut(place), shift)?);
-        }
-        let rows = GridRows::new(window, shift).filter(|_| maps_samples);
-        if let Some(rows) = rows {
-            let cut = Cut::Whole;
-            let lists = work(clip, timeline, window, shift, cut, &mut self.spare)?;
-            if let Some(grids) = rows.of_groups(&lists) {
-                let last = self.write_lists(device, &lists, Some(rows))?;
-                let blocks = grids.iter().map(GroupGrid::blocks).sum::<u32>() as usize;
-                // They are written out of order, and read meanwhile.
-                self.listed_blocks.resize(blocks, Block::zeroed());
-                write_blocks(&lists, &grids, last, &mut self.listed_blocks);
-                let bytes: &[u8] = bytemuck::cast_slice(&self.listed_blocks);
-                copy(self.blocks.room(device, bytes.len())?, bytes);
-                let grids = grids.into_iter().map(Some);
-                return Ok(self.listed(timeline, lists, grids));
-            }
-            self.take_back(lists);
-        }
-        let lists = work(clip, timeline, window, shift, Cut::Short, &mut self.spare)?;
-        self.write_lists(device, &lists, None)?;
-        Ok(self.listed(timeline, lists, std::iter::repeat(None)))
-    }
-
-    /// Writes items and distances, and for a grid one item without samples after all others, whose
-    /// place it returns.
-    fn write_lists(
-        &mut self,
-        device: &Arc<LogicalDevice>,
-        lists: &[GroupWork],
-        rows: Option<GridRows>,
-    ) -> Result<u32, VulkanError> {
-        let item_count: usize = lists.iter().map(GroupWork::item_count).sum();
-        let distance_count: usize = lists.iter().map(GroupWork::distance_count).sum();
-        let item_bytes = (item_count + usize::from(rows.is_some())) * size_of::<Item>();
-        let items = self.items.room(device, item_bytes)?;
-        let distance_bytes = distance_count * size_of::<f32>();
-        let distances = self.distances.room(device, distance_bytes)?;
-        let (items, nothing) = bytemuck::cast_slice_mut(items).split_at_mut(item_count);
-        nothing.fill(Item::zeroed());
-        write(lists, rows, items, bytemuck::cast_slice_mut(distances));
-        Ok(item_count as u32)
-    }
-
-    /// What is to be done of lists that were written, whose memory is kept.
-    fn listed(
-        &mut self,
-        timeline: &Timeline,
-        lists: Vec<GroupWork>,
-        grids: impl Iterator<Item = Option<GroupGrid>>,
-    ) -> Work {
-        let is_timed = matches!(timeline.ticks, Ticks::Times { .. });
-        let mut groups = Vec::new();
-        for (list, grid) in lists.iter().zip(grids) {
-            groups.push(GroupItems {
-                group: list.group,
-                items: list.item_count() as u32,
-                first_output: 0,
-                grid,
-            });
-        }
-        let list = match (groups.iter().any(|own| own.grid.is_some()), is_timed) {
-            (false, false) => List::Frames,
-            (false, true) => List::Times,
-            (true, false) => List::FramesCoalesced,
-            (true, true) => List::TimesCoalesced,
-        };
-        Work {
-            list,
-            groups,
-            patches: self.take_back(lists),
-        }
-    }
-
-    /// Keeps the memory of lists for the next ones; returns what they leave to the host.
-    fn take_back(&mut self, lists: Vec<GroupWork>) -> Vec<Patch> {
-        let mut patches = Vec::new();
-        for mut chunk in lists.into_iter().flat_map(|list| list.chunks) {
-            patches.append(&mut chunk.patches);
-            self.spare.push(chunk.cleared());
-        }
-        patches
-    }
-}
-
-/// Writes the work lists of all groups, one after another; in `rows` of a grid, the position of an
-/// item takes the place of where it is stored. Each element is written once, in order, and none is
-/// read again: what is written to may be slow to read.
-pub(crate) fn write(
-    lists: &[GroupWork],
-    rows: Option<GridRows>,
-    mut items: &mut [Item],
-    mut distances: &mut [f32],
-) {
-    let mut next_distance = 0;
-    let mut places = Vec::new();
-    for chunk in lists.iter().flat_map(|list| &list.chunks) {
-        let (own_items, other_items) = items.split_at_mut(chunk.items.len());
-        let (own_distances, others) = distances.split_at_mut(chunk.distances.len());
-        (items, distances) = (other_items, others);
-        places.push((chunk, own_items, own_distances, next_distance));
-        next_distance += chunk.distances.len() as i32;
-    }
-    places
-        .into_par_iter()
-        .for_each(|(chunk, items, distances, first)| {
-            distances.copy_from_slice(&chunk.distances);
-            let first = if distances.is_empty() { 0 } else { first };
-            if first == 0 && rows.is_none() {
-                return items.copy_from_slice(&chunk.items);
-            }
-            for (to, item) in items.iter_mut().zip(&chunk.items) {
-                *to = Item {
-                    first: item.first.wrapping_add(first),
-                    output: rows.map_or(item.output, |rows| rows.position(item.output)),
-                    ..*item
-                };
-            }
-        });
 }
 
 /// Bytes that one thread copies at once.

@@ -1,5 +1,5 @@
-//! The way of a window's results to the host: read where kernels wrote them, or copied out of the
-//! device's own memory, by the kernels' submission or by another one beside later kernels.
+//! Kernels, and the way of their results to the host: read where kernels wrote them, or copied out of
+//! the device's own memory, by the kernels' submission or by another one beside later kernels.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -10,10 +10,10 @@ use crate::gpu::error::VulkanError;
 use crate::gpu::semaphore::Semaphore;
 use crate::gpu::submission::{Access, Spent, Submission};
 
-/// Results on their way. Whoever has one drops the kernels' submission first.
-#[derive(Default)]
+/// Kernels, and their results on the way. Whoever has one drops it before what else the kernels use.
 pub(crate) struct ReadBack {
-    // The copy goes first: it waits for its end before the buffers are freed.
+    // Kernels and copy go first: they wait for their end before the buffers are freed.
+    pub(crate) kernels: Submission,
     apart: Option<CopyApart>,
     /// What kernels write.
     output: Option<Buffer>,
@@ -29,6 +29,15 @@ struct CopyApart {
 }
 
 impl ReadBack {
+    pub(crate) fn new(device: &Arc<LogicalDevice>) -> Result<Self, VulkanError> {
+        Ok(Self {
+            kernels: Submission::new(device, Lane::Kernels)?,
+            apart: None,
+            output: None,
+            host: None,
+        })
+    }
+
     /// The buffer for kernels to write, of this size or longer; `staged` results are copied out of
     /// the device's own memory.
     pub(crate) fn room(
@@ -38,8 +47,7 @@ impl ReadBack {
         staged: bool,
     ) -> Result<&Buffer, VulkanError> {
         if !staged {
-            let output = grow(device, &mut self.output, size, Residence::InPlace)?;
-            return Ok(output);
+            return grow(device, &mut self.output, size, Residence::InPlace);
         }
         if self.apart.is_none() && device.copies_apart() {
             self.apart = Some(CopyApart {
@@ -48,22 +56,18 @@ impl ReadBack {
             });
         }
         grow(device, &mut self.host, size, Residence::Readback)?;
-        let output = grow(device, &mut self.output, size, Residence::Results)?;
-        Ok(output)
+        grow(device, &mut self.output, size, Residence::Results)
     }
 
-    /// Submits recorded kernels that wrote the first `size` bytes of the results, and what brings
-    /// these to the host.
-    pub(crate) fn submit(
-        &mut self,
-        kernels: &mut Submission,
-        size: u64,
-    ) -> Result<(), VulkanError> {
-        let size = size.max(4); // no copy may be of nothing, and no buffer is shorter
-        let (Some(output), Some(host)) = (&self.output, &self.host) else {
+    /// Submits the recorded kernels, and what brings the first `size` bytes of the results to the host;
+    /// with `None` they were written into other memory, where the host sees them.
+    pub(crate) fn submit(&mut self, size: Option<u64>) -> Result<(), VulkanError> {
+        let kernels = &mut self.kernels;
+        let (Some(size), Some(output), Some(host)) = (size, &self.output, &self.host) else {
             kernels.barrier(Access::Kernel, Access::Host);
             return kernels.submit();
         };
+        let size = size.max(4); // no copy may be of nothing, and no buffer is shorter
         let Some(CopyApart { submission, done }) = &mut self.apart else {
             kernels.barrier(Access::Kernel, Access::Copy);
             kernels.copy(output, host, 0, size);
@@ -81,20 +85,20 @@ impl ReadBack {
     }
 
     /// Whether the kernels and the copy have ended, as far as a look tells.
-    pub(crate) fn is_done(&self, kernels: &Submission) -> Result<bool, VulkanError> {
+    pub(crate) fn is_done(&self) -> Result<bool, VulkanError> {
         let copied = match &self.apart {
             Some(apart) => apart.submission.is_done()?,
             None => true,
         };
-        Ok(copied && kernels.is_done()?)
+        Ok(copied && self.kernels.is_done()?)
     }
 
     /// Waits for the copy and for the kernels, whose time it returns, the copy's end included.
-    pub(crate) fn wait(&mut self, kernels: &mut Submission) -> Result<Option<Spent>, VulkanError> {
+    pub(crate) fn wait(&mut self) -> Result<Option<Spent>, VulkanError> {
         if let Some(apart) = &mut self.apart {
             apart.submission.wait()?;
         }
-        kernels.wait()
+        self.kernels.wait()
     }
 
     /// Some of the results, after the wait.
@@ -110,7 +114,7 @@ fn grow<'b>(
     kept: &'b mut Option<Buffer>,
     size: u64,
     residence: Residence,
-) -> Result<&'b mut Buffer, VulkanError> {
+) -> Result<&'b Buffer, VulkanError> {
     // A shorter one is freed before the new one is made, so that both need not fit.
     let own = kept.take().filter(|buffer| buffer.size() >= size);
     let own = own.map_or_else(

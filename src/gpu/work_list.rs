@@ -1,16 +1,23 @@
 //! The work list of one window of the output: items, each some consecutive samples of one segment.
 
+use bytemuck::Zeroable as _;
 use rayon::prelude::*;
 
-use crate::gpu::grid::GroupGrid;
+use crate::gpu::engine::VulkanEngine;
+use crate::gpu::error::EvaluateError;
+use crate::gpu::grid::{GridRows, GroupGrid, write_blocks};
+use crate::gpu::in_flight::copy;
+use crate::gpu::memory_types::KernelReads;
+use crate::gpu::sample_list::SampleList;
+use crate::gpu::upload::Upload;
 use crate::math::canonical::round_f32;
 use crate::output::window::Window;
 use crate::prepare::clip_data::ClipData;
 use crate::prepare::prepared::Prepared;
-use crate::shader::{IS_CONSTANT, ITEM_SAMPLES, Item, List, MAY_BE_TINY};
+use crate::shader::{Block, IS_CONSTANT, ITEM_SAMPLES, Item, List, ListedSample, MAY_BE_TINY};
 use crate::simd::dispatch::{InLanes, in_lanes};
 use crate::simd::lanes::Lanes;
-use crate::time::frames::{FramesError, Timeline};
+use crate::time::frames::{FramesError, Ticks, Timeline};
 use crate::time::runs::{Distance, Emit, Run, RunSource};
 use crate::time::spans::Part;
 
@@ -52,16 +59,6 @@ pub(crate) struct WorkChunk {
     pub(crate) patches: Vec<Patch>,
 }
 
-impl WorkChunk {
-    /// Empty, and ready to be used again.
-    pub(crate) fn cleared(mut self) -> Self {
-        self.items.clear();
-        self.distances.clear();
-        self.patches.clear();
-        self
-    }
-}
-
 impl GroupWork {
     pub(crate) fn item_count(&self) -> usize {
         self.chunks.iter().map(|chunk| chunk.items.len()).sum()
@@ -69,6 +66,123 @@ impl GroupWork {
 
     pub(crate) fn distance_count(&self) -> usize {
         self.chunks.iter().map(|chunk| chunk.distances.len()).sum()
+    }
+}
+
+/// The lists of a window on their way to the device, in memory that is kept for the next window.
+pub(crate) struct WorkLists {
+    /// Items, or the samples of a sample list.
+    items: Upload,
+    distances: Upload,
+    /// The blocks of a grid.
+    blocks: Upload,
+    /// Emptied work lists.
+    spare: Vec<WorkChunk>,
+    /// Blocks before they are uploaded.
+    listed_blocks: Vec<Block>,
+}
+
+impl Default for WorkLists {
+    fn default() -> Self {
+        Self {
+            items: Upload::new("tumble items", KernelReads::Often),
+            distances: Upload::new("tumble distances", KernelReads::Often),
+            blocks: Upload::new("tumble blocks", KernelReads::Often),
+            spare: Vec::new(),
+            listed_blocks: Vec::new(),
+        }
+    }
+}
+
+impl WorkLists {
+    /// Writes the work list of a window into its buffers, one group after another; `shift`
+    /// is added to every place in the output. Where the engine maps samples, neighbouring
+    /// invocations take neighbouring samples if that can be.
+    pub(crate) fn list(
+        &mut self,
+        engine: &VulkanEngine,
+        clip: &ClipData,
+        timeline: &Timeline,
+        window: &Window,
+        shift: u32,
+    ) -> Result<Work, EvaluateError> {
+        let device = &engine.device;
+        if let Some(list) = SampleList::new(clip, timeline, window) {
+            let bytes = window.len() * size_of::<ListedSample>();
+            let place = self.items.room(device, bytes)?;
+            return Ok(list.write(bytemuck::cast_slice_mut(place), shift)?);
+        }
+        let mut rows = GridRows::new(window, shift).filter(|_| engine.maps_samples);
+        let (mut lists, mut grids) = (Vec::new(), Vec::new());
+        if let Some(rows) = rows {
+            lists = work(clip, timeline, window, shift, Cut::Whole, &mut self.spare)?;
+            grids = rows.of_groups(&lists).unwrap_or_default();
+        }
+        if grids.is_empty() {
+            rows = None;
+            self.take_back(lists);
+            lists = work(clip, timeline, window, shift, Cut::Short, &mut self.spare)?;
+        }
+
+        let item_count: usize = lists.iter().map(GroupWork::item_count).sum();
+        let distance_count: usize = lists.iter().map(GroupWork::distance_count).sum();
+        // A grid has one item without samples after all others.
+        let item_bytes = (item_count + usize::from(rows.is_some())) * size_of::<Item>();
+        let items = self.items.room(device, item_bytes)?;
+        let distance_bytes = distance_count * size_of::<f32>();
+        let distances = self.distances.room(device, distance_bytes)?;
+        let (items, nothing) = bytemuck::cast_slice_mut(items).split_at_mut(item_count);
+        nothing.fill(Item::zeroed());
+        write(&lists, rows, items, bytemuck::cast_slice_mut(distances));
+        if rows.is_some() {
+            let blocks = grids.iter().map(GroupGrid::blocks).sum::<u32>() as usize;
+            // They are written out of order, and read meanwhile.
+            self.listed_blocks.resize(blocks, Block::zeroed());
+            write_blocks(&lists, &grids, item_count as u32, &mut self.listed_blocks);
+            let bytes: &[u8] = bytemuck::cast_slice(&self.listed_blocks);
+            copy(self.blocks.room(device, bytes.len())?, bytes);
+        }
+
+        let is_timed = matches!(timeline.ticks, Ticks::Times { .. });
+        let groups = lists.iter().enumerate().map(|(place, list)| GroupItems {
+            group: list.group,
+            items: list.item_count() as u32,
+            first_output: 0,
+            grid: grids.get(place).copied(),
+        });
+        Ok(Work {
+            list: match (rows.is_some(), is_timed) {
+                (false, false) => List::Frames,
+                (false, true) => List::Times,
+                (true, false) => List::FramesCoalesced,
+                (true, true) => List::TimesCoalesced,
+            },
+            groups: groups.collect(),
+            patches: self.take_back(lists),
+        })
+    }
+
+    /// Keeps the memory of lists for the next ones; returns what they leave to the host.
+    fn take_back(&mut self, lists: Vec<GroupWork>) -> Vec<Patch> {
+        let mut patches = Vec::new();
+        for mut chunk in lists.into_iter().flat_map(|list| list.chunks) {
+            patches.append(&mut chunk.patches);
+            chunk.items.clear();
+            chunk.distances.clear();
+            self.spare.push(chunk);
+        }
+        patches
+    }
+
+    /// What kernels read of a list, in the order of their bindings.
+    pub(crate) fn uploads(&self, list: List) -> Vec<&Upload> {
+        let (items, blocks, distances) = (&self.items, &self.blocks, &self.distances);
+        match list {
+            List::Samples | List::Frames => vec![items],
+            List::Times => vec![items, distances],
+            List::FramesCoalesced => vec![items, blocks],
+            List::TimesCoalesced => vec![items, blocks, distances],
+        }
     }
 }
 
@@ -122,6 +236,7 @@ pub(crate) fn work(
                 window,
                 shift,
                 cut,
+                track: 0,
                 chunk: spare.pop().unwrap_or_default(),
                 listed: Ok(()),
             })
@@ -148,6 +263,8 @@ struct PartsList<'a> {
     window: &'a Window,
     shift: u32,
     cut: Cut,
+    /// The track whose runs are met.
+    track: usize,
     chunk: WorkChunk,
     listed: Result<(), FramesError>,
 }
@@ -155,22 +272,12 @@ struct PartsList<'a> {
 impl InLanes for PartsList<'_> {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
+        let (prepared, timeline) = (self.prepared, self.timeline);
         for part in self.parts {
-            let mut list = RunItems {
-                prepared: self.prepared,
-                timeline: self.timeline,
-                window: self.window,
-                shift: self.shift,
-                cut: self.cut,
-                track: part.track as usize,
-                chunk: &mut self.chunk,
-            };
+            self.track = part.track as usize;
             let samples = self.window.samples.clone();
-            for copy in self.prepared.copies(part, self.timeline, samples) {
-                let listed = self
-                    .prepared
-                    .spans
-                    .runs(part, self.timeline, &copy, &mut list);
+            for copy in prepared.copies(part, timeline, samples) {
+                let listed = prepared.spans.runs(part, timeline, &copy, self);
                 if listed.is_err() {
                     self.listed = listed;
                     return;
@@ -180,79 +287,96 @@ impl InLanes for PartsList<'_> {
     }
 }
 
-/// Turns the runs of one part into items.
-struct RunItems<'a> {
-    prepared: &'a Prepared,
-    timeline: &'a Timeline,
-    window: &'a Window,
-    shift: u32,
-    cut: Cut,
-    track: usize,
-    chunk: &'a mut WorkChunk,
-}
-
-impl Emit for RunItems<'_> {
+impl Emit for PartsList<'_> {
+    /// Turns a run into items, and what the host evaluates into patches.
     #[inline(always)]
     fn run(&mut self, run: Run) {
-        let chunk = &mut *self.chunk;
-        let output = |sample| self.window.place(self.track, sample) as u32 + self.shift;
+        let (prepared, timeline, window) = (self.prepared, self.timeline, self.window);
+        let (track, chunk) = (self.track, &mut self.chunk);
         let samples = run.sample..run.sample + run.count;
-        if let RunSource::Exact { index, parameter } = run.source {
-            chunk.patches.extend(samples.map(|sample| {
-                let (timeline, track) = (self.timeline, self.track);
-                let value = (self.prepared).exact(index, parameter, timeline, track, sample);
-                (self.window.place(track, sample), value)
-            }));
-            return;
-        }
-        let mut first = 0;
-        if let RunSource::Segment(_, distance, _) = run.source {
-            first = match distance {
-                Distance::Near { first } => first as i32,
-                Distance::Frames { first } => first,
-                Distance::Seconds { middle } => {
-                    let own = chunk.distances.len() as i32;
-                    let time = |sample| self.timeline.time_at(self.track, sample);
-                    let from_middle = |sample| round_f32(time(sample) - middle);
-                    chunk.distances.extend(samples.clone().map(from_middle));
-                    own
-                }
-            };
-        }
-        if self.cut == Cut::Whole {
-            let mut whole = item(run.source, output(run.sample), run.count as u32, first);
-            if let RunSource::Segment(index, ..) = run.source
-                && self.prepared.segments.may_be_tiny(index)
-            {
-                whole.count |= MAY_BE_TINY;
+        let mut whole = Item::zeroed();
+        let mut flags = 0;
+        match run.source {
+            RunSource::Constant(constant) => {
+                whole.source = constant;
+                flags = IS_CONSTANT;
             }
-            chunk.items.push(whole);
-            return;
+            RunSource::Segment(index, distance, affine) => {
+                whole.source = index;
+                (whole.scale, whole.offset) = (affine.scale, affine.offset);
+                whole.first = match distance {
+                    Distance::Near { first } => first as i32,
+                    Distance::Frames { first } => first,
+                    Distance::Seconds { middle } => {
+                        let own = chunk.distances.len() as i32;
+                        let from_middle =
+                            |sample| round_f32(timeline.time_at(track, sample) - middle);
+                        chunk.distances.extend(samples.map(from_middle));
+                        own
+                    }
+                };
+                if self.cut == Cut::Whole && prepared.segments.may_be_tiny(index) {
+                    flags = MAY_BE_TINY;
+                }
+            }
+            RunSource::Exact { index, parameter } => {
+                chunk.patches.extend(samples.map(|sample| {
+                    let value = prepared.exact(index, parameter, timeline, track, sample);
+                    (window.place(track, sample), value)
+                }));
+                return;
+            }
         }
-        for done in (0..run.count).step_by(ITEM_SAMPLES as usize) {
-            let count = (run.count - done).min(ITEM_SAMPLES as usize) as u32;
-            let first = first.wrapping_add(done as i32);
-            let output = output(run.sample + done);
-            chunk.items.push(item(run.source, output, count, first));
+        let most = match self.cut {
+            Cut::Short => ITEM_SAMPLES as usize,
+            Cut::Whole => usize::MAX,
+        };
+        let mut done = 0;
+        while done < run.count {
+            let count = most.min(run.count - done);
+            chunk.items.push(Item {
+                output: window.place(track, run.sample + done) as u32 + self.shift,
+                count: count as u32 | flags,
+                first: whole.first.wrapping_add(done as i32),
+                ..whole
+            });
+            done += count;
         }
     }
 }
 
-/// The item of `count` samples of a run. For a run that the host evaluates its count is 0, and it
-/// stores nothing.
-#[inline(always)]
-pub(crate) fn item(source: RunSource, output: u32, count: u32, first: i32) -> Item {
-    let (source, count, scale, offset) = match source {
-        RunSource::Constant(source) => (source, count | IS_CONSTANT, 0.0, 0.0),
-        RunSource::Segment(index, _, affine) => (index, count, affine.scale, affine.offset),
-        RunSource::Exact { .. } => (0, IS_CONSTANT, 0.0, 0.0),
-    };
-    Item {
-        source,
-        output,
-        count,
-        first,
-        scale,
-        offset,
+/// Writes the work lists of all groups, one after another; in `rows` of a grid, the position of an
+/// item takes the place of where it is stored. Each element is written once, in order, and none is
+/// read again: what is written to may be slow to read.
+pub(crate) fn write(
+    lists: &[GroupWork],
+    rows: Option<GridRows>,
+    mut items: &mut [Item],
+    mut distances: &mut [f32],
+) {
+    let mut next_distance = 0;
+    let mut places = Vec::new();
+    for chunk in lists.iter().flat_map(|list| &list.chunks) {
+        let (own_items, other_items) = items.split_at_mut(chunk.items.len());
+        let (own_distances, others) = distances.split_at_mut(chunk.distances.len());
+        (items, distances) = (other_items, others);
+        places.push((chunk, own_items, own_distances, next_distance));
+        next_distance += chunk.distances.len() as i32;
     }
+    places
+        .into_par_iter()
+        .for_each(|(chunk, items, distances, first)| {
+            distances.copy_from_slice(&chunk.distances);
+            let first = if distances.is_empty() { 0 } else { first };
+            if first == 0 && rows.is_none() {
+                return items.copy_from_slice(&chunk.items);
+            }
+            for (to, item) in items.iter_mut().zip(&chunk.items) {
+                *to = Item {
+                    first: item.first.wrapping_add(first),
+                    output: rows.map_or(item.output, |rows| rows.cell(item.output).1),
+                    ..*item
+                };
+            }
+        });
 }
