@@ -41,6 +41,26 @@ impl<'a> KeyJob<'a> {
         self.weights().is_none().then_some(self.request.set.keys())
     }
 
+    /// The clock of a track whose samples are frames.
+    pub(crate) fn clock(&self, track: usize) -> Option<FrameClock> {
+        match self.request.timeline.ticks {
+            Ticks::Frames { rate, start } => {
+                let times = self.request.set.times_and_keys(track).0;
+                Some(FrameClock::new(rate, start, times[times.len() - 1]))
+            }
+            Ticks::Times { .. } => None,
+        }
+    }
+
+    /// How many keys and samples a task has.
+    pub(crate) fn task_size(&self, task: &Task<'_>) -> (usize, usize) {
+        let Request { set, timeline, .. } = self.request;
+        match task {
+            Task::Tracks(tracks) => (set.keys_of(tracks.clone()), tracks.len() * timeline.len()),
+            Task::Window(window) => (window.keys.keys.len(), window.samples.len()),
+        }
+    }
+
     /// Its dispatches, which are consecutive in the result.
     pub(crate) fn dispatches(&self) -> KeyDispatches<'a, '_> {
         KeyDispatches {
@@ -70,13 +90,7 @@ pub(crate) struct KeyDispatch<'a, 'j> {
 }
 
 /// What one thread writes of a dispatch.
-pub(crate) struct Task<'a> {
-    pub(crate) what: What<'a>,
-    pub(crate) keys: usize,
-    pub(crate) samples: usize,
-}
-
-pub(crate) enum What<'a> {
+pub(crate) enum Task<'a> {
     /// All of some tracks.
     Tracks(Range<usize>),
     Window(KeyWindow<'a>),
@@ -84,7 +98,7 @@ pub(crate) enum What<'a> {
 
 /// Cuts a job into dispatches.
 pub(crate) struct KeyDispatches<'a, 'j> {
-    pub(crate) job: &'j KeyJob<'a>,
+    job: &'j KeyJob<'a>,
     /// The next track.
     next: usize,
     /// What is left of a track that is larger than a dispatch.
@@ -108,18 +122,24 @@ impl<'a, 'j> KeyDispatches<'a, 'j> {
         if let Some(dispatch) = self.next_of_long(most) {
             return Ok(Some(dispatch));
         }
-        let (set, samples, first) = (job.request.set, job.request.timeline.len(), self.next);
-        let in_frames = matches!(job.request.timeline.ticks, Ticks::Frames { .. });
-        let within = |tracks: Range<usize>, most| set.tracks_within(tracks, most);
+        let Request { set, timeline, .. } = *job.request;
+        let (samples, first, last) = (timeline.len(), self.next, job.request.tracks.end);
+        let in_frames = matches!(timeline.ticks, Ticks::Frames { .. });
         let rows = most / samples.max(1);
-        let end = within(first..job.request.tracks.end, most).min(first.saturating_add(rows));
-        let is_long = end == first;
-        self.next = job.request.tracks.end.min(end.max(first + 1));
-        job.check(first..self.next)?;
+        let end = (set.tracks_within(first..last, most)).min(first.saturating_add(rows));
+        self.next = last.min(end.max(first + 1));
+        // Ends that cannot be met are refused: a loop whose first and last rotation differ, or a
+        // clamped velocity that is too large.
+        let ends = job.request.interpolation.ends;
+        if matches!(ends, Ends::Loop | Ends::Clamped { .. }) {
+            for track in first..self.next {
+                ends.check(set.times_and_keys(track).1, track)?;
+            }
+        }
         if first == self.next {
             return Ok(None);
         }
-        if is_long && in_frames {
+        if end == first && in_frames {
             self.long = Some(Long {
                 track: first,
                 key: 0,
@@ -130,12 +150,8 @@ impl<'a, 'j> KeyDispatches<'a, 'j> {
         let mut tasks = Vec::new();
         let mut start = first;
         while start < self.next {
-            let end = within(start..self.next, TASK_KEYS).max(start + 1);
-            tasks.push(Task {
-                what: What::Tracks(start..end),
-                keys: set.keys_of(start..end),
-                samples: (end - start) * samples,
-            });
+            let end = (set.tracks_within(start..self.next, TASK_KEYS)).max(start + 1);
+            tasks.push(Task::Tracks(start..end));
             start = end;
         }
         let times = |track| set.times_and_keys(track).0;
@@ -169,14 +185,9 @@ impl<'a, 'j> KeyDispatches<'a, 'j> {
                 break;
             }
             let window = self.window_of(long, each);
-            let (keys, samples) = (window.keys.keys.len(), window.samples.len());
-            dispatch.keys += keys;
-            dispatch.samples += samples;
-            dispatch.tasks.push(Task {
-                what: What::Window(window),
-                keys,
-                samples,
-            });
+            dispatch.keys += window.keys.keys.len();
+            dispatch.samples += window.samples.len();
+            dispatch.tasks.push(Task::Window(window));
         }
         (!dispatch.tasks.is_empty()).then_some(dispatch)
     }
@@ -184,64 +195,27 @@ impl<'a, 'j> KeyDispatches<'a, 'j> {
     /// Takes the next window of a track that is larger than a dispatch, and notes what is left.
     fn window_of(&mut self, long: Long, most: usize) -> KeyWindow<'a> {
         let whole = TrackKeys::whole(self.job.request.set, long.track);
-        let times = whole.times;
         let samples = self.job.request.timeline.len();
         let last = whole.all - 1;
         let last_key = (long.key + most - 1).min(last);
-        let end = match self.job.clock(times) {
-            Some(clock) if last_key < last => clock.first_frame(times[last_key]) as usize,
+        let end = match self.job.clock(long.track) {
+            Some(clock) if last_key < last => clock.first_frame(whole.times[last_key]) as usize,
             _ => samples,
         };
         let end = end.clamp(long.sample, samples);
         let sample = end.min(long.sample + most);
-        self.long = if sample < end {
-            Some(Long { sample, ..long })
-        } else if sample < samples {
-            Some(Long {
-                key: last_key,
-                sample,
-                ..long
-            })
-        } else {
-            None
-        };
+        let key = if sample < end { long.key } else { last_key };
+        self.long = (sample < samples).then_some(Long {
+            key,
+            sample,
+            ..long
+        });
         // A cubic needs the keys before and after its own two as well.
         let beside = usize::from(self.job.weights().is_some());
         let first = long.key.saturating_sub(beside);
         KeyWindow {
             keys: whole.between(first, (last_key + beside).min(last)),
             samples: long.sample..sample,
-        }
-    }
-}
-
-impl<'a> KeyJob<'a> {
-    /// Refuses ends that cannot be met: a loop whose first and last rotation differ, or a clamped
-    /// velocity that is too large.
-    fn check(&self, tracks: Range<usize>) -> Result<(), InterpolationError> {
-        let ends = self.request.interpolation.ends;
-        if matches!(ends, Ends::Loop | Ends::Clamped { .. }) {
-            for track in tracks {
-                ends.check(self.request.set.times_and_keys(track).1, track)?;
-            }
-        }
-        Ok(())
-    }
-
-    /// All of a track.
-    pub(crate) fn track(&self, index: usize) -> KeyWindow<'a> {
-        KeyWindow {
-            keys: TrackKeys::whole(self.request.set, index),
-            samples: 0..self.request.timeline.len(),
-        }
-    }
-
-    fn clock(&self, times: &[f64]) -> Option<FrameClock> {
-        match self.request.timeline.ticks {
-            Ticks::Frames { rate, start } => {
-                Some(FrameClock::new(rate, start, times[times.len() - 1]))
-            }
-            Ticks::Times { .. } => None,
         }
     }
 }

@@ -7,16 +7,13 @@ use glam::Quat;
 use rayon::prelude::*;
 
 use crate::fit::tangent_weights::TrackWeights;
-use crate::from_keys::dispatches::{KeyDispatch, KeyWindow, What};
+use crate::from_keys::dispatches::{KeyDispatch, KeyWindow, Task};
 use crate::shader::{
     IS_KEY, KeySample, LINE, ROWS_PER_INVOCATION, RowShape, SIGN_TURNED, TangentWeights,
 };
-use crate::simd::dispatch::{InLanes, in_lanes};
-use crate::simd::lanes::Lanes;
-use crate::time::frame_clock::FrameClock;
 use crate::time::frames::{FramesError, Ticks};
 use crate::time::key_samples::FramePlan;
-use crate::time::times::{TimeLanes, key_before};
+use crate::time::times::TimePlan;
 use crate::tracks::set::TrackSet;
 use crate::tracks::track_keys::TrackKeys;
 
@@ -42,8 +39,8 @@ impl KeyDispatch<'_, '_> {
         self.samples * self.rows
     }
 
-    /// Bytes of its keys, the samples, the rotations and the weights.
-    pub(crate) fn bytes(&self) -> [usize; 4] {
+    /// Bytes of its keys, the samples and the weights.
+    pub(crate) fn bytes(&self) -> [usize; 3] {
         let weights = match self.job.weights() {
             Some(_) => self.keys / self.rows,
             None => 0,
@@ -51,105 +48,93 @@ impl KeyDispatch<'_, '_> {
         [
             self.keys * size_of::<Quat>(),
             self.samples * size_of::<KeySample>(),
-            self.rotation_count() * size_of::<Quat>(),
             weights * size_of::<TangentWeights>(),
         ]
     }
 
     /// Whether none of its keys is turned: a kernel may then read them as they were given.
     pub(crate) fn keys_are_as_given(&self) -> bool {
-        self.tasks.iter().all(|task| {
-            let signs = match &task.what {
-                What::Tracks(tracks) => self.job.request.set.signs_of(tracks.clone()),
-                What::Window(window) => window.keys.signs,
-            };
-            !signs.any()
+        self.tasks.iter().all(|task| match task {
+            Task::Tracks(tracks) => !self.job.request.set.signs_of(tracks.clone()).any(),
+            Task::Window(window) => !window.keys.signs.any(),
         })
     }
 
-    /// Writes what the kernel reads.
+    /// Writes what the kernel reads. Keys that it reads in imported memory, as they are stored and none
+    /// of them turned, are not written; `imported` is the place of the set's first key there.
     pub(crate) fn write(
         &self,
-        keys: Keys<'_>,
+        imported: Option<usize>,
+        mut keys: &mut [[u32; 4]],
         mut samples: &mut [KeySample],
         mut weights: &mut [TangentWeights],
     ) -> Result<(), FramesError> {
-        let (mut keys, imported) = match keys {
-            Keys::Copied(keys) => (keys, None),
-            Keys::ImportedMemory(first) => (&mut [][..], Some(first)),
-        };
-        let mut first_key = 0;
+        let mut next_key = 0;
         let mut places = Vec::with_capacity(self.tasks.len());
         for task in &self.tasks {
+            let (own_keys, own_samples) = self.job.task_size(task);
             // Several rows share the samples and weights of the first, which the first task
             // writes.
-            let (told, joined) = match self.rows {
-                1 => (task.samples, task.keys.min(weights.len())),
+            let (own_samples, own_weights) = match self.rows {
+                1 => (own_samples, own_keys),
                 _ => (samples.len(), weights.len()),
             };
-            let (own_keys, other_keys) = keys.split_at_mut(task.keys.min(keys.len()));
-            let (own_samples, other_samples) = samples.split_at_mut(told);
-            let (own_tangent_weights, other_tangent_weights) = weights.split_at_mut(joined);
-            (keys, samples, weights) = (other_keys, other_samples, other_tangent_weights);
             let written = Written {
-                keys: own_keys,
-                samples: own_samples,
-                weights: own_tangent_weights,
-                next_key: first_key,
+                keys: take_first(&mut keys, own_keys),
+                samples: take_first(&mut samples, own_samples),
+                weights: take_first(&mut weights, own_weights),
+                next_key,
                 imported,
             };
             places.push((task, written));
-            first_key += task.keys;
+            next_key += own_keys;
         }
-        let ends = self.job.request.interpolation.ends;
+        let request = self.job.request;
         let rule = self.job.weights();
         let new = || Known {
             frames: FramePlan::new(),
-            weights: rule.map(|rule| TrackWeights::new(rule, ends)),
+            weights: rule.map(|rule| TrackWeights::new(rule, request.interpolation.ends)),
         };
         places
             .into_par_iter()
             .try_for_each_init(new, |known, (task, mut written)| {
-                let tracks = match &task.what {
-                    What::Window(window) => return self.write_window(window, known, &mut written),
-                    What::Tracks(tracks) => tracks.clone(),
+                let tracks = match task {
+                    Task::Window(window) => return self.write_window(window, known, &mut written),
+                    Task::Tracks(tracks) => tracks.clone(),
                 };
-                if let Ticks::Times { times, stride } = &self.job.request.timeline.ticks {
-                    let mut of_tracks = TimesOfTracks {
-                        set: self.job.request.set,
-                        tracks: tracks.clone(),
-                        times,
-                        stride: *stride,
-                        each: self.job.request.timeline.len(),
-                        first_key: written.place_of(self.job.request.set, tracks.start, 0),
-                        samples: std::mem::take(&mut written.samples),
-                    };
-                    in_lanes(&mut of_tracks);
-                    if written.imported.is_some() {
+                if let Ticks::Times { times, stride } = &request.timeline.ticks {
+                    self.write_times(tracks.clone(), times, *stride, &mut written);
+                    if imported.is_some() {
                         return Ok(());
                     }
                 }
                 tracks.into_iter().try_for_each(|index| {
-                    self.write_window(&self.job.track(index), known, &mut written)
+                    let window = KeyWindow {
+                        keys: TrackKeys::whole(request.set, index),
+                        samples: 0..request.timeline.len(),
+                    };
+                    self.write_window(&window, known, &mut written)
                 })
             })
     }
 
+    /// Writes keys and weights, and the places of frames.
     fn write_window<'p>(
         &self,
         window: &KeyWindow<'p>,
         known: &mut Known<'p>,
         written: &mut Written<'_>,
     ) -> Result<(), FramesError> {
+        let TrackKeys {
+            signs,
+            index,
+            first_key,
+            ..
+        } = window.keys;
         let keys: &[[u32; 4]] = bytemuck::cast_slice(window.keys.keys);
-        let first_key = written.place_of(
-            self.job.request.set,
-            window.keys.index,
-            window.keys.first_key,
-        );
+        let place = written.place_of(self.job.request.set, index, first_key);
         if written.imported.is_none() {
-            let (own, others) = std::mem::take(&mut written.keys).split_at_mut(keys.len());
-            let signs = window.keys.signs;
+            let own = take_first(&mut written.keys, keys.len());
             if signs.any() {
                 // Whole keys, in order: what is written to may be slow to read.
                 for (i, (to, &[x, y, z, w])) in own.iter_mut().zip(keys).enumerate() {
@@ -159,114 +144,61 @@ impl KeyDispatch<'_, '_> {
             } else {
                 own.copy_from_slice(keys);
             }
-            written.keys = others;
         }
-        if !written.samples.is_empty() {
-            let all = std::mem::take(&mut written.samples);
-            let (own, others) = all.split_at_mut(window.samples.len());
-            self.write_frames(window, first_key as u32, own, known)?;
-            written.samples = others;
+        if !written.samples.is_empty()
+            && let Some(clock) = self.job.clock(index)
+        {
+            let own = take_first(&mut written.samples, window.samples.len());
+            let found = known.frames.samples(window.keys, clock, &window.samples)?;
+            for (to, sample) in own.iter_mut().zip(found) {
+                *to = KeySample {
+                    key: sample.key + place,
+                    ..*sample
+                };
+            }
         }
         if let (Some(weights), false) = (&mut known.weights, written.weights.is_empty()) {
-            let all = std::mem::take(&mut written.weights);
-            let (own, others) = all.split_at_mut(keys.len());
-            let TrackKeys { times, all, .. } = window.keys;
-            own.copy_from_slice(weights.of(times, window.keys.first_key, all));
-            written.weights = others;
+            let own = take_first(&mut written.weights, keys.len());
+            own.copy_from_slice(weights.of(window.keys.times, first_key, window.keys.all));
         }
         written.next_key += keys.len();
         Ok(())
     }
 
-    /// Writes the places of a window's samples if these are frames.
-    fn write_frames<'p>(
+    /// Writes the places of explicit times, which are as in [`Ticks::Times`]. A loop of its own: a crowd
+    /// has many tracks with one sample each.
+    fn write_times(
         &self,
-        window: &KeyWindow<'p>,
-        first_key: u32,
-        samples: &mut [KeySample],
-        known: &mut Known<'p>,
-    ) -> Result<(), FramesError> {
-        let (set, timeline) = (self.job.request.set, self.job.request.timeline);
-        let Ticks::Frames { rate, start } = timeline.ticks else {
-            return Ok(());
-        };
-        let all = set.times_and_keys(window.keys.index).0;
-        let clock = FrameClock::new(rate, start, all[all.len() - 1]);
-        let found = known.frames.samples(window.keys, clock, &window.samples)?;
-        for (sample, found) in samples.iter_mut().zip(found) {
-            *sample = KeySample {
-                key: found.key + first_key,
-                ..*found
-            };
-        }
-        Ok(())
-    }
-}
-
-/// Writes the places of explicit times in lanes, across tracks: a crowd has many tracks with one
-/// sample each.
-struct TimesOfTracks<'a> {
-    set: &'a TrackSet,
-    tracks: Range<usize>,
-    /// As in [`Ticks::Times`].
-    times: &'a [f64],
-    stride: usize,
-    /// Samples of each track.
-    each: usize,
-    /// The place of the tracks' first key.
-    first_key: usize,
-    samples: &'a mut [KeySample],
-}
-
-impl InLanes for TimesOfTracks<'_> {
-    #[inline(always)]
-    fn run<L: Lanes>(&mut self) {
-        let (mut first_key, mut done) = (self.first_key as u32, 0);
-        let mut found = TimeLanes::new();
-        for index in self.tracks.clone() {
-            let (starts, keys) = self.set.times_and_keys(index);
+        tracks: Range<usize>,
+        times: &[f64],
+        stride: usize,
+        written: &mut Written<'_>,
+    ) {
+        let (set, each) = (self.job.request.set, self.job.request.timeline.len());
+        let mut first_key = written.place_of(set, tracks.start, 0);
+        let mut samples = std::mem::take(&mut written.samples).iter_mut();
+        let mut plan = TimePlan::new();
+        for index in tracks {
+            let (starts, keys) = set.times_and_keys(index);
             let mut near = 0;
-            for &time in &self.times[index * self.stride..][..self.each] {
-                let key = key_before(starts, time, near);
-                near = (key & !IS_KEY) as usize;
-                let (start, end) = match key & IS_KEY {
-                    0 => (starts[near], starts[near + 1]),
-                    _ => (0.0, 1.0),
+            let own = &times[index * stride..][..each];
+            for (&time, to) in own.iter().zip(&mut samples) {
+                let sample = plan.sample(starts, time, near);
+                near = (sample.key & !IS_KEY) as usize;
+                *to = KeySample {
+                    key: sample.key + first_key,
+                    ..sample
                 };
-                found.push(key + first_key, time, start, end);
-                if found.count == TimeLanes::LEN {
-                    done += found.write(&mut self.samples[done..]);
-                }
             }
             first_key += keys.len() as u32;
         }
-        found.write(&mut self.samples[done..]);
     }
 }
 
-impl TimeLanes {
-    /// Writes the samples that wait; returns how many.
-    #[inline(always)]
-    fn write(&mut self, samples: &mut [KeySample]) -> usize {
-        let count = std::mem::take(&mut self.count);
-        let parameters = self.parameters();
-        for (lane, sample) in samples[..count].iter_mut().enumerate() {
-            *sample = KeySample {
-                key: self.sources[lane],
-                parameter: parameters[lane],
-            };
-        }
-        count
-    }
-}
-
-/// Where a kernel reads the keys of a dispatch.
-pub(crate) enum Keys<'w> {
-    /// In a buffer of the dispatch: here they are written, with their signs.
-    Copied(&'w mut [[u32; 4]]),
-    /// In imported memory, as they are stored: the set's first key has this place there. No key is
-    /// turned.
-    ImportedMemory(usize),
+/// Takes the first elements out of a slice, or as many as there are.
+fn take_first<'w, T>(slice: &mut &'w mut [T], count: usize) -> &'w mut [T] {
+    let count = count.min(slice.len());
+    slice.split_off_mut(..count).unwrap_or_default()
 }
 
 /// Results that a thread keeps for the next track.
@@ -289,8 +221,8 @@ struct Written<'w> {
 
 impl Written<'_> {
     /// The place of a track's key, which is the next one where keys are copied.
-    fn place_of(&self, set: &TrackSet, track: usize, key: usize) -> usize {
+    fn place_of(&self, set: &TrackSet, track: usize, key: usize) -> u32 {
         self.imported
-            .map_or(self.next_key, |first| first + set.keys_of(0..track) + key)
+            .map_or(self.next_key, |first| first + set.keys_of(0..track) + key) as u32
     }
 }

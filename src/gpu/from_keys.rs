@@ -9,7 +9,6 @@ use glam::Quat;
 
 use crate::from_keys::KeyCurve;
 use crate::from_keys::dispatches::{KeyDispatch, KeyJob};
-use crate::from_keys::upload::Keys;
 use crate::gpu::engine::VulkanEngine;
 use crate::gpu::error::EvaluateError;
 use crate::gpu::imported_memory::ImportedMemory;
@@ -100,16 +99,14 @@ impl VulkanEngine {
             Some((buffer, first)) => Binding::range(buffer, first + output.start as u64, size),
             None => Binding::whole(own.results.room(device, size, staged)?),
         };
-        let [key_bytes, sample_bytes, _, weight_bytes] = dispatch.bytes();
+        let [key_bytes, sample_bytes, weight_bytes] = dispatch.bytes();
         let uploads = &mut own.uploads;
         let as_given = keys.filter(|_| dispatch.keys_are_as_given());
         dispatch.write(
+            as_given.map(|keys| keys.start() / size_of::<Quat>()),
             match as_given {
-                Some(keys) => Keys::ImportedMemory(keys.start() / size_of::<Quat>()),
-                None => {
-                    let copied = uploads.keys.room(device, key_bytes)?;
-                    Keys::Copied(bytemuck::cast_slice_mut(copied))
-                }
+                Some(_) => &mut [],
+                None => bytemuck::cast_slice_mut(uploads.keys.room(device, key_bytes)?),
             },
             bytemuck::cast_slice_mut(uploads.samples.room(device, sample_bytes)?),
             bytemuck::cast_slice_mut(uploads.weights.room(device, weight_bytes)?),

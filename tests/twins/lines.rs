@@ -12,7 +12,6 @@ use glam::{DQuat, DVec3, Quat};
 
 use crate::from_keys::KeyCurve;
 use crate::from_keys::dispatches::KeyJob;
-use crate::from_keys::upload::Keys;
 use crate::gpu::grid::{GridRows, write_blocks};
 use crate::gpu::sample_list::SampleList;
 use crate::gpu::work_list::{Cut, GroupWork, work, write};
@@ -402,14 +401,14 @@ fn of_keys(set: &TrackSet, frames: &Frames, method: Method) -> Launch {
     };
     let dispatch = job.dispatches().next(1 << 21).unwrap().unwrap();
     let rows = dispatch.rows(true);
-    let [keys, samples, _, weights] = dispatch.bytes();
+    let [keys, samples, weights] = dispatch.bytes();
     let mut keys = vec![[0u32; 4]; keys / 16];
     let mut samples: Vec<KeySample> =
         vec![bytemuck::Zeroable::zeroed(); samples / size_of::<KeySample>()];
     let mut weights: Vec<TangentWeights> =
         vec![bytemuck::Zeroable::zeroed(); weights / size_of::<TangentWeights>()];
     dispatch
-        .write(Keys::Copied(&mut keys), &mut samples, &mut weights)
+        .write(None, &mut keys, &mut samples, &mut weights)
         .unwrap();
     let kernel = match curve {
         KeyCurve::Arcs => "from_keys_arcs",
