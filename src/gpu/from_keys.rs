@@ -49,6 +49,7 @@ impl VulkanEngine {
             KeyCurve::TwoKeys => Kernel::FromKeysTwoKeys,
             KeyCurve::Cubics(_) => Kernel::FromKeysCubics,
         })?;
+        let mut dispatches = job.dispatches(self.window())?;
         let each = size_of::<Quat>();
         // A dispatch's result may begin at any rotation, and a binding must be able to as well.
         let info = &self.device.physical.info;
@@ -59,13 +60,12 @@ impl VulkanEngine {
             .filter(|keys| keys.start().is_multiple_of(each));
         let output = bytemuck::cast_slice_mut(output);
         let mut target = Target::of(&self.device, imports, output, each);
-        let mut dispatches = job.dispatches();
-        let dispatches = from_fn(|| dispatches.next(self.window()).transpose());
+        let dispatches = from_fn(|| dispatches.next(self.window()));
         let mut end = 0;
         let result = self.fly(
             &self.keys_in_flight,
             &mut target,
-            dispatches.map(|dispatch| dispatch.map_err(EvaluateError::from)),
+            dispatches.map(Ok),
             |own, target, dispatch| {
                 let start = end;
                 end += dispatch.rotation_count() * each;
