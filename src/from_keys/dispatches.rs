@@ -1,13 +1,16 @@
 //! Sets with fewer samples than keys, cut into dispatches for a Vulkan device: some tracks at a time,
 //! with their keys as they are stored and the places of the samples among them.
 
+use std::iter::Peekable;
 use std::ops::Range;
+use std::vec::IntoIter;
 
 use glam::Quat;
 
 use crate::curve::options::{Ends, InterpolationError};
 use crate::fit::tangent_weights::WeightRule;
 use crate::from_keys::KeyCurve;
+use crate::prepare::batch::{Batch, BatchSize, batches};
 use crate::prepare::request::Request;
 use crate::time::frame_clock::FrameClock;
 use crate::time::frames::Ticks;
@@ -52,35 +55,86 @@ impl<'a> KeyJob<'a> {
         }
     }
 
-    /// How many keys and samples a task has.
-    pub(crate) fn task_size(&self, task: &Task<'_>) -> (usize, usize) {
-        let Request { set, timeline, .. } = self.request;
-        match task {
-            Task::Tracks(tracks) => (set.keys_of(tracks.clone()), tracks.len() * timeline.len()),
-            Task::Window(window) => (window.keys.keys.len(), window.samples.len()),
-        }
+    /// The keys among which the samples of a batch lie, of each of its tracks.
+    pub(crate) fn keys_of(&self, batch: &Batch) -> impl Iterator<Item = TrackKeys<'a>> {
+        let (set, curve) = (self.request.set, self.curve);
+        let tracks = batch.intervals(set);
+        tracks.map(move |(index, own)| TrackKeys::whole(set, index).around(&own, curve.beside()))
     }
 
-    /// Its dispatches, which are consecutive in the result.
-    pub(crate) fn dispatches(&self) -> KeyDispatches<'a, '_> {
-        KeyDispatches {
-            job: self,
-            next: self.request.tracks.start,
-            long: None,
+    /// Its dispatches, which are consecutive in the result; `most` is as in [`KeyDispatches::next`].
+    /// Refuses ends that cannot be met: a loop whose first and last rotation differ, or a clamped
+    /// velocity that is too large.
+    pub(crate) fn dispatches(
+        &self,
+        most: usize,
+    ) -> Result<KeyDispatches<'a, '_>, InterpolationError> {
+        let Request { set, timeline, .. } = *self.request;
+        let ends = self.request.interpolation.ends;
+        if matches!(ends, Ends::Loop | Ends::Clamped { .. }) {
+            for track in self.request.tracks.clone() {
+                ends.check(set.times_and_keys(track).1, track)?;
+            }
         }
+        let in_frames = matches!(timeline.ticks, Ticks::Frames { .. });
+        let size = BatchSize {
+            keys: most,
+            tracks: most / timeline.len().max(1),
+            cut: in_frames.then_some(TASK_KEYS.min(most)),
+        };
+        let task_size = BatchSize {
+            keys: TASK_KEYS,
+            tracks: usize::MAX,
+            cut: None,
+        };
+        let mut tasks = Vec::new();
+        for batch in batches(set, Batch::Tracks(self.request.tracks.clone()), size) {
+            let parts = match batch {
+                Batch::Tracks(_) => batches(set, batch, task_size),
+                Batch::Intervals { .. } => vec![batch],
+            };
+            for batch in parts {
+                let keys = match &batch {
+                    Batch::Tracks(tracks) => set.keys_of(tracks.clone()),
+                    Batch::Intervals { .. } => self.keys_of(&batch).map(|own| own.keys.len()).sum(),
+                };
+                let all = batch.samples(set, timeline, usize::MAX);
+                tasks.extend(all.clone().step_by(most).map(|first| Task {
+                    batch: batch.clone(),
+                    samples: first..all.end.min(first + most),
+                    keys,
+                }));
+            }
+        }
+        Ok(KeyDispatches {
+            job: self,
+            tasks: tasks.into_iter().peekable(),
+        })
     }
 }
 
-/// Some samples of a track, and the keys that they lie among.
-pub(crate) struct KeyWindow<'a> {
-    pub(crate) keys: TrackKeys<'a>,
+/// What one thread writes of a dispatch.
+pub(crate) struct Task {
+    pub(crate) batch: Batch,
+    /// Samples of each of its tracks; not all of them only where it has a single track.
     pub(crate) samples: Range<usize>,
+    /// Keys of all its tracks.
+    pub(crate) keys: usize,
+}
+
+impl Task {
+    /// Samples of all its tracks.
+    pub(crate) fn sample_count(&self) -> usize {
+        self.batch.tracks().len() * self.samples.len()
+    }
 }
 
 /// What one dispatch evaluates.
 pub(crate) struct KeyDispatch<'a, 'j> {
     pub(crate) job: &'j KeyJob<'a>,
-    pub(crate) tasks: Vec<Task<'a>>,
+    pub(crate) tasks: Vec<Task>,
+    /// The tracks that it has samples of.
+    pub(crate) tracks: Range<usize>,
     /// Number of rows. Tracks that share their key times are a row each, because their samples lie
     /// at the same places among their keys; other tracks together are one row.
     pub(crate) rows: usize,
@@ -89,133 +143,43 @@ pub(crate) struct KeyDispatch<'a, 'j> {
     pub(crate) samples: usize,
 }
 
-/// What one thread writes of a dispatch.
-pub(crate) enum Task<'a> {
-    /// All of some tracks.
-    Tracks(Range<usize>),
-    Window(KeyWindow<'a>),
-}
-
-/// Cuts a job into dispatches.
+/// The dispatches of a job.
 pub(crate) struct KeyDispatches<'a, 'j> {
     job: &'j KeyJob<'a>,
-    /// The next track.
-    next: usize,
-    /// What is left of a track that is larger than a dispatch.
-    long: Option<Long>,
-}
-
-#[derive(Clone, Copy)]
-struct Long {
-    track: usize,
-    key: usize,
-    sample: usize,
+    tasks: Peekable<IntoIter<Task>>,
 }
 
 impl<'a, 'j> KeyDispatches<'a, 'j> {
     /// The next dispatch, of about `most` keys and at most `most` samples.
-    pub(crate) fn next(
-        &mut self,
-        most: usize,
-    ) -> Result<Option<KeyDispatch<'a, 'j>>, InterpolationError> {
-        let job = self.job;
-        if let Some(dispatch) = self.next_of_long(most) {
-            return Ok(Some(dispatch));
+    pub(crate) fn next(&mut self, most: usize) -> Option<KeyDispatch<'a, 'j>> {
+        let Request { set, timeline, .. } = *self.job.request;
+        let (mut keys, mut samples) = (0, 0);
+        let mut tasks: Vec<Task> = Vec::new();
+        while let Some(task) = self.tasks.next_if(|task| {
+            let longest = (keys + task.keys).max(samples + task.sample_count());
+            tasks.is_empty() || longest <= most
+        }) {
+            keys += task.keys;
+            samples += task.sample_count();
+            tasks.push(task);
         }
-        let Request { set, timeline, .. } = *job.request;
-        let (samples, first, last) = (timeline.len(), self.next, job.request.tracks.end);
-        let in_frames = matches!(timeline.ticks, Ticks::Frames { .. });
-        let rows = most / samples.max(1);
-        let end = (set.tracks_within(first..last, most)).min(first.saturating_add(rows));
-        self.next = last.min(end.max(first + 1));
-        // Ends that cannot be met are refused: a loop whose first and last rotation differ, or a
-        // clamped velocity that is too large.
-        let ends = job.request.interpolation.ends;
-        if matches!(ends, Ends::Loop | Ends::Clamped { .. }) {
-            for track in first..self.next {
-                ends.check(set.times_and_keys(track).1, track)?;
-            }
-        }
-        if first == self.next {
-            return Ok(None);
-        }
-        if end == first && in_frames {
-            self.long = Some(Long {
-                track: first,
-                key: 0,
-                sample: 0,
-            });
-            return Ok(self.next_of_long(most));
-        }
-        let mut tasks = Vec::new();
-        let mut start = first;
-        while start < self.next {
-            let end = (set.tracks_within(start..self.next, TASK_KEYS)).max(start + 1);
-            tasks.push(Task::Tracks(start..end));
-            start = end;
-        }
+        let tracks = tasks.first()?.batch.tracks().start..tasks.last()?.batch.tracks().end;
+        let is_whole = |task: &Task| {
+            matches!(task.batch, Batch::Tracks(_)) && task.samples.len() == timeline.len()
+        };
         let times = |track| set.times_and_keys(track).0;
-        let tracks = self.next - first;
-        let alike = in_frames
-            && tracks <= ROWS
-            && (first..self.next).all(|track| std::ptr::eq(times(first), times(track)));
-        let rows = if alike { tracks } else { 1 };
-        Ok(Some(KeyDispatch {
-            job,
-            tasks,
-            rows,
-            keys: set.keys_of(first..self.next),
-            samples: tracks / rows * samples,
-        }))
-    }
-
-    /// The next dispatch of a track that is larger than a dispatch: several windows, a task each.
-    fn next_of_long(&mut self, most: usize) -> Option<KeyDispatch<'a, 'j>> {
-        let mut dispatch = KeyDispatch {
+        let are_alike = matches!(timeline.ticks, Ticks::Frames { .. })
+            && tracks.len() <= ROWS
+            && tasks.iter().all(is_whole)
+            && (tracks.clone()).all(|track| std::ptr::eq(times(tracks.start), times(track)));
+        let rows = if are_alike { tracks.len() } else { 1 };
+        Some(KeyDispatch {
             job: self.job,
-            tasks: Vec::new(),
-            rows: 1,
-            keys: 0,
-            samples: 0,
-        };
-        let each = most.min(TASK_KEYS);
-        while let Some(long) = self.long {
-            let is_full = dispatch.keys.max(dispatch.samples) + each > most;
-            if is_full && !dispatch.tasks.is_empty() {
-                break;
-            }
-            let window = self.window_of(long, each);
-            dispatch.keys += window.keys.keys.len();
-            dispatch.samples += window.samples.len();
-            dispatch.tasks.push(Task::Window(window));
-        }
-        (!dispatch.tasks.is_empty()).then_some(dispatch)
-    }
-
-    /// Takes the next window of a track that is larger than a dispatch, and notes what is left.
-    fn window_of(&mut self, long: Long, most: usize) -> KeyWindow<'a> {
-        let whole = TrackKeys::whole(self.job.request.set, long.track);
-        let samples = self.job.request.timeline.len();
-        let last = whole.all - 1;
-        let last_key = (long.key + most - 1).min(last);
-        let end = match self.job.clock(long.track) {
-            Some(clock) if last_key < last => clock.first_frame(whole.times[last_key]) as usize,
-            _ => samples,
-        };
-        let end = end.clamp(long.sample, samples);
-        let sample = end.min(long.sample + most);
-        let key = if sample < end { long.key } else { last_key };
-        self.long = (sample < samples).then_some(Long {
-            key,
-            sample,
-            ..long
-        });
-        // A cubic needs the keys before and after its own two as well.
-        let beside = usize::from(self.job.weights().is_some());
-        let first = long.key.saturating_sub(beside);
-        KeyWindow {
-            keys: whole.between(first, (last_key + beside).min(last)),
-            samples: long.sample..sample,
-        }
+            tasks,
+            tracks,
+            rows,
+            keys,
+            samples: samples / rows,
+        })
     }
 }

@@ -24,6 +24,7 @@ use crate::tracks::track_keys::TrackKeys;
 /// Evaluates tracks from their keys, and keeps its scratch from one to the next.
 pub(crate) struct KeyEvaluator<'a> {
     interpolation: &'a Interpolation,
+    curve: KeyCurve,
     block: Block<'a>,
     plan: FramePlan<'a>,
 }
@@ -45,6 +46,7 @@ impl<'a> KeyEvaluator<'a> {
         };
         Self {
             interpolation,
+            curve,
             block,
             plan: FramePlan::new(),
         }
@@ -66,12 +68,8 @@ impl<'a> KeyEvaluator<'a> {
             self.interpolation.ends.check(whole.keys, index)?;
             match &timeline.ticks {
                 Ticks::Frames { rate, start } => {
-                    let last = whole.all - 1;
-                    let clock = FrameClock::new(*rate, *start, whole.times[last]);
-                    // A cubic needs the keys before and after its own two as well.
-                    let beside = usize::from(matches!(self.block, Block::Cubics(..)));
-                    let first = own.start.saturating_sub(beside);
-                    let keys = whole.between(first, (own.end + beside).min(last));
+                    let clock = FrameClock::new(*rate, *start, whole.times[whole.all - 1]);
+                    let keys = whole.around(&own, self.curve.beside());
                     self.frames(keys, clock, window, &mut output)?;
                 }
                 Ticks::Times { times, stride } => {

@@ -30,6 +30,11 @@ pub(crate) enum KeyCurve {
 }
 
 impl KeyCurve {
+    /// How many keys beside an interval's own two a sample needs on both sides.
+    pub(crate) fn beside(self) -> usize {
+        usize::from(matches!(self, Self::Cubics(_)))
+    }
+
     /// The curves of a set that is evaluated from keys: it has fewer samples than keys, and its
     /// curves are arcs, or cubics most of which turn through small angles. `None` for any other.
     pub(crate) fn of_set(

@@ -1,13 +1,11 @@
 //! What a kernel reads of a dispatch: keys with their signs, the places of the samples among them,
 //! and tangent weights.
 
-use std::ops::Range;
-
 use glam::Quat;
 use rayon::prelude::*;
 
 use crate::fit::tangent_weights::TrackWeights;
-use crate::from_keys::dispatches::{KeyDispatch, KeyWindow, Task};
+use crate::from_keys::dispatches::{KeyDispatch, Task};
 use crate::shader::{
     IS_KEY, KeySample, LINE, ROWS_PER_INVOCATION, RowShape, SIGN_TURNED, TangentWeights,
 };
@@ -52,12 +50,9 @@ impl KeyDispatch<'_, '_> {
         ]
     }
 
-    /// Whether none of its keys is turned: a kernel may then read them as they were given.
+    /// Whether none of its tracks' keys is turned: a kernel may then read them as they were given.
     pub(crate) fn keys_are_as_given(&self) -> bool {
-        self.tasks.iter().all(|task| match task {
-            Task::Tracks(tracks) => !self.job.request.set.signs_of(tracks.clone()).any(),
-            Task::Window(window) => !window.keys.signs.any(),
-        })
+        !self.job.request.set.signs_of(self.tracks.clone()).any()
     }
 
     /// Writes what the kernel reads. Keys that it reads in imported memory, as they are stored and none
@@ -72,22 +67,21 @@ impl KeyDispatch<'_, '_> {
         let mut next_key = 0;
         let mut places = Vec::with_capacity(self.tasks.len());
         for task in &self.tasks {
-            let (own_keys, own_samples) = self.job.task_size(task);
             // Several rows share the samples and weights of the first, which the first task
             // writes.
             let (own_samples, own_weights) = match self.rows {
-                1 => (own_samples, own_keys),
+                1 => (task.sample_count(), task.keys),
                 _ => (samples.len(), weights.len()),
             };
             let written = Written {
-                keys: take_first(&mut keys, own_keys),
+                keys: take_first(&mut keys, task.keys),
                 samples: take_first(&mut samples, own_samples),
                 weights: take_first(&mut weights, own_weights),
                 next_key,
                 imported,
             };
             places.push((task, written));
-            next_key += own_keys;
+            next_key += task.keys;
         }
         let request = self.job.request;
         let rule = self.job.weights();
@@ -98,47 +92,37 @@ impl KeyDispatch<'_, '_> {
         places
             .into_par_iter()
             .try_for_each_init(new, |known, (task, mut written)| {
-                let tracks = match task {
-                    Task::Window(window) => return self.write_window(window, known, &mut written),
-                    Task::Tracks(tracks) => tracks.clone(),
-                };
                 if let Ticks::Times { times, stride } = &request.timeline.ticks {
-                    self.write_times(tracks.clone(), times, *stride, &mut written);
+                    self.write_times(task, times, *stride, &mut written);
                     if imported.is_some() {
                         return Ok(());
                     }
                 }
-                tracks.into_iter().try_for_each(|index| {
-                    let window = KeyWindow {
-                        keys: TrackKeys::whole(request.set, index),
-                        samples: 0..request.timeline.len(),
-                    };
-                    self.write_window(&window, known, &mut written)
-                })
+                let mut tracks = self.job.keys_of(&task.batch);
+                tracks.try_for_each(|keys| self.write_track(keys, task, known, &mut written))
             })
     }
 
-    /// Writes keys and weights, and the places of frames.
-    fn write_window<'p>(
+    /// Writes keys and weights of a track, and the places of frames.
+    fn write_track<'p>(
         &self,
-        window: &KeyWindow<'p>,
+        track: TrackKeys<'p>,
+        task: &Task,
         known: &mut Known<'p>,
         written: &mut Written<'_>,
     ) -> Result<(), FramesError> {
-        let TrackKeys {
-            signs,
-            index,
-            first_key,
-            ..
-        } = window.keys;
-        let keys: &[[u32; 4]] = bytemuck::cast_slice(window.keys.keys);
-        let place = written.place_of(self.job.request.set, index, first_key);
+        let keys: &[[u32; 4]] = bytemuck::cast_slice(track.keys);
+        let place = written.place_of(self.job.request.set, track.index, track.first_key);
         if written.imported.is_none() {
             let own = take_first(&mut written.keys, keys.len());
-            if signs.any() {
+            if track.signs.any() {
                 // Whole keys, in order: what is written to may be slow to read.
                 for (i, (to, &[x, y, z, w])) in own.iter_mut().zip(keys).enumerate() {
-                    let turned = if signs.is_turned(i) { SIGN_TURNED } else { 0 };
+                    let turned = if track.signs.is_turned(i) {
+                        SIGN_TURNED
+                    } else {
+                        0
+                    };
                     *to = [x | turned, y, z, w];
                 }
             } else {
@@ -146,10 +130,10 @@ impl KeyDispatch<'_, '_> {
             }
         }
         if !written.samples.is_empty()
-            && let Some(clock) = self.job.clock(index)
+            && let Some(clock) = self.job.clock(track.index)
         {
-            let own = take_first(&mut written.samples, window.samples.len());
-            let found = known.frames.samples(window.keys, clock, &window.samples)?;
+            let own = take_first(&mut written.samples, task.samples.len());
+            let found = known.frames.samples(track, clock, &task.samples)?;
             for (to, sample) in own.iter_mut().zip(found) {
                 *to = KeySample {
                     key: sample.key + place,
@@ -159,7 +143,7 @@ impl KeyDispatch<'_, '_> {
         }
         if let (Some(weights), false) = (&mut known.weights, written.weights.is_empty()) {
             let own = take_first(&mut written.weights, keys.len());
-            own.copy_from_slice(weights.of(window.keys.times, first_key, window.keys.all));
+            own.copy_from_slice(weights.of(track.times, track.first_key, track.all));
         }
         written.next_key += keys.len();
         Ok(())
@@ -167,20 +151,14 @@ impl KeyDispatch<'_, '_> {
 
     /// Writes the places of explicit times, which are as in [`Ticks::Times`]. A loop of its own: a crowd
     /// has many tracks with one sample each.
-    fn write_times(
-        &self,
-        tracks: Range<usize>,
-        times: &[f64],
-        stride: usize,
-        written: &mut Written<'_>,
-    ) {
-        let (set, each) = (self.job.request.set, self.job.request.timeline.len());
+    fn write_times(&self, task: &Task, times: &[f64], stride: usize, written: &mut Written<'_>) {
+        let (set, tracks) = (self.job.request.set, task.batch.tracks());
         let mut first_key = written.place_of(set, tracks.start, 0);
         let mut samples = std::mem::take(&mut written.samples).iter_mut();
         for index in tracks {
             let (starts, keys) = set.times_and_keys(index);
             let mut near = 0;
-            let own = &times[index * stride..][..each];
+            let own = &times[index * stride..][task.samples.clone()];
             for (&time, to) in own.iter().zip(&mut samples) {
                 let sample = key_sample(starts, time, near);
                 near = (sample.key & !IS_KEY) as usize;

@@ -49,6 +49,7 @@ impl VulkanEngine {
             KeyCurve::TwoKeys => Kernel::FromKeysTwoKeys,
             KeyCurve::Cubics(_) => Kernel::FromKeysCubics,
         })?;
+        let mut dispatches = job.dispatches(self.window())?;
         let each = size_of::<Quat>();
         // A dispatch's result may begin at any rotation, and a binding must be able to as well.
         let info = &self.device.physical.info;
@@ -59,13 +60,12 @@ impl VulkanEngine {
             .filter(|keys| keys.start().is_multiple_of(each));
         let output = bytemuck::cast_slice_mut(output);
         let mut target = Target::of(&self.device, imports, output, each);
-        let mut dispatches = job.dispatches();
-        let dispatches = from_fn(|| dispatches.next(self.window()).transpose());
+        let dispatches = from_fn(|| dispatches.next(self.window()));
         let mut end = 0;
         let result = self.fly(
             &self.keys_in_flight,
             &mut target,
-            dispatches.map(|dispatch| dispatch.map_err(EvaluateError::from)),
+            dispatches,
             |own, target, dispatch| {
                 let start = end;
                 end += dispatch.rotation_count() * each;
@@ -92,7 +92,7 @@ impl VulkanEngine {
     ) -> Result<(), EvaluateError> {
         let device = &self.device;
         let size = output.len() as u64;
-        let place = target.place().filter(|_| size > 0);
+        let place = target.place();
         // One queue alone gains nothing by a copy: kernels then write where the host reads.
         let staged = !self.in_place && device.copies_apart();
         let rotations = match place {
@@ -111,15 +111,15 @@ impl VulkanEngine {
             bytemuck::cast_slice_mut(uploads.samples.room(device, sample_bytes)?),
             bytemuck::cast_slice_mut(uploads.weights.room(device, weight_bytes)?),
         )?;
-        let mut written = vec![&uploads.samples];
-        written.extend((weight_bytes > 0).then_some(&uploads.weights));
-        let mut bindings = Vec::new();
-        match as_given {
-            Some(keys) => bindings.push(keys.binding()),
-            None => written.insert(0, &uploads.keys),
-        }
-        bindings.extend(written.iter().filter_map(|upload| upload.binding()));
-        bindings.push(rotations);
+        let keys = as_given.is_none().then_some(&uploads.keys);
+        let weights = (weight_bytes > 0).then_some(&uploads.weights);
+        let written = [keys, Some(&uploads.samples), weights]
+            .into_iter()
+            .flatten();
+        let bindings: Vec<Binding> = (as_given.map(ImportedMemory::binding).into_iter())
+            .chain(written.clone().filter_map(Upload::binding))
+            .chain([rotations])
+            .collect();
         let rows = dispatch.rows(self.maps_samples);
         let groups = [
             (rows.samples + rows.line).div_ceil(FROM_KEYS_WORKGROUP),
@@ -129,7 +129,7 @@ impl VulkanEngine {
         own.compiled = pipeline.has_run.swap(true, Ordering::Relaxed);
         let kernels = &mut own.results.kernels;
         kernels.begin(1)?;
-        Upload::record(written.into_iter(), kernels);
+        Upload::record(written, kernels);
         kernels.dispatch(pipeline, &bindings, bytemuck::bytes_of(&rows), groups)?;
         own.results.submit(place.is_none().then_some(size))?;
         own.done = Some(Finish {

@@ -125,7 +125,7 @@ impl VulkanEngine {
         &self,
         in_flight: &Mutex<Vec<InFlight<U>>>,
         target: &mut Target<'_>,
-        mut work: impl Iterator<Item = Result<W, EvaluateError>>,
+        mut work: impl Iterator<Item = W>,
         mut start: impl FnMut(&mut InFlight<U>, &Target<'_>, W) -> Result<(), EvaluateError>,
     ) -> Result<(), EvaluateError> {
         let mut in_flight = lock(in_flight);
@@ -142,7 +142,7 @@ impl VulkanEngine {
                 self.halve_windows();
             }
             let listing = Instant::now();
-            let started = start(own, target, work?);
+            let started = start(own, target, work);
             stopwatch.timings.work_lists += listing.elapsed();
             started
         });

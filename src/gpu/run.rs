@@ -42,7 +42,7 @@ impl VulkanEngine {
         self.fly(
             &self.in_flight,
             &mut target,
-            windows.map(Ok),
+            windows,
             |own, target, window| self.start(own, job, &window, target),
         )
     }

@@ -1,5 +1,7 @@
 //! Consecutive keys of a track, borrowed with their times and signs.
 
+use std::ops::Range;
+
 use glam::Quat;
 
 use crate::tracks::set::TrackSet;
@@ -35,13 +37,15 @@ impl<'a> TrackKeys<'a> {
         }
     }
 
-    /// The keys of a whole track from `first_key` to `last_key`, both included.
-    pub(crate) fn between(self, first_key: usize, last_key: usize) -> Self {
+    /// Of a whole track, the keys of some intervals and up to `beside` more on both sides.
+    pub(crate) fn around(self, intervals: &Range<usize>, beside: usize) -> Self {
+        let end = self.all.min(intervals.end + 1 + beside);
+        let own = intervals.start.saturating_sub(beside)..end;
         Self {
-            times: &self.times[first_key..=last_key],
-            keys: &self.keys[first_key..=last_key],
-            signs: self.signs.between(first_key..last_key + 1),
-            first_key,
+            times: &self.times[own.clone()],
+            keys: &self.keys[own.clone()],
+            signs: self.signs.between(own.clone()),
+            first_key: own.start,
             ..self
         }
     }

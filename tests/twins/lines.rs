@@ -397,7 +397,7 @@ fn of_keys(set: &TrackSet, frames: &Frames, method: Method) -> Launch {
         request: &request,
         curve,
     };
-    let dispatch = job.dispatches().next(1 << 21).unwrap().unwrap();
+    let dispatch = job.dispatches(1 << 21).unwrap().next(1 << 21).unwrap();
     let rows = dispatch.rows(true);
     let [keys, samples, weights] = dispatch.bytes();
     let mut keys = vec![[0u32; 4]; keys / 16];
