@@ -42,16 +42,21 @@ fn assert_same_bits(expected: &[Quat], found: &[Quat], what: &str) {
     }
 }
 
+/// `SOAK` compares ten times as many.
 #[test]
-fn fifty_million_hostile_rotations_have_the_same_bits() {
+fn twenty_million_hostile_rotations_have_the_same_bits() {
     let (cpu, engines) = (cpu(), vulkan_engines(|_| {}));
     if engines.is_empty() {
         return;
     }
     let mut random = Random(1);
+    let enough = match std::env::var_os("SOAK") {
+        Some(_) => 200_000_000,
+        None => 20_000_000,
+    };
     let mut compared = 0;
     for seed in 0.. {
-        let set = hostile_set(seed, 1024);
+        let set = hostile_set(seed, 256);
         let rate = random.pick(&["24", "25", "30000/1001", "60", "120", "1000/3"]);
         let frames = Frames::rate(rate.parse().unwrap()).between(-1.0, 20.0);
         for (place, method) in METHODS.into_iter().enumerate() {
@@ -68,7 +73,7 @@ fn fifty_million_hostile_rotations_have_the_same_bits() {
             }
             compared += expected.as_quats().len();
         }
-        if compared >= 50_000_000 {
+        if compared >= enough {
             break;
         }
     }
@@ -108,6 +113,10 @@ fn every_memory_budget_transfer_and_layout_gives_the_same_bits() {
     let ways = transfers.map(|transfer| WAYS.map(|way| (transfer, way)));
     for (way, (transfer, (reads, mapping))) in ways.concat().into_iter().enumerate() {
         for (budget, memory) in budgets.into_iter().enumerate() {
+            // Opening a device takes longer than what is asked of it.
+            if !is_turn(way, budget, 2) {
+                continue;
+            }
             for device in vulkan_devices() {
                 let engine = engine(&device, |options| {
                     options.transfer = transfer;
@@ -118,7 +127,7 @@ fn every_memory_budget_transfer_and_layout_gives_the_same_bits() {
                     options.memory = memory;
                 });
                 for (i, (method, expected)) in METHODS.iter().zip(&expected).enumerate() {
-                    if !is_turn(way + budget, i, budgets.len()) {
+                    if !is_turn(way + budget / 2, i, WAYS.len()) {
                         continue;
                     }
                     let what = format!("{method}, {transfer:?}, {mapping:?}, {memory:?} bytes");
@@ -467,11 +476,11 @@ fn few_samples_of_many_keys_have_the_same_bits() {
             path,
             ..method.into()
         };
+        let clip = cpu().upload(&set, interpolation).unwrap();
         for (place, frames) in requests.iter().enumerate() {
             if !is_turn(round, place, 2) {
                 continue;
             }
-            let clip = cpu().upload(&set, interpolation).unwrap();
             let expected = clip.evaluate(frames).unwrap();
             assert!(expected.as_quats().len() < set.key_count(), "few samples");
             assert_everywhere(&engines, &expected, &set, interpolation, frames);

@@ -61,13 +61,17 @@ impl SharedMemory {
             if let Some(share) = own.find_map(|block| block.share(needs)) {
                 return Ok(share);
             }
-            // Where there is no room for a block there may be some for the buffer alone.
-            if let Ok(whole) = allocate(device, kind, BLOCK) {
-                let free = Free::new(BLOCK);
-                blocks.push(Block { kind, whole, free });
-                if let Some(share) = blocks.last_mut().and_then(|block| block.share(needs)) {
-                    return Ok(share);
+            match allocate(device, kind, BLOCK) {
+                Ok(whole) => {
+                    let free = Free::new(BLOCK);
+                    blocks.push(Block { kind, whole, free });
+                    if let Some(share) = blocks.last_mut().and_then(|block| block.share(needs)) {
+                        return Ok(share);
+                    }
                 }
+                // There may be room for the buffer alone.
+                Err(error) if error.is_out_of_memory() => {}
+                Err(error) => return Err(error),
             }
         }
         allocate(device, kind, needs.size)

@@ -1,6 +1,9 @@
 //! What several test files need: devices, hostile keys, a small generator.
 #![allow(dead_code, unreachable_pub)] // each test file uses some of it
 
+use std::collections::BTreeMap;
+use std::sync::{Mutex, PoisonError};
+
 use glam::{DQuat, DVec3, Quat};
 use tumble::{
     Device, Engine, EngineOptions, Frames, Mapping, ReadBack, Reads, Tcb, TrackSet, Transfer,
@@ -44,17 +47,23 @@ pub fn stage(options: &mut EngineOptions, turn: usize) {
     (options.uploads, options.read_back) = STAGED[turn % STAGED.len()];
 }
 
-/// Every Vulkan device in all of [`WAYS`].
+/// Every Vulkan device in all of [`WAYS`]. Tests share the engines of the same options: what takes
+/// longest of most of them is that drivers compile kernels.
 pub fn vulkan_engines(change: impl Fn(&mut EngineOptions)) -> Vec<Engine> {
-    let every = |device: Device| {
-        WAYS.map(|(reads, mapping)| {
+    static OPEN: Mutex<BTreeMap<String, Engine>> = Mutex::new(BTreeMap::new());
+    let mut open = OPEN.lock().unwrap_or_else(PoisonError::into_inner);
+    let mut engines = Vec::new();
+    for (index, device) in vulkan_devices().into_iter().enumerate() {
+        for (reads, mapping) in WAYS {
             let mut options = EngineOptions::default();
             (options.reads, options.mapping) = (reads, mapping);
             change(&mut options);
-            Engine::with_options(device.clone(), &options).unwrap()
-        })
-    };
-    vulkan_devices().into_iter().flat_map(every).collect()
+            let new = || Engine::with_options(device.clone(), &options).unwrap();
+            let engine = open.entry(format!("{index} {options:?}"));
+            engines.push(engine.or_insert_with(new).clone());
+        }
+    }
+    engines
 }
 
 /// Of [`vulkan_engines`], called once or more often, those whose turn it is in this round: each device in

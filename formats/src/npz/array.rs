@@ -88,53 +88,55 @@ impl Array<'_> {
         frames: usize,
         finish: impl Fn(Vec<M::Key>) -> U + Sync,
     ) -> Vec<U> {
-        let asked = (at, tracks, frames);
-        match (&self.header.element, self.header.is_big_endian) {
-            (Element::F16, false) => {
-                self.gather::<M, 2, N, U>(asked, |b| f16::from_le_bytes(b).to_f64(), finish)
-            }
-            (Element::F16, true) => {
-                self.gather::<M, 2, N, U>(asked, |b| f16::from_be_bytes(b).to_f64(), finish)
-            }
-            (Element::F32, false) => {
-                self.gather::<M, 4, N, U>(asked, |b| f32::from_le_bytes(b).into(), finish)
-            }
-            (Element::F32, true) => {
-                self.gather::<M, 4, N, U>(asked, |b| f32::from_be_bytes(b).into(), finish)
-            }
-            (Element::F64, false) => self.gather::<M, 8, N, U>(asked, f64::from_le_bytes, finish),
-            (Element::F64, true) => self.gather::<M, 8, N, U>(asked, f64::from_be_bytes, finish),
-            _ => Vec::new(),
-        }
-    }
-
-    fn gather<M: Make<N>, const SIZE: usize, const N: usize, U: Send>(
-        &self,
-        (at, tracks, frames): (Strides, Range<usize>, usize),
-        number: impl Fn([u8; SIZE]) -> f64 + Sync,
-        finish: impl Fn(Vec<M::Key>) -> U + Sync,
-    ) -> Vec<U> {
-        let (numbers, _) = self.values().as_chunks::<SIZE>();
-        let starts: Vec<usize> = tracks.clone().step_by(TOGETHER).collect();
+        // What the numbers are is asked for each block, so that the threads' code is compiled once, not
+        // for each type of number.
         let block = |&start: &usize| {
-            let own = start..(start + TOGETHER).min(tracks.end);
-            let mut lists: Vec<Vec<M::Key>> =
-                own.clone().map(|_| Vec::with_capacity(frames)).collect();
-            for from in (0..frames).step_by(IN_CACHE) {
-                for (track, list) in own.clone().zip(&mut lists) {
-                    let key = |frame: usize| {
-                        let first = at.first + track * at.track + frame * at.frame;
-                        let component = |i: usize| number(numbers[first + i * at.component]);
-                        M::make(std::array::from_fn(component))
-                    };
-                    list.extend((from..(from + IN_CACHE).min(frames)).map(key));
+            let asked = (at, start..(start + TOGETHER).min(tracks.end), frames);
+            let lists = match (&self.header.element, self.header.is_big_endian) {
+                (Element::F16, false) => {
+                    self.gather::<M, 2, N>(asked, |b| f16::from_le_bytes(b).to_f64())
                 }
-            }
+                (Element::F16, true) => {
+                    self.gather::<M, 2, N>(asked, |b| f16::from_be_bytes(b).to_f64())
+                }
+                (Element::F32, false) => {
+                    self.gather::<M, 4, N>(asked, |b| f32::from_le_bytes(b).into())
+                }
+                (Element::F32, true) => {
+                    self.gather::<M, 4, N>(asked, |b| f32::from_be_bytes(b).into())
+                }
+                (Element::F64, false) => self.gather::<M, 8, N>(asked, f64::from_le_bytes),
+                (Element::F64, true) => self.gather::<M, 8, N>(asked, f64::from_be_bytes),
+                _ => Vec::new(),
+            };
             lists.into_iter().map(&finish).collect::<Vec<U>>()
         };
+        let starts: Vec<usize> = tracks.clone().step_by(TOGETHER).collect();
         let at_least = FEW.div_ceil(TOGETHER * frames.max(1));
         let blocks = starts.par_iter().with_min_len(at_least);
         blocks.flat_map_iter(block).collect()
+    }
+
+    /// The keys of some tracks, each a list.
+    fn gather<M: Make<N>, const SIZE: usize, const N: usize>(
+        &self,
+        (at, tracks, frames): (Strides, Range<usize>, usize),
+        number: impl Fn([u8; SIZE]) -> f64,
+    ) -> Vec<Vec<M::Key>> {
+        let (numbers, _) = self.values().as_chunks::<SIZE>();
+        let new = |_| Vec::with_capacity(frames);
+        let mut lists: Vec<Vec<M::Key>> = tracks.clone().map(new).collect();
+        for from in (0..frames).step_by(IN_CACHE) {
+            for (track, list) in tracks.clone().zip(&mut lists) {
+                let key = |frame: usize| {
+                    let first = at.first + track * at.track + frame * at.frame;
+                    let component = |i: usize| number(numbers[first + i * at.component]);
+                    M::make(std::array::from_fn(component))
+                };
+                list.extend((from..(from + IN_CACHE).min(frames)).map(key));
+            }
+        }
+        lists
     }
 
     /// Every number in C order; `None` for what are no numbers.
