@@ -121,6 +121,8 @@ fi
 if cargo fmt --version >/dev/null 2>&1; then cargo fmt --check; fi
 if cargo clippy --version >/dev/null 2>&1; then
     cargo clippy --workspace --all-targets --quiet -- -D warnings
+    # No other call compiles the tests that run on demand.
+    cargo clippy --workspace --test load --quiet -- -D warnings
 fi
 # Naming an example makes cargo choose the features that clippy's and the tests' builds have, and
 # nothing is checked a second time.

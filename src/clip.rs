@@ -98,9 +98,10 @@ impl Clip {
         layout: Layout,
         output: &mut [R],
     ) -> Result<(), Error> {
+        check_rows::<R>(self.quantity())?;
         let timeline = self.timeline(frames)?;
         let whole = Window::whole(self.track_count(), timeline.len(), layout);
-        in_quats(output, self.quantity(), whole.len(), |quats| {
+        in_quats(output, whole.len(), |quats| {
             let timeline = self.uploaded.data.folded(&timeline)?;
             Ok((self.uploaded).evaluate_window(&self.engine.backend, &timeline, &whole, quats)?)
         })

@@ -255,10 +255,11 @@ impl Engine {
         output: &mut [R],
     ) -> Result<(), Error> {
         let interpolation = interpolation.into();
+        check_rows::<R>(interpolation.quantity)?;
         let timeline = frames.resolve(set.track_count(), set.time_span())?;
         let request = Request::whole(set, &interpolation, &timeline);
         let needed = set.track_count() * timeline.len(); // which `resolve` found to fit
-        in_quats(output, interpolation.quantity, needed, |quats| {
+        in_quats(output, needed, |quats| {
             Ok((self.backend).evaluate_tracks(&request, layout, quats)?)
         })
     }
@@ -296,11 +297,9 @@ pub(crate) fn check_rows<R: Row>(quantity: Quantity) -> Result<(), Error> {
 /// not aligned as they are, memory that is gets the result first.
 pub(crate) fn in_quats<R: Row>(
     output: &mut [R],
-    quantity: Quantity,
     needed: usize,
     fill: impl FnOnce(&mut [Quat]) -> Result<(), Error>,
 ) -> Result<(), Error> {
-    check_rows::<R>(quantity)?;
     let given = output.len();
     if given != needed {
         return Err(Error::OutputLength { given, needed });

@@ -242,6 +242,7 @@ impl Clip {
         encoding: Encoding,
         output: &mut [u8],
     ) -> Result<(), Error> {
+        encoding.check(self.quantity())?;
         let timeline = self.timeline(frames)?;
         let part = Window {
             start: 0,

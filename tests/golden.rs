@@ -771,7 +771,8 @@ fn results_have_the_recorded_hashes() {
     let (widths, vulkan) = (every_width(), vulkan_engines(|_| {}));
     let mut compared = 0;
     for (round, case) in cases.iter().enumerate() {
-        for engine in widths.iter().chain(in_turn(&vulkan, round)) {
+        // A method has six cases: of the next one each is read in the next way.
+        for engine in widths.iter().chain(in_turn(&vulkan, round + round / 6)) {
             let found = evaluated(engine, &sets[case.set], &case.what);
             compared += 1;
             if recorded.get(case.name.as_str()) != Some(&found.as_str()) {

@@ -4,7 +4,7 @@ use glam::Quat;
 use rayon::prelude::*;
 
 use crate::cpu::engine::{CpuEngine, TASK};
-use crate::cpu::evaluate::FEW;
+use crate::cpu::evaluate::SAMPLES_ONE_BY_ONE;
 use crate::cpu::sparse_times::FewTimes;
 use crate::cpu::streaming::{Output, Stage};
 use crate::output::encoding::Encoding;
@@ -98,7 +98,7 @@ impl CpuEngine {
         let (samples, tracks) = (window.samples.len(), window.tracks.len());
         let in_rows = window.layout == Layout::TrackMajor || samples == 1;
         if let Ticks::Times { times, stride } = &timeline.ticks
-            && samples <= FEW
+            && samples <= SAMPLES_ONE_BY_ONE
             && in_rows
             && !clip.interpolation.wrap().repeats()
         {

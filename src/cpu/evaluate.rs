@@ -8,7 +8,7 @@ use crate::time::runs::Affine;
 use crate::twin::evaluate::{Evaluate, Parameters};
 
 /// Up to this many samples are evaluated one by one: most lanes of a vector would be wasted.
-pub(crate) const FEW: usize = 3;
+pub(crate) const SAMPLES_ONE_BY_ONE: usize = 3;
 
 /// Evaluates frames `first`, `first + 1`, … into `output[..count]`. Elements after `count` may be
 /// overwritten, up to the end of a vector. All distances must be integers that f32 holds exactly,
@@ -21,7 +21,7 @@ pub(crate) fn frames<L: Lanes, S: Evaluate>(
     count: usize,
     output: &mut [[f32; 4]],
 ) {
-    if count <= FEW {
+    if count <= SAMPLES_ONE_BY_ONE {
         for (j, rotation) in output[..count].iter_mut().enumerate() {
             *rotation = one(segment, affine, first + j as f32);
         }
@@ -78,7 +78,7 @@ pub(crate) fn distances<L: Lanes, S: Evaluate>(
     count: usize,
     output: &mut [[f32; 4]],
 ) {
-    if count <= FEW {
+    if count <= SAMPLES_ONE_BY_ONE {
         for (rotation, &distance) in output[..count].iter_mut().zip(distances) {
             *rotation = one(segment, affine, distance);
         }

@@ -2,7 +2,7 @@
 
 use glam::Vec4;
 
-use crate::cpu::evaluate::{FEW, distances, frames};
+use crate::cpu::evaluate::{SAMPLES_ONE_BY_ONE, distances, frames};
 use crate::cpu::streaming::{Output, Samples};
 use crate::prepare::clip_data::PartRef;
 use crate::simd::dispatch::{InLanesInto, VectorWidth, in_lanes_into};
@@ -43,7 +43,7 @@ impl<S: Evaluate, O: Samples + ?Sized> InLanesInto<O> for Row<'_, S> {
     #[inline(always)]
     fn run<L: Lanes>(&self, output: &mut O) -> Result<(), FramesError> {
         let PartRef { prepared, part } = self.part;
-        if self.copy.samples.len() <= FEW {
+        if self.copy.samples.len() <= SAMPLES_ONE_BY_ONE {
             return self.few(output.samples());
         }
         if let (&Ticks::Frames { rate, start }, true) = (&self.timeline.ticks, self.copy.is_own()) {
@@ -114,7 +114,7 @@ impl<S: Evaluate> Row<'_, S> {
         true
     }
 
-    /// Evaluates at most [`FEW`] samples, one by one.
+    /// Evaluates at most [`SAMPLES_ONE_BY_ONE`] samples, one by one.
     #[inline(never)]
     fn few(&self, output: &mut [[f32; 4]]) -> Result<(), FramesError> {
         let PartRef { prepared, part } = self.part;

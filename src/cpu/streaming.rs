@@ -4,7 +4,7 @@
 
 use std::ops::Range;
 
-use crate::cpu::evaluate::{FEW, frames, frames_past_caches};
+use crate::cpu::evaluate::{SAMPLES_ONE_BY_ONE, frames, frames_past_caches};
 use crate::cpu::sink::Places;
 use crate::simd::dispatch::{
     InLanesInto, VectorWidth, fence, in_lanes_into, streaming_stores_from,
@@ -63,7 +63,7 @@ impl<'o> Stage<'o> {
         let is_staged = rotations >= LONG / size_of::<[f32; 4]>()
             && samples >= ROW
             && streaming_stores_from().is_some_and(|from| width.narrowed() >= from)
-            && samples_of_a_run() > FEW;
+            && samples_of_a_run() > SAMPLES_ONE_BY_ONE;
         Self::with(width, is_staged, output)
     }
 
@@ -280,7 +280,7 @@ impl Samples for Staged<'_, '_> {
         let own = self.start + start;
         let (line, end) = (own / EACH, own + count);
         let is_next = self.made == own;
-        if is_next && count > FEW && end / EACH < LINES {
+        if is_next && count > SAMPLES_ONE_BY_ONE && end / EACH < LINES {
             // First the staged lines before these samples.
             self.place.store::<L>(&self.lines[..line]);
             if self.place.before.is_empty() {
@@ -378,7 +378,7 @@ pub(crate) mod tests {
     /// Streaming stores change no bit: of frames, of times in any order and of track copies, on
     /// arcs and on polynomials, with vectors of every width, from a clip and from a set.
     #[test]
-    fn rows_on_a_stage_have_the_bits_of_others() {
+    fn rows_past_the_caches_have_the_bits_of_others() {
         let widths = VectorWidth::available().into_iter();
         for (width, uneven) in widths.flat_map(|width| [(width, true), (width, false)]) {
             let set = swinging(4, 26, uneven);

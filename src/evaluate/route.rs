@@ -55,7 +55,7 @@ impl Backend {
                 }
             }
             (Self::Vulkan(opened), Some(curve)) => {
-                // Where samples are explicit times, a track is not cut.
+                // Where samples are explicit times, the keys of a track are not cut.
                 let most = opened.engine().window();
                 match in_order || set.longest().max(timeline.len()) <= most {
                     true => Route::FromKeys(curve),

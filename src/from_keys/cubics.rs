@@ -47,7 +47,7 @@ impl InLanes for CubicBlock {
     fn run<L: Lanes>(&mut self) {
         let [mut x, mut y, mut z, mut w] = [[0.0; LANES]; 4];
         let mut unresolved = 0;
-        // The lanes of a partly filled vector would be computed one by one.
+        // Whole vectors are computed: the lanes of a partly filled one would be computed one by one.
         let whole = self.count.next_multiple_of(16).min(LANES);
         let [before, start, end, after] = &self.keys;
         let [first, last] = &self.weights;

@@ -116,7 +116,7 @@ impl<'a> KeyJob<'a> {
 /// What one thread writes of a dispatch.
 pub(crate) struct Task {
     pub(crate) batch: Batch,
-    /// Samples of each of its tracks; not all of them only where it has a single track.
+    /// The samples that it has of each of its tracks: all, unless it has a single track.
     pub(crate) samples: Range<usize>,
     /// Keys of all its tracks.
     pub(crate) keys: usize,
@@ -150,7 +150,8 @@ pub(crate) struct KeyDispatches<'a, 'j> {
 }
 
 impl<'a, 'j> KeyDispatches<'a, 'j> {
-    /// The next dispatch, of about `most` keys and at most `most` samples.
+    /// The next dispatch, of about `most` keys and at most `most` samples. Where windows were halved
+    /// since the tasks were cut, one task may have more.
     pub(crate) fn next(&mut self, most: usize) -> Option<KeyDispatch<'a, 'j>> {
         let Request { set, timeline, .. } = *self.job.request;
         let (mut keys, mut samples) = (0, 0);

@@ -149,8 +149,8 @@ impl KeyDispatch<'_, '_> {
         Ok(())
     }
 
-    /// Writes the places of explicit times, which are as in [`Ticks::Times`]. A loop of its own: a crowd
-    /// has many tracks with one sample each.
+    /// Writes the places of explicit times, which are as in [`Ticks::Times`]. This is a loop of its own,
+    /// because a crowd has many tracks with one sample each.
     fn write_times(&self, task: &Task, times: &[f64], stride: usize, written: &mut Written<'_>) {
         let (set, tracks) = (self.job.request.set, task.batch.tracks());
         let mut first_key = written.place_of(set, tracks.start, 0);

@@ -57,7 +57,7 @@ impl Residence {
 }
 
 /// The handle type of imported memory: host allocations of this process.
-const LENT: vk::ExternalMemoryHandleTypeFlags =
+const HOST_ALLOCATION: vk::ExternalMemoryHandleTypeFlags =
     vk::ExternalMemoryHandleTypeFlags::HOST_ALLOCATION_EXT;
 
 fn usage(is_texels: bool) -> vk::BufferUsageFlags {
@@ -74,7 +74,7 @@ fn usage(is_texels: bool) -> vk::BufferUsageFlags {
 pub(crate) fn may_be_imported(physical: &PhysicalDevice, is_texels: bool) -> bool {
     let info = vk::PhysicalDeviceExternalBufferInfo::default()
         .usage(usage(is_texels))
-        .handle_type(LENT);
+        .handle_type(HOST_ALLOCATION);
     let mut found = vk::ExternalBufferProperties::default();
     let instance = &physical.instance.raw;
     // SAFETY: Vulkan 1.1, and a device of the instance.
@@ -154,17 +154,22 @@ impl Buffer {
         // SAFETY: the extension is enabled, and the pages are there.
         let known = unsafe {
             let call = borrows.fp().get_memory_host_pointer_properties_ext;
-            call(borrows.device(), LENT, pages, &raw mut properties)
+            call(
+                borrows.device(),
+                HOST_ALLOCATION,
+                pages,
+                &raw mut properties,
+            )
         };
         known.result().ok()?;
-        let (is_texels, lent) = (device.reads_texels, Some(LENT));
-        let made = Self::without_memory(device, size, is_texels, None, lent);
+        let (is_texels, handle_type) = (device.reads_texels, Some(HOST_ALLOCATION));
+        let made = Self::without_memory(device, size, is_texels, None, handle_type);
         let (mut buffer, needs) = made.ok().filter(|(_, needs)| needs.size <= size)?;
         let (required, preferred) = Residence::Readback.properties();
         let allowed = needs.memory_type_bits & properties.memory_type_bits;
         let memory_type = device.physical.memory_type(allowed, required, preferred)?;
         let mut import = vk::ImportMemoryHostPointerInfoEXT::default()
-            .handle_type(LENT)
+            .handle_type(HOST_ALLOCATION)
             .host_pointer(pages);
         let info = vk::MemoryAllocateInfo::default()
             .allocation_size(size)
@@ -177,7 +182,7 @@ impl Buffer {
             size,
             ..Share::default()
         };
-        buffer.bind(memory, is_texels, "tumble lent").ok()?;
+        buffer.bind(memory, is_texels, "tumble imported").ok()?;
         Some(buffer)
     }
 

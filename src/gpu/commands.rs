@@ -16,7 +16,8 @@ pub(crate) struct Commands<'a> {
 impl<'a> Commands<'a> {
     /// # Safety
     /// The command buffer must be of this device, in recording, outside of a render pass, and its queue
-    /// must be able to do what is recorded. Everything that is recorded uses must live until it has ended.
+    /// must be able to do what is recorded. What is recorded may use only objects of this device, which
+    /// must live until the work has ended.
     pub(crate) unsafe fn new(device: &'a LogicalDevice, raw: vk::CommandBuffer) -> Self {
         let device = &device.raw;
         Self { device, raw }
@@ -44,7 +45,8 @@ impl<'a> Commands<'a> {
 
     /// Records that some bytes, a multiple of 4 and at most 65 536, are written into a buffer.
     pub(crate) fn update(self, to: vk::Buffer, offset: u64, bytes: &[u8]) {
-        // SAFETY: as in `dispatch`; the bytes are few, and copied into the commands.
+        // SAFETY: as in `dispatch`; the range lies within the buffer, and the bytes are few and copied
+        // into the commands.
         unsafe { self.device.cmd_update_buffer(self.raw, to, offset, bytes) };
     }
 

@@ -105,7 +105,8 @@ impl DescriptorPool {
 impl Drop for DescriptorPool {
     fn drop(&mut self) {
         if self.device.may_destroy() {
-            // SAFETY: created from this device, and its owner has waited for what uses it; null is allowed.
+            // SAFETY: created from this device, and no submitted work uses its sets any more (see the
+            // type); null is allowed.
             unsafe { self.device.raw.destroy_descriptor_pool(self.raw, None) };
         }
     }

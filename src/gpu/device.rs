@@ -58,7 +58,7 @@ pub(crate) struct LogicalDevice {
     /// The extension that imports the caller's memory, where it is used.
     pub(crate) borrows: Option<ext::external_memory_host::Device>,
     owned: bool,
-    /// Memory of small buffers.
+    /// Memory of buffers.
     pub(crate) shared: SharedMemory,
     /// A wait ran out of time: work may still run, so nothing may be destroyed.
     hung: AtomicBool,

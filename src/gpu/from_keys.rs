@@ -1,5 +1,5 @@
-//! Evaluation from keys on a Vulkan device, for sets with fewer samples than keys. Two dispatches are
-//! in flight: the host writes the keys of one while the device works on the other.
+//! Evaluation from keys on a Vulkan device, for sets with fewer samples than keys. Two dispatches or
+//! three are in flight: the host writes the keys of one while the device works on the others.
 
 use std::iter::from_fn;
 use std::ops::Range;

@@ -4,7 +4,7 @@
 
 use rayon::prelude::*;
 
-use crate::cpu::evaluate::FEW;
+use crate::cpu::evaluate::SAMPLES_ONE_BY_ONE;
 use crate::gpu::work_list::{GroupItems, Patch, Work, parts_in, parts_per_chunk};
 use crate::output::rotations::Layout;
 use crate::output::window::Window;
@@ -76,7 +76,7 @@ impl<'a> SampleList<'a> {
             Ticks::Frames { .. } => is_dense,
             // Explicit times may alternate between the parts of a track: each must have only one.
             Ticks::Times { .. } => {
-                part_count == window.tracks.len() && (is_dense || samples <= FEW)
+                part_count == window.tracks.len() && (is_dense || samples <= SAMPLES_ONE_BY_ONE)
             }
         };
         let starts = all.groups.iter().map(|group| group.first);
@@ -180,7 +180,7 @@ impl InLanes for SampleChunk<'_> {
             timeline, window, ..
         } = *self.all;
         if let Ticks::Times { times, stride } = &timeline.ticks
-            && window.samples.len() <= FEW
+            && window.samples.len() <= SAMPLES_ONE_BY_ONE
         {
             return self.list_sparse_times(times, *stride);
         }

@@ -193,7 +193,7 @@ mod tests {
     /// A comparison that cannot fail proves nothing: without the decorations lavapipe folds `(a +
     /// b) - a`, and that check must fail.
     #[test]
-    fn canaries_fail_on_a_driver_that_is_left_free() {
+    fn it_fails_on_a_driver_that_is_left_free() {
         let devices = list(false).unwrap_or_default();
         let lavapipe = devices
             .into_iter()

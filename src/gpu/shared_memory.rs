@@ -69,9 +69,8 @@ impl SharedMemory {
                         return Ok(share);
                     }
                 }
-                // There may be room for the buffer alone.
-                Err(error) if error.is_out_of_memory() => {}
-                Err(error) => return Err(error),
+                Err(error) if error.is_lost() => return Err(error),
+                Err(_) => {} // there may be room for the buffer alone
             }
         }
         allocate(device, kind, needs.size)

@@ -119,7 +119,7 @@ impl Submission {
 
     /// Where commands are recorded, after `begin`. The caller keeps what they use until `wait`.
     pub(crate) fn commands(&self) -> Commands<'_> {
-        // SAFETY: the command buffer is this device's, and recording is on.
+        // SAFETY: the command buffer is this device's; callers have called `begin`, so recording is on.
         unsafe { Commands::new(&self.device, self.commands) }
     }
 
@@ -295,7 +295,7 @@ pub(crate) enum Access {
     Kernel,
     Copy,
     Host,
-    /// Whatever comes later on the queue.
+    /// Whatever comes before on the queue, or later.
     Any,
 }
 

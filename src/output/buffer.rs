@@ -111,5 +111,9 @@ mod tests {
                 (rotations > 0).then_some(Quat::IDENTITY)
             );
         }
+        for rotations in [1 << 44, usize::MAX / 16, usize::MAX] {
+            let refused = OutputBuffer::new(rotations).unwrap_err();
+            assert_eq!(refused.bytes, 16 * rotations as u128);
+        }
     }
 }

@@ -194,10 +194,10 @@ impl InLanes for InFit<'_> {
             for c in 0..4 {
                 numbers.middle[c] = L::rounded(middle[c] * scale);
                 for k in 0..PAIRS {
-                    let rise = (values[2 * k + 1][c] - middle[c]) * scale;
-                    let fall = (values[2 * k][c] - middle[c]) * scale;
-                    numbers.even[k][c] = L::rounded(rise + fall);
-                    numbers.odd[k][c] = L::rounded(rise - fall);
+                    let forward = (values[2 * k + 1][c] - middle[c]) * scale;
+                    let backward = (values[2 * k][c] - middle[c]) * scale;
+                    numbers.even[k][c] = L::rounded(forward + backward);
+                    numbers.odd[k][c] = L::rounded(forward - backward);
                 }
             }
             let (mut powers, tails) = coefficients(false, &FULL_NODES, &numbers);

@@ -104,7 +104,7 @@ impl Direct {
             self.small_angle.write(lane, segment);
             return;
         }
-        let squared_extent = self.whole.energies[lane];
+        let squared_extent = self.whole.squared_extents[lane];
         let list = if squared_extent <= LONGEST_OF_FEW as f32 {
             &mut self.few_powers
         } else if squared_extent <= LONGEST_WHOLE as f32 {

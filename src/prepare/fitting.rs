@@ -45,7 +45,7 @@ impl Fitting {
     /// [`Fitting::bring`] must copy it before the lanes of `curves` change.
     #[inline]
     pub(crate) fn take(&mut self, curves: &Intervals, lane: usize, place: Place) {
-        let queue = match tier(curves.energies[lane]) {
+        let queue = match tier(curves.squared_extents[lane]) {
             Tier::SmallAngle => &mut self.small_angle,
             Tier::Full => &mut self.full,
             Tier::Piece => {

@@ -127,7 +127,7 @@ impl TrackSet {
         Self::from_shared_times(times.to_vec(), keys.collect())
     }
 
-    /// As [`TrackSet::with_shared_times`], without a copy.
+    /// As [`TrackSet::with_shared_times`], without a copy of the keys.
     ///
     /// # Errors
     /// As there.

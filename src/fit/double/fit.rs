@@ -41,7 +41,7 @@ pub(crate) const SMALL_ANGLE: f64 = 0.002;
 
 /// The squared extent above which curves are cut without trying to fit them whole: hardly any
 /// would fit.
-pub(crate) const LONGEST_WHOLE: f64 = 0.2;
+pub(crate) const LARGEST_UNCUT: f64 = 0.2;
 
 /// The largest accepted estimate of twice a fit's truncation error; see [`tail`].
 pub(crate) const TOLERANCE: f32 = 1.5e-7;
@@ -58,7 +58,7 @@ pub(crate) type Lane32 = [f32; LANES];
 pub(crate) fn tier(squared_extent: f64) -> Tier {
     if squared_extent <= SMALL_ANGLE {
         Tier::SmallAngle
-    } else if squared_extent <= LONGEST_WHOLE {
+    } else if squared_extent <= LARGEST_UNCUT {
         Tier::Full
     } else {
         // NaN comes here too; such a curve is cut down to the finest pieces, and none fits.

@@ -225,7 +225,7 @@ impl Intervals {
             x, y, z, w, a[0], a[1], a[2], b[0], b[1], b[2], c[0], c[1], c[2],
         ];
         store(numbers, lane, own);
-        squared_extent(vectors).store(&mut self.energies[lane..]);
+        squared_extent(vectors).store(&mut self.squared_extents[lane..]);
     }
 
     /// Computes the curve of a lane between its handles, over the full range.
@@ -263,15 +263,15 @@ impl InLanes for ControlRotations<'_> {
         // Taken out, so that what is read and what is written are arguments of their own: the
         // compiler then knows that they do not overlap, and makes vectors of the loop.
         let mut numbers = std::mem::take(&mut self.0.numbers);
-        let mut energies = self.0.energies;
+        let mut squared_extents = self.0.squared_extents;
         let controls = numbers.first_chunk_mut().expect("four rotations");
-        control_lanes(self.0, controls, &mut energies);
-        (self.0.numbers, self.0.energies) = (numbers, energies);
+        control_lanes(self.0, controls, &mut squared_extents);
+        (self.0.numbers, self.0.squared_extents) = (numbers, squared_extents);
     }
 }
 
 #[inline(always)]
-fn control_lanes(own: &Intervals, controls: &mut [Lane; 16], energies: &mut Lane) {
+fn control_lanes(own: &Intervals, controls: &mut [Lane; 16], squared_extents: &mut Lane) {
     for j in 0..own.whole() {
         let (first, last) = (at(&own.outgoing, j), at(&own.incoming, j + 1));
         let start = own.key(j);
@@ -283,7 +283,7 @@ fn control_lanes(own: &Intervals, controls: &mut [Lane; 16], energies: &mut Lane
                 controls[4 * place + c][j] = control[c];
             }
         }
-        energies[j] = squared_extent([first, at(&own.logs, j), last]);
+        squared_extents[j] = squared_extent([first, at(&own.logs, j), last]);
     }
 }
 

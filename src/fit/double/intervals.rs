@@ -97,7 +97,7 @@ pub(crate) struct Intervals {
     /// The numbers that the curve's formula takes.
     pub(crate) numbers: Vec<Lane>,
     /// The squared extent of each curve: the sum of the squares of its half-rotation vectors.
-    pub(crate) energies: Lane,
+    pub(crate) squared_extents: Lane,
 }
 
 impl Intervals {
@@ -119,7 +119,7 @@ impl Intervals {
             outward: [lane; 4],
             inward: [lane; 4],
             numbers: vec![lane; numbers],
-            energies: lane,
+            squared_extents: lane,
         }
     }
 
@@ -247,7 +247,7 @@ impl Intervals {
 
     /// Sets the squared extent of the interval's curve.
     pub(crate) fn set_squared_extent(&mut self, lane: usize, vectors: [Vector; 3]) {
-        self.energies[lane] = squared_extent(vectors);
+        self.squared_extents[lane] = squared_extent(vectors);
     }
 
     /// The curve of an interval.

@@ -59,10 +59,10 @@ impl Sampling for Motion {
                 samples.middle[c] = L::rounded(middle[c] / unit);
                 for k in 0..PAIRS {
                     let [before, after] = [1 + k, 1 + PAIRS + k].map(|i| &found[i][c]);
-                    let rise = (L::Doubles::load(after) - middle[c]) / unit;
-                    let fall = (L::Doubles::load(before) - middle[c]) / unit;
-                    samples.even[k][c] = L::rounded(rise + fall);
-                    samples.odd[k][c] = L::rounded(rise - fall);
+                    let forward = (L::Doubles::load(after) - middle[c]) / unit;
+                    let backward = (L::Doubles::load(before) - middle[c]) / unit;
+                    samples.even[k][c] = L::rounded(forward + backward);
+                    samples.odd[k][c] = L::rounded(forward - backward);
                 }
             }
             block.interpolate(lane, nodes, &samples, segments);

@@ -69,7 +69,7 @@ pub(crate) struct HandlesF32 {
     pub(crate) numbers: CurveNumbers,
     /// The squared extent of each curve. It is above [`LONGEST_DIRECT`] where the f32 numbers do
     /// not hold.
-    pub(crate) energies: Row,
+    pub(crate) squared_extents: Row,
 }
 
 impl HandlesF32 {
@@ -81,7 +81,7 @@ impl HandlesF32 {
             outgoing: [[0.0; ROOM]; 3],
             far: [0.0; ROOM],
             numbers: [[[0.0; 4]; ROOM]; 5],
-            energies: [f32::INFINITY; ROOM],
+            squared_extents: [f32::INFINITY; ROOM],
         }
     }
 }
@@ -211,7 +211,7 @@ impl FindCurves<'_> {
                 [w3[0], w3[1], w3[2], none],
                 end,
             ];
-            squared_extent.store(&mut whole.energies[own..own + L::COUNT]);
+            squared_extent.store(&mut whole.squared_extents[own..own + L::COUNT]);
             for (i, all) in whole.numbers.iter_mut().enumerate() {
                 L::store_rotations(numbers[i], &mut all[own..own + L::COUNT]);
             }

@@ -12,7 +12,7 @@ use crate::simd::lanes::Lanes;
 use crate::twin::small_angle::{SmallAngleCubic, small_angle_cubic};
 
 /// Up to this many curves are computed one by one: in vectors most lanes would be wasted.
-const FEW: usize = 6;
+const CURVES_ONE_BY_ONE: usize = 6;
 
 /// The small-angle curves of a block's intervals.
 pub(crate) struct SmallAngleLanes {
@@ -58,7 +58,7 @@ impl SmallAngleLanes {
             // Step j of the loop computes the curve of lane j + 1, so `last` steps reach lane `last`.
             count: last.next_multiple_of(MOST),
         };
-        if near.len() > FEW {
+        if near.len() > CURVES_ONE_BY_ONE {
             in_lanes(&mut curves);
             return;
         }
