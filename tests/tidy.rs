@@ -52,7 +52,7 @@ fn unsafe_code_stays_in_its_homes() {
     }
 }
 
-/// A form, a helper or a canary in WGSL without its twin would go unchecked.
+/// A form, a helper or a check of the self-test in WGSL without its twin would go unchecked.
 #[test]
 fn every_shader_function_has_its_twin() {
     for shader in files("shaders", "wgsl") {

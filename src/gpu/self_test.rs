@@ -1,5 +1,5 @@
 //! The self-test: before a device is trusted it computes a fixed set of inputs, and every bit is
-//! compared with the CPU's. Each check of it is a canary.
+//! compared with the CPU's.
 
 use crate::gpu::error::{EvaluateError, VulkanError};
 use crate::shader::{Dispatch, Kernel, Probe, Reply, WORKGROUP};
@@ -25,7 +25,7 @@ use crate::time::frames::Frames;
 use crate::tracks::set::TrackSet;
 use crate::twin::self_test::reply;
 
-/// How a device did on one canary, a check of the self-test.
+/// How a device did on one check of the self-test.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct SelfTestReport {
@@ -37,7 +37,7 @@ pub struct SelfTestReport {
     pub differing: usize,
 }
 
-/// Runs every canary on a device.
+/// Runs every check on a device.
 pub(crate) fn run(engine: &VulkanEngine) -> Result<Vec<SelfTestReport>, VulkanError> {
     let mut reports = expressions(&engine.device, Exactness::Demanded)?;
     for (name, method) in [

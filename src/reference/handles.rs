@@ -20,13 +20,12 @@ pub(crate) struct Handles {
     inner: fn(&Sides) -> (DVec3, DVec3),
     /// The handle of an end of the track whose interval turns by `whole`, where `other` is the
     /// handle at the other end of the interval.
-    parabolic: fn(DVec3, DVec3) -> DVec3,
-    /// The same for ends without angular acceleration, of what is left of the interval without the
-    /// other handle, and this.
-    natural: fn(DVec3, DVec3) -> DVec3,
-    /// The same for an end that turns as if by the first vector in the whole interval, which turns
-    /// by the second.
-    turning: fn(DVec3, DVec3) -> DVec3,
+    parabolic: fn(whole: DVec3, other: DVec3) -> DVec3,
+    /// The same for ends without angular acceleration, where `rest` is what is left of the interval
+    /// without the other handle.
+    natural: fn(rest: DVec3, other: DVec3) -> DVec3,
+    /// The same for an end that turns as if by `turn` in the interval, which turns by `whole`.
+    turning: fn(turn: DVec3, whole: DVec3) -> DVec3,
     /// The curve of an interval with an outgoing and an incoming handle.
     segment: fn(&Track, usize, DVec3, DVec3) -> Segment,
 }

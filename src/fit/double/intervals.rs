@@ -29,7 +29,8 @@ pub(crate) type Lane = [f64; ROOM];
 /// Some consecutive intervals of a track in a block.
 #[derive(Debug, Clone)]
 pub(crate) struct Stretch {
-    /// The lane of its first interval; the lane before it is context.
+    /// The lane of its first interval. The lane before it is context, unless the interval is its
+    /// track's only one.
     pub(crate) lane: usize,
     /// The intervals' places in the track.
     pub(crate) intervals: Range<usize>,

@@ -115,7 +115,8 @@ impl InLanes for Curves<'_> {
     fn run<L: Lanes>(&mut self) {
         let mut powers = [[[0.0; ROOM]; 4]; 7];
         let mut holds = [false; ROOM];
-        // Lane 0 is always context, so the first curve is in lane 1.
+        // Lane 0 is context, or a track's only interval, which has no such curve: the first curve is in
+        // lane 1.
         let count = self.count.min(LANES);
         // Chosen in a loop of their own: a choice between two keys in memory would keep the
         // compiler from making vectors of the loop behind it, which then costs twice as much.
