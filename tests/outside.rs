@@ -176,6 +176,7 @@ fn the_same_bits_on_every_device_however_it_is_cut() {
                     let difference = first_difference(expected.as_quats(), found.as_quats());
                     assert_eq!(difference, None, "{what}, {}", engine.device_name());
                 }
+                round += 1;
             }
         }
     }
