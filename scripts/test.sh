@@ -124,10 +124,7 @@ if cargo clippy --version >/dev/null 2>&1; then
     # No other call compiles the tests that run on demand.
     cargo clippy --workspace --test load --quiet -- -D warnings
 fi
-# Naming an example makes cargo choose the features that clippy's and the tests' builds have, and
-# nothing is checked a second time.
-RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --document-private-items --quiet \
-    --lib --bins --example same_bits
+RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --document-private-items --quiet
 for fetch in "${fetching[@]}"; do wait "$fetch"; done
 # Four seconds for each fuzz target, a quarter for motion files; ten minutes each are FUZZ_SECONDS=600.
 export FUZZ_SECONDS=${FUZZ_SECONDS:-4}
