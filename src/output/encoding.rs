@@ -425,3 +425,25 @@ fn of_matrix(number: &Numbers, length: usize, order: u32) -> [f32; 4] {
     };
     Quat::from_mat3(&matrix).to_array()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_decoded_is_near_what_was_encoded() {
+        let rotation = [0.5, -0.5, 0.099_999, -0.7];
+        for (encoding, bound) in [
+            (Encoding::F32, 0.0),
+            (Encoding::F16, 2.5e-4),
+            (Encoding::Snorm16, 1.6e-5),
+        ] {
+            let mut bytes = vec![0; encoding.bytes()];
+            encoding.encode(&[rotation], &mut bytes).unwrap();
+            let decoded = encoding.decode(&bytes).unwrap();
+            for (a, b) in rotation.iter().zip(decoded) {
+                assert!((a - b).abs() <= bound, "{encoding:?}: {a} {b}");
+            }
+        }
+    }
+}
