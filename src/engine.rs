@@ -80,13 +80,13 @@ impl Engine {
         VectorWidth::limit()?;
         match device {
             Device::Cpu => {
-                let width = options.vector_width.unwrap_or_else(VectorWidth::widest);
                 if let Some(given) = options.threads.filter(|n| !(1..=MOST_THREADS).contains(n)) {
                     let most = MOST_THREADS;
                     return Err(Error::ThreadCount { given, most });
                 }
-                let engine =
-                    CpuEngine::new(width, options.threads).map_err(|error| Error::Threads {
+                let width = options.vector_width.unwrap_or_else(VectorWidth::widest);
+                let engine = CpuEngine::new(width, options.streaming_stores, options.threads)
+                    .map_err(|error| Error::Threads {
                         reason: error.to_string(),
                     })?;
                 Ok(Self {

@@ -24,6 +24,7 @@ mod textbook;
 mod tidy;
 mod transforms;
 mod validation;
+mod verify;
 mod vulkan;
 
 #[path = "support/application.rs"]

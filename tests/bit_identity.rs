@@ -8,8 +8,8 @@ use crate::support::{
 use glam::{DQuat, DVec3, Quat};
 use tumble::reference::{Curve, angle_between};
 use tumble::{
-    Device, Encoding, Ends, Engine, EngineOptions, Frames, Interpolation, Layout, METHODS, Path,
-    Rotations, TrackSet, Transfer, VectorWidth, WrapMode, method,
+    Device, Encoding, Ends, Engine, EngineOptions, Frames, Interpolation, Layout, METHODS, Method,
+    Path, Rotations, TrackSet, Transfer, VectorWidth, WrapMode, method,
 };
 
 const ENDS: [Ends; 5] = [
@@ -31,6 +31,17 @@ fn engine(device: &Device, change: impl FnOnce(&mut EngineOptions)) -> Engine {
     let mut options = EngineOptions::default();
     change(&mut options);
     Engine::with_options(device.clone(), &options).unwrap()
+}
+
+/// An engine on the CPU for each vector width, the narrowest first.
+fn widths(streaming_stores: Option<bool>) -> Vec<Engine> {
+    let of_width = |width| {
+        engine(&Device::Cpu, |options| {
+            options.vector_width = Some(width);
+            options.streaming_stores = streaming_stores;
+        })
+    };
+    VectorWidth::available().into_iter().map(of_width).collect()
 }
 
 fn assert_same_bits(expected: &[Quat], found: &[Quat], what: &str) {
@@ -101,6 +112,94 @@ fn every_vector_width_and_thread_count_gives_the_same_bits() {
     }
 }
 
+/// Catches an instruction set whose code fuses, reorders or divides otherwise where segments are
+/// prepared: steps from a hundredth of a degree to half a turn, evenly and unevenly.
+#[test]
+fn every_vector_width_prepares_the_same_curves() {
+    let mut set = TrackSet::new();
+    for track in 0..40 {
+        let step = 3.1 * 0.5f32.powi(track % 14);
+        let uneven = if track < 20 { 0.0 } else { 0.99 };
+        let times: Vec<f64> = (0..23)
+            .map(|i| f64::from(i) + uneven * f64::from(i % 2))
+            .collect();
+        let key = |i: u8| {
+            let i = f32::from(i);
+            let turn = step * (i + i.sin());
+            Quat::from_rotation_y(turn) * Quat::from_rotation_x(0.3 * turn.cos())
+        };
+        let mut keys: Vec<Quat> = (0..23).map(key).collect();
+        if track == 13 {
+            keys[7] = keys[6]; // no plane
+            keys[9] = Quat::IDENTITY; // half a turn to the next
+            keys[10] = Quat::from_xyzw(1.0, 0.0, 0.0, 0.0);
+        }
+        set.push("", &times, &keys).unwrap();
+    }
+    let frames = Frames::fps(64);
+    let [narrow, wider @ ..] = &widths(None)[..] else {
+        panic!("every processor has the baseline");
+    };
+    let found = |engine: &Engine, method: Method| {
+        let clip = engine.upload(&set, method).unwrap();
+        clip.evaluate(&frames).unwrap()
+    };
+    for method in METHODS {
+        let expected = found(narrow, method);
+        for engine in wider {
+            let found = found(engine, method);
+            assert_same_bits(expected.as_quats(), found.as_quats(), &method.to_string());
+        }
+    }
+}
+
+/// Catches samples that are begun too early or too late, in runs of every length: of frames and of
+/// times, with ordinary and with streaming stores, with vectors of every width.
+#[test]
+fn runs_of_every_length_have_the_bits_of_single_samples() {
+    // Each length once, long ones behind short ones.
+    let lengths = (0..140u16).map(|i| f64::from(1 + i * 61 % 140));
+    let ends = lengths.scan(0.0, |end, length| {
+        *end += length;
+        Some(*end)
+    });
+    let times: Vec<f64> = std::iter::once(0.0).chain(ends).collect();
+    let mut set = TrackSet::new();
+    for tiny in [0.3, 2.0f32.powi(-50)] {
+        let key = |i: usize| {
+            let (sine, cosine) = (0.7 * i as f32).sin_cos();
+            Quat::from_xyzw(sine, tiny, 0.0, cosine).normalize()
+        };
+        let keys: Vec<Quat> = (0..times.len()).map(key).collect();
+        set.push("", &times, &keys).unwrap();
+    }
+    let samples: Vec<f64> = (0..=9870).map(f64::from).collect();
+    let widths = [false, true].map(|streams| widths(Some(streams))).concat();
+    for method in [method::SLERP, method::BESSEL_OVERHAUSER] {
+        let clip = cpu().upload(&set, method).unwrap();
+        let mut expected = [Vec::new(), Vec::new()];
+        for pair in samples.chunks(2) {
+            let found = clip.evaluate(&Frames::at(pair.to_vec())).unwrap();
+            let tracks = found.as_quats().chunks(pair.len());
+            for (row, own) in expected.iter_mut().zip(tracks) {
+                row.extend(own);
+            }
+        }
+        let expected = expected.concat();
+        for engine in &widths {
+            let clip = engine.upload(&set, method).unwrap();
+            for frames in [Frames::fps(1), Frames::at(samples.clone())] {
+                let found = clip.evaluate(&frames).unwrap();
+                assert_same_bits(
+                    &expected,
+                    found.as_quats(),
+                    &format!("{method}, {frames:?}"),
+                );
+            }
+        }
+    }
+}
+
 /// Catches a result that depends on where a window of work starts, and a budget
 /// that is ignored until memory runs out.
 #[test]
@@ -142,29 +241,66 @@ fn every_memory_budget_transfer_and_layout_gives_the_same_bits() {
     }
 }
 
-/// Long results may be written to memory in another way than short ones. Catches what such
-/// stores leave out or put elsewhere.
+/// Long results are written past the caches on processors that gain by it: of arcs, of
+/// polynomials, and by the way that has no segments kept. Catches what such stores leave out.
 #[test]
 fn long_results_have_the_bits_of_short_ones() {
     let set = hostile_set(7, 1800);
     let frames = Frames::fps(60).between(-1.0, 20.0);
-    for method in [method::SLERP, method::BESSEL_OVERHAUSER, method::SQUAD] {
-        for width in VectorWidth::available() {
-            let engine = engine(&Device::Cpu, |options| options.vector_width = Some(width));
-            let long = engine.evaluate(&set, method, &frames).unwrap();
-            let samples = long.samples();
-            assert!(16 * long.as_quats().len() > 33 << 20, "{samples} each");
-            let kept = engine.upload(&set, method).unwrap();
-            let kept = kept.evaluate(&frames).unwrap();
-            let what = format!("{method}, {width:?}, kept");
-            assert_same_bits(long.as_quats(), kept.as_quats(), &what);
-            for (i, found) in long.as_quats().chunks(10 * samples).enumerate() {
-                let few = set
-                    .select(10 * i..(10 * i + 10).min(set.track_count()))
+    for method in [method::SLERP, method::BESSEL_OVERHAUSER] {
+        let long = cpu().evaluate(&set, method, &frames).unwrap();
+        let samples = long.samples();
+        assert!(16 * long.as_quats().len() > 33 << 20, "{samples} each");
+        let kept = cpu().upload(&set, method).unwrap();
+        let kept = kept.evaluate(&frames).unwrap();
+        assert_same_bits(long.as_quats(), kept.as_quats(), "kept");
+        let few = set.select(900..910).unwrap();
+        let short = cpu().evaluate(&few, method, &frames).unwrap();
+        let found = &long.as_quats()[900 * samples..910 * samples];
+        assert_same_bits(short.as_quats(), found, "ten tracks of many");
+    }
+}
+
+/// Streaming stores change no bit: of frames, of times in any order and of track copies, on arcs
+/// and on polynomials, with vectors of every width, from a clip and from a set, for every alignment
+/// of the output.
+#[test]
+fn streaming_stores_have_the_bits_of_others() {
+    let set = hostile_set(7, 16);
+    let engines = widths(Some(false)).into_iter().zip(widths(Some(true)));
+    for (ordinary, streaming) in engines {
+        for (method, after) in [
+            (method::SLERP, WrapMode::Hold),
+            (method::BESSEL_OVERHAUSER, WrapMode::Hold),
+            (method::BESSEL_OVERHAUSER, WrapMode::Loop),
+            (method::SQUAD, WrapMode::Hold),
+        ] {
+            let interpolation = Interpolation {
+                after,
+                ..method.into()
+            };
+            let clip = streaming.upload(&set, interpolation).unwrap();
+            let times = (0..700).map(|k| f64::from(k * 617 % 700) * 0.04 - 2.0);
+            for frames in [
+                Frames::fps(60).between(0.0, 16.0),
+                Frames::fps(24).between(3.01, 17.0),
+                Frames::fps(40).between(-3.0, 20.0),
+                Frames::at(times.collect()),
+            ] {
+                let expected = ordinary.evaluate(&set, interpolation, &frames).unwrap();
+                let count = expected.as_quats().len();
+                for shift in 0..4 {
+                    let mut found = vec![Quat::IDENTITY; count + 3];
+                    let found = &mut found[shift..][..count];
+                    let layout = Layout::TrackMajor;
+                    match shift % 2 {
+                        0 => clip.evaluate_into(&frames, layout, found),
+                        _ => streaming.evaluate_into(&set, interpolation, &frames, layout, found),
+                    }
                     .unwrap();
-                let short = engine.evaluate(&few, method, &frames).unwrap();
-                let what = format!("{method}, {width:?}, from track {}", 10 * i);
-                assert_same_bits(short.as_quats(), found, &what);
+                    let what = format!("{method}, {after:?}, {streaming:?}, shifted by {shift}");
+                    assert_same_bits(expected.as_quats(), found, &what);
+                }
             }
         }
     }

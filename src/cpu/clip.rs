@@ -121,7 +121,7 @@ impl CpuEngine {
         match window.layout {
             Layout::TrackMajor => {
                 let of_a_run = || clip.samples_of_a_run(timeline);
-                let mut stage = Stage::new(self.width, rotations, samples, of_a_run, output);
+                let mut stage = Stage::new(self, rotations, samples, of_a_run, output);
                 for track in window.tracks.clone() {
                     stage.row(samples, |samples, output| {
                         let first = window.samples.start + samples.start;

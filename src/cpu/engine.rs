@@ -16,6 +16,8 @@ pub(crate) const TASK: usize = 16 * 1024;
 /// Evaluates clips with the f32 twins.
 pub(crate) struct CpuEngine {
     pub(crate) width: VectorWidth,
+    /// Whether results are written by streaming stores; `None` where that depends on them.
+    pub(crate) streaming_stores: Option<bool>,
     pool: Option<rayon::ThreadPool>,
     pub(crate) scratch_pool: ScratchPool,
 }
@@ -24,12 +26,14 @@ impl CpuEngine {
     /// With `threads` threads of its own; by default with the process's shared ones.
     pub(crate) fn new(
         width: VectorWidth,
+        streaming_stores: Option<bool>,
         threads: Option<usize>,
     ) -> Result<Self, rayon::ThreadPoolBuildError> {
         let pool = threads
             .map(|threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build())
             .transpose()?;
         Ok(Self {
+            streaming_stores,
             pool,
             ..Self::on_shared_threads(width)
         })
@@ -39,6 +43,7 @@ impl CpuEngine {
     pub(crate) fn on_shared_threads(width: VectorWidth) -> Self {
         Self {
             width,
+            streaming_stores: None,
             pool: None,
             scratch_pool: ScratchPool::default(),
         }

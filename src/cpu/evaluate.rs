@@ -205,7 +205,7 @@ fn vectors<L: Lanes, S: Evaluate, const FILTER: bool, const FAR: bool>(
 }
 
 #[cfg(test)]
-pub(crate) mod tests {
+mod tests {
     use fastrand::Rng;
 
     use glam::Vec4;
@@ -214,7 +214,6 @@ pub(crate) mod tests {
     use crate::twin::evaluate::COARSE;
 
     use super::*;
-    use crate::cpu::sink::tests::in_lines;
     use crate::shader::{ArcSegment, PolynomialSegment};
 
     /// Both signs, magnitudes about 2^-40 and below, and zero.
@@ -268,58 +267,6 @@ pub(crate) mod tests {
             }
         }
         assert!(canonical > 300 && others > 1000, "{canonical} {others}");
-    }
-
-    /// Catches samples that are begun too early or too late, in runs of every length: of frames
-    /// and of distances, with room in the output after them and without.
-    pub(crate) fn runs_are_samples<L: Lanes>() {
-        let random = &mut Rng::with_seed(1);
-        let mut four = || std::array::from_fn(|_| random.f32() - 0.5);
-        let arc = ArcSegment {
-            middle: four(),
-            tangent: four(),
-        };
-        let tiny = ArcSegment {
-            middle: [0.5, 0.5, 0.0, 2.0f32.powi(-50)],
-            ..arc
-        };
-        let polynomial = PolynomialSegment {
-            coefficients: std::array::from_fn(|_| four()),
-        };
-        for count in 1..=140 {
-            samples_of_a_run::<L, _>(&arc, count);
-            samples_of_a_run::<L, _>(&tiny, count);
-            samples_of_a_run::<L, _>(&polynomial, count);
-        }
-    }
-
-    fn samples_of_a_run<L: Lanes, S: Evaluate>(segment: &S, count: usize) {
-        let affine = Affine {
-            scale: 0.9 / count as f32,
-            offset: 0.01,
-        };
-        let first = -(count as f32 * 0.5).floor();
-        let all: Vec<f32> = (0..count + STEPS.len()).map(|j| first + j as f32).collect();
-        let expected: Vec<_> = (all[..count].iter())
-            .map(|&distance| one(segment, affine, distance).map(f32::to_bits))
-            .collect();
-        for filled in 0..4 {
-            let found = in_lines::<L, S>(segment, affine, first, count, filled);
-            let found: Vec<_> = found.iter().map(|q| q.map(f32::to_bits)).collect();
-            assert_eq!(found, expected, "{count} frames behind {filled}");
-        }
-        for room in [0, STEPS.len()] {
-            let mut output = vec![[f32::NAN; 4]; count + room];
-            frames::<L, S>(segment, affine, first, count, &mut output);
-            let found = |output: &[[f32; 4]]| -> Vec<_> {
-                let own = output[..count].iter();
-                own.map(|q| q.map(f32::to_bits)).collect()
-            };
-            assert_eq!(found(&output), expected, "{count} frames");
-            output.fill([f32::NAN; 4]);
-            distances::<L, S>(segment, affine, &all, count, &mut output);
-            assert_eq!(found(&output), expected, "{count} distances");
-        }
     }
 
     /// The case nearest to the limit: two numbers that nearly cancel leave 2^-63.

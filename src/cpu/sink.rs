@@ -141,38 +141,3 @@ fn put<L: Lanes>(vector: L, i: usize, whole: &mut [L::Block], rest: &mut [L::Blo
         vector.store_side_by_side(bytemuck::cast_slice_mut(slice::from_mut(place)));
     }
 }
-
-#[cfg(test)]
-pub(crate) mod tests {
-    use bytemuck::Zeroable as _;
-
-    use super::*;
-    use crate::cpu::evaluate::frames_past_caches;
-    use crate::simd::line::EACH;
-    use crate::time::runs::Affine;
-
-    /// Evaluates frames with streaming stores, after `filled` rotations of their first line.
-    pub(crate) fn in_lines<L: Lanes, S: Evaluate>(
-        segment: &S,
-        affine: Affine,
-        first: f32,
-        count: usize,
-        filled: usize,
-    ) -> Vec<[f32; 4]> {
-        let there: Vec<[f32; 4]> = (0..EACH).map(|k| [9.0 + k as f32; 4]).collect();
-        let whole = (filled + count) / EACH;
-        let mut lines = vec![Line::zeroed(); whole + 1];
-        let mut begun = Line::zeroed();
-        bytemuck::cast_slice_mut(slice::from_mut(&mut begun)).copy_from_slice(&there);
-        let (own, rest) = lines.split_at_mut(whole);
-        let places = Places {
-            begun: (begun, filled),
-            whole: own,
-            rest: &mut rest[0],
-        };
-        frames_past_caches::<L, S>(segment, affine, first, count, places);
-        let found: &[[f32; 4]] = bytemuck::cast_slice(&lines);
-        assert_eq!(found[..filled], there[..filled]);
-        found[filled..filled + count].to_vec()
-    }
-}

@@ -4,6 +4,7 @@
 
 use std::ops::Range;
 
+use crate::cpu::engine::CpuEngine;
 use crate::cpu::evaluate::{SAMPLES_ONE_BY_ONE, frames, frames_past_caches};
 use crate::cpu::sink::Places;
 use crate::simd::dispatch::{
@@ -50,20 +51,19 @@ impl<'o> Stage<'o> {
     /// For `output`: rows of `samples` each, a part of a result of `rotations`. The average length
     /// of a run is computed last, only if everything else calls for streaming stores.
     pub(crate) fn new(
-        width: VectorWidth,
+        engine: &CpuEngine,
         rotations: usize,
         samples: usize,
         samples_of_a_run: impl FnOnce() -> usize,
         output: &'o mut [[f32; 4]],
     ) -> Self {
-        #[cfg(test)]
-        if tests::IS_STAGED.get() {
-            return Self::with(width, true, output);
-        }
-        let is_staged = rotations >= LONG / size_of::<[f32; 4]>()
-            && samples >= ROW
-            && streaming_stores_from().is_some_and(|from| width.narrowed() >= from)
-            && samples_of_a_run() > SAMPLES_ONE_BY_ONE;
+        let width = engine.width;
+        let is_staged = engine.streaming_stores.unwrap_or_else(|| {
+            rotations >= LONG / size_of::<[f32; 4]>()
+                && samples >= ROW
+                && streaming_stores_from().is_some_and(|from| width.narrowed() >= from)
+                && samples_of_a_run() > SAMPLES_ONE_BY_ONE
+        });
         Self::with(width, is_staged, output)
     }
 
@@ -309,29 +309,13 @@ impl Samples for Staged<'_, '_> {
 }
 
 #[cfg(test)]
-pub(crate) mod tests {
-    use std::cell::Cell;
+mod tests {
     use std::convert::Infallible;
 
     use glam::Quat;
     use proptest::prelude::*;
 
     use super::*;
-    use crate::device::Device;
-    use crate::engine::Engine;
-    use crate::gpu::options::EngineOptions;
-    use crate::method;
-    use crate::method::interpolation::Interpolation;
-    use crate::output::rotations::Layout;
-    use crate::simd::dispatch::VectorWidth;
-    use crate::time::frames::Frames;
-    use crate::time::wrap::WrapMode;
-    use crate::tracks::set::swinging;
-
-    thread_local! {
-        /// Whether this thread stages all rows.
-        pub(crate) static IS_STAGED: Cell<bool> = const { Cell::new(false) };
-    }
 
     /// Catches lines that are stored too early, in a wrong place or not at all, and gaps between
     /// rows, for every alignment of the output.
@@ -373,58 +357,5 @@ pub(crate) mod tests {
         let widths = proptest::sample::select(VectorWidth::available());
         let strategy = (proptest::collection::vec(row, 1..9), 0usize..8, widths);
         proptest!(|((rows, shift, width) in strategy)| run(rows, shift, width));
-    }
-
-    /// Streaming stores change no bit: of frames, of times in any order and of track copies, on
-    /// arcs and on polynomials, with vectors of every width, from a clip and from a set.
-    #[test]
-    fn rows_past_the_caches_have_the_bits_of_others() {
-        let widths = VectorWidth::available().into_iter();
-        for (width, uneven) in widths.flat_map(|width| [(width, true), (width, false)]) {
-            let set = swinging(4, 26, uneven);
-            let options = EngineOptions {
-                vector_width: Some(width),
-                ..EngineOptions::default()
-            };
-            let engine = Engine::with_options(Device::Cpu, &options).unwrap();
-            for (method, after) in [
-                (method::SLERP, WrapMode::Hold),
-                (method::BESSEL_OVERHAUSER, WrapMode::Hold),
-                (method::BESSEL_OVERHAUSER, WrapMode::Loop),
-            ] {
-                let interpolation = Interpolation {
-                    after,
-                    ..method.into()
-                };
-                let clip = engine.upload(&set, interpolation).unwrap();
-                let times = (0..2500).map(|k| f64::from(k * 617 % 2500) * 0.01 - 2.0);
-                for frames in [
-                    Frames::fps(60),
-                    Frames::fps(24).between(3.01, 17.0),
-                    Frames::fps(120).between(-3.0, 25.0),
-                    Frames::at(times.collect()),
-                ] {
-                    let expected = clip.evaluate(&frames).unwrap();
-                    let expected = bytemuck::cast_slice::<Quat, u32>(expected.as_quats());
-                    let count = expected.len() / 4;
-                    // So few that they are evaluated on this thread, which stages its rows.
-                    assert!(count <= 16 * 1024);
-                    for shift in 0..4 {
-                        let mut found = vec![Quat::IDENTITY; count + 3];
-                        let found = &mut found[shift..][..count];
-                        let layout = Layout::TrackMajor;
-                        IS_STAGED.set(true);
-                        let done = if shift % 2 == 0 {
-                            clip.evaluate_into(&frames, layout, found)
-                        } else {
-                            engine.evaluate_into(&set, interpolation, &frames, layout, found)
-                        };
-                        IS_STAGED.set(false);
-                        done.unwrap();
-                        assert_eq!(expected, bytemuck::cast_slice::<Quat, u32>(found));
-                    }
-                }
-            }
-        }
     }
 }

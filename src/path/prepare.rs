@@ -309,6 +309,3 @@ fn add_part(
     let spans = from..prepared.spans.len();
     prepared.push_part(track, times, &(0..times.len() - 1), spans, [before, after]);
 }
-
-#[cfg(test)]
-mod tests;

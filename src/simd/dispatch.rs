@@ -43,10 +43,6 @@ impl VectorWidth {
     /// narrower one that the environment variable `TUMBLE_VECTOR_WIDTH` names.
     pub fn widest() -> Self {
         static WIDEST: OnceLock<VectorWidth> = OnceLock::new();
-        #[cfg(test)]
-        if let Some(width) = tests::WIDTH.get() {
-            return width;
-        }
         *WIDEST.get_or_init(|| {
             let limit = Self::limit().ok().flatten().unwrap_or(Self::Avx512);
             limit.narrowed()
@@ -222,29 +218,8 @@ pub(crate) fn fence() {
 }
 
 #[cfg(test)]
-pub(crate) mod tests {
-    use std::cell::Cell;
-
+mod tests {
     use super::VectorWidth;
-
-    thread_local! {
-        pub(crate) static WIDTH: Cell<Option<VectorWidth>> = const { Cell::new(None) };
-    }
-
-    /// What `work` gives on this thread, which must be the same at every width that the processor
-    /// has.
-    pub(crate) fn same_at_every_width<R: PartialEq>(work: impl Fn() -> R) -> R {
-        let at = |width| {
-            WIDTH.set(Some(width));
-            work()
-        };
-        let expected = at(VectorWidth::Baseline);
-        for wider in VectorWidth::available().into_iter().skip(1) {
-            assert!(at(wider) == expected, "{wider:?}");
-        }
-        WIDTH.set(None);
-        expected
-    }
 
     #[test]
     fn widths_have_names() {

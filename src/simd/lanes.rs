@@ -289,7 +289,6 @@ impl Lanes for Vec4 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cpu::evaluate::tests::runs_are_samples;
     use crate::simd::dispatch::{InLanes, VectorWidth, in_lanes_of};
     use crate::simd::doubles::tests::doubles_are_samples;
 
@@ -349,7 +348,6 @@ mod tests {
         fn run<L: Lanes>(&mut self) {
             lanes_are_samples::<L>();
             doubles_are_samples::<L>();
-            runs_are_samples::<L>();
         }
     }
 

@@ -38,6 +38,16 @@ fn cpu() -> Engine {
     Engine::new(Device::Cpu).unwrap()
 }
 
+/// An engine on the CPU for each vector width.
+fn widths() -> Vec<Engine> {
+    let at = |width: VectorWidth| {
+        let mut options = EngineOptions::default();
+        options.vector_width = Some(width);
+        Engine::with_options(Device::Cpu, &options).unwrap()
+    };
+    VectorWidth::available().into_iter().map(at).collect()
+}
+
 fn follow_of(own: &Follower) -> Follow {
     Follow {
         method: own.curve.method.parse().unwrap(),
@@ -448,12 +458,7 @@ fn the_same_bits_on_every_device() {
     let set = trouble();
     let frames = Frames::fps(50).between(-2.0, 9.0);
     let devices = vulkan_engines(|_| {});
-    let at = |width: VectorWidth| {
-        let mut options = EngineOptions::default();
-        options.vector_width = Some(width);
-        Engine::with_options(Device::Cpu, &options).unwrap()
-    };
-    let widths: Vec<Engine> = VectorWidth::available().into_iter().map(at).collect();
+    let widths = widths();
     for (i, follow) in manners().into_iter().enumerate() {
         let own = taken(&set, &follow);
         let layout = [Layout::TrackMajor, Layout::FrameMajor][i % 2];
@@ -469,6 +474,74 @@ fn the_same_bits_on_every_device() {
                 bits(&engine.follow(&own, &follow, &frames, layout).unwrap()) == expected,
                 "{follow:?}, {engine:?}"
             );
+        }
+    }
+}
+
+/// Catches lanes that mix up paths or pieces of them, and a vector width with bits of its own.
+#[test]
+fn paths_are_followed_together_as_alone() {
+    let mut set = TrackSet::new();
+    for track in 0..23u8 {
+        let far = f32::from(track % 5);
+        let point = |i: u8| {
+            let t = f32::from(i) * (0.3 + 0.1 * far);
+            // One stands still, and one goes to and fro.
+            match track {
+                7 => Vec3::ONE,
+                8 => Vec3::X * f32::from(i % 2),
+                _ => Vec3::new((3.0 * t).sin() * far, t, (t * t).cos()),
+            }
+        };
+        let points: Vec<Vec3> = (0..2 + track).map(point).collect();
+        let times: Vec<f64> = (0..2 + track).map(|i| 0.5 * f64::from(i)).collect();
+        set.push_path("", &times, &points, &[]).unwrap();
+    }
+    let own = Follow::default();
+    let follows = [
+        own.clone(),
+        Follow {
+            axes: ["x", "-z"].map(|axis| axis.parse().unwrap()),
+            ..own.clone()
+        },
+        Follow {
+            speed: PathSpeed::Constant,
+            ..own.clone()
+        },
+        Follow {
+            frame: Frame::Fixed,
+            direction: Direction::Point(DVec3::new(0.0, 2.0, 9.0)),
+            ..own.clone()
+        },
+        Follow {
+            frame: Frame::Frenet,
+            ..own
+        },
+    ];
+    let frames = Frames::fps(100).between(-0.1, 12.1);
+    let found = |engine: &Engine, set: &TrackSet, follow: &Follow| {
+        bits(
+            &engine
+                .follow(set, follow, &frames, Layout::TrackMajor)
+                .unwrap(),
+        )
+    };
+    for follow in follows {
+        let together = found(&cpu(), &set, &follow);
+        for engine in widths() {
+            assert!(
+                found(&engine, &set, &follow) == together,
+                "{follow:?}, {engine:?}"
+            );
+        }
+        // Positions of all tracks, then rotations of all tracks.
+        let (positions, rotations) = together.split_at(together.len() / 2);
+        let tracks = positions.len() / 23;
+        for track in 0..23 {
+            let alone = found(&cpu(), &set.select([track]).unwrap(), &follow);
+            let own = track * tracks..(track + 1) * tracks;
+            let expected = [&positions[own.clone()], &rotations[own]].concat();
+            assert!(alone == expected, "{track}, {follow:?}");
         }
     }
 }

@@ -1,0 +1,73 @@
+//! Results against the f64 reference, by the engine's own report.
+
+use glam::Quat;
+use tumble::verify::verify;
+use tumble::{Device, Engine, Frames, METHODS, TrackSet};
+
+fn set() -> TrackSet {
+    let mut set = TrackSet::new();
+    let times = [0.0, 0.5, 2.0, 2.5];
+    let keys = [0.0, 1.0, -0.4, 2.0].map(Quat::from_rotation_z);
+    set.push("", &times, &keys).unwrap();
+    let keys = keys.map(|key| key * Quat::from_rotation_x(1.2));
+    set.push("", &times, &keys).unwrap();
+    set
+}
+
+#[test]
+fn the_cpu_is_within_its_bounds_and_says_that_no_device_took_part() {
+    let engine = Engine::new(Device::Cpu).unwrap();
+    for method in METHODS {
+        let found = verify(&engine, &set(), method.into(), &Frames::fps(60)).unwrap();
+        assert!(found.passes(), "{found:?}");
+        assert_eq!((found.device.as_deref(), found.rotations), (None, 2 * 151));
+    }
+}
+
+/// Where every sample is a key, rates may be 0 at all samples, and large between them.
+#[test]
+fn samples_on_keys_are_within_their_bounds() {
+    let engine = Engine::new(Device::Cpu).unwrap();
+    let times: Vec<f64> = (0..8).map(|k| f64::from(k) / 25.0).collect();
+    let mut set = TrackSet::new();
+    let angles = [0.0, 0.01, 0.05, 0.02, 0.02, -0.1, -0.05, 0.0];
+    set.push("", &times, &angles.map(Quat::from_rotation_x))
+        .unwrap();
+    for method in METHODS {
+        let found = verify(&engine, &set, method.into(), &Frames::fps(25)).unwrap();
+        assert!(found.passes(), "{found:?}");
+    }
+}
+
+/// A track of more intervals than are prepared at once. Catches a part that ignores the signs of the
+/// keys before it, and lanes that mix up parts.
+#[test]
+fn a_long_track_is_within_its_bounds_in_all_its_parts() {
+    let engine = Engine::new(Device::Cpu).unwrap();
+    let count = 3 * 4096 + 17;
+    let times: Vec<f64> = (0..count)
+        .map(|i| f64::from(i) + 0.3 * f64::from(i % 3))
+        .collect();
+    let key = |i: i32| {
+        let key = Quat::from_rotation_y(i as f32 * 0.7) * Quat::from_rotation_x(i as f32);
+        if i * i % 7 == 2 { -key } else { key }
+    };
+    let keys: Vec<Quat> = (0..count).map(key).collect();
+    let mut set = TrackSet::new();
+    set.push("", &times, &keys).unwrap();
+    for method in METHODS {
+        let found = verify(&engine, &set, method.into(), &Frames::fps(4)).unwrap();
+        assert!(found.passes(), "{found:?}");
+    }
+}
+
+/// Wherever the tests run: a small job goes to the CPU, a large one never to a device that is one.
+#[test]
+fn nothing_slower_than_the_cpu_is_chosen() {
+    let small = Engine::auto_for(2000).unwrap();
+    assert!(small.device_info().is_none());
+    let large = Engine::auto().unwrap();
+    let is_software = |info: &tumble::DeviceInfo| info.kind == tumble::DeviceKind::Cpu;
+    assert!(!large.device_info().is_some_and(is_software));
+    assert!(small.probe_time().unwrap() > std::time::Duration::ZERO);
+}
