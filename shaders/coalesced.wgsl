@@ -1,7 +1,7 @@
 // Entry point for cards: neighbours store neighbours, so that a wave's stores are whole lines of
 // memory. An invocation takes a few samples in turn, and loads the constants of an item again only
 // where the next one lies in another; neighbours of one item read its constants from one address.
-// The build joins it with a form (`Segment`, `evaluate`), with the functions that read buffers
+// It is joined with a form (`Segment`, `evaluate`), with the functions that read buffers
 // (`segment_at`, `constant_at`, `item_at`, `block_at`), a `distance_from_middle` and a `store`.
 
 @compute @workgroup_size(WORKGROUP)

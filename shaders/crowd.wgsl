@@ -1,4 +1,4 @@
-// Entry point of the kernels over a crowd. The build joins it with a file of `crowd/`, which has
+// Entry point of the kernels over a crowd. It is joined with a file of `crowd/`, which has
 // `crowd_work`.
 
 /// The arguments of one dispatch over a crowd.

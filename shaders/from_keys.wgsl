@@ -1,6 +1,6 @@
 // Entry point: an invocation evaluates one sample of some tracks straight from the keys beside it,
 // for sets with fewer samples than keys; no segment is prepared.
-// The build joins it with a file of `from_keys/` (`hoisted`, which computes once what all rows
+// It is joined with a file of `from_keys/` (`hoisted`, which computes once what all rows
 // share, and `rotation_between`), with the functions that read buffers (`key_at`, `sample_at`) and
 // a `store`.
 

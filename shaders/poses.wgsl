@@ -1,4 +1,4 @@
-// Entry point of the kernels over evaluated poses. The build joins it with a file of `poses/`,
+// Entry point of the kernels over evaluated poses. It is joined with a file of `poses/`,
 // which has `pose`.
 
 /// The arguments of one dispatch over poses.

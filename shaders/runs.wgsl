@@ -1,5 +1,5 @@
 // Entry point: an invocation evaluates a work item, some consecutive samples of one segment.
-// The build joins it with a form (`Segment`, `evaluate`), with the functions that read buffers
+// It is joined with a form (`Segment`, `evaluate`), with the functions that read buffers
 // (`segment_at`, `constant_at`, `item_at`), a `distance_from_middle` and a `store`.
 
 const ITEM_SAMPLES: u32 = 16;

@@ -1,5 +1,5 @@
 // Entry point: an invocation evaluates one sample of a sample list; each may lie in another
-// segment. The build joins it with a form (`Segment`, `evaluate`), with the functions that read
+// segment. It is joined with a form (`Segment`, `evaluate`), with the functions that read
 // buffers (`segment_at`, `constant_at`, `sample_at`) and a `store`.
 
 /// One sample of the list.

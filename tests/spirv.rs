@@ -7,7 +7,7 @@ use std::process::{Command, Stdio};
 use naga::back::spv;
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 use proptest::prelude::*;
-#[allow(dead_code, unreachable_pub)] // the pass that the build and the engine have
+#[allow(dead_code, unreachable_pub)] // the pass that the shaders' compiler and the engine have
 #[path = "../src/shader/spirv.rs"]
 pub(crate) mod pass;
 

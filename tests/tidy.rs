@@ -31,8 +31,15 @@ fn read(path: impl AsRef<Path>) -> String {
 
 #[test]
 fn unsafe_code_stays_in_its_homes() {
-    let sources = ["src", "formats/src", "routes/src", "cli/src", "python/src"]
-        .map(|folder| files(folder, "rs"));
+    let sources = [
+        "src",
+        "formats/src",
+        "routes/src",
+        "cli/src",
+        "python/src",
+        "shader-compiler/src",
+    ]
+    .map(|folder| files(folder, "rs"));
     for path in sources.concat() {
         let relative = path.strip_prefix(root()).unwrap();
         let home = relative.starts_with("src/gpu")
@@ -237,6 +244,7 @@ fn files_stay_short() {
         "cli/src",
         "python/src",
         "capi/src",
+        "shader-compiler/src",
     ]
     .map(|folder| files(folder, "rs"));
     for path in sources

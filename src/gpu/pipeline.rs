@@ -1,4 +1,4 @@
-//! Compute pipelines: a kernel of the build's table with its descriptor and pipeline layouts.
+//! Compute pipelines: a kernel with its descriptor and pipeline layouts.
 
 use crate::gpu::submission::{Access, Binding, Submission};
 use crate::gpu::upload::Upload;
@@ -42,7 +42,7 @@ impl Pipeline {
         kernel: Kernel,
         exactness: Exactness,
     ) -> Result<Self, VulkanError> {
-        let ((name, code), reads_texels) = kernel.code(device.reads_texels);
+        let (name, code, reads_texels) = kernel.code(device.reads_texels);
         let bindings = kernel.compiled().bindings;
         let mut pipeline = Self {
             device: Arc::clone(device),
@@ -80,7 +80,7 @@ impl Pipeline {
 
         let words = words(code, device, exactness);
         let info = vk::ShaderModuleCreateInfo::default().code(&words);
-        // SAFETY: the words are valid SPIR-V: the build made them.
+        // SAFETY: the words are valid SPIR-V: naga made them.
         let module = unsafe { device.raw.create_shader_module(&info, None) }
             .named("vkCreateShaderModule")?;
         let stage = vk::PipelineShaderStageCreateInfo::default()
@@ -154,13 +154,12 @@ pub(crate) enum Exactness {
     LeftToTheDriver,
 }
 
-fn words(code: &[u8], device: &LogicalDevice, exactness: Exactness) -> Vec<u32> {
-    let words: Vec<u32> = bytemuck::pod_collect_to_vec(code);
+fn words(code: &[u32], device: &LogicalDevice, exactness: Exactness) -> Vec<u32> {
     let passed = match exactness {
-        Exactness::Demanded => spirv::float_controls(&words, device.physical.float_controls),
-        Exactness::LeftToTheDriver => spirv::without_decorations(&words),
+        Exactness::Demanded => spirv::float_controls(code, device.physical.float_controls),
+        Exactness::LeftToTheDriver => spirv::without_decorations(code),
     };
-    passed.expect("the build validated its shaders")
+    passed.expect("the kernels passed when they were compiled")
 }
 
 impl Drop for Pipeline {

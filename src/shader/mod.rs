@@ -1,7 +1,7 @@
-//! What the shaders and Rust share, as the build reads it from `shaders/`: constants, the structs
-//! that buffers hold, and the kernels by name, as SPIR-V.
+//! What the shaders and Rust share, as the compiler of the shaders wrote it into `shaders/compiled`:
+//! constants, the structs that buffers hold, and the kernels by name, as SPIR-V.
 
-// The build has its own copy of the pass, and uses more of it.
+// The compiler of the shaders (`shader-compiler/`) has its own copy of the pass, and uses more of it.
 #[allow(dead_code, unreachable_pub)]
 pub(crate) mod spirv;
 
@@ -11,7 +11,7 @@ mod generated {
 
     use super::{Form, KernelCode};
 
-    include!(concat!(env!("OUT_DIR"), "/shaders.rs"));
+    include!("../../shaders/compiled/kernels.rs");
 }
 
 pub(crate) use generated::*;
@@ -28,35 +28,42 @@ pub enum Form {
     Polynomial,
 }
 
-/// A kernel's name and its SPIR-V, words with the least significant byte first.
-pub(crate) type Code = (&'static str, &'static [u8]);
+/// Bytes that lie where words may lie.
+#[repr(C, align(4))]
+struct Aligned<Bytes: ?Sized>(Bytes);
 
-/// A kernel as the build compiled it.
+/// The SPIR-V of all kernels, one behind the other, words with the least significant byte first.
+static SPIRV: &Aligned<[u8]> = &Aligned(*include_bytes!("../../shaders/compiled/kernels.spv"));
+
+/// A kernel as it was compiled: names, with how many words of [`SPIRV`] are theirs.
 pub(crate) struct KernelCode {
     /// The code that reads storage buffers.
-    storage: Code,
+    storage: (&'static str, usize),
     /// The code that reads texel buffers: all bindings but the last.
-    texels: Option<Code>,
+    texels: Option<(&'static str, usize)>,
     /// How many buffers it binds.
     pub(crate) bindings: u32,
 }
 
 impl Kernel {
-    /// As the build compiled it.
+    /// As it was compiled.
     pub(crate) fn compiled(self) -> &'static KernelCode {
         &KERNELS[self as usize]
     }
 
-    /// Its code, and whether that reads texel buffers: it does if asked to and if the kernel has
-    /// such code.
-    pub(crate) fn code(self, reads_texels: bool) -> (Code, bool) {
-        let KernelCode {
-            storage, texels, ..
-        } = self.compiled();
-        match texels {
-            Some(texels) if reads_texels => (*texels, true),
-            _ => (*storage, false),
-        }
+    /// Its name, its code, and whether that reads texel buffers: it does if asked to and if the
+    /// kernel has such code.
+    pub(crate) fn code(self, reads_texels: bool) -> (&'static str, &'static [u32], bool) {
+        let own = self.compiled();
+        let (name, reads_texels) = match own.texels {
+            Some((name, _)) if reads_texels => (name, true),
+            _ => (own.storage.0, false),
+        };
+        let mut all = kernels();
+        let (_, code) = all
+            .find(|kernel| kernel.0 == name)
+            .expect("it is one of them");
+        (name, bytemuck::cast_slice(code), reads_texels)
     }
 }
 
@@ -64,6 +71,11 @@ impl Kernel {
 /// least significant byte first, before the float controls that depend on the device.
 pub fn kernels() -> impl Iterator<Item = (&'static str, &'static [u8])> {
     let all = KERNELS.iter();
-    all.flat_map(|kernel| [Some(kernel.storage), kernel.texels])
-        .flatten()
+    let all = all.flat_map(|kernel| [Some(kernel.storage), kernel.texels]);
+    let mut rest = &SPIRV.0;
+    all.flatten().map(move |(name, words)| {
+        let (code, behind) = rest.split_at(4 * words);
+        rest = behind;
+        (name, code)
+    })
 }

@@ -4,8 +4,8 @@
 //! without them a driver may fuse a multiplication with an addition or rewrite
 //! `(a + b) - a` to `b`. This pass works on the words of a module: it decorates
 //! every float arithmetic instruction, and refuses a module that uses an operation
-//! whose rounding Vulkan leaves open. The build runs it over every shader
-//! ([`no_contraction`]); at run time [`float_controls`] adds the modes that the
+//! whose rounding Vulkan leaves open. The compiler of the shaders runs it over
+//! every one ([`no_contraction`]); at run time [`float_controls`] adds the modes that the
 //! device reports.
 
 use std::collections::BTreeSet;

@@ -136,7 +136,7 @@ struct Count {
 
 impl Launch {
     fn run(&self) -> Count {
-        let program = Checked::parse(&source(&self.kernel)).program();
+        let program = Checked::parse(source(&self.kernel)).program();
         let mut machine = Machine::new(&program);
         for (name, cells) in &self.globals {
             machine.globals[global(&program, name)].clone_from(cells);

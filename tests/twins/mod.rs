@@ -1,5 +1,5 @@
 //! Every function of the shaders against its twin, without a device: the functions are evaluated as
-//! naga reads them from the text that the build compiles, an operation at a time, and every bit of
+//! naga reads them from the text that is compiled, an operation at a time, and every bit of
 //! every result has to be the twin's. `tests/bit_identity.rs` compares whole results on devices; here
 //! a function that differs is named, with the arguments that show it.
 //!
@@ -23,7 +23,7 @@ mod stores;
 mod trial;
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::fs;
+use std::sync::LazyLock;
 
 use naga::{BinaryOperator, Expression, Literal, Module};
 
@@ -74,10 +74,11 @@ const WITHOUT: [(&str, &str); 4] = [
     ),
 ];
 
-/// The text of a kernel as the build compiled it.
-fn source(kernel: &str) -> String {
-    let path = format!("{}/{kernel}.wgsl", env!("OUT_DIR"));
-    fs::read_to_string(&path).unwrap_or_else(|error| panic!("{path}: {error}"))
+/// The text of a kernel as it is compiled.
+fn source(kernel: &str) -> &'static str {
+    static ALL: LazyLock<BTreeMap<String, String>> = LazyLock::new(tumble_shaders::sources);
+    ALL.get(kernel)
+        .unwrap_or_else(|| panic!("no kernel {kernel}"))
 }
 
 /// The kernels of the table, each read once.
@@ -85,7 +86,7 @@ fn kernels(twins: &[Twin]) -> BTreeMap<&'static str, Checked> {
     let names: BTreeSet<&str> = twins.iter().map(|twin| twin.kernel).collect();
     names
         .into_iter()
-        .map(|name| (name, Checked::parse(&source(name))))
+        .map(|name| (name, Checked::parse(source(name))))
         .collect()
 }
 
@@ -111,7 +112,8 @@ fn functions_of_kernels() -> BTreeMap<(String, String), &'static str> {
     let mut all = BTreeMap::new();
     for (kernel, _) in crate::shader::kernels() {
         let text = source(kernel);
-        let module = naga::front::wgsl::parse_str(&text).expect("the build parses it too");
+        let module =
+            naga::front::wgsl::parse_str(text).expect("the compiler of the shaders parses it too");
         for (handle, function) in module.functions.iter() {
             let name = function.name.clone().expect("functions in WGSL have names");
             let own = module
@@ -213,7 +215,7 @@ fn a_mistake_anywhere_is_found() {
             *changed.expressions.get_mut(at) = wrong;
             program.functions[index] = checked.compiled(&changed, info);
             let span = function.expressions.get_span(at);
-            let line = span.location(&text).line_number as usize;
+            let line = span.location(text).line_number as usize;
             let line = text.lines().nth(line - 1).unwrap_or_default().to_owned();
             let own = span.to_range().map_or("", |own| &text[own]).to_owned();
             *mistakes.entry((line, own)).or_insert(false) |=

@@ -32,11 +32,11 @@ pub(super) struct Checked {
 
 impl Checked {
     pub(super) fn parse(source: &str) -> Self {
-        let module = naga::front::wgsl::parse_str(source).expect("the build parses it too");
+        let module = naga::front::wgsl::parse_str(source).expect("it was compiled");
         let capabilities = Capabilities::IMMEDIATES | Capabilities::SHADER_INT64;
         let info = Validator::new(ValidationFlags::all(), capabilities)
             .validate(&module)
-            .expect("the build validates it too");
+            .expect("it was compiled");
         Self { module, info }
     }
 

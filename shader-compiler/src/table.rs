@@ -1,10 +1,13 @@
 //! The table of kernels: which files of `shaders/` each is joined from, and what it reads.
 //!
 //! To add a kernel, write its file and name it in [`kernels`]; a store needs no more than its file.
-//! The rest of the build walks the table: it writes the bindings and the functions that read them,
+//! The rest of the compiler walks the table: it writes the bindings and the functions that read them,
 //! compiles each kernel, and gives Rust an enum of them, their layouts and their constants.
 
 use std::fs;
+use std::path::Path;
+
+use crate::ROOT;
 
 /// A buffer that a kernel reads, and the WGSL function that reads one element of it.
 pub(crate) struct Read {
@@ -112,7 +115,8 @@ fn is_for_cards(list: &str) -> bool {
 /// `store`, and the files that its line `// Needs: FILE, FILE.` names.
 pub(crate) fn stores() -> Vec<(&'static str, Vec<&'static str>)> {
     let mut stores = Vec::new();
-    for entry in fs::read_dir("shaders/stores").expect("the stores lie there") {
+    let folder = Path::new(ROOT).join("shaders/stores");
+    for entry in fs::read_dir(folder).expect("the stores lie there") {
         let path = entry.expect("a file").path();
         let text = fs::read_to_string(&path).expect("WGSL").leak();
         let name = path

@@ -11,8 +11,8 @@ use naga::{
 
 use crate::table::{FORMS, LISTS, stores};
 
-/// Everything that the kernels declare, once each. Two declarations of one name that differ are a
-/// build error.
+/// Everything that the kernels declare, once each. Two declarations of one name that differ are
+/// an error.
 #[derive(Default)]
 pub(crate) struct Declared {
     constants: BTreeMap<String, String>,
@@ -79,7 +79,9 @@ impl Declared {
 
     /// Constants and structs as Rust.
     pub(crate) fn rust(&self) -> String {
-        let mut text = String::new();
+        let mut text = String::from(
+            "// Written by `cargo run -p tumble-shaders` from the shaders: change those.\n\n",
+        );
         for (name, value) in &self.constants {
             writeln!(text, "pub(crate) const {name}: {value};").unwrap();
         }
@@ -200,12 +202,13 @@ fn rust_type(module: &Module, ty: Handle<Type>) -> (String, u32) {
     }
 }
 
-/// A kernel that was compiled: its name, how many bindings it has, and whether it has a variant
-/// that reads texel buffers.
+/// A kernel that was compiled, and how long its code is.
 pub(crate) struct Compiled {
     pub(crate) name: String,
     pub(crate) bindings: usize,
-    pub(crate) has_texels: bool,
+    pub(crate) words: usize,
+    /// Of its variant that reads texel buffers.
+    pub(crate) texel_words: Option<usize>,
 }
 
 /// The kernels as Rust: an enum of their names, their code, and the choice of a kernel by form,
@@ -231,11 +234,11 @@ pub(crate) fn kernels(all: &[Compiled]) -> String {
     ] {
         let (name, variants) = names;
         let variants: Vec<String> = variants.into_iter().map(variant).collect();
-        let variants = variants.join(", ");
+        let variants = variants.join(",\n    ");
         writeln!(
             text,
             "/// {what}\n#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]\n\
-             pub(crate) enum {name} {{ {variants} }}"
+             pub(crate) enum {name} {{\n    {variants},\n}}"
         )
         .unwrap();
     }
@@ -269,18 +272,16 @@ pub(crate) fn kernels(all: &[Compiled]) -> String {
     )
     .unwrap();
     for kernel in all {
-        let code = |name: &str| {
-            format!("(\"{name}\", include_bytes!(concat!(env!(\"OUT_DIR\"), \"/{name}.spv\")))")
-        };
-        let texels = match kernel.has_texels {
-            true => format!("Some({})", code(&format!("{}_texels", kernel.name))),
-            false => "None".to_owned(),
-        };
+        let Compiled {
+            name,
+            bindings,
+            words,
+            texel_words,
+        } = kernel;
+        let texels = texel_words.map(|words| (format!("{name}_texels"), words));
         writeln!(
             text,
-            "    KernelCode {{ storage: {}, texels: {texels}, bindings: {} }},",
-            code(&kernel.name),
-            kernel.bindings
+            "    KernelCode {{ storage: ({name:?}, {words}), texels: {texels:?}, bindings: {bindings} }},"
         )
         .unwrap();
     }

@@ -1,0 +1,202 @@
+//! The compiler of the shaders: WGSL to SPIR-V. Each kernel of the table is joined from its files,
+//! parsed, validated, emitted, and passed through the exactness pass, so that a broken or inexact
+//! shader is an error. Rust gets the constants and structs that the shaders declare, so that
+//! neither is written twice.
+//!
+//! What it makes is checked in, in `shaders/compiled/`: who builds the engine needs no naga, and gets
+//! the SPIR-V that was tested. `cargo run -p tumble-shaders` writes it anew.
+
+// The engine's build script and the engine have these, too, and use other parts of them.
+#[allow(dead_code)]
+#[path = "../../build/hashes.rs"]
+mod hashes;
+mod readers;
+mod rust;
+#[allow(dead_code, unreachable_pub)]
+#[path = "../../src/shader/spirv.rs"]
+mod spirv;
+mod table;
+#[cfg(test)]
+mod tests;
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+
+use naga::back::spv;
+use naga::front::wgsl::{Frontend, Options};
+use naga::valid::{Capabilities, ValidationFlags, Validator};
+
+use rust::{Compiled, Declared};
+use table::{Kernel, WIDE_STORE};
+
+/// The engine's package.
+const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
+
+/// Compiles the shaders, writes the files that are not as they should be, each whole or not at all,
+/// and says which.
+///
+/// # Panics
+/// With a message about the shader that cannot be read, is broken or inexact, or declares what
+/// another one declares differently, or about the file that cannot be written.
+pub fn write() {
+    let files = compile();
+    let stale = stale(Path::new(ROOT), &files);
+    for (path, bytes) in files.iter().filter(|(path, _)| stale.contains(path)) {
+        let partial = Path::new(ROOT).join("shaders/compiled/partial");
+        fs::write(&partial, bytes)
+            .and_then(|()| fs::rename(&partial, Path::new(ROOT).join(path)))
+            .unwrap_or_else(|error| panic!("{path}: {error}"));
+        println!("wrote {path}");
+    }
+    if stale.is_empty() {
+        println!("the compiled kernels are those of the shaders");
+    }
+}
+
+/// The files that are checked in: their paths from the engine's root, and what belongs into them.
+type Files = Vec<(&'static str, Vec<u8>)>;
+
+/// What the shaders compile to.
+fn compile() -> Files {
+    let mut declared = Declared::default();
+    let (mut compiled, mut code) = (Vec::new(), Vec::new());
+    for kernel in table::kernels() {
+        let (storage, texels) = modules(&kernel);
+        declared.collect(&storage.name, &storage.parsed);
+        let mut emit = |module: &Module| {
+            let words = module.spirv();
+            code.extend(words.iter().flat_map(|word| word.to_le_bytes()));
+            words.len()
+        };
+        let bindings = storage.parsed.global_variables.iter();
+        compiled.push(Compiled {
+            bindings: bindings.filter(|(_, own)| own.binding.is_some()).count(),
+            words: emit(&storage),
+            texel_words: texels.as_ref().map(emit),
+            name: kernel.name,
+        });
+    }
+    let rust = declared.rust() + &rust::kernels(&compiled);
+    let mut files = vec![
+        ("shaders/compiled/kernels.rs", rust.into_bytes()),
+        ("shaders/compiled/kernels.spv", code),
+    ];
+    let mut hashes = hashes::of_folder(Path::new(ROOT), "shaders").expect("the shaders lie there");
+    hashes.retain(|path, _| path.ends_with(".wgsl"));
+    let made = files
+        .iter()
+        .map(|(path, bytes)| ((*path).to_owned(), hashes::hash(bytes)));
+    hashes.extend(made);
+    let list: String = hashes
+        .iter()
+        .map(|(path, hash)| format!("{hash} {path}\n"))
+        .collect();
+    // Written last: files of two runs that got mixed do not fit it.
+    files.push((hashes::LIST, list.into_bytes()));
+    files
+}
+
+/// The files that are not as they should be, to the byte.
+fn stale(root: &Path, files: &Files) -> Vec<&'static str> {
+    let stale = files
+        .iter()
+        .filter(|(path, bytes)| fs::read(root.join(path)).map_or(true, |found| found != *bytes));
+    stale.map(|(path, _)| *path).collect()
+}
+
+/// The WGSL of each kernel as it is compiled, by the kernel's name.
+///
+/// # Panics
+/// With a message about the shader that cannot be read or parsed.
+#[must_use]
+pub fn sources() -> BTreeMap<String, String> {
+    let kernels = table::kernels();
+    let modules = kernels
+        .iter()
+        .map(modules)
+        .flat_map(|(storage, texels)| [Some(storage), texels]);
+    modules
+        .flatten()
+        .map(|own| (own.name, own.source))
+        .collect()
+}
+
+/// A kernel, or its variant for texel buffers.
+struct Module {
+    name: String,
+    source: String,
+    parsed: naga::Module,
+}
+
+/// A kernel, and its variant that reads texel buffers if it has one.
+fn modules(kernel: &Kernel) -> (Module, Option<Module>) {
+    let Kernel {
+        name,
+        files,
+        reads,
+        has_texels,
+    } = kernel;
+    let joined: String = files.iter().map(|file| read_shader(file)).collect();
+    let source = match reads.is_empty() {
+        true => joined,
+        false => readers::storage(reads) + &joined,
+    };
+    let storage = Module::parse(name.clone(), source);
+    let texels = has_texels.then(|| {
+        let wide = files.iter().flat_map(|&file| match file {
+            "stores/f32" => WIDE_STORE.to_vec(),
+            other => vec![other],
+        });
+        let joined: String = wide.map(read_shader).collect();
+        let source = readers::texels(reads, &storage.parsed) + &joined;
+        Module::parse(format!("{name}_texels"), source)
+    });
+    (storage, texels)
+}
+
+fn read_shader(file: &str) -> String {
+    let file = format!("shaders/{file}.wgsl");
+    fs::read_to_string(Path::new(ROOT).join(&file))
+        .unwrap_or_else(|error| panic!("{file}: {error}"))
+        + "\n"
+}
+
+impl Module {
+    fn parse(name: String, source: String) -> Self {
+        let mut options = Options::new();
+        options.parse_doc_comments = true;
+        let parsed = Frontend::new_with_options(options)
+            .parse(&source)
+            .unwrap_or_else(|error| panic!("{name}: {}", error.emit_to_string(&source)));
+        Self {
+            name,
+            source,
+            parsed,
+        }
+    }
+
+    /// Its SPIR-V, which rounds as it is written.
+    fn spirv(&self) -> Vec<u32> {
+        let Self {
+            name,
+            source,
+            parsed,
+        } = self;
+        let capabilities = Capabilities::IMMEDIATES | Capabilities::SHADER_INT64;
+        let info = Validator::new(ValidationFlags::all(), capabilities)
+            .validate(parsed)
+            .unwrap_or_else(|error| panic!("{name}: {}", error.emit_to_string(source)));
+        let options = spv::Options {
+            lang_version: (1, 3), // what Vulkan 1.1 takes
+            // Loops here end: their bounds are data that the host wrote.
+            force_loop_bounding: false,
+            flags: spv::WriterFlags::empty(),
+            ..spv::Options::default()
+        };
+        let words = spv::write_vec(parsed, &info, &options, None)
+            .unwrap_or_else(|error| panic!("{name}: {error}"));
+        let words = spirv::texel_buffers(&words).unwrap_or_else(|error| panic!("{name}: {error}"));
+        spirv::no_contraction(&words).unwrap_or_else(|error| panic!("{name}: {error}"))
+    }
+}

@@ -1,0 +1,872 @@
+// Written by `cargo run -p tumble-shaders` from the shaders: change those.
+
+pub(crate) const ARC_0: f32 = -0.3333333;
+pub(crate) const ARC_1: f32 = 0.1999974;
+pub(crate) const ARC_2: f32 = -0.14278568;
+pub(crate) const ARC_3: f32 = 0.110337645;
+pub(crate) const ARC_4: f32 = -0.0865688;
+pub(crate) const ARC_5: f32 = 0.06250169;
+pub(crate) const ARC_6: f32 = -0.03587154;
+pub(crate) const ARC_7: f32 = 0.013507771;
+pub(crate) const ARC_8: f32 = -0.0023869972;
+pub(crate) const ARC_SINE_1: f32 = 0.16666622;
+pub(crate) const ARC_SINE_2: f32 = 0.075026825;
+pub(crate) const ARC_SINE_3: f32 = 0.04408178;
+pub(crate) const ARC_SINE_4: f32 = 0.035991196;
+pub(crate) const ARC_SINE_5: f32 = -0.008057682;
+pub(crate) const ARC_SINE_6: f32 = 0.11032987;
+pub(crate) const ARC_SINE_7: f32 = -0.13996805;
+pub(crate) const ARC_SINE_8: f32 = 0.12611471;
+pub(crate) const BLOCK_SAMPLES: u32 = 32;
+pub(crate) const B_111_1: f32 = -0.00268809;
+pub(crate) const B_111_2: f32 = 0.0012817383;
+pub(crate) const B_111_3: f32 = 0.01542155;
+pub(crate) const B_111_4: f32 = 0.38085938;
+pub(crate) const B_111_5: f32 = -1.8040365;
+pub(crate) const B_111_6: f32 = 2.015625;
+pub(crate) const B_122_1: f32 = 0.0010681152;
+pub(crate) const B_122_2: f32 = 0.005126953;
+pub(crate) const B_122_3: f32 = -0.88134766;
+pub(crate) const B_122_4: f32 = 1.5234375;
+pub(crate) const B_122_5: f32 = 1.5078125;
+pub(crate) const B_122_6: f32 = -3.1875;
+pub(crate) const B_123_1: f32 = 0.0036315918;
+pub(crate) const B_123_3: f32 = 0.7241211;
+pub(crate) const B_123_5: f32 = -1.2109375;
+pub(crate) const B_133_1: f32 = -0.00037384033;
+pub(crate) const B_133_2: f32 = -0.0012817383;
+pub(crate) const B_133_3: f32 = -0.1998291;
+pub(crate) const B_133_4: f32 = -0.38085938;
+pub(crate) const B_133_5: f32 = -0.068359375;
+pub(crate) const B_133_6: f32 = 0.234375;
+pub(crate) const B_211_1: f32 = 0.005874634;
+pub(crate) const B_211_2: f32 = -0.005126953;
+pub(crate) const B_211_3: f32 = -0.6081543;
+pub(crate) const B_211_4: f32 = 1.8515625;
+pub(crate) const B_211_5: f32 = -0.80078125;
+pub(crate) const B_211_6: f32 = -1.3125;
+pub(crate) const B_222_1: f32 = -0.0041300454;
+pub(crate) const B_222_3: f32 = -0.4280599;
+pub(crate) const B_222_5: f32 = 1.1197916;
+pub(crate) const CHANNELS: u32 = 3;
+pub(crate) const COSINE_10: f32 = -2.620902e-7;
+pub(crate) const COSINE_2: f32 = -0.5;
+pub(crate) const COSINE_4: f32 = 0.041666657;
+pub(crate) const COSINE_6: f32 = -0.0013888585;
+pub(crate) const COSINE_8: f32 = 2.477018e-5;
+pub(crate) const COSM1_1: f32 = -0.5;
+pub(crate) const COSM1_2: f32 = 0.041666668;
+pub(crate) const CROWD_WORKGROUP: u32 = 64;
+pub(crate) const DEGREES: f32 = 57.29578;
+pub(crate) const FLUSHED_BITS: u32 = 562036736;
+pub(crate) const FORM_ARC: u32 = 1;
+pub(crate) const FORM_CONSTANT: u32 = 0;
+pub(crate) const FORM_CUBIC: u32 = 2;
+pub(crate) const FORM_POLYNOMIAL: u32 = 3;
+pub(crate) const FROM_KEYS_WORKGROUP: u32 = 64;
+pub(crate) const GIMBAL: f32 = 2.5e-7;
+pub(crate) const HALF_INFINITE: u32 = 31744;
+pub(crate) const HALF_OVERFLOW: u32 = 1199566848;
+pub(crate) const HALF_PI: f32 = 1.5707964;
+pub(crate) const HALF_PI_LOW: f32 = -4.371139e-8;
+pub(crate) const INTRINSIC: u32 = 256;
+pub(crate) const IS_CONSTANT: u32 = 2147483648;
+pub(crate) const IS_KEY: u32 = 2147483648;
+pub(crate) const ITEM_SAMPLES: u32 = 16;
+pub(crate) const KEY_AT_END: f32 = 1.0;
+pub(crate) const KEY_INNER: f32 = 0.0;
+pub(crate) const KEY_UNKNOWN: f32 = 2.0;
+pub(crate) const LEAST_NORMAL: u32 = 947912704;
+pub(crate) const LEAST_SQUARED_SUM: f32 = 9.094947e-13;
+pub(crate) const LINE: u32 = 8;
+pub(crate) const LOG_1: f32 = 0.16666667;
+pub(crate) const LOG_2: f32 = 0.075;
+pub(crate) const LOG_3: f32 = 0.04464286;
+pub(crate) const LOG_4: f32 = 0.030381944;
+pub(crate) const LONGEST_STEP: f32 = 0.0034;
+pub(crate) const LONGEST_TANGENT_PART: f32 = 0.01;
+pub(crate) const LONGEST_TURN_SQUARE: f32 = 2.4674;
+pub(crate) const MAY_BE_TINY: u32 = 1073741824;
+pub(crate) const NEGATIVE: u32 = 128;
+pub(crate) const ON_KEY: u32 = 2147483648;
+pub(crate) const PI: f32 = 3.1415927;
+pub(crate) const PI_LOW: f32 = -8.742278e-8;
+pub(crate) const POSE_WORKGROUP: u32 = 64;
+pub(crate) const QUARTER_COSINE_2: f32 = -0.5;
+pub(crate) const QUARTER_COSINE_4: f32 = 0.041666646;
+pub(crate) const QUARTER_COSINE_6: f32 = -0.0013887301;
+pub(crate) const QUARTER_COSINE_8: f32 = 2.4430661e-5;
+pub(crate) const QUARTER_SINE_3: f32 = -0.16666651;
+pub(crate) const QUARTER_SINE_5: f32 = 0.008331983;
+pub(crate) const QUARTER_SINE_7: f32 = -0.00019496137;
+pub(crate) const RECIPROCAL_SEED: u32 = 2129859015;
+pub(crate) const ROOT: u32 = 4294967295;
+pub(crate) const ROOT_SEED: u32 = 1597463007;
+pub(crate) const ROTATION: u32 = 0;
+pub(crate) const ROWS_PER_INVOCATION: u32 = 4;
+pub(crate) const RUNS_BACKWARDS: u32 = 8388608;
+pub(crate) const SAMPLES_EACH: u32 = 4;
+pub(crate) const SCALE: u32 = 2;
+pub(crate) const SECANT_1: f32 = 0.500002;
+pub(crate) const SECANT_2: f32 = 0.37484172;
+pub(crate) const SECANT_3: f32 = 0.316693;
+pub(crate) const SECANT_4: f32 = 0.21955732;
+pub(crate) const SECANT_5: f32 = 0.63175416;
+pub(crate) const SECANT_6: f32 = -1.4024843;
+pub(crate) const SECANT_7: f32 = 4.2773666;
+pub(crate) const SECANT_8: f32 = -5.4673123;
+pub(crate) const SECANT_9: f32 = 3.7398531;
+pub(crate) const SERIES_10: f32 = -2.755732e-7;
+pub(crate) const SERIES_2: f32 = -0.5;
+pub(crate) const SERIES_3: f32 = -0.16666667;
+pub(crate) const SERIES_4: f32 = 0.041666668;
+pub(crate) const SERIES_5: f32 = 0.008333334;
+pub(crate) const SERIES_6: f32 = -0.0013888889;
+pub(crate) const SERIES_7: f32 = -0.0001984127;
+pub(crate) const SERIES_8: f32 = 2.4801588e-5;
+pub(crate) const SERIES_9: f32 = 2.7557319e-6;
+pub(crate) const SIGN_TURNED: u32 = 1073741824;
+pub(crate) const SINC_1: f32 = -0.16666667;
+pub(crate) const SINC_2: f32 = 0.008333334;
+pub(crate) const SINE_3: f32 = -0.16666657;
+pub(crate) const SINE_5: f32 = 0.008333009;
+pub(crate) const SINE_7: f32 = -0.00019806049;
+pub(crate) const SINE_9: f32 = 2.5989254e-6;
+pub(crate) const SMALL_SQUARED_EXTENT: f32 = 0.001;
+pub(crate) const SNORM_SHIFT: f32 = 12582912.0;
+pub(crate) const SPEED_MAGNITUDE: u32 = 8388607;
+pub(crate) const START_BIAS: u32 = 131072;
+pub(crate) const SYMMETRIC: u32 = 64;
+pub(crate) const THIRD: f32 = 0.33333334;
+pub(crate) const TICKS: u32 = 2147483647;
+pub(crate) const TINY_BITS: u32 = 528482304;
+pub(crate) const TRANSLATION: u32 = 1;
+pub(crate) const TWO_THIRDS: f32 = 0.6666667;
+pub(crate) const WEIGHT_UNIT: f32 = 3.0517578e-5;
+pub(crate) const WORKGROUP: u32 = 64;
+pub(crate) const WRAP_HOLD: u32 = 0;
+pub(crate) const WRAP_LOOP: u32 = 1;
+pub(crate) const WRAP_MIRROR: u32 = 2;
+#[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub(crate) struct ArcSegment {
+/// The rotation half way along the arc.
+    pub(crate) middle: [f32; 4],
+/// Its derivative there: orthogonal to it in the plane of the arc, and as long as the arc's
+/// angle in R⁴.
+    pub(crate) tangent: [f32; 4],
+}
+const _: () = {
+    assert!(size_of::<ArcSegment>() == 32);
+    assert!(std::mem::offset_of!(ArcSegment, middle) == 0);
+    assert!(std::mem::offset_of!(ArcSegment, tangent) == 16);
+};
+/// Which items the samples of 32 neighbouring positions belong to.
+#[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub(crate) struct Block {
+/// The item of the first position.
+    pub(crate) first: u32,
+/// A bit for each position at which the next item begins, the lowest for the first.
+    pub(crate) starts: u32,
+}
+const _: () = {
+    assert!(size_of::<Block>() == 8);
+    assert!(std::mem::offset_of!(Block, first) == 0);
+    assert!(std::mem::offset_of!(Block, starts) == 4);
+};
+/// A time base: spans of time that some of a clip's channels share.
+#[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub(crate) struct CrowdBase {
+/// The first span, and how many there are.
+    pub(crate) first: u32,
+/// The largest power of 2 below `count`, where the search starts; 0 for one span.
+    pub(crate) count: u32,
+    pub(crate) step: u32,
+}
+const _: () = {
+    assert!(size_of::<CrowdBase>() == 12);
+    assert!(std::mem::offset_of!(CrowdBase, first) == 0);
+    assert!(std::mem::offset_of!(CrowdBase, count) == 4);
+    assert!(std::mem::offset_of!(CrowdBase, step) == 8);
+};
+/// Where one channel (the rotation, the translation or the scale) of a joint lies in a clip.
+#[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub(crate) struct CrowdChannel {
+/// The cell of its first constant in the first span.
+    pub(crate) first: u32,
+/// How many channels lie beside each other: the next constant is `count` cells on. 0 for a channel
+/// that is constant.
+    pub(crate) count: u32,
+/// The form, 8 bits, above the place of its time base in the clip, 24 bits.
+    pub(crate) form_and_base: u32,
+/// The cell of its first key.
+    pub(crate) keys: u32,
+}
+const _: () = {
+    assert!(size_of::<CrowdChannel>() == 16);
+    assert!(std::mem::offset_of!(CrowdChannel, first) == 0);
+    assert!(std::mem::offset_of!(CrowdChannel, count) == 4);
+    assert!(std::mem::offset_of!(CrowdChannel, form_and_base) == 8);
+    assert!(std::mem::offset_of!(CrowdChannel, keys) == 12);
+};
+#[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub(crate) struct CrowdClip {
+/// Its length in ticks, at least 1.
+    pub(crate) period: u32,
+/// Its first time base, and how many it has.
+    pub(crate) first_base: u32,
+    pub(crate) bases: u32,
+}
+const _: () = {
+    assert!(size_of::<CrowdClip>() == 12);
+    assert!(std::mem::offset_of!(CrowdClip, period) == 0);
+    assert!(std::mem::offset_of!(CrowdClip, first_base) == 4);
+    assert!(std::mem::offset_of!(CrowdClip, bases) == 8);
+};
+#[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub(crate) struct CrowdDispatch {
+/// The number of invocations with work.
+    pub(crate) count: u32,
+/// The first instance of the window that is evaluated.
+    pub(crate) first_instance: u32,
+/// Joints of the skeleton; when it is walked, joints of the level.
+    pub(crate) joints: u32,
+/// Layers of an instance.
+    pub(crate) layers: u32,
+/// The most time bases of a clip.
+    pub(crate) bases: u32,
+/// The first link of the level.
+    pub(crate) first_link: u32,
+/// The clock, ticks: the lower 32 bits.
+    pub(crate) clock_low: u32,
+/// The clock's upper bits.
+    pub(crate) clock_high: u32,
+/// The cell of the first mask.
+    pub(crate) masks: u32,
+/// The cell of the first reference pose.
+    pub(crate) references: u32,
+}
+const _: () = {
+    assert!(size_of::<CrowdDispatch>() == 40);
+    assert!(std::mem::offset_of!(CrowdDispatch, count) == 0);
+    assert!(std::mem::offset_of!(CrowdDispatch, first_instance) == 4);
+    assert!(std::mem::offset_of!(CrowdDispatch, joints) == 8);
+    assert!(std::mem::offset_of!(CrowdDispatch, layers) == 12);
+    assert!(std::mem::offset_of!(CrowdDispatch, bases) == 16);
+    assert!(std::mem::offset_of!(CrowdDispatch, first_link) == 20);
+    assert!(std::mem::offset_of!(CrowdDispatch, clock_low) == 24);
+    assert!(std::mem::offset_of!(CrowdDispatch, clock_high) == 28);
+    assert!(std::mem::offset_of!(CrowdDispatch, masks) == 32);
+    assert!(std::mem::offset_of!(CrowdDispatch, references) == 36);
+};
+#[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub(crate) struct CrowdEntry {
+/// The clip, 16 bits, and above it the weight in units of 2^-15; 0 leaves the layer out.
+    pub(crate) clip_and_weight: u32,
+/// The speed in units of 2^-16: its magnitude, 23 bits, and whether it runs backwards, 1 bit.
+/// Above them the mask, 5 bits, the wrap mode, 2 bits, and whether the layer is additive, 1 bit.
+    pub(crate) speed_and_modes: u32,
+/// The clip's own time in ticks, plus `START_BIAS`, when the clock stood at the anchor.
+    pub(crate) start: u32,
+/// The anchor: ticks of the clock without the lowest 8 bits.
+    pub(crate) anchor: u32,
+}
+const _: () = {
+    assert!(size_of::<CrowdEntry>() == 16);
+    assert!(std::mem::offset_of!(CrowdEntry, clip_and_weight) == 0);
+    assert!(std::mem::offset_of!(CrowdEntry, speed_and_modes) == 4);
+    assert!(std::mem::offset_of!(CrowdEntry, start) == 8);
+    assert!(std::mem::offset_of!(CrowdEntry, anchor) == 12);
+};
+#[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub(crate) struct CrowdLink {
+    pub(crate) joint: u32,
+    pub(crate) parent: u32,
+}
+const _: () = {
+    assert!(size_of::<CrowdLink>() == 8);
+    assert!(std::mem::offset_of!(CrowdLink, joint) == 0);
+    assert!(std::mem::offset_of!(CrowdLink, parent) == 4);
+};
+/// Where a layer stands in one time base of its clip.
+#[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub(crate) struct CrowdPlace {
+/// The span; with the bit `ON_KEY` exactly at its first key.
+    pub(crate) span: u32,
+/// The parameter in the span, about -1/2 to 1/2.
+    pub(crate) parameter: f32,
+}
+const _: () = {
+    assert!(size_of::<CrowdPlace>() == 8);
+    assert!(std::mem::offset_of!(CrowdPlace, span) == 0);
+    assert!(std::mem::offset_of!(CrowdPlace, parameter) == 4);
+};
+/// A span of time.
+#[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub(crate) struct CrowdSpan {
+/// The first tick in it, with `ON_KEY` where a key lies at exactly that tick.
+    pub(crate) start: u32,
+/// parameter = (tick - whole) × scale + offset
+    pub(crate) whole: i32,
+    pub(crate) scale: f32,
+    pub(crate) offset: f32,
+}
+const _: () = {
+    assert!(size_of::<CrowdSpan>() == 16);
+    assert!(std::mem::offset_of!(CrowdSpan, start) == 0);
+    assert!(std::mem::offset_of!(CrowdSpan, whole) == 4);
+    assert!(std::mem::offset_of!(CrowdSpan, scale) == 8);
+    assert!(std::mem::offset_of!(CrowdSpan, offset) == 12);
+};
+#[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub(crate) struct Dispatch {
+/// The first work item, or listed sample, of this dispatch.
+    pub(crate) first_item: u32,
+/// How many of them it evaluates.
+    pub(crate) item_count: u32,
+/// Distance in the result between neighbouring samples of a track, in rotations.
+    pub(crate) stride: u32,
+/// What the store needs beside the rotation: the order of a matrix, the axes of angles.
+    pub(crate) detail: u32,
+/// Where the first listed sample is stored; the others follow.
+    pub(crate) first_output: u32,
+/// Invocations before the first listed sample, which do nothing: so neighbours begin to store
+/// where a line of memory begins. `first_item` and `first_output` count them too.
+    pub(crate) idle: u32,
+}
+const _: () = {
+    assert!(size_of::<Dispatch>() == 24);
+    assert!(std::mem::offset_of!(Dispatch, first_item) == 0);
+    assert!(std::mem::offset_of!(Dispatch, item_count) == 4);
+    assert!(std::mem::offset_of!(Dispatch, stride) == 8);
+    assert!(std::mem::offset_of!(Dispatch, detail) == 12);
+    assert!(std::mem::offset_of!(Dispatch, first_output) == 16);
+    assert!(std::mem::offset_of!(Dispatch, idle) == 20);
+};
+#[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub(crate) struct Grid {
+/// What the store needs beside the rotation: the order of a matrix, the axes of angles.
+    pub(crate) detail: u32,
+/// Distance in the result between neighbouring samples of a track, in rotations.
+    pub(crate) stride: u32,
+/// Number of positions of a row.
+    pub(crate) samples: u32,
+/// How many rows.
+    pub(crate) rows: u32,
+/// Where the first position of the first row is stored; track by track that is a multiple of
+/// `BLOCK_SAMPLES`.
+    pub(crate) first_output: u32,
+/// The block of the first positions of the first row.
+    pub(crate) first_block: u32,
+}
+const _: () = {
+    assert!(size_of::<Grid>() == 24);
+    assert!(std::mem::offset_of!(Grid, detail) == 0);
+    assert!(std::mem::offset_of!(Grid, stride) == 4);
+    assert!(std::mem::offset_of!(Grid, samples) == 8);
+    assert!(std::mem::offset_of!(Grid, rows) == 12);
+    assert!(std::mem::offset_of!(Grid, first_output) == 16);
+    assert!(std::mem::offset_of!(Grid, first_block) == 20);
+};
+#[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub(crate) struct Item {
+/// The segment's index; the constant's, when `count` carries `IS_CONSTANT`.
+    pub(crate) source: u32,
+/// Where the first sample is stored. In the blocks of a grid, the first sample's position.
+    pub(crate) output: u32,
+/// Number of samples, with the bit `IS_CONSTANT` if they are a constant. Where an invocation
+/// evaluates an item they are at most `ITEM_SAMPLES`; in a grid there are as many as there are,
+/// and the bit `MAY_BE_TINY` may be set.
+    pub(crate) count: u32,
+/// For frames, the first sample's distance from the segment's middle; for explicit times, the
+/// index of its distance in the list of distances.
+    pub(crate) first: i32,
+/// parameter = distance * scale + offset
+    pub(crate) scale: f32,
+    pub(crate) offset: f32,
+}
+const _: () = {
+    assert!(size_of::<Item>() == 24);
+    assert!(std::mem::offset_of!(Item, source) == 0);
+    assert!(std::mem::offset_of!(Item, output) == 4);
+    assert!(std::mem::offset_of!(Item, count) == 8);
+    assert!(std::mem::offset_of!(Item, first) == 12);
+    assert!(std::mem::offset_of!(Item, scale) == 16);
+    assert!(std::mem::offset_of!(Item, offset) == 20);
+};
+#[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub(crate) struct KeySample {
+/// The index of the key before it; with `IS_KEY` that of the key which the sample is.
+    pub(crate) key: u32,
+/// From -1/2 at that key to 1/2 at the next.
+    pub(crate) parameter: f32,
+}
+const _: () = {
+    assert!(size_of::<KeySample>() == 8);
+    assert!(std::mem::offset_of!(KeySample, key) == 0);
+    assert!(std::mem::offset_of!(KeySample, parameter) == 4);
+};
+#[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub(crate) struct Link {
+/// Its offset in its parent's frame; that of a root in the world.
+    pub(crate) offset: [f32; 3],
+/// Its index among the tracks.
+    pub(crate) track: u32,
+/// Its parent's index, or ROOT.
+    pub(crate) parent: u32,
+    pub(crate) padding_3: [u32; 3],
+}
+const _: () = {
+    assert!(size_of::<Link>() == 32);
+    assert!(std::mem::offset_of!(Link, offset) == 0);
+    assert!(std::mem::offset_of!(Link, track) == 12);
+    assert!(std::mem::offset_of!(Link, parent) == 16);
+};
+#[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub(crate) struct ListedSample {
+/// The segment's index; the constant's, with `IS_CONSTANT`.
+    pub(crate) source: u32,
+/// As the form's `evaluate` takes it.
+    pub(crate) parameter: f32,
+}
+const _: () = {
+    assert!(size_of::<ListedSample>() == 8);
+    assert!(std::mem::offset_of!(ListedSample, source) == 0);
+    assert!(std::mem::offset_of!(ListedSample, parameter) == 4);
+};
+#[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub(crate) struct PolynomialSegment {
+/// The coefficients of 1, s, s², … s¹⁰.
+    pub(crate) coefficients: [[f32; 4]; 11],
+}
+const _: () = {
+    assert!(size_of::<PolynomialSegment>() == 176);
+    assert!(std::mem::offset_of!(PolynomialSegment, coefficients) == 0);
+};
+#[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub(crate) struct PoseDispatch {
+/// The number of values, each of which has an invocation.
+    pub(crate) count: u32,
+/// What else the kernel needs: the number of layers, or of tracks.
+    pub(crate) detail: u32,
+}
+const _: () = {
+    assert!(size_of::<PoseDispatch>() == 8);
+    assert!(std::mem::offset_of!(PoseDispatch, count) == 0);
+    assert!(std::mem::offset_of!(PoseDispatch, detail) == 4);
+};
+#[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub(crate) struct Probe {
+    pub(crate) a: f32,
+    pub(crate) b: f32,
+    pub(crate) c: f32,
+    pub(crate) n: i32,
+}
+const _: () = {
+    assert!(size_of::<Probe>() == 16);
+    assert!(std::mem::offset_of!(Probe, a) == 0);
+    assert!(std::mem::offset_of!(Probe, b) == 4);
+    assert!(std::mem::offset_of!(Probe, c) == 8);
+    assert!(std::mem::offset_of!(Probe, n) == 12);
+};
+/// What the expressions gave.
+#[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub(crate) struct Reply {
+    pub(crate) contraction: f32,
+    pub(crate) reassociation: f32,
+    pub(crate) rounding: f32,
+    pub(crate) association: f32,
+    pub(crate) conversion: f32,
+    pub(crate) cancellation: f32,
+    pub(crate) sine: f32,
+    pub(crate) cosine: f32,
+    pub(crate) root: f32,
+    pub(crate) arc_tangent: f32,
+}
+const _: () = {
+    assert!(size_of::<Reply>() == 40);
+    assert!(std::mem::offset_of!(Reply, contraction) == 0);
+    assert!(std::mem::offset_of!(Reply, reassociation) == 4);
+    assert!(std::mem::offset_of!(Reply, rounding) == 8);
+    assert!(std::mem::offset_of!(Reply, association) == 12);
+    assert!(std::mem::offset_of!(Reply, conversion) == 16);
+    assert!(std::mem::offset_of!(Reply, cancellation) == 20);
+    assert!(std::mem::offset_of!(Reply, sine) == 24);
+    assert!(std::mem::offset_of!(Reply, cosine) == 28);
+    assert!(std::mem::offset_of!(Reply, root) == 32);
+    assert!(std::mem::offset_of!(Reply, arc_tangent) == 36);
+};
+/// The rows of a dispatch. Tracks with the same key times are a row each and share one list of
+/// samples; other tracks together are one row.
+#[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub(crate) struct RowShape {
+/// Samples of each row.
+    pub(crate) samples: u32,
+/// Keys of each row.
+    pub(crate) keys: u32,
+/// How many rows.
+    pub(crate) count: u32,
+/// Rows that an invocation takes: up to `ROWS_PER_INVOCATION`, or one where `line` is not 0.
+    pub(crate) each: u32,
+/// Rows begin anywhere in a line of the result's memory. Where that matters, the number of
+/// rotations of a line, less one: the first of so many neighbours then stores where a line
+/// begins.
+    pub(crate) line: u32,
+}
+const _: () = {
+    assert!(size_of::<RowShape>() == 20);
+    assert!(std::mem::offset_of!(RowShape, samples) == 0);
+    assert!(std::mem::offset_of!(RowShape, keys) == 4);
+    assert!(std::mem::offset_of!(RowShape, count) == 8);
+    assert!(std::mem::offset_of!(RowShape, each) == 12);
+    assert!(std::mem::offset_of!(RowShape, line) == 16);
+};
+#[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub(crate) struct TangentWeights {
+/// The weight of the step before the key, and of the step after it.
+    pub(crate) before: f32,
+/// The handle after the key is the tangent times this; the handle before it is the tangent
+/// times 1/3 minus this.
+    pub(crate) after: f32,
+/// `KEY_INNER`, `KEY_AT_END` or `KEY_UNKNOWN`.
+    pub(crate) outgoing: f32,
+    pub(crate) kind: f32,
+}
+const _: () = {
+    assert!(size_of::<TangentWeights>() == 16);
+    assert!(std::mem::offset_of!(TangentWeights, before) == 0);
+    assert!(std::mem::offset_of!(TangentWeights, after) == 4);
+    assert!(std::mem::offset_of!(TangentWeights, outgoing) == 8);
+    assert!(std::mem::offset_of!(TangentWeights, kind) == 12);
+};
+/// A kernel, by its name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Kernel {
+    SelfTest,
+    ArcFramesAxisAngle,
+    ArcFramesEuler,
+    ArcFramesF16,
+    ArcFramesF32,
+    ArcFramesMatrix3x3,
+    ArcFramesMatrix3x4,
+    ArcFramesSnorm16,
+    ArcFramesVector,
+    ArcTimesAxisAngle,
+    ArcTimesEuler,
+    ArcTimesF16,
+    ArcTimesF32,
+    ArcTimesMatrix3x3,
+    ArcTimesMatrix3x4,
+    ArcTimesSnorm16,
+    ArcTimesVector,
+    ArcSamplesAxisAngle,
+    ArcSamplesEuler,
+    ArcSamplesF16,
+    ArcSamplesF32,
+    ArcSamplesMatrix3x3,
+    ArcSamplesMatrix3x4,
+    ArcSamplesSnorm16,
+    ArcSamplesVector,
+    ArcFramesCoalescedAxisAngle,
+    ArcFramesCoalescedEuler,
+    ArcFramesCoalescedF16,
+    ArcFramesCoalescedF32,
+    ArcFramesCoalescedMatrix3x3,
+    ArcFramesCoalescedMatrix3x4,
+    ArcFramesCoalescedSnorm16,
+    ArcFramesCoalescedVector,
+    ArcTimesCoalescedAxisAngle,
+    ArcTimesCoalescedEuler,
+    ArcTimesCoalescedF16,
+    ArcTimesCoalescedF32,
+    ArcTimesCoalescedMatrix3x3,
+    ArcTimesCoalescedMatrix3x4,
+    ArcTimesCoalescedSnorm16,
+    ArcTimesCoalescedVector,
+    PolynomialFramesAxisAngle,
+    PolynomialFramesEuler,
+    PolynomialFramesF16,
+    PolynomialFramesF32,
+    PolynomialFramesMatrix3x3,
+    PolynomialFramesMatrix3x4,
+    PolynomialFramesSnorm16,
+    PolynomialFramesVector,
+    PolynomialTimesAxisAngle,
+    PolynomialTimesEuler,
+    PolynomialTimesF16,
+    PolynomialTimesF32,
+    PolynomialTimesMatrix3x3,
+    PolynomialTimesMatrix3x4,
+    PolynomialTimesSnorm16,
+    PolynomialTimesVector,
+    PolynomialSamplesAxisAngle,
+    PolynomialSamplesEuler,
+    PolynomialSamplesF16,
+    PolynomialSamplesF32,
+    PolynomialSamplesMatrix3x3,
+    PolynomialSamplesMatrix3x4,
+    PolynomialSamplesSnorm16,
+    PolynomialSamplesVector,
+    PolynomialFramesCoalescedAxisAngle,
+    PolynomialFramesCoalescedEuler,
+    PolynomialFramesCoalescedF16,
+    PolynomialFramesCoalescedF32,
+    PolynomialFramesCoalescedMatrix3x3,
+    PolynomialFramesCoalescedMatrix3x4,
+    PolynomialFramesCoalescedSnorm16,
+    PolynomialFramesCoalescedVector,
+    PolynomialTimesCoalescedAxisAngle,
+    PolynomialTimesCoalescedEuler,
+    PolynomialTimesCoalescedF16,
+    PolynomialTimesCoalescedF32,
+    PolynomialTimesCoalescedMatrix3x3,
+    PolynomialTimesCoalescedMatrix3x4,
+    PolynomialTimesCoalescedSnorm16,
+    PolynomialTimesCoalescedVector,
+    FromKeysArcs,
+    FromKeysTwoKeys,
+    FromKeysCubics,
+    PosesAdd,
+    PosesBlend,
+    PosesMix,
+    PosesSmooth,
+    PosesSteps,
+    PosesWorld,
+    CrowdRotations,
+    CrowdPlainRotations,
+    CrowdLocals,
+    CrowdPlainLocals,
+    CrowdTimes,
+    CrowdWalk,
+    CrowdSkin,
+    CrowdHalf,
+}
+/// How the work over segments is listed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(crate) enum List {
+    Frames,
+    Times,
+    Samples,
+    FramesCoalesced,
+    TimesCoalesced,
+}
+/// What a kernel stores a rotation as.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(crate) enum Store {
+    AxisAngle,
+    Euler,
+    F16,
+    F32,
+    Matrix3x3,
+    Matrix3x4,
+    Snorm16,
+    Vector,
+}
+impl Kernel {
+    /// The kernel for a form of segments, a list and a store.
+    pub(crate) fn over_segments(form: Form, list: List, store: Store) -> Self {
+        match (form, list, store) {
+            (Form::Arc, List::Frames, Store::AxisAngle) => Self::ArcFramesAxisAngle,
+            (Form::Arc, List::Frames, Store::Euler) => Self::ArcFramesEuler,
+            (Form::Arc, List::Frames, Store::F16) => Self::ArcFramesF16,
+            (Form::Arc, List::Frames, Store::F32) => Self::ArcFramesF32,
+            (Form::Arc, List::Frames, Store::Matrix3x3) => Self::ArcFramesMatrix3x3,
+            (Form::Arc, List::Frames, Store::Matrix3x4) => Self::ArcFramesMatrix3x4,
+            (Form::Arc, List::Frames, Store::Snorm16) => Self::ArcFramesSnorm16,
+            (Form::Arc, List::Frames, Store::Vector) => Self::ArcFramesVector,
+            (Form::Arc, List::Times, Store::AxisAngle) => Self::ArcTimesAxisAngle,
+            (Form::Arc, List::Times, Store::Euler) => Self::ArcTimesEuler,
+            (Form::Arc, List::Times, Store::F16) => Self::ArcTimesF16,
+            (Form::Arc, List::Times, Store::F32) => Self::ArcTimesF32,
+            (Form::Arc, List::Times, Store::Matrix3x3) => Self::ArcTimesMatrix3x3,
+            (Form::Arc, List::Times, Store::Matrix3x4) => Self::ArcTimesMatrix3x4,
+            (Form::Arc, List::Times, Store::Snorm16) => Self::ArcTimesSnorm16,
+            (Form::Arc, List::Times, Store::Vector) => Self::ArcTimesVector,
+            (Form::Arc, List::Samples, Store::AxisAngle) => Self::ArcSamplesAxisAngle,
+            (Form::Arc, List::Samples, Store::Euler) => Self::ArcSamplesEuler,
+            (Form::Arc, List::Samples, Store::F16) => Self::ArcSamplesF16,
+            (Form::Arc, List::Samples, Store::F32) => Self::ArcSamplesF32,
+            (Form::Arc, List::Samples, Store::Matrix3x3) => Self::ArcSamplesMatrix3x3,
+            (Form::Arc, List::Samples, Store::Matrix3x4) => Self::ArcSamplesMatrix3x4,
+            (Form::Arc, List::Samples, Store::Snorm16) => Self::ArcSamplesSnorm16,
+            (Form::Arc, List::Samples, Store::Vector) => Self::ArcSamplesVector,
+            (Form::Arc, List::FramesCoalesced, Store::AxisAngle) => Self::ArcFramesCoalescedAxisAngle,
+            (Form::Arc, List::FramesCoalesced, Store::Euler) => Self::ArcFramesCoalescedEuler,
+            (Form::Arc, List::FramesCoalesced, Store::F16) => Self::ArcFramesCoalescedF16,
+            (Form::Arc, List::FramesCoalesced, Store::F32) => Self::ArcFramesCoalescedF32,
+            (Form::Arc, List::FramesCoalesced, Store::Matrix3x3) => Self::ArcFramesCoalescedMatrix3x3,
+            (Form::Arc, List::FramesCoalesced, Store::Matrix3x4) => Self::ArcFramesCoalescedMatrix3x4,
+            (Form::Arc, List::FramesCoalesced, Store::Snorm16) => Self::ArcFramesCoalescedSnorm16,
+            (Form::Arc, List::FramesCoalesced, Store::Vector) => Self::ArcFramesCoalescedVector,
+            (Form::Arc, List::TimesCoalesced, Store::AxisAngle) => Self::ArcTimesCoalescedAxisAngle,
+            (Form::Arc, List::TimesCoalesced, Store::Euler) => Self::ArcTimesCoalescedEuler,
+            (Form::Arc, List::TimesCoalesced, Store::F16) => Self::ArcTimesCoalescedF16,
+            (Form::Arc, List::TimesCoalesced, Store::F32) => Self::ArcTimesCoalescedF32,
+            (Form::Arc, List::TimesCoalesced, Store::Matrix3x3) => Self::ArcTimesCoalescedMatrix3x3,
+            (Form::Arc, List::TimesCoalesced, Store::Matrix3x4) => Self::ArcTimesCoalescedMatrix3x4,
+            (Form::Arc, List::TimesCoalesced, Store::Snorm16) => Self::ArcTimesCoalescedSnorm16,
+            (Form::Arc, List::TimesCoalesced, Store::Vector) => Self::ArcTimesCoalescedVector,
+            (Form::Polynomial, List::Frames, Store::AxisAngle) => Self::PolynomialFramesAxisAngle,
+            (Form::Polynomial, List::Frames, Store::Euler) => Self::PolynomialFramesEuler,
+            (Form::Polynomial, List::Frames, Store::F16) => Self::PolynomialFramesF16,
+            (Form::Polynomial, List::Frames, Store::F32) => Self::PolynomialFramesF32,
+            (Form::Polynomial, List::Frames, Store::Matrix3x3) => Self::PolynomialFramesMatrix3x3,
+            (Form::Polynomial, List::Frames, Store::Matrix3x4) => Self::PolynomialFramesMatrix3x4,
+            (Form::Polynomial, List::Frames, Store::Snorm16) => Self::PolynomialFramesSnorm16,
+            (Form::Polynomial, List::Frames, Store::Vector) => Self::PolynomialFramesVector,
+            (Form::Polynomial, List::Times, Store::AxisAngle) => Self::PolynomialTimesAxisAngle,
+            (Form::Polynomial, List::Times, Store::Euler) => Self::PolynomialTimesEuler,
+            (Form::Polynomial, List::Times, Store::F16) => Self::PolynomialTimesF16,
+            (Form::Polynomial, List::Times, Store::F32) => Self::PolynomialTimesF32,
+            (Form::Polynomial, List::Times, Store::Matrix3x3) => Self::PolynomialTimesMatrix3x3,
+            (Form::Polynomial, List::Times, Store::Matrix3x4) => Self::PolynomialTimesMatrix3x4,
+            (Form::Polynomial, List::Times, Store::Snorm16) => Self::PolynomialTimesSnorm16,
+            (Form::Polynomial, List::Times, Store::Vector) => Self::PolynomialTimesVector,
+            (Form::Polynomial, List::Samples, Store::AxisAngle) => Self::PolynomialSamplesAxisAngle,
+            (Form::Polynomial, List::Samples, Store::Euler) => Self::PolynomialSamplesEuler,
+            (Form::Polynomial, List::Samples, Store::F16) => Self::PolynomialSamplesF16,
+            (Form::Polynomial, List::Samples, Store::F32) => Self::PolynomialSamplesF32,
+            (Form::Polynomial, List::Samples, Store::Matrix3x3) => Self::PolynomialSamplesMatrix3x3,
+            (Form::Polynomial, List::Samples, Store::Matrix3x4) => Self::PolynomialSamplesMatrix3x4,
+            (Form::Polynomial, List::Samples, Store::Snorm16) => Self::PolynomialSamplesSnorm16,
+            (Form::Polynomial, List::Samples, Store::Vector) => Self::PolynomialSamplesVector,
+            (Form::Polynomial, List::FramesCoalesced, Store::AxisAngle) => Self::PolynomialFramesCoalescedAxisAngle,
+            (Form::Polynomial, List::FramesCoalesced, Store::Euler) => Self::PolynomialFramesCoalescedEuler,
+            (Form::Polynomial, List::FramesCoalesced, Store::F16) => Self::PolynomialFramesCoalescedF16,
+            (Form::Polynomial, List::FramesCoalesced, Store::F32) => Self::PolynomialFramesCoalescedF32,
+            (Form::Polynomial, List::FramesCoalesced, Store::Matrix3x3) => Self::PolynomialFramesCoalescedMatrix3x3,
+            (Form::Polynomial, List::FramesCoalesced, Store::Matrix3x4) => Self::PolynomialFramesCoalescedMatrix3x4,
+            (Form::Polynomial, List::FramesCoalesced, Store::Snorm16) => Self::PolynomialFramesCoalescedSnorm16,
+            (Form::Polynomial, List::FramesCoalesced, Store::Vector) => Self::PolynomialFramesCoalescedVector,
+            (Form::Polynomial, List::TimesCoalesced, Store::AxisAngle) => Self::PolynomialTimesCoalescedAxisAngle,
+            (Form::Polynomial, List::TimesCoalesced, Store::Euler) => Self::PolynomialTimesCoalescedEuler,
+            (Form::Polynomial, List::TimesCoalesced, Store::F16) => Self::PolynomialTimesCoalescedF16,
+            (Form::Polynomial, List::TimesCoalesced, Store::F32) => Self::PolynomialTimesCoalescedF32,
+            (Form::Polynomial, List::TimesCoalesced, Store::Matrix3x3) => Self::PolynomialTimesCoalescedMatrix3x3,
+            (Form::Polynomial, List::TimesCoalesced, Store::Matrix3x4) => Self::PolynomialTimesCoalescedMatrix3x4,
+            (Form::Polynomial, List::TimesCoalesced, Store::Snorm16) => Self::PolynomialTimesCoalescedSnorm16,
+            (Form::Polynomial, List::TimesCoalesced, Store::Vector) => Self::PolynomialTimesCoalescedVector,
+        }
+    }
+}
+pub(crate) static KERNELS: [KernelCode; 98] = [
+    KernelCode { storage: ("self_test", 1920), texels: None, bindings: 2 },
+    KernelCode { storage: ("arc_frames_axis_angle", 2843), texels: Some(("arc_frames_axis_angle_texels", 2969)), bindings: 4 },
+    KernelCode { storage: ("arc_frames_euler", 3391), texels: Some(("arc_frames_euler_texels", 3509)), bindings: 4 },
+    KernelCode { storage: ("arc_frames_f16", 2082), texels: Some(("arc_frames_f16_texels", 2200)), bindings: 4 },
+    KernelCode { storage: ("arc_frames_f32", 1826), texels: Some(("arc_frames_f32_texels", 2057)), bindings: 4 },
+    KernelCode { storage: ("arc_frames_matrix3x3", 2421), texels: Some(("arc_frames_matrix3x3_texels", 2539)), bindings: 4 },
+    KernelCode { storage: ("arc_frames_matrix3x4", 2504), texels: Some(("arc_frames_matrix3x4_texels", 2622)), bindings: 4 },
+    KernelCode { storage: ("arc_frames_snorm16", 1963), texels: Some(("arc_frames_snorm16_texels", 2081)), bindings: 4 },
+    KernelCode { storage: ("arc_frames_vector", 1890), texels: Some(("arc_frames_vector_texels", 2008)), bindings: 4 },
+    KernelCode { storage: ("arc_times_axis_angle", 2908), texels: Some(("arc_times_axis_angle_texels", 3069)), bindings: 5 },
+    KernelCode { storage: ("arc_times_euler", 3452), texels: Some(("arc_times_euler_texels", 3605)), bindings: 5 },
+    KernelCode { storage: ("arc_times_f16", 2147), texels: Some(("arc_times_f16_texels", 2300)), bindings: 5 },
+    KernelCode { storage: ("arc_times_f32", 1891), texels: Some(("arc_times_f32_texels", 2157)), bindings: 5 },
+    KernelCode { storage: ("arc_times_matrix3x3", 2482), texels: Some(("arc_times_matrix3x3_texels", 2639)), bindings: 5 },
+    KernelCode { storage: ("arc_times_matrix3x4", 2565), texels: Some(("arc_times_matrix3x4_texels", 2718)), bindings: 5 },
+    KernelCode { storage: ("arc_times_snorm16", 2028), texels: Some(("arc_times_snorm16_texels", 2181)), bindings: 5 },
+    KernelCode { storage: ("arc_times_vector", 1951), texels: Some(("arc_times_vector_texels", 2108)), bindings: 5 },
+    KernelCode { storage: ("arc_samples_axis_angle", 2540), texels: Some(("arc_samples_axis_angle_texels", 2591)), bindings: 4 },
+    KernelCode { storage: ("arc_samples_euler", 3088), texels: Some(("arc_samples_euler_texels", 3131)), bindings: 4 },
+    KernelCode { storage: ("arc_samples_f16", 1783), texels: Some(("arc_samples_f16_texels", 1826)), bindings: 4 },
+    KernelCode { storage: ("arc_samples_f32", 1523), texels: Some(("arc_samples_f32_texels", 1679)), bindings: 4 },
+    KernelCode { storage: ("arc_samples_matrix3x3", 2122), texels: Some(("arc_samples_matrix3x3_texels", 2165)), bindings: 4 },
+    KernelCode { storage: ("arc_samples_matrix3x4", 2201), texels: Some(("arc_samples_matrix3x4_texels", 2244)), bindings: 4 },
+    KernelCode { storage: ("arc_samples_snorm16", 1664), texels: Some(("arc_samples_snorm16_texels", 1707)), bindings: 4 },
+    KernelCode { storage: ("arc_samples_vector", 1591), texels: Some(("arc_samples_vector_texels", 1634)), bindings: 4 },
+    KernelCode { storage: ("arc_frames_coalesced_axis_angle", 3793), texels: None, bindings: 5 },
+    KernelCode { storage: ("arc_frames_coalesced_euler", 4329), texels: None, bindings: 5 },
+    KernelCode { storage: ("arc_frames_coalesced_f16", 3036), texels: None, bindings: 5 },
+    KernelCode { storage: ("arc_frames_coalesced_f32", 2776), texels: None, bindings: 5 },
+    KernelCode { storage: ("arc_frames_coalesced_matrix3x3", 3367), texels: None, bindings: 5 },
+    KernelCode { storage: ("arc_frames_coalesced_matrix3x4", 3442), texels: None, bindings: 5 },
+    KernelCode { storage: ("arc_frames_coalesced_snorm16", 2917), texels: None, bindings: 5 },
+    KernelCode { storage: ("arc_frames_coalesced_vector", 2836), texels: None, bindings: 5 },
+    KernelCode { storage: ("arc_times_coalesced_axis_angle", 3858), texels: None, bindings: 6 },
+    KernelCode { storage: ("arc_times_coalesced_euler", 4390), texels: None, bindings: 6 },
+    KernelCode { storage: ("arc_times_coalesced_f16", 3101), texels: None, bindings: 6 },
+    KernelCode { storage: ("arc_times_coalesced_f32", 2841), texels: None, bindings: 6 },
+    KernelCode { storage: ("arc_times_coalesced_matrix3x3", 3428), texels: None, bindings: 6 },
+    KernelCode { storage: ("arc_times_coalesced_matrix3x4", 3503), texels: None, bindings: 6 },
+    KernelCode { storage: ("arc_times_coalesced_snorm16", 2982), texels: None, bindings: 6 },
+    KernelCode { storage: ("arc_times_coalesced_vector", 2897), texels: None, bindings: 6 },
+    KernelCode { storage: ("polynomial_frames_axis_angle", 2469), texels: Some(("polynomial_frames_axis_angle_texels", 2762)), bindings: 4 },
+    KernelCode { storage: ("polynomial_frames_euler", 3017), texels: Some(("polynomial_frames_euler_texels", 3298)), bindings: 4 },
+    KernelCode { storage: ("polynomial_frames_f16", 1704), texels: Some(("polynomial_frames_f16_texels", 1989)), bindings: 4 },
+    KernelCode { storage: ("polynomial_frames_f32", 1448), texels: Some(("polynomial_frames_f32_texels", 1846)), bindings: 4 },
+    KernelCode { storage: ("polynomial_frames_matrix3x3", 2047), texels: Some(("polynomial_frames_matrix3x3_texels", 2324)), bindings: 4 },
+    KernelCode { storage: ("polynomial_frames_matrix3x4", 2126), texels: Some(("polynomial_frames_matrix3x4_texels", 2395)), bindings: 4 },
+    KernelCode { storage: ("polynomial_frames_snorm16", 1585), texels: Some(("polynomial_frames_snorm16_texels", 1870)), bindings: 4 },
+    KernelCode { storage: ("polynomial_frames_vector", 1512), texels: Some(("polynomial_frames_vector_texels", 1797)), bindings: 4 },
+    KernelCode { storage: ("polynomial_times_axis_angle", 2534), texels: Some(("polynomial_times_axis_angle_texels", 2858)), bindings: 5 },
+    KernelCode { storage: ("polynomial_times_euler", 3078), texels: Some(("polynomial_times_euler_texels", 3394)), bindings: 5 },
+    KernelCode { storage: ("polynomial_times_f16", 1769), texels: Some(("polynomial_times_f16_texels", 2085)), bindings: 5 },
+    KernelCode { storage: ("polynomial_times_f32", 1513), texels: Some(("polynomial_times_f32_texels", 1942)), bindings: 5 },
+    KernelCode { storage: ("polynomial_times_matrix3x3", 2108), texels: Some(("polynomial_times_matrix3x3_texels", 2420)), bindings: 5 },
+    KernelCode { storage: ("polynomial_times_matrix3x4", 2187), texels: Some(("polynomial_times_matrix3x4_texels", 2491)), bindings: 5 },
+    KernelCode { storage: ("polynomial_times_snorm16", 1650), texels: Some(("polynomial_times_snorm16_texels", 1966)), bindings: 5 },
+    KernelCode { storage: ("polynomial_times_vector", 1573), texels: Some(("polynomial_times_vector_texels", 1893)), bindings: 5 },
+    KernelCode { storage: ("polynomial_samples_axis_angle", 2166), texels: Some(("polynomial_samples_axis_angle_texels", 2380)), bindings: 4 },
+    KernelCode { storage: ("polynomial_samples_euler", 2714), texels: Some(("polynomial_samples_euler_texels", 2916)), bindings: 4 },
+    KernelCode { storage: ("polynomial_samples_f16", 1405), texels: Some(("polynomial_samples_f16_texels", 1611)), bindings: 4 },
+    KernelCode { storage: ("polynomial_samples_f32", 1145), texels: Some(("polynomial_samples_f32_texels", 1464)), bindings: 4 },
+    KernelCode { storage: ("polynomial_samples_matrix3x3", 1748), texels: Some(("polynomial_samples_matrix3x3_texels", 1942)), bindings: 4 },
+    KernelCode { storage: ("polynomial_samples_matrix3x4", 1823), texels: Some(("polynomial_samples_matrix3x4_texels", 2013)), bindings: 4 },
+    KernelCode { storage: ("polynomial_samples_snorm16", 1286), texels: Some(("polynomial_samples_snorm16_texels", 1492)), bindings: 4 },
+    KernelCode { storage: ("polynomial_samples_vector", 1213), texels: Some(("polynomial_samples_vector_texels", 1415)), bindings: 4 },
+    KernelCode { storage: ("polynomial_frames_coalesced_axis_angle", 3419), texels: None, bindings: 5 },
+    KernelCode { storage: ("polynomial_frames_coalesced_euler", 3955), texels: None, bindings: 5 },
+    KernelCode { storage: ("polynomial_frames_coalesced_f16", 2658), texels: None, bindings: 5 },
+    KernelCode { storage: ("polynomial_frames_coalesced_f32", 2398), texels: None, bindings: 5 },
+    KernelCode { storage: ("polynomial_frames_coalesced_matrix3x3", 2993), texels: None, bindings: 5 },
+    KernelCode { storage: ("polynomial_frames_coalesced_matrix3x4", 3064), texels: None, bindings: 5 },
+    KernelCode { storage: ("polynomial_frames_coalesced_snorm16", 2539), texels: None, bindings: 5 },
+    KernelCode { storage: ("polynomial_frames_coalesced_vector", 2458), texels: None, bindings: 5 },
+    KernelCode { storage: ("polynomial_times_coalesced_axis_angle", 3484), texels: None, bindings: 6 },
+    KernelCode { storage: ("polynomial_times_coalesced_euler", 4016), texels: None, bindings: 6 },
+    KernelCode { storage: ("polynomial_times_coalesced_f16", 2723), texels: None, bindings: 6 },
+    KernelCode { storage: ("polynomial_times_coalesced_f32", 2463), texels: None, bindings: 6 },
+    KernelCode { storage: ("polynomial_times_coalesced_matrix3x3", 3054), texels: None, bindings: 6 },
+    KernelCode { storage: ("polynomial_times_coalesced_matrix3x4", 3125), texels: None, bindings: 6 },
+    KernelCode { storage: ("polynomial_times_coalesced_snorm16", 2604), texels: None, bindings: 6 },
+    KernelCode { storage: ("polynomial_times_coalesced_vector", 2519), texels: None, bindings: 6 },
+    KernelCode { storage: ("from_keys_arcs", 2326), texels: Some(("from_keys_arcs_texels", 2479)), bindings: 3 },
+    KernelCode { storage: ("from_keys_two_keys", 2890), texels: Some(("from_keys_two_keys_texels", 3043)), bindings: 3 },
+    KernelCode { storage: ("from_keys_cubics", 5472), texels: Some(("from_keys_cubics_texels", 5616)), bindings: 4 },
+    KernelCode { storage: ("poses_add", 3094), texels: None, bindings: 4 },
+    KernelCode { storage: ("poses_blend", 3205), texels: None, bindings: 3 },
+    KernelCode { storage: ("poses_mix", 3009), texels: None, bindings: 4 },
+    KernelCode { storage: ("poses_smooth", 3504), texels: None, bindings: 4 },
+    KernelCode { storage: ("poses_steps", 3239), texels: None, bindings: 2 },
+    KernelCode { storage: ("poses_world", 3271), texels: None, bindings: 3 },
+    KernelCode { storage: ("crowd_rotations", 5456), texels: Some(("crowd_rotations_texels", 5542)), bindings: 5 },
+    KernelCode { storage: ("crowd_plain_rotations", 2319), texels: Some(("crowd_plain_rotations_texels", 2411)), bindings: 5 },
+    KernelCode { storage: ("crowd_locals", 6076), texels: Some(("crowd_locals_texels", 6162)), bindings: 5 },
+    KernelCode { storage: ("crowd_plain_locals", 2943), texels: Some(("crowd_plain_locals_texels", 3035)), bindings: 5 },
+    KernelCode { storage: ("crowd_times", 2589), texels: None, bindings: 5 },
+    KernelCode { storage: ("crowd_walk", 919), texels: None, bindings: 2 },
+    KernelCode { storage: ("crowd_skin", 746), texels: None, bindings: 2 },
+    KernelCode { storage: ("crowd_half", 777), texels: None, bindings: 2 },
+];
