@@ -59,24 +59,31 @@ fn largest_error(set: &TrackSet, interpolation: Interpolation, frames: &Frames) 
     let mut largest = 0.0f64;
     for (t, track) in set.tracks().enumerate() {
         let curve = Curve::of(&interpolation, track);
+        let mut scales = vec![None; track.times.len() + 1];
         for s in 0..found.samples() {
             let time = timeline.time(t, s).unwrap();
             let found = found.get(t, s).unwrap().as_dvec3();
             assert!(found.is_finite());
             let error = (found - expected(&curve, interpolation.quantity, time)).length();
-            largest = largest.max(error / scale(&curve, track, interpolation.quantity, time));
+            let interval = track.times.partition_point(|&key| key <= time);
+            let scale = scales[interval]
+                .get_or_insert_with(|| scale(&curve, track, interpolation.quantity, interval));
+            largest = largest.max(error / *scale);
         }
     }
     largest
 }
 
-/// The largest value in the interval of a time.
-fn scale(curve: &Curve, track: Track, quantity: Quantity, time: f64) -> f64 {
-    let i = track.times.partition_point(|&key| key <= time);
-    if i == 0 || i == track.times.len() {
-        return expected(curve, quantity, time).length().max(1e-3);
-    }
-    let (from, to) = (track.times[i - 1], track.times[i]);
+/// The largest value in the interval before key `i`; before the first key and behind the last one
+/// nothing moves.
+fn scale(curve: &Curve, track: Track, quantity: Quantity, i: usize) -> f64 {
+    let Some((from, to)) = i
+        .checked_sub(1)
+        .map(|i| track.times[i])
+        .zip(track.times.get(i))
+    else {
+        return 1e-3;
+    };
     let value = |k| {
         let at = from + (to - from) * (0.02 + 0.96 * f64::from(k) / 8.0);
         expected(curve, quantity, at).length()

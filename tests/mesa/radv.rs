@@ -13,6 +13,7 @@ use super::compile::child;
 use super::listing::{Generation, Listing};
 use super::table::{self, Cost};
 use super::{newer, with_driver};
+use crate::support::is_turn;
 use rayon::prelude::*;
 
 /// A family of processors.
@@ -144,6 +145,9 @@ fn faults(kernel: &str, listing: &Listing, generation: Generation) -> Vec<String
     faults
 }
 
+/// It is the turn of every third family for each kernel: the newer compiler compiles it for a
+/// processor of the older kind and for one of the newer, the system's for one or two. Those of the table
+/// are compiled for all.
 #[test]
 fn every_kernel_is_exact_on_six_families() {
     let newer = newer("radeon");
@@ -154,14 +158,24 @@ fn every_kernel_is_exact_on_six_families() {
         .chain(older_families)
         .filter_map(|(own, name, manifest)| Some((own, name?, manifest.as_deref()?)))
         .collect();
+    let in_table = table::kernels();
     let of_all: Vec<_> = asked
         .into_par_iter()
-        .map(|(own, name, manifest)| (own, manifest, compiled(manifest, name, &[], false)))
+        .enumerate()
+        .map(|(round, (own, name, manifest))| {
+            let is_next = |place: usize, kernel: &str| {
+                is_turn(round, place, 3) || in_table.iter().any(|own| own == kernel)
+            };
+            let kernels = tumble::kernels().map(|(kernel, _)| kernel).enumerate();
+            let kernels = kernels.filter(|(place, kernel)| is_next(*place, kernel));
+            let kernels: Vec<&str> = kernels.map(|(_, kernel)| kernel).collect();
+            (own, manifest, compiled(manifest, name, &kernels, false))
+        })
         .collect();
     let mut wrong = Vec::new();
     let mut costs = BTreeMap::new();
     for (own, manifest, listings) in &of_all {
-        assert!(listings.len() > 100, "{}: {}", own.name, listings.len());
+        assert!(listings.len() > 50, "{}: {}", own.name, listings.len());
         for (kernel, listing) in listings {
             for fault in faults(kernel, listing, own.generation) {
                 let manifest = manifest.display();

@@ -25,6 +25,17 @@ fn cells(line: &str) -> Vec<&str> {
     inner.map(|cell| cell.trim().trim_matches('`')).collect()
 }
 
+/// The kernels that the table has.
+pub(super) fn kernels() -> Vec<String> {
+    let text = std::fs::read_to_string(page()).unwrap();
+    let own = text
+        .lines()
+        .skip_while(|line| !line.starts_with(HEAD))
+        .skip(2);
+    let own = own.take_while(|line| line.starts_with('|'));
+    own.map(|line| cells(line)[0].to_owned()).collect()
+}
+
 /// Compares the table with what was measured, by kernel and family; returns what is wrong with it.
 pub(super) fn check(measured: &BTreeMap<(String, &str), Cost>) -> Vec<String> {
     let text = std::fs::read_to_string(page()).unwrap();

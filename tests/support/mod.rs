@@ -47,6 +47,15 @@ pub fn stage(options: &mut EngineOptions, turn: usize) {
     (options.uploads, options.read_back) = STAGED[turn % STAGED.len()];
 }
 
+/// [`WAYS`], or the first alone where `ONE_WAY` is set: for drivers that are tried beside those of
+/// the system.
+fn ways() -> &'static [(Reads, Mapping)] {
+    match std::env::var_os("ONE_WAY") {
+        Some(_) => &WAYS[..1],
+        None => &WAYS,
+    }
+}
+
 /// Every Vulkan device in all of [`WAYS`]. Tests share the engines of the same options: what takes
 /// longest of most of them is that drivers compile kernels.
 pub fn vulkan_engines(change: impl Fn(&mut EngineOptions)) -> Vec<Engine> {
@@ -54,7 +63,7 @@ pub fn vulkan_engines(change: impl Fn(&mut EngineOptions)) -> Vec<Engine> {
     let mut open = OPEN.lock().unwrap_or_else(PoisonError::into_inner);
     let mut engines = Vec::new();
     for (index, device) in vulkan_devices().into_iter().enumerate() {
-        for (reads, mapping) in WAYS {
+        for &(reads, mapping) in ways() {
             let mut options = EngineOptions::default();
             (options.reads, options.mapping) = (reads, mapping);
             change(&mut options);
@@ -69,7 +78,7 @@ pub fn vulkan_engines(change: impl Fn(&mut EngineOptions)) -> Vec<Engine> {
 /// Of [`vulkan_engines`], called once or more often, those whose turn it is in this round: each device in
 /// one of [`WAYS`], in the next round in the next.
 pub fn in_turn(engines: &[Engine], round: usize) -> impl Iterator<Item = &Engine> {
-    let is_next = move |(place, _): &(usize, &Engine)| is_turn(round, *place, WAYS.len());
+    let is_next = move |(place, _): &(usize, &Engine)| is_turn(round, *place, ways().len());
     (engines.iter().enumerate().filter(is_next)).map(|(_, engine)| engine)
 }
 
