@@ -7,6 +7,7 @@ use glam::Quat;
 use crate::evaluate::backend::Backend;
 use crate::gpu::engine::{ClipBuffers, Job, VulkanEngine, lock};
 use crate::gpu::error::{EvaluateError, VulkanError};
+use crate::gpu::recovery::Opened;
 use crate::method::interpolation::Interpolation;
 use crate::output::buffer::OutputBuffer;
 use crate::output::encoding::Encoding;
@@ -37,7 +38,7 @@ impl Uploaded {
     ) -> Result<Self, EvaluateError> {
         wanted.group_bytes = backend.group_bytes();
         let data = ClipData::new(set, interpolation, wanted).map_err(SetError::from)?;
-        Ok(Self::of_data(backend, data, spare)?)
+        Self::of_data(backend, data, spare)
     }
 
     /// Uploads data that is prepared already.
@@ -45,7 +46,7 @@ impl Uploaded {
         backend: &Backend,
         data: ClipData,
         spare: Option<ClipBuffers>,
-    ) -> Result<Self, VulkanError> {
+    ) -> Result<Self, EvaluateError> {
         let buffers = match backend {
             Backend::Cpu(_) => None,
             Backend::Vulkan(opened) => Some(Arc::new(opened.upload(&data, spare)?)),
@@ -72,10 +73,11 @@ impl Uploaded {
     ) -> Result<Box<dyn Storage>, EvaluateError> {
         let timeline = self.data.folded(timeline)?;
         match backend {
-            Backend::Vulkan(opened) => opened.attempt_smaller(|engine| {
-                let buffers = self.buffers_on(engine)?;
-                engine.evaluate(&self.data, &buffers, &timeline, layout)
-            }),
+            Backend::Vulkan(opened) => {
+                self.on_device(opened, &timeline, Encoding::F32, |engine, job| {
+                    engine.evaluate(job, layout)
+                })
+            }
             Backend::Cpu(_) => {
                 let whole = Window::whole(self.data.track_count(), timeline.len(), layout);
                 let mut quats = OutputBuffer::new(whole.len())?;
@@ -116,19 +118,34 @@ impl Uploaded {
             Backend::Cpu(engine) => {
                 Ok(engine.evaluate_encoded(&self.data, timeline, window, encoding, output)?)
             }
-            Backend::Vulkan(opened) => opened.attempt_smaller(|engine| {
-                let buffers = self.buffers_on(engine)?;
-                let job = Job::new(&self.data, &buffers, timeline, encoding);
+            Backend::Vulkan(opened) => self.on_device(opened, timeline, encoding, |engine, job| {
                 engine.evaluate_into(job, window, output)
             }),
         }
     }
 
-    /// The segments on a device; uploaded again where it is not the device that had them.
-    pub(crate) fn buffers_on(
+    /// Does some work on a Vulkan device, again in smaller windows if memory runs out.
+    pub(crate) fn on_device<T>(
         &self,
-        engine: &VulkanEngine,
-    ) -> Result<Arc<ClipBuffers>, VulkanError> {
+        opened: &Opened,
+        timeline: &Timeline,
+        encoding: Encoding,
+        mut work: impl FnMut(&VulkanEngine, Job<'_>) -> Result<T, EvaluateError>,
+    ) -> Result<T, EvaluateError> {
+        opened.attempt_smaller(|engine| {
+            let (clip, buffers) = (&self.data, &*self.buffers_on(engine)?);
+            let job = Job {
+                clip,
+                buffers,
+                timeline,
+                encoding,
+            };
+            work(engine, job)
+        })
+    }
+
+    /// The segments on a device; uploaded again where it is not the device that had them.
+    fn buffers_on(&self, engine: &VulkanEngine) -> Result<Arc<ClipBuffers>, VulkanError> {
         let mut buffers = lock(&self.buffers);
         if let Some(there) = buffers.as_ref().filter(|there| engine.holds(there)) {
             return Ok(Arc::clone(there));

@@ -53,11 +53,12 @@ pub(crate) struct LogicalDevice {
     /// The queue of [`Lane::Copies`], where that is another one.
     copy_queue: Option<Queue>,
     /// Whether staged results are copied in submissions of their own.
-    copies_apart: bool,
+    pub(crate) copies_apart: bool,
     names: Option<ext::debug_utils::Device>,
     /// The extension that imports the caller's memory, where it is used.
     pub(crate) borrows: Option<ext::external_memory_host::Device>,
-    owned: bool,
+    /// Whether it was opened here, and may be opened again here.
+    pub(crate) owned: bool,
     /// Memory of buffers.
     pub(crate) shared: SharedMemory,
     /// A wait ran out of time: work may still run, so nothing may be destroyed.
@@ -183,11 +184,6 @@ impl LogicalDevice {
         }
     }
 
-    /// Whether staged results are copied in submissions of their own.
-    pub(crate) fn copies_apart(&self) -> bool {
-        self.copies_apart
-    }
-
     /// The families that use staged results, where they are two.
     pub(crate) fn two_families(&self) -> Option<[u32; 2]> {
         let families = [Lane::Kernels, Lane::Copies].map(|lane| self.family(lane));
@@ -255,11 +251,6 @@ impl LogicalDevice {
         {
             std::thread::sleep(Duration::from_millis(10)); // memory may come back
         }
-    }
-
-    /// Whether it was opened here, and may be opened again here.
-    pub(crate) fn is_owned(&self) -> bool {
-        self.owned
     }
 
     /// Whether objects may be destroyed.

@@ -11,7 +11,6 @@ use crate::gpu::in_flight::{InFlight, Target, copy};
 use crate::gpu::mapped::{FreeBuffers, MappedQuats};
 use crate::gpu::memory_types::KernelReads;
 use crate::gpu::options::{EngineOptions, Timings, Transfer};
-use crate::gpu::physical::PhysicalDevice;
 use crate::gpu::pipeline::{Exactness, Pipeline};
 use crate::gpu::submission::{Access, Submission};
 use crate::gpu::upload::writable;
@@ -88,21 +87,7 @@ pub(crate) struct Job<'a> {
     pub(crate) encoding: Encoding,
 }
 
-impl<'a> Job<'a> {
-    pub(crate) fn new(
-        clip: &'a ClipData,
-        buffers: &'a ClipBuffers,
-        timeline: &'a Timeline,
-        encoding: Encoding,
-    ) -> Self {
-        Self {
-            clip,
-            buffers,
-            timeline,
-            encoding,
-        }
-    }
-
+impl Job<'_> {
     /// All of the result.
     pub(crate) fn whole(&self, layout: Layout) -> Window {
         Window::whole(self.clip.track_count(), self.timeline.len(), layout)
@@ -110,21 +95,10 @@ impl<'a> Job<'a> {
 }
 
 impl VulkanEngine {
-    /// Opens a device and checks that it is exact.
-    pub(crate) fn new(
-        physical: PhysicalDevice,
-        options: &EngineOptions,
-    ) -> Result<Self, VulkanError> {
-        let device = LogicalDevice::new(physical, options)?;
-        Self::with_device(device, options)
-    }
-
-    pub(crate) fn with_device(
-        device: Arc<LogicalDevice>,
-        options: &EngineOptions,
-    ) -> Result<Self, VulkanError> {
+    /// An engine on a device that is open, whose exactness is still to be tested.
+    pub(crate) fn new(device: Arc<LogicalDevice>, options: &EngineOptions) -> Self {
         let info = &device.physical.info;
-        let in_flight_count = match device.copies_apart() {
+        let in_flight_count = match device.copies_apart {
             true => IN_FLIGHT_WITH_COPIES,
             false => IN_FLIGHT,
         };
@@ -141,7 +115,7 @@ impl VulkanEngine {
         // Windows start at aligned offsets where their length allows.
         let window = (window / 64 * 64).max(64) as usize;
         let bytes = |bytes| usize::try_from(bytes).unwrap_or(usize::MAX);
-        Ok(Self {
+        Self {
             pipelines: Mutex::new([const { None }; KERNELS.len()]),
             in_flight: Mutex::default(),
             keys_in_flight: Mutex::default(),
@@ -155,7 +129,7 @@ impl VulkanEngine {
             free: Arc::default(),
             timings: Mutex::default(),
             device,
-        })
+        }
     }
 
     /// The pipeline of a kernel, made when it is first needed.
@@ -266,16 +240,13 @@ impl VulkanEngine {
         Ok(resident)
     }
 
-    /// Evaluates into memory of the engine's choice: the device's own, mapped, where
+    /// Evaluates in f32 into memory of the engine's choice: the device's own, mapped, where
     /// it writes in place and one allocation can hold the result.
     pub(crate) fn evaluate(
         &self,
-        clip: &ClipData,
-        buffers: &ClipBuffers,
-        timeline: &Timeline,
+        job: Job<'_>,
         layout: Layout,
     ) -> Result<Box<dyn Storage>, EvaluateError> {
-        let job = Job::new(clip, buffers, timeline, Encoding::F32);
         let whole = job.whole(layout);
         let bytes = (whole.len() * Encoding::F32.bytes()) as u64;
         let fits = bytes <= self.device.physical.info.max_memory_allocation_size;

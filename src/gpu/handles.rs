@@ -88,6 +88,6 @@ impl VulkanEngine {
             handles.copy_queue,
             options,
         );
-        Self::with_device(Arc::new(device), options)
+        Ok(Self::new(Arc::new(device), options))
     }
 }

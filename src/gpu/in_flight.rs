@@ -110,7 +110,7 @@ impl<'a> Target<'a> {
     pub(crate) fn place(&self) -> Option<(vk::Buffer, u64)> {
         match self {
             Self::Buffer(buffer) => Some((buffer.raw, 0)),
-            Self::ImportedMemory(memory) => Some((memory.raw(), memory.start() as u64)),
+            Self::ImportedMemory(memory) => Some((memory.buffer.raw, memory.start as u64)),
             Self::External(range) => Some((range.buffer, range.offset)),
             Self::Slice(_) => None,
         }
@@ -153,7 +153,7 @@ impl VulkanEngine {
             result = result.and(finished.map_err(EvaluateError::from));
         }
         if let (Target::ImportedMemory(memory), Ok(())) = (target, &result) {
-            memory.has_come_back();
+            memory.is_idle = true;
         }
         if stopwatch.is_slow() {
             self.halve_windows(); // those of the next call

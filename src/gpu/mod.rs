@@ -24,7 +24,6 @@ pub(crate) mod memory_types;
 pub(crate) mod options;
 pub(crate) mod physical;
 pub(crate) mod pipeline;
-pub(crate) mod pose_pass;
 pub(crate) mod queues;
 pub(crate) mod read_back;
 pub(crate) mod recovery;

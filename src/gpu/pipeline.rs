@@ -10,6 +10,7 @@ use ash::vk;
 
 use crate::gpu::buffer::{Buffer, Residence};
 use crate::gpu::device::{Lane, LogicalDevice};
+use crate::gpu::engine::VulkanEngine;
 use crate::gpu::error::{Named, VulkanError};
 use crate::gpu::memory_types::KernelReads;
 
@@ -110,16 +111,16 @@ impl Pipeline {
         groups: [u32; 3],
         output: &mut [u8],
     ) -> Result<(), VulkanError> {
+        let (name, once) = ("tumble once", KernelReads::Once);
         let mut uploads = Vec::with_capacity(inputs.len());
         for input in inputs {
-            let mut upload = Upload::new("tumble once", KernelReads::Once);
-            upload
-                .room(&self.device, input.len())?
-                .copy_from_slice(input);
+            let mut upload = Upload::default();
+            let room = upload.room(&self.device, name, once, input.len())?;
+            room.copy_from_slice(input);
             uploads.push(upload);
         }
         let bytes = output.len() as u64;
-        let found = Buffer::new(&self.device, "tumble once", bytes, Residence::InPlace)?;
+        let found = Buffer::new(&self.device, name, bytes, Residence::InPlace)?;
         let mut bindings: Vec<Binding> = uploads.iter().filter_map(Upload::binding).collect();
         bindings.push(Binding::whole(&found));
         // Made last: dropped first, it waits for its work before the buffers are freed.
@@ -141,6 +142,27 @@ impl Pipeline {
         } else {
             vk::DescriptorType::STORAGE_BUFFER
         }
+    }
+}
+
+impl VulkanEngine {
+    /// A pass over poses: runs a kernel with these inputs, of at most as many values of 16 bytes as a
+    /// window has rotations. It has so many invocations, and a detail that the kernel is told.
+    pub(crate) fn pass(
+        &self,
+        kernel: Kernel,
+        inputs: &[&[u8]],
+        [count, detail]: [usize; 2],
+        output: &mut [[f32; 4]],
+    ) -> Result<(), VulkanError> {
+        let output = bytemuck::cast_slice_mut(output);
+        for bytes in inputs.iter().copied().chain([&*output]) {
+            self.check_size("poses", bytes)?;
+        }
+        let [count, detail] = [count as u32, detail as u32];
+        let (pipeline, groups) = (self.pipeline(kernel)?, self.workgroups(count));
+        let pass = PoseDispatch { count, detail };
+        pipeline.run_once(inputs, bytemuck::bytes_of(&pass), groups, output)
     }
 }
 

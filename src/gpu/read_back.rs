@@ -49,7 +49,7 @@ impl ReadBack {
         if !staged {
             return grow(device, &mut self.output, size, Residence::InPlace);
         }
-        if self.apart.is_none() && device.copies_apart() {
+        if self.apart.is_none() && device.copies_apart {
             self.apart = Some(CopyApart {
                 submission: Submission::new(device, Lane::Copies)?,
                 done: Semaphore::new(device)?,

@@ -69,7 +69,12 @@ pub(crate) fn run(engine: &VulkanEngine) -> Result<Vec<SelfTestReport>, VulkanEr
             let mut found = expected.clone();
             cpu.evaluate(&clip, &timeline, &whole, &mut expected)
                 .expect("short gaps");
-            let job = Job::new(&clip, &buffers, &timeline, Encoding::F32);
+            let job = Job {
+                clip: &clip,
+                buffers: &buffers,
+                timeline: &timeline,
+                encoding: Encoding::F32,
+            };
             match engine.evaluate_into(job, &whole, bytemuck::cast_slice_mut(&mut found)) {
                 Err(EvaluateError::Vulkan(error)) => return Err(error),
                 done => done.expect("short gaps"),

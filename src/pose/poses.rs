@@ -7,13 +7,14 @@ use crate::engine::Engine;
 use crate::error::Error;
 use crate::evaluate::backend::Backend;
 use crate::gpu::engine::VulkanEngine;
+use crate::gpu::error::EvaluateError;
 use crate::memory::zeroed;
 use crate::output::buffer::OutputBuffer;
 use crate::output::pose_error::PoseError;
 use crate::output::rotations::{Layout, Rotations};
 use crate::pose::on_cpu;
 use crate::pose::skeleton::Skeleton;
-use crate::shader::{Kernel, PoseDispatch};
+use crate::shader::Kernel;
 use crate::twin::{pose_add, pose_blend, pose_mix};
 
 impl Engine {
@@ -46,7 +47,8 @@ impl Engine {
                 return Ok(());
             };
             let inputs = [bytes(values), bytes(&weights)];
-            pass(device, Kernel::PosesBlend, &inputs, layers.len(), output)
+            let counts = [output.len(), layers.len()];
+            Ok(device.pass(Kernel::PosesBlend, &inputs, counts, output)?)
         })
     }
 
@@ -67,7 +69,7 @@ impl Engine {
             };
             let weight = [weight];
             let inputs = [bytes(a), bytes(b), bytes(&weight)];
-            pass(device, Kernel::PosesMix, &inputs, 0, output)
+            Ok(device.pass(Kernel::PosesMix, &inputs, [output.len(), 0], output)?)
         })
     }
 
@@ -109,7 +111,7 @@ impl Engine {
             };
             own.push([weight, 0.0, 0.0, 0.0]);
             let inputs = [bytes(a), bytes(b), bytes(&own)];
-            pass(device, Kernel::PosesAdd, &inputs, 0, output)
+            Ok(device.pass(Kernel::PosesAdd, &inputs, [output.len(), 0], output)?)
         })
     }
 
@@ -156,12 +158,10 @@ impl Engine {
                 }
                 match device {
                     None => on_cpu::world(&frame_major, links, output),
-                    Some(device) => device.pass(
-                        Kernel::PosesWorld,
-                        &[bytes(&frame_major), bytes(links)],
-                        dispatch(count, tracks),
-                        bytemuck::cast_slice_mut(output),
-                    )?,
+                    Some(device) => {
+                        let inputs = [bytes(&frame_major), bytes(links)];
+                        device.pass(Kernel::PosesWorld, &inputs, [count, tracks], output)?;
+                    }
                 }
             }
             Ok(WorldPoses {
@@ -178,7 +178,7 @@ impl Engine {
         &self,
         like: &Rotations,
         layers: usize,
-        mut work: impl FnMut(Option<&VulkanEngine>, usize, &mut [[f32; 4]]) -> Result<(), Error>,
+        mut work: impl FnMut(Option<&VulkanEngine>, usize, &mut [[f32; 4]]) -> Result<(), EvaluateError>,
     ) -> Result<Rotations, Error> {
         self.on_device(|device| {
             let mut made = OutputBuffer::new(like.as_quats().len())?;
@@ -194,12 +194,12 @@ impl Engine {
     /// Does some work on the engine's device; `None` stands for the CPU.
     pub(crate) fn on_device<T>(
         &self,
-        mut work: impl FnMut(Option<&VulkanEngine>) -> Result<T, Error>,
+        mut work: impl FnMut(Option<&VulkanEngine>) -> Result<T, EvaluateError>,
     ) -> Result<T, Error> {
-        match &*self.backend {
+        Ok(match &*self.backend {
             Backend::Cpu(_) => work(None),
             Backend::Vulkan(opened) => opened.attempt_smaller(|engine| work(Some(engine))),
-        }
+        }?)
     }
 }
 
@@ -295,23 +295,4 @@ fn values(layer: &Rotations, start: usize, count: usize) -> &[[f32; 4]] {
 
 pub(super) fn bytes<T: bytemuck::Pod>(values: &[T]) -> &[u8] {
     bytemuck::cast_slice(values)
-}
-
-/// Runs a kernel that makes one value in each invocation.
-pub(super) fn pass(
-    device: &VulkanEngine,
-    kernel: Kernel,
-    inputs: &[&[u8]],
-    detail: usize,
-    output: &mut [[f32; 4]],
-) -> Result<(), Error> {
-    let dispatch = dispatch(output.len(), detail);
-    Ok(device.pass(kernel, inputs, dispatch, bytemuck::cast_slice_mut(output))?)
-}
-
-fn dispatch(count: usize, detail: usize) -> PoseDispatch {
-    PoseDispatch {
-        count: count as u32,
-        detail: detail as u32,
-    }
 }

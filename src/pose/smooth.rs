@@ -5,9 +5,10 @@ use rayon::prelude::*;
 use crate::engine::Engine;
 use crate::error::Error;
 use crate::gpu::engine::VulkanEngine;
+use crate::gpu::error::VulkanError;
 use crate::output::buffer::OutputBuffer;
 use crate::output::rotations::{Layout, Rotations, Samples, Vectors};
-use crate::pose::poses::{self, bytes};
+use crate::pose::poses::bytes;
 use crate::shader::Kernel;
 use crate::smooth::kernel::Smoothing;
 use crate::smooth::rows::{Block, Pass, Row};
@@ -88,7 +89,7 @@ impl Engine {
             };
             let to = bytemuck::cast_slice_mut(to);
             self.on_device(|device| match device {
-                Some(device) if !weights.is_empty() => set.on(&pass, device, to),
+                Some(device) if !weights.is_empty() => Ok(set.on(&pass, device, to)?),
                 _ => {
                     set.on_cpu(&pass, to);
                     Ok(())
@@ -170,7 +171,7 @@ impl Set<'_> {
         pass: &Pass<'_>,
         device: &VulkanEngine,
         output: &mut [[f32; 4]],
-    ) -> Result<(), Error> {
+    ) -> Result<(), VulkanError> {
         let (limit, radius) = (device.window().max(2), pass.weights.len());
         let detail = usize::from(pass.are_rotations);
         let stride = self.samples - 1 + 2 * radius;
@@ -192,7 +193,8 @@ impl Set<'_> {
             let mut steps = vec![[0.0; 4]; values.len() - 1];
             for (first, output) in (0..).step_by(limit - 1).zip(steps.chunks_mut(limit - 1)) {
                 let values = &values[first..=first + output.len()];
-                poses::pass(device, Kernel::PosesSteps, &[bytes(values)], detail, output)?;
+                let counts = [output.len(), detail];
+                device.pass(Kernel::PosesSteps, &[bytes(values)], counts, output)?;
             }
             let mut padded = Vec::with_capacity(rows.len() * stride);
             let mut spaced = Vec::with_capacity(rows.len() * stride);
@@ -208,8 +210,8 @@ impl Set<'_> {
                 let steps = &padded[first..first + output.len() + 2 * radius - 1];
                 let values = &spaced[first..first + output.len()];
                 let inputs = [bytes(values), bytes(steps), bytes(pass.weights)];
-                let detail = 2 * radius + detail;
-                poses::pass(device, Kernel::PosesSmooth, &inputs, detail, output)?;
+                let counts = [output.len(), 2 * radius + detail];
+                device.pass(Kernel::PosesSmooth, &inputs, counts, output)?;
             }
             for (row, start) in rows.iter().zip((0..).step_by(stride)) {
                 for sample in 0..self.samples {
