@@ -8,9 +8,9 @@ use ash::vk;
 
 use crate::crowd::error::{CrowdError, OFFSET_STEP};
 use crate::crowd::player::Crowd;
-use crate::gpu::commands::Commands;
 use crate::gpu::crowd_target::CrowdTarget;
 use crate::gpu::handles::VulkanBuffer;
+use crate::gpu::submission::Commands;
 use crate::output::crowd::CrowdOutput;
 
 impl Crowd {

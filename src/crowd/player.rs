@@ -12,7 +12,7 @@ use crate::crowd::on_cpu::{self, Scene};
 use crate::engine::Engine;
 use crate::evaluate::backend::Backend;
 use crate::gpu::crowd::{CrowdShape, CrowdTables, DeviceCrowd};
-use crate::gpu::crowd_reader::CrowdReader;
+use crate::gpu::crowd_target::CrowdReader;
 use crate::memory::zeroed;
 use crate::output::crowd::{CrowdOutput, CrowdValues};
 use crate::shader::{CrowdDispatch, CrowdEntry};

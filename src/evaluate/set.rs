@@ -6,7 +6,6 @@ use glam::Quat;
 use rayon::prelude::*;
 
 use crate::cpu::engine::CpuEngine;
-use crate::cpu::fallback::Row;
 use crate::curve::segment::segment_size;
 use crate::evaluate::backend::Backend;
 use crate::evaluate::route::Route;
@@ -188,16 +187,7 @@ impl Opened {
         let engine = CpuEngine::on_shared_threads(VectorWidth::widest());
         let rows = output.par_chunks_mut(job.request.timeline.len());
         rows.zip(job.request.tracks.clone())
-            .try_for_each(|(output, index)| {
-                let (request, first, key) = (job.request, 0, 0);
-                let row = Row {
-                    request,
-                    index,
-                    first,
-                    key,
-                };
-                engine.resolve(row, output)
-            })?;
+            .try_for_each(|(output, track)| engine.resolve(job.request, track, (0, 0), output))?;
         Ok(())
     }
 }

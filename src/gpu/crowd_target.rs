@@ -6,12 +6,12 @@ use std::sync::Arc;
 use ash::vk;
 
 use crate::gpu::buffer::{Buffer, Residence};
-use crate::gpu::commands::Commands;
 use crate::gpu::crowd::DeviceCrowd;
 use crate::gpu::descriptors::DescriptorPool;
 use crate::gpu::error::VulkanError;
 use crate::gpu::pipeline::Pipeline;
-use crate::gpu::submission::{Access, Binding};
+use crate::gpu::read_back::ReadBack;
+use crate::gpu::submission::{Access, Binding, Commands};
 use crate::output::crowd::CrowdOutput;
 use crate::shader::{CROWD_WORKGROUP, CrowdDispatch, CrowdEntry, Kernel, WORKGROUP};
 
@@ -167,6 +167,50 @@ impl CrowdTarget {
             };
             dispatch(count, arguments);
         }
+    }
+}
+
+/// A target whose result the host reads: evaluated into memory that it sees, submitted without a wait.
+pub(crate) struct CrowdReader {
+    // It goes first: it waits for what uses the rest.
+    results: ReadBack,
+    pub(crate) target: CrowdTarget,
+}
+
+impl CrowdReader {
+    pub(crate) fn new(crowd: &Arc<DeviceCrowd>, output: CrowdOutput) -> Result<Self, VulkanError> {
+        let engine = &crowd.engine;
+        let bytes = crowd.bytes(output);
+        let mut results = ReadBack::new(&engine.device)?;
+        let buffer = results.room(&engine.device, bytes, !engine.in_place)?.raw;
+        Ok(Self {
+            results,
+            target: CrowdTarget::new(crowd, output, buffer, 0)?,
+        })
+    }
+
+    /// Submits an evaluation; the one before must have been waited for.
+    pub(crate) fn submit<'e>(
+        &mut self,
+        clock: u64,
+        changes: impl Iterator<Item = (usize, &'e [CrowdEntry])>,
+    ) -> Result<(), VulkanError> {
+        self.results.kernels.begin(0)?;
+        let commands = self.results.kernels.commands();
+        self.target.record(commands, clock, changes);
+        let bytes = self.target.crowd.bytes(self.target.output);
+        self.results.submit(Some(bytes))
+    }
+
+    pub(crate) fn is_done(&self) -> Result<bool, VulkanError> {
+        self.results.is_done()
+    }
+
+    /// Waits, and copies the result, of which `output` has as many bytes.
+    pub(crate) fn wait_into(&mut self, output: &mut [u8]) -> Result<(), VulkanError> {
+        self.results.wait()?;
+        output.copy_from_slice(self.results.bytes(0..output.len()));
+        Ok(())
     }
 }
 

@@ -233,8 +233,8 @@ impl VulkanEngine {
         let resident = Buffer::new(&self.device, name, size, Residence::Device)?;
         let mut submission = Submission::new(&self.device, Lane::Kernels)?;
         submission.begin(0)?;
-        submission.copy(&upload, &resident, upload.size());
-        submission.barrier(Access::Copy, Access::Kernel);
+        (submission.commands()).copy(&upload, &resident, upload.size());
+        (submission.commands()).barrier(Access::Copy, Access::Kernel);
         submission.submit()?;
         submission.wait()?;
         Ok(resident)

@@ -5,9 +5,7 @@
 pub(crate) mod buffer;
 #[cfg(test)]
 pub(crate) mod cards;
-pub(crate) mod commands;
 pub(crate) mod crowd;
-pub(crate) mod crowd_reader;
 pub(crate) mod crowd_target;
 pub(crate) mod descriptors;
 pub(crate) mod device;
@@ -30,7 +28,6 @@ pub(crate) mod recovery;
 pub(crate) mod run;
 pub(crate) mod sample_list;
 pub(crate) mod self_test;
-pub(crate) mod semaphore;
 pub(crate) mod shared_memory;
 pub(crate) mod submission;
 pub(crate) mod upload;

@@ -126,9 +126,9 @@ impl Pipeline {
         // Made last: dropped first, it waits for its work before the buffers are freed.
         let mut submission = Submission::new(&self.device, Lane::Kernels)?;
         submission.begin(1)?;
-        Upload::record(uploads.iter(), &mut submission);
+        Upload::record(uploads.iter(), &submission);
         submission.dispatch(self, &bindings, constants, groups)?;
-        submission.barrier(Access::Kernel, Access::Host);
+        (submission.commands()).barrier(Access::Kernel, Access::Host);
         submission.submit()?;
         submission.wait()?;
         output.copy_from_slice(found.bytes(0..output.len()));

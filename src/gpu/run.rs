@@ -129,15 +129,16 @@ impl VulkanEngine {
         }
         let mut patches = work.patches;
         if let Target::External(range) = target {
-            kernels.barrier(Access::Kernel, Access::Copy);
+            let commands = kernels.commands();
+            commands.barrier(Access::Kernel, Access::Copy);
             let mut value_bytes = vec![0; encoding.bytes()];
             for (place, value) in patches.drain(..) {
                 encoding.encode_all(&[value], &mut value_bytes);
                 let offset = start + place as u64 * rotation;
-                kernels.update(range.buffer, offset, &value_bytes);
+                commands.update(range.buffer, offset, &value_bytes);
             }
-            kernels.barrier(Access::Kernel, Access::Any);
-            kernels.barrier(Access::Copy, Access::Any);
+            commands.barrier(Access::Kernel, Access::Any);
+            commands.barrier(Access::Copy, Access::Any);
             kernels.submit()?;
         } else {
             own.results.submit(place.is_none().then_some(size))?;

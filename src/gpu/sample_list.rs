@@ -2,6 +2,7 @@
 //! which samples are stored. It serves dense keys (no more samples than spans) and sparse times (a
 //! few explicit times of each track, such as a crowd's poses); other windows are listed by runs.
 
+use bytemuck::Zeroable as _;
 use rayon::prelude::*;
 
 use crate::cpu::evaluate::SAMPLES_ONE_BY_ONE;
@@ -262,7 +263,7 @@ impl SampleChunk<'_> {
     #[inline(always)]
     fn list_sparse_times(&mut self, times: &[f64], stride: usize) {
         let samples = self.all.window.samples.clone();
-        let mut found = TimeLanes::new();
+        let mut found = TimeLanes::zeroed();
         for parts in self.parts.chunks(TimeLanes::LEN / samples.len().max(1)) {
             found.count = 0;
             for part in parts {

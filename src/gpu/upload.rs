@@ -46,19 +46,19 @@ impl Upload {
     }
 
     /// Records the copies of some uploads, where any of them are copied, and that kernels wait.
-    pub(crate) fn record<'u>(uploads: impl Iterator<Item = &'u Self>, submission: &mut Submission) {
+    pub(crate) fn record<'u>(uploads: impl Iterator<Item = &'u Self>, submission: &Submission) {
         let mut any = false;
         for upload in uploads {
             if let (Some(from), Some(to)) = (&upload.written, &upload.copied)
                 && upload.used > 0
             {
                 let size = (upload.used as u64).next_multiple_of(4);
-                submission.copy(from, to, size);
+                submission.commands().copy(from, to, size);
                 any = true;
             }
         }
         if any {
-            submission.barrier(Access::Copy, Access::Kernel);
+            (submission.commands()).barrier(Access::Copy, Access::Kernel);
         }
     }
 

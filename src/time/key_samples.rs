@@ -3,6 +3,8 @@
 
 use std::ops::Range;
 
+use bytemuck::Zeroable as _;
+
 use crate::shader::{IS_KEY, KeySample};
 use crate::time::frame_clock::FrameClock;
 use crate::time::frames::FramesError;
@@ -25,7 +27,7 @@ impl<'a> FramePlan<'a> {
             clock: None,
             window: 0..0,
             samples: Vec::new(),
-            block: IntervalBlock::new(),
+            block: IntervalBlock::zeroed(),
         }
     }
 

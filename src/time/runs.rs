@@ -4,6 +4,8 @@
 
 use std::ops::Range;
 
+use bytemuck::Zeroable as _;
+
 use crate::math::canonical::round_f32;
 use crate::time::frame_clock::FrameClock;
 use crate::time::frames::{FramesError, Ticks, Timeline};
@@ -153,7 +155,7 @@ impl Spans {
             emit.run(run);
         }
         let mut intervals = IntervalBlocks::new(starts, part.end, clock, samples.clone());
-        let mut block = IntervalBlock::new();
+        let mut block = IntervalBlock::zeroed();
         while let Some(own) = intervals.fill(&mut block) {
             for j in block.occupied {
                 let met = own.start + j;
