@@ -209,12 +209,7 @@ fn frame_tasks<'a>(
         let of_block = all.len();
         all.extend(starts.map(|start| {
             let tracks = start..(start + tracks_each).min(window.tracks.end);
-            let window = Window {
-                start: 0,
-                tracks,
-                samples: samples.clone(),
-                layout: Layout::FrameMajor,
-            };
+            let window = Window::of(tracks, samples.clone(), Layout::FrameMajor);
             (window, Vec::with_capacity(samples.len()))
         }));
         for frame in block.chunks_mut(tracks) {

@@ -13,7 +13,6 @@ use crate::memory::reserved;
 use crate::method::interpolation::Interpolation;
 use crate::method::vector_method::VectorMethod;
 use crate::prepare::clip_data::{ClipData, Wanted};
-use crate::prepare::prepared::Prepared;
 use crate::shader::{
     CHANNELS, CrowdBase, CrowdChannel, CrowdClip, CrowdSpan, FORM_ARC, FORM_CONSTANT, FORM_CUBIC,
     FORM_POLYNOMIAL, Form, ON_KEY, POWERS, SCALE,
@@ -108,20 +107,6 @@ struct ClipClock {
     period: u32,
 }
 
-/// The constants of one segment, power by power.
-fn segment(prepared: &Prepared, index: u32, form: u32) -> [[f32; 4]; POWERS] {
-    let segments = &prepared.segments;
-    match form {
-        FORM_ARC => {
-            let arc = &segments.arcs[index as usize];
-            let mut constants = [[0.0; 4]; POWERS];
-            [constants[0], constants[1]] = [arc.middle, arc.tangent];
-            constants
-        }
-        _ => segments.polynomials[index as usize].coefficients,
-    }
-}
-
 /// The curve of one track, as evaluation at frames has it: a frame is a tick.
 fn curve(data: &ClipData, track: usize, form: u32, clock: ClipClock) -> Result<Curve, CrowdError> {
     let mut curve = Curve {
@@ -157,7 +142,17 @@ fn curve(data: &ClipData, track: usize, form: u32, clock: ClipClock) -> Result<C
                         scale: along.scale,
                         offset: along.offset,
                     };
-                    curve.push(span, &segment(prepared, index, form), key);
+                    // The constants, power by power.
+                    let constants = match (form, index as usize) {
+                        (FORM_ARC, index) => {
+                            let arc = &prepared.segments.arcs[index];
+                            let mut constants = [[0.0; 4]; POWERS];
+                            [constants[0], constants[1]] = [arc.middle, arc.tangent];
+                            constants
+                        }
+                        (_, index) => prepared.segments.polynomials[index].coefficients,
+                    };
+                    curve.push(span, &constants, key);
                 }
                 Source::Constant(index) => curve.hold(first, constant(index), key),
                 Source::Exact(_) => {

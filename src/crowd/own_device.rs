@@ -72,7 +72,7 @@ impl Crowd {
         };
         // SAFETY: promised by the caller.
         let commands = unsafe { Commands::new(&device.engine.device, commands) };
-        let clock = self.instances.clock();
+        let clock = self.instances.clock;
         target.record(commands, clock, self.instances.take_changes());
         Ok(())
     }

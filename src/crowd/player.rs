@@ -114,7 +114,7 @@ impl Crowd {
     /// Number of instances.
     #[must_use]
     pub fn instances(&self) -> usize {
-        self.instances.entries().len() / self.layers()
+        self.instances.entries.len() / self.layers()
     }
 
     /// Layers of an instance.
@@ -184,7 +184,7 @@ impl Crowd {
     /// # Errors
     /// When there is no such instance or layer.
     pub fn get(&self, instance: usize, layer: usize) -> Result<CrowdLayer, CrowdError> {
-        let entry = &self.instances.entries()[self.place(instance, layer)?];
+        let entry = &self.instances.entries[self.place(instance, layer)?];
         let (clips, clock) = (&self.library.tables.clips, self.clock());
         Ok(CrowdLayer::moved(entry, clips, clock, clock))
     }
@@ -195,7 +195,7 @@ impl Crowd {
     /// # Errors
     /// When there is no such instance or layer.
     pub fn tick(&self, instance: usize, layer: usize) -> Result<u32, CrowdError> {
-        let entry = &self.instances.entries()[self.place(instance, layer)?];
+        let entry = &self.instances.entries[self.place(instance, layer)?];
         Ok(tick(entry, &self.library.tables.clips, self.clock()))
     }
 
@@ -271,7 +271,7 @@ impl Crowd {
         let kept = kept.filter(|reader| reader.target.output() == output);
         let reader = kept.map_or_else(|| CrowdReader::new(device, output), Ok)?;
         let reader = self.reader.insert(reader);
-        let clock = self.instances.clock();
+        let clock = self.instances.clock;
         if let Err(error) = reader.submit(clock, self.instances.take_changes()) {
             // What was recorded may never have reached the device.
             self.instances.forget();
@@ -378,7 +378,7 @@ impl Crowd {
             values,
             clock: self.clock(),
             context: Layers {
-                entries: self.instances.entries(),
+                entries: &self.instances.entries,
                 channels: &self.library.tables.channels,
                 cells: &self.cells,
                 places: &[],

@@ -70,12 +70,8 @@ pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 /// The segments and constants of a clip, on the device.
 pub(crate) struct ClipBuffers {
     device: Arc<LogicalDevice>,
-    pub(crate) groups: Vec<GroupBuffers>,
-}
-
-pub(crate) struct GroupBuffers {
-    pub(crate) segments: Buffer,
-    pub(crate) constants: Buffer,
+    /// The segments of each group, and its constants.
+    pub(crate) groups: Vec<(Buffer, Buffer)>,
 }
 
 /// What is to be evaluated, and how stored.
@@ -153,8 +149,7 @@ impl VulkanEngine {
         // Under a memory budget the old buffers are freed before new ones are allocated.
         let spare = spare.filter(|old| self.clip_bytes.is_none() && self.holds(old));
         let spare = spare.into_iter().flat_map(|buffers| buffers.groups);
-        let (mut segments_of, mut constants_of): (Vec<Buffer>, Vec<Buffer>) =
-            spare.map(|group| (group.segments, group.constants)).unzip();
+        let (mut segments_of, mut constants_of): (Vec<Buffer>, Vec<Buffer>) = spare.unzip();
         let groups = clip
             .groups
             .iter()
@@ -163,10 +158,10 @@ impl VulkanEngine {
                 let constants = bytemuck::cast_slice(&group.constants);
                 self.check_size("segments", segments)?;
                 self.check_size("keys", constants)?;
-                Ok(GroupBuffers {
-                    segments: self.resident("tumble segments", segments, &mut segments_of)?,
-                    constants: self.resident("tumble constants", constants, &mut constants_of)?,
-                })
+                Ok((
+                    self.resident("tumble segments", segments, &mut segments_of)?,
+                    self.resident("tumble constants", constants, &mut constants_of)?,
+                ))
             })
             .collect::<Result<_, _>>()?;
         Ok(ClipBuffers {
@@ -264,7 +259,13 @@ impl VulkanEngine {
             return Ok(Box::new(quats));
         };
         self.run(job, &whole, Target::Buffer(&mut buffer))?;
-        Ok(Box::new(MappedQuats::new(buffer, whole.len(), &self.free)))
+        let (count, free) = (whole.len(), Arc::clone(&self.free));
+        let buffer = Some(buffer);
+        Ok(Box::new(MappedQuats {
+            buffer,
+            count,
+            free,
+        }))
     }
 
     /// Evaluates a window into the caller's memory.

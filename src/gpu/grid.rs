@@ -248,13 +248,7 @@ mod tests {
                 let rows = GridRows::new(&window, shift).unwrap();
                 let list = listed(rows, tracks);
                 let grid = rows.of_group(&list, 0).unwrap();
-                let mut blocks = vec![
-                    Block {
-                        first: 0,
-                        starts: 0
-                    };
-                    grid.blocks() as usize
-                ];
+                let mut blocks = vec![Block::zeroed(); grid.blocks() as usize];
                 let nothing = list.item_count() as u32 + 3;
                 grid.write(&list, 3, nothing, &mut blocks);
                 let all: Vec<Item> = items(&list).copied().collect();

@@ -14,29 +14,17 @@ pub(crate) type FreeBuffers = Arc<Mutex<Vec<Buffer>>>;
 
 /// A result in mapped memory. When it is dropped, the buffer goes back to its engine.
 pub(crate) struct MappedQuats {
-    buffer: Option<Buffer>,
-    count: usize,
-    free: FreeBuffers,
-}
-
-impl MappedQuats {
-    pub(crate) fn new(buffer: Buffer, count: usize, free: &FreeBuffers) -> Self {
-        Self {
-            buffer: Some(buffer),
-            count,
-            free: Arc::clone(free),
-        }
-    }
+    /// There until it is dropped.
+    pub(crate) buffer: Option<Buffer>,
+    pub(crate) count: usize,
+    pub(crate) free: FreeBuffers,
 }
 
 impl Storage for MappedQuats {
     fn quats(&self) -> &[Quat] {
         let all = 0..self.count * size_of::<Quat>();
-        bytemuck::cast_slice(
-            self.buffer
-                .as_ref()
-                .map_or(&[][..], |buffer| buffer.bytes(all)),
-        )
+        let bytes = self.buffer.as_ref().map(|buffer| buffer.bytes(all));
+        bytemuck::cast_slice(bytes.unwrap_or_default())
     }
 }
 

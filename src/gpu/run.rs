@@ -92,11 +92,8 @@ impl VulkanEngine {
             if item_count == 0 {
                 continue;
             }
-            let buffers = &job.buffers.groups[group.group];
-            let mut bindings = vec![
-                Binding::whole(&buffers.segments),
-                Binding::whole(&buffers.constants),
-            ];
+            let (segments, constants) = &job.buffers.groups[group.group];
+            let mut bindings = vec![Binding::whole(segments), Binding::whole(constants)];
             bindings.extend(&listed);
             bindings.push(rotations);
             let (grid, dispatch);

@@ -87,10 +87,8 @@ impl<'a> SampleList<'a> {
 
     /// Where the samples of a part begin in the window; `before` is the part listed before it.
     fn start(&self, prepared: &Prepared, part: &Part, before: Option<&Part>) -> usize {
-        let Window {
-            samples, tracks, ..
-        } = self.window;
-        let row = (part.track as usize - tracks.start) * samples.len();
+        let samples = &self.window.samples;
+        let row = (part.track as usize - self.window.tracks.start) * samples.len();
         let Ticks::Frames { rate, start } = self.timeline.ticks else {
             return row;
         };
@@ -177,9 +175,7 @@ struct SampleChunk<'a> {
 impl InLanes for SampleChunk<'_> {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
-        let SampleList {
-            timeline, window, ..
-        } = *self.all;
+        let (timeline, window) = (self.all.timeline, self.all.window);
         if let Ticks::Times { times, stride } = &timeline.ticks
             && window.samples.len() <= SAMPLES_ONE_BY_ONE
         {
@@ -214,9 +210,7 @@ impl Emit for SampleChunk<'_> {
     /// Lists the samples of a run that belong to this chunk and are not listed yet.
     #[inline(always)]
     fn run(&mut self, run: Run) {
-        let SampleList {
-            timeline, window, ..
-        } = *self.all;
+        let (timeline, window) = (self.all.timeline, self.all.window);
         let track = self.track;
         let place = window.place(track, run.sample);
         // A sample within rounding of the boundary between two parts may come from both: the first

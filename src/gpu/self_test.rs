@@ -174,18 +174,9 @@ fn probes() -> Vec<Probe> {
         })
         .collect();
     let half_ulp = f32::EPSILON / 2.0;
-    for (a, c) in [
-        (1.0, half_ulp),
-        (1.0 + f32::EPSILON, half_ulp),
-        (-1.0, -half_ulp),
-    ] {
-        probes.push(Probe {
-            a,
-            b: half_ulp,
-            c,
-            n: (1 << 24) + 1,
-        });
-    }
+    let (even, odd) = ((1.0, half_ulp), (1.0 + f32::EPSILON, half_ulp));
+    let (b, n) = (half_ulp, (1 << 24) + 1);
+    probes.extend([even, odd, (-1.0, -half_ulp)].map(|(a, c)| Probe { a, b, c, n }));
     probes
 }
 

@@ -66,11 +66,6 @@ pub(crate) fn of_axes<R: Real>(x: [R; 3], z: [R; 3]) -> [R; 4] {
         z[2].up_to(zero, rest.up_to(zero, xz, yz), rest.up_to(zero, square, zw)) * inverse,
         z[2].up_to(zero, rest.up_to(zero, xw, yw), rest.up_to(zero, zw, square)) * inverse,
     ];
-    let inverse = one / dot(own, own).root();
-    [
-        own[0] * inverse,
-        own[1] * inverse,
-        own[2] * inverse,
-        own[3] * inverse,
-    ]
+    let (inverse, [x, y, z, w]) = (one / dot(own, own).root(), own);
+    [x * inverse, y * inverse, z * inverse, w * inverse]
 }

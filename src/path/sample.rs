@@ -121,9 +121,22 @@ impl<'a> Sampler<'a> {
         } else {
             self.places_by_length(spans);
         }
+        let (paths, rows) = (self.paths, &mut *self.rows);
+        let of_spans = spans.iter().map(|span| span.place(paths));
         match self.kind {
-            Kind::Vector => self.positions(spans),
-            Kind::Rotation => self.rotations(spans),
+            Kind::Vector => {
+                for (lane, (route, own)) in of_spans.enumerate() {
+                    let curve = &route.curves[own.interval];
+                    for (value, place) in rows.values.iter_mut().zip(&rows.places) {
+                        put(value, lane, curve.at(place[lane]).extend(0.0).to_array());
+                    }
+                }
+            }
+            Kind::Rotation => {
+                find_directions(of_spans, &rows.places, &mut rows.ways, None);
+                self.carried(spans);
+                self.by_axes(spans);
+            }
         }
         &self.rows.values
     }
@@ -156,25 +169,6 @@ impl<'a> Sampler<'a> {
                 };
             }
         }
-    }
-
-    fn positions(&mut self, spans: &[Span]) {
-        let Rows { places, values, .. } = &mut *self.rows;
-        for (lane, span) in spans.iter().enumerate() {
-            let (route, own) = span.place(self.paths);
-            let curve = &route.curves[own.interval];
-            for (value, place) in values.iter_mut().zip(&*places) {
-                put(value, lane, curve.at(place[lane]).extend(0.0).to_array());
-            }
-        }
-    }
-
-    fn rotations(&mut self, spans: &[Span]) {
-        let (paths, rows) = (self.paths, &mut *self.rows);
-        let stretches = spans.iter().map(|span| span.place(paths));
-        find_directions(stretches, &rows.places, &mut rows.ways, None);
-        self.carried(spans);
-        self.by_axes(spans);
     }
 
     /// The rotations of the other frames.

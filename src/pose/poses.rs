@@ -32,7 +32,10 @@ impl Engine {
             same_shape(first, layer, place)?;
         }
         let weights: Vec<f32> = layers.iter().map(|&(_, weight)| weight).collect();
-        finite(&weights)?;
+        if let Some(layer) = weights.iter().position(|weight| !weight.is_finite()) {
+            let weight = weights[layer];
+            return Err(PoseError::WeightNotFinite { layer, weight }.into());
+        }
         let mut gathered: Vec<Quat> = Vec::new();
         self.each_rotation(first, layers.len(), |device, start, output| {
             gathered.clear();
@@ -268,16 +271,6 @@ fn same_shape(first: &Rotations, own: &Rotations, layer: usize) -> Result<(), Po
             layer,
             given,
             first,
-        }),
-    }
-}
-
-fn finite(weights: &[f32]) -> Result<(), PoseError> {
-    match weights.iter().position(|weight| !weight.is_finite()) {
-        None => Ok(()),
-        Some(layer) => Err(PoseError::WeightNotFinite {
-            layer,
-            weight: weights[layer],
         }),
     }
 }

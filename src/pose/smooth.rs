@@ -10,6 +10,7 @@ use crate::output::buffer::OutputBuffer;
 use crate::output::rotations::{Layout, Rotations, Samples, Vectors};
 use crate::pose::poses::bytes;
 use crate::shader::Kernel;
+use crate::simd::dispatch::in_lanes;
 use crate::smooth::kernel::Smoothing;
 use crate::smooth::rows::{Block, Pass, Row};
 
@@ -132,7 +133,7 @@ impl Set<'_> {
         let length = BLOCK.max(4 * pass.weights.len());
         let block = |steps: &mut _, output: &mut [[f32; 4]], track: usize, place, i: usize| {
             let row = self.row(track);
-            Block {
+            in_lanes(&mut Block {
                 pass: *pass,
                 row,
                 first: i * length,
@@ -140,8 +141,7 @@ impl Set<'_> {
                 count: output.len() / row.stride,
                 output,
                 place,
-            }
-            .smooth();
+            });
         };
         match self.layout {
             Layout::TrackMajor => {

@@ -221,13 +221,10 @@ impl Part {
         let (begin, end) = (clock.boundary(begin), clock.boundary(self.end));
         let (from, to) = (begin.first as usize, end.first as usize);
         let run = |outside: Range<usize>, source: Option<RunSource>| {
-            let (first, last) = (
-                outside.start.max(samples.start),
-                outside.end.min(samples.end),
-            );
-            source
-                .filter(|_| first < last)
-                .map(|source| Run::new(first, last - first, source))
+            let first = outside.start.max(samples.start);
+            let last = outside.end.min(samples.end);
+            let source = source.filter(|_| first < last);
+            source.map(|source| Run::new(first, last - first, source))
         };
         if clock.is_reversed() {
             // Frames meet the last key first. Nothing is extrapolated: only the track itself is,
