@@ -83,11 +83,8 @@ impl Clip {
         Ok(Samples::new(storage, tracks, samples, layout))
     }
 
-    /// As [`Clip::evaluate_as`], or as [`Clip::rates`], into the caller's memory: [`Quat`] takes
-    /// rotations, [`Vec4`] velocities and accelerations, `[f32; 4]` either. It is faster
-    /// when it is used again ([`OutputBuffer`](crate::output::buffer::OutputBuffer)): the first touch
-    /// of fresh memory costs more than evaluating. Memory that is aligned to 16 bytes is filled
-    /// without a copy.
+    /// As [`Clip::evaluate_as`], or as [`Clip::rates`], into the caller's memory, of which
+    /// [`Engine::evaluate_into`] tells more.
     ///
     /// # Errors
     /// As [`Clip::evaluate`]; also when `output` is not exactly as long as the result, or of another

@@ -11,7 +11,7 @@ use crate::crowd::library::CrowdLibrary;
 use crate::crowd::on_cpu::{self, Scene};
 use crate::engine::Engine;
 use crate::evaluate::backend::Backend;
-use crate::gpu::crowd::{CrowdShape, CrowdTables, DeviceCrowd};
+use crate::gpu::crowd::{CrowdTables, DeviceCrowd};
 use crate::gpu::crowd_target::CrowdReader;
 use crate::memory::zeroed;
 use crate::output::crowd::{CrowdOutput, CrowdValues};
@@ -93,6 +93,10 @@ impl Crowd {
         let (engine, library) = (opened.engine(), &self.library);
         let own = &library.tables;
         let tables = CrowdTables {
+            instances: self.instances() as u32,
+            levels: library.levels.clone(),
+            only_arcs: own.has_only_arcs(),
+            arguments: self.arguments,
             clips: engine.crowd_table("tumble crowd clips", &own.clips)?,
             bases: engine.crowd_table("tumble crowd time bases", &own.bases)?,
             spans: engine.crowd_table("tumble crowd spans", &own.spans)?,
@@ -101,14 +105,7 @@ impl Crowd {
             links: engine.crowd_table("tumble crowd links", &library.links)?,
             bind: engine.crowd_table("tumble crowd inverse bind", &library.bind)?,
         };
-        let shape = CrowdShape {
-            instances: self.instances() as u32,
-            levels: library.levels.clone(),
-            only_arcs: own.has_only_arcs(),
-            arguments: self.arguments,
-        };
-        let crowd = DeviceCrowd::new(engine, shape, tables)?;
-        Ok(Some(Arc::new(crowd)))
+        Ok(Some(Arc::new(DeviceCrowd::new(engine, tables)?)))
     }
 
     /// Number of instances.

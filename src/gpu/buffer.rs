@@ -49,11 +49,6 @@ impl Residence {
             Self::Device | Self::Results => (Flags::DEVICE_LOCAL, &[]),
         }
     }
-
-    /// Whether kernels read it, as texels where they read those.
-    fn is_read_by_kernels(self) -> bool {
-        matches!(self, Self::Upload | Self::Direct | Self::Device)
-    }
 }
 
 /// The handle type of imported memory: host allocations of this process.
@@ -92,7 +87,8 @@ pub(crate) struct Buffer {
     /// A view of it as texels of 16 bytes; null unless kernels read it as a texel buffer.
     pub(crate) view: vk::BufferView,
     memory: Share,
-    size: u64,
+    /// Bytes.
+    pub(crate) size: u64,
 }
 
 /// The size of the largest element that a kernel reads.
@@ -108,7 +104,11 @@ impl Buffer {
         residence: Residence,
     ) -> Result<Self, VulkanError> {
         let size = size.max(LEAST).next_multiple_of(16);
-        let is_texels = device.reads_texels && residence.is_read_by_kernels();
+        let is_read = matches!(
+            residence,
+            Residence::Upload | Residence::Direct | Residence::Device
+        );
+        let is_texels = device.reads_texels && is_read;
         // Both families may use what is copied on another queue, without a change of owners.
         let is_copied = matches!(residence, Residence::Results | Residence::Readback);
         let families = device.two_families().filter(|_| is_copied);
@@ -234,11 +234,6 @@ impl Buffer {
         }
         self.device.name(self.raw, name);
         Ok(())
-    }
-
-    /// Size in bytes.
-    pub(crate) fn size(&self) -> u64 {
-        self.size
     }
 
     /// Whether the host sees its bytes.

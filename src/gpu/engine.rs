@@ -3,12 +3,13 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
+use glam::Quat;
+
 use crate::gpu::buffer::{Buffer, Residence};
 use crate::gpu::device::{Lane, LogicalDevice};
 use crate::gpu::error::{EvaluateError, VulkanError};
 use crate::gpu::from_keys::KeyUploads;
 use crate::gpu::in_flight::{InFlight, Target, copy};
-use crate::gpu::mapped::{FreeBuffers, MappedQuats};
 use crate::gpu::memory_types::KernelReads;
 use crate::gpu::options::{EngineOptions, Timings, Transfer};
 use crate::gpu::pipeline::{Exactness, Pipeline};
@@ -45,9 +46,6 @@ pub(crate) struct VulkanEngine {
     pub(crate) keys_in_flight: Mutex<Vec<InFlight<KeyUploads>>>,
     /// Windows in flight at once.
     pub(crate) in_flight_count: usize,
-    /// Whether kernels write into memory that the host reads; else results are copied out of the
-    /// device's own memory.
-    pub(crate) in_place: bool,
     /// Whether neighbouring invocations take neighbouring samples; else each takes a run of them.
     pub(crate) maps_samples: bool,
     /// Whether the caller's memory is imported where the device can.
@@ -116,7 +114,6 @@ impl VulkanEngine {
             in_flight: Mutex::default(),
             keys_in_flight: Mutex::default(),
             in_flight_count,
-            in_place: device.placing.in_place,
             maps_samples: device.physical.maps_samples(options.mapping),
             imports: options.transfer == Transfer::Automatic,
             window: AtomicUsize::new(window),
@@ -216,7 +213,7 @@ impl VulkanEngine {
     ) -> Result<Buffer, VulkanError> {
         let size = bytes.len() as u64;
         // Of spare ones the host writes those that kernels have read in place.
-        let fits = |buffer: &Buffer| buffer.is_mapped() && buffer.size() >= size;
+        let fits = |buffer: &Buffer| buffer.is_mapped() && buffer.size >= size;
         let (mut upload, is_staged) = match spare.iter().position(fits) {
             Some(place) => (spare.swap_remove(place), false),
             None => writable(&self.device, name, size, KernelReads::Often)?,
@@ -228,7 +225,7 @@ impl VulkanEngine {
         let resident = Buffer::new(&self.device, name, size, Residence::Device)?;
         let mut submission = Submission::new(&self.device, Lane::Kernels)?;
         submission.begin(0)?;
-        (submission.commands()).copy(&upload, &resident, upload.size());
+        (submission.commands()).copy(&upload, &resident, upload.size);
         (submission.commands()).barrier(Access::Copy, Access::Kernel);
         submission.submit()?;
         submission.wait()?;
@@ -245,7 +242,7 @@ impl VulkanEngine {
         let whole = job.whole(layout);
         let bytes = (whole.len() * Encoding::F32.bytes()) as u64;
         let fits = bytes <= self.device.physical.info.max_memory_allocation_size;
-        let buffer = match self.in_place && fits {
+        let buffer = match self.device.placing.in_place && fits {
             true => match self.output_buffer(bytes) {
                 // Window by window the result may still be made.
                 Err(error) if error.is_out_of_memory() => None,
@@ -283,11 +280,44 @@ impl VulkanEngine {
     /// A buffer that was given back, when one fits closely, else a new one.
     fn output_buffer(&self, bytes: u64) -> Result<Buffer, VulkanError> {
         let mut free = lock(&self.free);
-        let fits = |buffer: &Buffer| (bytes..=bytes.max(1 << 16) * 2).contains(&buffer.size());
+        let fits = |buffer: &Buffer| (bytes..=bytes.max(1 << 16) * 2).contains(&buffer.size);
         if let Some(i) = free.iter().position(fits) {
             return Ok(free.swap_remove(i));
         }
         drop(free);
         Buffer::new(&self.device, "tumble rotations", bytes, Residence::InPlace)
+    }
+}
+
+/// Output buffers of dropped results, to use again: the first touch of fresh memory costs more
+/// than evaluating.
+type FreeBuffers = Arc<Mutex<Vec<Buffer>>>;
+
+/// A result in mapped memory. When it is dropped, the buffer goes back to its engine.
+struct MappedQuats {
+    /// There until it is dropped.
+    buffer: Option<Buffer>,
+    count: usize,
+    free: FreeBuffers,
+}
+
+impl Storage for MappedQuats {
+    fn quats(&self) -> &[Quat] {
+        let all = 0..self.count * size_of::<Quat>();
+        let bytes = self.buffer.as_ref().map(|buffer| buffer.bytes(all));
+        bytemuck::cast_slice(bytes.unwrap_or_default())
+    }
+}
+
+/// The most output buffers that are kept for later evaluations.
+const KEPT: usize = 4;
+
+impl Drop for MappedQuats {
+    fn drop(&mut self) {
+        let mut free = lock(&self.free);
+        if free.len() == KEPT {
+            free.remove(0);
+        }
+        free.extend(self.buffer.take());
     }
 }

@@ -85,7 +85,7 @@ impl VulkanEngine {
         let size = output.len() as u64;
         let place = target.place();
         // One queue alone gains nothing by a copy: kernels then write where the host reads.
-        let staged = !self.in_place && device.copies_apart;
+        let staged = !device.placing.in_place && device.copies_apart;
         let rotations = match place {
             Some((buffer, first)) => Binding::range(buffer, first + output.start as u64, size),
             None => Binding::whole(own.results.room(device, size, staged)?),

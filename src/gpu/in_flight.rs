@@ -133,7 +133,12 @@ impl VulkanEngine {
         let mut next = 0;
         let mut result = work.try_for_each(|work| {
             if next == in_flight.len() {
-                in_flight.push(InFlight::new(&self.device)?);
+                in_flight.push(InFlight {
+                    results: ReadBack::new(&self.device)?,
+                    uploads: U::default(),
+                    done: None,
+                    compiled: false,
+                });
             }
             let own = &mut in_flight[next];
             next = (next + 1) % self.in_flight_count;
@@ -166,16 +171,7 @@ impl VulkanEngine {
     }
 }
 
-impl<U: Default> InFlight<U> {
-    fn new(device: &Arc<LogicalDevice>) -> Result<Self, VulkanError> {
-        Ok(Self {
-            results: ReadBack::new(device)?,
-            uploads: U::default(),
-            done: None,
-            compiled: false,
-        })
-    }
-
+impl<U> InFlight<U> {
     /// Waits for the work, if there is any, and does what is left to do then.
     fn finish(
         &mut self,

@@ -17,7 +17,6 @@ pub(crate) mod handles;
 pub(crate) mod imported_memory;
 pub(crate) mod in_flight;
 pub(crate) mod instance;
-pub(crate) mod mapped;
 pub(crate) mod memory_types;
 pub(crate) mod options;
 pub(crate) mod physical;

@@ -185,6 +185,8 @@ impl PhysicalDevice {
             name.map(|name| name.to_string_lossy().into_owned())
                 .unwrap_or_default()
         };
+        let heaps = memory.memory_heaps_as_slice().iter();
+        let local = |h: &&vk::MemoryHeap| h.flags.contains(vk::MemoryHeapFlags::DEVICE_LOCAL);
         let driver = [driver.driver_name_as_c_str(), driver.driver_info_as_c_str()];
         let info = DeviceInfo {
             name: text(properties.device_name_as_c_str()),
@@ -199,7 +201,7 @@ impl PhysicalDevice {
             max_compute_work_group_invocations: limits.max_compute_work_group_invocations,
             max_compute_work_group_count: limits.max_compute_work_group_count,
             min_storage_buffer_offset_alignment: limits.min_storage_buffer_offset_alignment,
-            device_local_memory: device_local_memory(&memory),
+            device_local_memory: heaps.filter(local).map(|heap| heap.size).sum(),
             preserves_signed_zero_inf_nan: float_controls.preserve_signed_zero_inf_nan,
             rounds_to_nearest_even: float_controls.round_to_nearest_even,
         };
@@ -311,14 +313,6 @@ impl PhysicalDevice {
         let found = preferred.find_map(|&flags| find(required | flags));
         found.or_else(|| find(required))
     }
-}
-
-fn device_local_memory(memory: &vk::PhysicalDeviceMemoryProperties) -> u64 {
-    let heaps = memory.memory_heaps_as_slice().iter();
-    heaps
-        .filter(|h| h.flags.contains(vk::MemoryHeapFlags::DEVICE_LOCAL))
-        .map(|h| h.size)
-        .sum()
 }
 
 fn kind(device_type: vk::PhysicalDeviceType) -> DeviceKind {

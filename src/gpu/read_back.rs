@@ -161,7 +161,7 @@ fn grow<'b>(
     residence: Residence,
 ) -> Result<&'b Buffer, VulkanError> {
     // A shorter one is freed before the new one is made, so that both need not fit.
-    let own = kept.take().filter(|buffer| buffer.size() >= size);
+    let own = kept.take().filter(|buffer| buffer.size >= size);
     let own = own.map_or_else(
         || Buffer::new(device, "tumble results", size, residence),
         Ok,

@@ -11,7 +11,7 @@ use crate::gpu::upload::Upload;
 use crate::gpu::work_list::WorkLists;
 use crate::output::encoding::Encoding;
 use crate::output::window::Window;
-use crate::shader::{Dispatch, Kernel, LINE, WORKGROUP};
+use crate::shader::{Dispatch, Grid, Kernel, LINE, WORKGROUP};
 
 /// Bytes of the lines in which a card's memory is written, at most.
 const LINE_BYTES: u64 = 128;
@@ -74,7 +74,11 @@ impl VulkanEngine {
 
         let buffer = match place {
             Some((buffer, _)) => buffer,
-            None => (own.results.room(&self.device, size, !self.in_place)?).raw,
+            None => {
+                (own.results
+                    .room(&self.device, size, !self.device.placing.in_place)?)
+                .raw
+            }
         };
         let rotations = Binding::range(buffer, aligned, size);
         let kernels = &mut own.results.kernels;
@@ -99,7 +103,10 @@ impl VulkanEngine {
             let (grid, dispatch);
             let (arguments, groups) = match group.grid {
                 Some(of_group) => {
-                    grid = of_group.arguments(detail);
+                    grid = Grid {
+                        detail,
+                        ..of_group.arguments
+                    };
                     let most = info.max_compute_work_group_count[0];
                     (bytemuck::bytes_of(&grid), of_group.workgroups(most))
                 }

@@ -70,7 +70,7 @@ impl Binding {
             buffer: buffer.raw,
             view: buffer.view,
             offset: 0,
-            size: buffer.size(),
+            size: buffer.size,
         }
     }
 }

@@ -31,7 +31,7 @@ impl Upload {
         bytes: usize,
     ) -> Result<&mut [u8], VulkanError> {
         let size = bytes as u64;
-        if self.written.as_ref().is_none_or(|own| own.size() < size) {
+        if self.written.as_ref().is_none_or(|own| own.size < size) {
             // Shorter ones are freed before new ones are made, so that both need not fit.
             (self.written, self.copied) = (None, None);
             let (written, is_staged) = writable(device, name, size, reads)?;

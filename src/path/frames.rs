@@ -4,8 +4,8 @@ use std::ops::Range;
 
 use glam::{DQuat, DVec3, Vec3};
 
-use crate::path::axes;
 use crate::path::carry::{Piece, Uncarried, about_z, around_corner, least_turn};
+use crate::path::lanes;
 use crate::path::options::{Follow, Frame, Twist};
 use crate::path::polynomial::Polynomial;
 use crate::path::rolls::{Rolls, unwrapped, wrapped};
@@ -324,7 +324,7 @@ impl Frames {
 /// The rotation that takes z to a direction and x as near as possible to a side.
 fn of_axes(side: DVec3, way: DVec3) -> DQuat {
     let side = across(side, way);
-    DQuat::from_array(axes::of_axes(side.to_array(), way.to_array()))
+    DQuat::from_array(lanes::of_axes(side.to_array(), way.to_array()))
 }
 
 /// The part of a vector across a direction, of unit length.

@@ -2,6 +2,7 @@
 //! walked from its roots down to rotations and positions in the world.
 
 use glam::{Quat, Vec3};
+use rayon::prelude::*;
 
 use crate::engine::Engine;
 use crate::error::Error;
@@ -12,10 +13,11 @@ use crate::memory::zeroed;
 use crate::output::buffer::OutputBuffer;
 use crate::output::pose_error::PoseError;
 use crate::output::rotations::{Layout, Rotations};
-use crate::pose::on_cpu;
 use crate::pose::skeleton::Skeleton;
 use crate::shader::Kernel;
-use crate::twin::{pose_add, pose_blend, pose_mix};
+use crate::simd::dispatch::{InLanes, in_lanes};
+use crate::simd::lanes::Lanes;
+use crate::twin::{pose_add, pose_blend, pose_mix, pose_world};
 
 impl Engine {
     /// Blends layers into one: the weighted sum of each rotation, normalised, every layer with the
@@ -46,7 +48,7 @@ impl Engine {
             let Some(device) = device else {
                 let count = output.len();
                 let blended = |place| pose_blend::pose(values, &weights, count, place);
-                on_cpu::for_each(output, blended);
+                set_all(output, blended);
                 return Ok(());
             };
             let inputs = [bytes(values), bytes(&weights)];
@@ -67,7 +69,7 @@ impl Engine {
             let [a, b] = [from, to].map(|layer| values(layer, start, output.len()));
             let Some(device) = device else {
                 let mixed = |place: usize| pose_mix::pose(a[place], b[place], weight);
-                on_cpu::for_each(output, mixed);
+                set_all(output, mixed);
                 return Ok(());
             };
             let weight = [weight];
@@ -109,7 +111,7 @@ impl Engine {
             }));
             let Some(device) = device else {
                 let added = |place: usize| pose_add::pose(a[place], b[place], own[place], weight);
-                on_cpu::for_each(output, added);
+                set_all(output, added);
                 return Ok(());
             };
             own.push([weight, 0.0, 0.0, 0.0]);
@@ -160,7 +162,11 @@ impl Engine {
                     frame_major.extend(own.map(|place| local.as_quats()[place].to_array()));
                 }
                 match device {
-                    None => on_cpu::world(&frame_major, links, output),
+                    None => {
+                        let frames = output.par_chunks_mut(2 * tracks);
+                        let frames = frames.zip(frame_major.par_chunks(tracks));
+                        frames.for_each(|(world, local)| pose_world::pose(local, links, world));
+                    }
                     Some(device) => {
                         let inputs = [bytes(&frame_major), bytes(links)];
                         device.pass(Kernel::PosesWorld, &inputs, [count, tracks], output)?;
@@ -288,4 +294,34 @@ fn values(layer: &Rotations, start: usize, count: usize) -> &[[f32; 4]] {
 
 pub(super) fn bytes<T: bytemuck::Pod>(values: &[T]) -> &[u8] {
     bytemuck::cast_slice(values)
+}
+
+/// Values in one task of the CPU.
+const TASK: usize = 8192;
+
+struct Task<'a, F> {
+    first: usize,
+    output: &'a mut [[f32; 4]],
+    pose: &'a F,
+}
+
+impl<F: Fn(usize) -> [f32; 4]> InLanes for Task<'_, F> {
+    #[inline(always)]
+    fn run<L: Lanes>(&mut self) {
+        for (i, value) in self.output.iter_mut().enumerate() {
+            *value = (self.pose)(self.first + i);
+        }
+    }
+}
+
+/// Sets the values at all places, on the CPU.
+fn set_all(output: &mut [[f32; 4]], pose: impl Fn(usize) -> [f32; 4] + Sync) {
+    let tasks = output.par_chunks_mut(TASK).enumerate();
+    tasks.for_each(|(task, output)| {
+        in_lanes(&mut Task {
+            first: task * TASK,
+            output,
+            pose: &pose,
+        });
+    });
 }
