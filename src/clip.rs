@@ -78,7 +78,7 @@ impl Clip {
     /// The stored values, whatever they are.
     pub(crate) fn samples<T>(&self, frames: &Frames, layout: Layout) -> Result<Samples<T>, Error> {
         let timeline = self.timeline(frames)?;
-        let storage = (self.uploaded).evaluate(&self.engine.backend, &timeline, layout)?;
+        let storage = (self.uploaded).evaluate(&timeline, layout)?;
         let (tracks, samples) = (self.track_count(), timeline.len());
         Ok(Samples::new(storage, tracks, samples, layout))
     }
@@ -100,7 +100,8 @@ impl Clip {
         let whole = Window::whole(self.track_count(), timeline.len(), layout);
         in_quats(output, whole.len(), |quats| {
             let timeline = self.uploaded.data.folded(&timeline)?;
-            Ok((self.uploaded).evaluate_window(&self.engine.backend, &timeline, &whole, quats)?)
+            let bytes = bytemuck::cast_slice_mut(quats);
+            Ok((self.uploaded).evaluate_into(&timeline, &whole, Encoding::F32, bytes)?)
         })
     }
 
@@ -117,13 +118,8 @@ impl Clip {
         if output.is_empty() {
             return Ok(());
         }
-        let (backend, timeline) = (&self.engine.backend, self.uploaded.data.folded(timeline)?);
-        if encoding == Encoding::F32
-            && let Ok(quats) = bytemuck::try_cast_slice_mut(&mut *output)
-        {
-            return Ok((self.uploaded).evaluate_window(backend, &timeline, window, quats)?);
-        }
-        Ok((self.uploaded).evaluate_encoded(backend, &timeline, window, encoding, output)?)
+        let timeline = self.uploaded.data.folded(timeline)?;
+        Ok((self.uploaded).evaluate_into(&timeline, window, encoding, output)?)
     }
 
     /// The rotation of every track at every sample, encoded where it is evaluated. The bytes are

@@ -103,12 +103,8 @@ impl Clip {
         let whole = Window::whole(self.track_count(), timeline.len(), layout);
         let timeline = self.uploaded.data.folded(&timeline).map_err(Error::from)?;
         let fill = |window: &Window, output: &mut [Quat]| {
-            Ok((self.uploaded).evaluate_window(
-                &self.engine().backend,
-                &timeline,
-                window,
-                output,
-            )?)
+            let bytes = bytemuck::cast_slice_mut(output);
+            Ok((self.uploaded).evaluate_into(&timeline, window, Encoding::F32, bytes)?)
         };
         run(whole.cut(chunk), self.quantity(), fill, sink)
     }

@@ -292,7 +292,7 @@ impl Crowd {
     pub fn poll(&self) -> Result<bool, CrowdError> {
         match (&self.submitted, &self.reader) {
             (Some((_, Some(_))), _) => Ok(true),
-            (Some((_, None)), Some(reader)) => Ok(reader.is_done()?),
+            (Some((_, None)), Some(reader)) => Ok(reader.results.is_done()?),
             _ => Err(CrowdError::NothingSubmitted),
         }
     }

@@ -1,6 +1,7 @@
 //! Evaluates a set by its route.
 
 use std::collections::VecDeque;
+use std::sync::Arc;
 
 use glam::Quat;
 use rayon::prelude::*;
@@ -15,6 +16,7 @@ use crate::from_keys::{KeyCurve, UNRESOLVED};
 use crate::gpu::error::EvaluateError;
 use crate::gpu::recovery::Opened;
 use crate::output::buffer::OutputBuffer;
+use crate::output::encoding::Encoding;
 use crate::output::rotations::{Layout, Storage};
 use crate::output::window::Window;
 use crate::prepare::batch::{Batch, BatchSize, PART_INTERVALS, batches};
@@ -33,7 +35,7 @@ const LOOK: usize = 16 * 1024;
 impl Backend {
     /// Evaluates a set; the result stays in memory of the device where that saves a copy.
     pub(crate) fn evaluate(
-        &self,
+        self: &Arc<Self>,
         request: &Request<'_>,
         layout: Layout,
     ) -> Result<Box<dyn Storage>, EvaluateError> {
@@ -45,7 +47,7 @@ impl Backend {
                 ..Wanted::all(request.set)
             };
             let clip = Uploaded::new(self, request.set, *request.interpolation, wanted, None)?;
-            return clip.evaluate(self, request.timeline, layout);
+            return clip.evaluate(request.timeline, layout);
         }
         let mut quats = OutputBuffer::new(request.tracks.len() * request.timeline.len())?;
         self.evaluate_tracks(request, layout, &mut quats)?;
@@ -54,12 +56,12 @@ impl Backend {
 
     /// Evaluates into `output`, which is exactly as long as the result.
     pub(crate) fn evaluate_tracks(
-        &self,
+        self: &Arc<Self>,
         request: &Request<'_>,
         layout: Layout,
         output: &mut [Quat],
     ) -> Result<(), EvaluateError> {
-        match (self.route(request, layout), self) {
+        match (self.route(request, layout), &**self) {
             (Route::FromKeys(curve), Self::Cpu(engine)) => {
                 Ok(engine.evaluate_from_keys(request, curve, output)?)
             }
@@ -110,7 +112,7 @@ impl Backend {
 
     /// Prepares and evaluates one batch after another.
     fn evaluate_clips(
-        &self,
+        self: &Arc<Self>,
         request: &Request<'_>,
         layout: Layout,
         mut clips: VecDeque<Batch>,
@@ -150,7 +152,8 @@ impl Backend {
                 ..Window::whole(own.len(), timeline.len(), layout)
             };
             let evaluate = |output: &mut [Quat]| {
-                clip.evaluate_window(self, &folded, &window, output)
+                let output = bytemuck::cast_slice_mut(output);
+                clip.evaluate_into(&folded, &window, Encoding::F32, output)
                     .map_err(|error| error.of_tracks_from(own.start))
             };
             let place = own.start - tracks.start..own.end - tracks.start;

@@ -2,8 +2,6 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use glam::Quat;
-
 use crate::evaluate::backend::Backend;
 use crate::gpu::engine::{ClipBuffers, Job, VulkanEngine, lock};
 use crate::gpu::error::{EvaluateError, VulkanError};
@@ -21,6 +19,7 @@ use crate::tracks::set::TrackSet;
 
 /// Prepared tracks, and their segments on a Vulkan device.
 pub(crate) struct Uploaded {
+    backend: Arc<Backend>,
     pub(crate) data: ClipData,
     /// Uploaded again after the device was lost.
     buffers: Mutex<Option<Arc<ClipBuffers>>>,
@@ -30,7 +29,7 @@ impl Uploaded {
     /// Prepares what is wanted of a set, and uploads it where the device is Vulkan's. The buffers
     /// of `spare`, which are no longer needed, are used again where they are large enough.
     pub(crate) fn new(
-        backend: &Backend,
+        backend: &Arc<Backend>,
         set: &TrackSet,
         interpolation: Interpolation,
         mut wanted: Wanted<'_>,
@@ -43,15 +42,16 @@ impl Uploaded {
 
     /// Uploads data that is prepared already.
     pub(crate) fn of_data(
-        backend: &Backend,
+        backend: &Arc<Backend>,
         data: ClipData,
         spare: Option<ClipBuffers>,
     ) -> Result<Self, EvaluateError> {
-        let buffers = match backend {
+        let buffers = match &**backend {
             Backend::Cpu(_) => None,
             Backend::Vulkan(opened) => Some(Arc::new(opened.upload(&data, spare)?)),
         };
         Ok(Self {
+            backend: Arc::clone(backend),
             data,
             buffers: Mutex::new(buffers),
         })
@@ -67,12 +67,11 @@ impl Uploaded {
     /// Evaluates all tracks; the result stays in memory of the device where that saves a copy.
     pub(crate) fn evaluate(
         &self,
-        backend: &Backend,
         timeline: &Timeline,
         layout: Layout,
     ) -> Result<Box<dyn Storage>, EvaluateError> {
         let timeline = self.data.folded(timeline)?;
-        match backend {
+        match &*self.backend {
             Backend::Vulkan(opened) => {
                 self.on_device(opened, &timeline, Encoding::F32, |engine, job| {
                     engine.evaluate(job, layout)
@@ -81,43 +80,30 @@ impl Uploaded {
             Backend::Cpu(_) => {
                 let whole = Window::whole(self.data.track_count(), timeline.len(), layout);
                 let mut quats = OutputBuffer::new(whole.len())?;
-                self.evaluate_window(backend, &timeline, &whole, &mut quats)?;
+                let output = bytemuck::cast_slice_mut(&mut quats);
+                self.evaluate_into(&timeline, &whole, Encoding::F32, output)?;
                 Ok(Box::new(quats))
             }
         }
     }
 
-    /// Evaluates a window of the result into `output`, which is exactly as long. Explicit times
-    /// must be folded into the keys already, as the wrap mode has it.
-    pub(crate) fn evaluate_window(
+    /// Evaluates a window of the result into `output`, encoded, which is exactly as long. Explicit
+    /// times must be folded into the keys already, as the wrap mode has it.
+    pub(crate) fn evaluate_into(
         &self,
-        backend: &Backend,
-        timeline: &Timeline,
-        window: &Window,
-        output: &mut [Quat],
-    ) -> Result<(), EvaluateError> {
-        match backend {
-            Backend::Cpu(engine) => Ok(engine.evaluate(&self.data, timeline, window, output)?),
-            Backend::Vulkan(_) => {
-                let bytes = bytemuck::cast_slice_mut(output);
-                self.evaluate_encoded(backend, timeline, window, Encoding::F32, bytes)
-            }
-        }
-    }
-
-    /// As [`Uploaded::evaluate_window`], encoded.
-    pub(crate) fn evaluate_encoded(
-        &self,
-        backend: &Backend,
         timeline: &Timeline,
         window: &Window,
         encoding: Encoding,
         output: &mut [u8],
     ) -> Result<(), EvaluateError> {
-        match backend {
-            Backend::Cpu(engine) => {
-                Ok(engine.evaluate_encoded(&self.data, timeline, window, encoding, output)?)
-            }
+        let data = &self.data;
+        match &*self.backend {
+            Backend::Cpu(engine) => Ok(match bytemuck::try_cast_slice_mut(&mut *output) {
+                Ok(quats) if encoding == Encoding::F32 => {
+                    engine.evaluate(data, timeline, window, quats)
+                }
+                _ => engine.evaluate_encoded(data, timeline, window, encoding, output),
+            }?),
             Backend::Vulkan(opened) => self.on_device(opened, timeline, encoding, |engine, job| {
                 engine.evaluate_into(job, window, output)
             }),

@@ -173,7 +173,7 @@ impl CrowdTarget {
 /// A target whose result the host reads: evaluated into memory that it sees, submitted without a wait.
 pub(crate) struct CrowdReader {
     // It goes first: it waits for what uses the rest.
-    results: ReadBack,
+    pub(crate) results: ReadBack,
     pub(crate) target: CrowdTarget,
 }
 
@@ -202,10 +202,6 @@ impl CrowdReader {
         self.target.record(commands, clock, changes);
         let bytes = self.target.crowd.bytes(self.target.output);
         self.results.submit(Some(bytes))
-    }
-
-    pub(crate) fn is_done(&self) -> Result<bool, VulkanError> {
-        self.results.is_done()
     }
 
     /// Waits, and copies the result, of which `output` has as many bytes.

@@ -89,11 +89,6 @@ impl Route {
         self.lengths = Lengths::new(self.slopes.clone(), stops);
     }
 
-    /// Where an interval's curve stops.
-    fn stops(&self, interval: usize) -> &[f64] {
-        &self.divided[interval].0
-    }
-
     /// The position at a time.
     pub(crate) fn position(&self, time: f64) -> [DVec3; 2] {
         if self.curves.is_empty() {
@@ -112,7 +107,7 @@ impl Route {
     /// The times between two at which the path's own curves change.
     fn times_between(&self, from: f64, to: f64) -> Vec<f64> {
         let places = |interval: usize| {
-            let stops = self.stops(interval).iter().copied();
+            let stops = self.divided[interval].0.iter().copied();
             let places = stops.chain([0.0, 1.0]);
             places.map(move |t| self.time(interval, t))
         };
@@ -273,7 +268,7 @@ pub(crate) fn stretches(
         }
         // At given speeds, a body's motion is not smooth where its curve stops.
         if route.speed != PathSpeed::Keys || matches!(direction, Direction::Ahead(_)) {
-            cuts.extend(route.stops(interval));
+            cuts.extend(&route.divided[interval].0);
         }
         match (direction, target) {
             (Direction::Ahead(distance), _) => cuts.extend(route.passings(interval, distance)),

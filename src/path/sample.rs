@@ -80,7 +80,9 @@ pub(crate) struct Sampler<'a> {
 /// The numbers of a block of spans.
 #[derive(Default)]
 struct Rows {
-    times: Times,
+    /// The times at which spans start and end, those of their intervals' keys, and the parameters between
+    /// which their stretches lie.
+    times: [Row; 6],
     places: [Row; PLACES],
     ways: [[Row; 3]; PLACES],
     pieces: Pieces,
@@ -141,14 +143,14 @@ impl<'a> Sampler<'a> {
     }
 
     fn places_by_keys(&mut self, spans: &[Span]) {
-        let Rows { times, places, .. } = &mut *self.rows;
+        let rows = &mut *self.rows;
         for (lane, span) in spans.iter().enumerate() {
             let (route, own) = span.place(self.paths);
             let [first, last] = route.keys_of(own.interval);
             let numbers = [span.from, span.to, first, last, own.from, own.to];
-            put(times, lane, numbers);
+            put(&mut rows.times, lane, numbers);
         }
-        in_lanes(&mut ByKeys { times, places });
+        in_lanes(rows);
     }
 
     fn places_by_length(&mut self, spans: &[Span]) {
@@ -274,22 +276,13 @@ impl<'a> Sampler<'a> {
     }
 }
 
-/// The times at which spans start and end, those of their intervals' keys, and the parameters between
-/// which their stretches lie.
-type Times = [Row; 6];
-
-/// The places of spans on paths that are as their keys say.
-struct ByKeys<'a> {
-    times: &'a Times,
-    places: &'a mut [Row; PLACES],
-}
-
-impl InLanes for ByKeys<'_> {
+/// Finds the places of spans on paths that are as their keys say.
+impl InLanes for Rows {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
         let (zero, one) = (L::Doubles::all(0.0), L::Doubles::all(1.0));
         for lane in (0..MOST).step_by(L::COUNT) {
-            let [from, to, first, last, start, end] = load::<L, 6>(self.times, lane);
+            let [from, to, first, last, start, end] = load::<L, 6>(&self.times, lane);
             let width = to - from;
             for (place, (row, part)) in self.places.iter_mut().zip(PARTS).enumerate() {
                 let time = match place {
