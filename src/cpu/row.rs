@@ -133,40 +133,6 @@ impl<S: Evaluate> Row<'_, S> {
         in_lanes_into(self.width, &RunList { row: self, runs }, output);
         Ok(())
     }
-}
-
-/// Runs of a row, to be evaluated in vectors.
-struct RunList<'a, 'r, S> {
-    row: &'a Row<'r, S>,
-    runs: Vec<Run>,
-}
-
-impl<S: Evaluate> InLanesInto<[[f32; 4]]> for RunList<'_, '_, S> {
-    type Outcome = ();
-
-    #[inline(always)]
-    fn run<L: Lanes>(&self, output: &mut [[f32; 4]]) {
-        for run in &self.runs {
-            self.row.evaluate_run::<L>(run, output);
-        }
-    }
-}
-
-/// Takes runs and evaluates them as they come; for few samples, and for those outside the keys.
-struct OneByOne<'a, 'r, S> {
-    row: &'a Row<'r, S>,
-    output: &'a mut [[f32; 4]],
-}
-
-impl<S: Evaluate> Emit for OneByOne<'_, '_, S> {
-    // Not inlined, because runs come from many places.
-    #[inline(never)]
-    fn run(&mut self, run: Run) {
-        self.row.evaluate_run::<Vec4>(&run, self.output);
-    }
-}
-
-impl<S: Evaluate> Row<'_, S> {
     /// Evaluates a run; `output` starts at the first sample of the track copy.
     #[inline(always)]
     fn evaluate_run<L: Lanes>(&self, run: &Run, output: &mut [[f32; 4]]) {
@@ -203,5 +169,36 @@ impl<S: Evaluate> Row<'_, S> {
         for (sample, rotation) in (first..).zip(output) {
             *rotation = prepared.exact(index, parameter, self.timeline, track, sample);
         }
+    }
+}
+
+/// Runs of a row, to be evaluated in vectors.
+struct RunList<'a, 'r, S> {
+    row: &'a Row<'r, S>,
+    runs: Vec<Run>,
+}
+
+impl<S: Evaluate> InLanesInto<[[f32; 4]]> for RunList<'_, '_, S> {
+    type Outcome = ();
+
+    #[inline(always)]
+    fn run<L: Lanes>(&self, output: &mut [[f32; 4]]) {
+        for run in &self.runs {
+            self.row.evaluate_run::<L>(run, output);
+        }
+    }
+}
+
+/// Takes runs and evaluates them as they come; for few samples, and for those outside the keys.
+struct OneByOne<'a, 'r, S> {
+    row: &'a Row<'r, S>,
+    output: &'a mut [[f32; 4]],
+}
+
+impl<S: Evaluate> Emit for OneByOne<'_, '_, S> {
+    // Not inlined, because runs come from many places.
+    #[inline(never)]
+    fn run(&mut self, run: Run) {
+        self.row.evaluate_run::<Vec4>(&run, self.output);
     }
 }

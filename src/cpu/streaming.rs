@@ -180,7 +180,6 @@ impl<'o> Place<'o> {
     }
 }
 
-/// Staging lines to be stored.
 struct WholeLines<'s>(&'s [Line]);
 
 impl<'o> InLanesInto<Place<'o>> for WholeLines<'_> {
@@ -201,7 +200,6 @@ pub(crate) enum Output<'s, 'o> {
 
 /// Samples in the staging lines.
 pub(crate) struct Staged<'s, 'o> {
-    /// All staging lines.
     lines: &'s mut [Line],
     /// Where these samples start in the lines, and where they end.
     start: usize,

@@ -14,7 +14,6 @@ use crate::twin::crowd_matrices::{Rows, affine_product, transform};
 use crate::twin::crowd_times::places;
 use crate::twin::evaluate_arc::{norm_squared, on_arc};
 
-/// Instances of one task.
 const TASK: usize = 32;
 
 /// What is evaluated: the same for all instances.
@@ -84,14 +83,18 @@ impl InLanes for Task<'_, '_> {
             }
             rotations::<L>(&context, tables, instance, self.rotations);
             let (matrices, _) = output.as_chunks_mut::<3>();
-            locals(&context, instance, self.rotations, matrices);
+            let instance = instance as u32;
+            for ((joint, &rotation), matrix) in (0..).zip(&*self.rotations).zip(&mut *matrices) {
+                let moved = context.layered(instance, joint, TRANSLATION);
+                let scale = context.layered(instance, joint, SCALE);
+                *matrix = transform(rotation, moved, scale);
+            }
             scene.walk(matrices);
         }
     }
 }
 
 impl Scene<'_> {
-    /// Vectors of an instance.
     fn vectors(&self) -> usize {
         self.library.joints() * CrowdOutput::from(self.values).vectors()
     }
@@ -190,14 +193,3 @@ fn arcs<L: Lanes>(
 
 /// Lanes of the widest vectors.
 const MOST_LANES: usize = 16;
-
-/// The matrices of an instance in the parents' frames.
-#[inline(always)]
-fn locals(context: &Layers<'_>, instance: usize, rotations: &[[f32; 4]], matrices: &mut [Rows]) {
-    let instance = instance as u32;
-    for ((joint, &rotation), matrix) in (0..).zip(rotations).zip(matrices) {
-        let moved = context.layered(instance, joint, TRANSLATION);
-        let scale = context.layered(instance, joint, SCALE);
-        *matrix = transform(rotation, moved, scale);
-    }
-}

@@ -46,10 +46,8 @@ impl Uploaded {
         data: ClipData,
         spare: Option<ClipBuffers>,
     ) -> Result<Self, EvaluateError> {
-        let buffers = match &**backend {
-            Backend::Cpu(_) => None,
-            Backend::Vulkan(opened) => Some(Arc::new(opened.upload(&data, spare)?)),
-        };
+        let upload = |opened: &Opened| opened.upload(&data, spare).map(Arc::new);
+        let buffers = backend.opened().map(upload).transpose()?;
         Ok(Self {
             backend: Arc::clone(backend),
             data,
@@ -146,9 +144,14 @@ impl Uploaded {
 impl Backend {
     /// Bytes of segments that go into one buffer of a Vulkan device.
     pub(crate) fn group_bytes(&self) -> Option<usize> {
+        self.opened().map(|opened| opened.engine().group_bytes)
+    }
+
+    /// The Vulkan device; `None` for the CPU.
+    pub(crate) fn opened(&self) -> Option<&Opened> {
         match self {
             Self::Cpu(_) => None,
-            Self::Vulkan(opened) => Some(opened.engine().group_bytes),
+            Self::Vulkan(opened) => Some(opened),
         }
     }
 }

@@ -56,8 +56,7 @@ impl VulkanEngine {
         table: &[T],
     ) -> Result<Buffer, VulkanError> {
         let bytes: &[u8] = bytemuck::cast_slice(table);
-        let physical = &self.device.physical;
-        physical.check_range("a crowd's library", bytes.len() as u64)?;
+        self.check_size("a crowd's library", bytes)?;
         self.resident(name, bytes, &mut Vec::new())
     }
 }
@@ -79,7 +78,6 @@ impl DeviceCrowd {
         })
     }
 
-    /// Bytes of a result.
     pub(crate) fn bytes(&self, output: CrowdOutput) -> u64 {
         let joints = u64::from(self.tables.instances) * u64::from(self.tables.arguments.joints);
         joints * output.bytes() as u64

@@ -59,7 +59,6 @@ pub(crate) struct LogicalDevice {
     pub(crate) borrows: Option<ext::external_memory_host::Device>,
     /// Whether it was opened here, and may be opened again here.
     pub(crate) owned: bool,
-    /// Memory of buffers.
     pub(crate) shared: SharedMemory,
     /// A wait ran out of time: work may still run, so nothing may be destroyed.
     hung: AtomicBool,
@@ -172,7 +171,6 @@ impl LogicalDevice {
         lock(&self.queue_of(lane).raw)
     }
 
-    /// The family of a lane's queue.
     pub(crate) fn family(&self, lane: Lane) -> u32 {
         self.queue_of(lane).family
     }

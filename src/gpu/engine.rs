@@ -44,7 +44,6 @@ pub(crate) struct VulkanEngine {
     pipelines: Mutex<[Option<Arc<Pipeline>>; KERNELS.len()]>,
     pub(crate) in_flight: Mutex<Vec<InFlight<WorkLists>>>,
     pub(crate) keys_in_flight: Mutex<Vec<InFlight<KeyUploads>>>,
-    /// Windows in flight at once.
     pub(crate) in_flight_count: usize,
     /// Whether neighbouring invocations take neighbouring samples; else each takes a run of them.
     pub(crate) maps_samples: bool,
@@ -177,7 +176,6 @@ impl VulkanEngine {
         Arc::ptr_eq(&self.device, &buffers.device)
     }
 
-    /// Rotations of one window.
     pub(crate) fn window(&self) -> usize {
         self.window.load(Ordering::Relaxed)
     }

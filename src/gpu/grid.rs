@@ -112,7 +112,6 @@ fn items(list: &GroupWork) -> impl Iterator<Item = &Item> {
     list.chunks.iter().flat_map(|chunk| &chunk.items)
 }
 
-/// The number of an item's samples.
 fn count(item: &Item) -> u32 {
     item.count & !(IS_CONSTANT | MAY_BE_TINY)
 }
@@ -128,7 +127,6 @@ pub(crate) struct GroupGrid {
 }
 
 impl GroupGrid {
-    /// How many blocks it has.
     pub(crate) fn blocks(&self) -> u32 {
         self.arguments.samples.div_ceil(BLOCK_SAMPLES) * self.arguments.rows
     }

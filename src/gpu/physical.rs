@@ -185,6 +185,7 @@ impl PhysicalDevice {
             name.map(|name| name.to_string_lossy().into_owned())
                 .unwrap_or_default()
         };
+        let version = properties.api_version;
         let heaps = memory.memory_heaps_as_slice().iter();
         let local = |h: &&vk::MemoryHeap| h.flags.contains(vk::MemoryHeapFlags::DEVICE_LOCAL);
         let driver = [driver.driver_name_as_c_str(), driver.driver_info_as_c_str()];
@@ -192,7 +193,12 @@ impl PhysicalDevice {
             name: text(properties.device_name_as_c_str()),
             driver: driver.map(text).join(" ").trim().to_owned(),
             kind: kind(properties.device_type),
-            api_version: version(properties.api_version),
+            api_version: format!(
+                "{}.{}.{}",
+                vk::api_version_major(version),
+                vk::api_version_minor(version),
+                vk::api_version_patch(version)
+            ),
             vendor_id: properties.vendor_id,
             device_id: properties.device_id,
             uuid: uuid(id.device_uuid),
@@ -330,10 +336,4 @@ fn uuid(bytes: [u8; 16]) -> String {
     let digits: String = bytes.iter().map(|byte| format!("{byte:02x}")).collect();
     let parts = [0..8, 8..12, 12..16, 16..20, 20..32];
     parts.map(|part| &digits[part]).join("-")
-}
-
-fn version(version: u32) -> String {
-    let major = vk::api_version_major(version);
-    let minor = vk::api_version_minor(version);
-    format!("{major}.{minor}.{}", vk::api_version_patch(version))
 }

@@ -37,7 +37,6 @@ pub(crate) struct Pipeline {
 }
 
 impl Pipeline {
-    /// The pipeline of a kernel.
     pub(crate) fn new(
         device: &Arc<LogicalDevice>,
         kernel: Kernel,
@@ -135,12 +134,10 @@ impl Pipeline {
         Ok(())
     }
 
-    /// The descriptor type of a binding.
     pub(crate) fn kind(&self, binding: u32) -> vk::DescriptorType {
-        if self.reads_texels && binding + 1 < self.bindings {
-            vk::DescriptorType::UNIFORM_TEXEL_BUFFER
-        } else {
-            vk::DescriptorType::STORAGE_BUFFER
+        match self.reads_texels && binding + 1 < self.bindings {
+            true => vk::DescriptorType::UNIFORM_TEXEL_BUFFER,
+            false => vk::DescriptorType::STORAGE_BUFFER,
         }
     }
 }

@@ -47,7 +47,6 @@ impl VulkanEngine {
         )
     }
 
-    /// Submits one window.
     fn start(
         &self,
         own: &mut InFlight<WorkLists>,

@@ -144,14 +144,12 @@ impl<'a> SampleList<'a> {
                 chunk.result.map(|()| chunk.patches)
             })
             .collect();
-        let mut patches = Vec::new();
-        for own in chunks {
-            patches.append(&mut own?);
-        }
+        // Of several errors the first counts.
+        let patches = chunks.into_iter().collect::<Result<Vec<_>, _>>()?;
         Ok(Work {
             list: List::Samples,
             groups,
-            patches,
+            patches: patches.concat(),
         })
     }
 }
@@ -198,7 +196,6 @@ impl InLanes for SampleChunk<'_> {
 /// A sample outside every segment, or one that the host computes in f64.
 const NOTHING: ListedSample = held(0);
 
-/// A sample that is a constant.
 const fn held(constant: u32) -> ListedSample {
     ListedSample {
         source: constant | IS_CONSTANT,

@@ -110,7 +110,6 @@ fn hostile_set() -> TrackSet {
     set
 }
 
-/// One of a reply's results.
 type Value = fn(&Reply) -> f32;
 
 /// The single expressions of `shaders/self_test.wgsl`.

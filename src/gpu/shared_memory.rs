@@ -50,7 +50,6 @@ struct Block {
 }
 
 impl SharedMemory {
-    /// Memory for a buffer.
     pub(crate) fn take(
         &self,
         device: &ash::Device,

@@ -64,7 +64,6 @@ impl Binding {
         }
     }
 
-    /// All of a buffer.
     pub(crate) fn whole(buffer: &Buffer) -> Self {
         Self {
             buffer: buffer.raw,
@@ -222,11 +221,7 @@ impl Submission {
         let raw = &self.device.raw;
         let fences = [self.fence];
         // A device that has hung is not waited for again.
-        let seconds = if self.device.may_destroy() {
-            TIMEOUT_SECONDS
-        } else {
-            0
-        };
+        let seconds = TIMEOUT_SECONDS * u64::from(self.device.may_destroy());
         let timeout = seconds * 1_000_000_000;
         // SAFETY: the fence belongs to this device.
         match unsafe { raw.wait_for_fences(&fences, true, timeout) } {

@@ -15,7 +15,6 @@ pub(crate) struct Window {
 }
 
 impl Window {
-    /// All of a result.
     pub(crate) fn whole(tracks: usize, samples: usize, layout: Layout) -> Self {
         Self::of(0..tracks, 0..samples, layout)
     }
@@ -30,7 +29,6 @@ impl Window {
         }
     }
 
-    /// Number of rotations.
     pub(crate) fn len(&self) -> usize {
         self.tracks.len() * self.samples.len()
     }

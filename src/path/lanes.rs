@@ -201,7 +201,6 @@ pub(crate) struct Pieces {
 }
 
 impl Pieces {
-    /// Sets the piece of a lane.
     pub(crate) fn set(&mut self, lane: usize, piece: &Piece) {
         put(&mut self.ends, lane, [piece.from, piece.to]);
         put(&mut self.roll, lane, piece.roll);

@@ -128,7 +128,6 @@ impl Lengths {
     }
 }
 
-/// The length between two parameters.
 fn between(slope: &Polynomial, from: f64, to: f64) -> f64 {
     let tolerance = 1e-14 * slope.size();
     // What overflows is no number, and halving it finds none.
@@ -136,7 +135,6 @@ fn between(slope: &Polynomial, from: f64, to: f64) -> f64 {
     integral(&speed(slope), from, to, FINEST, &differ)
 }
 
-/// The speed by the parameter.
 fn speed(slope: &Polynomial) -> impl Fn(f64) -> f64 {
     move |t| slope.at(t).length()
 }

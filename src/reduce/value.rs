@@ -16,7 +16,6 @@ pub(crate) trait Value: Copy + Default + PartialEq {
     /// The value at a part of the way to another.
     fn towards(self, other: Self, part: f64) -> Self;
 
-    /// Its numbers.
     fn numbers(self) -> DVec4;
 
     /// The value of these numbers, which need not be of a unit quaternion.

@@ -17,7 +17,6 @@ pub(crate) struct Row<'a> {
     pub(crate) values: &'a [[f32; 4]],
     pub(crate) first: usize,
     pub(crate) stride: usize,
-    /// The number of samples.
     pub(crate) count: usize,
 }
 

@@ -19,7 +19,7 @@ const LEN: usize = 32;
 #[derive(Zeroable)]
 pub(crate) struct IntervalBlock {
     /// Where each interval starts and, as the last entry, where the last one ends, in frames.
-    frame: [f64; LEN + 1],
+    pub(crate) frame: [f64; LEN + 1],
     /// The first requested sample that is not before `frame`, or the end of the requested ones.
     pub(crate) first: [usize; LEN + 1],
     /// 1 if that sample lies exactly at `frame`, else 0.
@@ -55,11 +55,6 @@ impl IntervalBlock {
             scale: self.scale[j],
             offset: self.offset[j],
         }
-    }
-
-    /// The length of the `j`th interval in frames.
-    pub(crate) fn frames(&self, j: usize) -> f64 {
-        self.frame[j + 1] - self.frame[j]
     }
 
     /// Whether the distances of the samples in the `j`th interval fit 32 bits.

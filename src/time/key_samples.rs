@@ -56,7 +56,7 @@ impl<'a> FramePlan<'a> {
                     return Err(FramesError::GapTooLong {
                         track: of.index,
                         key: of.first_key + key,
-                        frames: block.frames(j),
+                        frames: block.frame[j + 1] - block.frame[j],
                     });
                 }
                 let samples = block.first[j]..block.first[j + 1];
