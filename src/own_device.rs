@@ -5,7 +5,7 @@
 use crate::clip::Clip;
 use crate::engine::Engine;
 use crate::error::Error;
-use crate::evaluate::backend::Backend;
+use crate::evaluate::uploaded::Backend;
 use crate::gpu::engine::{Job, VulkanEngine};
 use crate::gpu::error::VulkanError;
 use crate::gpu::handles::{VulkanBuffer, VulkanHandles};

@@ -10,7 +10,7 @@ use crate::shader::{CHANNELS, CrowdPlace, FORM_ARC, ON_KEY, ROTATION, SCALE, TRA
 use crate::simd::dispatch::{InLanes, VectorWidth, in_lanes_of};
 use crate::simd::lanes::{Lanes, canonical};
 use crate::twin::crowd_layers::Layers;
-use crate::twin::crowd_matrices::{Rows, affine_product, transform};
+use crate::twin::crowd_matrices::{affine_product, transform};
 use crate::twin::crowd_times::places;
 use crate::twin::evaluate_arc::{norm_squared, on_arc};
 
@@ -89,7 +89,18 @@ impl InLanes for Task<'_, '_> {
                 let scale = context.layered(instance, joint, SCALE);
                 *matrix = transform(rotation, moved, scale);
             }
-            scene.walk(matrices);
+            if scene.values == CrowdValues::Local {
+                continue;
+            }
+            for link in &scene.library.links {
+                let joint = link.joint as usize;
+                matrices[joint] = affine_product(&matrices[link.parent as usize], &matrices[joint]);
+            }
+            if scene.values == CrowdValues::Skinning {
+                for (matrix, bind) in matrices.iter_mut().zip(&scene.library.bind) {
+                    *matrix = affine_product(matrix, bind);
+                }
+            }
         }
     }
 }
@@ -97,23 +108,6 @@ impl InLanes for Task<'_, '_> {
 impl Scene<'_> {
     fn vectors(&self) -> usize {
         self.library.joints() * CrowdOutput::from(self.values).vectors()
-    }
-
-    /// Makes matrices in the model of those in the parents' frames, and skinning matrices of these.
-    #[inline(always)]
-    fn walk(&self, matrices: &mut [Rows]) {
-        if self.values == CrowdValues::Local {
-            return;
-        }
-        for link in &self.library.links {
-            let joint = link.joint as usize;
-            matrices[joint] = affine_product(&matrices[link.parent as usize], &matrices[joint]);
-        }
-        if self.values == CrowdValues::Skinning {
-            for (matrix, bind) in matrices.iter_mut().zip(&self.library.bind) {
-                *matrix = affine_product(matrix, bind);
-            }
-        }
     }
 }
 

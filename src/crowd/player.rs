@@ -10,7 +10,7 @@ use crate::crowd::layer::{CrowdLayer, tick};
 use crate::crowd::library::CrowdLibrary;
 use crate::crowd::on_cpu::{self, Scene};
 use crate::engine::Engine;
-use crate::evaluate::backend::Backend;
+use crate::evaluate::uploaded::Backend;
 use crate::gpu::crowd::{CrowdTables, DeviceCrowd};
 use crate::gpu::crowd_target::CrowdReader;
 use crate::memory::zeroed;

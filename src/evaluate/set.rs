@@ -8,9 +8,8 @@ use rayon::prelude::*;
 
 use crate::cpu::engine::CpuEngine;
 use crate::curve::segment::segment_size;
-use crate::evaluate::backend::Backend;
 use crate::evaluate::route::Route;
-use crate::evaluate::uploaded::Uploaded;
+use crate::evaluate::uploaded::{Backend, Uploaded};
 use crate::from_keys::dispatches::KeyJob;
 use crate::from_keys::{KeyCurve, UNRESOLVED};
 use crate::gpu::error::EvaluateError;

@@ -1,8 +1,8 @@
-//! Prepared tracks on their device.
+//! What an engine evaluates on, and prepared tracks there.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use crate::evaluate::backend::Backend;
+use crate::cpu::engine::CpuEngine;
 use crate::gpu::engine::{ClipBuffers, Job, VulkanEngine, lock};
 use crate::gpu::error::{EvaluateError, VulkanError};
 use crate::gpu::recovery::Opened;
@@ -139,6 +139,12 @@ impl Uploaded {
         *buffers = Some(Arc::clone(&there));
         Ok(there)
     }
+}
+
+/// What an engine evaluates on.
+pub(crate) enum Backend {
+    Cpu(CpuEngine),
+    Vulkan(Box<Opened>),
 }
 
 impl Backend {

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use ash::vk;
 
-use crate::gpu::device::LogicalDevice;
+use crate::gpu::device::{Lane, LogicalDevice};
 use crate::gpu::error::{Named, VulkanError};
 use crate::gpu::physical::PhysicalDevice;
 use crate::gpu::shared_memory::{Kind, Share};
@@ -111,21 +111,18 @@ impl Buffer {
         let is_texels = device.reads_texels && is_read;
         // Both families may use what is copied on another queue, without a change of owners.
         let is_copied = matches!(residence, Residence::Results | Residence::Readback);
-        let families = device.two_families().filter(|_| is_copied);
+        let families = [Lane::Kernels, Lane::Copies].map(|lane| device.family(lane));
+        let families = (is_copied && families[0] != families[1]).then_some(families);
         let (mut buffer, needs) = Self::without_memory(device, size, is_texels, families, None)?;
         let (required, preferred) = residence.properties();
         let allowed = match (residence, device.placing.direct) {
             (Residence::Direct, Some(direct)) => needs.memory_type_bits & 1 << direct.memory_type,
             _ => needs.memory_type_bits,
         };
-        let memory_type = device
-            .physical
-            .memory_type(allowed, required, preferred)
-            .ok_or(VulkanError::NoMemoryType {
-                wanted: required.as_raw(),
-            })?;
+        let (physical, wanted) = (&device.physical, required.as_raw());
+        let memory_type = physical.memory_type(allowed, required, preferred);
         let kind = Kind {
-            memory_type,
+            memory_type: memory_type.ok_or(VulkanError::NoMemoryType { wanted })?,
             mapped: required.contains(vk::MemoryPropertyFlags::HOST_VISIBLE),
         };
         let memory = device.shared.take(&device.raw, kind, &needs)?;

@@ -32,15 +32,6 @@ struct Queue {
     family: u32,
 }
 
-impl Queue {
-    fn new(raw: vk::Queue, family: u32) -> Self {
-        Self {
-            raw: Mutex::new(raw),
-            family,
-        }
-    }
-}
-
 /// An opened device, destroyed with its last user unless it was handed in.
 pub(crate) struct LogicalDevice {
     pub(crate) raw: ash::Device,
@@ -142,6 +133,10 @@ impl LogicalDevice {
         let in_place = physical.in_place(options.transfer);
         let stay = in_place || options.read_back == ReadBack::SameQueue;
         let named = copy_queue.filter(|_| !stay);
+        let own = |(raw, family)| {
+            let raw = Mutex::new(raw);
+            Queue { raw, family }
+        };
         let instance = &physical.instance;
         let names = instance
             .debug_utils
@@ -154,8 +149,8 @@ impl LogicalDevice {
                 in_place,
                 direct: direct(&physical.memory),
             },
-            queue: Queue::new(queue, physical.queue_family),
-            copy_queue: named.map(|named| Queue::new(named.queue, named.family)),
+            queue: own((queue, physical.queue_family)),
+            copy_queue: named.map(|named| own((named.queue, named.family))),
             copies_apart: named.is_some(),
             physical,
             names,
@@ -180,12 +175,6 @@ impl LogicalDevice {
             (Lane::Copies, Some(own)) => own,
             _ => &self.queue,
         }
-    }
-
-    /// The families that use staged results, where they are two.
-    pub(crate) fn two_families(&self) -> Option<[u32; 2]> {
-        let families = [Lane::Kernels, Lane::Copies].map(|lane| self.family(lane));
-        (families[0] != families[1]).then_some(families)
     }
 
     /// Nobody else uses any queue meanwhile.

@@ -160,10 +160,8 @@ impl VulkanEngine {
                 ))
             })
             .collect::<Result<_, _>>()?;
-        Ok(ClipBuffers {
-            device: Arc::clone(&self.device),
-            groups,
-        })
+        let device = Arc::clone(&self.device);
+        Ok(ClipBuffers { device, groups })
     }
 
     /// Refuses what is longer than a kernel can bind.

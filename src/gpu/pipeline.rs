@@ -78,7 +78,12 @@ impl Pipeline {
         pipeline.layout = unsafe { device.raw.create_pipeline_layout(&info, None) }
             .named("vkCreatePipelineLayout")?;
 
-        let words = words(code, device, exactness);
+        let words: Vec<u32> = bytemuck::pod_collect_to_vec(code);
+        let words = match exactness {
+            Exactness::Demanded => spirv::float_controls(&words, device.physical.float_controls),
+            Exactness::LeftToTheDriver => spirv::without_decorations(&words),
+        };
+        let words = words.expect("the build validated its shaders");
         let info = vk::ShaderModuleCreateInfo::default().code(&words);
         // SAFETY: the words are valid SPIR-V: the build made them.
         let module = unsafe { device.raw.create_shader_module(&info, None) }
@@ -171,15 +176,6 @@ pub(crate) enum Exactness {
     /// Neither: what the negative control uses, to prove that they matter.
     #[cfg_attr(not(test), expect(dead_code))]
     LeftToTheDriver,
-}
-
-fn words(code: &[u8], device: &LogicalDevice, exactness: Exactness) -> Vec<u32> {
-    let words: Vec<u32> = bytemuck::pod_collect_to_vec(code);
-    let passed = match exactness {
-        Exactness::Demanded => spirv::float_controls(&words, device.physical.float_controls),
-        Exactness::LeftToTheDriver => spirv::without_decorations(&words),
-    };
-    passed.expect("the build validated its shaders")
 }
 
 impl Drop for Pipeline {

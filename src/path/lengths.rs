@@ -105,11 +105,8 @@ impl Lengths {
                 low = t;
             }
             let newton = t - excess / slope.at(t).length().max(1e-300);
-            let next = if newton > low && newton < high {
-                newton
-            } else {
-                0.5 * (low + high)
-            };
+            let inside = newton > low && newton < high;
+            let next = if inside { newton } else { 0.5 * (low + high) };
             let step = next - t;
             if step.abs() <= 1e-14 {
                 return next;

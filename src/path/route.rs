@@ -232,10 +232,9 @@ fn direction([vector, change]: Way) -> Way {
 /// A polynomial whose zeros are divided out, with the sign that these give at a place.
 pub(crate) fn signed((zeros, rest): &(Vec<f64>, Polynomial), at: f64) -> Polynomial {
     let passed = zeros.iter().filter(|&&zero| at < zero).count();
-    if passed % 2 == 1 {
-        rest.map(|c| -c)
-    } else {
-        *rest
+    match passed % 2 {
+        1 => rest.map(|c| -c),
+        _ => *rest,
     }
 }
 

@@ -117,13 +117,32 @@ impl<'a> Sampler<'a> {
 
     /// The values on at most as many spans as there are lanes.
     pub(crate) fn sample(&mut self, spans: &[Span]) -> &Samples {
-        if self.speed == PathSpeed::Keys {
-            self.places_by_keys(spans);
-        } else {
-            self.places_by_length(spans);
-        }
         let (paths, rows) = (self.paths, &mut *self.rows);
         let of_spans = spans.iter().map(|span| span.place(paths));
+        for (lane, ((route, own), span)) in of_spans.clone().zip(spans).enumerate() {
+            if self.speed == PathSpeed::Keys {
+                let [first, last] = route.keys_of(own.interval);
+                let numbers = [span.from, span.to, first, last, own.from, own.to];
+                put(&mut rows.times, lane, numbers);
+                continue;
+            }
+            let width = span.to - span.from;
+            for (place, (row, part)) in rows.places.iter_mut().zip(PARTS).enumerate() {
+                let time = match place {
+                    END => span.to,
+                    _ => span.from + width * part,
+                };
+                row[lane] = if route.lengths.total() > 0.0 {
+                    route.parameter(own.interval, time).clamp(own.from, own.to)
+                } else {
+                    // A path without length is stood on.
+                    own.from
+                };
+            }
+        }
+        if self.speed == PathSpeed::Keys {
+            in_lanes(rows);
+        }
         match self.kind {
             Kind::Vector => {
                 for (lane, (route, own)) in of_spans.enumerate() {
@@ -140,36 +159,6 @@ impl<'a> Sampler<'a> {
             }
         }
         &self.rows.values
-    }
-
-    fn places_by_keys(&mut self, spans: &[Span]) {
-        let rows = &mut *self.rows;
-        for (lane, span) in spans.iter().enumerate() {
-            let (route, own) = span.place(self.paths);
-            let [first, last] = route.keys_of(own.interval);
-            let numbers = [span.from, span.to, first, last, own.from, own.to];
-            put(&mut rows.times, lane, numbers);
-        }
-        in_lanes(rows);
-    }
-
-    fn places_by_length(&mut self, spans: &[Span]) {
-        for (lane, span) in spans.iter().enumerate() {
-            let (route, own) = span.place(self.paths);
-            let width = span.to - span.from;
-            for (place, (row, part)) in self.rows.places.iter_mut().zip(PARTS).enumerate() {
-                let time = match place {
-                    END => span.to,
-                    _ => span.from + width * part,
-                };
-                row[lane] = if route.lengths.total() > 0.0 {
-                    route.parameter(own.interval, time).clamp(own.from, own.to)
-                } else {
-                    // A path without length is stood on.
-                    own.from
-                };
-            }
-        }
     }
 
     /// The rotations of the other frames.

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use crate::engine::Engine;
 use crate::error::Error;
-use crate::evaluate::backend::Backend;
+use crate::evaluate::uploaded::Backend;
 use crate::math::canonical::canonical;
 use crate::memory::zeroed;
 use crate::output::encoding::MatrixOrder;

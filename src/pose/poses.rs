@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use crate::engine::Engine;
 use crate::error::Error;
-use crate::evaluate::backend::Backend;
+use crate::evaluate::uploaded::Backend;
 use crate::gpu::engine::VulkanEngine;
 use crate::gpu::error::EvaluateError;
 use crate::memory::zeroed;

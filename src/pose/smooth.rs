@@ -79,10 +79,9 @@ impl Engine {
                 _ => (&output, &mut other),
             };
             let set = Set {
-                values: if done == 0 {
-                    values.as_arrays()
-                } else {
-                    bytemuck::cast_slice(from)
+                values: match done {
+                    0 => values.as_arrays(),
+                    _ => bytemuck::cast_slice(from),
                 },
                 tracks,
                 samples,
