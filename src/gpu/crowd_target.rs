@@ -182,9 +182,8 @@ impl CrowdReader {
         let engine = &crowd.engine;
         let bytes = crowd.bytes(output);
         let mut results = ReadBack::new(&engine.device)?;
-        let buffer = results
-            .room(&engine.device, bytes, !engine.device.placing.in_place)?
-            .raw;
+        let staged = !engine.device.placing.in_place;
+        let buffer = results.room(&engine.device, bytes, staged)?.raw;
         Ok(Self {
             results,
             target: CrowdTarget::new(crowd, output, buffer, 0)?,

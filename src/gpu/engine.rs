@@ -252,12 +252,10 @@ impl VulkanEngine {
             return Ok(Box::new(quats));
         };
         self.run(job, &whole, Target::Buffer(&mut buffer))?;
-        let (count, free) = (whole.len(), Arc::clone(&self.free));
-        let buffer = Some(buffer);
         Ok(Box::new(MappedQuats {
-            buffer,
-            count,
-            free,
+            buffer: Some(buffer),
+            count: whole.len(),
+            free: Arc::clone(&self.free),
         }))
     }
 

@@ -110,12 +110,11 @@ impl VulkanEngine {
         let written = [keys, Some(&uploads.samples), weights]
             .into_iter()
             .flatten();
-        let bindings: Vec<Binding> = (as_given
-            .map(|keys| Binding::whole(&keys.buffer))
-            .into_iter())
-        .chain(written.clone().filter_map(Upload::binding))
-        .chain([rotations])
-        .collect();
+        let given = as_given.map(|keys| Binding::whole(&keys.buffer));
+        let bindings: Vec<Binding> = (given.into_iter())
+            .chain(written.clone().filter_map(Upload::binding))
+            .chain([rotations])
+            .collect();
         let rows = dispatch.rows(self.maps_samples);
         let groups = [
             (rows.samples + rows.line).div_ceil(FROM_KEYS_WORKGROUP),

@@ -71,13 +71,10 @@ impl VulkanEngine {
         let lists = &mut own.uploads;
         let work = lists.list(self, clip, job.timeline, window, shift as u32)?;
 
+        let staged = !self.device.placing.in_place;
         let buffer = match place {
             Some((buffer, _)) => buffer,
-            None => {
-                (own.results
-                    .room(&self.device, size, !self.device.placing.in_place)?)
-                .raw
-            }
+            None => (own.results.room(&self.device, size, staged)?).raw,
         };
         let rotations = Binding::range(buffer, aligned, size);
         let kernels = &mut own.results.kernels;
