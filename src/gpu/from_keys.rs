@@ -95,13 +95,16 @@ impl VulkanEngine {
         let as_given = keys.filter(|_| dispatch.keys_are_as_given());
         let keys = match as_given {
             Some(_) => &mut [],
-            None => (uploads.keys).room(device, "tumble keys", once, key_bytes)?,
+            None => {
+                let room = (uploads.keys).room(device, "tumble keys", once, key_bytes)?;
+                bytemuck::cast_slice_mut(room)
+            }
         };
         let samples = (uploads.samples).room(device, "tumble samples", once, sample_bytes)?;
         let weights = (uploads.weights).room(device, "tumble weights", once, weight_bytes)?;
         dispatch.write(
             as_given.map(|keys| keys.start / size_of::<Quat>()),
-            bytemuck::cast_slice_mut(keys),
+            keys,
             bytemuck::cast_slice_mut(samples),
             bytemuck::cast_slice_mut(weights),
         )?;

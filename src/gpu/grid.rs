@@ -197,6 +197,8 @@ impl GroupGrid {
 
 #[cfg(test)]
 mod tests {
+    use bytemuck::Zeroable as _;
+
     use super::*;
     use crate::gpu::work_list::WorkChunk;
     use crate::output::rotations::Layout;
@@ -214,7 +216,7 @@ mod tests {
                     1 => track * rows.samples + sample,
                     stride => sample * stride + track,
                 };
-                let mut item: Item = bytemuck::Zeroable::zeroed();
+                let mut item = Item::zeroed();
                 (item.output, item.count) = (output + rows.shift, count);
                 let flags = [0, IS_CONSTANT, MAY_BE_TINY];
                 item.count |= flags[random.usize(..3)];

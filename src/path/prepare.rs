@@ -58,8 +58,8 @@ impl PreparedPaths {
         let batches: Vec<_> = batches(set).into_par_iter().map(prepared).collect();
         // Of several errors that of the first track counts.
         let batches = batches.into_iter().collect::<Result<Vec<_>, _>>()?;
-        let ((of_positions, of_rotations), warnings): ((Vec<_>, Vec<_>), Vec<_>) =
-            batches.into_iter().unzip();
+        let batches = batches.into_iter().map(|([a, b], own)| ((a, b), own));
+        let ((of_positions, of_rotations), warnings): ((Vec<_>, Vec<_>), Vec<_>) = batches.unzip();
         Ok(Self {
             positions: ClipData::of_groups(of_positions, set, positions, group_bytes),
             rotations: ClipData::of_groups(of_rotations, set, rotations, group_bytes),
@@ -140,7 +140,7 @@ fn prepared(
     tracks: Range<usize>,
     follow: &Follow,
     interpolations: [&Interpolation; 2],
-) -> Result<((Prepared, Prepared), Vec<FollowWarning>), FollowError> {
+) -> Result<([Prepared; 2], Vec<FollowWarning>), FollowError> {
     let (mut points, mut paths) = (Vec::new(), Vec::new());
     for track in tracks.clone() {
         let path = path_of(set, track, follow)?;
@@ -173,7 +173,7 @@ fn prepared(
     let [mut positions, mut rotations] = interpolations.map(Prepared::new);
     adding.add(&mut positions, Kind::Vector);
     adding.add(&mut rotations, Kind::Rotation);
-    Ok(((positions, rotations), warnings))
+    Ok(([positions, rotations], warnings))
 }
 
 /// The stretches of a path that are used: of one on which a body stands the first alone.
