@@ -78,16 +78,13 @@ impl Clip {
     /// The stored values, whatever they are.
     pub(crate) fn samples<T>(&self, frames: &Frames, layout: Layout) -> Result<Samples<T>, Error> {
         let timeline = self.timeline(frames)?;
-        let storage = (self.uploaded).evaluate(&self.engine.backend, &timeline, layout)?;
+        let storage = (self.uploaded).evaluate(&timeline, layout)?;
         let (tracks, samples) = (self.track_count(), timeline.len());
         Ok(Samples::new(storage, tracks, samples, layout))
     }
 
-    /// As [`Clip::evaluate_as`], or as [`Clip::rates`], into the caller's memory: [`Quat`] takes
-    /// rotations, [`Vec4`] velocities and accelerations, `[f32; 4]` either. It is faster
-    /// when it is used again ([`OutputBuffer`](crate::output::buffer::OutputBuffer)): the first touch
-    /// of fresh memory costs more than evaluating. Memory that is aligned to 16 bytes is filled
-    /// without a copy.
+    /// As [`Clip::evaluate_as`], or as [`Clip::rates`], into the caller's memory, of which
+    /// [`Engine::evaluate_into`] tells more.
     ///
     /// # Errors
     /// As [`Clip::evaluate`]; also when `output` is not exactly as long as the result, or of another
@@ -103,7 +100,8 @@ impl Clip {
         let whole = Window::whole(self.track_count(), timeline.len(), layout);
         in_quats(output, whole.len(), |quats| {
             let timeline = self.uploaded.data.folded(&timeline)?;
-            Ok((self.uploaded).evaluate_window(&self.engine.backend, &timeline, &whole, quats)?)
+            let bytes = bytemuck::cast_slice_mut(quats);
+            Ok((self.uploaded).evaluate_into(&timeline, &whole, Encoding::F32, bytes)?)
         })
     }
 
@@ -120,13 +118,8 @@ impl Clip {
         if output.is_empty() {
             return Ok(());
         }
-        let (backend, timeline) = (&self.engine.backend, self.uploaded.data.folded(timeline)?);
-        if encoding == Encoding::F32
-            && let Ok(quats) = bytemuck::try_cast_slice_mut(&mut *output)
-        {
-            return Ok((self.uploaded).evaluate_window(backend, &timeline, window, quats)?);
-        }
-        Ok((self.uploaded).evaluate_encoded(backend, &timeline, window, encoding, output)?)
+        let timeline = self.uploaded.data.folded(timeline)?;
+        Ok((self.uploaded).evaluate_into(&timeline, window, encoding, output)?)
     }
 
     /// The rotation of every track at every sample, encoded where it is evaluated. The bytes are

@@ -9,8 +9,7 @@ use crate::cpu::engine::CpuEngine;
 use crate::curve::options::Quantity;
 use crate::device::{Device, VulkanDevice};
 use crate::error::Error;
-use crate::evaluate::backend::Backend;
-use crate::evaluate::uploaded::Uploaded;
+use crate::evaluate::uploaded::{Backend, Uploaded};
 use crate::gpu::engine::lock;
 use crate::gpu::options::{EngineOptions, Timings};
 use crate::gpu::physical::DeviceInfo;
@@ -111,25 +110,19 @@ impl Engine {
         self.device_info().map_or("CPU", |info| &info.name)
     }
 
-    /// Its Vulkan device; `None` on the CPU.
-    fn opened(&self) -> Option<&Opened> {
-        match &*self.backend {
-            Backend::Cpu(_) => None,
-            Backend::Vulkan(opened) => Some(opened),
-        }
-    }
-
     /// What is known of its Vulkan device; `None` on the CPU.
     #[must_use]
     pub fn device_info(&self) -> Option<&DeviceInfo> {
-        self.opened().map(|opened| &opened.info)
+        self.backend.opened().map(|opened| &opened.info)
     }
 
     /// The results of the device's self-test, one report for each check; empty on the CPU, which
     /// devices are compared with.
     #[must_use]
     pub fn self_tests(&self) -> &[SelfTestReport] {
-        self.opened().map_or(&[], |opened| &opened.self_tests)
+        self.backend
+            .opened()
+            .map_or(&[], |opened| &opened.self_tests)
     }
 
     /// What the validation layer has said so far; see [`Device::list_with`].
@@ -139,7 +132,7 @@ impl Engine {
             let device = &opened.engine().device;
             device.physical.instance.validation_messages()
         };
-        self.opened().map_or_else(Vec::new, messages)
+        self.backend.opened().map_or_else(Vec::new, messages)
     }
 
     /// Where the time of this engine's evaluations went since this was last asked,
@@ -147,7 +140,7 @@ impl Engine {
     #[must_use]
     pub fn take_timings(&self) -> Timings {
         let timings = |opened: &Opened| std::mem::take(&mut *lock(&opened.engine().timings));
-        self.opened().map_or_else(Timings::default, timings)
+        self.backend.opened().map_or_else(Timings::default, timings)
     }
 
     /// Prepares a set for a method and brings it to the device, where it stays.

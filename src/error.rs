@@ -4,7 +4,6 @@ use std::ops::Range;
 
 use crate::curve::options::InterpolationError;
 use crate::gpu::error::{EvaluateError, VulkanError};
-use crate::gpu::recovery::OfDevice;
 use crate::memory::OutOfMemory;
 use crate::output::encoding::Encoding;
 use crate::output::pose_error::{PoseError, SkeletonError};
@@ -128,15 +127,6 @@ impl From<EvaluateError> for Error {
         match error {
             EvaluateError::Vulkan(error) => Self::Vulkan(error),
             EvaluateError::Set(error) => error.into(),
-        }
-    }
-}
-
-impl OfDevice for Error {
-    fn vulkan(&self) -> Option<&VulkanError> {
-        match self {
-            Self::Vulkan(error) => Some(error),
-            _ => None,
         }
     }
 }

@@ -5,7 +5,7 @@
 use crate::clip::Clip;
 use crate::engine::Engine;
 use crate::error::Error;
-use crate::evaluate::backend::Backend;
+use crate::evaluate::uploaded::Backend;
 use crate::gpu::engine::{Job, VulkanEngine};
 use crate::gpu::error::VulkanError;
 use crate::gpu::handles::{VulkanBuffer, VulkanHandles};
@@ -73,11 +73,9 @@ impl Clip {
                 needed,
             }));
         }
-        let done = opened.attempt_smaller(|engine| {
-            let buffers = self.uploaded.buffers_on(engine)?;
-            let job = Job::new(&self.uploaded.data, &buffers, &timeline, encoding);
+        let to_buffer = |engine: &VulkanEngine, job: Job<'_>| {
             engine.run(job, &job.whole(layout), Target::External(buffer))
-        });
-        Ok(done?)
+        };
+        Ok((self.uploaded).on_device(opened, &timeline, encoding, to_buffer)?)
     }
 }

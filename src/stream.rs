@@ -2,7 +2,7 @@
 //! is used.
 
 use std::ops::Range;
-use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::sync::mpsc::sync_channel;
 use std::thread;
 
 use glam::{Quat, Vec4};
@@ -69,9 +69,6 @@ impl<'a> Chunk<'a> {
 /// Buffers that are used in turn: one is filled, one is read, one waits.
 const BUFFERS: usize = 3;
 
-/// A filled buffer, and what is in it.
-type Filled = Result<(Window, OutputBuffer), Error>;
-
 impl Clip {
     /// Evaluates in chunks of about `chunk` rotations (at least one row of the layout
     /// is best); `sink` uses one while others are evaluated. The rotations are those
@@ -106,12 +103,8 @@ impl Clip {
         let whole = Window::whole(self.track_count(), timeline.len(), layout);
         let timeline = self.uploaded.data.folded(&timeline).map_err(Error::from)?;
         let fill = |window: &Window, output: &mut [Quat]| {
-            Ok((self.uploaded).evaluate_window(
-                &self.engine().backend,
-                &timeline,
-                window,
-                output,
-            )?)
+            let bytes = bytemuck::cast_slice_mut(output);
+            Ok((self.uploaded).evaluate_into(&timeline, window, Encoding::F32, bytes)?)
         };
         run(whole.cut(chunk), self.quantity(), fill, sink)
     }
@@ -196,12 +189,7 @@ impl Engine {
         let interpolation = interpolation.into();
         encoding.check(interpolation.quantity)?;
         let timeline = frames.resolve(set.track_count(), set.time_span())?;
-        let part = Window {
-            start: 0,
-            tracks: tracks.clone(),
-            samples: 0..timeline.len(),
-            layout: Layout::TrackMajor,
-        };
+        let part = Window::of(tracks.clone(), 0..timeline.len(), Layout::TrackMajor);
         part.check(set.track_count(), timeline.len(), encoding, output)?;
         if output.is_empty() {
             return Ok(());
@@ -244,12 +232,7 @@ impl Clip {
     ) -> Result<(), Error> {
         encoding.check(self.quantity())?;
         let timeline = self.timeline(frames)?;
-        let part = Window {
-            start: 0,
-            tracks,
-            samples,
-            layout,
-        };
+        let part = Window::of(tracks, samples, layout);
         self.encode_window_into(&timeline, &part, encoding, output)
     }
 }
@@ -285,21 +268,37 @@ fn run<E: From<Error>>(
     mut sink: impl FnMut(Chunk<'_>) -> Result<(), E>,
 ) -> Result<(), E> {
     let first = [windows.next(), windows.next()];
+    let fill_one = move |window: Window, used: OutputBuffer| -> Result<_, Error> {
+        let mut rotations = match used.len() < window.len() {
+            true => OutputBuffer::new(window.len())?,
+            false => used,
+        };
+        fill(&window, &mut rotations[..window.len()])?;
+        Ok((window, rotations))
+    };
     // One chunk has nothing to overlap with.
     if let [Some(window), None] = first {
-        let mut rotations = OutputBuffer::new(window.len()).map_err(Error::from)?;
-        fill(&window, &mut rotations)?;
+        let none = OutputBuffer::new(0).map_err(Error::from)?;
+        let (window, rotations) = fill_one(window, none)?;
         return sink(Chunk::new(window, &rotations, quantity));
     }
-    let windows = first.into_iter().flatten().chain(windows);
+    let mut windows = first.into_iter().flatten().chain(windows);
     thread::scope(|scope| {
-        let (give_back, empty) = sync_channel(BUFFERS);
+        let (give_back, empty) = sync_channel::<OutputBuffer>(BUFFERS);
         let (hand_over, filled) = sync_channel(BUFFERS);
         for _ in 0..BUFFERS {
             let _ = give_back.send(OutputBuffer::new(0).map_err(Error::from)?); // it has room
         }
+        // It stops after an error, or when the receiver is gone.
+        let fill_all = move || {
+            windows.try_for_each(|window| {
+                let filled = fill_one(window, empty.recv().ok()?);
+                let is_filled = filled.is_ok();
+                hand_over.send(filled).ok().filter(|()| is_filled)
+            })
+        };
         thread::Builder::new()
-            .spawn_scoped(scope, move || fill_all(windows, fill, &empty, &hand_over))
+            .spawn_scoped(scope, fill_all)
             .map_err(|error| Error::Threads {
                 reason: error.to_string(),
             })?;
@@ -311,31 +310,4 @@ fn run<E: From<Error>>(
         }
         Ok(())
     })
-}
-
-/// Fills the windows in order; stops after an error, or when the receiver is gone.
-fn fill_all(
-    windows: impl Iterator<Item = Window>,
-    fill: impl Fn(&Window, &mut [Quat]) -> Result<(), Error>,
-    empty: &Receiver<OutputBuffer>,
-    hand_over: &SyncSender<Filled>,
-) {
-    let fill_one = |window: Window, used: OutputBuffer| -> Filled {
-        let mut rotations = match used.len() < window.len() {
-            true => OutputBuffer::new(window.len())?,
-            false => used,
-        };
-        fill(&window, &mut rotations[..window.len()])?;
-        Ok((window, rotations))
-    };
-    for window in windows {
-        let Ok(used) = empty.recv() else {
-            return;
-        };
-        let filled = fill_one(window, used);
-        let failed = filled.is_err();
-        if hand_over.send(filled).is_err() || failed {
-            return;
-        }
-    }
 }

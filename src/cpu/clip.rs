@@ -40,18 +40,15 @@ impl CpuEngine {
             return self.window(clip, timeline, window, 0, output);
         }
         if window.layout == Layout::FrameMajor {
-            let tasks = frame_tasks(window, output);
+            let tasks = frame_tasks(window, output).into_par_iter();
             return self.on_threads(|| {
-                tasks
-                    .into_par_iter()
-                    .try_for_each(|(window, frames)| self.frames(clip, timeline, &window, frames))
+                tasks.try_for_each(|(window, frames)| self.frames(clip, timeline, &window, frames))
             });
         }
         let rotations = output.len();
         self.on_threads(|| {
-            tasks(window, 1, output)
-                .into_par_iter()
-                .try_for_each(|(window, own)| self.window(clip, timeline, &window, rotations, own))
+            let tasks = tasks(window, 1, output).into_par_iter();
+            tasks.try_for_each(|(window, own)| self.window(clip, timeline, &window, rotations, own))
         })
     }
 
@@ -78,11 +75,10 @@ impl CpuEngine {
             };
         }
         self.on_threads(|| {
-            tasks(window, encoding.bytes(), output)
-                .into_par_iter()
-                .try_for_each_init(Vec::new, |rotations, (window, own)| {
-                    task(rotations, &window, own)
-                })
+            let tasks = tasks(window, encoding.bytes(), output).into_par_iter();
+            tasks.try_for_each_init(Vec::new, |rotations, (window, own)| {
+                task(rotations, &window, own)
+            })
         })
     }
 
@@ -209,20 +205,13 @@ fn frame_tasks<'a>(
         let of_block = all.len();
         all.extend(starts.map(|start| {
             let tracks = start..(start + tracks_each).min(window.tracks.end);
-            let window = Window {
-                start: 0,
-                tracks,
-                samples: samples.clone(),
-                layout: Layout::FrameMajor,
-            };
+            let window = Window::of(tracks, samples.clone(), Layout::FrameMajor);
             (window, Vec::with_capacity(samples.len()))
         }));
         for frame in block.chunks_mut(tracks) {
-            for (task, row) in all[of_block..]
-                .iter_mut()
-                .zip(frame.chunks_mut(tracks_each))
-            {
-                task.1.push(row);
+            let rows = frame.chunks_mut(tracks_each);
+            for ((_, frames), row) in all[of_block..].iter_mut().zip(rows) {
+                frames.push(row);
             }
         }
     }

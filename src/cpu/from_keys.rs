@@ -6,7 +6,6 @@ use rayon::prelude::*;
 
 use crate::cpu::batches::tasks;
 use crate::cpu::engine::{CpuEngine, TASK};
-use crate::cpu::fallback::Row;
 use crate::from_keys::KeyCurve;
 use crate::from_keys::evaluate::KeyEvaluator;
 use crate::prepare::batch::{Batch, BatchSize, batches};
@@ -44,14 +43,8 @@ impl CpuEngine {
             batch
                 .intervals(set)
                 .zip(rows)
-                .try_for_each(|((index, own), output)| {
-                    let row = Row {
-                        request,
-                        index,
-                        first: window.start,
-                        key: own.start,
-                    };
-                    self.resolve(row, output)
+                .try_for_each(|((track, own), output)| {
+                    self.resolve(request, track, (window.start, own.start), output)
                 })
         };
         let batches: Vec<Batch> = batches(set, Batch::Tracks(request.tracks.clone()), size);

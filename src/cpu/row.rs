@@ -1,5 +1,6 @@
 //! The samples of one part of a track: its runs, evaluated as they are found.
 
+use bytemuck::Zeroable as _;
 use glam::Vec4;
 
 use crate::cpu::evaluate::{SAMPLES_ONE_BY_ONE, distances, frames};
@@ -52,9 +53,9 @@ impl<S: Evaluate, O: Samples + ?Sized> InLanesInto<O> for Row<'_, S> {
                 let starts = &prepared.spans.starts[part.spans.clone()];
                 let begin = starts.first().copied().unwrap_or(part.end);
                 let runs = part.runs_outside(begin, clock, &self.copy.samples);
-                for run in runs.into_iter().flatten() {
-                    self.outside(&run, output.samples());
-                }
+                let output = output.samples();
+                let mut outside = OneByOne { row: self, output };
+                runs.into_iter().flatten().for_each(|run| outside.run(run));
                 return Ok(());
             }
         }
@@ -73,7 +74,7 @@ impl<S: Evaluate> Row<'_, S> {
         let spans = &prepared.spans;
         let starts = &spans.starts[part.spans.clone()];
         let mut intervals = IntervalBlocks::new(starts, part.end, clock, samples.clone());
-        let mut block = IntervalBlock::new();
+        let mut block = IntervalBlock::zeroed();
         while let Some(own) = intervals.fill(&mut block) {
             if !block.are_near {
                 return false;
@@ -132,45 +133,11 @@ impl<S: Evaluate> Row<'_, S> {
         in_lanes_into(self.width, &RunList { row: self, runs }, output);
         Ok(())
     }
-}
-
-/// Runs of a row, to be evaluated in vectors.
-struct RunList<'a, 'r, S> {
-    row: &'a Row<'r, S>,
-    runs: Vec<Run>,
-}
-
-impl<S: Evaluate> InLanesInto<[[f32; 4]]> for RunList<'_, '_, S> {
-    type Outcome = ();
-
-    #[inline(always)]
-    fn run<L: Lanes>(&self, output: &mut [[f32; 4]]) {
-        for run in &self.runs {
-            self.row.evaluate_run::<L>(run, output);
-        }
-    }
-}
-
-/// Takes runs and evaluates them as they come; for few samples.
-struct OneByOne<'a, 'r, S> {
-    row: &'a Row<'r, S>,
-    output: &'a mut [[f32; 4]],
-}
-
-impl<S: Evaluate> Emit for OneByOne<'_, '_, S> {
-    // Not inlined, because runs come from many places.
-    #[inline(never)]
-    fn run(&mut self, run: Run) {
-        self.row.evaluate_run::<Vec4>(&run, self.output);
-    }
-}
-
-impl<S: Evaluate> Row<'_, S> {
     /// Evaluates a run; `output` starts at the first sample of the track copy.
     #[inline(always)]
     fn evaluate_run<L: Lanes>(&self, run: &Run, output: &mut [[f32; 4]]) {
         let PartRef { prepared, part } = self.part;
-        let output = self.samples_of(run.sample, run.count, output);
+        let output = &mut output[run.sample - self.copy.samples.start..][..run.count];
         match run.source {
             RunSource::Constant(index) => output.fill(prepared.constants[index as usize]),
             RunSource::Segment(index, distance, affine) => {
@@ -194,30 +161,6 @@ impl<S: Evaluate> Row<'_, S> {
         }
     }
 
-    /// Where samples of the track go; `output` starts at the first sample of the track copy.
-    #[inline(always)]
-    fn samples_of<'o>(
-        &self,
-        sample: usize,
-        count: usize,
-        output: &'o mut [[f32; 4]],
-    ) -> &'o mut [[f32; 4]] {
-        &mut output[sample - self.copy.samples.start..][..count]
-    }
-
-    /// Stores a run outside the keys; `output` starts at the first sample of the track copy.
-    #[inline(never)]
-    fn outside(&self, run: &Run, output: &mut [[f32; 4]]) {
-        let output = self.samples_of(run.sample, run.count, output);
-        match run.source {
-            RunSource::Constant(index) => output.fill(self.part.prepared.constants[index as usize]),
-            RunSource::Exact { index, parameter } => {
-                self.exact(run.sample, index, parameter, output);
-            }
-            RunSource::Segment(..) => {} // lies between keys
-        }
-    }
-
     /// Evaluates samples from `first` on in f64.
     #[inline(never)]
     fn exact(&self, first: usize, index: u32, parameter: Parameter, output: &mut [[f32; 4]]) {
@@ -226,5 +169,36 @@ impl<S: Evaluate> Row<'_, S> {
         for (sample, rotation) in (first..).zip(output) {
             *rotation = prepared.exact(index, parameter, self.timeline, track, sample);
         }
+    }
+}
+
+/// Runs of a row, to be evaluated in vectors.
+struct RunList<'a, 'r, S> {
+    row: &'a Row<'r, S>,
+    runs: Vec<Run>,
+}
+
+impl<S: Evaluate> InLanesInto<[[f32; 4]]> for RunList<'_, '_, S> {
+    type Outcome = ();
+
+    #[inline(always)]
+    fn run<L: Lanes>(&self, output: &mut [[f32; 4]]) {
+        for run in &self.runs {
+            self.row.evaluate_run::<L>(run, output);
+        }
+    }
+}
+
+/// Takes runs and evaluates them as they come; for few samples, and for those outside the keys.
+struct OneByOne<'a, 'r, S> {
+    row: &'a Row<'r, S>,
+    output: &'a mut [[f32; 4]],
+}
+
+impl<S: Evaluate> Emit for OneByOne<'_, '_, S> {
+    // Not inlined, because runs come from many places.
+    #[inline(never)]
+    fn run(&mut self, run: Run) {
+        self.row.evaluate_run::<Vec4>(&run, self.output);
     }
 }

@@ -19,8 +19,13 @@ pub(crate) struct Turns<'a, L: Lanes, S: Evaluate, P, const FILTER: bool, const 
     pub(crate) parameters: P,
 }
 
-impl<L: Lanes, S: Evaluate, P: Parameters<L>, const FILTER: bool, const FAR: bool>
-    Turns<'_, L, S, P, FILTER, FAR>
+/// The turns of a run, whatever their parameters.
+pub(crate) trait NextTurn<L: Lanes, S: Evaluate> {
+    fn next(&mut self) -> S::Vectors<L>;
+}
+
+impl<L: Lanes, S: Evaluate, P: Parameters<L>, const FILTER: bool, const FAR: bool> NextTurn<L, S>
+    for Turns<'_, L, S, P, FILTER, FAR>
 {
     #[inline(always)]
     fn next(&mut self) -> S::Vectors<L> {
@@ -34,21 +39,13 @@ impl<L: Lanes, S: Evaluate, P: Parameters<L>, const FILTER: bool, const FAR: boo
 
 pub(crate) trait Sink {
     /// Stores the first `count` samples.
-    fn take<L: Lanes, S: Evaluate, P: Parameters<L>, const FILTER: bool, const FAR: bool>(
-        self,
-        count: usize,
-        turns: Turns<'_, L, S, P, FILTER, FAR>,
-    );
+    fn take<L: Lanes, S: Evaluate>(self, count: usize, turns: impl NextTurn<L, S>);
 }
 
 /// Ordinary stores. Elements after `count` may be overwritten, up to the end of a turn.
 impl Sink for &mut [[f32; 4]] {
     #[inline(always)]
-    fn take<L: Lanes, S: Evaluate, P: Parameters<L>, const FILTER: bool, const FAR: bool>(
-        self,
-        count: usize,
-        mut turns: Turns<'_, L, S, P, FILTER, FAR>,
-    ) {
+    fn take<L: Lanes, S: Evaluate>(self, count: usize, mut turns: impl NextTurn<L, S>) {
         let samples = S::samples::<L>();
         let whole = count.next_multiple_of(samples).min(self.len());
         let mut all = self[..whole].chunks_exact_mut(samples);
@@ -88,11 +85,7 @@ pub(crate) struct Places<'a> {
 
 impl Sink for Places<'_> {
     #[inline(always)]
-    fn take<L: Lanes, S: Evaluate, P: Parameters<L>, const FILTER: bool, const FAR: bool>(
-        self,
-        count: usize,
-        mut turns: Turns<'_, L, S, P, FILTER, FAR>,
-    ) {
+    fn take<L: Lanes, S: Evaluate>(self, count: usize, mut turns: impl NextTurn<L, S>) {
         let rotations = L::COUNT / 4;
         let of_turn = S::samples::<L>() / rotations;
         let (begun, there) = self.begun;

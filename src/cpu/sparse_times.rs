@@ -1,6 +1,8 @@
 //! Sparse times: a few explicit times of each of many tracks, such as the poses of a crowd. Each
 //! lane evaluates one sample, and no runs are listed.
 
+use bytemuck::Zeroable;
+
 use crate::cpu::evaluate::one;
 use crate::math::canonical::round_f32;
 use crate::output::window::Window;
@@ -29,6 +31,7 @@ pub(crate) struct FewTimes<'a> {
 }
 
 /// Samples on arcs, gathered until the block is full.
+#[derive(Zeroable)]
 struct Block {
     middles: [[f32; 4]; LANES],
     tangents: [[f32; 4]; LANES],
@@ -42,13 +45,7 @@ impl InLanes for FewTimes<'_> {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
         let samples = self.window.samples.clone();
-        let mut block = Block {
-            middles: [[0.0; 4]; LANES],
-            tangents: [[0.0; 4]; LANES],
-            parameters: [0.0; LANES],
-            places: [0; LANES],
-            count: 0,
-        };
+        let mut block = Block::zeroed();
         for (i, track) in self.window.tracks.clone().enumerate() {
             let Some(PartRef { prepared, part }) = self.clip.only_part(track) else {
                 self.others.push(i);

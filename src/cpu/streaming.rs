@@ -180,7 +180,6 @@ impl<'o> Place<'o> {
     }
 }
 
-/// Staging lines to be stored.
 struct WholeLines<'s>(&'s [Line]);
 
 impl<'o> InLanesInto<Place<'o>> for WholeLines<'_> {
@@ -201,7 +200,6 @@ pub(crate) enum Output<'s, 'o> {
 
 /// Samples in the staging lines.
 pub(crate) struct Staged<'s, 'o> {
-    /// All staging lines.
     lines: &'s mut [Line],
     /// Where these samples start in the lines, and where they end.
     start: usize,
@@ -226,25 +224,6 @@ pub(crate) trait Samples {
 
     /// Evaluates `count` frames of a segment into the samples from `start` on; `first` is the
     /// distance of the first one from the segment's middle.
-    fn frames<L: Lanes, S: Evaluate>(
-        &mut self,
-        segment: &S,
-        affine: Affine,
-        first: f32,
-        start: usize,
-        count: usize,
-    );
-
-    /// Says that these samples are final, so that their lines may be stored.
-    fn made(&mut self, samples: Range<usize>);
-}
-
-impl Samples for [[f32; 4]] {
-    #[inline(always)]
-    fn samples(&mut self) -> &mut [[f32; 4]] {
-        self
-    }
-
     #[inline(always)]
     fn frames<L: Lanes, S: Evaluate>(
         &mut self,
@@ -254,11 +233,19 @@ impl Samples for [[f32; 4]] {
         start: usize,
         count: usize,
     ) {
-        frames::<L, S>(segment, affine, first, count, &mut self[start..]);
+        frames::<L, S>(segment, affine, first, count, &mut self.samples()[start..]);
     }
 
+    /// Says that these samples are final, so that their lines may be stored.
     #[inline(always)]
     fn made(&mut self, _: Range<usize>) {}
+}
+
+impl Samples for [[f32; 4]] {
+    #[inline(always)]
+    fn samples(&mut self) -> &mut [[f32; 4]] {
+        self
+    }
 }
 
 impl Samples for Staged<'_, '_> {

@@ -13,7 +13,6 @@ use crate::memory::reserved;
 use crate::method::interpolation::Interpolation;
 use crate::method::vector_method::VectorMethod;
 use crate::prepare::clip_data::{ClipData, Wanted};
-use crate::prepare::prepared::Prepared;
 use crate::shader::{
     CHANNELS, CrowdBase, CrowdChannel, CrowdClip, CrowdSpan, FORM_ARC, FORM_CONSTANT, FORM_CUBIC,
     FORM_POLYNOMIAL, Form, ON_KEY, POWERS, SCALE,
@@ -99,40 +98,23 @@ impl Curve {
     }
 }
 
-/// The ticks of a clip.
-#[derive(Clone, Copy)]
-struct ClipClock {
-    rate: FrameRate,
-    /// When it starts, seconds.
-    start: f64,
-    period: u32,
-}
-
-/// The constants of one segment, power by power.
-fn segment(prepared: &Prepared, index: u32, form: u32) -> [[f32; 4]; POWERS] {
-    let segments = &prepared.segments;
-    match form {
-        FORM_ARC => {
-            let arc = &segments.arcs[index as usize];
-            let mut constants = [[0.0; 4]; POWERS];
-            [constants[0], constants[1]] = [arc.middle, arc.tangent];
-            constants
-        }
-        _ => segments.polynomials[index as usize].coefficients,
-    }
-}
-
-/// The curve of one track, as evaluation at frames has it: a frame is a tick.
-fn curve(data: &ClipData, track: usize, form: u32, clock: ClipClock) -> Result<Curve, CrowdError> {
+/// The curve of one track, as evaluation at frames has it: a frame is a tick, of which there are `period`
+/// from the clip's start on.
+fn curve(
+    data: &ClipData,
+    track: usize,
+    form: u32,
+    (rate, start, period): (FrameRate, f64, u32),
+) -> Result<Curve, CrowdError> {
     let mut curve = Curve {
         form,
         ..Curve::default()
     };
     let whole = TrackCopy::own(0..0);
-    let last_tick = f64::from(clock.period);
+    let last_tick = f64::from(period);
     for own in data.parts_in(track, &whole) {
         let (prepared, part) = (own.prepared, own.part);
-        let frames = FrameClock::new(clock.rate, clock.start, part.end);
+        let frames = FrameClock::new(rate, start, part.end);
         let constant = |index: u32| prepared.constants[index as usize];
         let starts = &prepared.spans.starts[part.spans.clone()];
         let begin = frames.boundary(*starts.first().unwrap_or(&part.end));
@@ -140,8 +122,8 @@ fn curve(data: &ClipData, track: usize, form: u32, clock: ClipClock) -> Result<C
             curve.hold(0, constant(part.before), None);
         }
         let ends = starts.iter().skip(1).chain([&part.end]);
-        for ((place, &start), &end) in part.spans.clone().zip(starts).zip(ends) {
-            let (from, to) = (frames.boundary(start), frames.boundary(end));
+        for ((place, &own_start), &end) in part.spans.clone().zip(starts).zip(ends) {
+            let (from, to) = (frames.boundary(own_start), frames.boundary(end));
             if from.first >= to.first || from.first > last_tick {
                 continue; // no tick lies in it
             }
@@ -157,13 +139,23 @@ fn curve(data: &ClipData, track: usize, form: u32, clock: ClipClock) -> Result<C
                         scale: along.scale,
                         offset: along.offset,
                     };
-                    curve.push(span, &segment(prepared, index, form), key);
+                    // The constants, power by power.
+                    let constants = match (form, index as usize) {
+                        (FORM_ARC, index) => {
+                            let arc = &prepared.segments.arcs[index];
+                            let mut constants = [[0.0; 4]; POWERS];
+                            [constants[0], constants[1]] = [arc.middle, arc.tangent];
+                            constants
+                        }
+                        (_, index) => prepared.segments.polynomials[index].coefficients,
+                    };
+                    curve.push(span, &constants, key);
                 }
                 Source::Constant(index) => curve.hold(first, constant(index), key),
                 Source::Exact(_) => {
                     return Err(CrowdError::TooWild {
                         track,
-                        seconds: start,
+                        seconds: own_start,
                     });
                 }
             }
@@ -209,11 +201,8 @@ impl ClipTables {
                 ticks_per_second,
             });
         }
-        let clock = ClipClock {
-            rate,
-            start,
-            period: (ticks as u32).max(1),
-        };
+        let period = (ticks as u32).max(1);
+        let clock = (rate, start, period);
         let rotations = ClipData::new(set, interpolation, Wanted::all(set))?;
         let form = match interpolation.form() {
             Form::Arc => FORM_ARC,
@@ -242,7 +231,7 @@ impl ClipTables {
         if counts.iter().any(|&count| count > MOST_PLACES) || curves.len() >= 1 << 24 {
             return Err(CrowdError::TooLarge);
         }
-        self.add(clock.period, &curves);
+        self.add(period, &curves);
         Ok(())
     }
 

@@ -10,7 +10,7 @@ impl Crowd {
     /// The clock, ticks.
     #[must_use]
     pub fn clock(&self) -> u64 {
-        self.instances.clock()
+        self.instances.clock
     }
 
     /// Sets the clock, ticks; all instances move with it, forwards or backwards.

@@ -8,12 +8,12 @@ use crate::twin::crowd_times::ELAPSED_BITS;
 /// The entries, the clock, and the entries that the device does not know yet.
 #[derive(Debug)]
 pub(crate) struct Instances {
-    /// `[instance][layer]`
-    entries: Vec<CrowdEntry>,
+    /// `[instance][layer]`; [`set`](Self::set) changes them.
+    pub(crate) entries: Vec<CrowdEntry>,
     /// A bit for each entry that changed; those beyond the last entry mean nothing.
     changed: Vec<u64>,
-    /// Ticks.
-    clock: u64,
+    /// Ticks; [`set_clock`](Self::set_clock) changes it.
+    pub(crate) clock: u64,
     /// The time of the clock that no anchor lies before.
     since: u64,
 }
@@ -40,14 +40,6 @@ impl Instances {
         }
         own.forget();
         Ok(own)
-    }
-
-    pub(crate) fn entries(&self) -> &[CrowdEntry] {
-        &self.entries
-    }
-
-    pub(crate) fn clock(&self) -> u64 {
-        self.clock
     }
 
     pub(crate) fn set(&mut self, place: usize, entry: CrowdEntry) {

@@ -10,11 +10,10 @@ use crate::shader::{CHANNELS, CrowdPlace, FORM_ARC, ON_KEY, ROTATION, SCALE, TRA
 use crate::simd::dispatch::{InLanes, VectorWidth, in_lanes_of};
 use crate::simd::lanes::{Lanes, canonical};
 use crate::twin::crowd_layers::Layers;
-use crate::twin::crowd_matrices::{Rows, affine_product, transform};
+use crate::twin::crowd_matrices::{affine_product, transform};
 use crate::twin::crowd_times::places;
 use crate::twin::evaluate_arc::{norm_squared, on_arc};
 
-/// Instances of one task.
 const TASK: usize = 32;
 
 /// What is evaluated: the same for all instances.
@@ -84,33 +83,31 @@ impl InLanes for Task<'_, '_> {
             }
             rotations::<L>(&context, tables, instance, self.rotations);
             let (matrices, _) = output.as_chunks_mut::<3>();
-            locals(&context, instance, self.rotations, matrices);
-            scene.walk(matrices);
+            let instance = instance as u32;
+            for ((joint, &rotation), matrix) in (0..).zip(&*self.rotations).zip(&mut *matrices) {
+                let moved = context.layered(instance, joint, TRANSLATION);
+                let scale = context.layered(instance, joint, SCALE);
+                *matrix = transform(rotation, moved, scale);
+            }
+            if scene.values == CrowdValues::Local {
+                continue;
+            }
+            for link in &scene.library.links {
+                let joint = link.joint as usize;
+                matrices[joint] = affine_product(&matrices[link.parent as usize], &matrices[joint]);
+            }
+            if scene.values == CrowdValues::Skinning {
+                for (matrix, bind) in matrices.iter_mut().zip(&scene.library.bind) {
+                    *matrix = affine_product(matrix, bind);
+                }
+            }
         }
     }
 }
 
 impl Scene<'_> {
-    /// Vectors of an instance.
     fn vectors(&self) -> usize {
         self.library.joints() * CrowdOutput::from(self.values).vectors()
-    }
-
-    /// Makes matrices in the model of those in the parents' frames, and skinning matrices of these.
-    #[inline(always)]
-    fn walk(&self, matrices: &mut [Rows]) {
-        if self.values == CrowdValues::Local {
-            return;
-        }
-        for link in &self.library.links {
-            let joint = link.joint as usize;
-            matrices[joint] = affine_product(&matrices[link.parent as usize], &matrices[joint]);
-        }
-        if self.values == CrowdValues::Skinning {
-            for (matrix, bind) in matrices.iter_mut().zip(&self.library.bind) {
-                *matrix = affine_product(matrix, bind);
-            }
-        }
     }
 }
 
@@ -190,14 +187,3 @@ fn arcs<L: Lanes>(
 
 /// Lanes of the widest vectors.
 const MOST_LANES: usize = 16;
-
-/// The matrices of an instance in the parents' frames.
-#[inline(always)]
-fn locals(context: &Layers<'_>, instance: usize, rotations: &[[f32; 4]], matrices: &mut [Rows]) {
-    let instance = instance as u32;
-    for ((joint, &rotation), matrix) in (0..).zip(rotations).zip(matrices) {
-        let moved = context.layered(instance, joint, TRANSLATION);
-        let scale = context.layered(instance, joint, SCALE);
-        *matrix = transform(rotation, moved, scale);
-    }
-}

@@ -8,9 +8,9 @@ use ash::vk;
 
 use crate::crowd::error::{CrowdError, OFFSET_STEP};
 use crate::crowd::player::Crowd;
-use crate::gpu::commands::Commands;
 use crate::gpu::crowd_target::CrowdTarget;
 use crate::gpu::handles::VulkanBuffer;
+use crate::gpu::submission::Commands;
 use crate::output::crowd::CrowdOutput;
 
 impl Crowd {
@@ -72,7 +72,7 @@ impl Crowd {
         };
         // SAFETY: promised by the caller.
         let commands = unsafe { Commands::new(&device.engine.device, commands) };
-        let clock = self.instances.clock();
+        let clock = self.instances.clock;
         target.record(commands, clock, self.instances.take_changes());
         Ok(())
     }

@@ -10,9 +10,9 @@ use crate::crowd::layer::{CrowdLayer, tick};
 use crate::crowd::library::CrowdLibrary;
 use crate::crowd::on_cpu::{self, Scene};
 use crate::engine::Engine;
-use crate::evaluate::backend::Backend;
-use crate::gpu::crowd::{CrowdShape, CrowdTables, DeviceCrowd};
-use crate::gpu::crowd_reader::CrowdReader;
+use crate::evaluate::uploaded::Backend;
+use crate::gpu::crowd::{CrowdTables, DeviceCrowd};
+use crate::gpu::crowd_target::CrowdReader;
 use crate::memory::zeroed;
 use crate::output::crowd::{CrowdOutput, CrowdValues};
 use crate::shader::{CrowdDispatch, CrowdEntry};
@@ -93,6 +93,10 @@ impl Crowd {
         let (engine, library) = (opened.engine(), &self.library);
         let own = &library.tables;
         let tables = CrowdTables {
+            instances: self.instances() as u32,
+            levels: library.levels.clone(),
+            only_arcs: own.has_only_arcs(),
+            arguments: self.arguments,
             clips: engine.crowd_table("tumble crowd clips", &own.clips)?,
             bases: engine.crowd_table("tumble crowd time bases", &own.bases)?,
             spans: engine.crowd_table("tumble crowd spans", &own.spans)?,
@@ -101,20 +105,13 @@ impl Crowd {
             links: engine.crowd_table("tumble crowd links", &library.links)?,
             bind: engine.crowd_table("tumble crowd inverse bind", &library.bind)?,
         };
-        let shape = CrowdShape {
-            instances: self.instances() as u32,
-            levels: library.levels.clone(),
-            only_arcs: own.has_only_arcs(),
-            arguments: self.arguments,
-        };
-        let crowd = DeviceCrowd::new(engine, shape, tables)?;
-        Ok(Some(Arc::new(crowd)))
+        Ok(Some(Arc::new(DeviceCrowd::new(engine, tables)?)))
     }
 
     /// Number of instances.
     #[must_use]
     pub fn instances(&self) -> usize {
-        self.instances.entries().len() / self.layers()
+        self.instances.entries.len() / self.layers()
     }
 
     /// Layers of an instance.
@@ -184,7 +181,7 @@ impl Crowd {
     /// # Errors
     /// When there is no such instance or layer.
     pub fn get(&self, instance: usize, layer: usize) -> Result<CrowdLayer, CrowdError> {
-        let entry = &self.instances.entries()[self.place(instance, layer)?];
+        let entry = &self.instances.entries[self.place(instance, layer)?];
         let (clips, clock) = (&self.library.tables.clips, self.clock());
         Ok(CrowdLayer::moved(entry, clips, clock, clock))
     }
@@ -195,7 +192,7 @@ impl Crowd {
     /// # Errors
     /// When there is no such instance or layer.
     pub fn tick(&self, instance: usize, layer: usize) -> Result<u32, CrowdError> {
-        let entry = &self.instances.entries()[self.place(instance, layer)?];
+        let entry = &self.instances.entries[self.place(instance, layer)?];
         Ok(tick(entry, &self.library.tables.clips, self.clock()))
     }
 
@@ -271,7 +268,7 @@ impl Crowd {
         let kept = kept.filter(|reader| reader.target.output() == output);
         let reader = kept.map_or_else(|| CrowdReader::new(device, output), Ok)?;
         let reader = self.reader.insert(reader);
-        let clock = self.instances.clock();
+        let clock = self.instances.clock;
         if let Err(error) = reader.submit(clock, self.instances.take_changes()) {
             // What was recorded may never have reached the device.
             self.instances.forget();
@@ -295,7 +292,7 @@ impl Crowd {
     pub fn poll(&self) -> Result<bool, CrowdError> {
         match (&self.submitted, &self.reader) {
             (Some((_, Some(_))), _) => Ok(true),
-            (Some((_, None)), Some(reader)) => Ok(reader.is_done()?),
+            (Some((_, None)), Some(reader)) => Ok(reader.results.is_done()?),
             _ => Err(CrowdError::NothingSubmitted),
         }
     }
@@ -378,7 +375,7 @@ impl Crowd {
             values,
             clock: self.clock(),
             context: Layers {
-                entries: self.instances.entries(),
+                entries: &self.instances.entries,
                 channels: &self.library.tables.channels,
                 cells: &self.cells,
                 places: &[],

@@ -4,7 +4,7 @@
 use std::fmt;
 
 use crate::curve::options::Speed;
-use crate::evaluate::backend::Backend;
+use crate::evaluate::uploaded::Backend;
 use crate::from_keys::KeyCurve;
 use crate::output::rotations::Layout;
 use crate::prepare::request::Request;

@@ -1,21 +1,21 @@
 //! Evaluates a set by its route.
 
 use std::collections::VecDeque;
+use std::sync::Arc;
 
 use glam::Quat;
 use rayon::prelude::*;
 
 use crate::cpu::engine::CpuEngine;
-use crate::cpu::fallback::Row;
 use crate::curve::segment::segment_size;
-use crate::evaluate::backend::Backend;
 use crate::evaluate::route::Route;
-use crate::evaluate::uploaded::Uploaded;
+use crate::evaluate::uploaded::{Backend, Uploaded};
 use crate::from_keys::dispatches::KeyJob;
 use crate::from_keys::{KeyCurve, UNRESOLVED};
 use crate::gpu::error::EvaluateError;
 use crate::gpu::recovery::Opened;
 use crate::output::buffer::OutputBuffer;
+use crate::output::encoding::Encoding;
 use crate::output::rotations::{Layout, Storage};
 use crate::output::window::Window;
 use crate::prepare::batch::{Batch, BatchSize, PART_INTERVALS, batches};
@@ -34,7 +34,7 @@ const LOOK: usize = 16 * 1024;
 impl Backend {
     /// Evaluates a set; the result stays in memory of the device where that saves a copy.
     pub(crate) fn evaluate(
-        &self,
+        self: &Arc<Self>,
         request: &Request<'_>,
         layout: Layout,
     ) -> Result<Box<dyn Storage>, EvaluateError> {
@@ -46,7 +46,7 @@ impl Backend {
                 ..Wanted::all(request.set)
             };
             let clip = Uploaded::new(self, request.set, *request.interpolation, wanted, None)?;
-            return clip.evaluate(self, request.timeline, layout);
+            return clip.evaluate(request.timeline, layout);
         }
         let mut quats = OutputBuffer::new(request.tracks.len() * request.timeline.len())?;
         self.evaluate_tracks(request, layout, &mut quats)?;
@@ -55,12 +55,12 @@ impl Backend {
 
     /// Evaluates into `output`, which is exactly as long as the result.
     pub(crate) fn evaluate_tracks(
-        &self,
+        self: &Arc<Self>,
         request: &Request<'_>,
         layout: Layout,
         output: &mut [Quat],
     ) -> Result<(), EvaluateError> {
-        match (self.route(request, layout), self) {
+        match (self.route(request, layout), &**self) {
             (Route::FromKeys(curve), Self::Cpu(engine)) => {
                 Ok(engine.evaluate_from_keys(request, curve, output)?)
             }
@@ -111,7 +111,7 @@ impl Backend {
 
     /// Prepares and evaluates one batch after another.
     fn evaluate_clips(
-        &self,
+        self: &Arc<Self>,
         request: &Request<'_>,
         layout: Layout,
         mut clips: VecDeque<Batch>,
@@ -151,7 +151,8 @@ impl Backend {
                 ..Window::whole(own.len(), timeline.len(), layout)
             };
             let evaluate = |output: &mut [Quat]| {
-                clip.evaluate_window(self, &folded, &window, output)
+                let output = bytemuck::cast_slice_mut(output);
+                clip.evaluate_into(&folded, &window, Encoding::F32, output)
                     .map_err(|error| error.of_tracks_from(own.start))
             };
             let place = own.start - tracks.start..own.end - tracks.start;
@@ -188,16 +189,7 @@ impl Opened {
         let engine = CpuEngine::on_shared_threads(VectorWidth::widest());
         let rows = output.par_chunks_mut(job.request.timeline.len());
         rows.zip(job.request.tracks.clone())
-            .try_for_each(|(output, index)| {
-                let (request, first, key) = (job.request, 0, 0);
-                let row = Row {
-                    request,
-                    index,
-                    first,
-                    key,
-                };
-                engine.resolve(row, output)
-            })?;
+            .try_for_each(|(output, track)| engine.resolve(job.request, track, (0, 0), output))?;
         Ok(())
     }
 }

@@ -1,12 +1,11 @@
-//! Prepared tracks on their device.
+//! What an engine evaluates on, and prepared tracks there.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use glam::Quat;
-
-use crate::evaluate::backend::Backend;
+use crate::cpu::engine::CpuEngine;
 use crate::gpu::engine::{ClipBuffers, Job, VulkanEngine, lock};
 use crate::gpu::error::{EvaluateError, VulkanError};
+use crate::gpu::recovery::Opened;
 use crate::method::interpolation::Interpolation;
 use crate::output::buffer::OutputBuffer;
 use crate::output::encoding::Encoding;
@@ -20,6 +19,7 @@ use crate::tracks::set::TrackSet;
 
 /// Prepared tracks, and their segments on a Vulkan device.
 pub(crate) struct Uploaded {
+    backend: Arc<Backend>,
     pub(crate) data: ClipData,
     /// Uploaded again after the device was lost.
     buffers: Mutex<Option<Arc<ClipBuffers>>>,
@@ -29,7 +29,7 @@ impl Uploaded {
     /// Prepares what is wanted of a set, and uploads it where the device is Vulkan's. The buffers
     /// of `spare`, which are no longer needed, are used again where they are large enough.
     pub(crate) fn new(
-        backend: &Backend,
+        backend: &Arc<Backend>,
         set: &TrackSet,
         interpolation: Interpolation,
         mut wanted: Wanted<'_>,
@@ -37,20 +37,19 @@ impl Uploaded {
     ) -> Result<Self, EvaluateError> {
         wanted.group_bytes = backend.group_bytes();
         let data = ClipData::new(set, interpolation, wanted).map_err(SetError::from)?;
-        Ok(Self::of_data(backend, data, spare)?)
+        Self::of_data(backend, data, spare)
     }
 
     /// Uploads data that is prepared already.
     pub(crate) fn of_data(
-        backend: &Backend,
+        backend: &Arc<Backend>,
         data: ClipData,
         spare: Option<ClipBuffers>,
-    ) -> Result<Self, VulkanError> {
-        let buffers = match backend {
-            Backend::Cpu(_) => None,
-            Backend::Vulkan(opened) => Some(Arc::new(opened.upload(&data, spare)?)),
-        };
+    ) -> Result<Self, EvaluateError> {
+        let upload = |opened: &Opened| opened.upload(&data, spare).map(Arc::new);
+        let buffers = backend.opened().map(upload).transpose()?;
         Ok(Self {
+            backend: Arc::clone(backend),
             data,
             buffers: Mutex::new(buffers),
         })
@@ -66,69 +65,71 @@ impl Uploaded {
     /// Evaluates all tracks; the result stays in memory of the device where that saves a copy.
     pub(crate) fn evaluate(
         &self,
-        backend: &Backend,
         timeline: &Timeline,
         layout: Layout,
     ) -> Result<Box<dyn Storage>, EvaluateError> {
         let timeline = self.data.folded(timeline)?;
-        match backend {
-            Backend::Vulkan(opened) => opened.attempt_smaller(|engine| {
-                let buffers = self.buffers_on(engine)?;
-                engine.evaluate(&self.data, &buffers, &timeline, layout)
-            }),
+        match &*self.backend {
+            Backend::Vulkan(opened) => {
+                self.on_device(opened, &timeline, Encoding::F32, |engine, job| {
+                    engine.evaluate(job, layout)
+                })
+            }
             Backend::Cpu(_) => {
                 let whole = Window::whole(self.data.track_count(), timeline.len(), layout);
                 let mut quats = OutputBuffer::new(whole.len())?;
-                self.evaluate_window(backend, &timeline, &whole, &mut quats)?;
+                let output = bytemuck::cast_slice_mut(&mut quats);
+                self.evaluate_into(&timeline, &whole, Encoding::F32, output)?;
                 Ok(Box::new(quats))
             }
         }
     }
 
-    /// Evaluates a window of the result into `output`, which is exactly as long. Explicit times
-    /// must be folded into the keys already, as the wrap mode has it.
-    pub(crate) fn evaluate_window(
+    /// Evaluates a window of the result into `output`, encoded, which is exactly as long. Explicit
+    /// times must be folded into the keys already, as the wrap mode has it.
+    pub(crate) fn evaluate_into(
         &self,
-        backend: &Backend,
-        timeline: &Timeline,
-        window: &Window,
-        output: &mut [Quat],
-    ) -> Result<(), EvaluateError> {
-        match backend {
-            Backend::Cpu(engine) => Ok(engine.evaluate(&self.data, timeline, window, output)?),
-            Backend::Vulkan(_) => {
-                let bytes = bytemuck::cast_slice_mut(output);
-                self.evaluate_encoded(backend, timeline, window, Encoding::F32, bytes)
-            }
-        }
-    }
-
-    /// As [`Uploaded::evaluate_window`], encoded.
-    pub(crate) fn evaluate_encoded(
-        &self,
-        backend: &Backend,
         timeline: &Timeline,
         window: &Window,
         encoding: Encoding,
         output: &mut [u8],
     ) -> Result<(), EvaluateError> {
-        match backend {
-            Backend::Cpu(engine) => {
-                Ok(engine.evaluate_encoded(&self.data, timeline, window, encoding, output)?)
-            }
-            Backend::Vulkan(opened) => opened.attempt_smaller(|engine| {
-                let buffers = self.buffers_on(engine)?;
-                let job = Job::new(&self.data, &buffers, timeline, encoding);
+        let data = &self.data;
+        match &*self.backend {
+            Backend::Cpu(engine) => Ok(match bytemuck::try_cast_slice_mut(&mut *output) {
+                Ok(quats) if encoding == Encoding::F32 => {
+                    engine.evaluate(data, timeline, window, quats)
+                }
+                _ => engine.evaluate_encoded(data, timeline, window, encoding, output),
+            }?),
+            Backend::Vulkan(opened) => self.on_device(opened, timeline, encoding, |engine, job| {
                 engine.evaluate_into(job, window, output)
             }),
         }
     }
 
-    /// The segments on a device; uploaded again where it is not the device that had them.
-    pub(crate) fn buffers_on(
+    /// Does some work on a Vulkan device, again in smaller windows if memory runs out.
+    pub(crate) fn on_device<T>(
         &self,
-        engine: &VulkanEngine,
-    ) -> Result<Arc<ClipBuffers>, VulkanError> {
+        opened: &Opened,
+        timeline: &Timeline,
+        encoding: Encoding,
+        mut work: impl FnMut(&VulkanEngine, Job<'_>) -> Result<T, EvaluateError>,
+    ) -> Result<T, EvaluateError> {
+        opened.attempt_smaller(|engine| {
+            let (clip, buffers) = (&self.data, &*self.buffers_on(engine)?);
+            let job = Job {
+                clip,
+                buffers,
+                timeline,
+                encoding,
+            };
+            work(engine, job)
+        })
+    }
+
+    /// The segments on a device; uploaded again where it is not the device that had them.
+    fn buffers_on(&self, engine: &VulkanEngine) -> Result<Arc<ClipBuffers>, VulkanError> {
         let mut buffers = lock(&self.buffers);
         if let Some(there) = buffers.as_ref().filter(|there| engine.holds(there)) {
             return Ok(Arc::clone(there));
@@ -140,12 +141,23 @@ impl Uploaded {
     }
 }
 
+/// What an engine evaluates on.
+pub(crate) enum Backend {
+    Cpu(CpuEngine),
+    Vulkan(Box<Opened>),
+}
+
 impl Backend {
     /// Bytes of segments that go into one buffer of a Vulkan device.
     pub(crate) fn group_bytes(&self) -> Option<usize> {
+        self.opened().map(|opened| opened.engine().group_bytes)
+    }
+
+    /// The Vulkan device; `None` for the CPU.
+    pub(crate) fn opened(&self) -> Option<&Opened> {
         match self {
             Self::Cpu(_) => None,
-            Self::Vulkan(opened) => Some(opened.engine().group_bytes),
+            Self::Vulkan(opened) => Some(opened),
         }
     }
 }

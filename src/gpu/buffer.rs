@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use ash::vk;
 
-use crate::gpu::device::LogicalDevice;
+use crate::gpu::device::{Lane, LogicalDevice};
 use crate::gpu::error::{Named, VulkanError};
 use crate::gpu::physical::PhysicalDevice;
 use crate::gpu::shared_memory::{Kind, Share};
@@ -49,11 +49,6 @@ impl Residence {
             Self::Device | Self::Results => (Flags::DEVICE_LOCAL, &[]),
         }
     }
-
-    /// Whether kernels read it, as texels where they read those.
-    fn is_read_by_kernels(self) -> bool {
-        matches!(self, Self::Upload | Self::Direct | Self::Device)
-    }
 }
 
 /// The handle type of imported memory: host allocations of this process.
@@ -92,14 +87,9 @@ pub(crate) struct Buffer {
     /// A view of it as texels of 16 bytes; null unless kernels read it as a texel buffer.
     pub(crate) view: vk::BufferView,
     memory: Share,
-    size: u64,
+    /// Bytes.
+    pub(crate) size: u64,
 }
-
-// SAFETY: the pointer is to memory that belongs to the buffer alone; access goes
-// through `&self` for reading and `&mut self` for writing.
-unsafe impl Send for Buffer {}
-// SAFETY: as above.
-unsafe impl Sync for Buffer {}
 
 /// The size of the largest element that a kernel reads.
 const LEAST: u64 = size_of::<PolynomialSegment>() as u64;
@@ -114,24 +104,25 @@ impl Buffer {
         residence: Residence,
     ) -> Result<Self, VulkanError> {
         let size = size.max(LEAST).next_multiple_of(16);
-        let is_texels = device.reads_texels && residence.is_read_by_kernels();
+        let is_read = matches!(
+            residence,
+            Residence::Upload | Residence::Direct | Residence::Device
+        );
+        let is_texels = device.reads_texels && is_read;
         // Both families may use what is copied on another queue, without a change of owners.
         let is_copied = matches!(residence, Residence::Results | Residence::Readback);
-        let families = device.two_families().filter(|_| is_copied);
+        let families = [Lane::Kernels, Lane::Copies].map(|lane| device.family(lane));
+        let families = (is_copied && families[0] != families[1]).then_some(families);
         let (mut buffer, needs) = Self::without_memory(device, size, is_texels, families, None)?;
         let (required, preferred) = residence.properties();
         let allowed = match (residence, device.placing.direct) {
             (Residence::Direct, Some(direct)) => needs.memory_type_bits & 1 << direct.memory_type,
             _ => needs.memory_type_bits,
         };
-        let memory_type = device
-            .physical
-            .memory_type(allowed, required, preferred)
-            .ok_or(VulkanError::NoMemoryType {
-                wanted: required.as_raw(),
-            })?;
+        let (physical, wanted) = (&device.physical, required.as_raw());
+        let memory_type = physical.memory_type(allowed, required, preferred);
         let kind = Kind {
-            memory_type,
+            memory_type: memory_type.ok_or(VulkanError::NoMemoryType { wanted })?,
             mapped: required.contains(vk::MemoryPropertyFlags::HOST_VISIBLE),
         };
         let memory = device.shared.take(&device.raw, kind, &needs)?;
@@ -240,11 +231,6 @@ impl Buffer {
         }
         self.device.name(self.raw, name);
         Ok(())
-    }
-
-    /// Size in bytes.
-    pub(crate) fn size(&self) -> u64 {
-        self.size
     }
 
     /// Whether the host sees its bytes.

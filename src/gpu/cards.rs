@@ -43,7 +43,6 @@ fn memory(heaps: &[(u64, bool)], types: &[(M, u32)]) -> vk::PhysicalDeviceMemory
     memory
 }
 
-/// A card by its name here.
 pub(crate) fn card(name: &str) -> Card {
     let draws = Q::GRAPHICS | Q::COMPUTE | Q::TRANSFER | Q::SPARSE_BINDING;
     let computes = Q::COMPUTE | Q::TRANSFER | Q::SPARSE_BINDING;

@@ -21,8 +21,15 @@ const SOFTWARE_WINDOW: u64 = 8 << 20;
 /// Bytes of a matrix.
 const MATRIX: u64 = 48;
 
-/// What a crowd's kernels read of its library ([`VulkanEngine::crowd_table`]).
+/// The sizes of a crowd, and what its kernels read of its library ([`VulkanEngine::crowd_table`]).
 pub(crate) struct CrowdTables {
+    pub(crate) instances: u32,
+    /// Where each level of the skeleton below the roots starts among the links, and their end.
+    pub(crate) levels: Vec<u32>,
+    /// Whether all rotations are arcs or constants.
+    pub(crate) only_arcs: bool,
+    /// What all dispatches are told.
+    pub(crate) arguments: CrowdDispatch,
     pub(crate) clips: Buffer,
     pub(crate) bases: Buffer,
     pub(crate) spans: Buffer,
@@ -33,22 +40,10 @@ pub(crate) struct CrowdTables {
     pub(crate) bind: Buffer,
 }
 
-/// The sizes of a crowd.
-pub(crate) struct CrowdShape {
-    pub(crate) instances: u32,
-    /// Where each level of the skeleton below the roots starts among the links, and their end.
-    pub(crate) levels: Vec<u32>,
-    /// Whether all rotations are arcs or constants.
-    pub(crate) only_arcs: bool,
-    /// What all dispatches are told.
-    pub(crate) arguments: CrowdDispatch,
-}
-
 /// A crowd's buffers on a device.
 pub(crate) struct DeviceCrowd {
     pub(crate) engine: Arc<VulkanEngine>,
-    pub(crate) shape: CrowdShape,
-    tables: CrowdTables,
+    pub(crate) tables: CrowdTables,
     /// `[instance][layer]`
     pub(crate) entries: Buffer,
 }
@@ -61,21 +56,16 @@ impl VulkanEngine {
         table: &[T],
     ) -> Result<Buffer, VulkanError> {
         let bytes: &[u8] = bytemuck::cast_slice(table);
-        let physical = &self.device.physical;
-        physical.check_range("a crowd's library", bytes.len() as u64)?;
+        self.check_size("a crowd's library", bytes)?;
         self.resident(name, bytes, &mut Vec::new())
     }
 }
 
 impl DeviceCrowd {
-    pub(crate) fn new(
-        engine: Arc<VulkanEngine>,
-        shape: CrowdShape,
-        tables: CrowdTables,
-    ) -> Result<Self, VulkanError> {
+    pub(crate) fn new(engine: Arc<VulkanEngine>, tables: CrowdTables) -> Result<Self, VulkanError> {
         let device = &engine.device;
-        let own = &shape.arguments;
-        let entries = u64::from(shape.instances) * u64::from(own.layers);
+        let own = &tables.arguments;
+        let entries = u64::from(tables.instances) * u64::from(own.layers);
         let entries = entries * size_of::<CrowdEntry>() as u64;
         let poses = LEAST_WINDOW * MATRIX * u64::from(own.joints);
         let physical = &device.physical;
@@ -84,27 +74,25 @@ impl DeviceCrowd {
         Ok(Self {
             entries: Buffer::new(device, "tumble crowd entries", entries, Residence::Device)?,
             engine,
-            shape,
             tables,
         })
     }
 
-    /// Bytes of a result.
     pub(crate) fn bytes(&self, output: CrowdOutput) -> u64 {
-        let joints = u64::from(self.shape.instances) * u64::from(self.shape.arguments.joints);
+        let joints = u64::from(self.tables.instances) * u64::from(self.tables.arguments.joints);
         joints * output.bytes() as u64
     }
 
     /// Bytes of the places where the layers of an instance stand.
     pub(crate) fn place_bytes(&self) -> u64 {
-        let own = &self.shape.arguments;
+        let own = &self.tables.arguments;
         size_of::<CrowdPlace>() as u64 * u64::from(own.layers) * u64::from(own.bases)
     }
 
     /// Instances that are evaluated at once: as many as their results fit the device's limits, and the
     /// memory budget.
     pub(crate) fn window(&self) -> u32 {
-        let own = &self.shape.arguments;
+        let own = &self.tables.arguments;
         let info = &self.engine.device.physical.info;
         let bytes = self.place_bytes().max(MATRIX * u64::from(own.joints));
         let range = info
@@ -118,14 +106,14 @@ impl DeviceCrowd {
         }
         // Vectors are counted in 32 bits.
         let most = (range / bytes).min(u64::from(u32::MAX / 4) / (bytes / 8));
-        let all = u64::from(self.shape.instances).next_multiple_of(LEAST_WINDOW);
+        let all = u64::from(self.tables.instances).next_multiple_of(LEAST_WINDOW);
         (most / LEAST_WINDOW * LEAST_WINDOW).clamp(LEAST_WINDOW, all) as u32
     }
 
     /// The kernels that run for a result, one after another.
     pub(crate) fn kernels(&self, output: CrowdOutput) -> Vec<Kernel> {
         use CrowdValues::{Model, Rotations, Skinning};
-        let is_plain = self.shape.arguments.layers == 1 && self.shape.only_arcs;
+        let is_plain = self.tables.arguments.layers == 1 && self.tables.only_arcs;
         let joints = match (output.values, is_plain) {
             (Rotations, true) => Kernel::CrowdPlainRotations,
             (Rotations, false) => Kernel::CrowdRotations,

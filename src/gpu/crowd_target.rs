@@ -6,12 +6,12 @@ use std::sync::Arc;
 use ash::vk;
 
 use crate::gpu::buffer::{Buffer, Residence};
-use crate::gpu::commands::Commands;
 use crate::gpu::crowd::DeviceCrowd;
 use crate::gpu::descriptors::DescriptorPool;
 use crate::gpu::error::VulkanError;
 use crate::gpu::pipeline::Pipeline;
-use crate::gpu::submission::{Access, Binding};
+use crate::gpu::read_back::ReadBack;
+use crate::gpu::submission::{Access, Binding, Commands};
 use crate::output::crowd::CrowdOutput;
 use crate::shader::{CROWD_WORKGROUP, CrowdDispatch, CrowdEntry, Kernel, WORKGROUP};
 
@@ -44,8 +44,8 @@ impl CrowdTarget {
         offset: u64,
     ) -> Result<Self, VulkanError> {
         let engine = &crowd.engine;
-        let (window, instances) = (crowd.window(), crowd.shape.instances);
-        let joints = u64::from(crowd.shape.arguments.joints);
+        let (window, instances) = (crowd.window(), crowd.tables.instances);
+        let joints = u64::from(crowd.tables.arguments.joints);
         let new = |name, each: u64| {
             let size = u64::from(window) * each;
             Buffer::new(&engine.device, name, size, Residence::Device)
@@ -103,7 +103,7 @@ impl CrowdTarget {
         clock: u64,
         changes: impl Iterator<Item = (usize, &'e [CrowdEntry])>,
     ) {
-        let shape = &self.crowd.shape;
+        let tables = &self.crowd.tables;
         commands.barrier(Access::Any, Access::Any);
         let each = size_of::<CrowdEntry>();
         for (first, entries) in changes {
@@ -114,14 +114,14 @@ impl CrowdTarget {
             }
         }
         commands.barrier(Access::Copy, Access::Kernel);
-        let firsts = (0..shape.instances).step_by(self.window as usize);
+        let firsts = (0..tables.instances).step_by(self.window as usize);
         for (first_instance, sets) in firsts.zip(&self.windows) {
-            let instances = self.window.min(shape.instances - first_instance);
+            let instances = self.window.min(tables.instances - first_instance);
             let arguments = CrowdDispatch {
                 first_instance,
                 clock_low: clock as u32,
                 clock_high: (clock >> 32) as u32,
-                ..shape.arguments
+                ..tables.arguments
             };
             self.record_window(commands, sets, instances, arguments);
         }
@@ -152,7 +152,7 @@ impl CrowdTarget {
                 Kernel::CrowdSkin => 3 * joints,
                 Kernel::CrowdHalf => joints * self.output.vectors() as u32,
                 Kernel::CrowdWalk => {
-                    for level in self.crowd.shape.levels.windows(2) {
+                    for level in self.crowd.tables.levels.windows(2) {
                         let own = CrowdDispatch {
                             joints: level[1] - level[0],
                             layers: arguments.joints,
@@ -167,6 +167,47 @@ impl CrowdTarget {
             };
             dispatch(count, arguments);
         }
+    }
+}
+
+/// A target whose result the host reads: evaluated into memory that it sees, submitted without a wait.
+pub(crate) struct CrowdReader {
+    // It goes first: it waits for what uses the rest.
+    pub(crate) results: ReadBack,
+    pub(crate) target: CrowdTarget,
+}
+
+impl CrowdReader {
+    pub(crate) fn new(crowd: &Arc<DeviceCrowd>, output: CrowdOutput) -> Result<Self, VulkanError> {
+        let engine = &crowd.engine;
+        let bytes = crowd.bytes(output);
+        let mut results = ReadBack::new(&engine.device)?;
+        let staged = !engine.device.placing.in_place;
+        let buffer = results.room(&engine.device, bytes, staged)?.raw;
+        Ok(Self {
+            results,
+            target: CrowdTarget::new(crowd, output, buffer, 0)?,
+        })
+    }
+
+    /// Submits an evaluation; the one before must have been waited for.
+    pub(crate) fn submit<'e>(
+        &mut self,
+        clock: u64,
+        changes: impl Iterator<Item = (usize, &'e [CrowdEntry])>,
+    ) -> Result<(), VulkanError> {
+        self.results.kernels.begin(0)?;
+        let commands = self.results.kernels.commands();
+        self.target.record(commands, clock, changes);
+        let bytes = self.target.crowd.bytes(self.target.output);
+        self.results.submit(Some(bytes))
+    }
+
+    /// Waits, and copies the result, of which `output` has as many bytes.
+    pub(crate) fn wait_into(&mut self, output: &mut [u8]) -> Result<(), VulkanError> {
+        self.results.wait()?;
+        output.copy_from_slice(self.results.bytes(0..output.len()));
+        Ok(())
     }
 }
 

@@ -32,15 +32,6 @@ struct Queue {
     family: u32,
 }
 
-impl Queue {
-    fn new(raw: vk::Queue, family: u32) -> Self {
-        Self {
-            raw: Mutex::new(raw),
-            family,
-        }
-    }
-}
-
 /// An opened device, destroyed with its last user unless it was handed in.
 pub(crate) struct LogicalDevice {
     pub(crate) raw: ash::Device,
@@ -53,12 +44,12 @@ pub(crate) struct LogicalDevice {
     /// The queue of [`Lane::Copies`], where that is another one.
     copy_queue: Option<Queue>,
     /// Whether staged results are copied in submissions of their own.
-    copies_apart: bool,
+    pub(crate) copies_apart: bool,
     names: Option<ext::debug_utils::Device>,
     /// The extension that imports the caller's memory, where it is used.
     pub(crate) borrows: Option<ext::external_memory_host::Device>,
-    owned: bool,
-    /// Memory of buffers.
+    /// Whether it was opened here, and may be opened again here.
+    pub(crate) owned: bool,
     pub(crate) shared: SharedMemory,
     /// A wait ran out of time: work may still run, so nothing may be destroyed.
     hung: AtomicBool,
@@ -142,6 +133,10 @@ impl LogicalDevice {
         let in_place = physical.in_place(options.transfer);
         let stay = in_place || options.read_back == ReadBack::SameQueue;
         let named = copy_queue.filter(|_| !stay);
+        let own = |(raw, family)| {
+            let raw = Mutex::new(raw);
+            Queue { raw, family }
+        };
         let instance = &physical.instance;
         let names = instance
             .debug_utils
@@ -154,8 +149,8 @@ impl LogicalDevice {
                 in_place,
                 direct: direct(&physical.memory),
             },
-            queue: Queue::new(queue, physical.queue_family),
-            copy_queue: named.map(|named| Queue::new(named.queue, named.family)),
+            queue: own((queue, physical.queue_family)),
+            copy_queue: named.map(|named| own((named.queue, named.family))),
             copies_apart: named.is_some(),
             physical,
             names,
@@ -171,7 +166,6 @@ impl LogicalDevice {
         lock(&self.queue_of(lane).raw)
     }
 
-    /// The family of a lane's queue.
     pub(crate) fn family(&self, lane: Lane) -> u32 {
         self.queue_of(lane).family
     }
@@ -181,17 +175,6 @@ impl LogicalDevice {
             (Lane::Copies, Some(own)) => own,
             _ => &self.queue,
         }
-    }
-
-    /// Whether staged results are copied in submissions of their own.
-    pub(crate) fn copies_apart(&self) -> bool {
-        self.copies_apart
-    }
-
-    /// The families that use staged results, where they are two.
-    pub(crate) fn two_families(&self) -> Option<[u32; 2]> {
-        let families = [Lane::Kernels, Lane::Copies].map(|lane| self.family(lane));
-        (families[0] != families[1]).then_some(families)
     }
 
     /// Nobody else uses any queue meanwhile.
@@ -255,11 +238,6 @@ impl LogicalDevice {
         {
             std::thread::sleep(Duration::from_millis(10)); // memory may come back
         }
-    }
-
-    /// Whether it was opened here, and may be opened again here.
-    pub(crate) fn is_owned(&self) -> bool {
-        self.owned
     }
 
     /// Whether objects may be destroyed.

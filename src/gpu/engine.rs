@@ -3,15 +3,15 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
+use glam::Quat;
+
 use crate::gpu::buffer::{Buffer, Residence};
 use crate::gpu::device::{Lane, LogicalDevice};
 use crate::gpu::error::{EvaluateError, VulkanError};
 use crate::gpu::from_keys::KeyUploads;
 use crate::gpu::in_flight::{InFlight, Target, copy};
-use crate::gpu::mapped::{FreeBuffers, MappedQuats};
 use crate::gpu::memory_types::KernelReads;
 use crate::gpu::options::{EngineOptions, Timings, Transfer};
-use crate::gpu::physical::PhysicalDevice;
 use crate::gpu::pipeline::{Exactness, Pipeline};
 use crate::gpu::submission::{Access, Submission};
 use crate::gpu::upload::writable;
@@ -44,11 +44,7 @@ pub(crate) struct VulkanEngine {
     pipelines: Mutex<[Option<Arc<Pipeline>>; KERNELS.len()]>,
     pub(crate) in_flight: Mutex<Vec<InFlight<WorkLists>>>,
     pub(crate) keys_in_flight: Mutex<Vec<InFlight<KeyUploads>>>,
-    /// Windows in flight at once.
     pub(crate) in_flight_count: usize,
-    /// Whether kernels write into memory that the host reads; else results are copied out of the
-    /// device's own memory.
-    pub(crate) in_place: bool,
     /// Whether neighbouring invocations take neighbouring samples; else each takes a run of them.
     pub(crate) maps_samples: bool,
     /// Whether the caller's memory is imported where the device can.
@@ -71,12 +67,8 @@ pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 /// The segments and constants of a clip, on the device.
 pub(crate) struct ClipBuffers {
     device: Arc<LogicalDevice>,
-    pub(crate) groups: Vec<GroupBuffers>,
-}
-
-pub(crate) struct GroupBuffers {
-    pub(crate) segments: Buffer,
-    pub(crate) constants: Buffer,
+    /// The segments of each group, and its constants.
+    pub(crate) groups: Vec<(Buffer, Buffer)>,
 }
 
 /// What is to be evaluated, and how stored.
@@ -88,21 +80,7 @@ pub(crate) struct Job<'a> {
     pub(crate) encoding: Encoding,
 }
 
-impl<'a> Job<'a> {
-    pub(crate) fn new(
-        clip: &'a ClipData,
-        buffers: &'a ClipBuffers,
-        timeline: &'a Timeline,
-        encoding: Encoding,
-    ) -> Self {
-        Self {
-            clip,
-            buffers,
-            timeline,
-            encoding,
-        }
-    }
-
+impl Job<'_> {
     /// All of the result.
     pub(crate) fn whole(&self, layout: Layout) -> Window {
         Window::whole(self.clip.track_count(), self.timeline.len(), layout)
@@ -110,21 +88,10 @@ impl<'a> Job<'a> {
 }
 
 impl VulkanEngine {
-    /// Opens a device and checks that it is exact.
-    pub(crate) fn new(
-        physical: PhysicalDevice,
-        options: &EngineOptions,
-    ) -> Result<Self, VulkanError> {
-        let device = LogicalDevice::new(physical, options)?;
-        Self::with_device(device, options)
-    }
-
-    pub(crate) fn with_device(
-        device: Arc<LogicalDevice>,
-        options: &EngineOptions,
-    ) -> Result<Self, VulkanError> {
+    /// An engine on a device that is open, whose exactness is still to be tested.
+    pub(crate) fn new(device: Arc<LogicalDevice>, options: &EngineOptions) -> Self {
         let info = &device.physical.info;
-        let in_flight_count = match device.copies_apart() {
+        let in_flight_count = match device.copies_apart {
             true => IN_FLIGHT_WITH_COPIES,
             false => IN_FLIGHT,
         };
@@ -141,12 +108,11 @@ impl VulkanEngine {
         // Windows start at aligned offsets where their length allows.
         let window = (window / 64 * 64).max(64) as usize;
         let bytes = |bytes| usize::try_from(bytes).unwrap_or(usize::MAX);
-        Ok(Self {
+        Self {
             pipelines: Mutex::new([const { None }; KERNELS.len()]),
             in_flight: Mutex::default(),
             keys_in_flight: Mutex::default(),
             in_flight_count,
-            in_place: device.placing.in_place,
             maps_samples: device.physical.maps_samples(options.mapping),
             imports: options.transfer == Transfer::Automatic,
             window: AtomicUsize::new(window),
@@ -155,7 +121,7 @@ impl VulkanEngine {
             free: Arc::default(),
             timings: Mutex::default(),
             device,
-        })
+        }
     }
 
     /// The pipeline of a kernel, made when it is first needed.
@@ -179,8 +145,7 @@ impl VulkanEngine {
         // Under a memory budget the old buffers are freed before new ones are allocated.
         let spare = spare.filter(|old| self.clip_bytes.is_none() && self.holds(old));
         let spare = spare.into_iter().flat_map(|buffers| buffers.groups);
-        let (mut segments_of, mut constants_of): (Vec<Buffer>, Vec<Buffer>) =
-            spare.map(|group| (group.segments, group.constants)).unzip();
+        let (mut segments_of, mut constants_of): (Vec<Buffer>, Vec<Buffer>) = spare.unzip();
         let groups = clip
             .groups
             .iter()
@@ -189,16 +154,14 @@ impl VulkanEngine {
                 let constants = bytemuck::cast_slice(&group.constants);
                 self.check_size("segments", segments)?;
                 self.check_size("keys", constants)?;
-                Ok(GroupBuffers {
-                    segments: self.resident("tumble segments", segments, &mut segments_of)?,
-                    constants: self.resident("tumble constants", constants, &mut constants_of)?,
-                })
+                Ok((
+                    self.resident("tumble segments", segments, &mut segments_of)?,
+                    self.resident("tumble constants", constants, &mut constants_of)?,
+                ))
             })
             .collect::<Result<_, _>>()?;
-        Ok(ClipBuffers {
-            device: Arc::clone(&self.device),
-            groups,
-        })
+        let device = Arc::clone(&self.device);
+        Ok(ClipBuffers { device, groups })
     }
 
     /// Refuses what is longer than a kernel can bind.
@@ -211,7 +174,6 @@ impl VulkanEngine {
         Arc::ptr_eq(&self.device, &buffers.device)
     }
 
-    /// Rotations of one window.
     pub(crate) fn window(&self) -> usize {
         self.window.load(Ordering::Relaxed)
     }
@@ -247,7 +209,7 @@ impl VulkanEngine {
     ) -> Result<Buffer, VulkanError> {
         let size = bytes.len() as u64;
         // Of spare ones the host writes those that kernels have read in place.
-        let fits = |buffer: &Buffer| buffer.is_mapped() && buffer.size() >= size;
+        let fits = |buffer: &Buffer| buffer.is_mapped() && buffer.size >= size;
         let (mut upload, is_staged) = match spare.iter().position(fits) {
             Some(place) => (spare.swap_remove(place), false),
             None => writable(&self.device, name, size, KernelReads::Often)?,
@@ -259,27 +221,24 @@ impl VulkanEngine {
         let resident = Buffer::new(&self.device, name, size, Residence::Device)?;
         let mut submission = Submission::new(&self.device, Lane::Kernels)?;
         submission.begin(0)?;
-        submission.copy(&upload, &resident, upload.size());
-        submission.barrier(Access::Copy, Access::Kernel);
+        (submission.commands()).copy(&upload, &resident, upload.size);
+        (submission.commands()).barrier(Access::Copy, Access::Kernel);
         submission.submit()?;
         submission.wait()?;
         Ok(resident)
     }
 
-    /// Evaluates into memory of the engine's choice: the device's own, mapped, where
+    /// Evaluates in f32 into memory of the engine's choice: the device's own, mapped, where
     /// it writes in place and one allocation can hold the result.
     pub(crate) fn evaluate(
         &self,
-        clip: &ClipData,
-        buffers: &ClipBuffers,
-        timeline: &Timeline,
+        job: Job<'_>,
         layout: Layout,
     ) -> Result<Box<dyn Storage>, EvaluateError> {
-        let job = Job::new(clip, buffers, timeline, Encoding::F32);
         let whole = job.whole(layout);
         let bytes = (whole.len() * Encoding::F32.bytes()) as u64;
         let fits = bytes <= self.device.physical.info.max_memory_allocation_size;
-        let buffer = match self.in_place && fits {
+        let buffer = match self.device.placing.in_place && fits {
             true => match self.output_buffer(bytes) {
                 // Window by window the result may still be made.
                 Err(error) if error.is_out_of_memory() => None,
@@ -293,7 +252,11 @@ impl VulkanEngine {
             return Ok(Box::new(quats));
         };
         self.run(job, &whole, Target::Buffer(&mut buffer))?;
-        Ok(Box::new(MappedQuats::new(buffer, whole.len(), &self.free)))
+        Ok(Box::new(MappedQuats {
+            buffer: Some(buffer),
+            count: whole.len(),
+            free: Arc::clone(&self.free),
+        }))
     }
 
     /// Evaluates a window into the caller's memory.
@@ -311,11 +274,44 @@ impl VulkanEngine {
     /// A buffer that was given back, when one fits closely, else a new one.
     fn output_buffer(&self, bytes: u64) -> Result<Buffer, VulkanError> {
         let mut free = lock(&self.free);
-        let fits = |buffer: &Buffer| (bytes..=bytes.max(1 << 16) * 2).contains(&buffer.size());
+        let fits = |buffer: &Buffer| (bytes..=bytes.max(1 << 16) * 2).contains(&buffer.size);
         if let Some(i) = free.iter().position(fits) {
             return Ok(free.swap_remove(i));
         }
         drop(free);
         Buffer::new(&self.device, "tumble rotations", bytes, Residence::InPlace)
+    }
+}
+
+/// Output buffers of dropped results, to use again: the first touch of fresh memory costs more
+/// than evaluating.
+type FreeBuffers = Arc<Mutex<Vec<Buffer>>>;
+
+/// A result in mapped memory. When it is dropped, the buffer goes back to its engine.
+struct MappedQuats {
+    /// There until it is dropped.
+    buffer: Option<Buffer>,
+    count: usize,
+    free: FreeBuffers,
+}
+
+impl Storage for MappedQuats {
+    fn quats(&self) -> &[Quat] {
+        let all = 0..self.count * size_of::<Quat>();
+        let bytes = self.buffer.as_ref().map(|buffer| buffer.bytes(all));
+        bytemuck::cast_slice(bytes.unwrap_or_default())
+    }
+}
+
+/// The most output buffers that are kept for later evaluations.
+const KEPT: usize = 4;
+
+impl Drop for MappedQuats {
+    fn drop(&mut self) {
+        let mut free = lock(&self.free);
+        if free.len() == KEPT {
+            free.remove(0);
+        }
+        free.extend(self.buffer.take());
     }
 }

@@ -97,28 +97,23 @@ pub enum VulkanError {
 impl VulkanError {
     /// The device is lost: what it held is gone, and it must be opened again.
     pub(crate) fn is_lost(&self) -> bool {
-        self.result() == Some(vk::Result::ERROR_DEVICE_LOST)
+        let lost = vk::Result::ERROR_DEVICE_LOST;
+        matches!(self, Self::Call { result, .. } if *result == lost)
     }
 
     /// Memory ran out: the same work in smaller windows may succeed.
     pub(crate) fn is_out_of_memory(&self) -> bool {
         matches!(
-            self.result(),
-            Some(
-                vk::Result::ERROR_OUT_OF_HOST_MEMORY
+            self,
+            Self::Call {
+                result: vk::Result::ERROR_OUT_OF_HOST_MEMORY
                     | vk::Result::ERROR_OUT_OF_DEVICE_MEMORY
                     | vk::Result::ERROR_OUT_OF_POOL_MEMORY
                     | vk::Result::ERROR_FRAGMENTED_POOL
-                    | vk::Result::ERROR_TOO_MANY_OBJECTS
-            )
+                    | vk::Result::ERROR_TOO_MANY_OBJECTS,
+                ..
+            }
         )
-    }
-
-    fn result(&self) -> Option<vk::Result> {
-        match self {
-            Self::Call { result, .. } => Some(*result),
-            _ => None,
-        }
     }
 }
 

@@ -21,20 +21,11 @@ use crate::output::encoding::Encoding;
 use crate::shader::{FROM_KEYS_WORKGROUP, Kernel};
 
 /// What the host writes for one dispatch.
+#[derive(Default)]
 pub(crate) struct KeyUploads {
     keys: Upload,
     samples: Upload,
     weights: Upload,
-}
-
-impl Default for KeyUploads {
-    fn default() -> Self {
-        Self {
-            keys: Upload::new("tumble keys", KernelReads::Once),
-            samples: Upload::new("tumble samples", KernelReads::Once),
-            weights: Upload::new("tumble weights", KernelReads::Once),
-        }
-    }
 }
 
 impl VulkanEngine {
@@ -57,7 +48,7 @@ impl VulkanEngine {
         // The set's keys, where kernels read them in place.
         let mut keys = (job.keys().filter(|_| imports && self.device.reads_texels))
             .and_then(|keys| ImportedMemory::to_read(&self.device, bytemuck::cast_slice(keys)))
-            .filter(|keys| keys.start().is_multiple_of(each));
+            .filter(|keys| keys.start.is_multiple_of(each));
         let output = bytemuck::cast_slice_mut(output);
         let mut target = Target::of(&self.device, imports, output, each);
         let dispatches = from_fn(|| dispatches.next(self.window()));
@@ -74,7 +65,7 @@ impl VulkanEngine {
             },
         );
         if let (Some(keys), Ok(())) = (&mut keys, &result) {
-            keys.has_come_back();
+            keys.is_idle = true;
         }
         result
     }
@@ -94,29 +85,36 @@ impl VulkanEngine {
         let size = output.len() as u64;
         let place = target.place();
         // One queue alone gains nothing by a copy: kernels then write where the host reads.
-        let staged = !self.in_place && device.copies_apart();
+        let staged = !device.placing.in_place && device.copies_apart;
         let rotations = match place {
             Some((buffer, first)) => Binding::range(buffer, first + output.start as u64, size),
             None => Binding::whole(own.results.room(device, size, staged)?),
         };
         let [key_bytes, sample_bytes, weight_bytes] = dispatch.bytes();
-        let uploads = &mut own.uploads;
+        let (uploads, once) = (&mut own.uploads, KernelReads::Once);
         let as_given = keys.filter(|_| dispatch.keys_are_as_given());
+        let keys = match as_given {
+            Some(_) => &mut [],
+            None => {
+                let room = (uploads.keys).room(device, "tumble keys", once, key_bytes)?;
+                bytemuck::cast_slice_mut(room)
+            }
+        };
+        let samples = (uploads.samples).room(device, "tumble samples", once, sample_bytes)?;
+        let weights = (uploads.weights).room(device, "tumble weights", once, weight_bytes)?;
         dispatch.write(
-            as_given.map(|keys| keys.start() / size_of::<Quat>()),
-            match as_given {
-                Some(_) => &mut [],
-                None => bytemuck::cast_slice_mut(uploads.keys.room(device, key_bytes)?),
-            },
-            bytemuck::cast_slice_mut(uploads.samples.room(device, sample_bytes)?),
-            bytemuck::cast_slice_mut(uploads.weights.room(device, weight_bytes)?),
+            as_given.map(|keys| keys.start / size_of::<Quat>()),
+            keys,
+            bytemuck::cast_slice_mut(samples),
+            bytemuck::cast_slice_mut(weights),
         )?;
         let keys = as_given.is_none().then_some(&uploads.keys);
         let weights = (weight_bytes > 0).then_some(&uploads.weights);
         let written = [keys, Some(&uploads.samples), weights]
             .into_iter()
             .flatten();
-        let bindings: Vec<Binding> = (as_given.map(ImportedMemory::binding).into_iter())
+        let given = as_given.map(|keys| Binding::whole(&keys.buffer));
+        let bindings: Vec<Binding> = (given.into_iter())
             .chain(written.clone().filter_map(Upload::binding))
             .chain([rotations])
             .collect();

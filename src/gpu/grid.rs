@@ -78,11 +78,15 @@ impl GridRows {
         };
         Some(GroupGrid {
             all: self,
-            samples,
-            rows,
             first_row,
-            first_output,
-            first_block,
+            arguments: Grid {
+                detail: 0,
+                stride: self.stride,
+                samples,
+                rows,
+                first_output,
+                first_block,
+            },
         })
     }
 }
@@ -108,7 +112,6 @@ fn items(list: &GroupWork) -> impl Iterator<Item = &Item> {
     list.chunks.iter().flat_map(|chunk| &chunk.items)
 }
 
-/// The number of an item's samples.
 fn count(item: &Item) -> u32 {
     item.count & !(IS_CONSTANT | MAY_BE_TINY)
 }
@@ -117,19 +120,15 @@ fn count(item: &Item) -> u32 {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct GroupGrid {
     all: GridRows,
-    /// Positions of a row.
-    samples: u32,
-    rows: u32,
     /// The window's row that is the group's first.
     first_row: u32,
-    first_output: u32,
-    first_block: u32,
+    /// What comes with its dispatch, without the detail.
+    pub(crate) arguments: Grid,
 }
 
 impl GroupGrid {
-    /// How many blocks it has.
     pub(crate) fn blocks(&self) -> u32 {
-        self.samples.div_ceil(BLOCK_SAMPLES) * self.rows
+        self.arguments.samples.div_ceil(BLOCK_SAMPLES) * self.arguments.rows
     }
 
     /// Writes its blocks; `first_item` is the place of its first item in the list of all, and
@@ -140,10 +139,10 @@ impl GroupGrid {
             starts: 0,
         });
         let base = match self.all.stride {
-            1 => self.first_output,
+            1 => self.arguments.first_output,
             _ => 0,
         };
-        let end = self.samples.div_ceil(BLOCK_SAMPLES);
+        let end = self.arguments.samples.div_ceil(BLOCK_SAMPLES);
         // The row, the first of its blocks that is not written, and the last item that began in it.
         let (mut row, mut next, mut last) = (0, 0, nothing);
         for (index, item) in (first_item..).zip(items(list)) {
@@ -177,30 +176,18 @@ impl GroupGrid {
 
     /// Where a block of a row lies among all.
     fn place(&self, row: u32, block: u32) -> usize {
-        (block * self.rows + row) as usize
-    }
-
-    /// What comes with its dispatch.
-    pub(crate) fn arguments(&self, detail: u32) -> Grid {
-        Grid {
-            detail,
-            stride: self.all.stride,
-            samples: self.samples,
-            rows: self.rows,
-            first_output: self.first_output,
-            first_block: self.first_block,
-        }
+        (block * self.arguments.rows + row) as usize
     }
 
     /// The workgroups of its dispatch; `most` is the limit along x.
     pub(crate) fn workgroups(&self, most: u32) -> [u32; 3] {
         let samples = WORKGROUP * SAMPLES_EACH;
         let (tiles, z) = match self.all.stride {
-            1 => (self.samples.div_ceil(samples), 1),
+            1 => (self.arguments.samples.div_ceil(samples), 1),
             // Rows of neighbours begin up to a line less one before the first track.
             _ => {
-                let tiles = (self.rows + LINE - 1).div_ceil(LINE);
-                (tiles, self.samples.div_ceil(samples / LINE))
+                let tiles = (self.arguments.rows + LINE - 1).div_ceil(LINE);
+                (tiles, self.arguments.samples.div_ceil(samples / LINE))
             }
         };
         let x = tiles.clamp(1, most);
@@ -210,6 +197,8 @@ impl GroupGrid {
 
 #[cfg(test)]
 mod tests {
+    use bytemuck::Zeroable as _;
+
     use super::*;
     use crate::gpu::work_list::WorkChunk;
     use crate::output::rotations::Layout;
@@ -227,7 +216,7 @@ mod tests {
                     1 => track * rows.samples + sample,
                     stride => sample * stride + track,
                 };
-                let mut item: Item = bytemuck::Zeroable::zeroed();
+                let mut item = Item::zeroed();
                 (item.output, item.count) = (output + rows.shift, count);
                 let flags = [0, IS_CONSTANT, MAY_BE_TINY];
                 item.count |= flags[random.usize(..3)];
@@ -248,25 +237,19 @@ mod tests {
                 let rows = GridRows::new(&window, shift).unwrap();
                 let list = listed(rows, tracks);
                 let grid = rows.of_group(&list, 0).unwrap();
-                let mut blocks = vec![
-                    Block {
-                        first: 0,
-                        starts: 0
-                    };
-                    grid.blocks() as usize
-                ];
+                let mut blocks = vec![Block::zeroed(); grid.blocks() as usize];
                 let nothing = list.item_count() as u32 + 3;
                 grid.write(&list, 3, nothing, &mut blocks);
                 let all: Vec<Item> = items(&list).copied().collect();
                 let mut found = 0;
-                for row in 0..grid.rows {
-                    for position in 0..grid.samples {
+                for row in 0..grid.arguments.rows {
+                    for position in 0..grid.arguments.samples {
                         let block = blocks[grid.place(row, position / BLOCK_SAMPLES)];
                         let begun = block.starts << (!position & (BLOCK_SAMPLES - 1));
                         let index = block.first + begun.count_ones();
                         let place = match rows.stride {
-                            1 => grid.first_output + position,
-                            stride => position * stride + grid.first_output + row,
+                            1 => grid.arguments.first_output + position,
+                            stride => position * stride + grid.arguments.first_output + row,
                         };
                         let has = |item: &Item| {
                             let (own, at) = rows.cell(item.output);

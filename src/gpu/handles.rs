@@ -65,9 +65,7 @@ pub struct VulkanBuffer {
 
 impl VulkanEngine {
     /// # Safety
-    /// The handles must be valid and belong together, must outlive the engine and
-    /// all of its clips and results, and nobody else may use the queues while the
-    /// engine does.
+    /// As [`Engine::from_vulkan`](crate::engine::Engine::from_vulkan) says.
     pub(crate) unsafe fn from_handles(
         handles: VulkanHandles,
         options: &EngineOptions,
@@ -88,6 +86,6 @@ impl VulkanEngine {
             handles.copy_queue,
             options,
         );
-        Self::with_device(Arc::new(device), options)
+        Ok(Self::new(Arc::new(device), options))
     }
 }

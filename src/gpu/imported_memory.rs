@@ -5,11 +5,8 @@ use std::ops::Range;
 use std::ptr::NonNull;
 use std::sync::Arc;
 
-use ash::vk;
-
 use crate::gpu::buffer::Buffer;
 use crate::gpu::device::LogicalDevice;
-use crate::gpu::submission::Binding;
 
 /// Fewer bytes than this are copied faster than imported.
 const LEAST: usize = 1 << 20;
@@ -20,13 +17,13 @@ const PAGE: usize = 4096;
 /// Imported memory: the caller's, which a device may read or write as long as this lives.
 pub(crate) struct ImportedMemory<'a> {
     /// The pages that it lies in.
-    buffer: Buffer,
-    /// Where it starts in them.
-    start: usize,
+    pub(crate) buffer: Buffer,
+    /// Where it starts in them, bytes.
+    pub(crate) start: usize,
     memory: NonNull<u8>,
     size: usize,
-    /// Whether all work that was submitted has ended.
-    is_idle: bool,
+    /// Whether all work that was submitted has ended, so that dropping need not wait.
+    pub(crate) is_idle: bool,
     lender: PhantomData<&'a mut [u8]>,
 }
 
@@ -75,21 +72,6 @@ impl<'a> ImportedMemory<'a> {
         })
     }
 
-    /// Where it starts in its buffer, bytes.
-    pub(crate) fn start(&self) -> usize {
-        self.start
-    }
-
-    /// The buffer around it.
-    pub(crate) fn raw(&self) -> vk::Buffer {
-        self.buffer.raw
-    }
-
-    /// All of that buffer.
-    pub(crate) fn binding(&self) -> Binding {
-        Binding::whole(&self.buffer)
-    }
-
     /// Some of its bytes for the host to write, on which no kernel may work.
     pub(crate) fn bytes_mut(&mut self, range: Range<usize>) -> &mut [u8] {
         assert!(range.start <= range.end && range.end <= self.size);
@@ -97,11 +79,6 @@ impl<'a> ImportedMemory<'a> {
         unsafe {
             std::slice::from_raw_parts_mut(self.memory.as_ptr().add(range.start), range.len())
         }
-    }
-
-    /// Says that all work that was submitted has ended, so that dropping need not wait.
-    pub(crate) fn has_come_back(&mut self) {
-        self.is_idle = true;
     }
 }
 

@@ -1,6 +1,7 @@
 //! Work in flight: the host starts one piece of it while the device works on those before, and does
 //! what is left to do when they have been computed.
 
+use std::mem::take;
 use std::ops::Range;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
@@ -57,24 +58,14 @@ const LONG: Duration = Duration::from_millis(100);
 
 impl Stopwatch {
     pub(crate) fn ran(&mut self, spent: Spent, compiled: bool) {
-        let start = self
-            .last
-            .map_or(spent.submitted, |l| l.max(spent.submitted));
-        let waited = spent.finished - start;
-        let took = if spent.on_device.is_zero() {
-            waited
-        } else {
-            spent.on_device
-        };
+        let submitted = spent.submitted;
+        let waited = spent.finished - self.last.map_or(submitted, |last| last.max(submitted));
+        let by_its_clock = Some(spent.on_device).filter(|own| !own.is_zero());
+        let took = by_its_clock.unwrap_or(waited);
         self.slow |= compiled && took > LONG;
         self.timings.submit_to_fence += waited;
         self.timings.on_device += spent.on_device;
         self.last = Some(spent.finished);
-    }
-
-    /// Whether a window took too long since this was last asked.
-    pub(crate) fn is_slow(&mut self) -> bool {
-        std::mem::take(&mut self.slow)
     }
 }
 
@@ -110,7 +101,7 @@ impl<'a> Target<'a> {
     pub(crate) fn place(&self) -> Option<(vk::Buffer, u64)> {
         match self {
             Self::Buffer(buffer) => Some((buffer.raw, 0)),
-            Self::ImportedMemory(memory) => Some((memory.raw(), memory.start() as u64)),
+            Self::ImportedMemory(memory) => Some((memory.buffer.raw, memory.start as u64)),
             Self::External(range) => Some((range.buffer, range.offset)),
             Self::Slice(_) => None,
         }
@@ -133,12 +124,17 @@ impl VulkanEngine {
         let mut next = 0;
         let mut result = work.try_for_each(|work| {
             if next == in_flight.len() {
-                in_flight.push(InFlight::new(&self.device)?);
+                in_flight.push(InFlight {
+                    results: ReadBack::new(&self.device)?,
+                    uploads: U::default(),
+                    done: None,
+                    compiled: false,
+                });
             }
             let own = &mut in_flight[next];
             next = (next + 1) % self.in_flight_count;
             own.finish(target, &mut stopwatch)?;
-            if stopwatch.is_slow() {
+            if take(&mut stopwatch.slow) {
                 self.halve_windows();
             }
             let listing = Instant::now();
@@ -153,9 +149,9 @@ impl VulkanEngine {
             result = result.and(finished.map_err(EvaluateError::from));
         }
         if let (Target::ImportedMemory(memory), Ok(())) = (target, &result) {
-            memory.has_come_back();
+            memory.is_idle = true;
         }
-        if stopwatch.is_slow() {
+        if stopwatch.slow {
             self.halve_windows(); // those of the next call
         }
         if result.is_err() {
@@ -166,16 +162,7 @@ impl VulkanEngine {
     }
 }
 
-impl<U: Default> InFlight<U> {
-    fn new(device: &Arc<LogicalDevice>) -> Result<Self, VulkanError> {
-        Ok(Self {
-            results: ReadBack::new(device)?,
-            uploads: U::default(),
-            done: None,
-            compiled: false,
-        })
-    }
-
+impl<U> InFlight<U> {
     /// Waits for the work, if there is any, and does what is left to do then.
     fn finish(
         &mut self,
@@ -244,6 +231,6 @@ mod tests {
         let timings = stopwatch.timings;
         assert_eq!(timings.submit_to_fence, Duration::from_millis(50 + 10));
         assert_eq!(timings.on_device, Duration::from_millis(4 * 8));
-        assert!(!stopwatch.is_slow());
+        assert!(!stopwatch.slow);
     }
 }

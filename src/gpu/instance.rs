@@ -125,11 +125,7 @@ impl Drop for Instance {
     fn drop(&mut self) {
         if let Some(messenger) = &self.messenger {
             // SAFETY: created from this instance and destroyed once.
-            unsafe {
-                messenger
-                    .functions
-                    .destroy_debug_utils_messenger(messenger.raw, None);
-            }
+            unsafe { (messenger.functions).destroy_debug_utils_messenger(messenger.raw, None) };
         }
         if self.owned {
             // SAFETY: every object created from it holds an `Arc` to this.

@@ -185,12 +185,20 @@ impl PhysicalDevice {
             name.map(|name| name.to_string_lossy().into_owned())
                 .unwrap_or_default()
         };
+        let version = properties.api_version;
+        let heaps = memory.memory_heaps_as_slice().iter();
+        let local = |h: &&vk::MemoryHeap| h.flags.contains(vk::MemoryHeapFlags::DEVICE_LOCAL);
         let driver = [driver.driver_name_as_c_str(), driver.driver_info_as_c_str()];
         let info = DeviceInfo {
             name: text(properties.device_name_as_c_str()),
             driver: driver.map(text).join(" ").trim().to_owned(),
             kind: kind(properties.device_type),
-            api_version: version(properties.api_version),
+            api_version: format!(
+                "{}.{}.{}",
+                vk::api_version_major(version),
+                vk::api_version_minor(version),
+                vk::api_version_patch(version)
+            ),
             vendor_id: properties.vendor_id,
             device_id: properties.device_id,
             uuid: uuid(id.device_uuid),
@@ -199,7 +207,7 @@ impl PhysicalDevice {
             max_compute_work_group_invocations: limits.max_compute_work_group_invocations,
             max_compute_work_group_count: limits.max_compute_work_group_count,
             min_storage_buffer_offset_alignment: limits.min_storage_buffer_offset_alignment,
-            device_local_memory: device_local_memory(&memory),
+            device_local_memory: heaps.filter(local).map(|heap| heap.size).sum(),
             preserves_signed_zero_inf_nan: float_controls.preserve_signed_zero_inf_nan,
             rounds_to_nearest_even: float_controls.round_to_nearest_even,
         };
@@ -313,14 +321,6 @@ impl PhysicalDevice {
     }
 }
 
-fn device_local_memory(memory: &vk::PhysicalDeviceMemoryProperties) -> u64 {
-    let heaps = memory.memory_heaps_as_slice().iter();
-    heaps
-        .filter(|h| h.flags.contains(vk::MemoryHeapFlags::DEVICE_LOCAL))
-        .map(|h| h.size)
-        .sum()
-}
-
 fn kind(device_type: vk::PhysicalDeviceType) -> DeviceKind {
     match device_type {
         vk::PhysicalDeviceType::DISCRETE_GPU => DeviceKind::Discrete,
@@ -336,10 +336,4 @@ fn uuid(bytes: [u8; 16]) -> String {
     let digits: String = bytes.iter().map(|byte| format!("{byte:02x}")).collect();
     let parts = [0..8, 8..12, 12..16, 16..20, 20..32];
     parts.map(|part| &digits[part]).join("-")
-}
-
-fn version(version: u32) -> String {
-    let major = vk::api_version_major(version);
-    let minor = vk::api_version_minor(version);
-    format!("{major}.{minor}.{}", vk::api_version_patch(version))
 }

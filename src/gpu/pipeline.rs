@@ -10,6 +10,7 @@ use ash::vk;
 
 use crate::gpu::buffer::{Buffer, Residence};
 use crate::gpu::device::{Lane, LogicalDevice};
+use crate::gpu::engine::VulkanEngine;
 use crate::gpu::error::{Named, VulkanError};
 use crate::gpu::memory_types::KernelReads;
 
@@ -36,7 +37,6 @@ pub(crate) struct Pipeline {
 }
 
 impl Pipeline {
-    /// The pipeline of a kernel.
     pub(crate) fn new(
         device: &Arc<LogicalDevice>,
         kernel: Kernel,
@@ -78,7 +78,11 @@ impl Pipeline {
         pipeline.layout = unsafe { device.raw.create_pipeline_layout(&info, None) }
             .named("vkCreatePipelineLayout")?;
 
-        let words = words(code, device, exactness);
+        let words = match exactness {
+            Exactness::Demanded => spirv::float_controls(code, device.physical.float_controls),
+            Exactness::LeftToTheDriver => spirv::without_decorations(code),
+        };
+        let words = words.expect("the kernels passed when they were compiled");
         let info = vk::ShaderModuleCreateInfo::default().code(&words);
         // SAFETY: the words are valid SPIR-V: naga made them.
         let module = unsafe { device.raw.create_shader_module(&info, None) }
@@ -110,37 +114,56 @@ impl Pipeline {
         groups: [u32; 3],
         output: &mut [u8],
     ) -> Result<(), VulkanError> {
+        let (name, once) = ("tumble once", KernelReads::Once);
         let mut uploads = Vec::with_capacity(inputs.len());
         for input in inputs {
-            let mut upload = Upload::new("tumble once", KernelReads::Once);
-            upload
-                .room(&self.device, input.len())?
-                .copy_from_slice(input);
+            let mut upload = Upload::default();
+            let room = upload.room(&self.device, name, once, input.len())?;
+            room.copy_from_slice(input);
             uploads.push(upload);
         }
         let bytes = output.len() as u64;
-        let found = Buffer::new(&self.device, "tumble once", bytes, Residence::InPlace)?;
+        let found = Buffer::new(&self.device, name, bytes, Residence::InPlace)?;
         let mut bindings: Vec<Binding> = uploads.iter().filter_map(Upload::binding).collect();
         bindings.push(Binding::whole(&found));
         // Made last: dropped first, it waits for its work before the buffers are freed.
         let mut submission = Submission::new(&self.device, Lane::Kernels)?;
         submission.begin(1)?;
-        Upload::record(uploads.iter(), &mut submission);
+        Upload::record(uploads.iter(), &submission);
         submission.dispatch(self, &bindings, constants, groups)?;
-        submission.barrier(Access::Kernel, Access::Host);
+        (submission.commands()).barrier(Access::Kernel, Access::Host);
         submission.submit()?;
         submission.wait()?;
         output.copy_from_slice(found.bytes(0..output.len()));
         Ok(())
     }
 
-    /// The descriptor type of a binding.
     pub(crate) fn kind(&self, binding: u32) -> vk::DescriptorType {
-        if self.reads_texels && binding + 1 < self.bindings {
-            vk::DescriptorType::UNIFORM_TEXEL_BUFFER
-        } else {
-            vk::DescriptorType::STORAGE_BUFFER
+        match self.reads_texels && binding + 1 < self.bindings {
+            true => vk::DescriptorType::UNIFORM_TEXEL_BUFFER,
+            false => vk::DescriptorType::STORAGE_BUFFER,
         }
+    }
+}
+
+impl VulkanEngine {
+    /// A pass over poses: runs a kernel with these inputs, of at most as many values of 16 bytes as a
+    /// window has rotations. It has so many invocations, and a detail that the kernel is told.
+    pub(crate) fn pass(
+        &self,
+        kernel: Kernel,
+        inputs: &[&[u8]],
+        [count, detail]: [usize; 2],
+        output: &mut [[f32; 4]],
+    ) -> Result<(), VulkanError> {
+        let output = bytemuck::cast_slice_mut(output);
+        for bytes in inputs.iter().copied().chain([&*output]) {
+            self.check_size("poses", bytes)?;
+        }
+        let [count, detail] = [count as u32, detail as u32];
+        let (pipeline, groups) = (self.pipeline(kernel)?, self.workgroups(count));
+        let pass = PoseDispatch { count, detail };
+        pipeline.run_once(inputs, bytemuck::bytes_of(&pass), groups, output)
     }
 }
 
@@ -152,14 +175,6 @@ pub(crate) enum Exactness {
     /// Neither: what the negative control uses, to prove that they matter.
     #[cfg_attr(not(test), expect(dead_code))]
     LeftToTheDriver,
-}
-
-fn words(code: &[u32], device: &LogicalDevice, exactness: Exactness) -> Vec<u32> {
-    let passed = match exactness {
-        Exactness::Demanded => spirv::float_controls(code, device.physical.float_controls),
-        Exactness::LeftToTheDriver => spirv::without_decorations(code),
-    };
-    passed.expect("the kernels passed when they were compiled")
 }
 
 impl Drop for Pipeline {

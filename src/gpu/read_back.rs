@@ -4,11 +4,12 @@
 use std::ops::Range;
 use std::sync::Arc;
 
+use ash::vk;
+
 use crate::gpu::buffer::{Buffer, Residence};
 use crate::gpu::device::{Lane, LogicalDevice};
-use crate::gpu::error::VulkanError;
-use crate::gpu::semaphore::Semaphore;
-use crate::gpu::submission::{Access, Spent, Submission};
+use crate::gpu::error::{Named, VulkanError};
+use crate::gpu::submission::{Access, Point, Spent, Submission};
 
 /// Kernels, and their results on the way. Whoever has one drops it before what else the kernels use.
 pub(crate) struct ReadBack {
@@ -49,7 +50,7 @@ impl ReadBack {
         if !staged {
             return grow(device, &mut self.output, size, Residence::InPlace);
         }
-        if self.apart.is_none() && device.copies_apart() {
+        if self.apart.is_none() && device.copies_apart {
             self.apart = Some(CopyApart {
                 submission: Submission::new(device, Lane::Copies)?,
                 done: Semaphore::new(device)?,
@@ -64,21 +65,21 @@ impl ReadBack {
     pub(crate) fn submit(&mut self, size: Option<u64>) -> Result<(), VulkanError> {
         let kernels = &mut self.kernels;
         let (Some(size), Some(output), Some(host)) = (size, &self.output, &self.host) else {
-            kernels.barrier(Access::Kernel, Access::Host);
+            (kernels.commands()).barrier(Access::Kernel, Access::Host);
             return kernels.submit();
         };
         let size = size.max(4); // no copy may be of nothing, and no buffer is shorter
         let Some(CopyApart { submission, done }) = &mut self.apart else {
-            kernels.barrier(Access::Kernel, Access::Copy);
-            kernels.copy(output, host, size);
-            kernels.barrier(Access::Copy, Access::Host);
+            (kernels.commands()).barrier(Access::Kernel, Access::Copy);
+            (kernels.commands()).copy(output, host, size);
+            (kernels.commands()).barrier(Access::Copy, Access::Host);
             return kernels.submit();
         };
         // The semaphore orders the copy and makes the kernels' writes visible to it: there is no
         // barrier in between, and none that the next kernels would wait for.
         submission.begin(0)?;
-        submission.copy(output, host, size);
-        submission.barrier(Access::Copy, Access::Host);
+        (submission.commands()).copy(output, host, size);
+        (submission.commands()).barrier(Access::Copy, Access::Host);
         let point = done.advance();
         kernels.submit_between(None, Some(point))?;
         submission.submit_between(Some(point), None)
@@ -108,6 +109,50 @@ impl ReadBack {
     }
 }
 
+/// A timeline semaphore, whose device has that feature: what one queue has reached, for another that
+/// waits.
+struct Semaphore {
+    device: Arc<LogicalDevice>,
+    raw: vk::Semaphore,
+    /// The value of the point that was given last.
+    last: u64,
+}
+
+impl Semaphore {
+    fn new(device: &Arc<LogicalDevice>) -> Result<Self, VulkanError> {
+        let mut kind =
+            vk::SemaphoreTypeCreateInfo::default().semaphore_type(vk::SemaphoreType::TIMELINE);
+        let info = vk::SemaphoreCreateInfo::default().push_next(&mut kind);
+        // SAFETY: the device is alive, with the feature; what is made is destroyed in `drop`.
+        let raw = unsafe { device.raw.create_semaphore(&info, None) }.named("vkCreateSemaphore")?;
+        device.name(raw, "tumble kernels done");
+        Ok(Self {
+            device: Arc::clone(device),
+            raw,
+            last: 0,
+        })
+    }
+
+    /// The next point, later than all that were given before. One that is never reached, because
+    /// its submission failed, does no harm.
+    fn advance(&mut self) -> Point {
+        self.last += 1;
+        (self.raw, self.last)
+    }
+}
+
+impl Drop for Semaphore {
+    fn drop(&mut self) {
+        if self.device.may_destroy() {
+            // Fences say that copies have ended. But Mesa's drivers that make timelines of plain
+            // semaphores let go of them a moment after they signal the fence.
+            self.device.settle();
+            // SAFETY: created from this device; whoever submits with it waits for that before.
+            unsafe { self.device.raw.destroy_semaphore(self.raw, None) };
+        }
+    }
+}
+
 /// A kept buffer of at least `size` bytes, which is replaced if it is shorter.
 fn grow<'b>(
     device: &Arc<LogicalDevice>,
@@ -116,7 +161,7 @@ fn grow<'b>(
     residence: Residence,
 ) -> Result<&'b Buffer, VulkanError> {
     // A shorter one is freed before the new one is made, so that both need not fit.
-    let own = kept.take().filter(|buffer| buffer.size() >= size);
+    let own = kept.take().filter(|buffer| buffer.size >= size);
     let own = own.map_or_else(
         || Buffer::new(device, "tumble results", size, residence),
         Ok,

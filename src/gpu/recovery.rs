@@ -4,6 +4,7 @@
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
 
+use crate::gpu::device::LogicalDevice;
 use crate::gpu::engine::{ClipBuffers, VulkanEngine, lock};
 use crate::gpu::error::{EvaluateError, VulkanError};
 use crate::gpu::options::EngineOptions;
@@ -23,26 +24,6 @@ pub(crate) struct Opened {
     pub(crate) info: DeviceInfo,
 }
 
-/// An error that may come from a Vulkan device.
-pub(crate) trait OfDevice: From<VulkanError> {
-    fn vulkan(&self) -> Option<&VulkanError>;
-}
-
-impl OfDevice for VulkanError {
-    fn vulkan(&self) -> Option<&VulkanError> {
-        Some(self)
-    }
-}
-
-impl OfDevice for EvaluateError {
-    fn vulkan(&self) -> Option<&VulkanError> {
-        match self {
-            Self::Vulkan(error) => Some(error),
-            Self::Set(_) => None,
-        }
-    }
-}
-
 impl Opened {
     /// Opens a device and runs the self-test; refuses a device that fails it, unless the options
     /// allow inexact ones.
@@ -50,7 +31,10 @@ impl Opened {
         physical: &PhysicalDevice,
         options: &EngineOptions,
     ) -> Result<Self, VulkanError> {
-        let open = || Self::trusted(VulkanEngine::new(physical.clone(), options)?, options);
+        let open = || {
+            let device = LogicalDevice::new(physical.clone(), options)?;
+            Self::trusted(VulkanEngine::new(device, options), options)
+        };
         for _ in 0..REOPENINGS {
             match open() {
                 Err(error) if error.is_lost() => {}
@@ -79,18 +63,18 @@ impl Opened {
 
     /// Runs `work`. When the device is lost, opens it again and repeats the work, at most three
     /// times; repeated work gives the same bits.
-    pub(crate) fn attempt<T, E: OfDevice>(
+    fn attempt<T>(
         &self,
-        mut work: impl FnMut(&VulkanEngine) -> Result<T, E>,
-    ) -> Result<T, E> {
+        mut work: impl FnMut(&VulkanEngine) -> Result<T, EvaluateError>,
+    ) -> Result<T, EvaluateError> {
         for _ in 0..REOPENINGS {
             let engine = self.engine();
             match work(&engine) {
-                Err(error) if error.vulkan().is_some_and(VulkanError::is_lost) => {
+                Err(EvaluateError::Vulkan(error)) if error.is_lost() => {
                     match self.reopen(&engine) {
                         Ok(true) => {}
                         Err(again) if again.is_lost() => {}
-                        Ok(false) => return Err(error),
+                        Ok(false) => return Err(error.into()),
                         Err(other) => return Err(other.into()),
                     }
                 }
@@ -106,37 +90,34 @@ impl Opened {
         &self,
         clip: &ClipData,
         mut spare: Option<ClipBuffers>,
-    ) -> Result<ClipBuffers, VulkanError> {
+    ) -> Result<ClipBuffers, EvaluateError> {
         self.attempt(|engine| match engine.upload(clip, spare.take()) {
             Err(error) if error.is_out_of_memory() && engine.give_back() => {
-                engine.upload(clip, None)
+                Ok(engine.upload(clip, None)?)
             }
-            done => done,
+            done => Ok(done?),
         })
     }
 
     /// As [`Opened::attempt`]; when memory runs out, repeats the work in windows half as large,
     /// down to 1 MiB.
-    pub(crate) fn attempt_smaller<T, E: OfDevice>(
+    pub(crate) fn attempt_smaller<T>(
         &self,
-        mut work: impl FnMut(&VulkanEngine) -> Result<T, E>,
-    ) -> Result<T, E> {
+        mut work: impl FnMut(&VulkanEngine) -> Result<T, EvaluateError>,
+    ) -> Result<T, EvaluateError> {
         loop {
-            let done = self.attempt(&mut work);
-            let short = |error: &E| error.vulkan().is_some_and(VulkanError::is_out_of_memory);
-            match done {
-                Err(error) if short(&error) && self.shrink() => {}
+            match self.attempt(&mut work) {
+                Err(EvaluateError::Vulkan(error)) if error.is_out_of_memory() => {
+                    let engine = self.engine();
+                    engine.give_back();
+                    // At their minimum, another attempt would fail as well.
+                    if !engine.halve_windows() {
+                        return Err(error.into());
+                    }
+                }
                 done => return done,
             }
         }
-    }
-
-    /// Frees kept buffers and halves the windows; false when these are at their minimum, so that
-    /// another attempt would fail as well.
-    fn shrink(&self) -> bool {
-        let engine = self.engine();
-        engine.give_back();
-        engine.halve_windows()
     }
 
     /// Opens a lost device again and replaces it; false for an application's own, which only the
@@ -146,10 +127,11 @@ impl Opened {
         if !Arc::ptr_eq(&current, lost) {
             return Ok(true); // another thread was faster
         }
-        if !lost.device.is_owned() {
+        if !lost.device.owned {
             return Ok(false);
         }
-        let engine = VulkanEngine::new(lost.device.physical.clone(), &self.options)?;
+        let device = LogicalDevice::new(lost.device.physical.clone(), &self.options)?;
+        let engine = VulkanEngine::new(device, &self.options);
         engine.window.store(lost.window(), Ordering::Relaxed);
         trust(&engine, &self.options)?;
         *current = Arc::new(engine);

@@ -11,7 +11,7 @@ use crate::gpu::upload::Upload;
 use crate::gpu::work_list::WorkLists;
 use crate::output::encoding::Encoding;
 use crate::output::window::Window;
-use crate::shader::{Dispatch, Kernel, LINE, WORKGROUP};
+use crate::shader::{Dispatch, Grid, Kernel, LINE, WORKGROUP};
 
 /// Bytes of the lines in which a card's memory is written, at most.
 const LINE_BYTES: u64 = 128;
@@ -47,7 +47,6 @@ impl VulkanEngine {
         )
     }
 
-    /// Submits one window.
     fn start(
         &self,
         own: &mut InFlight<WorkLists>,
@@ -72,9 +71,10 @@ impl VulkanEngine {
         let lists = &mut own.uploads;
         let work = lists.list(self, clip, job.timeline, window, shift as u32)?;
 
+        let staged = !self.device.placing.in_place;
         let buffer = match place {
             Some((buffer, _)) => buffer,
-            None => (own.results.room(&self.device, size, !self.in_place)?).raw,
+            None => (own.results.room(&self.device, size, staged)?).raw,
         };
         let rotations = Binding::range(buffer, aligned, size);
         let kernels = &mut own.results.kernels;
@@ -92,17 +92,17 @@ impl VulkanEngine {
             if item_count == 0 {
                 continue;
             }
-            let buffers = &job.buffers.groups[group.group];
-            let mut bindings = vec![
-                Binding::whole(&buffers.segments),
-                Binding::whole(&buffers.constants),
-            ];
+            let (segments, constants) = &job.buffers.groups[group.group];
+            let mut bindings = vec![Binding::whole(segments), Binding::whole(constants)];
             bindings.extend(&listed);
             bindings.push(rotations);
             let (grid, dispatch);
             let (arguments, groups) = match group.grid {
                 Some(of_group) => {
-                    grid = of_group.arguments(detail);
+                    grid = Grid {
+                        detail,
+                        ..of_group.arguments
+                    };
                     let most = info.max_compute_work_group_count[0];
                     (bytemuck::bytes_of(&grid), of_group.workgroups(most))
                 }
@@ -129,15 +129,16 @@ impl VulkanEngine {
         }
         let mut patches = work.patches;
         if let Target::External(range) = target {
-            kernels.barrier(Access::Kernel, Access::Copy);
+            let commands = kernels.commands();
+            commands.barrier(Access::Kernel, Access::Copy);
             let mut value_bytes = vec![0; encoding.bytes()];
             for (place, value) in patches.drain(..) {
                 encoding.encode_all(&[value], &mut value_bytes);
                 let offset = start + place as u64 * rotation;
-                kernels.update(range.buffer, offset, &value_bytes);
+                commands.update(range.buffer, offset, &value_bytes);
             }
-            kernels.barrier(Access::Kernel, Access::Any);
-            kernels.barrier(Access::Copy, Access::Any);
+            commands.barrier(Access::Kernel, Access::Any);
+            commands.barrier(Access::Copy, Access::Any);
             kernels.submit()?;
         } else {
             own.results.submit(place.is_none().then_some(size))?;

@@ -2,6 +2,7 @@
 //! which samples are stored. It serves dense keys (no more samples than spans) and sparse times (a
 //! few explicit times of each track, such as a crowd's poses); other windows are listed by runs.
 
+use bytemuck::Zeroable as _;
 use rayon::prelude::*;
 
 use crate::cpu::evaluate::SAMPLES_ONE_BY_ONE;
@@ -86,10 +87,8 @@ impl<'a> SampleList<'a> {
 
     /// Where the samples of a part begin in the window; `before` is the part listed before it.
     fn start(&self, prepared: &Prepared, part: &Part, before: Option<&Part>) -> usize {
-        let Window {
-            samples, tracks, ..
-        } = self.window;
-        let row = (part.track as usize - tracks.start) * samples.len();
+        let samples = &self.window.samples;
+        let row = (part.track as usize - self.window.tracks.start) * samples.len();
         let Ticks::Frames { rate, start } = self.timeline.ticks else {
             return row;
         };
@@ -145,14 +144,12 @@ impl<'a> SampleList<'a> {
                 chunk.result.map(|()| chunk.patches)
             })
             .collect();
-        let mut patches = Vec::new();
-        for own in chunks {
-            patches.append(&mut own?);
-        }
+        // Of several errors the first counts.
+        let patches = chunks.into_iter().collect::<Result<Vec<_>, _>>()?;
         Ok(Work {
             list: List::Samples,
             groups,
-            patches,
+            patches: patches.concat(),
         })
     }
 }
@@ -176,9 +173,7 @@ struct SampleChunk<'a> {
 impl InLanes for SampleChunk<'_> {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
-        let SampleList {
-            timeline, window, ..
-        } = *self.all;
+        let (timeline, window) = (self.all.timeline, self.all.window);
         if let Ticks::Times { times, stride } = &timeline.ticks
             && window.samples.len() <= SAMPLES_ONE_BY_ONE
         {
@@ -201,7 +196,6 @@ impl InLanes for SampleChunk<'_> {
 /// A sample outside every segment, or one that the host computes in f64.
 const NOTHING: ListedSample = held(0);
 
-/// A sample that is a constant.
 const fn held(constant: u32) -> ListedSample {
     ListedSample {
         source: constant | IS_CONSTANT,
@@ -213,9 +207,7 @@ impl Emit for SampleChunk<'_> {
     /// Lists the samples of a run that belong to this chunk and are not listed yet.
     #[inline(always)]
     fn run(&mut self, run: Run) {
-        let SampleList {
-            timeline, window, ..
-        } = *self.all;
+        let (timeline, window) = (self.all.timeline, self.all.window);
         let track = self.track;
         let place = window.place(track, run.sample);
         // A sample within rounding of the boundary between two parts may come from both: the first
@@ -262,7 +254,7 @@ impl SampleChunk<'_> {
     #[inline(always)]
     fn list_sparse_times(&mut self, times: &[f64], stride: usize) {
         let samples = self.all.window.samples.clone();
-        let mut found = TimeLanes::new();
+        let mut found = TimeLanes::zeroed();
         for parts in self.parts.chunks(TimeLanes::LEN / samples.len().max(1)) {
             found.count = 0;
             for part in parts {

@@ -69,7 +69,12 @@ pub(crate) fn run(engine: &VulkanEngine) -> Result<Vec<SelfTestReport>, VulkanEr
             let mut found = expected.clone();
             cpu.evaluate(&clip, &timeline, &whole, &mut expected)
                 .expect("short gaps");
-            let job = Job::new(&clip, &buffers, &timeline, Encoding::F32);
+            let job = Job {
+                clip: &clip,
+                buffers: &buffers,
+                timeline: &timeline,
+                encoding: Encoding::F32,
+            };
             match engine.evaluate_into(job, &whole, bytemuck::cast_slice_mut(&mut found)) {
                 Err(EvaluateError::Vulkan(error)) => return Err(error),
                 done => done.expect("short gaps"),
@@ -105,7 +110,6 @@ fn hostile_set() -> TrackSet {
     set
 }
 
-/// One of a reply's results.
 type Value = fn(&Reply) -> f32;
 
 /// The single expressions of `shaders/self_test.wgsl`.
@@ -169,18 +173,9 @@ fn probes() -> Vec<Probe> {
         })
         .collect();
     let half_ulp = f32::EPSILON / 2.0;
-    for (a, c) in [
-        (1.0, half_ulp),
-        (1.0 + f32::EPSILON, half_ulp),
-        (-1.0, -half_ulp),
-    ] {
-        probes.push(Probe {
-            a,
-            b: half_ulp,
-            c,
-            n: (1 << 24) + 1,
-        });
-    }
+    let (even, odd) = ((1.0, half_ulp), (1.0 + f32::EPSILON, half_ulp));
+    let (b, n) = (half_ulp, (1 << 24) + 1);
+    probes.extend([even, odd, (-1.0, -half_ulp)].map(|(a, c)| Probe { a, b, c, n }));
     probes
 }
 

@@ -6,12 +6,10 @@ use std::time::{Duration, Instant};
 use ash::vk;
 
 use crate::gpu::buffer::Buffer;
-use crate::gpu::commands::Commands;
 use crate::gpu::descriptors::DescriptorPool;
 use crate::gpu::device::{Lane, LogicalDevice};
 use crate::gpu::error::{Named, VulkanError};
 use crate::gpu::pipeline::Pipeline;
-use crate::gpu::semaphore::Point;
 
 /// A dispatch takes milliseconds; a device that needs this long has hung.
 const TIMEOUT_SECONDS: u64 = 60;
@@ -42,6 +40,9 @@ pub(crate) struct Spent {
     pub(crate) on_device: Duration,
 }
 
+/// A point on the timeline of a semaphore.
+pub(crate) type Point = (vk::Semaphore, u64);
+
 /// A range of a buffer that a kernel sees.
 #[derive(Clone, Copy)]
 pub(crate) struct Binding {
@@ -63,13 +64,12 @@ impl Binding {
         }
     }
 
-    /// All of a buffer.
     pub(crate) fn whole(buffer: &Buffer) -> Self {
         Self {
             buffer: buffer.raw,
             view: buffer.view,
             offset: 0,
-            size: buffer.size(),
+            size: buffer.size,
         }
     }
 }
@@ -170,27 +170,6 @@ impl Submission {
         Ok(())
     }
 
-    /// Records a copy of `size` bytes.
-    pub(crate) fn copy(&mut self, from: &Buffer, to: &Buffer, size: u64) {
-        let region = [vk::BufferCopy::default().size(size)];
-        // SAFETY: recording is on, and both ranges lie within their buffers.
-        unsafe {
-            self.device
-                .raw
-                .cmd_copy_buffer(self.commands, from.raw, to.raw, &region);
-        }
-    }
-
-    /// Records that some bytes, a multiple of 4, are written into a buffer.
-    pub(crate) fn update(&mut self, to: vk::Buffer, offset: u64, bytes: &[u8]) {
-        self.commands().update(to, offset, bytes);
-    }
-
-    /// Records a barrier: what `from` wrote before it is visible to `to` after it.
-    pub(crate) fn barrier(&mut self, from: Access, to: Access) {
-        self.commands().barrier(from, to);
-    }
-
     /// Ends recording and hands the work to the queue.
     pub(crate) fn submit(&mut self) -> Result<(), VulkanError> {
         self.submit_between(None, None)
@@ -212,10 +191,8 @@ impl Submission {
         // SAFETY: recording is on.
         unsafe { raw.end_command_buffer(self.commands) }.named("vkEndCommandBuffer")?;
         let commands = [self.commands];
-        let values = |point: Option<Point>| point.map(|point| point.value);
-        let semaphores = |point: Option<Point>| point.map(|point| point.semaphore);
-        let (waits, signals) = (semaphores(after), semaphores(reached));
-        let (wait_values, signal_values) = (values(after), values(reached));
+        let (waits, wait_values) = after.unzip();
+        let (signals, signal_values) = reached.unzip();
         let mut timelines = vk::TimelineSemaphoreSubmitInfo::default()
             .wait_semaphore_values(wait_values.as_slice())
             .signal_semaphore_values(signal_values.as_slice());
@@ -244,11 +221,7 @@ impl Submission {
         let raw = &self.device.raw;
         let fences = [self.fence];
         // A device that has hung is not waited for again.
-        let seconds = if self.device.may_destroy() {
-            TIMEOUT_SECONDS
-        } else {
-            0
-        };
+        let seconds = TIMEOUT_SECONDS * u64::from(self.device.may_destroy());
         let timeout = seconds * 1_000_000_000;
         // SAFETY: the fence belongs to this device.
         match unsafe { raw.wait_for_fences(&fences, true, timeout) } {
@@ -286,6 +259,80 @@ impl Submission {
             }
         }
         Ok(Some(spent))
+    }
+}
+
+/// A command buffer in recording: a submission's, or one of an application's own.
+#[derive(Clone, Copy)]
+pub(crate) struct Commands<'a> {
+    device: &'a ash::Device,
+    raw: vk::CommandBuffer,
+}
+
+impl<'a> Commands<'a> {
+    /// # Safety
+    /// The command buffer must be of this device, in recording, outside of a render pass, and its queue
+    /// must be able to do what is recorded. What is recorded may use only objects of this device, which
+    /// must live until the work has ended.
+    pub(crate) unsafe fn new(device: &'a LogicalDevice, raw: vk::CommandBuffer) -> Self {
+        let device = &device.raw;
+        Self { device, raw }
+    }
+
+    /// Records a dispatch with the buffers of a set.
+    pub(crate) fn dispatch(
+        self,
+        pipeline: &Pipeline,
+        set: vk::DescriptorSet,
+        constants: &[u8],
+        [x, y, z]: [u32; 3],
+    ) {
+        let (device, layout) = (self.device, pipeline.layout);
+        let compute = vk::PipelineBindPoint::COMPUTE;
+        let stage = vk::ShaderStageFlags::COMPUTE;
+        // SAFETY: recording is on, and set and pipeline belong to this device (`new`).
+        unsafe {
+            device.cmd_bind_pipeline(self.raw, compute, pipeline.raw);
+            device.cmd_bind_descriptor_sets(self.raw, compute, layout, 0, &[set], &[]);
+            device.cmd_push_constants(self.raw, layout, stage, 0, constants);
+            device.cmd_dispatch(self.raw, x, y, z);
+        }
+    }
+
+    /// Records a copy of `size` bytes.
+    pub(crate) fn copy(self, from: &Buffer, to: &Buffer, size: u64) {
+        let region = [vk::BufferCopy::default().size(size)];
+        // SAFETY: as in `dispatch`; both ranges lie within their buffers.
+        unsafe { (self.device).cmd_copy_buffer(self.raw, from.raw, to.raw, &region) };
+    }
+
+    /// Records that some bytes, a multiple of 4 and at most 65 536, are written into a buffer.
+    pub(crate) fn update(self, to: vk::Buffer, offset: u64, bytes: &[u8]) {
+        // SAFETY: as in `dispatch`; the range lies within the buffer, and the bytes are few and copied
+        // into the commands.
+        unsafe { self.device.cmd_update_buffer(self.raw, to, offset, bytes) };
+    }
+
+    /// Records a barrier: what `from` wrote before it is visible to `to` after it.
+    pub(crate) fn barrier(self, from: Access, to: Access) {
+        let (source_stage, source_access) = from.scope(true);
+        let (destination_stage, destination_access) = to.scope(false);
+        let memory = [vk::MemoryBarrier::default()
+            .src_access_mask(source_access)
+            .dst_access_mask(destination_access)];
+        let none = vk::DependencyFlags::empty();
+        // SAFETY: as in `dispatch`.
+        unsafe {
+            self.device.cmd_pipeline_barrier(
+                self.raw,
+                source_stage,
+                destination_stage,
+                none,
+                &memory,
+                &[],
+                &[],
+            );
+        }
     }
 }
 

@@ -9,9 +9,8 @@ use crate::gpu::memory_types::{KernelReads, Place};
 use crate::gpu::submission::{Access, Binding, Submission};
 
 /// Bytes for kernels, in memory that is kept for the next ones.
+#[derive(Default)]
 pub(crate) struct Upload {
-    name: &'static str,
-    reads: KernelReads,
     /// Where the host writes.
     written: Option<Buffer>,
     /// The device's own copy, where there is one.
@@ -21,32 +20,23 @@ pub(crate) struct Upload {
 }
 
 impl Upload {
-    pub(crate) const fn new(name: &'static str, reads: KernelReads) -> Self {
-        Self {
-            name,
-            reads,
-            written: None,
-            copied: None,
-            used: 0,
-        }
-    }
-
     /// Room for as many bytes, on which no kernel may work. It may be memory that is fast only to
     /// write, and in order (write-combined): the host must write all of it, from the first byte on,
     /// and must not read it.
     pub(crate) fn room(
         &mut self,
         device: &Arc<LogicalDevice>,
+        name: &str,
+        reads: KernelReads,
         bytes: usize,
     ) -> Result<&mut [u8], VulkanError> {
         let size = bytes as u64;
-        if self.written.as_ref().is_none_or(|own| own.size() < size) {
+        if self.written.as_ref().is_none_or(|own| own.size < size) {
             // Shorter ones are freed before new ones are made, so that both need not fit.
             (self.written, self.copied) = (None, None);
-            let (written, is_staged) = writable(device, self.name, size, self.reads)?;
+            let (written, is_staged) = writable(device, name, size, reads)?;
             if is_staged {
-                let copied = Buffer::new(device, self.name, size, Residence::Device)?;
-                self.copied = Some(copied);
+                self.copied = Some(Buffer::new(device, name, size, Residence::Device)?);
             }
             self.written = Some(written);
         }
@@ -56,19 +46,19 @@ impl Upload {
     }
 
     /// Records the copies of some uploads, where any of them are copied, and that kernels wait.
-    pub(crate) fn record<'u>(uploads: impl Iterator<Item = &'u Self>, submission: &mut Submission) {
+    pub(crate) fn record<'u>(uploads: impl Iterator<Item = &'u Self>, submission: &Submission) {
         let mut any = false;
         for upload in uploads {
             if let (Some(from), Some(to)) = (&upload.written, &upload.copied)
                 && upload.used > 0
             {
                 let size = (upload.used as u64).next_multiple_of(4);
-                submission.copy(from, to, size);
+                submission.commands().copy(from, to, size);
                 any = true;
             }
         }
         if any {
-            submission.barrier(Access::Copy, Access::Kernel);
+            (submission.commands()).barrier(Access::Copy, Access::Kernel);
         }
     }
 

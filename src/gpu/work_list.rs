@@ -63,13 +63,10 @@ impl GroupWork {
     pub(crate) fn item_count(&self) -> usize {
         self.chunks.iter().map(|chunk| chunk.items.len()).sum()
     }
-
-    pub(crate) fn distance_count(&self) -> usize {
-        self.chunks.iter().map(|chunk| chunk.distances.len()).sum()
-    }
 }
 
 /// The lists of a window on their way to the device, in memory that is kept for the next window.
+#[derive(Default)]
 pub(crate) struct WorkLists {
     /// Items, or the samples of a sample list.
     items: Upload,
@@ -80,18 +77,6 @@ pub(crate) struct WorkLists {
     spare: Vec<WorkChunk>,
     /// Blocks before they are uploaded.
     listed_blocks: Vec<Block>,
-}
-
-impl Default for WorkLists {
-    fn default() -> Self {
-        Self {
-            items: Upload::new("tumble items", KernelReads::Often),
-            distances: Upload::new("tumble distances", KernelReads::Often),
-            blocks: Upload::new("tumble blocks", KernelReads::Often),
-            spare: Vec::new(),
-            listed_blocks: Vec::new(),
-        }
-    }
 }
 
 impl WorkLists {
@@ -106,10 +91,10 @@ impl WorkLists {
         window: &Window,
         shift: u32,
     ) -> Result<Work, EvaluateError> {
-        let device = &engine.device;
+        let (device, often) = (&engine.device, KernelReads::Often);
         if let Some(list) = SampleList::new(clip, timeline, window) {
             let bytes = window.len() * size_of::<ListedSample>();
-            let place = self.items.room(device, bytes)?;
+            let place = self.items.room(device, "tumble items", often, bytes)?;
             return Ok(list.write(bytemuck::cast_slice_mut(place), shift)?);
         }
         let mut rows = GridRows::new(window, shift).filter(|_| engine.maps_samples);
@@ -124,13 +109,14 @@ impl WorkLists {
             lists = work(clip, timeline, window, shift, Cut::Short, &mut self.spare)?;
         }
 
+        let chunks = lists.iter().flat_map(|list| &list.chunks);
         let item_count: usize = lists.iter().map(GroupWork::item_count).sum();
-        let distance_count: usize = lists.iter().map(GroupWork::distance_count).sum();
+        let distance_count: usize = chunks.map(|chunk| chunk.distances.len()).sum();
         // A grid has one item without samples after all others.
         let item_bytes = (item_count + usize::from(rows.is_some())) * size_of::<Item>();
-        let items = self.items.room(device, item_bytes)?;
-        let distance_bytes = distance_count * size_of::<f32>();
-        let distances = self.distances.room(device, distance_bytes)?;
+        let items = (self.items).room(device, "tumble items", often, item_bytes)?;
+        let bytes = distance_count * size_of::<f32>();
+        let distances = (self.distances).room(device, "tumble distances", often, bytes)?;
         let (items, nothing) = bytemuck::cast_slice_mut(items).split_at_mut(item_count);
         nothing.fill(Item::zeroed());
         write(&lists, rows, items, bytemuck::cast_slice_mut(distances));
@@ -140,7 +126,8 @@ impl WorkLists {
             self.listed_blocks.resize(blocks, Block::zeroed());
             write_blocks(&lists, &grids, item_count as u32, &mut self.listed_blocks);
             let bytes: &[u8] = bytemuck::cast_slice(&self.listed_blocks);
-            copy(self.blocks.room(device, bytes.len())?, bytes);
+            let room = (self.blocks).room(device, "tumble blocks", often, bytes.len())?;
+            copy(room, bytes);
         }
 
         let is_timed = matches!(timeline.ticks, Ticks::Times { .. });

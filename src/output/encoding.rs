@@ -418,10 +418,9 @@ impl Encoding {
 /// The rotation of a matrix whose rows, or columns if `order` is 1, start `length` numbers apart.
 fn of_matrix(number: &Numbers, length: usize, order: u32) -> [f32; 4] {
     let columns = Mat3::from_cols_array(&std::array::from_fn(|i| number(i / 3 * length + i % 3)));
-    let matrix = if order == 0 {
-        columns.transpose()
-    } else {
-        columns
+    let matrix = match order {
+        0 => columns.transpose(),
+        _ => columns,
     };
     Quat::from_mat3(&matrix).to_array()
 }

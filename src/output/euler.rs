@@ -33,16 +33,10 @@ impl EulerSequence {
     /// All 24: twelve intrinsic ones, then twelve extrinsic ones.
     #[must_use]
     pub fn all() -> Vec<Self> {
-        let mut all = Vec::new();
-        for intrinsic in [true, false] {
-            for code in 0..27u8 {
-                let axes = [code / 9, code / 3 % 3, code % 3];
-                if axes[0] != axes[1] && axes[1] != axes[2] {
-                    all.push(Self { axes, intrinsic });
-                }
-            }
-        }
-        all
+        let axes = (0..27u8).map(|code| [code / 9, code / 3 % 3, code % 3]);
+        let axes = axes.filter(|[i, j, k]| i != j && j != k);
+        let all = |intrinsic| axes.clone().map(move |axes| Self { axes, intrinsic });
+        all(true).chain(all(false)).collect()
     }
 
     /// The axes in the order of the angles: 0, 1, 2 for x, y, z.
@@ -96,11 +90,8 @@ impl EulerSequence {
     pub(crate) fn decode(degrees: &dyn Fn(usize) -> f32, detail: u32) -> [f32; 4] {
         let axis = |place: u32| Vec3::AXES[(detail >> (2 * place) & 3) as usize];
         let last_axis = axis(if detail & SYMMETRIC != 0 { 0 } else { 2 });
-        let (first, last) = if detail & INTRINSIC != 0 {
-            (2, 0)
-        } else {
-            (0, 2)
-        };
+        let is_intrinsic = detail & INTRINSIC != 0;
+        let (first, last) = if is_intrinsic { (2, 0) } else { (0, 2) };
         let turn = |axis, angle| Quat::from_axis_angle(axis, degrees(angle).to_radians());
         (turn(last_axis, last) * turn(axis(1), 1) * turn(axis(0), first)).to_array()
     }
@@ -109,9 +100,8 @@ impl EulerSequence {
 impl fmt::Display for EulerSequence {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let letters = if self.intrinsic { "XYZ" } else { "xyz" };
-        let axes = self.axes.map(usize::from);
-        axes.iter()
-            .try_for_each(|&axis| f.write_str(&letters[axis..=axis]))
+        let mut axes = self.axes().into_iter();
+        axes.try_for_each(|axis| f.write_str(&letters[axis..=axis]))
     }
 }
 

@@ -15,17 +15,20 @@ pub(crate) struct Window {
 }
 
 impl Window {
-    /// All of a result.
     pub(crate) fn whole(tracks: usize, samples: usize, layout: Layout) -> Self {
+        Self::of(0..tracks, 0..samples, layout)
+    }
+
+    /// Some samples of some tracks, as a result of its own.
+    pub(crate) fn of(tracks: Range<usize>, samples: Range<usize>, layout: Layout) -> Self {
         Self {
             start: 0,
-            tracks: 0..tracks,
-            samples: 0..samples,
+            tracks,
+            samples,
             layout,
         }
     }
 
-    /// Number of rotations.
     pub(crate) fn len(&self) -> usize {
         self.tracks.len() * self.samples.len()
     }
@@ -71,17 +74,13 @@ impl Window {
             };
             let window = Self {
                 start,
-                tracks,
-                samples,
-                layout,
+                ..Self::of(tracks, samples, layout)
             };
             start += window.len();
             window
         })
     }
-}
 
-impl Window {
     /// Cuts it further; the new windows start in the result that this one was cut from.
     pub(crate) fn within(&self, limit: usize) -> impl Iterator<Item = Self> + use<> {
         let first = self.start;

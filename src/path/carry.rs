@@ -104,7 +104,9 @@ impl Uncarried {
                 let own @ Waiting { stretch, from, to } = waiting[place];
                 let middle = 0.5 * (from + to);
                 let is_finest = to - from <= SHORTEST || counts[stretch] > MOST_PIECES;
-                if !block.fits(lane) && !is_finest && from < middle && middle < to {
+                let rolled = &block.rolled;
+                let is_exact = rolled.least[lane] > 0.5 && rolled.rest[lane] <= TOLERANCE;
+                if !is_exact && !is_finest && from < middle && middle < to {
                     counts[stretch] += 1;
                     for (from, to) in [(from, middle), (middle, to)] {
                         waiting.push(Waiting { stretch, from, to });
@@ -127,7 +129,6 @@ impl Uncarried {
         Self { pieces, firsts }
     }
 
-    /// A stretch's pieces.
     fn of(&self, stretch: usize) -> &[Unturned] {
         &self.pieces[self.firsts[stretch]..self.firsts[stretch + 1]]
     }
@@ -197,11 +198,6 @@ impl Block {
             ends: &ends,
             own: &mut self.rolled,
         });
-    }
-
-    /// Whether the roll of a lane's piece is exact.
-    fn fits(&self, lane: usize) -> bool {
-        self.rolled.least[lane] > 0.5 && self.rolled.rest[lane] <= TOLERANCE
     }
 
     fn unturned(&self, lane: usize, Waiting { stretch, from, to }: Waiting) -> Unturned {

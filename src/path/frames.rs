@@ -4,8 +4,8 @@ use std::ops::Range;
 
 use glam::{DQuat, DVec3, Vec3};
 
-use crate::path::axes;
 use crate::path::carry::{Piece, Uncarried, about_z, around_corner, least_turn};
+use crate::path::lanes;
 use crate::path::options::{Follow, Frame, Twist};
 use crate::path::polynomial::Polynomial;
 use crate::path::rolls::{Rolls, unwrapped, wrapped};
@@ -146,9 +146,10 @@ impl Frames {
                 let x = side.as_ref().map(|own| signed(own, 0.5 * (from + to)));
                 let end = part.way(&self.route, to)[0];
                 self.turns.push(Turn::Fixed(x, kept));
-                kept = match x {
-                    Some(x) => across(x.at(to), end),
-                    None => side_at(up, end, kept),
+                kept = match (x, up.cross(end)) {
+                    (Some(x), _) => across(x.at(to), end),
+                    (None, side) if side.length() < UPRIGHT => across(kept, end),
+                    (None, side) => side.normalize(),
                 };
                 cut.push(part);
             }
@@ -323,22 +324,12 @@ impl Frames {
 /// The rotation that takes z to a direction and x as near as possible to a side.
 fn of_axes(side: DVec3, way: DVec3) -> DQuat {
     let side = across(side, way);
-    DQuat::from_array(axes::of_axes(side.to_array(), way.to_array()))
+    DQuat::from_array(lanes::of_axes(side.to_array(), way.to_array()))
 }
 
 /// The part of a vector across a direction, of unit length.
 fn across(vector: DVec3, way: DVec3) -> DVec3 {
     (vector - way * way.dot(vector)).normalize_or(way.any_orthonormal_vector())
-}
-
-/// The x axis of a fixed frame, or the one before where it has none.
-fn side_at(up: DVec3, way: DVec3, kept: DVec3) -> DVec3 {
-    let side = up.cross(way);
-    if side.length() < UPRIGHT {
-        across(kept, way)
-    } else {
-        side.normalize()
-    }
 }
 
 /// The first x axis: `up × way`, with another direction in the place of `up` where both are one.

@@ -105,11 +105,8 @@ impl Lengths {
                 low = t;
             }
             let newton = t - excess / slope.at(t).length().max(1e-300);
-            let next = if newton > low && newton < high {
-                newton
-            } else {
-                0.5 * (low + high)
-            };
+            let inside = newton > low && newton < high;
+            let next = if inside { newton } else { 0.5 * (low + high) };
             let step = next - t;
             if step.abs() <= 1e-14 {
                 return next;
@@ -128,7 +125,6 @@ impl Lengths {
     }
 }
 
-/// The length between two parameters.
 fn between(slope: &Polynomial, from: f64, to: f64) -> f64 {
     let tolerance = 1e-14 * slope.size();
     // What overflows is no number, and halving it finds none.
@@ -136,7 +132,6 @@ fn between(slope: &Polynomial, from: f64, to: f64) -> f64 {
     integral(&speed(slope), from, to, FINEST, &differ)
 }
 
-/// The speed by the parameter.
 fn speed(slope: &Polynomial) -> impl Fn(f64) -> f64 {
     move |t| slope.at(t).length()
 }

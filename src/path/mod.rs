@@ -1,7 +1,6 @@
 //! Bodies that follow paths: which way they face on curves through points, and when they are where.
 //! Their rotations are sampled in f64 and fitted by the polynomials that serve all smooth curves.
 
-pub(crate) mod axes;
 pub(crate) mod carry;
 pub(crate) mod fit;
 pub(crate) mod frames;

@@ -179,7 +179,6 @@ impl Follow {
         DQuat::from_mat3(&axes).conjugate()
     }
 
-    /// Whether paths are closed.
     pub(crate) fn is_closed(&self) -> bool {
         self.ends == Ends::Loop
     }

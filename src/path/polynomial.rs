@@ -77,12 +77,8 @@ impl Polynomial {
         }
         let derivative = self.derivative();
         let rises = |t: f64| self.at(t).dot(derivative.at(t)) > 0.0;
-        let mut best = if self.at(1.0).length() < self.at(0.0).length() {
-            1.0
-        } else {
-            0.0
-        };
-        let mut least = self.at(best).length();
+        let [start, end] = [0.0, 1.0].map(|t| (t, self.at(t).length()));
+        let (mut best, mut least) = if end.1 < start.1 { end } else { start };
         let mut before = rises(0.0);
         for i in 1..=GRID {
             let [mut low, mut high] = [i - 1, i].map(|i| f64::from(i) / f64::from(GRID));

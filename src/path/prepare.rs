@@ -58,9 +58,8 @@ impl PreparedPaths {
         let batches: Vec<_> = batches(set).into_par_iter().map(prepared).collect();
         // Of several errors that of the first track counts.
         let batches = batches.into_iter().collect::<Result<Vec<_>, _>>()?;
-        let (prepared, warnings): (Vec<_>, Vec<_>) = batches.into_iter().unzip();
-        let both = prepared.into_iter().map(|[a, b]| (a, b));
-        let (of_positions, of_rotations): (Vec<_>, Vec<_>) = both.unzip();
+        let batches = batches.into_iter().map(|([a, b], own)| ((a, b), own));
+        let ((of_positions, of_rotations), warnings): ((Vec<_>, Vec<_>), Vec<_>) = batches.unzip();
         Ok(Self {
             positions: ClipData::of_groups(of_positions, set, positions, group_bytes),
             rotations: ClipData::of_groups(of_rotations, set, rotations, group_bytes),

@@ -89,11 +89,6 @@ impl Route {
         self.lengths = Lengths::new(self.slopes.clone(), stops);
     }
 
-    /// Where an interval's curve stops.
-    fn stops(&self, interval: usize) -> &[f64] {
-        &self.divided[interval].0
-    }
-
     /// The position at a time.
     pub(crate) fn position(&self, time: f64) -> [DVec3; 2] {
         if self.curves.is_empty() {
@@ -112,7 +107,7 @@ impl Route {
     /// The times between two at which the path's own curves change.
     fn times_between(&self, from: f64, to: f64) -> Vec<f64> {
         let places = |interval: usize| {
-            let stops = self.stops(interval).iter().copied();
+            let stops = self.divided[interval].0.iter().copied();
             let places = stops.chain([0.0, 1.0]);
             places.map(move |t| self.time(interval, t))
         };
@@ -237,10 +232,9 @@ fn direction([vector, change]: Way) -> Way {
 /// A polynomial whose zeros are divided out, with the sign that these give at a place.
 pub(crate) fn signed((zeros, rest): &(Vec<f64>, Polynomial), at: f64) -> Polynomial {
     let passed = zeros.iter().filter(|&&zero| at < zero).count();
-    if passed % 2 == 1 {
-        rest.map(|c| -c)
-    } else {
-        *rest
+    match passed % 2 {
+        1 => rest.map(|c| -c),
+        _ => *rest,
     }
 }
 
@@ -273,7 +267,7 @@ pub(crate) fn stretches(
         }
         // At given speeds, a body's motion is not smooth where its curve stops.
         if route.speed != PathSpeed::Keys || matches!(direction, Direction::Ahead(_)) {
-            cuts.extend(route.stops(interval));
+            cuts.extend(&route.divided[interval].0);
         }
         match (direction, target) {
             (Direction::Ahead(distance), _) => cuts.extend(route.passings(interval, distance)),

@@ -7,10 +7,9 @@ use crate::fit::double::fit::MOST;
 use crate::fit::double::intervals::{at, put};
 use crate::fit::nodes::FULL_NODES;
 use crate::math::quaternion::{Quaternion, Real};
-use crate::path::axes::ByAxes;
 use crate::path::carry::Piece;
 use crate::path::frames::Frames;
-use crate::path::lanes::{Carried, Pieces, Row, find_directions, load};
+use crate::path::lanes::{ByAxes, Carried, Pieces, Row, find_directions, load};
 use crate::path::options::{Follow, PathSpeed};
 use crate::path::route::{Route, Stretch};
 use crate::simd::dispatch::{InLanes, in_lanes};
@@ -81,7 +80,9 @@ pub(crate) struct Sampler<'a> {
 /// The numbers of a block of spans.
 #[derive(Default)]
 struct Rows {
-    times: Times,
+    /// The times at which spans start and end, those of their intervals' keys, and the parameters between
+    /// which their stretches lie.
+    times: [Row; 6],
     places: [Row; PLACES],
     ways: [[Row; 3]; PLACES],
     pieces: Pieces,
@@ -116,34 +117,17 @@ impl<'a> Sampler<'a> {
 
     /// The values on at most as many spans as there are lanes.
     pub(crate) fn sample(&mut self, spans: &[Span]) -> &Samples {
-        if self.speed == PathSpeed::Keys {
-            self.places_by_keys(spans);
-        } else {
-            self.places_by_length(spans);
-        }
-        match self.kind {
-            Kind::Vector => self.positions(spans),
-            Kind::Rotation => self.rotations(spans),
-        }
-        &self.rows.values
-    }
-
-    fn places_by_keys(&mut self, spans: &[Span]) {
-        let Rows { times, places, .. } = &mut *self.rows;
-        for (lane, span) in spans.iter().enumerate() {
-            let (route, own) = span.place(self.paths);
-            let [first, last] = route.keys_of(own.interval);
-            let numbers = [span.from, span.to, first, last, own.from, own.to];
-            put(times, lane, numbers);
-        }
-        in_lanes(&mut ByKeys { times, places });
-    }
-
-    fn places_by_length(&mut self, spans: &[Span]) {
-        for (lane, span) in spans.iter().enumerate() {
-            let (route, own) = span.place(self.paths);
+        let (paths, rows) = (self.paths, &mut *self.rows);
+        let of_spans = spans.iter().map(|span| span.place(paths));
+        for (lane, ((route, own), span)) in of_spans.clone().zip(spans).enumerate() {
+            if self.speed == PathSpeed::Keys {
+                let [first, last] = route.keys_of(own.interval);
+                let numbers = [span.from, span.to, first, last, own.from, own.to];
+                put(&mut rows.times, lane, numbers);
+                continue;
+            }
             let width = span.to - span.from;
-            for (place, (row, part)) in self.rows.places.iter_mut().zip(PARTS).enumerate() {
+            for (place, (row, part)) in rows.places.iter_mut().zip(PARTS).enumerate() {
                 let time = match place {
                     END => span.to,
                     _ => span.from + width * part,
@@ -156,25 +140,25 @@ impl<'a> Sampler<'a> {
                 };
             }
         }
-    }
-
-    fn positions(&mut self, spans: &[Span]) {
-        let Rows { places, values, .. } = &mut *self.rows;
-        for (lane, span) in spans.iter().enumerate() {
-            let (route, own) = span.place(self.paths);
-            let curve = &route.curves[own.interval];
-            for (value, place) in values.iter_mut().zip(&*places) {
-                put(value, lane, curve.at(place[lane]).extend(0.0).to_array());
+        if self.speed == PathSpeed::Keys {
+            in_lanes(rows);
+        }
+        match self.kind {
+            Kind::Vector => {
+                for (lane, (route, own)) in of_spans.enumerate() {
+                    let curve = &route.curves[own.interval];
+                    for (value, place) in rows.values.iter_mut().zip(&rows.places) {
+                        put(value, lane, curve.at(place[lane]).extend(0.0).to_array());
+                    }
+                }
+            }
+            Kind::Rotation => {
+                find_directions(of_spans, &rows.places, &mut rows.ways, None);
+                self.carried(spans);
+                self.by_axes(spans);
             }
         }
-    }
-
-    fn rotations(&mut self, spans: &[Span]) {
-        let (paths, rows) = (self.paths, &mut *self.rows);
-        let stretches = spans.iter().map(|span| span.place(paths));
-        find_directions(stretches, &rows.places, &mut rows.ways, None);
-        self.carried(spans);
-        self.by_axes(spans);
+        &self.rows.values
     }
 
     /// The rotations of the other frames.
@@ -281,22 +265,13 @@ impl<'a> Sampler<'a> {
     }
 }
 
-/// The times at which spans start and end, those of their intervals' keys, and the parameters between
-/// which their stretches lie.
-type Times = [Row; 6];
-
-/// The places of spans on paths that are as their keys say.
-struct ByKeys<'a> {
-    times: &'a Times,
-    places: &'a mut [Row; PLACES],
-}
-
-impl InLanes for ByKeys<'_> {
+/// Finds the places of spans on paths that are as their keys say.
+impl InLanes for Rows {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
         let (zero, one) = (L::Doubles::all(0.0), L::Doubles::all(1.0));
         for lane in (0..MOST).step_by(L::COUNT) {
-            let [from, to, first, last, start, end] = load::<L, 6>(self.times, lane);
+            let [from, to, first, last, start, end] = load::<L, 6>(&self.times, lane);
             let width = to - from;
             for (place, (row, part)) in self.places.iter_mut().zip(PARTS).enumerate() {
                 let time = match place {

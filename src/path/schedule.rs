@@ -111,10 +111,9 @@ impl PathSpeed {
         if x >= start && x <= 1.0 - end {
             return x;
         }
-        let (mut low, mut high) = if x < start {
-            (0.0, start)
-        } else {
-            (1.0 - end, 1.0)
+        let (mut low, mut high) = match x < start {
+            true => (0.0, start),
+            false => (1.0 - end, 1.0),
         };
         // Half of 2^-64 of the time is below the resolution of f64.
         for _ in 0..64 {

@@ -3,7 +3,6 @@
 
 pub(crate) mod follow;
 pub(crate) mod local_to_model;
-pub(crate) mod on_cpu;
 pub(crate) mod poses;
 pub(crate) mod skeleton;
 pub(crate) mod smooth;

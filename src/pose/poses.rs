@@ -2,19 +2,22 @@
 //! walked from its roots down to rotations and positions in the world.
 
 use glam::{Quat, Vec3};
+use rayon::prelude::*;
 
 use crate::engine::Engine;
 use crate::error::Error;
-use crate::evaluate::backend::Backend;
+use crate::evaluate::uploaded::Backend;
 use crate::gpu::engine::VulkanEngine;
+use crate::gpu::error::EvaluateError;
 use crate::memory::zeroed;
 use crate::output::buffer::OutputBuffer;
 use crate::output::pose_error::PoseError;
 use crate::output::rotations::{Layout, Rotations};
-use crate::pose::on_cpu;
-use crate::pose::skeleton::Skeleton;
-use crate::shader::{Kernel, PoseDispatch};
-use crate::twin::{pose_add, pose_blend, pose_mix};
+use crate::pose::skeleton::{JointValues, Skeleton};
+use crate::shader::Kernel;
+use crate::simd::dispatch::{InLanes, in_lanes};
+use crate::simd::lanes::Lanes;
+use crate::twin::{pose_add, pose_blend, pose_mix, pose_world};
 
 impl Engine {
     /// Blends layers into one: the weighted sum of each rotation, normalised, every layer with the
@@ -31,7 +34,10 @@ impl Engine {
             same_shape(first, layer, place)?;
         }
         let weights: Vec<f32> = layers.iter().map(|&(_, weight)| weight).collect();
-        finite(&weights)?;
+        if let Some(layer) = weights.iter().position(|weight| !weight.is_finite()) {
+            let weight = weights[layer];
+            return Err(PoseError::WeightNotFinite { layer, weight }.into());
+        }
         let mut gathered: Vec<Quat> = Vec::new();
         self.each_rotation(first, layers.len(), |device, start, output| {
             gathered.clear();
@@ -42,11 +48,12 @@ impl Engine {
             let Some(device) = device else {
                 let count = output.len();
                 let blended = |place| pose_blend::pose(values, &weights, count, place);
-                on_cpu::for_each(output, blended);
+                set_all(output, blended);
                 return Ok(());
             };
             let inputs = [bytes(values), bytes(&weights)];
-            pass(device, Kernel::PosesBlend, &inputs, layers.len(), output)
+            let counts = [output.len(), layers.len()];
+            Ok(device.pass(Kernel::PosesBlend, &inputs, counts, output)?)
         })
     }
 
@@ -62,12 +69,12 @@ impl Engine {
             let [a, b] = [from, to].map(|layer| values(layer, start, output.len()));
             let Some(device) = device else {
                 let mixed = |place: usize| pose_mix::pose(a[place], b[place], weight);
-                on_cpu::for_each(output, mixed);
+                set_all(output, mixed);
                 return Ok(());
             };
             let weight = [weight];
             let inputs = [bytes(a), bytes(b), bytes(&weight)];
-            pass(device, Kernel::PosesMix, &inputs, 0, output)
+            Ok(device.pass(Kernel::PosesMix, &inputs, [output.len(), 0], output)?)
         })
     }
 
@@ -104,12 +111,12 @@ impl Engine {
             }));
             let Some(device) = device else {
                 let added = |place: usize| pose_add::pose(a[place], b[place], own[place], weight);
-                on_cpu::for_each(output, added);
+                set_all(output, added);
                 return Ok(());
             };
             own.push([weight, 0.0, 0.0, 0.0]);
             let inputs = [bytes(a), bytes(b), bytes(&own)];
-            pass(device, Kernel::PosesAdd, &inputs, 0, output)
+            Ok(device.pass(Kernel::PosesAdd, &inputs, [output.len(), 0], output)?)
         })
     }
 
@@ -141,13 +148,13 @@ impl Engine {
         }
         let links = skeleton.links();
         self.on_device(|device| {
-            let count = tracks.saturating_mul(samples).saturating_mul(2);
-            let mut values: Vec<[f32; 4]> = zeroed(count, "poses in the world")?;
+            let count = tracks.saturating_mul(samples);
+            let mut values: Vec<[[f32; 4]; 2]> = zeroed(count, "poses in the world")?;
             let frames = (limit(device) / (2 * tracks).max(1)).max(1);
             let mut frame_major: Vec<[f32; 4]> = Vec::new();
-            let windows = values.chunks_mut((2 * tracks * frames).max(1));
+            let windows = values.chunks_mut((tracks * frames).max(1));
             for (first, output) in (0..).step_by(frames).zip(windows) {
-                let count = output.len() / (2 * tracks);
+                let (count, output) = (output.len() / tracks, output.as_flattened_mut());
                 frame_major.clear();
                 for frame in first..first + count {
                     let own = (0..tracks)
@@ -155,20 +162,18 @@ impl Engine {
                     frame_major.extend(own.map(|place| local.as_quats()[place].to_array()));
                 }
                 match device {
-                    None => on_cpu::world(&frame_major, links, output),
-                    Some(device) => device.pass(
-                        Kernel::PosesWorld,
-                        &[bytes(&frame_major), bytes(links)],
-                        dispatch(count, tracks),
-                        bytemuck::cast_slice_mut(output),
-                    )?,
+                    None => {
+                        let frames = output.par_chunks_mut(2 * tracks);
+                        let frames = frames.zip(frame_major.par_chunks(tracks));
+                        frames.for_each(|(world, local)| pose_world::pose(local, links, world));
+                    }
+                    Some(device) => {
+                        let inputs = [bytes(&frame_major), bytes(links)];
+                        device.pass(Kernel::PosesWorld, &inputs, [count, tracks], output)?;
+                    }
                 }
             }
-            Ok(WorldPoses {
-                values,
-                tracks,
-                samples,
-            })
+            Ok(JointValues::new(values, tracks, samples))
         })
     }
 
@@ -178,7 +183,7 @@ impl Engine {
         &self,
         like: &Rotations,
         layers: usize,
-        mut work: impl FnMut(Option<&VulkanEngine>, usize, &mut [[f32; 4]]) -> Result<(), Error>,
+        mut work: impl FnMut(Option<&VulkanEngine>, usize, &mut [[f32; 4]]) -> Result<(), EvaluateError>,
     ) -> Result<Rotations, Error> {
         self.on_device(|device| {
             let mut made = OutputBuffer::new(like.as_quats().len())?;
@@ -194,12 +199,12 @@ impl Engine {
     /// Does some work on the engine's device; `None` stands for the CPU.
     pub(crate) fn on_device<T>(
         &self,
-        mut work: impl FnMut(Option<&VulkanEngine>) -> Result<T, Error>,
+        mut work: impl FnMut(Option<&VulkanEngine>) -> Result<T, EvaluateError>,
     ) -> Result<T, Error> {
-        match &*self.backend {
+        Ok(match &*self.backend {
             Backend::Cpu(_) => work(None),
             Backend::Vulkan(opened) => opened.attempt_smaller(|engine| work(Some(engine))),
-        }
+        }?)
     }
 }
 
@@ -211,51 +216,28 @@ fn limit(device: Option<&VulkanEngine>) -> usize {
     device.map_or(CPU_PASS, VulkanEngine::window)
 }
 
-/// Rotations and positions in the world, `[frame][track]`.
-#[derive(Debug, Clone, PartialEq)]
-pub struct WorldPoses {
-    /// For each frame and track the rotation, then the position.
-    values: Vec<[f32; 4]>,
-    tracks: usize,
-    samples: usize,
-}
+/// Rotations and positions in the world, `[frame][track]`: for each the rotation, then the position.
+pub type WorldPoses = JointValues<[[f32; 4]; 2]>;
 
 impl WorldPoses {
-    /// Number of tracks.
-    #[must_use]
-    pub fn tracks(&self) -> usize {
-        self.tracks
-    }
-
-    /// Samples of each track.
-    #[must_use]
-    pub fn samples(&self) -> usize {
-        self.samples
-    }
-
     /// The rotation of a track at a sample; `None` out of range.
     #[must_use]
     pub fn rotation(&self, track: usize, sample: usize) -> Option<Quat> {
-        let place = self.place(track, sample)?;
-        Some(Quat::from_array(self.values[place]))
+        let [rotation, _] = *self.at(track, sample)?;
+        Some(Quat::from_array(rotation))
     }
 
     /// The position of a track at a sample, in the world; `None` out of range.
     #[must_use]
     pub fn position(&self, track: usize, sample: usize) -> Option<Vec3> {
-        let [x, y, z, _] = self.values[self.place(track, sample)? + 1];
+        let [_, [x, y, z, _]] = *self.at(track, sample)?;
         Some(Vec3::new(x, y, z))
     }
 
     /// `[frame][track]`: the rotation `x y z w`, then the position `x y z 0`.
     #[must_use]
     pub fn as_slice(&self) -> &[[f32; 4]] {
-        &self.values
-    }
-
-    fn place(&self, track: usize, sample: usize) -> Option<usize> {
-        let place = Layout::FrameMajor.index(track, sample, self.tracks, self.samples)?;
-        Some(2 * place)
+        self.values.as_flattened()
     }
 }
 
@@ -268,16 +250,6 @@ fn same_shape(first: &Rotations, own: &Rotations, layer: usize) -> Result<(), Po
             layer,
             given,
             first,
-        }),
-    }
-}
-
-fn finite(weights: &[f32]) -> Result<(), PoseError> {
-    match weights.iter().position(|weight| !weight.is_finite()) {
-        None => Ok(()),
-        Some(layer) => Err(PoseError::WeightNotFinite {
-            layer,
-            weight: weights[layer],
         }),
     }
 }
@@ -297,21 +269,32 @@ pub(super) fn bytes<T: bytemuck::Pod>(values: &[T]) -> &[u8] {
     bytemuck::cast_slice(values)
 }
 
-/// Runs a kernel that makes one value in each invocation.
-pub(super) fn pass(
-    device: &VulkanEngine,
-    kernel: Kernel,
-    inputs: &[&[u8]],
-    detail: usize,
-    output: &mut [[f32; 4]],
-) -> Result<(), Error> {
-    let dispatch = dispatch(output.len(), detail);
-    Ok(device.pass(kernel, inputs, dispatch, bytemuck::cast_slice_mut(output))?)
+/// Values in one task of the CPU.
+const TASK: usize = 8192;
+
+struct Task<'a, F> {
+    first: usize,
+    output: &'a mut [[f32; 4]],
+    pose: &'a F,
 }
 
-fn dispatch(count: usize, detail: usize) -> PoseDispatch {
-    PoseDispatch {
-        count: count as u32,
-        detail: detail as u32,
+impl<F: Fn(usize) -> [f32; 4]> InLanes for Task<'_, F> {
+    #[inline(always)]
+    fn run<L: Lanes>(&mut self) {
+        for (i, value) in self.output.iter_mut().enumerate() {
+            *value = (self.pose)(self.first + i);
+        }
     }
+}
+
+/// Sets the values at all places, on the CPU.
+fn set_all(output: &mut [[f32; 4]], pose: impl Fn(usize) -> [f32; 4] + Sync) {
+    let tasks = output.par_chunks_mut(TASK).enumerate();
+    tasks.for_each(|(task, output)| {
+        in_lanes(&mut Task {
+            first: task * TASK,
+            output,
+            pose: &pose,
+        });
+    });
 }

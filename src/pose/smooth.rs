@@ -5,10 +5,12 @@ use rayon::prelude::*;
 use crate::engine::Engine;
 use crate::error::Error;
 use crate::gpu::engine::VulkanEngine;
+use crate::gpu::error::VulkanError;
 use crate::output::buffer::OutputBuffer;
 use crate::output::rotations::{Layout, Rotations, Samples, Vectors};
-use crate::pose::poses::{self, bytes};
+use crate::pose::poses::bytes;
 use crate::shader::Kernel;
+use crate::simd::dispatch::in_lanes;
 use crate::smooth::kernel::Smoothing;
 use crate::smooth::rows::{Block, Pass, Row};
 
@@ -77,10 +79,9 @@ impl Engine {
                 _ => (&output, &mut other),
             };
             let set = Set {
-                values: if done == 0 {
-                    values.as_arrays()
-                } else {
-                    bytemuck::cast_slice(from)
+                values: match done {
+                    0 => values.as_arrays(),
+                    _ => bytemuck::cast_slice(from),
                 },
                 tracks,
                 samples,
@@ -88,7 +89,7 @@ impl Engine {
             };
             let to = bytemuck::cast_slice_mut(to);
             self.on_device(|device| match device {
-                Some(device) if !weights.is_empty() => set.on(&pass, device, to),
+                Some(device) if !weights.is_empty() => Ok(set.on(&pass, device, to)?),
                 _ => {
                     set.on_cpu(&pass, to);
                     Ok(())
@@ -131,7 +132,7 @@ impl Set<'_> {
         let length = BLOCK.max(4 * pass.weights.len());
         let block = |steps: &mut _, output: &mut [[f32; 4]], track: usize, place, i: usize| {
             let row = self.row(track);
-            Block {
+            in_lanes(&mut Block {
                 pass: *pass,
                 row,
                 first: i * length,
@@ -139,8 +140,7 @@ impl Set<'_> {
                 count: output.len() / row.stride,
                 output,
                 place,
-            }
-            .smooth();
+            });
         };
         match self.layout {
             Layout::TrackMajor => {
@@ -170,7 +170,7 @@ impl Set<'_> {
         pass: &Pass<'_>,
         device: &VulkanEngine,
         output: &mut [[f32; 4]],
-    ) -> Result<(), Error> {
+    ) -> Result<(), VulkanError> {
         let (limit, radius) = (device.window().max(2), pass.weights.len());
         let detail = usize::from(pass.are_rotations);
         let stride = self.samples - 1 + 2 * radius;
@@ -192,7 +192,8 @@ impl Set<'_> {
             let mut steps = vec![[0.0; 4]; values.len() - 1];
             for (first, output) in (0..).step_by(limit - 1).zip(steps.chunks_mut(limit - 1)) {
                 let values = &values[first..=first + output.len()];
-                poses::pass(device, Kernel::PosesSteps, &[bytes(values)], detail, output)?;
+                let counts = [output.len(), detail];
+                device.pass(Kernel::PosesSteps, &[bytes(values)], counts, output)?;
             }
             let mut padded = Vec::with_capacity(rows.len() * stride);
             let mut spaced = Vec::with_capacity(rows.len() * stride);
@@ -208,8 +209,8 @@ impl Set<'_> {
                 let steps = &padded[first..first + output.len() + 2 * radius - 1];
                 let values = &spaced[first..first + output.len()];
                 let inputs = [bytes(values), bytes(steps), bytes(pass.weights)];
-                let detail = 2 * radius + detail;
-                poses::pass(device, Kernel::PosesSmooth, &inputs, detail, output)?;
+                let counts = [output.len(), 2 * radius + detail];
+                device.pass(Kernel::PosesSmooth, &inputs, counts, output)?;
             }
             for (row, start) in rows.iter().zip((0..).step_by(stride)) {
                 for sample in 0..self.samples {

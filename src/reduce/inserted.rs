@@ -80,7 +80,6 @@ fn can_miss(keys: &[usize], key: usize, worst_of_each: &Worst<'_>) -> bool {
 }
 
 impl<T: Value> Task<'_, T> {
-    /// As [`Worst`] says.
     pub(crate) fn worst_of_each(
         &self,
         keys: &[usize],
@@ -106,12 +105,5 @@ impl<T: Value> Task<'_, T> {
             worst
         };
         intervals.map(worst).collect()
-    }
-
-    /// The largest distance of a sample from the curve through the keys at some places.
-    pub(crate) fn bessel_error(&self, places: &[usize]) -> f64 {
-        let worst = self.worst_of_each(places, 0..places.len() - 1);
-        let largest = worst.iter().map(|own| own.1).fold(0.0, f64::max);
-        largest * self.tolerance
     }
 }

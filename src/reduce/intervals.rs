@@ -55,7 +55,8 @@ impl<T: Value> Task<'_, T> {
     /// The tangents of cubics at the keys at some places, per second.
     pub(crate) fn tangents_at(&self, places: &[usize]) -> Vec<[T; 2]> {
         let mut found = Vec::with_capacity(places.len());
-        let mut arriving = T::zero();
+        let still = T::of_numbers(DVec4::ZERO);
+        let mut arriving = still;
         for pair in places.windows(2) {
             let (from, to) = (pair[0], pair[1]);
             let seconds = self.times[to] - self.times[from];
@@ -64,7 +65,7 @@ impl<T: Value> Task<'_, T> {
             found.push([arriving, leaving]);
             arriving = next;
         }
-        found.push([arriving, T::zero()]);
+        found.push([arriving, still]);
         found
     }
 

@@ -263,7 +263,10 @@ impl<'a, T: Value> Task<'a, T> {
             },
             error: match curve {
                 _ if places.len() < 2 => self.still().unwrap_or(f64::INFINITY),
-                ReducedCurve::BesselOverhauser => self.bessel_error(places),
+                ReducedCurve::BesselOverhauser => {
+                    let worst = self.worst_of_each(places, 0..places.len() - 1);
+                    worst.iter().map(|own| own.1).fold(0.0, f64::max) * self.tolerance
+                }
                 ReducedCurve::Linear => self.interval_error(places, false),
                 ReducedCurve::GltfCubic => self.interval_error(places, true),
             },

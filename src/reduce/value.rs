@@ -16,16 +16,10 @@ pub(crate) trait Value: Copy + Default + PartialEq {
     /// The value at a part of the way to another.
     fn towards(self, other: Self, part: f64) -> Self;
 
-    /// Its numbers.
     fn numbers(self) -> DVec4;
 
     /// The value of these numbers, which need not be of a unit quaternion.
     fn of_numbers(numbers: DVec4) -> Self;
-
-    /// The tangent of what stands still.
-    fn zero() -> Self {
-        Self::of_numbers(DVec4::ZERO)
-    }
 
     /// The value nearest to these numbers.
     fn nearest(numbers: DVec4) -> Self;

@@ -14,18 +14,6 @@ pub struct Smoothing {
     pub passes: u32,
 }
 
-impl Smoothing {
-    /// Once, with ends that stay.
-    #[must_use]
-    pub fn new(kernel: SmoothingKernel) -> Self {
-        Self {
-            kernel,
-            ends: SmoothingEnds::Keep,
-            passes: 1,
-        }
-    }
-}
-
 /// The weights of a sample and its neighbours: a function about the sample, integrated over the cell
 /// of each neighbour, from half a sample before it to half a sample after it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -102,6 +90,15 @@ const MOST_RADIUS: usize = 1_000_000;
 const MOST_ORDER: usize = 20;
 
 impl Smoothing {
+    /// Once, with ends that stay.
+    #[must_use]
+    pub fn new(kernel: SmoothingKernel) -> Self {
+        Self {
+            kernel,
+            ends: SmoothingEnds::Keep,
+            passes: 1,
+        }
+    }
     /// Refuses what means nothing.
     ///
     /// # Errors

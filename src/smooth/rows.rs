@@ -4,7 +4,7 @@ use glam::DQuat;
 
 use crate::math::canonical::{canonical, round_quat};
 use crate::math::quaternion::{exp, product, unit};
-use crate::simd::dispatch::{InLanes, in_lanes};
+use crate::simd::dispatch::InLanes;
 use crate::simd::lanes::Lanes;
 use crate::smooth::kernel::{Smoothing, SmoothingEnds, SmoothingKernel};
 use crate::twin::arc_tangent::{arc_tangent, reciprocal_root, root};
@@ -17,7 +17,6 @@ pub(crate) struct Row<'a> {
     pub(crate) values: &'a [[f32; 4]],
     pub(crate) first: usize,
     pub(crate) stride: usize,
-    /// The number of samples.
     pub(crate) count: usize,
 }
 
@@ -195,10 +194,6 @@ pub(crate) struct Block<'a> {
 }
 
 impl Block<'_> {
-    pub(crate) fn smooth(&mut self) {
-        in_lanes(self);
-    }
-
     #[inline(always)]
     fn find_steps<L: Lanes, const ARE_ROTATIONS: bool>(&mut self) {
         let (row, radius) = (self.row, self.pass.weights.len());
@@ -304,9 +299,7 @@ impl Block<'_> {
             }
         }
     }
-}
 
-impl Block<'_> {
     /// Smooths vectors that lie side by side: their components are smoothed alike, and need not be
     /// taken apart.
     #[inline(always)]

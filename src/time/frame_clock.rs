@@ -95,11 +95,8 @@ impl FrameClock {
     pub(crate) fn boundary(self, time: f64) -> Boundary {
         let exact = self.rate.frames_in(time - self.start) * self.sign + self.offset;
         let whole = nearest_whole(exact);
-        let frame = if (exact - whole).abs() <= self.rounding {
-            whole
-        } else {
-            exact
-        };
+        let is_whole = (exact - whole).abs() <= self.rounding;
+        let frame = if is_whole { whole } else { exact };
         let first = if whole < frame { whole + 1.0 } else { whole };
         Boundary { frame, first }
     }

@@ -126,10 +126,9 @@ fn decimal_ratio(text: &str) -> Option<(u64, u64)> {
     let places = exponent.checked_sub(i32::try_from(fraction.trim_end_matches('0').len()).ok()?)?;
     let power = 10u64.checked_pow(places.unsigned_abs())?;
     let digits: u64 = digits.parse().ok()?;
-    if places < 0 {
-        Some((digits, power))
-    } else {
-        Some((digits.checked_mul(power)?, 1))
+    match places {
+        ..0 => Some((digits, power)),
+        _ => Some((digits.checked_mul(power)?, 1)),
     }
 }
 

@@ -3,27 +3,33 @@
 
 use std::ops::Range;
 
+use bytemuck::Zeroable;
+
 use crate::math::canonical::whole_number;
 use crate::simd::dispatch::{InLanes, in_lanes};
 use crate::simd::lanes::Lanes;
 use crate::time::frame_clock::{FrameClock, in_frames};
 use crate::time::runs::{Affine, COUNTABLE, Parameter};
 
+/// Intervals of a block.
+const LEN: usize = 32;
+
 /// The frame coordinates of consecutive intervals, and the constants from which the parameters of
 /// their samples follow.
+#[derive(Zeroable)]
 pub(crate) struct IntervalBlock {
     /// Where each interval starts and, as the last entry, where the last one ends, in frames.
-    frame: [f64; Self::LEN + 1],
+    pub(crate) frame: [f64; LEN + 1],
     /// The first requested sample that is not before `frame`, or the end of the requested ones.
-    pub(crate) first: [usize; Self::LEN + 1],
+    pub(crate) first: [usize; LEN + 1],
     /// 1 if that sample lies exactly at `frame`, else 0.
-    pub(crate) is_held: [u64; Self::LEN],
+    pub(crate) is_held: [u64; LEN],
     /// The whole frame nearest to the middle of each.
-    pub(crate) whole: [f64; Self::LEN],
+    pub(crate) whole: [f64; LEN],
     /// From `whole` to `first`, in frames.
-    pub(crate) distance: [f32; Self::LEN],
-    pub(crate) scale: [f32; Self::LEN],
-    pub(crate) offset: [f32; Self::LEN],
+    pub(crate) distance: [f32; LEN],
+    pub(crate) scale: [f32; LEN],
+    pub(crate) offset: [f32; LEN],
     /// Whether f32 holds the distances of all samples from `whole` exactly.
     pub(crate) are_near: bool,
     /// The intervals that hold samples, by their places in the block.
@@ -31,23 +37,6 @@ pub(crate) struct IntervalBlock {
 }
 
 impl IntervalBlock {
-    const LEN: usize = 32;
-
-    #[inline(always)]
-    pub(crate) fn new() -> Self {
-        Self {
-            frame: [0.0; Self::LEN + 1],
-            first: [0; Self::LEN + 1],
-            is_held: [0; Self::LEN],
-            whole: [0.0; Self::LEN],
-            distance: [0.0; Self::LEN],
-            scale: [0.0; Self::LEN],
-            offset: [0.0; Self::LEN],
-            are_near: true,
-            occupied: Occupied::default(),
-        }
-    }
-
     /// Where the `j`th interval starts and how long it is, for a curve evaluated in f64. The length
     /// is negative if frames run backwards.
     pub(crate) fn parameter(&self, j: usize, clock: FrameClock) -> Parameter {
@@ -68,11 +57,6 @@ impl IntervalBlock {
         }
     }
 
-    /// The length of the `j`th interval in frames.
-    pub(crate) fn frames(&self, j: usize) -> f64 {
-        self.frame[j + 1] - self.frame[j]
-    }
-
     /// Whether the distances of the samples in the `j`th interval fit 32 bits.
     #[inline(always)]
     pub(crate) fn is_countable(&self, j: usize) -> bool {
@@ -84,8 +68,8 @@ impl IntervalBlock {
 
 /// A bit for each interval that holds samples; iterates over their places in order. Where keys are
 /// denser than samples, a branch for each interval would often be mispredicted.
-#[derive(Clone, Copy, Default)]
-pub(crate) struct Occupied(pub(crate) u64);
+#[derive(Clone, Copy, Zeroable)]
+pub(crate) struct Occupied(u64);
 
 impl Iterator for Occupied {
     type Item = usize;
@@ -148,9 +132,9 @@ impl<'a> IntervalBlocks<'a> {
         if from == count {
             return None;
         }
-        let to = (from + IntervalBlock::LEN).min(count);
+        let to = (from + LEN).min(count);
         self.done = to;
-        let mut reversed = [0.0; IntervalBlock::LEN];
+        let mut reversed = [0.0; LEN];
         let (starts, next) = if self.clock.is_reversed() {
             let times = (self.starts[count - to..].iter().copied().chain([self.end])).rev();
             let times = times.skip(from);
@@ -175,7 +159,7 @@ impl<'a> IntervalBlocks<'a> {
 
 struct Fill<'a> {
     clock: FrameClock,
-    /// At most [`IntervalBlock::LEN`].
+    /// At most [`LEN`].
     starts: &'a [f64],
     /// Where the last of them ends.
     next: f64,
@@ -189,8 +173,8 @@ impl InLanes for Fill<'_> {
         let (clock, samples, starts) = (self.clock, self.samples, self.starts);
         let count = starts.len();
         // Local arrays, because the compiler must know that no other reference overlaps them.
-        let mut frames = [0.0; IntervalBlock::LEN + 1];
-        let mut firsts = [0.0; IntervalBlock::LEN + 1];
+        let mut frames = [0.0; LEN + 1];
+        let mut firsts = [0.0; LEN + 1];
         let (frame, first) = (&mut frames[..count], &mut firsts[..count]);
         for j in 0..count {
             let boundary = clock.boundary(starts[j]);
@@ -224,7 +208,7 @@ impl InLanes for Fill<'_> {
         block.are_near = far == 0;
         // Behind the end of the last interval `firsts` is 0, which sets no bit.
         let mut occupied = 0;
-        for j in 0..IntervalBlock::LEN {
+        for j in 0..LEN {
             occupied |= u64::from(firsts[j] < firsts[j + 1]) << j;
         }
         block.occupied = Occupied(occupied);
@@ -256,7 +240,7 @@ mod tests {
             let (starts, end) = ([0.0], frames as f64);
             let clock = FrameClock::new(rate, 0.0, end);
             let mut intervals = IntervalBlocks::new(&starts, end, clock, 0..frames as usize);
-            let mut block = IntervalBlock::new();
+            let mut block = IntervalBlock::zeroed();
             assert_eq!(intervals.fill(&mut block), Some(0..1));
             assert_eq!(block.are_near, are_near, "{frames} frames");
             assert!(block.is_countable(0));

@@ -3,6 +3,8 @@
 
 use std::ops::Range;
 
+use bytemuck::Zeroable as _;
+
 use crate::shader::{IS_KEY, KeySample};
 use crate::time::frame_clock::FrameClock;
 use crate::time::frames::FramesError;
@@ -25,7 +27,7 @@ impl<'a> FramePlan<'a> {
             clock: None,
             window: 0..0,
             samples: Vec::new(),
-            block: IntervalBlock::new(),
+            block: IntervalBlock::zeroed(),
         }
     }
 
@@ -54,7 +56,7 @@ impl<'a> FramePlan<'a> {
                     return Err(FramesError::GapTooLong {
                         track: of.index,
                         key: of.first_key + key,
-                        frames: block.frames(j),
+                        frames: block.frame[j + 1] - block.frame[j],
                     });
                 }
                 let samples = block.first[j]..block.first[j + 1];

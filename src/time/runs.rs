@@ -4,6 +4,8 @@
 
 use std::ops::Range;
 
+use bytemuck::Zeroable as _;
+
 use crate::math::canonical::round_f32;
 use crate::time::frame_clock::FrameClock;
 use crate::time::frames::{FramesError, Ticks, Timeline};
@@ -153,7 +155,7 @@ impl Spans {
             emit.run(run);
         }
         let mut intervals = IntervalBlocks::new(starts, part.end, clock, samples.clone());
-        let mut block = IntervalBlock::new();
+        let mut block = IntervalBlock::zeroed();
         while let Some(own) = intervals.fill(&mut block) {
             for j in block.occupied {
                 let met = own.start + j;
@@ -219,13 +221,10 @@ impl Part {
         let (begin, end) = (clock.boundary(begin), clock.boundary(self.end));
         let (from, to) = (begin.first as usize, end.first as usize);
         let run = |outside: Range<usize>, source: Option<RunSource>| {
-            let (first, last) = (
-                outside.start.max(samples.start),
-                outside.end.min(samples.end),
-            );
-            source
-                .filter(|_| first < last)
-                .map(|source| Run::new(first, last - first, source))
+            let first = outside.start.max(samples.start);
+            let last = outside.end.min(samples.end);
+            let source = source.filter(|_| first < last);
+            source.map(|source| Run::new(first, last - first, source))
         };
         if clock.is_reversed() {
             // Frames meet the last key first. Nothing is extrapolated: only the track itself is,

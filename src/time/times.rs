@@ -3,6 +3,8 @@
 
 use std::ops::Range;
 
+use bytemuck::Zeroable;
+
 use crate::math::canonical::round_f32;
 use crate::shader::{IS_KEY, KeySample};
 use crate::time::frame_clock::finite_scale;
@@ -162,28 +164,18 @@ pub(crate) fn interval_at(starts: &[f64], time: f64, near: usize) -> usize {
 
 /// Explicit times whose intervals are known, and whose parameters are computed together in vector
 /// lanes.
+#[derive(Zeroable)]
 pub(crate) struct TimeLanes {
     /// What gives each rotation, in the caller's own encoding.
-    pub(crate) sources: [u32; Self::LEN],
-    times: [f64; Self::LEN],
-    starts: [f64; Self::LEN],
-    ends: [f64; Self::LEN],
+    pub(crate) sources: [u32; TimeLanes::LEN],
+    times: [f64; TimeLanes::LEN],
+    starts: [f64; TimeLanes::LEN],
+    ends: [f64; TimeLanes::LEN],
     pub(crate) count: usize,
 }
 
 impl TimeLanes {
     pub(crate) const LEN: usize = 64;
-
-    #[inline(always)]
-    pub(crate) fn new() -> Self {
-        Self {
-            sources: [0; Self::LEN],
-            times: [0.0; Self::LEN],
-            starts: [0.0; Self::LEN],
-            ends: [1.0; Self::LEN],
-            count: 0,
-        }
-    }
 
     /// Adds a time in the interval from `start` to `end`.
     #[inline(always)]

@@ -99,7 +99,8 @@ pub(crate) fn verify(
         expected.resize(rotations.len() * bytes, 0);
         encoding.encode_all(rotations, &mut expected);
         let error = |(stored, &rotation): (&[u8], &[f32; 4])| {
-            let [decoded, rotation] = [encoding.decode_one(stored), rotation].map(exact);
+            let both = [encoding.decode_one(stored), rotation];
+            let [decoded, rotation] = both.map(|own| Quat::from_array(own).as_dquat());
             worse(angle_between(decoded, rotation))
         };
         outputs.push(OutputVerification {
@@ -145,10 +146,6 @@ fn world(
         }
     }
     Ok(output)
-}
-
-fn exact(rotation: [f32; 4]) -> DQuat {
-    Quat::from_array(rotation).as_dquat()
 }
 
 fn rate_error(

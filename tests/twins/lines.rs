@@ -338,7 +338,8 @@ fn of_clip(set: &TrackSet, frames: &Frames, method: Method, layout: Layout, cut:
     }
     let lists = work(&clip, &timeline, &window, 0, cut, &mut Vec::new()).unwrap();
     let count: usize = lists.iter().map(GroupWork::item_count).sum();
-    let distances: usize = lists.iter().map(GroupWork::distance_count).sum();
+    let chunks = lists.iter().flat_map(|list| &list.chunks);
+    let distances: usize = chunks.map(|chunk| chunk.distances.len()).sum();
     let mut items: Vec<Item> = vec![bytemuck::Zeroable::zeroed(); count + 1];
     let mut distances = vec![0.0; distances];
     let rows = GridRows::new(&window, 0).filter(|_| cut == Cut::Whole);
@@ -364,7 +365,7 @@ fn of_clip(set: &TrackSet, frames: &Frames, method: Method, layout: Layout, cut:
     let mut blocks: Vec<Block> = vec![bytemuck::Zeroable::zeroed(); grids[0].blocks() as usize];
     write_blocks(&lists, &grids, count as u32, &mut blocks);
     globals.push(("blocks", cells(bytemuck::cast_slice(&blocks))));
-    let arguments = grids[0].arguments(0);
+    let arguments = grids[0].arguments;
     globals.push(("dispatch", cells(bytemuck::bytes_of(&arguments))));
     Launch {
         kernel: format!("{form}_{listed}_coalesced_f32"),
