@@ -137,7 +137,7 @@ pub use crate::path::options::{
 pub use crate::pose::follow::Followed;
 pub use crate::pose::local_to_model::ModelMatrices;
 pub use crate::pose::poses::WorldPoses;
-pub use crate::pose::skeleton::{JointValues, Skeleton};
+pub use crate::pose::skeleton::Skeleton;
 pub use crate::pose::transforms::Transforms;
 pub use crate::shader::{Form, kernels};
 pub use crate::simd::dispatch::{UnknownWidth, VectorWidth};

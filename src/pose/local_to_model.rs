@@ -11,7 +11,8 @@ use crate::math::canonical::canonical;
 use crate::memory::zeroed;
 use crate::output::encoding::MatrixOrder;
 use crate::output::pose_error::PoseError;
-use crate::pose::skeleton::{JointValues, Skeleton};
+use crate::output::rotations::Layout;
+use crate::pose::skeleton::Skeleton;
 use crate::pose::transforms::Transforms;
 use crate::shader::{Link, ROOT};
 use crate::twin::matrix;
@@ -90,7 +91,11 @@ impl Engine {
             Backend::Cpu(engine) => engine.on_threads(&mut walk),
             Backend::Vulkan(_) => walk(),
         }
-        Ok(JointValues::new(matrices, tracks, samples))
+        Ok(ModelMatrices {
+            matrices,
+            tracks,
+            samples,
+        })
     }
 }
 
@@ -159,20 +164,37 @@ fn rows(matrix: Affine3A) -> Rows {
 
 /// The matrix of every joint at every sample, `[sample][track]`: three rows of four numbers, for column
 /// vectors, the last column the translation.
-pub type ModelMatrices = JointValues<Rows>;
+#[derive(Debug, Clone, PartialEq)]
+pub struct ModelMatrices {
+    matrices: Vec<Rows>,
+    tracks: usize,
+    samples: usize,
+}
 
 impl ModelMatrices {
+    /// Number of tracks.
+    #[must_use]
+    pub fn tracks(&self) -> usize {
+        self.tracks
+    }
+
+    /// Samples of each track.
+    #[must_use]
+    pub fn samples(&self) -> usize {
+        self.samples
+    }
+
     /// All matrices, `[sample][track][row][column]`, as a shader of row-major 3 × 4 matrices reads
     /// them.
     #[must_use]
     pub fn as_arrays(&self) -> &[[[f32; 4]; 3]] {
-        &self.values
+        &self.matrices
     }
 
     /// The matrix of a track at a sample; `None` out of range.
     #[must_use]
     pub fn get(&self, track: usize, sample: usize) -> Option<Affine3A> {
-        let [x, y, z] = *self.at(track, sample)?;
+        let [x, y, z] = *self.rows_of(track, sample)?;
         let column = |i: usize| [x[i], y[i], z[i]];
         let columns = [column(0), column(1), column(2), column(3)];
         Some(Affine3A::from_cols_array_2d(&columns))
@@ -181,7 +203,12 @@ impl ModelMatrices {
     /// Where a track's origin is at a sample; `None` out of range.
     #[must_use]
     pub fn position(&self, track: usize, sample: usize) -> Option<Vec3> {
-        let rows = self.at(track, sample)?;
+        let rows = self.rows_of(track, sample)?;
         Some(Vec3::from_array(rows.map(|[.., moved]| moved)))
+    }
+
+    fn rows_of(&self, track: usize, sample: usize) -> Option<&Rows> {
+        let place = Layout::FrameMajor.index(track, sample, self.tracks, self.samples)?;
+        Some(&self.matrices[place])
     }
 }

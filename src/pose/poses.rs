@@ -13,7 +13,7 @@ use crate::memory::zeroed;
 use crate::output::buffer::OutputBuffer;
 use crate::output::pose_error::PoseError;
 use crate::output::rotations::{Layout, Rotations};
-use crate::pose::skeleton::{JointValues, Skeleton};
+use crate::pose::skeleton::Skeleton;
 use crate::shader::Kernel;
 use crate::simd::dispatch::{InLanes, in_lanes};
 use crate::simd::lanes::Lanes;
@@ -148,13 +148,13 @@ impl Engine {
         }
         let links = skeleton.links();
         self.on_device(|device| {
-            let count = tracks.saturating_mul(samples);
-            let mut values: Vec<[[f32; 4]; 2]> = zeroed(count, "poses in the world")?;
+            let count = tracks.saturating_mul(samples).saturating_mul(2);
+            let mut values: Vec<[f32; 4]> = zeroed(count, "poses in the world")?;
             let frames = (limit(device) / (2 * tracks).max(1)).max(1);
             let mut frame_major: Vec<[f32; 4]> = Vec::new();
-            let windows = values.chunks_mut((tracks * frames).max(1));
+            let windows = values.chunks_mut((2 * tracks * frames).max(1));
             for (first, output) in (0..).step_by(frames).zip(windows) {
-                let (count, output) = (output.len() / tracks, output.as_flattened_mut());
+                let count = output.len() / (2 * tracks);
                 frame_major.clear();
                 for frame in first..first + count {
                     let own = (0..tracks)
@@ -173,7 +173,11 @@ impl Engine {
                     }
                 }
             }
-            Ok(JointValues::new(values, tracks, samples))
+            Ok(WorldPoses {
+                values,
+                tracks,
+                samples,
+            })
         })
     }
 
@@ -216,28 +220,51 @@ fn limit(device: Option<&VulkanEngine>) -> usize {
     device.map_or(CPU_PASS, VulkanEngine::window)
 }
 
-/// Rotations and positions in the world, `[frame][track]`: for each the rotation, then the position.
-pub type WorldPoses = JointValues<[[f32; 4]; 2]>;
+/// Rotations and positions in the world, `[frame][track]`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct WorldPoses {
+    /// For each frame and track the rotation, then the position.
+    values: Vec<[f32; 4]>,
+    tracks: usize,
+    samples: usize,
+}
 
 impl WorldPoses {
+    /// Number of tracks.
+    #[must_use]
+    pub fn tracks(&self) -> usize {
+        self.tracks
+    }
+
+    /// Samples of each track.
+    #[must_use]
+    pub fn samples(&self) -> usize {
+        self.samples
+    }
+
     /// The rotation of a track at a sample; `None` out of range.
     #[must_use]
     pub fn rotation(&self, track: usize, sample: usize) -> Option<Quat> {
-        let [rotation, _] = *self.at(track, sample)?;
-        Some(Quat::from_array(rotation))
+        let place = self.place(track, sample)?;
+        Some(Quat::from_array(self.values[place]))
     }
 
     /// The position of a track at a sample, in the world; `None` out of range.
     #[must_use]
     pub fn position(&self, track: usize, sample: usize) -> Option<Vec3> {
-        let [_, [x, y, z, _]] = *self.at(track, sample)?;
+        let [x, y, z, _] = self.values[self.place(track, sample)? + 1];
         Some(Vec3::new(x, y, z))
     }
 
     /// `[frame][track]`: the rotation `x y z w`, then the position `x y z 0`.
     #[must_use]
     pub fn as_slice(&self) -> &[[f32; 4]] {
-        self.values.as_flattened()
+        &self.values
+    }
+
+    fn place(&self, track: usize, sample: usize) -> Option<usize> {
+        let place = Layout::FrameMajor.index(track, sample, self.tracks, self.samples)?;
+        Some(2 * place)
     }
 }
 

@@ -5,7 +5,6 @@ use glam::Vec3;
 use crate::math::canonical::canonical;
 use crate::memory::reserved;
 use crate::output::pose_error::{MOST_TRACKS, SkeletonError};
-use crate::output::rotations::Layout;
 use crate::shader::{Link, ROOT};
 
 /// The parent of each track, and its offset in the parent's frame.
@@ -106,42 +105,6 @@ impl Skeleton {
 
     pub(crate) fn links(&self) -> &[Link] {
         &self.links
-    }
-}
-
-/// A value of every joint at every sample, `[sample][track]`.
-#[derive(Debug, Clone, PartialEq)]
-pub struct JointValues<T> {
-    pub(super) values: Vec<T>,
-    tracks: usize,
-    samples: usize,
-}
-
-impl<T> JointValues<T> {
-    pub(super) fn new(values: Vec<T>, tracks: usize, samples: usize) -> Self {
-        Self {
-            values,
-            tracks,
-            samples,
-        }
-    }
-
-    /// Number of tracks.
-    #[must_use]
-    pub fn tracks(&self) -> usize {
-        self.tracks
-    }
-
-    /// Samples of each track.
-    #[must_use]
-    pub fn samples(&self) -> usize {
-        self.samples
-    }
-
-    /// The value of a track at a sample; `None` out of range.
-    pub(super) fn at(&self, track: usize, sample: usize) -> Option<&T> {
-        let place = Layout::FrameMajor.index(track, sample, self.tracks, self.samples)?;
-        self.values.get(place)
     }
 }
 
