@@ -19,20 +19,42 @@ pub(crate) struct Memory {
 /// use three.
 const KEPT_EACH: usize = 4;
 
-/// The scratch pool: what threads have given back, the latest last.
-#[derive(Default)]
-pub(crate) struct ScratchPool(Mutex<Vec<Memory>>);
+/// A pool of buffers, each for one interpolation: what threads have given back, the latest last.
+pub(crate) struct Pool<T>(Mutex<Vec<(Interpolation, T)>>);
+
+/// The scratch pool.
+pub(crate) type ScratchPool = Pool<Memory>;
+
+impl<T> Default for Pool<T> {
+    fn default() -> Self {
+        Self(Mutex::default())
+    }
+}
+
+impl<T> Pool<T> {
+    /// Takes buffers for an interpolation out of the pool, if there are any.
+    fn find(&self, interpolation: &Interpolation) -> Option<T> {
+        let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let place = kept.iter().rposition(|(own, _)| own == interpolation)?;
+        Some(kept.remove(place).1)
+    }
+
+    /// Puts buffers back into the pool.
+    fn keep(&self, interpolation: Interpolation, buffers: T) {
+        let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if kept.len() >= KEPT_EACH * rayon::current_num_threads() {
+            kept.remove(0);
+        }
+        kept.push((interpolation, buffers));
+    }
+}
 
 impl ScratchPool {
     /// Takes scratch buffers for an interpolation out of the pool, or allocates them. They prepare
     /// only what the samples of this timeline need.
     pub(crate) fn take(&self, request: &Request<'_>) -> Memory {
         let interpolation = request.interpolation;
-        let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let suits = |memory: &Memory| memory.interpolation == *interpolation;
-        let own = (kept.iter().rposition(suits)).map(|place| kept.remove(place));
-        drop(kept);
-        let mut memory = own.unwrap_or_else(|| Memory {
+        let mut memory = self.find(interpolation).unwrap_or_else(|| Memory {
             interpolation: *interpolation,
             prepared: Prepared::new(interpolation),
             preparation: Preparation::new(interpolation),
@@ -44,11 +66,7 @@ impl ScratchPool {
     /// Puts scratch buffers back into the pool. Call it only after success: a failed preparation
     /// may leave them half filled.
     pub(crate) fn give_back(&self, memory: Memory) {
-        let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        if kept.len() >= KEPT_EACH * rayon::current_num_threads() {
-            kept.remove(0);
-        }
-        kept.push(memory);
+        self.keep(memory.interpolation, memory);
     }
 }
 
@@ -56,33 +74,23 @@ impl ScratchPool {
 mod tests {
     use super::*;
     use crate::method;
-    use crate::time::frames::Frames;
-    use crate::tracks::set::swinging;
 
     /// Catches a pool that allocates again when two methods alternate, and one that grows without
     /// bound.
     #[test]
     fn each_way_to_interpolate_finds_its_memory_again() {
-        let set = swinging(4, 26, false);
-        let timeline = Frames::fps(60)
-            .resolve(set.track_count(), set.time_span())
-            .unwrap();
-        let scratch_pool = ScratchPool::default();
-        let from = |pool: &ScratchPool, own| {
-            let interpolation = Interpolation::from(own);
-            pool.take(&Request::whole(&set, &interpolation, &timeline))
-        };
-        let take = |own| from(&scratch_pool, own);
-        let kept = || scratch_pool.0.lock().unwrap().len();
-        for own in [method::SLERP, method::BESSEL_OVERHAUSER] {
-            scratch_pool.give_back(take(own));
+        let pool = Pool::default();
+        let kept = || pool.0.lock().unwrap().len();
+        for (i, own) in [method::SLERP, method::BESSEL_OVERHAUSER]
+            .into_iter()
+            .enumerate()
+        {
+            pool.keep(own.into(), i);
         }
-        assert_eq!(kept(), 2);
-        let first = take(method::SLERP);
-        assert_eq!(kept(), 1);
-        scratch_pool.give_back(first);
-        for _ in 0..9 * rayon::current_num_threads() {
-            scratch_pool.give_back(from(&ScratchPool::default(), method::SLERP));
+        assert_eq!((kept(), pool.find(&method::C2.into())), (2, None));
+        assert_eq!((pool.find(&method::SLERP.into()), kept()), (Some(0), 1));
+        for i in 0..9 * rayon::current_num_threads() {
+            pool.keep(method::SLERP.into(), i);
         }
         assert_eq!(kept(), KEPT_EACH * rayon::current_num_threads());
     }

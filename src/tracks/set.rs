@@ -336,24 +336,5 @@ impl TrackSet {
     }
 }
 
-/// Tracks for tests: each swings for 20 s, at its own frequency.
-#[cfg(test)]
-pub(crate) fn swinging(tracks: usize, keys: usize, uneven: bool) -> TrackSet {
-    let last = (keys - 1).max(1) as f64;
-    let times: Vec<f64> = (0..keys)
-        .map(|k| 20.0 * (k as f64 + if uneven { 0.4 * (k as f64).sin() } else { 0.0 }) / last)
-        .collect();
-    let mut set = TrackSet::new();
-    for track in 0..tracks {
-        let key = |&time: &f64| {
-            let turn = (time * (0.9 + 0.2 * track as f64)).sin() as f32;
-            Quat::from_rotation_y(1.1 * turn) * Quat::from_rotation_x(0.4 * time as f32)
-        };
-        let keys: Vec<Quat> = times.iter().map(key).collect();
-        set.push("", &times, &keys).expect("unit keys in order");
-    }
-    set
-}
-
 #[cfg(test)]
 mod tests;
