@@ -295,9 +295,9 @@ fn the_oldest_rust_is_declared_once() {
         readme.contains(&format!("Rust {version}")),
         "README.md names Rust {version}"
     );
-    let script = read("scripts/test.sh");
+    let script = read("scripts/lint.sh");
     assert!(
         script.contains("rust-version"),
-        "scripts/test.sh checks with the oldest Rust where it is installed"
+        "scripts/lint.sh checks with the oldest Rust where it is installed"
     );
 }

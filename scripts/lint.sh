@@ -1,0 +1,25 @@
+#!/usr/bin/env bash
+# Formatting, lints and documents of every package and every target, without a warning, where rustup's
+# components for them are installed. scripts/test.sh does this first, but for CI.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+# The oldest Rust that Cargo.toml promises, where it is at hand and not the one in use.
+oldest=$(sed -n 's/^rust-version = "\(.*\)"/\1/p' Cargo.toml)
+if ! rustc --version | grep -q "^rustc $oldest\b" &&
+    command -v rustup >/dev/null && rustup run "$oldest" rustc --version >/dev/null 2>&1; then
+    CARGO_TARGET_DIR=target/oldest rustup run "$oldest" cargo check --workspace --all-targets --quiet
+fi
+
+# What the dependencies may be (deny.toml), where the tool is installed.
+if cargo deny --version >/dev/null 2>&1; then
+    cargo deny --log-level error check bans licenses sources
+fi
+
+if cargo fmt --version >/dev/null 2>&1; then cargo fmt --check; fi
+if cargo clippy --version >/dev/null 2>&1; then
+    cargo clippy --workspace --all-targets --quiet -- -D warnings
+    # No other call compiles the tests that run on demand.
+    cargo clippy --workspace --test load --quiet -- -D warnings
+fi
+RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --document-private-items --quiet
