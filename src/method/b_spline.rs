@@ -3,7 +3,7 @@
 use crate::curve::formula::product::Product;
 use crate::curve::options::Ends;
 use crate::fit::double::handles::BetweenNeighbours;
-use crate::fit::double::intervals::{Intervals, Stretch};
+use crate::fit::double::intervals::{Intervals, Stretch, at, put};
 use crate::fit::double::shape::Shape;
 use crate::math::quaternion::{Vector, exp, ratio, rotated, scaled, sum};
 use crate::method::ends::End;
@@ -89,29 +89,29 @@ fn curves(intervals: &mut Intervals, stretches: &[Stretch], ends: Ends) {
         let after = |lane| (lane + 1, after_last(intervals, lane, end, alone));
         let (before, after) = (stretch.first().map(before), stretch.last().map(after));
         for (lane, log) in [before, after].into_iter().flatten() {
-            intervals.set_log(lane, log);
+            put(&mut intervals.logs, lane, log);
         }
     }
     in_lanes(&mut BetweenNeighbours(intervals));
     for lane in stretches.iter().flat_map(Stretch::lanes) {
-        let basis = basis(intervals.outward(lane));
+        let basis = basis(at(&intervals.outward, lane));
         intervals.set_numbers(lane, Product::BASIS, basis.as_flattened());
     }
 }
 
 /// The logarithm that continues the curve before the first interval.
 fn before_first(intervals: &Intervals, lane: usize, end: End, alone: bool) -> Vector {
-    let own = intervals.log(lane);
+    let own = at(&intervals.logs, lane);
     if alone {
         return own; // two keys: constant velocity
     }
-    let [[_, slope1, ..], [value2, slope2, bend2, _], _] = basis(intervals.outward(lane));
+    let [[_, slope1, ..], [value2, slope2, bend2, _], _] = basis(at(&intervals.outward, lane));
     let turn = match end {
         End::Parabolic => return extrapolated(intervals, lane, lane + 1),
         // B₁'' = -2 B₁' at t = 0.
         End::Natural => return scaled(own, bend2 / slope1),
         End::Secant => own,
-        End::Clamped(half) => scaled(half, intervals.duration(lane)),
+        End::Clamped(half) => scaled(half, intervals.durations[lane]),
     };
     let rest = sum(turn, scaled(own, -slope2));
     rotated(exp(scaled(own, value2)), scaled(rest, 1.0 / slope1))
@@ -119,17 +119,17 @@ fn before_first(intervals: &Intervals, lane: usize, end: End, alone: bool) -> Ve
 
 /// The logarithm that continues the curve after the last interval.
 fn after_last(intervals: &Intervals, lane: usize, end: End, alone: bool) -> Vector {
-    let own = intervals.log(lane);
+    let own = at(&intervals.logs, lane);
     if alone {
         return own;
     }
-    let [_, [_, c1, c2, c3], [.., value3]] = basis(intervals.outward(lane));
+    let [_, [_, c1, c2, c3], [.., value3]] = basis(at(&intervals.outward, lane));
     let slope3 = 3.0 * value3;
     let turn = match end {
         End::Parabolic => return extrapolated(intervals, lane, lane - 1),
         End::Natural => return scaled(own, -(c2 + 3.0 * c3) / slope3),
         End::Secant => own,
-        End::Clamped(half) => scaled(half, intervals.duration(lane)),
+        End::Clamped(half) => scaled(half, intervals.durations[lane]),
     };
     // The unknown step also rotates the slope of the own step, so the equation is iterated.
     let own_slope = c1 + 2.0 * c2 + 3.0 * c3;
@@ -142,8 +142,8 @@ fn after_last(intervals: &Intervals, lane: usize, end: End, alone: bool) -> Vect
 
 /// The logarithm of one more interval of the parabola through the three keys at an end.
 fn extrapolated(intervals: &Intervals, lane: usize, next: usize) -> Vector {
-    let (own, other) = (intervals.log(lane), intervals.log(next));
-    let (h, next_h) = (intervals.duration(lane), intervals.duration(next));
+    let (own, other) = (at(&intervals.logs, lane), at(&intervals.logs, next));
+    let (h, next_h) = (intervals.durations[lane], intervals.durations[next]);
     let change = sum(scaled(other, ratio(h, next_h)), scaled(own, -1.0));
     sum(own, scaled(change, -2.0 / (1.0 + ratio(next_h, h))))
 }

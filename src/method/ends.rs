@@ -7,9 +7,9 @@ use glam::DVec3;
 
 use crate::curve::options::Ends;
 use crate::fit::double::handles::{
-    BetweenHandles, ControlRotations, EndHandle, EndInterval, HandleRule, KeyHandles,
+    BetweenHandles, ControlRotations, EndHandle, HandleRule, KeyHandles,
 };
-use crate::fit::double::intervals::{Intervals, Stretch};
+use crate::fit::double::intervals::{Intervals, Stretch, at, put};
 use crate::math::quaternion::{self, Quaternion, Vector, exp, product, scaled};
 use crate::simd::dispatch::in_lanes;
 
@@ -43,26 +43,26 @@ fn handles<R: HandleRule>(intervals: &mut Intervals, stretches: &[Stretch], ends
     for stretch in stretches {
         if let (Some(lane), 1) = (stretch.first(), stretch.all) {
             // Two keys: the handles of constant velocity.
-            let (log, other) = (intervals.log(lane), [0.0; 3]);
-            let handle = R::end(EndInterval { log, other }, EndHandle::Turn(log));
-            intervals.set_outgoing(lane, handle);
-            intervals.set_incoming(lane + 1, handle);
+            let log = at(&intervals.logs, lane);
+            let handle = R::end(log, [0.0; 3], EndHandle::Turn(log));
+            put(&mut intervals.outgoing, lane, handle);
+            put(&mut intervals.incoming, lane + 1, handle);
             continue;
         }
         if matches!(ends, Ends::Loop) {
             continue;
         }
         if let Some(lane) = stretch.first() {
-            let other = intervals.incoming(lane + 1);
-            let without = |back| product(intervals.step(lane), back);
+            let other = at(&intervals.incoming, lane + 1);
+            let without = |back| product(at(&intervals.steps, lane), back);
             let handle = end_handle::<R>(intervals, lane, other, without, start);
-            intervals.set_outgoing(lane, handle);
+            put(&mut intervals.outgoing, lane, handle);
         }
         if let Some(lane) = stretch.last() {
-            let other = intervals.outgoing(lane);
-            let without = |back| product(back, intervals.step(lane));
+            let other = at(&intervals.outgoing, lane);
+            let without = |back| product(back, at(&intervals.steps, lane));
             let handle = end_handle::<R>(intervals, lane, other, without, end);
-            intervals.set_incoming(lane + 1, handle);
+            put(&mut intervals.incoming, lane + 1, handle);
         }
     }
 }
@@ -100,7 +100,7 @@ fn end_handle<R: HandleRule>(
     without: impl Fn(Quaternion) -> Quaternion,
     end: End,
 ) -> Vector {
-    let log = intervals.log(lane);
+    let log = at(&intervals.logs, lane);
     let handle = match end {
         End::Parabolic => EndHandle::Parabolic,
         End::Natural => {
@@ -108,7 +108,7 @@ fn end_handle<R: HandleRule>(
             EndHandle::Natural(quaternion::log(rest))
         }
         End::Secant => EndHandle::Turn(log),
-        End::Clamped(half) => EndHandle::Turn(scaled(half, intervals.duration(lane))),
+        End::Clamped(half) => EndHandle::Turn(scaled(half, intervals.durations[lane])),
     };
-    R::end(EndInterval { log, other }, handle)
+    R::end(log, other, handle)
 }

@@ -1,7 +1,7 @@
 //! The cubic spline of glTF.
 
 use crate::curve::options::{Ends, Path};
-use crate::fit::double::intervals::{Intervals, Stretch};
+use crate::fit::double::intervals::{Intervals, Stretch, at, squared_extent};
 use crate::fit::double::shape::Shape;
 use crate::math::quaternion::{Quaternion, Vector, length};
 use crate::method::interpolation::Interpolation;
@@ -43,17 +43,17 @@ fn numbers(track: Track, interval: usize, _: &Interpolation) -> [[f64; 4]; 2] {
 
 fn curves(intervals: &mut Intervals, stretches: &[Stretch], _: Ends) {
     for lane in stretches.iter().flat_map(Stretch::lanes) {
-        let duration = intervals.duration(lane);
-        let outgoing = intervals.outward(lane).map(|c| c * duration);
-        let incoming = intervals.inward(lane + 1).map(|c| c * duration);
+        let duration = intervals.durations[lane];
+        let outgoing = at(&intervals.outward, lane).map(|c| c * duration);
+        let incoming = at(&intervals.inward, lane + 1).map(|c| c * duration);
         let (start, end) = (intervals.key(lane), intervals.end_key(lane));
         let numbers = [start, outgoing, incoming, end];
         intervals.set_numbers(lane, 0, numbers.as_flattened());
         // An estimate of the squared extent: the component of a tangent along its key changes only
         // the quaternion's length.
-        let log = intervals.log(lane);
+        let log = at(&intervals.logs, lane);
         let across = [cross3(start, outgoing), log, cross3(end, incoming)];
-        intervals.set_squared_extent(lane, across);
+        intervals.squared_extents[lane] = squared_extent(across);
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::curve::options::Ends;
 use crate::fit::double::handles::BetweenHandles;
-use crate::fit::double::intervals::{Intervals, Stretch};
+use crate::fit::double::intervals::{Intervals, Stretch, at, put};
 use crate::fit::double::shape::Shape;
 use crate::math::quaternion::scaled;
 use crate::method::interpolation::Interpolation;
@@ -42,10 +42,13 @@ fn numbers(track: Track, interval: usize, _: &Interpolation) -> [[f64; 4]; 2] {
 
 fn curves(intervals: &mut Intervals, stretches: &[Stretch], _: Ends) {
     for lane in stretches.iter().flat_map(Stretch::lanes) {
-        let sixth = intervals.duration(lane) / 6.0;
-        let ([x, y, z, _], [u, v, w, _]) = (intervals.outward(lane), intervals.inward(lane + 1));
-        intervals.set_outgoing(lane, scaled([x, y, z], sixth));
-        intervals.set_incoming(lane + 1, scaled([u, v, w], sixth));
+        let sixth = intervals.durations[lane] / 6.0;
+        let ([x, y, z, _], [u, v, w, _]) = (
+            at(&intervals.outward, lane),
+            at(&intervals.inward, lane + 1),
+        );
+        put(&mut intervals.outgoing, lane, scaled([x, y, z], sixth));
+        put(&mut intervals.incoming, lane + 1, scaled([u, v, w], sixth));
     }
     in_lanes(&mut BetweenHandles(intervals));
 }

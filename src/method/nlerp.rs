@@ -1,7 +1,7 @@
 //! Normalised linear interpolation.
 
 use crate::curve::options::Ends;
-use crate::fit::double::intervals::{Intervals, Stretch};
+use crate::fit::double::intervals::{Intervals, Stretch, at, squared_extent};
 use crate::fit::double::shape::Shape;
 use crate::method::{Continuity, Cost, Curves, Keys, Method, Smooth, USUAL};
 use crate::reference;
@@ -30,6 +30,7 @@ fn curves(intervals: &mut Intervals, stretches: &[Stretch], _: Ends) {
         let (start, end) = (intervals.key(lane), intervals.end_key(lane));
         intervals.set_numbers(lane, 0, &start);
         intervals.set_numbers(lane, 12, &end);
-        intervals.set_squared_extent(lane, [intervals.log(lane), [0.0; 3], [0.0; 3]]);
+        intervals.squared_extents[lane] =
+            squared_extent([at(&intervals.logs, lane), [0.0; 3], [0.0; 3]]);
     }
 }

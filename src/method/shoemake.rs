@@ -1,8 +1,8 @@
 //! Shoemake's first approach, as lectured, and the handle rule of all three approaches.
 
-use crate::fit::double::handles::{BothSides, EndHandle, EndInterval, HandleRule, Handles};
+use crate::fit::double::handles::{BothSides, HandleRule, Handles};
 use crate::fit::double::shape::Shape;
-use crate::math::quaternion::{Real as _, Vector, dot, scaled, sum};
+use crate::math::quaternion::{Real as _, dot, scaled, sum};
 use crate::math::ranges::Algebra;
 use crate::method::{Continuity, Cost, Curves, Keys, Method, Smooth, USUAL, ends};
 use crate::reference;
@@ -36,6 +36,9 @@ static CURVES: Curves = Curves::Smooth(Smooth::new(
 pub(crate) struct Bisector<const DIVISOR: u8>;
 
 impl<const DIVISOR: u8> HandleRule for Bisector<DIVISOR> {
+    // These handles are 3/DIVISOR times as long as the parabola's, at inner keys too.
+    const BOTH: f64 = 2.0 / DIVISOR as f64;
+
     #[inline(always)]
     fn handles<A: Algebra>(algebra: &mut A, [before, after]: BothSides<A>) -> Handles<A::Number> {
         let (a, b) = (before.step, after.step);
@@ -55,18 +58,6 @@ impl<const DIVISOR: u8> HandleRule for Bisector<DIVISOR> {
         Handles {
             incoming: handle,
             outgoing: handle,
-        }
-    }
-
-    fn end(EndInterval { log, other }: EndInterval, handle: EndHandle) -> Vector {
-        match handle {
-            EndHandle::Turn(turn) => scaled(turn, 1.0 / 3.0),
-            // These handles are 3/DIVISOR times as long as the parabola's, at inner keys too.
-            EndHandle::Parabolic => {
-                let whole = scaled(log, 2.0 / f64::from(DIVISOR));
-                sum(whole, scaled(other, -1.0))
-            }
-            EndHandle::Natural(rest) => scaled(rest, 0.5),
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Spherical quadrangle interpolation.
 
-use crate::fit::double::handles::{BothSides, EndHandle, EndInterval, HandleRule, Handles};
+use crate::fit::double::handles::{BothSides, EndHandle, HandleRule, Handles};
 use crate::fit::double::shape::Shape;
 use crate::math::quaternion::{Real as _, Vector, scaled, sum};
 use crate::math::ranges::Algebra;
@@ -39,7 +39,7 @@ impl HandleRule for Rule {
 
     /// The derivative of a squad is `log + 2 outgoing` at its start and `log + 2 incoming` at its
     /// end, as half-rotation vectors per interval.
-    fn end(EndInterval { log, other }: EndInterval, handle: EndHandle) -> Vector {
+    fn end(log: Vector, other: Vector, handle: EndHandle) -> Vector {
         match handle {
             EndHandle::Turn(turn) => scaled(sum(turn, scaled(log, -1.0)), 0.5),
             EndHandle::Parabolic => scaled(other, -1.0),

@@ -9,7 +9,7 @@ use crate::curve::options::{Ends, Quantity, Speed};
 use crate::fit::constant_velocity::arc_polynomial;
 use crate::fit::double::curve::Curve;
 use crate::fit::double::handles::FramesHeld;
-use crate::fit::double::intervals::{Intervals, LANES, Stretch};
+use crate::fit::double::intervals::{Intervals, LANES, Stretch, put};
 use crate::math::canonical::round_quat;
 use crate::math::quaternion::Vector;
 use crate::method::interpolation::Interpolation;
@@ -190,7 +190,8 @@ impl SmoothPreparation {
                 }
                 _ => break, // the method has no numbers of its own for any interval
             };
-            self.intervals.set_given(first + i, outward, inward);
+            put(&mut self.intervals.outward, first + i, outward);
+            put(&mut self.intervals.inward, first + i + 1, inward);
         }
     }
 
@@ -276,7 +277,8 @@ impl SmoothPreparation {
                 };
                 prepared.push_span(start, Source::Constant(constant), NONE);
             } else if is_steady {
-                prepared.push_segment(start, arc_polynomial(self.intervals.keys(lane)), key);
+                let keys = [self.intervals.from[lane], self.intervals.to[lane]];
+                prepared.push_segment(start, arc_polynomial(keys), key);
             } else if let Some(direct) = &mut self.direct {
                 direct.take(prepared, &self.intervals, lane, key);
             } else {

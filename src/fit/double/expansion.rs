@@ -8,7 +8,7 @@ use crate::fit::nodes::Nodes;
 use crate::math::quaternion::{
     self, Real as _, cross3, dot3, exp_by, product, product_with_vector, scaled, square,
 };
-use crate::math::ranges::{LONG_SQUARE, SHORT_SQUARE, long_waves, short_waves};
+use crate::math::ranges::{LONG_WAVES, SHORT_WAVES};
 use crate::shader::PolynomialSegment;
 use crate::simd::lanes::{Doubles, Lanes};
 use crate::twin::sine_cosine::{sine_cosm1, sine_cosm1_quarter};
@@ -46,7 +46,7 @@ fn fit<L: Lanes, const PAIRS: usize, const OWN_BASIS: bool, const WHOLE: bool>(
         let third = Factor::<L>::new::<OWN_BASIS, WHOLE>(block, lane, 2);
         let reach = third.reach.larger(second.reach.larger(first.reach));
         reach.store(&mut block.reaches[lane..]);
-        let base = load::<L, _, _>(from(&block.numbers, 0), lane);
+        let base = load(from(&block.numbers, 0), lane);
         let samples = Expanded::new(base, [first, second, third]).sample::<PAIRS, WHOLE>(nodes);
         block.interpolate(lane, nodes, &samples, segments);
     }
@@ -75,7 +75,7 @@ impl<L: Lanes> Factor<L> {
         j: usize,
     ) -> Self {
         let [c0, c1, c2, c3] = if OWN_BASIS {
-            load::<L, _, _>(from(&block.numbers, Product::BASIS + 4 * j), lane)
+            load(from(&block.numbers, Product::BASIS + 4 * j), lane)
         } else {
             let [c0, c1, c2, c3] = Product::BERNSTEIN[j];
             [all::<L>(c0), all::<L>(c1), all::<L>(c2), all::<L>(c3)]
@@ -88,7 +88,7 @@ impl<L: Lanes> Factor<L> {
                 L::Doubles::load(&block.widths[lane..]),
             )
         };
-        let vector = load::<L, _, _>(from(&block.numbers, Product::VECTORS + 3 * j), lane);
+        let vector = load(from(&block.numbers, Product::VECTORS + 3 * j), lane);
         let squared = square(vector);
         let weight = ((c3 * middle + c2) * middle + c1) * middle + c0;
         // B_j(middle + s width) - B_j(middle), in powers of s.
@@ -118,9 +118,9 @@ impl<L: Lanes> Factor<L> {
 fn exp_in_lanes<L: Lanes, const SHORT: bool>(vector: [L::Doubles; 3]) -> [L::Doubles; 4] {
     let squared = square(vector);
     let (limit, waves) = if SHORT {
-        (SHORT_SQUARE, short_waves(squared))
+        (SHORT_WAVES.limit, SHORT_WAVES.of(squared))
     } else {
-        (LONG_SQUARE, long_waves(squared))
+        (LONG_WAVES.limit, LONG_WAVES.of(squared))
     };
     let turn = exp_by(vector, waves);
     if squared.are_at_most(limit) {
@@ -130,7 +130,7 @@ fn exp_in_lanes<L: Lanes, const SHORT: bool>(vector: [L::Doubles; 3]) -> [L::Dou
     store(&mut vectors, 0, vector);
     store(&mut turns, 0, turn);
     exp_beyond(limit, &vectors, &mut turns);
-    load::<L, _, _>(&turns, 0)
+    load(&turns, 0)
 }
 
 /// Computes the exponentials of half-rotation vectors whose squares exceed `limit`, over the full

@@ -185,6 +185,6 @@ fn sample_full_range<F: Formula, L: Lanes, const PAIRS: usize>(
         store(&mut lanes, 0, *found);
         let t = at + nodes.offset(i) * width;
         put(&mut lanes, j, F::rotation(&numbers, t));
-        *found = load::<L, _, _>(&lanes, 0);
+        *found = load(&lanes, 0);
     }
 }

@@ -11,7 +11,7 @@ use crate::fit::single::exp_log::{LOG, LONG_LOG, Row, load3, log, long_exp, medi
 use crate::fit::single::key_weights::KeyWeights;
 use crate::fit::single::long_tangents::AT_ONCE;
 use crate::math::quaternion::{self, Real as _, dot, minus, product, scaled, square, sum};
-use crate::math::ranges::{MEDIUM_SQUARE, one_plus};
+use crate::math::ranges::{MEDIUM_WAVES, one_plus};
 use crate::shader::KEY_INNER;
 use crate::simd::dispatch::InLanes;
 use crate::simd::lanes::Lanes;
@@ -38,7 +38,7 @@ const LARGEST_COSINE_MINUS_ONE: f32 = 0.5645;
 const LONGEST_CHORD: f32 = 1.0;
 
 /// The largest squared extent of a curve whose f32 numbers hold.
-pub(crate) const LONGEST_DIRECT: f64 = MEDIUM_SQUARE;
+pub(crate) const LONGEST_DIRECT: f64 = MEDIUM_WAVES.limit;
 
 /// Added to the squared extent of a curve whose numbers may not hold.
 const IN_DOUBT: f64 = 2.0;
