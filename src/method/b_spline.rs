@@ -1,6 +1,6 @@
 //! The cumulative cubic B-spline, with the key times as knots.
 
-use crate::curve::formula::product::Product;
+use crate::curve::formula::Product;
 use crate::curve::options::Ends;
 use crate::fit::double::handles::BetweenNeighbours;
 use crate::fit::double::intervals::{Intervals, Stretch, at, put};

@@ -17,7 +17,6 @@ pub const BESSEL_OVERHAUSER: Method = Method {
     formula: "t_i = ((s⁻)^h_i (s⁺)^h_{i-1})^(1/(h_{i-1}+h_i)), a_i = q_i t_i^(h_i/3), b_i = q_i t_i^(-h_{i-1}/3)",
     source: "Overhauser 1968; on rotations in the form of Kim, Kim, Shin 1995",
     continuity: Continuity::C1,
-    continuity_on_even_keys: Continuity::C1,
     keeps_constant_velocity: Keys::Any,
     symmetric: false,
     cost: Cost::new(210.0, 2.8),
@@ -27,9 +26,7 @@ pub const BESSEL_OVERHAUSER: Method = Method {
 };
 
 static CURVES: Curves = Curves::Smooth(
-    Smooth::new(Shape::BERNSTEIN, ends::products::<Rule>)
-        .steady_alone()
-        .direct::<Rule>(WeightRule::ByTime),
+    Smooth::new(Shape::BERNSTEIN, ends::products::<Rule>).direct::<Rule>(WeightRule::ByTime),
 );
 
 struct Rule;

@@ -18,7 +18,6 @@ pub const BESSEL_OVERHAUSER_MEAN: Method = Method {
     formula: "log t_i = (h_i/h_{i-1} log(q_{i-1}⁻¹ q_i) + h_{i-1}/h_i log(q_i⁻¹ q_{i+1})) / (h_{i-1} + h_i), a_i = q_i t_i^(h_i/3), b_i = q_i t_i^(-h_{i-1}/3), de Casteljau",
     source: "Overhauser 1968; Shoemake 1985; Geier, splines 0.3 (Python)",
     continuity: Continuity::C1,
-    continuity_on_even_keys: Continuity::C1,
     keeps_constant_velocity: Keys::Any,
     cost: Cost::new(840.0, 3.2),
     reference: reference::handles::BESSEL_OVERHAUSER_MEAN,
@@ -26,8 +25,10 @@ pub const BESSEL_OVERHAUSER_MEAN: Method = Method {
     ..USUAL
 };
 
-static CURVES: Curves =
-    Curves::Smooth(Smooth::new(Shape::DE_CASTELJAU, ends::controls::<Rule>).steady_alone());
+static CURVES: Curves = Curves::Smooth(Smooth {
+    steady_alone: true,
+    ..Smooth::new(Shape::DE_CASTELJAU, ends::controls::<Rule>)
+});
 
 struct Rule;
 

@@ -5,7 +5,7 @@ use crate::fit::double::shape::Shape;
 use crate::fit::tangent_weights::WeightRule;
 use crate::math::quaternion::{Real as _, product, scaled, sum};
 use crate::math::ranges::Algebra;
-use crate::method::{Continuity, Cost, Curves, Keys, Method, Smooth, USUAL, ends};
+use crate::method::{Cost, Curves, Keys, Method, Smooth, USUAL, ends};
 use crate::reference;
 
 /// Catmull-Rom on rotations, in cumulative form. It ignores the time steps, so its velocity jumps
@@ -16,8 +16,6 @@ pub const CATMULL_ROM: Method = Method {
     summary: "smooth through evenly spaced keys; its velocity jumps where they are uneven",
     formula: "a_i = q_i (q_{i-1}⁻¹ q_{i+1})^(1/6), b_i = q_i (q_{i-1}⁻¹ q_{i+1})^(-1/6)",
     source: "Kim, Kim, Shin 1995, A general construction scheme for unit quaternion curves",
-    continuity: Continuity::C0,
-    continuity_on_even_keys: Continuity::C1,
     keeps_constant_velocity: Keys::Even,
     symmetric: false,
     cost: Cost::new(150.0, 2.6),
@@ -27,9 +25,7 @@ pub const CATMULL_ROM: Method = Method {
 };
 
 static CURVES: Curves = Curves::Smooth(
-    Smooth::new(Shape::BERNSTEIN, ends::products::<Rule>)
-        .steady_alone()
-        .direct::<Rule>(WeightRule::Alike),
+    Smooth::new(Shape::BERNSTEIN, ends::products::<Rule>).direct::<Rule>(WeightRule::Alike),
 );
 
 struct Rule;

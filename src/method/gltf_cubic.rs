@@ -5,7 +5,7 @@ use crate::fit::double::intervals::{Intervals, Stretch, at, squared_extent};
 use crate::fit::double::shape::Shape;
 use crate::math::quaternion::{Quaternion, Vector, length};
 use crate::method::interpolation::Interpolation;
-use crate::method::{Continuity, Cost, Curves, Given, Keys, Method, Smooth, USUAL};
+use crate::method::{Continuity, Cost, Curves, Given, Method, Smooth, USUAL};
 use crate::reference;
 use crate::tracks::set::Track;
 
@@ -19,8 +19,6 @@ pub const GLTF_CUBIC: Method = Method {
     formula: "p(t) = (2t³-3t²+1) q0 + h (t³-2t²+t) out0 + (3t²-2t³) q1 + h (t³-t²) in1, q = p/|p|",
     source: "glTF 2.0, appendix C.5, Cubic Spline Interpolation",
     continuity: Continuity::C1,
-    continuity_on_even_keys: Continuity::C1,
-    keeps_constant_velocity: Keys::Never,
     uses_neighbours: false,
     path: Some(Path::AsAuthored),
     cost: Cost::new(350.0, 3.8),

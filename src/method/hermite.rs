@@ -6,7 +6,7 @@ use crate::fit::double::intervals::{Intervals, Stretch, at, put};
 use crate::fit::double::shape::Shape;
 use crate::math::quaternion::scaled;
 use crate::method::interpolation::Interpolation;
-use crate::method::{Continuity, Cost, Curves, Given, Keys, Method, Smooth, USUAL};
+use crate::method::{Continuity, Cost, Curves, Given, Method, Smooth, USUAL};
 use crate::reference;
 use crate::simd::dispatch::in_lanes;
 use crate::tracks::set::Track;
@@ -20,8 +20,6 @@ pub const HERMITE: Method = Method {
     formula: "a_i = q_i exp(ω_i h_i/6), b_i = q_i exp(-ω_i h_{i-1}/6)",
     source: "Kim, Kim, Shin 1995, A general construction scheme for unit quaternion curves",
     continuity: Continuity::C1,
-    continuity_on_even_keys: Continuity::C1,
-    keeps_constant_velocity: Keys::Never,
     symmetric: false,
     uses_neighbours: false,
     cost: Cost::new(160.0, 2.8),

@@ -20,7 +20,6 @@ pub const KOCHANEK_BARTELS: Method = Method {
     formula: "log in = h_{i-1}/3 (c h_i/h_{i-1} log(q_{i-1}⁻¹ q_i) + d h_{i-1}/h_i log(q_i⁻¹ q_{i+1})) / (h_{i-1} + h_i), log out alike with h_i, a, b; a, d = (1-T)(1+C)(1±B), c, b = (1-T)(1-C)(1±B), de Casteljau",
     source: "Kochanek, Bartels 1984, Interpolating splines with local tension, continuity, and bias control; Geier, splines 0.3 (Python)",
     continuity: Continuity::C1,
-    continuity_on_even_keys: Continuity::C1,
     keeps_constant_velocity: Keys::Any,
     cost: Cost::new(860.0, 3.2),
     reference: reference::handles::KOCHANEK_BARTELS,

@@ -125,7 +125,8 @@ pub struct Method {
     pub(crate) curves: &'static Curves,
 }
 
-/// What most methods have in common; names, formula and curves are each method's own.
+/// What most methods have in common, and how they are unless they say otherwise. Names, formula and
+/// curves are each method's own; without curves a method holds its keys.
 const USUAL: Method = Method {
     name: "",
     summary: "",
@@ -200,19 +201,14 @@ impl Smooth {
         }
     }
 
+    /// Allows curves straight from keys; tracks of two keys then turn at constant velocity.
     const fn direct<R: HandleRule>(self, weights: WeightRule) -> Self {
         Self {
+            steady_alone: true,
             direct: Some(FromKeys {
                 weights,
                 set_long: HandlesF32::set_long::<R>,
             }),
-            ..self
-        }
-    }
-
-    const fn steady_alone(self) -> Self {
-        Self {
-            steady_alone: true,
             ..self
         }
     }

@@ -4,7 +4,7 @@ use crate::fit::double::handles::{BothSides, HandleRule, Handles};
 use crate::fit::double::shape::Shape;
 use crate::math::quaternion::{Real as _, dot, scaled, sum};
 use crate::math::ranges::Algebra;
-use crate::method::{Continuity, Cost, Curves, Keys, Method, Smooth, USUAL, ends};
+use crate::method::{Cost, Curves, Method, Smooth, USUAL, ends};
 use crate::reference;
 
 /// Approach I of the lecture: the control rotation is the bisector itself. It passes its keys three
@@ -15,9 +15,6 @@ pub const SHOEMAKE: Method = Method {
     summary: "Bezier curves whose controls are the bisectors; passes its keys three times too fast",
     formula: "a_i = Bisect(Double(q_{i-1}, q_i), q_{i+1}), b_i = Double(a_i, q_i), de Casteljau",
     source: "Shoemake 1985 as lectured, approach I",
-    continuity: Continuity::C0,
-    continuity_on_even_keys: Continuity::C1,
-    keeps_constant_velocity: Keys::Never,
     cost: Cost::new(1500.0, 4.1),
     reference: reference::handles::SHOEMAKE,
     curves: &CURVES,

@@ -2,7 +2,7 @@
 
 use crate::fit::double::shape::Shape;
 use crate::method::shoemake::Bisector;
-use crate::method::{Continuity, Cost, Curves, Keys, Method, Smooth, USUAL, ends};
+use crate::method::{Cost, Curves, Method, Smooth, USUAL, ends};
 use crate::reference;
 
 /// Approach II of the lecture: the handle goes half of the way to the bisector. It passes its keys
@@ -13,9 +13,6 @@ pub const SHOEMAKE_2: Method = Method {
     summary: "Bezier curves whose controls are half way to the bisector; passes its keys half too fast",
     formula: "a_i = Bisect(q_i, Bisect(Double(q_{i-1}, q_i), q_{i+1})), b_i = Double(a_i, q_i), de Casteljau",
     source: "Shoemake 1985 as lectured, approach II",
-    continuity: Continuity::C0,
-    continuity_on_even_keys: Continuity::C1,
-    keeps_constant_velocity: Keys::Never,
     cost: Cost::new(700.0, 3.1),
     reference: reference::handles::SHOEMAKE_2,
     curves: &CURVES,

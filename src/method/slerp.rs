@@ -13,7 +13,6 @@ pub const SLERP: Method = Method {
     summary: "constant angular velocity between keys; velocity jumps at each key",
     formula: "q(t) = q0 (q0⁻¹ q1)^t",
     source: "Shoemake 1985, Animating rotation with quaternion curves",
-    continuity: Continuity::C0,
     continuity_on_even_keys: Continuity::C0,
     keeps_constant_velocity: Keys::Any,
     uses_neighbours: false,

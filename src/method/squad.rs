@@ -4,7 +4,7 @@ use crate::fit::double::handles::{BothSides, EndHandle, HandleRule, Handles};
 use crate::fit::double::shape::Shape;
 use crate::math::quaternion::{Real as _, Vector, scaled, sum};
 use crate::math::ranges::Algebra;
-use crate::method::{Continuity, Cost, Curves, Keys, Method, Smooth, USUAL, ends};
+use crate::method::{Cost, Curves, Keys, Method, Smooth, USUAL, ends};
 use crate::reference;
 
 /// Squad. It ignores the time steps, so its velocity jumps on uneven keys.
@@ -13,8 +13,6 @@ pub const SQUAD: Method = Method {
     summary: "smooth through evenly spaced keys, as many engines have it",
     formula: "slerp(slerp(q0, q1; t), slerp(s0, s1; t); 2t(1-t)), s_i = q_i exp(-(log(q_i⁻¹ q_{i+1}) + log(q_i⁻¹ q_{i-1}))/4)",
     source: "Shoemake 1987, Quaternion calculus and fast animation",
-    continuity: Continuity::C0,
-    continuity_on_even_keys: Continuity::C1,
     keeps_constant_velocity: Keys::Even,
     cost: Cost::new(300.0, 2.9),
     reference: reference::handles::SQUAD,

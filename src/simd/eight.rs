@@ -1,15 +1,6 @@
 //! Eight lanes of AVX2.
 
-use std::arch::x86_64::{
-    __m256, __m256d, _CMP_LE_OQ, _CMP_LT_OQ, _CMP_NLT_UQ, _mm256_add_pd, _mm256_add_ps,
-    _mm256_and_ps, _mm256_blendv_pd, _mm256_blendv_ps, _mm256_castps_pd, _mm256_castps256_ps128,
-    _mm256_cmp_pd, _mm256_cmp_ps, _mm256_cvtpd_ps, _mm256_cvtps_pd, _mm256_div_pd,
-    _mm256_extractf128_ps, _mm256_max_pd, _mm256_max_ps, _mm256_min_pd, _mm256_movemask_pd,
-    _mm256_movemask_ps, _mm256_mul_pd, _mm256_mul_ps, _mm256_permute_ps, _mm256_permutevar8x32_ps,
-    _mm256_set_m128, _mm256_set1_pd, _mm256_set1_ps, _mm256_setr_epi32, _mm256_setzero_ps,
-    _mm256_sqrt_pd, _mm256_stream_ps, _mm256_sub_pd, _mm256_sub_ps, _mm256_unpackhi_pd,
-    _mm256_unpackhi_ps, _mm256_unpacklo_pd, _mm256_unpacklo_ps, _mm256_xor_ps,
-};
+use std::arch::x86_64::*;
 
 use bytemuck::{Pod, Zeroable};
 

@@ -1,16 +1,6 @@
 //! Sixteen lanes of AVX-512.
 
-use std::arch::x86_64::{
-    __m256, __m512, __m512d, _CMP_LE_OQ, _CMP_LT_OQ, _CMP_NLT_UQ, _mm256_set_m128, _mm512_abs_ps,
-    _mm512_add_pd, _mm512_add_ps, _mm512_broadcast_f32x4, _mm512_castpd_ps, _mm512_castps_pd,
-    _mm512_castps256_ps512, _mm512_castps512_ps256, _mm512_cmp_pd_mask, _mm512_cmp_ps_mask,
-    _mm512_cvtpd_ps, _mm512_cvtps_pd, _mm512_div_pd, _mm512_extractf32x8_ps, _mm512_insertf32x8,
-    _mm512_mask_blend_pd, _mm512_mask_blend_ps, _mm512_maskz_mov_ps, _mm512_max_pd, _mm512_max_ps,
-    _mm512_min_pd, _mm512_mul_pd, _mm512_mul_ps, _mm512_permute_ps, _mm512_permutexvar_ps,
-    _mm512_set1_pd, _mm512_set1_ps, _mm512_setr_epi32, _mm512_setzero_ps, _mm512_shuffle_f32x4,
-    _mm512_sqrt_pd, _mm512_stream_ps, _mm512_sub_pd, _mm512_sub_ps, _mm512_unpackhi_pd,
-    _mm512_unpackhi_ps, _mm512_unpacklo_pd, _mm512_unpacklo_ps, _mm512_xor_ps,
-};
+use std::arch::x86_64::*;
 
 use bytemuck::{Pod, Zeroable};
 

@@ -1,6 +1,6 @@
 //! Samples cubics in cumulative form at the nodes, in vector lanes: the first half of a fit.
 
-use crate::curve::formula::product::Product;
+use crate::curve::formula::Product;
 use crate::fit::double::fit::{FitBlock, Lane64, MOST, Samples, Tier};
 use crate::fit::double::intervals::{at, load, put, rounded, store};
 use crate::fit::double::shape::Sampling;

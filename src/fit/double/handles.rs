@@ -3,7 +3,7 @@
 use std::marker::PhantomData;
 use std::ops::Range;
 
-use crate::curve::formula::product::Product;
+use crate::curve::formula::Product;
 use crate::fit::double::fit::MOST;
 use crate::fit::double::intervals::{
     Intervals, LANES, Lane, ROOM, Stretch, at, load, put, squared_extent, store, widened,

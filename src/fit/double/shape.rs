@@ -3,12 +3,9 @@
 
 use std::marker::PhantomData;
 
-use crate::curve::formula::de_casteljau::DeCasteljau;
-use crate::curve::formula::hermite::{Hermite, Line, Linear};
-use crate::curve::formula::product::Product;
-use crate::curve::formula::rotation_vector::RotationVector;
-use crate::curve::formula::squad::Squad;
-use crate::curve::formula::{Formula, NUMBERS, Numbers};
+use crate::curve::formula::{
+    DeCasteljau, Formula, Hermite, Line, Linear, NUMBERS, Numbers, Product, RotationVector, Squad,
+};
 use crate::fit::double::expansion::Expansion;
 use crate::fit::double::fit::{FitBlock, MOST, Samples, Tier};
 use crate::fit::double::intervals::{load, put, rounded, store};
