@@ -84,9 +84,21 @@ fn curves(intervals: &mut Intervals, stretches: &[Stretch], ends: Ends) {
         if matches!(ends, Ends::Loop) && stretch.all > 1 {
             continue; // the context already has the neighbours across the seam
         }
+        // Two keys: constant velocity.
         let alone = stretch.all == 1 || matches!(ends, Ends::Frozen);
-        let before = |lane| (lane - 1, before_first(intervals, lane, start, alone));
-        let after = |lane| (lane + 1, after_last(intervals, lane, end, alone));
+        let own = |lane| alone.then(|| at(&intervals.logs, lane));
+        let before = |lane| {
+            (
+                lane - 1,
+                own(lane).unwrap_or_else(|| before_first(intervals, lane, start)),
+            )
+        };
+        let after = |lane| {
+            (
+                lane + 1,
+                own(lane).unwrap_or_else(|| after_last(intervals, lane, end)),
+            )
+        };
         let (before, after) = (stretch.first().map(before), stretch.last().map(after));
         for (lane, log) in [before, after].into_iter().flatten() {
             put(&mut intervals.logs, lane, log);
@@ -100,11 +112,8 @@ fn curves(intervals: &mut Intervals, stretches: &[Stretch], ends: Ends) {
 }
 
 /// The logarithm that continues the curve before the first interval.
-fn before_first(intervals: &Intervals, lane: usize, end: End, alone: bool) -> Vector {
+fn before_first(intervals: &Intervals, lane: usize, end: End) -> Vector {
     let own = at(&intervals.logs, lane);
-    if alone {
-        return own; // two keys: constant velocity
-    }
     let [[_, slope1, ..], [value2, slope2, bend2, _], _] = basis(at(&intervals.outward, lane));
     let turn = match end {
         End::Parabolic => return extrapolated(intervals, lane, lane + 1),
@@ -118,11 +127,8 @@ fn before_first(intervals: &Intervals, lane: usize, end: End, alone: bool) -> Ve
 }
 
 /// The logarithm that continues the curve after the last interval.
-fn after_last(intervals: &Intervals, lane: usize, end: End, alone: bool) -> Vector {
+fn after_last(intervals: &Intervals, lane: usize, end: End) -> Vector {
     let own = at(&intervals.logs, lane);
-    if alone {
-        return own;
-    }
     let [_, [_, c1, c2, c3], [.., value3]] = basis(at(&intervals.outward, lane));
     let slope3 = 3.0 * value3;
     let turn = match end {

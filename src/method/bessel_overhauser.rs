@@ -26,12 +26,14 @@ pub const BESSEL_OVERHAUSER: Method = Method {
 };
 
 static CURVES: Curves = Curves::Smooth(
-    Smooth::new(Shape::BERNSTEIN, ends::products::<Rule>).direct::<Rule>(WeightRule::ByTime),
+    Smooth::new(Shape::BERNSTEIN, ends::curves::<Rule>).direct::<Rule>(WeightRule::ByTime),
 );
 
 struct Rule;
 
 impl HandleRule for Rule {
+    const IS_CUMULATIVE: bool = true;
+
     #[inline(always)]
     fn handles<A: Algebra>(algebra: &mut A, [before, after]: BothSides<A>) -> Handles<A::Number> {
         let both = before.duration + after.duration;

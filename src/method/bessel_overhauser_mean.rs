@@ -27,7 +27,7 @@ pub const BESSEL_OVERHAUSER_MEAN: Method = Method {
 
 static CURVES: Curves = Curves::Smooth(Smooth {
     steady_alone: true,
-    ..Smooth::new(Shape::DE_CASTELJAU, ends::controls::<Rule>)
+    ..Smooth::new(Shape::DE_CASTELJAU, ends::curves::<Rule>)
 });
 
 struct Rule;

@@ -25,12 +25,14 @@ pub const CATMULL_ROM: Method = Method {
 };
 
 static CURVES: Curves = Curves::Smooth(
-    Smooth::new(Shape::BERNSTEIN, ends::products::<Rule>).direct::<Rule>(WeightRule::Alike),
+    Smooth::new(Shape::BERNSTEIN, ends::curves::<Rule>).direct::<Rule>(WeightRule::Alike),
 );
 
 struct Rule;
 
 impl HandleRule for Rule {
+    const IS_CUMULATIVE: bool = true;
+
     #[inline(always)]
     fn handles<A: Algebra>(algebra: &mut A, [before, after]: BothSides<A>) -> Handles<A::Number> {
         // The half-angle of both steps together may approach pi, so its sign is not changed to the

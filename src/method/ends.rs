@@ -13,27 +13,17 @@ use crate::fit::double::intervals::{Intervals, Stretch, at, put};
 use crate::math::quaternion::{self, Quaternion, Vector, exp, product, scaled};
 use crate::simd::dispatch::in_lanes;
 
-/// Curves in cumulative form, for a method with that rule for handles.
-pub(crate) fn products<R: HandleRule>(
-    intervals: &mut Intervals,
-    stretches: &[Stretch],
-    ends: Ends,
-) {
-    handles::<R>(intervals, stretches, ends);
-    in_lanes(&mut BetweenHandles(intervals));
+/// The curves of a method with that rule for handles.
+pub(crate) fn curves<R: HandleRule>(intervals: &mut Intervals, stretches: &[Stretch], ends: Ends) {
+    set_handles::<R>(intervals, stretches, ends);
+    if R::IS_CUMULATIVE {
+        in_lanes(&mut BetweenHandles(intervals));
+    } else {
+        in_lanes(&mut ControlRotations(intervals));
+    }
 }
 
-/// Curves by control rotations, for a method with that rule for handles.
-pub(crate) fn controls<R: HandleRule>(
-    intervals: &mut Intervals,
-    stretches: &[Stretch],
-    ends: Ends,
-) {
-    handles::<R>(intervals, stretches, ends);
-    in_lanes(&mut ControlRotations(intervals));
-}
-
-fn handles<R: HandleRule>(intervals: &mut Intervals, stretches: &[Stretch], ends: Ends) {
+fn set_handles<R: HandleRule>(intervals: &mut Intervals, stretches: &[Stretch], ends: Ends) {
     in_lanes(&mut KeyHandles::<R> {
         intervals,
         stretches,

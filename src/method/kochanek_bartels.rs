@@ -28,7 +28,7 @@ pub const KOCHANEK_BARTELS: Method = Method {
 };
 
 static CURVES: Curves = Curves::Smooth(
-    Smooth::new(Shape::DE_CASTELJAU, ends::controls::<Rule>).with(Given::Numbers(numbers)),
+    Smooth::new(Shape::DE_CASTELJAU, ends::curves::<Rule>).with(Given::Numbers(numbers)),
 );
 
 /// Tension, continuity and bias of the key that an interval starts with.

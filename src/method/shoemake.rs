@@ -23,7 +23,7 @@ pub const SHOEMAKE: Method = Method {
 
 static CURVES: Curves = Curves::Smooth(Smooth::new(
     Shape::DE_CASTELJAU,
-    ends::controls::<Bisector<1>>,
+    ends::curves::<Bisector<1>>,
 ));
 
 /// Handles that go 1/`DIVISOR` of the way from the key to the bisector.

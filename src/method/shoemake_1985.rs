@@ -21,5 +21,5 @@ pub const SHOEMAKE_1985: Method = Method {
 
 static CURVES: Curves = Curves::Smooth(Smooth::new(
     Shape::DE_CASTELJAU,
-    ends::controls::<Bisector<3>>,
+    ends::curves::<Bisector<3>>,
 ));

@@ -21,5 +21,5 @@ pub const SHOEMAKE_2: Method = Method {
 
 static CURVES: Curves = Curves::Smooth(Smooth::new(
     Shape::DE_CASTELJAU,
-    ends::controls::<Bisector<2>>,
+    ends::curves::<Bisector<2>>,
 ));

@@ -20,7 +20,7 @@ pub const SQUAD: Method = Method {
     ..USUAL
 };
 
-static CURVES: Curves = Curves::Smooth(Smooth::new(Shape::SQUAD, ends::controls::<Rule>));
+static CURVES: Curves = Curves::Smooth(Smooth::new(Shape::SQUAD, ends::curves::<Rule>));
 
 /// `s_i = q_i exp(outgoing) = q_i exp(-incoming)`.
 struct Rule;

@@ -18,16 +18,6 @@ pub(crate) struct Cubic {
 }
 
 impl Cubic {
-    /// Stands still.
-    pub(crate) fn still(at: DVec3) -> Self {
-        Self {
-            start: at,
-            leaving: DVec3::ZERO,
-            arriving: DVec3::ZERO,
-            end: at,
-        }
-    }
-
     /// The coefficients of 1, t, t², t³.
     pub(crate) fn powers(&self) -> [DVec3; 4] {
         let rise = self.end - self.start;
@@ -37,15 +27,6 @@ impl Cubic {
             rise * 3.0 - self.leaving * 2.0 - self.arriving,
             self.leaving + self.arriving - rise * 2.0,
         ]
-    }
-
-    fn from_powers([c0, c1, c2, c3]: [DVec3; 4]) -> Self {
-        Self {
-            start: c0,
-            leaving: c1,
-            arriving: c1 + c2 * 2.0 + c3 * 3.0,
-            end: c0 + c1 + c2 + c3,
-        }
     }
 }
 
@@ -104,7 +85,14 @@ impl<'a> Curves<'a> {
     /// The curve of an interval.
     pub(crate) fn of(&self, i: usize) -> Cubic {
         if self.is_held(i) {
-            return Cubic::still(self.key(i));
+            let [start, end] = [self.key(i); 2];
+            let [leaving, arriving] = [DVec3::ZERO; 2];
+            return Cubic {
+                start,
+                leaving,
+                arriving,
+                end,
+            };
         }
         if self.method == VectorMethod::BSpline && self.track.keys.len() > 2 {
             return self.b_spline(i);
@@ -239,7 +227,13 @@ impl<'a> Curves<'a> {
             }
         }
         powers[0] += self.key(i) - before;
-        Cubic::from_powers(powers)
+        let [start, c1, c2, c3] = powers;
+        Cubic {
+            start,
+            leaving: c1,
+            arriving: c1 + c2 * 2.0 + c3 * 3.0,
+            end: start + c1 + c2 + c3,
+        }
     }
 
     /// One more step of the parabola through the three keys at an end.

@@ -113,10 +113,8 @@ impl ArcPreparation {
             }
             let own = self.count..LANES.min(self.count + intervals.len());
             let (start, end) = (intervals.start, intervals.start + own.len());
-            let (from, to) = (start..end, start + 1..end + 1);
-            let signs = [&from, &to].map(|keys| signs.between(keys.clone()));
-            signs[0].copy(&keys[from], &mut self.from[own.clone()]);
-            signs[1].copy(&keys[to], &mut self.to[own.clone()]);
+            signs.copy(keys, start..end, &mut self.from[own.clone()]);
+            signs.copy(keys, start + 1..end + 1, &mut self.to[own.clone()]);
             self.count = own.end;
             intervals.start = end;
         }

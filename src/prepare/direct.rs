@@ -51,7 +51,7 @@ impl Direct {
     pub(crate) fn new(how: FromKeys, smooth: Smooth, ends: Ends) -> Self {
         Self {
             weights: KeyWeights::new(how.weights, ends),
-            small_angle: SmallAngleLanes::new(),
+            small_angle: SmallAngleLanes::zeroed(),
             whole: HandlesF32::new(),
             places: [Place {
                 span: 0,
@@ -297,7 +297,7 @@ impl Rest {
             fitting.take(intervals, lane, place);
         }
         fitting.bring(prepared, intervals);
-        intervals.clear();
+        intervals.count = 0;
         stretches.clear();
         self.places.clear();
     }

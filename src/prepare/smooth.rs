@@ -165,7 +165,11 @@ impl SmoothPreparation {
                 self.push(track, signs, other..other + 1, &[]);
                 // Across the seam, keys are multiplied by the last key's sign, so that they continue
                 // the signs on this side.
-                self.intervals.turn(lane, signs.sign(track.keys.len() - 1));
+                let sign = signs.sign(track.keys.len() - 1);
+                let Intervals { from, to, .. } = &mut self.intervals;
+                for key in [&mut from[lane], &mut to[lane]] {
+                    *key = key.map(|component| component * sign);
+                }
             }
             None => self.intervals.push_nothing(),
         }
@@ -212,7 +216,7 @@ impl SmoothPreparation {
             direct.fit(prepared, intervals, &stretches, is_exact, fitting);
         }
         self.fitting.bring(prepared, &self.intervals);
-        self.intervals.clear();
+        self.intervals.count = 0;
         self.stretches = stretches;
         self.stretches.clear();
     }

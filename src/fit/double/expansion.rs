@@ -2,6 +2,7 @@
 
 use crate::curve::formula::Product;
 use crate::fit::double::fit::{FitBlock, Lane64, MOST, Samples, Tier};
+use crate::fit::double::handles::redo;
 use crate::fit::double::intervals::{at, load, put, rounded, store};
 use crate::fit::double::shape::Sampling;
 use crate::fit::nodes::Nodes;
@@ -129,21 +130,11 @@ fn exp_in_lanes<L: Lanes, const SHORT: bool>(vector: [L::Doubles; 3]) -> [L::Dou
     let (mut vectors, mut turns) = ([[0.0; MOST]; 3], [[0.0; MOST]; 4]);
     store(&mut vectors, 0, vector);
     store(&mut turns, 0, turn);
-    exp_beyond(limit, &vectors, &mut turns);
+    let doubt = squared.up_to(all::<L>(limit), all::<L>(0.0), all::<L>(1.0));
+    redo(doubt, 0..L::COUNT, |lane| {
+        put(&mut turns, lane, quaternion::exp(at(&vectors, lane)));
+    });
     load(&turns, 0)
-}
-
-/// Computes the exponentials of half-rotation vectors whose squares exceed `limit`, over the full
-/// range.
-#[inline(never)]
-fn exp_beyond(limit: f64, vectors: &[[f64; MOST]; 3], turns: &mut [[f64; MOST]; 4]) {
-    for lane in 0..MOST {
-        let vector = at(vectors, lane);
-        let squared = square(vector);
-        if squared > limit || squared.is_nan() {
-            put(turns, lane, quaternion::exp(vector));
-        }
-    }
 }
 
 /// The sine of an angle divided by the length of its vector, and the angle's cosine minus one.

@@ -28,35 +28,29 @@ impl InLanes for Steps<'_> {
             let log = near.log(step);
             store(&mut own.steps, lane, step);
             store(&mut own.logs, lane, log);
-            near.redo(lane, own.count, |j| {
+            redo(near.doubt, lane..own.count, |j| {
                 put(&mut own.logs, j, quaternion::log(at(&own.steps, j)));
             });
         }
     }
 }
 
-impl<D: Doubles> PrincipalRange<D> {
-    /// Calls `redo` for the lanes outside the principal range, among those from `lane` on and before
-    /// `end`; most vectors have none.
-    #[inline(always)]
-    fn redo(&self, lane: usize, end: usize, redo: impl FnMut(usize)) {
-        if self.doubt.are_at_most(0.0) {
-            return;
-        }
+/// Calls `again` for those of some lanes whose doubt, one in each lane of a vector, is not 0; most
+/// vectors have none.
+#[inline(always)]
+pub(crate) fn redo<D: Doubles>(doubt: D, lanes: Range<usize>, again: impl FnMut(usize)) {
+    if !doubt.are_at_most(0.0) {
         let mut doubts = [0.0; MOST];
-        self.doubt.store(&mut doubts);
-        redo_lanes(lane..end, doubts, redo);
+        doubt.store(&mut doubts);
+        redo_lanes(lanes, doubts, again);
     }
 }
 
-/// Calls `redo` for the lanes whose doubt is not 0. It is kept out of the loops over vectors.
+/// It is kept out of the loops over vectors.
 #[inline(never)]
-fn redo_lanes(lanes: Range<usize>, doubts: [f64; MOST], mut redo: impl FnMut(usize)) {
-    for (lane, doubt) in lanes.zip(doubts) {
-        if doubt != 0.0 {
-            redo(lane);
-        }
-    }
+fn redo_lanes(lanes: Range<usize>, doubts: [f64; MOST], again: impl FnMut(usize)) {
+    let lanes = lanes.zip(doubts).filter(|&(_, doubt)| doubt != 0.0);
+    lanes.map(|(lane, _)| lane).for_each(again);
 }
 
 /// Keys in f64, normalised.
@@ -116,6 +110,9 @@ pub(crate) trait HandleRule {
     /// have no branches, so that they run in vector lanes.
     fn handles<A: Algebra>(algebra: &mut A, sides: BothSides<A>) -> Handles<A::Number>;
 
+    /// Whether curves are given in cumulative form, not by their control rotations.
+    const IS_CUMULATIVE: bool = false;
+
     /// The part of a turn at constant rate that both handles of its interval are together.
     const BOTH: f64 = 2.0 / 3.0;
 
@@ -157,7 +154,7 @@ impl<R: HandleRule> InLanes for KeyHandles<'_, R> {
         for lane in (0..own.whole()).step_by(L::COUNT) {
             let mut near = PrincipalRange::<L::Doubles>::new();
             own.find_handles::<R, _>(&mut near, lane + 1);
-            near.redo(lane + 1, own.count, |j| {
+            redo(near.doubt, lane + 1..own.count, |j| {
                 // The context lanes of two neighbouring stretches do not share a key.
                 let mut stretches = self.stretches.iter().map(Stretch::lanes);
                 if stretches.any(|lanes| (lanes.start..=lanes.end).contains(&j)) {
@@ -205,7 +202,9 @@ impl InLanes for BetweenHandles<'_> {
             own.store_base(lane, units::<L>(&own.from, lane));
             let mut near = PrincipalRange::<L::Doubles>::new();
             own.find_vectors(&mut near, lane);
-            near.redo(lane, own.count, |j| own.find_vectors(&mut FullRange, j));
+            redo(near.doubt, lane..own.count, |j| {
+                own.find_vectors(&mut FullRange, j)
+            });
         }
     }
 }
@@ -289,7 +288,7 @@ impl InLanes for BetweenNeighbours<'_> {
             let (before, after) = (load(&own.logs, lane), load(&own.logs, lane + 2));
             let log = load::<L::Doubles, _, _>(&own.logs, lane + 1);
             own.store_vectors(lane + 1, [before, log, after]);
-            near.redo(lane + 1, own.count, |j| {
+            redo(near.doubt, lane + 1..own.count, |j| {
                 own.find_base(&mut FullRange, j, own.key(j));
             });
         }

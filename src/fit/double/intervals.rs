@@ -130,10 +130,8 @@ impl Intervals {
         let lanes = self.count..self.count + intervals.len();
         let Range { start, end } = intervals;
         let keys: &[[f32; 4]] = bytemuck::cast_slice(track.keys);
-        let (from, to) = (start..end, start + 1..end + 1);
-        let own = [&from, &to].map(|keys| signs.between(keys.clone()));
-        own[0].copy(&keys[from], &mut self.from[lanes.clone()]);
-        own[1].copy(&keys[to], &mut self.to[lanes.clone()]);
+        signs.copy(keys, start..end, &mut self.from[lanes.clone()]);
+        signs.copy(keys, start + 1..end + 1, &mut self.to[lanes.clone()]);
         let (starts, ends) = (&track.times[start..end], &track.times[start + 1..=end]);
         self.starts[lanes.clone()].copy_from_slice(starts);
         self.ends[lanes.clone()].copy_from_slice(ends);
@@ -154,13 +152,6 @@ impl Intervals {
         self.count = own.end;
     }
 
-    /// Multiplies both keys of a lane by `sign`, which is 1 or -1.
-    pub(crate) fn turn(&mut self, lane: usize, sign: f32) {
-        for key in [&mut self.from[lane], &mut self.to[lane]] {
-            *key = key.map(|component| component * sign);
-        }
-    }
-
     /// Adds an empty lane of context, where a track ends and has no neighbour.
     pub(crate) fn push_nothing(&mut self) {
         let lane = self.count;
@@ -168,11 +159,6 @@ impl Intervals {
         (self.from[lane], self.to[lane]) = (identity, identity);
         self.durations[lane] = 1.0;
         self.count += 1;
-    }
-
-    /// Forgets all intervals.
-    pub(crate) fn clear(&mut self) {
-        self.count = 0;
     }
 
     /// The change of the parameter per second.

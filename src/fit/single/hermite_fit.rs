@@ -81,7 +81,10 @@ impl KeyFit<5> for Halves {
         let middle = Moment::new::<false>(end, backward, &LAST_HALF.middle);
         let ends = [End::new(end, backward[2], HALF.slope), seam.negated()];
         sample(samples, &LAST_HALF, middle, ends);
-        samples.turn_round();
+        // The parameter runs backwards there.
+        for odd in samples.odd.as_flattened_mut() {
+            *odd = -*odd;
+        }
         let behind = places.map(|place| place + 1);
         interpolate(true, LAST_HALF.nodes, samples, &behind, segments);
     }
