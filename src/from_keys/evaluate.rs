@@ -41,7 +41,7 @@ impl<'a> KeyEvaluator<'a> {
             KeyCurve::TwoKeys => Block::TwoKeys(Box::new(TwoKeyBlock::new(Form::Polynomial))),
             KeyCurve::Cubics(weights) => {
                 let weights = TrackWeights::new(weights, interpolation.ends);
-                Block::Cubics(Box::new(CubicBlock::new()), weights)
+                Block::Cubics(bytemuck::zeroed_box(), weights)
             }
         };
         Self {
@@ -102,7 +102,7 @@ impl<'a> Block<'a> {
         let Block::TwoKeys(block) = self else {
             return samples;
         };
-        let (Form::Arc, Some(sign)) = (block.form, keys.signs.shared()) else {
+        let (false, Some(sign)) = (block.are_polynomials, keys.signs.shared()) else {
             return samples;
         };
         block.flush(output);

@@ -14,8 +14,8 @@ use crate::fit::single::handles::{
     CurveNumbers, FindCurves, FindSteps, HandlesF32, LONGEST_DIRECT,
 };
 use crate::fit::single::hermite_fit::{BetweenKeys, Halves, KeyFit};
-use crate::fit::single::key_weights::KeyWeights;
 use crate::fit::single::small_angle::SmallAngleLanes;
+use crate::fit::tangent_weights::KeyWeights;
 use crate::method::{FromKeys, Smooth};
 use crate::prepare::fitting::Fitting;
 use crate::prepare::prepared::{Place, Prepared};

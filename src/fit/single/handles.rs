@@ -10,8 +10,8 @@ use bytemuck::Zeroable;
 
 use crate::fit::double::intervals::{Intervals, ROOM, rounded, squared_extent, widened};
 use crate::fit::single::exp_log::{LOG, LONG_LOG, Row, load3, log, long_exp, medium_exp, store};
-use crate::fit::single::key_weights::KeyWeights;
 use crate::fit::single::long_tangents::AT_ONCE;
+use crate::fit::tangent_weights::KeyWeights;
 use crate::math::quaternion::{self, Real as _, dot, minus, product, scaled, square, sum};
 use crate::math::ranges::{MEDIUM_WAVES, one_plus};
 use crate::shader::KEY_INNER;

@@ -7,7 +7,7 @@ use bytemuck::Zeroable;
 
 use crate::fit::double::fit::MOST;
 use crate::fit::double::intervals::{Intervals, LANES, ROOM, Stretch};
-use crate::fit::single::key_weights::KeyWeights;
+use crate::fit::tangent_weights::KeyWeights;
 use crate::shader::{KEY_INNER, LONGEST_STEP, PolynomialSegment};
 use crate::simd::dispatch::{InLanes, in_lanes};
 use crate::simd::lanes::Lanes;
