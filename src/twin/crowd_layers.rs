@@ -4,10 +4,7 @@
 use glam::Vec4;
 
 use crate::math::canonical::canonical;
-use crate::shader::{
-    ArcSegment, CHANNELS, CrowdChannel, CrowdEntry, CrowdPlace, FORM_ARC, FORM_CONSTANT,
-    FORM_CUBIC, ON_KEY, POWERS, PolynomialSegment, ROTATION, TICKS, TRANSLATION, WEIGHT_UNIT,
-};
+use crate::shader::*;
 use crate::simd::lanes::Number;
 use crate::twin::evaluate::Evaluate as _;
 pub(crate) use crate::twin::pose_add::pose as turn_added;

@@ -1,13 +1,7 @@
 //! Twin of `shaders/from_keys/small_angle.wgsl`: the same names, the same order.
 
 use crate::math::quaternion::{Arithmetic, cross3, dot3, minus, product, scaled, sum};
-use crate::shader::{
-    B_111_1, B_111_2, B_111_3, B_111_4, B_111_5, B_111_6, B_122_1, B_122_2, B_122_3, B_122_4,
-    B_122_5, B_122_6, B_123_1, B_123_3, B_123_5, B_133_1, B_133_2, B_133_3, B_133_4, B_133_5,
-    B_133_6, B_211_1, B_211_2, B_211_3, B_211_4, B_211_5, B_211_6, B_222_1, B_222_3, B_222_5,
-    COSM1_1, COSM1_2, KEY_AT_END, KEY_UNKNOWN, LOG_1, LOG_2, LOG_3, LOG_4, LONGEST_STEP,
-    LONGEST_TANGENT_PART, SINC_1, SINC_2, SMALL_SQUARED_EXTENT, THIRD, TWO_THIRDS, TangentWeights,
-};
+use crate::shader::*;
 use crate::simd::lanes::canonical;
 use crate::twin::evaluate_arc::norm_squared;
 
