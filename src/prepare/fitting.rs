@@ -99,7 +99,8 @@ impl Fitting {
         }
         self.cutter.cut(&mut prepared.segments.polynomials);
         prepared.put_subcurves(&self.cutter);
-        self.cutter.clear();
+        self.cutter.curves.clear();
+        self.cutter.subcurves.clear();
     }
 }
 
@@ -125,7 +126,7 @@ fn run(
 impl Prepared {
     /// Replaces the spans of curves that were cut by those of their parts.
     fn put_subcurves(&mut self, cutter: &Cutter) {
-        let mut cut = cutter.subcurves();
+        let mut cut = &cutter.subcurves[..];
         if cut.is_empty() {
             return;
         }

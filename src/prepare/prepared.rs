@@ -55,7 +55,8 @@ impl Prepared {
 
     /// Forgets everything and keeps the memory.
     pub(crate) fn clear(&mut self) {
-        self.segments.clear();
+        self.segments.arcs.clear();
+        self.segments.polynomials.clear();
         self.constants.clear();
         self.exact.clear();
         self.spans.clear();
@@ -96,7 +97,9 @@ impl Prepared {
             }),
             ..part
         }));
-        self.segments.append(other.segments);
+        self.segments.arcs.extend(other.segments.arcs);
+        let polynomials = other.segments.polynomials;
+        self.segments.polynomials.extend(polynomials);
         self.constants.extend(other.constants);
         self.exact.extend(other.exact);
     }

@@ -15,10 +15,10 @@ pub(crate) struct Cutter {
     quantity: Quantity,
     /// Made for the first curve to cut.
     block: Option<Box<FitBlock>>,
-    /// The curves added since the last [`Cutter::clear`].
-    curves: Vec<Curve>,
+    pub(crate) curves: Vec<Curve>,
     waiting: Vec<Subcurve>,
-    subcurves: Vec<Subcurve>,
+    /// The subcurves of every curve that was cut, in order of spans and time.
+    pub(crate) subcurves: Vec<Subcurve>,
 }
 
 /// A subcurve of a curve.
@@ -116,22 +116,11 @@ impl Cutter {
             .sort_by_key(|subcurve| (subcurve.span, subcurve.piece.from));
     }
 
-    /// The subcurves of every curve, in order of spans and time.
-    pub(crate) fn subcurves(&self) -> &[Subcurve] {
-        &self.subcurves
-    }
-
     /// The subcurve as a curve of its own.
     pub(crate) fn curve(&self, subcurve: &Subcurve) -> Curve {
         Curve {
             piece: subcurve.piece,
             ..self.curves[subcurve.curve].clone()
         }
-    }
-
-    /// Forgets the curves and their subcurves.
-    pub(crate) fn clear(&mut self) {
-        self.curves.clear();
-        self.subcurves.clear();
     }
 }
