@@ -116,11 +116,7 @@ impl KeyDispatch<'_, '_> {
             if track.signs.any() {
                 // Whole keys, in order: what is written to may be slow to read.
                 for (i, (to, &[x, y, z, w])) in own.iter_mut().zip(keys).enumerate() {
-                    let turned = if track.signs.is_turned(i) {
-                        SIGN_TURNED
-                    } else {
-                        0
-                    };
+                    let turned = SIGN_TURNED * u32::from(track.signs.is_turned(i));
                     *to = [x | turned, y, z, w];
                 }
             } else {

@@ -77,18 +77,13 @@ fn curves(intervals: &mut Intervals, stretches: &[Stretch], ends: Ends) {
         }
         // Two keys: constant velocity.
         let alone = stretch.all == 1 || matches!(ends, Ends::Frozen);
-        let own = |lane| alone.then(|| at(&intervals.logs, lane));
-        let before = |lane| {
-            (
-                lane - 1,
-                own(lane).unwrap_or_else(|| before_first(intervals, lane, start)),
-            )
+        let before = |lane| match alone {
+            true => (lane - 1, at(&intervals.logs, lane)),
+            false => (lane - 1, before_first(intervals, lane, start)),
         };
-        let after = |lane| {
-            (
-                lane + 1,
-                own(lane).unwrap_or_else(|| after_last(intervals, lane, end)),
-            )
+        let after = |lane| match alone {
+            true => (lane + 1, at(&intervals.logs, lane)),
+            false => (lane + 1, after_last(intervals, lane, end)),
         };
         let (before, after) = (stretch.first().map(before), stretch.last().map(after));
         for (lane, log) in [before, after].into_iter().flatten() {

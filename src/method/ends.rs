@@ -10,7 +10,7 @@ use crate::fit::double::handles::{
     BetweenHandles, ControlRotations, EndHandle, HandleRule, KeyHandles,
 };
 use crate::fit::double::intervals::{Intervals, Stretch, at, put};
-use crate::math::quaternion::{self, Quaternion, Vector, exp, product, scaled};
+use crate::math::quaternion::{self, Vector, exp, product, scaled};
 use crate::simd::dispatch::in_lanes;
 
 /// The curves of a method with that rule for handles.
@@ -42,17 +42,30 @@ fn set_handles<R: HandleRule>(intervals: &mut Intervals, stretches: &[Stretch], 
         if matches!(ends, Ends::Loop) {
             continue;
         }
-        if let Some(lane) = stretch.first() {
-            let other = at(&intervals.incoming, lane + 1);
-            let without = |back| product(at(&intervals.steps, lane), back);
-            let handle = end_handle::<R>(intervals, lane, other, without, start);
-            put(&mut intervals.outgoing, lane, handle);
-        }
-        if let Some(lane) = stretch.last() {
-            let other = at(&intervals.outgoing, lane);
-            let without = |back| product(back, at(&intervals.steps, lane));
-            let handle = end_handle::<R>(intervals, lane, other, without, end);
-            put(&mut intervals.incoming, lane + 1, handle);
+        let both = [(stretch.first(), start, true), (stretch.last(), end, false)];
+        for (lane, end, is_first) in both {
+            let Some(lane) = lane else { continue };
+            let (log, step) = (at(&intervals.logs, lane), at(&intervals.steps, lane));
+            // The handle of the interval's inner key.
+            let other = match is_first {
+                true => at(&intervals.incoming, lane + 1),
+                false => at(&intervals.outgoing, lane),
+            };
+            let handle = match end {
+                End::Parabolic => EndHandle::Parabolic,
+                End::Natural => {
+                    let back = exp(scaled(other, -1.0));
+                    let (a, b) = if is_first { (step, back) } else { (back, step) };
+                    EndHandle::Natural(quaternion::log(product(a, b)))
+                }
+                End::Secant => EndHandle::Turn(log),
+                End::Clamped(half) => EndHandle::Turn(scaled(half, intervals.durations[lane])),
+            };
+            let handle = R::end(log, other, handle);
+            match is_first {
+                true => put(&mut intervals.outgoing, lane, handle),
+                false => put(&mut intervals.incoming, lane + 1, handle),
+            }
         }
     }
 }
@@ -78,27 +91,4 @@ impl Ends {
             Self::Parabolic | Self::Loop | Self::Frozen => [End::Parabolic; 2],
         }
     }
-}
-
-/// The handle of a track's first or last key towards the interval in `lane`. `other` is the handle
-/// of that interval's inner key; `without` returns the interval's step without that handle, given
-/// the exponential of its negative.
-fn end_handle<R: HandleRule>(
-    intervals: &Intervals,
-    lane: usize,
-    other: Vector,
-    without: impl Fn(Quaternion) -> Quaternion,
-    end: End,
-) -> Vector {
-    let log = at(&intervals.logs, lane);
-    let handle = match end {
-        End::Parabolic => EndHandle::Parabolic,
-        End::Natural => {
-            let rest = without(exp(scaled(other, -1.0)));
-            EndHandle::Natural(quaternion::log(rest))
-        }
-        End::Secant => EndHandle::Turn(log),
-        End::Clamped(half) => EndHandle::Turn(scaled(half, intervals.durations[lane])),
-    };
-    R::end(log, other, handle)
 }

@@ -53,10 +53,7 @@ impl Direct {
             weights: KeyWeights::new(how.weights, ends),
             small_angle: SmallAngleLanes::zeroed(),
             whole: HandlesF32::new(),
-            places: [Place {
-                span: 0,
-                segment: 0,
-            }; ROOM],
+            places: [Place::zeroed(); ROOM],
             usual: Vec::new(),
             few_powers: Vec::new(),
             halves: Vec::new(),

@@ -2,6 +2,8 @@
 
 use std::ops::Range;
 
+use bytemuck::Zeroable;
+
 use crate::curve::segment::Segments;
 use crate::fit::double::curve::Curve;
 use crate::math::canonical::round_quat;
@@ -28,7 +30,7 @@ pub(crate) struct Prepared {
 }
 
 /// Where a curve goes: its span, and the segment of that.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Zeroable)]
 pub(crate) struct Place {
     pub(crate) span: usize,
     pub(crate) segment: usize,
