@@ -300,19 +300,20 @@ mod tests {
     /// Catches a wrong digit in a polynomial.
     #[test]
     fn short_and_medium_waves_are_those_of_libm() {
-        for i in 0..=5_000 {
-            let x = f64::from(i) * 1e-4;
-            let (sinc, cosine) = SHORT_WAVES.of(x * x);
-            assert!((sinc * x - libm::sin(x)).abs() < 3e-12, "{x}");
-            assert!((cosine - libm::cos(x)).abs() < 3e-12, "{x}");
-        }
-        assert_eq!(SHORT_WAVES.limit, 0.5 * 0.5);
+        assert_near(&SHORT_WAVES, |_| [3e-12; 2]);
+        assert_near(&MEDIUM_WAVES, |square| {
+            [1e-9, if square <= 0.5 { 3e-9 } else { 7e-9 }]
+        });
+    }
+
+    /// Asserts that sine and cosine are within these bounds up to the limit.
+    fn assert_near<const N: usize>(waves: &Waves<N>, within: fn(f64) -> [f64; 2]) {
         for i in 0..=10_000 {
-            let square = MEDIUM_WAVES.limit * f64::from(i) / 10_000.0;
-            let (x, (sinc, cosine)) = (libm::sqrt(square), MEDIUM_WAVES.of(square));
-            assert!((sinc * x - libm::sin(x)).abs() < 1e-9, "{x}");
-            let bound = if square <= 0.5 { 3e-9 } else { 7e-9 };
-            assert!((cosine - libm::cos(x)).abs() < bound, "{x}");
+            let square = waves.limit * f64::from(i) / 10_000.0;
+            let (x, (sinc, cosine)) = (libm::sqrt(square), waves.of(square));
+            let [of_sine, of_cosine] = within(square);
+            assert!((sinc * x - libm::sin(x)).abs() < of_sine, "{x}");
+            assert!((cosine - libm::cos(x)).abs() < of_cosine, "{x}");
         }
     }
 

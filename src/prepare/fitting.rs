@@ -37,7 +37,7 @@ impl Fitting {
             quantity,
             small_angle: Queue::default(),
             full: Queue::default(),
-            cutter: Cutter::new(shape, quantity),
+            cutter: Cutter::default(),
         }
     }
 
@@ -97,7 +97,8 @@ impl Fitting {
                 run(block, &mut queue.places, &mut self.cutter, prepared);
             }
         }
-        self.cutter.cut(&mut prepared.segments.polynomials);
+        let segments = &mut prepared.segments.polynomials;
+        self.cutter.cut(self.shape, self.quantity, segments);
         prepared.put_subcurves(&self.cutter);
         self.cutter.curves.clear();
         self.cutter.subcurves.clear();
