@@ -203,7 +203,7 @@ impl InLanes for BetweenHandles<'_> {
             let mut near = PrincipalRange::<L::Doubles>::new();
             own.find_vectors(&mut near, lane);
             redo(near.doubt, lane..own.count, |j| {
-                own.find_vectors(&mut FullRange, j)
+                own.find_vectors(&mut FullRange, j);
             });
         }
     }
