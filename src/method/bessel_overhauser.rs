@@ -4,7 +4,7 @@
 use crate::method::*;
 
 /// Bessel-Overhauser on rotations: smooth in time for any spacing of keys, and
-/// equal to [`CATMULL_ROM`](crate::method::catmull_rom::CATMULL_ROM) for even ones.
+/// equal to [`CATMULL_ROM`] for even ones.
 pub const BESSEL_OVERHAUSER: Method = Method {
     name: "bessel-overhauser",
     summary: "smooth through keys at any spacing; equals catmull-rom on even spacing",

@@ -4,7 +4,7 @@ use crate::method::*;
 
 /// Catmull-Rom on rotations, in cumulative form. It ignores the time steps, so its velocity jumps
 /// on uneven keys;
-/// [`BESSEL_OVERHAUSER`](crate::method::bessel_overhauser::BESSEL_OVERHAUSER) corrects this.
+/// [`BESSEL_OVERHAUSER`] corrects this.
 pub const CATMULL_ROM: Method = Method {
     name: "catmull-rom",
     summary: "smooth through evenly spaced keys; its velocity jumps where they are uneven",

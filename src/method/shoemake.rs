@@ -4,7 +4,7 @@ use crate::method::*;
 
 /// Approach I of the lecture: the control rotation is the bisector itself. It passes its keys three
 /// times too fast and overshoots; it is here for comparison.
-/// [`SHOEMAKE_1985`](crate::method::shoemake_1985::SHOEMAKE_1985) corrects this.
+/// [`SHOEMAKE_1985`] corrects this.
 pub const SHOEMAKE: Method = Method {
     name: "shoemake",
     summary: "Bezier curves whose controls are the bisectors; passes its keys three times too fast",
