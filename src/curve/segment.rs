@@ -31,11 +31,6 @@ impl Segments {
         }
     }
 
-    pub(crate) fn clear(&mut self) {
-        self.arcs.clear();
-        self.polynomials.clear();
-    }
-
     /// Whether a sample of a segment may have a component that is nearly 0, and needs the filter for
     /// those ([`Evaluate::is_canonical`](crate::twin::evaluate::Evaluate::is_canonical)).
     #[inline(always)]
@@ -51,12 +46,6 @@ impl Segments {
             Form::Arc => bytemuck::cast_slice(&self.arcs),
             Form::Polynomial => bytemuck::cast_slice(&self.polynomials),
         }
-    }
-
-    /// Appends the segments of `other`.
-    pub(crate) fn append(&mut self, other: Self) {
-        self.arcs.extend(other.arcs);
-        self.polynomials.extend(other.polynomials);
     }
 }
 

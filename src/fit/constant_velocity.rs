@@ -4,10 +4,7 @@
 
 use glam::Vec4;
 
-use crate::shader::{
-    POWERS, PolynomialSegment, SERIES_2, SERIES_3, SERIES_4, SERIES_5, SERIES_6, SERIES_7,
-    SERIES_8, SERIES_9, SERIES_10,
-};
+use crate::shader::*;
 use crate::simd::lanes::Number;
 use crate::twin::arc_between::arc_between;
 use crate::twin::evaluate_arc::norm_squared;

@@ -3,6 +3,8 @@
 // Loops over lanes index many arrays at once.
 #![allow(clippy::needless_range_loop)]
 
+use bytemuck::Zeroable;
+
 use crate::fit::constant_velocity::arc_component;
 use crate::shader::{Form, IS_KEY, KeySample};
 use crate::simd::dispatch::InLanes;
@@ -15,8 +17,10 @@ use crate::twin::evaluate_polynomial::polynomial;
 pub(crate) const LANES: usize = 64;
 
 /// Samples that are gathered to be evaluated together; they are consecutive in the result.
+#[derive(Zeroable)]
 pub(crate) struct TwoKeyBlock {
-    pub(crate) form: Form,
+    /// Whether arcs are evaluated as polynomials.
+    pub(crate) are_polynomials: bool,
     /// The keys before and after each sample, with continued signs. A sample that is a key itself
     /// has that key twice, with the sign that it was given.
     pub(crate) from: [[f32; 4]; LANES],
@@ -28,14 +32,9 @@ pub(crate) struct TwoKeyBlock {
 
 impl TwoKeyBlock {
     pub(crate) fn new(form: Form) -> Self {
-        let identity = [0.0, 0.0, 0.0, 1.0];
         Self {
-            form,
-            from: [identity; LANES],
-            to: [identity; LANES],
-            parameters: [0.0; LANES],
-            count: 0,
-            rotations: [identity; LANES],
+            are_polynomials: form == Form::Polynomial,
+            ..Self::zeroed()
         }
     }
 }
@@ -45,9 +44,9 @@ impl InLanes for TwoKeyBlock {
     fn run<L: Lanes>(&mut self) {
         // Smooth methods join a track's only two keys by an arc, which is evaluated as a
         // polynomial like their other curves.
-        match self.form {
-            Form::Arc => self.evaluate::<L, false>(),
-            Form::Polynomial => self.evaluate::<L, true>(),
+        match self.are_polynomials {
+            false => self.evaluate::<L, false>(),
+            true => self.evaluate::<L, true>(),
         }
     }
 }

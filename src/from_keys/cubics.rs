@@ -2,7 +2,8 @@
 // Loops over lanes index many arrays at once.
 #![allow(clippy::needless_range_loop)]
 
-use crate::fit::tangent_weights::UNKNOWN;
+use bytemuck::Zeroable;
+
 use crate::from_keys::arcs::LANES;
 use crate::math::canonical::canonical;
 use crate::shader::TangentWeights;
@@ -11,6 +12,7 @@ use crate::simd::lanes::Lanes;
 use crate::twin::small_angle::small_angle_cubic;
 
 /// Samples that are gathered to be evaluated together; they are consecutive in the result.
+#[derive(Zeroable)]
 pub(crate) struct CubicBlock {
     /// The four keys around each sample, with continued signs. For a sample that is a key itself
     /// the second is that key, with the sign that it was given.
@@ -25,21 +27,6 @@ pub(crate) struct CubicBlock {
     pub(crate) rotations: [[f32; 4]; LANES],
     /// How many of the samples were unresolved.
     pub(crate) unresolved: usize,
-}
-
-impl CubicBlock {
-    pub(crate) fn new() -> Self {
-        let identity = [0.0, 0.0, 0.0, 1.0];
-        Self {
-            keys: [[identity; LANES]; 4],
-            weights: [[UNKNOWN; LANES]; 2],
-            parameters: [0.0; LANES],
-            held: [0.0; LANES],
-            count: 0,
-            rotations: [identity; LANES],
-            unresolved: 0,
-        }
-    }
 }
 
 impl InLanes for CubicBlock {

@@ -14,7 +14,7 @@ use crate::prepare::error::SetError;
 use crate::shader::{Form, IS_KEY, KEY_INNER, KeySample, TangentWeights};
 use crate::simd::dispatch::in_lanes;
 use crate::time::frame_clock::FrameClock;
-use crate::time::frames::{FramesError, Ticks, Timeline};
+use crate::time::frames::{Ticks, Timeline};
 use crate::time::key_samples::FramePlan;
 use crate::time::times::key_sample;
 use crate::tracks::set::TrackSet;
@@ -41,7 +41,7 @@ impl<'a> KeyEvaluator<'a> {
             KeyCurve::TwoKeys => Block::TwoKeys(Box::new(TwoKeyBlock::new(Form::Polynomial))),
             KeyCurve::Cubics(weights) => {
                 let weights = TrackWeights::new(weights, interpolation.ends);
-                Block::Cubics(Box::new(CubicBlock::new()), weights)
+                Block::Cubics(bytemuck::zeroed_box(), weights)
             }
         };
         Self {
@@ -70,88 +70,73 @@ impl<'a> KeyEvaluator<'a> {
                 Ticks::Frames { rate, start } => {
                     let clock = FrameClock::new(*rate, *start, whole.times[whole.all - 1]);
                     let keys = whole.around(&own, self.curve.beside());
-                    self.frames(keys, clock, window, &mut output)?;
+                    let samples = self.plan.samples(keys, clock, window)?;
+                    let left = self.block.whole_vectors(keys, samples, &mut output);
+                    self.block.push(keys, left.iter().copied(), &mut output);
                 }
                 Ticks::Times { times, stride } => {
                     let own = &times[index * stride..][..timeline.len()];
-                    self.times(whole, own, &mut output);
+                    let mut near = 0;
+                    let samples = own.iter().map(|&time| {
+                        let sample = key_sample(whole.times, time, near);
+                        near = (sample.key & !IS_KEY) as usize;
+                        sample
+                    });
+                    self.block.push(whole, samples, &mut output);
                 }
             }
         }
         Ok(self.block.flush(&mut output))
     }
-
-    /// Evaluates the frames in `window`, which lie between these keys or outside the track's.
-    fn frames(
-        &mut self,
-        keys: TrackKeys<'a>,
-        clock: FrameClock,
-        window: &Range<usize>,
-        output: &mut Output<'_>,
-    ) -> Result<(), FramesError> {
-        let samples = self.plan.samples(keys, clock, window)?;
-        match &mut self.block {
-            Block::TwoKeys(block) => {
-                let mut samples = samples;
-                if block.form == Form::Arc
-                    && let Some(sign) = keys.signs.shared()
-                {
-                    block.flush(output);
-                    let left = std::mem::take(output).into_slice();
-                    let mut run = ArcRun {
-                        samples,
-                        keys: bytemuck::cast_slice(keys.keys),
-                        sign,
-                        output: &mut *left,
-                        done: 0,
-                    };
-                    in_lanes(&mut run);
-                    let done = run.done;
-                    samples = &samples[done..];
-                    *output = left[done..].iter_mut();
-                }
-                let keys = SignedKeys::new(keys);
-                for &sample in samples {
-                    block.push(keys, sample, output);
-                }
-            }
-            Block::Cubics(block, weights) => {
-                let weights = weights.of(keys.times, keys.first_key, keys.all);
-                let keys = SignedKeys::new(keys);
-                for &sample in samples {
-                    block.push(keys, weights, sample, output);
-                }
-            }
-        }
-        Ok(())
-    }
-
-    fn times(&mut self, keys: TrackKeys<'a>, times: &[f64], output: &mut Output<'_>) {
-        let mut near = 0;
-        let mut next = |time: f64| {
-            let sample = key_sample(keys.times, time, near);
-            near = (sample.key & !IS_KEY) as usize;
-            sample
-        };
-        match &mut self.block {
-            Block::TwoKeys(block) => {
-                let keys = SignedKeys::new(keys);
-                for &time in times {
-                    block.push(keys, next(time), output);
-                }
-            }
-            Block::Cubics(block, weights) => {
-                let weights = weights.of(keys.times, keys.first_key, keys.all);
-                let keys = SignedKeys::new(keys);
-                for &time in times {
-                    block.push(keys, weights, next(time), output);
-                }
-            }
-        }
-    }
 }
 
-impl Block<'_> {
+impl<'a> Block<'a> {
+    /// Evaluates whole vectors of samples between keys of one sign straight into the output, if they
+    /// lie on arcs. Returns the samples that are left.
+    fn whole_vectors<'s>(
+        &mut self,
+        keys: TrackKeys<'_>,
+        samples: &'s [KeySample],
+        output: &mut Output<'_>,
+    ) -> &'s [KeySample] {
+        let Block::TwoKeys(block) = self else {
+            return samples;
+        };
+        let (false, Some(sign)) = (block.are_polynomials, keys.signs.shared()) else {
+            return samples;
+        };
+        block.flush(output);
+        let left = std::mem::take(output).into_slice();
+        let mut run = ArcRun {
+            samples,
+            keys: bytemuck::cast_slice(keys.keys),
+            sign,
+            output: &mut *left,
+            done: 0,
+        };
+        in_lanes(&mut run);
+        let done = run.done;
+        *output = left[done..].iter_mut();
+        &samples[done..]
+    }
+
+    /// Adds samples between these keys.
+    fn push(
+        &mut self,
+        keys: TrackKeys<'a>,
+        samples: impl Iterator<Item = KeySample>,
+        output: &mut Output<'_>,
+    ) {
+        let signed = SignedKeys::new(keys);
+        match self {
+            Block::TwoKeys(block) => samples.for_each(|sample| block.push(signed, sample, output)),
+            Block::Cubics(block, weights) => {
+                let weights = weights.of(keys.times, keys.first_key, keys.all);
+                samples.for_each(|sample| block.push(signed, weights, sample, output));
+            }
+        }
+    }
+
     /// Evaluates the samples that wait; returns whether all since the last call are resolved.
     fn flush(&mut self, output: &mut Output<'_>) -> bool {
         match self {

@@ -6,9 +6,7 @@ use rayon::prelude::*;
 
 use crate::fit::tangent_weights::TrackWeights;
 use crate::from_keys::dispatches::{KeyDispatch, Task};
-use crate::shader::{
-    IS_KEY, KeySample, LINE, ROWS_PER_INVOCATION, RowShape, SIGN_TURNED, TangentWeights,
-};
+use crate::shader::*;
 use crate::time::frames::{FramesError, Ticks};
 use crate::time::key_samples::FramePlan;
 use crate::time::times::key_sample;
@@ -118,11 +116,7 @@ impl KeyDispatch<'_, '_> {
             if track.signs.any() {
                 // Whole keys, in order: what is written to may be slow to read.
                 for (i, (to, &[x, y, z, w])) in own.iter_mut().zip(keys).enumerate() {
-                    let turned = if track.signs.is_turned(i) {
-                        SIGN_TURNED
-                    } else {
-                        0
-                    };
+                    let turned = SIGN_TURNED * u32::from(track.signs.is_turned(i));
                     *to = [x | turned, y, z, w];
                 }
             } else {

@@ -110,42 +110,35 @@ pub(crate) struct Dual {
 }
 
 impl Dual {
-    /// The parameter itself, whose first derivative is 1.
-    pub(crate) fn parameter(value: f64) -> Self {
+    pub(crate) const fn new(value: f64, first: f64, second: f64) -> Self {
         Self {
             value,
-            first: 1.0,
-            second: 0.0,
+            first,
+            second,
         }
+    }
+
+    /// The parameter itself, whose first derivative is 1.
+    pub(crate) fn parameter(value: f64) -> Self {
+        Self::new(value, 1.0, 0.0)
     }
 
     /// A function of this number by the chain rule, given the function's value and derivatives.
     fn chain(self, [value, first, second]: [f64; 3]) -> Self {
-        Self {
-            value,
-            first: first * self.first,
-            second: second * self.first * self.first + first * self.second,
-        }
+        let bend = second * self.first * self.first + first * self.second;
+        Self::new(value, first * self.first, bend)
     }
 }
 
 operators! {
     [] Dual, a, b:
-    Add add => Self {
-        value: a.value + b.value,
-        first: a.first + b.first,
-        second: a.second + b.second,
-    };
-    Sub sub => Self {
-        value: a.value - b.value,
-        first: a.first - b.first,
-        second: a.second - b.second,
-    };
-    Mul mul => Self {
-        value: a.value * b.value,
-        first: a.first * b.value + a.value * b.first,
-        second: a.second * b.value + 2.0 * (a.first * b.first) + a.value * b.second,
-    };
+    Add add => Self::new(a.value + b.value, a.first + b.first, a.second + b.second);
+    Sub sub => Self::new(a.value - b.value, a.first - b.first, a.second - b.second);
+    Mul mul => Self::new(
+        a.value * b.value,
+        a.first * b.value + a.value * b.first,
+        a.second * b.value + 2.0 * (a.first * b.first) + a.value * b.second,
+    );
 }
 
 /// A power series and its first two derivatives at `x`.
@@ -163,11 +156,7 @@ impl Scalar for Dual {
     type Constant = f64;
 
     fn constant(value: f64) -> Self {
-        Self {
-            value,
-            first: 0.0,
-            second: 0.0,
-        }
+        Self::new(value, 0.0, 0.0)
     }
 
     fn waves(self) -> (Self, Self) {

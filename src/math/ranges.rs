@@ -68,66 +68,74 @@ pub(crate) struct PrincipalRange<R> {
     pub(crate) doubt: R,
 }
 
-/// Coefficients of `(sin(x)/x - 1) / x²` and of `(cos(x) - 1) / x²` in powers of x²,
-/// for x² up to (pi/2)²; from Chebyshev nodes, within 1e-14.
-const SINC: [f64; 8] = [
-    -0.16666666666666666,
-    0.008333333333333316,
-    -0.00019841269841254974,
-    2.7557319219163234e-06,
-    -2.5052107616996182e-08,
-    1.6058977312464087e-10,
-    -7.643970296798572e-13,
-    2.7314447669863995e-15,
-];
-const COSINE: [f64; 8] = [
-    -0.5,
-    0.04166666666666634,
-    -0.0013888888888860709,
-    2.4801587292446213e-05,
-    -2.755731776732053e-07,
-    2.0876630867422994e-09,
-    -1.1464689885720029e-11,
-    4.6276759850181716e-14,
-];
+/// `sin(x)/x` and `cos(x)` by polynomials in x².
+pub(crate) struct Waves<const N: usize> {
+    /// The largest x² for which they hold.
+    pub(crate) limit: f64,
+    /// The coefficients of `(sin(x)/x - 1) / x²` and of `(cos(x) - 1) / x²` in powers of x²; from
+    /// Chebyshev nodes.
+    sinc: [f64; N],
+    cosine: [f64; N],
+}
 
-/// As [`SINC`] and [`COSINE`] for x² up to [`SHORT_SQUARE`], within 3e-12: for what is
-/// rounded to f32.
-const SHORT_SINC: [f64; 4] = [
-    -0.16666666666590457,
-    0.008333333235781787,
-    -0.00019841074685369954,
-    2.743233430893218e-06,
-];
-const SHORT_COSINE: [f64; 4] = [
-    -0.499999999991622,
-    0.04166666559421515,
-    -0.0013888674329962797,
-    2.466415894289239e-05,
-];
+/// Within 1e-14.
+pub(crate) const LONG_WAVES: Waves<8> = Waves {
+    limit: FRAC_PI_2 * FRAC_PI_2,
+    sinc: [
+        -0.16666666666666666,
+        0.008333333333333316,
+        -0.00019841269841254974,
+        2.7557319219163234e-06,
+        -2.5052107616996182e-08,
+        1.6058977312464087e-10,
+        -7.643970296798572e-13,
+        2.7314447669863995e-15,
+    ],
+    cosine: [
+        -0.5,
+        0.04166666666666634,
+        -0.0013888888888860709,
+        2.4801587292446213e-05,
+        -2.755731776732053e-07,
+        2.0876630867422994e-09,
+        -1.1464689885720029e-11,
+        4.6276759850181716e-14,
+    ],
+};
 
-/// The largest square of an angle that [`short_waves`] takes.
-pub(crate) const SHORT_SQUARE: f64 = 0.25;
+/// Within 3e-12: for what is rounded to f32.
+pub(crate) const SHORT_WAVES: Waves<4> = Waves {
+    limit: 0.25,
+    sinc: [
+        -0.16666666666590457,
+        0.008333333235781787,
+        -0.00019841074685369954,
+        2.743233430893218e-06,
+    ],
+    cosine: [
+        -0.499999999991622,
+        0.04166666559421515,
+        -0.0013888674329962797,
+        2.466415894289239e-05,
+    ],
+};
 
-/// The same for x² up to [`MEDIUM_SQUARE`], within 7e-9; up to 1/2 within 3e-9.
-const MEDIUM_SINC: [f64; 4] = [
-    -0.1666666661964308,
-    0.008333321292269242,
-    -0.0001983644687633356,
-    2.693786858624223e-06,
-];
-const MEDIUM_COSINE: [f64; 4] = [
-    -0.4999999948424723,
-    0.04166653459468085,
-    -0.001388359752363535,
-    2.412155240317313e-05,
-];
-
-/// The largest square of an angle that [`medium_waves`] takes.
-pub(crate) const MEDIUM_SQUARE: f64 = 1.25;
-
-/// The largest square of an angle that [`long_waves`] takes.
-pub(crate) const LONG_SQUARE: f64 = FRAC_PI_2 * FRAC_PI_2;
+/// Within 7e-9; up to 1/2 within 3e-9.
+pub(crate) const MEDIUM_WAVES: Waves<4> = Waves {
+    limit: 1.25,
+    sinc: [
+        -0.1666666661964308,
+        0.008333321292269242,
+        -0.0001983644687633356,
+        2.693786858624223e-06,
+    ],
+    cosine: [
+        -0.4999999948424723,
+        0.04166653459468085,
+        -0.001388359752363535,
+        2.412155240317313e-05,
+    ],
+};
 
 /// Coefficients of `(x / sin(x) - 1) / u` in powers of u = 1 - cos(x), 0 <= u <= 1: an angle from
 /// its sine without an arc function. From Chebyshev nodes, within 2e-13.
@@ -186,35 +194,19 @@ pub(crate) fn one_plus<R: Real, const N: usize>(c: &[f64; N], x: R) -> R {
     sum * x + R::all(1.0)
 }
 
-/// `sin(x)/x` and `cos(x)` by `x²`, which is at most [`LONG_SQUARE`]; within 1e-14.
-#[inline(always)]
-pub(crate) fn long_waves<R: Real>(square: R) -> (R, R) {
-    (one_plus(&SINC, square), one_plus(&COSINE, square))
-}
-
-/// `sin(x)/x` and `cos(x)` by `x²`, which is at most [`SHORT_SQUARE`]; within 3e-12.
-#[inline(always)]
-pub(crate) fn short_waves<R: Real>(square: R) -> (R, R) {
-    (
-        one_plus(&SHORT_SINC, square),
-        one_plus(&SHORT_COSINE, square),
-    )
-}
-
-/// `sin(x)/x` and `cos(x)` by `x²`, which is at most [`MEDIUM_SQUARE`]; within 7e-9.
-#[inline(always)]
-pub(crate) fn medium_waves<R: Real>(square: R) -> (R, R) {
-    (
-        one_plus(&MEDIUM_SINC, square),
-        one_plus(&MEDIUM_COSINE, square),
-    )
+impl<const N: usize> Waves<N> {
+    /// `sin(x)/x` and `cos(x)` by `x²`.
+    #[inline(always)]
+    pub(crate) fn of<R: Real>(&self, square: R) -> (R, R) {
+        (one_plus(&self.sinc, square), one_plus(&self.cosine, square))
+    }
 }
 
 /// `sin(x)/x` and `cos(x)` by `x²`, which is at most (pi/2)²; else NaN.
 #[inline(always)]
 pub(crate) fn near_waves<R: Real>(square: R) -> (R, R) {
-    let doubt = near_or_nan(square, LONG_SQUARE);
-    let (sinc, cosine) = long_waves(square);
+    let doubt = near_or_nan(square, LONG_WAVES.limit);
+    let (sinc, cosine) = LONG_WAVES.of(square);
     (sinc + doubt, cosine + doubt)
 }
 
@@ -249,8 +241,8 @@ impl<R: Real> Algebra for PrincipalRange<R> {
     #[inline(always)]
     fn exp(&mut self, a: [R; 3]) -> [R; 4] {
         let z = square(a);
-        self.check(z, LONG_SQUARE);
-        exp_by(a, long_waves(z))
+        self.check(z, LONG_WAVES.limit);
+        exp_by(a, LONG_WAVES.of(z))
     }
 
     #[inline(always)]
@@ -308,19 +300,20 @@ mod tests {
     /// Catches a wrong digit in a polynomial.
     #[test]
     fn short_and_medium_waves_are_those_of_libm() {
-        for i in 0..=5_000 {
-            let x = f64::from(i) * 1e-4;
-            let (sinc, cosine) = short_waves(x * x);
-            assert!((sinc * x - libm::sin(x)).abs() < 3e-12, "{x}");
-            assert!((cosine - libm::cos(x)).abs() < 3e-12, "{x}");
-        }
-        assert_eq!(SHORT_SQUARE, 0.5 * 0.5);
+        assert_near(&SHORT_WAVES, |_| [3e-12; 2]);
+        assert_near(&MEDIUM_WAVES, |square| {
+            [1e-9, if square <= 0.5 { 3e-9 } else { 7e-9 }]
+        });
+    }
+
+    /// Asserts that sine and cosine are within these bounds up to the limit.
+    fn assert_near<const N: usize>(waves: &Waves<N>, within: fn(f64) -> [f64; 2]) {
         for i in 0..=10_000 {
-            let square = MEDIUM_SQUARE * f64::from(i) / 10_000.0;
-            let (x, (sinc, cosine)) = (libm::sqrt(square), medium_waves(square));
-            assert!((sinc * x - libm::sin(x)).abs() < 1e-9, "{x}");
-            let bound = if square <= 0.5 { 3e-9 } else { 7e-9 };
-            assert!((cosine - libm::cos(x)).abs() < bound, "{x}");
+            let square = waves.limit * f64::from(i) / 10_000.0;
+            let (x, (sinc, cosine)) = (libm::sqrt(square), waves.of(square));
+            let [of_sine, of_cosine] = within(square);
+            assert!((sinc * x - libm::sin(x)).abs() < of_sine, "{x}");
+            assert!((cosine - libm::cos(x)).abs() < of_cosine, "{x}");
         }
     }
 

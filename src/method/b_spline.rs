@@ -1,17 +1,8 @@
 //! The cumulative cubic B-spline, with the key times as knots.
 
-use crate::curve::formula::product::Product;
-use crate::curve::options::Ends;
-use crate::fit::double::handles::BetweenNeighbours;
-use crate::fit::double::intervals::{Intervals, Stretch};
-use crate::fit::double::shape::Shape;
-use crate::math::quaternion::{Vector, exp, ratio, rotated, scaled, sum};
+use crate::curve::formula::Product;
 use crate::method::ends::End;
-use crate::method::interpolation::Interpolation;
-use crate::method::{Continuity, Cost, Curves, Given, Keys, Method, Smooth, USUAL};
-use crate::reference;
-use crate::simd::dispatch::in_lanes;
-use crate::tracks::set::Track;
+use crate::method::*;
 
 /// The cumulative cubic B-spline: the smoothest method, but it passes near its keys and not through
 /// them. Its knots are the key times, even or not; before the first and after the last key they
@@ -84,52 +75,53 @@ fn curves(intervals: &mut Intervals, stretches: &[Stretch], ends: Ends) {
         if matches!(ends, Ends::Loop) && stretch.all > 1 {
             continue; // the context already has the neighbours across the seam
         }
+        // Two keys: constant velocity.
         let alone = stretch.all == 1 || matches!(ends, Ends::Frozen);
-        let before = |lane| (lane - 1, before_first(intervals, lane, start, alone));
-        let after = |lane| (lane + 1, after_last(intervals, lane, end, alone));
+        let before = |lane| match alone {
+            true => (lane - 1, at(&intervals.logs, lane)),
+            false => (lane - 1, before_first(intervals, lane, start)),
+        };
+        let after = |lane| match alone {
+            true => (lane + 1, at(&intervals.logs, lane)),
+            false => (lane + 1, after_last(intervals, lane, end)),
+        };
         let (before, after) = (stretch.first().map(before), stretch.last().map(after));
         for (lane, log) in [before, after].into_iter().flatten() {
-            intervals.set_log(lane, log);
+            put(&mut intervals.logs, lane, log);
         }
     }
     in_lanes(&mut BetweenNeighbours(intervals));
     for lane in stretches.iter().flat_map(Stretch::lanes) {
-        let basis = basis(intervals.outward(lane));
+        let basis = basis(at(&intervals.outward, lane));
         intervals.set_numbers(lane, Product::BASIS, basis.as_flattened());
     }
 }
 
 /// The logarithm that continues the curve before the first interval.
-fn before_first(intervals: &Intervals, lane: usize, end: End, alone: bool) -> Vector {
-    let own = intervals.log(lane);
-    if alone {
-        return own; // two keys: constant velocity
-    }
-    let [[_, slope1, ..], [value2, slope2, bend2, _], _] = basis(intervals.outward(lane));
+fn before_first(intervals: &Intervals, lane: usize, end: End) -> Vector {
+    let own = at(&intervals.logs, lane);
+    let [[_, slope1, ..], [value2, slope2, bend2, _], _] = basis(at(&intervals.outward, lane));
     let turn = match end {
         End::Parabolic => return extrapolated(intervals, lane, lane + 1),
         // B₁'' = -2 B₁' at t = 0.
         End::Natural => return scaled(own, bend2 / slope1),
         End::Secant => own,
-        End::Clamped(half) => scaled(half, intervals.duration(lane)),
+        End::Clamped(half) => scaled(half, intervals.durations[lane]),
     };
     let rest = sum(turn, scaled(own, -slope2));
     rotated(exp(scaled(own, value2)), scaled(rest, 1.0 / slope1))
 }
 
 /// The logarithm that continues the curve after the last interval.
-fn after_last(intervals: &Intervals, lane: usize, end: End, alone: bool) -> Vector {
-    let own = intervals.log(lane);
-    if alone {
-        return own;
-    }
-    let [_, [_, c1, c2, c3], [.., value3]] = basis(intervals.outward(lane));
+fn after_last(intervals: &Intervals, lane: usize, end: End) -> Vector {
+    let own = at(&intervals.logs, lane);
+    let [_, [_, c1, c2, c3], [.., value3]] = basis(at(&intervals.outward, lane));
     let slope3 = 3.0 * value3;
     let turn = match end {
         End::Parabolic => return extrapolated(intervals, lane, lane - 1),
         End::Natural => return scaled(own, -(c2 + 3.0 * c3) / slope3),
         End::Secant => own,
-        End::Clamped(half) => scaled(half, intervals.duration(lane)),
+        End::Clamped(half) => scaled(half, intervals.durations[lane]),
     };
     // The unknown step also rotates the slope of the own step, so the equation is iterated.
     let own_slope = c1 + 2.0 * c2 + 3.0 * c3;
@@ -142,8 +134,8 @@ fn after_last(intervals: &Intervals, lane: usize, end: End, alone: bool) -> Vect
 
 /// The logarithm of one more interval of the parabola through the three keys at an end.
 fn extrapolated(intervals: &Intervals, lane: usize, next: usize) -> Vector {
-    let (own, other) = (intervals.log(lane), intervals.log(next));
-    let (h, next_h) = (intervals.duration(lane), intervals.duration(next));
+    let (own, other) = (at(&intervals.logs, lane), at(&intervals.logs, next));
+    let (h, next_h) = (intervals.durations[lane], intervals.durations[next]);
     let change = sum(scaled(other, ratio(h, next_h)), scaled(own, -1.0));
     sum(own, scaled(change, -2.0 / (1.0 + ratio(next_h, h))))
 }

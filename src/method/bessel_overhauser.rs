@@ -1,23 +1,16 @@
 //! Bessel-Overhauser: the tangent at a key is that of the parabola through it and
 //! its two neighbours.
 
-use crate::fit::double::handles::{BothSides, HandleRule, Handles};
-use crate::fit::double::shape::Shape;
-use crate::fit::tangent_weights::WeightRule;
-use crate::math::quaternion::{Real as _, product, ratio, scaled, sum};
-use crate::math::ranges::Algebra;
-use crate::method::{Continuity, Cost, Curves, Keys, Method, Smooth, USUAL, ends};
-use crate::reference;
+use crate::method::*;
 
 /// Bessel-Overhauser on rotations: smooth in time for any spacing of keys, and
-/// equal to [`CATMULL_ROM`](crate::method::catmull_rom::CATMULL_ROM) for even ones.
+/// equal to [`CATMULL_ROM`] for even ones.
 pub const BESSEL_OVERHAUSER: Method = Method {
     name: "bessel-overhauser",
     summary: "smooth through keys at any spacing; equals catmull-rom on even spacing",
     formula: "t_i = ((s⁻)^h_i (s⁺)^h_{i-1})^(1/(h_{i-1}+h_i)), a_i = q_i t_i^(h_i/3), b_i = q_i t_i^(-h_{i-1}/3)",
     source: "Overhauser 1968; on rotations in the form of Kim, Kim, Shin 1995",
     continuity: Continuity::C1,
-    continuity_on_even_keys: Continuity::C1,
     keeps_constant_velocity: Keys::Any,
     symmetric: false,
     cost: Cost::new(210.0, 2.8),
@@ -27,14 +20,14 @@ pub const BESSEL_OVERHAUSER: Method = Method {
 };
 
 static CURVES: Curves = Curves::Smooth(
-    Smooth::new(Shape::BERNSTEIN, ends::products::<Rule>)
-        .steady_alone()
-        .direct::<Rule>(WeightRule::ByTime),
+    Smooth::new(Shape::BERNSTEIN, ends::curves::<Rule>).direct::<Rule>(WeightRule::ByTime),
 );
 
 struct Rule;
 
 impl HandleRule for Rule {
+    const IS_CUMULATIVE: bool = true;
+
     #[inline(always)]
     fn handles<A: Algebra>(algebra: &mut A, [before, after]: BothSides<A>) -> Handles<A::Number> {
         let both = before.duration + after.duration;

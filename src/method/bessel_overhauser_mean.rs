@@ -1,12 +1,7 @@
 //! Bessel-Overhauser by the weighted mean of the slopes: the tangent is that of the parabola
 //! through three keys, computed with logarithms.
 
-use crate::fit::double::handles::{BothSides, HandleRule, Handles, Interval};
-use crate::fit::double::shape::Shape;
-use crate::math::quaternion::{Real, ratio, scaled, sum};
-use crate::math::ranges::Algebra;
-use crate::method::{Continuity, Cost, Curves, Keys, Method, Smooth, USUAL, ends};
-use crate::reference;
+use crate::method::*;
 
 /// Bessel-Overhauser with tangents that are means of logarithms: they never wrap, and the
 /// curve is the same forwards and backwards in time.
@@ -18,7 +13,6 @@ pub const BESSEL_OVERHAUSER_MEAN: Method = Method {
     formula: "log t_i = (h_i/h_{i-1} log(q_{i-1}⁻¹ q_i) + h_{i-1}/h_i log(q_i⁻¹ q_{i+1})) / (h_{i-1} + h_i), a_i = q_i t_i^(h_i/3), b_i = q_i t_i^(-h_{i-1}/3), de Casteljau",
     source: "Overhauser 1968; Shoemake 1985; Geier, splines 0.3 (Python)",
     continuity: Continuity::C1,
-    continuity_on_even_keys: Continuity::C1,
     keeps_constant_velocity: Keys::Any,
     cost: Cost::new(840.0, 3.2),
     reference: reference::handles::BESSEL_OVERHAUSER_MEAN,
@@ -26,8 +20,10 @@ pub const BESSEL_OVERHAUSER_MEAN: Method = Method {
     ..USUAL
 };
 
-static CURVES: Curves =
-    Curves::Smooth(Smooth::new(Shape::DE_CASTELJAU, ends::controls::<Rule>).steady_alone());
+static CURVES: Curves = Curves::Smooth(Smooth {
+    steady_alone: true,
+    ..Smooth::new(Shape::DE_CASTELJAU, ends::curves::<Rule>)
+});
 
 struct Rule;
 

@@ -4,16 +4,8 @@ use std::ops::Range;
 
 use glam::{DMat3, DVec3};
 
-use crate::curve::options::Ends;
-use crate::fit::double::intervals::{Intervals, Stretch};
-use crate::fit::double::shape::Shape;
-use crate::math::quaternion::{self, Vector, log, scaled, sine_cosine, sum};
 use crate::method::ends::End;
-use crate::method::interpolation::Interpolation;
-use crate::method::{Continuity, Cost, Curves, Given, Keys, Method, Smooth, USUAL};
-use crate::reference;
-use crate::tracks::set::Track;
-use crate::tracks::signs::Signs;
+use crate::method::*;
 
 /// The curve of `SciPy`'s `RotationSpline`: the rotation vector from each key is a cubic,
 /// and the angular velocities at the keys are such that the angular acceleration is
@@ -45,9 +37,12 @@ static CURVES: Curves =
 
 fn curves(intervals: &mut Intervals, stretches: &[Stretch], _: Ends) {
     for lane in stretches.iter().flat_map(Stretch::lanes) {
-        let half = 0.5 * intervals.duration(lane).max(SHORTEST);
-        let ([x, y, z, _], [u, v, w, _]) = (intervals.outward(lane), intervals.inward(lane + 1));
-        let log = intervals.log(lane);
+        let half = 0.5 * intervals.durations[lane].max(SHORTEST);
+        let ([x, y, z, _], [u, v, w, _]) = (
+            at(&intervals.outward, lane),
+            at(&intervals.inward, lane + 1),
+        );
+        let log = at(&intervals.logs, lane);
         let turn = Turn::new(DVec3::from_array(scaled(log, 2.0)));
         // Half of θ' at both ends, per unit of the parameter.
         let start = scaled([x, y, z], half);
@@ -60,7 +55,7 @@ fn curves(intervals: &mut Intervals, stretches: &[Stretch], _: Ends) {
         let third = sum(both, scaled(log, -2.0));
         intervals.set_numbers(lane, 0, &intervals.key(lane));
         intervals.set_numbers(lane, 4, [start, second, third].as_flattened());
-        intervals.set_squared_extent(lane, [start, second, third]);
+        intervals.squared_extents[lane] = squared_extent([start, second, third]);
     }
 }
 

@@ -1,23 +1,15 @@
 //! Catmull-Rom: the tangent at a key is half of the step between its neighbours.
 
-use crate::fit::double::handles::{BothSides, HandleRule, Handles};
-use crate::fit::double::shape::Shape;
-use crate::fit::tangent_weights::WeightRule;
-use crate::math::quaternion::{Real as _, product, scaled, sum};
-use crate::math::ranges::Algebra;
-use crate::method::{Continuity, Cost, Curves, Keys, Method, Smooth, USUAL, ends};
-use crate::reference;
+use crate::method::*;
 
 /// Catmull-Rom on rotations, in cumulative form. It ignores the time steps, so its velocity jumps
 /// on uneven keys;
-/// [`BESSEL_OVERHAUSER`](crate::method::bessel_overhauser::BESSEL_OVERHAUSER) corrects this.
+/// [`BESSEL_OVERHAUSER`] corrects this.
 pub const CATMULL_ROM: Method = Method {
     name: "catmull-rom",
     summary: "smooth through evenly spaced keys; its velocity jumps where they are uneven",
     formula: "a_i = q_i (q_{i-1}⁻¹ q_{i+1})^(1/6), b_i = q_i (q_{i-1}⁻¹ q_{i+1})^(-1/6)",
     source: "Kim, Kim, Shin 1995, A general construction scheme for unit quaternion curves",
-    continuity: Continuity::C0,
-    continuity_on_even_keys: Continuity::C1,
     keeps_constant_velocity: Keys::Even,
     symmetric: false,
     cost: Cost::new(150.0, 2.6),
@@ -27,14 +19,14 @@ pub const CATMULL_ROM: Method = Method {
 };
 
 static CURVES: Curves = Curves::Smooth(
-    Smooth::new(Shape::BERNSTEIN, ends::products::<Rule>)
-        .steady_alone()
-        .direct::<Rule>(WeightRule::Alike),
+    Smooth::new(Shape::BERNSTEIN, ends::curves::<Rule>).direct::<Rule>(WeightRule::Alike),
 );
 
 struct Rule;
 
 impl HandleRule for Rule {
+    const IS_CUMULATIVE: bool = true;
+
     #[inline(always)]
     fn handles<A: Algebra>(algebra: &mut A, [before, after]: BothSides<A>) -> Handles<A::Number> {
         // The half-angle of both steps together may approach pi, so its sign is not changed to the

@@ -7,33 +7,23 @@ use glam::DVec3;
 
 use crate::curve::options::Ends;
 use crate::fit::double::handles::{
-    BetweenHandles, ControlRotations, EndHandle, EndInterval, HandleRule, KeyHandles,
+    BetweenHandles, ControlRotations, EndHandle, HandleRule, KeyHandles,
 };
-use crate::fit::double::intervals::{Intervals, Stretch};
-use crate::math::quaternion::{self, Quaternion, Vector, exp, product, scaled};
+use crate::fit::double::intervals::{Intervals, Stretch, at, put};
+use crate::math::quaternion::{self, Vector, exp, product, scaled};
 use crate::simd::dispatch::in_lanes;
 
-/// Curves in cumulative form, for a method with that rule for handles.
-pub(crate) fn products<R: HandleRule>(
-    intervals: &mut Intervals,
-    stretches: &[Stretch],
-    ends: Ends,
-) {
-    handles::<R>(intervals, stretches, ends);
-    in_lanes(&mut BetweenHandles(intervals));
+/// The curves of a method with that rule for handles.
+pub(crate) fn curves<R: HandleRule>(intervals: &mut Intervals, stretches: &[Stretch], ends: Ends) {
+    set_handles::<R>(intervals, stretches, ends);
+    if R::IS_CUMULATIVE {
+        in_lanes(&mut BetweenHandles(intervals));
+    } else {
+        in_lanes(&mut ControlRotations(intervals));
+    }
 }
 
-/// Curves by control rotations, for a method with that rule for handles.
-pub(crate) fn controls<R: HandleRule>(
-    intervals: &mut Intervals,
-    stretches: &[Stretch],
-    ends: Ends,
-) {
-    handles::<R>(intervals, stretches, ends);
-    in_lanes(&mut ControlRotations(intervals));
-}
-
-fn handles<R: HandleRule>(intervals: &mut Intervals, stretches: &[Stretch], ends: Ends) {
+fn set_handles<R: HandleRule>(intervals: &mut Intervals, stretches: &[Stretch], ends: Ends) {
     in_lanes(&mut KeyHandles::<R> {
         intervals,
         stretches,
@@ -43,26 +33,39 @@ fn handles<R: HandleRule>(intervals: &mut Intervals, stretches: &[Stretch], ends
     for stretch in stretches {
         if let (Some(lane), 1) = (stretch.first(), stretch.all) {
             // Two keys: the handles of constant velocity.
-            let (log, other) = (intervals.log(lane), [0.0; 3]);
-            let handle = R::end(EndInterval { log, other }, EndHandle::Turn(log));
-            intervals.set_outgoing(lane, handle);
-            intervals.set_incoming(lane + 1, handle);
+            let log = at(&intervals.logs, lane);
+            let handle = R::end(log, [0.0; 3], EndHandle::Turn(log));
+            put(&mut intervals.outgoing, lane, handle);
+            put(&mut intervals.incoming, lane + 1, handle);
             continue;
         }
         if matches!(ends, Ends::Loop) {
             continue;
         }
-        if let Some(lane) = stretch.first() {
-            let other = intervals.incoming(lane + 1);
-            let without = |back| product(intervals.step(lane), back);
-            let handle = end_handle::<R>(intervals, lane, other, without, start);
-            intervals.set_outgoing(lane, handle);
-        }
-        if let Some(lane) = stretch.last() {
-            let other = intervals.outgoing(lane);
-            let without = |back| product(back, intervals.step(lane));
-            let handle = end_handle::<R>(intervals, lane, other, without, end);
-            intervals.set_incoming(lane + 1, handle);
+        let both = [(stretch.first(), start, true), (stretch.last(), end, false)];
+        for (lane, end, is_first) in both {
+            let Some(lane) = lane else { continue };
+            let (log, step) = (at(&intervals.logs, lane), at(&intervals.steps, lane));
+            // The handle of the interval's inner key.
+            let other = match is_first {
+                true => at(&intervals.incoming, lane + 1),
+                false => at(&intervals.outgoing, lane),
+            };
+            let handle = match end {
+                End::Parabolic => EndHandle::Parabolic,
+                End::Natural => {
+                    let back = exp(scaled(other, -1.0));
+                    let (a, b) = if is_first { (step, back) } else { (back, step) };
+                    EndHandle::Natural(quaternion::log(product(a, b)))
+                }
+                End::Secant => EndHandle::Turn(log),
+                End::Clamped(half) => EndHandle::Turn(scaled(half, intervals.durations[lane])),
+            };
+            let handle = R::end(log, other, handle);
+            match is_first {
+                true => put(&mut intervals.outgoing, lane, handle),
+                false => put(&mut intervals.incoming, lane + 1, handle),
+            }
         }
     }
 }
@@ -88,27 +91,4 @@ impl Ends {
             Self::Parabolic | Self::Loop | Self::Frozen => [End::Parabolic; 2],
         }
     }
-}
-
-/// The handle of a track's first or last key towards the interval in `lane`. `other` is the handle
-/// of that interval's inner key; `without` returns the interval's step without that handle, given
-/// the exponential of its negative.
-fn end_handle<R: HandleRule>(
-    intervals: &Intervals,
-    lane: usize,
-    other: Vector,
-    without: impl Fn(Quaternion) -> Quaternion,
-    end: End,
-) -> Vector {
-    let log = intervals.log(lane);
-    let handle = match end {
-        End::Parabolic => EndHandle::Parabolic,
-        End::Natural => {
-            let rest = without(exp(scaled(other, -1.0)));
-            EndHandle::Natural(quaternion::log(rest))
-        }
-        End::Secant => EndHandle::Turn(log),
-        End::Clamped(half) => EndHandle::Turn(scaled(half, intervals.duration(lane))),
-    };
-    R::end(EndInterval { log, other }, handle)
 }

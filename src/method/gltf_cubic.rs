@@ -1,13 +1,6 @@
 //! The cubic spline of glTF.
 
-use crate::curve::options::{Ends, Path};
-use crate::fit::double::intervals::{Intervals, Stretch};
-use crate::fit::double::shape::Shape;
-use crate::math::quaternion::{Quaternion, Vector, length};
-use crate::method::interpolation::Interpolation;
-use crate::method::{Continuity, Cost, Curves, Given, Keys, Method, Smooth, USUAL};
-use crate::reference;
-use crate::tracks::set::Track;
+use crate::method::*;
 
 /// glTF's CUBICSPLINE: a cubic in each component, with given tangents
 /// ([`TrackSet::set_tangents`](crate::tracks::set::TrackSet::set_tangents)), normalised. Keys count
@@ -19,8 +12,6 @@ pub const GLTF_CUBIC: Method = Method {
     formula: "p(t) = (2t³-3t²+1) q0 + h (t³-2t²+t) out0 + (3t²-2t³) q1 + h (t³-t²) in1, q = p/|p|",
     source: "glTF 2.0, appendix C.5, Cubic Spline Interpolation",
     continuity: Continuity::C1,
-    continuity_on_even_keys: Continuity::C1,
-    keeps_constant_velocity: Keys::Never,
     uses_neighbours: false,
     path: Some(Path::AsAuthored),
     cost: Cost::new(350.0, 3.8),
@@ -43,17 +34,17 @@ fn numbers(track: Track, interval: usize, _: &Interpolation) -> [[f64; 4]; 2] {
 
 fn curves(intervals: &mut Intervals, stretches: &[Stretch], _: Ends) {
     for lane in stretches.iter().flat_map(Stretch::lanes) {
-        let duration = intervals.duration(lane);
-        let outgoing = intervals.outward(lane).map(|c| c * duration);
-        let incoming = intervals.inward(lane + 1).map(|c| c * duration);
+        let duration = intervals.durations[lane];
+        let outgoing = at(&intervals.outward, lane).map(|c| c * duration);
+        let incoming = at(&intervals.inward, lane + 1).map(|c| c * duration);
         let (start, end) = (intervals.key(lane), intervals.end_key(lane));
         let numbers = [start, outgoing, incoming, end];
         intervals.set_numbers(lane, 0, numbers.as_flattened());
         // An estimate of the squared extent: the component of a tangent along its key changes only
         // the quaternion's length.
-        let log = intervals.log(lane);
+        let log = at(&intervals.logs, lane);
         let across = [cross3(start, outgoing), log, cross3(end, incoming)];
-        intervals.set_squared_extent(lane, across);
+        intervals.squared_extents[lane] = squared_extent(across);
     }
 }
 

@@ -1,15 +1,6 @@
 //! The Hermite method: angular velocities at the keys are given.
 
-use crate::curve::options::Ends;
-use crate::fit::double::handles::BetweenHandles;
-use crate::fit::double::intervals::{Intervals, Stretch};
-use crate::fit::double::shape::Shape;
-use crate::math::quaternion::scaled;
-use crate::method::interpolation::Interpolation;
-use crate::method::{Continuity, Cost, Curves, Given, Keys, Method, Smooth, USUAL};
-use crate::reference;
-use crate::simd::dispatch::in_lanes;
-use crate::tracks::set::Track;
+use crate::method::*;
 
 /// Hermite: the rotation and the angular velocity of every key are given
 /// ([`TrackSet::set_velocities`](crate::tracks::set::TrackSet::set_velocities)); without them every
@@ -20,8 +11,6 @@ pub const HERMITE: Method = Method {
     formula: "a_i = q_i exp(ω_i h_i/6), b_i = q_i exp(-ω_i h_{i-1}/6)",
     source: "Kim, Kim, Shin 1995, A general construction scheme for unit quaternion curves",
     continuity: Continuity::C1,
-    continuity_on_even_keys: Continuity::C1,
-    keeps_constant_velocity: Keys::Never,
     symmetric: false,
     uses_neighbours: false,
     cost: Cost::new(160.0, 2.8),
@@ -42,10 +31,13 @@ fn numbers(track: Track, interval: usize, _: &Interpolation) -> [[f64; 4]; 2] {
 
 fn curves(intervals: &mut Intervals, stretches: &[Stretch], _: Ends) {
     for lane in stretches.iter().flat_map(Stretch::lanes) {
-        let sixth = intervals.duration(lane) / 6.0;
-        let ([x, y, z, _], [u, v, w, _]) = (intervals.outward(lane), intervals.inward(lane + 1));
-        intervals.set_outgoing(lane, scaled([x, y, z], sixth));
-        intervals.set_incoming(lane + 1, scaled([u, v, w], sixth));
+        let sixth = intervals.durations[lane] / 6.0;
+        let ([x, y, z, _], [u, v, w, _]) = (
+            at(&intervals.outward, lane),
+            at(&intervals.inward, lane + 1),
+        );
+        put(&mut intervals.outgoing, lane, scaled([x, y, z], sixth));
+        put(&mut intervals.incoming, lane + 1, scaled([u, v, w], sixth));
     }
     in_lanes(&mut BetweenHandles(intervals));
 }

@@ -1,26 +1,18 @@
 //! Kochanek-Bartels: tension, continuity and bias at each key.
 
-use crate::fit::double::handles::{BothSides, HandleRule, Handles};
-use crate::fit::double::shape::Shape;
-use crate::math::quaternion::Real as _;
-use crate::math::ranges::Algebra;
 use crate::method::bessel_overhauser_mean::handle;
-use crate::method::interpolation::Interpolation;
-use crate::method::{Continuity, Cost, Curves, Given, Keys, Method, Smooth, USUAL, ends};
-use crate::reference;
-use crate::tracks::set::Track;
+use crate::method::*;
 
 /// Kochanek-Bartels, with [`Tcb`](crate::tracks::key_data::Tcb) for each key
 /// ([`TrackSet::set_tcb`](crate::tracks::set::TrackSet::set_tcb)) or for all
 /// ([`Interpolation::tcb`]). With zeros it is
-/// [`BESSEL_OVERHAUSER_MEAN`](crate::method::bessel_overhauser_mean::BESSEL_OVERHAUSER_MEAN).
+/// [`BESSEL_OVERHAUSER_MEAN`].
 pub const KOCHANEK_BARTELS: Method = Method {
     name: "kochanek-bartels",
     summary: "an animator's curve: tension, continuity and bias at each key",
     formula: "log in = h_{i-1}/3 (c h_i/h_{i-1} log(q_{i-1}⁻¹ q_i) + d h_{i-1}/h_i log(q_i⁻¹ q_{i+1})) / (h_{i-1} + h_i), log out alike with h_i, a, b; a, d = (1-T)(1+C)(1±B), c, b = (1-T)(1-C)(1±B), de Casteljau",
     source: "Kochanek, Bartels 1984, Interpolating splines with local tension, continuity, and bias control; Geier, splines 0.3 (Python)",
     continuity: Continuity::C1,
-    continuity_on_even_keys: Continuity::C1,
     keeps_constant_velocity: Keys::Any,
     cost: Cost::new(860.0, 3.2),
     reference: reference::handles::KOCHANEK_BARTELS,
@@ -29,7 +21,7 @@ pub const KOCHANEK_BARTELS: Method = Method {
 };
 
 static CURVES: Curves = Curves::Smooth(
-    Smooth::new(Shape::DE_CASTELJAU, ends::controls::<Rule>).with(Given::Numbers(numbers)),
+    Smooth::new(Shape::DE_CASTELJAU, ends::curves::<Rule>).with(Given::Numbers(numbers)),
 );
 
 /// Tension, continuity and bias of the key that an interval starts with.

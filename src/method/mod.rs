@@ -46,12 +46,19 @@ use std::fmt;
 use std::ops::Range;
 use std::str::FromStr;
 
-use crate::fit::double::handles::{HandleRule, Steps};
-use crate::fit::double::intervals::{Intervals, Stretch};
+// The files of methods take all of this by `use crate::method::*`.
+use crate::fit::double::handles::{
+    BetweenHandles, BetweenNeighbours, BothSides, EndHandle, HandleRule, Handles, Interval, Steps,
+};
+use crate::fit::double::intervals::{Intervals, Stretch, at, put, squared_extent};
 use crate::fit::double::shape::Shape;
 use crate::fit::single::handles::HandlesF32;
 use crate::fit::tangent_weights::WeightRule;
-use crate::math::quaternion::Vector;
+use crate::math::quaternion::{
+    self, Quaternion, Real, Vector, dot, exp, length, log, product, ratio, rotated, scaled,
+    sine_cosine, sum,
+};
+use crate::math::ranges::Algebra;
 use crate::reference;
 use crate::reference::curve::Definition;
 use crate::shader::Form;
@@ -125,7 +132,8 @@ pub struct Method {
     pub(crate) curves: &'static Curves,
 }
 
-/// What most methods have in common; names, formula and curves are each method's own.
+/// What most methods have in common, and how they are unless they say otherwise. Names, formula and
+/// curves are each method's own; without curves a method holds its keys.
 const USUAL: Method = Method {
     name: "",
     summary: "",
@@ -200,19 +208,14 @@ impl Smooth {
         }
     }
 
+    /// Allows curves straight from keys; tracks of two keys then turn at constant velocity.
     const fn direct<R: HandleRule>(self, weights: WeightRule) -> Self {
         Self {
+            steady_alone: true,
             direct: Some(FromKeys {
                 weights,
                 set_long: HandlesF32::set_long::<R>,
             }),
-            ..self
-        }
-    }
-
-    const fn steady_alone(self) -> Self {
-        Self {
-            steady_alone: true,
             ..self
         }
     }

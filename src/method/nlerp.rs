@@ -1,10 +1,6 @@
 //! Normalised linear interpolation.
 
-use crate::curve::options::Ends;
-use crate::fit::double::intervals::{Intervals, Stretch};
-use crate::fit::double::shape::Shape;
-use crate::method::{Continuity, Cost, Curves, Keys, Method, Smooth, USUAL};
-use crate::reference;
+use crate::method::*;
 
 /// Nlerp: the straight line between neighbouring keys, normalised. It follows the path of slerp at
 /// another speed, slower near the keys: it is up to 8° from slerp where keys are 180° apart.
@@ -30,6 +26,7 @@ fn curves(intervals: &mut Intervals, stretches: &[Stretch], _: Ends) {
         let (start, end) = (intervals.key(lane), intervals.end_key(lane));
         intervals.set_numbers(lane, 0, &start);
         intervals.set_numbers(lane, 12, &end);
-        intervals.set_squared_extent(lane, [intervals.log(lane), [0.0; 3], [0.0; 3]]);
+        intervals.squared_extents[lane] =
+            squared_extent([at(&intervals.logs, lane), [0.0; 3], [0.0; 3]]);
     }
 }

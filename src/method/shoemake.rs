@@ -1,23 +1,15 @@
 //! Shoemake's first approach, as lectured, and the handle rule of all three approaches.
 
-use crate::fit::double::handles::{BothSides, EndHandle, EndInterval, HandleRule, Handles};
-use crate::fit::double::shape::Shape;
-use crate::math::quaternion::{Real as _, Vector, dot, scaled, sum};
-use crate::math::ranges::Algebra;
-use crate::method::{Continuity, Cost, Curves, Keys, Method, Smooth, USUAL, ends};
-use crate::reference;
+use crate::method::*;
 
 /// Approach I of the lecture: the control rotation is the bisector itself. It passes its keys three
 /// times too fast and overshoots; it is here for comparison.
-/// [`SHOEMAKE_1985`](crate::method::shoemake_1985::SHOEMAKE_1985) corrects this.
+/// [`SHOEMAKE_1985`] corrects this.
 pub const SHOEMAKE: Method = Method {
     name: "shoemake",
     summary: "Bezier curves whose controls are the bisectors; passes its keys three times too fast",
     formula: "a_i = Bisect(Double(q_{i-1}, q_i), q_{i+1}), b_i = Double(a_i, q_i), de Casteljau",
     source: "Shoemake 1985 as lectured, approach I",
-    continuity: Continuity::C0,
-    continuity_on_even_keys: Continuity::C1,
-    keeps_constant_velocity: Keys::Never,
     cost: Cost::new(1500.0, 4.1),
     reference: reference::handles::SHOEMAKE,
     curves: &CURVES,
@@ -26,7 +18,7 @@ pub const SHOEMAKE: Method = Method {
 
 static CURVES: Curves = Curves::Smooth(Smooth::new(
     Shape::DE_CASTELJAU,
-    ends::controls::<Bisector<1>>,
+    ends::curves::<Bisector<1>>,
 ));
 
 /// Handles that go 1/`DIVISOR` of the way from the key to the bisector.
@@ -36,6 +28,9 @@ static CURVES: Curves = Curves::Smooth(Smooth::new(
 pub(crate) struct Bisector<const DIVISOR: u8>;
 
 impl<const DIVISOR: u8> HandleRule for Bisector<DIVISOR> {
+    // These handles are 3/DIVISOR times as long as the parabola's, at inner keys too.
+    const BOTH: f64 = 2.0 / DIVISOR as f64;
+
     #[inline(always)]
     fn handles<A: Algebra>(algebra: &mut A, [before, after]: BothSides<A>) -> Handles<A::Number> {
         let (a, b) = (before.step, after.step);
@@ -55,18 +50,6 @@ impl<const DIVISOR: u8> HandleRule for Bisector<DIVISOR> {
         Handles {
             incoming: handle,
             outgoing: handle,
-        }
-    }
-
-    fn end(EndInterval { log, other }: EndInterval, handle: EndHandle) -> Vector {
-        match handle {
-            EndHandle::Turn(turn) => scaled(turn, 1.0 / 3.0),
-            // These handles are 3/DIVISOR times as long as the parabola's, at inner keys too.
-            EndHandle::Parabolic => {
-                let whole = scaled(log, 2.0 / f64::from(DIVISOR));
-                sum(whole, scaled(other, -1.0))
-            }
-            EndHandle::Natural(rest) => scaled(rest, 0.5),
         }
     }
 }

@@ -1,9 +1,7 @@
 //! Shoemake's construction, as published.
 
-use crate::fit::double::shape::Shape;
 use crate::method::shoemake::Bisector;
-use crate::method::{Continuity, Cost, Curves, Keys, Method, Smooth, USUAL, ends};
-use crate::reference;
+use crate::method::*;
 
 /// Shoemake's own construction: the handle goes a third of the way to the bisector. It ignores the
 /// time steps, so its velocity jumps on uneven keys.
@@ -12,8 +10,6 @@ pub const SHOEMAKE_1985: Method = Method {
     summary: "Bezier curves of rotations as their author has them; smooth through evenly spaced keys",
     formula: "a_i = slerp(q_i, Bisect(Double(q_{i-1}, q_i), q_{i+1}), 1/3), b_i = Double(a_i, q_i), de Casteljau",
     source: "Shoemake 1985, Animating rotation with quaternion curves, section 4.4",
-    continuity: Continuity::C0,
-    continuity_on_even_keys: Continuity::C1,
     keeps_constant_velocity: Keys::Even,
     cost: Cost::new(530.0, 2.8),
     reference: reference::handles::SHOEMAKE_1985,
@@ -23,5 +19,5 @@ pub const SHOEMAKE_1985: Method = Method {
 
 static CURVES: Curves = Curves::Smooth(Smooth::new(
     Shape::DE_CASTELJAU,
-    ends::controls::<Bisector<3>>,
+    ends::curves::<Bisector<3>>,
 ));

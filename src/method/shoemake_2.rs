@@ -1,21 +1,16 @@
 //! Shoemake's second approach, as lectured.
 
-use crate::fit::double::shape::Shape;
 use crate::method::shoemake::Bisector;
-use crate::method::{Continuity, Cost, Curves, Keys, Method, Smooth, USUAL, ends};
-use crate::reference;
+use crate::method::*;
 
 /// Approach II of the lecture: the handle goes half of the way to the bisector. It passes its keys
 /// one and a half times too fast;
-/// [`SHOEMAKE_1985`](crate::method::shoemake_1985::SHOEMAKE_1985) corrects this.
+/// [`SHOEMAKE_1985`] corrects this.
 pub const SHOEMAKE_2: Method = Method {
     name: "shoemake-2",
     summary: "Bezier curves whose controls are half way to the bisector; passes its keys half too fast",
     formula: "a_i = Bisect(q_i, Bisect(Double(q_{i-1}, q_i), q_{i+1})), b_i = Double(a_i, q_i), de Casteljau",
     source: "Shoemake 1985 as lectured, approach II",
-    continuity: Continuity::C0,
-    continuity_on_even_keys: Continuity::C1,
-    keeps_constant_velocity: Keys::Never,
     cost: Cost::new(700.0, 3.1),
     reference: reference::handles::SHOEMAKE_2,
     curves: &CURVES,
@@ -24,5 +19,5 @@ pub const SHOEMAKE_2: Method = Method {
 
 static CURVES: Curves = Curves::Smooth(Smooth::new(
     Shape::DE_CASTELJAU,
-    ends::controls::<Bisector<2>>,
+    ends::curves::<Bisector<2>>,
 ));

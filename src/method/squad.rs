@@ -1,11 +1,6 @@
 //! Spherical quadrangle interpolation.
 
-use crate::fit::double::handles::{BothSides, EndHandle, EndInterval, HandleRule, Handles};
-use crate::fit::double::shape::Shape;
-use crate::math::quaternion::{Real as _, Vector, scaled, sum};
-use crate::math::ranges::Algebra;
-use crate::method::{Continuity, Cost, Curves, Keys, Method, Smooth, USUAL, ends};
-use crate::reference;
+use crate::method::*;
 
 /// Squad. It ignores the time steps, so its velocity jumps on uneven keys.
 pub const SQUAD: Method = Method {
@@ -13,8 +8,6 @@ pub const SQUAD: Method = Method {
     summary: "smooth through evenly spaced keys, as many engines have it",
     formula: "slerp(slerp(q0, q1; t), slerp(s0, s1; t); 2t(1-t)), s_i = q_i exp(-(log(q_i⁻¹ q_{i+1}) + log(q_i⁻¹ q_{i-1}))/4)",
     source: "Shoemake 1987, Quaternion calculus and fast animation",
-    continuity: Continuity::C0,
-    continuity_on_even_keys: Continuity::C1,
     keeps_constant_velocity: Keys::Even,
     cost: Cost::new(300.0, 2.9),
     reference: reference::handles::SQUAD,
@@ -22,7 +15,7 @@ pub const SQUAD: Method = Method {
     ..USUAL
 };
 
-static CURVES: Curves = Curves::Smooth(Smooth::new(Shape::SQUAD, ends::controls::<Rule>));
+static CURVES: Curves = Curves::Smooth(Smooth::new(Shape::SQUAD, ends::curves::<Rule>));
 
 /// `s_i = q_i exp(outgoing) = q_i exp(-incoming)`.
 struct Rule;
@@ -39,7 +32,7 @@ impl HandleRule for Rule {
 
     /// The derivative of a squad is `log + 2 outgoing` at its start and `log + 2 incoming` at its
     /// end, as half-rotation vectors per interval.
-    fn end(EndInterval { log, other }: EndInterval, handle: EndHandle) -> Vector {
+    fn end(log: Vector, other: Vector, handle: EndHandle) -> Vector {
         match handle {
             EndHandle::Turn(turn) => scaled(sum(turn, scaled(log, -1.0)), 0.5),
             EndHandle::Parabolic => scaled(other, -1.0),

@@ -1,7 +1,6 @@
 //! The step method: each key is held until the next.
 
-use crate::method::{Continuity, Cost, Curves, Keys, Method, USUAL};
-use crate::reference;
+use crate::method::*;
 
 /// Holds each key until the next: for things that switch and do not move.
 pub const STEP: Method = Method {
@@ -11,13 +10,8 @@ pub const STEP: Method = Method {
     source: "glTF 2.0, section 3.11, STEP",
     continuity: Continuity::Jumps,
     continuity_on_even_keys: Continuity::Jumps,
-    keeps_constant_velocity: Keys::Never,
     symmetric: false,
     uses_neighbours: false,
     cost: Cost::new(3.4, 0.87),
-    reference: reference::given::STEP,
-    curves: &CURVES,
     ..USUAL
 };
-
-static CURVES: Curves = Curves::Steps;

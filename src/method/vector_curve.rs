@@ -18,16 +18,6 @@ pub(crate) struct Cubic {
 }
 
 impl Cubic {
-    /// Stands still.
-    pub(crate) fn still(at: DVec3) -> Self {
-        Self {
-            start: at,
-            leaving: DVec3::ZERO,
-            arriving: DVec3::ZERO,
-            end: at,
-        }
-    }
-
     /// The coefficients of 1, t, t², t³.
     pub(crate) fn powers(&self) -> [DVec3; 4] {
         let rise = self.end - self.start;
@@ -37,15 +27,6 @@ impl Cubic {
             rise * 3.0 - self.leaving * 2.0 - self.arriving,
             self.leaving + self.arriving - rise * 2.0,
         ]
-    }
-
-    fn from_powers([c0, c1, c2, c3]: [DVec3; 4]) -> Self {
-        Self {
-            start: c0,
-            leaving: c1,
-            arriving: c1 + c2 * 2.0 + c3 * 3.0,
-            end: c0 + c1 + c2 + c3,
-        }
     }
 }
 
@@ -103,18 +84,19 @@ impl<'a> Curves<'a> {
 
     /// The curve of an interval.
     pub(crate) fn of(&self, i: usize) -> Cubic {
-        if self.is_held(i) {
-            return Cubic::still(self.key(i));
-        }
-        if self.method == VectorMethod::BSpline && self.track.keys.len() > 2 {
+        let is_held = self.is_held(i);
+        if !is_held && self.method == VectorMethod::BSpline && self.track.keys.len() > 2 {
             return self.b_spline(i);
         }
-        let [leaving, arriving] = self.slopes_of(i);
+        let [leaving, arriving] = match is_held {
+            true => [DVec3::ZERO; 2],
+            false => self.slopes_of(i),
+        };
         Cubic {
             start: self.key(i),
             leaving,
             arriving,
-            end: self.key(i + 1),
+            end: self.key(if is_held { i } else { i + 1 }),
         }
     }
 
@@ -210,26 +192,22 @@ impl<'a> Curves<'a> {
             [_, slope2, bend2, cube2],
             [_, _, _, value3],
         ] = basis;
+        // The step beyond an end, by what the basis functions of the own step and of that one are there.
+        let beyond = |bend: f64, own_slope: f64, slope: f64, next: usize| match self.ends {
+            Ends::Natural => own * (bend / slope),
+            Ends::Clamped { .. } => own * (-own_slope / slope),
+            Ends::Secant => own * ((1.0 - own_slope) / slope),
+            _ => self.extrapolated(i, next),
+        };
         let before = match i.checked_sub(1).or(closed.then_some(last)) {
             Some(before) => self.rise(before),
-            None => match self.ends {
-                Ends::Natural => own * (bend2 / slope1),
-                Ends::Clamped { .. } => own * (-slope2 / slope1),
-                Ends::Secant => own * ((1.0 - slope2) / slope1),
-                _ => self.extrapolated(i, i + 1),
-            },
+            None => beyond(bend2, slope2, slope1, i + 1),
         };
         let after = match (i < last).then_some(i + 1).or(closed.then_some(0)) {
             Some(after) => self.rise(after),
             None => {
-                let slope3 = 3.0 * value3;
                 let own_slope = slope2 + 2.0 * bend2 + 3.0 * cube2;
-                match self.ends {
-                    Ends::Natural => own * (-(bend2 + 3.0 * cube2) / slope3),
-                    Ends::Clamped { .. } => own * (-own_slope / slope3),
-                    Ends::Secant => own * ((1.0 - own_slope) / slope3),
-                    _ => self.extrapolated(i, i - 1),
-                }
+                beyond(-(bend2 + 3.0 * cube2), own_slope, 3.0 * value3, i - 1)
             }
         };
         let mut powers = [DVec3::ZERO; 4];
@@ -239,7 +217,13 @@ impl<'a> Curves<'a> {
             }
         }
         powers[0] += self.key(i) - before;
-        Cubic::from_powers(powers)
+        let [start, c1, c2, c3] = powers;
+        Cubic {
+            start,
+            leaving: c1,
+            arriving: c1 + c2 * 2.0 + c3 * 3.0,
+            end: start + c1 + c2 + c3,
+        }
     }
 
     /// One more step of the parabola through the three keys at an end.

@@ -41,15 +41,15 @@ impl VectorMethod {
     /// The name by which programs call it.
     #[must_use]
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Step => "step",
-            Self::Linear => "linear",
-            Self::CatmullRom => "catmull-rom",
-            Self::BesselOverhauser => "bessel-overhauser",
-            Self::GltfCubic => "gltf-cubic",
-            Self::C2 => "c2",
-            Self::BSpline => "b-spline",
-        }
+        [
+            "step",
+            "linear",
+            "catmull-rom",
+            "bessel-overhauser",
+            "gltf-cubic",
+            "c2",
+            "b-spline",
+        ][self as usize]
     }
 }
 
@@ -62,7 +62,8 @@ impl fmt::Display for VectorMethod {
 /// The error for a name that no method for vectors has.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "there is no method `{name}` for vectors; there are step, linear, catmull-rom, bessel-overhauser, gltf-cubic, c2, b-spline"
+    "there is no method `{name}` for vectors; there are {}",
+    VectorMethod::ALL.map(VectorMethod::name).join(", ")
 )]
 pub struct UnknownVectorMethod {
     /// The name given.

@@ -3,6 +3,8 @@
 
 use std::ops::Range;
 
+use bytemuck::Zeroable;
+
 use crate::curve::options::Path;
 use crate::math::canonical::round_f32;
 use crate::math::quaternion::{dot, unit};
@@ -19,8 +21,10 @@ use crate::twin::arc_between::arc_between;
 const LANES: usize = 64;
 
 /// Intervals that wait for their block, and the arcs that they become.
+#[derive(Zeroable)]
 pub(crate) struct ArcPreparation {
-    path: Path,
+    /// Whether no arc is longer than half a turn.
+    is_shortest: bool,
     from: [[f32; 4]; LANES],
     /// The key at the end of each interval, in the sign nearer to `from`.
     to: [[f32; 4]; LANES],
@@ -47,12 +51,8 @@ impl InLanes for ArcPreparation {
 impl ArcPreparation {
     pub(crate) fn new(path: Path) -> Self {
         Self {
-            path,
-            from: [[0.0; 4]; LANES],
-            to: [[0.0; 4]; LANES],
-            count: 0,
-            middles: [[0.0; 4]; LANES],
-            tangents: [[0.0; 4]; LANES],
+            is_shortest: path == Path::Shortest,
+            ..Self::zeroed()
         }
     }
 
@@ -71,27 +71,24 @@ impl ArcPreparation {
         let last_key = first_key + intervals.len() as u32;
         let own = &keys[intervals.start..=intervals.end];
         prepared.constants.extend_from_slice(own);
-        match self.path {
-            Path::Shortest => {
-                let segments = (prepared.segments.len() + self.count) as u32;
-                let places = segments..segments + intervals.len() as u32;
-                let spans = &mut prepared.spans;
-                spans.starts.extend_from_slice(&times[intervals.clone()]);
-                spans.sources.extend(places.map(Source::Segment));
-                spans.keys.extend(first_key..last_key);
-                self.push(prepared, keys, set.signs(index), intervals.clone());
-            }
-            Path::AsAuthored => {
-                for (key, constant) in intervals.clone().zip(first_key..) {
-                    let [start, end] = [times[key], times[key + 1]];
-                    let [from, to] = [keys[key], keys[key + 1]];
-                    if let Some(middle) = middle_of_long([from, to]) {
-                        let halfway = start + (end - start) * 0.5;
-                        self.push_arc(prepared, start, constant, [from, middle]);
-                        self.push_arc(prepared, halfway, NONE, [middle, to]);
-                    } else {
-                        self.push_arc(prepared, start, constant, [from, to]);
-                    }
+        if self.is_shortest {
+            let segments = (prepared.segments.len() + self.count) as u32;
+            let places = segments..segments + intervals.len() as u32;
+            let spans = &mut prepared.spans;
+            spans.starts.extend_from_slice(&times[intervals.clone()]);
+            spans.sources.extend(places.map(Source::Segment));
+            spans.keys.extend(first_key..last_key);
+            self.push(prepared, keys, set.signs(index), intervals.clone());
+        } else {
+            for (key, constant) in intervals.clone().zip(first_key..) {
+                let [start, end] = [times[key], times[key + 1]];
+                let [from, to] = [keys[key], keys[key + 1]];
+                if let Some(middle) = middle_of_long([from, to]) {
+                    let halfway = start + (end - start) * 0.5;
+                    self.push_arc(prepared, start, constant, [from, middle]);
+                    self.push_arc(prepared, halfway, NONE, [middle, to]);
+                } else {
+                    self.push_arc(prepared, start, constant, [from, to]);
                 }
             }
         }
@@ -113,10 +110,8 @@ impl ArcPreparation {
             }
             let own = self.count..LANES.min(self.count + intervals.len());
             let (start, end) = (intervals.start, intervals.start + own.len());
-            let (from, to) = (start..end, start + 1..end + 1);
-            let signs = [&from, &to].map(|keys| signs.between(keys.clone()));
-            signs[0].copy(&keys[from], &mut self.from[own.clone()]);
-            signs[1].copy(&keys[to], &mut self.to[own.clone()]);
+            signs.copy(keys, start..end, &mut self.from[own.clone()]);
+            signs.copy(keys, start + 1..end + 1, &mut self.to[own.clone()]);
             self.count = own.end;
             intervals.start = end;
         }

@@ -14,8 +14,8 @@ use crate::fit::single::handles::{
     CurveNumbers, FindCurves, FindSteps, HandlesF32, LONGEST_DIRECT,
 };
 use crate::fit::single::hermite_fit::{BetweenKeys, Halves, KeyFit};
-use crate::fit::single::key_weights::KeyWeights;
 use crate::fit::single::small_angle::SmallAngleLanes;
+use crate::fit::tangent_weights::KeyWeights;
 use crate::method::{FromKeys, Smooth};
 use crate::prepare::fitting::Fitting;
 use crate::prepare::prepared::{Place, Prepared};
@@ -51,12 +51,9 @@ impl Direct {
     pub(crate) fn new(how: FromKeys, smooth: Smooth, ends: Ends) -> Self {
         Self {
             weights: KeyWeights::new(how.weights, ends),
-            small_angle: SmallAngleLanes::new(),
+            small_angle: SmallAngleLanes::zeroed(),
             whole: HandlesF32::new(),
-            places: [Place {
-                span: 0,
-                segment: 0,
-            }; ROOM],
+            places: [Place::zeroed(); ROOM],
             usual: Vec::new(),
             few_powers: Vec::new(),
             halves: Vec::new(),
@@ -297,7 +294,7 @@ impl Rest {
             fitting.take(intervals, lane, place);
         }
         fitting.bring(prepared, intervals);
-        intervals.clear();
+        intervals.count = 0;
         stretches.clear();
         self.places.clear();
     }

@@ -37,7 +37,7 @@ impl Fitting {
             quantity,
             small_angle: Queue::default(),
             full: Queue::default(),
-            cutter: Cutter::new(shape, quantity),
+            cutter: Cutter::default(),
         }
     }
 
@@ -97,9 +97,11 @@ impl Fitting {
                 run(block, &mut queue.places, &mut self.cutter, prepared);
             }
         }
-        self.cutter.cut(&mut prepared.segments.polynomials);
+        let segments = &mut prepared.segments.polynomials;
+        self.cutter.cut(self.shape, self.quantity, segments);
         prepared.put_subcurves(&self.cutter);
-        self.cutter.clear();
+        self.cutter.curves.clear();
+        self.cutter.subcurves.clear();
     }
 }
 
@@ -125,7 +127,7 @@ fn run(
 impl Prepared {
     /// Replaces the spans of curves that were cut by those of their parts.
     fn put_subcurves(&mut self, cutter: &Cutter) {
-        let mut cut = cutter.subcurves();
+        let mut cut = &cutter.subcurves[..];
         if cut.is_empty() {
             return;
         }

@@ -16,5 +16,4 @@ pub(crate) mod preparation;
 pub(crate) mod prepared;
 pub(crate) mod request;
 pub(crate) mod smooth;
-pub(crate) mod steps;
 pub(crate) mod vectors;

@@ -2,14 +2,16 @@
 
 use std::ops::Range;
 
-use crate::curve::options::InterpolationError;
+use glam::Quat;
+
+use crate::curve::options::{InterpolationError, Quantity};
 use crate::method::Curves;
 use crate::method::interpolation::Interpolation;
 use crate::prepare::arcs::ArcPreparation;
 use crate::prepare::prepared::Prepared;
 use crate::prepare::smooth::SmoothPreparation;
-use crate::prepare::steps;
 use crate::time::frames::{Ticks, Timeline};
+use crate::time::spans::{NONE, Source};
 use crate::tracks::set::TrackSet;
 
 /// Prepares tracks by an interpolation; its memory is reused.
@@ -74,7 +76,7 @@ impl Preparation {
                 interpolation.path.check(keys, own.clone(), track)?;
             }
             match way {
-                Way::Steps => steps::add(prepared, set, track, own, interpolation.quantity),
+                Way::Steps => add_steps(prepared, set, track, own, interpolation.quantity),
                 Way::Arcs(arcs) => arcs.add(prepared, set, track, own),
                 Way::Smooth(smooth) => smooth.add(prepared, set, track, own),
             }
@@ -85,5 +87,31 @@ impl Preparation {
             Way::Smooth(smooth) => smooth.finish(prepared),
         }
         Ok(())
+    }
+}
+
+/// Adds some intervals of the `index`th track of a set, whose keys are held until the next key, as a
+/// part of their own: every sample is a constant.
+fn add_steps(
+    prepared: &mut Prepared,
+    set: &TrackSet,
+    index: usize,
+    intervals: Range<usize>,
+    quantity: Quantity,
+) {
+    let (times, keys) = set.times_and_keys(index);
+    let first = prepared.constants.len() as u32;
+    let last = first + intervals.len() as u32;
+    let value = |key: &Quat| match quantity {
+        Quantity::Rotation => key.to_array(),
+        _ => [0.0; 4],
+    };
+    let keys = keys[intervals.start..=intervals.end].iter();
+    prepared.constants.extend(keys.map(value));
+    let first_span = prepared.spans.len();
+    let spans = first_span..first_span + intervals.len();
+    prepared.push_part(index, times, &intervals, spans, [first, last]);
+    for (i, constant) in intervals.zip(first..last) {
+        prepared.push_span(times[i], Source::Constant(constant), NONE);
     }
 }

@@ -2,6 +2,8 @@
 
 use std::ops::Range;
 
+use bytemuck::Zeroable;
+
 use crate::curve::segment::Segments;
 use crate::fit::double::curve::Curve;
 use crate::math::canonical::round_quat;
@@ -28,7 +30,7 @@ pub(crate) struct Prepared {
 }
 
 /// Where a curve goes: its span, and the segment of that.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Zeroable)]
 pub(crate) struct Place {
     pub(crate) span: usize,
     pub(crate) segment: usize,
@@ -55,7 +57,8 @@ impl Prepared {
 
     /// Forgets everything and keeps the memory.
     pub(crate) fn clear(&mut self) {
-        self.segments.clear();
+        self.segments.arcs.clear();
+        self.segments.polynomials.clear();
         self.constants.clear();
         self.exact.clear();
         self.spans.clear();
@@ -96,7 +99,9 @@ impl Prepared {
             }),
             ..part
         }));
-        self.segments.append(other.segments);
+        self.segments.arcs.extend(other.segments.arcs);
+        let polynomials = other.segments.polynomials;
+        self.segments.polynomials.extend(polynomials);
         self.constants.extend(other.constants);
         self.exact.extend(other.exact);
     }

@@ -9,7 +9,7 @@ use crate::curve::options::{Ends, Quantity, Speed};
 use crate::fit::constant_velocity::arc_polynomial;
 use crate::fit::double::curve::Curve;
 use crate::fit::double::handles::FramesHeld;
-use crate::fit::double::intervals::{Intervals, LANES, Stretch};
+use crate::fit::double::intervals::{Intervals, LANES, Stretch, put};
 use crate::math::canonical::round_quat;
 use crate::math::quaternion::Vector;
 use crate::method::interpolation::Interpolation;
@@ -165,7 +165,11 @@ impl SmoothPreparation {
                 self.push(track, signs, other..other + 1, &[]);
                 // Across the seam, keys are multiplied by the last key's sign, so that they continue
                 // the signs on this side.
-                self.intervals.turn(lane, signs.sign(track.keys.len() - 1));
+                let sign = signs.sign(track.keys.len() - 1);
+                let Intervals { from, to, .. } = &mut self.intervals;
+                for key in [&mut from[lane], &mut to[lane]] {
+                    *key = key.map(|component| component * sign);
+                }
             }
             None => self.intervals.push_nothing(),
         }
@@ -190,7 +194,8 @@ impl SmoothPreparation {
                 }
                 _ => break, // the method has no numbers of its own for any interval
             };
-            self.intervals.set_given(first + i, outward, inward);
+            put(&mut self.intervals.outward, first + i, outward);
+            put(&mut self.intervals.inward, first + i + 1, inward);
         }
     }
 
@@ -211,7 +216,7 @@ impl SmoothPreparation {
             direct.fit(prepared, intervals, &stretches, is_exact, fitting);
         }
         self.fitting.bring(prepared, &self.intervals);
-        self.intervals.clear();
+        self.intervals.count = 0;
         self.stretches = stretches;
         self.stretches.clear();
     }
@@ -276,7 +281,8 @@ impl SmoothPreparation {
                 };
                 prepared.push_span(start, Source::Constant(constant), NONE);
             } else if is_steady {
-                prepared.push_segment(start, arc_polynomial(self.intervals.keys(lane)), key);
+                let keys = [self.intervals.from[lane], self.intervals.to[lane]];
+                prepared.push_segment(start, arc_polynomial(keys), key);
             } else if let Some(direct) = &mut self.direct {
                 direct.take(prepared, &self.intervals, lane, key);
             } else {

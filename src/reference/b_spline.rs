@@ -17,39 +17,32 @@ fn b_spline(track: &Track, ends: Ends, i: usize) -> Segment {
     let last = track.last() - 1;
     let step = |i: usize| logarithm(track.difference(i));
     let basis = Basis::Knots(knots(&track.times, ends, i));
-    let before = if i > 0 {
-        step(i - 1)
-    } else {
+    // The step beyond the first interval or, `at_end`, beyond the last.
+    let beyond = |at_end: bool| {
+        let (own, next, t, outer) = match at_end {
+            false => (0, 1, 0.0, 0),
+            true => (last, last.saturating_sub(1), 1.0, 2),
+        };
+        let solved = if at_end { third } else { first };
         match ends {
             _ if last == 0 => step(0),
-            Ends::Loop => step(last),
-            Ends::Parabolic => parabola(track, 0, 1),
+            Ends::Loop => step(last - own),
+            Ends::Parabolic => parabola(track, own, next),
             Ends::Natural => {
-                // The second derivatives of the first two factors cancel.
-                let second = bends(basis, 0.0);
-                step(0) * (-second[1] / second[0])
+                // The second derivatives of the two factors that bend there cancel.
+                let second = bends(basis, t);
+                step(own) * (-second[1] / second[outer])
             }
-            Ends::Clamped { start, .. } => first(basis, start * track.step(0) / 2.0, step(0)),
-            Ends::Secant => first(basis, step(0), step(0)),
-            Ends::Frozen => step(0),
+            Ends::Clamped { start, end } => {
+                let rate = if at_end { end } else { start };
+                solved(basis, rate * track.step(own) / 2.0, step(own))
+            }
+            Ends::Secant => solved(basis, step(own), step(own)),
+            Ends::Frozen => step(own),
         }
     };
-    let after = if i < last {
-        step(i + 1)
-    } else {
-        match ends {
-            _ if last == 0 => step(0),
-            Ends::Loop => step(0),
-            Ends::Parabolic => parabola(track, last, last - 1),
-            Ends::Natural => {
-                let second = bends(basis, 1.0);
-                step(last) * (-second[1] / second[2])
-            }
-            Ends::Clamped { end, .. } => third(basis, end * track.step(last) / 2.0, step(last)),
-            Ends::Secant => third(basis, step(last), step(last)),
-            Ends::Frozen => step(last),
-        }
-    };
+    let before = if i > 0 { step(i - 1) } else { beyond(false) };
+    let after = if i < last { step(i + 1) } else { beyond(true) };
     Segment::Product {
         base: multiply(track.keys[i], exponential(-before)),
         w: [before, step(i), after],

@@ -13,17 +13,11 @@ use crate::reference::track::Track;
 /// Cubic rotation vectors with continuous angular acceleration.
 pub(crate) const C2: Definition = Definition::new(|track, ends| {
     let velocities = velocities(track, ends);
-    smooth(track, ends, |i| segment(track, &velocities, i))
-});
-
-/// The curve of interval `i`, given the angular velocity at every key.
-fn segment(track: &Track, velocities: &[DVec3], i: usize) -> Segment {
-    let powers = Interval::new(track, i).cubic(velocities, i).powers;
-    Segment::RotationVector {
+    smooth(track, ends, |i| Segment::RotationVector {
         base: track.keys[i],
-        powers,
-    }
-}
+        powers: Interval::new(track, i).cubic(&velocities, i).powers,
+    })
+});
 
 /// The angular velocities at the keys (rad/s, body frame) that make the angular acceleration
 /// continuous. Each in turn is changed so that it is continuous at its key, until nothing changes
@@ -81,16 +75,12 @@ fn relax(intervals: &[Interval], ends: Ends, velocities: &mut [DVec3], bent: &[b
                 _ => (Some(key - 1), Some(key)),
             };
             let (mut excess, mut stiffness) = (DVec3::ZERO, 0.0);
-            if let Some(i) = before {
+            for (i, t, sign) in [(before, 1.0, 1.0), (after, 0.0, -1.0)] {
+                let Some(i) = i else { continue };
                 let h = intervals[i].duration;
                 let cubic = intervals[i].cubic(velocities, i);
-                excess += cubic.acceleration(1.0, bent[key]) / (h * h);
-                stiffness += 4.0 / h;
-            }
-            if let Some(i) = after {
-                let h = intervals[i].duration;
-                let cubic = intervals[i].cubic(velocities, i);
-                excess -= cubic.acceleration(0.0, true) / (h * h);
+                let is_bent = t == 0.0 || bent[key];
+                excess += cubic.acceleration(t, is_bent) / (h * h) * sign;
                 stiffness += 4.0 / h;
             }
             let step = excess / stiffness;

@@ -6,7 +6,6 @@ use std::fmt;
 use glam::{DQuat, DVec3, Quat};
 
 use crate::curve::options::{Ends, Path};
-use crate::reference::handles::Handles;
 use crate::reference::pace::Pace;
 use crate::reference::segment::Segment;
 use crate::reference::track::Track;
@@ -16,16 +15,10 @@ use crate::tracks::set as tracks;
 /// A method by the book: how the curve of a track follows from its keys. Every method has one.
 #[derive(Clone, Copy)]
 pub struct Definition {
-    pub(super) curves: Curves,
+    /// The curve of every interval of a track.
+    pub(super) segments: fn(&Track, Ends) -> Vec<Segment>,
     /// The path that it always takes, whatever is asked for.
     pub(crate) path: Option<Path>,
-}
-
-/// What the curve of every interval of a track follows from.
-#[derive(Clone, Copy)]
-pub(super) enum Curves {
-    Track(fn(&Track, Ends) -> Vec<Segment>),
-    Handles(Handles),
 }
 
 impl fmt::Debug for Definition {
@@ -36,14 +29,8 @@ impl fmt::Debug for Definition {
 
 impl Definition {
     pub(crate) const fn new(segments: fn(&Track, Ends) -> Vec<Segment>) -> Self {
-        let (curves, path) = (Curves::Track(segments), None);
-        Self { curves, path }
-    }
-
-    /// By the handles of keys.
-    pub(crate) const fn by(handles: Handles) -> Self {
-        let (curves, path) = (Curves::Handles(handles), None);
-        Self { curves, path }
+        let path = None;
+        Self { segments, path }
     }
 }
 
@@ -99,10 +86,7 @@ impl Curve {
 
     fn build(definition: Definition, ends: Ends, track: Track) -> Self {
         Self {
-            segments: match definition.curves {
-                Curves::Track(segments) => segments(&track, ends),
-                Curves::Handles(handles) => handles.segments(&track, ends),
-            },
+            segments: (definition.segments)(&track, ends),
             track,
             pace: None,
         }

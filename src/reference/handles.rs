@@ -123,15 +123,22 @@ impl Sides {
     }
 }
 
+/// The method that says this of handles.
+macro_rules! by_handles {
+    ($handles:expr) => {
+        Definition::new(|track, ends| $handles.segments(track, ends))
+    };
+}
+
 /// A cumulative cubic with tangents from the neighbouring keys.
-pub(crate) const CATMULL_ROM: Definition = Definition::by(Handles::cumulative(|sides| {
+pub(crate) const CATMULL_ROM: Definition = by_handles!(Handles::cumulative(|sides| {
     let sum = sides.l + sides.r;
     let sixth = logarithm_or(multiply(sides.before, sides.after), sum) / 6.0;
     (sixth, sixth)
 }));
 
 /// A cumulative cubic with tangents of the parabola through three keys.
-pub(crate) const BESSEL_OVERHAUSER: Definition = Definition::by(Handles::cumulative(|sides| {
+pub(crate) const BESSEL_OVERHAUSER: Definition = by_handles!(Handles::cumulative(|sides| {
     let (before, after) = (sides.h_before, sides.h_after);
     let (left, right) = (sides.l * (after / before), sides.r * (before / after));
     let product = multiply(exponential(left), exponential(right));
@@ -140,14 +147,14 @@ pub(crate) const BESSEL_OVERHAUSER: Definition = Definition::by(Handles::cumulat
 }));
 
 /// Bézier curves with the mean of the logarithms of the slopes.
-pub(crate) const BESSEL_OVERHAUSER_MEAN: Definition = Definition::by(Handles::bezier(|sides| {
+pub(crate) const BESSEL_OVERHAUSER_MEAN: Definition = by_handles!(Handles::bezier(|sides| {
     let (before, after) = (sides.h_before, sides.h_after);
     let mean = (sides.l * (after / before) + sides.r * (before / after)) / sides.both;
     (mean * (before / 3.0), mean * (after / 3.0))
 }));
 
 /// Bézier curves with tension, continuity and bias.
-pub(crate) const KOCHANEK_BARTELS: Definition = Definition::by(Handles::bezier(|sides| {
+pub(crate) const KOCHANEK_BARTELS: Definition = by_handles!(Handles::bezier(|sides| {
     let Tcb {
         tension,
         continuity,
@@ -166,7 +173,7 @@ pub(crate) const KOCHANEK_BARTELS: Definition = Definition::by(Handles::bezier(|
 }));
 
 /// Spherical quadrangles. One starts with `log(q0⁻¹ q1) + 2 log(q0⁻¹ s0)`.
-pub(crate) const SQUAD: Definition = Definition::by(Handles {
+pub(crate) const SQUAD: Definition = by_handles!(Handles {
     inner: |&Sides { l, r, .. }| ((r - l) / 4.0, (l - r) / 4.0),
     parabolic: |_, other| -other,
     natural: |_, other| -other / 2.0,
@@ -175,19 +182,19 @@ pub(crate) const SQUAD: Definition = Definition::by(Handles {
 });
 
 /// Bézier curves, their control rotations the bisectors.
-pub(crate) const SHOEMAKE: Definition = Definition::by(Handles {
+pub(crate) const SHOEMAKE: Definition = by_handles!(Handles {
     parabolic: |whole, other| 2.0 * whole - other,
     ..Handles::bezier(|sides| shoemake(sides, |_, bisector| bisector))
 });
 
 /// Bézier curves, their control rotations half way to the bisectors.
-pub(crate) const SHOEMAKE_2: Definition = Definition::by(Handles {
+pub(crate) const SHOEMAKE_2: Definition = by_handles!(Handles {
     parabolic: |whole, other| whole - other,
     ..Handles::bezier(|sides| shoemake(sides, |q, bisector| bisect(q, bisector, q)))
 });
 
 /// Bézier curves, their control rotations a third of the way to the bisectors.
-pub(crate) const SHOEMAKE_1985: Definition = Definition::by(Handles::bezier(|sides| {
+pub(crate) const SHOEMAKE_1985: Definition = by_handles!(Handles::bezier(|sides| {
     shoemake(sides, |q, bisector| slerp(q, bisector, 1.0 / 3.0))
 }));
 

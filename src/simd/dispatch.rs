@@ -187,24 +187,23 @@ pub(crate) fn streaming_stores_from() -> Option<VectorWidth> {
     *FROM.get_or_init(detect_streaming_stores)
 }
 
-#[cfg(target_arch = "x86_64")]
 fn detect_streaming_stores() -> Option<VectorWidth> {
-    use std::arch::x86_64::__cpuid;
-    const ZEN_5: u32 = 26;
-    let vendor = __cpuid(0);
-    let name = [vendor.ebx, vendor.edx, vendor.ecx].map(u32::to_le_bytes);
-    // The family is a sum of two fields, the second of which is 0 for families below 15.
-    let signature = __cpuid(1).eax;
-    let family = (signature >> 8 & 0xf) + (signature >> 20 & 0xff);
-    match name.as_flattened() {
-        b"GenuineIntel" => Some(VectorWidth::Avx2),
-        b"AuthenticAMD" if family >= ZEN_5 => Some(VectorWidth::Avx512),
-        _ => None,
+    #[cfg(target_arch = "x86_64")]
+    {
+        use std::arch::x86_64::__cpuid;
+        const ZEN_5: u32 = 26;
+        let vendor = __cpuid(0);
+        let name = [vendor.ebx, vendor.edx, vendor.ecx].map(u32::to_le_bytes);
+        // The family is a sum of two fields, the second of which is 0 for families below 15.
+        let signature = __cpuid(1).eax;
+        let family = (signature >> 8 & 0xf) + (signature >> 20 & 0xff);
+        match name.as_flattened() {
+            b"GenuineIntel" => Some(VectorWidth::Avx2),
+            b"AuthenticAMD" if family >= ZEN_5 => Some(VectorWidth::Avx512),
+            _ => None,
+        }
     }
-}
-
-#[cfg(not(target_arch = "x86_64"))]
-fn detect_streaming_stores() -> Option<VectorWidth> {
+    #[cfg(not(target_arch = "x86_64"))]
     None
 }
 

@@ -101,10 +101,7 @@ doubles!(
 /// Vectors of two f64, by the instructions of SSE2.
 #[cfg(target_arch = "x86_64")]
 pub(crate) mod pair {
-    use std::arch::x86_64::{
-        __m128, _mm_and_pd, _mm_andnot_pd, _mm_cmple_pd, _mm_cvtpd_ps, _mm_cvtps_pd, _mm_movehl_ps,
-        _mm_movelh_ps, _mm_movemask_pd, _mm_or_pd,
-    };
+    use std::arch::x86_64::*;
     pub(crate) use std::arch::x86_64::{
         __m128d as Pair, _mm_add_pd as add, _mm_div_pd as div, _mm_max_pd as larger,
         _mm_min_pd as smaller, _mm_mul_pd as mul, _mm_set1_pd as all, _mm_sqrt_pd as root,

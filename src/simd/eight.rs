@@ -1,15 +1,6 @@
 //! Eight lanes of AVX2.
 
-use std::arch::x86_64::{
-    __m256, __m256d, _CMP_LE_OQ, _CMP_LT_OQ, _CMP_NLT_UQ, _mm256_add_pd, _mm256_add_ps,
-    _mm256_and_ps, _mm256_blendv_pd, _mm256_blendv_ps, _mm256_castps_pd, _mm256_castps256_ps128,
-    _mm256_cmp_pd, _mm256_cmp_ps, _mm256_cvtpd_ps, _mm256_cvtps_pd, _mm256_div_pd,
-    _mm256_extractf128_ps, _mm256_max_pd, _mm256_max_ps, _mm256_min_pd, _mm256_movemask_pd,
-    _mm256_movemask_ps, _mm256_mul_pd, _mm256_mul_ps, _mm256_permute_ps, _mm256_permutevar8x32_ps,
-    _mm256_set_m128, _mm256_set1_pd, _mm256_set1_ps, _mm256_setr_epi32, _mm256_setzero_ps,
-    _mm256_sqrt_pd, _mm256_stream_ps, _mm256_sub_pd, _mm256_sub_ps, _mm256_unpackhi_pd,
-    _mm256_unpackhi_ps, _mm256_unpacklo_pd, _mm256_unpacklo_ps, _mm256_xor_ps,
-};
+use std::arch::x86_64::*;
 
 use bytemuck::{Pod, Zeroable};
 
@@ -25,6 +16,53 @@ macro_rules! avx2 {
         unsafe { $($work)* }
     };
 }
+
+/// The methods of [`Lanes`] that differ in nothing but the width of their instructions, which the
+/// macro `$run` calls.
+macro_rules! alike_at_any_width {
+    ($run:ident, $block:ty, $permute:ident, $to_doubles:ident, $to_floats:ident, $low:ident,
+     $high:ident, $low_pair:ident, $high_pair:ident, $larger:ident, $stream:ident) => {
+        #[inline(always)]
+        fn fourfold(self) -> [Self; 4] {
+            // The order of lanes is such that nothing crosses between the parts of four.
+            $run! {
+                [
+                    Self($permute::<0b00_00_00_00>(self.0)),
+                    Self($permute::<0b01_01_01_01>(self.0)),
+                    Self($permute::<0b10_10_10_10>(self.0)),
+                    Self($permute::<0b11_11_11_11>(self.0)),
+                ]
+            }
+        }
+
+        #[inline(always)]
+        fn transposed([a, b, c, d]: [Self; 4]) -> [Self; 4] {
+            // Written out: closures are not always inlined.
+            $run! {
+                let (ab_low, ab_high) = ($to_doubles($low(a.0, b.0)), $to_doubles($high(a.0, b.0)));
+                let (cd_low, cd_high) = ($to_doubles($low(c.0, d.0)), $to_doubles($high(c.0, d.0)));
+                [
+                    Self($to_floats($low_pair(ab_low, cd_low))),
+                    Self($to_floats($high_pair(ab_low, cd_low))),
+                    Self($to_floats($low_pair(ab_high, cd_high))),
+                    Self($to_floats($high_pair(ab_high, cd_high))),
+                ]
+            }
+        }
+
+        #[inline(always)]
+        fn store_past_caches(self, block: &mut $block) {
+            // The block is aligned as this instruction demands.
+            $run!($stream(std::ptr::from_mut(block).cast(), self.0));
+        }
+
+        #[inline(always)]
+        fn larger(self, other: Self) -> Self {
+            Self($run!($larger(self.0, other.0)))
+        }
+    };
+}
+pub(crate) use alike_at_any_width;
 
 /// Eight samples: 0 2 4 6 in one half and 1 3 5 7 in the other. After a transposition of each half
 /// two neighbouring rotations lie side by side, without an exchange between the halves.
@@ -100,6 +138,11 @@ impl Lanes for Eight {
     type Doubles = EightDoubles;
     type Block = HalfLine;
 
+    alike_at_any_width! {
+        avx2, HalfLine, _mm256_permute_ps, _mm256_castps_pd, _mm256_castpd_ps, _mm256_unpacklo_ps,
+        _mm256_unpackhi_ps, _mm256_unpacklo_pd, _mm256_unpackhi_pd, _mm256_max_ps, _mm256_stream_ps
+    }
+
     #[inline(always)]
     fn rounded(EightDoubles([a, b]): EightDoubles) -> Self {
         Self(avx2! {
@@ -157,39 +200,9 @@ impl Lanes for Eight {
     }
 
     #[inline(always)]
-    fn fourfold(self) -> [Self; 4] {
-        // The order of lanes is such that nothing crosses between the halves.
-        avx2! {
-            [
-                Self(_mm256_permute_ps::<0b00_00_00_00>(self.0)),
-                Self(_mm256_permute_ps::<0b01_01_01_01>(self.0)),
-                Self(_mm256_permute_ps::<0b10_10_10_10>(self.0)),
-                Self(_mm256_permute_ps::<0b11_11_11_11>(self.0)),
-            ]
-        }
-    }
-
-    #[inline(always)]
     fn fourfold_of(samples: &[f32]) -> Self {
         let [a, b]: [f32; 2] = *samples.first_chunk().expect("two samples");
         Self::of_two([a; 4], [b; 4])
-    }
-
-    #[inline(always)]
-    fn transposed([a, b, c, d]: [Self; 4]) -> [Self; 4] {
-        // Written out: closures are not always inlined.
-        bytemuck::cast(avx2! {
-            let ab_low = _mm256_castps_pd(_mm256_unpacklo_ps(a.0, b.0));
-            let ab_high = _mm256_castps_pd(_mm256_unpackhi_ps(a.0, b.0));
-            let cd_low = _mm256_castps_pd(_mm256_unpacklo_ps(c.0, d.0));
-            let cd_high = _mm256_castps_pd(_mm256_unpackhi_ps(c.0, d.0));
-            [
-                _mm256_unpacklo_pd(ab_low, cd_low),
-                _mm256_unpackhi_pd(ab_low, cd_low),
-                _mm256_unpacklo_pd(ab_high, cd_high),
-                _mm256_unpackhi_pd(ab_high, cd_high),
-            ]
-        })
     }
 
     #[inline(always)]
@@ -200,12 +213,6 @@ impl Lanes for Eight {
             let is_first = _mm256_cmp_ps::<_CMP_LT_OQ>(places.0, end.0);
             _mm256_blendv_ps(self.0, half.0, is_first)
         })
-    }
-
-    #[inline(always)]
-    fn store_past_caches(self, half: &mut HalfLine) {
-        // `HalfLine` is aligned as this instruction demands.
-        avx2!(_mm256_stream_ps(std::ptr::from_mut(half).cast(), self.0));
     }
 
     #[inline(always)]
@@ -221,11 +228,6 @@ impl Lanes for Eight {
     fn magnitude(self) -> Self {
         let magnitude = Self::all(f32::from_bits(i32::MAX as u32));
         Self(avx2!(_mm256_and_ps(self.0, magnitude.0)))
-    }
-
-    #[inline(always)]
-    fn larger(self, other: Self) -> Self {
-        Self(avx2!(_mm256_max_ps(self.0, other.0)))
     }
 
     #[inline(always)]

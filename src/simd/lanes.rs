@@ -159,7 +159,7 @@ pub(crate) trait Lanes: Number + Pod {
     fn any_at_most(self, limit: f32) -> bool;
 }
 
-/// As many numbers in f64 as a vector of f32 has lanes, in the order of samples.
+/// As many numbers in f64 as a vector of f32 has lanes, in the order of samples; or a single one.
 pub(crate) trait Doubles: Real + Pod {
     /// Number of samples.
     const COUNT: usize = size_of::<Self>() / size_of::<f64>();
@@ -178,6 +178,13 @@ pub(crate) trait Doubles: Real + Pod {
 
     /// Whether every number is at most `limit`, and none is NaN.
     fn are_at_most(self, limit: f64) -> bool;
+}
+
+impl Doubles for f64 {
+    #[inline(always)]
+    fn are_at_most(self, limit: f64) -> bool {
+        self <= limit
+    }
 }
 
 impl Number for Vec4 {

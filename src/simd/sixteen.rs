@@ -1,23 +1,13 @@
 //! Sixteen lanes of AVX-512.
 
-use std::arch::x86_64::{
-    __m256, __m512, __m512d, _CMP_LE_OQ, _CMP_LT_OQ, _CMP_NLT_UQ, _mm256_set_m128, _mm512_abs_ps,
-    _mm512_add_pd, _mm512_add_ps, _mm512_broadcast_f32x4, _mm512_castpd_ps, _mm512_castps_pd,
-    _mm512_castps256_ps512, _mm512_castps512_ps256, _mm512_cmp_pd_mask, _mm512_cmp_ps_mask,
-    _mm512_cvtpd_ps, _mm512_cvtps_pd, _mm512_div_pd, _mm512_extractf32x8_ps, _mm512_insertf32x8,
-    _mm512_mask_blend_pd, _mm512_mask_blend_ps, _mm512_maskz_mov_ps, _mm512_max_pd, _mm512_max_ps,
-    _mm512_min_pd, _mm512_mul_pd, _mm512_mul_ps, _mm512_permute_ps, _mm512_permutexvar_ps,
-    _mm512_set1_pd, _mm512_set1_ps, _mm512_setr_epi32, _mm512_setzero_ps, _mm512_shuffle_f32x4,
-    _mm512_sqrt_pd, _mm512_stream_ps, _mm512_sub_pd, _mm512_sub_ps, _mm512_unpackhi_pd,
-    _mm512_unpackhi_ps, _mm512_unpacklo_pd, _mm512_unpacklo_ps, _mm512_xor_ps,
-};
+use std::arch::x86_64::*;
 
 use bytemuck::{Pod, Zeroable};
 
 use crate::math::operators::operators;
 use crate::shader::{PolynomialSegment, TINY_BITS};
 use crate::simd::doubles::doubles;
-use crate::simd::eight::Eight;
+use crate::simd::eight::{Eight, alike_at_any_width};
 use crate::simd::lanes::{Lanes, Number};
 use crate::simd::line::Line;
 
@@ -127,6 +117,11 @@ impl Lanes for Sixteen {
     type Doubles = SixteenDoubles;
     type Block = Line;
 
+    alike_at_any_width! {
+        avx512, Line, _mm512_permute_ps, _mm512_castps_pd, _mm512_castpd_ps, _mm512_unpacklo_ps,
+        _mm512_unpackhi_ps, _mm512_unpacklo_pd, _mm512_unpackhi_pd, _mm512_max_ps, _mm512_stream_ps
+    }
+
     #[inline(always)]
     fn rounded(SixteenDoubles([a, b]): SixteenDoubles) -> Self {
         Self(avx512!(joined(_mm512_cvtpd_ps(a), _mm512_cvtpd_ps(b)))).reordered()
@@ -182,39 +177,9 @@ impl Lanes for Sixteen {
     }
 
     #[inline(always)]
-    fn fourfold(self) -> [Self; 4] {
-        // The order of lanes is such that nothing crosses between the quarters.
-        avx512! {
-            [
-                Self(_mm512_permute_ps::<0b00_00_00_00>(self.0)),
-                Self(_mm512_permute_ps::<0b01_01_01_01>(self.0)),
-                Self(_mm512_permute_ps::<0b10_10_10_10>(self.0)),
-                Self(_mm512_permute_ps::<0b11_11_11_11>(self.0)),
-            ]
-        }
-    }
-
-    #[inline(always)]
     fn fourfold_of(samples: &[f32]) -> Self {
         let [a, b, c, d]: [f32; 4] = *samples.first_chunk().expect("four samples");
         Self(bytemuck::cast([[a; 4], [b; 4], [c; 4], [d; 4]]))
-    }
-
-    #[inline(always)]
-    fn transposed([a, b, c, d]: [Self; 4]) -> [Self; 4] {
-        // Written out: closures are not always inlined.
-        avx512! {
-            let ab_low = _mm512_castps_pd(_mm512_unpacklo_ps(a.0, b.0));
-            let ab_high = _mm512_castps_pd(_mm512_unpackhi_ps(a.0, b.0));
-            let cd_low = _mm512_castps_pd(_mm512_unpacklo_ps(c.0, d.0));
-            let cd_high = _mm512_castps_pd(_mm512_unpackhi_ps(c.0, d.0));
-            [
-                Self(_mm512_castpd_ps(_mm512_unpacklo_pd(ab_low, cd_low))),
-                Self(_mm512_castpd_ps(_mm512_unpackhi_pd(ab_low, cd_low))),
-                Self(_mm512_castpd_ps(_mm512_unpacklo_pd(ab_high, cd_high))),
-                Self(_mm512_castpd_ps(_mm512_unpackhi_pd(ab_high, cd_high))),
-            ]
-        }
     }
 
     #[inline(always)]
@@ -247,12 +212,6 @@ impl Lanes for Sixteen {
     }
 
     #[inline(always)]
-    fn store_past_caches(self, line: &mut Line) {
-        // `Line` is aligned as this instruction demands.
-        avx512!(_mm512_stream_ps(std::ptr::from_mut(line).cast(), self.0));
-    }
-
-    #[inline(always)]
     fn sign(self) -> Self {
         let (one, minus_one) = (Self::all(1.0), Self::all(-1.0));
         Self(avx512! {
@@ -264,11 +223,6 @@ impl Lanes for Sixteen {
     #[inline(always)]
     fn magnitude(self) -> Self {
         Self(avx512!(_mm512_abs_ps(self.0)))
-    }
-
-    #[inline(always)]
-    fn larger(self, other: Self) -> Self {
-        Self(avx512!(_mm512_max_ps(self.0, other.0)))
     }
 
     #[inline(always)]

@@ -126,15 +126,16 @@ impl Signs<'_> {
         })
     }
 
-    /// Copies the keys, each multiplied by its sign.
+    /// Copies some of the keys, each multiplied by its sign.
     #[inline]
-    pub(crate) fn copy(self, keys: &[[f32; 4]], to: &mut [[f32; 4]]) {
-        if !self.any() {
+    pub(crate) fn copy(self, keys: &[[f32; 4]], own: Range<usize>, to: &mut [[f32; 4]]) {
+        let (signs, keys) = (self.between(own.clone()), &keys[own]);
+        if !signs.any() {
             to.copy_from_slice(keys);
             return;
         }
         for (i, (to, key)) in to.iter_mut().zip(keys).enumerate() {
-            let sign = self.sign(i);
+            let sign = signs.sign(i);
             *to = key.map(|component| component * sign);
         }
     }
@@ -205,7 +206,7 @@ mod tests {
         let mut copied = vec![[9.0; 4]; 200];
         let mut bits = SignBits::default();
         bits.push_track(0, &keys);
-        bits.of(0..200).copy(&keys, &mut copied);
+        bits.of(0..200).copy(&keys, 0..200, &mut copied);
         assert!(copied.iter().all(|own| own[3] == first));
         assert!(!Signs::AS_GIVEN.between(3..90).any());
     }

@@ -1,9 +1,6 @@
 //! Twin of `shaders/from_keys/arc_between.wgsl`: the same names, the same order.
 
-use crate::shader::{
-    ARC_SINE_1, ARC_SINE_2, ARC_SINE_3, ARC_SINE_4, ARC_SINE_5, ARC_SINE_6, ARC_SINE_7, ARC_SINE_8,
-    SECANT_1, SECANT_2, SECANT_3, SECANT_4, SECANT_5, SECANT_6, SECANT_7, SECANT_8, SECANT_9,
-};
+use crate::shader::*;
 use crate::simd::lanes::{Number, canonical};
 use crate::twin::evaluate_arc::norm_squared;
 

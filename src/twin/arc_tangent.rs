@@ -1,9 +1,6 @@
 //! Twin of `shaders/math/arc_tangent.wgsl`: the same names, the same order.
 
-use crate::shader::{
-    ARC_0, ARC_1, ARC_2, ARC_3, ARC_4, ARC_5, ARC_6, ARC_7, ARC_8, FLUSHED_BITS, HALF_PI,
-    HALF_PI_LOW, PI, PI_LOW, RECIPROCAL_SEED, ROOT_SEED,
-};
+use crate::shader::*;
 
 #[inline(always)]
 pub(crate) fn flushed(x: f32) -> f32 {

@@ -4,14 +4,11 @@
 use glam::Vec4;
 
 use crate::math::canonical::canonical;
-use crate::math::quaternion::{product, step};
-use crate::shader::{
-    ArcSegment, CHANNELS, CrowdChannel, CrowdEntry, CrowdPlace, FORM_ARC, FORM_CONSTANT,
-    FORM_CUBIC, ON_KEY, POWERS, PolynomialSegment, ROTATION, TICKS, TRANSLATION, WEIGHT_UNIT,
-};
+use crate::shader::*;
 use crate::simd::lanes::Number;
 use crate::twin::evaluate::Evaluate as _;
-use crate::twin::quaternion::{normalised, slerp};
+pub(crate) use crate::twin::pose_add::pose as turn_added;
+use crate::twin::quaternion::slerp;
 
 /// What the kernels over layers read. Entries and places are those of a window of instances.
 #[derive(Clone, Copy)]
@@ -34,17 +31,6 @@ pub(crate) struct Layers<'a> {
 pub(crate) fn cubic<N: Number>([c0, c1, c2, c3]: [N; 4], s: N) -> N {
     let z = s * s;
     c0 + ((c3 * s + c2) * z + c1 * s)
-}
-
-#[inline(always)]
-pub(crate) fn turn_added(
-    base: [f32; 4],
-    layer: [f32; 4],
-    reference: [f32; 4],
-    weight: f32,
-) -> [f32; 4] {
-    let turn = slerp([0.0, 0.0, 0.0, 1.0], step(reference, layer), weight);
-    normalised(product(base, turn)).map(canonical)
 }
 
 #[inline(always)]

@@ -1,9 +1,7 @@
 //! Twin of `shaders/stores/euler.wgsl`: the same names, the same order.
 
 use crate::math::canonical::canonical;
-use crate::shader::{
-    DEGREES, GIMBAL, HALF_PI, HALF_PI_LOW, INTRINSIC, NEGATIVE, PI, PI_LOW, SYMMETRIC,
-};
+use crate::shader::*;
 use crate::twin::arc_tangent::{arc_tangent, flushed, root};
 
 #[inline(always)]

@@ -1,23 +1,16 @@
 //! Twin of `shaders/math/quaternion.wgsl`: the same names, the same order. The twins of its `product`
 //! and `dot4` are [`product`](crate::math::quaternion::product) and [`dot`].
 
-use crate::math::quaternion::dot;
+use crate::math::quaternion::{cross3, dot, sum};
 use crate::twin::arc_tangent::{arc_tangent, flushed, reciprocal_root, root};
 use crate::twin::sine_cosine::sine_cosine;
 
 #[inline(always)]
 pub(crate) fn rotated(q: [f32; 4], v: [f32; 3]) -> [f32; 3] {
-    let across = [
-        q[1] * v[2] - q[2] * v[1],
-        q[2] * v[0] - q[0] * v[2],
-        q[0] * v[1] - q[1] * v[0],
-    ];
-    let twice = across.map(|c| c + c);
-    let again = [
-        q[1] * twice[2] - q[2] * twice[1],
-        q[2] * twice[0] - q[0] * twice[2],
-        q[0] * twice[1] - q[1] * twice[0],
-    ];
+    let axis = [q[0], q[1], q[2]];
+    let across = cross3(axis, v);
+    let twice = sum(across, across);
+    let again = cross3(axis, twice);
     std::array::from_fn(|c| v[c] + twice[c] * q[3] + again[c])
 }
 

@@ -1,10 +1,6 @@
 //! Twin of `shaders/math/sine_cosine.wgsl`: the same names, the same order.
 
-use crate::shader::{
-    COSINE_2, COSINE_4, COSINE_6, COSINE_8, COSINE_10, QUARTER_COSINE_2, QUARTER_COSINE_4,
-    QUARTER_COSINE_6, QUARTER_COSINE_8, QUARTER_SINE_3, QUARTER_SINE_5, QUARTER_SINE_7, SINE_3,
-    SINE_5, SINE_7, SINE_9,
-};
+use crate::shader::*;
 use crate::simd::lanes::Number;
 
 /// Sine and cosine for |angle| <= pi/2.

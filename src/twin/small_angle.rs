@@ -1,14 +1,8 @@
 //! Twin of `shaders/from_keys/small_angle.wgsl`: the same names, the same order.
 
-use crate::math::canonical::canonical;
 use crate::math::quaternion::{Arithmetic, cross3, dot3, minus, product, scaled, sum};
-use crate::shader::{
-    B_111_1, B_111_2, B_111_3, B_111_4, B_111_5, B_111_6, B_122_1, B_122_2, B_122_3, B_122_4,
-    B_122_5, B_122_6, B_123_1, B_123_3, B_123_5, B_133_1, B_133_2, B_133_3, B_133_4, B_133_5,
-    B_133_6, B_211_1, B_211_2, B_211_3, B_211_4, B_211_5, B_211_6, B_222_1, B_222_3, B_222_5,
-    COSM1_1, COSM1_2, KEY_AT_END, KEY_UNKNOWN, LOG_1, LOG_2, LOG_3, LOG_4, LONGEST_STEP,
-    LONGEST_TANGENT_PART, SINC_1, SINC_2, SMALL_SQUARED_EXTENT, THIRD, TWO_THIRDS, TangentWeights,
-};
+use crate::shader::*;
+use crate::simd::lanes::canonical;
 use crate::twin::evaluate_arc::norm_squared;
 
 type Vector = [f32; 3];
@@ -84,8 +78,7 @@ pub(crate) fn inverse_rotated<N: Arithmetic>(v: [N; 3], r: FromIdentity<N>) -> [
 
 #[inline(always)]
 pub(super) fn canonical_product(m: Quaternion, v: Vector, w: f32) -> Quaternion {
-    let [x, y, z, w] = product(m, [v[0], v[1], v[2], w]);
-    [canonical(x), canonical(y), canonical(z), canonical(w)]
+    canonical(product(m, [v[0], v[1], v[2], w]))
 }
 
 /// The cubic between the second and the third of four keys, each of which has the sign nearer to
@@ -208,12 +201,7 @@ pub(crate) fn small_angle_cubic(
     let sixth = sum(minus(x13, sum(even, even)), f6);
     SmallAngleCubic {
         powers: [
-            [
-                canonical(m[0]),
-                canonical(m[1]),
-                canonical(m[2]),
-                canonical(m[3]),
-            ],
+            canonical(m),
             canonical_product(m, sum(a, f1), -(volume * B_123_1)),
             canonical_product(m, sum(b, second), dot3(a, a) * -0.5),
             canonical_product(

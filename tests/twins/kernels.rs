@@ -272,7 +272,7 @@ fn from_four_keys() -> Twin {
         // A key without a neighbour takes its place.
         let before = usize::from(first.kind != KEY_INNER);
         let after = 3 - usize::from(last.kind != KEY_INNER);
-        let mut block = CubicBlock::new();
+        let mut block: CubicBlock = bytemuck::Zeroable::zeroed();
         for (row, keys) in rows.rows.iter().enumerate() {
             for (place, key) in [before, 1, 2, after].into_iter().enumerate() {
                 block.keys[place][row] = keys[key].continued;

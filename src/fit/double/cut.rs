@@ -10,15 +10,14 @@ use crate::fit::double::shape::Shape;
 use crate::shader::PolynomialSegment;
 
 /// Cuts curves; its memory is kept for the next ones.
+#[derive(Default)]
 pub(crate) struct Cutter {
-    shape: &'static Shape,
-    quantity: Quantity,
     /// Made for the first curve to cut.
     block: Option<Box<FitBlock>>,
-    /// The curves added since the last [`Cutter::clear`].
-    curves: Vec<Curve>,
+    pub(crate) curves: Vec<Curve>,
     waiting: Vec<Subcurve>,
-    subcurves: Vec<Subcurve>,
+    /// The subcurves of every curve that was cut, in order of spans and time.
+    pub(crate) subcurves: Vec<Subcurve>,
 }
 
 /// A subcurve of a curve.
@@ -50,17 +49,6 @@ impl Subcurve {
 }
 
 impl Cutter {
-    pub(crate) fn new(shape: &'static Shape, quantity: Quantity) -> Self {
-        Self {
-            shape,
-            quantity,
-            block: None,
-            curves: Vec::new(),
-            waiting: Vec::new(),
-            subcurves: Vec::new(),
-        }
-    }
-
     /// Adds the curve of a span. If the span has a segment, the curve is known not to fit as a whole
     /// and is cut into at least two subcurves; else it is cut only if it does not fit.
     pub(crate) fn push(&mut self, span: usize, curve: Curve, segment: Option<usize>) {
@@ -77,11 +65,16 @@ impl Cutter {
         self.curves.push(curve);
     }
 
-    /// Cuts and fits the curves that were added.
-    pub(crate) fn cut(&mut self, segments: &mut Vec<PolynomialSegment>) {
+    /// Cuts and fits the curves that were added, all of one shape and quantity.
+    pub(crate) fn cut(
+        &mut self,
+        shape: &'static Shape,
+        quantity: Quantity,
+        segments: &mut Vec<PolynomialSegment>,
+    ) {
         let mut done = 0;
         while done < self.waiting.len() {
-            let new = || Box::new(FitBlock::new(self.shape, self.quantity, Tier::Piece));
+            let new = || Box::new(FitBlock::new(shape, quantity, Tier::Piece));
             let block = self.block.get_or_insert_with(new);
             block.clear();
             let some = done..self.waiting.len().min(done + LANES);
@@ -116,22 +109,11 @@ impl Cutter {
             .sort_by_key(|subcurve| (subcurve.span, subcurve.piece.from));
     }
 
-    /// The subcurves of every curve, in order of spans and time.
-    pub(crate) fn subcurves(&self) -> &[Subcurve] {
-        &self.subcurves
-    }
-
     /// The subcurve as a curve of its own.
     pub(crate) fn curve(&self, subcurve: &Subcurve) -> Curve {
         Curve {
             piece: subcurve.piece,
             ..self.curves[subcurve.curve].clone()
         }
-    }
-
-    /// Forgets the curves and their subcurves.
-    pub(crate) fn clear(&mut self) {
-        self.curves.clear();
-        self.subcurves.clear();
     }
 }

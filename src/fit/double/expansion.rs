@@ -1,14 +1,15 @@
 //! Samples cubics in cumulative form at the nodes, in vector lanes: the first half of a fit.
 
-use crate::curve::formula::product::Product;
+use crate::curve::formula::Product;
 use crate::fit::double::fit::{FitBlock, Lane64, MOST, Samples, Tier};
+use crate::fit::double::handles::redo;
 use crate::fit::double::intervals::{at, load, put, rounded, store};
 use crate::fit::double::shape::Sampling;
 use crate::fit::nodes::Nodes;
 use crate::math::quaternion::{
     self, Real as _, cross3, dot3, exp_by, product, product_with_vector, scaled, square,
 };
-use crate::math::ranges::{LONG_SQUARE, SHORT_SQUARE, long_waves, short_waves};
+use crate::math::ranges::{LONG_WAVES, SHORT_WAVES};
 use crate::shader::PolynomialSegment;
 use crate::simd::lanes::{Doubles, Lanes};
 use crate::twin::sine_cosine::{sine_cosm1, sine_cosm1_quarter};
@@ -46,7 +47,7 @@ fn fit<L: Lanes, const PAIRS: usize, const OWN_BASIS: bool, const WHOLE: bool>(
         let third = Factor::<L>::new::<OWN_BASIS, WHOLE>(block, lane, 2);
         let reach = third.reach.larger(second.reach.larger(first.reach));
         reach.store(&mut block.reaches[lane..]);
-        let base = load::<L, _, _>(from(&block.numbers, 0), lane);
+        let base = load(from(&block.numbers, 0), lane);
         let samples = Expanded::new(base, [first, second, third]).sample::<PAIRS, WHOLE>(nodes);
         block.interpolate(lane, nodes, &samples, segments);
     }
@@ -75,7 +76,7 @@ impl<L: Lanes> Factor<L> {
         j: usize,
     ) -> Self {
         let [c0, c1, c2, c3] = if OWN_BASIS {
-            load::<L, _, _>(from(&block.numbers, Product::BASIS + 4 * j), lane)
+            load(from(&block.numbers, Product::BASIS + 4 * j), lane)
         } else {
             let [c0, c1, c2, c3] = Product::BERNSTEIN[j];
             [all::<L>(c0), all::<L>(c1), all::<L>(c2), all::<L>(c3)]
@@ -88,7 +89,7 @@ impl<L: Lanes> Factor<L> {
                 L::Doubles::load(&block.widths[lane..]),
             )
         };
-        let vector = load::<L, _, _>(from(&block.numbers, Product::VECTORS + 3 * j), lane);
+        let vector = load(from(&block.numbers, Product::VECTORS + 3 * j), lane);
         let squared = square(vector);
         let weight = ((c3 * middle + c2) * middle + c1) * middle + c0;
         // B_j(middle + s width) - B_j(middle), in powers of s.
@@ -118,9 +119,9 @@ impl<L: Lanes> Factor<L> {
 fn exp_in_lanes<L: Lanes, const SHORT: bool>(vector: [L::Doubles; 3]) -> [L::Doubles; 4] {
     let squared = square(vector);
     let (limit, waves) = if SHORT {
-        (SHORT_SQUARE, short_waves(squared))
+        (SHORT_WAVES.limit, SHORT_WAVES.of(squared))
     } else {
-        (LONG_SQUARE, long_waves(squared))
+        (LONG_WAVES.limit, LONG_WAVES.of(squared))
     };
     let turn = exp_by(vector, waves);
     if squared.are_at_most(limit) {
@@ -129,21 +130,11 @@ fn exp_in_lanes<L: Lanes, const SHORT: bool>(vector: [L::Doubles; 3]) -> [L::Dou
     let (mut vectors, mut turns) = ([[0.0; MOST]; 3], [[0.0; MOST]; 4]);
     store(&mut vectors, 0, vector);
     store(&mut turns, 0, turn);
-    exp_beyond(limit, &vectors, &mut turns);
-    load::<L, _, _>(&turns, 0)
-}
-
-/// Computes the exponentials of half-rotation vectors whose squares exceed `limit`, over the full
-/// range.
-#[inline(never)]
-fn exp_beyond(limit: f64, vectors: &[[f64; MOST]; 3], turns: &mut [[f64; MOST]; 4]) {
-    for lane in 0..MOST {
-        let vector = at(vectors, lane);
-        let squared = square(vector);
-        if squared > limit || squared.is_nan() {
-            put(turns, lane, quaternion::exp(vector));
-        }
-    }
+    let doubt = squared.up_to(all::<L>(limit), all::<L>(0.0), all::<L>(1.0));
+    redo(doubt, 0..L::COUNT, |lane| {
+        put(&mut turns, lane, quaternion::exp(at(&vectors, lane)));
+    });
+    load(&turns, 0)
 }
 
 /// The sine of an angle divided by the length of its vector, and the angle's cosine minus one.

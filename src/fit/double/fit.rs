@@ -120,14 +120,6 @@ impl<L: Lanes, const PAIRS: usize> Samples<L, PAIRS> {
         }
     }
 
-    /// Reverses the direction of the parameter.
-    #[inline(always)]
-    pub(crate) fn turn_round(&mut self) {
-        for odd in self.odd.as_flattened_mut() {
-            *odd = -*odd;
-        }
-    }
-
     /// Sets the derivatives by s at the ends, which are the last pair of nodes and are there twice.
     /// Each is stored as a second sample, whose difference from the first is the derivative by s²
     /// that the divided differences of [`Nodes::powers`] need there.
@@ -285,10 +277,10 @@ impl FitBlock {
         samples: &Samples<L, PAIRS>,
         segments: &mut [PolynomialSegment],
     ) {
-        let mut places = [0; MOST];
-        places[..L::COUNT].copy_from_slice(&self.places[lane..lane + L::COUNT]);
-        let tails = interpolate(self.is_entire(), nodes, samples, &places, segments);
-        tails.store(&mut self.tails[lane..lane + L::COUNT]);
+        let own = lane..lane + L::COUNT;
+        let places = &self.places[own.clone()];
+        let tails = interpolate(self.is_entire(), nodes, samples, places, segments);
+        tails.store(&mut self.tails[own]);
     }
 }
 
@@ -299,7 +291,7 @@ pub(crate) fn interpolate<L: Lanes, const PAIRS: usize>(
     are_entire: bool,
     nodes: &Nodes<PAIRS>,
     samples: &Samples<L, PAIRS>,
-    places: &[usize; MOST],
+    places: &[usize],
     segments: &mut [PolynomialSegment],
 ) -> L {
     let (powers, tails) = coefficients(are_entire, nodes, samples);

@@ -3,7 +3,7 @@
 use std::marker::PhantomData;
 use std::ops::Range;
 
-use crate::curve::formula::product::Product;
+use crate::curve::formula::Product;
 use crate::fit::double::fit::MOST;
 use crate::fit::double::intervals::{
     Intervals, LANES, Lane, ROOM, Stretch, at, load, put, squared_extent, store, widened,
@@ -28,27 +28,29 @@ impl InLanes for Steps<'_> {
             let log = near.log(step);
             store(&mut own.steps, lane, step);
             store(&mut own.logs, lane, log);
-            near.redo(lane, own.count, |j| {
+            redo(near.doubt, lane..own.count, |j| {
                 put(&mut own.logs, j, quaternion::log(at(&own.steps, j)));
             });
         }
     }
 }
 
-impl<D: Doubles> PrincipalRange<D> {
-    /// Calls `redo` for the lanes outside the principal range, among those from `lane` on and before
-    /// `end`; most vectors have none.
-    #[inline(always)]
-    fn redo(&self, lane: usize, end: usize, redo: impl FnMut(usize)) {
-        if self.doubt.are_at_most(0.0) {
-            return;
-        }
+/// Calls `again` for those of some lanes whose doubt, one in each lane of a vector, is not 0; most
+/// vectors have none.
+#[inline(always)]
+pub(crate) fn redo<D: Doubles>(doubt: D, lanes: Range<usize>, again: impl FnMut(usize)) {
+    if !doubt.are_at_most(0.0) {
         let mut doubts = [0.0; MOST];
-        self.doubt.store(&mut doubts);
-        let lanes = (lane..end).zip(doubts);
-        let in_doubt = lanes.filter_map(|(lane, doubt)| (doubt != 0.0).then_some(lane));
-        in_doubt.for_each(redo);
+        doubt.store(&mut doubts);
+        redo_lanes(lanes, doubts, again);
     }
+}
+
+/// It is kept out of the loops over vectors.
+#[inline(never)]
+fn redo_lanes(lanes: Range<usize>, doubts: [f64; MOST], again: impl FnMut(usize)) {
+    let lanes = lanes.zip(doubts).filter(|&(_, doubt)| doubt != 0.0);
+    lanes.map(|(lane, _)| lane).for_each(again);
 }
 
 /// Keys in f64, normalised.
@@ -108,25 +110,23 @@ pub(crate) trait HandleRule {
     /// have no branches, so that they run in vector lanes.
     fn handles<A: Algebra>(algebra: &mut A, sides: BothSides<A>) -> Handles<A::Number>;
 
-    /// The handle of the first or of the last key of a track.
-    fn end(EndInterval { log, other }: EndInterval, handle: EndHandle) -> Vector {
+    /// Whether curves are given in cumulative form, not by their control rotations.
+    const IS_CUMULATIVE: bool = false;
+
+    /// The part of a turn at constant rate that both handles of its interval are together.
+    const BOTH: f64 = 2.0 / 3.0;
+
+    /// The handle of the first or of the last key of a track, from the logarithm of its interval's
+    /// step and from the handle of the interval's inner key.
+    fn end(log: Vector, other: Vector, handle: EndHandle) -> Vector {
         match handle {
             EndHandle::Turn(turn) => scaled(turn, 1.0 / 3.0),
             // The tangent of a parabola changes at a constant rate.
-            EndHandle::Parabolic => sum(scaled(log, 2.0 / 3.0), scaled(other, -1.0)),
+            EndHandle::Parabolic => sum(scaled(log, Self::BOTH), scaled(other, -1.0)),
             // No acceleration: the control rotation lies half way to the other one.
             EndHandle::Natural(rest) => scaled(rest, 0.5),
         }
     }
-}
-
-/// The interval at an end of a track.
-#[derive(Clone, Copy)]
-pub(crate) struct EndInterval {
-    /// The logarithm of its step.
-    pub(crate) log: Vector,
-    /// The handle of its inner key.
-    pub(crate) other: Vector,
 }
 
 /// The condition for the handle of a track's first or last key.
@@ -152,16 +152,13 @@ impl<R: HandleRule> InLanes for KeyHandles<'_, R> {
     fn run<L: Lanes>(&mut self) {
         let own = &mut *self.intervals;
         for lane in (0..own.whole()).step_by(L::COUNT) {
-            let mut near = PrincipalRange::new();
-            let (before, after) = (own.intervals::<L>(lane), own.intervals::<L>(lane + 1));
-            let handles = R::handles(&mut near, [before, after]);
-            store(&mut own.incoming, lane + 1, handles.incoming);
-            store(&mut own.outgoing, lane + 1, handles.outgoing);
-            near.redo(lane + 1, own.count, |j| {
+            let mut near = PrincipalRange::<L::Doubles>::new();
+            own.find_handles::<R, _>(&mut near, lane + 1);
+            redo(near.doubt, lane + 1..own.count, |j| {
                 // The context lanes of two neighbouring stretches do not share a key.
                 let mut stretches = self.stretches.iter().map(Stretch::lanes);
                 if stretches.any(|lanes| (lanes.start..=lanes.end).contains(&j)) {
-                    own.handles_full_range::<R>(j);
+                    own.find_handles::<R, _>(&mut FullRange, j);
                 }
             });
         }
@@ -170,27 +167,26 @@ impl<R: HandleRule> InLanes for KeyHandles<'_, R> {
 
 impl Intervals {
     #[inline(always)]
-    fn intervals<L: Lanes>(&self, lane: usize) -> Interval<L::Doubles> {
+    fn interval<D: Doubles>(&self, lane: usize) -> Interval<D> {
         Interval {
-            duration: L::Doubles::load(&self.durations[lane..]),
-            step: load::<L, _, _>(&self.steps, lane),
-            log: load::<L, _, _>(&self.logs, lane),
-            key: load::<L, _, _>(&self.outward, lane),
+            duration: D::load(&self.durations[lane..]),
+            step: load(&self.steps, lane),
+            log: load(&self.logs, lane),
+            key: load(&self.outward, lane),
         }
     }
 
-    /// Computes the handles of the key at the start of an interval, over the full range.
-    #[inline(never)]
-    fn handles_full_range<R: HandleRule>(&mut self, lane: usize) {
-        let interval = |lane: usize| Interval {
-            duration: self.durations[lane],
-            step: self.step(lane),
-            log: self.log(lane),
-            key: self.outward(lane),
-        };
-        let handles = R::handles(&mut FullRange, [lane - 1, lane].map(interval));
-        self.set_incoming(lane, handles.incoming);
-        self.set_outgoing(lane, handles.outgoing);
+    /// Computes the handles of the keys at the start of the intervals from `lane` on.
+    #[inline(always)]
+    fn find_handles<R: HandleRule, A: Algebra<Number: Doubles>>(
+        &mut self,
+        algebra: &mut A,
+        lane: usize,
+    ) {
+        let sides = [self.interval(lane - 1), self.interval(lane)];
+        let handles = R::handles(algebra, sides);
+        store(&mut self.incoming, lane, handles.incoming);
+        store(&mut self.outgoing, lane, handles.outgoing);
     }
 }
 
@@ -203,54 +199,45 @@ impl InLanes for BetweenHandles<'_> {
     fn run<L: Lanes>(&mut self) {
         let own = &mut *self.0;
         for lane in (0..own.whole()).step_by(L::COUNT) {
-            let first = load::<L, _, _>(&own.outgoing, lane);
-            let step = load::<L, _, _>(&own.steps, lane);
-            let last = load::<L, _, _>(&own.incoming, lane + 1);
-            let mut near = PrincipalRange::new();
-            let middle = between(&mut near, first, step, last);
-            own.store_product(lane, units::<L>(&own.from, lane), [first, middle, last]);
-            near.redo(lane, own.count, |j| own.between_full_range(j));
+            own.store_base(lane, units::<L>(&own.from, lane));
+            let mut near = PrincipalRange::<L::Doubles>::new();
+            own.find_vectors(&mut near, lane);
+            redo(near.doubt, lane..own.count, |j| {
+                own.find_vectors(&mut FullRange, j);
+            });
         }
     }
 }
 
 impl Intervals {
-    /// Stores the bases and the vectors of [`Product`], and the squared extents, from `lane` on.
+    /// Computes the vectors of the curves between handles, from `lane` on.
     #[inline(always)]
-    fn store_product<D: Doubles>(&mut self, lane: usize, base: [D; 4], vectors: [[D; 3]; 3]) {
-        let numbers: &mut [Lane; Product::BASIS] =
-            (self.numbers.first_chunk_mut()).expect("a base and three vectors");
-        let ([x, y, z, w], [a, b, c]) = (base, vectors);
-        let own = [
-            x, y, z, w, a[0], a[1], a[2], b[0], b[1], b[2], c[0], c[1], c[2],
-        ];
+    fn find_vectors<A: Algebra<Number: Doubles>>(&mut self, algebra: &mut A, lane: usize) {
+        let first = load(&self.outgoing, lane);
+        let last = load(&self.incoming, lane + 1);
+        let back = A::Number::all(-1.0);
+        let from_a = product(algebra.exp(scaled(first, back)), load(&self.steps, lane));
+        let middle = product(from_a, algebra.exp(scaled(last, back)));
+        self.store_vectors(lane, [first, algebra.log(middle), last]);
+    }
+
+    /// Stores the bases of [`Product`] from `lane` on.
+    #[inline(always)]
+    fn store_base<D: Doubles>(&mut self, lane: usize, base: [D; 4]) {
+        let numbers: &mut [Lane; 4] = self.numbers.first_chunk_mut().expect("a base");
+        store(numbers, lane, base);
+    }
+
+    /// Stores the vectors of [`Product`], and the squared extents, from `lane` on.
+    #[inline(always)]
+    fn store_vectors<D: Doubles>(&mut self, lane: usize, vectors: [[D; 3]; 3]) {
+        let numbers = self.numbers[Product::VECTORS..].first_chunk_mut();
+        let numbers: &mut [Lane; 9] = numbers.expect("three vectors");
+        let [a, b, c] = vectors;
+        let own = [a[0], a[1], a[2], b[0], b[1], b[2], c[0], c[1], c[2]];
         store(numbers, lane, own);
         squared_extent(vectors).store(&mut self.squared_extents[lane..]);
     }
-
-    /// Computes the curve of a lane between its handles, over the full range.
-    #[inline(never)]
-    fn between_full_range(&mut self, lane: usize) {
-        let (first, last) = (self.outgoing(lane), self.incoming(lane + 1));
-        let middle = between(&mut FullRange, first, self.step(lane), last);
-        let vectors = [first, middle, last];
-        self.set_numbers(lane, Product::VECTORS, vectors.as_flattened());
-        self.set_squared_extent(lane, vectors);
-    }
-}
-
-/// `log(a⁻¹ b)`.
-#[inline(always)]
-fn between<A: Algebra>(
-    algebra: &mut A,
-    outgoing: [A::Number; 3],
-    step: [A::Number; 4],
-    incoming: [A::Number; 3],
-) -> [A::Number; 3] {
-    let back = A::Number::all(-1.0);
-    let from_a = product(algebra.exp(scaled(outgoing, back)), step);
-    let middle = product(from_a, algebra.exp(scaled(incoming, back)));
-    algebra.log(middle)
 }
 
 /// Control rotations from keys and handles: `q0`, `a = q0 exp(out)`, `b = q1 exp(-in)`,
@@ -296,18 +283,28 @@ impl InLanes for BetweenNeighbours<'_> {
     fn run<L: Lanes>(&mut self) {
         let own = &mut *self.0;
         for lane in (0..own.whole()).step_by(L::COUNT) {
-            let before = load::<L, _, _>(&own.logs, lane);
-            let log = load::<L, _, _>(&own.logs, lane + 1);
-            let after = load::<L, _, _>(&own.logs, lane + 2);
-            let mut near = PrincipalRange::new();
-            let back = near.exp(scaled(before, L::Doubles::all(-1.0)));
-            let base = product(units::<L>(&own.from, lane + 1), back);
-            own.store_product(lane + 1, base, [before, log, after]);
-            near.redo(lane + 1, own.count, |j| {
-                let back = quaternion::exp(scaled(own.log(j - 1), -1.0));
-                let base = product(own.key(j), back);
-                own.set_numbers(j, 0, &base);
+            let mut near = PrincipalRange::<L::Doubles>::new();
+            own.find_base(&mut near, lane + 1, units::<L>(&own.from, lane + 1));
+            let (before, after) = (load(&own.logs, lane), load(&own.logs, lane + 2));
+            let log = load::<L::Doubles, _, _>(&own.logs, lane + 1);
+            own.store_vectors(lane + 1, [before, log, after]);
+            redo(near.doubt, lane + 1..own.count, |j| {
+                own.find_base(&mut FullRange, j, own.key(j));
             });
         }
+    }
+}
+
+impl Intervals {
+    /// Computes the keys before the intervals from `lane` on, which start with the keys `start`.
+    #[inline(always)]
+    fn find_base<A: Algebra<Number: Doubles>>(
+        &mut self,
+        algebra: &mut A,
+        lane: usize,
+        start: [A::Number; 4],
+    ) {
+        let before = scaled(load(&self.logs, lane - 1), A::Number::all(-1.0));
+        self.store_base(lane, product(start, algebra.exp(before)));
     }
 }

@@ -11,7 +11,7 @@ use std::ops::Range;
 use crate::curve::options::Quantity;
 use crate::fit::double::curve::Curve;
 use crate::fit::double::shape::Shape;
-use crate::math::quaternion::{self, Arithmetic, Quaternion, Real as _, Vector, square};
+use crate::math::quaternion::{self, Arithmetic, Quaternion, Real as _, square};
 use crate::simd::lanes::{Doubles, Lanes};
 use crate::time::spans::NONE;
 use crate::tracks::set::Track;
@@ -130,10 +130,8 @@ impl Intervals {
         let lanes = self.count..self.count + intervals.len();
         let Range { start, end } = intervals;
         let keys: &[[f32; 4]] = bytemuck::cast_slice(track.keys);
-        let (from, to) = (start..end, start + 1..end + 1);
-        let own = [&from, &to].map(|keys| signs.between(keys.clone()));
-        own[0].copy(&keys[from], &mut self.from[lanes.clone()]);
-        own[1].copy(&keys[to], &mut self.to[lanes.clone()]);
+        signs.copy(keys, start..end, &mut self.from[lanes.clone()]);
+        signs.copy(keys, start + 1..end + 1, &mut self.to[lanes.clone()]);
         let (starts, ends) = (&track.times[start..end], &track.times[start + 1..=end]);
         self.starts[lanes.clone()].copy_from_slice(starts);
         self.ends[lanes.clone()].copy_from_slice(ends);
@@ -154,19 +152,6 @@ impl Intervals {
         self.count = own.end;
     }
 
-    /// Multiplies both keys of a lane by `sign`, which is 1 or -1.
-    pub(crate) fn turn(&mut self, lane: usize, sign: f32) {
-        for key in [&mut self.from[lane], &mut self.to[lane]] {
-            *key = key.map(|component| component * sign);
-        }
-    }
-
-    /// Sets the method's own numbers of the keys that an interval starts and ends with.
-    pub(crate) fn set_given(&mut self, lane: usize, outward: [f64; 4], inward: [f64; 4]) {
-        put(&mut self.outward, lane, outward);
-        put(&mut self.inward, lane + 1, inward);
-    }
-
     /// Adds an empty lane of context, where a track ends and has no neighbour.
     pub(crate) fn push_nothing(&mut self) {
         let lane = self.count;
@@ -176,56 +161,9 @@ impl Intervals {
         self.count += 1;
     }
 
-    /// Forgets all intervals.
-    pub(crate) fn clear(&mut self) {
-        self.count = 0;
-    }
-
-    pub(crate) fn duration(&self, lane: usize) -> f64 {
-        self.durations[lane]
-    }
-
     /// The change of the parameter per second.
     pub(crate) fn rate(&self, lane: usize) -> f64 {
         quaternion::ratio(1.0, self.durations[lane])
-    }
-
-    pub(crate) fn log(&self, lane: usize) -> Vector {
-        at(&self.logs, lane)
-    }
-
-    pub(crate) fn set_log(&mut self, lane: usize, log: Vector) {
-        put(&mut self.logs, lane, log);
-    }
-
-    pub(crate) fn step(&self, lane: usize) -> Quaternion {
-        at(&self.steps, lane)
-    }
-
-    pub(crate) fn incoming(&self, lane: usize) -> Vector {
-        at(&self.incoming, lane)
-    }
-
-    pub(crate) fn set_incoming(&mut self, lane: usize, handle: Vector) {
-        put(&mut self.incoming, lane, handle);
-    }
-
-    pub(crate) fn outgoing(&self, lane: usize) -> Vector {
-        at(&self.outgoing, lane)
-    }
-
-    pub(crate) fn set_outgoing(&mut self, lane: usize, handle: Vector) {
-        put(&mut self.outgoing, lane, handle);
-    }
-
-    /// The method's own numbers for the key that the interval starts with.
-    pub(crate) fn outward(&self, lane: usize) -> [f64; 4] {
-        at(&self.outward, lane)
-    }
-
-    /// The method's own numbers for the key that the interval before `lane` ends with.
-    pub(crate) fn inward(&self, lane: usize) -> [f64; 4] {
-        at(&self.inward, lane)
     }
 
     /// The key that the interval starts with.
@@ -236,7 +174,7 @@ impl Intervals {
 
     /// The key that the interval ends with: the first key times the step.
     pub(crate) fn end_key(&self, lane: usize) -> Quaternion {
-        quaternion::product(self.key(lane), self.step(lane))
+        quaternion::product(self.key(lane), at(&self.steps, lane))
     }
 
     /// Sets numbers of the interval's curve, from `place` on.
@@ -246,20 +184,10 @@ impl Intervals {
         }
     }
 
-    /// Sets the squared extent of the interval's curve.
-    pub(crate) fn set_squared_extent(&mut self, lane: usize, vectors: [Vector; 3]) {
-        self.squared_extents[lane] = squared_extent(vectors);
-    }
-
     /// The curve of an interval.
     pub(crate) fn curve(&self, lane: usize, shape: &'static Shape, quantity: Quantity) -> Curve {
         let numbers = shape.with(|i| self.numbers[i][lane]);
         Curve::new(shape, numbers, quantity, self.rate(lane))
-    }
-
-    /// The keys at both ends of an interval.
-    pub(crate) fn keys(&self, lane: usize) -> [[f32; 4]; 2] {
-        [self.from[lane], self.to[lane]]
     }
 
     /// The number of lanes to compute, rounded up to vectors of eight. A wider vector writes beyond
@@ -303,14 +231,14 @@ pub(crate) fn squared_extent<N: Arithmetic>([a, b, c]: [[N; 3]; 3]) -> N {
 
 /// The numbers of a vector's lanes from `lane` on.
 #[inline(always)]
-pub(crate) fn load<L: Lanes, const N: usize, const WIDTH: usize>(
+pub(crate) fn load<D: Doubles, const N: usize, const WIDTH: usize>(
     lanes: &[[f64; WIDTH]; N],
     lane: usize,
-) -> [L::Doubles; N] {
+) -> [D; N] {
     // A loop: closures are not always inlined.
-    let mut own = [L::Doubles::all(0.0); N];
+    let mut own = [D::all(0.0); N];
     for c in 0..N {
-        own[c] = L::Doubles::load(&lanes[c][lane..]);
+        own[c] = D::load(&lanes[c][lane..]);
     }
     own
 }

@@ -3,14 +3,12 @@
 
 use std::marker::PhantomData;
 
-use crate::curve::formula::de_casteljau::DeCasteljau;
-use crate::curve::formula::hermite::{Hermite, Line, Linear};
-use crate::curve::formula::product::Product;
-use crate::curve::formula::rotation_vector::RotationVector;
-use crate::curve::formula::squad::Squad;
-use crate::curve::formula::{Formula, NUMBERS, Numbers};
+use crate::curve::formula::{
+    DeCasteljau, Formula, Hermite, Line, Linear, NUMBERS, Numbers, Product, RotationVector, Squad,
+};
 use crate::fit::double::expansion::Expansion;
 use crate::fit::double::fit::{FitBlock, MOST, Samples, Tier};
+use crate::fit::double::handles::redo;
 use crate::fit::double::intervals::{load, put, rounded, store};
 use crate::fit::nodes::{FULL_NODES, Nodes, SMALL_ANGLE_NODES};
 use crate::math::dual::{Dual, Near};
@@ -145,13 +143,9 @@ impl<F: Formula> Sampling for Directly<F> {
                 // NaN if any component is NaN or infinite, else 0.
                 doubt = doubt + (x + y + z + w) * zero;
             }
-            if !doubt.are_at_most(0.0) {
-                let mut doubts = [0.0; MOST];
-                doubt.store(&mut doubts);
-                for j in (0..L::COUNT).filter(|&j| doubts[j].is_nan()) {
-                    sample_full_range::<F, L, PAIRS>(block, lane + j, nodes, j, &mut found);
-                }
-            }
+            redo(doubt, 0..L::COUNT, |j| {
+                sample_full_range::<F, L, PAIRS>(block, lane + j, nodes, j, &mut found);
+            });
             let middle = found[0];
             let mut samples = Samples::all(L::all(0.0));
             samples.middle = rounded(middle);
@@ -170,7 +164,6 @@ impl<F: Formula> Sampling for Directly<F> {
 
 /// Samples the curve in a lane over the full range, because its angles are too long for [`Near`],
 /// into the `j`th lane of the vectors found.
-#[inline(never)]
 fn sample_full_range<F: Formula, L: Lanes, const PAIRS: usize>(
     block: &FitBlock,
     lane: usize,
@@ -185,6 +178,6 @@ fn sample_full_range<F: Formula, L: Lanes, const PAIRS: usize>(
         store(&mut lanes, 0, *found);
         let t = at + nodes.offset(i) * width;
         put(&mut lanes, j, F::rotation(&numbers, t));
-        *found = load::<L, _, _>(&lanes, 0);
+        *found = load(&lanes, 0);
     }
 }

@@ -50,12 +50,8 @@ impl Pace {
         let speed = length(velocity).max(1e-12);
         let first = self.total() / speed;
         let along: f64 = velocity.iter().zip(acceleration).map(|(v, a)| v * a).sum();
-        Dual {
-            value: u,
-            first,
-            // |ω| u' is constant, so its derivative is 0.
-            second: -along * (first / speed) * (first / speed),
-        }
+        // |ω| u' is constant, so its derivative is 0.
+        Dual::new(u, first, -along * (first / speed) * (first / speed))
     }
 
     /// The parameter where the curve has turned by `target` radians: Newton's method, or bisection

@@ -53,7 +53,7 @@ impl Sampling for Motion {
                 (units[own - lane], scales[own]) = (unit, unit as f32);
             }
             let unit = L::Doubles::load(&units);
-            let middle = load::<L, _, _>(&found[0], 0);
+            let middle = load(&found[0], 0);
             let mut samples = Samples::all(L::all(0.0));
             for c in 0..4 {
                 samples.middle[c] = L::rounded(middle[c] / unit);

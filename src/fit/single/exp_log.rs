@@ -2,7 +2,7 @@
 
 use crate::fit::double::intervals::{ROOM, widened};
 use crate::math::quaternion::{Real as _, exp_by, scaled, square, sum};
-use crate::math::ranges::medium_waves;
+use crate::math::ranges::MEDIUM_WAVES;
 use crate::simd::lanes::{Lanes, Number};
 use crate::twin::sine_cosine::{sine_cosm1, sine_cosm1_quarter};
 use crate::twin::small_angle::FromIdentity;
@@ -55,11 +55,11 @@ fn exp_from_identity<N: Number>(v: [N; 3], (sinc, cosm1): (N, N)) -> FromIdentit
 }
 
 /// The exponential of `times` a vector, in f64: within 7e-9 for squared lengths up to
-/// [`MEDIUM_SQUARE`](crate::math::ranges::MEDIUM_SQUARE).
+/// the limit of [`MEDIUM_WAVES`].
 #[inline(always)]
 pub(crate) fn medium_exp<L: Lanes>(v: [L; 3], times: f32) -> [L::Doubles; 4] {
     let vector = scaled(widened(v), L::Doubles::all(f64::from(times)));
-    exp_by(vector, medium_waves(square(vector)))
+    exp_by(vector, MEDIUM_WAVES.of(square(vector)))
 }
 
 /// The logarithm, by [`LOG`] or [`LONG_LOG`], each within its range.

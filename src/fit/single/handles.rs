@@ -6,12 +6,14 @@
 //! where the curve turns little. Only the vector between the handles is computed in f64, because
 //! the rounding errors of all others would add up in it.
 
+use bytemuck::Zeroable;
+
 use crate::fit::double::intervals::{Intervals, ROOM, rounded, squared_extent, widened};
 use crate::fit::single::exp_log::{LOG, LONG_LOG, Row, load3, log, long_exp, medium_exp, store};
-use crate::fit::single::key_weights::KeyWeights;
 use crate::fit::single::long_tangents::AT_ONCE;
+use crate::fit::tangent_weights::KeyWeights;
 use crate::math::quaternion::{self, Real as _, dot, minus, product, scaled, square, sum};
-use crate::math::ranges::{MEDIUM_SQUARE, one_plus};
+use crate::math::ranges::{MEDIUM_WAVES, one_plus};
 use crate::shader::KEY_INNER;
 use crate::simd::dispatch::InLanes;
 use crate::simd::lanes::Lanes;
@@ -38,7 +40,7 @@ const LARGEST_COSINE_MINUS_ONE: f32 = 0.5645;
 const LONGEST_CHORD: f32 = 1.0;
 
 /// The largest squared extent of a curve whose f32 numbers hold.
-pub(crate) const LONGEST_DIRECT: f64 = MEDIUM_SQUARE;
+pub(crate) const LONGEST_DIRECT: f64 = MEDIUM_WAVES.limit;
 
 /// Added to the squared extent of a curve whose numbers may not hold.
 const IN_DOUBT: f64 = 2.0;
@@ -55,6 +57,7 @@ const LONGEST_TANGENT_PART: f32 = 1.5 * 1.5;
 pub(crate) type CurveNumbers = [[[f32; 4]; ROOM]; 5];
 
 /// The steps, handles and curves of a block's intervals, in f32.
+#[derive(Zeroable)]
 pub(crate) struct HandlesF32 {
     /// The squares of the differences of keys.
     pub(crate) chords: Row,
@@ -75,13 +78,8 @@ pub(crate) struct HandlesF32 {
 impl HandlesF32 {
     pub(crate) fn new() -> Self {
         Self {
-            chords: [0.0; ROOM],
-            logs: [[0.0; ROOM]; 3],
-            incoming: [[0.0; ROOM]; 3],
-            outgoing: [[0.0; ROOM]; 3],
-            far: [0.0; ROOM],
-            numbers: [[[0.0; 4]; ROOM]; 5],
             squared_extents: [f32::INFINITY; ROOM],
+            ..Self::zeroed()
         }
     }
 }

@@ -79,9 +79,17 @@ impl KeyFit<5> for Halves {
         interpolate(true, HALF.nodes, samples, places, segments);
         let backward = backward(vectors);
         let middle = Moment::new::<false>(end, backward, &LAST_HALF.middle);
-        let ends = [End::new(end, backward[2], HALF.slope), seam.negated()];
+        let [x, y, z, w] = seam.slope;
+        let seam = End {
+            slope: [-x, -y, -z, -w],
+            ..seam
+        };
+        let ends = [End::new(end, backward[2], HALF.slope), seam];
         sample(samples, &LAST_HALF, middle, ends);
-        samples.turn_round();
+        // The parameter runs backwards there.
+        for odd in samples.odd.as_flattened_mut() {
+            *odd = -*odd;
+        }
         let behind = places.map(|place| place + 1);
         interpolate(true, LAST_HALF.nodes, samples, &behind, segments);
     }
@@ -101,16 +109,6 @@ impl<L: Lanes> End<L> {
         Self {
             rotation,
             slope: product_with_vector(rotation, scaled(vector, L::all(times))),
-        }
-    }
-
-    /// The same end for a parameter that runs backwards.
-    #[inline(always)]
-    fn negated(self) -> Self {
-        let [x, y, z, w] = self.slope;
-        Self {
-            slope: [-x, -y, -z, -w],
-            ..self
         }
     }
 }
@@ -166,10 +164,8 @@ impl<L: Lanes> Moment<L> {
 fn backward<L: Lanes>([w1, w2, w3]: [[L; 3]; 3]) -> [[L; 3]; 3] {
     let third_turn = long_exp(w3);
     let second_turn = composed(long_exp(w2), third_turn);
-    let [v1, v2] = [
-        inverse_rotated(w1, second_turn),
-        inverse_rotated(w2, third_turn),
-    ];
+    let v1 = inverse_rotated(w1, second_turn);
+    let v2 = inverse_rotated(w2, third_turn);
     // Written out: closures are not always inlined.
     [
         [-v1[0], -v1[1], -v1[2]],

@@ -3,7 +3,7 @@
 
 use std::marker::PhantomData;
 
-use crate::fit::double::handles::{HandleRule, Interval};
+use crate::fit::double::handles::{HandleRule, Handles, Interval};
 use crate::fit::double::intervals::{Intervals, at, put};
 use crate::fit::single::handles::HandlesF32;
 use crate::math::quaternion::{log, normalised, step};
@@ -19,11 +19,9 @@ type Row = [f64; AT_ONCE];
 
 /// Keys with long tangents, and their handles by a rule.
 struct LongTangents<R> {
-    /// The intervals on both sides.
-    before: Side,
-    after: Side,
-    incoming: [Row; 3],
-    outgoing: [Row; 3],
+    /// The intervals before the keys, and those after them.
+    sides: [Side; 2],
+    handles: Handles<Row>,
     rule: PhantomData<R>,
 }
 
@@ -39,17 +37,18 @@ impl HandlesF32 {
     #[inline(never)]
     pub(crate) fn set_long<R: HandleRule>(&mut self, keys: &[usize], intervals: &Intervals) {
         let mut far = LongTangents::<R> {
-            before: Side::new(intervals, keys.iter().map(|key| key - 1)),
-            after: Side::new(intervals, keys.iter().copied()),
-            incoming: [[0.0; AT_ONCE]; 3],
-            outgoing: [[0.0; AT_ONCE]; 3],
+            sides: [1, 0].map(|back| Side::new(intervals, keys, back)),
+            handles: Handles {
+                incoming: [[0.0; AT_ONCE]; 3],
+                outgoing: [[0.0; AT_ONCE]; 3],
+            },
             rule: PhantomData,
         };
         in_lanes(&mut far);
         for (i, &key) in keys.iter().enumerate() {
             for c in 0..3 {
-                self.incoming[c][key] = far.incoming[c][i] as f32;
-                self.outgoing[c][key] = far.outgoing[c][i] as f32;
+                self.incoming[c][key] = far.handles.incoming[c][i] as f32;
+                self.outgoing[c][key] = far.handles.outgoing[c][i] as f32;
             }
             self.far[key] = 0.0;
         }
@@ -57,16 +56,17 @@ impl HandlesF32 {
 }
 
 impl Side {
-    fn new(intervals: &Intervals, lanes: impl Iterator<Item = usize>) -> Self {
+    /// The intervals that lie so far before those after the keys.
+    fn new(intervals: &Intervals, keys: &[usize], back: usize) -> Self {
         let mut side = Self {
             from: [[0.0; AT_ONCE]; 4],
             to: [[0.0; AT_ONCE]; 4],
             durations: [1.0; AT_ONCE],
         };
-        for (i, lane) in lanes.enumerate() {
-            let [from, to] = intervals.keys(lane);
-            put(&mut side.from, i, from.map(f64::from));
-            put(&mut side.to, i, to.map(f64::from));
+        for (i, key) in keys.iter().enumerate() {
+            let lane = key - back;
+            put(&mut side.from, i, intervals.from[lane].map(f64::from));
+            put(&mut side.to, i, intervals.to[lane].map(f64::from));
             side.durations[i] = intervals.durations[lane];
         }
         side
@@ -88,13 +88,8 @@ impl<R: HandleRule> InLanes for LongTangents<R> {
     // The compiler vectorises this loop.
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
-        let Self {
-            before,
-            after,
-            incoming,
-            outgoing,
-            ..
-        } = self;
+        let [before, after] = &self.sides;
+        let Handles { incoming, outgoing } = &mut self.handles;
         for i in 0..AT_ONCE {
             let found = R::handles(&mut FullRange, [before.interval(i), after.interval(i)]);
             for c in 0..3 {

@@ -4,6 +4,5 @@ pub(crate) mod exp_log;
 pub(crate) mod fit_range;
 pub(crate) mod handles;
 pub(crate) mod hermite_fit;
-pub(crate) mod key_weights;
 pub(crate) mod long_tangents;
 pub(crate) mod small_angle;

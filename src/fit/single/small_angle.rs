@@ -3,9 +3,11 @@
 // Loops over lanes index many arrays at once.
 #![allow(clippy::needless_range_loop)]
 
+use bytemuck::Zeroable;
+
 use crate::fit::double::fit::MOST;
 use crate::fit::double::intervals::{Intervals, LANES, ROOM, Stretch};
-use crate::fit::single::key_weights::KeyWeights;
+use crate::fit::tangent_weights::KeyWeights;
 use crate::shader::{KEY_INNER, LONGEST_STEP, PolynomialSegment};
 use crate::simd::dispatch::{InLanes, in_lanes};
 use crate::simd::lanes::Lanes;
@@ -15,6 +17,7 @@ use crate::twin::small_angle::{SmallAngleCubic, small_angle_cubic};
 const CURVES_ONE_BY_ONE: usize = 6;
 
 /// The small-angle curves of a block's intervals.
+#[derive(Zeroable)]
 pub(crate) struct SmallAngleLanes {
     powers: [[[f32; 4]; ROOM]; 7],
     /// Whether a lane's curve turns through small angles only, so that `powers` are its
@@ -23,13 +26,6 @@ pub(crate) struct SmallAngleLanes {
 }
 
 impl SmallAngleLanes {
-    pub(crate) fn new() -> Self {
-        Self {
-            powers: [[[0.0; 4]; ROOM]; 7],
-            holds: [false; ROOM],
-        }
-    }
-
     /// Computes the curves of the intervals whose squared chords, and those of both neighbours, are at
     /// most [`LONGEST_STEP`].
     pub(crate) fn find(

@@ -1,0 +1,227 @@
+//! Formulas: the curve between two keys, in f64, as a function of the parameter from 0 to 1. A
+//! formula takes up to [`NUMBERS`] numbers; its documentation says what they are.
+//!
+//! Kernels do not evaluate formulas: they evaluate the polynomials that are fitted to
+//! them, the same form for all.
+
+use crate::math::dual::Scalar;
+use crate::math::quaternion::{dot, exp_by, product, square, sum};
+
+/// How many numbers a formula may take.
+pub(crate) const NUMBERS: usize = 25;
+
+/// The numbers of one curve.
+pub(crate) type Numbers = [f64; NUMBERS];
+
+/// A curve of rotations.
+pub(crate) trait Formula: 'static {
+    /// The rotation at `t`. Implementations are `#[inline(always)]` and without branches. If `t` is
+    /// a vector, the numbers are vectors too.
+    fn rotation<S: Scalar>(numbers: &[S::Constant; NUMBERS], t: S) -> [S; 4];
+}
+
+/// The quaternion that starts at a place among the numbers.
+#[inline(always)]
+fn quaternion<S: Scalar>(numbers: &[S::Constant; NUMBERS], place: usize) -> [S; 4] {
+    [
+        S::constant(numbers[place]),
+        S::constant(numbers[place + 1]),
+        S::constant(numbers[place + 2]),
+        S::constant(numbers[place + 3]),
+    ]
+}
+
+/// The vector that starts at a place among the numbers, times `k`.
+#[inline(always)]
+fn vector<S: Scalar>(numbers: &[S::Constant; NUMBERS], place: usize, k: S) -> [S; 3] {
+    [
+        S::constant(numbers[place]) * k,
+        S::constant(numbers[place + 1]) * k,
+        S::constant(numbers[place + 2]) * k,
+    ]
+}
+
+/// The exponential of a half-rotation vector.
+#[inline(always)]
+fn exp<S: Scalar>(a: [S; 3]) -> [S; 4] {
+    exp_by(a, square(a).waves())
+}
+
+/// `q / |q|`, whatever the length.
+#[inline(always)]
+fn normalised<S: Scalar>(q: [S; 4]) -> [S; 4] {
+    let scale = dot(q, q).reciprocal_root();
+    [q[0] * scale, q[1] * scale, q[2] * scale, q[3] * scale]
+}
+
+/// `a u + b v`.
+#[inline(always)]
+fn weighted<S: Scalar>(a: [S; 4], u: S, b: [S; 4], v: S) -> [S; 4] {
+    [
+        a[0] * u + b[0] * v,
+        a[1] * u + b[1] * v,
+        a[2] * u + b[2] * v,
+        a[3] * u + b[3] * v,
+    ]
+}
+
+/// Slerp on the arc that the signs give: `sin((1-t)θ)/sin θ a + sin(tθ)/sin θ b` (Shoemake 1985),
+/// up to a factor that normalising removes. Its ends may depend on time too.
+///
+/// The sines are written `x sinc(x²)`, and the square of the angle is a smooth function of the
+/// chord between the ends, so that small angles are no special case.
+#[inline(always)]
+fn slerp<S: Scalar>(a: [S; 4], b: [S; 4], t: S) -> [S; 4] {
+    let minus = S::all(-1.0);
+    let difference = weighted(b, S::all(1.0), a, minus);
+    let chord = dot(difference, difference) * S::all(0.25);
+    let square = chord.arc_square();
+    let rest = S::all(1.0) - t;
+    let (to_b, _) = (t * t * square).waves();
+    let (to_a, _) = (rest * rest * square).waves();
+    normalised(weighted(a, rest * to_a, b, t * to_b))
+}
+
+/// Cubics in cumulative form (Kim, Kim, Shin 1995):
+/// `base · exp(v₁ B₁(t)) · exp(v₂ B₂(t)) · exp(v₃ B₃(t))`.
+///
+/// Numbers: the base, the three half-rotation vectors, and for each of the three
+/// cumulative basis functions the coefficients of 1, t, t², t³.
+pub(crate) struct Product;
+
+impl Product {
+    pub(crate) const VECTORS: usize = 4;
+    pub(crate) const BASIS: usize = 13;
+
+    /// The cumulative Bernstein basis, `1-(1-t)³`, `t²(3-2t)`, `t³`.
+    pub(crate) const BERNSTEIN: [[f64; 4]; 3] = [
+        [0.0, 3.0, -3.0, 1.0],
+        [0.0, 0.0, 3.0, -2.0],
+        [0.0, 0.0, 0.0, 1.0],
+    ];
+
+    /// The numbers of a curve with that basis; base and vectors are still 0.
+    pub(crate) const WITH_BERNSTEIN: Numbers = {
+        let mut numbers = [0.0; NUMBERS];
+        let (_, basis) = numbers.split_at_mut(Self::BASIS);
+        basis.copy_from_slice(Self::BERNSTEIN.as_flattened());
+        numbers
+    };
+}
+
+impl Formula for Product {
+    #[inline(always)]
+    fn rotation<S: Scalar>(numbers: &[S::Constant; NUMBERS], t: S) -> [S; 4] {
+        let factor = |j: usize| {
+            let [c0, c1, c2, c3] = quaternion::<S>(numbers, Self::BASIS + 4 * j);
+            let weight = ((c3 * t + c2) * t + c1) * t + c0;
+            exp(vector(numbers, Self::VECTORS + 3 * j, weight))
+        };
+        let first = product(quaternion(numbers, 0), factor(0));
+        product(product(first, factor(1)), factor(2))
+    }
+}
+
+/// A cubic in the rotation vector from a key: `base · exp(v₁ t + v₂ t² + v₃ t³)`.
+///
+/// Numbers: the base and the three half-rotation vectors.
+pub(crate) struct RotationVector;
+
+impl Formula for RotationVector {
+    #[inline(always)]
+    fn rotation<S: Scalar>(numbers: &[S::Constant; NUMBERS], t: S) -> [S; 4] {
+        let square = t * t;
+        let first = vector(numbers, 4, t);
+        let second = vector(numbers, 7, square);
+        let third = vector(numbers, 10, square * t);
+        product(quaternion(numbers, 0), exp(sum(sum(first, second), third)))
+    }
+}
+
+/// Bézier curves of rotations (Shoemake 1985): de Casteljau's construction with slerps.
+///
+/// Numbers: the four control rotations. The arcs between them are those that their signs give.
+/// Unlike in flat space, the two halves into which the construction cuts such a curve are not parts
+/// of it.
+pub(crate) struct DeCasteljau;
+
+impl Formula for DeCasteljau {
+    #[inline(always)]
+    fn rotation<S: Scalar>(numbers: &[S::Constant; NUMBERS], t: S) -> [S; 4] {
+        let (q0, a) = (quaternion(numbers, 0), quaternion(numbers, 4));
+        let (b, q1) = (quaternion(numbers, 8), quaternion(numbers, 12));
+        let middle = slerp(a, b, t);
+        let left = slerp(slerp(q0, a, t), middle, t);
+        let right = slerp(middle, slerp(b, q1, t), t);
+        slerp(left, right, t)
+    }
+}
+
+/// Spherical quadrangle interpolation (Shoemake 1987):
+/// `slerp(slerp(q0, q1; t), slerp(s0, s1; t); 2t(1-t))`.
+///
+/// Numbers: `q0`, `s0`, `s1`, `q1`. The arcs are those that the signs give.
+pub(crate) struct Squad;
+
+impl Formula for Squad {
+    #[inline(always)]
+    fn rotation<S: Scalar>(numbers: &[S::Constant; NUMBERS], t: S) -> [S; 4] {
+        let along = slerp(quaternion(numbers, 0), quaternion(numbers, 12), t);
+        let beside = slerp(quaternion(numbers, 4), quaternion(numbers, 8), t);
+        let weight = S::all(2.0) * t * (S::all(1.0) - t);
+        slerp(along, beside, weight)
+    }
+}
+
+/// `((1-t) q0 + t q1) / |…|`. Numbers: `q0`, two quaternions that are not used, `q1`.
+pub(crate) struct Linear;
+
+impl Formula for Linear {
+    #[inline(always)]
+    fn rotation<S: Scalar>(numbers: &[S::Constant; NUMBERS], t: S) -> [S; 4] {
+        let rest = S::all(1.0) - t;
+        normalised(weighted(
+            quaternion(numbers, 0),
+            rest,
+            quaternion(numbers, 12),
+            t,
+        ))
+    }
+}
+
+/// A straight line, not normalised. Numbers: its value at 0, and its slope.
+pub(crate) struct Line;
+
+impl Formula for Line {
+    #[inline(always)]
+    fn rotation<S: Scalar>(numbers: &[S::Constant; NUMBERS], t: S) -> [S; 4] {
+        let start = quaternion(numbers, 0);
+        weighted(start, S::all(1.0), quaternion(numbers, 4), t)
+    }
+}
+
+/// `((2t³-3t²+1) q0 + (t³-2t²+t) m0 + (3t²-2t³) q1 + (t³-t²) m1) / |…|`.
+///
+/// Numbers: `q0`, `m0`, `m1`, `q1`; the tangents are multiplied by the interval's length.
+pub(crate) struct Hermite;
+
+impl Formula for Hermite {
+    #[inline(always)]
+    fn rotation<S: Scalar>(numbers: &[S::Constant; NUMBERS], t: S) -> [S; 4] {
+        let one = S::all(1.0);
+        let rest = one - t;
+        let two = S::all(2.0);
+        let start = (one + two * t) * rest * rest;
+        let end = t * t * (S::all(3.0) - two * t);
+        let leaving = t * rest * rest;
+        let arriving = t * t * (t - one);
+        let keys = weighted(quaternion(numbers, 0), start, quaternion(numbers, 12), end);
+        let tangents = weighted(
+            quaternion(numbers, 4),
+            leaving,
+            quaternion(numbers, 8),
+            arriving,
+        );
+        normalised(weighted(keys, one, tangents, one))
+    }
+}
