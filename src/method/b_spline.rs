@@ -1,8 +1,17 @@
 //! The cumulative cubic B-spline, with the key times as knots.
 
 use crate::curve::formula::Product;
+use crate::curve::options::Ends;
+use crate::fit::double::handles::BetweenNeighbours;
+use crate::fit::double::intervals::{Intervals, Stretch, at, put};
+use crate::fit::double::shape::Shape;
+use crate::math::quaternion::{Vector, exp, ratio, rotated, scaled, sum};
 use crate::method::ends::End;
-use crate::method::*;
+use crate::method::interpolation::Interpolation;
+use crate::method::{Continuity, Cost, Curves, Given, Keys, Method, Smooth, USUAL};
+use crate::reference;
+use crate::simd::dispatch::in_lanes;
+use crate::tracks::set::Track;
 
 /// The cumulative cubic B-spline: the smoothest method, but it passes near its keys and not through
 /// them. Its knots are the key times, even or not; before the first and after the last key they

@@ -1,7 +1,13 @@
 //! Bessel-Overhauser: the tangent at a key is that of the parabola through it and
 //! its two neighbours.
 
-use crate::method::*;
+use crate::fit::double::handles::{BothSides, HandleRule, Handles};
+use crate::fit::double::shape::Shape;
+use crate::fit::tangent_weights::WeightRule;
+use crate::math::quaternion::{Real as _, product, ratio, scaled, sum};
+use crate::math::ranges::Algebra;
+use crate::method::{Continuity, Cost, Curves, Keys, Method, Smooth, USUAL, ends};
+use crate::reference;
 
 /// Bessel-Overhauser on rotations: smooth in time for any spacing of keys, and
 /// equal to [`CATMULL_ROM`] for even ones.

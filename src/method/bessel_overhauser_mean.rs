@@ -1,7 +1,12 @@
 //! Bessel-Overhauser by the weighted mean of the slopes: the tangent is that of the parabola
 //! through three keys, computed with logarithms.
 
-use crate::method::*;
+use crate::fit::double::handles::{BothSides, HandleRule, Handles, Interval};
+use crate::fit::double::shape::Shape;
+use crate::math::quaternion::{Real, ratio, scaled, sum};
+use crate::math::ranges::Algebra;
+use crate::method::{Continuity, Cost, Curves, Keys, Method, Smooth, USUAL, ends};
+use crate::reference;
 
 /// Bessel-Overhauser with tangents that are means of logarithms: they never wrap, and the
 /// curve is the same forwards and backwards in time.

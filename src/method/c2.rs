@@ -4,8 +4,16 @@ use std::ops::Range;
 
 use glam::{DMat3, DVec3};
 
+use crate::curve::options::Ends;
+use crate::fit::double::intervals::{Intervals, Stretch, at, squared_extent};
+use crate::fit::double::shape::Shape;
+use crate::math::quaternion::{self, Vector, log, scaled, sine_cosine, sum};
 use crate::method::ends::End;
-use crate::method::*;
+use crate::method::interpolation::Interpolation;
+use crate::method::{Continuity, Cost, Curves, Given, Keys, Method, Smooth, USUAL};
+use crate::reference;
+use crate::tracks::set::Track;
+use crate::tracks::signs::Signs;
 
 /// The curve of `SciPy`'s `RotationSpline`: the rotation vector from each key is a cubic,
 /// and the angular velocities at the keys are such that the angular acceleration is

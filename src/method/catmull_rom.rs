@@ -1,6 +1,12 @@
 //! Catmull-Rom: the tangent at a key is half of the step between its neighbours.
 
-use crate::method::*;
+use crate::fit::double::handles::{BothSides, HandleRule, Handles};
+use crate::fit::double::shape::Shape;
+use crate::fit::tangent_weights::WeightRule;
+use crate::math::quaternion::{Real as _, product, scaled, sum};
+use crate::math::ranges::Algebra;
+use crate::method::{Cost, Curves, Keys, Method, Smooth, USUAL, ends};
+use crate::reference;
 
 /// Catmull-Rom on rotations, in cumulative form. It ignores the time steps, so its velocity jumps
 /// on uneven keys;

@@ -1,6 +1,13 @@
 //! The cubic spline of glTF.
 
-use crate::method::*;
+use crate::curve::options::{Ends, Path};
+use crate::fit::double::intervals::{Intervals, Stretch, at, squared_extent};
+use crate::fit::double::shape::Shape;
+use crate::math::quaternion::{Quaternion, Vector, length};
+use crate::method::interpolation::Interpolation;
+use crate::method::{Continuity, Cost, Curves, Given, Method, Smooth, USUAL};
+use crate::reference;
+use crate::tracks::set::Track;
 
 /// glTF's CUBICSPLINE: a cubic in each component, with given tangents
 /// ([`TrackSet::set_tangents`](crate::tracks::set::TrackSet::set_tangents)), normalised. Keys count

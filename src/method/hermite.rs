@@ -1,6 +1,15 @@
 //! The Hermite method: angular velocities at the keys are given.
 
-use crate::method::*;
+use crate::curve::options::Ends;
+use crate::fit::double::handles::BetweenHandles;
+use crate::fit::double::intervals::{Intervals, Stretch, at, put};
+use crate::fit::double::shape::Shape;
+use crate::math::quaternion::scaled;
+use crate::method::interpolation::Interpolation;
+use crate::method::{Continuity, Cost, Curves, Given, Method, Smooth, USUAL};
+use crate::reference;
+use crate::simd::dispatch::in_lanes;
+use crate::tracks::set::Track;
 
 /// Hermite: the rotation and the angular velocity of every key are given
 /// ([`TrackSet::set_velocities`](crate::tracks::set::TrackSet::set_velocities)); without them every

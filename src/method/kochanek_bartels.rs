@@ -1,7 +1,14 @@
 //! Kochanek-Bartels: tension, continuity and bias at each key.
 
+use crate::fit::double::handles::{BothSides, HandleRule, Handles};
+use crate::fit::double::shape::Shape;
+use crate::math::quaternion::Real as _;
+use crate::math::ranges::Algebra;
 use crate::method::bessel_overhauser_mean::handle;
-use crate::method::*;
+use crate::method::interpolation::Interpolation;
+use crate::method::{Continuity, Cost, Curves, Given, Keys, Method, Smooth, USUAL, ends};
+use crate::reference;
+use crate::tracks::set::Track;
 
 /// Kochanek-Bartels, with [`Tcb`](crate::tracks::key_data::Tcb) for each key
 /// ([`TrackSet::set_tcb`](crate::tracks::set::TrackSet::set_tcb)) or for all

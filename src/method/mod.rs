@@ -46,19 +46,12 @@ use std::fmt;
 use std::ops::Range;
 use std::str::FromStr;
 
-// The files of methods take all of this by `use crate::method::*`.
-use crate::fit::double::handles::{
-    BetweenHandles, BetweenNeighbours, BothSides, EndHandle, HandleRule, Handles, Interval, Steps,
-};
-use crate::fit::double::intervals::{Intervals, Stretch, at, put, squared_extent};
+use crate::fit::double::handles::{HandleRule, Steps};
+use crate::fit::double::intervals::{Intervals, Stretch};
 use crate::fit::double::shape::Shape;
 use crate::fit::single::handles::HandlesF32;
 use crate::fit::tangent_weights::WeightRule;
-use crate::math::quaternion::{
-    self, Quaternion, Real, Vector, dot, exp, length, log, product, ratio, rotated, scaled,
-    sine_cosine, sum,
-};
-use crate::math::ranges::Algebra;
+use crate::math::quaternion::Vector;
 use crate::reference;
 use crate::reference::curve::Definition;
 use crate::shader::Form;

@@ -1,6 +1,10 @@
 //! Normalised linear interpolation.
 
-use crate::method::*;
+use crate::curve::options::Ends;
+use crate::fit::double::intervals::{Intervals, Stretch, at, squared_extent};
+use crate::fit::double::shape::Shape;
+use crate::method::{Continuity, Cost, Curves, Keys, Method, Smooth, USUAL};
+use crate::reference;
 
 /// Nlerp: the straight line between neighbouring keys, normalised. It follows the path of slerp at
 /// another speed, slower near the keys: it is up to 8° from slerp where keys are 180° apart.

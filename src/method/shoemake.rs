@@ -1,6 +1,11 @@
 //! Shoemake's first approach, as lectured, and the handle rule of all three approaches.
 
-use crate::method::*;
+use crate::fit::double::handles::{BothSides, HandleRule, Handles};
+use crate::fit::double::shape::Shape;
+use crate::math::quaternion::{Real as _, dot, scaled, sum};
+use crate::math::ranges::Algebra;
+use crate::method::{Cost, Curves, Method, Smooth, USUAL, ends};
+use crate::reference;
 
 /// Approach I of the lecture: the control rotation is the bisector itself. It passes its keys three
 /// times too fast and overshoots; it is here for comparison.

@@ -1,7 +1,9 @@
 //! Shoemake's construction, as published.
 
+use crate::fit::double::shape::Shape;
 use crate::method::shoemake::Bisector;
-use crate::method::*;
+use crate::method::{Cost, Curves, Keys, Method, Smooth, USUAL, ends};
+use crate::reference;
 
 /// Shoemake's own construction: the handle goes a third of the way to the bisector. It ignores the
 /// time steps, so its velocity jumps on uneven keys.

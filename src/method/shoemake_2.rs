@@ -1,7 +1,9 @@
 //! Shoemake's second approach, as lectured.
 
+use crate::fit::double::shape::Shape;
 use crate::method::shoemake::Bisector;
-use crate::method::*;
+use crate::method::{Cost, Curves, Method, Smooth, USUAL, ends};
+use crate::reference;
 
 /// Approach II of the lecture: the handle goes half of the way to the bisector. It passes its keys
 /// one and a half times too fast;

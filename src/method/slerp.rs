@@ -1,6 +1,10 @@
 //! Spherical linear interpolation.
 
-use crate::method::*;
+use crate::curve::options::Ends;
+use crate::fit::double::intervals::{Intervals, Stretch, at, squared_extent};
+use crate::fit::double::shape::Shape;
+use crate::method::{Continuity, Cost, Curves, Keys, Method, Smooth, USUAL};
+use crate::reference;
 use crate::shader::Form;
 
 /// Slerp: the shortest arc between neighbouring keys, at constant speed.

@@ -1,6 +1,11 @@
 //! Spherical quadrangle interpolation.
 
-use crate::method::*;
+use crate::fit::double::handles::{BothSides, EndHandle, HandleRule, Handles};
+use crate::fit::double::shape::Shape;
+use crate::math::quaternion::{Real as _, Vector, scaled, sum};
+use crate::math::ranges::Algebra;
+use crate::method::{Cost, Curves, Keys, Method, Smooth, USUAL, ends};
+use crate::reference;
 
 /// Squad. It ignores the time steps, so its velocity jumps on uneven keys.
 pub const SQUAD: Method = Method {

@@ -1,6 +1,6 @@
 //! The step method: each key is held until the next.
 
-use crate::method::*;
+use crate::method::{Continuity, Cost, Method, USUAL};
 
 /// Holds each key until the next: for things that switch and do not move.
 pub const STEP: Method = Method {
