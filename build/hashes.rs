@@ -19,19 +19,28 @@ pub(crate) fn hash(bytes: &[u8]) -> String {
     format!("{hash:016x}")
 }
 
-/// The hashes of the shaders and of what is compiled of them, below a folder.
+/// The hashes of the shaders and of what is compiled of them, below a folder. Hidden files do not
+/// count, nor does how lines end, which a checkout may change.
 pub(crate) fn of_folder(root: &Path, folder: &str) -> io::Result<Hashes> {
     let mut found = Hashes::new();
     for entry in fs::read_dir(root.join(folder))? {
         let entry = entry?;
-        let path = format!("{folder}/{}", entry.file_name().display());
+        let name = entry.file_name();
+        let path = format!("{folder}/{}", name.display());
+        if name.as_encoded_bytes().starts_with(b".") {
+            continue;
+        }
         if entry.path().is_dir() {
             found.extend(of_folder(root, &path)?);
         } else if [".wgsl", ".rs", ".spv"]
             .iter()
             .any(|end| path.ends_with(end))
         {
-            found.insert(path, hash(&fs::read(entry.path())?));
+            let mut bytes = fs::read(entry.path())?;
+            if !path.ends_with(".spv") {
+                bytes.retain(|&byte| byte != b'\r');
+            }
+            found.insert(path, hash(&bytes));
         }
     }
     Ok(found)

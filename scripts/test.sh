@@ -20,7 +20,7 @@ missing_packages() {
     compgen -G '/usr/share/vulkan/icd.d/lvp_icd*.json' >/dev/null || echo mesa-vulkan-drivers
     compgen -G '/usr/share/vulkan/explicit_layer.d/VkLayer_khronos_validation.json' >/dev/null ||
         echo vulkan-validationlayers
-    ldconfig -p 2>/dev/null | grep -q 'libvulkan\.so\.1' || echo libvulkan1
+    PATH=$PATH:/sbin ldconfig -p 2>/dev/null | grep 'libvulkan\.so\.1' >/dev/null || echo libvulkan1
     command -v spirv-val >/dev/null || echo spirv-tools
     command -v valgrind >/dev/null || echo valgrind
     command -v chromium >/dev/null || command -v chromium-browser >/dev/null ||
@@ -78,36 +78,45 @@ fetch() {
         $part &
         fetching+=($!)
     done
-    for part in "${fetching[@]}"; do wait "$part"; done
+    failed=0
+    for part in "${fetching[@]}"; do wait "$part" || failed=$?; done
+    return $failed
 }
 
 sudo=""
-mapfile -t missing < <(missing_packages)
-if [ ${#missing[@]} -gt 0 ]; then
+missing=$(missing_packages | tr '\n' ' ')
+if [ -n "$missing" ]; then
     if command -v apt-get >/dev/null; then
         # A password is asked for here: what runs beside the rest has no terminal.
-        [ "$(id -u)" -eq 0 ] || { sudo="sudo" && sudo -v; }
+        [ "$(id -u)" -eq 0 ] || { sudo="sudo" && { sudo -n true 2>/dev/null || sudo -v || true; }; }
     else
-        echo "the tests want these packages of Debian's, or your system's for the same: ${missing[*]}." >&2
+        echo "the tests want these packages of Debian's, or your system's for the same: $missing." >&2
         echo "Tests without them say so and compare nothing." >&2
-        missing=()
+        missing=""
     fi
 fi
-fetch "${missing[@]}" </dev/null &
+# shellcheck disable=SC2086 # names of packages, with blanks between them
+fetch $missing </dev/null &
 fetching=$!
+trap 'wait "$fetching" 2>/dev/null || true' EXIT
 
-# CI checks what can hide a fault of the engine: a multiply-add that rounds once, `unsafe` without its
-# reason. A quarter of its time would go into the other lints and the documents.
+# CI checks what can hide a fault: a multiply-add that rounds once, `unsafe` without its reason. A quarter
+# of its time would go into the other lints and the documents.
 if [ -z "${CI:-}" ]; then
     ./scripts/lint.sh
 else
     if cargo fmt --version >/dev/null 2>&1; then cargo fmt --check; fi
     if cargo clippy --version >/dev/null 2>&1; then
         cargo clippy --package tumble --lib --quiet -- -D warnings
+    else
+        echo "clippy is not installed: nothing was linted" >&2
     fi
 fi
 cargo test --workspace --no-run --quiet
-wait "$fetching"
+wait "$fetching" || {
+    echo "what the tests need could not be fetched: see above" >&2
+    exit 1
+}
 
 # SwiftShader, a second and independent driver, comes inside Debian's chromium; where
 # it is there, every test that walks the devices walks it too.

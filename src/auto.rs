@@ -82,8 +82,11 @@ impl Engine {
         }
         Ok(best.1)
     }
+
     /// How long this engine takes to evaluate a probe of 2^19 rotations: the shortest of three
-    /// times. [`Engine::auto`] compares devices by it.
+    /// times, after one that does not count. Making and uploading the probe is not timed.
+    /// [`Engine::auto_for`] compares devices by it. The four evaluations count in
+    /// [`Engine::take_timings`].
     ///
     /// # Errors
     /// When the device fails, or there is no memory for the probe.

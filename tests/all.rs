@@ -26,6 +26,7 @@ mod transforms;
 mod validation;
 mod verify;
 mod vulkan;
+mod widths;
 
 #[path = "support/application.rs"]
 mod application;

@@ -8,8 +8,8 @@ use crate::support::{
 use glam::{DQuat, DVec3, Quat};
 use tumble::reference::{Curve, angle_between};
 use tumble::{
-    Device, Encoding, Ends, Engine, EngineOptions, Frames, Interpolation, Layout, METHODS, Method,
-    Path, Rotations, TrackSet, Transfer, VectorWidth, WrapMode, method,
+    Device, Encoding, Ends, Engine, EngineOptions, Frames, Interpolation, Layout, METHODS, Path,
+    Rotations, TrackSet, Transfer, VectorWidth, WrapMode, method,
 };
 
 const ENDS: [Ends; 5] = [
@@ -112,47 +112,6 @@ fn every_vector_width_and_thread_count_gives_the_same_bits() {
     }
 }
 
-/// Catches an instruction set whose code fuses, reorders or divides otherwise where segments are
-/// prepared: steps from a hundredth of a degree to half a turn, evenly and unevenly.
-#[test]
-fn every_vector_width_prepares_the_same_curves() {
-    let mut set = TrackSet::new();
-    for track in 0..40 {
-        let step = 3.1 * 0.5f32.powi(track % 14);
-        let uneven = if track < 20 { 0.0 } else { 0.99 };
-        let times: Vec<f64> = (0..23)
-            .map(|i| f64::from(i) + uneven * f64::from(i % 2))
-            .collect();
-        let key = |i: u8| {
-            let i = f32::from(i);
-            let turn = step * (i + i.sin());
-            Quat::from_rotation_y(turn) * Quat::from_rotation_x(0.3 * turn.cos())
-        };
-        let mut keys: Vec<Quat> = (0..23).map(key).collect();
-        if track == 13 {
-            keys[7] = keys[6]; // no plane
-            keys[9] = Quat::IDENTITY; // half a turn to the next
-            keys[10] = Quat::from_xyzw(1.0, 0.0, 0.0, 0.0);
-        }
-        set.push("", &times, &keys).unwrap();
-    }
-    let frames = Frames::fps(64);
-    let [narrow, wider @ ..] = &widths(None)[..] else {
-        panic!("every processor has the baseline");
-    };
-    let found = |engine: &Engine, method: Method| {
-        let clip = engine.upload(&set, method).unwrap();
-        clip.evaluate(&frames).unwrap()
-    };
-    for method in METHODS {
-        let expected = found(narrow, method);
-        for engine in wider {
-            let found = found(engine, method);
-            assert_same_bits(expected.as_quats(), found.as_quats(), &method.to_string());
-        }
-    }
-}
-
 /// Catches samples that are begun too early or too late, in runs of every length: of frames and of
 /// times, with ordinary and with streaming stores, with vectors of every width.
 #[test]
@@ -240,29 +199,33 @@ fn every_memory_budget_transfer_and_layout_gives_the_same_bits() {
     }
 }
 
-/// Long results are written past the caches on processors that gain by it: of arcs, of
-/// polynomials, and by the way that has no segments kept. Catches what such stores leave out.
+/// Long results are written past the caches on processors that gain by it. Catches what such
+/// stores leave out.
 #[test]
 fn long_results_have_the_bits_of_short_ones() {
     let set = hostile_set(7, 1800);
     let frames = Frames::fps(60).between(-1.0, 20.0);
-    for method in [method::SLERP, method::BESSEL_OVERHAUSER] {
+    let ordinary = engine(&Device::Cpu, |options| {
+        options.streaming_stores = Some(false)
+    });
+    for method in [method::SLERP, method::BESSEL_OVERHAUSER, method::SQUAD] {
+        let expected = ordinary.evaluate(&set, method, &frames).unwrap();
+        assert!(16 * expected.as_quats().len() > 33 << 20);
         let long = cpu().evaluate(&set, method, &frames).unwrap();
-        let samples = long.samples();
-        assert!(16 * long.as_quats().len() > 33 << 20, "{samples} each");
+        assert_same_bits(expected.as_quats(), long.as_quats(), &method.to_string());
         let kept = cpu().upload(&set, method).unwrap();
         let kept = kept.evaluate(&frames).unwrap();
-        assert_same_bits(long.as_quats(), kept.as_quats(), "kept");
-        let few = set.select(900..910).unwrap();
-        let short = cpu().evaluate(&few, method, &frames).unwrap();
-        let found = &long.as_quats()[900 * samples..910 * samples];
-        assert_same_bits(short.as_quats(), found, "ten tracks of many");
+        assert_same_bits(expected.as_quats(), kept.as_quats(), "kept");
+        let samples = expected.samples();
+        let short = cpu().evaluate(&set.select(900..910).unwrap(), method, &frames);
+        let found = &expected.as_quats()[900 * samples..910 * samples];
+        assert_same_bits(short.unwrap().as_quats(), found, "ten tracks of many");
     }
 }
 
-/// Streaming stores change no bit: of frames, of times in any order and of track copies, on arcs
-/// and on polynomials, with vectors of every width, from a clip and from a set, for every alignment
-/// of the output.
+/// Streaming stores change no bit, and none beside the output: of frames, of times in any order and of
+/// track copies, on arcs and on polynomials, with vectors of every width, from a clip and from a
+/// set, for every alignment of the output.
 #[test]
 fn streaming_stores_have_the_bits_of_others() {
     let set = hostile_set(7, 16);
@@ -289,16 +252,24 @@ fn streaming_stores_have_the_bits_of_others() {
                 let expected = ordinary.evaluate(&set, interpolation, &frames).unwrap();
                 let count = expected.as_quats().len();
                 for shift in 0..4 {
-                    let mut found = vec![Quat::IDENTITY; count + 3];
-                    let found = &mut found[shift..][..count];
-                    let layout = Layout::TrackMajor;
-                    match shift % 2 {
-                        0 => clip.evaluate_into(&frames, layout, found),
-                        _ => streaming.evaluate_into(&set, interpolation, &frames, layout, found),
+                    for from_set in [false, true] {
+                        let mut memory = vec![Quat::from_array([9.0; 4]); count + 4];
+                        let (before, rest) = memory.split_at_mut(shift);
+                        let (found, behind) = rest.split_at_mut(count);
+                        let layout = Layout::TrackMajor;
+                        match from_set {
+                            true => {
+                                streaming.evaluate_into(&set, interpolation, &frames, layout, found)
+                            }
+                            false => clip.evaluate_into(&frames, layout, found),
+                        }
+                        .unwrap();
+                        let what =
+                            format!("{method}, {after:?}, {streaming:?}, shifted by {shift}");
+                        assert_same_bits(expected.as_quats(), found, &what);
+                        let mut beside = before.iter().chain(&*behind);
+                        assert!(beside.all(|q| q.to_array() == [9.0; 4]), "{what}");
                     }
-                    .unwrap();
-                    let what = format!("{method}, {after:?}, {streaming:?}, shifted by {shift}");
-                    assert_same_bits(expected.as_quats(), found, &what);
                 }
             }
         }

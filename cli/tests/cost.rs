@@ -40,7 +40,7 @@ fn instructions(file: &Path, method: &str, fps: u32, width: &str) -> Option<u64>
     Some(count.expect(&words).trim().parse().expect("a number"))
 }
 
-const TRACKS: u64 = 16;
+const TRACKS: u64 = 32;
 
 fn generate(folder: &Path, keys: u32, motion: &[&str]) -> std::path::PathBuf {
     let file = folder.join(format!("{keys}.dat"));

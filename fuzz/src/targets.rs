@@ -5,7 +5,7 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 
 use clap::Parser;
 use glam::Quat;
-#[allow(dead_code, unreachable_pub)] // the pass that the build and the engine have
+#[allow(dead_code, unreachable_pub)] // the pass that the shaders' compiler and the engine have
 #[path = "../../src/shader/spirv.rs"]
 mod pass;
 

@@ -50,7 +50,14 @@ impl CpuEngine {
         let batches: Vec<Batch> = batches(set, Batch::Tracks(tracks), size);
         let samples_of_a_run = || rotations / keys.max(1);
         let task = |(batches, output): (&[Batch], &mut [[f32; 4]])| {
-            let mut stage = Stage::new(self, rotations, samples, samples_of_a_run, output);
+            let mut stage = Stage::new(
+                self.width,
+                self.streaming_stores,
+                rotations,
+                samples,
+                samples_of_a_run,
+                output,
+            );
             let mut memory = self.scratch_pool.take(request);
             for batch in batches {
                 memory.prepare(set, batch.intervals(set))?;

@@ -37,7 +37,7 @@ impl CpuEngine {
         }
         // Waking a thread costs more than a task's worth of work.
         if output.len() <= TASK {
-            return self.window(clip, timeline, window, 0, output);
+            return self.window(clip, timeline, window, Some(output.len()), output);
         }
         if window.layout == Layout::FrameMajor {
             let tasks = frame_tasks(window, output).into_par_iter();
@@ -45,7 +45,7 @@ impl CpuEngine {
                 tasks.try_for_each(|(window, frames)| self.frames(clip, timeline, &window, frames))
             });
         }
-        let rotations = output.len();
+        let rotations = Some(output.len());
         self.on_threads(|| {
             let tasks = tasks(window, 1, output).into_par_iter();
             tasks.try_for_each(|(window, own)| self.window(clip, timeline, &window, rotations, own))
@@ -64,7 +64,7 @@ impl CpuEngine {
     ) -> Result<(), FramesError> {
         let task = |rotations: &mut Vec<[f32; 4]>, window: &Window, output: &mut [u8]| {
             rotations.resize(window.len(), [0.0; 4]);
-            self.window(clip, timeline, window, 0, rotations)?;
+            self.window(clip, timeline, window, None, rotations)?;
             encoding.encode_all(rotations, output);
             Ok(())
         };
@@ -82,13 +82,14 @@ impl CpuEngine {
         })
     }
 
-    /// Evaluates a window on this thread; the whole result has `rotations` rotations.
+    /// Evaluates a window on this thread; the whole result has `rotations` rotations, or is read again
+    /// at once.
     fn window(
         &self,
         clip: &ClipData,
         timeline: &Timeline,
         window: &Window,
-        rotations: usize,
+        rotations: Option<usize>,
         output: &mut [[f32; 4]],
     ) -> Result<(), FramesError> {
         let (samples, tracks) = (window.samples.len(), window.tracks.len());
@@ -117,7 +118,10 @@ impl CpuEngine {
         match window.layout {
             Layout::TrackMajor => {
                 let of_a_run = || clip.samples_of_a_run(timeline);
-                let mut stage = Stage::new(self, rotations, samples, of_a_run, output);
+                let streams = rotations.map_or(Some(false), |_| self.streaming_stores);
+                let rotations = rotations.unwrap_or_default();
+                let mut stage =
+                    Stage::new(self.width, streams, rotations, samples, of_a_run, output);
                 for track in window.tracks.clone() {
                     stage.row(samples, |samples, output| {
                         let first = window.samples.start + samples.start;

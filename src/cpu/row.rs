@@ -133,6 +133,7 @@ impl<S: Evaluate> Row<'_, S> {
         in_lanes_into(self.width, &RunList { row: self, runs }, output);
         Ok(())
     }
+
     /// Evaluates a run; `output` starts at the first sample of the track copy.
     #[inline(always)]
     fn evaluate_run<L: Lanes>(&self, run: &Run, output: &mut [[f32; 4]]) {

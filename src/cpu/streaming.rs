@@ -4,7 +4,6 @@
 
 use std::ops::Range;
 
-use crate::cpu::engine::CpuEngine;
 use crate::cpu::evaluate::{SAMPLES_ONE_BY_ONE, frames, frames_past_caches};
 use crate::cpu::sink::Places;
 use crate::simd::dispatch::{
@@ -48,17 +47,18 @@ struct Place<'o> {
 }
 
 impl<'o> Stage<'o> {
-    /// For `output`: rows of `samples` each, a part of a result of `rotations`. The average length
-    /// of a run is computed last, only if everything else calls for streaming stores.
+    /// For `output`: rows of `samples` each, a part of a result of `rotations`, written by streaming
+    /// stores as `streams` says. Where it says nothing, the average length of a run is computed last,
+    /// only if everything else calls for them.
     pub(crate) fn new(
-        engine: &CpuEngine,
+        width: VectorWidth,
+        streams: Option<bool>,
         rotations: usize,
         samples: usize,
         samples_of_a_run: impl FnOnce() -> usize,
         output: &'o mut [[f32; 4]],
     ) -> Self {
-        let width = engine.width;
-        let is_staged = engine.streaming_stores.unwrap_or_else(|| {
+        let is_staged = streams.unwrap_or_else(|| {
             rotations >= LONG / size_of::<[f32; 4]>()
                 && samples >= ROW
                 && streaming_stores_from().is_some_and(|from| width.narrowed() >= from)

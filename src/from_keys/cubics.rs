@@ -11,7 +11,8 @@ use crate::simd::dispatch::InLanes;
 use crate::simd::lanes::Lanes;
 use crate::twin::small_angle::small_angle_cubic;
 
-/// Samples that are gathered to be evaluated together; they are consecutive in the result.
+/// Samples that are gathered to be evaluated together; they are consecutive in the result. A block of
+/// zeros is empty; lanes that no sample has are marked as held before it is evaluated.
 #[derive(Zeroable)]
 pub(crate) struct CubicBlock {
     /// The four keys around each sample, with continued signs. For a sample that is a key itself

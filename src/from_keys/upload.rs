@@ -6,7 +6,9 @@ use rayon::prelude::*;
 
 use crate::fit::tangent_weights::TrackWeights;
 use crate::from_keys::dispatches::{KeyDispatch, Task};
-use crate::shader::*;
+use crate::shader::{
+    IS_KEY, KeySample, LINE, ROWS_PER_INVOCATION, RowShape, SIGN_TURNED, TangentWeights,
+};
 use crate::time::frames::{FramesError, Ticks};
 use crate::time::key_samples::FramePlan;
 use crate::time::times::key_sample;

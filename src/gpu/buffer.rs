@@ -91,6 +91,12 @@ pub(crate) struct Buffer {
     pub(crate) size: u64,
 }
 
+// SAFETY: the pointer is to memory that belongs to the buffer alone; access goes
+// through `&self` for reading and `&mut self` for writing.
+unsafe impl Send for Buffer {}
+// SAFETY: as above.
+unsafe impl Sync for Buffer {}
+
 /// The size of the largest element that a kernel reads.
 const LEAST: u64 = size_of::<PolynomialSegment>() as u64;
 

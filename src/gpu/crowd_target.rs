@@ -170,7 +170,7 @@ impl CrowdTarget {
     }
 }
 
-/// A target whose result the host reads: evaluated into memory that it sees, submitted without a wait.
+/// A target whose result the host reads: evaluated into memory that the host sees, submitted without a wait.
 pub(crate) struct CrowdReader {
     // It goes first: it waits for what uses the rest.
     pub(crate) results: ReadBack,

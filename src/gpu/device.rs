@@ -133,7 +133,7 @@ impl LogicalDevice {
         let in_place = physical.in_place(options.transfer);
         let stay = in_place || options.read_back == ReadBack::SameQueue;
         let named = copy_queue.filter(|_| !stay);
-        let own = |(raw, family)| {
+        let queue_of_family = |(raw, family)| {
             let raw = Mutex::new(raw);
             Queue { raw, family }
         };
@@ -149,8 +149,8 @@ impl LogicalDevice {
                 in_place,
                 direct: direct(&physical.memory),
             },
-            queue: own((queue, physical.queue_family)),
-            copy_queue: named.map(|named| own((named.queue, named.family))),
+            queue: queue_of_family((queue, physical.queue_family)),
+            copy_queue: named.map(|named| queue_of_family((named.queue, named.family))),
             copies_apart: named.is_some(),
             physical,
             names,

@@ -235,8 +235,10 @@ impl VulkanEngine {
         job: Job<'_>,
         layout: Layout,
     ) -> Result<Box<dyn Storage>, EvaluateError> {
+        let encoding = Encoding::F32;
+        let job = Job { encoding, ..job };
         let whole = job.whole(layout);
-        let bytes = (whole.len() * Encoding::F32.bytes()) as u64;
+        let bytes = (whole.len() * encoding.bytes()) as u64;
         let fits = bytes <= self.device.physical.info.max_memory_allocation_size;
         let buffer = match self.device.placing.in_place && fits {
             true => match self.output_buffer(bytes) {

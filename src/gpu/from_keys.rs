@@ -65,7 +65,7 @@ impl VulkanEngine {
             },
         );
         if let (Some(keys), Ok(())) = (&mut keys, &result) {
-            keys.is_idle = true;
+            keys.has_come_back();
         }
         result
     }

@@ -23,7 +23,7 @@ pub(crate) struct ImportedMemory<'a> {
     memory: NonNull<u8>,
     size: usize,
     /// Whether all work that was submitted has ended, so that dropping need not wait.
-    pub(crate) is_idle: bool,
+    is_idle: bool,
     lender: PhantomData<&'a mut [u8]>,
 }
 
@@ -79,6 +79,11 @@ impl<'a> ImportedMemory<'a> {
         unsafe {
             std::slice::from_raw_parts_mut(self.memory.as_ptr().add(range.start), range.len())
         }
+    }
+
+    /// Says that all work that was submitted with it has ended.
+    pub(crate) fn has_come_back(&mut self) {
+        self.is_idle = true;
     }
 }
 

@@ -149,7 +149,7 @@ impl VulkanEngine {
             result = result.and(finished.map_err(EvaluateError::from));
         }
         if let (Target::ImportedMemory(memory), Ok(())) = (target, &result) {
-            memory.is_idle = true;
+            memory.has_come_back();
         }
         if stopwatch.slow {
             self.halve_windows(); // those of the next call

@@ -88,8 +88,9 @@ pub struct EngineOptions {
     /// The widest vector instructions to evaluate with on the CPU; by default
     /// [`VectorWidth::widest`].
     pub vector_width: Option<VectorWidth>,
-    /// Whether the CPU writes rotations past its caches; by default where results are so long that
-    /// caches keep little of them, on processors that gain by it.
+    /// Whether the CPU writes past its caches: rotations of segments in f32, track by track, where the
+    /// memory is aligned to 16 bytes. By default it does so with results of 32 MiB and more, on
+    /// processors that gain by it.
     pub streaming_stores: Option<bool>,
     /// How results come back from a Vulkan device.
     pub transfer: Transfer,

@@ -84,7 +84,7 @@ impl Pipeline {
         };
         let words = words.expect("the kernels passed when they were compiled");
         let info = vk::ShaderModuleCreateInfo::default().code(&words);
-        // SAFETY: the words are valid SPIR-V: naga made them.
+        // SAFETY: the words are valid SPIR-V: naga made and validated them, and the passes keep them valid.
         let module = unsafe { device.raw.create_shader_module(&info, None) }
             .named("vkCreateShaderModule")?;
         let stage = vk::PipelineShaderStageCreateInfo::default()
@@ -129,7 +129,7 @@ impl Pipeline {
         // Made last: dropped first, it waits for its work before the buffers are freed.
         let mut submission = Submission::new(&self.device, Lane::Kernels)?;
         submission.begin(1)?;
-        Upload::record(uploads.iter(), &submission);
+        Upload::record(uploads.iter(), &mut submission);
         submission.dispatch(self, &bindings, constants, groups)?;
         (submission.commands()).barrier(Access::Kernel, Access::Host);
         submission.submit()?;
@@ -148,7 +148,7 @@ impl Pipeline {
 
 impl VulkanEngine {
     /// A pass over poses: runs a kernel with these inputs, of at most as many values of 16 bytes as a
-    /// window has rotations. It has so many invocations, and a detail that the kernel is told.
+    /// window has rotations. It has `count` invocations; `detail` is passed to the kernel.
     pub(crate) fn pass(
         &self,
         kernel: Kernel,

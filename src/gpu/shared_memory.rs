@@ -37,17 +37,15 @@ pub(crate) struct Share {
     pub(crate) mapped: Option<NonNull<u8>>,
 }
 
-// SAFETY: the pointer is to mapped memory that goes from thread to thread with its block or its buffer.
-// Each part of it is used by the one buffer that holds it, whose `&self` reads and whose `&mut self` writes.
-unsafe impl Send for Share {}
-// SAFETY: as above.
-unsafe impl Sync for Share {}
-
 struct Block {
     kind: Kind,
     whole: Share,
     free: Free,
 }
+
+// SAFETY: the pointer is to mapped memory that goes from thread to thread with the block; each part of
+// it is used by the one buffer that holds it.
+unsafe impl Send for Block {}
 
 impl SharedMemory {
     pub(crate) fn take(

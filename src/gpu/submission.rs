@@ -40,7 +40,7 @@ pub(crate) struct Spent {
     pub(crate) on_device: Duration,
 }
 
-/// A point on the timeline of a semaphore.
+/// A point of time: a semaphore and a value of its timeline.
 pub(crate) type Point = (vk::Semaphore, u64);
 
 /// A range of a buffer that a kernel sees.
@@ -118,8 +118,9 @@ impl Submission {
     }
 
     /// Where commands are recorded, after `begin`. The caller keeps what they use until `wait`.
-    pub(crate) fn commands(&self) -> Commands<'_> {
-        // SAFETY: the command buffer is this device's; callers have called `begin`, so recording is on.
+    pub(crate) fn commands(&mut self) -> Commands<'_> {
+        // SAFETY: the command buffer is this device's, and nobody else records while `self` is lent; callers
+        // have called `begin`, so recording is on.
         unsafe { Commands::new(&self.device, self.commands) }
     }
 

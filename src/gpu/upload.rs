@@ -46,7 +46,7 @@ impl Upload {
     }
 
     /// Records the copies of some uploads, where any of them are copied, and that kernels wait.
-    pub(crate) fn record<'u>(uploads: impl Iterator<Item = &'u Self>, submission: &Submission) {
+    pub(crate) fn record<'u>(uploads: impl Iterator<Item = &'u Self>, submission: &mut Submission) {
         let mut any = false;
         for upload in uploads {
             if let (Some(from), Some(to)) = (&upload.written, &upload.copied)

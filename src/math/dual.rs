@@ -17,6 +17,7 @@ pub(crate) trait Scalar: Arithmetic {
     fn all(value: f64) -> Self {
         Self::constant(Self::Constant::all(value))
     }
+
     /// `sin(x)/x` and `cos(x)`, given `x²`: both are smooth functions of it, also at 0.
     fn waves(self) -> (Self, Self);
     /// `x²`, given `sin²(x/2)`, for `x` up to pi.

@@ -72,13 +72,13 @@ pub(crate) struct PrincipalRange<R> {
 pub(crate) struct Waves<const N: usize> {
     /// The largest x² for which they hold.
     pub(crate) limit: f64,
-    /// The coefficients of `(sin(x)/x - 1) / x²` and of `(cos(x) - 1) / x²` in powers of x²; from
-    /// Chebyshev nodes.
+    /// The coefficients of `(sin(x)/x - 1) / x²` in powers of x²; from Chebyshev nodes.
     sinc: [f64; N],
+    /// Those of `(cos(x) - 1) / x²`.
     cosine: [f64; N],
 }
 
-/// Within 1e-14.
+/// For angles up to pi/2, within 1e-14.
 pub(crate) const LONG_WAVES: Waves<8> = Waves {
     limit: FRAC_PI_2 * FRAC_PI_2,
     sinc: [
@@ -103,7 +103,7 @@ pub(crate) const LONG_WAVES: Waves<8> = Waves {
     ],
 };
 
-/// Within 3e-12: for what is rounded to f32.
+/// For angles up to 1/2, within 3e-12: for what is rounded to f32.
 pub(crate) const SHORT_WAVES: Waves<4> = Waves {
     limit: 0.25,
     sinc: [
@@ -120,7 +120,7 @@ pub(crate) const SHORT_WAVES: Waves<4> = Waves {
     ],
 };
 
-/// Within 7e-9; up to 1/2 within 3e-9.
+/// For squared angles up to 5/4, within 7e-9; up to 1/2 within 3e-9.
 pub(crate) const MEDIUM_WAVES: Waves<4> = Waves {
     limit: 1.25,
     sinc: [

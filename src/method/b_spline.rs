@@ -84,13 +84,14 @@ fn curves(intervals: &mut Intervals, stretches: &[Stretch], ends: Ends) {
         if matches!(ends, Ends::Loop) && stretch.all > 1 {
             continue; // the context already has the neighbours across the seam
         }
-        // Two keys: constant velocity.
-        let alone = stretch.all == 1 || matches!(ends, Ends::Frozen);
-        let before = |lane| match alone {
+        // Two keys turn at constant velocity. With frozen ends the outer intervals stand still, and
+        // any continuation will do.
+        let repeats_own = stretch.all == 1 || matches!(ends, Ends::Frozen);
+        let before = |lane| match repeats_own {
             true => (lane - 1, at(&intervals.logs, lane)),
             false => (lane - 1, before_first(intervals, lane, start)),
         };
-        let after = |lane| match alone {
+        let after = |lane| match repeats_own {
             true => (lane + 1, at(&intervals.logs, lane)),
             false => (lane + 1, after_last(intervals, lane, end)),
         };

@@ -125,8 +125,8 @@ pub struct Method {
     pub(crate) curves: &'static Curves,
 }
 
-/// What most methods have in common, and how they are unless they say otherwise. Names, formula and
-/// curves are each method's own; without curves a method holds its keys.
+/// What most methods have in common, and how they are unless they say otherwise. Names, formula,
+/// textbook definition and curves are each method's own.
 const USUAL: Method = Method {
     name: "",
     summary: "",

@@ -34,7 +34,7 @@ pub(crate) struct Bisector<const DIVISOR: u8>;
 
 impl<const DIVISOR: u8> HandleRule for Bisector<DIVISOR> {
     // These handles are 3/DIVISOR times as long as the parabola's, at inner keys too.
-    const BOTH: f64 = 2.0 / DIVISOR as f64;
+    const HANDLES_OF_TURN: f64 = 2.0 / DIVISOR as f64;
 
     #[inline(always)]
     fn handles<A: Algebra>(algebra: &mut A, [before, after]: BothSides<A>) -> Handles<A::Number> {

@@ -192,7 +192,8 @@ impl<'a> Curves<'a> {
             [_, slope2, bend2, cube2],
             [_, _, _, value3],
         ] = basis;
-        // The step beyond an end, by what the basis functions of the own step and of that one are there.
+        // The step beyond an end, from the own basis function's bend and slope there, and the slope of
+        // that step's.
         let beyond = |bend: f64, own_slope: f64, slope: f64, next: usize| match self.ends {
             Ends::Natural => own * (bend / slope),
             Ends::Clamped { .. } => own * (-own_slope / slope),

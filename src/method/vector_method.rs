@@ -41,15 +41,15 @@ impl VectorMethod {
     /// The name by which programs call it.
     #[must_use]
     pub fn name(self) -> &'static str {
-        [
-            "step",
-            "linear",
-            "catmull-rom",
-            "bessel-overhauser",
-            "gltf-cubic",
-            "c2",
-            "b-spline",
-        ][self as usize]
+        match self {
+            Self::Step => "step",
+            Self::Linear => "linear",
+            Self::CatmullRom => "catmull-rom",
+            Self::BesselOverhauser => "bessel-overhauser",
+            Self::GltfCubic => "gltf-cubic",
+            Self::C2 => "c2",
+            Self::BSpline => "b-spline",
+        }
     }
 }
 

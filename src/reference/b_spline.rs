@@ -19,6 +19,8 @@ fn b_spline(track: &Track, ends: Ends, i: usize) -> Segment {
     let basis = Basis::Knots(knots(&track.times, ends, i));
     // The step beyond the first interval or, `at_end`, beyond the last.
     let beyond = |at_end: bool| {
+        // The outermost interval, the next one, where the curve ends in the former, and which factor
+        // turns beyond it.
         let (own, next, t, outer) = match at_end {
             false => (0, 1, 0.0, 0),
             true => (last, last.saturating_sub(1), 1.0, 2),
@@ -26,6 +28,7 @@ fn b_spline(track: &Track, ends: Ends, i: usize) -> Segment {
         let solved = if at_end { third } else { first };
         match ends {
             _ if last == 0 => step(0),
+            // Across the seam.
             Ends::Loop => step(last - own),
             Ends::Parabolic => parabola(track, own, next),
             Ends::Natural => {

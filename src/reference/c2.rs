@@ -75,11 +75,10 @@ fn relax(intervals: &[Interval], ends: Ends, velocities: &mut [DVec3], bent: &[b
                 _ => (Some(key - 1), Some(key)),
             };
             let (mut excess, mut stiffness) = (DVec3::ZERO, 0.0);
-            for (i, t, sign) in [(before, 1.0, 1.0), (after, 0.0, -1.0)] {
+            for (i, t, is_bent, sign) in [(before, 1.0, bent[key], 1.0), (after, 0.0, true, -1.0)] {
                 let Some(i) = i else { continue };
                 let h = intervals[i].duration;
                 let cubic = intervals[i].cubic(velocities, i);
-                let is_bent = t == 0.0 || bent[key];
                 excess += cubic.acceleration(t, is_bent) / (h * h) * sign;
                 stiffness += 4.0 / h;
             }

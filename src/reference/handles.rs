@@ -123,7 +123,8 @@ impl Sides {
     }
 }
 
-/// The method that says this of handles.
+/// A definition whose curves follow from these [`Handles`]: a macro, because a function pointer cannot
+/// capture them.
 macro_rules! by_handles {
     ($handles:expr) => {
         Definition::new(|track, ends| $handles.segments(track, ends))

@@ -99,6 +99,7 @@ impl Smoothing {
             passes: 1,
         }
     }
+
     /// Refuses what means nothing.
     ///
     /// # Errors

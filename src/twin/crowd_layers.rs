@@ -4,11 +4,16 @@
 use glam::Vec4;
 
 use crate::math::canonical::canonical;
-use crate::shader::*;
+use crate::shader::{
+    ArcSegment, CHANNELS, CrowdChannel, CrowdEntry, CrowdPlace, FORM_ARC, FORM_CONSTANT,
+    FORM_CUBIC, ON_KEY, POWERS, PolynomialSegment, ROTATION, TICKS, TRANSLATION, WEIGHT_UNIT,
+};
 use crate::simd::lanes::Number;
 use crate::twin::evaluate::Evaluate as _;
-pub(crate) use crate::twin::pose_add::pose as turn_added;
 use crate::twin::quaternion::slerp;
+
+/// The function of the shader with this name does what `pose` of `shaders/poses/add.wgsl` does.
+pub(crate) use crate::twin::pose_add::pose as turn_added;
 
 /// What the kernels over layers read. Entries and places are those of a window of instances.
 #[derive(Clone, Copy)]

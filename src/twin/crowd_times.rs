@@ -1,7 +1,10 @@
 //! Twin of `shaders/crowd/times.wgsl` and `shaders/crowd/entry.wgsl`: the same names, with the whole
 //! numbers of 64 bits that the shader makes of two words.
 
-use crate::shader::*;
+use crate::shader::{
+    CrowdBase, CrowdClip, CrowdEntry, CrowdPlace, CrowdSpan, ON_KEY, RUNS_BACKWARDS,
+    SPEED_MAGNITUDE, START_BIAS, TICKS, WRAP_HOLD, WRAP_LOOP,
+};
 
 /// Bits of the time since an anchor, in ticks.
 pub(crate) const ELAPSED_BITS: u32 = 40;

@@ -1,5 +1,5 @@
 //! The claim on a lavapipe that is years newer than the system's: recorded hashes, the self-test,
-//! and each way of evaluating against the CPU.
+//! and one way of reading against the CPU.
 
 use std::path::Path;
 use std::process::Command;
@@ -30,7 +30,7 @@ fn the_newer_lavapipe_gives_the_same_bits() {
         let output = with_driver(command.args(arguments), &manifest)
             .env("MESA_SHADER_CACHE_DISABLE", "false")
             .env("MESA_SHADER_CACHE_DIR", &cache)
-            .env("ONE_WAY", "1")
+            .env("TUMBLE_TEST_ONE_WAY", "1")
             .output()
             .unwrap();
         let said = String::from_utf8_lossy(&output.stdout).into_owned();

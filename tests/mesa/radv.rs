@@ -1,4 +1,4 @@
-//! AMD's real compiler over every kernel, for six families of processors, without one of them:
+//! AMD's real compiler over every kernel, for six families of processors in turn, without one of them:
 //! told a family (`RADV_FORCE_FAMILY`), Mesa's RADV makes a device that cannot compute, and
 //! compiles for it. What it made is read, and every instruction on floats must round as the shader
 //! says.
@@ -149,7 +149,7 @@ fn faults(kernel: &str, listing: &Listing, generation: Generation) -> Vec<String
 /// processor of the older kind and for one of the newer, the system's for one or two. Those of the table
 /// are compiled for all.
 #[test]
-fn every_kernel_is_exact_on_six_families() {
+fn every_kernel_is_exact_on_families_in_turn() {
     let newer = newer("radeon");
     let newer_families = FAMILIES.iter().map(|own| (own, Some(own.name), &newer));
     let system = system();

@@ -47,10 +47,10 @@ pub fn stage(options: &mut EngineOptions, turn: usize) {
     (options.uploads, options.read_back) = STAGED[turn % STAGED.len()];
 }
 
-/// [`WAYS`], or the first alone where `ONE_WAY` is set: for drivers that are tried beside those of
+/// [`WAYS`], or the first alone where `TUMBLE_TEST_ONE_WAY` is set: for drivers that are tried beside those of
 /// the system.
 fn ways() -> &'static [(Reads, Mapping)] {
-    match std::env::var_os("ONE_WAY") {
+    match std::env::var_os("TUMBLE_TEST_ONE_WAY") {
         Some(_) => &WAYS[..1],
         None => &WAYS,
     }

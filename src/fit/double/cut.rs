@@ -65,7 +65,7 @@ impl Cutter {
         self.curves.push(curve);
     }
 
-    /// Cuts and fits the curves that were added, all of one shape and quantity.
+    /// Cuts and fits the curves that were added. Shape and quantity are the same at every call.
     pub(crate) fn cut(
         &mut self,
         shape: &'static Shape,

@@ -35,8 +35,9 @@ impl InLanes for Steps<'_> {
     }
 }
 
-/// Calls `again` for those of some lanes whose doubt, one in each lane of a vector, is not 0; most
-/// vectors have none.
+/// Calls `again` for every lane in doubt. `doubt` has a number for each lane of a vector, the first of
+/// which is the first of `lanes`; a lane is in doubt where its number is not 0, and NaN is not. Most vectors
+/// have none.
 #[inline(always)]
 pub(crate) fn redo<D: Doubles>(doubt: D, lanes: Range<usize>, again: impl FnMut(usize)) {
     if !doubt.are_at_most(0.0) {
@@ -46,7 +47,7 @@ pub(crate) fn redo<D: Doubles>(doubt: D, lanes: Range<usize>, again: impl FnMut(
     }
 }
 
-/// It is kept out of the loops over vectors.
+/// The rest of [`redo`], rarely needed and so not inlined into loops over vectors.
 #[inline(never)]
 fn redo_lanes(lanes: Range<usize>, doubts: [f64; MOST], again: impl FnMut(usize)) {
     let lanes = lanes.zip(doubts).filter(|&(_, doubt)| doubt != 0.0);
@@ -113,8 +114,8 @@ pub(crate) trait HandleRule {
     /// Whether curves are given in cumulative form, not by their control rotations.
     const IS_CUMULATIVE: bool = false;
 
-    /// The part of a turn at constant rate that both handles of its interval are together.
-    const BOTH: f64 = 2.0 / 3.0;
+    /// At constant velocity the two handles of an interval are together this part of its logarithm.
+    const HANDLES_OF_TURN: f64 = 2.0 / 3.0;
 
     /// The handle of the first or of the last key of a track, from the logarithm of its interval's
     /// step and from the handle of the interval's inner key.
@@ -122,7 +123,7 @@ pub(crate) trait HandleRule {
         match handle {
             EndHandle::Turn(turn) => scaled(turn, 1.0 / 3.0),
             // The tangent of a parabola changes at a constant rate.
-            EndHandle::Parabolic => sum(scaled(log, Self::BOTH), scaled(other, -1.0)),
+            EndHandle::Parabolic => sum(scaled(log, Self::HANDLES_OF_TURN), scaled(other, -1.0)),
             // No acceleration: the control rotation lies half way to the other one.
             EndHandle::Natural(rest) => scaled(rest, 0.5),
         }

@@ -56,7 +56,7 @@ impl HandlesF32 {
 }
 
 impl Side {
-    /// The intervals that lie so far before those after the keys.
+    /// `back` is 1 for the intervals before the keys, 0 for those after them.
     fn new(intervals: &Intervals, keys: &[usize], back: usize) -> Self {
         let mut side = Self {
             from: [[0.0; AT_ONCE]; 4],
