@@ -206,7 +206,7 @@ fn long_results_have_the_bits_of_short_ones() {
     let set = hostile_set(7, 1800);
     let frames = Frames::fps(60).between(-1.0, 20.0);
     let ordinary = engine(&Device::Cpu, |options| {
-        options.streaming_stores = Some(false)
+        options.streaming_stores = Some(false);
     });
     for method in [method::SLERP, method::BESSEL_OVERHAUSER, method::SQUAD] {
         let expected = ordinary.evaluate(&set, method, &frames).unwrap();

@@ -10,7 +10,7 @@ use crate::method::{Continuity, Cost, Curves, Keys, Method, Smooth, USUAL, ends}
 use crate::reference;
 
 /// Bessel-Overhauser on rotations: smooth in time for any spacing of keys, and
-/// equal to [`CATMULL_ROM`] for even ones.
+/// equal to [`CATMULL_ROM`](crate::method::CATMULL_ROM) for even ones.
 pub const BESSEL_OVERHAUSER: Method = Method {
     name: "bessel-overhauser",
     summary: "smooth through keys at any spacing; equals catmull-rom on even spacing",

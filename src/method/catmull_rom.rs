@@ -10,7 +10,7 @@ use crate::reference;
 
 /// Catmull-Rom on rotations, in cumulative form. It ignores the time steps, so its velocity jumps
 /// on uneven keys;
-/// [`BESSEL_OVERHAUSER`] corrects this.
+/// [`BESSEL_OVERHAUSER`](crate::method::BESSEL_OVERHAUSER) corrects this.
 pub const CATMULL_ROM: Method = Method {
     name: "catmull-rom",
     summary: "smooth through evenly spaced keys; its velocity jumps where they are uneven",

@@ -13,7 +13,7 @@ use crate::tracks::set::Track;
 /// Kochanek-Bartels, with [`Tcb`](crate::tracks::key_data::Tcb) for each key
 /// ([`TrackSet::set_tcb`](crate::tracks::set::TrackSet::set_tcb)) or for all
 /// ([`Interpolation::tcb`]). With zeros it is
-/// [`BESSEL_OVERHAUSER_MEAN`].
+/// [`BESSEL_OVERHAUSER_MEAN`](crate::method::BESSEL_OVERHAUSER_MEAN).
 pub const KOCHANEK_BARTELS: Method = Method {
     name: "kochanek-bartels",
     summary: "an animator's curve: tension, continuity and bias at each key",

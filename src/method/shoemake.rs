@@ -9,7 +9,7 @@ use crate::reference;
 
 /// Approach I of the lecture: the control rotation is the bisector itself. It passes its keys three
 /// times too fast and overshoots; it is here for comparison.
-/// [`SHOEMAKE_1985`] corrects this.
+/// [`SHOEMAKE_1985`](crate::method::SHOEMAKE_1985) corrects this.
 pub const SHOEMAKE: Method = Method {
     name: "shoemake",
     summary: "Bezier curves whose controls are the bisectors; passes its keys three times too fast",

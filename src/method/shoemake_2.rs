@@ -7,7 +7,7 @@ use crate::reference;
 
 /// Approach II of the lecture: the handle goes half of the way to the bisector. It passes its keys
 /// one and a half times too fast;
-/// [`SHOEMAKE_1985`] corrects this.
+/// [`SHOEMAKE_1985`](crate::method::SHOEMAKE_1985) corrects this.
 pub const SHOEMAKE_2: Method = Method {
     name: "shoemake-2",
     summary: "Bezier curves whose controls are half way to the bisector; passes its keys half too fast",
