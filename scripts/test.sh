@@ -125,8 +125,8 @@ if [ -z "${VK_DRIVER_FILES:-}${VK_ADD_DRIVER_FILES:-}" ] && [ -e "$swiftshader" 
     export VK_ADD_DRIVER_FILES="$swiftshader"
 fi
 
-# Four seconds for each fuzz target, a quarter for motion files; ten minutes each are FUZZ_SECONDS=600.
-export FUZZ_SECONDS=${FUZZ_SECONDS:-4}
+# Three seconds for each fuzz target, a quarter for motion files; ten minutes each are FUZZ_SECONDS=600.
+export FUZZ_SECONDS=${FUZZ_SECONDS:-3}
 # The Python package waits for processes that it starts more than it computes: it is tested meanwhile.
 said=target/python.log
 ./scripts/python.sh --color=yes >"$said" 2>&1 &

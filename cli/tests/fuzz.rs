@@ -2,7 +2,7 @@
 //! those that lead to something new are mutated further.
 //!
 //! `FUZZ_SECONDS` says how long each target runs; 600 is a run on demand, `scripts/test.sh`
-//! takes 4. A failing input is kept under `target/fuzz/`.
+//! takes 3. A failing input is kept under `target/fuzz/`.
 
 #[path = "../../tests/support/mod.rs"]
 mod support;
