@@ -1,12 +1,13 @@
 // Reciprocal, square root and arc tangent, from operations that every driver rounds alike: a
 // first guess by integer arithmetic on the bits, and Newton's steps. Arguments are 0 or at least
-// 2^-60 in magnitude, so that no square is subnormal; `flushed` makes them so.
+// 2^-50 in magnitude, so that no square is subnormal, nor what rounding takes from one; `flushed`
+// makes them so.
 // Twin: src/twin/arc_tangent.rs.
 
 const RECIPROCAL_SEED: u32 = 0x7ef311c7;
 const ROOT_SEED: u32 = 0x5f3759df;
-// 2^-60.
-const FLUSHED_BITS: u32 = 0x21800000;
+// 2^-50.
+const FLUSHED_BITS: u32 = 0x26800000;
 
 // (atan(t)/t - 1)/t² in powers of t², for 0 <= t <= 1; within 6e-8.
 const ARC_0: f32 = -0.3333333134651184;
@@ -26,7 +27,7 @@ const PI: f32 = 3.1415927410125732;
 const PI_LOW: f32 = -8.742277657347586e-8;
 const DEGREES: f32 = 57.295780181884766;
 
-// 0 where the magnitude is below 2^-60.
+// 0 where the magnitude is below 2^-50.
 fn flushed(x: f32) -> f32 {
     return select(x, 0.0, (bitcast<u32>(x) & 0x7fffffffu) < FLUSHED_BITS);
 }
