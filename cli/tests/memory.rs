@@ -107,7 +107,7 @@ fn a_large_file_is_read_in_bounded_extra_memory() {
     use std::io::Write;
 
     let length = std::env::var("LARGE_FILE").map_or(100_000_000, |text| text.parse().unwrap());
-    for boxes in [1, 200] {
+    for boxes in [1, 3, 200] {
         let mut written = 0;
         let mut input = Lines::new(|number, line: &mut Vec<u8>| {
             if number == 0 {
