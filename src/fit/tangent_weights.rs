@@ -3,7 +3,7 @@
 //! in f64.
 
 use crate::curve::options::Ends;
-use crate::fit::double::intervals::{Intervals, LANES, ROOM, Stretch};
+use crate::fit::double::intervals::{Intervals, ROOM, Stretch};
 use crate::shader::{KEY_AT_END, KEY_INNER, KEY_UNKNOWN, TangentWeights};
 use crate::simd::dispatch::{InLanes, in_lanes};
 use crate::simd::lanes::Lanes;
@@ -87,10 +87,11 @@ impl KeyWeights {
 
     /// Computes the weights of all keys of a block.
     pub(crate) fn bring(&mut self, intervals: &Intervals, stretches: &[Stretch]) {
-        for lane in 0..LANES {
-            let [before, after] = [lane, lane + 1].map(|lane| intervals.durations[lane]);
-            self.keys[lane + 1] = self.rule.between(before, after);
-        }
+        in_lanes(&mut Between {
+            rule: self.rule,
+            durations: &intervals.durations[..=intervals.count],
+            weights: &mut self.keys[1..=intervals.count],
+        });
         for stretch in stretches {
             // A track of two keys has no neighbouring intervals, not even in a loop.
             let end = match (stretch.all, self.ends) {
@@ -114,6 +115,7 @@ pub(crate) struct TrackWeights<'a> {
     ends: Ends,
     times: &'a [f64],
     whole: (usize, usize),
+    durations: Vec<f64>,
     weights: Vec<TangentWeights>,
 }
 
@@ -124,6 +126,7 @@ impl<'a> TrackWeights<'a> {
             ends,
             times: &[],
             whole: (0, 0),
+            durations: Vec::new(),
             weights: Vec::new(),
         }
     }
@@ -137,12 +140,15 @@ impl<'a> TrackWeights<'a> {
         (self.times, self.whole) = (times, (first, all));
         self.weights.clear();
         self.weights.resize(times.len(), UNKNOWN);
-        let mut work = Between {
-            rule: self.rule,
-            times,
-            weights: &mut self.weights,
-        };
-        in_lanes(&mut work);
+        self.durations.clear();
+        (self.durations).extend(times.windows(2).map(|pair| pair[1] - pair[0]));
+        if let [_, inner @ .., _] = &mut self.weights[..] {
+            in_lanes(&mut Between {
+                rule: self.rule,
+                durations: &self.durations,
+                weights: inner,
+            });
+        }
         let is_curve = all > 2;
         if first == 0 && is_curve {
             self.weights[0] = WeightRule::end(self.ends);
@@ -154,23 +160,21 @@ impl<'a> TrackWeights<'a> {
     }
 }
 
-/// Computes [`WeightRule::between`] for every key but the first and the last.
+/// Computes the weights of the keys between neighbouring intervals of these durations, one fewer
+/// than there are durations.
 struct Between<'a> {
     rule: WeightRule,
-    times: &'a [f64],
+    durations: &'a [f64],
     weights: &'a mut [TangentWeights],
 }
 
 impl InLanes for Between<'_> {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
-        let ([_, inner @ .., _], [_, own @ ..]) = (&mut *self.weights, self.times) else {
-            return;
-        };
-        let count = inner.len();
-        let (before, own, after) = (&self.times[..count], &own[..count], &own[1..][..count]);
+        let count = self.weights.len();
+        let (before, after) = (&self.durations[..count], &self.durations[1..=count]);
         for j in 0..count {
-            inner[j] = self.rule.between(own[j] - before[j], after[j] - own[j]);
+            self.weights[j] = self.rule.between(before[j], after[j]);
         }
     }
 }

@@ -11,7 +11,7 @@ use crate::math::quaternion::{Quaternion, Real, dot};
 use crate::path::lanes::{Row, load};
 use crate::path::sample::{END, Kind, MIDDLE, PAIRS, START, Sampler, Samples, Span};
 use crate::prepare::prepared::Prepared;
-use crate::shader::PolynomialSegment;
+use crate::shader::{POWERS, PolynomialSegment};
 use crate::simd::dispatch::{InLanes, in_lanes};
 use crate::simd::lanes::{Doubles, Lanes, canonical};
 use crate::time::spans::Source;
@@ -200,7 +200,8 @@ impl InLanes for InFit<'_> {
                     numbers.odd[k][c] = L::rounded(forward - backward);
                 }
             }
-            let (mut powers, tails) = coefficients(false, &FULL_NODES, &numbers);
+            let mut powers = [[L::all(0.0); 4]; POWERS];
+            let tails = coefficients(false, &FULL_NODES, &numbers, &mut powers);
             tails.store(&mut self.own.tails[lane..lane + L::COUNT]);
             let unit = L::load(&self.own.units[lane..]);
             for power in &mut powers {

@@ -4,14 +4,14 @@
 
 use std::ops::Range;
 
-use bytemuck::Zeroable as _;
+use bytemuck::Zeroable;
 
 use crate::curve::options::Ends;
 use crate::fit::double::fit::{MOST, Samples};
 use crate::fit::double::intervals::{Intervals, LANES, ROOM, Stretch};
 use crate::fit::single::fit_range::{FEW_POWERS, LONGEST_OF_FEW, LONGEST_WHOLE, WHOLE};
 use crate::fit::single::handles::{
-    CurveNumbers, FindCurves, FindSteps, HandlesF32, LONGEST_DIRECT,
+    CurveNumbers, FindCurves, FindSteps, HandlesF32, LONGEST_DIRECT, WAITING,
 };
 use crate::fit::single::hermite_fit::{BetweenKeys, Halves, KeyFit};
 use crate::fit::single::small_angle::SmallAngleLanes;
@@ -25,20 +25,25 @@ use crate::simd::dispatch::{InLanes, in_lanes};
 use crate::simd::lanes::Lanes;
 use crate::time::spans::NONE;
 
+type Places = [Place; ROOM + WAITING];
+
+/// The list of the lanes whose curve becomes two spans.
+const HALVES: usize = 3;
+
 /// Prepares the curves of a block straight from keys.
 pub(crate) struct Direct {
     weights: KeyWeights,
     small_angle: SmallAngleLanes,
     whole: HandlesF32,
     /// Where the curve of each lane goes; of one that is split, the first half.
-    places: [Place; ROOM],
-    /// Lanes that are fitted whole by degree 10.
-    usual: Vec<u32>,
-    /// Lanes that are fitted with degree 8, and lanes whose curve is split at its middle.
-    few_powers: Vec<u32>,
-    halves: Vec<u32>,
-    /// Lanes that f32 cannot prepare.
-    left_over: Vec<u32>,
+    places: Places,
+    /// The lanes that were taken, by what becomes of their curves: small-angle cubics, curves
+    /// fitted with degree 8, curves fitted with degree 10, curves split at their middle
+    /// ([`HALVES`]), and those that f32 cannot prepare.
+    lists: [List; 5],
+    /// The starts and the keys of the spans that lanes become, which are at most two each.
+    starts: [f64; 2 * LANES],
+    keys: [u32; 2 * LANES],
     /// Intervals that f32 cannot prepare wait here; made for the first one.
     rest: Option<Box<Rest>>,
     /// See [`FromKeys`].
@@ -53,11 +58,10 @@ impl Direct {
             weights: KeyWeights::new(how.weights, ends),
             small_angle: SmallAngleLanes::zeroed(),
             whole: HandlesF32::new(),
-            places: [Place::zeroed(); ROOM],
-            usual: Vec::new(),
-            few_powers: Vec::new(),
-            halves: Vec::new(),
-            left_over: Vec::new(),
+            places: [Place::zeroed(); ROOM + WAITING],
+            lists: [List::zeroed(); 5],
+            starts: [0.0; 2 * LANES],
+            keys: [NONE; 2 * LANES],
             rest: None,
             set_long: how.set_long,
             smooth,
@@ -83,38 +87,39 @@ impl Direct {
         });
     }
 
-    /// Takes the curve in a lane: it becomes the next span, with the constant `key` at its start,
-    /// or the next two if it is split at its middle.
-    #[inline]
+    /// Takes the curves in some lanes: they become the next spans, two for each that is split at
+    /// its middle. `key` is the constant at the start of the first. Nothing branches on how far a
+    /// curve turns, which no processor can predict.
     pub(crate) fn take(
         &mut self,
         prepared: &mut Prepared,
         intervals: &Intervals,
-        lane: usize,
+        lanes: Range<usize>,
         key: u32,
     ) {
-        let start = intervals.starts[lane];
-        let place = prepared.push_segment(start, PolynomialSegment::zeroed(), key);
-        self.places[lane] = place;
-        if self.small_angle.holds[lane] {
-            let segment = &mut prepared.segments.polynomials[place.segment];
-            self.small_angle.write(lane, segment);
-            return;
+        let (first_span, first_segment) = prepared.next_place();
+        let mut count = 0;
+        for (i, lane) in lanes.enumerate() {
+            let squared_extent = self.whole.squared_extents[lane];
+            // NaN is left over too.
+            let longer = [LONGEST_OF_FEW, LONGEST_WHOLE, LONGEST_DIRECT]
+                .map(|longest| usize::from(!(squared_extent <= longest as f32)));
+            let is_small = self.small_angle.holds[lane];
+            let list = usize::from(!is_small) * (1 + longer.iter().sum::<usize>());
+            self.lists[list].push(lane);
+            self.places[lane] = Place {
+                span: first_span + count,
+                segment: first_segment + count,
+            };
+            let (start, end) = (intervals.starts[lane], intervals.ends[lane]);
+            let own = if key == NONE { NONE } else { key + i as u32 };
+            let (this, next) = (count % (2 * LANES), (count + 1) % (2 * LANES));
+            (self.starts[this], self.keys[this]) = (start, own);
+            // The next lane writes over this unless the curve is split.
+            (self.starts[next], self.keys[next]) = (start + (end - start) * 0.5, NONE);
+            count += 1 + usize::from(list == HALVES);
         }
-        let squared_extent = self.whole.squared_extents[lane];
-        let list = if squared_extent <= LONGEST_OF_FEW as f32 {
-            &mut self.few_powers
-        } else if squared_extent <= LONGEST_WHOLE as f32 {
-            &mut self.usual
-        } else if squared_extent <= LONGEST_DIRECT as f32 {
-            let middle = start + (intervals.ends[lane] - start) * 0.5;
-            prepared.push_segment(middle, PolynomialSegment::zeroed(), NONE);
-            &mut self.halves
-        } else {
-            // NaN comes here too.
-            &mut self.left_over
-        };
-        list.push(lane as u32);
+        prepared.push_segments(&self.starts[..count], &self.keys[..count]);
     }
 
     /// Fits the curves that were taken. Those left over wait, here or in `fitting`. `is_exact` says
@@ -127,19 +132,26 @@ impl Direct {
         is_exact: bool,
         fitting: &mut Fitting,
     ) {
-        let (numbers, places) = (&self.whole.numbers, &self.places);
-        fit(&WHOLE, &mut self.usual, numbers, places, prepared);
-        fit(&FEW_POWERS, &mut self.few_powers, numbers, places, prepared);
-        fit(&Halves, &mut self.halves, numbers, places, prepared);
+        let (numbers, places) = (&mut self.whole.numbers, &mut self.places);
+        let [small_angle, few_powers, usual, halves, left_over] = &mut self.lists;
+        for &lane in small_angle.lanes() {
+            let segment = &mut prepared.segments.polynomials[places[lane as usize].segment];
+            self.small_angle.write(lane as usize, segment);
+        }
+        fit_vectors(&FEW_POWERS, few_powers, 0, numbers, places, prepared);
+        fit_vectors(&WHOLE, usual, 1, numbers, places, prepared);
+        fit_vectors(&Halves, halves, 2, numbers, places, prepared);
         if is_exact {
-            for &lane in &self.left_over {
+            for &lane in left_over.lanes() {
                 let lane = lane as usize;
                 fitting.take(intervals, lane, self.places[lane]);
             }
         } else {
             self.leave(prepared, intervals, stretches, fitting);
         }
-        self.left_over.clear();
+        let [small_angle, .., left_over] = &mut self.lists;
+        small_angle.count = 0;
+        left_over.count = 0;
     }
 
     /// Moves intervals that are left over to `rest`, each run of them between its neighbours as
@@ -151,7 +163,8 @@ impl Direct {
         stretches: &[Stretch],
         fitting: &mut Fitting,
     ) {
-        let mut left_over = &self.left_over[..];
+        let [.., left_over] = &self.lists;
+        let mut left_over = left_over.lanes();
         for stretch in stretches {
             let end = stretch.lanes().end;
             let own = left_over.partition_point(|&lane| (lane as usize) < end);
@@ -171,48 +184,103 @@ impl Direct {
 
     /// Fits the curves that still wait, and hands those left over to `fitting`.
     pub(crate) fn finish(&mut self, prepared: &mut Prepared, fitting: &mut Fitting) {
+        let (numbers, places) = (&self.whole.numbers, &self.places);
+        let [_, few_powers, usual, halves, _] = &mut self.lists;
+        fit(
+            &FEW_POWERS,
+            few_powers,
+            few_powers.count,
+            numbers,
+            places,
+            prepared,
+        );
+        fit(&WHOLE, usual, usual.count, numbers, places, prepared);
+        fit(&Halves, halves, halves.count, numbers, places, prepared);
+        for list in [few_powers, usual, halves] {
+            list.count = 0;
+        }
         if let Some(rest) = &mut self.rest {
             rest.flush(prepared, fitting);
         }
     }
 }
 
-/// Fits the curves in the listed lanes into the segments at their places, and empties the list.
-fn fit<const PAIRS: usize>(
+/// Some lanes of a block.
+#[derive(Clone, Copy, Zeroable)]
+struct List {
+    count: usize,
+    /// Those after `count` are any lanes.
+    all: [u32; 2 * LANES],
+}
+
+impl List {
+    fn push(&mut self, lane: usize) {
+        self.all[self.count % (2 * LANES)] = lane as u32;
+        self.count += 1;
+    }
+
+    fn lanes(&self) -> &[u32] {
+        &self.all[..self.count]
+    }
+}
+
+/// Fits the curves in the listed lanes as far as they fill vectors. The others wait, in the
+/// `waiting`th row of the lanes for that.
+fn fit_vectors<const PAIRS: usize>(
     how: &impl KeyFit<PAIRS>,
-    lanes: &mut Vec<u32>,
-    curves: &CurveNumbers,
-    places: &[Place; ROOM],
+    list: &mut List,
+    waiting: usize,
+    curves: &mut CurveNumbers,
+    places: &mut Places,
     prepared: &mut Prepared,
 ) {
-    if lanes.is_empty() {
+    let fitted = list.count - list.count % MOST;
+    fit(how, list, fitted, curves, places, prepared);
+    for i in 0..list.count - fitted {
+        let (from, to) = (list.all[fitted + i] as usize, ROOM + waiting * MOST + i);
+        for numbers in &mut *curves {
+            numbers[to] = numbers[from];
+        }
+        places[to] = places[from];
+        list.all[i] = to as u32;
+    }
+    list.count -= fitted;
+}
+
+/// Fits the curves in the first `count` listed lanes into the segments at their places.
+fn fit<const PAIRS: usize>(
+    how: &impl KeyFit<PAIRS>,
+    list: &List,
+    count: usize,
+    curves: &CurveNumbers,
+    places: &Places,
+    prepared: &mut Prepared,
+) {
+    if count == 0 {
         return;
     }
-    let count = lanes.len();
-    lanes.resize(count.next_multiple_of(MOST), 0);
     let segments = &mut prepared.segments.polynomials;
     let all = segments.len();
     // The lanes of the last vector that have no curve write to two extra segments.
     segments.extend([PolynomialSegment::zeroed(); 2]);
     in_lanes(&mut Fit::<_, PAIRS> {
         how,
-        lanes,
+        lanes: &list.all,
         count,
         curves,
         places,
         segments,
     });
     segments.truncate(all);
-    lanes.clear();
 }
 
 struct Fit<'a, F, const PAIRS: usize> {
     how: &'a F,
-    /// The listed lanes, and others up to whole vectors.
+    /// The lanes to fit, and any lanes up to whole vectors.
     lanes: &'a [u32],
     count: usize,
     curves: &'a CurveNumbers,
-    places: &'a [Place; ROOM],
+    places: &'a Places,
     /// All segments, and two extra ones at the end.
     segments: &'a mut [PolynomialSegment],
 }

@@ -135,17 +135,22 @@ impl Prepared {
         self.spans.reserve(uncut.len() + cut.len());
         for part in 0..self.parts.len() {
             let (spans, first_span) = (self.parts[part].spans.clone(), self.spans.len());
-            for span in spans.clone() {
+            let mut next = spans.start;
+            loop {
+                let first_cut = cut.first().map_or(spans.end, |first| first.span);
+                let span = first_cut.min(spans.end);
+                self.spans.extend_from(&uncut, next..span);
+                if span == spans.end {
+                    break;
+                }
+                next = span + 1;
                 let (start, key) = (uncut.starts[span], uncut.keys[span]);
-                let end = match span + 1 < spans.end {
-                    true => uncut.starts[span + 1],
+                let end = match next < spans.end {
+                    true => uncut.starts[next],
                     false => self.parts[part].end,
                 };
                 let own = cut.partition_point(|subcurve| subcurve.span <= span);
                 let (own, others) = cut.split_at(own);
-                if own.is_empty() {
-                    self.push_span(start, uncut.sources[span], key);
-                }
                 for subcurve in own {
                     let (from, _) = subcurve.piece.extent();
                     let key = if from == 0.0 { key } else { NONE };

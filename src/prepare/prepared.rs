@@ -6,6 +6,7 @@ use bytemuck::Zeroable;
 
 use crate::curve::segment::Segments;
 use crate::fit::double::curve::Curve;
+use crate::fit::double::intervals::LANES;
 use crate::math::canonical::round_quat;
 use crate::method::interpolation::Interpolation;
 use crate::shader::PolynomialSegment;
@@ -35,6 +36,12 @@ pub(crate) struct Place {
     pub(crate) span: usize,
     pub(crate) segment: usize,
 }
+
+/// Segments that are zero, at most two for each lane of a block. They are copied, which is faster
+/// than clearing segments one by one.
+static ZEROS: [PolynomialSegment; 2 * LANES] = [PolynomialSegment {
+    coefficients: [[0.0; 4]; 11],
+}; 2 * LANES];
 
 impl Prepared {
     pub(crate) fn new(interpolation: &Interpolation) -> Self {
@@ -179,6 +186,23 @@ impl Prepared {
             span,
             segment: place,
         }
+    }
+
+    /// Where the next span with a segment of its own goes: its place and that of the segment.
+    pub(crate) fn next_place(&self) -> (usize, usize) {
+        (self.spans.len(), self.segments.polynomials.len())
+    }
+
+    /// Adds spans that start at these times and with these keys, each with a segment of its own,
+    /// which is zero.
+    pub(crate) fn push_segments(&mut self, starts: &[f64], keys: &[u32]) {
+        let segments = &mut self.segments.polynomials;
+        let places = segments.len()..segments.len() + starts.len();
+        segments.extend_from_slice(&ZEROS[..starts.len()]);
+        let sources = places.map(|place| Source::Segment(place as u32));
+        self.spans.sources.extend(sources);
+        self.spans.starts.extend_from_slice(starts);
+        self.spans.keys.extend_from_slice(keys);
     }
 
     pub(crate) fn push_span(&mut self, start: f64, source: Source, key: u32) {

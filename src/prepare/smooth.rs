@@ -270,9 +270,20 @@ impl SmoothPreparation {
             in_lanes(&mut frames);
             holds_frame = frames.held;
         }
-        for (i, lane) in stretch.lanes().enumerate() {
-            let (start, key) = (self.intervals.starts[lane], stretch.key_at(i));
-            if !holds_frame[lane] {
+        let is_fitted =
+            |own: &Self, lane| holds_frame[lane] && !is_steady && !own.holds(stretch, lane);
+        let Range {
+            start: mut lane,
+            end,
+        } = stretch.lanes();
+        while lane < end {
+            let (start, i) = (self.intervals.starts[lane], lane - stretch.lane);
+            let fitted = (lane..end)
+                .take_while(|&lane| is_fitted(self, lane))
+                .count();
+            if fitted > 0 {
+                self.take(prepared, lane..lane + fitted, stretch.key_at(i));
+            } else if !holds_frame[lane] {
                 prepared.push_span(start, Source::Constant(NONE), NONE);
             } else if self.holds(stretch, lane) {
                 let constant = match self.interpolation.quantity {
@@ -280,15 +291,11 @@ impl SmoothPreparation {
                     _ => prepared.constant(STILL),
                 };
                 prepared.push_span(start, Source::Constant(constant), NONE);
-            } else if is_steady {
-                let keys = [self.intervals.from[lane], self.intervals.to[lane]];
-                prepared.push_segment(start, arc_polynomial(keys), key);
-            } else if let Some(direct) = &mut self.direct {
-                direct.take(prepared, &self.intervals, lane, key);
             } else {
-                let place = prepared.push_segment(start, PolynomialSegment::zeroed(), key);
-                self.fitting.take(&self.intervals, lane, place);
+                let keys = [self.intervals.from[lane], self.intervals.to[lane]];
+                prepared.push_segment(start, arc_polynomial(keys), stretch.key_at(i));
             }
+            lane += fitted.max(1);
         }
         let end = prepared.spans.len();
         let spans = &mut prepared.parts[stretch.part].spans;
@@ -296,6 +303,20 @@ impl SmoothPreparation {
             spans.start = first_span;
         }
         spans.end = end;
+    }
+
+    /// Takes the curves in some lanes to be fitted: they become the next spans. `key` is the
+    /// constant at the start of the first.
+    fn take(&mut self, prepared: &mut Prepared, lanes: Range<usize>, key: u32) {
+        if let Some(direct) = &mut self.direct {
+            return direct.take(prepared, &self.intervals, lanes, key);
+        }
+        for (i, lane) in lanes.enumerate() {
+            let (start, segment) = (self.intervals.starts[lane], PolynomialSegment::zeroed());
+            let key = if key == NONE { NONE } else { key + i as u32 };
+            let place = prepared.push_segment(start, segment, key);
+            self.fitting.take(&self.intervals, lane, place);
+        }
     }
 
     /// Whether an interval stands still.

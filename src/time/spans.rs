@@ -105,6 +105,14 @@ impl Spans {
         self.keys.clear();
     }
 
+    /// Adds a range of others.
+    pub(crate) fn extend_from(&mut self, others: &Self, range: Range<usize>) {
+        self.starts.extend_from_slice(&others.starts[range.clone()]);
+        self.sources
+            .extend_from_slice(&others.sources[range.clone()]);
+        self.keys.extend_from_slice(&others.keys[range]);
+    }
+
     /// The error for a part's span with too many frames to count, with the keys around it.
     #[cold]
     pub(crate) fn gap_too_long(&self, part: &Part, span: usize, rate: f64) -> FramesError {

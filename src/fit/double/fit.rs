@@ -294,21 +294,23 @@ pub(crate) fn interpolate<L: Lanes, const PAIRS: usize>(
     places: &[usize],
     segments: &mut [PolynomialSegment],
 ) -> L {
-    let (powers, tails) = coefficients(are_entire, nodes, samples);
+    let mut powers = [[L::all(0.0); 4]; POWERS];
+    let tails = coefficients(are_entire, nodes, samples, &mut powers);
     L::store_powers(&powers[..=2 * PAIRS], segments, places);
     tails
 }
 
-/// The coefficients of the polynomials through samples, and estimates of twice the truncation error,
-/// which depend on whether the curves are [entire](Shape::entire).
+/// Sets the coefficients of the polynomials through samples. Returns estimates of twice the
+/// truncation error, which depend on whether the curves are [entire](Shape::entire).
 #[allow(clippy::needless_range_loop)]
 #[inline(always)]
 pub(crate) fn coefficients<L: Lanes, const PAIRS: usize>(
     are_entire: bool,
     nodes: &Nodes<PAIRS>,
     samples: &Samples<L, PAIRS>,
-) -> ([[L; 4]; POWERS], L) {
-    let mut powers = [canonical(samples.middle); POWERS];
+    powers: &mut [[L; 4]; POWERS],
+) -> L {
+    powers[0] = canonical(samples.middle);
     let mut tails = L::all(0.0);
     for c in 0..4 {
         let own = nodes.powers(samples, c);
@@ -319,5 +321,5 @@ pub(crate) fn coefficients<L: Lanes, const PAIRS: usize>(
             powers[2 * i + 2][c] = even[i].canonical();
         }
     }
-    (powers, tails)
+    tails
 }

@@ -8,6 +8,7 @@
 
 use bytemuck::Zeroable;
 
+use crate::fit::double::fit::MOST;
 use crate::fit::double::intervals::{Intervals, ROOM, rounded, squared_extent, widened};
 use crate::fit::single::exp_log::{LOG, LONG_LOG, Row, load3, log, long_exp, medium_exp, store};
 use crate::fit::single::long_tangents::AT_ONCE;
@@ -53,8 +54,11 @@ const TWO_THIRDS: f32 = 2.0 / 3.0;
 /// Up to it no other branch of the tangent's logarithm is nearer than the principal one.
 const LONGEST_TANGENT_PART: f32 = 1.5 * 1.5;
 
+/// Lanes behind those of a block, in which curves of earlier blocks wait to be fitted.
+pub(crate) const WAITING: usize = 3 * MOST;
+
 /// The first key of each curve, its three half-rotation vectors, and its last key.
-pub(crate) type CurveNumbers = [[[f32; 4]; ROOM]; 5];
+pub(crate) type CurveNumbers = [[[f32; 4]; ROOM + WAITING]; 5];
 
 /// The steps, handles and curves of a block's intervals, in f32.
 #[derive(Zeroable)]

@@ -37,7 +37,7 @@ impl HandlesF32 {
     #[inline(never)]
     pub(crate) fn set_long<R: HandleRule>(&mut self, keys: &[usize], intervals: &Intervals) {
         let mut far = LongTangents::<R> {
-            sides: [1, 0].map(|back| Side::new(intervals, keys, back)),
+            sides: [Side::new(intervals, keys, 1), Side::new(intervals, keys, 0)],
             handles: Handles {
                 incoming: [[0.0; AT_ONCE]; 3],
                 outgoing: [[0.0; AT_ONCE]; 3],
@@ -57,6 +57,7 @@ impl HandlesF32 {
 
 impl Side {
     /// `back` is 1 for the intervals before the keys, 0 for those after them.
+    #[inline(always)]
     fn new(intervals: &Intervals, keys: &[usize], back: usize) -> Self {
         let mut side = Self {
             from: [[0.0; AT_ONCE]; 4],

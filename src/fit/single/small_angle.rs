@@ -42,6 +42,9 @@ impl SmallAngleLanes {
                 & (chords[j + 1] <= LONGEST_STEP);
         }
         self.holds = [false; ROOM];
+        if !near.contains(&true) {
+            return;
+        }
         let own = stretches.iter().flat_map(Stretch::lanes);
         let near: Vec<usize> = own.filter(|&lane| near[lane]).collect();
         let Some(last) = near.last() else {
