@@ -65,24 +65,16 @@ impl CpuEngine {
         copy: &TrackCopy,
         output: &mut Output<'_, '_>,
     ) -> Result<(), FramesError> {
+        let row = Row {
+            part,
+            timeline,
+            copy,
+            width: self.width,
+        };
         let segments = &part.prepared.segments;
         match segments.form {
-            Form::Arc => Row {
-                part,
-                segments: &segments.arcs,
-                timeline,
-                copy,
-                width: self.width,
-            }
-            .evaluate(output),
-            Form::Polynomial => Row {
-                part,
-                segments: &segments.polynomials,
-                timeline,
-                copy,
-                width: self.width,
-            }
-            .evaluate(output),
+            Form::Arc => row.evaluate(&segments.arcs, output),
+            Form::Polynomial => row.evaluate(&segments.polynomials, output),
         }
     }
 }

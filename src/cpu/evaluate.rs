@@ -3,6 +3,7 @@
 use std::marker::PhantomData;
 
 use crate::cpu::sink::{Places, Sink, Turns};
+use crate::shader::ArcSegment;
 use crate::simd::lanes::{Lanes, Number as _};
 use crate::time::runs::Affine;
 use crate::twin::evaluate::{Evaluate, Parameters};
@@ -62,9 +63,9 @@ fn frames_in_vectors<L: Lanes, S: Evaluate>(
     // vector.
     let (all, narrow) = (S::samples::<L>(), S::samples::<L::Narrow>());
     if all > narrow && count <= narrow {
-        run::<L::Narrow, S>(segment, affine, count, Frames::new::<S>(first), output);
+        run::<L::Narrow, S, _>(segment, affine, count, Frames::new::<S>(first), output);
     } else {
-        run::<L, S>(segment, affine, count, Frames::new::<S>(first), output);
+        run::<L, S, _>(segment, affine, count, Frames::new::<S>(first), output);
     }
 }
 
@@ -85,7 +86,7 @@ pub(crate) fn distances<L: Lanes, S: Evaluate>(
         return;
     }
     let distances = Listed::<S>(distances, PhantomData);
-    run::<L, S>(segment, affine, count, distances, output);
+    run::<L, S, _>(segment, affine, count, distances, output);
 }
 
 /// Evaluates the sample at a distance from the segment's middle.
@@ -159,32 +160,32 @@ impl<L: Lanes, S: Evaluate> Distances<L> for Listed<'_, S> {
 }
 
 #[inline(always)]
-fn run<L: Lanes, S: Evaluate>(
+fn run<L: Lanes, S: Evaluate, O: Sink>(
     segment: &S,
     affine: Affine,
     count: usize,
     distances: impl Distances<L>,
-    output: impl Sink,
+    output: O,
 ) {
     let turns = count.div_ceil(S::samples::<L>());
     let is_far = matches!(S::FAR_FROM, Some(from) if turns >= from);
     if !segment.is_canonical() {
-        vectors::<L, S, true, false>(segment, affine, count, distances, output);
+        vectors::<L, S, O, true, false>(segment, affine, count, distances, output);
     } else if is_far {
-        vectors::<L, S, false, true>(segment, affine, count, distances, output);
+        vectors::<L, S, O, false, true>(segment, affine, count, distances, output);
     } else {
-        vectors::<L, S, false, false>(segment, affine, count, distances, output);
+        vectors::<L, S, O, false, false>(segment, affine, count, distances, output);
     }
 }
 
 /// Evaluates a run in turns; [`Turns`] explains `FILTER` and `FAR`.
 #[inline(always)]
-fn vectors<L: Lanes, S: Evaluate, const FILTER: bool, const FAR: bool>(
+fn vectors<L: Lanes, S: Evaluate, O: Sink, const FILTER: bool, const FAR: bool>(
     segment: &S,
     affine: Affine,
     count: usize,
     distances: impl Distances<L>,
-    output: impl Sink,
+    output: O,
 ) {
     let mut parameters = OfDistances {
         distances,
@@ -193,8 +194,18 @@ fn vectors<L: Lanes, S: Evaluate, const FILTER: bool, const FAR: bool>(
     };
     let constant = L::all(segment.constant());
     let begun = S::begin::<L, FAR>(constant, &mut parameters);
-    // A local copy cannot overlap the output, so its coefficients are loaded once for all samples.
-    let segment = &{ *segment };
+    // A copy is loaded as a whole before the first sample is stored. That is faster for arcs, and for
+    // polynomials that come from memory, as those of long results do; of a polynomial in the caches
+    // each coefficient is better loaded where it is used.
+    let copy;
+    let is_copied = O::STREAMS || size_of::<S>() <= size_of::<ArcSegment>();
+    let segment = match is_copied {
+        true => {
+            copy = *segment;
+            &copy
+        }
+        false => segment,
+    };
     let turns = Turns::<_, _, _, FILTER, FAR> {
         segment,
         constant,
@@ -214,7 +225,7 @@ mod tests {
     use crate::twin::evaluate::COARSE;
 
     use super::*;
-    use crate::shader::{ArcSegment, PolynomialSegment};
+    use crate::shader::PolynomialSegment;
 
     /// Both signs, magnitudes about 2^-40 and below, and zero.
     fn hostile(random: &mut Rng) -> f32 {

@@ -9,11 +9,11 @@ use crate::simd::line::Line;
 /// Stores one rotation everywhere.
 struct Fill([f32; 4]);
 
-impl InLanesInto<[Line]> for Fill {
+impl InLanesInto<(), [Line]> for Fill {
     type Outcome = ();
 
     #[inline(always)]
-    fn run<L: Lanes>(&self, lines: &mut [Line]) {
+    fn run<L: Lanes>(&self, (): &(), lines: &mut [Line]) {
         let value = L::repeated(self.0);
         for block in bytemuck::cast_slice_mut::<Line, L::Block>(lines) {
             value.store_past_caches(block);
@@ -30,7 +30,7 @@ impl VectorWidth {
         let (before, lines, after) = bytemuck::pod_align_to_mut(rotations);
         let value = value.to_array();
         before.fill(value);
-        in_lanes_into(self, &Fill(value), lines);
+        in_lanes_into(self, &Fill(value), &(), lines);
         after.fill(value);
     }
 }

@@ -20,55 +20,66 @@ use crate::twin::evaluate::Evaluate;
 const CHUNK: usize = 64;
 
 /// The samples of one part of a track, within one track copy.
-pub(crate) struct Row<'a, S> {
+pub(crate) struct Row<'a> {
     pub(crate) part: PartRef<'a>,
-    pub(crate) segments: &'a [S],
     pub(crate) timeline: &'a Timeline,
     pub(crate) copy: &'a TrackCopy,
     pub(crate) width: VectorWidth,
 }
 
-impl<S: Evaluate> Row<'_, S> {
+impl Row<'_> {
     /// Evaluates them into `output`, which starts at the first sample of the track copy.
-    pub(crate) fn evaluate(&self, output: &mut Output<'_, '_>) -> Result<(), FramesError> {
+    pub(crate) fn evaluate<S: Evaluate>(
+        &self,
+        segments: &[S],
+        output: &mut Output<'_, '_>,
+    ) -> Result<(), FramesError> {
         match output {
-            Output::Here(samples) => in_lanes_into(self.width, self, *samples),
-            Output::Staged(staged) => in_lanes_into(self.width, self, staged),
+            Output::Here(samples) => in_lanes_into(self.width, self, segments, *samples),
+            Output::Staged(staged) => in_lanes_into(self.width, self, segments, staged),
         }
     }
 }
 
-impl<S: Evaluate, O: Samples + ?Sized> InLanesInto<O> for Row<'_, S> {
+impl<S: Evaluate, O: Samples + ?Sized> InLanesInto<[S], O> for Row<'_> {
     type Outcome = Result<(), FramesError>;
 
     #[inline(always)]
-    fn run<L: Lanes>(&self, output: &mut O) -> Result<(), FramesError> {
+    fn run<L: Lanes>(&self, segments: &[S], output: &mut O) -> Result<(), FramesError> {
         let PartRef { prepared, part } = self.part;
         if self.copy.samples.len() <= SAMPLES_ONE_BY_ONE {
-            return self.few(output.samples());
+            return self.few(segments, output.samples());
         }
         if let (&Ticks::Frames { rate, start }, true) = (&self.timeline.ticks, self.copy.is_own()) {
             let clock = FrameClock::new(rate, start, part.end);
-            if self.spans::<L, O>(clock, output) {
+            if self.spans::<L, S, O>(clock, segments, output) {
                 let starts = &prepared.spans.starts[part.spans.clone()];
                 let begin = starts.first().copied().unwrap_or(part.end);
                 let runs = part.runs_outside(begin, clock, &self.copy.samples);
-                let output = output.samples();
-                let mut outside = OneByOne { row: self, output };
+                let mut outside = OneByOne {
+                    row: self,
+                    segments,
+                    output: output.samples(),
+                };
                 runs.into_iter().flatten().for_each(|run| outside.run(run));
                 return Ok(());
             }
         }
-        self.runs(output.samples())
+        self.runs(segments, output.samples())
     }
 }
 
-impl<S: Evaluate> Row<'_, S> {
+impl Row<'_> {
     /// Evaluates the frames between the keys of the track itself (not of a repeated copy), without
     /// a list of runs: nearly every sample takes this path. Returns false if a distance from a
     /// segment's middle is no integer of f32; the caller then evaluates all samples by runs.
     #[inline(always)]
-    fn spans<L: Lanes, O: Samples + ?Sized>(&self, clock: FrameClock, output: &mut O) -> bool {
+    fn spans<L: Lanes, S: Evaluate, O: Samples + ?Sized>(
+        &self,
+        clock: FrameClock,
+        segments: &[S],
+        output: &mut O,
+    ) -> bool {
         let PartRef { prepared, part } = self.part;
         let samples = &self.copy.samples;
         let spans = &prepared.spans;
@@ -95,7 +106,7 @@ impl<S: Evaluate> Row<'_, S> {
                 match source {
                     Source::Segment(index) => {
                         let affine = block.affine(j);
-                        let segment = &self.segments[index as usize];
+                        let segment = &segments[index as usize];
                         output.frames::<L, S>(segment, affine, distance, start, count);
                     }
                     Source::Constant(index) => {
@@ -117,32 +128,45 @@ impl<S: Evaluate> Row<'_, S> {
 
     /// Evaluates at most [`SAMPLES_ONE_BY_ONE`] samples, one by one.
     #[inline(never)]
-    fn few(&self, output: &mut [[f32; 4]]) -> Result<(), FramesError> {
+    fn few<S: Evaluate>(&self, segments: &[S], output: &mut [[f32; 4]]) -> Result<(), FramesError> {
         let PartRef { prepared, part } = self.part;
-        let mut samples = OneByOne { row: self, output };
+        let mut samples = OneByOne {
+            row: self,
+            segments,
+            output,
+        };
         (prepared.spans).runs(part, self.timeline, self.copy, &mut samples)
     }
 
     /// Evaluates all samples by way of a list of their runs. It is a function of its own to keep
     /// the usual path small, and to compile the search for runs once, not for each vector width.
     #[inline(never)]
-    fn runs(&self, output: &mut [[f32; 4]]) -> Result<(), FramesError> {
+    fn runs<S: Evaluate>(
+        &self,
+        segments: &[S],
+        output: &mut [[f32; 4]],
+    ) -> Result<(), FramesError> {
         let PartRef { prepared, part } = self.part;
         let mut runs = Vec::new();
         (prepared.spans).runs(part, self.timeline, self.copy, &mut runs)?;
-        in_lanes_into(self.width, &RunList { row: self, runs }, output);
+        in_lanes_into(self.width, &RunList { row: self, runs }, segments, output);
         Ok(())
     }
 
     /// Evaluates a run; `output` starts at the first sample of the track copy.
     #[inline(always)]
-    fn evaluate_run<L: Lanes>(&self, run: &Run, output: &mut [[f32; 4]]) {
+    fn evaluate_run<L: Lanes, S: Evaluate>(
+        &self,
+        run: &Run,
+        segments: &[S],
+        output: &mut [[f32; 4]],
+    ) {
         let PartRef { prepared, part } = self.part;
         let output = &mut output[run.sample - self.copy.samples.start..][..run.count];
         match run.source {
             RunSource::Constant(index) => output.fill(prepared.constants[index as usize]),
             RunSource::Segment(index, distance, affine) => {
-                let segment = &self.segments[index as usize];
+                let segment = &segments[index as usize];
                 if let Distance::Near { first } = distance {
                     return frames::<L, S>(segment, affine, first, run.count, output);
                 }
@@ -174,25 +198,26 @@ impl<S: Evaluate> Row<'_, S> {
 }
 
 /// Runs of a row, to be evaluated in vectors.
-struct RunList<'a, 'r, S> {
-    row: &'a Row<'r, S>,
+struct RunList<'a, 'r> {
+    row: &'a Row<'r>,
     runs: Vec<Run>,
 }
 
-impl<S: Evaluate> InLanesInto<[[f32; 4]]> for RunList<'_, '_, S> {
+impl<S: Evaluate> InLanesInto<[S], [[f32; 4]]> for RunList<'_, '_> {
     type Outcome = ();
 
     #[inline(always)]
-    fn run<L: Lanes>(&self, output: &mut [[f32; 4]]) {
+    fn run<L: Lanes>(&self, segments: &[S], output: &mut [[f32; 4]]) {
         for run in &self.runs {
-            self.row.evaluate_run::<L>(run, output);
+            self.row.evaluate_run::<L, S>(run, segments, output);
         }
     }
 }
 
 /// Takes runs and evaluates them as they come; for few samples, and for those outside the keys.
 struct OneByOne<'a, 'r, S> {
-    row: &'a Row<'r, S>,
+    row: &'a Row<'r>,
+    segments: &'a [S],
     output: &'a mut [[f32; 4]],
 }
 
@@ -200,6 +225,6 @@ impl<S: Evaluate> Emit for OneByOne<'_, '_, S> {
     // Not inlined, because runs come from many places.
     #[inline(never)]
     fn run(&mut self, run: Run) {
-        self.row.evaluate_run::<Vec4>(&run, self.output);
+        (self.row).evaluate_run::<Vec4, S>(&run, self.segments, self.output);
     }
 }

@@ -38,12 +38,17 @@ impl<L: Lanes, S: Evaluate, P: Parameters<L>, const FILTER: bool, const FAR: boo
 }
 
 pub(crate) trait Sink {
+    /// Whether its stores bypass the caches.
+    const STREAMS: bool;
+
     /// Stores the first `count` samples.
     fn take<L: Lanes, S: Evaluate>(self, count: usize, turns: impl NextTurn<L, S>);
 }
 
 /// Ordinary stores. Elements after `count` may be overwritten, up to the end of a turn.
 impl Sink for &mut [[f32; 4]] {
+    const STREAMS: bool = false;
+
     #[inline(always)]
     fn take<L: Lanes, S: Evaluate>(self, count: usize, mut turns: impl NextTurn<L, S>) {
         let samples = S::samples::<L>();
@@ -84,6 +89,8 @@ pub(crate) struct Places<'a> {
 }
 
 impl Sink for Places<'_> {
+    const STREAMS: bool = true;
+
     #[inline(always)]
     fn take<L: Lanes, S: Evaluate>(self, count: usize, mut turns: impl NextTurn<L, S>) {
         let rotations = L::COUNT / 4;

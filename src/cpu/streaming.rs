@@ -133,7 +133,7 @@ impl<'o> Stage<'o> {
             return;
         };
         let whole = self.filled / EACH;
-        in_lanes_into(self.width, &WholeLines(&lines[..whole]), &mut self.place);
+        in_lanes_into(self.width, &WholeLines, &lines[..whole], &mut self.place);
         if whole < LINES {
             lines[0] = lines[whole];
         }
@@ -180,14 +180,15 @@ impl<'o> Place<'o> {
     }
 }
 
-struct WholeLines<'s>(&'s [Line]);
+/// Stores whole staging lines.
+struct WholeLines;
 
-impl<'o> InLanesInto<Place<'o>> for WholeLines<'_> {
+impl<'o> InLanesInto<[Line], Place<'o>> for WholeLines {
     type Outcome = ();
 
     #[inline(always)]
-    fn run<L: Lanes>(&self, place: &mut Place<'o>) {
-        place.store::<L>(self.0);
+    fn run<L: Lanes>(&self, lines: &[Line], place: &mut Place<'o>) {
+        place.store::<L>(lines);
     }
 }
 

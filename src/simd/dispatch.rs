@@ -58,12 +58,14 @@ impl VectorWidth {
     }
 
     /// This width, or the next narrower one that the processor has.
+    #[inline]
     pub(crate) fn narrowed(self) -> Self {
-        let wider = [Self::Avx512, Self::Avx2].into_iter();
-        let mut narrower = wider.filter(|&width| width <= self && width.is_available());
-        narrower.next().unwrap_or(Self::Baseline)
+        static WIDEST_THERE_IS: OnceLock<VectorWidth> = OnceLock::new();
+        let widest = || *Self::available().last().unwrap_or(&Self::Baseline);
+        self.min(*WIDEST_THERE_IS.get_or_init(widest))
     }
 
+    /// A processor that has a width has the narrower ones too.
     fn is_available(self) -> bool {
         match self {
             Self::Baseline => true,
@@ -71,7 +73,8 @@ impl VectorWidth {
             Self::Avx2 => std::arch::is_x86_feature_detected!("avx2"),
             #[cfg(wide_vectors)]
             Self::Avx512 => {
-                std::arch::is_x86_feature_detected!("avx512f")
+                Self::Avx2.is_available()
+                    && std::arch::is_x86_feature_detected!("avx512f")
                     && std::arch::is_x86_feature_detected!("avx512dq")
                     && std::arch::is_x86_feature_detected!("avx512vl")
                     && std::arch::is_x86_feature_detected!("avx512bw")
@@ -123,60 +126,73 @@ pub(crate) fn in_lanes<W: InLanes>(work: &mut W) {
 pub(crate) fn in_lanes_of<W: InLanes>(width: VectorWidth, work: &mut W) {
     struct InPlace;
 
-    impl<W: InLanes> InLanesInto<W> for InPlace {
+    impl<W: InLanes> InLanesInto<(), W> for InPlace {
         type Outcome = ();
 
         #[inline(always)]
-        fn run<L: Lanes>(&self, work: &mut W) {
+        fn run<L: Lanes>(&self, (): &(), work: &mut W) {
             work.run::<L>();
         }
     }
-    in_lanes_into(width, &InPlace, work);
+    in_lanes_into(width, &InPlace, &(), work);
 }
 
-/// As [`InLanes`], with the output as an argument of its own. Behind the one `&mut self` of
-/// [`InLanes`] the compiler cannot know that input and output do not overlap, which costs a fifth
-/// of the time of a row.
-pub(crate) trait InLanesInto<O: ?Sized> {
+/// As [`InLanes`], with input and output as arguments of their own. Behind the one `&mut self` of
+/// [`InLanes`] the compiler cannot know that they do not overlap, which costs a fifth of the time
+/// of a row.
+pub(crate) trait InLanesInto<I: ?Sized, O: ?Sized> {
     /// What `run` returns beside the output.
     type Outcome;
 
     /// `L` is the type of vectors, for work that is written in them.
-    fn run<L: Lanes>(&self, output: &mut O) -> Self::Outcome;
+    fn run<L: Lanes>(&self, input: &I, output: &mut O) -> Self::Outcome;
 }
 
-/// As [`in_lanes_of`], into an output.
-pub(crate) fn in_lanes_into<W: InLanesInto<O>, O: ?Sized>(
+/// As [`in_lanes_of`], from an input into an output.
+pub(crate) fn in_lanes_into<W: InLanesInto<I, O>, I: ?Sized, O: ?Sized>(
     width: VectorWidth,
     work: &W,
+    input: &I,
     output: &mut O,
 ) -> W::Outcome {
     match width.narrowed() {
         #[cfg(wide_vectors)]
         // SAFETY: the processor has AVX-512, for `narrowed` gives only what it has.
-        VectorWidth::Avx512 => unsafe { avx512(work, output) },
+        VectorWidth::Avx512 => unsafe { avx512(work, input, output) },
         #[cfg(wide_vectors)]
         // SAFETY: the processor has AVX2, likewise.
-        VectorWidth::Avx2 => unsafe { avx2(work, output) },
-        _ => baseline(work, output),
+        VectorWidth::Avx2 => unsafe { avx2(work, input, output) },
+        _ => baseline(work, input, output),
     }
 }
 
 #[inline(never)]
-fn baseline<W: InLanesInto<O>, O: ?Sized>(work: &W, output: &mut O) -> W::Outcome {
-    work.run::<Vec4>(output)
+fn baseline<W: InLanesInto<I, O>, I: ?Sized, O: ?Sized>(
+    work: &W,
+    input: &I,
+    output: &mut O,
+) -> W::Outcome {
+    work.run::<Vec4>(input, output)
 }
 
 #[cfg(wide_vectors)]
 #[target_feature(enable = "avx512f,avx512dq,avx512vl,avx512bw")]
-fn avx512<W: InLanesInto<O>, O: ?Sized>(work: &W, output: &mut O) -> W::Outcome {
-    work.run::<Sixteen>(output)
+fn avx512<W: InLanesInto<I, O>, I: ?Sized, O: ?Sized>(
+    work: &W,
+    input: &I,
+    output: &mut O,
+) -> W::Outcome {
+    work.run::<Sixteen>(input, output)
 }
 
 #[cfg(wide_vectors)]
 #[target_feature(enable = "avx2")]
-fn avx2<W: InLanesInto<O>, O: ?Sized>(work: &W, output: &mut O) -> W::Outcome {
-    work.run::<Eight>(output)
+fn avx2<W: InLanesInto<I, O>, I: ?Sized, O: ?Sized>(
+    work: &W,
+    input: &I,
+    output: &mut O,
+) -> W::Outcome {
+    work.run::<Eight>(input, output)
 }
 
 /// The narrowest vectors with which streaming stores, past the caches, write long results faster on
