@@ -11,16 +11,22 @@ use naga::{
 
 use super::layout::{cells, cells_of, constant, element};
 use super::machine::{Step, pointer_to_global};
-use super::operations::{Operand, Place, binary, conversion, unary};
+use super::operations::{Operand, Place, Subnormals, binary, conversion, unary};
 use super::program::Compiled;
 
 /// Makes a function of a module into steps; `info` is what the validator found out about it, or about
 /// a function whose expressions have the same types.
-pub(super) fn compiled(module: &Module, function: &Function, info: &FunctionInfo) -> Compiled {
+pub(super) fn compiled(
+    module: &Module,
+    function: &Function,
+    info: &FunctionInfo,
+    subnormals: Subnormals,
+) -> Compiled {
     let mut own = Frame {
         module,
         function,
         info,
+        subnormals,
         start: Vec::new(),
         size: 0,
         places: vec![None; function.expressions.len()],
@@ -45,6 +51,7 @@ struct Frame<'a> {
     module: &'a Module,
     function: &'a Function,
     info: &'a FunctionInfo,
+    subnormals: Subnormals,
     start: Vec<u64>,
     size: usize,
     /// The place of each expression, once it has been evaluated.
@@ -305,7 +312,7 @@ impl Frame<'_> {
                 }
             }
             Expression::Binary { op, left, right } => {
-                let work = binary(op, self.scalar(left));
+                let work = binary(op, self.scalar(left), self.subnormals);
                 Step::Binary {
                     work,
                     operands: [self.operand(left), self.operand(right)],

@@ -31,6 +31,7 @@ use crate::time::frames::{Frames, Ticks, Timeline};
 use crate::tracks::set::TrackSet;
 
 use super::machine::{Machine, Touch};
+use super::operations::Subnormals;
 use super::program::{Checked, Program};
 use super::source;
 
@@ -136,7 +137,7 @@ struct Count {
 
 impl Launch {
     fn run(&self) -> Count {
-        let program = Checked::parse(source(&self.kernel)).program();
+        let program = Checked::parse(source(&self.kernel)).program(Subnormals::Kept);
         let mut machine = Machine::new(&program);
         for (name, cells) in &self.globals {
             machine.globals[global(&program, name)].clone_from(cells);

@@ -43,8 +43,24 @@ pub(super) fn unary(operator: UnaryOperator, of: Scalar) -> Unary {
     }
 }
 
+/// What becomes of numbers smaller than the least normal one: Vulkan lets a driver do either.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Subnormals {
+    Kept,
+    /// They are 0 as operands and as results.
+    Flushed,
+}
+
+fn flushed(a: f32) -> f32 {
+    if a.is_subnormal() { 0.0 } else { a }
+}
+
 /// Integers have no bits above their width, and a bool is 0 or 1.
-pub(super) fn binary(operator: BinaryOperator, of: Scalar) -> &'static dyn Binary {
+pub(super) fn binary(
+    operator: BinaryOperator,
+    of: Scalar,
+    subnormals: Subnormals,
+) -> &'static dyn Binary {
     use BinaryOperator as Operator;
     /// A closure of two cells, or of what they hold.
     macro_rules! on {
@@ -57,6 +73,21 @@ pub(super) fn binary(operator: BinaryOperator, of: Scalar) -> &'static dyn Binar
                 $result
             }
         };
+        (flushed $a:ident $b:ident => $result:expr) => {
+            on!(f32 a b => {
+                let ($a, $b) = (flushed(a), flushed(b));
+                of_f32(flushed($result))
+            })
+        };
+    }
+    if (subnormals, of) == (Subnormals::Flushed, Scalar::F32) {
+        // Comparisons are as they are where none is left.
+        match operator {
+            Operator::Add => return on!(flushed a b => a + b),
+            Operator::Subtract => return on!(flushed a b => a - b),
+            Operator::Multiply => return on!(flushed a b => a * b),
+            _ => {}
+        }
     }
     match (operator, of) {
         (Operator::Add, Scalar::F32) => on!(f32 a b => of_f32(a + b)),

@@ -5,6 +5,7 @@ use naga::{Function, Module};
 
 use super::frame::compiled;
 use super::machine::Step;
+use super::operations::Subnormals;
 
 /// A function that can run.
 pub(super) struct Compiled {
@@ -49,11 +50,13 @@ impl Checked {
         named.chain(entries).collect()
     }
 
-    pub(super) fn program(&self) -> Program {
+    pub(super) fn program(&self, subnormals: Subnormals) -> Program {
         let all = self.functions().into_iter();
         let globals = self.module.global_variables.iter();
         Program {
-            functions: all.map(|(own, info)| self.compiled(own, info)).collect(),
+            functions: all
+                .map(|(own, info)| compiled(&self.module, own, info, subnormals))
+                .collect(),
             globals: globals
                 .map(|(_, own)| own.name.clone().unwrap_or_default())
                 .collect(),
@@ -62,6 +65,6 @@ impl Checked {
 
     /// One function; `info` is that of this function, or of one with expressions of the same types.
     pub(super) fn compiled(&self, function: &Function, info: &FunctionInfo) -> Compiled {
-        compiled(&self.module, function, info)
+        compiled(&self.module, function, info, Subnormals::Kept)
     }
 }

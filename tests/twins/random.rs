@@ -12,39 +12,71 @@ use crate::shader::{
 /// An angle in R⁴ between two keys, well within what the small-angle series takes.
 const ORDINARY_STEP: f32 = 0.02;
 
-pub(super) struct Random(Rng);
+/// The largest number that the host is taken to give to kernels.
+const LARGEST_GIVEN: f32 = 1.0e12;
+
+pub(super) struct Random {
+    rng: Rng,
+    /// Whether numbers are as the host gives them to kernels: 0 or at least 2^-64, none of them huge, and
+    /// rotations of norm 1.
+    are_canonical: bool,
+}
 
 impl Random {
     pub(super) fn new() -> Self {
-        Self(Rng::with_seed(1))
+        Self {
+            rng: Rng::with_seed(1),
+            are_canonical: false,
+        }
+    }
+
+    /// Of numbers as the host gives them to kernels.
+    pub(super) fn canonical() -> Self {
+        Self {
+            are_canonical: true,
+            ..Self::new()
+        }
     }
 
     /// True once in `times`.
     pub(super) fn once_in(&mut self, times: u32) -> bool {
-        self.0.u32(..times) == 0
+        self.rng.u32(..times) == 0
     }
 
     pub(super) fn below(&mut self, end: u32) -> u32 {
-        self.0.u32(..end)
+        self.rng.u32(..end)
     }
 
     pub(super) fn word(&mut self) -> u32 {
-        self.0.u32(..)
+        self.rng.u32(..)
     }
 
     fn signed(&mut self, magnitude: f32) -> f32 {
-        if self.0.bool() { -magnitude } else { magnitude }
+        if self.rng.bool() {
+            -magnitude
+        } else {
+            magnitude
+        }
     }
 
     fn uniform(&mut self) -> f32 {
-        2.0 * self.0.f32() - 1.0
+        2.0 * self.rng.f32() - 1.0
     }
 
     /// Of a magnitude between two powers of 2, each as often as the others.
     fn scaled(&mut self, powers: std::ops::Range<i32>) -> f32 {
-        let exponent = (1023 + self.0.i32(powers)) as u64;
-        let magnitude = (1.0 + self.0.f64()) * f64::from_bits(exponent << 52);
-        self.signed(magnitude as f32)
+        let exponent = (1023 + self.rng.i32(powers)) as u64;
+        let magnitude = (1.0 + self.rng.f64()) * f64::from_bits(exponent << 52);
+        let number = self.signed(magnitude as f32);
+        self.given(number)
+    }
+
+    fn given(&mut self, number: f32) -> f32 {
+        match self.are_canonical {
+            true if number.abs() > LARGEST_GIVEN => self.uniform(),
+            true => canonical(number),
+            false => number,
+        }
     }
 
     /// A number at which a shader branches, or the one before or after it.
@@ -60,15 +92,16 @@ impl Random {
             PI,
             f32::MIN_POSITIVE,
         ];
-        let border = borders[self.0.usize(..borders.len())];
+        let border = borders[self.rng.usize(..borders.len())];
         let near = [border.next_down(), border, border.next_up()];
-        let near = near[self.0.usize(..3)];
-        self.signed(near)
+        let near = near[self.rng.usize(..3)];
+        let near = self.signed(near);
+        self.given(near)
     }
 
     /// From -1 to 1, or hostile: near a border, tiny or subnormal.
     pub(super) fn number(&mut self) -> f32 {
-        match self.0.u32(..10) {
+        match self.rng.u32(..10) {
             0 => self.border(),
             1 => self.scaled(-149..-20),
             2 => self.scaled(-20..0),
@@ -90,7 +123,7 @@ impl Random {
 
     /// A vector of ordinary length; rarely a hostile or a huge one.
     pub(super) fn vector<const N: usize>(&mut self) -> [f32; N] {
-        match self.0.u32(..12) {
+        match self.rng.u32(..12) {
             0 => std::array::from_fn(|_| self.finite()),
             1 => std::array::from_fn(|_| self.number()),
             2 => {
@@ -104,7 +137,7 @@ impl Random {
     /// A unit quaternion; some have components that are 0 or tiny.
     pub(super) fn unit(&mut self) -> [f32; 4] {
         loop {
-            let raw: [f64; 4] = std::array::from_fn(|_| match self.0.u32(..8) {
+            let raw: [f64; 4] = std::array::from_fn(|_| match self.rng.u32(..8) {
                 0 => self.scaled(-70..-10).into(),
                 1 => 0.0,
                 _ => self.uniform().into(),
@@ -128,7 +161,7 @@ impl Random {
     /// Two keys that are at most about pi/2 apart in R⁴, some equal and some hardly apart.
     pub(super) fn pair(&mut self) -> [[f32; 4]; 2] {
         let from = self.unit();
-        match self.0.u32(..8) {
+        match self.rng.u32(..8) {
             0 => [from, from],
             1 => [from, from.map(|c| -c)],
             2 | 3 => {
@@ -145,8 +178,8 @@ impl Random {
 
     /// A rotation as it is stored: a unit quaternion, or one that is not quite.
     pub(super) fn rotation(&mut self) -> [f32; 4] {
-        match self.0.u32(..8) {
-            0 => std::array::from_fn(|_| canonical(self.number())),
+        match self.rng.u32(..8) {
+            0 if !self.are_canonical => std::array::from_fn(|_| canonical(self.number())),
             1 => {
                 let off = 1.0 + self.uniform() * 1e-6;
                 self.unit().map(|c| canonical(c * off))
@@ -168,7 +201,7 @@ impl Random {
 
     /// The parameter of a sample, from -1/2 to 1/2.
     pub(super) fn parameter(&mut self) -> f32 {
-        match self.0.u32(..8) {
+        match self.rng.u32(..8) {
             0 => self.signed(0.5),
             1 => 0.0,
             2 => self.scaled(-40..-2),
@@ -179,14 +212,14 @@ impl Random {
     /// An angle in R⁴ between two keys: mostly within the small-angle series, at one of its limits, or
     /// beyond.
     fn step(&mut self) -> f32 {
-        match self.0.u32(..12) {
+        match self.rng.u32(..12) {
             0 => 0.0,
             1 => self.scaled(-40..-6).abs(),
             2 => LONGEST_STEP.sqrt() * (1.0 + 1e-3 * self.uniform()),
-            3 | 4 => 0.03 + 0.03 * self.0.f32(), // the extents on both sides of the limit
-            5 => 0.4 * self.0.f32(),
+            3 | 4 => 0.03 + 0.03 * self.rng.f32(), // the extents on both sides of the limit
+            5 => 0.4 * self.rng.f32(),
             6 => ORDINARY_STEP * (1.0 + 1e-3 * self.uniform()),
-            _ => 0.03 * self.0.f32(),
+            _ => 0.03 * self.rng.f32(),
         }
     }
 
@@ -206,7 +239,7 @@ impl Random {
     /// small-angle series allows.
     fn weight(&mut self) -> f32 {
         let most = LONGEST_TANGENT_PART.sqrt() / ORDINARY_STEP;
-        match self.0.u32(..4) {
+        match self.rng.u32(..4) {
             0 => most * (1.0 + 1e-3 * self.uniform()),
             1 => 2.0 * most * self.uniform(),
             _ => self.uniform(),
@@ -221,8 +254,8 @@ impl Random {
         TangentWeights {
             before: even.unwrap_or_else(|| self.weight()),
             after: even.unwrap_or_else(|| self.weight()),
-            outgoing: most * self.0.f32(),
-            kind: kinds[self.0.usize(..kinds.len())],
+            outgoing: most * self.rng.f32(),
+            kind: kinds[self.rng.usize(..kinds.len())],
         }
     }
 }

@@ -95,10 +95,15 @@ impl Twin {
         index.unwrap_or_else(|| panic!("{} has no function {}", self.kernel, self.function))
     }
 
-    /// Compares every bit of so many samples; else the first sample that differs.
-    pub(super) fn compare(&self, program: &Program, samples: usize) -> Result<(), String> {
+    /// Compares every bit of so many samples of random inputs; else the first sample that differs.
+    pub(super) fn compare(
+        &self,
+        program: &Program,
+        mut random: Random,
+        samples: usize,
+    ) -> Result<(), String> {
         let function = self.index(program);
-        let (mut random, mut trial) = (Random::new(), Trial::default());
+        let mut trial = Trial::default();
         let mut machine = Machine::new(program);
         let mut sample = 0;
         while sample < samples {
