@@ -59,6 +59,42 @@ fn unsafe_code_stays_in_its_homes() {
     }
 }
 
+/// How many lines before unsafe code its reason may be.
+const REASON_WITHIN: usize = 6;
+
+/// Clippy finds both, and more (`scripts/lint.sh`); CI has not the time for it.
+#[test]
+fn no_multiply_add_is_fused_and_unsafe_code_has_its_reason() {
+    let folders = ["src", "formats/src", "routes/src", "cli/src", "capi/src"];
+    let folders = (folders.into_iter()).chain(["python/src", "shader-compiler/src"]);
+    let mut unsafe_lines = 0;
+    for path in folders.flat_map(|folder| files(folder, "rs")) {
+        let text = read(&path);
+        let lines: Vec<&str> = text.lines().collect();
+        for (i, line) in lines.iter().enumerate() {
+            if line.trim_start().starts_with("//") {
+                continue;
+            }
+            let place = format!("{}:{}", path.display(), i + 1);
+            // A fused one rounds once where the kernels round twice.
+            assert!(
+                !line.contains("mul_add") && !line.contains("fmadd"),
+                "{place}"
+            );
+            if line.contains("unsafe {") || line.contains("unsafe impl") {
+                unsafe_lines += 1;
+                let before = &lines[i.saturating_sub(REASON_WITHIN)..=i];
+                let has_reason = before.iter().any(|line| line.contains("SAFETY: "));
+                assert!(
+                    has_reason,
+                    "{place}: say why it is sound, after `// SAFETY: `"
+                );
+            }
+        }
+    }
+    assert!(unsafe_lines > 200, "only {unsafe_lines} were found");
+}
+
 /// A form, a helper or a check of the self-test in WGSL without its twin would go unchecked.
 #[test]
 fn every_shader_function_has_its_twin() {

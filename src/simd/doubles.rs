@@ -69,7 +69,7 @@ macro_rules! doubles {
         }
     };
 }
-#[cfg(wide_vectors)]
+#[cfg(all(wide_vectors, not(test)))]
 pub(crate) use doubles;
 
 /// Calls instructions that every processor of the target has.

@@ -4,9 +4,9 @@
 
 pub(crate) mod dispatch;
 pub(crate) mod doubles;
-#[cfg(wide_vectors)]
+#[cfg(all(wide_vectors, not(test)))]
 pub(crate) mod eight;
 pub(crate) mod lanes;
 pub(crate) mod line;
-#[cfg(wide_vectors)]
+#[cfg(all(wide_vectors, not(test)))]
 pub(crate) mod sixteen;
