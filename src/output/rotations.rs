@@ -5,6 +5,7 @@ use std::marker::PhantomData;
 
 use glam::{Quat, Vec3, Vec4};
 
+use crate::math::canonical::canonical;
 use crate::memory::OutOfMemory;
 use crate::output::buffer::OutputBuffer;
 use crate::tracks::rotation::Rotation;
@@ -125,7 +126,9 @@ impl<T> Samples<T> {
             return Err(SamplesError::Uneven { values, tracks });
         }
         let mut storage = OutputBuffer::new(values)?;
-        storage.iter_mut().zip(rows).for_each(|(to, row)| *to = row);
+        for (to, row) in storage.iter_mut().zip(rows) {
+            *to = Quat::from_array(row.to_array().map(canonical));
+        }
         Ok(Self::new(Box::new(storage), tracks, samples, layout))
     }
 
@@ -165,7 +168,9 @@ impl<T> Samples<T> {
 }
 
 impl Rotations {
-    /// Rotations from elsewhere, [`Quat`] or `[f32; 4]`, of so many tracks, in this order.
+    /// Rotations from elsewhere, [`Quat`] or `[f32; 4]`, of so many tracks, in this order. Components
+    /// below 2^-64 become 0, as in every result. They should be unit quaternions: of others nothing is
+    /// promised, not that all devices give the same bits.
     ///
     /// ```
     /// use tumble::{Device, Engine, Layout, Rotations, Smoothing, SmoothingKernel};

@@ -97,7 +97,7 @@ impl Direct {
         lanes: Range<usize>,
         key: u32,
     ) {
-        let (first_span, first_segment) = prepared.next_place();
+        let first = prepared.next_place();
         let mut count = 0;
         for (i, lane) in lanes.enumerate() {
             let squared_extent = self.whole.squared_extents[lane];
@@ -108,8 +108,8 @@ impl Direct {
             let list = usize::from(!is_small) * (1 + longer.iter().sum::<usize>());
             self.lists[list].push(lane);
             self.places[lane] = Place {
-                span: first_span + count,
-                segment: first_segment + count,
+                span: first.span + count,
+                segment: first.segment + count,
             };
             let (start, end) = (intervals.starts[lane], intervals.ends[lane]);
             let own = if key == NONE { NONE } else { key + i as u32 };

@@ -179,18 +179,18 @@ impl Prepared {
         segment: PolynomialSegment,
         key: u32,
     ) -> Place {
-        let (span, place) = (self.spans.len(), self.segments.polynomials.len());
+        let place = self.next_place();
         self.segments.polynomials.push(segment);
-        self.push_span(start, Source::Segment(place as u32), key);
-        Place {
-            span,
-            segment: place,
-        }
+        self.push_span(start, Source::Segment(place.segment as u32), key);
+        place
     }
 
-    /// Where the next span with a segment of its own goes: its place and that of the segment.
-    pub(crate) fn next_place(&self) -> (usize, usize) {
-        (self.spans.len(), self.segments.polynomials.len())
+    /// Where the next span with a segment of its own goes.
+    pub(crate) fn next_place(&self) -> Place {
+        Place {
+            span: self.spans.len(),
+            segment: self.segments.polynomials.len(),
+        }
     }
 
     /// Adds spans that start at these times and with these keys, each with a segment of its own,
