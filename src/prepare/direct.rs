@@ -101,11 +101,11 @@ impl Direct {
         let mut count = 0;
         for (i, lane) in lanes.enumerate() {
             let squared_extent = self.whole.squared_extents[lane];
-            // NaN is left over too.
-            let longer = [LONGEST_OF_FEW, LONGEST_WHOLE, LONGEST_DIRECT]
-                .map(|longest| usize::from(!(squared_extent <= longest as f32)));
+            let within = [LONGEST_OF_FEW, LONGEST_WHOLE, LONGEST_DIRECT]
+                .map(|longest| usize::from(squared_extent <= longest as f32));
             let is_small = self.small_angle.holds[lane];
-            let list = usize::from(!is_small) * (1 + longer.iter().sum::<usize>());
+            // NaN is within nothing, and left over.
+            let list = usize::from(!is_small) * (4 - within.iter().sum::<usize>());
             self.lists[list].push(lane);
             self.places[lane] = Place {
                 span: first.span + count,
