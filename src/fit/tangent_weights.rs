@@ -87,7 +87,7 @@ impl KeyWeights {
 
     /// Computes the weights of all keys of a block.
     pub(crate) fn bring(&mut self, intervals: &Intervals, stretches: &[Stretch]) {
-        in_lanes(&mut Between {
+        in_lanes(&mut BetweenIntervals {
             rule: self.rule,
             durations: &intervals.durations[..=intervals.count],
             weights: &mut self.keys[1..=intervals.count],
@@ -109,13 +109,31 @@ impl KeyWeights {
     }
 }
 
+/// Computes [`WeightRule::between`] for the keys between neighbouring intervals of a block, one fewer
+/// than there are durations.
+struct BetweenIntervals<'a> {
+    rule: WeightRule,
+    durations: &'a [f64],
+    weights: &'a mut [TangentWeights],
+}
+
+impl InLanes for BetweenIntervals<'_> {
+    #[inline(always)]
+    fn run<L: Lanes>(&mut self) {
+        let count = self.weights.len();
+        let (before, after) = (&self.durations[..count], &self.durations[1..=count]);
+        for j in 0..count {
+            self.weights[j] = self.rule.between(before[j], after[j]);
+        }
+    }
+}
+
 /// The weights of some keys of a track, kept for the next track with the same times.
 pub(crate) struct TrackWeights<'a> {
     rule: WeightRule,
     ends: Ends,
     times: &'a [f64],
     whole: (usize, usize),
-    durations: Vec<f64>,
     weights: Vec<TangentWeights>,
 }
 
@@ -126,7 +144,6 @@ impl<'a> TrackWeights<'a> {
             ends,
             times: &[],
             whole: (0, 0),
-            durations: Vec::new(),
             weights: Vec::new(),
         }
     }
@@ -140,15 +157,12 @@ impl<'a> TrackWeights<'a> {
         (self.times, self.whole) = (times, (first, all));
         self.weights.clear();
         self.weights.resize(times.len(), UNKNOWN);
-        self.durations.clear();
-        (self.durations).extend(times.windows(2).map(|pair| pair[1] - pair[0]));
-        if let [_, inner @ .., _] = &mut self.weights[..] {
-            in_lanes(&mut Between {
-                rule: self.rule,
-                durations: &self.durations,
-                weights: inner,
-            });
-        }
+        let mut work = Between {
+            rule: self.rule,
+            times,
+            weights: &mut self.weights,
+        };
+        in_lanes(&mut work);
         let is_curve = all > 2;
         if first == 0 && is_curve {
             self.weights[0] = WeightRule::end(self.ends);
@@ -160,21 +174,23 @@ impl<'a> TrackWeights<'a> {
     }
 }
 
-/// Computes the weights of the keys between neighbouring intervals of these durations, one fewer
-/// than there are durations.
+/// Computes [`WeightRule::between`] for every key but the first and the last.
 struct Between<'a> {
     rule: WeightRule,
-    durations: &'a [f64],
+    times: &'a [f64],
     weights: &'a mut [TangentWeights],
 }
 
 impl InLanes for Between<'_> {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
-        let count = self.weights.len();
-        let (before, after) = (&self.durations[..count], &self.durations[1..=count]);
+        let ([_, inner @ .., _], [_, own @ ..]) = (&mut *self.weights, self.times) else {
+            return;
+        };
+        let count = inner.len();
+        let (before, own, after) = (&self.times[..count], &own[..count], &own[1..][..count]);
         for j in 0..count {
-            self.weights[j] = self.rule.between(before[j], after[j]);
+            inner[j] = self.rule.between(own[j] - before[j], after[j] - own[j]);
         }
     }
 }

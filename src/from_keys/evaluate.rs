@@ -129,10 +129,16 @@ impl<'a> Block<'a> {
     ) {
         let signed = SignedKeys::new(keys);
         match self {
-            Block::TwoKeys(block) => samples.for_each(|sample| block.push(signed, sample, output)),
+            Block::TwoKeys(block) => {
+                for sample in samples {
+                    block.push(signed, sample, output);
+                }
+            }
             Block::Cubics(block, weights) => {
                 let weights = weights.of(keys.times, keys.first_key, keys.all);
-                samples.for_each(|sample| block.push(signed, weights, sample, output));
+                for sample in samples {
+                    block.push(signed, weights, sample, output);
+                }
             }
         }
     }
