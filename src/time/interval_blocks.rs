@@ -134,9 +134,13 @@ impl<'a> IntervalBlocks<'a> {
         }
         let to = (from + LEN).min(count);
         self.done = to;
-        let reversed;
+        let mut reversed = [0.0; LEN];
         let (starts, next) = if self.clock.is_reversed() {
-            reversed = self.reversed(from..to);
+            let times = (self.starts[count - to..].iter().copied().chain([self.end])).rev();
+            let times = times.skip(from);
+            for (place, time) in reversed[..to - from].iter_mut().zip(times) {
+                *place = time;
+            }
             (&reversed[..to - from], self.starts[count - to])
         } else {
             let next = self.starts.get(to).copied().unwrap_or(self.end);
@@ -150,22 +154,6 @@ impl<'a> IntervalBlocks<'a> {
             block,
         });
         (block.first[0] < self.samples.end).then_some(from..to)
-    }
-
-    /// Where these intervals end, in reversed order: frames that run backwards meet their ends
-    /// first.
-    #[cold]
-    fn reversed(&self, intervals: Range<usize>) -> [f64; LEN] {
-        let (from, count) = (intervals.start, self.starts.len());
-        let times = (self.starts[count - intervals.end..].iter().copied()).chain([self.end]);
-        let mut reversed = [0.0; LEN];
-        for (place, time) in reversed[..intervals.len()]
-            .iter_mut()
-            .zip(times.rev().skip(from))
-        {
-            *place = time;
-        }
-        reversed
     }
 }
 
