@@ -28,7 +28,7 @@ use std::sync::LazyLock;
 use naga::{BinaryOperator, Expression, Literal, Module};
 
 use operations::Subnormals;
-use program::Checked;
+use program::{Checked, Program};
 use random::Random;
 use trial::Twin;
 
@@ -92,12 +92,16 @@ fn kernels(twins: &[Twin]) -> BTreeMap<&'static str, Checked> {
         .collect()
 }
 
+/// The same, as they run on a device that keeps or flushes subnormals.
+fn programs(twins: &[Twin], subnormals: Subnormals) -> BTreeMap<&'static str, Program> {
+    let program = |(name, checked): (_, Checked)| (name, checked.program(subnormals));
+    kernels(twins).into_iter().map(program).collect()
+}
+
 #[test]
 fn every_shader_function_has_the_bits_of_its_twin() {
     let twins = twins();
-    let programs: BTreeMap<_, _> = (kernels(&twins).iter())
-        .map(|(&name, checked)| (name, checked.program(Subnormals::Kept)))
-        .collect();
+    let programs = programs(&twins, Subnormals::Kept);
     let samples = match std::env::var_os("SOAK") {
         Some(_) => SOAKED,
         None => SAMPLES,
@@ -117,12 +121,12 @@ const RESULTS: [&str; 4] = ["main", "pose", "crowd_work", "store"];
 #[test]
 fn results_are_the_same_where_subnormals_are_flushed() {
     let twins = twins();
-    let programs: BTreeMap<_, _> = (kernels(&twins).iter())
-        .map(|(&name, checked)| (name, checked.program(Subnormals::Flushed)))
-        .collect();
+    let programs = programs(&twins, Subnormals::Flushed);
     // The numbers of the self-test are chosen; they are compared on devices.
     let is_result = |twin: &&Twin| RESULTS.contains(&twin.function) && twin.kernel != "self_test";
-    for twin in twins.iter().filter(is_result) {
+    let results: Vec<&Twin> = twins.iter().filter(is_result).collect();
+    assert!(results.len() >= 30, "only {} were tried", results.len());
+    for twin in results {
         let program = &programs[twin.kernel];
         if let Err(why) = twin.compare(program, Random::canonical(), SAMPLES) {
             panic!("{why}");
