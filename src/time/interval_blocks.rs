@@ -184,7 +184,10 @@ impl InLanes for Fill<'_> {
         let end = clock.boundary(self.next);
         (frames[count], firsts[count]) = (end.frame, within(end.first, samples));
         let block = &mut *self.block;
-        (block.frame, block.first) = (frames, firsts.map(|first| whole_number(first) as usize));
+        block.frame = frames;
+        for j in 0..LEN + 1 {
+            block.first[j] = whole_number(firsts[j]) as usize;
+        }
         let (frame, next_frame) = (&frames[..count], &frames[1..=count]);
         let (first, next_first) = (&firsts[..count], &firsts[1..=count]);
         let is_held = &mut block.is_held[..count];
@@ -193,12 +196,14 @@ impl InLanes for Fill<'_> {
         let scale = &mut block.scale[..count];
         let offset = &mut block.offset[..count];
         let extent = if clock.is_reversed() { -1.0 } else { 1.0 };
-        let mut far = 0;
+        let (mut far, mut occupied) = (0, 0);
         for j in 0..count {
             let span = in_frames(frame[j], next_frame[j], extent);
             let (before, after) = (first[j] - span.whole, next_first[j] - span.whole);
             let is_far = (before.abs() >= FAR) | (after.abs() >= FAR);
-            far |= u64::from(is_far & (first[j] < next_first[j]));
+            let own = u64::from(first[j] < next_first[j]) << j;
+            occupied |= own;
+            far |= if is_far { own } else { 0 };
             is_held[j] = u64::from(first[j] == frame[j]);
             whole[j] = span.whole;
             distance[j] = before as f32;
@@ -206,11 +211,6 @@ impl InLanes for Fill<'_> {
             offset[j] = span.offset;
         }
         block.are_near = far == 0;
-        // Behind the end of the last interval `firsts` is 0, which sets no bit.
-        let mut occupied = 0;
-        for j in 0..LEN {
-            occupied |= u64::from(firsts[j] < firsts[j + 1]) << j;
-        }
         block.occupied = Occupied(occupied);
     }
 }
