@@ -10,6 +10,7 @@ use crate::simd::line::Line;
 struct Fill([f32; 4]);
 
 impl InLanesInto<(), [Line]> for Fill {
+    const WIDE_IN_TESTS: bool = true;
     type Outcome = ();
 
     #[inline(always)]

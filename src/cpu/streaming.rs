@@ -184,6 +184,7 @@ impl<'o> Place<'o> {
 struct WholeLines;
 
 impl<'o> InLanesInto<[Line], Place<'o>> for WholeLines {
+    const WIDE_IN_TESTS: bool = true;
     type Outcome = ();
 
     #[inline(always)]

@@ -4,17 +4,17 @@
 //!
 //! Work is compiled once for each width. In a build without optimisation the wide vectors would
 //! take two thirds of the build time and bring no speed, so it has the baseline alone (the build
-//! script sets `wide_vectors` in the others). So have the unit tests: that all widths give the same
-//! bits is tested from outside, of results, where they are stored, and of what keys become.
+//! script sets `wide_vectors` in the others). Most work has it alone in unit tests too: that all
+//! widths give the same bits is tested from outside, of results and of what keys become.
 
 use std::str::FromStr;
 use std::sync::OnceLock;
 
 use glam::Vec4;
 
-#[cfg(all(wide_vectors, not(test)))]
+#[cfg(wide_vectors)]
 use crate::simd::eight::Eight;
-#[cfg(all(wide_vectors, not(test)))]
+#[cfg(wide_vectors)]
 use crate::simd::sixteen::Sixteen;
 
 use crate::simd::lanes::Lanes;
@@ -70,9 +70,9 @@ impl VectorWidth {
     fn is_available(self) -> bool {
         match self {
             Self::Baseline => true,
-            #[cfg(all(wide_vectors, not(test)))]
+            #[cfg(wide_vectors)]
             Self::Avx2 => std::arch::is_x86_feature_detected!("avx2"),
-            #[cfg(all(wide_vectors, not(test)))]
+            #[cfg(wide_vectors)]
             Self::Avx512 => {
                 Self::Avx2.is_available()
                     && std::arch::is_x86_feature_detected!("avx512f")
@@ -80,7 +80,7 @@ impl VectorWidth {
                     && std::arch::is_x86_feature_detected!("avx512vl")
                     && std::arch::is_x86_feature_detected!("avx512bw")
             }
-            #[cfg(any(not(wide_vectors), test))]
+            #[cfg(not(wide_vectors))]
             _ => false,
         }
     }
@@ -113,6 +113,9 @@ impl FromStr for VectorWidth {
 /// `#[inline(always)]`. Plain loops in them have no branches, calls or intrinsics, so that the
 /// compiler vectorises them.
 pub(crate) trait InLanes {
+    /// Whether unit tests compile it for wide vectors too.
+    const WIDE_IN_TESTS: bool = false;
+
     /// `L` is the type of vectors, for work that is written in them.
     fn run<L: Lanes>(&mut self);
 }
@@ -128,6 +131,7 @@ pub(crate) fn in_lanes_of<W: InLanes>(width: VectorWidth, work: &mut W) {
     struct InPlace;
 
     impl<W: InLanes> InLanesInto<(), W> for InPlace {
+        const WIDE_IN_TESTS: bool = W::WIDE_IN_TESTS;
         type Outcome = ();
 
         #[inline(always)]
@@ -142,6 +146,8 @@ pub(crate) fn in_lanes_of<W: InLanes>(width: VectorWidth, work: &mut W) {
 /// [`InLanes`] the compiler cannot know that they do not overlap, which costs a fifth of the time
 /// of a row.
 pub(crate) trait InLanesInto<I: ?Sized, O: ?Sized> {
+    /// As in [`InLanes`].
+    const WIDE_IN_TESTS: bool = false;
     /// What `run` returns beside the output.
     type Outcome;
 
@@ -156,11 +162,14 @@ pub(crate) fn in_lanes_into<W: InLanesInto<I, O>, I: ?Sized, O: ?Sized>(
     input: &I,
     output: &mut O,
 ) -> W::Outcome {
+    if cfg!(test) && !W::WIDE_IN_TESTS {
+        return baseline(work, input, output);
+    }
     match width.narrowed() {
-        #[cfg(all(wide_vectors, not(test)))]
+        #[cfg(wide_vectors)]
         // SAFETY: the processor has AVX-512, for `narrowed` gives only what it has.
         VectorWidth::Avx512 => unsafe { avx512(work, input, output) },
-        #[cfg(all(wide_vectors, not(test)))]
+        #[cfg(wide_vectors)]
         // SAFETY: the processor has AVX2, likewise.
         VectorWidth::Avx2 => unsafe { avx2(work, input, output) },
         _ => baseline(work, input, output),
@@ -176,7 +185,7 @@ fn baseline<W: InLanesInto<I, O>, I: ?Sized, O: ?Sized>(
     work.run::<Vec4>(input, output)
 }
 
-#[cfg(all(wide_vectors, not(test)))]
+#[cfg(wide_vectors)]
 #[target_feature(enable = "avx512f,avx512dq,avx512vl,avx512bw")]
 fn avx512<W: InLanesInto<I, O>, I: ?Sized, O: ?Sized>(
     work: &W,
@@ -186,7 +195,7 @@ fn avx512<W: InLanesInto<I, O>, I: ?Sized, O: ?Sized>(
     work.run::<Sixteen>(input, output)
 }
 
-#[cfg(all(wide_vectors, not(test)))]
+#[cfg(wide_vectors)]
 #[target_feature(enable = "avx2")]
 fn avx2<W: InLanesInto<I, O>, I: ?Sized, O: ?Sized>(
     work: &W,

@@ -69,7 +69,7 @@ macro_rules! doubles {
         }
     };
 }
-#[cfg(all(wide_vectors, not(test)))]
+#[cfg(wide_vectors)]
 pub(crate) use doubles;
 
 /// Calls instructions that every processor of the target has.

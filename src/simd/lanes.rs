@@ -352,6 +352,8 @@ mod tests {
     struct EveryVector;
 
     impl InLanes for EveryVector {
+        const WIDE_IN_TESTS: bool = true;
+
         fn run<L: Lanes>(&mut self) {
             lanes_are_samples::<L>();
             doubles_are_samples::<L>();

@@ -4,9 +4,9 @@
 
 pub(crate) mod dispatch;
 pub(crate) mod doubles;
-#[cfg(all(wide_vectors, not(test)))]
+#[cfg(wide_vectors)]
 pub(crate) mod eight;
 pub(crate) mod lanes;
 pub(crate) mod line;
-#[cfg(all(wide_vectors, not(test)))]
+#[cfg(wide_vectors)]
 pub(crate) mod sixteen;
