@@ -2,7 +2,6 @@
 //! which samples are stored. It serves dense keys (no more samples than spans) and sparse times (a
 //! few explicit times of each track, such as a crowd's poses); other windows are listed by runs.
 
-use bytemuck::Zeroable as _;
 use rayon::prelude::*;
 
 use crate::cpu::evaluate::SAMPLES_ONE_BY_ONE;
@@ -17,8 +16,7 @@ use crate::simd::lanes::Lanes;
 use crate::time::frame_clock::FrameClock;
 use crate::time::frames::{FramesError, Ticks, Timeline};
 use crate::time::runs::{Affine, Emit, Run, RunSource};
-use crate::time::spans::{NONE, Part, Source};
-use crate::time::times::TimeLanes;
+use crate::time::spans::Part;
 use crate::time::wrap::TrackCopy;
 
 /// A window whose samples are listed one by one.
@@ -174,19 +172,23 @@ impl InLanes for SampleChunk<'_> {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
         let (timeline, window) = (self.all.timeline, self.all.window);
+        let (prepared, parts) = (self.prepared, self.parts);
         if let Ticks::Times { times, stride } = &timeline.ticks
             && window.samples.len() <= SAMPLES_ONE_BY_ONE
         {
-            return self.list_sparse_times(times, *stride);
-        }
-        let (prepared, parts) = (self.prepared, self.parts);
-        let copy = TrackCopy::own(window.samples.clone());
-        for part in parts {
-            self.track = part.track as usize;
-            let listed = prepared.spans.runs(part, timeline, &copy, self);
-            if listed.is_err() {
-                self.result = listed;
-                return;
+            for part in parts {
+                let own = &times[part.track as usize * stride..];
+                self.list_sparse_times(part, own);
+            }
+        } else {
+            let copy = TrackCopy::own(window.samples.clone());
+            for part in parts {
+                self.track = part.track as usize;
+                let listed = prepared.spans.runs(part, timeline, &copy, self);
+                if listed.is_err() {
+                    self.result = listed;
+                    return;
+                }
             }
         }
         self.list[self.listed..].fill(NOTHING);
@@ -249,65 +251,25 @@ impl Emit for SampleChunk<'_> {
 }
 
 impl SampleChunk<'_> {
-    /// Lists sparse times, a block at a time: first each sample is looked up, then the parameters
-    /// of all are computed in lanes.
+    /// Lists the few samples of a part without runs.
     #[inline(always)]
-    fn list_sparse_times(&mut self, times: &[f64], stride: usize) {
-        let samples = self.all.window.samples.clone();
-        let mut found = TimeLanes::zeroed();
-        for parts in self.parts.chunks(TimeLanes::LEN / samples.len().max(1)) {
-            found.count = 0;
-            for part in parts {
-                let own = &times[part.track as usize * stride..];
-                for sample in samples.clone() {
-                    let (source, start, end) = self.look_up(part, own, sample);
-                    found.push(source, own[sample], start, end);
+    fn list_sparse_times(&mut self, part: &Part, times: &[f64]) {
+        self.track = part.track as usize;
+        for sample in self.all.window.samples.clone() {
+            let spans = &self.prepared.spans;
+            self.list[self.listed] = match spans.source_at(part, times[sample]) {
+                Some(RunSource::Constant(constant)) => held(constant),
+                Some(RunSource::Segment(source, distance, Affine { scale, offset })) => {
+                    let parameter = distance.of(0, || times[sample]) * scale + offset;
+                    ListedSample { source, parameter }
                 }
-            }
-            let parameters = found.parameters();
-            let own = &mut self.list[self.listed..][..found.count];
-            for (lane, single) in own.iter_mut().enumerate() {
-                let (source, parameter) = (found.sources[lane], parameters[lane]);
-                *single = ListedSample { source, parameter };
-            }
-            self.listed += found.count;
-        }
-    }
-
-    /// The source of a sample, and the start and end of its segment in seconds; 0 and 1 for a
-    /// constant.
-    #[inline(always)]
-    fn look_up(&mut self, part: &Part, times: &[f64], sample: usize) -> (u32, f64, f64) {
-        let (prepared, time) = (self.prepared, times[sample]);
-        if let Some((span, end)) = prepared.spans.span_at(part, time) {
-            let (start, key) = (prepared.spans.starts[span], prepared.spans.keys[span]);
-            match prepared.spans.sources[span] {
-                _ if time == start && key != NONE => return (key | IS_CONSTANT, 0.0, 1.0),
-                Source::Segment(index) => return (index, start, end),
-                Source::Constant(constant) => return (constant | IS_CONSTANT, 0.0, 1.0),
-                Source::Exact(_) => {}
-            }
-        }
-        let constant = self.constant_outside(part, times, sample);
-        (constant | IS_CONSTANT, 0.0, 1.0)
-    }
-
-    /// The constant of a sample outside the keys, or 0 for one that the host computes in f64. A
-    /// function of its own, so that the usual path stays small.
-    #[inline(never)]
-    fn constant_outside(&mut self, part: &Part, times: &[f64], sample: usize) -> u32 {
-        let (all, track) = (self.all, part.track as usize);
-        let mut found = Vec::new();
-        (self.prepared.spans).runs_of_times(part, times, sample..sample + 1, &mut found);
-        match found.first().map(|run| run.source) {
-            Some(RunSource::Constant(constant)) => constant,
-            // Neither occurs: outside the keys of a whole track lie constants or f64 curves.
-            Some(RunSource::Segment(..)) | None => 0,
-            Some(RunSource::Exact { index, parameter }) => {
-                let exact = (self.prepared).exact(index, parameter, all.timeline, track, sample);
-                self.patches.push((all.window.place(track, sample), exact));
-                0
-            }
+                // Outside the keys of a whole track lie constants or curves, which are one run.
+                _ => {
+                    spans.runs_of_times(part, times, sample..sample + 1, self);
+                    continue;
+                }
+            };
+            self.listed += 1;
         }
     }
 }

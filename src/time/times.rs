@@ -3,8 +3,6 @@
 
 use std::ops::Range;
 
-use bytemuck::Zeroable;
-
 use crate::math::canonical::round_f32;
 use crate::shader::{IS_KEY, KeySample};
 use crate::time::frame_clock::finite_scale;
@@ -52,25 +50,20 @@ impl Spans {
     /// The source of one part's rotation at a time; `None` outside its keys.
     #[inline(always)]
     pub(crate) fn source_at(&self, part: &Part, time: f64) -> Option<RunSource> {
-        let (span, end) = self.span_at(part, time)?;
-        let key = self.keys[span];
-        if time == self.starts[span] && key != NONE {
-            return Some(RunSource::Constant(key));
-        }
-        Some(self.time_source(span, end))
-    }
-
-    /// The span of one part that holds a time, and when it ends; `None` outside its keys.
-    #[inline(always)]
-    pub(crate) fn span_at(&self, part: &Part, time: f64) -> Option<(usize, f64)> {
         let starts = &self.starts[part.spans.clone()];
-        if starts.is_empty() {
-            return None;
-        }
         let i = interval_at(starts, time, 0);
         let end = starts.get(i + 1).copied().unwrap_or(part.end);
         // Written out: closures are not always inlined.
-        (starts[i] <= time && time < end).then_some((part.spans.start + i, end))
+        let is_within = !starts.is_empty() && starts[i] <= time && time < end;
+        if !is_within {
+            return None;
+        }
+        let span = part.spans.start + i;
+        let key = self.keys[span];
+        if time == starts[i] && key != NONE {
+            return Some(RunSource::Constant(key));
+        }
+        Some(self.time_source(span, end))
     }
 
     #[inline(always)]
@@ -159,37 +152,5 @@ pub(crate) fn interval_at(starts: &[f64], time: f64, near: usize) -> usize {
     } else {
         let behind = starts.partition_point(|&start| start <= time);
         behind.saturating_sub(1)
-    }
-}
-
-/// Explicit times whose intervals are known, and whose parameters are computed together in vector
-/// lanes.
-#[derive(Zeroable)]
-pub(crate) struct TimeLanes {
-    /// What gives each rotation, in the caller's own encoding.
-    pub(crate) sources: [u32; TimeLanes::LEN],
-    times: [f64; TimeLanes::LEN],
-    starts: [f64; TimeLanes::LEN],
-    ends: [f64; TimeLanes::LEN],
-    pub(crate) count: usize,
-}
-
-impl TimeLanes {
-    pub(crate) const LEN: usize = 64;
-
-    /// Adds a time in the interval from `start` to `end`.
-    #[inline(always)]
-    pub(crate) fn push(&mut self, source: u32, time: f64, start: f64, end: f64) {
-        let lane = self.count % Self::LEN;
-        self.sources[lane] = source;
-        self.times[lane] = time;
-        (self.starts[lane], self.ends[lane]) = (start, end);
-        self.count = lane + 1;
-    }
-
-    /// The parameter of each time in its interval.
-    #[inline(always)]
-    pub(crate) fn parameters(&self) -> [f32; Self::LEN] {
-        std::array::from_fn(|lane| parameter(self.starts[lane], self.ends[lane], self.times[lane]))
     }
 }
