@@ -118,81 +118,64 @@ mod tests {
     use super::*;
     use crate::gpu::cards::card;
 
-    fn of(name: &str) -> Option<(u32, u64)> {
-        direct(&card(name).memory).map(|found| (found.memory_type, found.largest))
-    }
-
-    /// All of it where a resizable BAR or shared memory makes the host see everything; a 64th of the
-    /// old window; nothing where there is none.
+    /// Uploads go to all of it where a resizable BAR or shared memory makes the host see everything,
+    /// to a 64th of the old window, nowhere where there is none. Results stay where memory is one
+    /// and cached.
     #[test]
-    fn each_card_takes_the_uploads_that_its_memory_is_made_for() {
+    fn each_card_has_the_memory_that_it_is_made_for() {
         let everything = u64::MAX;
         let window = (256 << 20) / 64;
-        assert_eq!(of("H200"), Some((4, everything)));
-        assert_eq!(of("RTX 4060"), Some((4, everything)));
-        assert_eq!(
-            of("RTX 4060, no resizable BAR"),
-            Some((4, window - (10 << 20) / 64))
-        );
-        assert_eq!(of("RX 7900 XTX, RADV"), Some((2, everything)));
-        assert_eq!(of("RX 7900 XTX, no resizable BAR"), Some((2, window)));
-        assert_eq!(of("RX 7900 XTX, AMD's driver"), Some((2, everything)));
-        assert_eq!(of("Steam Deck"), Some((2, everything)));
-        assert_eq!(of("Arc A770, Mesa 24"), Some((1, everything)));
-        assert_eq!(of("Apple M2, MoltenVK"), Some((1, everything)));
-        assert_eq!(of("lavapipe"), Some((0, everything)));
-        assert_eq!(of("SwiftShader"), Some((0, everything)));
+        let without_bar = window - (10 << 20) / 64;
+        for (name, memory_type, largest, unified) in [
+            ("H200", 4, everything, false),
+            ("RTX 4060", 4, everything, false),
+            ("RTX 4060, no resizable BAR", 4, without_bar, false),
+            ("RX 7900 XTX, RADV", 2, everything, false),
+            ("RX 7900 XTX, no resizable BAR", 2, window, false),
+            ("RX 7900 XTX, AMD's driver", 2, everything, false),
+            ("Steam Deck", 2, everything, false), // cached memory is not called the device's there
+            ("Arc A770, Mesa 24", 1, everything, false),
+            ("Apple M2, MoltenVK", 1, everything, true),
+            ("lavapipe", 0, everything, true),
+            ("SwiftShader", 0, everything, true),
+        ] {
+            let memory = card(name).memory;
+            let found = direct(&memory).map(|found| (found.memory_type, found.largest));
+            assert_eq!(found, Some((memory_type, largest)), "{name}");
+            assert_eq!(is_unified(&memory), unified, "{name}");
+        }
         let mut host_alone = card("H200").memory;
         host_alone.memory_type_count = 4;
         assert_eq!(direct(&host_alone), None);
     }
 
     #[test]
-    fn results_stay_where_memory_is_one_and_cached() {
-        for (name, unified) in [
-            ("H200", false),
-            ("RTX 4060", false),
-            ("RX 7900 XTX, RADV", false),
-            ("Steam Deck", false), // cached memory is not called the device's there
-            ("Arc A770, Mesa 24", false),
-            ("Apple M2, MoltenVK", true),
-            ("lavapipe", true),
-            ("SwiftShader", true),
-        ] {
-            assert_eq!(is_unified(&card(name).memory), unified, "{name}");
-        }
-    }
-
-    #[test]
     fn every_upload_is_placed_by_its_size() {
-        let direct = Some(DirectMemory {
+        use KernelReads::{Often, Once};
+        use Uploads::{Automatic, Direct, Staged};
+        let some = Some(DirectMemory {
             memory_type: 4,
             largest: 1000,
         });
-        let placing = |uploads, in_place, direct| Placing {
-            uploads,
-            in_place,
-            direct,
-        };
-        let (once, often) = (KernelReads::Once, KernelReads::Often);
-        let card = placing(Uploads::Automatic, false, direct);
-        assert_eq!(card.place(1000, often), Place::Direct);
-        assert_eq!(card.place(1001, often), Place::Staged);
-        assert_eq!(card.place(1001, once), Place::Host);
-        let shared = placing(Uploads::Automatic, true, direct);
-        assert_eq!(shared.place(1000, often), Place::Direct);
-        assert_eq!(shared.place(1001, often), Place::Host);
-        let forced = placing(Uploads::Direct, false, direct);
-        assert_eq!(forced.place(u64::MAX, once), Place::Direct);
-        let forced = placing(Uploads::Direct, false, None);
-        assert_eq!(forced.place(1, often), Place::Staged);
-        for in_place in [false, true] {
-            let staged = placing(Uploads::Staged, in_place, direct);
-            assert_eq!(staged.place(1, once), Place::Staged);
+        for (uploads, in_place, direct, bytes, reads, expected) in [
+            (Automatic, false, some, 1000, Often, Place::Direct),
+            (Automatic, false, some, 1001, Often, Place::Staged),
+            (Automatic, false, some, 1001, Once, Place::Host),
+            (Automatic, true, some, 1000, Often, Place::Direct),
+            (Automatic, true, some, 1001, Often, Place::Host),
+            (Automatic, true, None, 1, Often, Place::Host),
+            (Direct, false, some, u64::MAX, Once, Place::Direct),
+            (Direct, false, None, 1, Often, Place::Staged),
+            (Staged, false, some, 1, Once, Place::Staged),
+            (Staged, true, some, 1, Once, Place::Staged),
+        ] {
+            let placing = Placing {
+                uploads,
+                in_place,
+                direct,
+            };
+            let case = (uploads, in_place, bytes);
+            assert_eq!(placing.place(bytes, reads), expected, "{case:?}");
         }
-        assert_eq!(
-            placing(Uploads::Automatic, true, None).place(1, often),
-            Place::Host
-        );
     }
 }

@@ -137,21 +137,20 @@ mod tests {
 
     #[test]
     fn nothing_is_chosen_for_software_unless_it_is_forced() {
-        let Card { families, .. } = card("lavapipe");
-        let of = |read_back| copies(&families, 0, read_back, true);
-        assert_eq!(of(ReadBack::Automatic), Copies::Together);
-        assert_eq!(of(ReadBack::SameQueue), Copies::Together);
-        assert_eq!(of(ReadBack::Overlapped), Copies::Apart);
-        let Card { families, .. } = card("H200");
-        let beside = Copies::Beside(QueuePlace {
-            family: 1,
-            index: 0,
-        });
-        let of = |read_back| copies(&families, 0, read_back, false);
-        assert_eq!(of(ReadBack::Automatic), beside);
-        assert_eq!(of(ReadBack::SameQueue), Copies::Together);
-        assert_eq!(of(ReadBack::Overlapped), beside);
-        let many = copies(&families, 0, ReadBack::Automatic, true);
-        assert_eq!(many, Copies::Together);
+        let ways = [
+            ReadBack::Automatic,
+            ReadBack::SameQueue,
+            ReadBack::Overlapped,
+        ];
+        let of = |name, is_software| {
+            let families = card(name).families;
+            ways.map(|read_back| copies(&families, 0, read_back, is_software))
+        };
+        let (family, index) = (1, 0);
+        let beside = Copies::Beside(QueuePlace { family, index });
+        let software = [Copies::Together, Copies::Together, Copies::Apart];
+        assert_eq!(of("lavapipe", true), software);
+        assert_eq!(of("H200", false), [beside, Copies::Together, beside]);
+        assert_eq!(of("H200", true)[0], Copies::Together);
     }
 }

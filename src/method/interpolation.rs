@@ -106,6 +106,7 @@ impl Curve {
         let &Interpolation {
             method, path, ends, ..
         } = interpolation;
+        let path = method.path.unwrap_or(path);
         let curve = Self::of_track(method.reference, path, ends, interpolation.tcb, track);
         match interpolation.speed {
             Speed::AsKeyed => curve,

@@ -4,11 +4,11 @@
 use bytemuck::Zeroable;
 
 use crate::fit::double::fit::{self, MOST, TOLERANCE, coefficients};
-use crate::fit::double::intervals::at;
+use crate::fit::double::intervals::{at, load};
 use crate::fit::nodes::FULL_NODES;
 use crate::math::canonical::{power_of_two, round_quat};
 use crate::math::quaternion::{Quaternion, Real, dot};
-use crate::path::lanes::{Row, load};
+use crate::path::lanes::Row;
 use crate::path::sample::{END, Kind, MIDDLE, PAIRS, START, Sampler, Samples, Span};
 use crate::prepare::prepared::Prepared;
 use crate::shader::{POWERS, PolynomialSegment};
@@ -156,12 +156,12 @@ impl InLanes for InFit<'_> {
         // The segment of each lane.
         let places: [usize; MOST] = std::array::from_fn(|lane| lane);
         for lane in (0..self.count).step_by(L::COUNT) {
-            let middle = load::<L, 4>(&self.samples[MIDDLE], lane);
+            let middle = load::<L::Doubles, 4, _>(&self.samples[MIDDLE], lane);
             let mut values = [[zero; 4]; 2 * PAIRS];
             let mut is_far = zero;
             let mut largest = zero;
             for (value, samples) in values.iter_mut().zip(self.samples) {
-                *value = load::<L, 4>(samples, lane);
+                *value = load::<L::Doubles, 4, _>(samples, lane);
                 if self.kind == Kind::Vector {
                     for c in 0..4 {
                         largest = magnitude(value[c]).larger(largest);
@@ -212,7 +212,7 @@ impl InLanes for InFit<'_> {
             }
             let mut error = zero;
             for (s, end) in [(-0.5, START), (0.5, END)] {
-                let expected = load::<L, 4>(&self.samples[end], lane);
+                let expected = load::<L::Doubles, 4, _>(&self.samples[end], lane);
                 let (mut off, mut off_negated, mut farthest) = (zero, zero, zero);
                 for c in 0..4 {
                     let mut found = zero;

@@ -2,7 +2,7 @@
 //! time on one, of as many paths as it takes to fill a block; all lanes take their places in turn.
 
 use crate::fit::double::fit::MOST;
-use crate::fit::double::intervals::{put, store};
+use crate::fit::double::intervals::{load, put, store};
 use crate::math::quaternion::{
     Quaternion, Real, cross3, dot, dot3, minus, product, scaled, sine_cosine, square,
 };
@@ -71,7 +71,7 @@ impl<const PLACES: usize> InLanes for Directions<'_, PLACES> {
         for lane in (0..self.count).step_by(L::COUNT) {
             let mut powers = [[zero; 3]; 4];
             for (power, rows) in powers.iter_mut().zip(self.polynomials) {
-                *power = load::<L, 3>(rows, lane);
+                *power = load::<L::Doubles, 3, _>(rows, lane);
             }
             for place in 0..PLACES {
                 let t = L::Doubles::load(&self.places[place][lane..]);
@@ -141,14 +141,14 @@ impl<const PLACES: usize> InLanes for Rolling<'_, PLACES> {
         let all_cosines = &CHEBYSHEV.cosines;
         let mut angles = [[0.0; MOST]; 2];
         for lane in (0..self.count).step_by(L::COUNT) {
-            let [from, to] = load::<L, 2>(self.ends, lane);
+            let [from, to] = load::<L::Doubles, 2, _>(self.ends, lane);
             let half = L::Doubles::all(0.5) * (to - from);
-            let middle = load::<L, 3>(&self.ways[MIDDLE], lane);
+            let middle = load::<L::Doubles, 3, _>(&self.ways[MIDDLE], lane);
             let mut least = one;
             let mut values = [zero; NODES];
             for (k, value) in values.iter_mut().enumerate() {
-                let way = load::<L, 3>(&self.ways[k], lane);
-                let change = load::<L, 3>(&self.changes[k], lane);
+                let way = load::<L::Doubles, 3, _>(&self.ways[k], lane);
+                let change = load::<L::Doubles, 3, _>(&self.changes[k], lane);
                 let cosine = dot3(middle, way);
                 let rest = (one + cosine).larger(L::Doubles::all(1e-9));
                 *value = half * dot3(cross3(middle, way), change) / rest;
@@ -181,7 +181,7 @@ impl<const PLACES: usize> InLanes for Rolling<'_, PLACES> {
             (-clenshaw(&roll, -one)).store(&mut angles[0][lane..]);
             clenshaw(&roll, within([from, to], to)).store(&mut angles[1][lane..]);
             for end in 0..2 {
-                let way = load::<L, 3>(&self.ways[MIDDLE + 1 + end], lane);
+                let way = load::<L::Doubles, 3, _>(&self.ways[MIDDLE + 1 + end], lane);
                 store(&mut self.own.turns[end], lane, least_turn(middle, way));
             }
         }
@@ -239,9 +239,9 @@ impl<const PLACES: usize> InLanes for Carried<'_, PLACES> {
             }
             let mut angles = [0.0; MOST];
             for lane in (0..self.count).step_by(L::COUNT) {
-                let ends = load::<L, 2>(&self.pieces.ends, lane);
+                let ends = load::<L::Doubles, 2, _>(&self.pieces.ends, lane);
                 let t = L::Doubles::load(&self.places[place][lane..]);
-                let roll = load::<L, { NODES + 1 }>(&self.pieces.roll, lane);
+                let roll = load::<L::Doubles, { NODES + 1 }, _>(&self.pieces.roll, lane);
                 clenshaw(&roll, within(ends, t)).store(&mut angles[lane..]);
             }
             let own = sines_and_cosines(&angles);
@@ -250,13 +250,14 @@ impl<const PLACES: usize> InLanes for Carried<'_, PLACES> {
                 added = sines_and_cosines(&rolls[place]);
             }
             for lane in (0..self.count).step_by(L::COUNT) {
-                let middle = load::<L, 3>(&self.pieces.middle, lane);
-                let base = load::<L, 4>(&self.pieces.base, lane);
-                let way = load::<L, 3>(&self.ways[place], lane);
+                let middle = load::<L::Doubles, 3, _>(&self.pieces.middle, lane);
+                let base = load::<L::Doubles, 4, _>(&self.pieces.base, lane);
+                let way = load::<L::Doubles, 3, _>(&self.ways[place], lane);
                 let turn = least_turn(middle, way);
-                let mut rotation = product(turn, about_z(base, load::<L, 2>(&own, lane)));
+                let mut rotation =
+                    product(turn, about_z(base, load::<L::Doubles, 2, _>(&own, lane)));
                 if self.rolls.is_some() {
-                    rotation = about_z(rotation, load::<L, 2>(&added, lane));
+                    rotation = about_z(rotation, load::<L::Doubles, 2, _>(&added, lane));
                 }
                 if let Some(body) = self.body {
                     rotation = product(rotation, all::<L, 4>(body));
@@ -288,8 +289,8 @@ impl<const PLACES: usize> InLanes for ByAxes<'_, PLACES> {
         for lane in (0..self.count).step_by(L::COUNT) {
             let mut is_along = zero;
             for place in 0..PLACES {
-                let way = load::<L, 3>(&self.ways[place], lane);
-                let side = load::<L, 3>(&self.sides[place], lane);
+                let way = load::<L::Doubles, 3, _>(&self.ways[place], lane);
+                let side = load::<L::Doubles, 3, _>(&self.sides[place], lane);
                 let across = minus(side, scaled(way, dot3(way, side)));
                 let inverse = one / square(across).root();
                 is_along = inverse.up_to(most, is_along, one);
@@ -381,16 +382,6 @@ fn about_z<R: Real>([x, y, z, w]: [R; 4], [sine, cosine]: [R; 2]) -> [R; 4] {
         w * sine + z * cosine,
         w * cosine - z * sine,
     ]
-}
-
-/// Numbers of lanes from `lane` on.
-#[inline(always)]
-pub(crate) fn load<L: Lanes, const N: usize>(rows: &[Row; N], lane: usize) -> [L::Doubles; N] {
-    let mut own = [L::Doubles::all(0.0); N];
-    for c in 0..N {
-        own[c] = L::Doubles::load(&rows[c][lane..]);
-    }
-    own
 }
 
 /// The same numbers in every lane.

@@ -4,12 +4,12 @@
 use glam::DVec3;
 
 use crate::fit::double::fit::MOST;
-use crate::fit::double::intervals::{at, put};
+use crate::fit::double::intervals::{at, load, put};
 use crate::fit::nodes::FULL_NODES;
 use crate::math::quaternion::{Quaternion, Real};
 use crate::path::carry::Piece;
 use crate::path::frames::Frames;
-use crate::path::lanes::{ByAxes, Carried, Pieces, Row, find_directions, load};
+use crate::path::lanes::{ByAxes, Carried, Pieces, Row, find_directions};
 use crate::path::options::{Follow, PathSpeed};
 use crate::path::route::{Route, Stretch};
 use crate::simd::dispatch::{InLanes, in_lanes};
@@ -271,7 +271,7 @@ impl InLanes for Rows {
     fn run<L: Lanes>(&mut self) {
         let (zero, one) = (L::Doubles::all(0.0), L::Doubles::all(1.0));
         for lane in (0..MOST).step_by(L::COUNT) {
-            let [from, to, first, last, start, end] = load::<L, 6>(&self.times, lane);
+            let [from, to, first, last, start, end] = load::<L::Doubles, 6, _>(&self.times, lane);
             let width = to - from;
             for (place, (row, part)) in self.places.iter_mut().zip(PARTS).enumerate() {
                 let time = match place {

@@ -5,6 +5,7 @@ use glam::DVec4;
 
 use crate::reduce::Task;
 use crate::reduce::value::Value;
+use crate::reference::vector::hermite;
 
 /// The places of the keys of intervals that are as long as possible: the farthest sample from each key
 /// that `fits` lets an interval reach. Its length is doubled until it does not, and then halved down
@@ -166,15 +167,4 @@ impl<T: Value> Task<'_, T> {
             (br * aa - ar * ab) / determinant,
         ]
     }
-}
-
-/// The weights of start, start tangent, end and end tangent.
-fn hermite(t: f64) -> [f64; 4] {
-    let (t2, t3) = (t * t, t * t * t);
-    [
-        2.0 * t3 - 3.0 * t2 + 1.0,
-        t3 - 2.0 * t2 + t,
-        3.0 * t2 - 2.0 * t3,
-        t3 - t2,
-    ]
 }

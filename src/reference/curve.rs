@@ -17,8 +17,6 @@ use crate::tracks::set as tracks;
 pub struct Definition {
     /// The curve of every interval of a track.
     pub(super) segments: fn(&Track, Ends) -> Vec<Segment>,
-    /// The path that it always takes, whatever is asked for.
-    pub(crate) path: Option<Path>,
 }
 
 impl fmt::Debug for Definition {
@@ -29,8 +27,7 @@ impl fmt::Debug for Definition {
 
 impl Definition {
     pub(crate) const fn new(segments: fn(&Track, Ends) -> Vec<Segment>) -> Self {
-        let path = None;
-        Self { segments, path }
+        Self { segments }
     }
 }
 
@@ -66,7 +63,6 @@ impl Curve {
         tcb: Tcb,
         track: tracks::Track<'_>,
     ) -> Self {
-        let path = definition.path.unwrap_or(path);
         let mut own = Track::new(path, track.times, track.keys);
         own.velocities = track.velocities.to_vec();
         own.tangents = track.tangents.to_vec();

@@ -2,7 +2,7 @@
 
 use glam::DQuat;
 
-use crate::curve::options::{Ends, Path};
+use crate::curve::options::Ends;
 use crate::reference::curve::Definition;
 use crate::reference::handles::cumulative;
 use crate::reference::segment::Segment;
@@ -32,19 +32,16 @@ pub(crate) const HERMITE: Definition = Definition::new(|track, _| {
 });
 
 /// Cubics in the components, with given tangents, normalised.
-pub(crate) const GLTF_CUBIC: Definition = Definition {
-    path: Some(Path::AsAuthored),
-    ..Definition::new(|track, _| {
-        each(track, |i| {
-            let tangent = |key: usize, side: usize| match track.tangents.get(key) {
-                Some(both) => both[side].as_dquat() * track.step(i),
-                None => DQuat::from_xyzw(0.0, 0.0, 0.0, 0.0),
-            };
-            let (from, to) = (track.keys[i], track.keys[i + 1]);
-            Segment::Cubic([from, tangent(i, 1), tangent(i + 1, 0), to])
-        })
+pub(crate) const GLTF_CUBIC: Definition = Definition::new(|track, _| {
+    each(track, |i| {
+        let tangent = |key: usize, side: usize| match track.tangents.get(key) {
+            Some(both) => both[side].as_dquat() * track.step(i),
+            None => DQuat::from_xyzw(0.0, 0.0, 0.0, 0.0),
+        };
+        let (from, to) = (track.keys[i], track.keys[i + 1]);
+        Segment::Cubic([from, tangent(i, 1), tangent(i + 1, 0), to])
     })
-};
+});
 
 /// The curves of all intervals.
 pub(crate) fn each(track: &Track, curve: impl Fn(usize) -> Segment) -> Vec<Segment> {

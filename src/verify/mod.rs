@@ -245,17 +245,9 @@ mod tests {
     use crate::reference::Curve;
 
     fn set() -> TrackSet {
-        let mut set = TrackSet::new();
-        let times = [0.0, 0.5, 2.0, 2.5];
         let keys = [0.0, 1.0, -0.4, 2.0].map(Quat::from_rotation_z);
-        set.push("", &times, &keys).unwrap();
-        set.push(
-            "",
-            &times,
-            &keys.map(|key| key * Quat::from_rotation_x(1.2)),
-        )
-        .unwrap();
-        set
+        let tilted = keys.map(|key| key * Quat::from_rotation_x(1.2));
+        TrackSet::with_shared_times(&[0.0, 0.5, 2.0, 2.5], &[keys, tilted].concat()).unwrap()
     }
 
     #[test]
