@@ -27,8 +27,10 @@ use crate::time::spans::NONE;
 
 type Places = [Place; ROOM + WAITING];
 
-/// The list of the lanes whose curve becomes two spans.
+/// Places in the lists of lanes.
+const SMALL_ANGLE: usize = 0;
 const HALVES: usize = 3;
+const LEFT_OVER: usize = 4;
 
 /// Prepares the curves of a block straight from keys.
 pub(crate) struct Direct {
@@ -38,8 +40,8 @@ pub(crate) struct Direct {
     /// Where the curve of each lane goes; of one that is split, the first half.
     places: Places,
     /// The lanes that were taken, by what becomes of their curves: small-angle cubics, curves
-    /// fitted with degree 8, curves fitted with degree 10, curves split at their middle
-    /// ([`HALVES`]), and those that f32 cannot prepare.
+    /// fitted with degree 8, curves fitted with degree 10, curves split at their middle, and those
+    /// that f32 cannot prepare.
     lists: [List; 5],
     /// The starts and the keys of the spans that lanes become, which are at most two each.
     starts: [f64; 2 * LANES],
@@ -105,7 +107,7 @@ impl Direct {
                 .map(|longest| usize::from(squared_extent <= longest as f32));
             let is_small = self.small_angle.holds[lane];
             // NaN is within nothing, and left over.
-            let list = usize::from(!is_small) * (4 - within.iter().sum::<usize>());
+            let list = usize::from(!is_small) * (LEFT_OVER - within.iter().sum::<usize>());
             self.lists[list].push(lane);
             self.places[lane] = Place {
                 span: first.span + count,
@@ -132,26 +134,30 @@ impl Direct {
         is_exact: bool,
         fitting: &mut Fitting,
     ) {
-        let (numbers, places) = (&mut self.whole.numbers, &mut self.places);
-        let [small_angle, few_powers, usual, halves, left_over] = &mut self.lists;
-        for &lane in small_angle.lanes() {
-            let segment = &mut prepared.segments.polynomials[places[lane as usize].segment];
+        for &lane in self.lists[SMALL_ANGLE].lanes() {
+            let segment = self.places[lane as usize].segment;
+            let segment = &mut prepared.segments.polynomials[segment];
             self.small_angle.write(lane as usize, segment);
         }
-        fit_vectors(&FEW_POWERS, few_powers, 0, numbers, places, prepared);
-        fit_vectors(&WHOLE, usual, 1, numbers, places, prepared);
-        fit_vectors(&Halves, halves, 2, numbers, places, prepared);
+        self.fit_lists(prepared, false);
         if is_exact {
-            for &lane in left_over.lanes() {
+            for &lane in self.lists[LEFT_OVER].lanes() {
                 let lane = lane as usize;
                 fitting.take(intervals, lane, self.places[lane]);
             }
         } else {
             self.leave(prepared, intervals, stretches, fitting);
         }
-        let [small_angle, .., left_over] = &mut self.lists;
-        small_angle.count = 0;
-        left_over.count = 0;
+        (self.lists[SMALL_ANGLE].count, self.lists[LEFT_OVER].count) = (0, 0);
+    }
+
+    /// Fits the listed curves: all, or as many as fill vectors.
+    fn fit_lists(&mut self, prepared: &mut Prepared, all: bool) {
+        let (numbers, places) = (&mut self.whole.numbers, &mut self.places);
+        let [_, few_powers, usual, halves, _] = &mut self.lists;
+        fit_list(&FEW_POWERS, few_powers, 0, all, numbers, places, prepared);
+        fit_list(&WHOLE, usual, 1, all, numbers, places, prepared);
+        fit_list(&Halves, halves, 2, all, numbers, places, prepared);
     }
 
     /// Moves intervals that are left over to `rest`, each run of them between its neighbours as
@@ -163,18 +169,17 @@ impl Direct {
         stretches: &[Stretch],
         fitting: &mut Fitting,
     ) {
-        let [.., left_over] = &self.lists;
-        let mut left_over = left_over.lanes();
+        let mut left_over = self.lists[LEFT_OVER].lanes();
         for stretch in stretches {
             let end = stretch.lanes().end;
             let own = left_over.partition_point(|&lane| (lane as usize) < end);
             let (own, others) = left_over.split_at(own);
             for run in own.chunk_by(|&lane, &next| lane + 1 == next) {
                 let lanes = run[0] as usize..run[0] as usize + run.len();
-                let new = || Box::new(Rest::new(self.smooth, self.ends));
+                let new = || Box::new(Rest::new(self.smooth));
                 let rest = self.rest.get_or_insert_with(new);
                 if rest.intervals.count + lanes.len() + CONTEXT > LANES {
-                    rest.flush(prepared, fitting);
+                    rest.flush((self.smooth, self.ends), prepared, fitting);
                 }
                 rest.push(intervals, stretch, lanes.clone(), &self.places[lanes]);
             }
@@ -184,23 +189,9 @@ impl Direct {
 
     /// Fits the curves that still wait, and hands those left over to `fitting`.
     pub(crate) fn finish(&mut self, prepared: &mut Prepared, fitting: &mut Fitting) {
-        let (numbers, places) = (&self.whole.numbers, &self.places);
-        let [_, few_powers, usual, halves, _] = &mut self.lists;
-        fit(
-            &FEW_POWERS,
-            few_powers,
-            few_powers.count,
-            numbers,
-            places,
-            prepared,
-        );
-        fit(&WHOLE, usual, usual.count, numbers, places, prepared);
-        fit(&Halves, halves, halves.count, numbers, places, prepared);
-        for list in [few_powers, usual, halves] {
-            list.count = 0;
-        }
+        self.fit_lists(prepared, true);
         if let Some(rest) = &mut self.rest {
-            rest.flush(prepared, fitting);
+            rest.flush((self.smooth, self.ends), prepared, fitting);
         }
     }
 }
@@ -224,54 +215,43 @@ impl List {
     }
 }
 
-/// Fits the curves in the listed lanes as far as they fill vectors. The others wait, in the
-/// `waiting`th row of the lanes for that.
-fn fit_vectors<const PAIRS: usize>(
+/// Fits the curves in the listed lanes into the segments at their places, all or as many as fill
+/// vectors. The others wait, in the `waiting`th row of the lanes for that.
+fn fit_list<const PAIRS: usize>(
     how: &impl KeyFit<PAIRS>,
     list: &mut List,
     waiting: usize,
+    all: bool,
     curves: &mut CurveNumbers,
     places: &mut Places,
     prepared: &mut Prepared,
 ) {
-    let fitted = list.count - list.count % MOST;
-    fit(how, list, fitted, curves, places, prepared);
-    for i in 0..list.count - fitted {
-        let (from, to) = (list.all[fitted + i] as usize, ROOM + waiting * MOST + i);
+    let left = if all { 0 } else { list.count % MOST };
+    let count = list.count - left;
+    if count > 0 {
+        let segments = &mut prepared.segments.polynomials;
+        let all = segments.len();
+        // The lanes of the last vector that have no curve write to two extra segments.
+        segments.extend([PolynomialSegment::zeroed(); 2]);
+        in_lanes(&mut Fit::<_, PAIRS> {
+            how,
+            lanes: &list.all,
+            count,
+            curves,
+            places,
+            segments,
+        });
+        segments.truncate(all);
+    }
+    for i in 0..left {
+        let (from, to) = (list.all[count + i] as usize, ROOM + waiting * MOST + i);
         for numbers in &mut *curves {
             numbers[to] = numbers[from];
         }
         places[to] = places[from];
         list.all[i] = to as u32;
     }
-    list.count -= fitted;
-}
-
-/// Fits the curves in the first `count` listed lanes into the segments at their places.
-fn fit<const PAIRS: usize>(
-    how: &impl KeyFit<PAIRS>,
-    list: &List,
-    count: usize,
-    curves: &CurveNumbers,
-    places: &Places,
-    prepared: &mut Prepared,
-) {
-    if count == 0 {
-        return;
-    }
-    let segments = &mut prepared.segments.polynomials;
-    let all = segments.len();
-    // The lanes of the last vector that have no curve write to two extra segments.
-    segments.extend([PolynomialSegment::zeroed(); 2]);
-    in_lanes(&mut Fit::<_, PAIRS> {
-        how,
-        lanes: &list.all,
-        count,
-        curves,
-        places,
-        segments,
-    });
-    segments.truncate(all);
+    list.count = left;
 }
 
 struct Fit<'a, F, const PAIRS: usize> {
@@ -317,18 +297,14 @@ struct Rest {
     intervals: Intervals,
     stretches: Vec<Stretch>,
     places: Vec<Place>,
-    smooth: Smooth,
-    ends: Ends,
 }
 
 impl Rest {
-    fn new(smooth: Smooth, ends: Ends) -> Self {
+    fn new(smooth: Smooth) -> Self {
         Self {
             intervals: Intervals::new(smooth.shape.own),
             stretches: Vec::new(),
             places: Vec::new(),
-            smooth,
-            ends,
         }
     }
 
@@ -354,9 +330,14 @@ impl Rest {
     }
 
     /// Computes the curves of all intervals in f64, and queues them to be fitted.
-    fn flush(&mut self, prepared: &mut Prepared, fitting: &mut Fitting) {
+    fn flush(
+        &mut self,
+        (smooth, ends): (Smooth, Ends),
+        prepared: &mut Prepared,
+        fitting: &mut Fitting,
+    ) {
         let (intervals, stretches) = (&mut self.intervals, &mut self.stretches);
-        self.smooth.find_curves(intervals, stretches, self.ends);
+        smooth.find_curves(intervals, stretches, ends);
         let lanes = stretches.iter().flat_map(Stretch::lanes);
         for (lane, &place) in lanes.zip(&self.places) {
             fitting.take(intervals, lane, place);
