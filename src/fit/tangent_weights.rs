@@ -87,10 +87,12 @@ impl KeyWeights {
 
     /// Computes the weights of all keys of a block.
     pub(crate) fn bring(&mut self, intervals: &Intervals, stretches: &[Stretch]) {
-        in_lanes(&mut BetweenIntervals {
+        let count = intervals.count;
+        in_lanes(&mut Between {
             rule: self.rule,
-            durations: &intervals.durations[..=intervals.count],
-            weights: &mut self.keys[1..=intervals.count],
+            starts: &intervals.starts[..=count],
+            ends: &intervals.ends[..=count],
+            weights: &mut self.keys[1..=count],
         });
         for stretch in stretches {
             // A track of two keys has no neighbouring intervals, not even in a loop.
@@ -109,21 +111,24 @@ impl KeyWeights {
     }
 }
 
-/// Computes [`WeightRule::between`] for the keys between neighbouring intervals of a block, one fewer
-/// than there are durations.
-struct BetweenIntervals<'a> {
+/// Computes [`WeightRule::between`] for the keys between neighbouring intervals, one fewer than
+/// there are intervals.
+struct Between<'a> {
     rule: WeightRule,
-    durations: &'a [f64],
+    starts: &'a [f64],
+    ends: &'a [f64],
     weights: &'a mut [TangentWeights],
 }
 
-impl InLanes for BetweenIntervals<'_> {
+impl InLanes for Between<'_> {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
         let count = self.weights.len();
-        let (before, after) = (&self.durations[..count], &self.durations[1..=count]);
+        let (starts, next_starts) = (&self.starts[..count], &self.starts[1..=count]);
+        let (ends, next_ends) = (&self.ends[..count], &self.ends[1..=count]);
         for j in 0..count {
-            self.weights[j] = self.rule.between(before[j], after[j]);
+            let (before, after) = (ends[j] - starts[j], next_ends[j] - next_starts[j]);
+            self.weights[j] = self.rule.between(before, after);
         }
     }
 }
@@ -157,12 +162,15 @@ impl<'a> TrackWeights<'a> {
         (self.times, self.whole) = (times, (first, all));
         self.weights.clear();
         self.weights.resize(times.len(), UNKNOWN);
-        let mut work = Between {
-            rule: self.rule,
-            times,
-            weights: &mut self.weights,
-        };
-        in_lanes(&mut work);
+        if let ([_, weights @ .., _], [starts @ .., _]) = (&mut self.weights[..], times) {
+            let (rule, ends) = (self.rule, &times[1..]);
+            in_lanes(&mut Between {
+                rule,
+                starts,
+                ends,
+                weights,
+            });
+        }
         let is_curve = all > 2;
         if first == 0 && is_curve {
             self.weights[0] = WeightRule::end(self.ends);
@@ -171,26 +179,5 @@ impl<'a> TrackWeights<'a> {
             self.weights[times.len() - 1] = WeightRule::end(self.ends);
         }
         &self.weights
-    }
-}
-
-/// Computes [`WeightRule::between`] for every key but the first and the last.
-struct Between<'a> {
-    rule: WeightRule,
-    times: &'a [f64],
-    weights: &'a mut [TangentWeights],
-}
-
-impl InLanes for Between<'_> {
-    #[inline(always)]
-    fn run<L: Lanes>(&mut self) {
-        let ([_, inner @ .., _], [_, own @ ..]) = (&mut *self.weights, self.times) else {
-            return;
-        };
-        let count = inner.len();
-        let (before, own, after) = (&self.times[..count], &own[..count], &own[1..][..count]);
-        for j in 0..count {
-            inner[j] = self.rule.between(own[j] - before[j], after[j] - own[j]);
-        }
     }
 }
