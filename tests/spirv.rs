@@ -7,13 +7,12 @@ use std::process::{Command, Stdio};
 use naga::back::spv;
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 use proptest::prelude::*;
-#[allow(dead_code, unreachable_pub)] // the pass that the shaders' compiler and the engine have
-#[path = "../src/shader/spirv.rs"]
-pub(crate) mod pass;
+#[allow(unreachable_pub)]
+#[path = "../shader-compiler/src/exactness.rs"]
+pub(crate) mod exactness;
 
-use pass::{
-    FloatControls, SpirvError, float_controls, no_contraction, texel_buffers, without_decorations,
-};
+use exactness::spirv::{FloatControls, SpirvError, float_controls, without_decorations};
+use exactness::{PassError, no_contraction, texel_buffers};
 
 const ALL_CONTROLS: FloatControls = FloatControls {
     preserve_signed_zero_inf_nan: true,
@@ -132,7 +131,7 @@ fn inexact_operations_are_refused() {
     ] {
         let error = no_contraction(&kernel_of(expression)).unwrap_err();
         assert!(
-            matches!(error, SpirvError::Inexact { .. }),
+            matches!(error, PassError::Inexact { .. }),
             "{expression}: {error}"
         );
     }
@@ -229,21 +228,22 @@ fn textures_of_one_dimension_become_texel_buffers() {
 
 #[test]
 fn what_is_no_module_is_refused() {
-    assert_eq!(no_contraction(&[]), Err(SpirvError::NotSpirv));
+    assert_eq!(no_contraction(&[]), Err(SpirvError::NotSpirv.into()));
     assert_eq!(texel_buffers(&[]), Err(SpirvError::NotSpirv));
-    assert_eq!(no_contraction(&[0; 8]), Err(SpirvError::NotSpirv));
+    assert_eq!(no_contraction(&[0; 8]), Err(SpirvError::NotSpirv.into()));
     let header = [0x0723_0203, 0x1_0300, 0, 1, 0];
-    assert_eq!(no_contraction(&header), Err(SpirvError::Incomplete));
+    assert_eq!(no_contraction(&header), Err(SpirvError::Incomplete.into()));
     assert_eq!(
         float_controls(&header, ALL_CONTROLS),
         Err(SpirvError::Incomplete)
     );
     let cut = [&header[..], &[9 << 16 | 17]].concat();
-    assert_eq!(no_contraction(&cut), Err(SpirvError::Truncated { word: 5 }));
+    let truncated = SpirvError::Truncated { word: 5 };
+    assert_eq!(no_contraction(&cut), Err(truncated.into()));
     let double = [&header[..], &[3 << 16 | 22, 1, 64]].concat();
     assert_eq!(
         no_contraction(&double),
-        Err(SpirvError::FloatWidth { bits: 64 })
+        Err(PassError::FloatWidth { bits: 64 })
     );
 }
 

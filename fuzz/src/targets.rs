@@ -5,11 +5,12 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 
 use clap::Parser;
 use glam::Quat;
-#[allow(dead_code, unreachable_pub)] // the pass that the shaders' compiler and the engine have
-#[path = "../../src/shader/spirv.rs"]
-mod pass;
+#[allow(dead_code, unreachable_pub)] // the shaders' compiler has it
+#[path = "../../shader-compiler/src/exactness.rs"]
+mod exactness;
 
-use pass::{FloatControls, float_controls, no_contraction, without_decorations};
+use exactness::no_contraction;
+use exactness::spirv::{FloatControls, float_controls, without_decorations};
 use tumble::{
     Device, Encoding, Engine, FrameRate, Frames, Interpolation, Layout, MAX_FRAMES, METHODS, Path,
     Speed, TrackSet, WrapMode,

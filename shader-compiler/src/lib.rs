@@ -6,15 +6,14 @@
 //! What it makes is checked in, in `shaders/compiled/`: who builds the engine needs no naga, and gets
 //! the SPIR-V that was tested. `cargo run -p tumble-shaders` writes it anew.
 
-// The engine's build script and the engine have these, too, and use other parts of them.
+#[allow(unreachable_pub)] // tests and fuzzing include it
+mod exactness;
+// The engine's build script has it, too, and uses another part of it.
 #[allow(dead_code)]
 #[path = "../../build/hashes.rs"]
 mod hashes;
 mod readers;
 mod rust;
-#[allow(dead_code, unreachable_pub)]
-#[path = "../../src/shader/spirv.rs"]
-mod spirv;
 mod table;
 #[cfg(test)]
 mod tests;
@@ -196,7 +195,8 @@ impl Module {
         };
         let words = spv::write_vec(parsed, &info, &options, None)
             .unwrap_or_else(|error| panic!("{name}: {error}"));
-        let words = spirv::texel_buffers(&words).unwrap_or_else(|error| panic!("{name}: {error}"));
-        spirv::no_contraction(&words).unwrap_or_else(|error| panic!("{name}: {error}"))
+        let words =
+            exactness::texel_buffers(&words).unwrap_or_else(|error| panic!("{name}: {error}"));
+        exactness::no_contraction(&words).unwrap_or_else(|error| panic!("{name}: {error}"))
     }
 }

@@ -185,8 +185,8 @@ impl InLanes for Fill<'_> {
         (frames[count], firsts[count]) = (end.frame, within(end.first, samples));
         let block = &mut *self.block;
         block.frame = frames;
-        for j in 0..LEN + 1 {
-            block.first[j] = whole_number(firsts[j]) as usize;
+        for (number, &first) in block.first.iter_mut().zip(&firsts) {
+            *number = whole_number(first) as usize;
         }
         let (frame, next_frame) = (&frames[..count], &frames[1..=count]);
         let (first, next_first) = (&firsts[..count], &firsts[1..=count]);

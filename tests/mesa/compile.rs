@@ -6,7 +6,7 @@ use std::ffi::CStr;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-use crate::spirv::pass::{FloatControls, float_controls, without_decorations};
+use crate::spirv::exactness::spirv::{FloatControls, float_controls, without_decorations};
 use ash::{khr, vk};
 use tumble::Device;
 

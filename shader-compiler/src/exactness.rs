@@ -1,0 +1,147 @@
+//! The exactness pass: what makes a driver round each operation once, as written.
+//!
+//! naga emits neither `NoContraction` nor the float-control execution modes, and
+//! without them a driver may fuse a multiplication with an addition or rewrite
+//! `(a + b) - a` to `b`. This pass works on the words of a module: it decorates
+//! every float arithmetic instruction, and refuses a module that uses an operation
+//! whose rounding Vulkan leaves open. The engine adds the modes that a device reports.
+
+use std::collections::BTreeSet;
+
+// The engine has it, too, and uses other parts of it.
+#[allow(dead_code, unreachable_pub)]
+#[path = "../../src/shader/spirv.rs"]
+pub(crate) mod spirv;
+
+use spirv::{HEADER_WORDS, NO_CONTRACTION, SpirvError, instruction_word, instructions, op};
+
+// Further opcodes.
+const NAME_LAST: [u16; 6] = [3, 4, 5, 6, 7, 330]; // OpSource … OpModuleProcessed
+const EXT_INST_IMPORT: u16 = 11;
+const EXT_INST: u16 = 12;
+const MEMORY_MODEL: u16 = 14;
+const TYPE_FLOAT: u16 = 22;
+const TYPE_IMAGE: u16 = 25;
+const LOAD: u16 = 61;
+const IMAGE_FETCH: u16 = 95;
+const EXECUTION_MODE_ID: u16 = 331;
+/// Correctly rounded by Vulkan ("Precision and Operation of SPIR-V Instructions").
+const EXACT: [u16; 5] = [127, 129, 131, 133, 142]; // FNegate FAdd FSub FMul VectorTimesScalar
+/// Float arithmetic with a looser bound, or conversions that round freely.
+const INEXACT: [u16; 17] = [
+    109, 110, 115, 116, // ConvertFToU ConvertFToS FConvert QuantizeToF16
+    136, 140, 141, // FDiv FRem FMod
+    143, 144, 145, 146, 147, 148, // matrix products, OuterProduct, Dot
+    207, 208, 209, 215, // DPdx DPdy Fwidth and relatives
+];
+
+/// Why the pass refuses a module.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum PassError {
+    /// It is no complete module.
+    #[error(transparent)]
+    Spirv(#[from] SpirvError),
+    /// An instruction whose result Vulkan does not define to the last bit.
+    #[error("opcode {opcode} at word {word} does not round exactly; use only + - * and integers")]
+    Inexact {
+        /// Offset of the instruction in words.
+        word: usize,
+        /// Its opcode.
+        opcode: u16,
+    },
+    /// A floating-point type other than 32 bits wide.
+    #[error("a float type of {bits} bits; only 32 are exact everywhere")]
+    FloatWidth {
+        /// Its width in bits.
+        bits: u32,
+    },
+}
+
+/// Decorates the result of every float arithmetic instruction with
+/// `NoContraction`.
+///
+/// # Errors
+/// A [`PassError`] for words that are no module, and for a module that computes
+/// anything whose last bit Vulkan leaves open.
+pub fn no_contraction(module: &[u32]) -> Result<Vec<u32>, PassError> {
+    let code = instructions(module)?;
+    let mut results = BTreeSet::new();
+    let mut decorated = BTreeSet::new();
+    for instruction in &code {
+        let (word, opcode) = (instruction.start, instruction.opcode);
+        match (opcode, instruction.words) {
+            (TYPE_FLOAT, &[_, _, bits, ..]) if bits != 32 => {
+                return Err(PassError::FloatWidth { bits });
+            }
+            // Every built-in function of GLSL.std.450 that naga would emit for our
+            // shaders is one of those that round freely.
+            _ if opcode == EXT_INST || INEXACT.contains(&opcode) => {
+                return Err(PassError::Inexact { word, opcode });
+            }
+            _ if EXACT.contains(&opcode) => {
+                results.insert(instruction.word(2)?);
+            }
+            _ => decorated.extend(instruction.decorated()),
+        }
+    }
+    let additions: Vec<u32> = results
+        .difference(&decorated)
+        .flat_map(|&id| [instruction_word(op::DECORATE, 3), id, NO_CONTRACTION])
+        .collect();
+    // Annotations come after the debug instructions and before the types.
+    let place = code
+        .iter()
+        .find(|i| !precedes_annotations(i.opcode))
+        .map(|i| i.start)
+        .ok_or(SpirvError::Incomplete)?;
+    Ok([&module[..place], &additions, &module[place..]].concat())
+}
+
+/// Turns the one-dimensional textures of a module into texel buffers, which WGSL does not have.
+/// They are read in the same way, and may be as long as a buffer.
+///
+/// # Errors
+/// A [`SpirvError`] for words that are no module.
+pub fn texel_buffers(module: &[u32]) -> Result<Vec<u32>, SpirvError> {
+    const SAMPLED_1D: u32 = 43;
+    const SAMPLED_BUFFER: u32 = 46;
+    const BUFFER: u32 = 5; // a dimension
+    const FETCH_WORDS: usize = 5; // without the level of detail, which buffers do not have
+    let code = instructions(module)?;
+    let mut words = module[..HEADER_WORDS].to_vec();
+    // The ids of the types that were changed, and of values loaded of these types.
+    let mut buffers = BTreeSet::new();
+    for instruction in &code {
+        let first = words.len();
+        words.extend_from_slice(instruction.words);
+        match (instruction.opcode, instruction.words) {
+            (op::CAPABILITY, [_, SAMPLED_1D]) => words[first + 1] = SAMPLED_BUFFER,
+            (TYPE_IMAGE, [_, id, _, 0, ..]) => {
+                words[first + 3] = BUFFER;
+                buffers.insert(*id);
+            }
+            (LOAD, [_, kind, id, ..]) if buffers.contains(kind) => {
+                buffers.insert(*id);
+            }
+            (IMAGE_FETCH, [_, _, _, image, _, ..]) if buffers.contains(image) => {
+                words.truncate(first + FETCH_WORDS);
+                words[first] = instruction_word(IMAGE_FETCH, FETCH_WORDS as u32);
+            }
+            _ => {}
+        }
+    }
+    Ok(words)
+}
+
+fn precedes_annotations(opcode: u16) -> bool {
+    matches!(
+        opcode,
+        op::CAPABILITY
+            | op::EXTENSION
+            | EXT_INST_IMPORT
+            | MEMORY_MODEL
+            | op::ENTRY_POINT
+            | op::EXECUTION_MODE
+            | EXECUTION_MODE_ID
+    ) || NAME_LAST.contains(&opcode)
+}
