@@ -1,7 +1,6 @@
 //! What a rotation and a key cost, in instructions: counted, not timed, so that a
 //! loop that is no longer vectorised is found on any machine. The engine is counted as it is shipped:
 //! its profile for tests has no checks for overflow either, which would keep loops scalar.
-#![cfg(target_arch = "x86_64")]
 
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
