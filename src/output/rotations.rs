@@ -8,6 +8,7 @@ use glam::{Quat, Vec3, Vec4};
 use crate::math::canonical::canonical;
 use crate::memory::OutOfMemory;
 use crate::output::buffer::OutputBuffer;
+use crate::tracks::check::NORM_TOLERANCE;
 use crate::tracks::rotation::Rotation;
 
 /// The order of a result in memory.
@@ -94,6 +95,15 @@ pub enum SamplesError {
         /// Number of tracks.
         tracks: usize,
     },
+    /// A rotation is no unit quaternion as far as
+    /// [`NORM_TOLERANCE`](crate::NORM_TOLERANCE), or a vector is not finite.
+    #[error("value {index} is {value:?}; rotations are unit quaternions, and vectors finite")]
+    OutOfRange {
+        /// Its place among the values.
+        index: usize,
+        /// `x y z w`, or `x y z 0` of a vector.
+        value: [f32; 4],
+    },
     /// There is not the memory.
     #[error(transparent)]
     OutOfMemory(#[from] OutOfMemory),
@@ -118,6 +128,7 @@ impl<T> Samples<T> {
 
     fn of_rows(
         rows: impl ExactSizeIterator<Item = Quat>,
+        is_valid: impl Fn(Quat) -> bool,
         tracks: usize,
         layout: Layout,
     ) -> Result<Self, SamplesError> {
@@ -126,8 +137,12 @@ impl<T> Samples<T> {
             return Err(SamplesError::Uneven { values, tracks });
         }
         let mut storage = OutputBuffer::new(values)?;
-        for (to, row) in storage.iter_mut().zip(rows) {
-            *to = Quat::from_array(row.to_array().map(canonical));
+        for (index, (to, row)) in storage.iter_mut().zip(rows).enumerate() {
+            let value = row.to_array();
+            if !is_valid(row) {
+                return Err(SamplesError::OutOfRange { index, value });
+            }
+            *to = Quat::from_array(value.map(canonical));
         }
         Ok(Self::new(Box::new(storage), tracks, samples, layout))
     }
@@ -169,8 +184,7 @@ impl<T> Samples<T> {
 
 impl Rotations {
     /// Rotations from elsewhere, [`Quat`] or `[f32; 4]`, of so many tracks, in this order. Components
-    /// below 2^-64 become 0, as in every result. They should be unit quaternions: of others nothing is
-    /// promised, not that all devices give the same bits.
+    /// below 2^-64 become 0, as in every result.
     ///
     /// ```
     /// use tumble::{Device, Engine, Layout, Rotations, Smoothing, SmoothingKernel};
@@ -184,14 +198,16 @@ impl Rotations {
     /// ```
     ///
     /// # Errors
-    /// When their number is not a multiple of the tracks', or there is not the memory.
+    /// When their number is not a multiple of the tracks', when one is no unit quaternion, or when there
+    /// is not the memory.
     pub fn of<R: Rotation>(
         rotations: &[R],
         tracks: usize,
         layout: Layout,
     ) -> Result<Self, SamplesError> {
         let quats = rotations.iter().map(|rotation| rotation.quat());
-        Self::of_rows(quats, tracks, layout)
+        let is_unit = |q: Quat| (q.as_dquat().length() - 1.0).abs() <= NORM_TOLERANCE;
+        Self::of_rows(quats, is_unit, tracks, layout)
     }
 
     /// All rotations, without a copy: where a device maps its memory, these are the
@@ -212,14 +228,14 @@ impl Vectors {
     /// Vectors from elsewhere, [`Vec3`] or `[f32; 3]`; otherwise as [`Rotations::of`].
     ///
     /// # Errors
-    /// As there.
+    /// As there; also when one is not finite.
     pub fn of<V: Copy + Into<Vec3>>(
         vectors: &[V],
         tracks: usize,
         layout: Layout,
     ) -> Result<Self, SamplesError> {
         let rows = (vectors.iter()).map(|&vector| Quat::from_vec4(vector.into().extend(0.0)));
-        Self::of_rows(rows, tracks, layout)
+        Self::of_rows(rows, Quat::is_finite, tracks, layout)
     }
 
     /// All of them, without a copy, each followed by 0.
@@ -242,5 +258,36 @@ impl<T> fmt::Debug for Samples<T> {
             .field("samples", &self.samples)
             .field("layout", &self.layout)
             .finish_non_exhaustive()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_no_result_is_refused() {
+        let unit = [0.0, 0.6, 0.0, 0.8];
+        let of = |second, tracks| {
+            let given = [unit, second];
+            Rotations::of(&given, tracks, Layout::TrackMajor).map(|own| own.as_arrays()[1])
+        };
+        let tiny = [1e-20, 0.0, 0.0, 1.05];
+        assert_eq!(of(tiny, 2), Ok([0.0, 0.0, 0.0, 1.05]));
+        let values = 2;
+        for tracks in [0, 3] {
+            assert_eq!(
+                of(unit, tracks),
+                Err(SamplesError::Uneven { values, tracks })
+            );
+        }
+        let (index, value) = (1, [0.0; 4]);
+        assert_eq!(of(value, 1), Err(SamplesError::OutOfRange { index, value }));
+        assert!(of([f32::NAN, 0.0, 0.0, 1.0], 1).is_err());
+        let vectors = [[1.0; 3], [0.0, f32::INFINITY, 0.0]];
+        let error = Vectors::of(&vectors, 1, Layout::TrackMajor).unwrap_err();
+        let expected =
+            "value 1 is [0.0, inf, 0.0, 0.0]; rotations are unit quaternions, and vectors finite";
+        assert_eq!(error.to_string(), expected);
     }
 }
