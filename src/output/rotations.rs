@@ -95,8 +95,7 @@ pub enum SamplesError {
         /// Number of tracks.
         tracks: usize,
     },
-    /// A rotation is no unit quaternion as far as
-    /// [`NORM_TOLERANCE`](crate::NORM_TOLERANCE), or a vector is not finite.
+    /// A rotation is no unit quaternion as far as [`NORM_TOLERANCE`], or a vector is not finite.
     #[error("value {index} is {value:?}; rotations are unit quaternions, and vectors finite")]
     OutOfRange {
         /// Its place among the values.
