@@ -62,7 +62,7 @@ fn unsafe_code_stays_in_its_homes() {
 /// How many lines before unsafe code its reason may be.
 const REASON_WITHIN: usize = 6;
 
-/// Clippy finds both, and more (`scripts/lint.sh`); CI has not the time for it.
+/// Clippy finds both, and more (`scripts/lint.sh`); in CI it has the time for the engine's library alone.
 #[test]
 fn no_multiply_add_is_fused_and_unsafe_code_has_its_reason() {
     let folders = ["src", "formats/src", "routes/src", "cli/src", "capi/src"];
