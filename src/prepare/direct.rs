@@ -230,7 +230,7 @@ fn fit_list<const PAIRS: usize>(
     let count = list.count - left;
     if count > 0 {
         let segments = &mut prepared.segments.polynomials;
-        let all = segments.len();
+        let len = segments.len();
         // The lanes of the last vector that have no curve write to two extra segments.
         segments.extend([PolynomialSegment::zeroed(); 2]);
         in_lanes(&mut Fit::<_, PAIRS> {
@@ -241,7 +241,7 @@ fn fit_list<const PAIRS: usize>(
             places,
             segments,
         });
-        segments.truncate(all);
+        segments.truncate(len);
     }
     for i in 0..left {
         let (from, to) = (list.all[count + i] as usize, ROOM + waiting * MOST + i);
