@@ -156,7 +156,11 @@ pub use crate::tracks::vectors::{Channel, VectorKeys};
 pub use ash;
 pub use glam;
 
-/// The README's example is compiled and run as a test.
+/// The examples of the README and of the guide are compiled and run as tests.
 #[cfg(doctest)]
-#[doc = include_str!("../README.md")]
-struct Readme;
+mod guide {
+    #[doc = include_str!("../README.md")]
+    struct Readme;
+    #[doc = include_str!("../docs/library.md")]
+    struct Library;
+}

@@ -250,16 +250,58 @@ fn an_import_upwards_is_refused() {
 }
 
 #[test]
-fn every_method_is_in_the_readme() {
-    let readme = read("README.md");
+fn every_method_is_in_the_guide() {
+    let guide = read("docs/methods.md");
     for method in METHODS {
         assert!(
-            readme.contains(&format!("| `{}` |", method.name)),
+            guide.contains(&format!("| `{}` |", method.name)),
             "{method}"
         );
         let file = format!("src/method/{}.rs", method.name.replace('-', "_"));
         assert!(root().join(&file).exists(), "{file}");
     }
+}
+
+/// A visitor reads one page; all else is in `docs/`.
+#[test]
+fn the_readme_is_one_page() {
+    let lines = read("README.md").lines().count();
+    assert!(lines <= 150, "README.md has {lines} lines");
+}
+
+/// Every page of the guide is in its table of contents, and no link between pages is dead.
+#[test]
+fn every_page_is_listed_and_no_link_is_dead() {
+    let contents = read("docs/SUMMARY.md");
+    let pages = files("docs", "md").into_iter().chain(
+        [
+            "README.md",
+            "ARCHITECTURE.md",
+            "CONTRIBUTING.md",
+            "SECURITY.md",
+        ]
+        .map(|f| root().join(f)),
+    );
+    let mut links = 0;
+    for page in pages {
+        let name = page.file_name().unwrap().to_str().unwrap();
+        if page.parent() == Some(&root().join("docs")) && name != "SUMMARY.md" {
+            assert!(contents.contains(&format!("({name})")), "{name}");
+        }
+        let text = read(&page);
+        // Code is not text: `a[i](b)` links nowhere.
+        let prose = (text.split("```").step_by(2)).flat_map(|part| part.split('`').step_by(2));
+        for link in prose.flat_map(|part| part.split("](").skip(1)) {
+            let target = link.split([')', '#']).next().unwrap();
+            if target.is_empty() || target.contains("://") {
+                continue;
+            }
+            links += 1;
+            let path = page.parent().unwrap().join(target);
+            assert!(path.exists(), "{}: {target} is not there", page.display());
+        }
+    }
+    assert!(links > 100, "only {links} links were found");
 }
 
 /// A crate that nobody can say the use of is one to leave out.

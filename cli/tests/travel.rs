@@ -37,10 +37,10 @@ fn colourful(pixel: &[u8; 3]) -> bool {
     pixel.iter().max().unwrap() - pixel.iter().min().unwrap() > 60
 }
 
-/// The commands of the README's block that begins so.
+/// The commands of the guide's block that begins so.
 fn commands(start: &str) -> String {
-    let readme = fs::read_to_string(root().join("README.md")).unwrap();
-    let mut blocks = readme.split("```");
+    let guide = fs::read_to_string(root().join("docs/paths.md")).unwrap();
+    let mut blocks = guide.split("```");
     let found =
         blocks.find_map(|block| block.strip_prefix("sh\n").filter(|b| b.starts_with(start)));
     found
@@ -48,9 +48,9 @@ fn commands(start: &str) -> String {
         .to_owned()
 }
 
-/// The README's pipe, as it stands there: the box stays on the hill, upright on it, and clear of rocks.
+/// The guide's pipe, as it stands there: the box stays on the hill, upright on it, and clear of rocks.
 #[test]
-fn the_readme_s_pipe_leads_a_box_over_the_hill() {
+fn the_guide_s_pipe_leads_a_box_over_the_hill() {
     let place = tempfile::tempdir().unwrap();
     let program = Path::new(env!("CARGO_BIN_EXE_tumble")).parent().unwrap();
     let path = std::env::var("PATH").unwrap();

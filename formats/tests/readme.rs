@@ -1,4 +1,4 @@
-//! The README's table of formats, all of which are read, is the code's.
+//! The table of formats in the guide, all of which are read, is the code's.
 
 use std::fmt::Write;
 use std::fs;
@@ -26,11 +26,11 @@ fn the_table_of_formats_is_that_of_the_code() {
         let (endings, summary) = (endings.join(" "), format.summary);
         writeln!(table, "| {endings} | {summary} | {written} |").unwrap();
     }
-    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../README.md");
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/formats.md");
     let text = fs::read_to_string(&file).unwrap();
     let (before, rest) = text
         .split_once(BEGIN)
-        .expect("the README has a table of formats");
+        .expect("docs/formats.md has a table of formats");
     let (found, after) = rest.split_once(END).expect("the table of formats ends");
     if std::env::var_os("UPDATE_EXPECTED").is_some() {
         fs::write(&file, format!("{before}{BEGIN}{table}{END}{after}")).unwrap();
