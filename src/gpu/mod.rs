@@ -3,6 +3,8 @@
 #![allow(unsafe_code)]
 
 pub(crate) mod buffer;
+#[allow(dead_code)] // until the next changes use it
+pub(crate) mod cache;
 #[cfg(test)]
 pub(crate) mod cards;
 pub(crate) mod crowd;
