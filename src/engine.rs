@@ -10,6 +10,8 @@ use crate::curve::options::Quantity;
 use crate::device::{Device, VulkanDevice};
 use crate::error::Error;
 use crate::evaluate::uploaded::{Backend, Uploaded};
+#[cfg(feature = "prove")]
+use crate::gpu::details::{DeviceDetails, EngineChoices};
 use crate::gpu::engine::lock;
 use crate::gpu::options::{EngineOptions, Timings};
 use crate::gpu::physical::DeviceInfo;
@@ -114,6 +116,21 @@ impl Engine {
     #[must_use]
     pub fn device_info(&self) -> Option<&DeviceInfo> {
         self.backend.opened().map(|opened| &opened.info)
+    }
+
+    /// What Vulkan tells of its device, for a report; `None` on the CPU.
+    #[cfg(feature = "prove")]
+    #[must_use]
+    pub fn device_details(&self) -> Option<DeviceDetails> {
+        let opened = self.backend.opened()?;
+        Some(opened.engine().device.physical.details())
+    }
+
+    /// What was chosen for its device; `None` on the CPU.
+    #[cfg(feature = "prove")]
+    #[must_use]
+    pub fn choices(&self) -> Option<EngineChoices> {
+        Some(self.backend.opened()?.engine().choices())
     }
 
     /// The results of the device's self-test, one report for each check; empty on the CPU, which

@@ -112,6 +112,10 @@ pub use crate::device::{Device, VulkanDevice};
 pub use crate::engine::Engine;
 pub use crate::error::Error;
 pub use crate::gpu::crowd_target::CrowdTarget;
+#[cfg(feature = "prove")]
+pub use crate::gpu::details::{
+    DeviceDetails, EngineChoices, FloatControlsReport, Limits, MemoryHeap, MemoryType, QueueFamily,
+};
 pub use crate::gpu::error::VulkanError;
 pub use crate::gpu::handles::{VulkanBuffer, VulkanHandles, VulkanQueue};
 pub use crate::gpu::options::{

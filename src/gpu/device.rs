@@ -177,6 +177,12 @@ impl LogicalDevice {
         }
     }
 
+    /// Whether results are copied on another queue than the kernels'.
+    #[cfg(feature = "prove")]
+    pub(crate) fn has_copy_queue(&self) -> bool {
+        self.copy_queue.is_some()
+    }
+
     /// Nobody else uses any queue meanwhile.
     fn all_queues(&self) -> (MutexGuard<'_, vk::Queue>, Option<MutexGuard<'_, vk::Queue>>) {
         let own = lock(&self.queue.raw);

@@ -30,6 +30,11 @@ struct Messenger {
 impl Instance {
     /// Loads Vulkan and creates an instance of version 1.1 or newer.
     pub(crate) fn new(validation: bool) -> Result<Arc<Self>, VulkanError> {
+        Self::of_version(validation, vk::API_VERSION_1_3)
+    }
+
+    /// The same for an application that asks for that version of Vulkan.
+    pub(crate) fn of_version(validation: bool, api_version: u32) -> Result<Arc<Self>, VulkanError> {
         // SAFETY: loading a library runs its initialisers; that is what is asked for.
         let entry = unsafe { ash::Entry::load() }.map_err(|error| VulkanError::NoLoader {
             reason: error.to_string(),
@@ -55,7 +60,7 @@ impl Instance {
         let application = vk::ApplicationInfo::default()
             .application_name(c"tumble")
             .engine_name(c"tumble")
-            .api_version(vk::API_VERSION_1_3);
+            .api_version(api_version);
         let messages: Box<Mutex<Vec<String>>> = Box::default();
         let mut messenger_info = vk::DebugUtilsMessengerCreateInfoEXT::default()
             .message_severity(
@@ -112,6 +117,20 @@ impl Instance {
             owned: false,
             _entry: entry,
         })
+    }
+
+    /// The loaded functions.
+    #[cfg(feature = "prove")]
+    pub(crate) fn entry(&self) -> &ash::Entry {
+        &self._entry
+    }
+
+    /// The loader's version.
+    #[cfg(feature = "prove")]
+    pub(crate) fn loader_version(&self) -> u32 {
+        // SAFETY: no requirements beyond a loaded entry.
+        let version = unsafe { self._entry.try_enumerate_instance_version() };
+        version.ok().flatten().unwrap_or(vk::API_VERSION_1_0)
     }
 
     /// What the validation layer has said so far.

@@ -2,6 +2,8 @@
 //! recovery from errors. One type owns one Vulkan object and destroys it; unsafe code is allowed.
 #![allow(unsafe_code)]
 
+#[cfg(feature = "prove")]
+pub(crate) mod application;
 pub(crate) mod buffer;
 #[allow(dead_code)] // until the next changes use it
 pub(crate) mod cache;
@@ -10,6 +12,8 @@ pub(crate) mod cards;
 pub(crate) mod crowd;
 pub(crate) mod crowd_target;
 pub(crate) mod descriptors;
+#[cfg(feature = "prove")]
+pub(crate) mod details;
 pub(crate) mod device;
 pub(crate) mod engine;
 pub(crate) mod error;

@@ -4,7 +4,17 @@
 //! The last word on every result: nothing here trusts what the engine says about
 //! itself. The reference shares no code with the kernels.
 
+#[cfg(feature = "prove")]
+pub mod figures;
+#[cfg(feature = "prove")]
+pub mod golden;
 pub(crate) mod outputs;
+#[cfg(feature = "prove")]
+pub mod random;
+#[cfg(feature = "prove")]
+pub mod renderer;
+#[cfg(feature = "prove")]
+pub(crate) mod sets;
 
 pub use crate::verify::outputs::OutputVerification;
 use bytemuck::NoUninit;

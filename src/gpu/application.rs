@@ -1,0 +1,454 @@
+//! A device as an application makes it: an instance of Vulkan 1.1, one queue that computes, one that only
+//! copies where there is one, and buffers and commands of the application's. The proof of a device
+//! ([`verify::renderer`](crate::verify::renderer)) lets the engine work on it, and measures by its time
+//! stamps.
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use ash::{khr, vk};
+
+use crate::gpu::error::{Named, VulkanError};
+use crate::gpu::handles::{VulkanBuffer, VulkanHandles, VulkanQueue};
+use crate::gpu::instance::Instance;
+use crate::gpu::physical::PhysicalDevice;
+
+/// The version of Vulkan that the application asks for.
+const VERSION: u32 = vk::API_VERSION_1_1;
+
+/// Work that takes longer than this has hung.
+const TIMEOUT_SECONDS: u64 = 60;
+
+/// An application's device, destroyed with it.
+pub(crate) struct Application {
+    pub(crate) physical: PhysicalDevice,
+    device: ash::Device,
+    queue: vk::Queue,
+    pub(crate) copy_queue: Option<VulkanQueue>,
+    pool: vk::CommandPool,
+    /// Two time stamps; null where the queue takes none.
+    stamps: vk::QueryPool,
+    /// A wait ran out of time: nothing may be destroyed.
+    has_hung: bool,
+    // Destroyed last.
+    instance: Arc<Instance>,
+}
+
+/// Where an application's buffer lies.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum ApplicationMemory {
+    /// In the device's own memory; not visible to the host where there is such.
+    Device,
+    /// In the host's, cached where there is such.
+    Host,
+}
+
+/// A buffer of an application's, of its own memory.
+pub(crate) struct ApplicationBuffer {
+    device: ash::Device,
+    pub(crate) raw: vk::Buffer,
+    memory: vk::DeviceMemory,
+    pub(crate) size: u64,
+    /// Whether its memory is in the device's own heap and the host cannot see it.
+    pub(crate) is_hidden: bool,
+}
+
+/// How long work took.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Taken {
+    /// By the device's time stamps, where it has any.
+    pub(crate) on_device: Option<Duration>,
+    /// From before it was submitted until its fence was seen.
+    pub(crate) on_host: Duration,
+}
+
+/// The family that only copies: it neither draws nor computes.
+fn copy_family(families: &[vk::QueueFamilyProperties], compute: u32) -> Option<u32> {
+    let only_copies = |family: &vk::QueueFamilyProperties| {
+        use vk::QueueFlags as Flags;
+        let other = Flags::GRAPHICS
+            | Flags::COMPUTE
+            | Flags::VIDEO_DECODE_KHR
+            | Flags::VIDEO_ENCODE_KHR
+            | Flags::OPTICAL_FLOW_NV;
+        let flags = family.queue_flags;
+        family.queue_count > 0 && flags.contains(Flags::TRANSFER) && !flags.intersects(other)
+    };
+    let mut all = (0..).zip(families);
+    let found = all.find(|(index, family)| *index != compute && only_copies(family));
+    found.map(|(index, _)| index)
+}
+
+impl Application {
+    /// Opens the physical device of that UUID.
+    pub(crate) fn new(uuid: &str, validation: bool) -> Result<Self, VulkanError> {
+        let instance = Instance::of_version(validation, VERSION)?;
+        // SAFETY: the instance is alive, here and below.
+        let all = unsafe { instance.raw.enumerate_physical_devices() };
+        let all = all.named("vkEnumeratePhysicalDevices")?.into_iter();
+        let mut found = all.filter_map(|raw| PhysicalDevice::new(&instance, raw).ok().flatten());
+        let physical = found
+            .find(|physical| physical.info.uuid == uuid)
+            .ok_or(VulkanError::NoDevice)?;
+        // SAFETY: as above.
+        let families =
+            unsafe { (instance.raw).get_physical_device_queue_family_properties(physical.raw) };
+        let family = physical.queue_family;
+        let copy_family = copy_family(&families, family).filter(|_| physical.has_timelines);
+        let of_family = |family| {
+            vk::DeviceQueueCreateInfo::default()
+                .queue_family_index(family)
+                .queue_priorities(&[1.0])
+        };
+        let mut queues = vec![of_family(family)];
+        queues.extend(copy_family.map(of_family));
+        let features = vk::PhysicalDeviceFeatures::default().shader_int64(physical.has_int64);
+        let timeline = [khr::timeline_semaphore::NAME.as_ptr()];
+        let mut timelines =
+            vk::PhysicalDeviceTimelineSemaphoreFeatures::default().timeline_semaphore(true);
+        let mut info = vk::DeviceCreateInfo::default()
+            .queue_create_infos(&queues)
+            .enabled_features(&features);
+        if copy_family.is_some() {
+            // An instance of Vulkan 1.1 has them by their extension.
+            info = info
+                .enabled_extension_names(&timeline)
+                .push_next(&mut timelines);
+        }
+        // SAFETY: the physical device belongs to the instance and has these families.
+        let device = unsafe { instance.raw.create_device(physical.raw, &info, None) }
+            .named("vkCreateDevice")?;
+        // SAFETY: these queues were just created.
+        let queue = |family| unsafe { device.get_device_queue(family, 0) };
+        let mut application = Self {
+            queue: queue(family),
+            copy_queue: copy_family.map(|family| VulkanQueue {
+                queue: queue(family),
+                family,
+            }),
+            physical,
+            pool: vk::CommandPool::null(),
+            stamps: vk::QueryPool::null(),
+            has_hung: false,
+            instance,
+            device,
+        };
+        let device = &application.device;
+        let info = vk::CommandPoolCreateInfo::default().queue_family_index(family);
+        // SAFETY: the device is alive; destroyed in `drop`, here and below.
+        application.pool =
+            unsafe { device.create_command_pool(&info, None) }.named("vkCreateCommandPool")?;
+        if application.physical.timestamp_bits() > 0 {
+            let info = vk::QueryPoolCreateInfo::default()
+                .query_type(vk::QueryType::TIMESTAMP)
+                .query_count(2);
+            // SAFETY: as above.
+            application.stamps =
+                unsafe { device.create_query_pool(&info, None) }.named("vkCreateQueryPool")?;
+        }
+        Ok(application)
+    }
+
+    /// What the engine is given of it.
+    pub(crate) fn handles(&self) -> VulkanHandles {
+        VulkanHandles {
+            entry: self.instance.entry().clone(),
+            instance: self.instance.raw.clone(),
+            api_version: VERSION,
+            physical_device: self.physical.raw,
+            device: self.device.clone(),
+            shader_float_controls: false,
+            shader_int64: self.physical.has_int64,
+            queue: self.queue,
+            queue_family: self.physical.queue_family,
+            copy_queue: self.copy_queue,
+        }
+    }
+
+    /// What the validation layer has said so far.
+    pub(crate) fn validation_messages(&self) -> Vec<String> {
+        self.instance.validation_messages()
+    }
+
+    /// A buffer for results, that can be copied from and to.
+    pub(crate) fn buffer(
+        &self,
+        size: u64,
+        memory: ApplicationMemory,
+    ) -> Result<ApplicationBuffer, VulkanError> {
+        use vk::MemoryPropertyFlags as Flags;
+        let size = size.max(16).next_multiple_of(16);
+        let info = vk::BufferCreateInfo::default().size(size).usage(
+            vk::BufferUsageFlags::STORAGE_BUFFER
+                | vk::BufferUsageFlags::TRANSFER_DST
+                | vk::BufferUsageFlags::TRANSFER_SRC,
+        );
+        // SAFETY: the device is alive, here and below; destroyed when the buffer is dropped.
+        let raw = unsafe { self.device.create_buffer(&info, None) }.named("vkCreateBuffer")?;
+        let mut buffer = ApplicationBuffer {
+            device: self.device.clone(),
+            raw,
+            memory: vk::DeviceMemory::null(),
+            size,
+            is_hidden: false,
+        };
+        // SAFETY: as above.
+        let needs = unsafe { self.device.get_buffer_memory_requirements(raw) };
+        let types = self.physical.memory.memory_types_as_slice();
+        let find = |with: Flags, without: Flags| {
+            (0..types.len() as u32).find(|&index| {
+                let flags = types[index as usize].property_flags;
+                let is_allowed = needs.memory_type_bits & (1 << index) != 0;
+                is_allowed && flags.contains(with) && !flags.intersects(without)
+            })
+        };
+        let mapped = Flags::HOST_VISIBLE | Flags::HOST_COHERENT;
+        let index = match memory {
+            ApplicationMemory::Device => {
+                let hidden = find(Flags::DEVICE_LOCAL, Flags::HOST_VISIBLE);
+                buffer.is_hidden = hidden.is_some();
+                hidden.or_else(|| find(Flags::DEVICE_LOCAL, Flags::empty()))
+            }
+            ApplicationMemory::Host => {
+                let cached = find(mapped | Flags::HOST_CACHED, Flags::empty());
+                cached.or_else(|| find(mapped, Flags::empty()))
+            }
+        };
+        let wanted = match memory {
+            ApplicationMemory::Device => Flags::DEVICE_LOCAL,
+            ApplicationMemory::Host => mapped,
+        };
+        let info = vk::MemoryAllocateInfo::default()
+            .allocation_size(needs.size)
+            .memory_type_index(index.ok_or(VulkanError::NoMemoryType {
+                wanted: wanted.as_raw(),
+            })?);
+        // SAFETY: as above.
+        buffer.memory =
+            unsafe { self.device.allocate_memory(&info, None) }.named("vkAllocateMemory")?;
+        // SAFETY: as above; the memory is large enough and of an allowed type.
+        unsafe { self.device.bind_buffer_memory(raw, buffer.memory, 0) }
+            .named("vkBindBufferMemory")?;
+        Ok(buffer)
+    }
+
+    /// Commands with what `record` leaves in them; with time stamps around it where they are asked for
+    /// and there are any.
+    pub(crate) fn recorded<E: From<VulkanError>>(
+        &self,
+        is_timed: bool,
+        record: impl FnOnce(vk::CommandBuffer) -> Result<(), E>,
+    ) -> Result<vk::CommandBuffer, E> {
+        let device = &self.device;
+        let is_timed = is_timed && self.stamps != vk::QueryPool::null();
+        let info = vk::CommandBufferAllocateInfo::default()
+            .command_pool(self.pool)
+            .command_buffer_count(1);
+        // SAFETY: the device, its pools and the commands are alive, and nobody else uses them.
+        let commands =
+            unsafe { device.allocate_command_buffers(&info) }.named("vkAllocateCommandBuffers")?[0];
+        let info = vk::CommandBufferBeginInfo::default();
+        // SAFETY: as above.
+        unsafe { device.begin_command_buffer(commands, &info) }.named("vkBeginCommandBuffer")?;
+        if is_timed {
+            let start = vk::PipelineStageFlags::TOP_OF_PIPE;
+            // SAFETY: recording is on, and the pool has two queries.
+            unsafe {
+                device.cmd_reset_query_pool(commands, self.stamps, 0, 2);
+                device.cmd_write_timestamp(commands, start, self.stamps, 0);
+            }
+        }
+        record(commands)?;
+        if is_timed {
+            let end = vk::PipelineStageFlags::BOTTOM_OF_PIPE;
+            // SAFETY: as above.
+            unsafe { device.cmd_write_timestamp(commands, end, self.stamps, 1) };
+        }
+        // SAFETY: as above.
+        unsafe { device.end_command_buffer(commands) }.named("vkEndCommandBuffer")?;
+        Ok(commands)
+    }
+
+    /// Records a copy of the first `size` bytes, which waits for all before it and which the host and all
+    /// behind it see.
+    pub(crate) fn copy(
+        &self,
+        commands: vk::CommandBuffer,
+        from: &ApplicationBuffer,
+        to: &ApplicationBuffer,
+        size: u64,
+    ) {
+        use vk::{AccessFlags as Access, PipelineStageFlags as Stages};
+        let region = [vk::BufferCopy::default().size(size.min(from.size).min(to.size))];
+        self.barrier(
+            commands,
+            [Stages::ALL_COMMANDS, Stages::TRANSFER],
+            [
+                Access::MEMORY_WRITE,
+                Access::TRANSFER_READ | Access::TRANSFER_WRITE,
+            ],
+        );
+        // SAFETY: recording is on, and both ranges lie within their buffers.
+        unsafe { (self.device).cmd_copy_buffer(commands, from.raw, to.raw, &region) };
+        self.barrier(
+            commands,
+            [Stages::TRANSFER, Stages::HOST | Stages::ALL_COMMANDS],
+            [
+                Access::TRANSFER_WRITE,
+                Access::HOST_READ | Access::MEMORY_READ | Access::MEMORY_WRITE,
+            ],
+        );
+    }
+
+    /// Records that a whole buffer is filled with a word.
+    pub(crate) fn fill(&self, commands: vk::CommandBuffer, buffer: &ApplicationBuffer, word: u32) {
+        // SAFETY: recording is on, and the buffer's size is a multiple of 4.
+        unsafe { (self.device).cmd_fill_buffer(commands, buffer.raw, 0, buffer.size, word) };
+    }
+
+    fn barrier(
+        &self,
+        commands: vk::CommandBuffer,
+        [from, to]: [vk::PipelineStageFlags; 2],
+        [wrote, sees]: [vk::AccessFlags; 2],
+    ) {
+        let memory = [vk::MemoryBarrier::default()
+            .src_access_mask(wrote)
+            .dst_access_mask(sees)];
+        let none = vk::DependencyFlags::empty();
+        // SAFETY: recording is on.
+        unsafe {
+            (self.device).cmd_pipeline_barrier(commands, from, to, none, &memory, &[], &[]);
+        }
+    }
+
+    /// Submits commands one after another, without a wait between them, and waits for the last.
+    pub(crate) fn run(&mut self, all: &[vk::CommandBuffer]) -> Result<Taken, VulkanError> {
+        let device = &self.device;
+        // SAFETY: the device is alive, here and below, and nobody else uses its queue now.
+        let fence = unsafe { device.create_fence(&vk::FenceCreateInfo::default(), None) }
+            .named("vkCreateFence")?;
+        let started = Instant::now();
+        let submitted = (0..).zip(all).try_for_each(|(place, &commands)| {
+            let commands = [commands];
+            let info = [vk::SubmitInfo::default().command_buffers(&commands)];
+            let last = place + 1 == all.len();
+            let fence = if last { fence } else { vk::Fence::null() };
+            // SAFETY: as above.
+            unsafe { device.queue_submit(self.queue, &info, fence) }
+        });
+        let timeout = TIMEOUT_SECONDS * 1_000_000_000;
+        // SAFETY: as above.
+        let waited =
+            submitted.and_then(|()| unsafe { device.wait_for_fences(&[fence], true, timeout) });
+        let on_host = started.elapsed();
+        if waited == Err(vk::Result::TIMEOUT) {
+            self.has_hung = true;
+            return Err(VulkanError::Timeout {
+                seconds: TIMEOUT_SECONDS,
+            });
+        }
+        if waited.is_err() {
+            // SAFETY: as above. What was submitted must end before the fence goes.
+            let _ = unsafe { device.device_wait_idle() };
+        }
+        // SAFETY: as above.
+        unsafe { device.destroy_fence(fence, None) };
+        waited.named("vkQueueSubmit")?;
+        Ok(Taken {
+            on_device: None,
+            on_host,
+        })
+    }
+
+    /// Runs commands that were recorded with time stamps.
+    pub(crate) fn timed(&mut self, commands: vk::CommandBuffer) -> Result<Taken, VulkanError> {
+        let mut taken = self.run(&[commands])?;
+        if self.stamps != vk::QueryPool::null() {
+            let mut stamps = [0u64; 2];
+            let flags = vk::QueryResultFlags::TYPE_64;
+            // SAFETY: the pool has two queries, and what writes them has ended.
+            let read =
+                unsafe { (self.device).get_query_pool_results(self.stamps, 0, &mut stamps, flags) };
+            taken.on_device = (read.is_ok())
+                .then(|| self.physical.between(stamps[0], stamps[1]))
+                .filter(|time| !time.is_zero());
+        }
+        Ok(taken)
+    }
+
+    /// Takes back all commands, none of which is in flight.
+    pub(crate) fn forget_commands(&self) {
+        let flags = vk::CommandPoolResetFlags::RELEASE_RESOURCES;
+        // SAFETY: nothing is in flight: `run` waits. Commands that cannot be taken back stay.
+        let _ = unsafe { self.device.reset_command_pool(self.pool, flags) };
+    }
+}
+
+impl ApplicationBuffer {
+    /// A range of it, for the engine.
+    pub(crate) fn range(&self, offset: u64, size: u64) -> VulkanBuffer {
+        VulkanBuffer {
+            buffer: self.raw,
+            offset,
+            size,
+        }
+    }
+
+    /// Its first bytes; it must be in the host's memory, and nothing may write it now.
+    pub(crate) fn bytes(&self, size: usize) -> Result<Vec<u8>, VulkanError> {
+        let size = size.min(self.size as usize);
+        let flags = vk::MemoryMapFlags::empty();
+        // SAFETY: the memory is the buffer's alone, visible to the host (`ApplicationMemory::Host`), and
+        // unmapped again below.
+        let pointer = unsafe { (self.device).map_memory(self.memory, 0, vk::WHOLE_SIZE, flags) }
+            .named("vkMapMemory")?;
+        // SAFETY: so many bytes are mapped, and nothing writes them.
+        let bytes = unsafe { std::slice::from_raw_parts(pointer.cast::<u8>(), size) }.to_vec();
+        // SAFETY: mapped above.
+        unsafe { self.device.unmap_memory(self.memory) };
+        Ok(bytes)
+    }
+}
+
+impl Drop for ApplicationBuffer {
+    fn drop(&mut self) {
+        // SAFETY: created from this device, which whoever has the buffer keeps; no work uses it any more,
+        // because `Application::run` waits. Null is allowed.
+        unsafe {
+            self.device.destroy_buffer(self.raw, None);
+            self.device.free_memory(self.memory, None);
+        }
+    }
+}
+
+impl Drop for Application {
+    fn drop(&mut self) {
+        if self.has_hung {
+            std::mem::forget(Arc::clone(&self.instance));
+            return;
+        }
+        // SAFETY: engines, clips and buffers of it are gone; null is allowed.
+        unsafe {
+            let _ = self.device.device_wait_idle();
+            self.device.destroy_query_pool(self.stamps, None);
+            self.device.destroy_command_pool(self.pool, None);
+            self.device.destroy_device(None);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gpu::cards::card;
+
+    /// NVIDIA's copy engines are also for sparse memory; the family for video copies too, and is left alone.
+    #[test]
+    fn the_copy_queue_is_one_that_neither_draws_nor_computes() {
+        let of = |name| copy_family(&card(name).families, 0);
+        assert_eq!(of("H200"), Some(1));
+        assert_eq!(of("RTX 4060"), Some(1));
+        assert_eq!(of("lavapipe"), None);
+    }
+}

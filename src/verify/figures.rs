@@ -1,0 +1,387 @@
+//! How fast a device is, by its own time stamps, on a renderer's device ([`mod@crate::verify::renderer`]): memory,
+//! the bus, a submission, and the engine's cases as shares of these.
+
+use std::time::{Duration, Instant};
+
+use crate::device::VulkanDevice;
+use crate::engine::Engine;
+use crate::error::Error;
+use crate::gpu::application::{ApplicationBuffer, ApplicationMemory, Taken};
+use crate::gpu::options::EngineOptions;
+use crate::gpu::physical::DeviceKind;
+use crate::method::{self, Method};
+use crate::output::buffer::OutputBuffer;
+use crate::output::crowd::{CrowdOutput, CrowdValues};
+use crate::output::encoding::Encoding;
+use crate::output::rotations::Layout;
+use crate::time::frames::Frames;
+use crate::verify::golden::GoldenError;
+use crate::verify::renderer::{Renderer, record};
+use crate::verify::sets::{Random, crowd_layer, crowd_library, shared_set};
+
+/// Seconds of the keys of the cases: 26 keys, 0.8 s apart.
+const SECONDS: f64 = 20.0;
+
+/// What was measured. Rates are bytes a second; each figure is the median of several runs behind one that
+/// does not count.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Figures {
+    /// `device` where the device has time stamps, else `host`: the clock of the rates and of
+    /// [`FigureCase::seconds`].
+    pub clock: &'static str,
+    /// Bytes of each buffer that was filled and copied.
+    pub buffer_bytes: u64,
+    /// Filling memory of the device's own (`vkCmdFillBuffer`).
+    pub fill_rate: f64,
+    /// Copying from the device's own memory into the device's own; bytes written.
+    pub device_copy_rate: f64,
+    /// Copying from the host's memory to the device's.
+    pub upload_rate: f64,
+    /// Copying from the device's memory to the host's.
+    pub download_rate: f64,
+    /// Seconds from submitting nothing until its fence is seen, by the host's clock.
+    pub submit_and_fence: f64,
+    /// The engine's cases.
+    pub cases: Vec<FigureCase>,
+}
+
+/// One case of the engine.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct FigureCase {
+    /// `resident`, `read-back`, `crowd` or `encoded`.
+    pub case: &'static str,
+    /// What is evaluated.
+    pub name: String,
+    /// Values of the result: rotations, or joints.
+    pub values: u64,
+    /// Bytes of the result.
+    pub bytes: u64,
+    /// Seconds from first asking, keys to result, kernels not compiled yet.
+    pub first_call: f64,
+    /// Seconds of later calls.
+    pub seconds: f64,
+    /// Seconds of later calls by the host's clock.
+    pub host_seconds: f64,
+    /// Bytes of the result in a second.
+    pub rate: f64,
+    /// `fill` or `download`: the limit.
+    pub limit: &'static str,
+    /// The share of the limit that the rate is.
+    pub share: f64,
+}
+
+/// Measures, for about `budget`: cases for which no time is left are left out.
+///
+/// # Errors
+/// When the device cannot be made, or fails.
+pub fn figures(device: &VulkanDevice, budget: Duration) -> Result<Figures, GoldenError> {
+    let deadline = Instant::now() + budget;
+    let is_software = matches!(device.info().kind, DeviceKind::Cpu | DeviceKind::Other);
+    let renderer = Renderer::new(device, false, &EngineOptions::default())?;
+    let mut bench = Bench {
+        renderer,
+        is_software,
+        deadline,
+        figures: Figures {
+            clock: "device",
+            buffer_bytes: if is_software { 16 << 20 } else { 256 << 20 },
+            fill_rate: 0.0,
+            device_copy_rate: 0.0,
+            upload_rate: 0.0,
+            download_rate: 0.0,
+            submit_and_fence: 0.0,
+            cases: Vec::new(),
+        },
+    };
+    bench.memory()?;
+    bench.resident()?;
+    bench.crowds()?;
+    bench.read_back()?;
+    bench.encoded()?;
+    Ok(bench.figures)
+}
+
+struct Bench {
+    renderer: Renderer,
+    is_software: bool,
+    deadline: Instant,
+    figures: Figures,
+}
+
+fn median(mut times: Vec<Duration>) -> f64 {
+    times.sort();
+    times
+        .get(times.len() / 2)
+        .map_or(0.0, Duration::as_secs_f64)
+}
+
+/// The median of up to seven runs behind the first, fewer where they take long.
+fn measured<T>(mut run: impl FnMut() -> Result<T, Error>) -> Result<(T, Vec<T>), Error> {
+    const RUNS: usize = 7;
+    const LONG: Duration = Duration::from_millis(700);
+    let first = run()?;
+    let (mut runs, started) = (Vec::new(), Instant::now());
+    while runs.is_empty() || runs.len() < RUNS && started.elapsed() < LONG {
+        runs.push(run()?);
+    }
+    Ok((first, runs))
+}
+
+/// Seconds by the device's clock, where every run has them, and by the host's.
+fn seconds(runs: &[Taken]) -> (Option<f64>, f64) {
+    let on_device: Option<Vec<_>> = runs.iter().map(|taken| taken.on_device).collect();
+    let on_host = runs.iter().map(|taken| taken.on_host).collect();
+    (on_device.map(median), median(on_host))
+}
+
+impl Bench {
+    fn is_over(&self) -> bool {
+        Instant::now() > self.deadline
+    }
+
+    /// Seconds by the clock that counts.
+    fn clocked(&mut self, (on_device, on_host): (Option<f64>, f64)) -> f64 {
+        if on_device.is_none() {
+            self.figures.clock = "host";
+        }
+        on_device.unwrap_or(on_host)
+    }
+
+    fn device_buffer(&self, size: u64) -> Result<ApplicationBuffer, Error> {
+        Ok((self.renderer.application).buffer(size, ApplicationMemory::Device)?)
+    }
+
+    /// The bytes a second of commands that are recorded for each run.
+    fn rate(
+        &mut self,
+        bytes: u64,
+        commands: impl Fn(&crate::gpu::application::Application, ash::vk::CommandBuffer),
+    ) -> Result<f64, Error> {
+        let application = &mut self.renderer.application;
+        let (_, runs) = measured(|| {
+            let recorded = application.recorded(true, |own| {
+                commands(application, own);
+                Ok::<_, Error>(())
+            })?;
+            Ok(application.timed(recorded)?)
+        })?;
+        application.forget_commands();
+        let seconds = seconds(&runs);
+        Ok(bytes as f64 / self.clocked(seconds).max(1e-9))
+    }
+
+    fn memory(&mut self) -> Result<(), Error> {
+        let bytes = self.figures.buffer_bytes;
+        let [one, two] = [self.device_buffer(bytes)?, self.device_buffer(bytes)?];
+        let host = (self.renderer.application).buffer(bytes, ApplicationMemory::Host)?;
+        self.figures.fill_rate = self.rate(bytes, |application, commands| {
+            application.fill(commands, &one, 0x3f80_0000);
+        })?;
+        self.figures.device_copy_rate = self.rate(bytes, |application, commands| {
+            application.copy(commands, &one, &two, bytes);
+        })?;
+        self.figures.upload_rate = self.rate(bytes, |application, commands| {
+            application.copy(commands, &host, &one, bytes);
+        })?;
+        self.figures.download_rate = self.rate(bytes, |application, commands| {
+            application.copy(commands, &one, &host, bytes);
+        })?;
+        let application = &mut self.renderer.application;
+        let nothing = application.recorded(false, |_| Ok::<_, Error>(()))?;
+        let mut times = Vec::new();
+        for _ in 0..33 {
+            times.push(application.run(&[nothing])?.on_host);
+        }
+        application.forget_commands();
+        self.figures.submit_and_fence = median(times);
+        Ok(())
+    }
+
+    /// How many tracks a set of the cases has.
+    fn tracks(&self) -> usize {
+        if self.is_software { 256 } else { 4096 }
+    }
+
+    /// Adds a case.
+    fn add(
+        &mut self,
+        (case, name): (&'static str, String),
+        (values, bytes): (u64, u64),
+        first_call: Duration,
+        runs: &[Taken],
+        limit: &'static str,
+    ) {
+        let (on_device, on_host) = seconds(runs);
+        let seconds = match limit {
+            // What the bus takes is on the way until the host has it.
+            "download" => on_host,
+            _ => self.clocked((on_device, on_host)),
+        };
+        let rate = bytes as f64 / seconds.max(1e-9);
+        let of = match limit {
+            "download" => self.figures.download_rate,
+            _ => self.figures.fill_rate,
+        };
+        self.figures.cases.push(FigureCase {
+            case,
+            name,
+            values,
+            bytes,
+            first_call: first_call.as_secs_f64(),
+            seconds,
+            host_seconds: on_host,
+            rate,
+            limit,
+            share: if of > 0.0 { rate / of } else { 0.0 },
+        });
+    }
+
+    /// One clip, kept on the device, whose result stays there.
+    fn kept(
+        &mut self,
+        case: &'static str,
+        method: Method,
+        encoding: Encoding,
+        layout: Layout,
+    ) -> Result<(), Error> {
+        if self.is_over() {
+            return Ok(());
+        }
+        let tracks = self.tracks();
+        let set = shared_set(51, tracks, 26, SECONDS / 25.0, 0.6, 0);
+        // 1200 frames of 60 a second.
+        let frames = Frames::fps(60).between(0.0, SECONDS - 1.0 / 60.0);
+        let samples = frames.resolve(tracks, set.time_span())?.len();
+        let bytes = (tracks * samples * encoding.bytes()) as u64;
+        let buffer = self.device_buffer(bytes)?;
+        let started = Instant::now();
+        let clip = self.renderer.engine.upload(&set, method)?;
+        let renderer = &self.renderer;
+        let mut first_call = None;
+        let (_, runs) = measured(|| {
+            let call = Instant::now();
+            renderer.to_buffer(&clip, &frames, (layout, encoding), (&buffer, 0))?;
+            let on_host = call.elapsed();
+            first_call.get_or_insert_with(|| started.elapsed());
+            Ok(taken(&renderer.engine, on_host))
+        })?;
+        let name = format!("{tracks} tracks × {samples} frames, {method}, {encoding}, {layout:?}");
+        let values = (tracks * samples) as u64;
+        let first_call = first_call.unwrap_or_default();
+        self.add((case, name), (values, bytes), first_call, &runs, "fill");
+        Ok(())
+    }
+
+    fn resident(&mut self) -> Result<(), Error> {
+        for method in [method::SLERP, method::BESSEL_OVERHAUSER] {
+            self.kept("resident", method, Encoding::F32, Layout::TrackMajor)?;
+        }
+        Ok(())
+    }
+
+    fn encoded(&mut self) -> Result<(), Error> {
+        for encoding in Encoding::KINDS {
+            if encoding.row().error_bound.is_some() {
+                self.kept("encoded", method::SLERP, encoding, Layout::TrackMajor)?;
+            }
+        }
+        self.kept("encoded", method::SLERP, Encoding::F32, Layout::FrameMajor)
+    }
+
+    /// The same clips, read back into memory that is used again.
+    fn read_back(&mut self) -> Result<(), Error> {
+        for method in [method::SLERP, method::BESSEL_OVERHAUSER] {
+            if self.is_over() {
+                return Ok(());
+            }
+            let tracks = self.tracks();
+            let set = shared_set(51, tracks, 26, SECONDS / 25.0, 0.6, 0);
+            let frames = Frames::fps(60).between(0.0, SECONDS - 1.0 / 60.0);
+            let samples = frames.resolve(tracks, set.time_span())?.len();
+            let mut output = OutputBuffer::new(tracks * samples)?;
+            let started = Instant::now();
+            let clip = self.renderer.engine.upload(&set, method)?;
+            let engine = &self.renderer.engine;
+            let mut first_call = None;
+            let (_, runs) = measured(|| {
+                let call = Instant::now();
+                clip.evaluate_into(&frames, Layout::TrackMajor, &mut output)?;
+                let on_host = call.elapsed();
+                first_call.get_or_insert_with(|| started.elapsed());
+                Ok(taken(engine, on_host))
+            })?;
+            let values = (tracks * samples) as u64;
+            let name = format!("{tracks} tracks × {samples} frames, {method}");
+            let first_call = first_call.unwrap_or_default();
+            self.add(
+                ("read-back", name),
+                (values, 16 * values),
+                first_call,
+                &runs,
+                "download",
+            );
+        }
+        Ok(())
+    }
+
+    /// 10 000 characters of 60 joints, recorded; 500 on software devices.
+    fn crowds(&mut self) -> Result<(), GoldenError> {
+        const JOINTS: usize = 60;
+        let instances = if self.is_software { 500 } else { 10_000 };
+        let mut random = Random(61);
+        let library = crowd_library(&mut random, JOINTS, &[method::SLERP, method::SLERP])?;
+        for values in [
+            CrowdValues::Rotations,
+            CrowdValues::Local,
+            CrowdValues::Model,
+        ] {
+            if self.is_over() {
+                return Ok(());
+            }
+            let output = CrowdOutput::from(values);
+            let size = (instances * JOINTS * output.bytes()) as u64;
+            let buffer = self.device_buffer(size)?;
+            let started = Instant::now();
+            let mut crowd = self.renderer.engine.crowd(&library, instances, 1)?;
+            for instance in 0..instances {
+                crowd.set(instance, 0, crowd_layer(&mut random, &library))?;
+            }
+            let target = self.renderer.target(&crowd, output, &buffer)?;
+            let mut runs = Vec::new();
+            let mut first_call = None;
+            for _ in 0..8 {
+                crowd.advance_ticks(11_760)?;
+                let call = Instant::now();
+                let application = &self.renderer.application;
+                let commands =
+                    application.recorded(true, |commands| record(&mut crowd, &target, commands))?;
+                let ran = self.renderer.application.timed(commands);
+                let ran = ran.map_err(Error::from)?;
+                if first_call.is_none() {
+                    first_call = Some(started.elapsed());
+                    continue;
+                }
+                runs.push(Taken {
+                    on_host: call.elapsed(),
+                    ..ran
+                });
+            }
+            drop(target);
+            self.renderer.application.forget_commands();
+            let joints = (instances * JOINTS) as u64;
+            let name = format!("{instances} instances × {JOINTS} joints, {values:?}");
+            let first_call = first_call.unwrap_or_default();
+            self.add(("crowd", name), (joints, size), first_call, &runs, "fill");
+        }
+        Ok(())
+    }
+}
+
+/// What the engine says of its last call.
+fn taken(engine: &Engine, on_host: Duration) -> Taken {
+    let timings = engine.take_timings();
+    Taken {
+        on_device: (!timings.on_device.is_zero()).then_some(timings.on_device),
+        on_host,
+    }
+}

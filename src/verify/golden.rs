@@ -1,0 +1,750 @@
+//! Golden hashes: SHA-256 of the bytes of some hundred results, recorded once in `golden.txt` and the same
+//! ever after, on the CPU at every vector width and on every Vulkan device, whichever way its kernels
+//! read and its results are copied.
+//!
+//! They catch any change of a bit that all devices make alike, which comparing devices with each other
+//! cannot show. The inputs are made by arithmetic that every machine rounds alike. A hash that changes is
+//! a change of the engine's promise.
+//!
+//! ```
+//! use tumble::{Device, Engine, verify::golden::Golden};
+//! let golden = Golden::new();
+//! let engine = Engine::new(Device::Cpu)?;
+//! let (case, name) = (0, golden.name(0));
+//! assert_eq!(Some(&*golden.evaluate(case, &engine)?.hash), Golden::recorded(name));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::sync::OnceLock;
+
+use glam::{DVec3, Quat};
+use sha2::{Digest, Sha256};
+
+use crate::crowd::error::CrowdError;
+use crate::curve::options::{Axes, Ends, Path, Quantity, Speed};
+use crate::engine::Engine;
+use crate::error::Error;
+use crate::method;
+use crate::method::interpolation::Interpolation;
+use crate::method::vector_method::VectorMethod;
+use crate::method::{METHODS, Method};
+use crate::output::crowd::{CrowdOutput, CrowdValues};
+use crate::output::encoding::Encoding;
+use crate::output::rotations::Layout;
+use crate::path::options::{Direction, Follow, Frame, PathSpeed};
+use crate::pose::skeleton::Skeleton;
+use crate::smooth::kernel::Smoothing;
+use crate::stream::Chunk;
+use crate::time::frames::Frames;
+use crate::time::wrap::WrapMode;
+use crate::tracks::set::TrackSet;
+use crate::verify::sets::{
+    Random, closed_set, crowd_layer, crowd_library, later, paths_set, random_set, shared_set,
+    vectors_set,
+};
+
+/// The recorded hashes: a line of a hash and a name for each case.
+const RECORDED: &str = include_str!("golden.txt");
+
+/// Why a case could not be evaluated.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum GoldenError {
+    /// Of a set of tracks.
+    #[error(transparent)]
+    Evaluate(#[from] Error),
+    /// Of a crowd.
+    #[error(transparent)]
+    Crowd(#[from] CrowdError),
+}
+
+/// What an engine makes of a case.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct GoldenResult {
+    /// The first 64 bits of the SHA-256 of all bytes, in hexadecimal digits.
+    pub hash: String,
+    /// How many bytes there are.
+    pub bytes: u64,
+}
+
+/// The cases: each a set, and what is evaluated of it.
+pub struct Golden {
+    sets: BTreeMap<&'static str, TrackSet>,
+    cases: Vec<Case>,
+}
+
+struct Case {
+    name: String,
+    set: &'static str,
+    evaluation: Evaluation,
+}
+
+enum Evaluation {
+    /// From keys, in one go.
+    Set(Interpolation, Frames, Layout),
+    /// From a clip that stays on the device, encoded.
+    Encoded(Interpolation, Frames, Layout, Encoding),
+    /// In chunks.
+    Stream(Interpolation, Frames, Layout),
+    /// Translations, rotations and scales.
+    Transforms(Interpolation, VectorMethod, Frames),
+    /// Layers blended, mixed and added, and walked down a skeleton.
+    Poses,
+    /// Bodies on paths.
+    Follow(Box<Follow>),
+    /// Rotations and translations, smoothed.
+    Smooth(Smoothing),
+    /// Instances of a library's clips, at several times of the clock.
+    Crowd(CrowdMix, CrowdOutput),
+}
+
+/// What the instances of a crowd play.
+#[derive(Clone, Copy)]
+struct CrowdMix {
+    name: &'static str,
+    methods: &'static [Method],
+    joints: usize,
+    instances: usize,
+    layers: usize,
+}
+
+const ARCS: CrowdMix = CrowdMix {
+    name: "arcs",
+    methods: &[method::SLERP, method::SLERP],
+    joints: 21,
+    instances: 67,
+    layers: 2,
+};
+
+const SEVERAL: CrowdMix = CrowdMix {
+    name: "several",
+    methods: &[
+        method::BESSEL_OVERHAUSER,
+        method::STEP,
+        method::CATMULL_ROM,
+        method::SLERP,
+    ],
+    joints: 33,
+    instances: 41,
+    layers: 3,
+};
+
+/// Ticks by which the clock goes on between the evaluations of a crowd: the last ones are a day and more.
+const CLOCK: [u64; 4] = [0, 11_760, 1 << 33, 61_000_000_000];
+
+impl Default for Golden {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+fn shortest(method: Method) -> Interpolation {
+    Interpolation::from(method)
+}
+
+impl Golden {
+    /// Makes the sets and names the cases. The sets take some ten megabytes.
+    #[must_use]
+    #[expect(
+        clippy::missing_panics_doc,
+        reason = "the sets are the same at every call"
+    )]
+    pub fn new() -> Self {
+        let uneven = random_set(2, 7, 26, &[0.05, 0.3, 0.9], false);
+        let sets = BTreeMap::from([
+            ("even", shared_set(1, 5, 26, 0.4, 0.6, 0)),
+            (
+                "hostile",
+                random_set(3, 48, 20, &[0.0, 1e-7, 1e-4, 0.02, 0.4, 2.0, 9.0], true),
+            ),
+            ("dense", shared_set(4, 6, 2500, 0.01, 0.02, 0)),
+            ("dense turned", shared_set(5, 6, 2500, 0.01, 0.03, 3)),
+            ("dense wild", shared_set(6, 5, 1500, 0.01, 0.4, 5)),
+            ("crowd", shared_set(7, 700, 2, 1.0, 0.5, 4)),
+            ("long", shared_set(8, 1, 40_000, 0.02, 0.25, 3)),
+            ("day", later(&uneven, 86_400.0)),
+            ("closed", closed_set()),
+            ("vectors", vectors_set()),
+            ("paths", paths_set()),
+            ("uneven", uneven),
+        ]);
+        let mut golden = Self {
+            sets,
+            cases: Vec::new(),
+        };
+        golden.methods();
+        golden.outputs();
+        golden.options();
+        golden.routes();
+        golden.add("uneven", "poses", Evaluation::Poses);
+        golden.paths();
+        golden.smoothing();
+        golden.crowds();
+        golden
+    }
+
+    fn add(&mut self, set: &'static str, name: &str, evaluation: Evaluation) {
+        assert!(self.sets.contains_key(set), "{set}");
+        let name = format!("{set} {name}");
+        assert!(self.cases.iter().all(|case| case.name != name), "{name}");
+        self.cases.push(Case {
+            name,
+            set,
+            evaluation,
+        });
+    }
+
+    fn rows(
+        &mut self,
+        set: &'static str,
+        name: &str,
+        interpolation: Interpolation,
+        frames: &Frames,
+    ) {
+        self.add(
+            set,
+            name,
+            Evaluation::Set(interpolation, frames.clone(), Layout::TrackMajor),
+        );
+    }
+
+    /// Every kind of path, direction, frame and speed.
+    fn paths(&mut self) {
+        let eased = PathSpeed::Eased {
+            start: 0.2,
+            end: 0.3,
+        };
+        for method in VectorMethod::ALL {
+            let follow = Follow {
+                method,
+                ..Follow::default()
+            };
+            self.add(
+                "paths",
+                &format!("{method}"),
+                Evaluation::Follow(Box::new(follow)),
+            );
+        }
+        let c2 = || Follow {
+            method: VectorMethod::C2,
+            ..Follow::default()
+        };
+        let point = Direction::Point(DVec3::new(9.0, 8.0, -7.0));
+        let others = [
+            (
+                "constant",
+                Follow {
+                    speed: PathSpeed::Constant,
+                    ..c2()
+                },
+            ),
+            (
+                "eased ahead",
+                Follow {
+                    speed: eased,
+                    direction: Direction::Ahead(0.7),
+                    ..c2()
+                },
+            ),
+            (
+                "fixed at",
+                Follow {
+                    frame: Frame::Fixed,
+                    direction: point,
+                    ..c2()
+                },
+            ),
+            (
+                "frenet",
+                Follow {
+                    frame: Frame::Frenet,
+                    ..c2()
+                },
+            ),
+        ];
+        for (name, follow) in others {
+            self.add("paths", name, Evaluation::Follow(Box::new(follow)));
+        }
+    }
+
+    /// Every kernel.
+    fn smoothing(&mut self) {
+        for name in [
+            "linear",
+            "cubic",
+            "box:2.25",
+            "tent:3",
+            "gaussian:2",
+            "savitzky-golay:4:3",
+        ] {
+            let kernel = name.parse().expect("a kernel");
+            let smoothing = Smoothing {
+                passes: 2,
+                ..Smoothing::new(kernel)
+            };
+            self.add(
+                "vectors",
+                &format!("{name} smoothed"),
+                Evaluation::Smooth(smoothing),
+            );
+        }
+    }
+
+    /// Every method, on every kind of keys, and its derivatives.
+    fn methods(&mut self) {
+        let frames = Frames::fps(60).between(-1.0, 9.0);
+        for method in METHODS {
+            for set in ["even", "uneven", "hostile"] {
+                self.rows(set, method.name, shortest(method), &frames);
+            }
+            let film =
+                Frames::rate("24000/1001".parse().expect("a rate")).between(86_399.0, 86_409.0);
+            self.rows("day", method.name, shortest(method), &film);
+            for (name, quantity) in [
+                ("velocity body", Quantity::Velocity(Axes::Body)),
+                ("acceleration world", Quantity::Acceleration(Axes::Parent)),
+            ] {
+                let interpolation = Interpolation {
+                    quantity,
+                    ..shortest(method)
+                };
+                self.rows(
+                    "uneven",
+                    &format!("{method} {name}"),
+                    interpolation,
+                    &frames,
+                );
+            }
+        }
+    }
+
+    /// Every encoding in both layouts, and results in chunks.
+    fn outputs(&mut self) {
+        let frames = Frames::fps(30);
+        for encoding in Encoding::KINDS {
+            for (name, layout) in [("rows", Layout::TrackMajor), ("frames", Layout::FrameMajor)] {
+                for method in [method::SLERP, method::BESSEL_OVERHAUSER] {
+                    let evaluation =
+                        Evaluation::Encoded(shortest(method), frames.clone(), layout, encoding);
+                    self.add(
+                        "hostile",
+                        &format!("{method} {encoding:?} {name}"),
+                        evaluation,
+                    );
+                }
+            }
+        }
+        for layout in [Layout::TrackMajor, Layout::FrameMajor] {
+            for method in [method::STEP, method::SLERP, method::C2] {
+                let evaluation = Evaluation::Set(shortest(method), frames.clone(), layout);
+                self.add("hostile", &format!("{method} {layout:?}"), evaluation);
+                let evaluation = Evaluation::Stream(shortest(method), frames.clone(), layout);
+                self.add("uneven", &format!("{method} {layout:?} stream"), evaluation);
+            }
+        }
+        for vectors in VectorMethod::ALL {
+            let evaluation =
+                Evaluation::Transforms(shortest(method::SLERP), vectors, frames.clone());
+            self.add("vectors", &format!("{vectors} transforms"), evaluation);
+        }
+    }
+
+    /// Ends, paths, speeds, and what lies outside the keys.
+    fn options(&mut self) {
+        let frames = Frames::fps(50).between(-7.0, 21.0);
+        let times = Frames::at(
+            (0..500)
+                .map(|k| f64::from(k * 317 % 500) * 0.06 - 8.0)
+                .collect(),
+        );
+        let clamped = Ends::Clamped {
+            start: DVec3::new(1.0, -2.0, 0.5),
+            end: DVec3::new(0.0, 0.25, -1.0),
+        };
+        for (name, ends) in [
+            ("natural", Ends::Natural),
+            ("clamped", clamped),
+            ("secant", Ends::Secant),
+            ("frozen", Ends::Frozen),
+        ] {
+            for method in [
+                method::BESSEL_OVERHAUSER,
+                method::B_SPLINE,
+                method::C2,
+                method::SQUAD,
+            ] {
+                let interpolation = Interpolation {
+                    ends,
+                    ..shortest(method)
+                };
+                self.rows(
+                    "hostile",
+                    &format!("{method} {name}"),
+                    interpolation,
+                    &frames,
+                );
+            }
+        }
+        for method in [
+            method::SLERP,
+            method::CATMULL_ROM,
+            method::B_SPLINE,
+            method::C2,
+            method::SHOEMAKE_1985,
+        ] {
+            let interpolation = Interpolation {
+                ends: Ends::Loop,
+                ..shortest(method)
+            };
+            self.rows(
+                "closed",
+                &format!("{method} loop ends"),
+                interpolation,
+                &frames,
+            );
+        }
+        for method in [
+            method::NLERP,
+            method::SLERP,
+            method::BESSEL_OVERHAUSER,
+            method::C2,
+        ] {
+            let interpolation = Interpolation {
+                path: Path::AsAuthored,
+                ..shortest(method)
+            };
+            self.rows(
+                "uneven",
+                &format!("{method} as authored"),
+                interpolation,
+                &frames,
+            );
+            let few = Frames::fps(19).between(1.0, 9.0);
+            self.rows(
+                "dense turned",
+                &format!("{method} as authored"),
+                interpolation,
+                &few,
+            );
+        }
+        for method in [method::SLERP, method::BESSEL_OVERHAUSER, method::SQUAD] {
+            let interpolation = Interpolation {
+                speed: Speed::Constant,
+                ..shortest(method)
+            };
+            self.rows(
+                "uneven",
+                &format!("{method} constant speed"),
+                interpolation,
+                &frames,
+            );
+        }
+        let sides = [
+            WrapMode::Hold,
+            WrapMode::Loop,
+            WrapMode::Mirror,
+            WrapMode::Extrapolate,
+        ];
+        for method in [
+            method::STEP,
+            method::SLERP,
+            method::BESSEL_OVERHAUSER,
+            method::B_SPLINE,
+        ] {
+            for (i, &before) in sides.iter().enumerate() {
+                let after = sides[(i + 1) % 4];
+                let interpolation = Interpolation {
+                    before,
+                    after,
+                    ..shortest(method)
+                };
+                let name = format!("{method} {before:?} {after:?}");
+                self.rows("uneven", &name, interpolation, &frames);
+                self.rows("uneven", &format!("{name} times"), interpolation, &times);
+            }
+        }
+        let looped = Interpolation {
+            after: WrapMode::Loop,
+            ..shortest(method::SLERP)
+        };
+        let tomorrow = Frames::fps(60).between(86_400.0, 86_403.0);
+        self.rows("uneven", "slerp Loop tomorrow", looped, &tomorrow);
+        let velocity = Interpolation {
+            quantity: Quantity::Velocity(Axes::Parent),
+            ..looped
+        };
+        self.rows("closed", "slerp velocity Loop", velocity, &frames);
+    }
+
+    /// Every route from keys to results: by segments, straight from keys, by single samples,
+    /// a long track piece by piece.
+    fn routes(&mut self) {
+        let methods = [
+            method::STEP,
+            method::SLERP,
+            method::CATMULL_ROM,
+            method::BESSEL_OVERHAUSER,
+            method::SQUAD,
+            method::B_SPLINE,
+            method::C2,
+        ];
+        let mut random = Random(77);
+        let mut draw = |count: usize, end: f64| -> Vec<f64> {
+            (0..count).map(|_| random.between(-0.5, end)).collect()
+        };
+        let shared = Frames::at(draw(300, 30.0));
+        let few = Frames::at(draw(2, 1.2));
+        let each = Frames::at_each(draw(700, 1.2));
+        let each_dense = Frames::at_each(draw(12, 25.0));
+        for method in methods {
+            let shortest = shortest(method);
+            for set in ["dense", "dense turned", "dense wild"] {
+                self.rows(set, &format!("{method} 30 fps"), shortest, &Frames::fps(30));
+                self.rows(
+                    set,
+                    &format!("{method} 211 fps"),
+                    shortest,
+                    &Frames::fps(211).between(1.0, 4.0),
+                );
+                self.rows(set, &format!("{method} times"), shortest, &shared);
+            }
+            self.rows(
+                "dense",
+                &format!("{method} times of each"),
+                shortest,
+                &each_dense,
+            );
+            self.rows(
+                "crowd",
+                &format!("{method} 60 fps"),
+                shortest,
+                &Frames::fps(60),
+            );
+            self.rows(
+                "crowd",
+                &format!("{method} one frame"),
+                shortest,
+                &Frames::fps(1).between(0.3, 0.3),
+            );
+            self.rows("crowd", &format!("{method} few times"), shortest, &few);
+            self.rows(
+                "crowd",
+                &format!("{method} a time of each"),
+                shortest,
+                &each,
+            );
+            let evaluation = Evaluation::Set(shortest, few.clone(), Layout::FrameMajor);
+            self.add("crowd", &format!("{method} few times, frames"), evaluation);
+            self.rows(
+                "long",
+                &format!("{method} 7 fps"),
+                shortest,
+                &Frames::fps(7),
+            );
+            self.rows(
+                "long",
+                &format!("{method} 120 fps"),
+                shortest,
+                &Frames::fps(120),
+            );
+        }
+    }
+
+    /// Every form of a crowd's results, in both precisions, of arcs alone in two layers and of several
+    /// methods in three.
+    fn crowds(&mut self) {
+        use CrowdValues::{Local, Model, Rotations, Skinning};
+        for mix in [ARCS, SEVERAL] {
+            for values in [Rotations, Local, Model, Skinning] {
+                let outputs = [CrowdOutput::from(values), CrowdOutput::half(values)];
+                for output in outputs {
+                    let bits = if output.is_half { 16 } else { 32 };
+                    self.cases.push(Case {
+                        name: format!("crowds {} {values:?} {bits} bits", mix.name),
+                        set: "even", // not used
+                        evaluation: Evaluation::Crowd(mix, output),
+                    });
+                }
+            }
+        }
+    }
+
+    /// How many cases there are.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.cases.len()
+    }
+
+    /// A case's name.
+    ///
+    /// # Panics
+    /// When there is no such case.
+    #[must_use]
+    pub fn name(&self, case: usize) -> &str {
+        &self.cases[case].name
+    }
+
+    /// The hash that is recorded for a case's name.
+    #[must_use]
+    pub fn recorded(name: &str) -> Option<&'static str> {
+        static TABLE: OnceLock<BTreeMap<&str, &str>> = OnceLock::new();
+        let table = TABLE.get_or_init(|| {
+            let lines = RECORDED.lines().filter_map(|line| line.split_once(' '));
+            lines.map(|(hash, name)| (name, hash)).collect()
+        });
+        table.get(name).copied()
+    }
+
+    /// The recorded hashes as they are kept: a line of a hash and a name for each case.
+    #[must_use]
+    pub fn table() -> &'static str {
+        RECORDED
+    }
+
+    /// How many hashes are recorded.
+    #[must_use]
+    pub fn recorded_count() -> usize {
+        RECORDED.lines().count()
+    }
+
+    /// What an engine makes of a case.
+    ///
+    /// # Errors
+    /// As the calls of the engine.
+    ///
+    /// # Panics
+    /// When there is no such case.
+    pub fn evaluate(&self, case: usize, engine: &Engine) -> Result<GoldenResult, GoldenError> {
+        let Case {
+            set, evaluation, ..
+        } = &self.cases[case];
+        let mut hash = Hash::default();
+        evaluation.run(engine, &self.sets[set], &mut hash)?;
+        Ok(hash.result())
+    }
+}
+
+/// The hash of all bytes that are added.
+#[derive(Default)]
+struct Hash {
+    sha: Sha256,
+    bytes: u64,
+}
+
+impl Hash {
+    fn add<T: bytemuck::NoUninit>(&mut self, values: &[T]) {
+        let bytes: &[u8] = bytemuck::cast_slice(values);
+        self.sha.update(bytes);
+        self.bytes += bytes.len() as u64;
+    }
+
+    fn result(self) -> GoldenResult {
+        let mut hash = String::new();
+        for byte in &self.sha.finalize()[..8] {
+            write!(hash, "{byte:02x}").expect("memory takes everything");
+        }
+        GoldenResult {
+            hash,
+            bytes: self.bytes,
+        }
+    }
+}
+
+impl Evaluation {
+    fn run(&self, engine: &Engine, set: &TrackSet, hash: &mut Hash) -> Result<(), GoldenError> {
+        let rows = Layout::TrackMajor;
+        match self {
+            Self::Set(interpolation, frames, layout) => {
+                if interpolation.quantity == Quantity::Rotation {
+                    let found = engine.evaluate_as(set, *interpolation, frames, *layout)?;
+                    hash.add(found.as_quats());
+                } else {
+                    let found = engine.rates(set, *interpolation, frames, *layout)?;
+                    hash.add(found.as_slice());
+                }
+            }
+            Self::Encoded(interpolation, frames, layout, encoding) => {
+                let clip = engine.upload(set, *interpolation)?;
+                hash.add(&clip.evaluate_encoded(frames, *layout, *encoding)?);
+            }
+            Self::Stream(interpolation, frames, layout) => {
+                let clip = engine.upload(set, *interpolation)?;
+                let add = |chunk: Chunk<'_>| -> Result<(), Error> {
+                    hash.add(chunk.rotations().unwrap_or_default());
+                    Ok(())
+                };
+                clip.stream(frames, *layout, 777, add)?;
+            }
+            Self::Transforms(interpolation, vectors, frames) => {
+                let found = engine.transforms(set, *interpolation, *vectors, frames, rows)?;
+                hash.add(found.translations.as_slice());
+                hash.add(found.rotations.as_quats());
+                hash.add(found.scales.as_slice());
+            }
+            Self::Follow(follow) => {
+                let found = engine.follow(set, follow, &Frames::fps(30), rows)?;
+                hash.add(found.positions.as_slice());
+                hash.add(found.rotations.as_quats());
+            }
+            Self::Smooth(smoothing) => {
+                let linear = VectorMethod::Linear;
+                let found =
+                    engine.transforms(set, method::SLERP, linear, &Frames::fps(30), rows)?;
+                hash.add(engine.smooth(&found.rotations, smoothing)?.as_quats());
+                hash.add(
+                    engine
+                        .smooth_vectors(&found.translations, smoothing)?
+                        .as_slice(),
+                );
+            }
+            Self::Poses => {
+                let frames = Frames::fps(30);
+                let one = engine.evaluate(set, method::SLERP, &frames)?;
+                let two = engine.evaluate(set, method::C2, &frames)?;
+                let three = engine.evaluate(set, method::B_SPLINE, &frames)?;
+                let blended = engine.blend(&[(&one, 0.5), (&two, 0.3), (&three, 0.2)])?;
+                let mixed = engine.mix(&one, &three, 0.3)?;
+                let reference: Vec<Quat> = set.tracks().map(|track| track.keys[0]).collect();
+                let added = engine.add(&blended, &mixed, &reference, 0.7)?;
+                let skeleton = Skeleton::chain(set.track_count(), 3.0).map_err(Error::from)?;
+                let world = engine.world(&added, &skeleton)?;
+                hash.add(blended.as_quats());
+                hash.add(mixed.as_quats());
+                hash.add(added.as_quats());
+                hash.add(world.as_slice());
+            }
+            Self::Crowd(mix, output) => mix.run(engine, *output, hash)?,
+        }
+        Ok(())
+    }
+}
+
+impl CrowdMix {
+    fn run(self, engine: &Engine, output: CrowdOutput, hash: &mut Hash) -> Result<(), CrowdError> {
+        let mut random = Random(41);
+        let library = crowd_library(&mut random, self.joints, self.methods)?;
+        let mut crowd = engine.crowd(&library, self.instances, self.layers)?;
+        for (step, ticks) in CLOCK.into_iter().enumerate() {
+            for index in 0..self.instances * self.layers {
+                if step == 0 || random.below(5) == 0 {
+                    let plays = crowd_layer(&mut random, &library);
+                    crowd.set(index / self.layers, index % self.layers, plays)?;
+                }
+            }
+            crowd.advance_ticks(ticks)?;
+            let vectors = crowd.output_len(output);
+            if output.is_half {
+                let mut found = vec![[0u16; 4]; vectors];
+                crowd.evaluate_half_into(output.values, &mut found)?;
+                hash.add(&found);
+            } else {
+                let mut found = vec![[0f32; 4]; vectors];
+                crowd.evaluate_into(output.values, &mut found)?;
+                hash.add(&found);
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,356 @@
+//! Random sets and crowds, hostile ones, evaluated on a device and on the CPU: rounds that a seed decides,
+//! the same on every machine, for as long as there is time.
+
+use std::fmt::Write as _;
+
+use sha2::{Digest, Sha256};
+
+use crate::crowd::error::CrowdError;
+use crate::curve::options::{Axes, Ends, Path, Quantity, Speed};
+use crate::engine::Engine;
+use crate::error::Error;
+use crate::method::interpolation::Interpolation;
+use crate::method::{self, METHODS};
+use crate::output::crowd::{CrowdOutput, CrowdValues};
+use crate::output::encoding::Encoding;
+use crate::output::rotations::Layout;
+use crate::time::frame_rate::FrameRate;
+use crate::time::frames::Frames;
+use crate::time::wrap::WrapMode;
+use crate::tracks::set::TrackSet;
+use crate::verify::differences;
+use crate::verify::golden::GoldenError;
+use crate::verify::sets::{Random, crowd_layer, crowd_library, later, random_set, shared_set};
+
+/// What a round found.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct RandomRound {
+    /// What was evaluated, in words.
+    pub description: String,
+    /// Values compared: rotations, velocities, accelerations, or joints of a crowd.
+    pub values: u64,
+    /// Bytes compared.
+    pub bytes: u64,
+    /// Values whose bits differ.
+    pub differing: u64,
+    /// The first of them, by its place in the result.
+    pub first_difference: Option<usize>,
+    /// SHA-256 of what the CPU made: the same on every machine.
+    pub hash: [u8; 32],
+}
+
+/// One round of a seed: a set in three of four, a crowd in the fourth. Both engines evaluate it, and every
+/// bit is compared. A combination that both refuse in the same words compares nothing, and its round says
+/// so in its description.
+///
+/// ```
+/// use tumble::{Device, Engine, verify::random::round};
+/// let cpu = Engine::new(Device::Cpu)?;
+/// let found = round(&cpu, &cpu, 1, 0)?;
+/// assert_eq!(found.differing, 0);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
+/// # Errors
+/// When the device fails, or refuses what the CPU does not.
+pub fn round(
+    device: &Engine,
+    cpu: &Engine,
+    seed: u64,
+    number: u64,
+) -> Result<RandomRound, GoldenError> {
+    // Neighbouring seeds and rounds have nothing in common.
+    let mut random = Random(seed.rotate_left(32) ^ number.wrapping_mul(0x9e37_79b9_7f4a_7c15));
+    random.next();
+    match number % 4 {
+        3 => crowd_round(device, cpu, &mut random),
+        _ => set_round(device, cpu, &mut random),
+    }
+}
+
+/// Compares two results of values of `size` bytes each.
+fn compared(description: String, found: &[u8], expected: &[u8], size: usize) -> RandomRound {
+    let (mut differing, mut first_difference) = differences(found, expected, size);
+    if found.len() != expected.len() {
+        let shorter = found.len().min(expected.len()) / size;
+        differing += found.len().abs_diff(expected.len()).div_ceil(size) as u64;
+        first_difference = first_difference.or(Some(shorter));
+    }
+    RandomRound {
+        description,
+        values: (expected.len() / size) as u64,
+        bytes: expected.len() as u64,
+        differing,
+        first_difference,
+        hash: Sha256::digest(expected).into(),
+    }
+}
+
+/// What both engines make of one request; `None` where both refuse it alike.
+fn both<E: std::fmt::Display>(
+    mut evaluate: impl FnMut(&Engine) -> Result<Vec<u8>, E>,
+    [device, cpu]: [&Engine; 2],
+) -> Result<Result<[Vec<u8>; 2], String>, E> {
+    let expected = evaluate(cpu);
+    let found = evaluate(device);
+    match (found, expected) {
+        (Ok(found), Ok(expected)) => Ok(Ok([found, expected])),
+        (Err(found), Err(expected)) if found.to_string() == expected.to_string() => {
+            Ok(Err(expected.to_string()))
+        }
+        (Err(error), _) | (_, Err(error)) => Err(error),
+    }
+}
+
+fn refused(mut description: String, reason: &str) -> RandomRound {
+    let _ = write!(description, "; refused: {reason}");
+    compared(description, &[], &[], 1)
+}
+
+/// A set with the sizes that it is evaluated at.
+fn set_round(
+    device: &Engine,
+    cpu: &Engine,
+    random: &mut Random,
+) -> Result<RandomRound, GoldenError> {
+    let interpolation = interpolation(random);
+    let (kind, set) = set(random);
+    let frames = frames(random, &set);
+    let layout = random.pick(&[Layout::TrackMajor, Layout::FrameMajor]);
+    let is_rotation = interpolation.quantity == Quantity::Rotation;
+    let encoding = match is_rotation && random.below(2) == 0 {
+        true => random.pick(&Encoding::KINDS),
+        false => Encoding::F32,
+    };
+    let stores_rotations = encoding.row().error_bound.is_some();
+    let encoding = if stores_rotations {
+        encoding
+    } else {
+        Encoding::F32
+    };
+    let keeps = random.below(2) == 0;
+    let mut description = format!(
+        "{kind}, {} tracks, {} as {encoding}, {layout:?}",
+        set.track_count(),
+        interpolation.method
+    );
+    let _ = write!(
+        description,
+        ", {:?}, {:?}, {:?} to {:?}, {:?}, {:?}",
+        interpolation.ends,
+        interpolation.path,
+        interpolation.before,
+        interpolation.after,
+        interpolation.speed,
+        interpolation.quantity,
+    );
+    let evaluate = |engine: &Engine| -> Result<Vec<u8>, Error> {
+        if encoding != Encoding::F32 {
+            let clip = engine.upload(&set, interpolation)?;
+            return clip.evaluate_encoded(&frames, layout, encoding);
+        }
+        // Kept clips and sets in one go take different routes.
+        let bytes = match (is_rotation, keeps) {
+            (true, true) => {
+                let clip = engine.upload(&set, interpolation)?;
+                bytemuck::cast_slice(clip.evaluate_as(&frames, layout)?.as_quats()).to_vec()
+            }
+            (true, false) => {
+                let found = engine.evaluate_as(&set, interpolation, &frames, layout)?;
+                bytemuck::cast_slice(found.as_quats()).to_vec()
+            }
+            (false, _) => {
+                let found = engine.rates(&set, interpolation, &frames, layout)?;
+                bytemuck::cast_slice(found.as_slice()).to_vec()
+            }
+        };
+        Ok(bytes)
+    };
+    Ok(match both(evaluate, [device, cpu])? {
+        Ok([found, expected]) => compared(description, &found, &expected, encoding.bytes()),
+        Err(reason) => refused(description, &reason),
+    })
+}
+
+fn interpolation(random: &mut Random) -> Interpolation {
+    let sides = [
+        WrapMode::Hold,
+        WrapMode::Loop,
+        WrapMode::Mirror,
+        WrapMode::Extrapolate,
+    ];
+    let usual = |random: &mut Random| random.below(3) > 0;
+    let mut interpolation = Interpolation::from(random.pick(&METHODS));
+    if !usual(random) {
+        interpolation.ends = random.pick(&[Ends::Natural, Ends::Secant, Ends::Frozen]);
+    }
+    if !usual(random) {
+        interpolation.path = Path::AsAuthored;
+    }
+    if !usual(random) {
+        interpolation.before = random.pick(&sides);
+        interpolation.after = random.pick(&sides);
+    }
+    if random.below(12) == 0 {
+        interpolation.speed = Speed::Constant;
+    }
+    if random.below(5) == 0 {
+        let axes = random.pick(&[Axes::Body, Axes::Parent]);
+        interpolation.quantity =
+            random.pick(&[Quantity::Velocity(axes), Quantity::Acceleration(axes)]);
+    }
+    interpolation
+}
+
+/// Steps of nothing, of next to nothing, of half a turn and more, at times from milliseconds to seconds
+/// apart; dense keys; one key; the second day.
+fn set(random: &mut Random) -> (&'static str, TrackSet) {
+    let seed = random.next();
+    let every = [0.0, 1e-7, 1e-4, 0.02, 0.4, 2.0, 9.0];
+    match random.below(8) {
+        0..3 => {
+            let (tracks, keys) = (1 + random.below(200), 2 + random.below(40));
+            ("hostile", random_set(seed, tracks, keys, &every, true))
+        }
+        3 => {
+            let (tracks, keys) = (1 + random.below(64), 2 + random.below(60));
+            (
+                "gentle",
+                random_set(seed, tracks, keys, &[0.05, 0.3, 0.9], false),
+            )
+        }
+        4 => {
+            let keys = 200 + random.below(3000);
+            let size = random.pick(&[0.003, 0.02, 0.1, 0.4]);
+            let signs = random.pick(&[0, 3, 5]);
+            (
+                "dense",
+                shared_set(seed, 1 + random.below(12), keys, 0.01, size, signs),
+            )
+        }
+        5 => {
+            let tracks = 200 + random.below(3000);
+            (
+                "wide",
+                shared_set(seed, tracks, 2 + random.below(3), 1.0, 0.5, 4),
+            )
+        }
+        6 => {
+            let keys = 10_000 + random.below(30_000);
+            ("long", shared_set(seed, 1, keys, 0.02, 0.25, 3))
+        }
+        _ => {
+            let set = random_set(seed, 1 + random.below(40), 12, &[0.05, 0.3, 0.9], false);
+            ("hour 24", later(&set, 86_400.0))
+        }
+    }
+}
+
+/// So many samples that a round takes milliseconds on a card and at most about a tenth of a second on two
+/// cores.
+fn frames(random: &mut Random, set: &TrackSet) -> Frames {
+    let (start, end) = set.time_span().unwrap_or_default();
+    let tracks = set.track_count().max(1);
+    let samples = (random.pick(&[3_000, 60_000, 400_000]) / tracks).max(1);
+    let (low, high) = (start - 0.3, end + 0.3);
+    match random.below(5) {
+        0 => {
+            let times = (0..samples.min(700)).map(|_| random.between(low, high));
+            Frames::at(times.collect())
+        }
+        1 => {
+            let each = samples.min(40);
+            Frames::at_each(
+                (0..tracks * each)
+                    .map(|_| random.between(low, high))
+                    .collect(),
+            )
+        }
+        2 => {
+            let rate = FrameRate::new(24_000, 1001).expect("a rate of films");
+            let last = low + (samples as f64 / 24.0).min(high - low);
+            Frames::rate(rate).between(low, last)
+        }
+        _ => {
+            let rates = [7, 24, 30, 60, 120, 211];
+            let rate = random.pick(&rates);
+            let last = low + (samples as f64 / f64::from(rate)).min(high - low);
+            Frames::fps(rate).between(low, last)
+        }
+    }
+}
+
+fn crowd_round(
+    device: &Engine,
+    cpu: &Engine,
+    random: &mut Random,
+) -> Result<RandomRound, GoldenError> {
+    const MIXES: [&[crate::method::Method]; 3] = [
+        &[method::SLERP],
+        &[method::SLERP, method::STEP],
+        &[
+            method::BESSEL_OVERHAUSER,
+            method::SLERP,
+            method::CATMULL_ROM,
+        ],
+    ];
+    let methods = random.pick(&MIXES);
+    let (joints, layers) = (1 + random.below(70), 1 + random.below(4));
+    let instances = 1 + random.below(20_000 / joints);
+    let values = random.pick(&[
+        CrowdValues::Rotations,
+        CrowdValues::Local,
+        CrowdValues::Model,
+        CrowdValues::Skinning,
+    ]);
+    let is_half = random.below(3) == 0;
+    let output = CrowdOutput { values, is_half };
+    let library = crowd_library(random, joints, methods)?;
+    let plays: Vec<_> = (0..instances * layers)
+        .map(|_| crowd_layer(random, &library))
+        .collect();
+    let clock = random.pick(&[0, 11_760, 1 << 33, 61_000_000_000]) + random.next() % 1_000_000;
+    let bits = if is_half { 16 } else { 32 };
+    let description = format!(
+        "crowd, {instances} instances of {joints} joints, {} clips in {layers} layers, {values:?} in {bits} bits",
+        methods.len(),
+    );
+    let evaluate = |engine: &Engine| -> Result<Vec<u8>, CrowdError> {
+        let mut crowd = engine.crowd(&library, instances, layers)?;
+        for (index, &plays) in plays.iter().enumerate() {
+            crowd.set(index / layers, index % layers, plays)?;
+        }
+        crowd.advance_ticks(clock)?;
+        let vectors = crowd.output_len(output);
+        if is_half {
+            let mut found = vec![[0u16; 4]; vectors];
+            crowd.evaluate_half_into(values, &mut found)?;
+            return Ok(bytemuck::cast_slice(&found).to_vec());
+        }
+        let mut found = vec![[0f32; 4]; vectors];
+        crowd.evaluate_into(values, &mut found)?;
+        Ok(bytemuck::cast_slice(&found).to_vec())
+    };
+    Ok(match both(evaluate, [device, cpu])? {
+        Ok([found, expected]) => compared(description, &found, &expected, output.bytes()),
+        Err(reason) => refused(description, &reason),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A comparison that cannot fail proves nothing.
+    #[test]
+    fn a_bit_that_differs_is_found_and_a_result_that_is_too_short() {
+        let expected = [7u8; 64];
+        let mut found = expected;
+        found[33] ^= 1;
+        let round = compared(String::new(), &found, &expected, 16);
+        assert_eq!((round.values, round.differing), (4, 1));
+        assert_eq!(round.first_difference, Some(2));
+        let round = compared(String::new(), &expected[..48], &expected, 16);
+        assert_eq!((round.differing, round.first_difference), (1, Some(3)));
+    }
+}

@@ -1,0 +1,343 @@
+//! What a renderer does with the engine, on a device that is made here as an application would make it:
+//! results from buffer to buffer, recorded into its commands with frames in flight, in memory that only the
+//! device sees, and copied on a queue of their own. Every bit is compared with the CPU's.
+#![allow(unsafe_code)] // the device, the buffers and the commands are the application's
+
+use glam::Quat;
+
+use crate::clip::Clip;
+use crate::crowd::error::CrowdError;
+use crate::crowd::player::Crowd;
+use crate::device::{Device, VulkanDevice};
+use crate::engine::Engine;
+use crate::error::Error;
+use crate::gpu::application::{Application, ApplicationBuffer, ApplicationMemory, Taken};
+use crate::gpu::crowd_target::CrowdTarget;
+use crate::gpu::options::{EngineOptions, ReadBack, Transfer};
+use crate::method;
+use crate::output::crowd::{CrowdOutput, CrowdValues};
+use crate::output::encoding::Encoding;
+use crate::output::rotations::Layout;
+use crate::time::frames::Frames;
+use crate::verify::differences;
+use crate::verify::golden::GoldenError;
+use crate::verify::sets::{Random, crowd_layer, crowd_library, random_set, shared_set};
+
+/// Frames in flight.
+const FRAMES: usize = 3;
+
+/// What was found of one use of the engine.
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+pub struct RendererCheck {
+    /// What was done.
+    pub name: String,
+    /// Values compared: rotations, or joints of a crowd.
+    pub values: u64,
+    /// Values whose bits differ from the CPU's, and bytes beside a result that changed.
+    pub differing: u64,
+}
+
+/// What was found on a renderer's device.
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+pub struct RendererReport {
+    /// Each use of the engine.
+    pub checks: Vec<RendererCheck>,
+    /// Whether results lay in memory that the host cannot see; else the device has no such memory.
+    pub memory_is_hidden: bool,
+    /// Frames that were in flight at once.
+    pub frames_in_flight: usize,
+    /// The family of the queue that copied results; nothing where the device has none that only copies.
+    pub copy_queue_family: Option<u32>,
+    /// What the validation layer said, where it was asked for.
+    pub validation_messages: Vec<String>,
+}
+
+/// An application's device with an engine on it. Clips, crowds, targets and buffers of either are dropped
+/// before it: each function here makes them after it.
+pub(crate) struct Renderer {
+    /// Dropped before its device.
+    pub(crate) engine: Engine,
+    pub(crate) application: Application,
+}
+
+impl Renderer {
+    pub(crate) fn new(
+        device: &VulkanDevice,
+        validation: bool,
+        options: &EngineOptions,
+    ) -> Result<Self, Error> {
+        let application = Application::new(&device.info().uuid, validation)?;
+        // SAFETY: the handles belong together; the engine goes before them (`Renderer`), and its queue is used
+        // by one of the two at a time.
+        let engine = unsafe { Engine::from_vulkan(application.handles(), options) }?;
+        Ok(Self {
+            engine,
+            application,
+        })
+    }
+
+    /// Leaves a clip's result in a buffer, from `offset` on.
+    pub(crate) fn to_buffer(
+        &self,
+        clip: &Clip,
+        frames: &Frames,
+        (layout, encoding): (Layout, Encoding),
+        (buffer, offset): (&ApplicationBuffer, u64),
+    ) -> Result<(), Error> {
+        let range = buffer.range(offset, buffer.size - offset);
+        // SAFETY: the buffer is of the same application, made for both uses, and nobody uses it now.
+        unsafe { clip.evaluate_to_buffer(frames, layout, encoding, range) }
+    }
+
+    pub(crate) fn target(
+        &self,
+        crowd: &Crowd,
+        output: CrowdOutput,
+        buffer: &ApplicationBuffer,
+    ) -> Result<CrowdTarget, CrowdError> {
+        // SAFETY: the buffer is of the same application, and outlives the target, which is made after it.
+        unsafe { crowd.target(output, buffer.range(0, buffer.size)) }
+    }
+
+    /// A buffer that nothing has been left in: all bits are set, so that what is not stored shows.
+    fn untouched(&mut self, size: u64) -> Result<ApplicationBuffer, Error> {
+        let buffer = self.application.buffer(size, ApplicationMemory::Device)?;
+        self.fill(&buffer)?;
+        Ok(buffer)
+    }
+
+    fn fill(&mut self, buffer: &ApplicationBuffer) -> Result<Taken, Error> {
+        let application = &self.application;
+        let commands = application.recorded(false, |commands| {
+            application.fill(commands, buffer, u32::MAX);
+            Ok::<_, Error>(())
+        })?;
+        Ok(self.application.run(&[commands])?)
+    }
+
+    /// The bytes of a buffer, copied by the application's own commands.
+    fn bytes(
+        &mut self,
+        from: &ApplicationBuffer,
+        through: &ApplicationBuffer,
+        size: usize,
+    ) -> Result<Vec<u8>, Error> {
+        let application = &self.application;
+        let commands = application.recorded(false, |commands| {
+            application.copy(commands, from, through, size as u64);
+            Ok::<_, Error>(())
+        })?;
+        self.application.run(&[commands])?;
+        Ok(through.bytes(size)?)
+    }
+}
+
+/// Records an evaluation of a crowd.
+pub(crate) fn record(
+    crowd: &mut Crowd,
+    target: &CrowdTarget,
+    commands: ash::vk::CommandBuffer,
+) -> Result<(), CrowdError> {
+    // SAFETY: the commands are in recording and of the same device; callers here submit them once, in the
+    // order of the calls, to the engine's queue, and wait for them before the target goes.
+    unsafe { crowd.record(target, commands) }
+}
+
+/// Works on a device that is made here as a renderer's is. With `validation` the Khronos validation layer
+/// watches both the application's calls and the engine's.
+///
+/// # Errors
+/// When the device cannot be made, or fails.
+pub fn renderer(
+    device: &VulkanDevice,
+    validation: bool,
+    seed: u64,
+) -> Result<RendererReport, GoldenError> {
+    let cpu = Engine::new(Device::Cpu)?;
+    let mut renderer = Renderer::new(device, validation, &EngineOptions::default())?;
+    let mut report = RendererReport {
+        checks: Vec::new(),
+        memory_is_hidden: false,
+        frames_in_flight: FRAMES,
+        copy_queue_family: None,
+        validation_messages: Vec::new(),
+    };
+    buffer_to_buffer(&mut renderer, &cpu, seed, &mut report)?;
+    frames_in_flight(&mut renderer, &cpu, seed, &mut report)?;
+    report.validation_messages = renderer.application.validation_messages();
+    if let Some(queue) = renderer.application.copy_queue {
+        drop(renderer);
+        let mut options = EngineOptions::default();
+        options.transfer = Transfer::Staged;
+        options.read_back = ReadBack::Overlapped;
+        let renderer = Renderer::new(device, validation, &options)?;
+        report
+            .checks
+            .push(copied_beside(&renderer.engine, &cpu, seed)?);
+        report.copy_queue_family = Some(queue.family);
+        let messages = renderer.application.validation_messages();
+        report.validation_messages.extend(messages);
+    }
+    Ok(report)
+}
+
+/// Every encoding in both layouts, of arcs and polynomials, at frames and at explicit times, behind bytes that
+/// stay as they are.
+fn buffer_to_buffer(
+    renderer: &mut Renderer,
+    cpu: &Engine,
+    seed: u64,
+    report: &mut RendererReport,
+) -> Result<(), GoldenError> {
+    let set = random_set(seed ^ 0x17, 37, 14, &[0.0, 1e-4, 0.02, 0.4, 2.0], true);
+    let mut random = Random(seed);
+    let mut times: Vec<f64> = (0..90).map(|_| random.between(-0.5, 7.0)).collect();
+    times.sort_by(f64::total_cmp);
+    let requests = [
+        ("frames", Frames::fps(60).between(-0.5, 6.0)),
+        ("times", Frames::at(times)),
+    ];
+    for method in [method::SLERP, method::BESSEL_OVERHAUSER, method::C2] {
+        for (name, frames) in &requests {
+            let mut check = RendererCheck {
+                name: format!("buffer to buffer, {method}, {name}"),
+                values: 0,
+                differing: 0,
+            };
+            let clip = renderer.engine.upload(&set, method)?;
+            let expected_clip = cpu.upload(&set, method)?;
+            let samples = clip.timeline(frames).map_err(Error::from)?.len();
+            let largest = Encoding::KINDS.map(Encoding::bytes).into_iter().max();
+            let offset_rotations = 256;
+            let room =
+                (clip.track_count() * samples + offset_rotations) * largest.unwrap_or_default();
+            let buffer = renderer.untouched(room as u64)?;
+            report.memory_is_hidden = buffer.is_hidden;
+            let host = (renderer.application).buffer(room as u64, ApplicationMemory::Host);
+            let host = host.map_err(Error::from)?;
+            for encoding in Encoding::KINDS {
+                if encoding.row().error_bound.is_none() {
+                    continue; // not for rotations
+                }
+                for layout in [Layout::TrackMajor, Layout::FrameMajor] {
+                    let each = encoding.bytes();
+                    let offset = offset_rotations * each;
+                    let expected = expected_clip.evaluate_encoded(frames, layout, encoding)?;
+                    renderer.to_buffer(
+                        &clip,
+                        frames,
+                        (layout, encoding),
+                        (&buffer, offset as u64),
+                    )?;
+                    let found = renderer.bytes(&buffer, &host, offset + expected.len())?;
+                    let (before, found) = found.split_at(offset);
+                    check.values += (expected.len() / each) as u64;
+                    check.differing += differences(found, &expected, each).0;
+                    check.differing += before.iter().filter(|&&byte| byte != 0xff).count() as u64;
+                    renderer.fill(&buffer)?;
+                    renderer.application.forget_commands();
+                }
+            }
+            report.checks.push(check);
+        }
+    }
+    Ok(())
+}
+
+/// A crowd recorded into the application's commands, each of three frames into a buffer of its own, submitted
+/// without a wait between them.
+fn frames_in_flight(
+    renderer: &mut Renderer,
+    cpu: &Engine,
+    seed: u64,
+    report: &mut RendererReport,
+) -> Result<(), GoldenError> {
+    const LAYERS: usize = 2;
+    const INSTANCES: usize = 33;
+    let mut random = Random(seed ^ 0x29);
+    let methods = [method::SLERP, method::BESSEL_OVERHAUSER];
+    let library = crowd_library(&mut random, 21, &methods)?;
+    for values in [
+        CrowdValues::Rotations,
+        CrowdValues::Local,
+        CrowdValues::Model,
+        CrowdValues::Skinning,
+    ] {
+        for output in [CrowdOutput::from(values), CrowdOutput::half(values)] {
+            let mut crowd = renderer.engine.crowd(&library, INSTANCES, LAYERS)?;
+            let mut expected_crowd = cpu.crowd(&library, INSTANCES, LAYERS)?;
+            let each = output.bytes();
+            let size = (crowd.output_len(output) * each / output.vectors()) as u64;
+            let mut buffers = Vec::new();
+            for _ in 0..FRAMES {
+                let host = (renderer.application).buffer(size, ApplicationMemory::Host);
+                buffers.push((renderer.untouched(size)?, host.map_err(Error::from)?));
+            }
+            // Made after the buffers that they lead to, and dropped before.
+            let targets = (buffers.iter())
+                .map(|(buffer, _)| renderer.target(&crowd, output, buffer))
+                .collect::<Result<Vec<_>, _>>()?;
+            let (mut frames, mut expected) = (Vec::new(), Vec::new());
+            for (frame, (target, (buffer, host))) in targets.iter().zip(&buffers).enumerate() {
+                for index in 0..INSTANCES * LAYERS {
+                    if frame == 0 || random.below(7) == 0 {
+                        let plays = crowd_layer(&mut random, &library);
+                        crowd.set(index / LAYERS, index % LAYERS, plays)?;
+                        expected_crowd.set(index / LAYERS, index % LAYERS, plays)?;
+                    }
+                }
+                crowd.advance_ticks(70_560)?;
+                expected_crowd.advance_ticks(70_560)?;
+                let application = &renderer.application;
+                frames.push(application.recorded(false, |commands| {
+                    record(&mut crowd, target, commands)?;
+                    application.copy(commands, buffer, host, size);
+                    Ok::<_, CrowdError>(())
+                })?);
+                let vectors = expected_crowd.output_len(output);
+                expected.push(if output.is_half {
+                    let mut found = vec![[0u16; 4]; vectors];
+                    expected_crowd.evaluate_half_into(values, &mut found)?;
+                    bytemuck::cast_slice(&found).to_vec()
+                } else {
+                    let mut found = vec![[0f32; 4]; vectors];
+                    expected_crowd.evaluate_into(values, &mut found)?;
+                    bytemuck::cast_slice::<_, u8>(&found).to_vec()
+                });
+            }
+            renderer.application.run(&frames).map_err(Error::from)?;
+            let mut check = RendererCheck {
+                name: format!(
+                    "{FRAMES} frames in flight, {values:?} in {} bits",
+                    if output.is_half { 16 } else { 32 }
+                ),
+                values: 0,
+                differing: 0,
+            };
+            for ((_, host), expected) in buffers.iter().zip(&expected) {
+                let found = host.bytes(size as usize).map_err(Error::from)?;
+                check.values += (expected.len() / each) as u64;
+                check.differing += differences(&found, expected, each).0;
+            }
+            report.checks.push(check);
+            drop(targets);
+            renderer.application.forget_commands();
+        }
+    }
+    Ok(())
+}
+
+/// Results of several windows that a queue of their own copies while the next window is evaluated.
+fn copied_beside(engine: &Engine, cpu: &Engine, seed: u64) -> Result<RendererCheck, Error> {
+    let set = shared_set(seed ^ 0x31, 1024, 26, 0.4, 0.6, 4);
+    let frames = Frames::fps(400).between(0.0, 10.0);
+    let [found, expected] =
+        [engine, cpu].map(|engine| engine.evaluate(&set, method::SLERP, &frames));
+    let (found, expected) = (found?, expected?);
+    let (found, expected): (&[Quat], &[Quat]) = (found.as_quats(), expected.as_quats());
+    Ok(RendererCheck {
+        name: "copied on a queue of their own, slerp".to_owned(),
+        values: expected.len() as u64,
+        differing: differences(found, expected, 1).0,
+    })
+}

@@ -1,0 +1,354 @@
+//! Sets and crowds made of a seed by additions, multiplications, divisions and square roots alone: the
+//! same bits on every machine, whatever its sine is. So what is recorded of them on one machine is what
+//! every other has to find.
+
+use glam::{Affine3A, DVec3, Mat3A, Quat, Vec3};
+
+use crate::crowd::error::CrowdError;
+use crate::crowd::layer::CrowdLayer;
+use crate::crowd::library::CrowdLibrary;
+use crate::method::Method;
+use crate::method::vector_method::VectorMethod;
+use crate::pose::skeleton::Skeleton;
+use crate::time::wrap::WrapMode;
+use crate::tracks::key_data::Tcb;
+use crate::tracks::set::TrackSet;
+
+/// `SplitMix64` (Steele, Lea, Flood 2014).
+pub(crate) struct Random(pub(crate) u64);
+
+impl Random {
+    pub(crate) fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    /// In [0, 1).
+    fn unit(&mut self) -> f64 {
+        (self.next() >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    pub(crate) fn between(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * self.unit()
+    }
+
+    pub(crate) fn below(&mut self, count: usize) -> usize {
+        (self.next() % count as u64) as usize
+    }
+
+    pub(crate) fn pick<T: Copy>(&mut self, values: &[T]) -> T {
+        values[self.below(values.len())]
+    }
+}
+
+fn normalised(q: [f64; 4]) -> [f64; 4] {
+    let length = q.iter().map(|c| c * c).sum::<f64>().sqrt();
+    q.map(|c| c / length)
+}
+
+pub(crate) fn random_rotation(random: &mut Random) -> [f64; 4] {
+    loop {
+        let q = [(); 4].map(|()| random.between(-1.0, 1.0));
+        if (0.01..1.0).contains(&q.iter().map(|c| c * c).sum::<f64>()) {
+            return normalised(q);
+        }
+    }
+}
+
+/// The rotation moved a little: the step's half-angle is about `size` where that is small.
+fn stepped(random: &mut Random, q: [f64; 4], size: f64) -> [f64; 4] {
+    let step = random_rotation(random);
+    normalised([0, 1, 2, 3].map(|c| q[c] + size * step[c]))
+}
+
+fn key(q: [f64; 4], sign: f32) -> Quat {
+    Quat::from_array(q.map(|c| sign * c as f32))
+}
+
+/// Tracks with times of their own, each step's size drawn from `sizes`, every fourth sign
+/// turned where `turned`, and with velocities, tangents and tension for most tracks.
+pub(crate) fn random_set(
+    seed: u64,
+    tracks: usize,
+    keys: usize,
+    sizes: &[f64],
+    turned: bool,
+) -> TrackSet {
+    let mut random = Random(seed);
+    let mut set = TrackSet::new();
+    for track in 0..tracks {
+        let count = match track % 8 {
+            0 if tracks > 8 => 1,
+            1 if tracks > 8 => 2,
+            2 if tracks > 8 => 3,
+            _ => keys + track % 3,
+        };
+        let mut time = random.between(-0.5, 0.5);
+        let mut rotation = random_rotation(&mut random);
+        let (mut times, mut quats) = (Vec::new(), Vec::new());
+        for index in 0..count {
+            times.push(time);
+            let sign = if turned && random.next().is_multiple_of(4) {
+                -1.0
+            } else {
+                1.0
+            };
+            let mut quat = key(rotation, sign);
+            if turned && index % 7 == 5 {
+                // A component far below what f32 resolves beside the others.
+                quat = key(normalised([1e-30, 0.6, rotation[2], rotation[3]]), sign);
+            }
+            quats.push(quat);
+            time += if turned {
+                random.pick(&[0.04, 0.001, 0.3, 1.0, 0.55])
+            } else {
+                random.between(0.1, 0.9)
+            };
+            let size = random.pick(sizes);
+            rotation = stepped(&mut random, rotation, size);
+        }
+        set.push("", &times, &quats).expect("unit keys in order");
+    }
+    give_data(&mut set, seed);
+    set
+}
+
+fn give_data(set: &mut TrackSet, seed: u64) {
+    let mut random = Random(seed ^ 0xdada);
+    for index in (0..set.track_count()).filter(|index| index % 5 != 3) {
+        let keys = set.track(index).keys.len();
+        let three = |random: &mut Random| [(); 3].map(|()| random.between(-1.0, 1.0));
+        let velocities: Vec<DVec3> = (0..keys)
+            .map(|_| DVec3::from_array(three(&mut random)) * 2.0)
+            .collect();
+        let four = |random: &mut Random| {
+            Quat::from_array([(); 4].map(|()| random.between(-1.0, 1.0) as f32))
+        };
+        let tangents: Vec<[Quat; 2]> = (0..keys)
+            .map(|_| [four(&mut random), four(&mut random)])
+            .collect();
+        let tcb: Vec<Tcb> = (0..keys)
+            .map(|_| {
+                let [tension, continuity, bias] = three(&mut random);
+                Tcb {
+                    tension,
+                    continuity,
+                    bias,
+                }
+            })
+            .collect();
+        set.set_velocities(index, &velocities)
+            .expect("one for each key");
+        set.set_tangents(index, &tangents)
+            .expect("one for each key");
+        set.set_tcb(index, &tcb).expect("one for each key");
+    }
+}
+
+/// Tracks that share times `step` apart; each key's step has that size.
+pub(crate) fn shared_set(
+    seed: u64,
+    tracks: usize,
+    keys: usize,
+    step: f64,
+    size: f64,
+    turned: u64,
+) -> TrackSet {
+    let mut random = Random(seed);
+    let times: Vec<f64> = (0..keys).map(|k| k as f64 * step).collect();
+    let mut all = Vec::with_capacity(tracks * keys);
+    for _ in 0..tracks {
+        let mut rotation = random_rotation(&mut random);
+        for _ in 0..keys {
+            let sign = if turned > 0 && random.next().is_multiple_of(turned) {
+                -1.0
+            } else {
+                1.0
+            };
+            all.push(key(rotation, sign));
+            rotation = stepped(&mut random, rotation, size);
+        }
+    }
+    TrackSet::with_shared_times(&times, &all).expect("unit keys in order")
+}
+
+/// The same set `seconds` later.
+pub(crate) fn later(set: &TrackSet, seconds: f64) -> TrackSet {
+    let mut moved = TrackSet::new();
+    for track in set.tracks() {
+        let times: Vec<f64> = track.times.iter().map(|time| time + seconds).collect();
+        moved.push("", &times, track.keys).expect("still in order");
+    }
+    give_data(&mut moved, 99);
+    moved
+}
+
+/// Tracks whose last key repeats the first.
+pub(crate) fn closed_set() -> TrackSet {
+    let mut set = TrackSet::new();
+    for track in random_set(31, 6, 12, &[0.2, 0.7], true).tracks() {
+        let mut keys = track.keys.to_vec();
+        keys.push(keys[0]);
+        let mut times = track.times.to_vec();
+        times.push(times[times.len() - 1] + 0.4);
+        set.push("", &times, &keys).expect("unit keys in order");
+    }
+    set
+}
+
+/// Tracks of rotations, most of which have translations and scales.
+pub(crate) fn vectors_set() -> TrackSet {
+    let mut set = random_set(12, 5, 9, &[0.3, 0.8], false);
+    for track in 0..5 {
+        let times: Vec<f64> = (0..7)
+            .map(|k| f64::from(k) * (0.5 + 0.1 * track as f64))
+            .collect();
+        let mut random = Random(track as u64 + 5);
+        let mut vector = || Vec3::from_array([(); 3].map(|()| random.between(-3.0, 3.0) as f32));
+        let keys: Vec<Vec3> = times.iter().map(|_| vector()).collect();
+        let tangents: Vec<[Vec3; 2]> = times.iter().map(|_| [vector(), vector()]).collect();
+        if track != 2 {
+            set.set_translations(track, &times, &keys, &tangents)
+                .expect("a track");
+        }
+        if track != 3 {
+            set.set_scales(track, &times[..4], &keys[..4], &[])
+                .expect("a track");
+        }
+    }
+    set
+}
+
+/// Walks of points, some of which stand still for a while.
+pub(crate) fn paths_set() -> TrackSet {
+    let mut random = Random(14);
+    let mut set = TrackSet::new();
+    for track in 0..9 {
+        let (mut place, mut time) = (Vec3::ZERO, 0.0);
+        let (mut times, mut points) = (Vec::new(), Vec::new());
+        for point in 0..3 + track {
+            times.push(time);
+            points.push(place);
+            time += random.between(0.3, 1.5);
+            let step = Vec3::from_array([(); 3].map(|()| random.between(-3.0, 4.0) as f32));
+            place += if (track + point) % 7 == 5 {
+                Vec3::ZERO
+            } else {
+                step
+            };
+        }
+        set.push_path("", &times, &points, &[])
+            .expect("points in order");
+    }
+    set
+}
+
+/// A point whose coordinates are at most `reach` from 0.
+fn point(random: &mut Random, reach: f64) -> Vec3 {
+    Vec3::from_array([(); 3].map(|()| random.between(-reach, reach) as f32))
+}
+
+/// A skeleton whose joints hang from random ones before them; some are roots.
+fn skeleton(random: &mut Random, joints: usize) -> Skeleton {
+    let parent = |joint: usize, random: &mut Random| match random.below(8) {
+        0 => None,
+        _ => (joint > 0).then(|| random.below(joint)),
+    };
+    let parents = (0..joints).map(|joint| parent(joint, random)).collect();
+    let offsets = (0..joints).map(|_| point(random, 1.0)).collect();
+    Skeleton::new(parents, offsets).expect("parents come before their children")
+}
+
+/// Keys as games have them: most joints at the same times, some at fewer, some still; a few with
+/// translations and scales.
+fn joints_set(random: &mut Random, joints: usize, keys: usize) -> TrackSet {
+    let mut shared = Vec::new();
+    let mut time = random.between(-1.0, 2.0);
+    for _ in 0..keys {
+        shared.push(time);
+        time += random.pick(&[0.1, 0.1, 0.1, 0.0625, 0.7]);
+    }
+    let mut set = TrackSet::new();
+    for joint in 0..joints {
+        let times: Vec<f64> = match random.below(5) {
+            0 => shared.iter().step_by(3).copied().collect(),
+            1 => shared.iter().map(|time| time + 0.033).collect(),
+            2 => vec![shared[0]],
+            _ => shared.clone(),
+        };
+        let mut rotation = random_rotation(random);
+        let mut rotations = Vec::new();
+        for _ in &times {
+            rotations.push(key(rotation, 1.0));
+            let size = random.between(0.0, 0.5);
+            rotation = stepped(random, rotation, size);
+        }
+        (set.push("", &times, &rotations)).expect("unit keys in order");
+        if joint.is_multiple_of(3) {
+            let keys: Vec<Vec3> = shared.iter().map(|_| point(random, 2.0)).collect();
+            (set.set_translations(joint, &shared, &keys, &[])).expect("a track");
+        }
+        if joint % 4 == 1 {
+            let keys = shared.iter().map(|_| Vec3::ONE + point(random, 0.5));
+            let keys: Vec<Vec3> = keys.collect();
+            (set.set_scales(joint, &shared, &keys, &[])).expect("a track");
+        }
+    }
+    set
+}
+
+/// A library of a clip for each method, with masks, a reference pose and inverse bind matrices.
+pub(crate) fn crowd_library(
+    random: &mut Random,
+    joints: usize,
+    methods: &[Method],
+) -> Result<CrowdLibrary, CrowdError> {
+    let mut library = CrowdLibrary::new(&skeleton(random, joints))?;
+    for (index, &method) in methods.iter().enumerate() {
+        // A curve that turns too wildly for a crowd is refused, and leaves nothing behind.
+        while library.clips() == index {
+            let set = joints_set(random, joints, 2 + 3 * index);
+            match library.push(&set, method, VectorMethod::CatmullRom) {
+                Ok(_) | Err(CrowdError::TooWild { .. }) => {}
+                Err(error) => return Err(error),
+            }
+        }
+    }
+    for mask in 0..2 {
+        let weight = |joint| match (joint + mask) % 3 {
+            0 => 0.0,
+            1 => 1.0,
+            _ => random.unit() as f32,
+        };
+        let weights: Vec<f32> = (0..joints).map(weight).collect();
+        library.push_mask(&weights)?;
+    }
+    library.set_reference(0, methods.len() - 1, 5000)?;
+    let bind = |_| {
+        let columns = [(); 3].map(|()| point(random, 1.0).into());
+        let [x, y, z] = columns;
+        Affine3A {
+            matrix3: Mat3A::from_cols(x, y, z),
+            translation: point(random, 2.0).into(),
+        }
+    };
+    let bind: Vec<Affine3A> = (0..joints).map(bind).collect();
+    library.set_inverse_bind(&bind)?;
+    Ok(library)
+}
+
+/// What a layer of an instance may play.
+pub(crate) fn crowd_layer(random: &mut Random, library: &CrowdLibrary) -> CrowdLayer {
+    CrowdLayer {
+        clip: random.below(library.clips()),
+        time: random.between(-3e6, 3e6) as i64,
+        speed: random.pick(&[0.0, 1.0, 1.0, -1.0, 0.37, -2.25, 100.0]),
+        wrap: random.pick(&[WrapMode::Hold, WrapMode::Loop, WrapMode::Mirror]),
+        weight: random.pick(&[0.0, 1.0, 0.25, 0.7]),
+        additive: random.next().is_multiple_of(2),
+        mask: random.pick(&[None, Some(0), Some(1)]),
+    }
+}
