@@ -42,7 +42,7 @@ Exit codes:
   1 a bug in tumble                6 the device failed, or is not exact
   2 the command line is wrong      7 output could not be written
   3 some inputs failed             8 verification found a difference
-  4 all inputs failed              130, 141, 143 stopped by a signal";
+  4 all inputs failed              129 to 131, 141, 143 by a signal";
 
 /// What the command line says.
 #[derive(Debug, Parser)]

@@ -15,7 +15,6 @@ use tumble_formats::Format;
 use crate::arguments::gather::{Found, Gathered};
 use crate::batch::folder;
 use crate::batch::manifest;
-use crate::batch::output::Target;
 use crate::batch::shards::plan::Plan as OwnPlan;
 use crate::batch::shards::record::Header;
 use crate::batch::shards::run::Shard;
@@ -94,12 +93,13 @@ impl Plan {
                 let found = of_formats.map(|(name, size)| {
                     let path = PathBuf::from(format!("{}/{name}", library.display()));
                     let below = PathBuf::from(name);
-                    (Found { path, below }, size)
+                    (Found::named(path, below), size)
                 });
                 found.unzip()
             }
             None => {
                 let found = Gathered::new(&[library.to_owned()], None)?.files;
+                let found = folder::without_results(found, folder)?;
                 let sizes = found.iter().map(size).collect();
                 (found, sizes)
             }
@@ -110,6 +110,7 @@ impl Plan {
             return Err(Failure::usage(message).into());
         }
         let own = request.plan(&arguments, inputs, &sizes, folder, shard_bytes)?;
+        folder::refuse_shared_names(&own.inputs, own.format)?;
         Ok(Self { own, arguments })
     }
 
@@ -161,11 +162,12 @@ impl Plan {
         )
     }
 
-    /// What the results of a shard are called below the directory of results.
+    /// What the results of a shard are called below the directory of results; an input whose result can
+    /// have no name there fails.
     #[must_use]
-    pub fn names_of(&self, shard: usize) -> Option<&[String]> {
+    pub fn names_of(&self, shard: usize) -> Option<Vec<String>> {
         let own = self.own.cuts.get(shard.checked_sub(1)?)?;
-        Some(&self.own.names[own.clone()])
+        Some(self.own.names[own.clone()].iter().flatten().cloned().collect())
     }
 }
 
@@ -245,27 +247,23 @@ impl Worker {
     /// When the device fails or results cannot be written. Inputs that are refused are no error.
     pub fn run(&mut self, task: &Task, folder: &Path) -> Result<Outcome, Refused> {
         let found: Vec<Found> = (task.inputs.iter())
-            .map(|(path, below)| Found {
-                path: path.clone(),
-                below: below.clone(),
-            })
+            .map(|(path, below)| Found::named(path.clone(), below.clone()))
             .collect();
         let format = folder::format(folder, self.arguments.results.format())?;
-        let names = folder::names(&found, folder, format)?;
+        let names = folder::names(&found, folder, format);
         let header = Header {
             shard: task.shard,
             of: task.of,
             plan: task.plan.clone(),
             inputs: found.len(),
-            failed: Vec::new(),
+            ..Header::default()
         };
-        let own: Vec<&str> = names.iter().map(|name| &**name).collect();
+        let own: Vec<&str> = names.iter().flatten().map(|name| &**name).collect();
         let resume = self.arguments.results.is_resumed();
         let mut shard = Shard::new(folder, header, &own, resume);
         shard.quiet = true;
-        let targets = shard.targets(&names, format)?;
         let paths = found.into_iter().map(|found| found.path);
-        let jobs: Vec<(PathBuf, Target)> = paths.zip(targets).collect();
+        let jobs = shard.jobs(paths, &names, format);
         let mut told = Vec::new();
         self.evaluator
             .evaluate(&self.arguments, &jobs, &mut shard, &mut told)?;

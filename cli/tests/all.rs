@@ -1,6 +1,8 @@
 //! Every test of the program that may share its process with others.
 //! `cargo test -p tumble-cli --test all plot::` runs those of one file.
 
+#[cfg(unix)]
+mod attack;
 mod batch;
 mod cli;
 mod cli_arguments;

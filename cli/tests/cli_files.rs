@@ -3,7 +3,7 @@
 use std::fs;
 use std::process::{Command, Stdio};
 
-use crate::program::{command, finish, run, sample_folder};
+use crate::program::{command, finish, is_writing, run, sample_folder};
 
 #[cfg(unix)]
 #[test]
@@ -65,7 +65,7 @@ fn signals_stop_the_program_and_leave_no_file() {
         let line = ["eval", "a.dat", "--fps", "1000000", "-o", "out/o.csv"];
         let mut child = command(place.path(), &line).spawn().unwrap();
         let out = place.path().join("out");
-        while fs::read_dir(&out).unwrap().count() == 0 {
+        while !is_writing(&child, &out) {
             assert!(
                 child.try_wait().unwrap().is_none(),
                 "it ended before it could be stopped"

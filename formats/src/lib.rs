@@ -6,6 +6,7 @@
 pub mod adjust;
 #[cfg(feature = "parquet")]
 pub mod arrow;
+pub mod beneath;
 pub mod bvh;
 pub mod csv;
 pub mod dat;

@@ -1,9 +1,17 @@
-//! Files are written whole or not at all: under a temporary name in their own
-//! directory, then renamed. Standard output is the exception, for pipes.
+//! Files are written whole or not at all: without a name, or under a temporary one, in
+//! their own directory, and get their names at the end. Standard output is the exception,
+//! for pipes.
+//!
+//! On Linux a file that is being written has no name (`O_TMPFILE`), so that whatever ends
+//! its writer leaves nothing behind. Where the file system knows no such files it is called
+//! `.tumble-….part`, and locked: what is not locked has no writer any more, and is removed by
+//! the next one.
 
-use std::fs;
+use std::collections::BTreeSet;
+use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use tempfile::NamedTempFile;
 
@@ -72,7 +80,7 @@ pub struct Output {
 
 enum Sink {
     File {
-        temporary: BufWriter<NamedTempFile>,
+        temporary: BufWriter<Temporary>,
         overwrite: bool,
     },
     Standard(BufWriter<io::Stdout>),
@@ -84,17 +92,49 @@ const BUFFER: usize = 1 << 18;
 const PREFIX: &str = ".tumble-";
 const SUFFIX: &str = ".part";
 
+/// So many letters and digits at random end their names; a mark ends in `-`.
+const RANDOM: usize = 6;
+
+/// The temporary files that this process is writing.
+static UNFINISHED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+
+fn unfinished() -> MutexGuard<'static, BTreeSet<PathBuf>> {
+    UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// The entry of a temporary file in [`UNFINISHED`].
+struct Listed(PathBuf);
+
+impl Drop for Listed {
+    fn drop(&mut self) {
+        unfinished().remove(&self.0);
+    }
+}
+
+/// While it lives, this process creates no temporary file.
+pub struct NoMoreOutputs {
+    _unfinished: MutexGuard<'static, BTreeSet<PathBuf>>,
+}
+
+/// Removes all temporary files of this process, which is about to end: what is returned is to live
+/// until then.
+#[must_use]
+pub fn remove_unfinished() -> NoMoreOutputs {
+    let unfinished = unfinished();
+    for path in &*unfinished {
+        let _ = fs::remove_file(path); // it has its name, or its writer was quicker
+    }
+    NoMoreOutputs {
+        _unfinished: unfinished,
+    }
+}
+
 /// Removes the temporary files in a directory whose writers were killed; those that are
 /// being written are locked, and stay.
 pub fn remove_abandoned(directory: &Path) {
-    for entry in fs::read_dir(directory).into_iter().flatten().flatten() {
-        let name = entry.file_name();
-        let name = name.to_string_lossy();
-        if name.starts_with(PREFIX)
-            && name.ends_with(SUFFIX)
-            && fs::File::open(entry.path()).is_ok_and(|file| file.try_lock().is_ok())
-        {
-            let _ = fs::remove_file(entry.path()); // the next run tries again
+    for path in temporary_files(directory, |_| true) {
+        if File::open(&path).is_ok_and(|file| file.try_lock().is_ok()) {
+            let _ = fs::remove_file(path); // the next run tries again
         }
     }
 }
@@ -102,14 +142,31 @@ pub fn remove_abandoned(directory: &Path) {
 /// Removes the temporary files in a directory that were created with that mark, whether or not they
 /// are locked: locks do not reach other machines.
 pub fn remove_marked(directory: &Path, mark: &str) {
-    let prefix = format!("{PREFIX}{mark}");
-    for entry in fs::read_dir(directory).into_iter().flatten().flatten() {
-        let name = entry.file_name();
-        let name = name.to_string_lossy();
-        if name.starts_with(&prefix) && name.ends_with(SUFFIX) {
-            let _ = fs::remove_file(entry.path()); // the next run tries again
-        }
+    for path in temporary_files(directory, |own| own.starts_with(mark)) {
+        let _ = fs::remove_file(path); // the next run tries again
     }
+}
+
+/// The files in a directory that are called as temporary files are, and whose mark is a good one.
+/// Links, pipes and directories are nobody's output.
+fn temporary_files(directory: &Path, is_good: impl Fn(&str) -> bool) -> Vec<PathBuf> {
+    let entries = fs::read_dir(directory).into_iter().flatten().flatten();
+    let temporary = entries.filter(|entry| {
+        let name = entry.file_name();
+        let name = name.to_str().and_then(|name| name.strip_prefix(PREFIX));
+        let Some(own) = name.and_then(|name| name.strip_suffix(SUFFIX)) else {
+            return false;
+        };
+        let (mark, random) = own.split_at(own.rfind('-').map_or(0, |at| at + 1));
+        // Python's temporary files have eight, underscores among them.
+        let is_random = random.len() == RANDOM || !mark.is_empty() && random.len() == 8;
+        is_random
+            && random.bytes().all(|byte| byte.is_ascii_alphanumeric() || byte == b'_')
+            && (mark.is_empty() || mark.starts_with("shard"))
+            && is_good(mark)
+            && entry.file_type().is_ok_and(|kind| kind.is_file())
+    });
+    temporary.map(|entry| entry.path()).collect()
 }
 
 impl Output {
@@ -139,25 +196,11 @@ impl Output {
             return Ok(Self { path, writer });
         }
         check_target(&path, overwrite, inputs)?;
-        let parent = parent(&path);
-        let mut builder = tempfile::Builder::new();
-        let prefix = format!("{PREFIX}{mark}");
-        builder.prefix(&prefix).suffix(SUFFIX);
-        #[cfg(unix)]
-        {
-            // As `File::create` does: readable by all, less the umask.
-            use std::os::unix::fs::PermissionsExt;
-            builder.permissions(fs::Permissions::from_mode(0o666));
-        }
-        let temporary = builder
-            .tempfile_in(&parent)
-            .map_err(|source| OutputError::Write {
-                path: path.clone(),
-                source,
-            })?;
-        // Who holds the lock is still writing; see `remove_abandoned`. A file system
-        // without locks has no such files removed.
-        let _ = temporary.as_file().try_lock();
+        let failed = |source| OutputError::Write {
+            path: path.clone(),
+            source,
+        };
+        let temporary = Temporary::new(&parent(&path), mark).map_err(failed)?;
         let temporary = BufWriter::with_capacity(BUFFER, temporary);
         Ok(Self {
             path,
@@ -166,15 +209,6 @@ impl Output {
                 overwrite,
             },
         })
-    }
-
-    /// The temporary file, to remove when the process is stopped by a signal.
-    #[must_use]
-    pub fn temporary_path(&self) -> Option<&Path> {
-        match &self.writer {
-            Sink::File { temporary, .. } => Some(temporary.get_ref().path()),
-            Sink::Standard(_) => None,
-        }
     }
 
     /// Hands everything to the system and gives the buffer's memory back, for files that wait for
@@ -208,34 +242,191 @@ impl Output {
     /// # Errors
     /// When the system cannot; the old file, if any, is intact then.
     pub fn commit(self) -> Result<(), OutputError> {
+        self.commit_open().map(drop)
+    }
+
+    /// As [`Output::commit`]; gives the file, which is still open. Nothing for standard output.
+    ///
+    /// # Errors
+    /// As [`Output::commit`].
+    pub fn commit_open(self) -> Result<Option<File>, OutputError> {
         let Self { path, writer } = self;
         let named = |source| OutputError::Write {
             path: path.clone(),
             source,
         };
         match writer {
-            Sink::Standard(mut writer) => writer.flush().map_err(named),
+            Sink::Standard(mut writer) => writer.flush().map(|()| None).map_err(named),
             Sink::File {
                 temporary,
                 overwrite,
             } => {
                 let temporary = temporary.into_inner().map_err(|e| named(e.into_error()))?;
-                temporary.as_file().sync_all().map_err(named)?;
-                let persisted = if overwrite {
-                    temporary.persist(&path)
-                } else {
-                    temporary.persist_noclobber(&path)
-                };
-                match persisted {
-                    Ok(_) => Ok(()),
-                    Err(error) if error.error.kind() == io::ErrorKind::AlreadyExists => {
+                match temporary.persist(&path, overwrite) {
+                    Ok(file) => Ok(Some(file)),
+                    Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {
                         Err(OutputError::Exists { path: path.clone() })
                     }
-                    Err(error) => Err(named(error.error)),
+                    Err(error) => Err(named(error)),
                 }
             }
         }
     }
+}
+
+/// A file without its name.
+enum Temporary {
+    /// It has none.
+    #[cfg(target_os = "linux")]
+    Unnamed { file: File, mark: String },
+    /// Dropped before it is forgotten.
+    Named(NamedTempFile, Listed),
+}
+
+impl Temporary {
+    fn new(parent: &Path, mark: &str) -> io::Result<Self> {
+        #[cfg(target_os = "linux")]
+        if let Some(file) = unnamed_in(parent) {
+            let _ = file.try_lock(); // for the moment between its two names
+            let mark = mark.to_owned();
+            return Ok(Self::Unnamed { file, mark });
+        }
+        remove_abandoned_once(parent);
+        named_in(parent, mark)
+    }
+
+    fn file(&mut self) -> &mut File {
+        match self {
+            #[cfg(target_os = "linux")]
+            Self::Unnamed { file, .. } => file,
+            Self::Named(file, _) => file.as_file_mut(),
+        }
+    }
+
+    fn persist(mut self, path: &Path, overwrite: bool) -> io::Result<File> {
+        self.file().sync_all()?;
+        match self {
+            #[cfg(target_os = "linux")]
+            Self::Unnamed { file, .. } if !overwrite => link(&file, path).map(|()| file),
+            #[cfg(target_os = "linux")]
+            Self::Unnamed { file, mark } => {
+                // Only a file that has a name can replace another one.
+                let prefix = format!("{PREFIX}{mark}");
+                let mut unfinished = unfinished();
+                let named = builder(&prefix).make_in(parent(path), |name| link(&file, name))?;
+                let name = named.path().to_owned();
+                unfinished.insert(name.clone());
+                drop(unfinished);
+                let _listed = Listed(name);
+                named.persist(path).map_err(|error| error.error)?;
+                Ok(file)
+            }
+            Self::Named(file, _listed) => {
+                let persisted = match overwrite {
+                    true => file.persist(path),
+                    false => file.persist_noclobber(path),
+                };
+                persisted.map_err(|error| error.error)
+            }
+        }
+    }
+}
+
+impl Write for Temporary {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.file().write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.file().flush()
+    }
+}
+
+fn builder(prefix: &str) -> tempfile::Builder<'_, 'static> {
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(prefix).suffix(SUFFIX).rand_bytes(RANDOM);
+    builder
+}
+
+/// A file without a name; nothing where the file system has no such files, and of what else is wrong
+/// with the directory the named file tells.
+#[cfg(target_os = "linux")]
+fn unnamed_in(parent: &Path) -> Option<File> {
+    use rustix::fs::{Mode, OFlags, open};
+
+    // As `File::create` does: readable by all, less the umask.
+    let flags = OFlags::TMPFILE | OFlags::RDWR | OFlags::CLOEXEC;
+    let file = File::from(open(parent, flags, Mode::from_raw_mode(0o666)).ok()?);
+    fs::symlink_metadata(descriptor(&file)).is_ok().then_some(file)
+}
+
+/// What leads to an open file.
+#[cfg(target_os = "linux")]
+fn descriptor(file: &File) -> PathBuf {
+    use std::os::fd::AsRawFd;
+    PathBuf::from(format!("/proc/self/fd/{}", file.as_raw_fd()))
+}
+
+/// Gives a file a name, if nothing has it.
+#[cfg(target_os = "linux")]
+fn link(file: &File, path: &Path) -> io::Result<()> {
+    use rustix::fs::{AtFlags, CWD, linkat};
+    linkat(CWD, descriptor(file), CWD, path, AtFlags::SYMLINK_FOLLOW)?;
+    Ok(())
+}
+
+/// A file with a temporary name, locked: who holds the lock is still writing; see `remove_abandoned`.
+/// A file system without locks has no such files removed.
+fn named_in(parent: &Path, mark: &str) -> io::Result<Temporary> {
+    let prefix = format!("{PREFIX}{mark}");
+    let mut builder = builder(&prefix);
+    #[cfg(unix)]
+    {
+        // As `File::create` does: readable by all, less the umask.
+        use std::os::unix::fs::PermissionsExt;
+        builder.permissions(fs::Permissions::from_mode(0o666));
+    }
+    loop {
+        // A process that is about to end waits until the new file is listed.
+        let mut unfinished = unfinished();
+        let temporary = builder.tempfile_in(parent)?;
+        let path = temporary.path().to_owned();
+        unfinished.insert(path.clone());
+        drop(unfinished);
+        let listed = Listed(path);
+        // Whoever looks for abandoned files may have met it before it was locked.
+        let is_taken = matches!(
+            temporary.as_file().try_lock(),
+            Err(fs::TryLockError::WouldBlock)
+        );
+        if !is_taken && is_there(&temporary) {
+            return Ok(Temporary::Named(temporary, listed));
+        }
+    }
+}
+
+/// Looks once for what killed writers left, in a directory that is not too large to be looked through
+/// for each of many results.
+fn remove_abandoned_once(parent: &Path) {
+    static SEEN: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+    const MOST: usize = 4096;
+    let is_new = (SEEN.lock().unwrap_or_else(PoisonError::into_inner)).insert(parent.to_owned());
+    let entries = fs::read_dir(parent).into_iter().flatten();
+    if is_new && entries.take(MOST).count() < MOST {
+        remove_abandoned(parent);
+    }
+}
+
+#[cfg(unix)]
+fn is_there(temporary: &NamedTempFile) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    let file = temporary.as_file().metadata();
+    file.is_ok_and(|file| file.nlink() > 0)
+}
+
+#[cfg(not(unix))]
+fn is_there(_: &NamedTempFile) -> bool {
+    true
 }
 
 impl Write for Output {
@@ -285,12 +476,17 @@ pub fn check_target(path: &Path, overwrite: bool, inputs: &[PathBuf]) -> Result<
             });
         }
     }
-    if !overwrite && fs::symlink_metadata(path).is_ok() {
-        return Err(OutputError::Exists {
+    match fs::symlink_metadata(path) {
+        Ok(_) if !overwrite => Err(OutputError::Exists {
             path: path.to_owned(),
-        });
+        }),
+        // Its name is too long, or has what no name may have.
+        Err(source) if source.kind() == io::ErrorKind::InvalidFilename => Err(OutputError::Write {
+            path: path.to_owned(),
+            source,
+        }),
+        _ => Ok(()),
     }
-    Ok(())
 }
 
 fn parent(path: &Path) -> PathBuf {
@@ -330,32 +526,87 @@ mod tests {
     fn what_a_killed_writer_left_is_removed_and_no_more() {
         let directory = tempfile::tempdir().unwrap();
         fs::write(directory.path().join(".tumble-x1y2z3.part"), "half").unwrap();
-        fs::write(directory.path().join(".tumble-notes"), "mine").unwrap();
-        let output = Output::create(&directory.path().join("out"), false, &[]).unwrap();
+        fs::write(directory.path().join(".tumble-shard00001-x1y2z3.part"), "half").unwrap();
+        let mine = [".tumble-notes", ".tumble-notes.part", ".tumble-my.notes.part"];
+        for name in mine {
+            fs::write(directory.path().join(name), "mine").unwrap();
+        }
+        let own = named_in(directory.path(), "").unwrap();
+        let Temporary::Named(own, _) = &own else {
+            panic!("it has a name");
+        };
+        let own = own.path().file_name().unwrap();
         remove_abandoned(directory.path());
-        let mut left = names(directory.path());
-        left.sort();
-        let own = output.temporary_path().unwrap().file_name().unwrap();
-        assert_eq!(left.len(), 2);
-        assert!(left.contains(&".tumble-notes".to_owned()));
+        let left = names(directory.path());
+        assert_eq!(left.len(), 4);
+        assert!(mine.iter().all(|name| left.contains(&(*name).to_owned())));
         assert!(left.contains(&own.to_str().unwrap().to_owned()));
+    }
+
+    /// Writers and those who look for abandoned files run at once.
+    #[test]
+    fn what_is_being_written_is_never_removed() {
+        let directory = tempfile::tempdir().unwrap();
+        let done = std::sync::atomic::AtomicBool::new(false);
+        std::thread::scope(|scope| {
+            scope.spawn(|| {
+                while !done.load(std::sync::atomic::Ordering::Relaxed) {
+                    remove_abandoned(directory.path());
+                }
+            });
+            for number in 0..300 {
+                let path = directory.path().join(number.to_string());
+                let mut file = named_in(directory.path(), "").unwrap();
+                file.write_all(b"whole").unwrap();
+                file.persist(&path, number % 2 == 0).unwrap();
+            }
+            done.store(true, std::sync::atomic::Ordering::Relaxed);
+        });
+        assert_eq!(names(directory.path()).len(), 300);
     }
 
     #[test]
     fn marked_files_are_removed_by_their_mark() {
         let directory = tempfile::tempdir().unwrap();
-        let create = |mark| {
-            let path = directory.path().join("out");
-            let output = Output::create_marked(&path, false, &[], mark).unwrap();
-            let temporary = output.temporary_path().unwrap().to_owned();
-            (output.settle().unwrap(), temporary)
-        };
-        let (_one, first) = create("shard1-");
-        let (two, second) = create("shard2-");
+        let first = named_in(directory.path(), "shard1-").unwrap();
+        let second = named_in(directory.path(), "shard2-").unwrap();
         remove_marked(directory.path(), "shard1-");
-        assert!(!first.exists() && second.exists());
-        two.commit().unwrap();
+        assert_eq!(names(directory.path()).len(), 1);
+        assert!(first.persist(&directory.path().join("out"), false).is_err());
+        second.persist(&directory.path().join("out"), false).unwrap();
         assert_eq!(names(directory.path()), ["out"]);
+    }
+
+    /// Whatever ends the writer of a file without a name leaves nothing.
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_file_without_a_name_gets_one_at_the_end() {
+        use std::os::unix::fs::PermissionsExt;
+
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("out");
+        let Some(file) = unnamed_in(directory.path()) else {
+            return; // this file system has none
+        };
+        let unnamed = |file: File| Temporary::Unnamed {
+            file,
+            mark: String::new(),
+        };
+        let mut first = unnamed(file);
+        first.write_all(b"first").unwrap();
+        assert_eq!(names(directory.path()), Vec::<String>::new());
+        first.persist(&path, false).unwrap();
+        let second = || unnamed(unnamed_in(directory.path()).unwrap());
+        let refused = second().persist(&path, false).unwrap_err();
+        assert_eq!(refused.kind(), io::ErrorKind::AlreadyExists);
+        assert_eq!(fs::read(&path).unwrap(), b"first");
+        second().persist(&path, true).unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"");
+        assert_eq!(names(directory.path()), ["out"]);
+        let created = directory.path().join("created");
+        File::create(&created).unwrap();
+        let mode = |path| fs::metadata(path).unwrap().permissions().mode();
+        assert_eq!(mode(&path), mode(&created));
     }
 
     #[test]

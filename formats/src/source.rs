@@ -4,6 +4,7 @@ use std::fs::{File, Metadata};
 use std::io::{self, BufRead, BufReader, Read};
 use std::path::Path;
 
+use crate::beneath::{is_refused, open_beneath};
 use crate::diagnostic::{Code, Diagnostic};
 
 /// An open input. What it was at the start is compared with what it is at the end.
@@ -40,8 +41,23 @@ impl Source {
             return Err(refuse(Code::NotAFile, format!("is {kind}{hint}")));
         }
         let file = File::open(path).map_err(unreadable)?;
-        let metadata = file.metadata().map_err(unreadable)?;
-        let watched = file.try_clone().map_err(unreadable)?;
+        Self::of_file(file, name.clone()).map_err(unreadable)
+    }
+
+    /// A file that a file in `folder` names; see [`open_beneath`].
+    pub(super) fn open_beneath(folder: &Path, named: &Path) -> Result<Self, Diagnostic> {
+        let name = folder.join(named).display().to_string();
+        let unreadable = |error: io::Error| match is_refused(&error) {
+            true => Diagnostic::new(&name, Code::Uri, error.to_string()),
+            false => Diagnostic::new(&name, Code::Open, format!("cannot be read: {error}")),
+        };
+        let file = open_beneath(folder, named).map_err(unreadable)?;
+        Self::of_file(file, name.clone()).map_err(unreadable)
+    }
+
+    fn of_file(file: File, name: String) -> io::Result<Self> {
+        let metadata = file.metadata()?;
+        let watched = file.try_clone()?;
         let reader: Box<dyn Read> = Box::new(file);
         Ok(Self {
             name,

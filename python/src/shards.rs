@@ -110,7 +110,7 @@ impl Plan {
 
     /// What the results of a shard are called below the directory of results.
     fn names_of(&self, shard: usize) -> Vec<String> {
-        self.own.names_of(shard).unwrap_or_default().to_vec()
+        self.own.names_of(shard).unwrap_or_default()
     }
 }
 

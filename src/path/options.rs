@@ -212,7 +212,8 @@ pub enum FollowError {
     },
     /// An upward direction at a key, with a frame that has its own.
     #[error(
-        "track {track} has upward directions at its keys, which only the minimal frame follows"
+        "track {track} has upward directions at its keys, which only the minimal frame follows; choose that \
+         frame, or leave the directions out"
     )]
     UpsUnused {
         /// The track's place in the set.

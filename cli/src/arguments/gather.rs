@@ -20,10 +20,30 @@ pub(crate) struct Gathered {
 }
 
 /// One file, and its place in a directory of results.
+#[derive(Debug, Clone)]
 pub(crate) struct Found {
     pub(crate) path: PathBuf,
     /// Its name; below a directory that was given, the way to it.
     pub(crate) below: PathBuf,
+    /// It was met below a directory that was given, rather than named.
+    pub(crate) is_met: bool,
+}
+
+impl Found {
+    /// A file that was named.
+    pub(crate) fn named(path: PathBuf, below: PathBuf) -> Self {
+        Self {
+            path,
+            below,
+            is_met: false,
+        }
+    }
+
+    /// The directory that it was met below.
+    pub(crate) fn root(&self) -> Option<&Path> {
+        let steps = self.below.components().count();
+        self.path.ancestors().nth(steps).filter(|_| self.is_met)
+    }
 }
 
 impl Gathered {
@@ -59,9 +79,9 @@ impl Gathered {
     }
 
     fn expand(&mut self, path: &Path) -> Vec<Found> {
-        let alone = || Found {
-            path: path.to_owned(),
-            below: path.file_name().unwrap_or(path.as_os_str()).into(),
+        let alone = || {
+            let name = path.file_name().unwrap_or(path.as_os_str());
+            Found::named(path.to_owned(), name.into())
         };
         if is_standard(path) || path.is_file() {
             return vec![alone()];
@@ -96,7 +116,11 @@ fn below(directory: &Path) -> Vec<Found> {
             },
         };
         let below = path.strip_prefix(directory).unwrap_or(&path).to_owned();
-        found.push(Found { path, below });
+        found.push(Found {
+            path,
+            below,
+            is_met: true,
+        });
     }
     found
 }
@@ -115,9 +139,9 @@ fn matches(pattern: &Path) -> Vec<Found> {
     };
     let files = paths.filter_map(Result::ok).filter(|path| path.is_file());
     files
-        .map(|path| Found {
-            below: path.file_name().unwrap_or(path.as_os_str()).into(),
-            path,
+        .map(|path| {
+            let below = path.file_name().unwrap_or(path.as_os_str()).into();
+            Found::named(path, below)
         })
         .collect()
 }

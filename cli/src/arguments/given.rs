@@ -6,7 +6,7 @@ use std::path::Path;
 use clap::parser::ValueSource;
 use clap::{ArgMatches, Command};
 
-use crate::batch::digest;
+use crate::batch::digest::InputFile;
 
 /// The options of a command. Stands as the first of the fields of its arguments: those behind it
 /// take their values away.
@@ -65,7 +65,8 @@ impl Given {
 
 /// The hash of a file; nothing where it cannot be read again, as standard input cannot.
 fn content(file: &str) -> String {
-    digest::of_input(Path::new(file)).unwrap_or_default()
+    let file = InputFile::new(Path::new(file));
+    file.sha256().unwrap_or_default().to_owned()
 }
 
 /// It has no options of its own.

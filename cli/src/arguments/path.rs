@@ -5,7 +5,10 @@ use std::path::Path;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use glam::{DVec3, Mat3, Quat};
-use tumble::{BodyAxis, Direction, Follow, Frame, PathSpeed, TrackSet, Twist, VectorMethod};
+use tumble::{
+    BodyAxis, Channel, Direction, Follow, Frame, PathSpeed, TrackError, TrackSet, Twist, VectorKeys,
+    VectorMethod,
+};
 use tumble_formats::path::{Pace, open_paths};
 use tumble_formats::{Limits, ReadOptions};
 
@@ -47,6 +50,10 @@ pub(crate) struct PathArguments {
     /// The upward direction: at the start of minimal frames, everywhere of fixed ones
     #[arg(long, value_name = "X,Y,Z", default_value = "0,1,0", value_parser = vector, allow_hyphen_values = true)]
     path_up: DVec3,
+    /// Leave out the upward directions that a file has at its points (ux, uy, uz): frames other than
+    /// minimal ones have their own
+    #[arg(long)]
+    no_ups: bool,
     /// What becomes of the turn about the direction that a closed path leaves over
     #[arg(long, value_name = "TWIST", default_value = "spread")]
     twist: TwistArgument,
@@ -236,8 +243,14 @@ impl PathArguments {
             limits: Limits::default(),
             ..ReadOptions::default()
         };
-        open_paths(path, &input::stem(path), pace, &options)
-            .map_err(|diagnostic| Failure::input(&diagnostic, ""))
+        let set = open_paths(path, &input::stem(path), pace, &options)
+            .map_err(|diagnostic| Failure::input(&diagnostic, ""))?;
+        match self.no_ups {
+            true => without_ups(&set).map_err(|error| {
+                Failure::evaluating(&input::name(path), &error.into())
+            }),
+            false => Ok(set),
+        }
     }
 
     /// How the paths of a set, which messages call `name`, are followed in a frame.
@@ -265,4 +278,16 @@ impl PathArguments {
             axes: [self.forward.axis, self.upward.axis],
         })
     }
+}
+
+/// The paths alone, without their upward directions.
+fn without_ups(set: &TrackSet) -> Result<TrackSet, TrackError> {
+    let mut plain = TrackSet::new();
+    for track in 0..set.track_count() {
+        let name = set.track_name(track);
+        if let Some(VectorKeys { times, keys, .. }) = set.vector_keys(Channel::Translation, track) {
+            plain.push_path(&name, times, keys, &[])?;
+        }
+    }
+    Ok(plain)
 }

@@ -9,10 +9,11 @@ use tumble_formats::{Format, Loaded};
 
 use crate::arguments::gather::Gathered;
 use crate::arguments::input::{Inputs, clip_name, is_standard, name, several, tell_warnings};
+use crate::batch::digest::InputFile;
 use crate::batch::output::{self, Plan, Target, Wish};
 use crate::batch::place::Place;
 use crate::batch::run::{Batch, Done, Evaluated};
-use crate::messages::exit::{Failure, SOME_INPUTS, for_each};
+use crate::messages::exit::{Failure, SOME_INPUTS, for_all};
 use crate::messages::progress::busy;
 use crate::messages::words;
 
@@ -34,12 +35,20 @@ pub(crate) struct Results {
 
 impl Results {
     /// Where a picture goes that is drawn beside the result of one input.
-    pub(crate) fn picture(&self, file: &Path, inputs: &Gathered) -> Result<Option<Place>, Failure> {
+    pub(crate) fn picture(
+        &self,
+        file: &Path,
+        inputs: &Gathered,
+        plan: &Plan,
+    ) -> Result<Option<Place>, Failure> {
         let inputs = inputs.paths();
         if inputs.len() > 1 {
             return Err(Failure::usage("--plot is of one input"));
         }
-        let place = Place::new(file, self.overwrite, &inputs)?;
+        let place = Place::of_picture(file, self.overwrite, &inputs)?;
+        for target in &plan.targets {
+            place.refuse_same(target.path())?;
+        }
         place.try_out()?;
         Ok(Some(place))
     }
@@ -88,39 +97,43 @@ impl Results {
     pub(crate) fn make(
         &self,
         inputs: &Inputs,
-        files: &Gathered,
         plan: Plan,
         options: String,
-        work: impl FnMut(&Path, &Loaded, &Target, &mut Done<'_>) -> Result<(), Failure>,
+        work: impl FnMut(&InputFile, &Loaded, &Target, &mut Done<'_>) -> Result<(), Failure>,
     ) -> Result<(), Failure> {
-        self.make_of(|path| inputs.read(path), files, plan, options, work)
+        self.make_of(|path| inputs.read(path), plan, options, work)
     }
 
     /// As [`Results::make`], of inputs that `read` reads.
     pub(crate) fn make_of(
         &self,
         read: impl Fn(&Path) -> Result<Loaded, Failure> + Sync,
-        files: &Gathered,
         plan: Plan,
         options: String,
-        mut work: impl FnMut(&Path, &Loaded, &Target, &mut Done<'_>) -> Result<(), Failure>,
+        mut work: impl FnMut(&InputFile, &Loaded, &Target, &mut Done<'_>) -> Result<(), Failure>,
     ) -> Result<(), Failure> {
-        let Plan { targets, manifest } = plan;
-        let jobs: Vec<(PathBuf, Target)> = files.paths().into_iter().zip(targets).collect();
+        let Plan {
+            paths,
+            targets,
+            refused,
+            manifest,
+        } = plan;
+        let jobs: Vec<(PathBuf, Target)> = paths.into_iter().zip(targets).collect();
         if let Some(mut manifest) = manifest {
             let batch = Batch {
                 read,
                 options,
                 resume: self.resume,
             };
-            let outcome = batch.run(&jobs, &mut manifest, work);
+            let outcome = batch.run(&jobs, refused, &mut manifest, work);
             manifest.finish()?;
             return outcome;
         }
-        for_each(&jobs, |(path, target)| {
+        for_all(refused, &jobs, |(path, target)| {
+            let file = InputFile::new(path);
             let loaded = busy(&format!("reading {}", name(path)), || read(path))?;
             tell_warnings(&loaded);
-            work(path, &loaded, target, &mut |_, evaluated: Evaluated| {
+            work(&file, &loaded, target, &mut |_, evaluated: Evaluated| {
                 evaluated.written.commit()?;
                 words::note(&evaluated.told);
                 Ok(())
@@ -142,14 +155,17 @@ pub(crate) fn each_file(
     if target.format().many_clips || clips.len() == 1 {
         done(target.name(), make(name, &clips, target)?)?;
     } else {
-        for (clip, file) in clips.iter().zip(file_names(&clips)) {
-            let target = target.of_clip(&file);
-            let target = target.ok_or_else(|| {
-                several(path, loaded).hinted(", or give a directory for all of them: -o RESULTS/")
-            })??;
-            let made = make(&format!("{name} {}", clip_name(clip)), &[clip], &target)?;
-            done(target.name(), made)?;
+        if target.name().is_empty() {
+            let hint = ", or give a directory for all of them: -o RESULTS/";
+            return Err(several(path, loaded).hinted(hint));
         }
+        // One clip's trouble is no other's.
+        let jobs: Vec<(&Motion, String)> = clips.into_iter().zip(file_names(&loaded.clips)).collect();
+        for_clips(name, &jobs, |(clip, file)| {
+            let target = target.of_clip(file)?;
+            let made = make(&format!("{name} {}", clip_name(clip)), &[clip], &target)?;
+            done(target.name(), made)
+        })?;
     }
     match loaded.refused.len() {
         0 => Ok(()),
@@ -161,24 +177,71 @@ pub(crate) fn each_file(
     }
 }
 
+/// Makes something of each clip of an input. A failure is reported and the others go on, unless they
+/// would fail alike.
+fn for_clips<T>(
+    name: &str,
+    clips: &[T],
+    mut work: impl FnMut(&T) -> Result<(), Failure>,
+) -> Result<(), Failure> {
+    let mut failed: Vec<Failure> = Vec::new();
+    for clip in clips {
+        match work(clip) {
+            Ok(()) => {}
+            Err(failure) if failure.is_final() => return Err(failure),
+            Err(failure) => failed.push(failure),
+        }
+    }
+    let count = failed.len();
+    let Some(last) = failed.pop() else {
+        return Ok(());
+    };
+    for failure in failed {
+        failure.report();
+    }
+    if count == clips.len() {
+        return Err(last);
+    }
+    last.report();
+    let message = format!("{name}: {count} of {} animations failed", clips.len());
+    Err(Failure::new(SOME_INPUTS, message))
+}
+
 /// What the files of clips are called: by the clips' names, as far as file systems take them; names
 /// that are then the same get the clip's place in its file behind them.
-fn file_names(clips: &[&Motion]) -> Vec<String> {
+fn file_names(clips: &[Motion]) -> Vec<String> {
     let is_plain = |c: char| c.is_alphanumeric() || matches!(c, '-' | '_' | '.' | ' ');
-    let plain = |clip: &&Motion| -> String {
+    let plain = |clip: &Motion| -> String {
         let name = clip_name(clip);
         let each = name.chars().map(|c| if is_plain(c) { c } else { '_' });
         each.collect()
     };
     let mut taken = HashSet::new();
     let names = clips.iter().map(|clip| {
-        let mut name = plain(clip);
+        let whole = plain(clip);
+        let mut name = short(&whole, "");
+        let mut end = String::new();
+        if name != whole {
+            end = format!(".{}", clip.place);
+            name = short(&whole, &end);
+        }
         while !taken.insert(name.to_lowercase()) {
-            name = format!("{name}.{}", clip.place);
+            end = format!("{end}.{}", clip.place);
+            name = short(&whole, &end);
         }
         name
     });
     names.collect()
+}
+
+/// A clip's part of a file's name has no more bytes; the input's name and two extensions are to go
+/// beside it.
+const MAX_CLIP_NAME: usize = 120;
+
+/// As much of a name as has room before its end, and the end.
+fn short(name: &str, end: &str) -> String {
+    let most = MAX_CLIP_NAME.saturating_sub(end.len());
+    format!("{}{end}", &name[..name.floor_char_boundary(most)])
 }
 
 #[cfg(test)]
@@ -204,10 +267,22 @@ mod tests {
                 ..Motion::default()
             })
             .collect();
-        let clips: Vec<&Motion> = clips.iter().collect();
         assert_eq!(
             file_names(&clips),
             ["Run", "run.1", "a_b", "a_b.3", "4", "4.5"]
         );
+    }
+
+    #[test]
+    fn long_names_are_cut_between_letters_and_stay_apart() {
+        let long = "ä".repeat(200);
+        let clip = |place| Motion {
+            name: Some(long.clone()),
+            place,
+            ..Motion::default()
+        };
+        let names = file_names(&[clip(0), clip(1)]);
+        assert_eq!(names[0], format!("{}.0", "ä".repeat(59)));
+        assert_eq!(names[1], format!("{}.1", "ä".repeat(59)));
     }
 }

@@ -1,12 +1,15 @@
 //! SHA-256 of what is read and written, as `sha256sum` prints it.
 
-use std::fs::File;
+use std::fs::{File, Metadata};
 use std::io::{self, Read};
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 
 use sha2::{Digest as _, Sha256};
+use tumble_formats::beneath::open_beneath;
 
 use crate::arguments::input;
+use crate::messages::exit::{ALL_INPUTS, Failure};
 
 /// A hash that grows with the bytes.
 #[derive(Default)]
@@ -33,16 +36,103 @@ impl Digest {
     }
 }
 
-/// The hash of an input, where it can be read twice: not of standard input, nor of a pipe. What
-/// cannot be read is told about when it is opened.
-pub(crate) fn of_input(path: &Path) -> Option<String> {
-    let is_file = !input::is_standard(path) && path.is_file();
-    is_file.then(|| of_file(path).ok()).flatten()
+/// An input and its hash, which is that of the bytes that are evaluated: both are read between the
+/// same two looks at the file, which must find it unchanged.
+pub(crate) struct InputFile {
+    path: PathBuf,
+    /// What it was at first; nothing where it cannot be read twice, as standard input and pipes.
+    before: Option<Identity>,
+    sha256: OnceLock<Option<String>>,
+}
+
+impl InputFile {
+    /// Before it is read.
+    pub(crate) fn new(path: &Path) -> Self {
+        Self {
+            path: path.to_owned(),
+            before: Identity::of(path),
+            sha256: OnceLock::new(),
+        }
+    }
+
+    pub(crate) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Its hash, where it can be read twice. What cannot be read is told about when it is opened.
+    pub(crate) fn sha256(&self) -> Option<&str> {
+        let hash = || {
+            self.before.as_ref()?;
+            of_file(File::open(&self.path).ok()?).ok()
+        };
+        self.sha256.get_or_init(hash).as_deref()
+    }
+
+    /// Refuses an input that was replaced or written to since it was looked at.
+    pub(crate) fn check_unchanged(&self) -> Result<(), Failure> {
+        if self.before.is_none() || Identity::of(&self.path) == self.before {
+            return Ok(());
+        }
+        let message = "changed while it was read; read it again when its writer is done";
+        let name = input::name(&self.path);
+        Err(Failure::new(ALL_INPUTS, format!("{name}: {message}")))
+    }
+}
+
+/// Which file has a name, and since when it has its bytes.
+#[derive(Debug, PartialEq, Eq)]
+struct Identity([i128; 6]);
+
+impl Identity {
+    fn of(path: &Path) -> Option<Self> {
+        if input::is_standard(path) {
+            return None;
+        }
+        let metadata = std::fs::metadata(path).ok()?;
+        metadata.is_file().then(|| Self::new(&metadata))
+    }
+
+    #[cfg(unix)]
+    fn new(metadata: &Metadata) -> Self {
+        use std::os::unix::fs::MetadataExt;
+        let nanoseconds = |seconds: i64, rest: i64| {
+            i128::from(seconds) * 1_000_000_000 + i128::from(rest)
+        };
+        Self([
+            metadata.dev().into(),
+            metadata.ino().into(),
+            metadata.len().into(),
+            nanoseconds(metadata.mtime(), metadata.mtime_nsec()),
+            nanoseconds(metadata.ctime(), metadata.ctime_nsec()),
+            0,
+        ])
+    }
+
+    #[cfg(not(unix))]
+    fn new(metadata: &Metadata) -> Self {
+        let since = |time: io::Result<std::time::SystemTime>| {
+            let since = time.ok()?.duration_since(std::time::UNIX_EPOCH).ok()?;
+            i128::try_from(since.as_nanos()).ok()
+        };
+        Self([
+            metadata.len().into(),
+            since(metadata.modified()).unwrap_or_default(),
+            since(metadata.created()).unwrap_or_default(),
+            0,
+            0,
+            0,
+        ])
+    }
+}
+
+/// Whether a file that a manifest in `folder` names has that many bytes and that hash.
+pub(crate) fn is_whole(folder: &Path, name: &str, bytes: u64, sha256: &str) -> io::Result<bool> {
+    let file = open_beneath(folder, Path::new(name))?;
+    Ok(file.metadata()?.len() == bytes && of_file(file)? == sha256)
 }
 
 /// Of a whole file.
-pub(crate) fn of_file(path: &Path) -> io::Result<String> {
-    let mut file = File::open(path)?;
+fn of_file(mut file: File) -> io::Result<String> {
     let mut digest = Digest::default();
     let mut buffer = vec![0; 1 << 16];
     loop {

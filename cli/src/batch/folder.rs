@@ -1,58 +1,133 @@
 //! A directory of results: what each input's result is called in it, and that none of the files
 //! there is a stranger's.
+//!
+//! An input whose result has no name there, or no place, is an input that failed; the others are
+//! made.
 
 use std::collections::{BTreeSet, HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
+use tumble_formats::beneath::parent_beneath;
 use tumble_formats::format::Format;
 use tumble_formats::output::remove_abandoned;
 
 use crate::arguments::gather::{Found, Gathered};
 use crate::arguments::input;
-use crate::batch::manifest::Manifest;
+use crate::batch::manifest::{self, Manifest};
 use crate::batch::output::{Plan, Target, Wish, choose, of};
 use crate::batch::place::{self, Place};
-use crate::batch::shards::plan::{Stated, hash_of};
+use crate::batch::shards::plan::{self, Stated, hash_of};
+use crate::batch::shards::record;
 use crate::messages::exit::Failure;
+
+/// What the result of an input is called below the directory of results, or why it has no name.
+pub(crate) type Name = Result<String, Failure>;
+
+/// File systems take no longer names.
+const MAX_NAME: usize = 255;
 
 /// A file in `folder` for each input, named after it; below it, where the input lay below
 /// a directory.
 pub(crate) fn in_folder(inputs: &Gathered, folder: &Path, wish: Wish<'_>) -> Result<Plan, Failure> {
     let format = format(folder, wish.format)?;
-    let names = names(&inputs.files, folder, format)?;
+    let files = without_results(inputs.files.clone(), folder)?;
+    let names = names(&files, folder, format);
     let shards = Stated::read(folder)?;
     if let Some(stated) = &shards {
         refuse_shards(stated, &names, folder, wish)?;
     }
     place::folder(folder)?;
-    for parent in &parents(&names, folder)? {
-        if wish.resume {
-            remove_abandoned(parent);
+    let manifest = Manifest::open(folder, shards.is_some(), wish.overwrite)?;
+    // What shards were making has no line yet.
+    let is_known = |name: &str| shards.is_some() || manifest.knows(name);
+    let overwrites = |name: &str| wish.overwrite || wish.resume && is_known(name);
+    for name in names.iter().flatten().filter(|name| !overwrites(name)) {
+        refuse_existing(folder, name, is_known(name))?;
+    }
+    let mut places = Places::new(folder);
+    let mut plan = Plan::default();
+    for (found, name) in files.iter().zip(names) {
+        let target = name.and_then(|name| {
+            let place = places.place(&name, overwrites(&name))?;
+            Ok(Target::new(place.hashed(), format, name))
+        });
+        match target {
+            Ok(target) => {
+                plan.paths.push(found.path.clone());
+                plan.targets.push(target);
+            }
+            Err(failure) => plan.refused.push(failure),
         }
     }
-    let manifest = Manifest::open(folder, shards.is_some())?;
-    let target = |name: String| {
-        // What shards were making has no line yet.
-        let known = shards.is_some() || manifest.knows(&name);
-        let overwrite = wish.overwrite || wish.resume && known;
-        let place = Place::new(&folder.join(&name), overwrite, &[]).map_err(|failure| {
-            if known {
-                failure.hinted(" (--resume skips what is done)")
-            } else {
-                failure
-            }
-        })?;
-        Ok(Target::new(place.hashed(), format, name))
+    // What is locked is being written, whoever looks.
+    places.made.extend(manifest.folders());
+    places.made.insert(folder.to_owned());
+    for folder in &places.made {
+        remove_abandoned(folder);
+    }
+    plan.manifest = Some(manifest);
+    Ok(plan)
+}
+
+/// The inputs that are no results of an earlier batch: a directory of results may lie below the
+/// directory of their inputs, or be it.
+pub(crate) fn without_results(inputs: Vec<Found>, folder: &Path) -> Result<Vec<Found>, Failure> {
+    let is_below = |path: &Path, folder: &Path| {
+        path.canonicalize().is_ok_and(|path| path.starts_with(folder))
     };
-    let targets = names.into_iter().map(target).collect::<Result<_, _>>()?;
-    let manifest = Some(manifest);
-    Ok(Plan { targets, manifest })
+    let Ok(real) = folder.canonicalize() else {
+        return Ok(inputs);
+    };
+    let below: Vec<bool> = (inputs.iter())
+        .map(|found| found.is_met && is_below(&found.path, &real))
+        .collect();
+    let has_results = || {
+        let manifest = manifest::open(folder).is_ok_and(|manifest| manifest.is_some());
+        manifest || Stated::read(folder).is_ok_and(|stated| stated.is_some())
+    };
+    if !below.contains(&true) || !has_results() {
+        return Ok(inputs);
+    }
+    let names = record::names(folder);
+    let is_result = |found: &Found| {
+        // Where inputs and results share a directory, the manifest says which are which.
+        let is_shared = found.root().is_some_and(|root| is_below(root, &real));
+        let path = found.path.canonicalize().unwrap_or_default();
+        let name = path.strip_prefix(&real).ok().and_then(Path::to_str);
+        !is_shared || name.is_some_and(|name| names.contains(name))
+    };
+    let left: Vec<Found> = (inputs.into_iter().zip(below))
+        .filter(|(found, is_below)| !(*is_below && is_result(found)))
+        .map(|(found, _)| found)
+        .collect();
+    match left.is_empty() {
+        false => Ok(left),
+        true => Err(Failure::usage(format!(
+            "{}: has results alone, and no other input was given",
+            folder.display()
+        ))),
+    }
+}
+
+/// A file that nobody said to replace ends a batch before it begins: none of its results is made
+/// for nothing.
+fn refuse_existing(folder: &Path, name: &str, is_known: bool) -> Result<(), Failure> {
+    let path = folder.join(name);
+    if std::fs::symlink_metadata(&path).is_err() {
+        return Ok(());
+    }
+    let shown = path.display();
+    let failure = Failure::usage(format!("{shown}: exists; give --overwrite to replace it"));
+    Err(match is_known {
+        true => failure.hinted(" (--resume skips what is done)"),
+        false => failure,
+    })
 }
 
 /// Shards that are not merged yet are gone on with by the same inputs alone.
 fn refuse_shards(
     stated: &Stated,
-    names: &[String],
+    names: &[Name],
     folder: &Path,
     wish: Wish<'_>,
 ) -> Result<(), Failure> {
@@ -85,66 +160,141 @@ pub(crate) fn format(
     choose(Path::new("-"), wished)
 }
 
-/// What the results are called in the directory, in the order of their inputs.
-pub(crate) fn names(
-    inputs: &[Found],
-    folder: &Path,
-    format: &Format,
-) -> Result<Vec<String>, Failure> {
+/// What the results are called in the directory, in the order of their inputs. Those of `walk.bvh`
+/// and `walk.tum` are called `walk.bvh.npy` and `walk.tum.npy`.
+pub(crate) fn names(inputs: &[Found], folder: &Path, format: &Format) -> Vec<Name> {
     let sources: HashSet<PathBuf> = (inputs.iter())
         .filter_map(|found| found.path.canonicalize().ok())
         .collect();
-    let mut owners: HashMap<PathBuf, &Path> = HashMap::new();
-    let mut names = Vec::new();
-    for found in inputs {
-        let (path, name) = (&found.path, name_for(format, found));
-        let target = folder.join(&name);
-        if target
-            .canonicalize()
-            .is_ok_and(|target| sources.contains(&target))
-        {
-            let target = target.display();
-            return Err(Failure::usage(format!(
-                "{target}: is an input; give another directory"
-            )));
-        }
-        if let Some(other) = owners.insert(name.clone(), path) {
-            return Err(Failure::usage(format!(
-                "{} and {} would both write {}; give their directory, whose tree is kept, or \
-                 evaluate them into different directories",
-                input::name(other),
-                input::name(path),
-                target.display()
-            )));
-        }
-        let Some(name) = name.to_str() else {
-            let message = "its name is not UTF-8, and a manifest could not name it; rename it";
-            let input = input::name(path);
-            return Err(Failure::usage(format!("{input}: {message}")));
-        };
-        names.push(name.to_owned());
+    let mut names: Vec<PathBuf> = (inputs.iter())
+        .map(|found| name_for(format, found))
+        .collect();
+    let shared = counts(&names);
+    let whole: Vec<PathBuf> = (inputs.iter().zip(&names))
+        .map(|(found, name)| match shared[name] {
+            1 => name.clone(),
+            _ => whole_name_for(format, found),
+        })
+        .collect();
+    names = whole;
+    let mut owners: HashMap<&Path, Vec<&Path>> = HashMap::new();
+    for (found, name) in inputs.iter().zip(&names) {
+        owners.entry(name).or_default().push(&found.path);
     }
-    Ok(names)
+    let checked = inputs.iter().zip(&names).map(|(found, name)| {
+        let input = input::name(&found.path);
+        let refuse = |why: String| Err(Failure::usage(format!("{input}: {why}")));
+        let target = folder.join(name);
+        let is_input = |target: PathBuf| sources.contains(&target);
+        if target.canonicalize().is_ok_and(is_input) {
+            let target = target.display();
+            return refuse(format!("its result {target} is an input; give another directory"));
+        }
+        let other = owners[name.as_path()].iter().find(|other| **other != found.path);
+        if let Some(other) = other {
+            return refuse(format!(
+                "its result and that of {} would both be {}; give their directory, whose tree is \
+                 kept, or evaluate them into different directories",
+                input::name(other),
+                target.display()
+            ));
+        }
+        let length = name.file_name().map_or(0, |name| name.len());
+        if length > MAX_NAME {
+            return refuse(format!(
+                "the name of its result has {length} bytes, and may have {MAX_NAME}; give the input \
+                 a shorter name"
+            ));
+        }
+        if name.starts_with(plan::FOLDER) {
+            let of_shards = plan::FOLDER;
+            return refuse(format!(
+                "{of_shards} is the directory of shards; give its directory another name"
+            ));
+        }
+        match name.to_str() {
+            Some(name) => Ok(name.to_owned()),
+            None => refuse(
+                "its name is not UTF-8, and a manifest could not name it; rename it".to_owned(),
+            ),
+        }
+    });
+    checked.collect()
+}
+
+/// Refuses inputs whose results would have one name: workers that have some of the inputs would not
+/// know of the others.
+pub(crate) fn refuse_shared_names(inputs: &[Found], format: &Format) -> Result<(), Failure> {
+    let mut owners = HashMap::new();
+    for found in inputs {
+        let name = name_for(format, found);
+        let shown = name.display().to_string();
+        if let Some(other) = owners.insert(name, &found.path) {
+            return Err(Failure::usage(format!(
+                "{} and {} would both write {shown}; evaluate them into different directories",
+                input::name(other),
+                input::name(&found.path),
+            )));
+        }
+    }
+    Ok(())
+}
+
+fn counts(names: &[PathBuf]) -> HashMap<&PathBuf, usize> {
+    let mut counts = HashMap::new();
+    for name in names {
+        *counts.entry(name).or_default() += 1;
+    }
+    counts
+}
+
+fn below(found: &Found) -> &Path {
+    match input::is_standard(&found.path) {
+        true => Path::new("stdin"),
+        false => &found.below,
+    }
 }
 
 /// `walk.dat` becomes `walk.npy`, where it lies.
 fn name_for(format: &Format, found: &Found) -> PathBuf {
-    let below = if input::is_standard(&found.path) {
-        Path::new("stdin")
-    } else {
-        &found.below
-    };
-    below.with_extension(format.name)
+    below(found).with_extension(format.name)
 }
 
-/// The directories that the results lie in, made where they are not there.
-pub(crate) fn parents(names: &[String], folder: &Path) -> Result<BTreeSet<PathBuf>, Failure> {
-    let parents: BTreeSet<PathBuf> = (names.iter())
-        .filter_map(|name| folder.join(name).parent().map(Path::to_owned))
-        .collect();
-    for parent in &parents {
-        std::fs::create_dir_all(parent)
-            .map_err(|error| Failure::writing(&parent.display().to_string(), &error))?;
+/// `walk.dat` becomes `walk.dat.npy`.
+fn whole_name_for(format: &Format, found: &Found) -> PathBuf {
+    let mut name = below(found).as_os_str().to_owned();
+    name.push(format!(".{}", format.name));
+    name.into()
+}
+
+/// Where results go below a directory. Their own directories are made, and none is a link.
+pub(crate) struct Places<'a> {
+    folder: &'a Path,
+    /// The directories of the results.
+    pub(crate) made: BTreeSet<PathBuf>,
+}
+
+impl<'a> Places<'a> {
+    pub(crate) fn new(folder: &'a Path) -> Self {
+        Self {
+            folder,
+            made: BTreeSet::new(),
+        }
     }
-    Ok(parents)
+
+    /// Where the result of that name goes.
+    pub(crate) fn place(&mut self, name: &str, overwrite: bool) -> Result<Place, Failure> {
+        let path = self.folder.join(name);
+        let parent = path.parent().unwrap_or(self.folder);
+        if !self.made.contains(parent) {
+            let parent = parent_beneath(self.folder, Path::new(name)).map_err(|error| {
+                let shown = path.display();
+                Failure::usage(format!("{shown}: its directory cannot be used: {error}"))
+            })?;
+            std::fs::create_dir_all(&parent)
+                .map_err(|error| Failure::writing(&parent.display().to_string(), &error))?;
+            self.made.insert(parent);
+        }
+        Place::new(&path, overwrite, &[])
+    }
 }

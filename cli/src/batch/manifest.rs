@@ -5,14 +5,19 @@
 //! name: whatever is there under its name, and is not what the line says, is to be
 //! made again. At the end the lines are put in order and the file is replaced whole, so
 //! that a batch that was stopped and resumed ends with the bytes of one that was not.
+//!
+//! A file is a manifest if its first line is an entry; any other of its name is somebody's,
+//! and refused unless files may be replaced. Lines are added to no file but one that this
+//! batch has put there by a rename: what else leads to an older one keeps its bytes.
 
 use std::collections::BTreeMap;
 use std::fs::{File, TryLockError};
-use std::io::{self, Read, Seek, SeekFrom, Write};
+use std::io::{self, BufRead, BufReader, Read, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, LazyLock};
 
 use serde::{Deserialize, Serialize};
+use tumble_formats::beneath::{is_beneath, open_beneath, parent_beneath};
 use tumble_formats::output::Output;
 
 use crate::batch::digest;
@@ -20,6 +25,7 @@ use crate::batch::place::Written;
 use crate::batch::run::Records;
 use crate::batch::shards::{plan::Stated, record};
 use crate::messages::exit::{Failure, OUTPUT};
+use crate::messages::words;
 
 /// Its name in the directory.
 pub(crate) const NAME: &str = "manifest.jsonl";
@@ -49,6 +55,13 @@ pub(crate) struct Entry {
 }
 
 impl Entry {
+    /// The entry in a line; nothing where the line is none, or names a result outside its directory.
+    pub(crate) fn of_line(line: &[u8]) -> Option<Self> {
+        let entry: Self = serde_json::from_slice(line).ok()?;
+        let all = entry.one_of.as_ref().map(|(all, _)| &**all);
+        (is_beneath(&entry.output) && all.is_none_or(is_beneath)).then_some(entry)
+    }
+
     /// Whether it is the result of the same request.
     fn is_made_from(&self, input_sha256: &str, options: &str) -> bool {
         self.input_sha256.as_deref() == Some(input_sha256)
@@ -79,59 +92,121 @@ impl Lines {
             damaged: 0,
         };
         for line in bytes.split_inclusive(|&byte| byte == b'\n') {
-            match serde_json::from_slice::<Entry>(line) {
-                Ok(entry) => {
+            match Entry::of_line(line) {
+                Some(entry) => {
                     lines.entries.insert(entry.output.clone(), entry);
                 }
-                Err(_) if line.ends_with(b"\n") && line.len() > 1 => lines.damaged += 1,
-                Err(_) => {}
+                None if line.ends_with(b"\n") && line.len() > 1 => lines.damaged += 1,
+                None => {}
             }
         }
         lines
     }
 }
 
+/// Opens the manifest of a directory; nothing where there is none.
+///
+/// # Errors
+/// When what has its name is a link, no file, or somebody else's.
+pub(crate) fn open(folder: &Path) -> Result<Option<File>, Failure> {
+    let path = folder.join(NAME);
+    let shown = path.display();
+    let refuse = |why: &str| Err(Failure::usage(format!("{shown}: {why}")));
+    match std::fs::symlink_metadata(&path) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
+        Ok(found) if found.is_symlink() => {
+            return refuse("is a link, and a manifest is a file; remove the link");
+        }
+        Ok(found) if !found.is_file() => {
+            return refuse("is no file, and a manifest is one; give another directory");
+        }
+        Ok(_) | Err(_) => {}
+    }
+    let failed = |error| Failure::new(OUTPUT, format!("{shown}: cannot be read: {error}"));
+    let file = open_beneath(folder, Path::new(NAME)).map_err(failed)?;
+    let mut first = Vec::new();
+    let mut reader = BufReader::new(file.try_clone().map_err(failed)?).take(MAX_LINE);
+    reader.read_until(b'\n', &mut first).map_err(failed)?;
+    if Entry::of_line(&first).is_none() {
+        return refuse(
+            "is no manifest of tumble: its first line is no result; move it, give another directory, \
+             or --overwrite to replace it",
+        );
+    }
+    io::Seek::rewind(&mut &file).map_err(failed)?;
+    Ok(Some(file))
+}
+
+/// Says that lines of a directory's manifest are no results of its: they are left out of the next one.
+pub(crate) fn tell_damaged(folder: &Path, lines: usize) {
+    if lines > 0 {
+        let path = folder.join(NAME);
+        let lines = words::count(lines, "line");
+        words::warning(&format!(
+            "{}: {lines} that name no result of the directory; left out",
+            path.display()
+        ));
+    }
+}
+
+/// No line is longer.
+const MAX_LINE: u64 = 1 << 20;
+
 /// A directory's manifest, open for one batch.
 pub(crate) struct Manifest {
     folder: PathBuf,
     previous: Arc<BTreeMap<String, Entry>>,
     added: BTreeMap<String, Entry>,
-    /// The file, to whose end lines are added; locked.
-    journal: File,
+    /// Something has its name: a manifest, or what is to be replaced.
+    exists: bool,
+    /// The file, to whose end lines are added; there is none before the first.
+    journal: Option<File>,
     /// There are shards, whose lines become part of it.
     has_shards: bool,
+    /// Of the directory: two batches that write into it would lose each other's lines.
+    _lock: Option<File>,
+}
+
+/// Locks a directory of results; nothing where the system or the file system has no such locks.
+pub(crate) fn lock(folder: &Path) -> Result<Option<File>, Failure> {
+    let Ok(file) = File::open(folder) else {
+        return Ok(None);
+    };
+    match file.try_lock() {
+        Err(TryLockError::WouldBlock) => {
+            let folder = folder.display();
+            let message = format!("{folder}: another tumble is writing into it; wait for it");
+            Err(Failure::new(OUTPUT, message))
+        }
+        Ok(()) | Err(TryLockError::Error(_)) => Ok(Some(file)),
+    }
 }
 
 impl Manifest {
-    /// Opens a directory's manifest, or begins one. `has_shards`: what shards have made is the
-    /// batch's too, and their lines become lines of the manifest.
-    pub(crate) fn open(folder: &Path, has_shards: bool) -> Result<Self, Failure> {
-        let path = folder.join(NAME);
-        let failed = |error: io::Error| Failure::writing(&path.display().to_string(), &error);
-        let mut journal = File::options()
-            .read(true)
-            .append(true)
-            .create(true)
-            .open(&path)
-            .map_err(failed)?;
-        match journal.try_lock() {
-            Err(TryLockError::WouldBlock) => {
-                let folder = folder.display();
-                let message = format!("{folder}: another tumble is writing into it; wait for it");
-                return Err(Failure::new(OUTPUT, message));
-            }
-            // Where a file system has no locks there is none to wait for.
-            Ok(()) | Err(TryLockError::Error(_)) => {}
-        }
+    /// Opens a directory's manifest; its file is written with the first line. `has_shards`: what
+    /// shards have made is the batch's too, and their lines become lines of the manifest.
+    /// `overwrite`: a file of its name that is none is replaced.
+    pub(crate) fn open(folder: &Path, has_shards: bool, overwrite: bool) -> Result<Self, Failure> {
+        let lock = lock(folder)?;
         let mut bytes = Vec::new();
-        journal.read_to_end(&mut bytes).map_err(failed)?;
-        let whole = bytes.iter().rposition(|&byte| byte == b'\n');
-        let whole = whole.map_or(0, |last| last + 1);
-        if whole < bytes.len() {
-            journal.set_len(whole as u64).map_err(failed)?;
-            journal.seek(SeekFrom::End(0)).map_err(failed)?;
-        }
-        let mut previous = Lines::parse(&bytes[..whole]).entries;
+        let exists = match open(folder) {
+            Ok(None) => false,
+            Ok(Some(mut file)) => {
+                let read = file.read_to_end(&mut bytes);
+                read.map_err(|error| {
+                    let path = folder.join(NAME);
+                    Failure::new(OUTPUT, format!("{}: cannot be read: {error}", path.display()))
+                })?;
+                true
+            }
+            Err(_) if overwrite && folder.join(NAME).is_file() => true,
+            Err(failure) => return Err(failure),
+        };
+        let Lines {
+            entries: mut previous,
+            damaged,
+        } = Lines::parse(&bytes);
+        tell_damaged(folder, damaged);
         if has_shards {
             previous.extend(record::entries(folder));
         }
@@ -139,9 +214,17 @@ impl Manifest {
             folder: folder.to_owned(),
             previous: Arc::new(previous),
             added: BTreeMap::new(),
-            journal,
+            exists,
+            journal: None,
             has_shards,
+            _lock: lock,
         })
+    }
+
+    /// The directories of the results that it names, those alone that are beneath its own.
+    pub(crate) fn folders(&self) -> impl Iterator<Item = PathBuf> {
+        let outputs = self.previous.keys();
+        outputs.filter_map(|output| parent_beneath(&self.folder, Path::new(output)).ok())
     }
 
     /// Whether the manifest names that output, or results of several clips in its place, which are
@@ -152,10 +235,18 @@ impl Manifest {
 
     /// Adds a line, in one piece.
     pub(crate) fn add(&mut self, entry: Entry) -> Result<(), Failure> {
-        let line = line(&entry);
-        let written = self.journal.write_all(line.as_bytes());
-        let synced = written.and_then(|()| self.journal.sync_data());
-        synced.map_err(|error| self.failed(&error))?;
+        match &mut self.journal {
+            Some(journal) => {
+                let written = journal.write_all(line(&entry).as_bytes());
+                let synced = written.and_then(|()| journal.sync_data());
+                synced.map_err(|error| self.failed(&error))?;
+            }
+            None => {
+                let lines = self.previous.values().chain([&entry]);
+                self.journal = self.replace(lines)?;
+                self.exists = true;
+            }
+        }
         self.added.insert(entry.output.clone(), entry);
         Ok(())
     }
@@ -166,20 +257,29 @@ impl Manifest {
 
     /// Puts the lines in order.
     pub(crate) fn finish(self) -> Result<(), Failure> {
-        let path = self.folder.join(NAME);
-        if self.is_empty() {
-            return self.forget_shards();
+        if !self.is_empty() {
+            let mut entries: BTreeMap<&String, &Entry> = self.previous.iter().collect();
+            entries.extend(&self.added);
+            self.replace(entries.into_values())?;
         }
-        let mut output =
-            Output::create(&path, true, &[]).map_err(|error| Failure::output(&error))?;
-        let mut entries: BTreeMap<&String, &Entry> = self.previous.iter().collect();
-        entries.extend(&self.added);
-        for entry in entries.into_values() {
+        self.forget_shards()
+    }
+
+    /// Replaces the file whole; gives it, open at its end.
+    fn replace<'a>(
+        &self,
+        lines: impl Iterator<Item = &'a Entry>,
+    ) -> Result<Option<File>, Failure> {
+        let path = self.folder.join(NAME);
+        let output = Output::create(&path, self.exists, &[]);
+        let mut output = output.map_err(|error| Failure::output(&error))?;
+        for entry in lines {
             let written = output.write_all(line(entry).as_bytes());
             written.map_err(|error| self.failed(&error))?;
         }
-        output.commit().map_err(|error| Failure::output(&error))?;
-        self.forget_shards()
+        output
+            .commit_open()
+            .map_err(|error| Failure::output(&error))
     }
 
     /// The manifest has their lines.
@@ -204,17 +304,16 @@ impl Records for Manifest {
     }
 
     fn keep(&mut self, entry: Entry, written: Written) -> Result<(), Failure> {
+        let output = entry.output.clone();
         self.add(entry)?;
-        written.commit()
+        written.commit().inspect_err(|_| {
+            // The line stays until the end; until then it says what is to be made again.
+            self.added.remove(&output);
+        })
     }
-}
 
-/// A batch that was refused, or of which nothing came, leaves no manifest.
-impl Drop for Manifest {
-    fn drop(&mut self) {
-        if self.is_empty() {
-            let _ = std::fs::remove_file(self.folder.join(NAME)); // it says nothing
-        }
+    fn list(&self) -> PathBuf {
+        self.folder.join(NAME)
     }
 }
 
@@ -244,9 +343,10 @@ impl Previous {
     /// the results of the same request.
     pub(crate) fn is_done(&self, output: &str, input_sha256: &str, options: &str) -> bool {
         let is_whole = |entry: &Entry| {
+            let (bytes, sha256) = (entry.output_bytes, &entry.output_sha256);
             entry.is_made_from(input_sha256, options)
-                && digest::of_file(&self.folder.join(&entry.output))
-                    .is_ok_and(|hash| hash == entry.output_sha256)
+                && digest::is_whole(&self.folder, &entry.output, bytes, sha256)
+                    .is_ok_and(|is_whole| is_whole)
         };
         if let Some(entry) = self.entries.get(output) {
             return is_whole(entry);
@@ -301,11 +401,7 @@ mod tests {
     #[test]
     fn a_line_cut_short_is_forgotten_and_the_next_is_whole() {
         let place = tempfile::tempdir().unwrap();
-        let mut manifest = Manifest::open(place.path(), false).unwrap();
-        assert!(
-            Manifest::open(place.path(), false).is_err(),
-            "two batches in one directory"
-        );
+        let mut manifest = Manifest::open(place.path(), false, false).unwrap();
         manifest.add(entry("b", "1")).unwrap();
         manifest.add(entry("a", "2")).unwrap();
         manifest.add(entry("b", "3")).unwrap();
@@ -314,7 +410,7 @@ mod tests {
         let mut bytes = std::fs::read(&path).unwrap();
         bytes.truncate(bytes.len() - 5);
         std::fs::write(&path, &bytes).unwrap();
-        let mut manifest = Manifest::open(place.path(), false).unwrap();
+        let mut manifest = Manifest::open(place.path(), false, false).unwrap();
         assert_eq!(manifest.previous["b"].output_sha256, "1");
         manifest.add(entry("b", "4")).unwrap();
         manifest.finish().unwrap();
@@ -322,14 +418,52 @@ mod tests {
         assert_eq!(std::fs::read_to_string(&path).unwrap(), ordered);
     }
 
+    #[cfg(unix)]
+    #[test]
+    fn two_batches_do_not_write_into_one_directory() {
+        let place = tempfile::tempdir().unwrap();
+        let first = Manifest::open(place.path(), false, false).unwrap();
+        assert!(Manifest::open(place.path(), false, false).is_err());
+        drop(first);
+        assert!(Manifest::open(place.path(), false, false).is_ok());
+        assert_eq!(std::fs::read_dir(place.path()).unwrap().count(), 0);
+    }
+
+    /// Whatever leads to an older manifest keeps its bytes.
+    #[test]
+    fn a_manifest_is_replaced_and_never_written_into() {
+        let place = tempfile::tempdir().unwrap();
+        let mut manifest = Manifest::open(place.path(), false, false).unwrap();
+        manifest.add(entry("a", "1")).unwrap();
+        manifest.finish().unwrap();
+        let (path, other) = (place.path().join(NAME), place.path().join("copy"));
+        std::fs::hard_link(&path, &other).unwrap();
+        let mut manifest = Manifest::open(place.path(), false, false).unwrap();
+        manifest.add(entry("b", "1")).unwrap();
+        manifest.add(entry("c", "1")).unwrap();
+        manifest.finish().unwrap();
+        let text = |path| std::fs::read_to_string(path).unwrap();
+        assert_eq!(text(&other), line(&entry("a", "1")));
+        assert_eq!(text(&path).lines().count(), 3);
+    }
+
+    #[test]
+    fn names_outside_are_no_entries() {
+        for name in ["../a", "/a", "a/../../b", ""] {
+            let bytes = line(&entry(name, "1"));
+            let lines = Lines::parse(bytes.as_bytes());
+            assert_eq!((lines.entries.len(), lines.damaged), (0, 1), "{name}");
+        }
+    }
+
     #[test]
     fn what_is_done_is_what_is_there_and_was_asked_for() {
         let place = tempfile::tempdir().unwrap();
-        let mut manifest = Manifest::open(place.path(), false).unwrap();
+        let mut manifest = Manifest::open(place.path(), false, false).unwrap();
         let hash = digest::of_bytes([&b"abc"[..]]);
         manifest.add(entry("a", &hash)).unwrap();
         manifest.finish().unwrap();
-        let manifest = Manifest::open(place.path(), false).unwrap().previous();
+        let manifest = Manifest::open(place.path(), false, false).unwrap().previous();
         assert!(!manifest.is_done("a", "1", "o"), "it is not there");
         std::fs::write(place.path().join("a"), "abc").unwrap();
         assert!(manifest.is_done("a", "1", "o"));

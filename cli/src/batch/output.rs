@@ -1,9 +1,10 @@
 //! Results of evaluations: where they go, planned and checked before any work, and
 //! how they are written.
 
+use std::collections::HashSet;
 use std::fmt;
 use std::io::{self, IsTerminal, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use glam::Quat;
@@ -33,8 +34,13 @@ pub(crate) struct Target {
 }
 
 /// One target for each input, and the manifest of the directory that they are in.
+#[derive(Default)]
 pub(crate) struct Plan {
+    /// The inputs that have targets.
+    pub(crate) paths: Vec<PathBuf>,
     pub(crate) targets: Vec<Target>,
+    /// Inputs that have none: they have failed.
+    pub(crate) refused: Vec<Failure>,
     pub(crate) manifest: Option<Manifest>,
 }
 
@@ -69,9 +75,13 @@ pub(crate) fn plan(inputs: &Gathered, wish: Wish<'_>) -> Result<Plan, Failure> {
             }
             let format = choose(out, wish.format)?;
             let place = Place::new(out, wish.overwrite, &paths)?;
-            let targets = vec![Target::new(place, format, String::new())];
-            let manifest = None;
-            Plan { targets, manifest }
+            // The surest check is to try.
+            place.try_out()?;
+            Plan {
+                paths,
+                targets: vec![Target::new(place, format, String::new())],
+                ..Plan::default()
+            }
         }
         _ if input::is_standard(out) => {
             return Err(Failure::usage(
@@ -80,11 +90,26 @@ pub(crate) fn plan(inputs: &Gathered, wish: Wish<'_>) -> Result<Plan, Failure> {
         }
         _ => folder::in_folder(inputs, out, wish)?,
     };
-    // The surest check is to try; they are all in one directory.
-    if let Some(target) = plan.targets.first() {
-        target.place.try_out()?;
+    if plan.manifest.is_some() {
+        try_out(&plan.targets)?;
     }
     Ok(plan)
+}
+
+/// Tries a file in each directory of results; where none can be written into, no work is done.
+fn try_out(targets: &[Target]) -> Result<(), Failure> {
+    let mut tried = HashSet::new();
+    let mut failed = None;
+    for target in targets {
+        if !tried.insert(target.path().parent()) {
+            continue;
+        }
+        match target.place.try_out() {
+            Ok(()) => return Ok(()),
+            Err(failure) => failed.get_or_insert(failure),
+        };
+    }
+    failed.map_or(Ok(()), Err)
 }
 
 /// The format asked for, else the one that the name says.
@@ -180,15 +205,12 @@ impl Target {
     }
 
     /// Where the result of one of several clips of an input goes, beside the place where that of
-    /// all would: `fox.npy` becomes `fox.Run.npy`. Nothing where one file was asked for.
-    pub(crate) fn of_clip(&self, clip: &str) -> Option<Result<Self, Failure>> {
-        if self.name.is_empty() {
-            return None;
-        }
+    /// all would: `fox.npy` becomes `fox.Run.npy`.
+    pub(crate) fn of_clip(&self, clip: &str) -> Result<Self, Failure> {
         let with = |path: &Path| path.with_extension(format!("{clip}.{}", self.format.name));
         let name = with(Path::new(&self.name));
-        let place = self.place.renamed(&with(self.place.path()));
-        Some(place.map(|place| Self::new(place, self.format, name.display().to_string())))
+        let place = self.place.renamed(&with(self.place.path()))?;
+        Ok(Self::new(place, self.format, name.display().to_string()))
     }
 
     /// Refuses a result for which the disk has no room.

@@ -65,6 +65,30 @@ impl Place {
         })
     }
 
+    /// The same for a picture, whose name says its format.
+    pub(crate) fn of_picture(
+        path: &Path,
+        overwrite: bool,
+        inputs: &[PathBuf],
+    ) -> Result<Self, Failure> {
+        let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
+        if extension != "svg" && extension != "png" {
+            let path = path.display();
+            let message = format!("{path}: end the picture in .svg or .png");
+            return Err(Failure::usage(message));
+        }
+        Self::new(path, overwrite, inputs)
+    }
+
+    /// Refuses a place where another file of the same command goes.
+    pub(crate) fn refuse_same(&self, other: &Path) -> Result<(), Failure> {
+        if self.is_standard() || !is_same(&self.path, other) {
+            return Ok(());
+        }
+        let message = "is the place of two files of this command; give each a name of its own";
+        Err(Failure::usage(format!("{self}: {message}")))
+    }
+
     /// The same for a file of another name.
     pub(crate) fn renamed(&self, path: &Path) -> Result<Self, Failure> {
         let place = Self::new(path, self.overwrite, &self.inputs)?;
@@ -156,6 +180,18 @@ impl fmt::Display for Place {
         }
         write!(f, "{}", self.path.display())
     }
+}
+
+/// Whether two names are those of one file, which need not be there.
+fn is_same(one: &Path, other: &Path) -> bool {
+    let real = |path: &Path| {
+        let parent = match path.parent() {
+            Some(parent) if !parent.as_os_str().is_empty() => parent,
+            _ => Path::new("."),
+        };
+        Some(parent.canonicalize().ok()?.join(path.file_name()?))
+    };
+    one == other || real(one).is_some_and(|one| Some(one) == real(other))
 }
 
 /// Makes a directory for results where there is none. Another process may make it at the same

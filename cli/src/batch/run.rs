@@ -9,11 +9,11 @@ use std::thread;
 use tumble_formats::Loaded;
 
 use crate::arguments::input;
-use crate::batch::digest;
+use crate::batch::digest::InputFile;
 use crate::batch::manifest::{Entry, Previous, kernels_sha256};
 use crate::batch::output::Target;
 use crate::batch::place::Written;
-use crate::messages::exit::{Failure, for_each};
+use crate::messages::exit::{Failure, for_all};
 use crate::messages::{signals, words};
 
 /// How a batch is done.
@@ -30,7 +30,7 @@ pub(crate) struct Batch<R> {
 type Input = Option<Read>;
 
 struct Read {
-    sha256: Option<String>,
+    file: InputFile,
     loaded: Result<Loaded, Failure>,
 }
 
@@ -58,6 +58,9 @@ pub(crate) trait Records {
     /// An input has no result, and the batch goes on.
     fn refuse(&mut self, _path: &Path, _failure: &Failure) {}
 
+    /// Where results are listed.
+    fn list(&self) -> PathBuf;
+
     /// Says something to people.
     fn tell(&self, text: &str) {
         words::note(text);
@@ -68,11 +71,19 @@ impl<R: Fn(&Path) -> Result<Loaded, Failure> + Sync> Batch<R> {
     pub(crate) fn run(
         &self,
         jobs: &[(PathBuf, Target)],
+        refused: Vec<Failure>,
         records: &mut impl Records,
-        mut evaluate: impl FnMut(&Path, &Loaded, &Target, &mut Done<'_>) -> Result<(), Failure>,
+        mut evaluate: impl FnMut(
+            &InputFile,
+            &Loaded,
+            &Target,
+            &mut Done<'_>,
+        ) -> Result<(), Failure>,
     ) -> Result<(), Failure> {
         let previous = records.previous();
         let mut skipped = 0;
+        let mut failed = refused.len();
+        let inputs = failed + jobs.len();
         let mut made = HashSet::new();
         let outcome = thread::scope(|scope| {
             // One is waiting at most: two sets are in memory.
@@ -82,13 +93,13 @@ impl<R: Fn(&Path) -> Result<Loaded, Failure> + Sync> Batch<R> {
                 if let Some(stop) = signals::stopped() {
                     return Err(stop);
                 }
-                let Some((sha256, loaded)) = taken(&inputs)? else {
+                let Some((file, loaded)) = taken(&inputs)? else {
                     skipped += 1;
                     records.skip(target.name());
                     return Ok(());
                 };
                 let clips = loaded.clips.len();
-                evaluate(path, &loaded, target, &mut |name, mut evaluated| {
+                evaluate(&file, &loaded, target, &mut |name, mut evaluated| {
                     // Clips of one input may be called as another input is: walk.glb's `Run` and
                     // walk.Run.bvh.
                     if !made.insert(name.to_owned()) {
@@ -104,7 +115,7 @@ impl<R: Fn(&Path) -> Result<Loaded, Failure> + Sync> Batch<R> {
                         output_bytes: digest.bytes(),
                         output_sha256: digest.finish(),
                         input: input::name(path),
-                        input_sha256: sha256.clone(),
+                        input_sha256: file.sha256().map(str::to_owned),
                         options: self.options.clone(),
                         kernels_sha256: kernels_sha256().to_owned(),
                         tumble: env!("CARGO_PKG_VERSION").to_owned(),
@@ -116,17 +127,31 @@ impl<R: Fn(&Path) -> Result<Loaded, Failure> + Sync> Batch<R> {
                     Ok(())
                 })
             };
-            for_each(jobs, |(path, target)| {
+            for_all(refused, jobs, |(path, target)| {
                 make(path, target, records).inspect_err(|failure| {
                     if !failure.is_final() {
+                        failed += 1;
                         records.refuse(path, failure);
                     }
                 })
             })
         });
-        if skipped > 0 {
-            let results = words::count(skipped, "result");
-            records.tell(&format!("{results} skipped: done before, and whole"));
+        // The last line of many: what it came to, and where that stands.
+        if inputs > 1 || skipped > 0 {
+            let list = records.list();
+            let mut told = vec![format!("{} made", words::count(made.len(), "result"))];
+            if skipped > 0 {
+                let results = words::count(skipped, "result");
+                told.push(format!("{results} skipped (done before, and whole)"));
+            }
+            if failed > 0 {
+                told.push(format!("{} failed", words::count(failed, "input")));
+            }
+            let told = told.join(", ");
+            records.tell(&match list.exists() || !made.is_empty() {
+                true => format!("{told}; listed in {}", list.display()),
+                false => told,
+            });
         }
         outcome
     }
@@ -139,12 +164,15 @@ impl<R: Fn(&Path) -> Result<Loaded, Failure> + Sync> Batch<R> {
         hand_over: &SyncSender<Input>,
     ) {
         for (path, target) in jobs {
-            let sha256 = digest::of_input(path);
-            let is_done = |hash: &String| previous.is_done(target.name(), hash, &self.options);
-            let done = self.resume && sha256.as_ref().is_some_and(is_done);
-            let input = (!done).then(|| Read {
-                loaded: (self.read)(path),
-                sha256,
+            let file = InputFile::new(path);
+            let is_done = |hash: &str| previous.is_done(target.name(), hash, &self.options);
+            // The hash is of the bytes that are read next.
+            let sha256 = file.sha256();
+            let done = self.resume && sha256.is_some_and(is_done);
+            let input = (!done).then(|| {
+                let loaded = (self.read)(path);
+                let loaded = loaded.and_then(|loaded| file.check_unchanged().map(|()| loaded));
+                Read { file, loaded }
             });
             if hand_over.send(input).is_err() {
                 return;
@@ -154,12 +182,12 @@ impl<R: Fn(&Path) -> Result<Loaded, Failure> + Sync> Batch<R> {
 }
 
 /// The next input and its hash, when it has to be evaluated; says its warnings.
-fn taken(inputs: &Receiver<Input>) -> Result<Option<(Option<String>, Loaded)>, Failure> {
+fn taken(inputs: &Receiver<Input>) -> Result<Option<(InputFile, Loaded)>, Failure> {
     let input = inputs.recv().expect("the reader hands over every input");
-    let Some(Read { sha256, loaded }) = input else {
+    let Some(Read { file, loaded }) = input else {
         return Ok(None);
     };
     let loaded = loaded?;
     input::tell_warnings(&loaded);
-    Ok(Some((sha256, loaded)))
+    Ok(Some((file, loaded)))
 }

@@ -47,7 +47,15 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let shown = path.display();
     let folder = path.parent().unwrap_or(Path::new(""));
     let shards = Stated::read(folder)?;
-    let bytes = match std::fs::read(&path) {
+    // A pipe or a device may have no end.
+    let read = match std::fs::metadata(&path) {
+        Ok(found) if !found.is_file() => {
+            let message = format!("{shown}: is no manifest; `tumble eval` writes one, {NAME}");
+            return Err(Failure::new(ALL_INPUTS, message));
+        }
+        _ => std::fs::read(&path),
+    };
+    let bytes = match read {
         Err(error) if error.kind() == io::ErrorKind::NotFound && shards.is_some() => Vec::new(),
         read => read.map_err(|error| {
             Failure::new(
@@ -103,16 +111,17 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
 /// What is yet to do in a directory with shards.
 fn unmerged(folder: &Path, progress: &Progress) -> String {
     let (folder, told) = (folder.display(), progress.told());
-    match progress.missing.is_empty() {
+    match progress.is_done() {
         true => format!("{folder}: {told}; `tumble merge {folder}` makes them one"),
         false => format!("{folder}: {told}; --resume makes the others"),
     }
 }
 
 fn fault(folder: &Path, entry: &Entry) -> Option<Fault> {
-    match digest::of_file(&folder.join(&entry.output)) {
-        Ok(hash) if hash == entry.output_sha256 => None,
-        Ok(_) => Some(Fault::Damaged),
+    let (bytes, sha256) = (entry.output_bytes, &entry.output_sha256);
+    match digest::is_whole(folder, &entry.output, bytes, sha256) {
+        Ok(true) => None,
+        Ok(false) => Some(Fault::Damaged),
         Err(error) => Some(Fault::Unreadable(error)),
     }
 }

@@ -77,10 +77,10 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let results = &arguments.results;
     results.make(
         &arguments.inputs,
-        &files,
         plan,
         options,
-        |path, loaded, target, done| {
+        |file, loaded, target, done| {
+            let path = file.path();
             let convert = |name: &str, clips: &[&Motion], target: &Target| {
                 arguments.convert(name, (clips, loaded.box_length), target)
             };

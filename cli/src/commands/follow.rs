@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use clap::{ArgAction, Args};
 use glam::{Quat, Vec3};
-use tumble::{Engine, Error, Follow, Followed, Frames, Layout, TrackSet};
+use tumble::{Engine, Error, Follow, FollowError, Followed, Frames, Layout, TrackSet};
 use tumble_formats::Loaded;
 use tumble_formats::motion::{Joint, Motion, Sampled, Transform};
 use tumble_formats::poses::{Poses, WORLD};
@@ -83,10 +83,10 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let results = &arguments.results;
     results.make_of(
         read,
-        &inputs,
         plan,
         options,
-        |path, loaded, target, done| {
+        |file, loaded, target, done| {
+            let path = file.path();
             for clip in &loaded.clips {
                 let made = arguments.body(path, &clip.set, &samples, target, &mut device)?;
                 done(target.name(), made)?;
@@ -160,7 +160,13 @@ pub(crate) fn followed(
 /// What a path is refused for is the input's fault.
 fn failed(name: &str, error: &Error) -> Failure {
     match error {
-        Error::Follow(error) => Failure::new(ALL_INPUTS, format!("{name}: {error}")),
+        Error::Follow(error) => {
+            let hint = match error {
+                FollowError::UpsUnused { .. } => " (--frame minimal, --no-ups)",
+                _ => "",
+            };
+            Failure::new(ALL_INPUTS, format!("{name}: {error}{hint}"))
+        }
         error => Failure::evaluating(name, error),
     }
 }

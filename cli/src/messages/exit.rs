@@ -21,12 +21,14 @@ pub(crate) const DIFFERENCE: u8 = 8;
 pub(crate) const BROKEN_PIPE: u8 = 141;
 
 /// Why a command ends early. An empty message is a quiet end.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct Failure {
     pub(crate) code: u8,
     message: String,
     /// The message says itself that it is an error.
     plain: bool,
+    /// An output that cannot be written, where another one may be.
+    is_of_one: bool,
 }
 
 impl Failure {
@@ -35,6 +37,7 @@ impl Failure {
             code,
             message: message.into(),
             plain: false,
+            is_of_one: false,
         }
     }
 
@@ -61,9 +64,16 @@ impl Failure {
 
     /// Data could not be written. A reader that went away knows it already.
     pub(crate) fn writing(place: &str, error: &io::Error) -> Self {
-        match error.kind() {
-            io::ErrorKind::BrokenPipe => Self::quiet(BROKEN_PIPE),
-            _ => Self::new(OUTPUT, format!("{place}: cannot be written: {error}")),
+        let message = match error.kind() {
+            io::ErrorKind::BrokenPipe => return Self::quiet(BROKEN_PIPE),
+            io::ErrorKind::InvalidFilename => {
+                format!("{place}: cannot be written: {error}; give its input a shorter name")
+            }
+            _ => format!("{place}: cannot be written: {error}"),
+        };
+        Self {
+            is_of_one: is_of_one(error),
+            ..Self::new(OUTPUT, message)
         }
     }
 
@@ -71,19 +81,21 @@ impl Failure {
     pub(crate) fn input(diagnostic: &Diagnostic, hint: &str) -> Self {
         let message = format!("{diagnostic}{hint}");
         Self {
-            code: ALL_INPUTS,
-            message,
             plain: true,
+            ..Self::new(ALL_INPUTS, message)
         }
     }
 
     /// An output was refused: it is not what can be meant, or the system says no.
     pub(crate) fn output(error: &OutputError) -> Self {
         match error {
-            _ if error.is_broken_pipe() => Self::quiet(BROKEN_PIPE),
-            OutputError::NoDirectory { .. } | OutputError::Write { .. } => {
-                Self::new(OUTPUT, error.to_string())
+            OutputError::Write { path, source } => {
+                Self::writing(&path.display().to_string(), source)
             }
+            OutputError::NoDirectory { .. } => Self {
+                is_of_one: true,
+                ..Self::new(OUTPUT, error.to_string())
+            },
             _ => Self::usage(error.to_string()),
         }
     }
@@ -112,7 +124,7 @@ impl Failure {
 
     /// Whether the next input would fail in the same way.
     pub(crate) fn is_final(&self) -> bool {
-        !matches!(self.code, USAGE | SOME_INPUTS | ALL_INPUTS)
+        !(self.is_of_one || matches!(self.code, USAGE | SOME_INPUTS | ALL_INPUTS))
     }
 
     /// Says why, on standard error, and gives the exit code.
@@ -126,17 +138,48 @@ impl Failure {
     }
 }
 
+/// Whether the system refuses this file, and may take another one: its name or its place is at
+/// fault, or its length.
+fn is_of_one(error: &io::Error) -> bool {
+    use io::ErrorKind::{
+        AlreadyExists, DirectoryNotEmpty, FileTooLarge, InvalidFilename, InvalidInput, IsADirectory,
+        NotADirectory, NotFound, PermissionDenied,
+    };
+    matches!(
+        error.kind(),
+        AlreadyExists
+            | DirectoryNotEmpty
+            | FileTooLarge
+            | InvalidFilename
+            | InvalidInput
+            | IsADirectory
+            | NotADirectory
+            | NotFound
+            | PermissionDenied
+    )
+}
+
 /// Runs `work` for every input. A failure is reported and the others go on, unless
 /// they would fail alike; a single input ends with its own exit code.
 pub(crate) fn for_each<T>(
     inputs: &[T],
-    mut work: impl FnMut(&T) -> Result<(), Failure>,
+    work: impl FnMut(&T) -> Result<(), Failure>,
 ) -> Result<(), Failure> {
+    for_all(Vec::new(), inputs, work)
+}
+
+/// As [`for_each`], of inputs of which some have failed before.
+pub(crate) fn for_all<T>(
+    refused: Vec<Failure>,
+    inputs: &[T],
+    work: impl FnMut(&T) -> Result<(), Failure>,
+) -> Result<(), Failure> {
+    let total = refused.len() + inputs.len();
     let mut failed = 0;
-    for input in inputs {
-        match work(input) {
+    for outcome in (refused.into_iter().map(Err)).chain(inputs.iter().map(work)) {
+        match outcome {
             Ok(()) => {}
-            Err(failure) if failure.is_final() || inputs.len() == 1 => return Err(failure),
+            Err(failure) if failure.is_final() || total == 1 => return Err(failure),
             Err(failure) => {
                 failure.report();
                 failed += 1;
@@ -145,15 +188,12 @@ pub(crate) fn for_each<T>(
     }
     match failed {
         0 => Ok(()),
-        _ if failed == inputs.len() => Err(Failure::new(
+        _ if failed == total => Err(Failure::new(
             ALL_INPUTS,
             format!("all {failed} inputs failed"),
         )),
         _ => {
-            let message = format!(
-                "{failed} of {} inputs failed; the others are done",
-                inputs.len()
-            );
+            let message = format!("{failed} of {total} inputs failed; the others are done");
             Err(Failure::new(SOME_INPUTS, message))
         }
     }

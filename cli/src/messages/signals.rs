@@ -1,10 +1,14 @@
-//! Ctrl-C and SIGTERM: stop soon, and leave no half-written file.
+//! Ctrl-C, SIGTERM, SIGHUP and SIGQUIT: stop soon, and leave no half-written file.
 //!
 //! A thread waits for the signal. While no output file is open it ends the program
 //! at once; while one is, it leaves a mark that the writer finds at its next
-//! chunk, and the writer's temporary file is removed on the way out.
+//! chunk, and the writer's temporary file is removed on the way out. A second signal
+//! removes the file itself, and ends the program at once. What whoever started the
+//! program has it ignore, as `nohup` does SIGHUP, is ignored.
 
 use std::sync::Mutex;
+
+use tumble_formats::output::remove_unfinished;
 
 use crate::messages::exit::Failure;
 
@@ -40,12 +44,15 @@ pub(crate) fn stop_on_signals() {
 
 #[cfg(unix)]
 fn wait_for_signals() {
-    use signal_hook::consts::{SIGINT, SIGTERM, SIGXFSZ};
+    use signal_hook::consts::{SIGHUP, SIGINT, SIGQUIT, SIGTERM, SIGXFSZ};
     use signal_hook::iterator::Signals;
 
     // A file that may not grow (`ulimit -f`) is an error of its writer's, who has it to tell
     // and a file to remove; the signal would end the program before that.
-    let Ok(mut signals) = Signals::new([SIGINT, SIGTERM, SIGXFSZ]) else {
+    let ignored = ignored();
+    let all = [SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGXFSZ];
+    let heeded = all.into_iter().filter(|signal| ignored >> (signal - 1) & 1 == 0);
+    let Ok(mut signals) = Signals::new(heeded) else {
         return;
     };
     std::thread::spawn(move || {
@@ -53,12 +60,27 @@ fn wait_for_signals() {
             let mut state = state();
             // A second signal means it: do not wait for the writer.
             if state.writing == 0 || state.signal.is_some() {
-                // The lock is held: no file can be opened meanwhile.
+                // The locks are held: no file can be opened meanwhile.
+                let _no_more = remove_unfinished();
                 signal_hook::low_level::exit(i32::from(code(signal)));
             }
             state.signal = Some(signal);
         }
     });
+}
+
+/// The signals that this process was started to ignore, a bit each from that of 1 on; none where
+/// the system does not say.
+#[cfg(unix)]
+fn ignored() -> u64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    ignored_in(&status).unwrap_or(0)
+}
+
+#[cfg(unix)]
+fn ignored_in(status: &str) -> Option<u64> {
+    let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"))?;
+    u64::from_str_radix(mask.trim(), 16).ok()
 }
 
 #[cfg(not(unix))]
@@ -83,4 +105,14 @@ impl Drop for Writing {
 /// The failure that a signal asks for, once the writer has cleaned up.
 pub(crate) fn stopped() -> Option<Failure> {
     state().signal.map(|signal| Failure::quiet(code(signal)))
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    #[test]
+    fn ignored_signals_are_read_as_linux_says_them() {
+        let status = "SigBlk:\t0000000000000000\nSigIgn:\t0000000000001003\n";
+        assert_eq!(super::ignored_in(status), Some(1 << 12 | 0b11));
+        assert_eq!(super::ignored_in("Name:\ttumble\n"), None);
+    }
 }

@@ -85,3 +85,14 @@ pub(crate) fn succeed(place: &Path, line: &[&str]) -> Run {
     assert_eq!(run.code, 0, "{line:?}: {}", run.words);
     run
 }
+
+/// Whether a program writes a file into a folder: one that it has open there and that has no name yet, or
+/// a temporary one.
+pub(crate) fn is_writing(child: &std::process::Child, folder: &Path) -> bool {
+    let open = format!("/proc/{}/fd", child.id());
+    let open = std::fs::read_dir(open).into_iter().flatten().flatten();
+    let folder = folder.canonicalize().expect("a folder");
+    let mut files = open.filter_map(|file| std::fs::read_link(file.path()).ok());
+    files.any(|file| file.starts_with(&folder) && file != folder)
+        || std::fs::read_dir(&folder).is_ok_and(|mut files| files.next().is_some())
+}

@@ -160,7 +160,7 @@ impl<'a> Reader<'a> {
             return Err(refuse(message));
         };
         let read =
-            Source::open(&folder.join(&path), false).and_then(|file| file.into_bytes(self.most));
+            Source::open_beneath(folder, &path).and_then(|file| file.into_bytes(self.most));
         read.map_err(|error| {
             let message = format!("{}: {}", path.display(), error.message);
             self.json.refuse(&pointer, error.code, message)

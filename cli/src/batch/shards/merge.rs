@@ -1,18 +1,17 @@
 //! All shards of a directory become its manifest, as one process would have written it.
 
 use std::collections::{BTreeSet, HashMap};
-use std::fs::File;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use serde::Deserialize;
-use tumble_formats::output::{Output, remove_marked};
+use tumble_formats::beneath::parent_beneath;
+use tumble_formats::output::{Output, remove_abandoned, remove_marked};
 
-use crate::batch::manifest::{Entry, NAME};
+use crate::batch::manifest::{self, Entry, NAME};
 use crate::batch::shards::plan::Stated;
 use crate::batch::shards::record::{self, MARK, Refusal};
-use crate::messages::exit::{ALL_INPUTS, DIFFERENCE, Failure, OUTPUT};
+use crate::messages::exit::{ALL_INPUTS, DIFFERENCE, Failure};
 use crate::messages::words;
 
 /// So many shards' files are in memory at once; neighbouring results are mostly of one shard.
@@ -30,8 +29,9 @@ pub(crate) struct Merged {
 
 /// How far the shards of a directory are.
 pub(crate) struct Progress {
-    pub(crate) done: usize,
-    pub(crate) missing: Vec<usize>,
+    done: usize,
+    all: usize,
+    first_missing: Option<usize>,
 }
 
 /// A line of the manifest to be: whose it is, and where it stands. File 0 is the manifest before,
@@ -43,19 +43,31 @@ struct Line {
 }
 
 impl Progress {
+    /// Looks at the files that are there, however many shards there are to be.
     pub(crate) fn of(folder: &Path, stated: &Stated) -> Self {
-        let is_done = |&shard: &usize| read(folder, stated, shard).is_some();
-        let (done, missing): (Vec<usize>, Vec<usize>) = (1..=stated.shards).partition(is_done);
+        let all = stated.shards;
+        let numbers = record::numbers(folder).into_iter();
+        let numbers = numbers.filter(|shard| (1..=all).contains(shard));
+        let done: Vec<usize> = numbers
+            .filter(|&shard| read(folder, stated, shard).is_some())
+            .collect();
+        let gap = (1..).zip(&done).find(|(number, shard)| number != *shard);
+        let first = gap.map_or(done.len() + 1, |(number, _)| number);
         Self {
             done: done.len(),
-            missing,
+            all,
+            first_missing: (first <= all).then_some(first),
         }
+    }
+
+    pub(crate) fn is_done(&self) -> bool {
+        self.first_missing.is_none()
     }
 
     /// `3 of 79 shards are done; the first that is not is shard 4`.
     pub(crate) fn told(&self) -> String {
-        let all = words::count(self.done + self.missing.len(), "shard");
-        let first = self.missing.first();
+        let all = words::count(self.all, "shard");
+        let first = self.first_missing;
         let first = first.map(|first| format!("; the first that is not is shard {first}"));
         format!(
             "{} of {all} are done{}",
@@ -67,8 +79,8 @@ impl Progress {
 
 /// A shard's file, where it is of the plan and whole, with its refusals and the start of its lines.
 fn read(folder: &Path, stated: &Stated, shard: usize) -> Option<(Vec<u8>, Vec<Refusal>, usize)> {
-    let bytes = std::fs::read(record::path(folder, shard)).ok()?;
-    let (header, start) = record::header(&bytes)?;
+    let bytes = record::bytes(folder, shard).ok()?;
+    let (header, start) = record::whole(&bytes)?;
     let is_own = header.plan == stated.plan && header.shard == shard;
     is_own.then_some((bytes, header.failed, start))
 }
@@ -82,15 +94,16 @@ pub(crate) fn merge(folder: &Path) -> Result<Merged, Failure> {
             format!("{shown}: has no shards to merge; `tumble eval … --shard` makes them");
         return Err(Failure::new(ALL_INPUTS, message));
     };
-    let _lock = lock(folder)?;
+    // Two who merge at once would remove what the other reads.
+    let _lock = manifest::lock(folder)?;
     let progress = Progress::of(folder, &stated);
-    if !progress.missing.is_empty() {
+    if !progress.is_done() {
         let message = format!("{shown}: {}; make them with --resume", progress.told());
         return Err(Failure::new(DIFFERENCE, message));
     }
     let mut lines = Vec::new();
     let path = folder.join(NAME);
-    list_before(&path, &mut lines)?;
+    list_before(folder, &path, &mut lines)?;
     let mut failed = Vec::new();
     for shard in 1..=stated.shards {
         let (bytes, refused, start) = read(folder, &stated, shard).ok_or_else(|| {
@@ -105,10 +118,11 @@ pub(crate) fn merge(folder: &Path) -> Result<Merged, Failure> {
         write(folder, &path, &lines)?;
     }
     let parents: BTreeSet<PathBuf> = (lines.iter())
-        .filter_map(|line| folder.join(&line.output).parent().map(Path::to_owned))
+        .filter_map(|line| parent_beneath(folder, Path::new(&line.output)).ok())
         .collect();
     for parent in parents.iter().map(|parent| &**parent).chain([folder]) {
         remove_marked(parent, MARK);
+        remove_abandoned(parent);
     }
     Stated::remove(folder)?;
     Ok(Merged {
@@ -119,36 +133,15 @@ pub(crate) fn merge(folder: &Path) -> Result<Merged, Failure> {
     })
 }
 
-/// Two who merge at once would remove what the other reads.
-fn lock(folder: &Path) -> Result<Option<File>, Failure> {
-    let Ok(file) = File::open(folder.join(super::plan::FOLDER).join("plan.json")) else {
-        return Ok(None);
-    };
-    match file.try_lock() {
-        Err(std::fs::TryLockError::WouldBlock) => {
-            let folder = folder.display();
-            let message = format!("{folder}: another tumble is merging it; wait for it");
-            Err(Failure::new(OUTPUT, message))
-        }
-        // Where a file system has no locks there is none to wait for.
-        Ok(()) | Err(std::fs::TryLockError::Error(_)) => Ok(Some(file)),
-    }
-}
-
-/// As much of a line as says whose it is.
-#[derive(Deserialize)]
-struct Owner {
-    output: String,
-}
-
 /// Lists the lines of the manifest before, which may be of a million results: one is in memory at a
 /// time.
-fn list_before(path: &Path, lines: &mut Vec<Line>) -> Result<(), Failure> {
-    let Ok(file) = File::open(path) else {
+fn list_before(folder: &Path, path: &Path, lines: &mut Vec<Line>) -> Result<(), Failure> {
+    let Some(file) = manifest::open(folder)? else {
         return Ok(()); // mostly there is none
     };
     let mut reader = BufReader::new(file);
     let (mut line, mut start) = (Vec::new(), 0);
+    let mut damaged = 0;
     loop {
         line.clear();
         let length = reader.read_until(b'\n', &mut line).map_err(|error| {
@@ -156,10 +149,12 @@ fn list_before(path: &Path, lines: &mut Vec<Line>) -> Result<(), Failure> {
             Failure::new(ALL_INPUTS, message)
         })?;
         if length == 0 {
+            manifest::tell_damaged(folder, damaged);
             return Ok(());
         }
         let mut own = Vec::new();
         list(&line, 0, 0, &mut own);
+        damaged += usize::from(own.is_empty());
         lines.extend(own.pop().map(|Line { output, .. }| Line {
             output,
             file: 0,
@@ -175,7 +170,7 @@ fn list(bytes: &[u8], start: usize, file: usize, lines: &mut Vec<Line>) {
     for line in bytes[start..].split_inclusive(|&byte| byte == b'\n') {
         let end = at + line.len();
         if line.ends_with(b"\n")
-            && let Ok(Owner { output }) = serde_json::from_slice(line)
+            && let Some((output, _)) = record::owner(line)
         {
             let at = at..end;
             lines.push(Line { output, file, at });
@@ -216,7 +211,7 @@ fn write(folder: &Path, path: &Path, lines: &[Line]) -> Result<(), Failure> {
     let mut output = Output::create(path, true, &[]).map_err(|error| Failure::output(&error))?;
     let mut kept: HashMap<usize, Vec<u8>> = HashMap::new();
     let mut before = match lines.iter().any(|line| line.file == 0) {
-        true => Some(BufReader::new(File::open(path).map_err(failed)?)),
+        true => manifest::open(folder)?.map(BufReader::new),
         false => None,
     };
     let (mut at, mut one) = (0, Vec::new());
@@ -236,7 +231,7 @@ fn write(folder: &Path, path: &Path, lines: &[Line]) -> Result<(), Failure> {
                     if kept.len() == KEPT {
                         kept.clear();
                     }
-                    let bytes = std::fs::read(record::path(folder, shard)).map_err(failed)?;
+                    let bytes = record::bytes(folder, shard).map_err(failed)?;
                     kept.insert(shard, bytes);
                 }
                 kept[&shard].get(line.at.clone()).unwrap_or_default()
@@ -244,7 +239,7 @@ fn write(folder: &Path, path: &Path, lines: &[Line]) -> Result<(), Failure> {
         };
         // What was replaced meanwhile by another attempt has the same entries, maybe at other places.
         let is_whole =
-            serde_json::from_slice::<Entry>(text).is_ok_and(|entry| entry.output == line.output);
+            Entry::of_line(text).is_some_and(|entry| entry.output == line.output);
         if !is_whole {
             let message = format!(
                 "{}: changed while it was merged; try again",

@@ -1,20 +1,22 @@
 //! Which inputs a shard has, and what a directory's shards are of.
 
 use std::collections::HashSet;
-use std::io::{self, Write};
+use std::io::{self, Read, Write};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
+use tumble_formats::beneath::{open_beneath, parent_beneath};
 use tumble_formats::format::Format;
-use tumble_formats::output::Output;
+use tumble_formats::output::{Output, remove_abandoned};
 
 use crate::arguments::gather::Found;
 use crate::arguments::input;
 use crate::batch::digest::Digest;
 use crate::batch::manifest::kernels_sha256;
+use crate::batch::folder::{self, Name};
+use crate::batch::place;
 use crate::batch::shards::record;
-use crate::batch::{folder, place};
 use crate::messages::exit::{ALL_INPUTS, Failure};
 
 /// The directory in that of results.
@@ -30,7 +32,7 @@ const MOST_INPUTS: usize = 256;
 pub(crate) struct Plan {
     pub(crate) inputs: Vec<Found>,
     /// Of the results, in the order of their inputs.
-    pub(crate) names: Vec<String>,
+    pub(crate) names: Vec<Name>,
     /// The inputs of each shard.
     pub(crate) cuts: Vec<Range<usize>>,
     pub(crate) format: &'static Format,
@@ -72,10 +74,10 @@ pub(crate) fn cut(sizes: &[u64], most_bytes: u64) -> Vec<Range<usize>> {
     cuts
 }
 
-/// The hash of a list of names.
-pub(crate) fn hash_of(names: &[String]) -> String {
+/// The hash of a list of names; an input without one has none there.
+pub(crate) fn hash_of(names: &[Name]) -> String {
     let mut digest = Digest::default();
-    for name in names {
+    for name in names.iter().flatten() {
         digest.update(name.as_bytes());
         digest.update(b"\n"); // in a name it would be one of another list, which does no harm here
     }
@@ -98,7 +100,7 @@ impl Plan {
             return Err(Failure::usage(message));
         }
         let format = folder::format(folder, format)?;
-        let names = folder::names(&inputs, folder, format)?;
+        let names = folder::names(&inputs, folder, format);
         let cuts = cut(sizes, shard_bytes);
         let mut digest = Digest::default();
         let mut say = |text: &str| {
@@ -110,7 +112,7 @@ impl Plan {
         }
         say(&shard_bytes.to_string());
         for (name, size) in names.iter().zip(sizes) {
-            say(name);
+            say(name.as_deref().unwrap_or_default());
             say(&size.to_string());
         }
         let stated = Stated {
@@ -168,8 +170,10 @@ impl Plan {
             true => record::names(folder),
             false => HashSet::new(),
         };
-        let there = |name: &&String| !known.contains(*name) && folder.join(name).exists();
-        let name = self.names.iter().find(there)?;
+        let there = |name: &&String| {
+            !known.contains(*name) && std::fs::symlink_metadata(folder.join(name)).is_ok()
+        };
+        let name = self.names.iter().flatten().find(there)?;
         let path = folder.join(name);
         let path = path.display();
         Some(Failure::usage(format!(
@@ -179,8 +183,13 @@ impl Plan {
 }
 
 impl Stated {
+    /// Below the directory of results.
+    fn name() -> PathBuf {
+        Path::new(FOLDER).join(STATED)
+    }
+
     fn path(folder: &Path) -> PathBuf {
-        folder.join(FOLDER).join(STATED)
+        folder.join(Self::name())
     }
 
     /// What a directory says; nothing where it has no shards.
@@ -190,54 +199,66 @@ impl Stated {
             let path = path.display();
             Failure::new(ALL_INPUTS, format!("{path}: cannot be read: {why}"))
         };
-        match std::fs::read(&path) {
-            Ok(bytes) => serde_json::from_slice(&bytes)
-                .map(Some)
-                .map_err(|error| refuse(&error)),
-            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
-            Err(error) if error.kind() == io::ErrorKind::NotADirectory => Ok(None),
-            Err(error) => Err(refuse(&error)),
+        let mut bytes = Vec::new();
+        let mut open = || {
+            // What is in it is to be written and removed: it is no link.
+            parent_beneath(folder, &Self::name())?;
+            open_beneath(folder, &Self::name())?.read_to_end(&mut bytes)
+        };
+        match open() {
+            Ok(_) => {}
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
+            Err(error) if error.kind() == io::ErrorKind::NotADirectory => return Ok(None),
+            Err(error) => return Err(refuse(&error)),
+        }
+        let stated: Self = serde_json::from_slice(&bytes).map_err(|error| refuse(&error))?;
+        let Self { shards, inputs, .. } = stated;
+        match (1..=inputs).contains(&shards) {
+            true => Ok(Some(stated)),
+            false => Err(refuse(&format!(
+                "it says {shards} shards of {inputs} inputs, and each has one at least; remove it"
+            ))),
         }
     }
 
     /// Written whole, over what another process writes at the same time.
     fn write(&self, folder: &Path) -> Result<(), Failure> {
         let path = Self::path(folder);
-        let shown = path.display().to_string();
-        std::fs::create_dir_all(folder.join(FOLDER))
-            .map_err(|error| Failure::writing(&shown, &error))?;
+        place::folder(&folder.join(FOLDER))?;
         let text = serde_json::to_string(self).expect("strings and numbers") + "\n";
-        let written = Output::create(&path, true, &[]).and_then(|mut output| {
-            output.write_all(text.as_bytes()).map_err(|source| {
-                tumble_formats::output::OutputError::Write {
-                    path: path.clone(),
-                    source,
-                }
-            })?;
-            output.commit()
-        });
-        written.map_err(|error| Failure::output(&error))
+        let output = Output::create(&path, true, &[]);
+        let mut output = output.map_err(|error| Failure::output(&error))?;
+        let written = output.write_all(text.as_bytes());
+        written.map_err(|error| Failure::writing(&path.display().to_string(), &error))?;
+        output.commit().map_err(|error| Failure::output(&error))
     }
 
     /// The shards are merged: nothing is said of them any more. What is left when this is stopped
-    /// half-way says nothing without the plan, which goes first.
+    /// half-way says nothing without the plan, which goes first. Files that no shard has written stay.
     pub(crate) fn remove(folder: &Path) -> Result<(), Failure> {
-        let failed = |error: &io::Error| {
+        let failed = |error: io::Error| {
             let folder = folder.join(FOLDER);
-            Failure::writing(&folder.display().to_string(), error)
+            Failure::writing(&folder.display().to_string(), &error)
         };
-        for removed in [
-            std::fs::remove_file(Self::path(folder)),
-            std::fs::remove_dir_all(folder.join(FOLDER)),
-        ] {
-            match removed {
-                Err(error) if error.kind() != io::ErrorKind::NotFound => {
-                    return Err(failed(&error));
-                }
-                _ => {}
+        let gone = |removed: io::Result<()>| match removed {
+            Err(error) if error.kind() != io::ErrorKind::NotFound => Err(failed(error)),
+            _ => Ok(()),
+        };
+        if Self::read(folder)?.is_none() {
+            return Ok(());
+        }
+        gone(std::fs::remove_file(Self::path(folder)))?;
+        for shard in record::numbers(folder) {
+            let bytes = record::bytes(folder, shard).unwrap_or_default();
+            if record::header(&bytes).is_some() {
+                gone(std::fs::remove_file(record::path(folder, shard)))?;
             }
         }
-        Ok(())
+        remove_abandoned(&folder.join(FOLDER));
+        match std::fs::remove_dir(folder.join(FOLDER)) {
+            Err(error) if error.kind() == io::ErrorKind::DirectoryNotEmpty => Ok(()),
+            removed => gone(removed),
+        }
     }
 }
 

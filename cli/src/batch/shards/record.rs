@@ -1,17 +1,18 @@
 //! What a shard leaves when it is done: its lines of the manifest, behind a line about itself.
 
 use std::collections::{BTreeMap, HashSet};
-use std::fs::File;
-use std::io::{BufRead, BufReader};
+use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
+use tumble_formats::beneath::{is_beneath, open_beneath};
 
+use crate::batch::digest;
 use crate::batch::manifest::{self, Entry, Lines};
 use crate::batch::shards::plan::FOLDER;
 
 /// The first line of a shard's file.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct Header {
     /// From 1.
     pub(crate) shard: usize,
@@ -21,6 +22,12 @@ pub(crate) struct Header {
     pub(crate) inputs: usize,
     /// Inputs without a result.
     pub(crate) failed: Vec<Refusal>,
+    /// The lines behind this one, and their hash: a file that has lost one, or has another, is that
+    /// of a shard that is not done.
+    #[serde(default)]
+    pub(crate) results: usize,
+    #[serde(default)]
+    pub(crate) results_sha256: String,
 }
 
 /// An input that was refused.
@@ -32,9 +39,33 @@ pub(crate) struct Refusal {
     pub(crate) message: String,
 }
 
+/// The file of a shard, below the directory of results.
+fn name(shard: usize) -> PathBuf {
+    Path::new(FOLDER).join(format!("{shard:05}.jsonl"))
+}
+
 /// The file of a shard.
 pub(crate) fn path(folder: &Path, shard: usize) -> PathBuf {
-    folder.join(FOLDER).join(format!("{shard:05}.jsonl"))
+    folder.join(name(shard))
+}
+
+/// The numbers of the shards that a directory has files of, in order.
+pub(crate) fn numbers(folder: &Path) -> Vec<usize> {
+    let files = std::fs::read_dir(folder.join(FOLDER)).into_iter().flatten();
+    let numbers = files.flatten().filter_map(|file| {
+        let number = Path::new(&file.file_name()).file_stem()?.to_str()?.parse().ok()?;
+        (name(number).file_name()? == file.file_name()).then_some(number)
+    });
+    let mut numbers: Vec<usize> = numbers.collect();
+    numbers.sort_unstable();
+    numbers
+}
+
+/// The bytes of a shard's file.
+pub(crate) fn bytes(folder: &Path, shard: usize) -> std::io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    open_beneath(folder, &name(shard))?.read_to_end(&mut bytes)?;
+    Ok(bytes)
 }
 
 /// What the temporary files of a shard's results are called by.
@@ -47,29 +78,41 @@ pub(crate) const MARK: &str = "shard";
 
 /// A shard's file as text.
 pub(crate) fn text<'a>(header: &Header, entries: impl IntoIterator<Item = &'a Entry>) -> String {
-    let mut text = serde_json::to_string(header).expect("strings and numbers") + "\n";
-    for entry in entries {
-        text += &manifest::line(entry);
-    }
-    text
+    let lines: Vec<String> = entries.into_iter().map(manifest::line).collect();
+    let header = Header {
+        results: lines.len(),
+        results_sha256: digest::of_bytes(lines.iter().map(String::as_bytes)),
+        ..header.clone()
+    };
+    let first = serde_json::to_string(&header).expect("strings and numbers") + "\n";
+    first + &lines.concat()
 }
 
 /// The line about a shard, and how long it is; nothing where the file is no shard's.
 pub(crate) fn header(bytes: &[u8]) -> Option<(Header, usize)> {
     let end = bytes.iter().position(|&byte| byte == b'\n')? + 1;
     let header = serde_json::from_slice(&bytes[..end]).ok()?;
-    bytes.ends_with(b"\n").then_some((header, end))
+    Some((header, end))
+}
+
+/// As [`header`], of a file that has all its lines as they were written.
+pub(crate) fn whole(bytes: &[u8]) -> Option<(Header, usize)> {
+    let (header, start) = header(bytes)?;
+    let lines = &bytes[start..];
+    let count = lines.split_inclusive(|&byte| byte == b'\n').count();
+    let is_whole = count == header.results
+        && digest::of_bytes([lines]) == header.results_sha256
+        && lines
+            .split_inclusive(|&byte| byte == b'\n')
+            .all(|line| line.ends_with(b"\n") && owner(line).is_some());
+    is_whole.then_some((header, start))
 }
 
 /// All results that done shards of a directory have made.
 pub(crate) fn entries(folder: &Path) -> BTreeMap<String, Entry> {
     let mut all = BTreeMap::new();
-    for file in std::fs::read_dir(folder.join(FOLDER))
-        .into_iter()
-        .flatten()
-        .flatten()
-    {
-        let bytes = std::fs::read(file.path()).unwrap_or_default();
+    for shard in numbers(folder) {
+        let bytes = bytes(folder, shard).unwrap_or_default();
         if let Some((_, start)) = header(&bytes) {
             all.extend(Lines::parse(&bytes[start..]).entries);
         }
@@ -85,21 +128,26 @@ struct Owner {
     one_of: Option<(String, usize)>,
 }
 
+/// The owner of a line; nothing where it is no entry, or names a result outside its directory.
+pub(crate) fn owner(line: &[u8]) -> Option<(String, Option<String>)> {
+    let Owner { output, one_of } = serde_json::from_slice(line).ok()?;
+    let all = one_of.map(|(all, _)| all);
+    let is_good = is_beneath(&output) && all.as_deref().is_none_or(is_beneath);
+    is_good.then_some((output, all))
+}
+
 /// The results, and the results of all clips of an input together, that a directory's manifests name.
 /// They may be a million: one line is in memory at a time.
 pub(crate) fn names(folder: &Path) -> HashSet<String> {
-    let shards = std::fs::read_dir(folder.join(FOLDER)).into_iter().flatten();
-    let shards = shards.flatten().map(|file| file.path());
+    let shards = numbers(folder).into_iter();
+    let shards = shards.filter_map(|shard| open_beneath(folder, &name(shard)).ok());
     let mut known = HashSet::new();
-    for path in shards.chain([folder.join(manifest::NAME)]) {
-        let Ok(file) = File::open(path) else {
-            continue;
-        };
+    for file in shards.chain(manifest::open(folder).ok().flatten()) {
         // A line that is no entry, such as that about the shard itself, has no output.
-        for line in BufReader::new(file).lines().map_while(Result::ok) {
-            if let Ok(Owner { output, one_of }) = serde_json::from_str(&line) {
+        for line in BufReader::new(file).split(b'\n').map_while(Result::ok) {
+            if let Some((output, all)) = owner(&line) {
                 known.insert(output);
-                known.extend(one_of.map(|(all, _)| all));
+                known.extend(all);
             }
         }
     }
@@ -111,23 +159,54 @@ pub(crate) fn names(folder: &Path) -> HashSet<String> {
 pub(crate) fn previous(folder: &Path, shard: usize, names: &[&str]) -> BTreeMap<String, Entry> {
     let own: HashSet<&str> = names.iter().copied().collect();
     let mut found = BTreeMap::new();
-    if let Ok(file) = File::open(folder.join(manifest::NAME)) {
+    if let Ok(Some(file)) = manifest::open(folder) {
         // The directory's may be of a million results: one line is in memory at a time.
-        for line in BufReader::new(file).lines().map_while(Result::ok) {
-            let Ok(owner) = serde_json::from_str::<Owner>(&line) else {
+        for line in BufReader::new(file).split(b'\n').map_while(Result::ok) {
+            let Some((output, all)) = owner(&line) else {
                 continue;
             };
-            let of_all = owner.one_of.as_ref().map(|(all, _)| &**all);
-            let is_own =
-                own.contains(&*owner.output) || of_all.is_some_and(|all| own.contains(all));
-            if is_own && let Ok(entry) = serde_json::from_str::<Entry>(&line) {
-                found.insert(owner.output, entry);
+            let is_own = own.contains(&*output) || all.is_some_and(|all| own.contains(&*all));
+            if is_own && let Some(entry) = Entry::of_line(&line) {
+                found.insert(output, entry);
             }
         }
     }
-    let bytes = std::fs::read(path(folder, shard)).unwrap_or_default();
+    let bytes = bytes(folder, shard).unwrap_or_default();
     if let Some((_, start)) = header(&bytes) {
         found.extend(Lines::parse(&bytes[start..]).entries);
     }
     found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_that_lost_a_line_is_not_whole() {
+        let entry = |name: &str| Entry {
+            output: name.to_owned(),
+            output_sha256: String::new(),
+            output_bytes: 1,
+            input: name.to_owned(),
+            input_sha256: None,
+            options: String::new(),
+            kernels_sha256: String::new(),
+            tumble: String::new(),
+            device: String::new(),
+            one_of: None,
+        };
+        let entries = [entry("a"), entry("b"), entry("c")];
+        let all = text(&Header::default(), &entries);
+        assert!(whole(all.as_bytes()).is_some());
+        for gone in 1..4 {
+            let left: String = (all.lines().enumerate())
+                .filter(|(at, _)| *at != gone)
+                .map(|(_, line)| format!("{line}\n"))
+                .collect();
+            assert!(whole(left.as_bytes()).is_none(), "without line {gone}");
+        }
+        assert!(whole(all.trim_end().as_bytes()).is_none());
+        assert!(whole(all.replace("\"b\"", "\"d\"").as_bytes()).is_none());
+    }
 }

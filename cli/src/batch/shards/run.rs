@@ -4,13 +4,13 @@
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use tumble_formats::output::{Output, OutputError, remove_marked};
+use tumble_formats::output::{Output, remove_marked};
 
 use crate::arguments::input;
-use crate::batch::folder;
+use crate::batch::folder::{Name, Places};
 use crate::batch::manifest::{Entry, Previous};
 use crate::batch::output::Target;
-use crate::batch::place::{Place, Written};
+use crate::batch::place::Written;
 use crate::batch::run::Records;
 use crate::batch::shards::record::{self, Header, Refusal};
 use crate::messages::exit::Failure;
@@ -58,31 +58,42 @@ impl<'a> Shard<'a> {
 
     /// Whether its file says that it is done, by the same plan.
     pub(crate) fn is_done(&self) -> bool {
-        let bytes = std::fs::read(record::path(self.folder, self.header.shard));
-        let header = bytes.ok().and_then(|bytes| record::header(&bytes));
+        let bytes = record::bytes(self.folder, self.header.shard);
+        let header = bytes.ok().and_then(|bytes| record::whole(&bytes));
         header.is_some_and(|(header, _)| header.plan == self.header.plan)
     }
 
-    /// Where the results of those names go. What an earlier attempt left half-way is removed.
-    pub(crate) fn targets(
-        &self,
-        names: &[String],
+    /// What is to be done: each input, and where its result goes. Inputs whose results have no name or
+    /// no place have failed. What an earlier attempt left half-way is removed.
+    pub(crate) fn jobs(
+        &mut self,
+        paths: impl Iterator<Item = PathBuf>,
+        names: &[Name],
         format: &'static Format,
-    ) -> Result<Vec<Target>, Failure> {
+    ) -> Vec<(PathBuf, Target)> {
         let mark = record::mark(self.header.shard);
-        for parent in &folder::parents(names, self.folder)? {
-            remove_marked(parent, &mark);
+        let mut places = Places::new(self.folder);
+        let mut jobs = Vec::new();
+        for (path, name) in paths.zip(names) {
+            let target = name.clone().and_then(|name| {
+                // The plan has claimed its results.
+                let place = places.place(&name, true)?;
+                Ok(Target::new(place.hashed().marked(&mark), format, name))
+            });
+            match target {
+                Ok(target) => jobs.push((path, target)),
+                Err(failure) => {
+                    if !self.quiet {
+                        failure.report();
+                    }
+                    self.refuse(&path, &failure);
+                }
+            }
         }
-        let target = |name: &String| {
-            // The plan has claimed its results.
-            let place = Place::new(&self.folder.join(name), true, &[])?;
-            Ok(Target::new(
-                place.hashed().marked(&mark),
-                format,
-                name.clone(),
-            ))
-        };
-        names.iter().map(target).collect()
+        for folder in &places.made {
+            remove_marked(folder, &mark);
+        }
+        jobs
     }
 
     /// Gives the results their names, and says so in the shard's file.
@@ -90,19 +101,20 @@ impl<'a> Shard<'a> {
         self.commit()?;
         let path = record::path(self.folder, self.header.shard);
         let text = self.text();
-        if std::fs::read(&path).is_ok_and(|before| before == text.as_bytes()) {
-            return Ok(());
+        match record::bytes(self.folder, self.header.shard) {
+            Ok(before) if before == text.as_bytes() => return Ok(()),
+            Ok(before) if record::header(&before).is_none() => {
+                let path = path.display();
+                let message = "is not the file of a shard: its first line is none; move it";
+                return Err(Failure::usage(format!("{path}: {message}")));
+            }
+            Ok(_) | Err(_) => {}
         }
-        let written = Output::create(&path, true, &[]).and_then(|mut output| {
-            output
-                .write_all(text.as_bytes())
-                .map_err(|source| OutputError::Write {
-                    path: PathBuf::from(&path),
-                    source,
-                })?;
-            output.commit()
-        });
-        written.map_err(|error| Failure::output(&error))
+        let output = Output::create(&path, true, &[]);
+        let mut output = output.map_err(|error| Failure::output(&error))?;
+        let written = output.write_all(text.as_bytes());
+        written.map_err(|error| Failure::writing(&path.display().to_string(), &error))?;
+        output.commit().map_err(|error| Failure::output(&error))
     }
 
     /// As [`Shard::finish`], without the file: what it would hold.
@@ -164,6 +176,10 @@ impl Records for Shard<'_> {
             code: failure.code,
             message: failure.message().to_owned(),
         });
+    }
+
+    fn list(&self) -> PathBuf {
+        record::path(self.folder, self.header.shard)
     }
 
     fn tell(&self, text: &str) {

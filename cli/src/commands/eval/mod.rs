@@ -7,7 +7,6 @@ pub(crate) mod shards;
 
 use std::borrow::Cow;
 use std::cell::RefCell;
-use std::path::Path;
 use std::time::Instant;
 
 use clap::{Args, ValueEnum};
@@ -26,7 +25,7 @@ use crate::arguments::interpolation::{Manner, Wanted, wanted};
 use crate::arguments::results::{Results, each_file};
 use crate::arguments::time::{Samples, Sampling};
 use crate::arguments::what::{OrderArgument, What, quaternions};
-use crate::batch::digest;
+use crate::batch::digest::InputFile;
 use crate::batch::output::Target;
 use crate::batch::place::Written;
 use crate::batch::run::{Done, Evaluated};
@@ -179,15 +178,14 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let mut told = Vec::new();
     let outcome = results.make(
         &arguments.inputs,
-        &inputs,
         plan,
         options,
-        |path, loaded, target, done| {
+        |file, loaded, target, done| {
             let job = Job {
                 arguments,
                 device: &mut device,
                 samples: &samples,
-                path,
+                file,
                 loaded,
                 started: Instant::now(),
             };
@@ -229,7 +227,7 @@ struct Job<'a> {
     arguments: &'a Arguments,
     device: &'a mut Opened,
     samples: &'a Samples,
-    path: &'a Path,
+    file: &'a InputFile,
     loaded: &'a Loaded,
     started: Instant,
 }
@@ -242,8 +240,9 @@ impl Job<'_> {
         done: &mut Done<'_>,
         told: &mut Vec<Told>,
     ) -> Result<(), Failure> {
-        let name = input::name(self.path);
-        let file = (self.path, self.loaded);
+        let path = self.file.path();
+        let name = input::name(path);
+        let file = (path, self.loaded);
         let latest = RefCell::new(None);
         let mut done = |name: &str, evaluated: Evaluated| {
             done(name, evaluated)?;
@@ -366,13 +365,16 @@ impl Job<'_> {
     }
 
     /// What made a result, for formats that have room for it.
-    fn notes(&self, name: &str) -> Vec<(&'static str, String)> {
+    fn notes(&self, name: &str) -> Result<Vec<(&'static str, String)>, Failure> {
         let mut notes = vec![
             ("method", self.arguments.method.to_string()),
             ("input", name.to_owned()),
         ];
-        notes.extend(digest::of_input(self.path).map(|hash| ("input_sha256", hash)));
-        notes
+        let sha256 = self.file.sha256().map(str::to_owned);
+        // The hash is of the bytes that were read, or none.
+        self.file.check_unchanged()?;
+        notes.extend(sha256.map(|hash| ("input_sha256", hash)));
+        Ok(notes)
     }
 
     /// Which method interpolates each channel.

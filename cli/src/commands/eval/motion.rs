@@ -133,7 +133,7 @@ impl Job<'_> {
             all.push(self.sample(name, clip, frames)?);
         }
         let method = self.arguments.method.to_string();
-        let notes = self.notes(name);
+        let notes = self.notes(name)?;
         let sampled: Vec<Sampled<'_>> = (clips.iter().zip(&all))
             .map(|(clip, samples)| samples.of(clip, rate, &notes))
             .collect();

@@ -37,7 +37,7 @@ impl Job<'_> {
             LayoutArgument::Track => Layout::TrackMajor,
             LayoutArgument::Frame => Layout::FrameMajor,
         };
-        let mut notes = self.notes(name);
+        let mut notes = self.notes(name)?;
         if let time::Samples::Rate { rate, .. } = self.samples {
             notes.push(("rate", rate.to_string()));
         }

@@ -7,6 +7,7 @@ use std::time::Instant;
 use crate::arguments::device::Opened;
 use crate::arguments::gather::Found;
 use crate::arguments::time::Samples;
+use crate::batch::folder;
 use crate::batch::output::Target;
 use crate::batch::run::Batch;
 use crate::batch::shards::plan::Plan;
@@ -61,10 +62,11 @@ pub(crate) fn run(arguments: &Arguments, part: Part) -> Result<(), Failure> {
     let mut evaluator = Evaluator::new(arguments)?;
     let (folder, resume) = (arguments.results.folder()?, arguments.results.is_resumed());
     let gathered = arguments.inputs.gather(false)?;
-    let sizes: Vec<u64> = gathered.files.iter().map(size).collect();
+    let files = folder::without_results(gathered.files, folder)?;
+    let sizes: Vec<u64> = files.iter().map(size).collect();
     let bytes = arguments.shard_bytes;
     let request = &evaluator.request;
-    let plan = request.plan(arguments, gathered.files, &sizes, folder, bytes)?;
+    let plan = request.plan(arguments, files, &sizes, folder, bytes)?;
     let shards = part.shards(plan.cuts.len())?;
     plan.claim(folder, resume, arguments.results.overwrites())?;
     let (mut failed, mut inputs) = (0, 0);
@@ -77,9 +79,10 @@ pub(crate) fn run(arguments: &Arguments, part: Part) -> Result<(), Failure> {
             of: plan.cuts.len(),
             plan: plan.stated.plan.clone(),
             inputs: own.len(),
-            failed: Vec::new(),
+            ..Header::default()
         };
-        let names: Vec<&str> = plan.names[own.clone()].iter().map(|name| &**name).collect();
+        let names = plan.names[own.clone()].iter().flatten();
+        let names: Vec<&str> = names.map(|name| &**name).collect();
         let mut shard = Shard::new(folder, header, &names, resume);
         if shard.is_done() && !resume && !arguments.results.overwrites() {
             return Err(Failure::usage(format!(
@@ -89,8 +92,7 @@ pub(crate) fn run(arguments: &Arguments, part: Part) -> Result<(), Failure> {
         let paths = plan.inputs[own.clone()]
             .iter()
             .map(|found| found.path.clone());
-        let targets = shard.targets(&plan.names[own], plan.format)?;
-        let jobs: Vec<(PathBuf, Target)> = paths.zip(targets).collect();
+        let jobs = shard.jobs(paths, &plan.names[own], plan.format);
         evaluator.evaluate(arguments, &jobs, &mut shard, &mut told)?;
         shard.finish()?;
         failed += shard.header.failed.len();
@@ -184,12 +186,12 @@ impl Evaluator {
             resume: arguments.results.is_resumed(),
         };
         let refused = shard.header.failed.len();
-        let outcome = batch.run(jobs, shard, |path, loaded, target, done| {
+        let outcome = batch.run(jobs, Vec::new(), shard, |file, loaded, target, done| {
             let job = Job {
                 arguments,
                 device: &mut self.device,
                 samples: &self.request.samples,
-                path,
+                file,
                 loaded,
                 started: Instant::now(),
             };

@@ -92,6 +92,10 @@ fn land(arguments: &Arguments) -> Result<(), Failure> {
     let place = |path: &Path| Place::new(path, arguments.overwrite, &[]);
     let rocks = arguments.rocks.as_deref().map(place).transpose()?;
     let hill = place(&arguments.out)?;
+    if let Some(rocks) = &rocks {
+        rocks.refuse_same(&arguments.out)?;
+        rocks.try_out()?;
+    }
     hill.write(None, |out| landscape.write_hill(out))?;
     if let Some(rocks) = rocks {
         rocks.write(None, |out| landscape.write_rocks(out))?;

@@ -135,7 +135,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let files = arguments.inputs.gather(false)?;
     let plan = arguments.results.plan(&files)?;
     let plot = match &arguments.plot {
-        Some(file) => arguments.results.picture(file, &files)?,
+        Some(file) => arguments.results.picture(file, &files, &plan)?,
         None => None,
     };
     let format = plan.targets.first().map(Target::format);
@@ -151,10 +151,10 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let mut all = Vec::new();
     let outcome = arguments.results.make(
         &arguments.inputs,
-        &files,
         plan,
         options,
-        |path, loaded, target, done| {
+        |file, loaded, target, done| {
+            let path = file.path();
             let name = input::name(path);
             let mut make = |name: &str, clips: &[&Motion], target: &Target| {
                 let one = (path, loaded);

@@ -6,6 +6,7 @@ mod results;
 pub(crate) mod surface;
 mod tables;
 
+use std::io::Write as _;
 use std::time::Instant;
 
 use glam::DVec3;
@@ -69,9 +70,17 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     for outcome in &outcomes {
         warn_off(outcome, surface.size());
     }
+    // Drawn before anything is written: what cannot be drawn leaves nothing.
+    let picture = match results.plot() {
+        None => None,
+        Some(place) => {
+            let picture = picture::draw(arguments, place, &surface, avoided.as_deref(), &outcomes)?;
+            Some((place, picture))
+        }
+    };
     results.write(&outcomes)?;
-    if let Some(file) = &arguments.plot {
-        picture::draw(arguments, file, &surface, avoided.as_deref(), &outcomes)?;
+    if let Some((place, picture)) = picture {
+        place.write(None, |out| out.write_all(&picture))?;
     }
     told(arguments, &outcomes, &results, started)
 }

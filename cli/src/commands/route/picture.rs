@@ -2,8 +2,6 @@
 
 use std::collections::HashSet;
 use std::fmt::Write as _;
-use std::io::Write as _;
-use std::path::Path;
 
 use glam::{DVec2, DVec3};
 use resvg::{tiny_skia, usvg};
@@ -26,18 +24,15 @@ const MOST_EDGES: usize = 60_000;
 /// Of the ways, one after another: blue, orange, green, red, purple (after Okabe and Ito).
 const COLOURS: [&str; 5] = ["#0072b2", "#e69f00", "#009e73", "#d55e00", "#cc79a7"];
 
+/// The picture as its file has it.
 pub(super) fn draw(
     arguments: &Arguments,
-    file: &Path,
+    place: &Place,
     surface: &Surface,
     avoided: Option<&Mesh>,
     outcomes: &[Outcome],
-) -> Result<(), Failure> {
-    let name = file.display().to_string();
-    let extension = file
-        .extension()
-        .and_then(|own| own.to_str())
-        .unwrap_or_default();
+) -> Result<Vec<u8>, Failure> {
+    let name = place.to_string();
     let faceted;
     let mesh = match surface {
         Surface::Mesh(mesh) => mesh,
@@ -49,20 +44,11 @@ pub(super) fn draw(
         }
     };
     let svg = svg(arguments.up, mesh, avoided, outcomes);
-    let bytes = match extension.to_lowercase().as_str() {
-        "svg" => svg.into_bytes(),
-        "png" => png(&svg).map_err(|error| Failure::writing(&name, &error))?,
-        _ => {
-            let message = format!("{name}: end the picture in .svg or .png");
-            return Err(Failure::usage(message));
-        }
-    };
-    let place = Place::new(
-        file,
-        arguments.overwrite,
-        std::slice::from_ref(&arguments.surface),
-    )?;
-    place.write(None, |out| out.write_all(&bytes))
+    let extension = place.path().extension().unwrap_or_default();
+    match extension.eq_ignore_ascii_case("png") {
+        true => png(&svg).map_err(|error| Failure::writing(&name, &error)),
+        false => Ok(svg.into_bytes()),
+    }
 }
 
 /// How places are seen from above.

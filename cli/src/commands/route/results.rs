@@ -48,6 +48,8 @@ impl Row {
 pub(super) struct Results {
     place: String,
     places: Vec<Place>,
+    /// Of the picture.
+    plot: Option<Place>,
 }
 
 impl Results {
@@ -56,9 +58,6 @@ impl Results {
         inputs.extend(arguments.avoid.clone());
         let out = &arguments.out;
         let new = |path: &Path| Place::new(path, arguments.overwrite, &inputs);
-        if let Some(plot) = &arguments.plot {
-            new(plot)?;
-        }
         let places = if party.is_single {
             vec![new(out)?]
         } else {
@@ -70,11 +69,31 @@ impl Results {
                 .map(|name| new(&path(name)))
                 .collect::<Result<_, _>>()?
         };
+        let plot = match &arguments.plot {
+            None => None,
+            Some(plot) => {
+                let plot = Place::of_picture(plot, arguments.overwrite, &inputs)?;
+                for place in &places {
+                    plot.refuse_same(place.path())?;
+                }
+                plot.try_out()?;
+                Some(plot)
+            }
+        };
         let place = match &places[..] {
             [place] if party.is_single => place.to_string(),
             _ => out.display().to_string(),
         };
-        Ok(Self { place, places })
+        Ok(Self {
+            place,
+            places,
+            plot,
+        })
+    }
+
+    /// Where the picture goes, if one is drawn.
+    pub(super) fn plot(&self) -> Option<&Place> {
+        self.plot.as_ref()
     }
 
     /// Writes what was found, each file whole or not at all.

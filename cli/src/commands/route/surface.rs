@@ -5,6 +5,7 @@ use std::io::{self, Read};
 use std::path::Path;
 
 use tumble_formats::Limits;
+use tumble_formats::beneath::open_beneath;
 use tumble_formats::gltf::meshes::read_triangles;
 use tumble_routes::mesh::Mesh;
 use tumble_routes::net::Net;
@@ -67,25 +68,32 @@ impl Surface {
 
 /// All bytes of a file; no pipe, which could have no end.
 pub(super) fn bytes(path: &Path) -> Result<Vec<u8>, Failure> {
+    let open = || match std::fs::metadata(path)?.is_file() {
+        true => File::open(path),
+        false => Err(io::Error::other("is no file; give one")),
+    };
+    read(path, open())
+}
+
+/// All bytes of a file that a file in `folder` names.
+pub(super) fn bytes_beneath(folder: &Path, name: &Path) -> Result<Vec<u8>, Failure> {
+    read(name, open_beneath(folder, name))
+}
+
+fn read(path: &Path, file: io::Result<File>) -> Result<Vec<u8>, Failure> {
     let name = path.display();
     let refuse =
         |error: io::Error| Failure::new(ALL_INPUTS, format!("{name}: cannot be read: {error}"));
-    if std::fs::metadata(path).map_err(refuse)?.is_file() {
-        let mut bytes = Vec::new();
-        let file = File::open(path).map_err(refuse)?;
-        file.take(MOST_BYTES + 1)
-            .read_to_end(&mut bytes)
-            .map_err(refuse)?;
-        if bytes.len() as u64 <= MOST_BYTES {
-            return Ok(bytes);
-        }
-        return Err(Failure::new(
+    let mut bytes = Vec::new();
+    let file = file.map_err(refuse)?;
+    file.take(MOST_BYTES + 1)
+        .read_to_end(&mut bytes)
+        .map_err(refuse)?;
+    match bytes.len() as u64 <= MOST_BYTES {
+        true => Ok(bytes),
+        false => Err(Failure::new(
             ALL_INPUTS,
             format!("{name}: is longer than 4 GiB; simplify it"),
-        ));
+        )),
     }
-    Err(Failure::new(
-        ALL_INPUTS,
-        format!("{name}: is no file; give one"),
-    ))
 }

@@ -6,7 +6,7 @@ use glam::DVec3;
 use serde::Deserialize;
 use tumble_routes::walkers::Mover;
 
-use crate::commands::route::surface::bytes;
+use crate::commands::route::surface::{bytes, bytes_beneath};
 use crate::messages::exit::{ALL_INPUTS, Failure};
 
 /// Who goes from where to where.
@@ -44,8 +44,8 @@ fn refuse(path: &Path, line: u64, message: &str) -> Failure {
     Failure::new(ALL_INPUTS, format!("{}:{line}: {message}", path.display()))
 }
 
-fn text(path: &Path) -> Result<String, Failure> {
-    String::from_utf8(bytes(path)?).map_err(|_| {
+fn text(path: &Path, bytes: Vec<u8>) -> Result<String, Failure> {
+    String::from_utf8(bytes).map_err(|_| {
         let message = format!("{}: is no UTF-8 text", path.display());
         Failure::new(ALL_INPUTS, message)
     })
@@ -54,7 +54,7 @@ fn text(path: &Path) -> Result<String, Failure> {
 /// Six numbers a line; lines with `#` in front and empty ones are skipped.
 pub(super) fn read_pairs(path: &Path) -> Result<Party, Failure> {
     let mut pairs = Vec::new();
-    for (number, line) in (1..).zip(text(path)?.lines()) {
+    for (number, line) in (1..).zip(text(path, bytes(path)?)?.lines()) {
         let line = line.trim();
         if line.is_empty() || line.starts_with('#') {
             continue;
@@ -114,8 +114,11 @@ struct TrackRow {
     z: f64,
 }
 
-fn rows<T: for<'de> Deserialize<'de>>(path: &Path) -> Result<Vec<(u64, T)>, Failure> {
-    let text = text(path)?;
+fn rows<T: for<'de> Deserialize<'de>>(
+    path: &Path,
+    bytes: Vec<u8>,
+) -> Result<Vec<(u64, T)>, Failure> {
+    let text = text(path, bytes)?;
     let mut reader = csv::ReaderBuilder::new()
         .trim(csv::Trim::All)
         .comment(Some(b'#'))
@@ -145,14 +148,17 @@ pub(super) fn read_walkers(path: &Path) -> Result<Party, Failure> {
         movers: Vec::new(),
         is_single: false,
     };
-    for (line, row) in rows::<WalkerRow>(path)? {
+    for (line, row) in rows::<WalkerRow>(path, bytes(path)?)? {
         if let Some(track) = row.track.filter(|own| !own.is_empty()) {
             if !(row.radius >= 0.0 && row.radius.is_finite()) {
                 return Err(refuse(path, line, "a radius is a number of 0 or more"));
             }
-            let file = path.parent().unwrap_or(Path::new("")).join(track);
+            let folder = path.parent().unwrap_or(Path::new(""));
+            let file = folder.join(&track);
+            let bytes = bytes_beneath(folder, Path::new(&track))
+                .map_err(|failure| refuse(path, line, failure.message()))?;
             party.movers.push(Mover {
-                track: read_track(&file)?,
+                track: read_track(&file, bytes)?,
                 radius: row.radius,
             });
             continue;
@@ -201,9 +207,9 @@ pub(super) fn read_walkers(path: &Path) -> Result<Party, Failure> {
 }
 
 /// Times and places: `t,x,y,z`, times increasing.
-fn read_track(path: &Path) -> Result<Vec<(f64, DVec3)>, Failure> {
+fn read_track(path: &Path, bytes: Vec<u8>) -> Result<Vec<(f64, DVec3)>, Failure> {
     let mut track: Vec<(f64, DVec3)> = Vec::new();
-    for (line, row) in rows::<TrackRow>(path)? {
+    for (line, row) in rows::<TrackRow>(path, bytes)? {
         let place = DVec3::new(row.x, row.y, row.z);
         if !(place.is_finite() && row.t.is_finite()) {
             return Err(refuse(path, line, "times and places are finite numbers"));

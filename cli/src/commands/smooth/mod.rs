@@ -93,17 +93,17 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let files = arguments.inputs.gather(false)?;
     let plan = arguments.results.plan(&files)?;
     let plot = match &arguments.plot {
-        Some(file) => arguments.results.picture(file, &files)?,
+        Some(file) => arguments.results.picture(file, &files, &plan)?,
         None => None,
     };
     let mut device = arguments.device.open()?;
     let options = format!("smooth {}", arguments.given.options());
     arguments.results.make(
         &arguments.inputs,
-        &files,
         plan,
         options,
-        |path, loaded, target, done| {
+        |file, loaded, target, done| {
+            let path = file.path();
             let mut make = |name: &str, clips: &[&Motion], target: &Target| {
                 let started = Instant::now();
                 let tracks = &arguments.inputs.tracks;

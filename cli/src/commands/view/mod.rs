@@ -185,9 +185,9 @@ impl Arguments {
 
     fn place(&self, inputs: &[PathBuf]) -> Result<Place, Failure> {
         let Some(out) = &self.out else {
-            // Named after this run, and left there for the browser.
-            let name = format!("tumble-view-{}.html", std::process::id());
-            return Place::new(&std::env::temp_dir().join(name), true, inputs);
+            // A name of its own, under which nobody has a file, left there for the browser.
+            let name = format!("tumble-view-{:016x}.html", fastrand::u64(..));
+            return Place::new(&std::env::temp_dir().join(name), false, inputs);
         };
         if input::is_standard(out) && self.open {
             return Err(Failure::usage(

@@ -40,7 +40,7 @@ Examples:
   python -m tumble.distributed s3://bucket/clips s3://bucket/out --resume --into parquet
 
 Exit codes are those of `tumble`: 0 done, 2 the command line is wrong, 3 some inputs failed, 4 all did,
-6 a device failed, 7 output could not be written, 8 --check found a difference, 130 and 143 stopped by a signal: --resume goes on.
+6 a device failed, 7 output could not be written, 8 --check found a difference, 129 to 131 and 143 stopped by a signal: --resume goes on.
 """
 
 VALUES = {

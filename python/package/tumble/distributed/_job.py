@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import re
@@ -117,7 +118,10 @@ def lines_of(text: str) -> list[str]:
 
 
 def join_record(header: Entry, lines: list[str]) -> str:
-    return dump(header) + "".join(lines)
+    """A shard's file: the line about it says how many others there are, and their hash."""
+    text = "".join(lines)
+    digest = hashlib.sha256(text.encode()).hexdigest()
+    return dump(header | {"results": len(lines), "results_sha256": digest}) + text
 
 
 def dump(entry: Entry) -> str:

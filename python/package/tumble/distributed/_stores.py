@@ -6,11 +6,12 @@ import contextlib
 import importlib
 import os
 import shutil
+import stat
 import tempfile
 from collections.abc import Iterable
 from typing import Any, Protocol
 
-from tumble.distributed._job import USAGE, DistributedError, is_url
+from tumble.distributed._job import ALL_INPUTS, USAGE, DistributedError, is_url
 
 
 class Store(Protocol):
@@ -54,11 +55,21 @@ class _Files:
         self._place = place
 
     def _path(self, name: str) -> str:
-        return os.path.join(self._place, name)
+        """Beneath the directory, whatever a manifest says and through whatever links."""
+        path = os.path.join(self._place, name)
+        place = os.path.realpath(self._place)
+        if os.path.commonpath([place, os.path.realpath(path)]) != place:
+            message = f"{path}: leads out of its directory, which is not followed"
+            raise DistributedError(message, ALL_INPUTS)
+        return path
 
     def read(self, name: str) -> bytes | None:
+        path = self._path(name)
         try:
-            with open(self._path(name), "rb") as file:
+            # A pipe or a device may have no end.
+            if not stat.S_ISREG(os.stat(path).st_mode):
+                return None
+            with open(path, "rb") as file:
                 return file.read()
         except (FileNotFoundError, NotADirectoryError):
             return None
@@ -73,7 +84,7 @@ class _Files:
         path = self._path(name)
         os.makedirs(os.path.dirname(path), exist_ok=True)
         # As the program calls its temporary files, so that merging sweeps them.
-        number, temporary = tempfile.mkstemp(".part", ".tumble-shard", os.path.dirname(path))
+        number, temporary = tempfile.mkstemp(".part", ".tumble-shard-", os.path.dirname(path))
         try:
             with open(source, "rb") as file, open(number, "wb") as out:
                 shutil.copyfileobj(file, out)

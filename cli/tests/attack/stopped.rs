@@ -1,0 +1,267 @@
+//! Kills, signals, full disks and folders that nobody may write into: what is there is whole, and
+//! nothing is left behind.
+
+use std::fs;
+use std::os::unix::process::CommandExt;
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use crate::attack::{ended, entries, parts, run, succeed, times, two_animations, wait};
+use crate::program::{command, is_writing, sample_folder};
+use crate::support::Random;
+use crate::tree::tree;
+
+/// Every command that writes, with what it writes: files, or a folder.
+const WRITERS: &[(&str, &str)] = &[
+    ("eval a.dat --fps 20000 -o out/o.npy", "out/o.npy"),
+    ("eval a.dat --fps 20000 -o out/o.csv", "out/o.csv"),
+    ("eval walks --fps 4000 -o out/all", "out/all"),
+    ("convert walks --to npz -o out/all", "out/all"),
+    ("convert a.dat -o out/o.npz", "out/o.npz"),
+    ("smooth a.dat --fps 4000 -o out/o.npy --plot out/o.svg", "out/o.npy"),
+    ("reduce a.dat --fps 4000 -o out/o.npz --plot out/o.svg", "out/o.npz"),
+    ("follow path.csv --fps 20000 -o out/o.npy", "out/o.npy"),
+    ("plot a.dat -o out/o.svg", "out/o.svg"),
+    ("plot a.dat -o out/pictures", "out/pictures"),
+    ("render a.dat --size 64x48 --fps 10 -o out/o.png", "out/o.png"),
+    ("view a.dat -o out/o.html", "out/o.html"),
+    ("generate --boxes 400 --keys 200 -o out/o.dat", "out/o.dat"),
+    ("generate --hill -o out/hill.obj --rocks out/rocks.obj", "out/hill.obj"),
+    ("route hill.obj --from 1,0,1 --to 8,0,8 -o out/o.csv --plot out/o.svg", "out/o.csv"),
+];
+
+fn folder() -> tempfile::TempDir {
+    let place = sample_folder();
+    let at = place.path();
+    fs::create_dir_all(at.join("walks/deep")).unwrap();
+    for name in ["walks/deep/a.dat", "walks/deep/b.dat"] {
+        fs::copy(at.join("a.dat"), at.join(name)).unwrap();
+    }
+    fs::write(at.join("path.csv"), "t,x,y,z\n0,0,0,0\n1,1,0,0\n2,1,1,0\n3,0,1,1\n").unwrap();
+    fs::write(at.join("m.gltf"), two_animations()).unwrap();
+    succeed(at, &["generate", "--hill", "-o", "hill.obj"]);
+    fs::create_dir(at.join("out")).unwrap();
+    place
+}
+
+fn words(line: &str) -> Vec<&str> {
+    line.split(' ').collect()
+}
+
+fn quiet(place: &Path, line: &[&str]) -> Command {
+    let mut command = command(place, line);
+    command.stdout(Stdio::null()).stderr(Stdio::null());
+    command
+}
+
+/// Kills at random moments, in every command that writes: each file is whole or absent, the same
+/// command does its work afterwards, and nothing half-written stays.
+#[test]
+fn kills_leave_whole_files_and_nothing_else() {
+    let place = folder();
+    let at = place.path();
+    let mut random = Random(28);
+    let (mut kills, mut left) = (0, 0);
+    for (line, _) in WRITERS {
+        let line = words(line);
+        let started = Instant::now();
+        succeed(at, &line);
+        let longest = started.elapsed().as_micros() as u64;
+        let whole = tree(&at.join("out"));
+        for _ in 0..2 * times() {
+            fs::remove_dir_all(at.join("out")).unwrap();
+            fs::create_dir(at.join("out")).unwrap();
+            let mut child = quiet(at, &line).spawn().unwrap();
+            std::thread::sleep(Duration::from_micros(random.next() % longest.max(1)));
+            child.kill().unwrap();
+            kills += u32::from(child.wait().unwrap().code().is_none());
+            left += parts(&at.join("out")).len();
+            for (name, bytes) in tree(&at.join("out")) {
+                let is_part = name.ends_with(".part") || name.ends_with("manifest.jsonl");
+                assert!(is_part || whole[&name] == bytes, "{line:?}: {name} is not whole");
+            }
+            let has_manifest = whole.keys().any(|name| name.ends_with("manifest.jsonl"));
+            let again = if has_manifest { "--resume" } else { "--overwrite" };
+            succeed(at, &[&line[..], &[again]].concat());
+            assert_eq!(parts(&at.join("out")), Vec::<String>::new(), "{line:?}");
+            assert_eq!(tree(&at.join("out")), whole, "{line:?}");
+        }
+        fs::remove_dir_all(at.join("out")).unwrap();
+        fs::create_dir(at.join("out")).unwrap();
+    }
+    assert!(kills > 0, "no kill came in time; {left} files were left half-way");
+}
+
+/// What is left when all results lie in sub-folders goes too, and that of inputs that are gone.
+#[test]
+fn what_was_left_anywhere_below_a_folder_of_results_goes() {
+    let place = folder();
+    let at = place.path();
+    let line = ["eval", "walks", "-o", "out"];
+    succeed(at, &line);
+    for name in ["out/.tumble-aBcDeF.part", "out/deep/.tumble-aBcDeF.part"] {
+        fs::write(at.join(name), "half").unwrap();
+    }
+    fs::remove_file(at.join("walks/deep/b.dat")).unwrap();
+    fs::copy(at.join("a.dat"), at.join("walks/c.dat")).unwrap();
+    fs::remove_file(at.join("walks/deep/a.dat")).unwrap();
+    succeed(at, &[&line[..], &["--resume"]].concat());
+    assert_eq!(parts(&at.join("out")), Vec::<String>::new());
+}
+
+/// Some seconds of text, of which a first part is on its way.
+fn writing(at: &Path, ignored: Option<&str>) -> Child {
+    let line = "eval a.dat --fps 1000000 --device cpu -o out/o.csv";
+    let program = env!("CARGO_BIN_EXE_tumble");
+    let trap = ignored.map_or(String::new(), |signal| format!("trap '' {signal}; "));
+    let mut child = Command::new("sh")
+        .args(["-c", &format!("{trap}exec '{program}' {line}")])
+        .current_dir(at)
+        .stdin(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    let started = Instant::now();
+    while !is_writing(&child, &at.join("out")) {
+        assert!(child.try_wait().unwrap().is_none(), "it ended before it could be stopped");
+        assert!(started.elapsed().as_secs() < 60, "it does not begin");
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    child
+}
+
+fn send(signal: &str, child: &Child) {
+    let sent = Command::new("kill").args([&format!("-{signal}"), &child.id().to_string()]).status();
+    assert!(sent.unwrap().success());
+}
+
+#[test]
+fn every_signal_that_ends_programs_leaves_no_file() {
+    let place = folder();
+    let at = place.path();
+    for (signal, code) in [("INT", 130), ("TERM", 143), ("HUP", 129), ("QUIT", 131)] {
+        for twice in [false, true] {
+            let mut child = writing(at, None);
+            send(signal, &child);
+            if twice {
+                send(signal, &child);
+            }
+            assert_eq!(wait(&mut child).code(), Some(code), "{signal}, twice: {twice}");
+            assert_eq!(entries(&at.join("out")).len(), 0, "{signal}, twice: {twice}");
+        }
+    }
+}
+
+/// What whoever started the program has it ignore is ignored, as `nohup` has SIGHUP.
+#[cfg(target_os = "linux")]
+#[test]
+fn ignored_signals_stay_ignored() {
+    let place = folder();
+    let at = place.path();
+    for signal in ["INT", "HUP", "QUIT", "TERM"] {
+        let mut child = writing(at, Some(signal));
+        send(signal, &child);
+        std::thread::sleep(Duration::from_millis(100));
+        assert!(child.try_wait().unwrap().is_none(), "{signal} ended it");
+        let other = if signal == "TERM" { "INT" } else { "TERM" };
+        send(other, &child);
+        assert!(!wait(&mut child).success());
+        assert_eq!(entries(&at.join("out")).len(), 0, "{signal}");
+    }
+}
+
+/// A disk that is full, as a limit on the size of files shows it, in every command that writes: the
+/// old files stay as they are, and nothing is left half-way.
+#[test]
+fn a_full_disk_leaves_what_was_there() {
+    let place = folder();
+    let at = place.path();
+    let program = env!("CARGO_BIN_EXE_tumble");
+    for (line, made) in WRITERS {
+        let line = words(line);
+        succeed(at, &line);
+        let before = tree(&at.join("out"));
+        let largest = before.values().map(Vec::len).max().unwrap();
+        // Of the largest file half is written; of some commands a small one is whole before.
+        let blocks = (largest / 2 / 512).max(1);
+        let script = format!(
+            "ulimit -f {blocks}; exec '{program}' {} --overwrite 2>words",
+            line.join(" ")
+        );
+        let mut shell = Command::new("sh");
+        shell.current_dir(at).args(["-c", &script]);
+        let run = ended(&mut shell);
+        let said = fs::read_to_string(at.join("words")).unwrap();
+        let whole = largest <= 512;
+        assert!(whole || matches!(run.code, 3 | 4 | 7), "{line:?}: {}: {said}", run.code);
+        assert_eq!(tree(&at.join("out")), before, "{line:?}: {made}");
+        fs::remove_dir_all(at.join("out")).unwrap();
+        fs::create_dir(at.join("out")).unwrap();
+    }
+}
+
+/// A file system that is full: only where this process may mount one.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_file_system_ends_a_batch_and_resuming_finishes_it() {
+    let place = folder();
+    let at = place.path();
+    let mount = |size: &str| {
+        Command::new("mount")
+            .args(["-t", "tmpfs", "-o", &format!("{size},mode=777"), "tumble"])
+            .arg(at.join("out"))
+            .stderr(Stdio::null())
+            .status()
+            .is_ok_and(|status| status.success())
+    };
+    if !mount("size=64k") {
+        eprintln!("no file system may be mounted here: the limit on files' sizes stands for it");
+        return;
+    }
+    let unmounted = Unmount(at.join("out"));
+    let line = ["eval", "walks", "--fps", "1000", "-o", "out/all"];
+    let full = run(at, &line);
+    assert_eq!(full.code, 7, "{}", full.words);
+    assert_eq!(parts(&at.join("out")), Vec::<String>::new());
+    assert!(mount("remount,size=16m"));
+    succeed(at, &[&line[..], &["--resume"]].concat());
+    succeed(at, &["check", "out/all"]);
+    drop(unmounted);
+}
+
+struct Unmount(std::path::PathBuf);
+
+impl Drop for Unmount {
+    fn drop(&mut self) {
+        let _ = Command::new("umount").arg(&self.0).status();
+    }
+}
+
+/// Where nobody may write, every command says so, and nothing is changed.
+#[test]
+fn a_read_only_folder_is_refused_by_every_command() {
+    use std::os::unix::fs::PermissionsExt;
+
+    const NOBODY: u32 = 65_534;
+    let place = folder();
+    let at = place.path();
+    let out = at.join("out");
+    fs::set_permissions(&out, fs::Permissions::from_mode(0o555)).unwrap();
+    let is_root = fs::write(out.join("try"), "").is_ok();
+    let _ = fs::remove_file(out.join("try"));
+    if is_root {
+        fs::set_permissions(at, fs::Permissions::from_mode(0o755)).unwrap();
+    }
+    for (line, _) in WRITERS {
+        let mut command = command(at, &words(line));
+        if is_root {
+            // Whoever may do everything has to be told otherwise.
+            command.uid(NOBODY);
+        }
+        let run = ended(command.stdout(Stdio::piped()).stderr(Stdio::piped()));
+        assert_eq!(run.code, 7, "{line}: {}", run.words);
+        assert_eq!(entries(&out).len(), 0, "{line}");
+    }
+    fs::set_permissions(&out, fs::Permissions::from_mode(0o755)).unwrap();
+}
