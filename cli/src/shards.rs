@@ -167,7 +167,13 @@ impl Plan {
     #[must_use]
     pub fn names_of(&self, shard: usize) -> Option<Vec<String>> {
         let own = self.own.cuts.get(shard.checked_sub(1)?)?;
-        Some(self.own.names[own.clone()].iter().flatten().cloned().collect())
+        Some(
+            self.own.names[own.clone()]
+                .iter()
+                .flatten()
+                .cloned()
+                .collect(),
+        )
     }
 }
 

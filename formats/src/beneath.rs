@@ -52,7 +52,9 @@ pub fn is_beneath(name: &str) -> bool {
 /// Whether opening failed because the name leads elsewhere, or is that of no regular file.
 #[must_use]
 pub fn is_refused(error: &io::Error) -> bool {
-    error.get_ref().is_some_and(<dyn std::error::Error + Send + Sync>::is::<Refused>)
+    error
+        .get_ref()
+        .is_some_and(<dyn std::error::Error + Send + Sync>::is::<Refused>)
 }
 
 #[derive(Debug, thiserror::Error)]
@@ -216,7 +218,14 @@ mod tests {
         assert!(pipe.unwrap().success());
         let _socket = std::os::unix::net::UnixListener::bind(folder.join("socket")).unwrap();
         let names = [
-            "up", "absolute", "out/secret", "zeros", "magic", "circle", "pipe", "socket",
+            "up",
+            "absolute",
+            "out/secret",
+            "zeros",
+            "magic",
+            "circle",
+            "pipe",
+            "socket",
         ];
         for (way, open) in WAYS {
             for name in names {

@@ -161,7 +161,9 @@ fn temporary_files(directory: &Path, is_good: impl Fn(&str) -> bool) -> Vec<Path
         // Python's temporary files have eight, underscores among them.
         let is_random = random.len() == RANDOM || !mark.is_empty() && random.len() == 8;
         is_random
-            && random.bytes().all(|byte| byte.is_ascii_alphanumeric() || byte == b'_')
+            && random
+                .bytes()
+                .all(|byte| byte.is_ascii_alphanumeric() || byte == b'_')
             && (mark.is_empty() || mark.starts_with("shard"))
             && is_good(mark)
             && entry.file_type().is_ok_and(|kind| kind.is_file())
@@ -357,7 +359,9 @@ fn unnamed_in(parent: &Path) -> Option<File> {
     // As `File::create` does: readable by all, less the umask.
     let flags = OFlags::TMPFILE | OFlags::RDWR | OFlags::CLOEXEC;
     let file = File::from(open(parent, flags, Mode::from_raw_mode(0o666)).ok()?);
-    fs::symlink_metadata(descriptor(&file)).is_ok().then_some(file)
+    fs::symlink_metadata(descriptor(&file))
+        .is_ok()
+        .then_some(file)
 }
 
 /// What leads to an open file.
@@ -526,8 +530,16 @@ mod tests {
     fn what_a_killed_writer_left_is_removed_and_no_more() {
         let directory = tempfile::tempdir().unwrap();
         fs::write(directory.path().join(".tumble-x1y2z3.part"), "half").unwrap();
-        fs::write(directory.path().join(".tumble-shard00001-x1y2z3.part"), "half").unwrap();
-        let mine = [".tumble-notes", ".tumble-notes.part", ".tumble-my.notes.part"];
+        fs::write(
+            directory.path().join(".tumble-shard00001-x1y2z3.part"),
+            "half",
+        )
+        .unwrap();
+        let mine = [
+            ".tumble-notes",
+            ".tumble-notes.part",
+            ".tumble-my.notes.part",
+        ];
         for name in mine {
             fs::write(directory.path().join(name), "mine").unwrap();
         }
@@ -573,7 +585,9 @@ mod tests {
         remove_marked(directory.path(), "shard1-");
         assert_eq!(names(directory.path()).len(), 1);
         assert!(first.persist(&directory.path().join("out"), false).is_err());
-        second.persist(&directory.path().join("out"), false).unwrap();
+        second
+            .persist(&directory.path().join("out"), false)
+            .unwrap();
         assert_eq!(names(directory.path()), ["out"]);
     }
 

@@ -6,8 +6,8 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use glam::{DVec3, Mat3, Quat};
 use tumble::{
-    BodyAxis, Channel, Direction, Follow, Frame, PathSpeed, TrackError, TrackSet, Twist, VectorKeys,
-    VectorMethod,
+    BodyAxis, Channel, Direction, Follow, Frame, PathSpeed, TrackError, TrackSet, Twist,
+    VectorKeys, VectorMethod,
 };
 use tumble_formats::path::{Pace, open_paths};
 use tumble_formats::{Limits, ReadOptions};
@@ -246,9 +246,8 @@ impl PathArguments {
         let set = open_paths(path, &input::stem(path), pace, &options)
             .map_err(|diagnostic| Failure::input(&diagnostic, ""))?;
         match self.no_ups {
-            true => without_ups(&set).map_err(|error| {
-                Failure::evaluating(&input::name(path), &error.into())
-            }),
+            true => without_ups(&set)
+                .map_err(|error| Failure::evaluating(&input::name(path), &error.into())),
             false => Ok(set),
         }
     }

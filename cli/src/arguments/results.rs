@@ -160,7 +160,8 @@ pub(crate) fn each_file(
             return Err(several(path, loaded).hinted(hint));
         }
         // One clip's trouble is no other's.
-        let jobs: Vec<(&Motion, String)> = clips.into_iter().zip(file_names(&loaded.clips)).collect();
+        let jobs: Vec<(&Motion, String)> =
+            clips.into_iter().zip(file_names(&loaded.clips)).collect();
         for_clips(name, &jobs, |(clip, file)| {
             let target = target.of_clip(file)?;
             let made = make(&format!("{name} {}", clip_name(clip)), &[clip], &target)?;

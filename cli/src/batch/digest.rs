@@ -95,9 +95,8 @@ impl Identity {
     #[cfg(unix)]
     fn new(metadata: &Metadata) -> Self {
         use std::os::unix::fs::MetadataExt;
-        let nanoseconds = |seconds: i64, rest: i64| {
-            i128::from(seconds) * 1_000_000_000 + i128::from(rest)
-        };
+        let nanoseconds =
+            |seconds: i64, rest: i64| i128::from(seconds) * 1_000_000_000 + i128::from(rest);
         Self([
             metadata.dev().into(),
             metadata.ino().into(),

@@ -73,7 +73,8 @@ pub(crate) fn in_folder(inputs: &Gathered, folder: &Path, wish: Wish<'_>) -> Res
 /// directory of their inputs, or be it.
 pub(crate) fn without_results(inputs: Vec<Found>, folder: &Path) -> Result<Vec<Found>, Failure> {
     let is_below = |path: &Path, folder: &Path| {
-        path.canonicalize().is_ok_and(|path| path.starts_with(folder))
+        path.canonicalize()
+            .is_ok_and(|path| path.starts_with(folder))
     };
     let Ok(real) = folder.canonicalize() else {
         return Ok(inputs);

@@ -195,7 +195,10 @@ impl Manifest {
                 let read = file.read_to_end(&mut bytes);
                 read.map_err(|error| {
                     let path = folder.join(NAME);
-                    Failure::new(OUTPUT, format!("{}: cannot be read: {error}", path.display()))
+                    Failure::new(
+                        OUTPUT,
+                        format!("{}: cannot be read: {error}", path.display()),
+                    )
                 })?;
                 true
             }
@@ -266,10 +269,7 @@ impl Manifest {
     }
 
     /// Replaces the file whole; gives it, open at its end.
-    fn replace<'a>(
-        &self,
-        lines: impl Iterator<Item = &'a Entry>,
-    ) -> Result<Option<File>, Failure> {
+    fn replace<'a>(&self, lines: impl Iterator<Item = &'a Entry>) -> Result<Option<File>, Failure> {
         let path = self.folder.join(NAME);
         let output = Output::create(&path, self.exists, &[]);
         let mut output = output.map_err(|error| Failure::output(&error))?;
@@ -463,7 +463,9 @@ mod tests {
         let hash = digest::of_bytes([&b"abc"[..]]);
         manifest.add(entry("a", &hash)).unwrap();
         manifest.finish().unwrap();
-        let manifest = Manifest::open(place.path(), false, false).unwrap().previous();
+        let manifest = Manifest::open(place.path(), false, false)
+            .unwrap()
+            .previous();
         assert!(!manifest.is_done("a", "1", "o"), "it is not there");
         std::fs::write(place.path().join("a"), "abc").unwrap();
         assert!(manifest.is_done("a", "1", "o"));

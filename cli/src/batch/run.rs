@@ -73,12 +73,7 @@ impl<R: Fn(&Path) -> Result<Loaded, Failure> + Sync> Batch<R> {
         jobs: &[(PathBuf, Target)],
         refused: Vec<Failure>,
         records: &mut impl Records,
-        mut evaluate: impl FnMut(
-            &InputFile,
-            &Loaded,
-            &Target,
-            &mut Done<'_>,
-        ) -> Result<(), Failure>,
+        mut evaluate: impl FnMut(&InputFile, &Loaded, &Target, &mut Done<'_>) -> Result<(), Failure>,
     ) -> Result<(), Failure> {
         let previous = records.previous();
         let mut skipped = 0;

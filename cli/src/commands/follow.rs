@@ -81,19 +81,14 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     };
     let options = arguments.options(&samples);
     let results = &arguments.results;
-    results.make_of(
-        read,
-        plan,
-        options,
-        |file, loaded, target, done| {
-            let path = file.path();
-            for clip in &loaded.clips {
-                let made = arguments.body(path, &clip.set, &samples, target, &mut device)?;
-                done(target.name(), made)?;
-            }
-            Ok(())
-        },
-    )
+    results.make_of(read, plan, options, |file, loaded, target, done| {
+        let path = file.path();
+        for clip in &loaded.clips {
+            let made = arguments.body(path, &clip.set, &samples, target, &mut device)?;
+            done(target.name(), made)?;
+        }
+        Ok(())
+    })
 }
 
 impl Arguments {

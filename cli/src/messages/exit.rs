@@ -142,8 +142,8 @@ impl Failure {
 /// fault, or its length.
 fn is_of_one(error: &io::Error) -> bool {
     use io::ErrorKind::{
-        AlreadyExists, DirectoryNotEmpty, FileTooLarge, InvalidFilename, InvalidInput, IsADirectory,
-        NotADirectory, NotFound, PermissionDenied,
+        AlreadyExists, DirectoryNotEmpty, FileTooLarge, InvalidFilename, InvalidInput,
+        IsADirectory, NotADirectory, NotFound, PermissionDenied,
     };
     matches!(
         error.kind(),

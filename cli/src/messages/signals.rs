@@ -51,7 +51,9 @@ fn wait_for_signals() {
     // and a file to remove; the signal would end the program before that.
     let ignored = ignored();
     let all = [SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGXFSZ];
-    let heeded = all.into_iter().filter(|signal| ignored >> (signal - 1) & 1 == 0);
+    let heeded = all
+        .into_iter()
+        .filter(|signal| ignored >> (signal - 1) & 1 == 0);
     let Ok(mut signals) = Signals::new(heeded) else {
         return;
     };
@@ -79,7 +81,9 @@ fn ignored() -> u64 {
 
 #[cfg(unix)]
 fn ignored_in(status: &str) -> Option<u64> {
-    let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"))?;
+    let mask = status
+        .lines()
+        .find_map(|line| line.strip_prefix("SigIgn:"))?;
     u64::from_str_radix(mask.trim(), 16).ok()
 }
 

@@ -36,7 +36,11 @@ fn somebodys_manifest_is_kept() {
             fs::write(&path, content).unwrap();
             let refused = run(at, &with(&BATCH, more));
             assert_eq!(refused.code, 2, "{content:?}: {}", refused.words);
-            assert!(refused.words.contains("manifest.jsonl: is no manifest"), "{}", refused.words);
+            assert!(
+                refused.words.contains("manifest.jsonl: is no manifest"),
+                "{}",
+                refused.words
+            );
             assert_eq!(fs::read_to_string(&path).unwrap(), content);
             assert_eq!(entries(&out).len(), 1, "{:?}", entries(&out));
         }
@@ -89,7 +93,11 @@ fn a_manifest_that_is_a_link_a_pipe_or_a_directory_is_refused() {
             "directory" => fs::remove_dir(&path).unwrap(),
             _ => fs::remove_file(&path).unwrap(),
         }
-        assert_eq!(fs::read_to_string(at.join("outside")).unwrap(), ours, "{kind}");
+        assert_eq!(
+            fs::read_to_string(at.join("outside")).unwrap(),
+            ours,
+            "{kind}"
+        );
     }
 }
 
@@ -128,7 +136,10 @@ fn other_files_of_a_folder_of_results_stay() {
     fs::write(out.join("manifest.d/00001.jsonl"), "mine").unwrap();
     let refused = run(at, &with(&BATCH, &["--overwrite", "--shard", "1/1"]));
     assert_eq!(refused.code, 2, "{}", refused.words);
-    assert_eq!(fs::read(out.join("manifest.d/00001.jsonl")).unwrap(), b"mine");
+    assert_eq!(
+        fs::read(out.join("manifest.d/00001.jsonl")).unwrap(),
+        b"mine"
+    );
 }
 
 /// What a manifest names is opened beneath its folder alone, and no pipe or device is waited for.
@@ -139,8 +150,7 @@ fn outputs_that_a_manifest_names_elsewhere_are_not_read() {
     succeed(at, &BATCH);
     let bytes = fs::read(at.join("out/a.npy")).unwrap();
     let manifest = fs::read_to_string(at.join("out/manifest.jsonl")).unwrap();
-    let first: serde_json::Value =
-        serde_json::from_str(manifest.lines().next().unwrap()).unwrap();
+    let first: serde_json::Value = serde_json::from_str(manifest.lines().next().unwrap()).unwrap();
     fs::write(at.join("outside"), &bytes).unwrap();
     let absolute = at.join("outside");
     let out = at.join("out");
@@ -177,7 +187,11 @@ fn outputs_that_a_manifest_names_elsewhere_are_not_read() {
         fs::remove_file(&result).unwrap();
         make();
         let resumed = run(at, &with(&BATCH, &["--resume"]));
-        assert!(!resumed.words.contains("2 results skipped"), "{kind}: {}", resumed.words);
+        assert!(
+            !resumed.words.contains("2 results skipped"),
+            "{kind}: {}",
+            resumed.words
+        );
         assert_eq!(fs::read(&absolute).unwrap(), bytes, "{kind}");
         if fs::symlink_metadata(&result).unwrap().is_file() {
             continue;
@@ -251,11 +265,19 @@ fn records_of_shards_are_whole_or_made_again() {
     let plan = at.join("out/manifest.d/plan.json");
     let stated = fs::read_to_string(&plan).unwrap();
     let most = usize::MAX;
-    for (from, shards) in [("0 shards", 0), ("more shards than inputs", 3), ("too many", most)] {
+    for (from, shards) in [
+        ("0 shards", 0),
+        ("more shards than inputs", 3),
+        ("too many", most),
+    ] {
         let mut other: serde_json::Value = serde_json::from_str(&stated).unwrap();
         other["shards"] = shards.into();
         fs::write(&plan, other.to_string()).unwrap();
-        for line in [&["merge", "out"][..], &["check", "out"], &with(&BATCH, &["--resume"])] {
+        for line in [
+            &["merge", "out"][..],
+            &["check", "out"],
+            &with(&BATCH, &["--resume"]),
+        ] {
             let refused = run(at, line);
             assert_eq!(refused.code, 4, "{from}: {}", refused.words);
         }
@@ -277,7 +299,12 @@ fn results_do_not_leave_their_folder() {
     fs::copy(at.join("a.dat"), at.join("walks/a.dat")).unwrap();
     fs::copy(at.join("a.dat"), at.join("walks/deep/b.dat")).unwrap();
     symlink("../elsewhere", at.join("out/deep")).unwrap();
-    for more in [&[][..], &["--resume"], &["--overwrite"], &["--overwrite", "--shard", "1/1"]] {
+    for more in [
+        &[][..],
+        &["--resume"],
+        &["--overwrite"],
+        &["--overwrite", "--shard", "1/1"],
+    ] {
         let run = run(at, &with(&["eval", "walks", "-o", "out"], more));
         assert_eq!(run.code, 3, "{more:?}: {}", run.words);
         assert!(run.words.contains("deep/b.npy"), "{}", run.words);
@@ -304,9 +331,16 @@ fn what_a_gltf_names_does_not_leave_its_folder() {
         fs::write(at.join("model/m.gltf"), model.to_string()).unwrap();
         let line = ["eval", "model/m.gltf", "-o", "m.glb", "--overwrite"];
         let made = succeed(at, &line);
-        assert!(made.words.contains("the URI is kept"), "{uri}: {}", made.words);
+        assert!(
+            made.words.contains("the URI is kept"),
+            "{uri}: {}",
+            made.words
+        );
         let bytes = fs::read(at.join("m.glb")).unwrap();
-        assert!(!bytes.windows(secret.len()).any(|part| part == secret), "{uri}");
+        assert!(
+            !bytes.windows(secret.len()).any(|part| part == secret),
+            "{uri}"
+        );
     }
     // An image in the folder itself is embedded.
     fs::copy(at.join("secret.png"), at.join("model/own.png")).unwrap();
@@ -345,7 +379,17 @@ fn tracks_of_walkers_do_not_leave_their_folder() {
         );
         fs::write(at.join("walkers/list.csv"), list).unwrap();
         let _ = fs::remove_dir_all(at.join("ways"));
-        run(at, &["route", "hill.obj", "--walkers", "walkers/list.csv", "-o", "ways"])
+        run(
+            at,
+            &[
+                "route",
+                "hill.obj",
+                "--walkers",
+                "walkers/list.csv",
+                "-o",
+                "ways",
+            ],
+        )
     };
     let absolute = at.join("track.csv");
     for track in [
@@ -357,7 +401,11 @@ fn tracks_of_walkers_do_not_leave_their_folder() {
     ] {
         let refused = route(track);
         assert_eq!(refused.code, 4, "{track}: {}", refused.words);
-        assert!(refused.words.contains("list.csv:3"), "{track}: {}", refused.words);
+        assert!(
+            refused.words.contains("list.csv:3"),
+            "{track}: {}",
+            refused.words
+        );
     }
     assert_eq!(route("track.csv").code, 0);
 }
@@ -370,7 +418,9 @@ fn pictures_are_refused_before_anything_is_written() {
     let at = place.path();
     succeed(at, &["generate", "--hill", "-o", "hill.obj"]);
     let before = entries(at);
-    let route = ["route", "hill.obj", "--from", "1,0,1", "--to", "8,0,8", "-o", "way.csv", "--plot"];
+    let route = [
+        "route", "hill.obj", "--from", "1,0,1", "--to", "8,0,8", "-o", "way.csv", "--plot",
+    ];
     let smooth = ["smooth", "a.dat", "--fps", "30", "-o", "o.npy", "--plot"];
     let reduce = ["reduce", "a.dat", "--fps", "30", "-o", "o.npz", "--plot"];
     for line in [&route[..], &smooth, &reduce] {
@@ -387,7 +437,15 @@ fn pictures_are_refused_before_anything_is_written() {
             assert_eq!(entries(at), before, "{line:?} {plot}");
         }
     }
-    let both = ["generate", "--hill", "-o", "x.obj", "--rocks", "./x.obj", "--overwrite"];
+    let both = [
+        "generate",
+        "--hill",
+        "-o",
+        "x.obj",
+        "--rocks",
+        "./x.obj",
+        "--overwrite",
+    ];
     let refused = run(at, &both);
     assert_eq!(refused.code, 2, "{}", refused.words);
     assert_eq!(entries(at), before);
@@ -406,11 +464,23 @@ fn results_are_no_inputs_of_the_next_run() {
         succeed(at, &line);
         let whole = tree(&at.join("walks"));
         let resumed = succeed(at, &with(&line, &["--resume"]));
-        assert!(resumed.words.contains("2 results skipped"), "{out}: {}", resumed.words);
+        assert!(
+            resumed.words.contains("2 results skipped"),
+            "{out}: {}",
+            resumed.words
+        );
         assert_eq!(tree(&at.join("walks")), whole, "{out}");
         let _ = fs::remove_dir_all(at.join("walks/out"));
     }
-    let line = ["eval", "walks", "-o", "walks/shards", "--to", "npz", "--shard"];
+    let line = [
+        "eval",
+        "walks",
+        "-o",
+        "walks/shards",
+        "--to",
+        "npz",
+        "--shard",
+    ];
     fs::remove_file(at.join("walks/manifest.jsonl")).unwrap();
     for name in ["walks/a.npz", "walks/deep/b.npz"] {
         fs::remove_file(at.join(name)).unwrap();

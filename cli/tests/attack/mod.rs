@@ -41,7 +41,9 @@ fn ended(command: &mut Command) -> Run {
     let watch = std::thread::spawn(move || {
         let hangs = is_done.recv_timeout(LIMIT).is_err();
         if hangs {
-            let _ = Command::new("kill").args(["-9", &process.to_string()]).status();
+            let _ = Command::new("kill")
+                .args(["-9", &process.to_string()])
+                .status();
         }
         hangs
     });
@@ -131,7 +133,10 @@ fn line(output: &str, sha256: &str, bytes: usize) -> String {
 
 /// Two animations, `Run` and `Walk`, of one node.
 fn two_animations() -> String {
-    let times: Vec<u8> = [0f32, 1.0].iter().flat_map(|time| time.to_le_bytes()).collect();
+    let times: Vec<u8> = [0f32, 1.0]
+        .iter()
+        .flat_map(|time| time.to_le_bytes())
+        .collect();
     let keys: Vec<u8> = [0f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.6, 0.8]
         .iter()
         .flat_map(|part| part.to_le_bytes())

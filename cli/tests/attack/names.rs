@@ -38,9 +38,17 @@ fn no_name_ends_a_batch() {
     let line = ["eval", "--files-from", "list", "--from", "dat", "-o", "out"];
     let first = run(at, &line);
     assert_eq!(first.code, 3, "{}", first.words);
-    assert!(first.words.contains("2 of 9 inputs failed"), "{}", first.words);
+    assert!(
+        first.words.contains("2 of 9 inputs failed"),
+        "{}",
+        first.words
+    );
     assert!(first.words.contains("is not UTF-8"), "{}", first.words);
-    assert!(first.words.contains("7 results made, 2 inputs failed"), "{}", first.words);
+    assert!(
+        first.words.contains("7 results made, 2 inputs failed"),
+        "{}",
+        first.words
+    );
     let made = entries(&at.join("out"));
     assert_eq!(made.len(), 8, "{made:?}");
     assert!(made.contains(&format!("{}.npy", "x".repeat(251))));
@@ -48,12 +56,26 @@ fn no_name_ends_a_batch() {
     for _ in 0..2 {
         let resumed = run(at, &[&line[..], &["--resume"]].concat());
         assert_eq!(resumed.code, 3, "{}", resumed.words);
-        assert!(resumed.words.contains("7 results skipped"), "{}", resumed.words);
+        assert!(
+            resumed.words.contains("7 results skipped"),
+            "{}",
+            resumed.words
+        );
         assert_eq!(tree(&at.join("out")), whole);
     }
     succeed(at, &["check", "out"]);
 
-    let line = ["eval", "--files-from", "list", "--from", "dat", "-o", "shards", "--shard", "1/1"];
+    let line = [
+        "eval",
+        "--files-from",
+        "list",
+        "--from",
+        "dat",
+        "-o",
+        "shards",
+        "--shard",
+        "1/1",
+    ];
     let shard = run(at, &line);
     assert_eq!(shard.code, 3, "{}", shard.words);
     let merged = run(at, &["merge", "shards"]);
@@ -83,9 +105,17 @@ fn animations_of_any_name_get_files() {
         succeed(at, &["eval", "m.gltf", "a.dat", "-o", &out]);
         let made = entries(&at.join(&out));
         assert_eq!(made.len(), 4, "{made:?}");
-        assert!(made.iter().all(|name| !name.contains(['/', '\n', '\u{1b}'])), "{made:?}");
+        assert!(
+            made.iter()
+                .all(|name| !name.contains(['/', '\n', '\u{1b}'])),
+            "{made:?}"
+        );
         let resumed = succeed(at, &["eval", "m.gltf", "a.dat", "-o", &out, "--resume"]);
-        assert!(resumed.words.contains("2 results skipped"), "{}", resumed.words);
+        assert!(
+            resumed.words.contains("2 results skipped"),
+            "{}",
+            resumed.words
+        );
         succeed(at, &["check", &out]);
     }
 }
@@ -100,9 +130,16 @@ fn one_clip_that_cannot_be_written_does_not_end_the_others() {
     let line = ["eval", "m.gltf", "a.dat", "-o", "out", "--overwrite"];
     let made = run(at, &line);
     assert_eq!(made.code, 3, "{}", made.words);
-    assert!(made.words.contains("1 of 2 animations failed"), "{}", made.words);
+    assert!(
+        made.words.contains("1 of 2 animations failed"),
+        "{}",
+        made.words
+    );
     let there = entries(&at.join("out"));
-    assert!(there.contains("m.Walk.npy") && there.contains("a.npy"), "{there:?}");
+    assert!(
+        there.contains("m.Walk.npy") && there.contains("a.npy"),
+        "{there:?}"
+    );
     succeed(at, &["check", "out"]);
     fs::remove_dir(at.join("out/m.Run.npy")).unwrap();
     succeed(at, &["eval", "m.gltf", "a.dat", "-o", "out", "--resume"]);
@@ -122,23 +159,47 @@ fn inputs_of_one_stem_are_both_evaluated() {
     }
     succeed(at, &["eval", "walks", "-o", "out"]);
     let made = entries(&at.join("out"));
-    let expected = ["manifest.jsonl", "other.npy", "walk.DAT.npy", "walk.dat.npy"];
+    let expected = [
+        "manifest.jsonl",
+        "other.npy",
+        "walk.DAT.npy",
+        "walk.dat.npy",
+    ];
     assert!(made.iter().eq(expected), "{made:?}");
     let resumed = succeed(at, &["eval", "walks", "-o", "out", "--resume"]);
-    assert!(resumed.words.contains("3 results skipped"), "{}", resumed.words);
+    assert!(
+        resumed.words.contains("3 results skipped"),
+        "{}",
+        resumed.words
+    );
     succeed(at, &["eval", "walks", "-o", "shards", "--shard", "1/1"]);
     succeed(at, &["merge", "shards"]);
     assert_eq!(tree(&at.join("shards")), tree(&at.join("out")));
 
-    let shared = run(at, &["eval", "a.dat", "folder/a.dat", "b.dat", "-o", "shared"]);
+    let shared = run(
+        at,
+        &["eval", "a.dat", "folder/a.dat", "b.dat", "-o", "shared"],
+    );
     assert_eq!(shared.code, 3, "{}", shared.words);
-    assert!(shared.words.contains("2 of 3 inputs failed"), "{}", shared.words);
-    assert!(entries(&at.join("shared")).iter().eq(["b.npy", "manifest.jsonl"]));
+    assert!(
+        shared.words.contains("2 of 3 inputs failed"),
+        "{}",
+        shared.words
+    );
+    assert!(
+        entries(&at.join("shared"))
+            .iter()
+            .eq(["b.npy", "manifest.jsonl"])
+    );
     // A directory that only shards may use, and results that are inputs.
     fs::create_dir_all(at.join("odd/manifest.d")).unwrap();
     fs::write(at.join("odd/manifest.d/a.dat"), &keys).unwrap();
     fs::write(at.join("odd/b.dat"), &keys).unwrap();
     let odd = run(at, &["eval", "odd", "-o", "odd-out"]);
     assert_eq!(odd.code, 3, "{}", odd.words);
-    assert!(odd.words.contains("manifest.d is the directory of shards"), "{}", odd.words);
+    assert!(
+        odd.words.contains("manifest.d is the directory of shards"),
+        "{}",
+        odd.words
+    );
 }

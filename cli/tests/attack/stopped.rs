@@ -19,16 +19,31 @@ const WRITERS: &[(&str, &str)] = &[
     ("eval walks --fps 4000 -o out/all", "out/all"),
     ("convert walks --to npz -o out/all", "out/all"),
     ("convert a.dat -o out/o.npz", "out/o.npz"),
-    ("smooth a.dat --fps 4000 -o out/o.npy --plot out/o.svg", "out/o.npy"),
-    ("reduce a.dat --fps 4000 -o out/o.npz --plot out/o.svg", "out/o.npz"),
+    (
+        "smooth a.dat --fps 4000 -o out/o.npy --plot out/o.svg",
+        "out/o.npy",
+    ),
+    (
+        "reduce a.dat --fps 4000 -o out/o.npz --plot out/o.svg",
+        "out/o.npz",
+    ),
     ("follow path.csv --fps 20000 -o out/o.npy", "out/o.npy"),
     ("plot a.dat -o out/o.svg", "out/o.svg"),
     ("plot a.dat -o out/pictures", "out/pictures"),
-    ("render a.dat --size 64x48 --fps 10 -o out/o.png", "out/o.png"),
+    (
+        "render a.dat --size 64x48 --fps 10 -o out/o.png",
+        "out/o.png",
+    ),
     ("view a.dat -o out/o.html", "out/o.html"),
     ("generate --boxes 400 --keys 200 -o out/o.dat", "out/o.dat"),
-    ("generate --hill -o out/hill.obj --rocks out/rocks.obj", "out/hill.obj"),
-    ("route hill.obj --from 1,0,1 --to 8,0,8 -o out/o.csv --plot out/o.svg", "out/o.csv"),
+    (
+        "generate --hill -o out/hill.obj --rocks out/rocks.obj",
+        "out/hill.obj",
+    ),
+    (
+        "route hill.obj --from 1,0,1 --to 8,0,8 -o out/o.csv --plot out/o.svg",
+        "out/o.csv",
+    ),
 ];
 
 fn folder() -> tempfile::TempDir {
@@ -38,7 +53,11 @@ fn folder() -> tempfile::TempDir {
     for name in ["walks/deep/a.dat", "walks/deep/b.dat"] {
         fs::copy(at.join("a.dat"), at.join(name)).unwrap();
     }
-    fs::write(at.join("path.csv"), "t,x,y,z\n0,0,0,0\n1,1,0,0\n2,1,1,0\n3,0,1,1\n").unwrap();
+    fs::write(
+        at.join("path.csv"),
+        "t,x,y,z\n0,0,0,0\n1,1,0,0\n2,1,1,0\n3,0,1,1\n",
+    )
+    .unwrap();
     fs::write(at.join("m.gltf"), two_animations()).unwrap();
     succeed(at, &["generate", "--hill", "-o", "hill.obj"]);
     fs::create_dir(at.join("out")).unwrap();
@@ -79,10 +98,17 @@ fn kills_leave_whole_files_and_nothing_else() {
             left += parts(&at.join("out")).len();
             for (name, bytes) in tree(&at.join("out")) {
                 let is_part = name.ends_with(".part") || name.ends_with("manifest.jsonl");
-                assert!(is_part || whole[&name] == bytes, "{line:?}: {name} is not whole");
+                assert!(
+                    is_part || whole[&name] == bytes,
+                    "{line:?}: {name} is not whole"
+                );
             }
             let has_manifest = whole.keys().any(|name| name.ends_with("manifest.jsonl"));
-            let again = if has_manifest { "--resume" } else { "--overwrite" };
+            let again = if has_manifest {
+                "--resume"
+            } else {
+                "--overwrite"
+            };
             succeed(at, &[&line[..], &[again]].concat());
             assert_eq!(parts(&at.join("out")), Vec::<String>::new(), "{line:?}");
             assert_eq!(tree(&at.join("out")), whole, "{line:?}");
@@ -90,7 +116,10 @@ fn kills_leave_whole_files_and_nothing_else() {
         fs::remove_dir_all(at.join("out")).unwrap();
         fs::create_dir(at.join("out")).unwrap();
     }
-    assert!(kills > 0, "no kill came in time; {left} files were left half-way");
+    assert!(
+        kills > 0,
+        "no kill came in time; {left} files were left half-way"
+    );
 }
 
 /// What is left when all results lie in sub-folders goes too, and that of inputs that are gone.
@@ -124,7 +153,10 @@ fn writing(at: &Path, ignored: Option<&str>) -> Child {
         .unwrap();
     let started = Instant::now();
     while !is_writing(&child, &at.join("out")) {
-        assert!(child.try_wait().unwrap().is_none(), "it ended before it could be stopped");
+        assert!(
+            child.try_wait().unwrap().is_none(),
+            "it ended before it could be stopped"
+        );
         assert!(started.elapsed().as_secs() < 60, "it does not begin");
         std::thread::sleep(Duration::from_millis(2));
     }
@@ -132,7 +164,9 @@ fn writing(at: &Path, ignored: Option<&str>) -> Child {
 }
 
 fn send(signal: &str, child: &Child) {
-    let sent = Command::new("kill").args([&format!("-{signal}"), &child.id().to_string()]).status();
+    let sent = Command::new("kill")
+        .args([&format!("-{signal}"), &child.id().to_string()])
+        .status();
     assert!(sent.unwrap().success());
 }
 
@@ -147,8 +181,16 @@ fn every_signal_that_ends_programs_leaves_no_file() {
             if twice {
                 send(signal, &child);
             }
-            assert_eq!(wait(&mut child).code(), Some(code), "{signal}, twice: {twice}");
-            assert_eq!(entries(&at.join("out")).len(), 0, "{signal}, twice: {twice}");
+            assert_eq!(
+                wait(&mut child).code(),
+                Some(code),
+                "{signal}, twice: {twice}"
+            );
+            assert_eq!(
+                entries(&at.join("out")).len(),
+                0,
+                "{signal}, twice: {twice}"
+            );
         }
     }
 }
@@ -194,7 +236,11 @@ fn a_full_disk_leaves_what_was_there() {
         let run = ended(&mut shell);
         let said = fs::read_to_string(at.join("words")).unwrap();
         let whole = largest <= 512;
-        assert!(whole || matches!(run.code, 3 | 4 | 7), "{line:?}: {}: {said}", run.code);
+        assert!(
+            whole || matches!(run.code, 3 | 4 | 7),
+            "{line:?}: {}: {said}",
+            run.code
+        );
         assert_eq!(tree(&at.join("out")), before, "{line:?}: {made}");
         fs::remove_dir_all(at.join("out")).unwrap();
         fs::create_dir(at.join("out")).unwrap();

@@ -159,8 +159,7 @@ impl<'a> Reader<'a> {
                 format!("`{uri}` is a file beside, and standard input has none beside it");
             return Err(refuse(message));
         };
-        let read =
-            Source::open_beneath(folder, &path).and_then(|file| file.into_bytes(self.most));
+        let read = Source::open_beneath(folder, &path).and_then(|file| file.into_bytes(self.most));
         read.map_err(|error| {
             let message = format!("{}: {}", path.display(), error.message);
             self.json.refuse(&pointer, error.code, message)

@@ -238,8 +238,7 @@ fn write(folder: &Path, path: &Path, lines: &[Line]) -> Result<(), Failure> {
             }
         };
         // What was replaced meanwhile by another attempt has the same entries, maybe at other places.
-        let is_whole =
-            Entry::of_line(text).is_some_and(|entry| entry.output == line.output);
+        let is_whole = Entry::of_line(text).is_some_and(|entry| entry.output == line.output);
         if !is_whole {
             let message = format!(
                 "{}: changed while it was merged; try again",

@@ -53,7 +53,11 @@ pub(crate) fn path(folder: &Path, shard: usize) -> PathBuf {
 pub(crate) fn numbers(folder: &Path) -> Vec<usize> {
     let files = std::fs::read_dir(folder.join(FOLDER)).into_iter().flatten();
     let numbers = files.flatten().filter_map(|file| {
-        let number = Path::new(&file.file_name()).file_stem()?.to_str()?.parse().ok()?;
+        let number = Path::new(&file.file_name())
+            .file_stem()?
+            .to_str()?
+            .parse()
+            .ok()?;
         (name(number).file_name()? == file.file_name()).then_some(number)
     });
     let mut numbers: Vec<usize> = numbers.collect();
