@@ -13,10 +13,11 @@ use crate::evaluate::uploaded::{Backend, Uploaded};
 #[cfg(feature = "prove")]
 use crate::gpu::details::{DeviceDetails, EngineChoices};
 use crate::gpu::engine::lock;
+use crate::gpu::kernel_check::KernelCheck;
 use crate::gpu::options::{EngineOptions, Timings};
 use crate::gpu::physical::DeviceInfo;
 use crate::gpu::recovery::Opened;
-use crate::gpu::self_test::SelfTestReport;
+use crate::gpu::self_test::{NegativeControl, SelfTestReport};
 use crate::method::interpolation::Interpolation;
 use crate::output::buffer::OutputBuffer;
 use crate::output::rotations::{Layout, Rotations, Samples, Vectors};
@@ -76,7 +77,8 @@ impl Engine {
     ///
     /// # Errors
     /// When the device cannot be opened, or fails the self-test and
-    /// [`EngineOptions::allow_inexact`] is off.
+    /// [`EngineOptions::allow_inexact`] is off. Each kernel is checked when an evaluation first needs it, which
+    /// is refused with [`VulkanError::InexactKernel`](crate::VulkanError::InexactKernel) where it differs.
     pub fn with_options(device: Device, options: &EngineOptions) -> Result<Self, Error> {
         VectorWidth::limit()?;
         match device {
@@ -133,13 +135,39 @@ impl Engine {
         Some(self.backend.opened()?.engine().choices())
     }
 
-    /// The results of the device's self-test, one report for each check; empty on the CPU, which
-    /// devices are compared with.
+    /// The results of the device's self-test as it was opened, one report for each expression; empty on the
+    /// CPU, which devices are compared with.
     #[must_use]
     pub fn self_tests(&self) -> &[SelfTestReport] {
         self.backend
             .opened()
             .map_or(&[], |opened| &opened.self_tests)
+    }
+
+    /// Runs every kernel of the table on the device beside its twin on the CPU, and compares every bit: small
+    /// inputs, ordinary ones and hostile ones. Evaluations check each kernel by itself when they first need it,
+    /// unless it is known to be exact on this device, from this process or an earlier one; this checks all of
+    /// them whatever is known. A kernel that differs is no error here. Empty on the CPU.
+    ///
+    /// # Errors
+    /// When the device fails.
+    pub fn check_kernels(&self) -> Result<Vec<KernelCheck>, Error> {
+        let Some(opened) = self.backend.opened() else {
+            return Ok(Vec::new());
+        };
+        Ok(opened.engine().check_kernels()?)
+    }
+
+    /// Runs the expressions of the self-test without what forbids the driver to compute them otherwise, to see that
+    /// the comparison finds a driver that does. `None` on the CPU.
+    ///
+    /// # Errors
+    /// When the device fails.
+    pub fn negative_control(&self) -> Result<Option<NegativeControl>, Error> {
+        let Some(opened) = self.backend.opened() else {
+            return Ok(None);
+        };
+        Ok(Some(NegativeControl::run(&opened.engine())?))
     }
 
     /// What the validation layer has said so far; see [`Device::list_with`].

@@ -118,11 +118,12 @@ pub use crate::gpu::details::{
 };
 pub use crate::gpu::error::VulkanError;
 pub use crate::gpu::handles::{VulkanBuffer, VulkanHandles, VulkanQueue};
+pub use crate::gpu::kernel_check::KernelCheck;
 pub use crate::gpu::options::{
     EngineOptions, Mapping, ReadBack, Reads, Timings, Transfer, Uploads,
 };
 pub use crate::gpu::physical::{DeviceInfo, DeviceKind};
-pub use crate::gpu::self_test::SelfTestReport;
+pub use crate::gpu::self_test::{NegativeControl, SelfTestReport};
 pub use crate::memory::OutOfMemory;
 pub use crate::method::interpolation::Interpolation;
 pub use crate::method::vector_method::{UnknownVectorMethod, VectorMethod};

@@ -5,8 +5,11 @@
 //! `(a + b) - a` to `b`. This pass works on the words of a module: it decorates
 //! every float arithmetic instruction, and refuses a module that uses an operation
 //! whose rounding Vulkan leaves open. The engine adds the modes that a device reports.
+//!
+//! Vectors times scalars have an opcode of their own, which translators of SPIR-V treat apart: SPIRV-Cross,
+//! by which Metal runs these modules, drops `NoContraction` on it. They become products of two vectors.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 // The engine has it, too, and uses other parts of it.
 #[allow(dead_code, unreachable_pub)]
@@ -21,18 +24,37 @@ const EXT_INST_IMPORT: u16 = 11;
 const EXT_INST: u16 = 12;
 const MEMORY_MODEL: u16 = 14;
 const TYPE_FLOAT: u16 = 22;
+const TYPE_VECTOR: u16 = 23;
 const TYPE_IMAGE: u16 = 25;
 const LOAD: u16 = 61;
+const COMPOSITE_CONSTRUCT: u16 = 80;
 const IMAGE_FETCH: u16 = 95;
 const EXECUTION_MODE_ID: u16 = 331;
 /// Correctly rounded by Vulkan ("Precision and Operation of SPIR-V Instructions").
-const EXACT: [u16; 5] = [127, 129, 131, 133, 142]; // FNegate FAdd FSub FMul VectorTimesScalar
-/// Float arithmetic with a looser bound, or conversions that round freely.
-const INEXACT: [u16; 17] = [
-    109, 110, 115, 116, // ConvertFToU ConvertFToS FConvert QuantizeToF16
-    136, 140, 141, // FDiv FRem FMod
-    143, 144, 145, 146, 147, 148, // matrix products, OuterProduct, Dot
-    207, 208, 209, 215, // DPdx DPdy Fwidth and relatives
+const EXACT: [u16; 4] = [127, 129, 131, MULTIPLY]; // FNegate FAdd FSub FMul
+const MULTIPLY: u16 = 133;
+const VECTOR_TIMES_SCALAR: u16 = 142;
+/// Float arithmetic with a looser bound, conversions that round freely, and what [`splat_products`]
+/// leaves nothing of.
+const INEXACT: [u16; 18] = [
+    109,
+    110,
+    115,
+    116, // ConvertFToU ConvertFToS FConvert QuantizeToF16
+    136,
+    140,
+    141, // FDiv FRem FMod
+    VECTOR_TIMES_SCALAR,
+    143,
+    144,
+    145,
+    146,
+    147,
+    148, // matrix products, OuterProduct, Dot
+    207,
+    208,
+    209,
+    215, // DPdx DPdy Fwidth and relatives
 ];
 
 /// Why the pass refuses a module.
@@ -95,6 +117,45 @@ pub fn no_contraction(module: &[u32]) -> Result<Vec<u32>, PassError> {
         .map(|i| i.start)
         .ok_or(SpirvError::Incomplete)?;
     Ok([&module[..place], &additions, &module[place..]].concat())
+}
+
+/// Writes each product of a vector and a scalar as the product of two vectors, the second of which has
+/// the scalar in every component: `OpCompositeConstruct` and `OpFMul` for `OpVectorTimesScalar`. Both
+/// round each component once, so the bits are the same; drivers have one opcode less to get right.
+///
+/// # Errors
+/// A [`SpirvError`] for words that are no module, and for such a product of a type that is no vector.
+pub fn splat_products(module: &[u32]) -> Result<Vec<u32>, SpirvError> {
+    const BOUND: usize = 3; // where the header says that all ids are less
+    let mut words = module.get(..HEADER_WORDS).unwrap_or_default().to_vec();
+    let mut components = BTreeMap::new();
+    for instruction in instructions(module)? {
+        match (instruction.opcode, instruction.words) {
+            (TYPE_VECTOR, &[_, id, _, count]) => {
+                components.insert(id, count);
+            }
+            (VECTOR_TIMES_SCALAR, &[_, kind, id, vector, scalar]) => {
+                // A vector has 2, 3 or 4 components.
+                let count = components
+                    .get(&kind)
+                    .filter(|count| (2..=4).contains(*count));
+                let &count = count.ok_or(SpirvError::Incomplete)?;
+                let splat = words[BOUND];
+                words[BOUND] = splat.checked_add(1).ok_or(SpirvError::Incomplete)?;
+                words.extend([
+                    instruction_word(COMPOSITE_CONSTRUCT, 3 + count),
+                    kind,
+                    splat,
+                ]);
+                words.extend((0..count).map(|_| scalar));
+                words.extend([instruction_word(MULTIPLY, 5), kind, id, vector, splat]);
+                continue;
+            }
+            _ => {}
+        }
+        words.extend_from_slice(instruction.words);
+    }
+    Ok(words)
 }
 
 /// Turns the one-dimensional textures of a module into texel buffers, which WGSL does not have.

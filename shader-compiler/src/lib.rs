@@ -197,6 +197,8 @@ impl Module {
             .unwrap_or_else(|error| panic!("{name}: {error}"));
         let words =
             exactness::texel_buffers(&words).unwrap_or_else(|error| panic!("{name}: {error}"));
+        let words =
+            exactness::splat_products(&words).unwrap_or_else(|error| panic!("{name}: {error}"));
         exactness::no_contraction(&words).unwrap_or_else(|error| panic!("{name}: {error}"))
     }
 }

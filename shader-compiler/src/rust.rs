@@ -249,18 +249,15 @@ pub(crate) fn kernels(all: &[Compiled]) -> String {
          match (form, list, store) {{"
     )
     .unwrap();
+    let mut over_segments = BTreeMap::new();
     for (form, _) in FORMS {
         for (list, _, _) in LISTS {
             for (store, _) in stores() {
-                writeln!(
-                    text,
-                    "            (Form::{}, List::{}, Store::{}) => Self::{},",
-                    variant(form),
-                    variant(list),
-                    variant(store),
-                    variant(&format!("{form}_{list}_{store}"))
-                )
-                .unwrap();
+                let name = format!("{form}_{list}_{store}");
+                let [form, list, store] = [form, list, store].map(variant);
+                let choice = format!("(Form::{form}, List::{list}, Store::{store})");
+                writeln!(text, "            {choice} => Self::{},", variant(&name)).unwrap();
+                over_segments.insert(name, choice);
             }
         }
     }
@@ -279,9 +276,14 @@ pub(crate) fn kernels(all: &[Compiled]) -> String {
             texel_words,
         } = kernel;
         let texels = texel_words.map(|words| (format!("{name}_texels"), words));
+        let segments = over_segments
+            .get(name)
+            .map_or_else(|| "None".to_owned(), |choice| format!("Some({choice})"));
         writeln!(
             text,
-            "    KernelCode {{ storage: ({name:?}, {words}), texels: {texels:?}, bindings: {bindings} }},"
+            "    KernelCode {{ kernel: Kernel::{}, storage: ({name:?}, {words}), texels: {texels:?}, \
+             bindings: {bindings}, segments: {segments} }},",
+            variant(name)
         )
         .unwrap();
     }

@@ -10,6 +10,8 @@ use crate::gpu::device::{Lane, LogicalDevice};
 use crate::gpu::error::{EvaluateError, VulkanError};
 use crate::gpu::from_keys::KeyUploads;
 use crate::gpu::in_flight::{InFlight, Target, copy};
+use crate::gpu::kernel_check::passes::{Pass, Passes};
+use crate::gpu::kernel_check::{self, KernelCheck};
 use crate::gpu::memory_types::KernelReads;
 use crate::gpu::options::{EngineOptions, Timings, Transfer};
 use crate::gpu::pipeline::{Exactness, Pipeline};
@@ -21,7 +23,7 @@ use crate::output::encoding::Encoding;
 use crate::output::rotations::{Layout, Storage};
 use crate::output::window::Window;
 use crate::prepare::clip_data::ClipData;
-use crate::shader::{Item, KERNELS, Kernel};
+use crate::shader::{Item, KERNELS, Kernel, KernelCode};
 use crate::time::frames::Timeline;
 
 /// Rotations of one window, 32 MiB, unless the device's limits, the memory budget or the device's
@@ -55,6 +57,8 @@ pub(crate) struct VulkanEngine {
     pub(crate) group_bytes: usize,
     /// Bytes that the segments of one clip may take on the device; `None` without a memory budget.
     pub(crate) clip_bytes: Option<usize>,
+    /// Whether kernels that differ from the CPU are used all the same.
+    allow_inexact: bool,
     free: FreeBuffers,
     pub(crate) timings: Mutex<Timings>,
 }
@@ -118,13 +122,15 @@ impl VulkanEngine {
             window: AtomicUsize::new(window),
             group_bytes: bytes(half.map_or(largest, |half| half.min(largest))),
             clip_bytes: half.map(bytes),
+            allow_inexact: options.allow_inexact,
             free: Arc::default(),
             timings: Mutex::default(),
             device,
         }
     }
 
-    /// The pipeline of a kernel, made when it is first needed.
+    /// The pipeline of a kernel, made when it is first needed, and checked then unless this kernel is known to be
+    /// exact on this device.
     pub(crate) fn pipeline(&self, kernel: Kernel) -> Result<Arc<Pipeline>, VulkanError> {
         let mut all = lock(&self.pipelines);
         let kept = &mut all[kernel as usize];
@@ -132,7 +138,54 @@ impl VulkanEngine {
             return Ok(Arc::clone(pipeline));
         }
         let pipeline = Pipeline::new(&self.device, kernel, Exactness::Demanded)?;
+        self.trust(kernel, &pipeline)?;
         Ok(Arc::clone(kept.insert(Arc::new(pipeline))))
+    }
+
+    /// Refuses a kernel that differs from the CPU, unless inexact devices are allowed.
+    fn trust(&self, kernel: Kernel, pipeline: &Pipeline) -> Result<(), VulkanError> {
+        let passes = Passes::of_user();
+        let pass = Pass::new(&self.device.physical, pipeline);
+        if passes.has(&pass) {
+            return Ok(());
+        }
+        let check = kernel_check::check(kernel, pipeline)?;
+        if check.differing == 0 {
+            passes.remember([pass]);
+        } else if !self.allow_inexact {
+            return Err(VulkanError::InexactKernel {
+                device: self.device.physical.info.name.clone(),
+                kernel: check.name,
+                differing: check.differing,
+                total: check.total,
+            });
+        }
+        Ok(())
+    }
+
+    /// Checks every kernel, whatever is known of it.
+    pub(crate) fn check_kernels(&self) -> Result<Vec<KernelCheck>, VulkanError> {
+        let mut passed = Vec::new();
+        let mut check = |code: &KernelCode| {
+            let kept = lock(&self.pipelines)[code.kernel as usize].clone();
+            let pipeline = match kept {
+                Some(pipeline) => pipeline,
+                None => Arc::new(Pipeline::new(
+                    &self.device,
+                    code.kernel,
+                    Exactness::Demanded,
+                )?),
+            };
+            let check = kernel_check::check(code.kernel, &pipeline)?;
+            if check.differing == 0 {
+                passed.push(Pass::new(&self.device.physical, &pipeline));
+                lock(&self.pipelines)[code.kernel as usize].get_or_insert(pipeline);
+            }
+            Ok(check)
+        };
+        let checks = KERNELS.iter().map(&mut check).collect::<Result<_, _>>();
+        Passes::of_user().remember(passed);
+        checks
     }
 
     /// Copies a clip's segments to the device. The buffers of `spare`, which are no longer needed,

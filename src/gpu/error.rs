@@ -66,6 +66,20 @@ pub enum VulkanError {
         /// Results compared.
         total: usize,
     },
+    /// The device computes other bits than the CPU with one kernel.
+    #[error(
+        "{device} is not exact: the kernel `{kernel}` differs from the CPU in {differing} of {total} values; it is used only when inexact devices are allowed"
+    )]
+    InexactKernel {
+        /// The device's name.
+        device: String,
+        /// The kernel, as [`kernels`](crate::kernels) names it.
+        kernel: &'static str,
+        /// Values that differ.
+        differing: usize,
+        /// Values compared.
+        total: usize,
+    },
     /// The range of a buffer that was given for a result does not fit it.
     #[error(
         "the buffer's range of {size} bytes at {offset} does not fit: the result has {needed} bytes, and starts at a multiple of {rotation}"

@@ -23,6 +23,7 @@ pub(crate) mod handles;
 pub(crate) mod imported_memory;
 pub(crate) mod in_flight;
 pub(crate) mod instance;
+pub(crate) mod kernel_check;
 pub(crate) mod memory_types;
 pub(crate) mod options;
 pub(crate) mod physical;

@@ -75,6 +75,8 @@ pub(crate) struct PhysicalDevice {
     pub(crate) instance: Arc<Instance>,
     pub(crate) raw: vk::PhysicalDevice,
     pub(crate) queue_family: u32,
+    /// As the driver counts its versions.
+    pub(crate) driver_version: u32,
     families: Vec<vk::QueueFamilyProperties>,
     /// Nanoseconds of one tick of a time stamp.
     timestamp_period: f64,
@@ -215,6 +217,7 @@ impl PhysicalDevice {
             instance: Arc::clone(instance),
             raw,
             queue_family,
+            driver_version: properties.driver_version,
             families,
             timestamp_period: f64::from(limits.timestamp_period),
             float_controls,

@@ -37,12 +37,15 @@ static SPIRV: &Aligned<[u8]> = &Aligned(*include_bytes!("../../shaders/compiled/
 
 /// A kernel as it was compiled: names, with how many words of [`SPIRV`] are theirs.
 pub(crate) struct KernelCode {
+    pub(crate) kernel: Kernel,
     /// The code that reads storage buffers.
     storage: (&'static str, usize),
     /// The code that reads texel buffers: all bindings but the last.
     texels: Option<(&'static str, usize)>,
     /// How many buffers it binds.
     pub(crate) bindings: u32,
+    /// What it evaluates, how its work is listed and what it stores, if it evaluates segments.
+    pub(crate) segments: Option<(Form, List, Store)>,
 }
 
 impl Kernel {

@@ -28,9 +28,8 @@ pub enum SpirvError {
         /// Offset of the instruction in words.
         word: usize,
     },
-    /// The module has no types, memory model or entry point, so there is no place for the
-    /// additions.
-    #[error("the module has no memory model, entry point or types")]
+    /// The module lacks what additions need: types, a memory model or an entry point.
+    #[error("the module has no memory model or entry point, or not the types that it uses")]
     Incomplete,
 }
 
@@ -145,6 +144,13 @@ pub fn float_controls(module: &[u32], offered: FloatControls) -> Result<Vec<u32>
         &module[entries_end..],
     ]
     .concat())
+}
+
+/// A hash of words (64-bit FNV-1a, a word at a time), the same in every process.
+pub(crate) fn hash(words: &[u32]) -> u64 {
+    words.iter().fold(0xcbf2_9ce4_8422_2325, |hash, &word| {
+        (hash ^ u64::from(word)).wrapping_mul(0x100_0000_01b3)
+    })
 }
 
 fn string_words(text: &str) -> Vec<u32> {

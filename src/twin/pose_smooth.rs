@@ -39,7 +39,6 @@ pub(crate) fn moved(own: [f32; 4], sum: [f32; 4], are_rotations: bool) -> [f32; 
 }
 
 /// The whole function of the shader: `steps` begin at the first that reaches the value at place 0.
-#[cfg(test)]
 pub(crate) fn pose(
     values: &[[f32; 4]],
     steps: &[[f32; 4]],

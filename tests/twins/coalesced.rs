@@ -9,8 +9,8 @@ use crate::shader::{
 use crate::time::runs::Affine;
 
 use super::kernels::Segment;
-use super::random::Random;
 use super::trial::{Trial, Twin, UNTOUCHED, with_globals};
+use crate::gpu::kernel_check::random::Random;
 
 /// The sample that an invocation takes in one of its turns.
 struct Cell {

@@ -12,8 +12,8 @@ use crate::twin::crowd_matrices::{
 use crate::twin::crowd_times::{in_parts, place_at, places, span_at, tick_of, wide_remainder};
 
 use super::cells::Cells;
-use super::random::Random;
 use super::trial::{Trial, Twin, UNTOUCHED, twin, with_globals};
+use crate::gpu::kernel_check::random::Random;
 
 const TIMES: &str = "crowd_times";
 const LAYERS: &str = "crowd_rotations";

@@ -11,7 +11,7 @@ use naga::{
 
 use super::layout::{cells, cells_of, constant, element};
 use super::machine::{Step, pointer_to_global};
-use super::operations::{Operand, Place, Subnormals, binary, conversion, unary};
+use super::operations::{Arithmetic, Operand, Place, binary, conversion, unary};
 use super::program::Compiled;
 
 /// Makes a function of a module into steps; `info` is what the validator found out about it, or about
@@ -20,13 +20,13 @@ pub(super) fn compiled(
     module: &Module,
     function: &Function,
     info: &FunctionInfo,
-    subnormals: Subnormals,
+    arithmetic: Arithmetic,
 ) -> Compiled {
     let mut own = Frame {
         module,
         function,
         info,
-        subnormals,
+        arithmetic,
         start: Vec::new(),
         size: 0,
         places: vec![None; function.expressions.len()],
@@ -51,7 +51,7 @@ struct Frame<'a> {
     module: &'a Module,
     function: &'a Function,
     info: &'a FunctionInfo,
-    subnormals: Subnormals,
+    arithmetic: Arithmetic,
     start: Vec<u64>,
     size: usize,
     /// The place of each expression, once it has been evaluated.
@@ -312,7 +312,7 @@ impl Frame<'_> {
                 }
             }
             Expression::Binary { op, left, right } => {
-                let work = binary(op, self.scalar(left), self.subnormals);
+                let work = binary(op, self.scalar(left), self.arithmetic);
                 Step::Binary {
                     work,
                     operands: [self.operand(left), self.operand(right)],

@@ -24,9 +24,9 @@ use crate::twin::small_angle::{
 use crate::twin::snorm16::to_snorm;
 
 use super::cells::Cells;
-use super::random::Random;
 use super::stores::euler_detail;
 use super::trial::{Twin, twin};
+use crate::gpu::kernel_check::random::Random;
 
 const ARCS: &str = "from_keys_arcs";
 const CUBICS: &str = "from_keys_cubics";

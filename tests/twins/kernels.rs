@@ -13,9 +13,9 @@ use crate::simd::dispatch::in_lanes;
 use crate::time::runs::Affine;
 use crate::twin::evaluate::Evaluate;
 
-use super::random::Random;
-use super::stores::StoredKey;
 use super::trial::{Trial, Twin, UNTOUCHED, with_globals};
+use crate::gpu::kernel_check::StoredKey;
+use crate::gpu::kernel_check::random::Random;
 
 /// A form of segments: what its kernels read.
 pub(super) trait Segment: Evaluate + 'static {

@@ -31,7 +31,7 @@ use crate::time::frames::{Frames, Ticks, Timeline};
 use crate::tracks::set::TrackSet;
 
 use super::machine::{Machine, Touch};
-use super::operations::Subnormals;
+use super::operations::Arithmetic;
 use super::program::{Checked, Program};
 use super::source;
 
@@ -137,7 +137,7 @@ struct Count {
 
 impl Launch {
     fn run(&self) -> Count {
-        let program = Checked::parse(source(&self.kernel)).program(Subnormals::Kept);
+        let program = Checked::parse(source(&self.kernel)).program(Arithmetic::AsWritten);
         let mut machine = Machine::new(&program);
         for (name, cells) in &self.globals {
             machine.globals[global(&program, name)].clone_from(cells);

@@ -43,23 +43,36 @@ pub(super) fn unary(operator: UnaryOperator, of: Scalar) -> Unary {
     }
 }
 
-/// What becomes of numbers smaller than the least normal one: Vulkan lets a driver do either.
+/// How a device computes with f32, where Vulkan or a translator of its shaders leaves a choice.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Subnormals {
-    Kept,
-    /// They are 0 as operands and as results.
-    Flushed,
+pub(super) enum Arithmetic {
+    AsWritten,
+    /// Numbers smaller than the least normal one are 0 as operands and as results.
+    SubnormalsFlushed,
+    /// Products are `fma(a, b, 0)`, as SPIRV-Cross writes them for Metal: where a factor is 0, the product
+    /// is +0 whatever the signs.
+    ProductsFused,
 }
 
 fn flushed(a: f32) -> f32 {
     if a.is_subnormal() { 0.0 } else { a }
 }
 
+/// The sum of an exact product and +0, rounded once: -0 becomes +0, but a product that is too small
+/// keeps its sign.
+fn fused_product(a: f32, b: f32) -> f32 {
+    if a == 0.0 || b == 0.0 {
+        a * b + 0.0
+    } else {
+        a * b
+    }
+}
+
 /// Integers have no bits above their width, and a bool is 0 or 1.
 pub(super) fn binary(
     operator: BinaryOperator,
     of: Scalar,
-    subnormals: Subnormals,
+    arithmetic: Arithmetic,
 ) -> &'static dyn Binary {
     use BinaryOperator as Operator;
     /// A closure of two cells, or of what they hold.
@@ -80,14 +93,21 @@ pub(super) fn binary(
             })
         };
     }
-    if (subnormals, of) == (Subnormals::Flushed, Scalar::F32) {
-        // Comparisons are as they are where none is left.
-        match operator {
-            Operator::Add => return on!(flushed a b => a + b),
-            Operator::Subtract => return on!(flushed a b => a - b),
-            Operator::Multiply => return on!(flushed a b => a * b),
-            _ => {}
+    // Comparisons are as they are where no subnormal is left.
+    match (arithmetic, operator, of) {
+        (Arithmetic::SubnormalsFlushed, Operator::Add, Scalar::F32) => {
+            return on!(flushed a b => a + b);
         }
+        (Arithmetic::SubnormalsFlushed, Operator::Subtract, Scalar::F32) => {
+            return on!(flushed a b => a - b);
+        }
+        (Arithmetic::SubnormalsFlushed, Operator::Multiply, Scalar::F32) => {
+            return on!(flushed a b => a * b);
+        }
+        (Arithmetic::ProductsFused, Operator::Multiply, Scalar::F32) => {
+            return on!(f32 a b => of_f32(fused_product(a, b)));
+        }
+        _ => {}
     }
     match (operator, of) {
         (Operator::Add, Scalar::F32) => on!(f32 a b => of_f32(a + b)),
@@ -129,5 +149,38 @@ pub(super) fn conversion(from: Scalar, to: Scalar) -> Option<Unary> {
         (Scalar::I32, Scalar::F32) => Some(|a| of_f32(a as u32 as i32 as f32)),
         (Scalar::U32, Scalar::I32 | Scalar::U64) | (Scalar::I32, Scalar::U32) => None,
         _ => panic!("a conversion from {from:?} to {to:?} has no evaluation"),
+    }
+}
+
+/// What the modes change, and what they leave.
+#[test]
+fn a_mode_changes_what_it_says() {
+    let product = |arithmetic, a: f32, b: f32| {
+        let mut frame = [of_f32(a), of_f32(b), 0];
+        let operand = |place| Operand { place, step: 0 };
+        let multiply = binary(BinaryOperator::Multiply, Scalar::F32, arithmetic);
+        multiply.run(&mut frame, [operand(0), operand(1)], 2, 1);
+        as_f32(frame[2]).to_bits()
+    };
+    let tiny = f32::MIN_POSITIVE;
+    let [zero, minus_zero] = [0.0f32, -0.0].map(f32::to_bits);
+    for (a, b, [written, flushed, fused]) in [
+        (-1.0, 0.0, [minus_zero, minus_zero, zero]),
+        (0.0, -3.0, [minus_zero, minus_zero, zero]),
+        (-tiny, tiny, [minus_zero, minus_zero, minus_zero]),
+        (
+            tiny,
+            0.5,
+            [(tiny / 2.0).to_bits(), zero, (tiny / 2.0).to_bits()],
+        ),
+        (-3.0, 0.5, [(-1.5f32).to_bits(); 3]),
+    ] {
+        assert_eq!(product(Arithmetic::AsWritten, a, b), written, "{a} {b}");
+        assert_eq!(
+            product(Arithmetic::SubnormalsFlushed, a, b),
+            flushed,
+            "{a} {b}"
+        );
+        assert_eq!(product(Arithmetic::ProductsFused, a, b), fused, "{a} {b}");
     }
 }

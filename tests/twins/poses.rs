@@ -8,8 +8,8 @@ use crate::shader::{Link, Probe, ROOT, Reply};
 use crate::twin::self_test::reply;
 use crate::twin::{pose_add, pose_blend, pose_mix, pose_smooth, pose_steps, pose_world};
 
-use super::random::Random;
 use super::trial::{Trial, Twin, UNTOUCHED, twin, with_globals};
+use crate::gpu::kernel_check::random::Random;
 
 pub(super) fn self_test() -> Twin {
     with_globals("self_test", "main", |random, trial| {

@@ -5,7 +5,7 @@ use naga::{Function, Module};
 
 use super::frame::compiled;
 use super::machine::Step;
-use super::operations::Subnormals;
+use super::operations::Arithmetic;
 
 /// A function that can run.
 pub(super) struct Compiled {
@@ -50,12 +50,12 @@ impl Checked {
         named.chain(entries).collect()
     }
 
-    pub(super) fn program(&self, subnormals: Subnormals) -> Program {
+    pub(super) fn program(&self, arithmetic: Arithmetic) -> Program {
         let all = self.functions().into_iter();
         let globals = self.module.global_variables.iter();
         Program {
             functions: all
-                .map(|(own, info)| compiled(&self.module, own, info, subnormals))
+                .map(|(own, info)| compiled(&self.module, own, info, arithmetic))
                 .collect(),
             globals: globals
                 .map(|(_, own)| own.name.clone().unwrap_or_default())
@@ -65,6 +65,6 @@ impl Checked {
 
     /// One function; `info` is that of this function, or of one with expressions of the same types.
     pub(super) fn compiled(&self, function: &Function, info: &FunctionInfo) -> Compiled {
-        compiled(&self.module, function, info, Subnormals::Kept)
+        compiled(&self.module, function, info, Arithmetic::AsWritten)
     }
 }

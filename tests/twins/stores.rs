@@ -3,10 +3,10 @@
 use crate::math::canonical::canonical;
 use crate::output::encoding::{Encoding, MatrixOrder};
 use crate::output::euler::EulerSequence;
-use crate::shader::SIGN_TURNED;
 
-use super::random::Random;
 use super::trial::{Trial, Twin, UNTOUCHED, with_globals};
+use crate::gpu::kernel_check::StoredKey;
+use crate::gpu::kernel_check::random::Random;
 
 /// The parameter of the store of Euler angles.
 pub(super) fn euler_detail(random: &mut Random) -> u32 {
@@ -150,31 +150,8 @@ pub(super) fn readers() -> Vec<Twin> {
     all
 }
 
-/// A key as a kernel reads it, with the sign that was given, and with the one that continues the
-/// keys before it.
-pub(super) struct StoredKey {
-    pub(super) stored: [u32; 4],
-    pub(super) given: [f32; 4],
-    pub(super) continued: [f32; 4],
-}
-
-impl StoredKey {
-    pub(super) fn new(given: [f32; 4], is_turned: bool) -> Self {
-        let mut stored = given.map(f32::to_bits);
-        let sign = if is_turned { -1.0 } else { 1.0 };
-        if is_turned {
-            stored[0] |= SIGN_TURNED;
-        }
-        Self {
-            stored,
-            given,
-            continued: given.map(|c| c * sign),
-        }
-    }
-
-    fn random(random: &mut Random) -> Self {
-        Self::new(random.unit(), random.once_in(2))
-    }
+fn stored_key(random: &mut Random) -> StoredKey {
+    StoredKey::new(random.unit(), random.once_in(2))
 }
 
 pub(super) fn keys() -> Vec<Twin> {
@@ -184,7 +161,7 @@ pub(super) fn keys() -> Vec<Twin> {
             KERNEL,
             function,
             move |random: &mut Random, trial: &mut Trial| {
-                let key = StoredKey::random(random);
+                let key = stored_key(random);
                 trial.argument(key.stored);
                 trial.expect(expected(key));
             },
@@ -194,7 +171,7 @@ pub(super) fn keys() -> Vec<Twin> {
         key("as_given", |key| key.given),
         key("continued", |key| key.continued),
         with_globals(KERNEL, "continued_key_at", |random, trial| {
-            let all: [StoredKey; 2] = std::array::from_fn(|_| StoredKey::random(random));
+            let all: [StoredKey; 2] = std::array::from_fn(|_| stored_key(random));
             let place = random.below(2);
             trial.argument(place);
             trial.global("keys", [all[0].stored, all[1].stored]);

@@ -3,7 +3,7 @@
 use super::cells::{Cells, as_f32};
 use super::machine::Machine;
 use super::program::Program;
-use super::random::Random;
+use crate::gpu::kernel_check::random::Random;
 
 /// One call of a function: what goes in, and what its twin makes of it.
 #[derive(Default)]

@@ -354,9 +354,9 @@ pub(super) fn no_vulkan(error: &VulkanError) -> Failure {
 pub(crate) fn refused(error: &Error) -> Failure {
     match error {
         Error::Vulkan(error) if is_absence(error) => no_vulkan(error),
-        Error::Vulkan(error @ VulkanError::Inexact { .. }) => {
-            Failure::new(DEVICE, format!("{error} (--allow-inexact)"))
-        }
+        Error::Vulkan(
+            error @ (VulkanError::Inexact { .. } | VulkanError::InexactKernel { .. }),
+        ) => Failure::new(DEVICE, format!("{error} (--allow-inexact)")),
         _ => Failure::new(DEVICE, error.to_string()),
     }
 }

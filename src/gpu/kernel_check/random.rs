@@ -1,4 +1,5 @@
-//! Random inputs, always the same ones: ordinary values, and hostile ones among them.
+//! Random inputs for kernels, always the same ones: ordinary values, and hostile ones among them. The checks of
+//! kernels on devices use them, and the tests of the twins.
 
 use fastrand::Rng;
 use glam::Vec4;
@@ -15,7 +16,7 @@ const ORDINARY_STEP: f32 = 0.02;
 /// The largest number that the host is taken to give to kernels.
 const LARGEST_GIVEN: f32 = 1.0e12;
 
-pub(super) struct Random {
+pub(crate) struct Random {
     rng: Rng,
     /// Whether numbers are as the host gives them to kernels: 0 or at least 2^-64, none of them huge, and
     /// rotations of norm 1.
@@ -23,7 +24,9 @@ pub(super) struct Random {
 }
 
 impl Random {
-    pub(super) fn new() -> Self {
+    /// Of all numbers that are finite.
+    #[cfg(test)]
+    pub(crate) fn new() -> Self {
         Self {
             rng: Rng::with_seed(1),
             are_canonical: false,
@@ -31,23 +34,23 @@ impl Random {
     }
 
     /// Of numbers as the host gives them to kernels.
-    pub(super) fn canonical() -> Self {
+    pub(crate) fn canonical() -> Self {
         Self {
+            rng: Rng::with_seed(1),
             are_canonical: true,
-            ..Self::new()
         }
     }
 
     /// True once in `times`.
-    pub(super) fn once_in(&mut self, times: u32) -> bool {
+    pub(crate) fn once_in(&mut self, times: u32) -> bool {
         self.rng.u32(..times) == 0
     }
 
-    pub(super) fn below(&mut self, end: u32) -> u32 {
+    pub(crate) fn below(&mut self, end: u32) -> u32 {
         self.rng.u32(..end)
     }
 
-    pub(super) fn word(&mut self) -> u32 {
+    pub(crate) fn word(&mut self) -> u32 {
         self.rng.u32(..)
     }
 
@@ -100,7 +103,7 @@ impl Random {
     }
 
     /// From -1 to 1, or hostile: near a border, tiny or subnormal.
-    pub(super) fn number(&mut self) -> f32 {
+    pub(crate) fn number(&mut self) -> f32 {
         match self.rng.u32(..10) {
             0 => self.border(),
             1 => self.scaled(-149..-20),
@@ -110,19 +113,20 @@ impl Random {
     }
 
     /// As [`Random::number`], or of any magnitude whatsoever, but finite.
-    pub(super) fn finite(&mut self) -> f32 {
+    pub(crate) fn finite(&mut self) -> f32 {
         match self.once_in(4) {
             true => self.scaled(-149..127),
             false => self.number(),
         }
     }
 
-    pub(super) fn positive(&mut self) -> f32 {
+    #[cfg(test)]
+    pub(crate) fn positive(&mut self) -> f32 {
         self.finite().abs()
     }
 
     /// A vector of ordinary length; rarely a hostile or a huge one.
-    pub(super) fn vector<const N: usize>(&mut self) -> [f32; N] {
+    pub(crate) fn vector<const N: usize>(&mut self) -> [f32; N] {
         match self.rng.u32(..12) {
             0 => std::array::from_fn(|_| self.finite()),
             1 => std::array::from_fn(|_| self.number()),
@@ -135,7 +139,7 @@ impl Random {
     }
 
     /// A unit quaternion; some have components that are 0 or tiny.
-    pub(super) fn unit(&mut self) -> [f32; 4] {
+    pub(crate) fn unit(&mut self) -> [f32; 4] {
         loop {
             let raw: [f64; 4] = std::array::from_fn(|_| match self.rng.u32(..8) {
                 0 => self.scaled(-70..-10).into(),
@@ -150,7 +154,7 @@ impl Random {
     }
 
     /// A unit quaternion at an angle in R⁴ from another.
-    pub(super) fn near(&mut self, q: [f32; 4], angle: f32) -> [f32; 4] {
+    pub(crate) fn near(&mut self, q: [f32; 4], angle: f32) -> [f32; 4] {
         let (q, toward) = (Vec4::from(q).as_dvec4(), Vec4::from(self.unit()).as_dvec4());
         let across = (toward - q * toward.dot(q)).normalize_or_zero();
         let (sine, cosine) = f64::from(angle).sin_cos();
@@ -159,7 +163,7 @@ impl Random {
     }
 
     /// Two keys that are at most about pi/2 apart in R⁴, some equal and some hardly apart.
-    pub(super) fn pair(&mut self) -> [[f32; 4]; 2] {
+    pub(crate) fn pair(&mut self) -> [[f32; 4]; 2] {
         let from = self.unit();
         match self.rng.u32(..8) {
             0 => [from, from],
@@ -177,7 +181,7 @@ impl Random {
     }
 
     /// A rotation as it is stored: a unit quaternion, or one that is not quite.
-    pub(super) fn rotation(&mut self) -> [f32; 4] {
+    pub(crate) fn rotation(&mut self) -> [f32; 4] {
         match self.rng.u32(..8) {
             0 if !self.are_canonical => std::array::from_fn(|_| canonical(self.number())),
             1 => {
@@ -200,7 +204,7 @@ impl Random {
     }
 
     /// The parameter of a sample, from -1/2 to 1/2.
-    pub(super) fn parameter(&mut self) -> f32 {
+    pub(crate) fn parameter(&mut self) -> f32 {
         match self.rng.u32(..8) {
             0 => self.signed(0.5),
             1 => 0.0,
@@ -211,7 +215,7 @@ impl Random {
 
     /// An angle in R⁴ between two keys: mostly within the small-angle series, at one of its limits, or
     /// beyond.
-    fn step(&mut self) -> f32 {
+    pub(crate) fn step(&mut self) -> f32 {
         match self.rng.u32(..12) {
             0 => 0.0,
             1 => self.scaled(-40..-6).abs(),
@@ -224,7 +228,8 @@ impl Random {
     }
 
     /// Four keys around an interval.
-    pub(super) fn four_keys(&mut self) -> [[f32; 4]; 4] {
+    #[cfg(test)]
+    pub(crate) fn four_keys(&mut self) -> [[f32; 4]; 4] {
         let mut key = self.unit();
         let same = self.once_in(2).then(|| self.step());
         [0; 4].map(|_| {
@@ -246,7 +251,8 @@ impl Random {
         }
     }
 
-    pub(super) fn weights(&mut self) -> TangentWeights {
+    /// The tangent weights at a key.
+    pub(crate) fn weights(&mut self) -> TangentWeights {
         let kinds = [KEY_INNER, KEY_INNER, KEY_INNER, KEY_AT_END, KEY_UNKNOWN];
         // Steps between keys at even times count alike.
         let even = self.once_in(4).then_some(0.5);

@@ -1,0 +1,322 @@
+//! Trials of the kernels over a crowd.
+
+use crate::shader::{
+    CHANNELS, CrowdBase, CrowdChannel, CrowdClip, CrowdDispatch, CrowdEntry, CrowdLink, CrowdPlace,
+    CrowdSpan, FORM_ARC, FORM_CONSTANT, FORM_CUBIC, FORM_POLYNOMIAL, Kernel, ON_KEY, ROTATION,
+    RUNS_BACKWARDS, SCALE, SPEED_MAGNITUDE, START_BIAS, TRANSLATION,
+};
+use crate::twin::crowd_layers::Layers;
+use crate::twin::crowd_matrices::{Rows, affine_product, row_product, to_any_half, transform};
+use crate::twin::crowd_times::{place_at, tick_of};
+
+use bytemuck::Zeroable as _;
+
+use super::random::Random;
+use super::{Trial, bytes, groups};
+
+/// Instances of the window, and those before it.
+const INSTANCES: u32 = 11;
+const BEFORE: u32 = 1;
+const JOINTS: u32 = 7;
+const CLIPS: u32 = 3;
+const BASES: u32 = 2;
+/// Cells of segments and keys, before the masks.
+const CELLS: u32 = 72;
+const MASKS: u32 = 3;
+
+pub(super) fn trials(kernel: Kernel) -> Vec<Trial> {
+    let random = &mut Random::canonical();
+    match kernel {
+        Kernel::CrowdTimes => vec![times(random)],
+        Kernel::CrowdWalk => vec![walk(random)],
+        Kernel::CrowdSkin => vec![skin(random)],
+        Kernel::CrowdHalf => vec![half(random)],
+        Kernel::CrowdPlainRotations => vec![joints(random, 1, true, false)],
+        Kernel::CrowdPlainLocals => vec![joints(random, 1, true, true)],
+        Kernel::CrowdRotations => vec![joints(random, 3, false, false)],
+        _ => vec![joints(random, 3, false, true)],
+    }
+}
+
+/// A number below 2^`bits`, of any magnitude.
+fn number(random: &mut Random, bits: u32) -> u64 {
+    let word = u64::from(random.word()) << 32 | u64::from(random.word());
+    let own = random.below(bits + 1);
+    word.checked_shr(64 - own).unwrap_or(0)
+}
+
+/// An entry that may stand anywhere in a clip of a period, when the clock stands at a time.
+fn entry(random: &mut Random, clip: u32, period: u32, clock: u64) -> CrowdEntry {
+    let wrap = random.below(3);
+    let within = number(random, 32) % (u64::from(period) * u64::from(wrap.max(1)) + 1);
+    let early = match wrap {
+        0 if random.once_in(8) => random.below(1 << 15),
+        _ => 0,
+    };
+    let backwards = if random.once_in(2) { RUNS_BACKWARDS } else { 0 };
+    let mut speed = number(random, 23) as u32 & SPEED_MAGNITUDE;
+    if random.once_in(4) {
+        speed = 0; // it may stand at a key
+    }
+    let weight = random.below(0x8001);
+    let weight = if random.once_in(4) { 0 } else { weight };
+    let (mask, additive) = (random.below(MASKS), random.below(2));
+    let elapsed = number(random, 40);
+    CrowdEntry {
+        clip_and_weight: clip | weight << 16,
+        speed_and_modes: speed | backwards | mask << 24 | wrap << 29 | additive << 31,
+        start: START_BIAS + within as u32 - early,
+        anchor: (clock.wrapping_sub(elapsed) >> 8) as u32,
+    }
+}
+
+fn times(random: &mut Random) -> Trial {
+    const LAYERS: u32 = 2;
+    const MOST: u32 = 3;
+    const CLOCK: u64 = 0x00ab_cdef_0123_4567;
+    let (mut clips, mut bases, mut spans) = (Vec::new(), Vec::new(), Vec::new());
+    for clip in 0..CLIPS {
+        let period = 1 + number(random, 30) as u32;
+        let own = 1 + clip % MOST;
+        clips.push(CrowdClip {
+            period,
+            first_base: bases.len() as u32,
+            bases: own,
+        });
+        for _ in 0..own {
+            let count = 1 + random.below(9);
+            let mut starts: Vec<u32> = (1..count)
+                .map(|_| (number(random, 31) % u64::from(period + 1)) as u32)
+                .collect();
+            starts.push(0);
+            starts.sort_unstable();
+            let step = if count < 2 {
+                0
+            } else {
+                1 << (count - 1).ilog2()
+            };
+            bases.push(CrowdBase {
+                first: spans.len() as u32,
+                count,
+                step,
+            });
+            spans.extend(starts.into_iter().map(|start| CrowdSpan {
+                start: start | if random.once_in(2) { ON_KEY } else { 0 },
+                whole: (start as i32).wrapping_add(random.below(1 << 20) as i32),
+                scale: random.number(),
+                offset: random.parameter(),
+            }));
+        }
+    }
+    let mut entries = Vec::new();
+    for _ in 0..(BEFORE + 4 * INSTANCES) * LAYERS {
+        let clip = random.below(CLIPS);
+        let mut own = entry(random, clip, clips[clip as usize].period, CLOCK);
+        let clip = &clips[clip as usize];
+        if own.speed_and_modes & SPEED_MAGNITUDE == 0 {
+            let base = &bases[(clip.first_base + random.below(clip.bases)) as usize];
+            let span = &spans[(base.first + random.below(base.count)) as usize];
+            own.start = START_BIAS + (span.start & !ON_KEY);
+        }
+        entries.push(own);
+    }
+    let count = 4 * INSTANCES * LAYERS * MOST;
+    let dispatch = CrowdDispatch {
+        count,
+        first_instance: BEFORE,
+        layers: LAYERS,
+        bases: MOST,
+        clock_low: CLOCK as u32,
+        clock_high: (CLOCK >> 32) as u32,
+        ..CrowdDispatch::zeroed()
+    };
+    let inputs = [bytes(&entries), bytes(&clips), bytes(&bases), bytes(&spans)];
+    let mut trial = Trial::new(inputs, &dispatch, groups(count as usize, false));
+    let window = &entries[(BEFORE * LAYERS) as usize..];
+    for (layer, entry) in window.iter().enumerate() {
+        let clip = &clips[(entry.clip_and_weight & 0xffff) as usize];
+        let tick = tick_of(entry, clip.period, CLOCK);
+        for base in 0..clip.bases {
+            let own = &bases[(clip.first_base + base) as usize];
+            let place = layer * MOST as usize + base as usize;
+            trial.expect(place, &place_at(own, &spans, tick));
+        }
+    }
+    trial
+}
+
+fn channel(random: &mut Random) -> CrowdChannel {
+    let forms = [FORM_CONSTANT, FORM_ARC, FORM_CUBIC, FORM_POLYNOMIAL];
+    let form = forms[random.below(4) as usize];
+    CrowdChannel {
+        first: random.below(3),
+        count: 1 + random.below(2),
+        form_and_base: form << 24 | random.below(BASES),
+        keys: random.below(60),
+    }
+}
+
+/// A channel of one form, or a constant one, for the kernels without branches.
+fn plain(random: &mut Random, form: u32) -> CrowdChannel {
+    let own = channel(random);
+    let (first, base) = (own.first + 1, own.form_and_base & 0x00ff_ffff);
+    match random.once_in(3) {
+        true => CrowdChannel {
+            first,
+            count: 0,
+            form_and_base: FORM_CONSTANT << 24 | base,
+            keys: first,
+        },
+        false => CrowdChannel {
+            first,
+            form_and_base: form << 24 | base,
+            ..own
+        },
+    }
+}
+
+fn joints(random: &mut Random, layers: u32, is_plain: bool, are_locals: bool) -> Trial {
+    let entries: Vec<_> = (0..(BEFORE + INSTANCES) * layers)
+        .map(|_| {
+            let clip = random.below(CLIPS);
+            entry(random, clip, 1 << 20, 0)
+        })
+        .collect();
+    let channels: Vec<_> = (0..CLIPS * JOINTS * CHANNELS)
+        .map(|i| match (is_plain, i % CHANNELS == ROTATION) {
+            (true, true) => plain(random, FORM_ARC),
+            (true, false) => plain(random, FORM_CUBIC),
+            (false, _) => channel(random),
+        })
+        .collect();
+    let (masks, references) = (CELLS, CELLS + MASKS * JOINTS);
+    let mut cells: Vec<[f32; 4]> = (0..references + CLIPS * JOINTS * CHANNELS)
+        .map(|_| random.rotation())
+        .collect();
+    if is_plain {
+        cells[0] = [0.0; 4];
+    }
+    let places: Vec<_> = (0..INSTANCES * layers * BASES)
+        .map(|_| CrowdPlace {
+            span: random.below(2) | if random.once_in(4) { ON_KEY } else { 0 },
+            parameter: random.parameter(),
+        })
+        .collect();
+    let count = INSTANCES * JOINTS;
+    let dispatch = CrowdDispatch {
+        count,
+        first_instance: BEFORE,
+        joints: JOINTS,
+        layers,
+        bases: BASES,
+        masks,
+        references,
+        ..CrowdDispatch::zeroed()
+    };
+    let inputs = [
+        bytes(&entries),
+        bytes(&channels),
+        bytes(&cells),
+        bytes(&places),
+    ];
+    let mut trial = Trial::new(inputs, &dispatch, groups(count as usize, !are_locals));
+    let twin = Layers {
+        entries: &entries[(BEFORE * layers) as usize..],
+        channels: &channels,
+        cells: &cells,
+        places: &places,
+        joints: JOINTS,
+        layers,
+        bases: BASES,
+        masks,
+        references,
+    };
+    for place in 0..count {
+        let (instance, joint) = (place / JOINTS, place % JOINTS);
+        let own = |kind| twin.layered(instance, joint, kind);
+        match are_locals {
+            true => {
+                let rows = transform(own(ROTATION), own(TRANSLATION), own(SCALE));
+                trial.expect(place as usize, &rows);
+            }
+            false => trial.expect(place as usize, &own(ROTATION)),
+        }
+    }
+    trial
+}
+
+fn rows(random: &mut Random) -> Rows {
+    [random.vector(), random.vector(), random.vector()]
+}
+
+/// Expects what lies in the matrices, of which the kernel changes some.
+fn over(mut trial: Trial, before: &[Rows], after: &[Rows]) -> Trial {
+    trial.before = bytemuck::pod_collect_to_vec(&bytes(before));
+    trial.expected = bytemuck::pod_collect_to_vec(&bytes(after));
+    trial
+}
+
+fn walk(random: &mut Random) -> Trial {
+    // The levels of a skeleton; the one that is walked is the last.
+    const LINKS: [[u32; 2]; 6] = [[1, 0], [2, 0], [6, 1], [3, 2], [5, 2], [4, 1]];
+    const LEVEL: usize = 4;
+    const POSES: usize = 19;
+    let before: Vec<_> = (0..POSES * JOINTS as usize).map(|_| rows(random)).collect();
+    let links = LINKS.map(|[joint, parent]| CrowdLink { joint, parent });
+    let first_link = LINKS.len() - LEVEL;
+    let count = POSES * LEVEL;
+    let dispatch = CrowdDispatch {
+        count: count as u32,
+        joints: LEVEL as u32,
+        layers: JOINTS,
+        first_link: first_link as u32,
+        ..CrowdDispatch::zeroed()
+    };
+    let mut after = before.clone();
+    for pose in after.chunks_mut(JOINTS as usize) {
+        for [joint, parent] in &LINKS[first_link..] {
+            pose[*joint as usize] = affine_product(&pose[*parent as usize], &pose[*joint as usize]);
+        }
+    }
+    let trial = Trial::new([bytes(&links)], &dispatch, groups(count, true));
+    over(trial, &before, &after)
+}
+
+fn skin(random: &mut Random) -> Trial {
+    const POSES: usize = 5;
+    let before: Vec<_> = (0..POSES * JOINTS as usize).map(|_| rows(random)).collect();
+    let bind: Vec<_> = (0..JOINTS).map(|_| rows(random)).collect();
+    let count = 3 * before.len();
+    let dispatch = CrowdDispatch {
+        count: count as u32,
+        joints: JOINTS,
+        ..CrowdDispatch::zeroed()
+    };
+    let mut after = before.clone();
+    for (matrix, own) in after.iter_mut().enumerate() {
+        *own = own.map(|row| row_product(row, &bind[matrix % JOINTS as usize]));
+    }
+    let trial = Trial::new([bytes(&bind)], &dispatch, groups(count, false));
+    over(trial, &before, &after)
+}
+
+fn half(random: &mut Random) -> Trial {
+    const VALUES: usize = 139;
+    // Near the largest half, or any.
+    let number = |random: &mut Random| match random.once_in(4) {
+        true => 65_520.0 + 100.0 * random.number(),
+        false => random.finite(),
+    };
+    let values: Vec<[f32; 4]> = (0..VALUES)
+        .map(|_| [0; 4].map(|_| number(random)))
+        .collect();
+    let dispatch = CrowdDispatch {
+        count: VALUES as u32,
+        ..CrowdDispatch::zeroed()
+    };
+    let mut trial = Trial::new([bytes(&values)], &dispatch, groups(VALUES, true));
+    for (i, value) in values.iter().enumerate() {
+        trial.expect(i, &value.map(to_any_half));
+    }
+    trial
+}

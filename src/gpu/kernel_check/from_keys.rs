@@ -1,0 +1,182 @@
+//! Trials of the kernels that evaluate samples straight from keys.
+
+use bytemuck::Zeroable as _;
+
+use crate::from_keys::arcs::TwoKeyBlock;
+use crate::from_keys::cubics::CubicBlock;
+use crate::math::canonical::canonical;
+use crate::math::quaternion::dot;
+use crate::shader::{
+    FROM_KEYS_WORKGROUP, Form, IS_KEY, KEY_AT_END, KEY_INNER, Kernel, KeySample,
+    ROWS_PER_INVOCATION, RowShape, SIGN_TURNED, TangentWeights,
+};
+use crate::simd::dispatch::in_lanes;
+
+use super::random::Random;
+use super::{Trial, bytes};
+
+/// A key as a kernel reads it, with the sign that was given, and with the one that continues the
+/// keys before it.
+#[derive(Clone, Copy)]
+pub(crate) struct StoredKey {
+    pub(crate) stored: [u32; 4],
+    pub(crate) given: [f32; 4],
+    pub(crate) continued: [f32; 4],
+}
+
+impl StoredKey {
+    pub(crate) fn new(given: [f32; 4], is_turned: bool) -> Self {
+        let mut stored = given.map(f32::to_bits);
+        let sign = if is_turned { -1.0 } else { 1.0 };
+        if is_turned {
+            stored[0] |= SIGN_TURNED;
+        }
+        Self {
+            stored,
+            given,
+            continued: given.map(|c| c * sign),
+        }
+    }
+}
+
+const KEYS: usize = 23;
+const SAMPLES: usize = 75;
+/// One more than an invocation takes.
+const ROWS: usize = ROWS_PER_INVOCATION as usize + 1;
+
+/// Some rows of keys, and samples of all of them.
+struct Rows {
+    keys: Vec<StoredKey>,
+    samples: Vec<KeySample>,
+    weights: Vec<TangentWeights>,
+}
+
+pub(super) fn trials(kernel: Kernel) -> Vec<Trial> {
+    let rows = Rows::new(&mut Random::canonical(), kernel == Kernel::FromKeysCubics);
+    // All rows of an invocation, or one each that begins where a line of memory does.
+    [(ROWS_PER_INVOCATION, 0), (1, 7)]
+        .map(|(each, line)| rows.trial(kernel, each, line))
+        .into()
+}
+
+impl Rows {
+    fn new(random: &mut Random, are_cubics: bool) -> Self {
+        let mut keys = Vec::new();
+        for _ in 0..ROWS {
+            let mut key = random.unit();
+            for _ in 0..KEYS {
+                let is_turned = random.once_in(3);
+                let given = if is_turned {
+                    key.map(|c| canonical(-c))
+                } else {
+                    key
+                };
+                keys.push(StoredKey::new(given, is_turned));
+                key = match are_cubics || random.once_in(2) {
+                    true => {
+                        let step = random.step();
+                        random.near(key, step)
+                    }
+                    false => {
+                        let next = random.unit();
+                        let is_near = dot(key, next) >= 0.0;
+                        if is_near {
+                            next
+                        } else {
+                            next.map(|c| canonical(-c))
+                        }
+                    }
+                };
+            }
+        }
+        let samples = (0..SAMPLES).map(|_| match random.once_in(6) {
+            true => KeySample {
+                key: random.below(KEYS as u32) | IS_KEY,
+                parameter: 0.0,
+            },
+            false => KeySample {
+                key: random.below(KEYS as u32 - 1),
+                parameter: random.parameter(),
+            },
+        });
+        let samples = samples.collect();
+        let mut weights: Vec<_> = (0..KEYS).map(|_| random.weights()).collect();
+        // Nothing lies before the first key, and nothing after the last.
+        (weights[0].kind, weights[KEYS - 1].kind) = (KEY_AT_END, KEY_AT_END);
+        Self {
+            keys,
+            samples,
+            weights,
+        }
+    }
+
+    fn trial(&self, kernel: Kernel, each: u32, line: u32) -> Trial {
+        let shape = RowShape {
+            samples: SAMPLES as u32,
+            keys: KEYS as u32,
+            count: ROWS as u32,
+            each,
+            line,
+        };
+        let groups = [
+            (shape.samples + line).div_ceil(FROM_KEYS_WORKGROUP),
+            shape.count.div_ceil(each),
+            1,
+        ];
+        let stored: Vec<_> = self.keys.iter().map(|key| key.stored).collect();
+        let (keys, samples) = (bytes(&stored), bytes(&self.samples));
+        let mut trial = match kernel {
+            Kernel::FromKeysCubics => {
+                Trial::new([keys, samples, bytes(&self.weights)], &shape, groups)
+            }
+            _ => Trial::new([keys, samples], &shape, groups),
+        };
+        for row in 0..ROWS {
+            let keys = &self.keys[row * KEYS..][..KEYS];
+            for (i, sample) in self.samples.iter().enumerate() {
+                let rotation = match kernel {
+                    Kernel::FromKeysArcs => two_keys(Form::Arc, keys, sample),
+                    Kernel::FromKeysTwoKeys => two_keys(Form::Polynomial, keys, sample),
+                    _ => self.cubic(keys, sample),
+                };
+                trial.expect(row * SAMPLES + i, &rotation);
+            }
+        }
+        trial
+    }
+
+    fn cubic(&self, keys: &[StoredKey], sample: &KeySample) -> [f32; 4] {
+        let (is_key, own) = (sample.key & IS_KEY != 0, (sample.key & !IS_KEY) as usize);
+        let mut block = CubicBlock::zeroed();
+        (block.count, block.parameters[0]) = (1, sample.parameter);
+        if is_key {
+            block.held[0] = 1.0;
+            block.keys[1][0] = keys[own].given;
+        } else {
+            let (first, last) = (self.weights[own], self.weights[own + 1]);
+            // A key without a neighbour takes its place.
+            let before = own - usize::from(first.kind == KEY_INNER);
+            let after = own + 1 + usize::from(last.kind == KEY_INNER);
+            for (place, key) in [before, own, own + 1, after].into_iter().enumerate() {
+                block.keys[place][0] = keys[key].continued;
+            }
+            (block.weights[0][0], block.weights[1][0]) = (first, last);
+        }
+        // Lanes without a sample count as held.
+        block.held[1..].fill(1.0);
+        in_lanes(&mut block);
+        block.rotations[0]
+    }
+}
+
+fn two_keys(form: Form, keys: &[StoredKey], sample: &KeySample) -> [f32; 4] {
+    let own = (sample.key & !IS_KEY) as usize;
+    let mut block = TwoKeyBlock::new(form);
+    (block.from[0], block.to[0]) = match sample.key & IS_KEY {
+        0 => (keys[own].continued, keys[own + 1].continued),
+        _ => (keys[own].given, keys[own].given),
+    };
+    (block.count, block.parameters[0]) = (1, sample.parameter);
+    in_lanes(&mut block);
+    block.rotations[0]
+}

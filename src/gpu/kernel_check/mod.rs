@@ -1,0 +1,145 @@
+//! The check of kernels: what a device makes of a kernel is compared, bit for bit, with what the kernel's twin
+//! makes of the same inputs, before the first result of that kernel is used.
+
+mod crowd;
+mod from_keys;
+pub(crate) mod passes;
+mod poses;
+pub(crate) mod random;
+mod segments;
+
+use bytemuck::NoUninit;
+
+use crate::gpu::error::VulkanError;
+use crate::gpu::pipeline::Pipeline;
+use crate::gpu::self_test;
+use crate::shader::Kernel;
+
+#[cfg(test)]
+pub(crate) use from_keys::StoredKey;
+
+/// How a device did on one kernel.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct KernelCheck {
+    /// The kernel, as [`kernels`](crate::kernels) names it.
+    pub name: &'static str,
+    /// Values of 32 bits compared: those that the kernel has to store, and some around them that it has to
+    /// leave alone.
+    pub total: usize,
+    /// Values with other bits than the CPU's.
+    pub differing: usize,
+}
+
+/// What lies in a result before a kernel runs, and stays where it stores nothing.
+const UNTOUCHED: u32 = u32::MAX;
+
+/// Values behind a result that no kernel may touch.
+const GUARD: usize = 16;
+
+/// One dispatch of a kernel: all that it reads, and what its twin makes of it.
+pub(super) struct Trial {
+    /// The buffers that it reads, in the order of their bindings.
+    inputs: Vec<Vec<u8>>,
+    /// What comes with the dispatch.
+    arguments: Vec<u8>,
+    groups: [u32; 3],
+    /// What the kernel finds where it stores.
+    before: Vec<u32>,
+    expected: Vec<u32>,
+}
+
+impl Trial {
+    pub(super) fn new<const N: usize>(
+        inputs: [Vec<u8>; N],
+        arguments: &impl NoUninit,
+        groups: [u32; 3],
+    ) -> Self {
+        Self {
+            inputs: inputs.into(),
+            arguments: bytemuck::bytes_of(arguments).to_vec(),
+            groups,
+            before: Vec::new(),
+            expected: Vec::new(),
+        }
+    }
+
+    /// Expects a value as the `place`th of its type.
+    pub(super) fn expect<T: NoUninit>(&mut self, place: usize, value: &T) {
+        let words: Vec<u32> = bytemuck::pod_collect_to_vec(bytemuck::bytes_of(value));
+        self.expect_words(place * words.len(), &words);
+    }
+
+    fn expect_words(&mut self, first: usize, words: &[u32]) {
+        let end = first + words.len();
+        if self.expected.len() < end {
+            self.expected.resize(end, UNTOUCHED);
+        }
+        self.expected[first..end].copy_from_slice(words);
+    }
+
+    /// Runs it, and counts the values that differ.
+    fn differing(&self, pipeline: &Pipeline) -> Result<usize, VulkanError> {
+        let mut expected = self.expected.clone();
+        expected.resize(expected.len() + GUARD, UNTOUCHED);
+        let mut found = self.before.clone();
+        found.resize(expected.len(), UNTOUCHED);
+        let inputs: Vec<&[u8]> = self.inputs.iter().map(Vec::as_slice).collect();
+        let output = bytemuck::cast_slice_mut(&mut found);
+        pipeline.run_on(&inputs, &self.arguments, self.groups, output)?;
+        let pairs = found.iter().zip(&expected);
+        Ok(pairs.filter(|(found, expected)| found != expected).count())
+    }
+}
+
+/// The bytes of a buffer.
+pub(super) fn bytes<T: NoUninit>(values: &[T]) -> Vec<u8> {
+    bytemuck::cast_slice(values).to_vec()
+}
+
+/// Workgroups of 64 for so many invocations, in one column or in one row.
+fn groups(invocations: usize, in_row: bool) -> [u32; 3] {
+    let count = (invocations as u32).div_ceil(64);
+    match in_row {
+        true => [count, 1, 1],
+        false => [1, count, 1],
+    }
+}
+
+fn trials(kernel: Kernel) -> Vec<Trial> {
+    match kernel {
+        Kernel::SelfTest => vec![self_test::trial()],
+        Kernel::FromKeysArcs | Kernel::FromKeysTwoKeys | Kernel::FromKeysCubics => {
+            from_keys::trials(kernel)
+        }
+        Kernel::PosesAdd
+        | Kernel::PosesBlend
+        | Kernel::PosesMix
+        | Kernel::PosesSmooth
+        | Kernel::PosesSteps
+        | Kernel::PosesWorld => poses::trials(kernel),
+        Kernel::CrowdRotations
+        | Kernel::CrowdPlainRotations
+        | Kernel::CrowdLocals
+        | Kernel::CrowdPlainLocals
+        | Kernel::CrowdTimes
+        | Kernel::CrowdWalk
+        | Kernel::CrowdSkin
+        | Kernel::CrowdHalf => crowd::trials(kernel),
+        _ => segments::trials(kernel),
+    }
+}
+
+/// Runs the trials of a kernel through its pipeline.
+pub(crate) fn check(kernel: Kernel, pipeline: &Pipeline) -> Result<KernelCheck, VulkanError> {
+    let mut check = KernelCheck {
+        name: pipeline.name,
+        total: 0,
+        differing: 0,
+    };
+    for trial in trials(kernel) {
+        check.total += trial.expected.len() + GUARD;
+        check.differing += trial.differing(pipeline)?;
+    }
+    Ok(check)
+}

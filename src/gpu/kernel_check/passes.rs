@@ -1,0 +1,239 @@
+//! Which kernels were found to be exact on which devices: kept from process to process in the user's cache
+//! directory, where there is one. Only what passed is kept, so that a file that is lost costs no more than
+//! another check.
+
+use std::collections::BTreeSet;
+use std::env;
+use std::sync::{Mutex, OnceLock};
+
+use crate::gpu::cache::Cache;
+use crate::gpu::engine::lock;
+use crate::gpu::physical::{DeviceKind, PhysicalDevice};
+use crate::gpu::pipeline::Pipeline;
+use crate::simd::dispatch::VectorWidth;
+
+/// The file's name.
+const FILE: &str = "kernel-checks";
+
+/// How every line of it begins. Another number where checks are other ones than before.
+const MARK: &str = "exact 1";
+
+/// The most that is read of it, bytes.
+const MOST_BYTES: usize = 1 << 20;
+
+/// The most lines that are written.
+const MOST_LINES: usize = 4096;
+
+/// A kernel that passed on a device.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct Pass(String);
+
+impl Pass {
+    pub(crate) fn new(physical: &PhysicalDevice, pipeline: &Pipeline) -> Self {
+        Self::of(&of_device(physical, env::vars_os()), pipeline.code_hash)
+    }
+
+    fn of(device: &str, code: u64) -> Self {
+        Self(format!("{MARK} {device} {code:016x}"))
+    }
+
+    /// Of a line of the file; `None` for one that no version with the same checks has written.
+    fn parse(line: &str) -> Option<Self> {
+        let fields: Vec<&str> = line
+            .strip_prefix(MARK)?
+            .strip_prefix(' ')?
+            .split(' ')
+            .collect();
+        let is_hex = |text: &str, digits| {
+            text.len() == digits && text.bytes().all(|b| matches!(b, b'0'..=b'9' | b'a'..=b'f'))
+        };
+        match *fields {
+            [uuid, version, setting, code]
+                if is_hex(&uuid.replace('-', ""), 32)
+                    && is_hex(version, 8)
+                    && is_hex(setting, 16)
+                    && is_hex(code, 16) =>
+            {
+                Some(Self(line.to_owned()))
+            }
+            _ => None,
+        }
+    }
+}
+
+/// How the variables begin that change what drivers and loaders do.
+const OF_DRIVERS: [&str; 22] = [
+    "ACO_",
+    "AMD_",
+    "ANV_",
+    "DRI",
+    "GALLIUM_",
+    "GALLIVM_",
+    "INTEL_",
+    "LD_",
+    "LP_",
+    "MESA_",
+    "MVK_",
+    "NIR_",
+    "NVK_",
+    "RADV_",
+    "SPIRV_",
+    "SWIFTSHADER",
+    "TU_",
+    "VK_",
+    "V3D_",
+    "ZINK_",
+    "__GL_",
+    "__NV_",
+];
+
+/// A device with its driver, and what the driver's compiler goes by besides: its name and version in words, the
+/// variables of the environment that change drivers, and on software devices the processor's instructions.
+fn of_device(
+    physical: &PhysicalDevice,
+    environment: impl Iterator<Item = (std::ffi::OsString, std::ffi::OsString)>,
+) -> String {
+    let info = &physical.info;
+    let mut settings = vec![
+        env!("CARGO_PKG_VERSION").to_owned(),
+        format!(
+            "{:x} {:x} {}",
+            info.vendor_id, info.device_id, info.api_version
+        ),
+        info.name.clone(),
+        info.driver.clone(),
+    ];
+    if info.kind == DeviceKind::Cpu {
+        settings.push(format!("{} {:?}", env::consts::ARCH, VectorWidth::widest()));
+    }
+    let mut variables: Vec<String> = environment
+        .filter(|(name, _)| {
+            let name = name.to_string_lossy();
+            OF_DRIVERS.iter().any(|start| name.starts_with(start))
+        })
+        .map(|(name, value)| format!("{}={}", name.display(), value.display()))
+        .collect();
+    variables.sort_unstable();
+    settings.extend(variables);
+    let setting = settings.iter().flat_map(|own| own.bytes().chain([0]));
+    let setting = setting.fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| {
+        (hash ^ u64::from(byte)).wrapping_mul(0x100_0000_01b3)
+    });
+    format!(
+        "{} {:08x} {setting:016x}",
+        info.uuid, physical.driver_version
+    )
+}
+
+/// What has passed so far, in this process and before.
+pub(crate) struct Passes {
+    cache: Cache,
+    known: Mutex<BTreeSet<Pass>>,
+}
+
+impl Passes {
+    pub(crate) fn of_user() -> &'static Self {
+        static ALL: OnceLock<Passes> = OnceLock::new();
+        ALL.get_or_init(|| Self::of(Cache::of_user()))
+    }
+
+    fn of(cache: Cache) -> Self {
+        let known = Mutex::new(read(&cache));
+        Self { cache, known }
+    }
+
+    pub(crate) fn has(&self, pass: &Pass) -> bool {
+        lock(&self.known).contains(pass)
+    }
+
+    pub(crate) fn remember(&self, passed: impl IntoIterator<Item = Pass>) {
+        let mut known = lock(&self.known);
+        let before = known.len();
+        known.extend(passed);
+        if known.len() == before {
+            return;
+        }
+        // Other processes may have written meanwhile.
+        let mut all = read(&self.cache);
+        all.extend(known.iter().cloned());
+        if all.len() > MOST_LINES {
+            all.clone_from(&known);
+        }
+        drop(known);
+        let lines: String = all
+            .iter()
+            .flat_map(|Pass(line)| [line.as_str(), "\n"])
+            .collect();
+        self.cache.write(FILE, lines.as_bytes());
+    }
+}
+
+/// What the file says, as far as it can be understood.
+fn read(cache: &Cache) -> BTreeSet<Pass> {
+    let bytes = cache.read(FILE, MOST_BYTES).unwrap_or_default();
+    let text = String::from_utf8_lossy(&bytes);
+    text.lines().filter_map(Pass::parse).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const DEVICE: &str = "6d657361-3232-2e33-2e36-000000000000 00000001 0123456789abcdef";
+
+    #[test]
+    fn what_passed_is_known_to_the_next_process() {
+        let folder = tempfile::tempdir().unwrap();
+        let cache = Cache::within(folder.path());
+        let (one, two) = (Pass::of(DEVICE, 1), Pass::of(DEVICE, 2));
+        let passes = Passes::of(cache.clone());
+        assert!(!passes.has(&one));
+        passes.remember([one.clone()]);
+        assert!(passes.has(&one) && !passes.has(&two));
+        // Two processes that began at the same time.
+        let other = Passes::of(cache.clone());
+        passes.remember([two.clone()]);
+        let three = Pass::of(DEVICE, 3);
+        other.remember([three.clone()]);
+        let next = Passes::of(cache);
+        assert!([&one, &two, &three].into_iter().all(|own| next.has(own)));
+    }
+
+    /// Whoever wrote the file: what is no line of ours means nothing, and the others count.
+    #[test]
+    fn a_line_of_another_kind_means_nothing() {
+        let folder = tempfile::tempdir().unwrap();
+        let cache = Cache::within(folder.path());
+        let sound = Pass::of(DEVICE, 7);
+        let Pass(line) = &sound;
+        let foreign = [
+            "",
+            "exact",
+            "exact 1",
+            &line[..line.len() - 1],
+            &line.replace("exact 1", "exact 2"),
+            &line.replace("exact", "inexact"),
+            &line.to_uppercase(),
+            &format!("{line} more"),
+            &format!(" {line}"),
+            &"exact 1 ".repeat(1000),
+            "\u{fffd}\0",
+        ];
+        for other in foreign {
+            assert_eq!(Pass::parse(other), None, "{other}");
+        }
+        let file = format!("{}\n{line}\n{}", foreign.join("\n"), &line[..20]);
+        assert!(cache.write(FILE, &[file.as_bytes(), &[0xff, 0xfe]].concat()));
+        assert_eq!(read(&cache), BTreeSet::from([sound]));
+        // More than anybody has devices: what this process knows stays.
+        let many: String = (0..MOST_LINES as u64)
+            .map(|code| Pass::of(DEVICE, code).0 + "\n")
+            .collect();
+        assert!(cache.write(FILE, many.as_bytes()));
+        let passes = Passes::of(Cache::within(&folder.path().join("other")));
+        let passes = Passes { cache, ..passes };
+        let own = Pass::of(DEVICE, u64::MAX);
+        passes.remember([own.clone()]);
+        assert_eq!(read(&passes.cache), BTreeSet::from([own]));
+    }
+}

@@ -1,0 +1,401 @@
+//! Trials of the kernels that evaluate segments: each form by each list, in every encoding of its store.
+
+use crate::cpu::evaluate::one;
+use crate::fit::constant_velocity::arc_polynomial;
+use crate::math::canonical::canonical;
+use crate::output::encoding::{Encoding, MatrixOrder};
+use crate::output::euler::EulerSequence;
+use crate::shader::{
+    ArcSegment, BLOCK_SAMPLES, Block, Dispatch, Form, Grid, IS_CONSTANT, ITEM_SAMPLES, Item,
+    Kernel, LINE, List, ListedSample, MAY_BE_TINY, PolynomialSegment, SAMPLES_EACH, Store,
+    WORKGROUP,
+};
+use crate::time::runs::Affine;
+use crate::twin::arc_between::arc_between;
+use crate::twin::evaluate::Evaluate;
+
+use super::random::Random;
+use super::{Trial, bytes, groups};
+
+const SEGMENTS: usize = 24;
+const CONSTANTS: usize = 6;
+
+/// A form of segments.
+trait Segment: Evaluate {
+    /// Of numbers that need not be a rotation's.
+    fn any(random: &mut Random) -> Self;
+    /// The arc between two keys.
+    fn between(keys: [[f32; 4]; 2]) -> Self;
+}
+
+fn any_vector(random: &mut Random) -> [f32; 4] {
+    random.vector().map(canonical)
+}
+
+impl Segment for ArcSegment {
+    fn any(random: &mut Random) -> Self {
+        let (middle, tangent) = (any_vector(random), any_vector(random));
+        Self { middle, tangent }
+    }
+
+    fn between([from, to]: [[f32; 4]; 2]) -> Self {
+        let (middle, tangent) = arc_between(from, to);
+        Self { middle, tangent }
+    }
+}
+
+impl Segment for PolynomialSegment {
+    fn any(random: &mut Random) -> Self {
+        let coefficients = std::array::from_fn(|_| any_vector(random));
+        Self { coefficients }
+    }
+
+    fn between(keys: [[f32; 4]; 2]) -> Self {
+        arc_polynomial(keys)
+    }
+}
+
+/// Every encoding that a store makes.
+fn encodings(store: Store) -> Vec<Encoding> {
+    let orders = [MatrixOrder::RowMajor, MatrixOrder::ColumnMajor];
+    match store {
+        Store::AxisAngle => vec![Encoding::AxisAngle],
+        Store::Euler => EulerSequence::all()
+            .into_iter()
+            .map(Encoding::Euler)
+            .collect(),
+        Store::F16 => vec![Encoding::F16],
+        Store::F32 => vec![Encoding::F32],
+        Store::Matrix3x3 => orders.map(Encoding::Matrix3x3).into(),
+        Store::Matrix3x4 => orders.map(Encoding::Matrix3x4).into(),
+        Store::Snorm16 => vec![Encoding::Snorm16],
+        Store::Vector => vec![Encoding::Vector],
+    }
+}
+
+pub(super) fn trials(kernel: Kernel) -> Vec<Trial> {
+    let Some((form, list, store)) = kernel.compiled().segments else {
+        return Vec::new();
+    };
+    match form {
+        Form::Arc => of_form::<ArcSegment>(list, store),
+        Form::Polynomial => of_form::<PolynomialSegment>(list, store),
+    }
+}
+
+fn of_form<S: Segment>(list: List, store: Store) -> Vec<Trial> {
+    let random = &mut Random::canonical();
+    let encodings = encodings(store);
+    // Two shapes of a dispatch, and every encoding at least once.
+    (0..encodings.len().max(2))
+        .map(|i| {
+            let scene = Scene::<S>::new(random, store, encodings[i % encodings.len()]);
+            let first = i % 2 == 0;
+            match list {
+                List::Frames => scene.runs(random, false, first),
+                List::Times => scene.runs(random, true, first),
+                List::Samples => scene.samples(random, first),
+                List::FramesCoalesced if first => scene.track_by_track(random, false),
+                List::TimesCoalesced if first => scene.track_by_track(random, true),
+                List::FramesCoalesced => scene.frame_by_frame(random, false),
+                List::TimesCoalesced => scene.frame_by_frame(random, true),
+            }
+        })
+        .collect()
+}
+
+/// What all work of a dispatch is made of.
+struct Scene<S> {
+    encoding: Encoding,
+    segments: Vec<S>,
+    constants: Vec<[f32; 4]>,
+    distances: Vec<f32>,
+    items: Vec<Item>,
+    /// Where each sample is stored, and the rotation.
+    stored: Vec<(usize, [f32; 4])>,
+}
+
+impl<S: Segment> Scene<S> {
+    fn new(random: &mut Random, store: Store, encoding: Encoding) -> Self {
+        // Other stores take rotations alone.
+        let takes_any = matches!(store, Store::F32 | Store::Vector);
+        let segment = |random: &mut Random| match takes_any && random.once_in(3) {
+            true => S::any(random),
+            false => S::between(random.pair()),
+        };
+        Self {
+            encoding,
+            segments: (0..SEGMENTS).map(|_| segment(random)).collect(),
+            constants: (0..CONSTANTS).map(|_| random.rotation()).collect(),
+            distances: Vec::new(),
+            items: Vec::new(),
+            stored: Vec::new(),
+        }
+    }
+
+    /// Makes up an item, and stores what it evaluates; `places` are those of its samples.
+    fn item(
+        &mut self,
+        random: &mut Random,
+        is_listed: bool,
+        output: u32,
+        places: impl ExactSizeIterator<Item = usize>,
+    ) {
+        let count = places.len() as u32;
+        let (source, bit) = self.source(random);
+        // Frames about the middle of a short run, or those at one end of a very long one.
+        let (frame, scale) = match random.once_in(6) {
+            true => (random.word() as i32 >> 9, 0.25 / (1 << 23) as f32),
+            false => (
+                random.below(ITEM_SAMPLES) as i32 - 8,
+                random.number() / 16.0,
+            ),
+        };
+        let affine = Affine {
+            scale,
+            offset: random.parameter(),
+        };
+        let first = match is_listed {
+            true => self.distances.len() as i32,
+            false => frame,
+        };
+        for (j, place) in places.enumerate() {
+            let distance = match is_listed {
+                true => {
+                    self.distances.push(random.number() * 4.0);
+                    self.distances[first as usize + j]
+                }
+                false => (first + j as i32) as f32,
+            };
+            let rotation = match bit {
+                0 => one(&self.segments[source as usize], affine, distance),
+                _ => self.constants[source as usize],
+            };
+            self.stored.push((place, rotation));
+        }
+        self.items.push(Item {
+            source,
+            output,
+            count: count | bit,
+            first,
+            scale: affine.scale,
+            offset: affine.offset,
+        });
+    }
+
+    /// A segment, or a constant and the bit that says so.
+    fn source(&self, random: &mut Random) -> (u32, u32) {
+        match random.once_in(8) {
+            true => (random.below(CONSTANTS as u32), IS_CONSTANT),
+            false => (random.below(SEGMENTS as u32), 0),
+        }
+    }
+
+    fn finish(self, listed: Vec<Vec<u8>>, arguments: Vec<u8>, groups: [u32; 3]) -> Trial {
+        let mut inputs = vec![bytes(&self.segments), bytes(&self.constants)];
+        inputs.extend(listed);
+        let mut trial = Trial {
+            inputs,
+            arguments,
+            groups,
+            before: Vec::new(),
+            expected: Vec::new(),
+        };
+        let mut encoded = vec![0; self.encoding.bytes()];
+        for (place, rotation) in self.stored {
+            self.encoding.encode_all(&[rotation], &mut encoded);
+            let words: Vec<u32> = bytemuck::pod_collect_to_vec(&encoded);
+            trial.expect_words(place * words.len(), &words);
+        }
+        trial
+    }
+
+    fn detail(&self) -> u32 {
+        self.encoding.row().detail
+    }
+
+    /// Items of up to 16 samples, one an invocation: of one track, or of three whose samples lie between each
+    /// other's.
+    fn runs(mut self, random: &mut Random, is_listed: bool, is_one: bool) -> Trial {
+        const ITEMS: usize = 101;
+        const BEFORE: usize = 2;
+        let stride = if is_one { 1 } else { 3 };
+        let mut next = vec![0; stride];
+        for i in 0..ITEMS + BEFORE {
+            let track = i % stride;
+            let count = 1 + random.below(ITEM_SAMPLES) as usize;
+            let output = next[track] * stride + track;
+            self.item(
+                random,
+                is_listed,
+                output as u32,
+                (0..count).map(|j| output + j * stride),
+            );
+            next[track] += count;
+        }
+        // Another dispatch has the first items.
+        let others = (self.items[..BEFORE].iter()).map(|item| (item.count & !IS_CONSTANT) as usize);
+        let others: usize = others.sum();
+        self.stored.drain(..others);
+        let dispatch = Dispatch {
+            first_item: BEFORE as u32,
+            item_count: ITEMS as u32,
+            stride: stride as u32,
+            detail: self.detail(),
+            first_output: 0,
+            idle: 0,
+        };
+        let mut listed = vec![bytes(&self.items)];
+        listed.extend(is_listed.then(|| bytes(&self.distances)));
+        let arguments = bytemuck::bytes_of(&dispatch).to_vec();
+        self.finish(listed, arguments, groups(ITEMS, is_one))
+    }
+
+    /// Samples in any segments, one an invocation, some of which do nothing.
+    fn samples(mut self, random: &mut Random, in_row: bool) -> Trial {
+        const SAMPLES: usize = 203;
+        const BEFORE: usize = 5;
+        let mut samples = Vec::new();
+        let place = 4;
+        for i in 0..SAMPLES + BEFORE {
+            let ((source, bit), parameter) = (self.source(random), random.parameter());
+            samples.push(ListedSample {
+                source: source | bit,
+                parameter,
+            });
+            // A scale of 1 and an offset of 0 keep the parameter.
+            let same = Affine {
+                scale: 1.0,
+                offset: 0.0,
+            };
+            let rotation = match bit {
+                0 => one(&self.segments[source as usize], same, parameter),
+                _ => self.constants[source as usize],
+            };
+            if i >= BEFORE {
+                self.stored.push((place + i - BEFORE, rotation));
+            }
+        }
+        let idle = if in_row { 3 } else { 0 };
+        let dispatch = Dispatch {
+            first_item: BEFORE as u32 - idle,
+            item_count: SAMPLES as u32,
+            stride: 0,
+            detail: self.detail(),
+            first_output: place as u32 - idle,
+            idle,
+        };
+        let groups = groups(SAMPLES + idle as usize, in_row);
+        let arguments = bytemuck::bytes_of(&dispatch).to_vec();
+        self.finish(vec![bytes(&samples)], arguments, groups)
+    }
+
+    /// One row of items for a grid, from position `first` to `end`; between some of them there are samples of no
+    /// item. `place` is where a position is stored.
+    fn row(
+        &mut self,
+        random: &mut Random,
+        is_listed: bool,
+        [first, end]: [u32; 2],
+        place: impl Fn(u32) -> usize,
+    ) {
+        let mut position = first;
+        while position < end {
+            let length = (1 + random.below(40)).min(end - position);
+            let count = length - random.below(3).min(length - 1);
+            let places: Vec<_> = (position..position + count).map(&place).collect();
+            self.item(random, is_listed, position, places.into_iter());
+            // As on the CPU, every segment that may give a tiny component says so; others may.
+            let Some(item) = self.items.last_mut() else {
+                unreachable!("it was just added");
+            };
+            let is_constant = item.count & IS_CONSTANT != 0;
+            if !is_constant {
+                let may_be_tiny = !self.segments[item.source as usize].is_canonical();
+                item.count |= if may_be_tiny || random.once_in(4) {
+                    MAY_BE_TINY
+                } else {
+                    0
+                };
+            }
+            position += length;
+        }
+    }
+
+    /// The blocks of a row whose items are the last ones from `first_item` on.
+    fn blocks(&self, first_item: usize, [first, end]: [u32; 2]) -> Vec<Block> {
+        let items = &self.items[first_item..];
+        let starts = (first..end).step_by(BLOCK_SAMPLES as usize);
+        let block = |start: u32| {
+            let before = items.iter().filter(|item| item.output <= start).count();
+            let begins = |position| items.iter().any(|item| item.output == position);
+            let bits = (1..BLOCK_SAMPLES).filter(|bit| begins(start + bit));
+            Block {
+                first: (first_item + before - 1) as u32,
+                starts: bits.map(|bit| 1 << bit).sum(),
+            }
+        };
+        starts.map(block).collect()
+    }
+
+    fn grid(self, blocks: &[Block], grid: Grid, groups: [u32; 3], is_listed: bool) -> Trial {
+        let mut listed = vec![bytes(&self.items), bytes(blocks)];
+        listed.extend(is_listed.then(|| bytes(&self.distances)));
+        let arguments = bytemuck::bytes_of(&grid).to_vec();
+        self.finish(listed, arguments, groups)
+    }
+
+    /// A grid whose samples lie beside each other, as one row.
+    fn track_by_track(mut self, random: &mut Random, is_listed: bool) -> Trial {
+        const SAMPLES: u32 = 709;
+        let ends = [BLOCK_SAMPLES, BLOCK_SAMPLES + SAMPLES];
+        self.row(random, is_listed, ends, |position| position as usize);
+        // Another dispatch has the first block.
+        let other = Block {
+            first: 0,
+            starts: 0,
+        };
+        let blocks = [vec![other], self.blocks(0, ends)].concat();
+        let grid = Grid {
+            detail: self.detail(),
+            stride: 1,
+            samples: SAMPLES,
+            rows: 1,
+            first_output: BLOCK_SAMPLES,
+            first_block: 1,
+        };
+        let tiles = SAMPLES.div_ceil(WORKGROUP * SAMPLES_EACH);
+        self.grid(&blocks, grid, [2, tiles.div_ceil(2), 1], is_listed)
+    }
+
+    /// A grid whose tracks lie beside each other, a row each.
+    fn frame_by_frame(mut self, random: &mut Random, is_listed: bool) -> Trial {
+        const SAMPLES: u32 = 43;
+        const ROWS: u32 = 11;
+        const STRIDE: u32 = 13;
+        const FIRST: u32 = 5;
+        let mut of_rows = Vec::new();
+        for row in 0..ROWS {
+            let first_item = self.items.len();
+            let place = |sample: u32| (FIRST + row + sample * STRIDE) as usize;
+            self.row(random, is_listed, [0, SAMPLES], place);
+            of_rows.push(self.blocks(first_item, [0, SAMPLES]));
+        }
+        // [block of samples][row]
+        let of_samples = SAMPLES.div_ceil(BLOCK_SAMPLES) as usize;
+        let blocks = (0..of_samples).flat_map(|i| of_rows.iter().map(move |row| row[i]));
+        let blocks: Vec<_> = blocks.collect();
+        let grid = Grid {
+            detail: self.detail(),
+            stride: STRIDE,
+            samples: SAMPLES,
+            rows: ROWS,
+            first_output: FIRST,
+            first_block: 0,
+        };
+        // A row may begin at any place of a line.
+        let tiles = (LINE - 1 + ROWS).div_ceil(LINE);
+        let layers = SAMPLES.div_ceil(WORKGROUP / LINE * SAMPLES_EACH);
+        self.grid(&blocks, grid, [2, tiles.div_ceil(2), layers], is_listed)
+    }
+}
