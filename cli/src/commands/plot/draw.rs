@@ -6,7 +6,6 @@ use plotters::coord::Shift;
 use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
-use resvg::{tiny_skia, usvg};
 
 use crate::batch::place::Place;
 use crate::commands::picture;
@@ -74,19 +73,11 @@ pub(crate) fn svg(figure: &Figure) -> io::Result<String> {
 
 /// A figure as the bytes of a PNG file.
 pub(crate) fn png(figure: &Figure) -> io::Result<Vec<u8>> {
-    let tree =
-        usvg::Tree::from_str(&svg(figure)?, &picture::svg_options()).map_err(io::Error::other)?;
-    let (width, height) = size(figure);
-    let (width, height) = (width * PIXELS, height * PIXELS);
-    let mut canvas = tiny_skia::Pixmap::new(width, height)
-        .ok_or_else(|| io::Error::other("too large a picture"))?;
-    let scale = tiny_skia::Transform::from_scale(PIXELS as f32, PIXELS as f32);
-    resvg::render(&tree, scale, &mut canvas.as_mut());
-    // The ground is white, so that nothing is transparent.
-    let opaque = canvas.data().chunks_exact(4).flat_map(|pixel| &pixel[..3]);
-    let pixels: Vec<u8> = opaque.copied().collect();
+    let canvas = picture::rasterise(&svg(figure)?, PIXELS as f32)?;
     let mut bytes = Vec::new();
-    picture::png(&mut bytes, width, height, &pixels)?;
+    // The ground is white, so that nothing is transparent.
+    let pixels = picture::opaque(&canvas);
+    picture::png(&mut bytes, canvas.width(), canvas.height(), &pixels)?;
     Ok(bytes)
 }
 

@@ -4,7 +4,6 @@ use std::collections::HashSet;
 use std::fmt::Write as _;
 
 use glam::{DVec2, DVec3};
-use resvg::{tiny_skia, usvg};
 use tumble_routes::mesh::Mesh;
 
 use crate::batch::place::Place;
@@ -159,24 +158,9 @@ fn edges(view: &View, mesh: &Mesh) -> String {
 }
 
 fn png(svg: &str) -> std::io::Result<Vec<u8>> {
-    let other = std::io::Error::other::<Box<dyn std::error::Error + Send + Sync>>;
-    let tree =
-        usvg::Tree::from_str(svg, &picture::svg_options()).map_err(|error| other(error.into()))?;
-    let size = tree.size().to_int_size();
-    let (width, height) = (2 * size.width(), 2 * size.height());
-    let mut pixels = tiny_skia::Pixmap::new(width, height)
-        .ok_or_else(|| std::io::Error::other("the picture has no size"))?;
-    resvg::render(
-        &tree,
-        tiny_skia::Transform::from_scale(2.0, 2.0),
-        &mut pixels.as_mut(),
-    );
-    let colours: Vec<u8> = pixels
-        .pixels()
-        .iter()
-        .flat_map(|own| [own.red(), own.green(), own.blue()])
-        .collect();
+    let canvas = picture::rasterise(svg, 2.0)?;
     let mut bytes = Vec::new();
-    picture::png(&mut bytes, width, height, &colours)?;
+    let pixels = picture::opaque(&canvas);
+    picture::png(&mut bytes, canvas.width(), canvas.height(), &pixels)?;
     Ok(bytes)
 }

@@ -2,8 +2,6 @@
 
 use std::io;
 
-use resvg::{tiny_skia, usvg};
-
 use crate::commands::picture;
 use crate::messages::colours::Colour;
 
@@ -30,14 +28,7 @@ impl Labels {
             "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\">\
              <g font-family=\"sans-serif\" font-size=\"{size}\" text-anchor=\"middle\">{texts}</g></svg>"
         );
-        let tree = usvg::Tree::from_str(&svg, &picture::svg_options()).map_err(io::Error::other)?;
-        let mut canvas = tiny_skia::Pixmap::new(width, height)
-            .ok_or_else(|| io::Error::other("too large a picture"))?;
-        resvg::render(
-            &tree,
-            tiny_skia::Transform::identity(),
-            &mut canvas.as_mut(),
-        );
+        let canvas = picture::rasterise(&svg, 1.0)?;
         let cover = canvas
             .data()
             .chunks_exact(4)
