@@ -18,6 +18,8 @@ mod motion;
 mod peers;
 mod plot;
 mod reduce;
+#[cfg(unix)]
+mod remedies;
 mod render;
 mod route;
 mod shards;

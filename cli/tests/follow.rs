@@ -1,5 +1,6 @@
 //! `tumble follow` and `tumble smooth`, run as people run them.
 
+use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
@@ -251,6 +252,71 @@ fn smoothed_keys_are_the_library_s() {
         &["smooth", "a.dat", "-o", "out.glb", "--fps", "30"],
     );
     assert!(place.path().join("out.glb").exists());
+}
+
+/// At its frequency a low-pass keeps 1/√2 of a motion, at twice of it a quarter, whatever the rate.
+#[test]
+fn a_low_pass_is_in_hz() {
+    let place = place();
+    for rate in [50, 100] {
+        let mut text = String::new();
+        for sample in 0..=8 * rate {
+            let time = f64::from(sample) / f64::from(rate);
+            let wave = |hz: f64| (std::f64::consts::TAU * hz * time).sin();
+            let _ = writeln!(
+                text,
+                "{time} {} {} {} 0 0 0 1",
+                wave(2.0),
+                wave(4.0),
+                wave(0.1)
+            );
+        }
+        fs::write(place.path().join("waves.tum"), text).unwrap();
+        let line = [
+            "smooth",
+            "waves.tum",
+            "--low-pass",
+            "2",
+            "-o",
+            "low.tum",
+            "--overwrite",
+        ];
+        succeed(place.path(), &line);
+        let text = fs::read_to_string(place.path().join("low.tum")).unwrap();
+        let rows = text.lines().filter(|line| !line.starts_with('#'));
+        let rows = rows.map(|line| {
+            let numbers = line
+                .split_whitespace()
+                .map(|number| number.parse().unwrap());
+            numbers.collect::<Vec<f64>>()
+        });
+        // Far from the ends, whose samples stay.
+        let middle: Vec<Vec<f64>> = rows.filter(|row| (2.0..6.0).contains(&row[0])).collect();
+        let largest = |column: usize| {
+            middle
+                .iter()
+                .map(|row| row[column].abs())
+                .fold(0.0, f64::max)
+        };
+        let expected = [std::f64::consts::FRAC_1_SQRT_2, 0.25];
+        for (column, expected) in [1, 2].into_iter().zip(expected) {
+            let found = largest(column);
+            assert!(
+                (found - expected).abs() < 0.005,
+                "{rate} Hz: {found}, not {expected}"
+            );
+        }
+        assert!(largest(3) > 0.999, "{}", largest(3));
+    }
+    for (hz, words) in [
+        ("50", "nothing faster than 50"),
+        ("0", "give a number of Hz over 0"),
+    ] {
+        let line = ["smooth", "waves.tum", "--low-pass", hz, "-o", "no.tum"];
+        let refused = run(place.path(), &line);
+        assert_eq!(refused.code, 2, "{}", refused.words);
+        assert!(refused.words.contains(words), "{}", refused.words);
+    }
 }
 
 #[test]

@@ -552,6 +552,10 @@ def test_a_device_goes_by_its_uuid():
 def test_records_are_lines_of_json():
     header, lines = {"shard": 1, "failed": []}, ['{"output":"a\u2028b"}\n', '{"output":"é"}\n']
     assert _job.split_record(_job.join_record(header, lines)) == (header, lines)
+    text = _job.join_record(header, lines)
+    assert _job.is_whole(text)
+    assert not _job.is_whole(text.replace('{"output":"é"}\n', ""))
+    assert not _job.is_whole("") and not _job.is_whole(text[:-1])
 
 
 def test_examples_in_docstrings():

@@ -110,7 +110,7 @@ fn parts(directory: &Path) -> Vec<String> {
     all.filter(|name| name.ends_with(".part")).collect()
 }
 
-fn pipe(path: &Path) {
+pub(crate) fn pipe(path: &Path) {
     let made = Command::new("mkfifo").arg(path).status();
     assert!(made.unwrap().success());
 }
@@ -132,11 +132,14 @@ fn line(output: &str, sha256: &str, bytes: usize) -> String {
 }
 
 /// Two animations, `Run` and `Walk`, of one node.
-fn two_animations() -> String {
-    let times: Vec<u8> = [0f32, 1.0]
-        .iter()
-        .flat_map(|time| time.to_le_bytes())
-        .collect();
+pub(crate) fn two_animations() -> String {
+    two_animations_at([0.0, 1.0])
+}
+
+/// As [`two_animations`], with keys at these times.
+pub(crate) fn two_animations_at(times: [f32; 2]) -> String {
+    let [min, max] = times;
+    let times: Vec<u8> = times.iter().flat_map(|time| time.to_le_bytes()).collect();
     let keys: Vec<u8> = [0f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.6, 0.8]
         .iter()
         .flat_map(|part| part.to_le_bytes())
@@ -160,7 +163,7 @@ fn two_animations() -> String {
             {"buffer": 0, "byteOffset": 8, "byteLength": 32},
         ],
         "accessors": [
-            {"bufferView": 0, "componentType": 5126, "count": 2, "type": "SCALAR", "min": [0], "max": [1]},
+            {"bufferView": 0, "componentType": 5126, "count": 2, "type": "SCALAR", "min": [min], "max": [max]},
             {"bufferView": 1, "componentType": 5126, "count": 2, "type": "VEC4"},
         ],
         "nodes": [{"name": "a"}],

@@ -266,7 +266,8 @@ fn f32_times(samples: Samples<'_>, seconds: &[f64]) -> Result<Vec<f32>, (Code, S
     }
     if first < 0.0 {
         let why = format!(
-            "its first sample is at {} s, and times in glTF begin at 0; sample it from 0 s on",
+            "its first sample is at {} s, and times in glTF begin at 0; start it at 0 s (tumble \
+             convert --start 0)",
             seconds[0]
         );
         return Err((Code::TimesBelowZero, why));

@@ -32,13 +32,14 @@ use crate::messages::words;
 #[command(after_help = "\
 Kernels act on the steps from sample to sample, so that still tracks keep their bits and even
 motion stays: linear, cubic, box:S and tent:S (S samples to either side), gaussian:S (standard
-deviation), savitzky-golay:RADIUS:ORDER. Samples are the keys where these are evenly spaced, else
+deviation), savitzky-golay:RADIUS:ORDER. --low-pass HZ is the bell that halves the power of motion at
+that frequency, whatever the rate of the samples. Samples are the keys where these are evenly spaced, else
 --fps says how to sample. NPY and CSV hold the rotations, motion files everything.
 
 Examples:
   tumble smooth walk.dat --kernel gaussian:2 -o out.npy
   tumble smooth walk.bvh --kernel savitzky-golay:4:3 -o smooth.bvh
-  tumble smooth walk.bvh -o calm.bvh --plot calm.svg
+  tumble smooth walk.bvh --low-pass 6 -o calm.bvh --plot calm.svg
   tumble smooth takes -o smooth --to glb --fps 60 --kernel linear --passes 3")]
 pub(crate) struct Arguments {
     #[command(flatten)]
@@ -50,6 +51,10 @@ pub(crate) struct Arguments {
     /// The weights: linear, cubic, box:S, tent:S, gaussian:S or savitzky-golay:RADIUS:ORDER
     #[arg(short, long, value_name = "KERNEL", default_value = "gaussian:2")]
     kernel: SmoothingKernel,
+    /// Instead of a kernel: keep what is slower than this frequency; motion at it keeps 71 % of its size
+    /// (-3 dB), motion at twice of it 25 %
+    #[arg(long, value_name = "HZ", conflicts_with_all = ["kernel", "passes"], value_parser = frequency)]
+    low_pass: Option<f64>,
     /// How often
     #[arg(long, value_name = "N", default_value_t = 1)]
     passes: u32,
@@ -75,6 +80,44 @@ enum EndsArgument {
     Parabolic,
     /// the last sample repeats the first
     Loop,
+}
+
+fn frequency(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(hz) if hz.is_finite() && hz > 0.0 => Ok(hz),
+        _ => Err(format!(
+            "`{text}` is no frequency; give a number of Hz over 0"
+        )),
+    }
+}
+
+/// The smoothing of samples at those times: with a low-pass the bell whose spectrum, exp(-(2π f σ)²/2),
+/// is 1/√2 at its frequency.
+fn smoothing_at(
+    times: &[f64],
+    smoothing: &Smoothing,
+    low_pass: Option<f64>,
+) -> Result<Smoothing, String> {
+    let (Some(hz), [first, .., last]) = (low_pass, times) else {
+        return Ok(*smoothing);
+    };
+    let rate = (times.len() - 1) as f64 / (last - first);
+    if hz >= rate / 2.0 {
+        return Err(format!(
+            "--low-pass {hz}: the samples come at {rate} Hz and hold nothing faster than {} Hz; give a \
+             lower frequency",
+            rate / 2.0
+        ));
+    }
+    let deviation = rate * std::f64::consts::LN_2.sqrt() / (std::f64::consts::TAU * hz);
+    let kernel = SmoothingKernel::Gaussian(deviation);
+    let smoothing = Smoothing {
+        kernel,
+        ..*smoothing
+    };
+    let checked = smoothing.check();
+    checked.map_err(|error| format!("--low-pass {hz}: {error}; give a higher frequency"))?;
+    Ok(smoothing)
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
@@ -116,16 +159,20 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
                 let clips: Vec<&Motion> = clips.iter().map(|clip| &**clip).collect();
                 let samples = clips
                     .iter()
-                    .map(|clip| smoothed(&mut device, name, clip, &smoothing, arguments.fps))
+                    .map(|clip| {
+                        let rate = (arguments.fps, arguments.low_pass);
+                        smoothed(&mut device, name, clip, &smoothing, rate)
+                    })
                     .collect::<Result<Vec<_>, Failure>>()?;
                 if let ([clip], [own], Some(place)) = (&*clips, &*samples, &plot) {
                     let names = (0..clip.set.track_count()).map(|track| clip.set.track_name(track));
                     let names: Vec<String> = names.collect();
                     let subject = Subject {
                         title: input::file_name(path),
-                        about: match smoothing.passes {
-                            1 => smoothing.kernel.to_string(),
-                            passes => format!("{}, {passes} times", smoothing.kernel),
+                        about: match (arguments.low_pass, smoothing.passes) {
+                            (Some(hz), _) => format!("low-pass at {hz} Hz, {}", own.kernel),
+                            (None, 1) => own.kernel.to_string(),
+                            (None, passes) => format!("{}, {passes} times", own.kernel),
                         },
                         names: &names,
                         before: &own.before,
@@ -133,18 +180,15 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
                     };
                     picture::draw(&subject, place)?;
                 }
-                let written = write(
-                    name,
-                    &clips,
-                    &samples,
-                    &smoothing,
-                    (target, loaded.box_length),
-                )?;
+                let written = write(name, &clips, &samples, (target, loaded.box_length))?;
+                let kernels = samples.iter().map(|own| own.kernel.to_string());
+                let mut kernels: Vec<String> = kernels.collect();
+                kernels.dedup();
                 let times = samples.iter().map(|own| own.after.times.len()).sum();
                 let told = format!(
                     "{name}: {}, {}, on {} in {} → {target}",
                     words::count(times, "sample"),
-                    smoothing.kernel,
+                    kernels.join(", "),
                     device.label,
                     words::duration(started.elapsed()),
                 );
@@ -164,6 +208,7 @@ struct Smoothed {
     before: Samples,
     after: Samples,
     rate: Option<FrameRate>,
+    kernel: SmoothingKernel,
 }
 
 /// How far steps of time may differ, as a part of a step.
@@ -192,7 +237,7 @@ fn smoothed(
     name: &str,
     clip: &Motion,
     smoothing: &Smoothing,
-    fps: Option<FrameRate>,
+    (fps, low_pass): (Option<FrameRate>, Option<f64>),
 ) -> Result<Smoothed, Failure> {
     let (frames, rate) = match fps {
         Some(rate) => (Frames::rate(rate), Some(rate)),
@@ -208,6 +253,9 @@ fn smoothed(
     };
     let timeline = room::in_memory(name, &clip.set, &frames, 7)?;
     let rotations = clip.set.track_count() * timeline.len();
+    let times: Vec<f64> = timeline.times(0).collect();
+    let smoothing = smoothing_at(&times, smoothing, low_pass)
+        .map_err(|message| Failure::usage(format!("{name}: {message}")))?;
     let methods = ChannelMethods::AUTHORED;
     let tracks = clip.set.track_count();
     let work = |engine: &Engine| {
@@ -215,11 +263,11 @@ fn smoothed(
         let mut samples = before.clone();
         let layout = Layout::FrameMajor;
         if let Ok(own) = Rotations::of(&samples.rotations, tracks, layout) {
-            samples.rotations = engine.smooth(&own, smoothing)?.as_quats().to_vec();
+            samples.rotations = engine.smooth(&own, &smoothing)?.as_quats().to_vec();
         }
         continue_signs(&mut samples.rotations, tracks);
         if let Ok(own) = Vectors::of(&samples.translations, tracks, layout) {
-            let moved = engine.smooth_vectors(&own, smoothing)?;
+            let moved = engine.smooth_vectors(&own, &smoothing)?;
             samples.translations = moved.as_slice().iter().map(|v| v.truncate()).collect();
         }
         Ok::<_, Error>((before, samples))
@@ -232,6 +280,7 @@ fn smoothed(
         before,
         after,
         rate,
+        kernel: smoothing.kernel,
     })
 }
 
@@ -240,11 +289,15 @@ fn write(
     name: &str,
     clips: &[&Motion],
     samples: &[Smoothed],
-    smoothing: &Smoothing,
     (target, box_length): (&Target, Option<f64>),
 ) -> Result<Written, Failure> {
     let notes = [
-        ("kernel", smoothing.kernel.to_string()),
+        (
+            "kernel",
+            samples
+                .first()
+                .map_or_else(String::new, |own| own.kernel.to_string()),
+        ),
         ("input", name.to_owned()),
     ];
     let format = target.format();

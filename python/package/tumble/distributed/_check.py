@@ -7,7 +7,7 @@ import json
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
-from tumble.distributed._job import ALL_INPUTS, DistributedError, Entry, lines_of, split_record
+from tumble.distributed._job import ALL_INPUTS, DistributedError, Entry, is_whole, lines_of, split_record
 from tumble.distributed._stores import Store, read_text, store
 
 # Objects that are read at once; each waits for the network most of its time.
@@ -43,7 +43,7 @@ def check(out: str) -> Checked:
             if text is None:
                 continue
             header, more = split_record(text)
-            done += header["plan"] == own["plan"]
+            done += is_whole(text) and header["plan"] == own["plan"]
             lines += more
         shards = (done, own["shards"])
     for line in lines:

@@ -109,7 +109,15 @@ def split_record(text: str) -> tuple[Entry, list[str]]:
     """The line about the shard itself, and the others, each with its end."""
     first, *lines = lines_of(text)
     header: Entry = json.loads(first)
-    return header, lines
+    own = ("results", "results_sha256")
+    return {name: value for name, value in header.items() if name not in own}, lines
+
+
+def is_whole(text: str) -> bool:
+    """Whether a shard's file has all its lines, as they were written."""
+    first, end, lines = text.partition("\n")
+    header: Entry = json.loads(first) if end else {}
+    return header.get("results") == lines.count("\n") and header.get("results_sha256") == _hash(lines)
 
 
 def lines_of(text: str) -> list[str]:
@@ -120,8 +128,11 @@ def lines_of(text: str) -> list[str]:
 def join_record(header: Entry, lines: list[str]) -> str:
     """A shard's file: the line about it says how many others there are, and their hash."""
     text = "".join(lines)
-    digest = hashlib.sha256(text.encode()).hexdigest()
-    return dump(header | {"results": len(lines), "results_sha256": digest}) + text
+    return dump(header | {"results": len(lines), "results_sha256": _hash(text)}) + text
+
+
+def _hash(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def dump(entry: Entry) -> str:

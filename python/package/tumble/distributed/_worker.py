@@ -25,6 +25,7 @@ from tumble.distributed._job import (
     Task,
     dump,
     is_url,
+    is_whole,
     join_record,
     lines_of,
     record_name,
@@ -239,6 +240,8 @@ def _done(
     says so, or the manifest that it was merged into. The bytes of its results are not read again:
     whole is what has its length."""
     text = read_text(out, record_name(task.shard))
+    if text is not None and not is_whole(text):
+        return None
     if text is None:
         merged = _manifest(job.out, out.size("manifest.jsonl"))
         header: Entry = {

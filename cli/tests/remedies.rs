@@ -1,0 +1,200 @@
+//! Every remedy that a message names works: a line that is refused, what is said, and what then is done.
+
+use std::fs;
+use std::path::Path;
+
+use crate::program::{run, sample_folder, succeed};
+
+/// A line, a part of its message, and the lines that the message leads to.
+const REMEDIES: &[(&str, &str, &[&str])] = &[
+    (
+        "follow way.csv --frame fixed -o o.npy",
+        "(--frame minimal, --no-ups)",
+        &[
+            "follow way.csv --frame minimal -o o.npy",
+            "follow way.csv --frame fixed --no-ups -o o.npy",
+        ],
+    ),
+    (
+        "follow points.csv -o o.npy",
+        "give --seconds or --rate",
+        &[
+            "follow points.csv --seconds 2 -o o.npy",
+            "follow points.csv --rate 2 -o o.npy",
+        ],
+    ),
+    (
+        "follow path.csv --seconds 2 -o o.npy",
+        "leave out --seconds and --rate",
+        &["follow path.csv -o o.npy"],
+    ),
+    (
+        "eval a.dat -o old.npy",
+        "give --overwrite",
+        &["eval a.dat -o old.npy --overwrite"],
+    ),
+    (
+        "eval a.dat b.dat -o done",
+        "--resume skips what is done",
+        &[
+            "eval a.dat b.dat -o done --resume",
+            "eval a.dat b.dat -o done --overwrite",
+        ],
+    ),
+    (
+        "eval a.dat b.dat -o sharded",
+        "--resume goes on",
+        &["merge sharded"],
+    ),
+    (
+        "eval a.dat b.dat -o theirs",
+        "or --overwrite to replace it",
+        &[
+            "eval a.dat b.dat -o theirs --overwrite",
+            "eval a.dat b.dat -o other",
+        ],
+    ),
+    (
+        "smooth uneven.dat -o o.npy",
+        "give --fps",
+        &["smooth uneven.dat --fps 30 -o o.npy"],
+    ),
+    (
+        "eval m.gltf -o o.npy",
+        "choose one with --animation, or give a directory for all of them: -o RESULTS/",
+        &[
+            "eval m.gltf --animation Run -o o.npy",
+            "eval m.gltf -o all/",
+        ],
+    ),
+    (
+        "reduce a.dat --curve bessel-overhauser -o o.glb",
+        "choose --curve linear or cubic, or write .npz",
+        &[
+            "reduce a.dat --curve linear -o o.glb",
+            "reduce a.dat --curve cubic -o o.glb",
+            "reduce a.dat --curve bessel-overhauser -o o.npz",
+        ],
+    ),
+    (
+        "eval twice.tum -o o.npy",
+        "--duplicates first or last",
+        &[
+            "eval twice.tum --duplicates first -o o.npy",
+            "eval twice.tum --duplicates last -o o.npy",
+        ],
+    ),
+    (
+        "eval a.dat --output velocity --order wxyz -o o.npy",
+        "leave it out",
+        &["eval a.dat --output velocity -o o.npy"],
+    ),
+    (
+        "convert negative.gltf -o o.glb",
+        "(tumble convert --start 0)",
+        &["convert negative.gltf --start 0 -o o.glb"],
+    ),
+    (
+        "route hill.obj -o o.csv",
+        "give --from and --to",
+        &["route hill.obj --from 1,0,1 --to 8,0,8 -o o.csv"],
+    ),
+    (
+        "route hill.obj --by line --from 1,0,1 --to 8,0,8 -o o.csv",
+        "are for nets",
+        &["route hill.obj --from 1,0,1 --to 8,0,8 -o o.csv"],
+    ),
+    ("eval pipe.dat -o o.npy", "(--pipes reads named pipes)", &[]),
+    (
+        "eval a.dat --max-size 10B -o o.npy",
+        "(--max-size)",
+        &["eval a.dat --max-size 1MiB -o o.npy"],
+    ),
+    (
+        "eval a.dat --json -o -",
+        "give -o FILE",
+        &["eval a.dat --json -o o.npy"],
+    ),
+    (
+        "compare a.dat b.dat --start 1",
+        "add it",
+        &["compare a.dat b.dat --fps 30 --start 1"],
+    ),
+    (
+        "smooth waves.tum --low-pass 40 -o o.tum",
+        "give a lower frequency",
+        &["smooth waves.tum --low-pass 2 -o o.tum"],
+    ),
+];
+
+fn folder() -> tempfile::TempDir {
+    let place = sample_folder();
+    let at = place.path();
+    let write = |name: &str, text: &str| fs::write(at.join(name), text).unwrap();
+    write("points.csv", "x,y,z\n0,0,0\n1,0,0\n1,1,0\n");
+    write("path.csv", "t,x,y,z\n0,0,0,0\n1,1,0,0\n2,1,1,0\n");
+    write("uneven.dat", "# 1 1\n0 1 0 0 0\n1 1 0 0 0\n3 1 0 0 0\n");
+    write(
+        "twice.tum",
+        "0 0 0 0 0 0 0 1\n1 0 0 0 0.6 0 0 0.8\n1 0 0 0 0 0 0 1\n",
+    );
+    let waves = (0..100).map(|i| format!("{} {} 0 0 0 0 0 1\n", f64::from(i) / 50.0, i % 7));
+    write("waves.tum", &waves.collect::<String>());
+    write("m.gltf", &crate::attack::two_animations());
+    write(
+        "negative.gltf",
+        &crate::attack::two_animations_at([-0.5, 1.0]),
+    );
+    succeed(at, &["generate", "--hill", "-o", "hill.obj"]);
+    // The ways of `route` have upward directions.
+    let route = "route hill.obj --from 1,0,1 --to 8,0,8 -o ups.csv";
+    succeed(at, &words(route));
+    let way = fs::read_to_string(at.join("ups.csv")).unwrap();
+    assert!(way.starts_with("x,y,z,ux,uy,uz\n"), "{way}");
+    let timed = way.lines().enumerate().map(|(at, line)| match at {
+        0 => format!("t,{line}\n"),
+        at => format!("{at},{line}\n"),
+    });
+    write("way.csv", &timed.collect::<String>());
+    fs::create_dir(at.join("theirs")).unwrap();
+    write("theirs/manifest.jsonl", "notes\n");
+    succeed(at, &words("eval a.dat b.dat -o done"));
+    succeed(at, &words("eval a.dat b.dat -o sharded --shard 1/1"));
+    crate::attack::pipe(&at.join("pipe.dat"));
+    place
+}
+
+fn clear(at: &Path) {
+    for name in ["o.npy", "o.csv", "o.npz", "o.glb", "o.tum"] {
+        let _ = fs::remove_file(at.join(name));
+    }
+}
+
+fn words(line: &str) -> Vec<&str> {
+    line.split(' ').collect()
+}
+
+#[test]
+fn what_a_message_says_to_do_works() {
+    let place = folder();
+    let at: &Path = place.path();
+    let mut wrong = Vec::new();
+    for (line, message, remedies) in REMEDIES {
+        clear(at);
+        let refused = run(at, &words(line));
+        if refused.code == 0 || !refused.words.contains(message) {
+            wrong.push(format!(
+                "{line}: {}, not `{message}`: {}",
+                refused.code, refused.words
+            ));
+        }
+        for remedy in *remedies {
+            clear(at);
+            let done = run(at, &words(remedy));
+            if done.code != 0 {
+                wrong.push(format!("{remedy}: {}: {}", done.code, done.words));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
