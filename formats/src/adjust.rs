@@ -1,9 +1,9 @@
 //! Clips in other units and about other axes.
 
 use glam::{DQuat, DVec3, Quat, Vec3};
-use tumble::{Channel, TrackError, TrackSet};
+use tumble::{Channel, TrackError};
 
-use crate::motion::{Motion, Transform};
+use crate::motion::{Body, Motion, Transform};
 
 /// The clip with all translations multiplied by `scale`, and with all roots turned by `turn`, keys
 /// and tangents alike. Computed in f64, rounded once.
@@ -11,10 +11,14 @@ use crate::motion::{Motion, Transform};
 /// # Errors
 /// When a translation passes the largest f32.
 pub fn adjust(clip: &Motion, scale: f64, turn: DQuat) -> Result<Motion, TrackError> {
-    let mut adjusted = Motion {
-        set: TrackSet::new(),
-        ..clip.clone()
-    };
+    let mut adjusted = clip.without_tracks();
+    let ends = adjusted.bvh.iter_mut().flat_map(|own| &mut own.end_sites);
+    for end in ends {
+        *end = (end.as_dvec3() * scale).as_vec3();
+    }
+    if let Some(body) = &mut adjusted.body {
+        body.pelvis = (turn * (body.pelvis.as_dvec3() * scale)).as_vec3();
+    }
     for (index, track) in clip.set.tracks().enumerate() {
         let joint = clip.skeleton.get(index);
         let is_root = clip.is_world || joint.is_none_or(|joint| joint.parent.is_none());
@@ -59,7 +63,8 @@ pub fn adjust(clip: &Motion, scale: f64, turn: DQuat) -> Result<Motion, TrackErr
 
 /// Says where each joint rests relative to its parent, for files that do not: bodies of SMPL, whose
 /// joints lie where their shape puts them. `numbers` are x, y, z of each joint, in the order of the
-/// tracks.
+/// tracks. Those of a body's first joint, where its pelvis is when `trans` is 0, are added to its
+/// translations: the pelvis is at both together.
 ///
 /// # Errors
 /// When there are not three numbers for each joint of the clip, or joints besides roots have translations
@@ -79,15 +84,31 @@ pub fn set_offsets(clip: &mut Motion, numbers: &[f64]) -> Result<(), OffsetsErro
         let name = clip.set.track_name(joint);
         return Err(OffsetsError::Moved { joint, name });
     }
+    // SMPL's `trans` counts from where the shape puts the pelvis.
+    if let Some(body) = clip.body
+        && let Some(&pelvis) = offsets.first()
+    {
+        let pelvis = DVec3::from_array(pelvis);
+        if let Some(own) = clip.set.vector_keys(Channel::Translation, 0) {
+            let before = body.pelvis.as_dvec3();
+            let moved = |key: &Vec3| (key.as_dvec3() - before + pelvis).as_vec3();
+            let keys: Vec<Vec3> = own.keys.iter().map(moved).collect();
+            let (times, tangents) = (own.times.to_vec(), own.tangents.to_vec());
+            clip.set.set_translations(0, &times, &keys, &tangents)?;
+        }
+        clip.body = Some(Body {
+            pelvis: pelvis.as_vec3(),
+        });
+        clip.no_world = None;
+    }
     for (joint, &[x, y, z]) in clip.skeleton.iter_mut().zip(offsets) {
         joint.rest.translation = DVec3::new(x, y, z).as_vec3();
     }
-    clip.no_world = None;
     Ok(())
 }
 
 /// Why a skeleton's joints cannot be placed.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum OffsetsError {
     /// Every joint has three.
@@ -106,6 +127,9 @@ pub enum OffsetsError {
         /// Its name.
         name: String,
     },
+    /// Where the offsets move the body is no place.
+    #[error(transparent)]
+    Track(#[from] TrackError),
 }
 
 #[cfg(test)]

@@ -17,6 +17,7 @@ use std::path::Path;
 use glam::{DQuat, Quat};
 
 use crate::diagnostic::{Code, Diagnostic};
+use crate::feature::Feature;
 use crate::format::{Format, FormatOption, Loaded, ReadOptions};
 use crate::keys::QUIET_NORM;
 use crate::motion::Motion;
@@ -42,7 +43,11 @@ pub static FORMAT: Format = Format {
     read: open_dat,
     write: None,
     write_motion: Some(write::write_motion),
-    many_clips: false,
+    features: &[
+        Feature::BoxLength,
+        Feature::UnevenTimes,
+        Feature::Start,
+    ],
     options: &[FormatOption::BoxLength],
 };
 

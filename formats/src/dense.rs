@@ -64,11 +64,8 @@ impl Motion {
         Ok(Self {
             set,
             channels: channels.collect(),
-            name: self.name.clone(),
-            skeleton: self.skeleton.clone(),
-            no_world: self.no_world.clone(),
             rate: None,
-            ..*self
+            ..self.without_tracks()
         })
     }
 

@@ -225,6 +225,8 @@ codes! {
     TumTime = "E502", "a time out of range", "Times are seconds, up to 1e14 before or after 0.";
     TumEmpty = "E503", "no poses", "All lines are blank or comments.";
     TumWrite = "E504", "not to be written as a trajectory", "A trajectory is one clip of one track.";
+    KittiPose = "E505", "not a pose", "A line has twelve numbers: the three rows of a matrix, a rotation and a translation.";
+    NoRotation = "E506", "a matrix that is no rotation", "The rows of a rotation have length 1, stand at right angles, and do not mirror.";
     // E6xx: paths.
     Path = "E601", "not a path", "A path is CSV with the header `t,x,y,z,ux,uy,uz`, of which `t` and `ux,uy,uz` may be missing, or NPY of shape (tracks, points, 3). An upward direction has a length; its cells may be blank.";
     PathTimes = "E602", "no times, or too many", "A path whose file has no times needs --seconds or --rate; one that has times takes neither.";
@@ -252,11 +254,13 @@ codes! {
     BufferLong = "W108", "a buffer longer than it says", "What is behind the length that it says is not read.";
     TargetPath = "W109", "an unknown target", "The channel moves something that glTF 2.0 does not name; it is kept as it is.";
     StaysOutside = "W110", "a file that stays outside", "It could not be taken into the GLB, or the output is in another folder than its input; the URI is kept.";
+    StaysWhole = "W111", "channels that are not cut", "Channels of weights and other properties are kept as they are: the animation stays as long as they are.";
     BvhMoreRows = "W201", "more rows than frames", "The rows behind the last frame are left out.";
     BvhNoFrames = "W202", "no frames", "The skeleton rests.";
-    Scales = "W203", "scales are left out", "The format has rotations and translations only.";
     StartMoved = "W204", "the start is moved to 0", "BVH has no start time: its first frame is at 0. glTF keeps times in f32, which cannot tell frames apart in seconds since 1970: they count from the first whole second.";
-    RotationsAlone = "W205", "rotations alone", "The format has no room for a skeleton, translations or scales: they are left out.";
+    SameName = "W206", "two joints of one name", "The second one gets its number behind its name, so that they are told apart.";
+    NameChanged = "W207", "a name is changed", "The format has no line ends, braces or control characters in names, and no name twice.";
+    NoRoom = "W208", "what the format has no room for", "It is left out. A table in the documents says what each format holds.";
     UnknownBody = "W301", "a body of an unknown number of joints", "SMPL has 24 joints, SMPL-H 52, SMPL-X 55, and 22 are common to them; others are read without names and parents.";
     LeftOut = "W302", "arrays that are left out", "They have an entry for each frame of the input, and it is not known how to sample them: `--linear NAME`, in Python `linear=[NAME]`, interpolates them linearly.";
     ObjectsBeside = "W303", "pickled Python objects beside the keys", "They are not looked into. Where the file is written again, they are copied as they are if they are no lists of frames.";

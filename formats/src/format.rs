@@ -10,15 +10,17 @@ use glam::Quat;
 use tumble::{Encoding, EulerSequence, FrameRate, Layout, Timeline, TrackSet};
 
 use crate::diagnostic::Diagnostic;
+use crate::feature::{self, Feature};
 use crate::keys::Duplicates;
 use crate::motion::{Motion, Sampled};
 use crate::npy::ComponentOrder;
 use crate::poses::Poses;
+use crate::signs::{Signs, continue_signs, signs_jump};
 use crate::source::Source;
 use crate::text::lines::Limits;
 #[cfg(feature = "parquet")]
 use crate::{arrow, parquet};
-use crate::{bvh, csv, dat, gltf, npy, npz, tum};
+use crate::{bvh, csv, dat, gltf, kitti, npy, npz, tum};
 
 /// Every format. All of them are read. Inputs are known by their first bytes, then by the ending of
 /// their name; the first format is that of inputs which tell neither way, the first of
@@ -35,9 +37,10 @@ pub static FORMATS: [&Format; COUNT] = [
     &arrow::FORMAT,
     &csv::FORMAT,
     &tum::FORMAT,
+    &kitti::FORMAT,
 ];
 
-const COUNT: usize = if cfg!(feature = "parquet") { 9 } else { 7 };
+const COUNT: usize = if cfg!(feature = "parquet") { 10 } else { 8 };
 
 /// A file format.
 pub struct Format {
@@ -47,16 +50,16 @@ pub struct Format {
     pub summary: &'static str,
     /// Other extensions of its files.
     pub extensions: &'static [&'static str],
-    /// Whether a file that begins with these bytes (up to 64) is one.
+    /// Whether a file that begins with these bytes (up to 512) is one.
     pub probe: fn(&[u8]) -> bool,
     /// Reads keyframes from a file; `-` is standard input.
     pub read: ReadKeys,
     /// How rotations are written as they come.
     pub write: Option<WriteResults>,
-    /// How sampled clips are written.
-    pub write_motion: Option<WriteMotion>,
-    /// Whether one file holds any number of clips.
-    pub many_clips: bool,
+    /// How sampled clips are written: see [`Format::write_clips`].
+    pub(crate) write_motion: Option<WriteMotion>,
+    /// What its clips may hold beside rotations at times.
+    pub features: &'static [Feature],
     /// What its reader and its writers can be told.
     pub options: &'static [FormatOption],
 }
@@ -169,6 +172,9 @@ pub struct Loaded {
     pub warnings: Vec<Diagnostic>,
     /// The file itself, where it can be written again with other keys and everything else kept.
     pub document: Option<Arc<dyn Document>>,
+    /// The clips are in other units or about other axes than the file: whatever else it holds does not
+    /// go with them, so that it is not written again.
+    pub is_adjusted: bool,
 }
 
 impl Loaded {
@@ -195,8 +201,12 @@ pub trait Document: fmt::Debug + Send + Sync {
     /// Whether the file can be written again in that format.
     fn writes(&self, format: &Format) -> bool;
 
+    /// What the file holds that no clip holds, by names that its format has for it (`meshes`).
+    fn beside(&self) -> Vec<String>;
+
     /// Writes the file, as the one that `path` names, with the samples of some of its clips, each
-    /// with the clip's place, instead of their keys. Gives warnings.
+    /// with the clip's place, instead of their keys; without any, everything stays as it is. Gives
+    /// warnings.
     ///
     /// # Errors
     /// When writing fails, or what was read cannot be written in this way.
@@ -209,8 +219,8 @@ pub trait Document: fmt::Debug + Send + Sync {
     ) -> Result<Vec<Diagnostic>, WriteError>;
 }
 
-/// Writes sampled clips; gives warnings of what the format has no room for.
-pub type WriteMotion =
+/// Writes sampled clips; gives warnings of what becomes another thing.
+pub(crate) type WriteMotion =
     fn(&[Sampled<'_>], &MotionOptions, &mut dyn Write) -> Result<Vec<Diagnostic>, WriteError>;
 
 /// How sampled clips are written.
@@ -255,10 +265,50 @@ pub struct WriteResults {
     /// The fewest bytes that a rotation takes.
     pub rotation_bytes: fn(Encoding) -> f64,
     /// Begins a file of rotations, with its header.
-    pub rotations:
+    pub(crate) rotations:
         for<'a> fn(&'a mut dyn Write, &ResultShape<'a>) -> io::Result<Box<dyn ResultWriter + 'a>>,
     /// Writes poses.
     pub poses: fn(&Poses<'_>, &mut dyn Write) -> io::Result<()>,
+}
+
+impl WriteResults {
+    /// Begins a file of rotations, with its header. Each quaternion gets the sign that continues the
+    /// one before it in its track.
+    ///
+    /// # Errors
+    /// When writing fails.
+    pub fn begin<'a>(
+        &self,
+        out: &'a mut dyn Write,
+        shape: &ResultShape<'a>,
+    ) -> io::Result<Box<dyn ResultWriter + 'a>> {
+        let writer = (self.rotations)(out, shape)?;
+        // Of other representations q and -q are the same numbers; vectors have no sign to choose.
+        if !shape.encoding.is_quaternion() {
+            return Ok(writer);
+        }
+        let (tracks, samples) = (shape.set.track_count(), shape.timeline.len());
+        Ok(Box::new(Continued {
+            writer,
+            signs: Signs::new(shape.layout, tracks, samples),
+        }))
+    }
+}
+
+/// Quaternions on their way into a file, with signs that continue.
+struct Continued<'a> {
+    writer: Box<dyn ResultWriter + 'a>,
+    signs: Signs,
+}
+
+impl ResultWriter for Continued<'_> {
+    fn write(&mut self, rotations: &[Quat]) -> io::Result<()> {
+        self.writer.write(&self.signs.next(rotations))
+    }
+
+    fn finish(self: Box<Self>) -> io::Result<()> {
+        self.writer.finish()
+    }
 }
 
 /// Takes the rotations of a result as they come.
@@ -330,6 +380,62 @@ impl Format {
             && (self.write.is_none() || clips.len() > 1 || clips.iter().any(is_more))
     }
 
+    /// Whether clips are written in it.
+    #[must_use]
+    pub fn writes_clips(&self) -> bool {
+        self.write_motion.is_some()
+    }
+
+    /// Whether its files have room for that.
+    #[must_use]
+    pub fn holds(&self, feature: Feature) -> bool {
+        self.features.contains(&feature)
+    }
+
+    /// Writes sampled clips, each rotation with the sign that continues the one before it. Gives
+    /// warnings of what is left out, because the format has no room for it, or becomes another thing.
+    ///
+    /// # Errors
+    /// When writing fails, or the format cannot hold the clips; results alone ([`Format::writes_clips`])
+    /// are written by [`WriteResults`].
+    pub fn write_clips(
+        &self,
+        clips: &[Sampled<'_>],
+        options: &MotionOptions,
+        out: &mut dyn Write,
+    ) -> Result<Vec<Diagnostic>, WriteError> {
+        let Some(write) = self.write_motion else {
+            let message = format!("{} holds results, not clips", self.name);
+            return Err(io::Error::new(io::ErrorKind::Unsupported, message).into());
+        };
+        let mut warnings = feature::warnings(self, clips, options);
+        let continued: Vec<Vec<Quat>> = clips
+            .iter()
+            .map(|clip| {
+                let tracks = clip.clip.set.track_count();
+                let mut rotations = Vec::new();
+                if signs_jump(clip.rotations, tracks) {
+                    rotations = clip.rotations.to_vec();
+                    continue_signs(&mut rotations, tracks);
+                }
+                rotations
+            })
+            .collect();
+        let clips: Vec<Sampled<'_>> = clips
+            .iter()
+            .zip(&continued)
+            .map(|(clip, continued)| {
+                let mut clip = clip.clone();
+                if !continued.is_empty() {
+                    clip.rotations = continued;
+                }
+                clip
+            })
+            .collect();
+        warnings.extend(write(&clips, options, out)?);
+        Ok(warnings)
+    }
+
     /// Whether it can be told that.
     #[must_use]
     pub fn takes(&self, option: FormatOption) -> bool {
@@ -342,12 +448,21 @@ impl Format {
         self.write.is_some() || self.write_motion.is_some()
     }
 
-    /// The format of a file that begins with these bytes; by its name where they tell nothing, and
-    /// the first of the table where that tells nothing either.
+    /// The format of a file that begins with these bytes; by its name where they tell nothing, by how
+    /// many numbers its lines have where that tells nothing either, and else the first of the table.
     #[must_use]
     pub fn detect(path: &Path, start: &[u8]) -> &'static Self {
         let probed = FORMATS.into_iter().find(|format| (format.probe)(start));
-        probed.or_else(|| Self::of(path)).unwrap_or(FORMATS[0])
+        // Trajectories are mostly called `.txt`, and few say what they are.
+        let by_numbers = || match table_width(start)? {
+            8 => Some(&tum::FORMAT),
+            12 => Some(&kitti::FORMAT),
+            _ => None,
+        };
+        probed
+            .or_else(|| Self::of(path))
+            .or_else(by_numbers)
+            .unwrap_or(FORMATS[0])
     }
 
     /// Reads a file in the format that it is in: see [`Format::detect`].
@@ -374,6 +489,26 @@ impl Format {
     }
 }
 
+/// How many numbers the first line of text has that is no comment; nothing if it has anything else, or
+/// if the first line is the header of a `.dat` file.
+fn table_width(start: &[u8]) -> Option<usize> {
+    let start = start.strip_prefix(b"\xef\xbb\xbf").unwrap_or(start);
+    // The last line may be cut.
+    let whole = start.iter().rposition(|&byte| byte == b'\n')?;
+    let text = std::str::from_utf8(&start[..whole]).ok()?;
+    let header = text.lines().next()?.trim_start().strip_prefix('#');
+    let mut header = header.into_iter().flat_map(str::split_ascii_whitespace);
+    let boxes = header.next().is_some_and(|word| word.parse::<usize>().is_ok());
+    if boxes && header.next().is_some_and(|word| word.parse::<f64>().is_ok()) {
+        return None;
+    }
+    let content = |line: &str| line.split('#').next().unwrap_or_default().replace(',', " ");
+    let line = text.lines().map(content).find(|line| !line.trim().is_empty())?;
+    let mut words = line.split_ascii_whitespace();
+    let is_number = |word: &str| word.parse::<f64>().is_ok();
+    words.clone().all(is_number).then(|| words.by_ref().count())
+}
+
 impl fmt::Debug for Format {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_tuple("Format").field(&self.name).finish()
@@ -397,5 +532,19 @@ mod tests {
         assert!(Format::of(Path::new("walk")).is_none());
         assert_eq!(Format::detect(Path::new("walk"), b"# 4 3.0\n").name, "dat");
         assert_eq!(Format::detect(Path::new("walk"), b"\x93NUMPY").name, "npy");
+        for (text, name) in [
+            ("1311868164.36 0 0 0 0 0 0 1\n", "tum"),
+            ("# a remark\n\n1,0,0,0,0,0,0,1 # here\n2,0", "tum"),
+            ("1 0 0 0 0 1 0 0 0 0 1 0\n", "kitti"),
+            ("# 2 1.0\n0 1 0 0 0 1 0 0\n", "dat"),
+            ("0 1 0 0 0\n", "dat"),
+            ("a 0 0 0 0 0 0 1\n", "dat"),
+            ("0 0 0 0 0 0 0 1", "dat"),
+        ] {
+            let found = Format::detect(Path::new("poses.txt"), text.as_bytes());
+            assert_eq!(found.name, name, "{text}");
+        }
+        let named = Format::detect(Path::new("a.dat"), b"1 0 0 0 0 0 0 1\n");
+        assert_eq!(named.name, "dat");
     }
 }

@@ -5,6 +5,7 @@ use tumble::Channel;
 
 use crate::motion::{Motion, Sampler};
 use crate::sample::Samples;
+use crate::signs::continue_signs;
 
 /// Why the keys of a clip are no samples.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -34,7 +35,8 @@ pub enum KeyedError {
     },
 }
 
-/// The keys of all tracks at their common times. Channels with one key, and those at rest, hold.
+/// The keys of all tracks at their common times, with signs that continue. Channels with one key, and
+/// those at rest, hold.
 ///
 /// # Errors
 /// When the times of channels differ, or one is a cubic with tangents.
@@ -93,6 +95,7 @@ pub fn keyed(clip: &Motion) -> Result<Samples, KeyedError> {
             }
         }
     }
+    continue_signs(&mut samples.rotations, tracks);
     Ok(samples)
 }
 

@@ -3,6 +3,8 @@
 use glam::{Quat, Vec3};
 use tumble::{FrameRate, TrackSet};
 
+use crate::bvh::BvhJoint;
+
 /// One clip of a file.
 ///
 /// `skeleton` and `channels` have an entry for each track of `set`, or none at all. A joint whose
@@ -29,6 +31,34 @@ pub struct Motion {
     pub time_offset: i64,
     /// Why poses in the world cannot be told, where they cannot.
     pub no_world: Option<String>,
+    /// How BVH writes each track down; empty for clips of which no file says it.
+    pub bvh: Vec<BvhJoint>,
+    /// What is to be known of a body of SMPL.
+    pub body: Option<Body>,
+}
+
+impl Motion {
+    /// The clip without its tracks: what is made of it gets others.
+    pub(crate) fn without_tracks(&self) -> Self {
+        Self {
+            name: self.name.clone(),
+            set: TrackSet::new(),
+            skeleton: self.skeleton.clone(),
+            channels: self.channels.clone(),
+            no_world: self.no_world.clone(),
+            bvh: self.bvh.clone(),
+            ..*self
+        }
+    }
+}
+
+/// A body of SMPL, whose joints lie where its shape puts them.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Body {
+    /// Where the shape puts the pelvis when `trans` is 0, in the clip's units and about its axes: it is
+    /// part of the translations of the first track, and no part of the file's `trans`. 0 as long as
+    /// no offsets are given.
+    pub pelvis: Vec3,
 }
 
 /// A joint of a skeleton.

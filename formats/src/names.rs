@@ -4,11 +4,11 @@ use std::collections::HashSet;
 
 use tumble::TrackSet;
 
-/// The name of joint `index` (from 0) in a file whose names are words and differ: blanks and braces
-/// become `_`, a joint without a name is `joint7`, and a name that is taken gets the joint's number
-/// behind it, `hand#12`. `taken` collects what was given.
-pub(crate) fn usable_name(name: &str, index: usize, taken: &mut HashSet<String>) -> String {
-    let is_odd = |c: char| c.is_whitespace() || c.is_control() || c == '{' || c == '}';
+/// The name of joint `index` (from 0) in a file whose names are all that is on a line before a brace,
+/// and differ: braces and control characters become `_`, a joint without a name is `joint7`, and a name
+/// that is taken gets the joint's number behind it, `hand#12`. `taken` collects what was given.
+pub(crate) fn line_name(name: &str, index: usize, taken: &mut HashSet<String>) -> String {
+    let is_odd = |c: char| c.is_control() && c != '\t' || c == '{' || c == '}';
     let mut usable = name.trim().replace(is_odd, "_");
     if usable.is_empty() {
         usable = format!("joint{index}");
@@ -17,7 +17,7 @@ pub(crate) fn usable_name(name: &str, index: usize, taken: &mut HashSet<String>)
 }
 
 /// The name itself; one that is taken gets the number behind it, and as many `_` as it takes.
-fn untaken(mut name: String, index: usize, taken: &mut HashSet<String>) -> String {
+pub(crate) fn untaken(mut name: String, index: usize, taken: &mut HashSet<String>) -> String {
     if taken.contains(&name) {
         name = format!("{name}#{index}");
     }
@@ -41,17 +41,17 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_become_words_that_differ() {
+    fn names_become_lines_that_differ() {
         let given = [
             "hips", "left arm", "", " a{b}\n", "hips", "hips#4", "joint2", "hips",
         ];
         let mut taken = HashSet::new();
         let names = given.iter().enumerate();
         let names: Vec<_> = names
-            .map(|(index, name)| usable_name(name, index, &mut taken))
+            .map(|(index, name)| line_name(name, index, &mut taken))
             .collect();
         let expected = [
-            "hips", "left_arm", "joint2", "a_b_", "hips#4", "hips#4#5", "joint2#6", "hips#7",
+            "hips", "left arm", "joint2", "a_b_", "hips#4", "hips#4#5", "joint2#6", "hips#7",
         ];
         assert_eq!(names, expected);
     }

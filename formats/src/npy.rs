@@ -48,7 +48,7 @@ pub static FORMAT: Format = Format {
         poses: |poses, mut out| poses.write_npy(&mut out),
     }),
     write_motion: None,
-    many_clips: false,
+    features: &[],
     options: &FormatOption::OF_ARRAYS,
 };
 

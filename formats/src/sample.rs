@@ -9,6 +9,7 @@ use tumble::{
 };
 
 use crate::motion::{Channels, Motion, Sampled, Sampler};
+use crate::signs::continue_signs;
 
 /// The methods by which the channels of clips are interpolated.
 #[derive(Clone, Copy)]
@@ -349,16 +350,6 @@ fn scatter<T: Copy>(values: &[T], group: &[usize], tracks: usize, layout: Layout
             if let (Some(to), Some(from)) = (to, from) {
                 all[to] = values[from];
             }
-        }
-    }
-}
-
-/// Gives each rotation the sign that is nearer to the one before it, so that players without a test
-/// of signs go the right way round.
-pub fn continue_signs(rotations: &mut [Quat], tracks: usize) {
-    for next in tracks..rotations.len() {
-        if rotations[next - tracks].dot(rotations[next]) < 0.0 {
-            rotations[next] = -rotations[next];
         }
     }
 }

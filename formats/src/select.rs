@@ -27,13 +27,15 @@ impl Motion {
         let channels = tracks
             .iter()
             .filter_map(|&track| self.channels.get(track).copied());
+        let bvh = tracks
+            .iter()
+            .filter_map(|&track| self.bvh.get(track).cloned());
         Ok(Self {
-            name: self.name.clone(),
             set,
             skeleton: skeleton.collect(),
             channels: channels.collect(),
-            no_world: self.no_world.clone(),
-            ..*self
+            bvh: bvh.collect(),
+            ..self.without_tracks()
         })
     }
 

@@ -66,18 +66,18 @@ impl Source {
         })
     }
 
-    /// The first bytes of a file, up to 64; none of what is no file or cannot be read, whose fault
+    /// The first bytes of a file, up to 512; none of what is no file or cannot be read, whose fault
     /// shows when it is opened. Standard input keeps them for its reader: they lie in its buffer.
     pub(super) fn start(path: &Path) -> Vec<u8> {
         if path.as_os_str() == "-" {
             let mut input = io::stdin().lock();
             let start = input.fill_buf().unwrap_or_default();
-            return start[..start.len().min(64)].to_vec();
+            return start[..start.len().min(START)].to_vec();
         }
         let mut start = Vec::new();
         let is_file = std::fs::metadata(path).is_ok_and(|metadata| metadata.is_file());
         if is_file && let Ok(file) = File::open(path) {
-            let read = file.take(64).read_to_end(&mut start);
+            let read = file.take(START as u64).read_to_end(&mut start);
             if read.is_err() {
                 start.clear();
             }
@@ -133,6 +133,9 @@ impl Source {
         Err(Diagnostic::new(&self.name, Code::Changed, message))
     }
 }
+
+/// As many of the first bytes as tell a format.
+const START: usize = 512;
 
 /// Large enough that reading is not a matter of system calls.
 const BUFFER: usize = 1 << 18;

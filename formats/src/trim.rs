@@ -135,7 +135,7 @@ pub fn trim(clip: &Motion, start: f64, end: f64, engine: &Engine) -> Result<Moti
     Ok(Motion {
         set: trimmed,
         rate,
-        ..clip.clone()
+        ..clip.without_tracks()
     })
 }
 

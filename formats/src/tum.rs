@@ -10,6 +10,7 @@ use tumble::{Channel, TrackError, TrackSet};
 
 use crate::decimal::Decimal;
 use crate::diagnostic::{Code, Diagnostic, Place};
+use crate::feature::Feature;
 use crate::format::{Format, FormatOption, Loaded, MotionOptions, ReadOptions, WriteError};
 use crate::grid::{Precision, restore};
 use crate::keys::{Origin, select};
@@ -36,7 +37,7 @@ pub static FORMAT: Format = Format {
     read: open_tum,
     write: None,
     write_motion: Some(write_motion),
-    many_clips: false,
+    features: &[Feature::Translations, Feature::UnevenTimes, Feature::Start],
     options: &[FormatOption::RawTimes, FormatOption::Duplicates],
 };
 
@@ -208,19 +209,6 @@ fn write_motion(
         let message = "lists of samples whose lengths are not those of times and tracks";
         return Err(io::Error::new(io::ErrorKind::InvalidInput, message).into());
     }
-    let mut warnings = Warnings::new(&options.name);
-    if sampled
-        .scales
-        .iter()
-        .any(|scale| !scale.abs_diff_eq(Vec3::ONE, 1e-5))
-    {
-        warnings.warn(Code::Scales, || {
-            (
-                None,
-                "the body is scaled; a trajectory has no scales, they are left out",
-            )
-        });
-    }
     let mut text = String::from("# timestamp tx ty tz qx qy qz qw\n");
     for (key, value) in sampled.notes {
         let value = value.replace(char::is_control, " ");
@@ -248,5 +236,5 @@ fn write_motion(
         text.clear();
     }
     out.write_all(text.as_bytes())?;
-    Ok(warnings.into_list())
+    Ok(Vec::new())
 }

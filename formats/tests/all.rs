@@ -14,6 +14,7 @@ mod gltf_values;
 mod npz;
 mod readme;
 mod reduce;
+mod round_trip;
 mod support;
 mod table_options;
 #[cfg(feature = "parquet")]

@@ -98,7 +98,12 @@ fn every_code_of_a_file_is_shown_by_a_fixture_or_a_test() {
         Code::TumWrite,
         Code::Path,
         Code::PathTimes,
-        Code::Scales,
+        Code::SameName,
+        Code::NameChanged,
+        Code::NoRoom,
+        Code::StaysWhole,
+        Code::KittiPose,
+        Code::NoRotation,
         Code::StartMoved,
         Code::GltfFolder,
         Code::StaysOutside,
@@ -108,7 +113,6 @@ fn every_code_of_a_file_is_shown_by_a_fixture_or_a_test() {
         Code::NotPerFrame,
         Code::LeftOut,
         Code::ListLength,
-        Code::RotationsAlone,
         Code::SeveralClips,
     ];
     for &code in Code::ALL {

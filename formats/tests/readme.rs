@@ -4,7 +4,7 @@ use std::fmt::Write;
 use std::fs;
 use std::path::Path;
 
-use tumble_formats::FORMATS;
+use tumble_formats::{FORMATS, Feature};
 
 const BEGIN: &str =
     "<!-- formats: written by `UPDATE_EXPECTED=1 cargo test -p tumble-formats` -->\n";
@@ -16,12 +16,12 @@ fn the_table_of_formats_is_that_of_the_code() {
     for format in FORMATS {
         let endings = std::iter::once(&format.name).chain(format.extensions);
         let endings: Vec<String> = endings.map(|ending| format!("`.{ending}`")).collect();
-        let written = match (&format.write, format.write_motion, format.many_clips) {
-            (None, None, _) => "no",
-            (Some(_), None, _) => "results",
-            (Some(_), Some(_), _) => "results, clips",
-            (None, Some(_), true) => "clips",
-            (None, Some(_), false) => "one clip",
+        let written = match (&format.write, format.writes_clips(), format.holds(Feature::SeveralClips)) {
+            (None, false, _) => "no",
+            (Some(_), false, _) => "results",
+            (Some(_), true, _) => "results, clips",
+            (None, true, true) => "clips",
+            (None, true, false) => "one clip",
         };
         let (endings, summary) = (endings.join(" "), format.summary);
         writeln!(table, "| {endings} | {summary} | {written} |").unwrap();

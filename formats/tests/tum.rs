@@ -22,7 +22,7 @@ fn read(text: &str) -> Motion {
 
 fn write(clips: &[Sampled<'_>]) -> Result<(String, Vec<Diagnostic>), WriteError> {
     let mut out = Vec::new();
-    let warnings = FORMAT.write_motion.unwrap()(clips, &MotionOptions::default(), &mut out)?;
+    let warnings = FORMAT.write_clips(clips, &MotionOptions::default(), &mut out)?;
     Ok((String::from_utf8(out).unwrap(), warnings))
 }
 
@@ -170,7 +170,7 @@ fn what_a_trajectory_cannot_hold_is_refused() {
     let mut scaled = good.clone();
     let scales = [Vec3::ONE, Vec3::splat(2.0)];
     scaled.scales = &scales;
-    assert_eq!(write(&[scaled]).unwrap().1[0].code, Code::Scales);
+    assert_eq!(write(&[scaled]).unwrap().1[0].code, Code::NoRoom);
 }
 
 proptest! {

@@ -45,9 +45,9 @@ fn written(
     }
     let samples = keyed(&clip).expect("one list of times");
     let mut out = Vec::new();
-    let write = format.write_motion.expect("it is written");
     let sampled = samples.of(&clip, clip.rate, &[]);
-    write(&[sampled], &MotionOptions::default(), &mut out).expect("what was read");
+    let written = format.write_clips(&[sampled], &MotionOptions::default(), &mut out);
+    written.expect("what was read");
     let of = signature((
         codes,
         clip.set.track_count().min(5),

@@ -53,6 +53,8 @@ pub(crate) struct Clip {
 pub(crate) struct Source {
     pub(crate) path: PathBuf,
     pub(crate) document: Option<Arc<dyn Document>>,
+    /// How many clips the file has, those that cannot be read too.
+    pub(crate) clips: usize,
     pub(crate) box_length: Option<f64>,
 }
 

@@ -238,6 +238,7 @@ impl File {
         let source = Arc::new(Source {
             path: path.clone(),
             document: loaded.document.take(),
+            clips: loaded.clips.len() + loaded.refused.len(),
             box_length: loaded.box_length,
         });
         let clip = |motion| Clip {

@@ -201,12 +201,19 @@ impl Save<'_> {
 
     /// Keys at their own times.
     fn keys(&self, out: &mut dyn Write) -> PyResult<Vec<Diagnostic>> {
-        let Some(write) = self.format.write_motion else {
+        if !self.format.writes_clips() {
             return Err(input(format!(
                 "{} holds samples, not keys; give `fps` or `at`",
                 self.format.name
             )));
-        };
+        }
+        // All clips of a file as they are: everything stays.
+        let source = self.clips.first().and_then(|clip| clip.source.as_ref());
+        let is_whole = source.is_some_and(|source| source.clips == self.clips.len());
+        if let Some(document) = self.document().filter(|_| is_whole) {
+            let written = document.write(&[], &self.motion, self.path, out);
+            return written.map_err(|error| of_write(&error));
+        }
         let keys = self.clips.iter().map(|clip| keyed(&clip.motion));
         let keys: Result<Vec<Samples>, _> = keys.collect();
         let keys = keys.map_err(|error| input(error.to_string()))?;
@@ -216,7 +223,8 @@ impl Save<'_> {
                 keys.of(&clip.motion, rate, &[])
             })
             .collect();
-        write(&sampled, &self.motion, out).map_err(|error| of_write(&error))
+        let written = self.format.write_clips(&sampled, &self.motion, out);
+        written.map_err(|error| of_write(&error))
     }
 
     /// The clips' own file with other keys.
@@ -250,10 +258,8 @@ impl Save<'_> {
             Wanted::Rate(rate, ..) => Some(*rate),
             _ => None,
         };
-        let write = self.format.write_motion;
-        self.written(clips, &frames, rate, |sampled| match write {
-            Some(write) => write(sampled, &self.motion, out),
-            None => Ok(Vec::new()),
+        self.written(clips, &frames, rate, |sampled| {
+            self.format.write_clips(sampled, &self.motion, out)
         })
     }
 
@@ -318,7 +324,7 @@ impl Save<'_> {
             notes: &notes,
         };
         let of_io = |error: std::io::Error| of_write(&error.into());
-        let mut writer = (format.rotations)(out, &shape).map_err(of_io)?;
+        let mut writer = format.begin(out, &shape).map_err(of_io)?;
         let engine = self.engine.engine(clip.set.track_count() * count)?;
         let with = self.request.with(Quantity::Rotation);
         if let Some(method) = uniform(clip, self.request) {

@@ -98,6 +98,20 @@ fn format() -> impl TypedValueParser<Value = &'static Format> {
 }
 
 impl Reading {
+    /// Whether one animation was asked for.
+    pub(crate) fn chooses(&self) -> bool {
+        self.animation.is_some()
+    }
+
+    /// Whether the command line says what other keys or times are read than the file says itself.
+    pub(crate) fn changes_keys(&self) -> bool {
+        self.duplicates.is_some()
+            || self.source_fps.is_some()
+            || self.map.is_some()
+            || self.time_unit.is_some()
+            || self.offsets.is_some()
+    }
+
     /// Whether the command line says anything of how files are read.
     pub(crate) fn is_given(&self) -> bool {
         let Self {
@@ -217,8 +231,7 @@ impl Reading {
                     Failure::new(exit::ALL_INPUTS, format!("{}: {error}", name(path)))
                 })?;
             }
-            // What is kept of the file has its own units and axes.
-            loaded.document = None;
+            loaded.is_adjusted = true;
         }
         Ok(())
     }
@@ -227,6 +240,17 @@ impl Reading {
 /// Leaves the clip of that name, or at that place, alone.
 fn choose(loaded: &mut Loaded, wanted: &str, path: &Path) -> Result<(), Failure> {
     let named = |clip: &Motion| clip.name.as_deref() == Some(wanted);
+    let same: Vec<String> = (loaded.clips.iter().filter(|clip| named(clip)))
+        .map(|clip| clip.place.to_string())
+        .collect();
+    if let [_, _, ..] = &*same {
+        let (name, places) = (name(path), same.join(" and "));
+        let message = format!(
+            "{name}: has {} animations `{wanted}`, at the places {places}; give the place",
+            same.len()
+        );
+        return Err(Failure::new(exit::ALL_INPUTS, message));
+    }
     let place = loaded.clips.iter().position(named).or_else(|| {
         let place = wanted.parse::<usize>().ok()?;
         loaded.clips.iter().position(|clip| clip.place == place)

@@ -4,8 +4,10 @@ use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use tumble::EulerSequence;
 use tumble_formats::motion::Motion;
-use tumble_formats::{Format, Loaded};
+use tumble_formats::{Feature, Format, Loaded};
+use tumble_formats::format::{Document, FormatOption};
 
 use crate::arguments::gather::Gathered;
 use crate::arguments::input::{Inputs, clip_name, is_standard, name, several, tell_warnings};
@@ -142,6 +144,46 @@ impl Results {
     }
 }
 
+/// Refuses axes of angles for a format that has none.
+pub(crate) fn check_sequence(
+    sequence: Option<EulerSequence>,
+    format: Option<&'static Format>,
+) -> Result<(), Failure> {
+    match format.filter(|format| !format.takes(FormatOption::Sequence)) {
+        Some(format) if sequence.is_some() => Err(Failure::usage(format!(
+            "{} has no angles; leave out --sequence",
+            format.name
+        ))),
+        _ => Ok(()),
+    }
+}
+
+/// The input's own file, where the result is that file with other keys. Where it is of the same format
+/// and cannot be kept, `otherwise` says what makes a new one; then what stays behind is said.
+pub(crate) fn kept<'a>(
+    name: &str,
+    loaded: &'a Loaded,
+    target: &Target,
+    otherwise: Option<&str>,
+) -> Option<&'a dyn Document> {
+    let document = loaded.document.as_deref()?;
+    if !document.writes(target.format()) {
+        return None;
+    }
+    let adjusted = loaded.is_adjusted.then_some("other units or axes make");
+    match otherwise.or(adjusted) {
+        None => Some(document),
+        Some(why) => {
+            let beside = document.beside();
+            if !beside.is_empty() {
+                let all = beside.join(", ");
+                words::note(&format!("{name}: {why} a new file; stays behind: {all}"));
+            }
+            None
+        }
+    }
+}
+
 /// Makes a file of each input's clips: of all together where its format holds several, else of
 /// each. `make` gets what messages call the clips, the clips, and where they go.
 pub(crate) fn each_file(
@@ -152,7 +194,7 @@ pub(crate) fn each_file(
     mut make: impl FnMut(&str, &[&Motion], &Target) -> Result<Evaluated, Failure>,
 ) -> Result<(), Failure> {
     let clips: Vec<&Motion> = loaded.clips.iter().collect();
-    if target.format().many_clips || clips.len() == 1 {
+    if target.format().holds(Feature::SeveralClips) || clips.len() == 1 {
         done(target.name(), make(name, &clips, target)?)?;
     } else {
         if target.name().is_empty() {

@@ -140,7 +140,8 @@ pub(crate) enum PoseKind {
     World,
 }
 
-fn sequence(name: &str) -> Result<EulerSequence, String> {
+/// Reads a sequence of axes, for clap.
+pub(crate) fn sequence(name: &str) -> Result<EulerSequence, String> {
     name.parse().map_err(|_| {
         "give three axes, no two neighbours the same: XYZ, ZXZ … about turned axes, xyz, zxz … about fixed ones"
             .to_owned()

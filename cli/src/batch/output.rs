@@ -267,9 +267,9 @@ impl Target {
         result: &ResultShape<'_>,
         rotations: &[Quat],
     ) -> Result<Written, Failure> {
-        let begin = self.results()?.rotations;
+        let results = self.results()?;
         self.prepare(|out| {
-            let mut writer = begin(out, result)?;
+            let mut writer = results.begin(out, result)?;
             writer.write(rotations)?;
             writer.finish()
         })
@@ -292,7 +292,7 @@ impl Target {
         let mut unevaluated = None;
         let written = self.place.prepare(Some((progress, measure)), |out| {
             let mut writer = LateWriter {
-                rotations: write.rotations,
+                results: write,
                 result: *result,
                 state: State::Waiting(out),
             };
@@ -346,13 +346,10 @@ impl From<Error> for Ended {
 /// A writer of one format. Nothing is written before there is a first chunk: what
 /// cannot be evaluated leaves nothing behind, in a pipe neither.
 struct LateWriter<'a> {
-    rotations: RotationsWriter,
+    results: &'static WriteResults,
     result: ResultShape<'a>,
     state: State<'a>,
 }
-
-type RotationsWriter =
-    for<'a> fn(&'a mut dyn Write, &ResultShape<'a>) -> io::Result<Box<dyn ResultWriter + 'a>>;
 
 enum State<'a> {
     Waiting(&'a mut Stream),
@@ -364,7 +361,7 @@ impl<'a> LateWriter<'a> {
     /// What writes, after the header.
     fn started(&mut self) -> io::Result<&mut Box<dyn ResultWriter + 'a>> {
         self.state = match std::mem::replace(&mut self.state, State::Failed) {
-            State::Waiting(out) => State::Writing((self.rotations)(out, &self.result)?),
+            State::Waiting(out) => State::Writing(self.results.begin(out, &self.result)?),
             started => started,
         };
         match &mut self.state {

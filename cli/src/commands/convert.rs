@@ -4,19 +4,21 @@ use std::borrow::Cow;
 use std::time::Instant;
 
 use clap::Args;
-use tumble::{Device, Engine};
-use tumble_formats::format::{FormatOption, MotionOptions};
+use tumble::{Device, Engine, EulerSequence};
+use tumble_formats::format::{Document, FormatOption, MotionOptions};
 use tumble_formats::keyed::keyed;
 use tumble_formats::motion::{Motion, Sampled};
 use tumble_formats::sample::Samples;
 use tumble_formats::trim::{TrimError, trim};
+use tumble_formats::{Feature, Loaded};
 
 use crate::arguments::given::Given;
 use crate::arguments::input::{self, Inputs};
-use crate::arguments::results::{Results, each_file};
+use crate::arguments::results::{Results, check_sequence, each_file, kept};
 use crate::arguments::time::{check_range, finite_seconds};
-use crate::arguments::what::OrderArgument;
+use crate::arguments::what::{OrderArgument, sequence};
 use crate::batch::output::Target;
+use crate::batch::place::Written;
 use crate::batch::run::Evaluated;
 use crate::messages::exit::{ALL_INPUTS, Failure};
 use crate::messages::words;
@@ -27,7 +29,8 @@ use crate::messages::words;
 Nothing is sampled: keys stay what and when they are. A file whose channels have keys at
 different times goes through `tumble eval --fps`, unless its format holds such. --start and --end
 cut: a channel that goes over a cut gets a key there, on its curve, so that steps, lines and arcs stay
-as they are; a smooth curve, which depends on keys beyond the cut too, changes beside it.
+as they are; a smooth curve, which depends on keys beyond the cut too, changes beside it. A file of the
+same format keeps all else that it holds; --tracks and --animation make a new one of what they name.
 
 Examples:
   tumble convert walk.bvh -o walk.glb
@@ -51,13 +54,16 @@ pub(crate) struct Arguments {
     /// The order of a quaternion's columns in tables [default: xyzw; CSV: wxyz]
     #[arg(long, value_enum)]
     order: Option<OrderArgument>,
+    /// The axes of the angles of BVH, three different ones [default: those of the input, else ZXY]
+    #[arg(long, value_name = "AXES", value_parser = sequence)]
+    sequence: Option<EulerSequence>,
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     check_range(arguments.start, arguments.end)?;
     let files = arguments.inputs.gather(false)?;
     let plan = arguments.results.plan(&files)?;
-    let no_motion = |target: &&Target| target.format().write_motion.is_none();
+    let no_motion = |target: &&Target| !target.format().writes_clips();
     if let Some(target) = plan.targets.iter().find(no_motion) {
         let format = target.format().name;
         return Err(Failure::usage(format!(
@@ -73,6 +79,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
             format.name
         )));
     }
+    check_sequence(arguments.sequence, format)?;
     let options = format!("convert {}", arguments.given.options());
     let results = &arguments.results;
     results.make(
@@ -82,7 +89,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         |file, loaded, target, done| {
             let path = file.path();
             let convert = |name: &str, clips: &[&Motion], target: &Target| {
-                arguments.convert(name, (clips, loaded.box_length), target)
+                arguments.convert(name, (clips, loaded), target)
             };
             each_file(&input::name(path), (path, loaded), target, done, convert)
         },
@@ -113,66 +120,97 @@ impl Arguments {
     fn convert(
         &self,
         name: &str,
-        (clips, box_length): (&[&Motion], Option<f64>),
+        (clips, loaded): (&[&Motion], &Loaded),
         target: &Target,
     ) -> Result<Evaluated, Failure> {
         let started = Instant::now();
-        let clips = clips.iter().map(|&clip| self.part(name, clip));
-        let clips: Vec<Cow<'_, Motion>> = clips.collect::<Result<_, Failure>>()?;
+        let document = kept(name, loaded, target, self.makes_new(target));
+        if let Some(document) = &loaded.document
+            && !document.writes(target.format())
+            && !document.beside().is_empty()
+        {
+            let (all, format) = (document.beside().join(", "), target.format().name);
+            words::note(&format!("{name}: {format} has no room for it, left out: {all}"));
+        }
+        let parts = clips.iter().map(|&clip| self.part(name, clip));
+        let parts: Vec<Cow<'_, Motion>> = parts.collect::<Result<_, Failure>>()?;
+        let is_whole = (self.start, self.end) == (None, None);
+        let is_copy = document.is_some() && is_whole && !self.inputs.reading.changes_keys();
         let options = MotionOptions {
             order: self.order.map(OrderArgument::order),
-            box_length,
+            sequence: self.sequence,
+            box_length: loaded.box_length,
             ..target.motion_options()
         };
-        write(name, &clips, options, started, target)
+        let written = match document.filter(|_| is_copy) {
+            Some(document) => {
+                target.write_motion(|out| document.write(&[], &options, target.path(), out))?
+            }
+            None => write(name, &parts, document, options, target)?,
+        };
+        let told = format!(
+            "{name}: {}, {} in {} → {target}",
+            words::count(parts.len(), "clip"),
+            words::count(parts.iter().map(|clip| clip.key_count()).sum(), "key"),
+            words::duration(started.elapsed()),
+        );
+        Ok(Evaluated {
+            written,
+            device: "none".to_owned(),
+            told,
+        })
+    }
+
+    /// What makes a new file, where an input is not kept.
+    fn makes_new(&self, target: &Target) -> Option<&'static str> {
+        let several = target.format().holds(Feature::SeveralClips);
+        if self.inputs.tracks.is_given() {
+            return Some("some tracks make");
+        }
+        (self.inputs.reading.chooses() && several).then_some("one animation makes")
     }
 }
 
+/// Writes clips: into the input's own file, if it is kept, else into a new one.
 fn write(
     name: &str,
     clips: &[Cow<'_, Motion>],
+    document: Option<&dyn Document>,
     options: MotionOptions,
-    started: Instant,
     target: &Target,
-) -> Result<Evaluated, Failure> {
+) -> Result<Written, Failure> {
     // A format that has keys of each channel at times of their own keeps them, where channels differ.
-    let has_own_keys = target.format().takes(FormatOption::OwnKeys);
+    let has_own_keys = target.format().holds(Feature::OwnTimes);
     let mut keys: Vec<(Samples, bool)> = Vec::new();
     for clip in clips {
-        keys.push(match keyed(clip) {
-            Ok(samples) => (samples, false),
-            Err(_) if has_own_keys && !clip.is_world => {
+        let samples = match keyed(clip) {
+            Ok(samples) if document.is_none() || !has_own_keys => (samples, false),
+            Err(error) if !has_own_keys || clip.is_world => {
+                return Err(Failure::new(ALL_INPUTS, format!("{name}: {error}")));
+            }
+            _ => {
                 let engine = Engine::new(Device::Cpu);
                 let ends = engine.and_then(|engine| clip.ends(&engine));
-                (
-                    ends.map_err(|error| Failure::evaluating(name, &error))?,
-                    true,
-                )
+                let ends = ends.map_err(|error| Failure::evaluating(name, &error))?;
+                (ends, true)
             }
-            Err(error) => return Err(Failure::new(ALL_INPUTS, format!("{name}: {error}"))),
-        });
+        };
+        keys.push(samples);
     }
     let notes = [("input", name.to_owned())];
-    let sampled: Vec<Sampled<'_>> = (clips.iter().zip(&keys))
-        .map(|(clip, (samples, of_own_keys))| Sampled {
-            of_own_keys: *of_own_keys,
-            ..samples.of(clip, clip.rate, &notes)
-        })
-        .collect();
-    let write = target.format().write_motion;
-    let written = target.write_motion(|out| match write {
-        Some(write) => write(&sampled, &options, out),
-        None => Ok(Vec::new()),
-    })?;
-    let told = format!(
-        "{name}: {}, {} in {} → {target}",
-        words::count(clips.len(), "clip"),
-        words::count(clips.iter().map(|clip| clip.key_count()).sum(), "key"),
-        words::duration(started.elapsed()),
-    );
-    Ok(Evaluated {
-        written,
-        device: "none".to_owned(),
-        told,
-    })
+    let sampled = (clips.iter().zip(&keys)).map(|(clip, (samples, of_own_keys))| Sampled {
+        of_own_keys: *of_own_keys,
+        ..samples.of(clip, clip.rate, &notes)
+    });
+    match document {
+        Some(document) => {
+            let places = clips.iter().map(|clip| clip.place);
+            let clips: Vec<(usize, Sampled<'_>)> = places.zip(sampled).collect();
+            target.write_motion(|out| document.write(&clips, &options, target.path(), out))
+        }
+        None => {
+            let clips: Vec<Sampled<'_>> = sampled.collect();
+            target.write_motion(|out| target.format().write_clips(&clips, &options, out))
+        }
+    }
 }

@@ -9,7 +9,7 @@ use tumble::{Engine, Error, Follow, FollowError, Followed, Frames, Layout, Track
 use tumble_formats::Loaded;
 use tumble_formats::motion::{Joint, Motion, Sampled, Transform};
 use tumble_formats::poses::{Poses, WORLD};
-use tumble_formats::sample::{Samples as Baked, continue_signs};
+use tumble_formats::sample::Samples as Baked;
 
 use crate::arguments::device::{DeviceArguments, Opened};
 use crate::arguments::gather::Gathered;
@@ -210,11 +210,9 @@ fn write(
         rate,
         ..Motion::default()
     };
-    let mut rotations: Vec<Quat> = found.rotations.as_quats().to_vec();
-    continue_signs(&mut rotations, set.track_count());
     let samples = Baked {
         times: timeline.times(0).collect(),
-        rotations,
+        rotations: found.rotations.as_quats().to_vec(),
         translations: places
             .iter()
             .map(|place| Vec3::from_array([place.x, place.y, place.z]))
@@ -224,8 +222,5 @@ fn write(
     let notes = [("input", name.to_owned())];
     let sampled: [Sampled<'_>; 1] = [samples.of(&clip, rate, &notes)];
     let options = target.motion_options();
-    target.write_motion(|out| match format.write_motion {
-        Some(write) => write(&sampled, &options, out),
-        None => Ok(Vec::new()),
-    })
+    target.write_motion(|out| format.write_clips(&sampled, &options, out))
 }

@@ -71,7 +71,7 @@ struct Summary {
     samplers: BTreeMap<&'static str, usize>,
     #[serde(skip_serializing_if = "Option::is_none")]
     box_length: Option<f64>,
-    /// `FILE:LINE:COLUMN: warning[CODE]: …`
+    /// Of the whole file, with its first animation: `FILE:LINE:COLUMN: warning[CODE]: …`
     warnings: Vec<String>,
 }
 
@@ -81,11 +81,16 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let outcome = for_each(&inputs, |path| {
         let loaded = arguments.inputs.load_quietly(path)?;
         let several = loaded.clips.len() + loaded.refused.len() > 1;
-        for clip in &loaded.clips {
+        for (place, clip) in loaded.clips.iter().enumerate() {
             let animation = several.then(|| input::clip_name(clip));
             let name = input::name(path);
             let clip = arguments.inputs.tracks.select(clip, &name)?;
-            summaries.push(Summary::new(name, animation, &clip, &loaded));
+            let mut summary = Summary::new(name, animation, &clip, &loaded);
+            // They are those of the file.
+            if place > 0 {
+                summary.warnings.clear();
+            }
+            summaries.push(summary);
         }
         for refused in &loaded.refused {
             words::note(&refused.to_string());

@@ -14,6 +14,7 @@ use arrow_ipc::reader::{read_dictionary, read_record_batch};
 use crate::arrow::messages::{Body, Messages};
 use crate::arrow::write::ArrowSink;
 use crate::diagnostic::{Code, Diagnostic};
+use crate::feature::Feature;
 use crate::format::{Format, FormatOption, Loaded, ReadOptions, WriteResults};
 use crate::npy::ComponentOrder;
 use crate::source::Source;
@@ -43,7 +44,7 @@ pub static FORMAT: Format = Format {
     write_motion: Some(|clips, options, out| {
         write_motion(clips, options.order, |table| ArrowSink::new(out, table)).map(|()| Vec::new())
     }),
-    many_clips: true,
+    features: &Feature::OF_TABLES,
     options: &FormatOption::OF_TABLES,
 };
 

@@ -6,7 +6,8 @@ use std::io::BufRead;
 use glam::Vec3;
 
 use crate::diagnostic::{Code, Diagnostic, Place};
-use crate::names::usable_name;
+use crate::bvh::joint::{BvhChannel, BvhJoint};
+use crate::names::untaken;
 use crate::text::lines::Lines;
 use crate::text::number;
 
@@ -33,6 +34,8 @@ pub(super) struct Joint {
     pub(super) rotations: Vec<(usize, usize)>,
     /// The coordinates that a row has, each with its place there.
     pub(super) positions: Vec<(usize, usize)>,
+    /// All of these in their order, and the End Sites.
+    pub(super) written: BvhJoint,
 }
 
 /// A word of the hierarchy: its place, and the word.
@@ -54,6 +57,8 @@ struct Block {
     line: u64,
     /// An End Site is no joint.
     joint: Option<usize>,
+    /// The joint that an End Site belongs to.
+    end_of: Option<usize>,
     has_offset: bool,
     has_channels: bool,
 }
@@ -148,19 +153,28 @@ impl<R: BufRead> Parser<'_, R> {
 
     /// `ROOT name {` or `JOINT name {`; the name is all that is on the line.
     fn joint(&mut self, keyword: &Word) -> Result<(), Diagnostic> {
-        let mut name = String::new();
-        while let Some(word) = self.word_before(&["{"]) {
-            name = name + &word.text + " ";
-        }
+        let start = self.at;
+        while self.word_before(&["{"]).is_some() {}
+        let name = self.line[start..self.at].trim().to_owned();
         let parent = self.open.last().and_then(|block| block.joint);
         let joints = &mut self.hierarchy.joints;
         let joint = joints.len();
+        let own = match name.is_empty() {
+            true => format!("joint{joint}"),
+            false => name.clone(),
+        };
+        let own = untaken(own, joint, &mut self.names);
+        if own != name && !name.is_empty() {
+            let message = format!("a second joint is called `{name}`; it is read as `{own}`");
+            self.lines.warn(keyword.column, Code::SameName, message);
+        }
         joints.push(Joint {
-            name: usable_name(&name, joint, &mut self.names),
+            name: own,
             parent,
             offset: Vec3::ZERO,
             rotations: Vec::new(),
             positions: Vec::new(),
+            written: BvhJoint::default(),
         });
         self.brace(keyword, Some(joint))
     }
@@ -184,6 +198,7 @@ impl<R: BufRead> Parser<'_, R> {
         self.open.push(Block {
             line: keyword.line,
             joint,
+            end_of: self.open.last().and_then(|block| block.joint),
             has_offset: false,
             has_channels: false,
         });
@@ -220,8 +235,13 @@ impl<R: BufRead> Parser<'_, R> {
         }
         if let Some(block) = self.open.last_mut() {
             block.has_offset = true;
-            if let Some(joint) = block.joint {
-                self.hierarchy.joints[joint].offset = offset.into();
+            match (block.joint, block.end_of) {
+                (Some(joint), _) => self.hierarchy.joints[joint].offset = offset.into(),
+                (None, Some(joint)) => {
+                    let sites = &mut self.hierarchy.joints[joint].written.end_sites;
+                    sites.push(offset.into());
+                }
+                (None, None) => {}
             }
         }
         Ok(())
@@ -254,7 +274,7 @@ impl<R: BufRead> Parser<'_, R> {
         block.has_channels = true;
         let joint = block.joint.unwrap_or_default();
         for word in &names {
-            let Some((kind, axis)) = channel(&word.text) else {
+            let Some(channel) = BvhChannel::named(&word.text) else {
                 let message = format!(
                     "`{}` is no channel; there are Xposition, Xrotation and those of Y and Z",
                     word.text
@@ -262,15 +282,16 @@ impl<R: BufRead> Parser<'_, R> {
                 return Err(self.refuse(word, Code::BvhChannel, message));
             };
             let joint = &mut self.hierarchy.joints[joint];
-            let channels = match kind {
-                Kind::Position => &mut joint.positions,
-                Kind::Rotation => &mut joint.rotations,
+            let (axis, channels) = match channel {
+                BvhChannel::Position(axis) => (axis, &mut joint.positions),
+                BvhChannel::Rotation(axis) => (axis, &mut joint.rotations),
             };
             if channels.iter().any(|&(other, _)| other == axis) {
                 let message = format!("the joint has `{}` twice; remove one", word.text);
                 return Err(self.refuse(word, Code::BvhChannel, message));
             }
             channels.push((axis, self.hierarchy.columns));
+            joint.written.channels.push(channel);
             self.hierarchy.columns += 1;
         }
         Ok(())
@@ -320,23 +341,5 @@ impl<R: BufRead> Parser<'_, R> {
             place: Some(Place::Text { line, column }),
             ..self.lines.refuse(column, code, message)
         }
-    }
-}
-
-enum Kind {
-    Position,
-    Rotation,
-}
-
-/// `Xposition` to `Zrotation`, in any case.
-fn channel(name: &str) -> Option<(Kind, usize)> {
-    let (letter, kind) = name.split_at_checked(1)?;
-    let axis = ["x", "y", "z"]
-        .iter()
-        .position(|axis| axis.eq_ignore_ascii_case(letter))?;
-    match kind.to_ascii_lowercase().as_str() {
-        "position" => Some((Kind::Position, axis)),
-        "rotation" => Some((Kind::Rotation, axis)),
-        _ => None,
     }
 }

@@ -2,10 +2,12 @@
 //!
 //! A joint's rotation is the product of its rotation channels in the order in which `CHANNELS`
 //! names them, each about an axis that those before have turned, in degrees. Position channels
-//! replace the joint's `OFFSET`, each its own coordinate. End Sites are no joints.
+//! replace the joint's `OFFSET`, each its own coordinate. End Sites are no joints; they and the order of
+//! the channels are kept beside the clip ([`BvhJoint`]), and written again.
 
 mod angles;
 mod hierarchy;
+mod joint;
 mod motion;
 mod rate;
 mod write;
@@ -13,10 +15,12 @@ mod write;
 use std::io::BufRead;
 use std::path::Path;
 
+pub use crate::bvh::joint::{BvhChannel, BvhJoint};
 use crate::bvh::hierarchy::Hierarchy;
 use crate::bvh::motion::Rows;
 use crate::bvh::write::write_motion;
 use crate::diagnostic::Diagnostic;
+use crate::feature::Feature;
 use crate::format::{Format, FormatOption, Loaded, ReadOptions};
 use crate::source::Source;
 use crate::text::lines::Lines;
@@ -34,7 +38,12 @@ pub static FORMAT: Format = Format {
     read: open_bvh,
     write: None,
     write_motion: Some(write_motion),
-    many_clips: false,
+    features: &[
+        Feature::TrackNames,
+        Feature::Skeleton,
+        Feature::Translations,
+        Feature::Bvh,
+    ],
     options: &[FormatOption::RawTimes, FormatOption::Sequence],
 };
 

@@ -140,6 +140,9 @@ impl Rows {
             set,
             skeleton,
             rate: Some(self.rate),
+            bvh: (hierarchy.joints.iter())
+                .map(|joint| joint.written.clone())
+                .collect(),
             ..Motion::default()
         })
     }

@@ -5,17 +5,14 @@ use std::fmt::Write as _;
 use std::io::{self, Write};
 
 use glam::Vec3;
-use tumble::{Channel, FrameRate};
+use tumble::{Channel, EulerSequence, FrameRate};
 
-use crate::bvh::{angles, rate};
-use crate::diagnostic::{Code, Diagnostic, Place};
+use crate::bvh::{BvhChannel, angles, rate};
+use crate::diagnostic::{Code, Diagnostic};
 use crate::format::{MotionOptions, WriteError};
 use crate::motion::Sampled;
-use crate::names::usable_name;
+use crate::names::line_name;
 use crate::warnings::Warnings;
-
-/// Scales this close to 1 are 1: what rounding leaves of them.
-const UNSCALED: f32 = 1e-5;
 
 /// Up to here an f32 is exact to 8e-6 degrees; larger angles are written with six decimals, so that
 /// a wheel that turns a hundred times reads back within 1e-6 rad too.
@@ -27,13 +24,22 @@ struct Node {
     depth: usize,
     name: String,
     offset: Vec3,
-    has_positions: bool,
+    /// The numbers of a row, in their order.
+    channels: Vec<BvhChannel>,
+    /// The axes of its angles, three different ones; those that are no channels do not turn.
+    axes: [usize; 3],
+    end_sites: Vec<Vec3>,
 }
+
+/// Angles of channels that a joint has not are 0 within this, radians: what f32 leaves of them.
+const UNTURNED: f64 = 5e-7;
 
 /// Writes one clip, and says what BVH has no room for.
 ///
-/// Roots, and joints whose translation changes, have position channels; the translation of the
-/// others is their `OFFSET`. Tracks that have no skeleton, or are in the world already, are roots.
+/// Joints of clips from BVH have the channels and End Sites of their file, and more channels only
+/// where the motion needs them. Of others, roots and joints whose translation changes have position
+/// channels; the translation of the rest is their `OFFSET`, and the last joints end in an End Site at
+/// the joint itself. Tracks that have no skeleton, or are in the world already, are roots.
 ///
 /// # Errors
 /// When writing fails; for several clips, samples that are not frames of one rate, numbers that are
@@ -49,11 +55,10 @@ pub(super) fn write_motion(
         let message = format!("{} clips; a BVH file holds one, choose one", clips.len());
         return Err(refuse(message).into());
     };
-    let axes = axes(options).map_err(refuse)?;
+    let sequence = options.sequence.map(axes).transpose().map_err(refuse)?;
     let rate = check(sampled)?.map_err(refuse)?;
-    let nodes = nodes(sampled).map_err(refuse)?;
     let mut warnings = Warnings::new(&options.name);
-    warn_of_scales(sampled, &nodes, &mut warnings);
+    let nodes = nodes(sampled, sequence, &mut warnings).map_err(refuse)?;
     let start = sampled.clip.time_offset as f64 + sampled.times[0];
     if start != 0.0 {
         warnings.warn(Code::StartMoved, || {
@@ -61,7 +66,7 @@ pub(super) fn write_motion(
             (None, message)
         });
     }
-    let mut text = hierarchy(&nodes, axes);
+    let mut text = hierarchy(&nodes);
     let (frames, period) = (sampled.times.len(), frame_time(rate));
     text += &format!("MOTION\nFrames: {frames}\nFrame Time: {period}\n");
     out.write_all(text.as_bytes())?;
@@ -70,18 +75,22 @@ pub(super) fn write_motion(
     for sample in 0..frames {
         text.clear();
         for (node, before) in nodes.iter().zip(&mut before) {
-            if node.has_positions {
-                for coordinate in translation(sampled, sample, node.track).to_array() {
-                    push_f32(&mut text, coordinate);
+            let position = translation(sampled, sample, node.track);
+            let rotation = sampled.rotations[sample * tracks + node.track];
+            *before = angles::nearest(rotation.as_dquat().normalize(), node.axes, *before);
+            for channel in &node.channels {
+                match channel {
+                    BvhChannel::Position(axis) => push_f32(&mut text, position[*axis]),
+                    BvhChannel::Rotation(axis) => {
+                        let mut angles = node.axes.iter().zip(&*before);
+                        let angle = angles.find(|(own, _)| *own == axis);
+                        let angle = angle.map_or(0.0, |(_, angle)| *angle);
+                        push_degrees(&mut text, angle.to_degrees());
+                    }
                 }
             }
-            let rotation = sampled.rotations[sample * tracks + node.track];
-            *before = angles::nearest(rotation.as_dquat().normalize(), axes, *before);
-            for angle in *before {
-                push_degrees(&mut text, angle.to_degrees());
-            }
         }
-        text.pop(); // the last blank
+        text.truncate(text.trim_end_matches(' ').len());
         text.push('\n');
         out.write_all(text.as_bytes())?;
     }
@@ -102,10 +111,7 @@ fn frame_time(rate: FrameRate) -> String {
 
 /// The axes of the angles, each about those before it have turned: fixed axes in the other order are
 /// the same.
-fn axes(options: &MotionOptions) -> Result<[usize; 3], String> {
-    let Some(sequence) = options.sequence else {
-        return Ok([2, 0, 1]);
-    };
+fn axes(sequence: EulerSequence) -> Result<[usize; 3], String> {
     let mut axes = sequence.axes();
     if !sequence.is_intrinsic() {
         axes.reverse();
@@ -157,7 +163,11 @@ fn check(sampled: &Sampled<'_>) -> io::Result<Result<FrameRate, String>> {
 }
 
 /// The joints in the file's order, each before those that hang on it.
-fn nodes(sampled: &Sampled<'_>) -> Result<Vec<Node>, String> {
+fn nodes(
+    sampled: &Sampled<'_>,
+    sequence: Option<[usize; 3]>,
+    warnings: &mut Warnings,
+) -> Result<Vec<Node>, String> {
     let clip = sampled.clip;
     let tracks = clip.set.track_count();
     let mut children = vec![Vec::new(); tracks];
@@ -176,22 +186,16 @@ fn nodes(sampled: &Sampled<'_>) -> Result<Vec<Node>, String> {
     let mut nodes = Vec::with_capacity(tracks);
     while let Some((track, depth)) = open.pop() {
         open.extend(children[track].iter().map(|&child| (child, depth + 1)));
-        let first = translation(sampled, 0, track);
-        let moves =
-            (1..sampled.times.len()).any(|sample| translation(sampled, sample, track) != first);
-        let rest = clip.rest(Channel::Translation, track);
-        let has_positions = depth == 0 || moves;
-        nodes.push(Node {
-            track,
-            depth,
-            name: usable_name(clip.set.track(track).name.unwrap_or(""), track, &mut names),
-            offset: if has_positions && !clip.skeleton.is_empty() {
-                rest
-            } else {
-                first
-            },
-            has_positions,
-        });
+        let given = clip.set.track(track).name.unwrap_or("");
+        let name = line_name(given, track, &mut names);
+        if name != given && !given.is_empty() {
+            warnings.warn(Code::NameChanged, || {
+                let message = format!("`{}` is called `{name}` in BVH", given.escape_debug());
+                (None, message)
+            });
+        }
+        let is_leaf = children[track].is_empty();
+        nodes.push(node(sampled, (track, depth, name), is_leaf, sequence));
     }
     if nodes.len() < tracks {
         let message = "joints hang on each other in a circle; a skeleton has roots";
@@ -200,27 +204,102 @@ fn nodes(sampled: &Sampled<'_>) -> Result<Vec<Node>, String> {
     Ok(nodes)
 }
 
+/// One joint, given its track, its depth and its name.
+fn node(
+    sampled: &Sampled<'_>,
+    (track, depth, name): (usize, usize, String),
+    is_leaf: bool,
+    sequence: Option<[usize; 3]>,
+) -> Node {
+    let clip = sampled.clip;
+    let written = clip.bvh.get(track).filter(|_| !clip.is_world);
+    let samples = 0..sampled.times.len();
+    let first = translation(sampled, 0, track);
+    let rest = clip.rest(Channel::Translation, track);
+    let mut channels = written.map_or_else(Vec::new, |own| own.channels.clone());
+    let has_positions = |channels: &[BvhChannel]| {
+        let is_position = |own: &BvhChannel| matches!(own, BvhChannel::Position(_));
+        channels.iter().any(is_position)
+    };
+    let moves = |axis: usize| {
+        let mut all = samples.clone();
+        all.any(|sample| translation(sampled, sample, track)[axis] != first[axis])
+    };
+    let is_root = written.is_none() && depth == 0;
+    let is_moved = is_root || (0..3).any(moves);
+    let has_rest = (has_positions(&channels) || is_moved) && !clip.skeleton.is_empty();
+    let offset = if has_rest { rest } else { first };
+    // Coordinates that the file's channels leave to the OFFSET, and that are others now.
+    let is_missing = |axis: &usize| {
+        !channels.contains(&BvhChannel::Position(*axis))
+            && (is_root || moves(*axis) || first[*axis] != offset[*axis])
+    };
+    let missing: Vec<usize> = match is_moved && !has_positions(&channels) {
+        true => vec![0, 1, 2],
+        false => (0..3).filter(is_missing).collect(),
+    };
+    let last = channels
+        .iter()
+        .rposition(|own| matches!(own, BvhChannel::Position(_)));
+    let place = last.map_or(0, |last| last + 1);
+    let missing = missing.into_iter().map(BvhChannel::Position);
+    channels.splice(place..place, missing);
+    let turned = BvhChannel::rotations(&channels);
+    let mut axes = sequence.unwrap_or([2, 0, 1]);
+    if sequence.is_none() && !turned.is_empty() {
+        // The file's axes, then those that it leaves out.
+        let others = (0..3).filter(|axis| !turned.contains(axis));
+        let all = turned.iter().copied().chain(others);
+        axes.iter_mut().zip(all).for_each(|(own, axis)| *own = axis);
+    }
+    let is_partial = written.is_some() && turned.len() < 3;
+    if sequence.is_some() || !is_partial || turns_more(sampled, track, axes, &turned) {
+        // All three, where the file's first rotation is.
+        let is_rotation = |own: &BvhChannel| matches!(own, BvhChannel::Rotation(_));
+        let place = channels.iter().position(is_rotation);
+        let is_sorted = turned == axes;
+        if !is_sorted {
+            let place = place.unwrap_or(channels.len());
+            channels.retain(|own| !is_rotation(own));
+            channels.splice(place..place, axes.map(BvhChannel::Rotation));
+        }
+    }
+    let end_sites = match written {
+        Some(own) => own.end_sites.clone(),
+        None if is_leaf => vec![Vec3::ZERO],
+        None => Vec::new(),
+    };
+    Node {
+        track,
+        depth,
+        name,
+        offset,
+        channels,
+        axes,
+        end_sites,
+    }
+}
+
+/// Whether a joint turns about axes that are not among the first ones of these.
+fn turns_more(sampled: &Sampled<'_>, track: usize, axes: [usize; 3], among: &[usize]) -> bool {
+    let tracks = sampled.clip.set.track_count();
+    let mut before = [0.0; 3];
+    let mut rotations = sampled.rotations.iter().skip(track).step_by(tracks);
+    rotations.any(|rotation| {
+        before = angles::nearest(rotation.as_dquat().normalize(), axes, before);
+        let mut angles = axes.iter().zip(before);
+        angles.any(|(axis, angle)| !among.contains(axis) && angle.abs() > UNTURNED)
+    })
+}
+
 fn translation(sampled: &Sampled<'_>, sample: usize, track: usize) -> Vec3 {
     let tracks = sampled.clip.set.track_count();
     let found = sampled.translations.get(sample * tracks + track).copied();
     found.unwrap_or_else(|| sampled.clip.rest(Channel::Translation, track))
 }
 
-fn warn_of_scales(sampled: &Sampled<'_>, nodes: &[Node], warnings: &mut Warnings) {
-    let tracks = sampled.clip.set.track_count();
-    for node in nodes {
-        let mut own = sampled.scales.iter().skip(node.track).step_by(tracks);
-        if own.any(|scale| !scale.abs_diff_eq(Vec3::ONE, UNSCALED)) {
-            warnings.warn(Code::Scales, || {
-                let message = "the joint is scaled; BVH has no scales, they are left out";
-                (Some(Place::Inside(node.name.clone())), message)
-            });
-        }
-    }
-}
-
 /// All up to `MOTION`.
-fn hierarchy(nodes: &[Node], axes: [usize; 3]) -> String {
+fn hierarchy(nodes: &[Node]) -> String {
     let mut text = String::from("HIERARCHY\n");
     for (place, node) in nodes.iter().enumerate() {
         let (indent, keyword) = (
@@ -232,22 +311,16 @@ fn hierarchy(nodes: &[Node], axes: [usize; 3]) -> String {
             node.name
         );
         push_vector(&mut text, node.offset);
-        let positions = if node.has_positions {
-            " Xposition Yposition Zposition"
-        } else {
-            ""
-        };
-        let count = if node.has_positions { 6 } else { 3 };
-        text += &format!("{indent}  CHANNELS {count}{positions}");
-        for axis in axes {
-            text += [" Xrotation", " Yrotation", " Zrotation"][axis];
+        text += &format!("{indent}  CHANNELS {}", node.channels.len());
+        for channel in &node.channels {
+            text += &format!(" {channel}");
         }
         text.push('\n');
         let next = nodes.get(place + 1).map_or(0, |next| next.depth);
-        if next <= node.depth {
-            text += &format!(
-                "{indent}  End Site\n{indent}  {{\n{indent}    OFFSET 0 0 0\n{indent}  }}\n"
-            );
+        for &site in &node.end_sites {
+            text += &format!("{indent}  End Site\n{indent}  {{\n{indent}    OFFSET ");
+            push_vector(&mut text, site);
+            text += &format!("{indent}  }}\n");
         }
         for depth in (next..=node.depth).rev() {
             text += &format!("{}}}\n", "  ".repeat(depth));

@@ -11,6 +11,7 @@ use glam::Quat;
 
 use tumble::{Encoding, Layout, Timeline, TrackSet};
 
+use crate::feature::Feature;
 use crate::format::{Format, FormatOption, ResultShape, ResultWriter, WriteResults};
 use crate::npy::ComponentOrder;
 
@@ -46,7 +47,14 @@ pub static FORMAT: Format = Format {
         poses: |poses, mut out| poses.write_csv(&mut out),
     }),
     write_motion: Some(|clips, options, out| motion::write_motion(clips, options, out)),
-    many_clips: false,
+    features: &[
+        Feature::TrackNames,
+        Feature::Translations,
+        Feature::Scales,
+        Feature::World,
+        Feature::UnevenTimes,
+        Feature::Start,
+    ],
     options: &FormatOption::OF_TABLES,
 };
 

@@ -10,7 +10,6 @@ use crate::dat::MAX_BOXES;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::format::{MotionOptions, WriteError};
 use crate::motion::Sampled;
-use crate::warnings::Warnings;
 
 /// Writes a clip's samples, and says what the format has no room for.
 ///
@@ -43,22 +42,10 @@ pub(super) fn write_motion(
         );
         return Err(refuse(Code::TimeNotIncreasing, message).into());
     }
-    let mut warnings = Warnings::new(&options.name);
-    let is_placed = sampled
-        .clip
-        .skeleton
-        .iter()
-        .any(|joint| joint.parent.is_some());
-    if is_placed || !sampled.translations.is_empty() || !sampled.scales.is_empty() {
-        warnings.warn(Code::RotationsAlone, || {
-            let message = ".dat holds rotations; skeleton, translations and scales are left out";
-            (None, message)
-        });
-    }
     let times = sampled.times.iter().map(|time| time + offset);
     let rows = times.zip(sampled.rotations.chunks_exact(tracks));
     write_rows(out, tracks, options.box_length.unwrap_or(1.0), rows)?;
-    Ok(warnings.into_list())
+    Ok(Vec::new())
 }
 
 /// Writes a set whose tracks share their times, with boxes of that length. Numbers have as

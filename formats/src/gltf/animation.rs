@@ -22,9 +22,13 @@ pub(super) struct Read {
     pub(super) span: [f64; 2],
     /// The channels of more than one key that are not STEP.
     pub(super) sampled: Vec<SampledChannel>,
+    /// The other channels that move tracks: they change only where the clip is cut.
+    pub(super) others: Vec<SampledChannel>,
+    /// Channels that move other things, such as weights.
+    pub(super) beside: usize,
 }
 
-/// A channel that is sampled when the file is written again.
+/// A channel that gets other keys when the file is written again.
 #[derive(Debug)]
 pub(super) struct SampledChannel {
     /// Its place among the animation's channels, and its sampler's.
@@ -76,6 +80,7 @@ pub(super) fn read(
         .map(|(own, keys)| ((own.node, own.path), (own, keys)))
         .collect();
     for &node in &tracks.nodes {
+        motion.bvh.extend(nodes.bvh(node).cloned());
         let rest = rest(node, reader, nodes, &mut motion)?;
         let own = |path| {
             let found = targets.get(&(node, path)).copied();
@@ -112,23 +117,25 @@ pub(super) fn read(
             }
         }
     }
-    let sampled = moved.iter().zip(&keys).filter(|(moved, keys)| {
+    let (sampled, others): (Vec<_>, Vec<_>) = moved.iter().zip(&keys).partition(|(moved, keys)| {
         keys.times.len() > 1 && moved.interpolation != motion::Sampler::Step
     });
+    let channel = |(moved, _): (&Moved, _)| SampledChannel {
+        channel: moved.channel,
+        sampler: moved.sampler_index,
+        track: tracks.of_node(moved.node),
+        path: moved.path,
+    };
+    let others = others.into_iter().filter(|(_, keys)| !keys.times.is_empty());
     let read = Read {
         stored_span: stored,
         span: motion
             .set
             .time_span()
             .map_or([0.0; 2], |(first, last)| [first, last]),
-        sampled: sampled
-            .map(|(moved, _)| SampledChannel {
-                channel: moved.channel,
-                sampler: moved.sampler_index,
-                track: tracks.of_node(moved.node),
-                path: moved.path,
-            })
-            .collect(),
+        others: others.map(channel).collect(),
+        sampled: sampled.into_iter().map(channel).collect(),
+        beside: animation.channels.len() - moved.len(),
     };
     Ok(Some((motion, read)))
 }
@@ -231,7 +238,8 @@ fn times(
     Ok((times, [first as f32, last as f32], rate))
 }
 
-/// The nodes that are tracks: those that are moved, and those that carry them.
+/// The nodes that are tracks: those that are moved, those that carry them, and the other joints of
+/// their skins.
 struct Tracks {
     /// In their order in the file.
     nodes: Vec<usize>,
@@ -239,13 +247,8 @@ struct Tracks {
 
 impl Tracks {
     fn of(nodes: &Nodes, moved: &[Moved]) -> Self {
-        let mut tracks = BTreeSet::new();
-        for moved in moved {
-            let mut next = Some(moved.node);
-            while let Some(node) = next.filter(|&node| tracks.insert(node)) {
-                next = nodes.parent(node);
-            }
-        }
+        let mut tracks: BTreeSet<usize> = moved.iter().map(|moved| moved.node).collect();
+        nodes.complete(&mut tracks);
         Self {
             nodes: tracks.into_iter().collect(),
         }

@@ -3,13 +3,14 @@
 use std::io::Write;
 use std::path::{Path as FilePath, PathBuf};
 
+use serde_json::value::RawValue;
 use tumble::FrameRate;
 
 use crate::diagnostic::{Code, Diagnostic};
 use crate::format::{Document, Format, MotionOptions, WriteError};
 use crate::gltf::FORMAT;
 use crate::gltf::animation::Read;
-use crate::gltf::baking::Baking;
+use crate::gltf::baking::{Baking, is_cut};
 use crate::gltf::container::Container;
 use crate::gltf::data::{Data, check_length};
 use crate::gltf::edits::Edits;
@@ -79,6 +80,15 @@ impl Document for Gltf {
         format.name == FORMAT.name
     }
 
+    fn beside(&self) -> Vec<String> {
+        let Ok(json) = Json::parse(&self.name, &self.container.text) else {
+            return Vec::new();
+        };
+        let lists = ["meshes", "materials", "textures", "images", "cameras", "extensionsUsed"];
+        let has = |list: &&str| !json.optional::<&RawValue>(list).is_empty();
+        lists.into_iter().filter(has).map(str::to_owned).collect()
+    }
+
     fn write(
         &self,
         clips: &[(usize, Sampled<'_>)],
@@ -117,7 +127,14 @@ impl Document for Gltf {
             gather::images(&reader, &mut edits, &mut data)?;
         }
         for (read, (place, sampled)) in clips {
-            if !read.sampled.is_empty() {
+            let cuts = is_cut(read, sampled);
+            if cuts && read.beside > 0 {
+                reader.warn(Code::StaysWhole, &format!("/animations/{place}"), || {
+                    let count = read.beside;
+                    format!("{count} channels move other things than nodes, such as weights; they are not cut")
+                });
+            }
+            if !read.sampled.is_empty() || cuts {
                 let mut baking = Baking::new(&json, *place, read, sampled, &edits)?;
                 baking.bake(&mut edits)?;
                 data.append(&mut edits, &baking.bytes);
@@ -136,7 +153,7 @@ impl Document for Gltf {
         drop(data);
         // Whatever else is remarkable was said when the file was read.
         let mut warnings = reader.warnings.into_inner().into_list();
-        warnings.retain(|warning| warning.code == Code::StaysOutside);
+        warnings.retain(|own| [Code::StaysOutside, Code::StaysWhole].contains(&own.code));
         Ok(warnings)
     }
 }

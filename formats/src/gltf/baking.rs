@@ -34,6 +34,8 @@ pub(super) struct Baking<'a> {
     kept: HashSet<usize>,
     samplers: Vec<&'a RawValue>,
     samplers_array: &'a RawValue,
+    /// The clip was cut: all its channels get other keys.
+    is_cut: bool,
     /// The buffer view that the bytes will be.
     view: usize,
     pub(super) bytes: Vec<u8>,
@@ -45,6 +47,12 @@ struct Made {
     input: usize,
     interpolation: &'static str,
     values: Range<usize>,
+}
+
+/// Whether the keys that are written are those of a part of the animation.
+pub(super) fn is_cut(read: &Read, sampled: &Sampled<'_>) -> bool {
+    let span = sampled.clip.set.time_span();
+    sampled.of_own_keys && span.is_some_and(|(first, last)| [first, last] != read.span)
 }
 
 impl<'a> Baking<'a> {
@@ -60,7 +68,10 @@ impl<'a> Baking<'a> {
         let pointer = format!("/animations/{place}");
         let animation: Animation<'a> = json.entry("animations", place, &pointer)?;
         let members: Members<'a> = json.entry("animations", place, &pointer)?;
-        let sampled_channels: HashSet<usize> = read.sampled.iter().map(|own| own.channel).collect();
+        let is_cut = is_cut(read, sampled);
+        let others = read.others.iter().filter(|_| is_cut);
+        let changed = read.sampled.iter().chain(others);
+        let sampled_channels: HashSet<usize> = changed.map(|own| own.channel).collect();
         let mut kept = HashSet::new();
         let mut named = Vec::new();
         for (place, raw) in animation.channels.iter().enumerate() {
@@ -96,6 +107,7 @@ impl<'a> Baking<'a> {
             kept,
             samplers: animation.samplers,
             samplers_array,
+            is_cut,
             view: edits.count("bufferViews"),
             bytes: Vec::new(),
         })
@@ -110,7 +122,10 @@ impl<'a> Baking<'a> {
         let shared = self.input(self.sampled.times, &mut inputs, edits)?;
         // By the samplers whose keys the samples stand for.
         let mut made: HashMap<usize, Vec<Made>> = HashMap::new();
-        for channel in &self.read.sampled {
+        let read = self.read;
+        let others = read.others.iter().filter(|_| self.is_cut);
+        let channels: Vec<&SampledChannel> = read.sampled.iter().chain(others).collect();
+        for channel in channels {
             let own = match self.sampled.of_own_keys {
                 true => OwnKeys::of(self.sampled.clip, channel.track, channel.path),
                 false => None,

@@ -156,6 +156,7 @@ impl Moved {
     /// When they are no floats, or missing.
     pub(super) fn stored_times(&self, reader: &Reader<'_>) -> Result<Vec<f64>, Diagnostic> {
         let times = reader.numbers(self.sampler.input, &self.times, 1, &self.input)?;
+        reader.warn_of_stride(&self.times);
         if let Some(time) = times.iter().find(|time| **time < 0.0) {
             reader.warn(Code::NegativeTime, &self.input, || {
                 format!("the time {time} is negative; it is read as it is")
@@ -185,6 +186,7 @@ impl Moved {
             });
         }
         let numbers = reader.numbers(self.sampler.output, &self.values, width, &self.output)?;
+        reader.warn_of_stride(&self.values);
         let is_cubic = self.interpolation == motion::Sampler::Cubic;
         let key_width = if is_cubic { 3 * width } else { width };
         let of_key = |key: usize| &numbers[key * key_width..][..key_width];

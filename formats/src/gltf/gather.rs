@@ -1,6 +1,7 @@
 //! A `.gltf` and its files as one: buffers are gathered into a BIN chunk, images embedded.
 
 use std::borrow::Cow;
+use std::collections::HashSet;
 
 use serde_json::value::RawValue;
 
@@ -10,8 +11,9 @@ use crate::gltf::data::{Data, check_length};
 use crate::gltf::edits::Edits;
 use crate::gltf::json::Members;
 use crate::gltf::reader::{MESHOPT, Reader};
-use crate::gltf::schema::Buffer;
+use crate::gltf::schema::{Buffer, Texture};
 use crate::gltf::uri;
+use crate::gltf::whole::Whole;
 
 /// The buffers of a GLB: the BIN chunk, and those that could not be gathered.
 pub(super) struct Gathered {
@@ -124,9 +126,11 @@ fn move_view<'a>(
     places: &[(usize, usize)],
     pointer: &str,
 ) -> Result<(), Diagnostic> {
-    let number = |raw: Option<&'a RawValue>| match raw {
-        Some(raw) => reader.json.typed::<usize>(raw, pointer),
+    let number = |raw: Option<&'a RawValue>| -> Result<usize, Diagnostic> {
+        match raw {
+        Some(raw) => reader.json.typed(raw, pointer).map(|Whole(number)| number),
         None => Ok(0),
+        }
     };
     let (buffer, offset) = (members.get("buffer"), members.get("byteOffset"));
     let old = number(buffer)?;
@@ -155,6 +159,9 @@ pub(super) fn images<'a>(
     data: &mut Data<'_>,
 ) -> Result<(), Diagnostic> {
     let json = reader.json;
+    // glTF itself has PNG and JPEG; others are for textures of extensions.
+    let textures: Vec<Texture> = json.optional("textures");
+    let plain: HashSet<usize> = textures.iter().filter_map(|own| own.source).collect();
     for (index, image) in json.entries("images").iter().enumerate() {
         let pointer = format!("/images/{index}");
         let members: Members<'a> = json.typed(image, &pointer)?;
@@ -170,6 +177,12 @@ pub(super) fn images<'a>(
             let message =
                 || format!("{uri}: neither PNG nor JPEG nor another kind of image that is known");
             let kind = kind(&bytes).ok_or_else(|| json.refuse(&pointer, Code::Uri, message()))?;
+            if !["image/png", "image/jpeg"].contains(&kind) && plain.contains(&index) {
+                let message = format!(
+                    "{uri}: a texture has {kind} as its plain `source`, where glTF has PNG and JPEG alone"
+                );
+                return Err(json.refuse(&pointer, Code::Uri, message));
+            }
             Ok((bytes, kind))
         });
         let Some((bytes, kind)) = stays_outside(reader, found) else {

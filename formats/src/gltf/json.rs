@@ -130,6 +130,13 @@ impl<'a> Json<'a> {
         }
     }
 
+    /// A list at the top that is of use where it is as glTF has it, and may be anything else.
+    pub(super) fn optional<T: Deserialize<'a>>(&self, list: &str) -> Vec<T> {
+        let found = self.member(list).ok().flatten();
+        let typed = found.and_then(|raw| serde_json::from_str(raw.get()).ok());
+        typed.unwrap_or_default()
+    }
+
     /// The entries of an array at the top; none where the file has no such array.
     pub(super) fn entries(&self, list: &str) -> &[&'a RawValue] {
         let list = self.lists.iter().find(|own| own.name == list);

@@ -23,6 +23,7 @@ mod own_keys;
 mod reader;
 mod schema;
 mod uri;
+mod whole;
 pub mod write_new;
 
 use std::io::BufRead;
@@ -30,6 +31,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use crate::diagnostic::{Code, Diagnostic};
+use crate::feature::Feature;
 use crate::format::{Format, FormatOption, Loaded, ReadOptions};
 use crate::gltf::bake::Gltf;
 use crate::gltf::container::Container;
@@ -50,7 +52,19 @@ pub static FORMAT: Format = Format {
     read: open_gltf,
     write: None,
     write_motion: Some(write_new::write_new),
-    many_clips: true,
+    features: &[
+        Feature::TrackNames,
+        Feature::ClipName,
+        Feature::Skeleton,
+        Feature::RestRotations,
+        Feature::Translations,
+        Feature::Scales,
+        Feature::Steps,
+        Feature::Bvh,
+        Feature::SeveralClips,
+        Feature::OwnTimes,
+        Feature::UnevenTimes,
+    ],
     options: &[
         FormatOption::RawTimes,
         FormatOption::Duplicates,

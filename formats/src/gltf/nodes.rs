@@ -1,15 +1,17 @@
 //! The nodes of a file: what hangs on what, what each is called, and where it rests.
 
 use std::cell::OnceCell;
-use std::collections::HashSet;
+use std::collections::{BTreeSet, HashMap, HashSet};
 
-use glam::{DQuat, Vec3};
+use glam::{DQuat, DVec3, Vec3};
+use serde_json::value::RawValue;
 
+use crate::bvh::BvhJoint;
 use crate::diagnostic::{Code, Diagnostic, Place};
 use crate::gltf::json::Json;
 use crate::gltf::matrix::split;
 use crate::gltf::reader::Reader;
-use crate::gltf::schema::Node;
+use crate::gltf::schema::{Extras, Node, NodeBeside, Skin};
 use crate::keys::{Duplicates, Origin};
 use crate::motion::Transform;
 
@@ -19,6 +21,12 @@ pub(super) struct Nodes {
     parents: Vec<Option<usize>>,
     names: Vec<String>,
     rests: Vec<OnceCell<Result<Rest, Diagnostic>>>,
+    /// The joints of each skin, as far as there are such nodes.
+    skins: Vec<Vec<usize>>,
+    /// The skins of each node that is a joint.
+    skins_of: HashMap<usize, Vec<usize>>,
+    /// How BVH has the joints that nodes were made of; empty where the file says nothing of it.
+    bvh: Vec<BvhJoint>,
 }
 
 /// Where a node rests.
@@ -36,7 +44,21 @@ impl Nodes {
         let count = json.entries("nodes").len();
         let node = |index| json.entry("nodes", index, "/nodes");
         let list: Vec<Node> = (0..count).map(node).collect::<Result<_, _>>()?;
+        let skins = json.optional::<Skin>("skins").into_iter();
+        let skins = skins.map(|skin| skin.joints);
+        let skins: Vec<Vec<usize>> = skins
+            .map(|joints| joints.into_iter().filter(|&joint| joint < count).collect())
+            .collect();
+        let mut skins_of: HashMap<usize, Vec<usize>> = HashMap::new();
+        for (skin, joints) in skins.iter().enumerate() {
+            for &joint in joints {
+                skins_of.entry(joint).or_default().push(skin);
+            }
+        }
         Ok(Self {
+            skins,
+            skins_of,
+            bvh: bvh(json),
             parents: parents(json, &list)?,
             names: names(&list),
             rests: list.iter().map(|_| OnceCell::new()).collect(),
@@ -57,6 +79,29 @@ impl Nodes {
         &self.names[node]
     }
 
+    /// Adds the nodes that hang together with those among `nodes`: all that carry them, and all
+    /// joints of a skin that has one of them.
+    pub(super) fn complete(&self, nodes: &mut BTreeSet<usize>) {
+        let mut open: Vec<usize> = std::mem::take(nodes).into_iter().collect();
+        let mut is_done = vec![false; self.skins.len()];
+        while let Some(node) = open.pop() {
+            if !nodes.insert(node) {
+                continue;
+            }
+            open.extend(self.parents[node]);
+            for &skin in self.skins_of.get(&node).into_iter().flatten() {
+                if !std::mem::replace(&mut is_done[skin], true) {
+                    open.extend(&self.skins[skin]);
+                }
+            }
+        }
+    }
+
+    /// How BVH has the joint that a node was made of; nothing where the file says it of no node.
+    pub(super) fn bvh(&self, node: usize) -> Option<&BvhJoint> {
+        self.bvh.get(node)
+    }
+
     pub(super) fn has_matrix(&self, node: usize) -> bool {
         self.list[node].matrix.is_some()
     }
@@ -68,6 +113,29 @@ impl Nodes {
     pub(super) fn rest(&self, node: usize, reader: &Reader<'_>) -> Result<Rest, Diagnostic> {
         let find = || find_rest(&self.list[node], node, reader);
         self.rests[node].get_or_init(find).clone()
+    }
+}
+
+/// How BVH has the joints, where nodes say it among their extras: as they are written.
+fn bvh(json: &Json<'_>) -> Vec<BvhJoint> {
+    if !json.text.contains("\"bvh\"") {
+        return Vec::new();
+    }
+    let joint = |raw: &&RawValue| {
+        let beside: NodeBeside<'_> = serde_json::from_str(raw.get()).ok()?;
+        let extras: Extras = serde_json::from_str(beside.extras?.get()).ok()?;
+        let sites = extras.bvh.end_sites.into_iter();
+        let sites: Vec<Vec3> = sites.map(|site| DVec3::from_array(site).as_vec3()).collect();
+        let is_whole = sites.iter().all(|site| site.is_finite());
+        Some(BvhJoint {
+            channels: BvhJoint::channels_of(&extras.bvh.channels).filter(|_| is_whole)?,
+            end_sites: sites,
+        })
+    };
+    let all: Vec<Option<BvhJoint>> = json.entries("nodes").iter().map(joint).collect();
+    match all.iter().any(Option::is_some) {
+        true => all.into_iter().map(Option::unwrap_or_default).collect(),
+        false => Vec::new(),
     }
 }
 

@@ -5,6 +5,7 @@ use tumble::Channel;
 
 use crate::gltf::channel::Path;
 use crate::motion::{Motion, Sampler};
+use crate::signs::continue_signs;
 
 /// The keys of a channel of a clip.
 pub(super) struct OwnKeys {
@@ -38,8 +39,12 @@ impl OwnKeys {
         let own = clip.set.get(track)?;
         let sampler = lasting(sampler.unwrap_or(Some(Sampler::Linear))?, own.times);
         let mut values = Vec::new();
-        let mut before: Option<Quat> = None;
-        for (place, &key) in own.keys.iter().enumerate() {
+        let mut keys = own.keys.to_vec();
+        // The signs of cubics are part of their curves.
+        if sampler != Sampler::Cubic {
+            continue_signs(&mut keys, 1);
+        }
+        for (place, &key) in keys.iter().enumerate() {
             if sampler == Sampler::Cubic {
                 let none = [Quat::from_array([0.0; 4]); 2];
                 let [arriving, leaving] = own.tangents.get(place).copied().unwrap_or(none);
@@ -50,9 +55,7 @@ impl OwnKeys {
                 );
                 continue;
             }
-            // Each with the sign that continues the one before it.
-            let turns = before.is_some_and(|before| before.dot(key) < 0.0);
-            values.extend(before.insert(if turns { -key } else { key }).to_array());
+            values.extend(key.to_array());
         }
         Some(Self {
             times: own.times.to_vec(),

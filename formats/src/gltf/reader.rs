@@ -9,7 +9,7 @@ use crate::diagnostic::{Code, Diagnostic, Place};
 use crate::gltf::compressed;
 use crate::gltf::container::Container;
 use crate::gltf::json::Json;
-use crate::gltf::schema::{Buffer, BufferView, MeshoptView};
+use crate::gltf::schema::{Accessor, Buffer, BufferView, MeshoptView};
 use crate::gltf::uri;
 use crate::source::Source;
 use crate::warnings::Warnings;
@@ -190,15 +190,30 @@ impl<'a> Reader<'a> {
             }
         }
         let bytes = self.part(view.buffer, view.byte_offset, view.byte_length, &pointer)?;
-        if let Some(stride) = view.byte_stride {
-            self.warn(Code::ByteStride, &format!("{pointer}/byteStride"), || {
-                format!("a stride of {stride} bytes is for vertices alone; it is honoured")
-            });
-        }
         Ok(View {
             bytes,
             stride: view.byte_stride,
         })
+    }
+
+    /// Warns of a stride in the view of an accessor whose elements are no vertices.
+    pub(super) fn warn_of_stride(&self, accessor: &Accessor) {
+        let Some(index) = accessor.buffer_view else {
+            return;
+        };
+        let pointer = format!("/bufferViews/{index}");
+        let view = self.json.entry::<BufferView<'a>>("bufferViews", index, &pointer);
+        let Ok(view) = view else {
+            return;
+        };
+        let is_compressed = |(name, _): &(String, _)| MESHOPT.contains(&name.as_str());
+        if let Some(stride) = view.byte_stride
+            && !view.extensions.0.iter().any(is_compressed)
+        {
+            self.warn(Code::ByteStride, &format!("{pointer}/byteStride"), || {
+                format!("a stride of {stride} bytes is for vertices alone; it is honoured")
+            });
+        }
     }
 
     fn decode(&self, view: &MeshoptView, pointer: &str) -> Result<Vec<u8>, Diagnostic> {

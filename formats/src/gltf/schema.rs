@@ -6,6 +6,7 @@ use serde::Deserialize;
 use serde_json::value::RawValue;
 
 use crate::gltf::json::Members;
+use crate::gltf::whole;
 
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
@@ -18,18 +19,54 @@ pub(super) struct Asset {
 pub(super) struct Node {
     pub(super) name: Option<String>,
     #[serde(default)]
+    #[serde(deserialize_with = "whole::list")]
     pub(super) children: Vec<usize>,
     /// Column after column.
     pub(super) matrix: Option<[f64; 16]>,
     pub(super) translation: Option<[f64; 3]>,
     pub(super) rotation: Option<[f64; 4]>,
     pub(super) scale: Option<[f64; 3]>,
+    #[serde(default, deserialize_with = "whole::optional")]
     pub(super) mesh: Option<usize>,
+}
+
+/// What else a node says; read only where a file says it.
+#[derive(Deserialize)]
+pub(super) struct NodeBeside<'a> {
+    #[serde(borrow)]
+    pub(super) extras: Option<&'a RawValue>,
+}
+
+/// How BVH has the joint that a node was made of.
+#[derive(Deserialize)]
+pub(super) struct Extras {
+    pub(super) bvh: BvhExtras,
+}
+
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct BvhExtras {
+    pub(super) channels: String,
+    #[serde(default)]
+    pub(super) end_sites: Vec<[f64; 3]>,
+}
+
+#[derive(Deserialize)]
+pub(super) struct Skin {
+    #[serde(deserialize_with = "whole::list")]
+    pub(super) joints: Vec<usize>,
+}
+
+#[derive(Deserialize)]
+pub(super) struct Texture {
+    #[serde(default, deserialize_with = "whole::optional")]
+    pub(super) source: Option<usize>,
 }
 
 #[derive(Deserialize)]
 pub(super) struct Scene {
     #[serde(default)]
+    #[serde(deserialize_with = "whole::list")]
     pub(super) nodes: Vec<usize>,
 }
 
@@ -42,8 +79,10 @@ pub(super) struct Mesh<'a> {
 #[derive(Deserialize)]
 pub(super) struct Primitive<'a> {
     pub(super) attributes: Attributes,
+    #[serde(default, deserialize_with = "whole::optional")]
     pub(super) indices: Option<usize>,
     #[serde(default = "triangles")]
+    #[serde(deserialize_with = "whole::whole")]
     pub(super) mode: u32,
     #[serde(borrow, default)]
     pub(super) extensions: Members<'a>,
@@ -57,6 +96,7 @@ fn triangles() -> u32 {
 #[derive(Deserialize)]
 pub(super) struct Attributes {
     #[serde(rename = "POSITION")]
+    #[serde(default, deserialize_with = "whole::optional")]
     pub(super) position: Option<usize>,
 }
 
@@ -71,12 +111,14 @@ pub(super) struct Animation<'a> {
 
 #[derive(Deserialize)]
 pub(super) struct Channel {
+    #[serde(deserialize_with = "whole::whole")]
     pub(super) sampler: usize,
     pub(super) target: Target,
 }
 
 #[derive(Deserialize)]
 pub(super) struct Target {
+    #[serde(default, deserialize_with = "whole::optional")]
     pub(super) node: Option<usize>,
     pub(super) path: String,
     #[serde(default)]
@@ -96,7 +138,9 @@ pub(super) struct Pointer {
 
 #[derive(Deserialize)]
 pub(super) struct Sampler {
+    #[serde(deserialize_with = "whole::whole")]
     pub(super) input: usize,
+    #[serde(deserialize_with = "whole::whole")]
     pub(super) output: usize,
     pub(super) interpolation: Option<String>,
 }
@@ -104,12 +148,16 @@ pub(super) struct Sampler {
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub(super) struct Accessor {
+    #[serde(default, deserialize_with = "whole::optional")]
     pub(super) buffer_view: Option<usize>,
     #[serde(default)]
+    #[serde(deserialize_with = "whole::whole")]
     pub(super) byte_offset: u64,
+    #[serde(deserialize_with = "whole::whole")]
     pub(super) component_type: u32,
     #[serde(default)]
     pub(super) normalized: bool,
+    #[serde(deserialize_with = "whole::whole")]
     pub(super) count: u64,
     #[serde(rename = "type")]
     pub(super) kind: String,
@@ -118,6 +166,7 @@ pub(super) struct Accessor {
 
 #[derive(Deserialize)]
 pub(super) struct Sparse {
+    #[serde(deserialize_with = "whole::whole")]
     pub(super) count: u64,
     pub(super) indices: SparseIndices,
     pub(super) values: SparseValues,
@@ -126,27 +175,36 @@ pub(super) struct Sparse {
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub(super) struct SparseIndices {
+    #[serde(deserialize_with = "whole::whole")]
     pub(super) buffer_view: usize,
     #[serde(default)]
+    #[serde(deserialize_with = "whole::whole")]
     pub(super) byte_offset: u64,
+    #[serde(deserialize_with = "whole::whole")]
     pub(super) component_type: u32,
 }
 
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub(super) struct SparseValues {
+    #[serde(deserialize_with = "whole::whole")]
     pub(super) buffer_view: usize,
     #[serde(default)]
+    #[serde(deserialize_with = "whole::whole")]
     pub(super) byte_offset: u64,
 }
 
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub(super) struct BufferView<'a> {
+    #[serde(deserialize_with = "whole::whole")]
     pub(super) buffer: usize,
     #[serde(default)]
+    #[serde(deserialize_with = "whole::whole")]
     pub(super) byte_offset: u64,
+    #[serde(deserialize_with = "whole::whole")]
     pub(super) byte_length: u64,
+    #[serde(default, deserialize_with = "whole::optional")]
     pub(super) byte_stride: Option<usize>,
     #[serde(borrow, default)]
     pub(super) extensions: Members<'a>,
@@ -156,11 +214,16 @@ pub(super) struct BufferView<'a> {
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub(super) struct MeshoptView {
+    #[serde(deserialize_with = "whole::whole")]
     pub(super) buffer: usize,
     #[serde(default)]
+    #[serde(deserialize_with = "whole::whole")]
     pub(super) byte_offset: u64,
+    #[serde(deserialize_with = "whole::whole")]
     pub(super) byte_length: u64,
+    #[serde(deserialize_with = "whole::whole")]
     pub(super) byte_stride: usize,
+    #[serde(deserialize_with = "whole::whole")]
     pub(super) count: usize,
     pub(super) mode: String,
     pub(super) filter: Option<String>,
@@ -171,6 +234,7 @@ pub(super) struct MeshoptView {
 pub(super) struct Buffer<'a> {
     #[serde(borrow)]
     pub(super) uri: Option<Cow<'a, str>>,
+    #[serde(deserialize_with = "whole::whole")]
     pub(super) byte_length: u64,
     #[serde(default)]
     pub(super) extensions: BufferExtensions,

@@ -32,7 +32,8 @@ const HEADERS: u64 = 28;
 /// Writes clips as GLB, or where the options' `format` is `gltf`, as text with the binary data
 /// inside it; text takes memory for all of it.
 ///
-/// Clips with the same track names, parents and rest transforms move the same nodes; others get
+/// Joints that hang on the same joints, by name, move the same nodes in all clips, so that clips of
+/// parts of one skeleton stay clips of one skeleton; clips whose joints rest in different places get
 /// nodes of their own. Tracks of a clip without skeleton are roots without skin. Poses in the world
 /// become relative to the parents. Rotations are f32, each with the sign that continues the one
 /// before it; translations and scales are written of joints where they leave the rest pose. Steps
@@ -52,7 +53,7 @@ pub fn write_new(
     let parts = parts(clips, options, &mut nodes)?;
     let mut binary = Binary::default();
     let mut skins = Vec::new();
-    for (joints, matrices) in nodes.skins {
+    for (joints, matrices) in nodes.skins() {
         skins.push(Skin {
             inverse_bind_matrices: binary.push(Data::Matrices(matrices)),
             skeleton: joints[0],
@@ -121,8 +122,8 @@ struct Part<'a> {
     times: Vec<f32>,
     /// Keys of its channels that are written instead of the samples, each channel with its times.
     keys: Option<Vec<KeyedChannel>>,
-    /// The node of its first track; the others follow.
-    first_node: usize,
+    /// The node of each track.
+    nodes: Vec<usize>,
 }
 
 /// A channel whose keys are written.
@@ -161,8 +162,6 @@ fn parts<'a>(
     options: &MotionOptions,
     nodes: &mut Nodes,
 ) -> Result<Vec<Part<'a>>, WriteError> {
-    // The first clip of each skeleton, and the node of its first track.
-    let mut skeletons: Vec<(&Sampled<'_>, usize)> = Vec::new();
     let mut parts = Vec::new();
     for (place, clip) in clips.iter().enumerate() {
         let refuse = |(code, why): (Code, String)| {
@@ -178,21 +177,12 @@ fn parts<'a>(
                        made relative to their parents; write it without scales";
             return Err(refuse((Code::NotTrees, why.to_owned())).into());
         }
-        let mut known = skeletons.iter();
-        let first_node = match known.find(|(other, _)| have_one_skeleton(other, clip)) {
-            Some(&(_, first)) => first,
-            None => {
-                let first = nodes.add(clip.clip);
-                let first = first.map_err(|why| refuse((Code::NotTrees, why)))?;
-                skeletons.push((clip, first));
-                first
-            }
-        };
+        let added = nodes.add(clip.clip);
         parts.push(Part {
             samples,
             times,
             keys,
-            first_node,
+            nodes: added.map_err(|why| refuse((Code::NotTrees, why)))?,
         });
     }
     if parts.is_empty() {
@@ -247,12 +237,6 @@ fn glb_length(json: u64, binary: u64) -> Result<u32, String> {
     })
 }
 
-/// Whether two clips move the same nodes.
-fn have_one_skeleton(a: &Sampled<'_>, b: &Sampled<'_>) -> bool {
-    let [names, other_names] = [a, b].map(|of| of.clip.set.tracks().map(|track| track.name));
-    a.clip.skeleton == b.clip.skeleton && names.eq(other_names)
-}
-
 /// The times of a clip as glTF has them, or why it cannot.
 fn f32_times(samples: Samples<'_>, seconds: &[f64]) -> Result<Vec<f32>, (Code, String)> {
     // The sum makes -0 to 0.
@@ -296,7 +280,7 @@ fn animation<'a>(binary: &mut Binary<'a>, part: Part<'a>) -> Animation {
     let samples = part.samples;
     binary.begin_view();
     if let Some(channels) = part.keys.filter(|channels| !channels.is_empty()) {
-        return keyed_animation(binary, channels, part.first_node);
+        return keyed_animation(binary, channels, &part.nodes);
     }
     let input = binary.push(Data::Times(part.times));
     let mut channels = Vec::new();
@@ -319,7 +303,7 @@ fn animation<'a>(binary: &mut Binary<'a>, part: Part<'a>) -> Animation {
             interpolation,
         });
         let target = Target {
-            node: part.first_node + track,
+            node: part.nodes[track],
             path: property.path().name(),
         };
         animation.channels.push(Channel { sampler, target });
@@ -331,7 +315,7 @@ fn animation<'a>(binary: &mut Binary<'a>, part: Part<'a>) -> Animation {
 fn keyed_animation(
     binary: &mut Binary<'_>,
     channels: Vec<KeyedChannel>,
-    first_node: usize,
+    nodes: &[usize],
 ) -> Animation {
     let mut animation = Animation::default();
     let mut inputs: HashMap<Vec<u32>, usize> = HashMap::new();
@@ -346,7 +330,7 @@ fn keyed_animation(
             interpolation: own.keys.sampler.name(),
         });
         let target = Target {
-            node: first_node + own.track,
+            node: nodes[own.track],
             path: own.property.path().name(),
         };
         animation.channels.push(Channel { sampler, target });

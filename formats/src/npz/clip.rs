@@ -8,13 +8,14 @@ use tumble::{TrackError, TrackSet};
 use crate::diagnostic::{Code, Diagnostic, Place};
 use crate::format::ReadOptions;
 use crate::keys::{Duplicates, Origin, quiet_unit, select};
-use crate::motion::{Joint, Motion};
+use crate::motion::{Body, Joint, Motion};
 use crate::npy::ComponentOrder::{self, Wxyz, Xyzw};
 use crate::npz::archive::Archive;
 use crate::npz::array::{Array, AsStored, FEW, Make, TOGETHER};
 use crate::npz::plan::{Part, Plan, Values};
 use crate::npz::rotation_vector;
 use crate::quaternion::rounded;
+use crate::signs::continue_signs;
 use crate::warnings::Warnings;
 
 /// Reads the clip. The plan then knows its rate.
@@ -39,6 +40,9 @@ pub(crate) fn read(
         rate: plan.rate,
         is_world: plan.is_world,
         no_world: plan.no_world.clone(),
+        body: plan.is_body.then(Body::default),
+        channels: plan.channels.clone(),
+        bvh: plan.bvh.clone(),
         ..Motion::default()
     };
     let set = &mut motion.set;
@@ -162,7 +166,11 @@ fn read_keys(
         Values::Quaternion(Xyzw) => array.tracks::<QuietXyzw, 4, _>(at, own.clone(), frames, quiet),
         Values::Quaternion(Wxyz) => array.tracks::<QuietWxyz, 4, _>(at, own.clone(), frames, quiet),
         Values::RotationVector => {
-            let finish = |keys| quiet(continue_signs(keys));
+            // A vector that jumps to the other side of π goes on on this side.
+            let finish = |mut keys: Vec<Quat>| {
+                continue_signs(&mut keys, 1);
+                quiet(keys)
+            };
             array.tracks::<FromVector, 3, _>(at, own.clone(), frames, finish)
         }
         _ => return vectors(archive, part, array, own, frames),
@@ -262,17 +270,6 @@ fn remarkable(
     let keys = array.tracks::<AsStored, 4, _>(part.at, one, frames, |list| list);
     let keys = keys.into_iter().flatten();
     origin.unit(keys.map(|numbers| quaternion(order, numbers)), warnings)
-}
-
-/// Gives each rotation the sign that is nearer to the one before it: a vector that jumps to the other
-/// side of π goes on on this side.
-fn continue_signs(mut keys: Vec<Quat>) -> Vec<Quat> {
-    for next in 1..keys.len() {
-        if keys[next - 1].dot(keys[next]) < 0.0 {
-            keys[next] = -keys[next];
-        }
-    }
-    keys
 }
 
 /// The vectors of some tracks of a part.

@@ -4,6 +4,7 @@ use std::fmt;
 use std::io::Write;
 use std::path::Path;
 
+use glam::Vec3;
 use tumble::{FrameRate, Frames, Layout};
 
 use crate::diagnostic::{Code, Diagnostic};
@@ -14,7 +15,7 @@ use crate::npz::array::{Array, AsStored};
 use crate::npz::header::{Element, Header};
 use crate::npz::plan::{Part, Plan, Values};
 use crate::npz::write::{Members, check, keys, note_name, notes, times};
-use crate::npz::{FORMAT, linear, smpl};
+use crate::npz::{FORMAT, linear, own, smpl};
 use crate::warnings::Warnings;
 
 /// The archive, all of whose members are there, and what they mean.
@@ -122,6 +123,7 @@ impl NpzDocument {
         sampled: &Sampled<'_>,
         options: &MotionOptions,
     ) -> Result<Vec<Fate<'a>>, WriteError> {
+        let is_same = sampled.times == self.plan.all_times;
         let fate = |(place, member): (usize, &Member)| {
             if let Some(part) = parts.iter().find(|part| part.member == place) {
                 return Fate::Keys(part);
@@ -142,6 +144,8 @@ impl NpzDocument {
             }
             match self.frame_axis(place) {
                 None => Fate::Constant,
+                // At the same times everything is the same.
+                Some(_) if is_same && !options.linear.contains(&member.name) => Fate::Constant,
                 Some(axis) if options.linear.contains(&member.name) => Fate::Linear(axis),
                 Some(_) => Fate::LeftOut,
             }
@@ -274,6 +278,19 @@ impl Document for NpzDocument {
         format.name == FORMAT.name
     }
 
+    /// The arrays that no layout of clips has.
+    fn beside(&self) -> Vec<String> {
+        let is_key = |place: usize| self.plan.parts.iter().any(|part| part.member == place);
+        let is_time = |place: usize| self.plan.times.is_some_and(|list| list.member == place);
+        let members = self.archive.members.iter().enumerate();
+        let others = members.filter(|&(place, member)| {
+            let is_known = self.plan.constants.contains(&place)
+                || self.plan.is_own && own::CONSTANTS.contains(&&*member.name);
+            !is_key(place) && !is_time(place) && self.plan.rate_member != Some(place) && !is_known
+        });
+        others.map(|(_, member)| member.name.clone()).collect()
+    }
+
     fn write(
         &self,
         clips: &[(usize, Sampled<'_>)],
@@ -281,9 +298,28 @@ impl Document for NpzDocument {
         _: &Path,
         out: &mut dyn Write,
     ) -> Result<Vec<Diagnostic>, WriteError> {
+        if clips.is_empty() {
+            let mut members = Members::new();
+            for (place, member) in self.archive.members.iter().enumerate() {
+                members.bytes(&member.path, &self.archive.unpack(place)?, member.is_deflated)?;
+            }
+            members.finish(out)?;
+            return Ok(Vec::new());
+        }
         let [(0, sampled)] = clips else {
             let message = format!("{} clips; the file has the clip 0 alone", clips.len());
             return Err(self.refuse(Code::OneClip, message));
+        };
+        // `trans` counts from where the shape puts the pelvis.
+        let pelvis = sampled.clip.body.map_or(Vec3::ZERO, |body| body.pelvis);
+        let mut translations = sampled.translations.to_vec();
+        let roots = translations.iter_mut();
+        for root in roots.step_by(sampled.clip.set.track_count().max(1)) {
+            *root = (root.as_dvec3() - pelvis.as_dvec3()).as_vec3();
+        }
+        let sampled = &Sampled {
+            translations: &translations,
+            ..sampled.clone()
         };
         check(sampled, &options.name)?;
         let tracks = sampled.clip.set.track_count();

@@ -20,6 +20,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use crate::diagnostic::{Code, Diagnostic};
+use crate::feature::Feature;
 use crate::format::{Format, FormatOption, Loaded, ReadOptions};
 use crate::map::Map;
 use crate::npz::archive::{Archive, ONLY_ARRAY};
@@ -37,7 +38,19 @@ pub static FORMAT: Format = Format {
     read: open_npz,
     write: None,
     write_motion: Some(write::write_npz),
-    many_clips: false,
+    features: &[
+        Feature::TrackNames,
+        Feature::ClipName,
+        Feature::Skeleton,
+        Feature::RestRotations,
+        Feature::Translations,
+        Feature::Scales,
+        Feature::Steps,
+        Feature::Bvh,
+        Feature::World,
+        Feature::UnevenTimes,
+        Feature::Start,
+    ],
     options: &[
         FormatOption::RawTimes,
         FormatOption::Duplicates,

@@ -6,7 +6,8 @@ use std::ops::Range;
 use tumble::{FrameRate, Layout};
 
 use crate::diagnostic::{Code, Diagnostic};
-use crate::motion::Transform;
+use crate::bvh::BvhJoint;
+use crate::motion::{Channels, Transform};
 use crate::npy::ComponentOrder;
 use crate::npz::archive::Archive;
 use crate::npz::array::Strides;
@@ -39,6 +40,12 @@ pub(crate) struct Plan {
     pub(crate) is_world: bool,
     /// Why poses in the world cannot be told.
     pub(crate) no_world: Option<String>,
+    /// A body of SMPL.
+    pub(crate) is_body: bool,
+    /// How each track's channels are interpolated, or nothing.
+    pub(crate) channels: Vec<Channels>,
+    /// How BVH writes each track down, or nothing.
+    pub(crate) bvh: Vec<BvhJoint>,
     /// The layout is ours: what made the samples is written beside them.
     pub(crate) is_own: bool,
 }

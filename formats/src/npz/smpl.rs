@@ -20,8 +20,8 @@ const HEAD: usize = 15;
 const WRISTS: [(&str, usize); 2] = [("left", 20), ("right", 21)];
 const FINGERS: [&str; 5] = ["index", "middle", "pinky", "ring", "thumb"];
 
-/// The arrays that hold the pose of a body in pieces, in the order in which `poses` has them:
-/// pelvis, body, jaw, eyes, hands.
+/// The arrays that hold the pose of a body in pieces, as AMASS calls them, in the order in which
+/// `poses` has them: pelvis, body, jaw, eyes, hands.
 const PIECES: [(&str, usize); 5] = [
     ("root_orient", 1),
     ("pose_body", 21),
@@ -29,6 +29,23 @@ const PIECES: [(&str, usize); 5] = [
     ("pose_eye", 2),
     ("pose_hand", 30),
 ];
+
+/// The same as the models themselves call them. SMPL has two more joints in the body, the hands.
+const MODEL_PIECES: [(&str, usize); 7] = [
+    ("global_orient", 1),
+    ("body_pose", 21),
+    ("jaw_pose", 1),
+    ("leye_pose", 1),
+    ("reye_pose", 1),
+    ("left_hand_pose", 15),
+    ("right_hand_pose", 15),
+];
+
+/// Joints of the body of SMPL itself, without the pelvis.
+const SMPL_BODY: usize = 23;
+
+/// Where the root moves, by AMASS and by the models.
+const ROOTS: [&str; 2] = ["trans", "transl"];
 
 /// Where such files say their rate.
 const RATES: [&str; 4] = ["mocap_framerate", "mocap_frame_rate", "framerate", "fps"];
@@ -98,8 +115,8 @@ impl Skeleton {
     }
 }
 
-/// The plan of a file of `poses`, or of `root_orient`, `pose_body` and perhaps more; `None` for
-/// another.
+/// The plan of a file of `poses`, or of `root_orient`, `pose_body` and perhaps more, which the models
+/// call `global_orient` and `body_pose`; `None` for another.
 pub(crate) fn plan(archive: &Archive, warnings: &mut Warnings) -> Result<Option<Plan>, Diagnostic> {
     let vectors = |name: &str, first| {
         Part::of(
@@ -124,14 +141,16 @@ pub(crate) fn plan(archive: &Archive, warnings: &mut Warnings) -> Result<Option<
             });
         }
         skeleton
-    } else if archive.find("root_orient").is_some() && archive.find("pose_body").is_some() {
+    } else if let Some(pieces) = pieces_of(archive) {
         let mut skeleton = Skeleton::body();
-        for (name, joints) in PIECES {
+        let mut is_smpl = false;
+        for &(name, joints) in pieces {
             let Some(piece) = vectors(name, plan.tracks)? else {
                 continue;
             };
             let found = piece.0.tracks.len();
-            if found != joints {
+            is_smpl |= name == "body_pose" && found == SMPL_BODY;
+            if found != joints && !(name == "body_pose" && is_smpl) {
                 let message = format!(
                     "the array has {} numbers a frame where {} are rotation vectors; components of \
                      a hand model cannot be read",
@@ -142,28 +161,61 @@ pub(crate) fn plan(archive: &Archive, warnings: &mut Warnings) -> Result<Option<
             }
             plan.add(archive, piece)?;
         }
-        let has = |name| archive.find(name).is_some();
-        skeleton.face(has("pose_jaw"), has("pose_eye"));
-        if has("pose_hand") {
-            skeleton.fingers();
+        let has = |name: &str| archive.find(name).is_some();
+        let sides = [("leye_pose", "reye_pose"), ("left_hand_pose", "right_hand_pose")];
+        for (left, right) in sides {
+            if has(left) != has(right) {
+                let missing = if has(left) { right } else { left };
+                let message = format!("`{missing}` is missing; the other side is there");
+                return Err(Diagnostic::new(&archive.file, Code::UnknownArrays, message));
+            }
         }
-        Some(skeleton)
+        let is_piece = |name: &str| pieces.iter().any(|own| own.0 == name);
+        let has = |names: [&str; 2]| names.iter().any(|name| is_piece(name) && has(name));
+        let has_more = has(["pose_jaw", "jaw_pose"]) || has(["pose_eye", "leye_pose"]);
+        if is_smpl && !has_more && !has(["pose_hand", "left_hand_pose"]) {
+            Skeleton::of(SMPL_BODY + 1)
+        } else if is_smpl {
+            let message = "`body_pose` has the 23 joints of SMPL, whose hands have no fingers and whose \
+                           head no face; the arrays of these are of another model";
+            return Err(Diagnostic::new(&archive.file, Code::UnknownArrays, message));
+        } else {
+            skeleton.face(has(["pose_jaw", "jaw_pose"]), has(["pose_eye", "leye_pose"]));
+            if has(["pose_hand", "left_hand_pose"]) {
+                skeleton.fingers();
+            }
+            Some(skeleton)
+        }
     } else {
         return Ok(None);
     };
     if let Some(skeleton) = skeleton {
         (plan.names, plan.parents) = (skeleton.names, skeleton.parents);
+        plan.is_body = true;
         plan.no_world = Some(
             "where a body's joints are depends on its shape; give their places with --offsets"
                 .to_owned(),
         );
     }
-    let root = Part::of(archive, "trans", Values::Translation, 0, Layout::FrameMajor)?;
-    if let Some(root) = root {
+    let root = ROOTS.into_iter().find(|name| archive.find(name).is_some());
+    if let Some(root) = root
+        && let Some(root) = Part::of(archive, root, Values::Translation, 0, Layout::FrameMajor)?
+    {
         plan.add(archive, root)?;
     }
     plan.read_rate(archive, &RATES)?;
     Ok(Some(plan))
+}
+
+/// The names by which a file has its pose in pieces, if it has.
+fn pieces_of(archive: &Archive) -> Option<&'static [(&'static str, usize)]> {
+    let all: [&'static [_]; 2] = [&PIECES, &MODEL_PIECES];
+    let has = |pieces: &&'static [(&str, usize)]| {
+        pieces[..2]
+            .iter()
+            .all(|(name, _)| archive.find(name).is_some())
+    };
+    all.into_iter().find(has)
 }
 
 /// The pieces that repeat what `poses` has, each with the first of its joints there.

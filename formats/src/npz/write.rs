@@ -11,7 +11,8 @@ use zip::{CompressionMethod, ZipWriter};
 
 use crate::diagnostic::{Code, Diagnostic};
 use crate::format::{MotionOptions, WriteError};
-use crate::motion::{Joint, Sampled};
+use crate::bvh::BvhJoint;
+use crate::motion::{Joint, Motion, Sampled, Sampler};
 use crate::npy::ComponentOrder;
 use crate::npz::header::{Element, Header};
 use crate::npz::plan::Values;
@@ -181,7 +182,9 @@ pub(super) fn notes(members: &mut Members, sampled: &Sampled<'_>) -> io::Result<
 /// Writes one clip in our own layout: `rotations` (tracks, frames, x y z w) in f32, `times` in f64,
 /// `fps` where there is a rate, `names` and `parents`; `translations` and `scales` (tracks, frames,
 /// 3), where tracks have them; `rest` (tracks, 10), as `tx ty tz x y z w sx sy sz`, where the
-/// skeleton has a rest pose; and what made the samples.
+/// skeleton has a rest pose; `samplers` (tracks, 3) where the clip says how its channels are
+/// interpolated; `bvh_channels` (tracks) and `end_sites` (sites, track x y z) of clips from BVH; and
+/// what made the samples.
 ///
 /// # Errors
 /// When there is not one clip, or writing fails.
@@ -232,6 +235,8 @@ pub fn write_npz(
         members.texts("names.npy", &names, &[tracks])?;
     }
     skeleton(&mut members, &clip.skeleton)?;
+    samplers(&mut members, clip)?;
+    bvh(&mut members, &clip.bvh)?;
     if clip.is_world {
         let truth = (&Element::Unsigned(1), &[][..]);
         members.numbers("is_world.npy", truth, false, |put| put(1.0))?;
@@ -253,6 +258,45 @@ pub(super) fn times(members: &mut Members, sampled: &Sampled<'_>) -> io::Result<
             .times
             .iter()
             .try_for_each(|&time| put(time + offset))
+    })
+}
+
+/// Writes how channels are interpolated, where the clip says it. Samples of cubics are joined by lines.
+fn samplers(members: &mut Members, clip: &Motion) -> io::Result<()> {
+    let name = |sampler: Option<Sampler>| match sampler {
+        None => "",
+        Some(Sampler::Step) => "STEP",
+        Some(Sampler::Linear | Sampler::Cubic) => "LINEAR",
+    };
+    let all = clip.channels.iter();
+    let all = all.flat_map(|own| [own.rotation, own.translation, own.scale].map(name));
+    let all: Vec<&str> = all.collect();
+    match all.is_empty() {
+        true => Ok(()),
+        false => members.texts(&format!("{}.npy", own::SAMPLERS), &all, &[all.len() / 3, 3]),
+    }
+}
+
+/// Writes how BVH has the joints.
+fn bvh(members: &mut Members, joints: &[BvhJoint]) -> io::Result<()> {
+    if joints.is_empty() {
+        return Ok(());
+    }
+    let texts: Vec<String> = joints.iter().map(BvhJoint::channels_text).collect();
+    let texts: Vec<&str> = texts.iter().map(String::as_str).collect();
+    let path = format!("{}.npy", own::BVH_CHANNELS);
+    members.texts(&path, &texts, &[texts.len()])?;
+    let sites = joints.iter().enumerate();
+    let sites = sites.flat_map(|(track, own)| own.end_sites.iter().map(move |site| (track, site)));
+    let rows: Vec<[f64; 4]> = sites
+        .map(|(track, site)| {
+            let [x, y, z] = site.as_dvec3().to_array();
+            [track as f64, x, y, z]
+        })
+        .collect();
+    let shape = (&Element::F64, &[rows.len(), 4][..]);
+    members.numbers(&format!("{}.npy", own::END_SITES), shape, false, |put| {
+        rows.iter().flatten().try_for_each(|&number| put(number))
     })
 }
 

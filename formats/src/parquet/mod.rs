@@ -14,6 +14,7 @@ use bytes::Bytes;
 use parquet::arrow::arrow_reader::{ArrowReaderMetadata, ArrowReaderOptions};
 
 use crate::diagnostic::{Code, Diagnostic};
+use crate::feature::Feature;
 use crate::format::{Format, FormatOption, Loaded, ReadOptions, WriteResults};
 use crate::npy::ComponentOrder;
 use crate::parquet::columns::File;
@@ -47,7 +48,7 @@ pub static FORMAT: Format = Format {
         write_motion(clips, options.order, |table| ParquetSink::new(out, table))
             .map(|()| Vec::new())
     }),
-    many_clips: true,
+    features: &Feature::OF_TABLES,
     options: &FormatOption::OF_TABLES,
 };
 

@@ -26,12 +26,8 @@ impl Reduction<'_> {
     pub(super) fn attempt(&self, tolerances: &Tolerances) -> Result<Motion, ReduceMotionError> {
         let joints = self.parents.len();
         let mut reduced = Motion {
-            set: TrackSet::new(),
             channels: (0..joints).map(|joint| self.new_sampler(joint)).collect(),
-            skeleton: self.clip.skeleton.clone(),
-            name: self.clip.name.clone(),
-            no_world: self.clip.no_world.clone(),
-            ..*self.clip
+            ..self.clip.without_tracks()
         };
         if self.options.together {
             self.push_together(&mut reduced, tolerances)?;

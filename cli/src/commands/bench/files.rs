@@ -76,8 +76,8 @@ fn library(
         };
         let mut bytes = Vec::new();
         let written = format
-            .write_motion
-            .map(|write| write(&[samples.of(&clip, rate, &[])], &options, &mut bytes));
+            .writes_clips()
+            .then(|| format.write_clips(&[samples.of(&clip, rate, &[])], &options, &mut bytes));
         let written = match written {
             None | Some(Err(WriteError::Refused(_))) => return Ok(None),
             Some(Err(WriteError::Io(error))) => Err(error),

@@ -28,7 +28,7 @@ impl Arguments {
             if format.write.is_some() {
                 kinds.push(Kind::Rotations);
             }
-            if format.write_motion.is_some() {
+            if format.writes_clips() {
                 kinds.extend([Kind::Motion, Kind::Baked]);
             }
         } else {

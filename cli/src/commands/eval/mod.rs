@@ -22,7 +22,7 @@ use crate::arguments::given::Given;
 use crate::arguments::input;
 use crate::arguments::input::Inputs;
 use crate::arguments::interpolation::{Manner, Wanted, wanted};
-use crate::arguments::results::{Results, each_file};
+use crate::arguments::results::{Results, each_file, kept};
 use crate::arguments::time::{Samples, Sampling};
 use crate::arguments::what::{OrderArgument, What, quaternions};
 use crate::batch::digest::InputFile;
@@ -282,10 +282,9 @@ impl Job<'_> {
         }
         let tracks = &self.arguments.inputs.tracks;
         if kind == Kind::Motion {
-            if self.arguments.given.has("tracks") && self.keeps(target) {
-                let message = "some tracks make a new file: meshes and all else stay behind";
-                words::note(&format!("{name}: {message}"));
-            }
+            let some = self.arguments.given.has("tracks");
+            let some = some.then_some("some tracks make");
+            kept(name, self.loaded, target, some);
             let selected = clips
                 .iter()
                 .map(|&clip| tracks.select_with_ancestors(clip, name));

@@ -26,7 +26,8 @@ impl Job<'_> {
     /// Whether the input's own file can be written again.
     pub(super) fn keeps(&self, target: &Target) -> bool {
         let document = self.loaded.document.as_ref();
-        document.is_some_and(|document| document.writes(target.format()))
+        !self.loaded.is_adjusted
+            && document.is_some_and(|document| document.writes(target.format()))
     }
 
     /// Whether the result is a motion file: of a format that holds nothing else, or of a clip that
@@ -51,7 +52,7 @@ impl Job<'_> {
             Samples::Rate { rate, .. } => Some(*rate),
             Samples::Times(_) => None,
         };
-        let write = target.format().write_motion;
+        let format = target.format();
         let options = self.options(target);
         self.written(
             name,
@@ -59,10 +60,7 @@ impl Job<'_> {
             &times,
             rate,
             target,
-            |sampled, out| match write {
-                Some(write) => write(sampled, &options, out),
-                None => Ok(Vec::new()),
-            },
+            |sampled, out| format.write_clips(sampled, &options, out),
         )
     }
 

@@ -9,7 +9,7 @@ use std::time::Instant;
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 use tumble::reduce::ReducedCurve;
-use tumble::{Device, Engine, FrameRate, Frames};
+use tumble::{Device, Engine, EulerSequence, FrameRate, Frames};
 use tumble_formats::Loaded;
 use tumble_formats::format::{FormatOption, MotionOptions};
 use tumble_formats::keyed::keyed;
@@ -18,8 +18,9 @@ use tumble_formats::reduce::{ReduceMotionError, ReduceOptions, Reduced, reduce};
 
 use crate::arguments::given::Given;
 use crate::arguments::input::{self, Inputs};
-use crate::arguments::results::{Results, each_file};
+use crate::arguments::results::{Results, check_sequence, each_file, kept};
 use crate::arguments::tolerance::{degrees, not_negative};
+use crate::arguments::what::sequence;
 use crate::batch::output::Target;
 use crate::batch::place::{Place, Written};
 use crate::batch::room;
@@ -65,6 +66,9 @@ pub(crate) struct Arguments {
     /// Sample at this rate first [default: the keys are the samples]
     #[arg(long, value_name = "FPS")]
     fps: Option<FrameRate>,
+    /// The axes of the angles of BVH, three different ones [default: those of the input, else ZXY]
+    #[arg(long, value_name = "AXES", value_parser = sequence)]
+    sequence: Option<EulerSequence>,
     /// Also draw, as .svg or .png, how far the joints are away over time; of one input
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
@@ -139,6 +143,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         None => None,
     };
     let format = plan.targets.first().map(Target::format);
+    check_sequence(arguments.sequence, format)?;
     let is_bessel = matches!(arguments.curve, CurveArgument::BesselOverhauser);
     if is_bessel && format.is_some_and(|format| format.takes(FormatOption::OwnKeys)) {
         return Err(Failure::usage(
@@ -296,24 +301,26 @@ impl Arguments {
             })
             .collect();
         let options = MotionOptions {
+            sequence: self.sequence,
             box_length: loaded.box_length,
             ..target.motion_options()
         };
-        let document = loaded.document.as_ref();
-        let document = document
-            .filter(|document| document.writes(format) && has_own_keys)
-            .filter(|_| !self.inputs.tracks.is_given());
-        let Some(write) = format.write_motion else {
+        let otherwise = match has_own_keys {
+            true => self.inputs.tracks.is_given().then_some("some tracks make"),
+            false => Some("keys at uneven times make"),
+        };
+        let document = kept(name, loaded, target, otherwise);
+        if !format.writes_clips() {
             let message = format!("{target}: {} holds results, not keys", format.name);
             return Err(Failure::usage(message));
-        };
+        }
         target.write_motion(|out| match document {
             Some(document) => {
                 let places = clips.iter().map(|clip| clip.place);
                 let clips: Vec<_> = places.zip(sampled.iter().cloned()).collect();
                 document.write(&clips, &options, target.path(), out)
             }
-            None => write(&sampled, &options, out),
+            None => format.write_clips(&sampled, &options, out),
         })
     }
 }

@@ -8,17 +8,18 @@ use std::time::Instant;
 
 use clap::{Args, ValueEnum};
 use tumble::{
-    Engine, Error, FrameRate, Frames, Layout, Rotations, Smoothing, SmoothingEnds, SmoothingKernel,
+    Engine, Error, EulerSequence, FrameRate, Frames, Layout, Rotations, Smoothing, SmoothingEnds, SmoothingKernel,
     Vectors,
 };
-use tumble_formats::format::{MotionOptions, ResultShape};
+use tumble_formats::format::{Document, MotionOptions, ResultShape};
 use tumble_formats::motion::{Motion, Sampled};
-use tumble_formats::sample::{ChannelMethods, Samples, continue_signs};
+use tumble_formats::sample::{ChannelMethods, Samples};
 
 use crate::arguments::device::{DeviceArguments, Opened};
 use crate::arguments::given::Given;
 use crate::arguments::input::{self, Inputs};
-use crate::arguments::results::{Results, each_file};
+use crate::arguments::results::{Results, check_sequence, each_file, kept};
+use crate::arguments::what::sequence;
 use crate::batch::output::Target;
 use crate::batch::place::Written;
 use crate::batch::room;
@@ -34,7 +35,8 @@ Kernels act on the steps from sample to sample, so that still tracks keep their 
 motion stays: linear, cubic, box:S and tent:S (S samples to either side), gaussian:S (standard
 deviation), savitzky-golay:RADIUS:ORDER. --low-pass HZ is the bell that halves the power of motion at
 that frequency, whatever the rate of the samples. Samples are the keys where these are evenly spaced, else
---fps says how to sample. NPY and CSV hold the rotations, motion files everything.
+--fps says how to sample. NPY and CSV hold the rotations, motion files everything. A file of the same
+format keeps all else that it holds; steps stay steps there.
 
 Examples:
   tumble smooth walk.dat --kernel gaussian:2 -o out.npy
@@ -64,6 +66,9 @@ pub(crate) struct Arguments {
     /// Sample at this rate first [default: the keys themselves]
     #[arg(long, value_name = "FPS")]
     fps: Option<FrameRate>,
+    /// The axes of the angles of BVH, three different ones [default: those of the input, else ZXY]
+    #[arg(long, value_name = "AXES", value_parser = sequence)]
+    sequence: Option<EulerSequence>,
     /// Also draw, as .svg or .png, how fast the joint turns and moves that had the most noise, before
     /// and after; of one input
     #[arg(long, value_name = "FILE")]
@@ -139,6 +144,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         Some(file) => arguments.results.picture(file, &files, &plan)?,
         None => None,
     };
+    check_sequence(arguments.sequence, plan.targets.first().map(Target::format))?;
     let mut device = arguments.device.open()?;
     let options = format!("smooth {}", arguments.given.options());
     arguments.results.make(
@@ -180,7 +186,15 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
                     };
                     picture::draw(&subject, place)?;
                 }
-                let written = write(name, &clips, &samples, (target, loaded.box_length))?;
+                let options = MotionOptions {
+                    sequence: arguments.sequence,
+                    box_length: loaded.box_length,
+                    ..target.motion_options()
+                };
+                let some = tracks.is_given().then_some("some tracks make");
+                let document = kept(name, loaded, target, some);
+                let result = (target, options, document);
+                let written = write(name, &clips, &samples, result)?;
                 let kernels = samples.iter().map(|own| own.kernel.to_string());
                 let mut kernels: Vec<String> = kernels.collect();
                 kernels.dedup();
@@ -265,7 +279,6 @@ fn smoothed(
         if let Ok(own) = Rotations::of(&samples.rotations, tracks, layout) {
             samples.rotations = engine.smooth(&own, &smoothing)?.as_quats().to_vec();
         }
-        continue_signs(&mut samples.rotations, tracks);
         if let Ok(own) = Vectors::of(&samples.translations, tracks, layout) {
             let moved = engine.smooth_vectors(&own, &smoothing)?;
             samples.translations = moved.as_slice().iter().map(|v| v.truncate()).collect();
@@ -289,7 +302,7 @@ fn write(
     name: &str,
     clips: &[&Motion],
     samples: &[Smoothed],
-    (target, box_length): (&Target, Option<f64>),
+    (target, options, document): (&Target, MotionOptions, Option<&dyn Document>),
 ) -> Result<Written, Failure> {
     let notes = [
         (
@@ -329,16 +342,17 @@ fn write(
     let sampled: Vec<Sampled<'_>> = (clips.iter().zip(samples))
         .map(|(clip, own)| own.after.of(clip, own.rate, &notes))
         .collect();
-    let options = MotionOptions {
-        box_length,
-        ..target.motion_options()
-    };
-    let Some(write) = format.write_motion else {
+    if let Some(document) = document {
+        let places = clips.iter().map(|clip| clip.place);
+        let clips: Vec<(usize, Sampled<'_>)> = places.zip(sampled).collect();
+        return target.write_motion(|out| document.write(&clips, &options, target.path(), out));
+    }
+    if !format.writes_clips() {
         let message = format!(
             "{target}: {} holds one animation; choose one with --animation",
             format.name
         );
         return Err(Failure::usage(message));
-    };
-    target.write_motion(|out| write(&sampled, &options, out))
+    }
+    target.write_motion(|out| format.write_clips(&sampled, &options, out))
 }

@@ -41,6 +41,23 @@ pub(super) struct Node {
     pub(super) scale: [f32; 3],
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub(super) children: Vec<usize>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) extras: Option<Extras>,
+}
+
+/// What glTF itself has no room for, and is read again.
+#[derive(Serialize)]
+pub(super) struct Extras {
+    pub(super) bvh: BvhExtras,
+}
+
+/// How BVH has a joint.
+#[derive(Serialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct BvhExtras {
+    pub(super) channels: String,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub(super) end_sites: Vec<[f32; 3]>,
 }
 
 /// The joints of one tree of nodes; `skeleton` is its root.

@@ -1,11 +1,12 @@
 //! The nodes and skins of a new glTF file: a node for each track of a skeleton.
 
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 
 use glam::{DAffine3, DMat3, Vec3};
 use tumble::Skeleton;
 
-use crate::gltf::write_new::json::Node;
+use crate::bvh::BvhJoint;
+use crate::gltf::write_new::json::{BvhExtras, Extras, Node};
 use crate::motion::{Motion, Transform};
 
 /// The nodes of all skeletons of a file.
@@ -13,74 +14,193 @@ use crate::motion::{Motion, Transform};
 pub(super) struct Nodes {
     pub(super) list: Vec<Node>,
     pub(super) roots: Vec<usize>,
-    /// The joints of each skin, the root first, and their inverse bind matrices.
-    pub(super) skins: Vec<(Vec<usize>, Vec<[f32; 16]>)>,
+    /// Where each node rests.
+    rests: Vec<Transform>,
+    rigs: Vec<Rig>,
     names: UniqueNames,
+    /// The nodes that are children of others already.
+    children_until: usize,
 }
 
+/// The joints of clips that are parts of one skeleton, or tracks that hang on nothing.
+struct Rig {
+    has_skeleton: bool,
+    /// The node of each joint, by the node that it hangs on and its name, and which of the joints of
+    /// that name it is.
+    nodes: HashMap<(Option<usize>, String, usize), usize>,
+    roots: Vec<usize>,
+}
+
+/// The joints of a skin, the root first, and their inverse bind matrices.
+pub(super) type SkinOf = (Vec<usize>, Vec<[f32; 16]>);
+
 impl Nodes {
-    /// Adds a node for each track of a clip, in their order, and a skin for each tree of its
-    /// skeleton, as the joints of a skin have one root in common. Gives the first node's place.
+    /// The node of each track of a clip. Joints that hang on the same joints by the same names and
+    /// rest in the same places are the same nodes in all clips, unless another joint of the two clips
+    /// rests elsewhere in one than in the other.
     ///
     /// # Errors
     /// Why the joints are no trees, in words.
-    pub(super) fn add(&mut self, clip: &Motion) -> Result<usize, String> {
-        let first = self.list.len();
+    pub(super) fn add(&mut self, clip: &Motion) -> Result<Vec<usize>, String> {
         let tracks = clip.set.track_count();
         let parents: Vec<Option<usize>> = match clip.skeleton.is_empty() {
             true => vec![None; tracks],
             false => clip.skeleton.iter().map(|joint| joint.parent).collect(),
         };
-        Skeleton::new(parents.clone(), vec![Vec3::ZERO; tracks]).map_err(|e| e.to_string())?;
-        for track in 0..tracks {
-            let rest = clip.skeleton.get(track).map(|joint| joint.rest);
-            let rest = rest.unwrap_or_default();
+        let skeleton = Skeleton::new(parents.clone(), vec![Vec3::ZERO; tracks]);
+        skeleton.map_err(|error| error.to_string())?;
+        let rest = |track: usize| {
+            let joint = clip.skeleton.get(track).map(|joint| joint.rest);
+            joint.unwrap_or_default()
+        };
+        let is_finite = |rest: Transform| {
+            rest.translation.is_finite() && rest.rotation.is_finite() && rest.scale.is_finite()
+        };
+        if let Some(track) = (0..tracks).find(|&track| !is_finite(rest(track))) {
             let name = clip.set.track_name(track);
-            if !rest.translation.is_finite()
-                || !rest.rotation.is_finite()
-                || !rest.scale.is_finite()
-            {
-                return Err(format!(
-                    "the rest pose of `{name}` has a number that is not finite"
-                ));
-            }
-            self.list.push(Node {
-                name: self.names.unique(name, first + track),
-                translation: rest.translation.to_array(),
-                rotation: rest.rotation.to_array(),
-                scale: rest.scale.to_array(),
-                children: Vec::new(),
+            return Err(format!(
+                "the rest pose of `{name}` has a number that is not finite"
+            ));
+        }
+        let order = parents_first(&parents);
+        let names: Vec<String> = (0..tracks).map(|track| clip.set.track_name(track)).collect();
+        let has_skeleton = !clip.skeleton.is_empty();
+        let fitting = self.rigs.iter().enumerate().find_map(|(place, rig)| {
+            let found = self.shared(rig, (&order, &parents, &names), &rest)?;
+            (rig.has_skeleton == has_skeleton).then_some((place, found))
+        });
+        let (place, found) = fitting.unwrap_or_else(|| {
+            self.rigs.push(Rig {
+                has_skeleton,
+                nodes: HashMap::new(),
+                roots: Vec::new(),
             });
+            (self.rigs.len() - 1, vec![None; tracks])
+        });
+        // New nodes, in the order of the tracks.
+        let mut nodes = Vec::with_capacity(tracks);
+        for (track, found) in found.into_iter().enumerate() {
+            nodes.push(found.unwrap_or_else(|| {
+                let rest = rest(track);
+                let node = self.list.len();
+                self.rests.push(rest);
+                self.list.push(Node {
+                    name: self.names.unique(names[track].clone(), node),
+                    translation: rest.translation.to_array(),
+                    rotation: rest.rotation.to_array(),
+                    scale: rest.scale.to_array(),
+                    children: Vec::new(),
+                    extras: clip.bvh.get(track).map(extras),
+                });
+                node
+            }));
         }
-        let mut roots = Vec::new();
-        for (track, parent) in parents.into_iter().enumerate() {
-            match parent {
-                Some(parent) => self.list[first + parent].children.push(first + track),
-                None => roots.push(first + track),
+        let rig = &mut self.rigs[place];
+        let mut seen = HashMap::new();
+        for track in order {
+            let (parent, node) = (parents[track].map(|parent| nodes[parent]), nodes[track]);
+            let key = (parent, names[track].clone());
+            let which: &mut usize = seen.entry(key.clone()).or_default();
+            let key = (key.0, key.1, *which);
+            *which += 1;
+            if rig.nodes.insert(key, node).is_none() && parent.is_none() {
+                rig.roots.push(node);
+                self.roots.push(node);
             }
         }
-        if !clip.skeleton.is_empty() {
-            for &root in &roots {
-                self.add_skin(root, first, clip);
+        for (track, parent) in parents.iter().enumerate() {
+            if let Some(parent) = parent.map(|parent| nodes[parent]) {
+                // Nodes that are shared hang on theirs already.
+                if nodes[track] >= self.children_until {
+                    self.list[parent].children.push(nodes[track]);
+                }
             }
         }
-        self.roots.extend(roots);
-        Ok(first)
+        self.children_until = self.list.len();
+        Ok(nodes)
     }
 
-    /// A skin of all nodes under `root`. `first` is the node of the clip's first track.
-    fn add_skin(&mut self, root: usize, first: usize, clip: &Motion) {
+    /// The nodes that a clip shares with a rig, `None` for each that is to be made; nothing if they
+    /// share no root, or a joint rests elsewhere.
+    fn shared(
+        &self,
+        rig: &Rig,
+        (order, parents, names): (&[usize], &[Option<usize>], &[String]),
+        rest: &impl Fn(usize) -> Transform,
+    ) -> Option<Vec<Option<usize>>> {
+        let mut found: Vec<Option<usize>> = vec![None; names.len()];
+        let mut seen = HashMap::new();
+        let mut shares_root = false;
+        for &track in order {
+            let parent = match parents[track] {
+                None => None,
+                Some(parent) => match found[parent] {
+                    // Whatever hangs on a new node is new.
+                    None => continue,
+                    some => some,
+                },
+            };
+            let which: &mut usize = seen.entry((parent, &names[track])).or_default();
+            let node = rig.nodes.get(&(parent, names[track].clone(), *which));
+            *which += 1;
+            if node.is_some_and(|&node| self.rests[node] != rest(track)) {
+                return None;
+            }
+            shares_root |= parent.is_none() && node.is_some();
+            found[track] = node.copied();
+        }
+        shares_root.then_some(found)
+    }
+
+    /// A skin for each tree of a skeleton, as the joints of a skin have one root in common.
+    pub(super) fn skins(&self) -> Vec<SkinOf> {
+        let rigs = self.rigs.iter().filter(|rig| rig.has_skeleton);
+        rigs.flat_map(|rig| rig.roots.iter().map(|&root| self.skin(root)))
+            .collect()
+    }
+
+    /// A skin of all nodes under `root`.
+    fn skin(&self, root: usize) -> SkinOf {
         let mut joints = vec![(root, DAffine3::IDENTITY)];
         let mut next = 0;
         while let Some(&(node, parent)) = joints.get(next) {
-            let own = parent * affine(&clip.skeleton[node - first].rest);
+            let own = parent * affine(&self.rests[node]);
             joints[next].1 = own;
             joints.extend(self.list[node].children.iter().map(|&child| (child, own)));
             next += 1;
         }
         let matrices = joints.iter().map(|(_, world)| inverse(*world)).collect();
         let joints = joints.into_iter().map(|(node, _)| node).collect();
-        self.skins.push((joints, matrices));
+        (joints, matrices)
+    }
+}
+
+/// The joints of trees, each after the one that it hangs on.
+fn parents_first(parents: &[Option<usize>]) -> Vec<usize> {
+    let mut children = vec![Vec::new(); parents.len()];
+    let mut open = Vec::new();
+    for (track, parent) in parents.iter().enumerate().rev() {
+        match parent {
+            Some(parent) => children[*parent].push(track),
+            None => open.push(track),
+        }
+    }
+    let mut order = Vec::with_capacity(parents.len());
+    while let Some(track) = open.pop() {
+        order.push(track);
+        open.append(&mut children[track]);
+    }
+    order
+}
+
+/// How BVH has a joint, for those who write it as BVH again.
+fn extras(joint: &BvhJoint) -> Extras {
+    let sites = joint.end_sites.iter();
+    Extras {
+        bvh: BvhExtras {
+            channels: joint.channels_text(),
+            end_sites: sites.map(|site| site.to_array()).collect(),
+        },
     }
 }
 
