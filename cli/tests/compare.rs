@@ -202,7 +202,7 @@ fn keys_come_back_as_dat() {
                  2\nFrame Time: 0.5\n0 1 0 0 0 0\n1 1 0 90 0 0\n";
     std::fs::write(place.join("moved.bvh"), moved).unwrap();
     let run = succeed(place, &["convert", "moved.bvh", "-o", "moved.dat"]);
-    assert!(run.words.contains("warning[W205]"), "{}", run.words);
+    assert!(run.words.contains("warning[W208]"), "{}", run.words);
     let line = ["compare", "moved.bvh", "moved.dat", "--tolerance", "1e-4"];
     let told = String::from_utf8(succeed(place, &line).out).unwrap();
     assert!(told.contains("translation"), "{told}");

@@ -7,6 +7,7 @@ use crate::diagnostic::{Code, Diagnostic};
 use crate::format::{Format, MotionOptions};
 use crate::motion::{Sampled, Sampler};
 use crate::names::distinct_names;
+use crate::tum;
 
 /// What a clip may hold beside rotations at times.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -104,7 +105,10 @@ impl Feature {
         let joints = || clip.skeleton.iter();
         let (has_it, what) = match self {
             Self::TrackNames => {
-                let named = |name: Option<&str>| name.is_some_and(|name| !name.is_empty());
+                // What a trajectory is called when it is read is no name that it had.
+                let named = |name: Option<&str>| {
+                    name.is_some_and(|name| !name.is_empty() && name != tum::BODY)
+                };
                 let has_names = clip.set.tracks().any(|track| named(track.name));
                 (has_names, "the names of the tracks")
             }

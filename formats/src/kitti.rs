@@ -17,6 +17,7 @@ use crate::signs::continue_signs;
 use crate::source::Source;
 use crate::text::lines::{Lines, tokens};
 use crate::text::number;
+use crate::tum::BODY;
 
 /// A path of one body, without times.
 pub static FORMAT: Format = Format {
@@ -75,7 +76,7 @@ fn read_kitti(
         .collect();
     let mut set = TrackSet::new();
     let refuse = |error: TrackError| Diagnostic::new(name, Code::KittiPose, error.to_string());
-    set.push("body", &times, &rotations).map_err(refuse)?;
+    set.push(BODY, &times, &rotations).map_err(refuse)?;
     let moved: Result<(), TrackError> = set.set_translations(0, &times, &positions as &[Vec3], &[]);
     moved.map_err(refuse)?;
     let clip = Motion {

@@ -20,7 +20,7 @@ pub mod gltf;
 mod grid;
 pub mod keyed;
 pub mod keys;
-mod kitti;
+pub mod kitti;
 pub mod map;
 pub mod motion;
 mod names;

@@ -78,7 +78,7 @@ mod tests {
         let (tracks, samples) = (3, 7);
         let rotation = |track: usize, sample: usize| {
             let turned = Quat::from_rotation_y(0.3 * (track * samples + sample) as f32);
-            let flips = (track + 1) * (sample * sample + 1) % 3 == 0;
+            let flips = sample * (track + 2) % 3 == 1;
             if flips { -turned } else { turned }
         };
         let mut expected: Vec<Quat> = (0..samples * tracks)

@@ -20,6 +20,9 @@ use crate::text::lines::{Lines, tokens};
 use crate::text::number;
 use crate::warnings::Warnings;
 
+/// What the one track is called.
+pub(crate) const BODY: &str = "body";
+
 /// A path of one body.
 pub static FORMAT: Format = Format {
     name: "tum",
@@ -163,7 +166,7 @@ impl Poses {
         let mut set = TrackSet::new();
         // Checked above; a set refuses what slipped through.
         let refuse = |error: TrackError| Diagnostic::new(name, Code::TumPose, error.to_string());
-        set.push("body", &times, &keys).map_err(refuse)?;
+        set.push(BODY, &times, &keys).map_err(refuse)?;
         set.set_translations(0, &times, &positions, &[])
             .map_err(refuse)?;
         let clip = Motion {

@@ -11,6 +11,7 @@ mod gltf_gather;
 mod gltf_new;
 mod gltf_times;
 mod gltf_values;
+mod kept;
 mod npz;
 mod readme;
 mod reduce;

@@ -98,7 +98,6 @@ fn every_code_of_a_file_is_shown_by_a_fixture_or_a_test() {
         Code::TumWrite,
         Code::Path,
         Code::PathTimes,
-        Code::SameName,
         Code::NameChanged,
         Code::NoRoom,
         Code::StaysWhole,

@@ -200,3 +200,65 @@ fn a_glb_away_from_its_files_has_a_warning() {
         "/images/0/uri"
     );
 }
+
+/// A buffer without a URI is the BIN chunk of a GLB if it is the first, and no other may be.
+#[test]
+fn buffers_without_a_uri_stay_such() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut file = json_of(&fixture("one_key.gltf"));
+    let with_data = file["buffers"][0].clone();
+    let unnamed = json!({"byteLength": 4});
+    file["buffers"] = json!([unnamed, with_data]);
+    for view in file["bufferViews"].as_array_mut().unwrap() {
+        view["buffer"] = json!(1);
+    }
+    let mut none = file.clone();
+    none["buffers"] = json!([unnamed]);
+    none["bufferViews"] = json!([]);
+    none["accessors"] = json!([]);
+    none["animations"] = json!([{"channels": [], "samplers": []}]);
+    let mut made = Vec::new();
+    for (name, file, buffers) in [
+        ("second", &file, 2),
+        ("alone", &none, 2),
+    ] {
+        let path = folder.path().join(format!("{name}.gltf"));
+        fs::write(&path, file.to_string()).unwrap();
+        let loaded = tumble_formats::gltf::open_gltf(&path, &ReadOptions::default()).unwrap();
+        let (glb, _) = written(&loaded, Path::new("/elsewhere/walk.glb"));
+        let (found, bin) = json_and_bin(&glb);
+        let list = found["buffers"].as_array().unwrap();
+        assert_eq!(list.len(), buffers, "{name}: {found}");
+        assert!(list.iter().all(|own| own.get("uri").is_none()), "{found}");
+        assert_eq!(list[1], unnamed, "{found}");
+        assert_eq!(list[0]["byteLength"], json!(bin.len()), "{found}");
+        let path = folder.path().join(format!("{name}.glb"));
+        fs::write(&path, glb).unwrap();
+        made.push(path);
+    }
+    let missing = "BUFFER_MISSING_GLB_DATA";
+    for report in crate::validator::validate(&made).unwrap_or_default() {
+        assert!(!report.errors.iter().any(|error| error.contains(missing)), "{report:?}");
+    }
+}
+
+/// glTF itself has PNG and JPEG: another kind of image is embedded where an extension's texture has it.
+#[test]
+fn images_of_extensions_are_embedded_for_them_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut file = json_of(&fixture("one_key.gltf"));
+    fs::write(folder.path().join("a.ktx2"), b"\xabKTX 20\xbb and so on").unwrap();
+    file["images"] = json!([{"uri": "a.ktx2"}, {"uri": "a.ktx2"}]);
+    file["textures"] = json!([
+        {"source": 0},
+        {"extensions": {"KHR_texture_basisu": {"source": 1}}},
+    ]);
+    let path = folder.path().join("walk.gltf");
+    fs::write(&path, file.to_string()).unwrap();
+    let (glb, warnings) = written(&open(&path), Path::new("/elsewhere/walk.glb"));
+    let (found, _) = json_and_bin(&glb);
+    assert_eq!(found["images"][0], json!({"uri": "a.ktx2"}));
+    assert_eq!(found["images"][1]["mimeType"], json!("image/ktx2"));
+    let told: Vec<Code> = warnings.iter().map(|own| own.code).collect();
+    assert!(told.contains(&Code::StaysOutside), "{warnings:?}");
+}

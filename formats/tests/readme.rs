@@ -26,14 +26,43 @@ fn the_table_of_formats_is_that_of_the_code() {
         let (endings, summary) = (endings.join(" "), format.summary);
         writeln!(table, "| {endings} | {summary} | {written} |").unwrap();
     }
+    update(BEGIN, END, &table);
+}
+
+const BEGIN_FEATURES: &str =
+    "<!-- features: written by `UPDATE_EXPECTED=1 cargo test -p tumble-formats` -->\n";
+const END_FEATURES: &str = "<!-- end of features -->\n";
+
+#[test]
+fn the_table_of_what_formats_hold_is_that_of_the_code() {
+    let all = FORMATS.into_iter().filter(|format| format.writes_clips());
+    let all: Vec<_> = all.collect();
+    let mut table = String::from("| |");
+    for format in &all {
+        write!(table, " {} |", format.name).unwrap();
+    }
+    writeln!(table, "\n|---|{}", "---|".repeat(all.len())).unwrap();
+    for feature in Feature::ALL {
+        write!(table, "| {} |", feature.summary()).unwrap();
+        for format in &all {
+            let cell = if format.holds(feature) { "yes" } else { "–" };
+            write!(table, " {cell} |").unwrap();
+        }
+        table.push('\n');
+    }
+    update(BEGIN_FEATURES, END_FEATURES, &table);
+}
+
+/// Compares a table of the page with the code's, or writes it.
+fn update(begin: &str, end: &str, table: &str) {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/formats.md");
     let text = fs::read_to_string(&file).unwrap();
     let (before, rest) = text
-        .split_once(BEGIN)
-        .expect("docs/formats.md has a table of formats");
-    let (found, after) = rest.split_once(END).expect("the table of formats ends");
+        .split_once(begin)
+        .expect("docs/formats.md has the table");
+    let (found, after) = rest.split_once(end).expect("the table ends");
     if std::env::var_os("UPDATE_EXPECTED").is_some() {
-        fs::write(&file, format!("{before}{BEGIN}{table}{END}{after}")).unwrap();
+        fs::write(&file, format!("{before}{begin}{table}{end}{after}")).unwrap();
         return;
     }
     assert_eq!(found, table);

@@ -255,7 +255,7 @@ fn write(
 ) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     let write = Format::named(format).unwrap().write.as_ref().unwrap();
-    let mut writer = (write.rotations)(&mut bytes, result)?;
+    let mut writer = write.begin(&mut bytes, result)?;
     for part in rotations.chunks(window) {
         writer.write(part)?;
     }
@@ -405,7 +405,7 @@ fn rows_are_handed_on_before_the_end() {
         let written = std::cell::Cell::new(0);
         let mut out = Count(&written);
         let write = Format::named(format).unwrap().write.as_ref().unwrap();
-        let mut writer = (write.rotations)(&mut out, &result).unwrap();
+        let mut writer = write.begin(&mut out, &result).unwrap();
         let mut rows = 0;
         for _ in 0..18 {
             writer.write(&window).unwrap();

@@ -197,10 +197,16 @@ fn write(
         };
         keys.push(samples);
     }
+    // Formats of frames need a rate; others have the times.
+    let has_times = target.format().holds(Feature::UnevenTimes);
+    let rate = |clip: &Motion| match has_times {
+        true => clip.rate,
+        false => clip.rate.or_else(|| clip.rate_of_keys()),
+    };
     let notes = [("input", name.to_owned())];
     let sampled = (clips.iter().zip(&keys)).map(|(clip, (samples, of_own_keys))| Sampled {
         of_own_keys: *of_own_keys,
-        ..samples.of(clip, clip.rate, &notes)
+        ..samples.of(clip, rate(clip), &notes)
     });
     match document {
         Some(document) => {

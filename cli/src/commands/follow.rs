@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::{ArgAction, Args};
-use glam::{Quat, Vec3};
+use glam::Vec3;
 use tumble::{Engine, Error, Follow, FollowError, Followed, Frames, Layout, TrackSet};
 use tumble_formats::Loaded;
 use tumble_formats::motion::{Joint, Motion, Sampled, Transform};

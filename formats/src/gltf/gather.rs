@@ -44,6 +44,7 @@ pub(super) fn buffers<'a>(
     let mut bytes = Vec::new();
     let mut members = None;
     let mut kept = Vec::new();
+    let mut is_first_unnamed = false;
     // For each buffer, its new place and how far its bytes moved.
     let mut places: Vec<(usize, usize)> = Vec::new();
     for (index, raw) in json.entries("buffers").iter().enumerate() {
@@ -55,6 +56,7 @@ pub(super) fn buffers<'a>(
             None => None,
         };
         let Some(found) = found else {
+            is_first_unnamed |= index == 0 && buffer.uri.is_none();
             kept.push(raw.get().to_owned());
             places.push((kept.len(), 0));
             continue;
@@ -68,8 +70,15 @@ pub(super) fn buffers<'a>(
             members = Some(others(&own));
         }
     }
-    let Some(members) = members else {
-        return Ok(Data::in_uri(json));
+    let members = match members {
+        Some(members) => members,
+        // A GLB's first buffer without a URI is its BIN chunk: it gets one, that of the file comes
+        // behind it.
+        None if is_first_unnamed => {
+            bytes.extend([0; 4]);
+            String::new()
+        }
+        None => return Ok(Data::in_uri(json)),
     };
     for (index, view) in json.entries("bufferViews").iter().enumerate() {
         let pointer = format!("/bufferViews/{index}");

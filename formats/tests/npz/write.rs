@@ -275,7 +275,6 @@ fn what_does_not_fit_the_layout_is_refused() {
             .write(clips, &options, Path::new("out.npz"), &mut Vec::new())
             .unwrap_err()
     };
-    assert_refused(write(&[], ""), Code::OneClip);
     assert_refused(write(&[(1, rated.clone())], ""), Code::OneClip);
     assert_refused(write(&[(0, picked.sampled(clip))], ""), Code::Layout);
     assert_refused(write(&[(0, rated.clone())], "dmpls"), Code::NotPerFrame);

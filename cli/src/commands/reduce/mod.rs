@@ -10,7 +10,7 @@ use clap::{Args, ValueEnum};
 use serde::Serialize;
 use tumble::reduce::ReducedCurve;
 use tumble::{Device, Engine, EulerSequence, FrameRate, Frames};
-use tumble_formats::Loaded;
+use tumble_formats::{Feature, Loaded};
 use tumble_formats::format::{FormatOption, MotionOptions};
 use tumble_formats::keyed::keyed;
 use tumble_formats::motion::{Motion, Sampled, Sampler};
@@ -293,11 +293,14 @@ impl Arguments {
             ("input", name.to_owned()),
             ("tolerance", format!("{}°", self.tolerance)),
         ];
+        // Formats of frames take the keys where every frame has one.
+        let has_times = format.holds(Feature::UnevenTimes);
+        let rate = |clip: &Motion| clip.rate.filter(|_| !has_times);
         let own = reduced.iter().zip(&samples);
         let sampled: Vec<Sampled<'_>> = own
             .map(|(reduced, samples)| Sampled {
                 of_own_keys: has_own_keys,
-                ..samples.of(&reduced.clip, None, &notes)
+                ..samples.of(&reduced.clip, rate(&reduced.clip), &notes)
             })
             .collect();
         let options = MotionOptions {
