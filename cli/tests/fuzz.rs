@@ -211,6 +211,22 @@ fn bvh() {
 }
 
 #[test]
+fn kitti() {
+    let words = [
+        "1 0 0 0 ",
+        "0 1 0 0 ",
+        "0 0 1 0\n",
+        "-1",
+        "0.6 -0.8",
+        "nan",
+        ",",
+        "#",
+        "\n",
+    ];
+    fuzz_motion("kitti", targets::motion::kitti, fixtures("kitti"), &words);
+}
+
+#[test]
 fn tum() {
     let words = [
         "1700000000.125 0 0 0 0 0 0 1\n",

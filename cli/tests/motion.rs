@@ -273,18 +273,37 @@ fn converting_and_smoothing_keep_the_rest_of_a_file() {
         line(at, &format!("{command} fox.gltf -o {out}"));
         let bytes = fs::read(at.join(&out)).unwrap();
         let text = String::from_utf8_lossy(&bytes);
-        assert!(text.contains(r#""materials":[{"name":"skin"}]"#), "{command}: {text}");
+        assert!(
+            text.contains(r#""materials":[{"name":"skin"}]"#),
+            "{command}: {text}"
+        );
         let told = String::from_utf8(line(at, &format!("info {out}")).out).unwrap();
-        assert!(told.contains("animation Walk") && told.contains("animation Run"), "{told}");
+        assert!(
+            told.contains("animation Walk") && told.contains("animation Run"),
+            "{told}"
+        );
     }
     line(at, "convert fox.gltf -o copy.gltf");
     assert_eq!(fs::read_to_string(at.join("copy.gltf")).unwrap(), with);
     let part = line(at, "convert fox.gltf --animation Run -o run.glb");
-    assert!(part.words.contains("one animation makes a new file; stays behind: materials"), "{}", part.words);
+    assert!(
+        part.words
+            .contains("one animation makes a new file; stays behind: materials"),
+        "{}",
+        part.words
+    );
     let scaled = line(at, "convert fox.gltf --up z -o up.glb");
-    assert!(scaled.words.contains("stays behind: materials"), "{}", scaled.words);
+    assert!(
+        scaled.words.contains("stays behind: materials"),
+        "{}",
+        scaled.words
+    );
     let other = line(at, "convert fox.gltf --animation Run -o run.csv");
-    assert!(other.words.contains("left out: materials"), "{}", other.words);
+    assert!(
+        other.words.contains("left out: materials"),
+        "{}",
+        other.words
+    );
     line(at, "convert fox.gltf --start 0.25 --end 0.75 -o cut.glb");
     let told = String::from_utf8(line(at, "info cut.glb").out).unwrap();
     assert_eq!(told.matches("0.25 to 0.75 s").count(), 2, "{told}");
@@ -294,9 +313,18 @@ fn converting_and_smoothing_keep_the_rest_of_a_file() {
 fn one_name_of_two_animations_is_refused_with_their_places() {
     let place = sample_folder();
     let at = place.path();
-    fs::write(at.join("two.gltf"), two_animations().replace("\"Run\"", "\"Walk\"")).unwrap();
+    fs::write(
+        at.join("two.gltf"),
+        two_animations().replace("\"Run\"", "\"Walk\""),
+    )
+    .unwrap();
     let run = refused(at, "eval two.gltf --animation Walk -o out.npy");
-    assert!(run.words.contains("2 animations `Walk`, at the places 0 and 1"), "{}", run.words);
+    assert!(
+        run.words
+            .contains("2 animations `Walk`, at the places 0 and 1"),
+        "{}",
+        run.words
+    );
     line(at, "eval two.gltf --animation 1 -o out.npy");
 }
 
@@ -310,11 +338,21 @@ fn angles_of_bvh_keep_their_order_or_get_the_one_that_is_asked_for() {
     fs::write(at.join("in.bvh"), text).unwrap();
     line(at, "convert in.bvh -o same.bvh");
     let same = fs::read_to_string(at.join("same.bvh")).unwrap();
-    assert_eq!(same.split("Frame Time").next(), text.split("Frame Time").next());
+    assert_eq!(
+        same.split("Frame Time").next(),
+        text.split("Frame Time").next()
+    );
     for command in ["convert", "smooth", "reduce --tolerance 0", "eval --fps 25"] {
-        let run = line(at, &format!("{command} in.bvh --sequence ZYX -o turned.bvh --overwrite"));
+        let run = line(
+            at,
+            &format!("{command} in.bvh --sequence ZYX -o turned.bvh --overwrite"),
+        );
         let found = fs::read_to_string(at.join("turned.bvh")).unwrap();
-        assert!(found.contains("CHANNELS 3 Zrotation Yrotation Xrotation\n  End Site"), "{command}: {found} {}", run.words);
+        assert!(
+            found.contains("CHANNELS 3 Zrotation Yrotation Xrotation\n  End Site"),
+            "{command}: {found} {}",
+            run.words
+        );
         assert!(found.contains("OFFSET 0 12.5 0"), "{found}");
     }
     let run = refused(at, "convert in.bvh --sequence ZYX -o out.glb");

@@ -43,11 +43,7 @@ pub static FORMAT: Format = Format {
     read: open_dat,
     write: None,
     write_motion: Some(write::write_motion),
-    features: &[
-        Feature::BoxLength,
-        Feature::UnevenTimes,
-        Feature::Start,
-    ],
+    features: &[Feature::BoxLength, Feature::UnevenTimes, Feature::Start],
     options: &[FormatOption::BoxLength],
 };
 

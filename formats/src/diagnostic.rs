@@ -258,7 +258,7 @@ codes! {
     BvhMoreRows = "W201", "more rows than frames", "The rows behind the last frame are left out.";
     BvhNoFrames = "W202", "no frames", "The skeleton rests.";
     StartMoved = "W204", "the start is moved to 0", "BVH has no start time: its first frame is at 0. glTF keeps times in f32, which cannot tell frames apart in seconds since 1970: they count from the first whole second.";
-    SameName = "W206", "two joints of one name", "The second one gets its number behind its name, so that they are told apart.";
+    SameName = "W206", "two joints of one name", "The second one gets its number behind its name, so that they are told apart; braces and control characters in names become `_`.";
     NameChanged = "W207", "a name is changed", "The format has no line ends, braces or control characters in names, and no name twice.";
     NoRoom = "W208", "what the format has no room for", "It is left out. A table in the documents says what each format holds.";
     UnknownBody = "W301", "a body of an unknown number of joints", "SMPL has 24 joints, SMPL-H 52, SMPL-X 55, and 22 are common to them; others are read without names and parents.";

@@ -135,11 +135,9 @@ impl Feature {
                 "the order of the channels and the End Sites",
             ),
             Self::BoxLength => (options.box_length.is_some(), "the length of the boxes"),
-            Self::World
-            | Self::SeveralClips
-            | Self::OwnTimes
-            | Self::UnevenTimes
-            | Self::Start => return None,
+            Self::World | Self::SeveralClips | Self::OwnTimes | Self::UnevenTimes | Self::Start => {
+                return None;
+            }
         };
         has_it.then_some(what)
     }
@@ -158,7 +156,10 @@ pub(crate) fn warnings(
         let set = &clip.clip.set;
         let mut names = distinct_names(set).into_iter().enumerate();
         let (track, name) = names.find(|(track, name)| *name != set.track_name(*track))?;
-        let message = format!("a second track is called `{}`; it is written as `{name}`", set.track_name(track));
+        let message = format!(
+            "a second track is called `{}`; it is written as `{name}`",
+            set.track_name(track)
+        );
         Some(Diagnostic::new(&options.name, Code::NameChanged, message))
     });
     left_out.into_iter().chain(changed).collect()

@@ -498,12 +498,21 @@ fn table_width(start: &[u8]) -> Option<usize> {
     let text = std::str::from_utf8(&start[..whole]).ok()?;
     let header = text.lines().next()?.trim_start().strip_prefix('#');
     let mut header = header.into_iter().flat_map(str::split_ascii_whitespace);
-    let boxes = header.next().is_some_and(|word| word.parse::<usize>().is_ok());
-    if boxes && header.next().is_some_and(|word| word.parse::<f64>().is_ok()) {
+    let boxes = header
+        .next()
+        .is_some_and(|word| word.parse::<usize>().is_ok());
+    if boxes
+        && header
+            .next()
+            .is_some_and(|word| word.parse::<f64>().is_ok())
+    {
         return None;
     }
     let content = |line: &str| line.split('#').next().unwrap_or_default().replace(',', " ");
-    let line = text.lines().map(content).find(|line| !line.trim().is_empty())?;
+    let line = text
+        .lines()
+        .map(content)
+        .find(|line| !line.trim().is_empty())?;
     let mut words = line.split_ascii_whitespace();
     let is_number = |word: &str| word.parse::<f64>().is_ok();
     words.clone().all(is_number).then(|| words.by_ref().count())

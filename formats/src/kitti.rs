@@ -41,14 +41,18 @@ fn open_kitti(path: &Path, options: &ReadOptions) -> Result<Loaded, Diagnostic> 
 }
 
 /// Reads poses, one a frame of the rate that the options say; the one track is named `body`.
-fn read_kitti(
+///
+/// # Errors
+/// The first fault that refuses the input; options without a rate are one.
+pub fn read_kitti(
     name: &str,
     reader: impl BufRead,
     options: &ReadOptions,
 ) -> Result<Loaded, Diagnostic> {
     let mut lines = Lines::with_names(name, reader, options.limits)?;
     let Some(rate) = options.source_rate else {
-        let message = "KITTI's poses have no times; give --source-fps, their rate (in Python source_fps)";
+        let message =
+            "KITTI's poses have no times; give --source-fps, their rate (in Python source_fps)";
         return Err(Diagnostic::new(name, Code::NoRate, message));
     };
     let (mut rotations, mut positions) = (Vec::new(), Vec::new());
@@ -120,15 +124,22 @@ mod tests {
             source_rate: tumble::FrameRate::new(10, 1).ok(),
             ..ReadOptions::default()
         };
-        let clip = &read_kitti("k.txt", text.as_bytes(), &options).unwrap().clips[0];
+        let clip = &read_kitti("k.txt", text.as_bytes(), &options)
+            .unwrap()
+            .clips[0];
         let track = clip.set.track(0);
         assert_eq!(track.times, [0.0, 0.1]);
         let quarter = glam::Quat::from_rotation_z(std::f32::consts::FRAC_PI_2);
         assert!(track.keys[1].dot(quarter).abs() > 1.0 - 1e-6);
-        let moved = clip.set.vector_keys(tumble::Channel::Translation, 0).unwrap();
+        let moved = clip
+            .set
+            .vector_keys(tumble::Channel::Translation, 0)
+            .unwrap();
         assert_eq!(moved.keys, [Vec3::new(1.5, -2.0, 3.0), Vec3::X * 2.0]);
         let refused = |text: &str, options: &ReadOptions| {
-            read_kitti("k.txt", text.as_bytes(), options).unwrap_err().code
+            read_kitti("k.txt", text.as_bytes(), options)
+                .unwrap_err()
+                .code
         };
         assert_eq!(refused(text, &ReadOptions::default()), Code::NoRate);
         assert_eq!(refused("1 0 0 0\n", &options), Code::KittiPose);

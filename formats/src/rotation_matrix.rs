@@ -33,7 +33,10 @@ pub(crate) fn of_matrix(rows: [[f64; 3]; 3]) -> Option<DQuat> {
     let [x, y, z, w] = squares;
     let (xy, yz, zx) = (a[1] + b[0], b[2] + c[1], c[0] + a[2]);
     let (wx, wy, wz) = (c[1] - b[2], a[2] - c[0], b[0] - a[1]);
-    let largest = (0..4).fold(3, |most, i| if squares[i] > squares[most] { i } else { most });
+    let largest = (0..4).fold(
+        3,
+        |most, i| if squares[i] > squares[most] { i } else { most },
+    );
     let q = match largest {
         0 => DQuat::from_xyzw(x, xy, zx, wx),
         1 => DQuat::from_xyzw(xy, y, yz, wy),

@@ -103,10 +103,16 @@ fn joints_are_written_below_their_parents_with_usable_names() {
         text.ends_with(" 0.0000001 0.25 300000000 0 0 0 28.64789 0 0 0.1 0.7 0 0 0 0\n"),
         "{text}"
     );
-    let told: Vec<_> = warnings.iter().map(|own| (own.code, &*own.message)).collect();
+    let told: Vec<_> = warnings
+        .iter()
+        .map(|own| (own.code, &*own.message))
+        .collect();
     let no_room = "BVH has no room for it, left out: the scales";
     let changed = "`hips` is called `hips#3` in BVH";
-    assert_eq!(told, [(Code::NoRoom, no_room), (Code::NameChanged, changed)]);
+    assert_eq!(
+        told,
+        [(Code::NoRoom, no_room), (Code::NameChanged, changed)]
+    );
     let back = read(&text, &ReadOptions::default()).unwrap();
     let parents: Vec<_> = back.skeleton.iter().map(|joint| joint.parent).collect();
     assert_eq!(parents, [None, Some(0), Some(0), Some(2), None]);

@@ -218,10 +218,7 @@ fn buffers_without_a_uri_stay_such() {
     none["accessors"] = json!([]);
     none["animations"] = json!([{"channels": [], "samplers": []}]);
     let mut made = Vec::new();
-    for (name, file, buffers) in [
-        ("second", &file, 2),
-        ("alone", &none, 2),
-    ] {
+    for (name, file, buffers) in [("second", &file, 2), ("alone", &none, 2)] {
         let path = folder.path().join(format!("{name}.gltf"));
         fs::write(&path, file.to_string()).unwrap();
         let loaded = tumble_formats::gltf::open_gltf(&path, &ReadOptions::default()).unwrap();
@@ -238,7 +235,10 @@ fn buffers_without_a_uri_stay_such() {
     }
     let missing = "BUFFER_MISSING_GLB_DATA";
     for report in crate::validator::validate(&made).unwrap_or_default() {
-        assert!(!report.errors.iter().any(|error| error.contains(missing)), "{report:?}");
+        assert!(
+            !report.errors.iter().any(|error| error.contains(missing)),
+            "{report:?}"
+        );
     }
 }
 

@@ -82,11 +82,16 @@ fn assert_same(text: &str) {
     assert_eq!(own.0, expected.0);
     let [own, expected] = [own.1, expected.1].map(|text| {
         let numbers = text.split_ascii_whitespace().skip(1);
-        numbers.map(|word| word.parse::<f64>().unwrap()).collect::<Vec<_>>()
+        numbers
+            .map(|word| word.parse::<f64>().unwrap())
+            .collect::<Vec<_>>()
     });
     assert_eq!(own.len(), expected.len());
     let mut pairs = own.iter().zip(&expected);
-    assert!(pairs.all(|(own, expected)| (own - expected).abs() < 1e-5), "{text}");
+    assert!(
+        pairs.all(|(own, expected)| (own - expected).abs() < 1e-5),
+        "{text}"
+    );
 }
 
 /// By way of glTF and NPZ too, which have no channels of their own.
@@ -95,8 +100,17 @@ fn bvh_comes_back_word_for_word() {
     let clip = bvh();
     assert_same(&as_bvh(&clip, None));
     let options = MotionOptions::default();
-    let glb = read_gltf("t", written(&[&clip], "glb", &options), None, &ReadOptions::default());
-    let npz = read_npz("t", written(&[&clip], "npz", &options), &ReadOptions::default());
+    let glb = read_gltf(
+        "t",
+        written(&[&clip], "glb", &options),
+        None,
+        &ReadOptions::default(),
+    );
+    let npz = read_npz(
+        "t",
+        written(&[&clip], "npz", &options),
+        &ReadOptions::default(),
+    );
     for loaded in [glb.unwrap(), npz.unwrap()] {
         assert_same(&as_bvh(&loaded.clips[0], None));
     }
@@ -105,7 +119,10 @@ fn bvh_comes_back_word_for_word() {
 #[test]
 fn a_sequence_that_is_asked_for_is_that_of_all_joints() {
     let text = as_bvh(&bvh(), Some("XYZ"));
-    let lines: Vec<&str> = text.lines().filter(|line| line.contains("CHANNELS")).collect();
+    let lines: Vec<&str> = text
+        .lines()
+        .filter(|line| line.contains("CHANNELS"))
+        .collect();
     assert_eq!(lines.len(), 4);
     for line in lines {
         assert!(line.ends_with(" Xrotation Yrotation Zrotation"), "{line}");
@@ -121,17 +138,31 @@ fn channels_are_added_where_the_motion_needs_them() {
     let mut set = tumble::TrackSet::new();
     for track in clip.set.tracks() {
         let own = track.name == Some("toe");
-        set.push(track.name.unwrap(), &times, if own { &keys } else { track.keys }).unwrap();
+        set.push(
+            track.name.unwrap(),
+            &times,
+            if own { &keys } else { track.keys },
+        )
+        .unwrap();
     }
-    set.set_translations(3, &times, &[Vec3::Y * 10.0, Vec3::Y * 11.0], &[]).unwrap();
+    set.set_translations(3, &times, &[Vec3::Y * 10.0, Vec3::Y * 11.0], &[])
+        .unwrap();
     clip.set = set;
     let text = as_bvh(&clip, None);
-    assert!(text.contains("CHANNELS 3 Xrotation Yrotation Zrotation\n      End Site"), "{text}");
+    assert!(
+        text.contains("CHANNELS 3 Xrotation Yrotation Zrotation\n      End Site"),
+        "{text}"
+    );
     let chest = "CHANNELS 6 Xposition Yposition Zposition Xrotation Yrotation Zrotation\n  }";
     assert!(text.contains(chest), "{text}");
     let again = read_bvh("t", text.as_bytes(), &ReadOptions::default()).unwrap();
     let toe = again.clips[0].set.track(2).keys;
-    assert!(toe.iter().zip(keys).all(|(own, key)| own.dot(key).abs() > 1.0 - 1e-6), "{toe:?}");
+    assert!(
+        toe.iter()
+            .zip(keys)
+            .all(|(own, key)| own.dot(key).abs() > 1.0 - 1e-6),
+        "{toe:?}"
+    );
 }
 
 /// A file with two animations, each of which turns one node: LINEAR at first, then with STEP.
@@ -142,8 +173,14 @@ fn gltf(more: &[(&str, Value)]) -> Value {
         .chain([0.6, 0.0, 0.0, 0.8])
         .chain([0.0, 0.6, 0.0, 0.8])
         .collect();
-    let bytes: Vec<u8> = numbers.iter().flat_map(|number| number.to_le_bytes()).collect();
-    let uri = format!("data:application/octet-stream;base64,{}", STANDARD.encode(&bytes));
+    let bytes: Vec<u8> = numbers
+        .iter()
+        .flat_map(|number| number.to_le_bytes())
+        .collect();
+    let uri = format!(
+        "data:application/octet-stream;base64,{}",
+        STANDARD.encode(&bytes)
+    );
     let animation = |name: &str, node: usize, how: &str| {
         json!({
             "name": name,
@@ -206,17 +243,24 @@ fn animations_of_one_skeleton_stay_of_one() {
         let again = read_gltf("t", glb, None, &ReadOptions::default()).unwrap();
         for (own, other) in clips.iter().zip(&again.clips) {
             let name = |track: usize| own.set.track_name(track);
-            let moved = (0..own.set.track_count()).find(|&track| own.set.track(track).keys.len() > 1);
+            let moved =
+                (0..own.set.track_count()).find(|&track| own.set.track(track).keys.len() > 1);
             let moved = moved.unwrap();
             let mut tracks = other.set.tracks();
-            let same = tracks.find(|track| track.name == Some(&*name(moved))).unwrap();
+            let same = tracks
+                .find(|track| track.name == Some(&*name(moved)))
+                .unwrap();
             assert_eq!(same.keys, own.set.track(moved).keys);
         }
     }
     // Skeletons that rest in other places are others.
     let mut other = loaded.clips[0].clone();
     other.skeleton[1].rest.translation = Vec3::X;
-    let glb = written(&[&loaded.clips[0], &other], "glb", &MotionOptions::default());
+    let glb = written(
+        &[&loaded.clips[0], &other],
+        "glb",
+        &MotionOptions::default(),
+    );
     assert_eq!(json_of(&glb)["nodes"].as_array().unwrap().len(), 4);
 }
 
@@ -224,15 +268,27 @@ fn animations_of_one_skeleton_stay_of_one() {
 fn all_joints_of_a_skin_are_tracks() {
     let loaded = read(&gltf(&[("skins", json!([{"joints": [1, 2.0]}]))]));
     let names = |clip: &Motion| -> Vec<String> {
-        (0..clip.set.track_count()).map(|track| clip.set.track_name(track)).collect()
+        (0..clip.set.track_count())
+            .map(|track| clip.set.track_name(track))
+            .collect()
     };
-    assert_eq!(names(&loaded.clips[0]), ["root", "arm", "hand of the other arm"]);
+    assert_eq!(
+        names(&loaded.clips[0]),
+        ["root", "arm", "hand of the other arm"]
+    );
     // The root is no joint of the skin.
     assert_eq!(names(&loaded.clips[1]), ["root"]);
     assert_eq!(loaded.clips[0].skeleton[2].rest.translation, Vec3::Y);
     // What is no skin is not looked at.
-    for skins in [json!(3), json!([{"joints": [77]}]), json!([{"joints": "all"}])] {
-        assert_eq!(read(&gltf(&[("skins", skins)])).clips[0].set.track_count(), 2);
+    for skins in [
+        json!(3),
+        json!([{"joints": [77]}]),
+        json!([{"joints": "all"}]),
+    ] {
+        assert_eq!(
+            read(&gltf(&[("skins", skins)])).clips[0].set.track_count(),
+            2
+        );
     }
 }
 
@@ -251,7 +307,11 @@ fn indices_may_be_written_with_a_point() {
         assert!(text.contains(plain), "{plain}");
         let bytes = text.replace(plain, pointed).into_bytes();
         let loaded = read_gltf("t", bytes, None, &ReadOptions::default()).unwrap();
-        assert_eq!((loaded.clips.len(), loaded.refused.len()), (2, 0), "{pointed}");
+        assert_eq!(
+            (loaded.clips.len(), loaded.refused.len()),
+            (2, 0),
+            "{pointed}"
+        );
     }
     let half = text.replace("\"node\":1", "\"node\":1.5").into_bytes();
     let loaded = read_gltf("t", half, None, &ReadOptions::default()).unwrap();
@@ -267,20 +327,31 @@ fn a_part_of_a_file_is_the_file_with_shorter_animations() {
     let parts: Vec<Motion> = (loaded.clips.iter())
         .map(|clip| trim(clip, 0.5, 1.5, &engine).unwrap())
         .collect();
-    let ends: Vec<_> = parts.iter().map(|part| part.ends(&engine).unwrap()).collect();
+    let ends: Vec<_> = parts
+        .iter()
+        .map(|part| part.ends(&engine).unwrap())
+        .collect();
     let clips: Vec<(usize, Sampled<'_>)> = parts
         .iter()
         .zip(&ends)
         .map(|(part, ends)| {
             let own = ends.of(part, None, &[]);
-            (part.place, Sampled { of_own_keys: true, ..own })
+            (
+                part.place,
+                Sampled {
+                    of_own_keys: true,
+                    ..own
+                },
+            )
         })
         .collect();
     let document = loaded.document.as_ref().unwrap();
     assert_eq!(document.beside(), ["materials"]);
     let mut glb = Vec::new();
     let options = MotionOptions::default();
-    document.write(&clips, &options, Path::new("o.glb"), &mut glb).unwrap();
+    document
+        .write(&clips, &options, Path::new("o.glb"), &mut glb)
+        .unwrap();
     assert_eq!(json_of(&glb)["materials"], json!([{"name": "skin"}]));
     let again = read_gltf("t", glb, None, &ReadOptions::default()).unwrap();
     for (part, found) in parts.iter().zip(&again.clips) {
@@ -295,7 +366,9 @@ fn a_part_of_a_file_is_the_file_with_shorter_animations() {
     }
     // Without clips, everything stays.
     let mut text = Vec::new();
-    document.write(&[], &options, Path::new("t.gltf"), &mut text).unwrap();
+    document
+        .write(&[], &options, Path::new("t.gltf"), &mut text)
+        .unwrap();
     assert_eq!(serde_json::from_slice::<Value>(&text).unwrap(), file);
 }
 
@@ -318,28 +391,40 @@ fn the_pelvis_of_a_body_is_at_both_its_places() {
     set_offsets(&mut clip, &offsets).unwrap();
     let expected: Vec<Vec3> = before.iter().map(|at| *at + pelvis).collect();
     let near = |own: &[Vec3], other: &[Vec3]| {
-        own.iter().zip(other).all(|(own, other)| own.distance(*other) < 1e-6)
+        own.iter()
+            .zip(other)
+            .all(|(own, other)| own.distance(*other) < 1e-6)
     };
     assert!(near(&places(&clip), &expected));
     // Given again, they are those that count.
     set_offsets(&mut clip, &offsets).unwrap();
     assert!(near(&places(&clip), &expected));
     let turn = glam::DQuat::from_rotation_x(-std::f64::consts::FRAC_PI_2);
-    let turned: Vec<Vec3> = expected.iter().map(|at| Vec3::new(at.x, at.z, -at.y)).collect();
+    let turned: Vec<Vec3> = expected
+        .iter()
+        .map(|at| Vec3::new(at.x, at.z, -at.y))
+        .collect();
     assert!(near(&places(&adjust(&clip, 1.0, turn).unwrap()), &turned));
     let samples = keyed(&clip).unwrap();
     let sampled = samples.of(&clip, clip.rate, &[]);
     let document = loaded.document.as_ref().unwrap();
     let mut out = Vec::new();
     let options = MotionOptions::default();
-    document.write(&[(0, sampled)], &options, Path::new("o.npz"), &mut out).unwrap();
+    document
+        .write(&[(0, sampled)], &options, Path::new("o.npz"), &mut out)
+        .unwrap();
     let again = read_npz("t", out, &ReadOptions::default()).unwrap();
     assert!(near(&places(&again.clips[0]), &before));
     assert!(document.beside().is_empty(), "{:?}", document.beside());
     // A copy has the same arrays, bytes and all.
     let mut copy = Vec::new();
-    document.write(&[], &options, Path::new("o.npz"), &mut copy).unwrap();
+    document
+        .write(&[], &options, Path::new("o.npz"), &mut copy)
+        .unwrap();
     let again = read_npz("t", copy, &ReadOptions::default()).unwrap();
-    assert_eq!(again.clips[0].set.track(3).keys, loaded.clips[0].set.track(3).keys);
+    assert_eq!(
+        again.clips[0].set.track(3).keys,
+        loaded.clips[0].set.track(3).keys
+    );
     assert_eq!(again.document.unwrap().beside(), document.beside());
 }

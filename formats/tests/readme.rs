@@ -16,7 +16,11 @@ fn the_table_of_formats_is_that_of_the_code() {
     for format in FORMATS {
         let endings = std::iter::once(&format.name).chain(format.extensions);
         let endings: Vec<String> = endings.map(|ending| format!("`.{ending}`")).collect();
-        let written = match (&format.write, format.writes_clips(), format.holds(Feature::SeveralClips)) {
+        let written = match (
+            &format.write,
+            format.writes_clips(),
+            format.holds(Feature::SeveralClips),
+        ) {
             (None, false, _) => "no",
             (Some(_), false, _) => "results",
             (Some(_), true, _) => "results, clips",

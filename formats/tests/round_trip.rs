@@ -56,8 +56,21 @@ impl Numbers {
 
 /// A clip whose features are drawn, on frames of a rate or at other times.
 fn clip(numbers: &mut Numbers) -> Motion {
-    let names = ["Bip01 L Thigh", "hip", "räder", "a.b", "x", "left_foot", "tip: 1", "Hüfte"];
-    let tracks = if numbers.coin() { 1 } else { 2 + numbers.below(6) };
+    let names = [
+        "Bip01 L Thigh",
+        "hip",
+        "räder",
+        "a.b",
+        "x",
+        "left_foot",
+        "tip: 1",
+        "Hüfte",
+    ];
+    let tracks = if numbers.coin() {
+        1
+    } else {
+        2 + numbers.below(6)
+    };
     let has_skeleton = numbers.coin();
     let is_world = numbers.below(5) == 0;
     let is_even = numbers.below(4) > 0;
@@ -74,7 +87,8 @@ fn clip(numbers: &mut Numbers) -> Motion {
             }
         })
         .collect();
-    let (moves, scales, is_stepped) = (numbers.coin(), numbers.below(4) == 0, numbers.below(4) == 0);
+    let (moves, scales, is_stepped) =
+        (numbers.coin(), numbers.below(4) == 0, numbers.below(4) == 0);
     let mut motion = Motion {
         name: numbers.coin().then(|| "Walk, fast".to_owned()),
         rate: is_even.then_some(rate),
@@ -88,11 +102,17 @@ fn clip(numbers: &mut Numbers) -> Motion {
         let is_moved = is_world || moves && numbers.coin();
         if is_moved {
             let keys: Vec<Vec3> = times.iter().map(|_| numbers.vector(50.0)).collect();
-            motion.set.set_translations(track, &times, &keys, &[]).unwrap();
+            motion
+                .set
+                .set_translations(track, &times, &keys, &[])
+                .unwrap();
         }
         let is_scaled = scales && !is_world && !from_bvh;
         if is_scaled {
-            let keys: Vec<Vec3> = times.iter().map(|_| Vec3::ONE + numbers.vector(0.5)).collect();
+            let keys: Vec<Vec3> = times
+                .iter()
+                .map(|_| Vec3::ONE + numbers.vector(0.5))
+                .collect();
             motion.set.set_scales(track, &times, &keys, &[]).unwrap();
         }
         let sampler = match is_stepped {
@@ -114,7 +134,11 @@ fn clip(numbers: &mut Numbers) -> Motion {
             parent: (track > 0).then(|| numbers.below(track)),
             rest: Transform {
                 translation: numbers.vector(2.0),
-                rotation: if turned { numbers.rotation() } else { Quat::IDENTITY },
+                rotation: if turned {
+                    numbers.rotation()
+                } else {
+                    Quat::IDENTITY
+                },
                 ..Transform::default()
             },
         });
@@ -169,14 +193,21 @@ fn through(
     std::fs::write(&file, bytes).unwrap();
     let loaded = format.open(&file, &ReadOptions::default());
     let mut loaded = loaded.unwrap_or_else(|error| panic!("{ending}: {error}"));
-    assert_eq!((loaded.clips.len(), loaded.refused.len()), (1, 0), "{ending}");
+    assert_eq!(
+        (loaded.clips.len(), loaded.refused.len()),
+        (1, 0),
+        "{ending}"
+    );
     Ok((loaded.clips.remove(0), warnings))
 }
 
 /// The poses of a clip relative to the parents, or to the world.
 fn poses(motion: &Motion, in_world: bool) -> (Vec<f64>, Vec<Quat>, Vec<Vec3>, Vec<Vec3>) {
     let samples: Samples = keyed(motion).unwrap();
-    let times = samples.times.iter().map(|time| time + motion.time_offset as f64);
+    let times = samples
+        .times
+        .iter()
+        .map(|time| time + motion.time_offset as f64);
     let times = times.collect();
     let count = samples.rotations.len();
     if in_world {
@@ -196,12 +227,19 @@ fn poses(motion: &Motion, in_world: bool) -> (Vec<f64>, Vec<Quat>, Vec<Vec3>, Ve
 
 /// The tracks of `found` in the order of `clip`: BVH has children behind their parents.
 fn in_order(found: &Motion, clip: &Motion) -> Motion {
-    if clip.set.tracks().any(|track| track.name.is_none_or(str::is_empty)) {
+    if clip
+        .set
+        .tracks()
+        .any(|track| track.name.is_none_or(str::is_empty))
+    {
         return found.clone();
     }
     let name = |track: usize| clip.set.track_name(track);
-    let place = |name: String| (0..found.set.track_count()).find(|&it| found.set.track_name(it) == name);
-    let order: Option<Vec<usize>> = (0..clip.set.track_count()).map(|track| place(name(track))).collect();
+    let place =
+        |name: String| (0..found.set.track_count()).find(|&it| found.set.track_name(it) == name);
+    let order: Option<Vec<usize>> = (0..clip.set.track_count())
+        .map(|track| place(name(track)))
+        .collect();
     let order = order.unwrap_or_else(|| panic!("names are lost: {:?}", found.set));
     found.select(&order).unwrap()
 }
@@ -214,16 +252,27 @@ fn compare(clip: &Motion, found: &Motion, warnings: &[Diagnostic], format: &Form
     let found = match holds(Feature::TrackNames) {
         true => in_order(found, clip),
         false => {
-            let has_names = clip.set.tracks().any(|track| track.name.is_some_and(|name| !name.is_empty() && name != "body"));
-            assert!(!has_names || is_told("names of the tracks"), "{case}: {left_out}");
+            let has_names = clip.set.tracks().any(|track| {
+                track
+                    .name
+                    .is_some_and(|name| !name.is_empty() && name != "body")
+            });
+            assert!(
+                !has_names || is_told("names of the tracks"),
+                "{case}: {left_out}"
+            );
             found.clone()
         }
     };
     let in_world = clip.is_world != found.is_world;
-    let ((times, rotations, positions, scales), other) = (poses(clip, in_world), poses(&found, in_world));
+    let ((times, rotations, positions, scales), other) =
+        (poses(clip, in_world), poses(&found, in_world));
     assert_eq!(times.len(), other.0.len(), "{case}");
     for (time, other) in times.iter().zip(&other.0) {
-        assert!((time - other).abs() <= 1e-6 * time.abs().max(1.0), "{case}: {time} {other}");
+        assert!(
+            (time - other).abs() <= 1e-6 * time.abs().max(1.0),
+            "{case}: {time} {other}"
+        );
     }
     for (place, (own, other)) in rotations.iter().zip(&other.1).enumerate() {
         let (own, other) = (own.as_dquat().normalize(), other.as_dquat().normalize());
@@ -241,11 +290,19 @@ fn compare(clip: &Motion, found: &Motion, warnings: &[Diagnostic], format: &Form
     };
     let has_translations = positions.iter().any(|own| *own != Vec3::ZERO);
     let same = near(&positions, &other.2);
-    assert!(same && holds(Feature::Translations) || !has_translations || is_told("the translations"), "{case}: {positions:?} {:?}", other.2);
+    assert!(
+        same && holds(Feature::Translations) || !has_translations || is_told("the translations"),
+        "{case}: {positions:?} {:?}",
+        other.2
+    );
     let has_scales = scales.iter().any(|own| *own != Vec3::ONE);
     let same = near(&scales, &other.3);
-    assert!(same && holds(Feature::Scales) || !has_scales || is_told("the scales"), "{case}: {left_out}");
-    let parents = |of: &Motion| -> Vec<_> { of.skeleton.iter().map(|joint| joint.parent).collect() };
+    assert!(
+        same && holds(Feature::Scales) || !has_scales || is_told("the scales"),
+        "{case}: {left_out}"
+    );
+    let parents =
+        |of: &Motion| -> Vec<_> { of.skeleton.iter().map(|joint| joint.parent).collect() };
     let hangs = clip.skeleton.iter().any(|joint| joint.parent.is_some());
     match holds(Feature::Skeleton) && !(clip.is_world && format.name == "bvh") {
         true if hangs => {
@@ -259,15 +316,24 @@ fn compare(clip: &Motion, found: &Motion, warnings: &[Diagnostic], format: &Form
             }
         }
         true => {}
-        false => assert!(!hangs || is_told("the skeleton") || clip.is_world, "{case}: {left_out}"),
+        false => assert!(
+            !hangs || is_told("the skeleton") || clip.is_world,
+            "{case}: {left_out}"
+        ),
     }
     if holds(Feature::RestRotations) {
         let rests = clip.skeleton.iter().zip(&found.skeleton);
         let mut rests = rests.map(|(own, other)| own.rest.rotation.dot(other.rest.rotation).abs());
         assert!(rests.all(|dot| dot > 1.0 - 1e-6), "{case}");
     } else {
-        let turned = clip.skeleton.iter().any(|joint| joint.rest.rotation != Quat::IDENTITY);
-        assert!(!turned || is_told("rotations in which joints rest"), "{case}: {left_out}");
+        let turned = clip
+            .skeleton
+            .iter()
+            .any(|joint| joint.rest.rotation != Quat::IDENTITY);
+        assert!(
+            !turned || is_told("rotations in which joints rest"),
+            "{case}: {left_out}"
+        );
     }
     match holds(Feature::ClipName) {
         true => assert_eq!(found.name, clip.name, "{case}"),
@@ -276,12 +342,18 @@ fn compare(clip: &Motion, found: &Motion, warnings: &[Diagnostic], format: &Form
     let is_stepped = |of: &Motion| of.channels.iter().any(|own| own.has(Sampler::Step));
     match holds(Feature::Steps) {
         true => assert_eq!(is_stepped(&found), is_stepped(clip), "{case}"),
-        false => assert!(!is_stepped(clip) || is_told("hold each key"), "{case}: {left_out}"),
+        false => assert!(
+            !is_stepped(clip) || is_told("hold each key"),
+            "{case}: {left_out}"
+        ),
     }
     match holds(Feature::Bvh) && !clip.is_world {
         true if !clip.bvh.is_empty() => assert_eq!(found.bvh, clip.bvh, "{case}"),
         true => {}
-        false => assert!(clip.bvh.is_empty() || clip.is_world || is_told("End Sites"), "{case}"),
+        false => assert!(
+            clip.bvh.is_empty() || clip.is_world || is_told("End Sites"),
+            "{case}"
+        ),
     }
 }
 
@@ -290,14 +362,20 @@ fn may_be_refused(clip: &Motion, format: &Format) -> bool {
     let tracks = clip.set.track_count();
     let times = clip.key_times();
     let is_frame = |rate: FrameRate| {
-        let mut frames = times.iter().map(|time| (time - times[0]) * rate.per_second());
+        let mut frames = times
+            .iter()
+            .map(|time| (time - times[0]) * rate.per_second());
         let mut next = 0.0;
         frames.all(|frame| {
             next += 1.0;
             (frame + 1.0 - next).abs() < 0.01
         })
     };
-    let is_uneven = !clip.rate.or_else(|| clip.rate_of_keys()).is_some_and(is_frame) && !format.holds(Feature::UnevenTimes);
+    let is_uneven = !clip
+        .rate
+        .or_else(|| clip.rate_of_keys())
+        .is_some_and(is_frame)
+        && !format.holds(Feature::UnevenTimes);
     is_uneven || format.name == "tum" && tracks != 1
 }
 
@@ -343,7 +421,8 @@ fn signs_continue_whatever_writes_them() {
     let mut set = TrackSet::new();
     let keys = [-1.0f32, 1.0].map(|side| Quat::from_rotation_z((180.0 + side).to_radians()));
     set.push("a", &[0.0, 0.5], &[keys[0], -keys[1]]).unwrap();
-    set.set_translations(0, &[0.0, 0.5], &[Vec3::X; 2], &[]).unwrap();
+    set.set_translations(0, &[0.0, 0.5], &[Vec3::X; 2], &[])
+        .unwrap();
     let motion = Motion {
         set,
         rate: FrameRate::new(2, 1).ok(),
@@ -355,6 +434,11 @@ fn signs_continue_whatever_writes_them() {
         assert!(keys[0].dot(keys[1]) > 0.99, "{}: {keys:?}", format.1);
         let moved = found.set.vector_keys(Channel::Translation, 0);
         let moved = moved.map_or(0, |keys| keys.keys.len());
-        assert_eq!(moved > 0, format.0.holds(Feature::Translations), "{}", format.1);
+        assert_eq!(
+            moved > 0,
+            format.0.holds(Feature::Translations),
+            "{}",
+            format.1
+        );
     }
 }

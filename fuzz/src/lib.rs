@@ -9,6 +9,7 @@ pub fn target(name: &str, data: &[u8]) {
         "gltf" => targets::gltf::gltf,
         "bvh" => targets::motion::bvh,
         "tum" => targets::motion::tum,
+        "kitti" => targets::motion::kitti,
         "npz" => targets::arrays::npz,
         "npy" => targets::arrays::npy,
         "outputs" => targets::outputs,

@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use tumble::EulerSequence;
+use tumble_formats::format::{Document, FormatOption};
 use tumble_formats::motion::Motion;
 use tumble_formats::{Feature, Format, Loaded};
-use tumble_formats::format::{Document, FormatOption};
 
 use crate::arguments::gather::Gathered;
 use crate::arguments::input::{Inputs, clip_name, is_standard, name, several, tell_warnings};

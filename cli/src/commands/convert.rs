@@ -130,7 +130,9 @@ impl Arguments {
             && !document.beside().is_empty()
         {
             let (all, format) = (document.beside().join(", "), target.format().name);
-            words::note(&format!("{name}: {format} has no room for it, left out: {all}"));
+            words::note(&format!(
+                "{name}: {format} has no room for it, left out: {all}"
+            ));
         }
         let parts = clips.iter().map(|&clip| self.part(name, clip));
         let parts: Vec<Cow<'_, Motion>> = parts.collect::<Result<_, Failure>>()?;

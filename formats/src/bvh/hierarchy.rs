@@ -5,9 +5,9 @@ use std::io::BufRead;
 
 use glam::Vec3;
 
-use crate::diagnostic::{Code, Diagnostic, Place};
 use crate::bvh::joint::{BvhChannel, BvhJoint};
-use crate::names::untaken;
+use crate::diagnostic::{Code, Diagnostic, Place};
+use crate::names::line_name;
 use crate::text::lines::Lines;
 use crate::text::number;
 
@@ -159,13 +159,10 @@ impl<R: BufRead> Parser<'_, R> {
         let parent = self.open.last().and_then(|block| block.joint);
         let joints = &mut self.hierarchy.joints;
         let joint = joints.len();
-        let own = match name.is_empty() {
-            true => format!("joint{joint}"),
-            false => name.clone(),
-        };
-        let own = untaken(own, joint, &mut self.names);
+        let own = line_name(&name, joint, &mut self.names);
         if own != name && !name.is_empty() {
-            let message = format!("a second joint is called `{name}`; it is read as `{own}`");
+            let message =
+                format!("the joint called `{name}` is read as `{own}`, by which it is told apart");
             self.lines.warn(keyword.column, Code::SameName, message);
         }
         joints.push(Joint {

@@ -15,8 +15,8 @@ mod write;
 use std::io::BufRead;
 use std::path::Path;
 
-pub use crate::bvh::joint::{BvhChannel, BvhJoint};
 use crate::bvh::hierarchy::Hierarchy;
+pub use crate::bvh::joint::{BvhChannel, BvhJoint};
 use crate::bvh::motion::Rows;
 use crate::bvh::write::write_motion;
 use crate::diagnostic::Diagnostic;

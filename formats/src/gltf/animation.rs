@@ -126,7 +126,9 @@ pub(super) fn read(
         track: tracks.of_node(moved.node),
         path: moved.path,
     };
-    let others = others.into_iter().filter(|(_, keys)| !keys.times.is_empty());
+    let others = others
+        .into_iter()
+        .filter(|(_, keys)| !keys.times.is_empty());
     let read = Read {
         stored_span: stored,
         span: motion

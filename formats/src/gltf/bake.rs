@@ -84,7 +84,14 @@ impl Document for Gltf {
         let Ok(json) = Json::parse(&self.name, &self.container.text) else {
             return Vec::new();
         };
-        let lists = ["meshes", "materials", "textures", "images", "cameras", "extensionsUsed"];
+        let lists = [
+            "meshes",
+            "materials",
+            "textures",
+            "images",
+            "cameras",
+            "extensionsUsed",
+        ];
         let has = |list: &&str| !json.optional::<&RawValue>(list).is_empty();
         lists.into_iter().filter(has).map(str::to_owned).collect()
     }

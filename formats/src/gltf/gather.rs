@@ -137,8 +137,8 @@ fn move_view<'a>(
 ) -> Result<(), Diagnostic> {
     let number = |raw: Option<&'a RawValue>| -> Result<usize, Diagnostic> {
         match raw {
-        Some(raw) => reader.json.typed(raw, pointer).map(|Whole(number)| number),
-        None => Ok(0),
+            Some(raw) => reader.json.typed(raw, pointer).map(|Whole(number)| number),
+            None => Ok(0),
         }
     };
     let (buffer, offset) = (members.get("buffer"), members.get("byteOffset"));

@@ -125,7 +125,9 @@ fn bvh(json: &Json<'_>) -> Vec<BvhJoint> {
         let beside: NodeBeside<'_> = serde_json::from_str(raw.get()).ok()?;
         let extras: Extras = serde_json::from_str(beside.extras?.get()).ok()?;
         let sites = extras.bvh.end_sites.into_iter();
-        let sites: Vec<Vec3> = sites.map(|site| DVec3::from_array(site).as_vec3()).collect();
+        let sites: Vec<Vec3> = sites
+            .map(|site| DVec3::from_array(site).as_vec3())
+            .collect();
         let is_whole = sites.iter().all(|site| site.is_finite());
         Some(BvhJoint {
             channels: BvhJoint::channels_of(&extras.bvh.channels).filter(|_| is_whole)?,

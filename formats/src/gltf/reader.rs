@@ -202,7 +202,9 @@ impl<'a> Reader<'a> {
             return;
         };
         let pointer = format!("/bufferViews/{index}");
-        let view = self.json.entry::<BufferView<'a>>("bufferViews", index, &pointer);
+        let view = self
+            .json
+            .entry::<BufferView<'a>>("bufferViews", index, &pointer);
         let Ok(view) = view else {
             return;
         };

@@ -67,10 +67,26 @@ mod tests {
     #[test]
     fn whole_numbers_may_have_a_point_and_an_exponent() {
         let of = |text: &str| serde_json::from_str::<Whole<u32>>(text).map(|whole| whole.0);
-        for (text, number) in [("0", 0), ("1.0", 1), ("1e3", 1000), ("2.50e1", 25), ("0.0", 0), ("-0.0", 0)] {
+        for (text, number) in [
+            ("0", 0),
+            ("1.0", 1),
+            ("1e3", 1000),
+            ("2.50e1", 25),
+            ("0.0", 0),
+            ("-0.0", 0),
+        ] {
             assert_eq!(of(text).unwrap(), number, "{text}");
         }
-        for text in ["1.5", "-1", "-1.0", "4294967296", "4294967296.0", "1e300", "\"1\"", "null"] {
+        for text in [
+            "1.5",
+            "-1",
+            "-1.0",
+            "4294967296",
+            "4294967296.0",
+            "1e300",
+            "\"1\"",
+            "null",
+        ] {
             assert!(of(text).is_err(), "{text}");
         }
     }

@@ -301,7 +301,11 @@ impl Document for NpzDocument {
         if clips.is_empty() {
             let mut members = Members::new();
             for (place, member) in self.archive.members.iter().enumerate() {
-                members.bytes(&member.path, &self.archive.unpack(place)?, member.is_deflated)?;
+                members.bytes(
+                    &member.path,
+                    &self.archive.unpack(place)?,
+                    member.is_deflated,
+                )?;
             }
             members.finish(out)?;
             return Ok(Vec::new());

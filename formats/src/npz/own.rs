@@ -3,8 +3,8 @@
 use glam::{DVec3, Quat, Vec3};
 use tumble::Layout;
 
-use crate::diagnostic::{Code, Diagnostic};
 use crate::bvh::BvhJoint;
+use crate::diagnostic::{Code, Diagnostic};
 use crate::motion::{Channels, Sampler, Transform};
 use crate::npy::ComponentOrder;
 use crate::npz::archive::Archive;
@@ -90,7 +90,8 @@ fn texts(
     let texts = texts.map_err(|why| archive.refuse(member, Code::ElementType, why))?;
     if texts.len() != each * plan.tracks {
         let (found, tracks) = (texts.len(), plan.tracks);
-        let message = format!("the array has {found} texts; {each} are read for each of {tracks} tracks");
+        let message =
+            format!("the array has {found} texts; {each} are read for each of {tracks} tracks");
         return Err(archive.refuse(member, Code::Shape, message));
     }
     plan.constants.push(member);
@@ -106,7 +107,8 @@ fn read_samplers(archive: &Archive, plan: &mut Plan) -> Result<(), Diagnostic> {
         "STEP" => Ok(Some(Sampler::Step)),
         "LINEAR" => Ok(Some(Sampler::Linear)),
         other => {
-            let message = format!("`{SAMPLERS}` has `{other}`; STEP, LINEAR and an empty text are read");
+            let message =
+                format!("`{SAMPLERS}` has `{other}`; STEP, LINEAR and an empty text are read");
             Err(Diagnostic::new(&archive.file, Code::Shape, message))
         }
     };

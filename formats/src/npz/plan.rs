@@ -5,8 +5,8 @@ use std::ops::Range;
 
 use tumble::{FrameRate, Layout};
 
-use crate::diagnostic::{Code, Diagnostic};
 use crate::bvh::BvhJoint;
+use crate::diagnostic::{Code, Diagnostic};
 use crate::motion::{Channels, Transform};
 use crate::npy::ComponentOrder;
 use crate::npz::archive::Archive;

@@ -162,7 +162,10 @@ pub(crate) fn plan(archive: &Archive, warnings: &mut Warnings) -> Result<Option<
             plan.add(archive, piece)?;
         }
         let has = |name: &str| archive.find(name).is_some();
-        let sides = [("leye_pose", "reye_pose"), ("left_hand_pose", "right_hand_pose")];
+        let sides = [
+            ("leye_pose", "reye_pose"),
+            ("left_hand_pose", "right_hand_pose"),
+        ];
         for (left, right) in sides {
             if has(left) != has(right) {
                 let missing = if has(left) { right } else { left };
@@ -180,7 +183,10 @@ pub(crate) fn plan(archive: &Archive, warnings: &mut Warnings) -> Result<Option<
                            head no face; the arrays of these are of another model";
             return Err(Diagnostic::new(&archive.file, Code::UnknownArrays, message));
         } else {
-            skeleton.face(has(["pose_jaw", "jaw_pose"]), has(["pose_eye", "leye_pose"]));
+            skeleton.face(
+                has(["pose_jaw", "jaw_pose"]),
+                has(["pose_eye", "leye_pose"]),
+            );
             if has(["pose_hand", "left_hand_pose"]) {
                 skeleton.fingers();
             }

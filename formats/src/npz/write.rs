@@ -9,9 +9,9 @@ use tumble::Layout;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipWriter};
 
+use crate::bvh::BvhJoint;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::format::{MotionOptions, WriteError};
-use crate::bvh::BvhJoint;
 use crate::motion::{Joint, Motion, Sampled, Sampler};
 use crate::npy::ComponentOrder;
 use crate::npz::header::{Element, Header};

@@ -54,14 +54,9 @@ impl Job<'_> {
         };
         let format = target.format();
         let options = self.options(target);
-        self.written(
-            name,
-            clips,
-            &times,
-            rate,
-            target,
-            |sampled, out| format.write_clips(sampled, &options, out),
-        )
+        self.written(name, clips, &times, rate, target, |sampled, out| {
+            format.write_clips(sampled, &options, out)
+        })
     }
 
     /// The input's own file, everything kept but the keys of some of its animations.

@@ -10,11 +10,11 @@ use clap::{Args, ValueEnum};
 use serde::Serialize;
 use tumble::reduce::ReducedCurve;
 use tumble::{Device, Engine, EulerSequence, FrameRate, Frames};
-use tumble_formats::{Feature, Loaded};
 use tumble_formats::format::{FormatOption, MotionOptions};
 use tumble_formats::keyed::keyed;
 use tumble_formats::motion::{Motion, Sampled, Sampler};
 use tumble_formats::reduce::{ReduceMotionError, ReduceOptions, Reduced, reduce};
+use tumble_formats::{Feature, Loaded};
 
 use crate::arguments::given::Given;
 use crate::arguments::input::{self, Inputs};

@@ -8,8 +8,8 @@ use std::time::Instant;
 
 use clap::{Args, ValueEnum};
 use tumble::{
-    Engine, Error, EulerSequence, FrameRate, Frames, Layout, Rotations, Smoothing, SmoothingEnds, SmoothingKernel,
-    Vectors,
+    Engine, Error, EulerSequence, FrameRate, Frames, Layout, Rotations, Smoothing, SmoothingEnds,
+    SmoothingKernel, Vectors,
 };
 use tumble_formats::format::{Document, MotionOptions, ResultShape};
 use tumble_formats::motion::{Motion, Sampled};

@@ -63,7 +63,9 @@ impl Nodes {
             ));
         }
         let order = parents_first(&parents);
-        let names: Vec<String> = (0..tracks).map(|track| clip.set.track_name(track)).collect();
+        let names: Vec<String> = (0..tracks)
+            .map(|track| clip.set.track_name(track))
+            .collect();
         let has_skeleton = !clip.skeleton.is_empty();
         let fitting = self.rigs.iter().enumerate().find_map(|(place, rig)| {
             let found = self.shared(rig, (&order, &parents, &names), &rest)?;
