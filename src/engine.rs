@@ -1,6 +1,8 @@
 //! The engine: sets go in, clips stay on its device, rotations come out.
 
 use std::sync::Arc;
+#[cfg(feature = "prove")]
+use std::time::Duration;
 
 use glam::{Quat, Vec4};
 
@@ -142,6 +144,22 @@ impl Engine {
         self.backend
             .opened()
             .map_or(&[], |opened| &opened.self_tests)
+    }
+
+    /// Compiles every kernel, one after the other, and says how long the driver took, with its caches as they
+    /// are. `each` gets the name and the time, and goes on while it returns true. Nothing is kept.
+    ///
+    /// # Errors
+    /// When the device fails. On the CPU there is nothing to compile.
+    #[cfg(feature = "prove")]
+    pub fn compile_kernels(
+        &self,
+        each: &mut dyn FnMut(&'static str, Duration) -> bool,
+    ) -> Result<(), Error> {
+        let Some(opened) = self.backend.opened() else {
+            return Ok(());
+        };
+        Ok(opened.engine().compile_kernels(each)?)
     }
 
     /// Runs every kernel of the table on the device beside its twin on the CPU, and compares every bit: small

@@ -35,13 +35,14 @@ Examples:
   tumble view chain.dat --open                 see the boxes turn
   tumble plot chain.dat -o chain.svg           see every component
   tumble devices                               what Vulkan offers here
+  tumble prove                                 does a device keep what is promised?
   tumble bench                                 how fast this machine is
 
 Exit codes:
   0 done                           5 a Vulkan device was demanded, there is none
   1 a bug in tumble                6 the device failed, or is not exact
   2 the command line is wrong      7 output could not be written
-  3 some inputs failed             8 verification found a difference
+  3 some inputs failed             8 a difference was found, or nothing proved
   4 all inputs failed              129 to 131, 141, 143 by a signal";
 
 /// What the command line says.

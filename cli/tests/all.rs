@@ -17,6 +17,7 @@ mod json;
 mod motion;
 mod peers;
 mod plot;
+mod prove;
 mod reduce;
 #[cfg(unix)]
 mod remedies;

@@ -1,11 +1,16 @@
 //! What a report of a device tells beside [`DeviceInfo`](crate::gpu::physical::DeviceInfo): its loader,
 //! memory, queues and place on the bus, as the driver says, and what the engine chose for it.
 
+use std::time::{Duration, Instant};
+
 use ash::{ext, vk};
 
 use crate::gpu::device::{Lane, LogicalDevice};
 use crate::gpu::engine::VulkanEngine;
+use crate::gpu::error::VulkanError;
 use crate::gpu::physical::PhysicalDevice;
+use crate::gpu::pipeline::{Exactness, Pipeline};
+use crate::shader::KERNELS;
 
 /// What Vulkan tells of a device, for a report.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
@@ -232,6 +237,21 @@ impl PhysicalDevice {
 }
 
 impl VulkanEngine {
+    /// Compiles every kernel, and says how long each took.
+    pub(crate) fn compile_kernels(
+        &self,
+        each: &mut dyn FnMut(&'static str, Duration) -> bool,
+    ) -> Result<(), VulkanError> {
+        for code in &KERNELS {
+            let started = Instant::now();
+            let pipeline = Pipeline::new(&self.device, code.kernel, Exactness::Demanded)?;
+            if !each(pipeline.name, started.elapsed()) {
+                break;
+            }
+        }
+        Ok(())
+    }
+
     /// What was chosen for its device.
     pub(crate) fn choices(&self) -> EngineChoices {
         let device: &LogicalDevice = &self.device;

@@ -346,6 +346,26 @@ impl Opened {
     }
 }
 
+/// The Vulkan device of that name, as `--device` takes it, not opened; the first one where there is no name.
+/// `None` for the CPU.
+pub(crate) fn vulkan_device(name: Option<&str>) -> Result<Option<Device>, Failure> {
+    let choice = name.map_or(Choice::First, |name| {
+        let Ok(choice) = name.parse();
+        choice
+    });
+    let devices = || probe::devices().map_err(|error| refused(&error.into()));
+    match choice {
+        Choice::Cpu => Ok(None),
+        Choice::First | Choice::Auto | Choice::Vulkan => {
+            let first = devices()?.into_iter().next();
+            first
+                .map(Some)
+                .ok_or_else(|| no_vulkan(&VulkanError::NoDevice))
+        }
+        Choice::Named(name) => named(&name, &devices()?).map(Some),
+    }
+}
+
 pub(super) fn no_vulkan(error: &VulkanError) -> Failure {
     Failure::new(NO_VULKAN, format!("no Vulkan device: {error}"))
 }

@@ -16,6 +16,7 @@ pub(crate) mod methods;
 pub(crate) mod picture;
 pub(crate) mod plot;
 pub(crate) mod probe;
+pub(crate) mod prove;
 pub(crate) mod reduce;
 pub(crate) mod render;
 pub(crate) mod route;
@@ -36,6 +37,7 @@ pub(crate) enum Command {
     Follow(Box<follow::Arguments>),
     Compare(Box<compare::Arguments>),
     Verify(verify::Arguments),
+    Prove(prove::Arguments),
     Devices(devices::Arguments),
     Info(info::Arguments),
     Generate(generate::Arguments),
@@ -63,6 +65,7 @@ impl Command {
             Self::Follow(arguments) => follow::run(&arguments),
             Self::Compare(arguments) => compare::run(&arguments),
             Self::Verify(arguments) => verify::run(&arguments),
+            Self::Prove(arguments) => prove::run(&arguments),
             Self::Devices(arguments) => devices::run(&arguments),
             Self::Info(arguments) => info::run(&arguments),
             Self::Generate(arguments) => generate::run(&arguments),

@@ -1,0 +1,225 @@
+//! `tumble prove --compare`: two proofs, of two devices or two builds. What both compared has to have the same
+//! bits; figures stand side by side.
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+use serde_json::Value;
+
+use crate::commands::prove::report::{FORMAT, FORMAT_VERSION};
+use crate::messages::exit::{ALL_INPUTS, DIFFERENCE, Failure};
+use crate::messages::words;
+
+/// Files larger than any proof are refused unread.
+const MAX_BYTES: u64 = 64 << 20;
+
+/// What was found; also the form of the JSON.
+#[derive(Debug, Serialize)]
+pub(crate) struct Comparison {
+    /// Whether both prove their device.
+    pub(crate) both_proved: bool,
+    /// Whether both evaluated by the same kernels, and compared with the same recorded results.
+    pub(crate) same_kernels: bool,
+    pub(crate) same_golden_table: bool,
+    /// Rounds of random sets that both evaluated from the same seed; nothing where seeds differ.
+    pub(crate) rounds_in_common: Option<u64>,
+    /// Whether the CPUs of both made the same bits of these.
+    pub(crate) same_random_bits: Option<bool>,
+    pub(crate) figures: Vec<Pair>,
+}
+
+/// A figure of both.
+#[derive(Debug, Serialize)]
+pub(crate) struct Pair {
+    pub(crate) name: String,
+    pub(crate) unit: &'static str,
+    pub(crate) values: [f64; 2],
+    /// The second divided by the first.
+    pub(crate) ratio: f64,
+}
+
+/// A proof that was read.
+struct Read {
+    name: String,
+    value: Value,
+}
+
+impl Read {
+    fn new(path: &Path) -> Result<Self, Failure> {
+        let name = path.display().to_string();
+        let refuse = |why: String| Failure::new(ALL_INPUTS, format!("{name}: {why}"));
+        let size = std::fs::metadata(path).map_err(|error| refuse(error.to_string()))?;
+        if size.len() > MAX_BYTES {
+            return Err(refuse("it is too large to be a proof".to_owned()));
+        }
+        let text = std::fs::read_to_string(path).map_err(|error| refuse(error.to_string()))?;
+        let value: Value = serde_json::from_str(&text)
+            .map_err(|error| refuse(format!("it is no JSON: {error}")))?;
+        if value["format"] != FORMAT {
+            return Err(refuse(
+                "it is no proof; `tumble prove -o FILE` writes one".to_owned(),
+            ));
+        }
+        if value["format_version"] != FORMAT_VERSION {
+            let version = &value["format_version"];
+            return Err(refuse(format!(
+                "it is of version {version} of the format; this program reads {FORMAT_VERSION}"
+            )));
+        }
+        Ok(Self { name, value })
+    }
+
+    fn text(&self, pointer: &str) -> &str {
+        let found = self.value.pointer(pointer).and_then(Value::as_str);
+        found.unwrap_or("unknown")
+    }
+
+    fn number(&self, pointer: &str) -> Option<f64> {
+        self.value.pointer(pointer).and_then(Value::as_f64)
+    }
+
+    /// The hash of the first rounds, for each number of rounds that has one.
+    fn digests(&self) -> impl Iterator<Item = (u64, &str)> {
+        let all = self.value.pointer("/random/digests");
+        let all = all.and_then(Value::as_array).into_iter().flatten();
+        all.filter_map(|digest| Some((digest["rounds"].as_u64()?, digest["hash"].as_str()?)))
+    }
+
+    /// Rates and the cases by their names.
+    fn figures(&self) -> Vec<(String, &'static str, f64)> {
+        let mut all = Vec::new();
+        for (name, unit, pointer) in [
+            ("filling", "B/s", "/figures/fill_rate"),
+            ("copying", "B/s", "/figures/device_copy_rate"),
+            ("bus up", "B/s", "/figures/upload_rate"),
+            ("bus down", "B/s", "/figures/download_rate"),
+            ("submit and fence", "s", "/figures/submit_and_fence"),
+            (
+                "kernels compiled",
+                "ms",
+                "/compile_times/milliseconds_total",
+            ),
+        ] {
+            all.extend((self.number(pointer)).map(|value| (name.to_owned(), unit, value)));
+        }
+        let cases = self
+            .value
+            .pointer("/figures/cases")
+            .and_then(Value::as_array);
+        for case in cases.into_iter().flatten() {
+            let name = [&case["case"], &case["name"]].map(|own| own.as_str().unwrap_or_default());
+            let seconds = case["seconds"].as_f64();
+            all.extend(seconds.map(|seconds| (name.join(" "), "s", seconds)));
+        }
+        all
+    }
+}
+
+fn compared(one: &Read, two: &Read) -> Comparison {
+    let same = |pointer| one.text(pointer) == two.text(pointer);
+    let seed = |own: &Read| own.value.pointer("/random/seed").and_then(Value::as_u64);
+    let in_common = (seed(one).is_some() && seed(one) == seed(two))
+        .then(|| {
+            let pairs = (one.digests()).filter_map(|(rounds, hash)| {
+                let (_, other) = two.digests().find(|(own, _)| *own == rounds)?;
+                Some((rounds, hash == other))
+            });
+            pairs.max_by_key(|(rounds, _)| *rounds)
+        })
+        .flatten();
+    let others = two.figures();
+    let figures = one.figures().into_iter().filter_map(|(name, unit, value)| {
+        let (_, _, other) = others.iter().find(|(own, _, _)| *own == name)?;
+        Some(Pair {
+            ratio: if value > 0.0 { other / value } else { 0.0 },
+            values: [value, *other],
+            name,
+            unit,
+        })
+    });
+    Comparison {
+        both_proved: [one, two]
+            .iter()
+            .all(|own| own.text("/verdict") == "proved"),
+        same_kernels: same("/program/kernels"),
+        same_golden_table: same("/program/golden_table"),
+        rounds_in_common: in_common.map(|(rounds, _)| rounds),
+        same_random_bits: in_common.map(|(_, same)| same),
+        figures: figures.collect(),
+    }
+}
+
+fn page(one: &Read, two: &Read, found: &Comparison) -> String {
+    let mut text = String::new();
+    for own in [one, two] {
+        let _ = writeln!(
+            text,
+            "{}: {}, {}; tumble {}, commit {}; {}",
+            own.name,
+            own.text("/device/name"),
+            own.text("/device/driver"),
+            own.text("/program/version"),
+            own.text("/program/commit"),
+            own.text("/verdict").replace('_', " ")
+        );
+    }
+    let same = |is_same| if is_same { "the same" } else { "DIFFERENT" };
+    let _ = writeln!(text, "\nkernels            {}", same(found.same_kernels));
+    let _ = writeln!(text, "recorded results   {}", same(found.same_golden_table));
+    let _ = match (found.rounds_in_common, found.same_random_bits) {
+        (Some(rounds), Some(is_same)) => {
+            writeln!(
+                text,
+                "random             {} bits in the {rounds} rounds of both",
+                same(is_same)
+            )
+        }
+        _ => writeln!(
+            text,
+            "random             not comparable: other seeds, or no round"
+        ),
+    };
+    let width = (found.figures.iter())
+        .map(|pair| pair.name.chars().count())
+        .max()
+        .unwrap_or(0);
+    text.push('\n');
+    for Pair {
+        name,
+        unit,
+        values: [one, two],
+        ratio,
+    } in &found.figures
+    {
+        let _ = writeln!(
+            text,
+            "{name:width$}  {one:>10.3e} {two:>10.3e} {unit:3}  × {ratio:.2}"
+        );
+    }
+    text
+}
+
+pub(crate) fn run([one, two]: [&PathBuf; 2], json: bool) -> Result<(), Failure> {
+    let (one, two) = (Read::new(one)?, Read::new(two)?);
+    let found = compared(&one, &two);
+    if json {
+        words::json(&found)?;
+    } else {
+        words::listing(&page(&one, &two, &found))?;
+    }
+    let mut reasons = Vec::new();
+    if found.same_random_bits == Some(false) {
+        reasons.push("the CPUs of the two made other bits of the same random sets");
+    }
+    if !found.same_golden_table {
+        reasons.push("they compared with other recorded results");
+    }
+    if !found.both_proved {
+        reasons.push("not both of them prove their device");
+    }
+    match reasons.is_empty() {
+        true => Ok(()),
+        false => Err(Failure::new(DIFFERENCE, reasons.join("; "))),
+    }
+}

@@ -1,0 +1,123 @@
+//! `tumble prove`: one program that shows on any device what the engine promises, and says what it could not
+//! show.
+
+pub(crate) mod compare;
+pub(crate) mod compile;
+pub(crate) mod device;
+pub(crate) mod report;
+pub(crate) mod steps;
+pub(crate) mod text;
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use crate::arguments::device::vulkan_device;
+use crate::commands::prove::report::Verdict;
+use crate::commands::prove::steps::Request;
+use crate::messages::exit::{DEVICE, DIFFERENCE, Failure};
+use crate::messages::words;
+
+/// Show that a device keeps what is promised: every kernel, recorded results, random ones, speed
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Every kernel runs beside its twin on the CPU, recorded results of every method, output and crowd are
+evaluated in every way in which the engine may use the device, then random sets and crowds until the
+time is over, and a renderer's device is made to evaluate on. Every bit is compared. Figures are by
+the device's clock. `docs/proofs.md` has devices that this was run on, and what the JSON means.
+
+Exit codes:
+  0  proved: everything ran, and no bit differs
+  6  bits differ
+  8  not proved: something did not run or was not compared, or the validation layer complained
+
+Examples:
+  tumble prove                                   the first Vulkan device, at most 8 minutes
+  tumble prove --device 1 --seconds 60 -o proof.json
+  tumble prove --validate                        again under the Khronos validation layer
+  tumble prove --compare here.json there.json")]
+pub(crate) struct Arguments {
+    /// The device: its index, part of its name or uuid:UUID (`tumble devices`); by default the first
+    /// Vulkan device
+    #[arg(long, value_name = "DEVICE")]
+    device: Option<String>,
+    /// How long it may take; what has to run at least runs first
+    #[arg(
+        long,
+        value_name = "SECONDS",
+        default_value_t = 480,
+        value_parser = clap::value_parser!(u64).range(1..=86_400)
+    )]
+    seconds: u64,
+    /// Run only what a proof cannot do without: no more random rounds, nothing in every setting
+    #[arg(long)]
+    quick: bool,
+    /// Where random sets and crowds begin: the same seed gives the same ones on every machine
+    #[arg(long, value_name = "NUMBER", default_value_t = 1)]
+    seed: u64,
+    /// Do it again under the Khronos validation layer; any message is a failure
+    #[arg(long)]
+    validate: bool,
+    /// Write the proof to a file, as JSON
+    #[arg(short, long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Replace the file where it is there
+    #[arg(long, requires = "out")]
+    overwrite: bool,
+    /// Print JSON
+    #[arg(long)]
+    json: bool,
+    /// Compare two proofs instead: bits, then figures
+    #[arg(
+        long,
+        num_args = 2,
+        value_names = ["FILE", "FILE"],
+        conflicts_with_all = ["device", "seconds", "quick", "seed", "validate", "out", "overwrite"]
+    )]
+    compare: Vec<PathBuf>,
+    /// Compile every kernel, and say how long each took
+    #[arg(long, hide = true)]
+    compile_kernels: bool,
+}
+
+pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
+    if let [one, two] = &arguments.compare[..] {
+        return compare::run([one, two], arguments.json);
+    }
+    let device = vulkan_device(arguments.device.as_deref())?;
+    if arguments.compile_kernels {
+        return device.map_or(Ok(()), compile::run);
+    }
+    let Some(device) = device else {
+        return Err(Failure::new(
+            DIFFERENCE,
+            "nothing is proved: the CPU would be compared with itself; name a Vulkan device with \
+             --device, or leave that out for the first one (`tumble devices` lists them)",
+        ));
+    };
+    let out = arguments.out.as_deref();
+    if let Some(path) = out {
+        report::check_output(path, arguments.overwrite)?;
+    }
+    let proof = steps::prove(&Request {
+        device,
+        seconds: arguments.seconds,
+        quick: arguments.quick,
+        seed: arguments.seed,
+        validate: arguments.validate,
+    });
+    if let Some(path) = out {
+        proof.write(path)?;
+    }
+    if arguments.json {
+        words::json(&proof)?;
+    } else {
+        words::listing(&text::page(&proof))?;
+    }
+    let reasons = proof.reasons.join("; ");
+    match proof.verdict {
+        Verdict::Proved => Ok(()),
+        Verdict::BitsDiffer => Err(Failure::new(DEVICE, format!("bits differ: {reasons}"))),
+        Verdict::NotProved => Err(Failure::new(DIFFERENCE, format!("not proved: {reasons}"))),
+    }
+}

@@ -1,0 +1,588 @@
+//! What is run, in which order, and for how long. What a proof cannot do without runs first; what is left of
+//! the time is shared among the ways to use the device and random rounds.
+
+use std::collections::BTreeSet;
+use std::time::{Duration, Instant};
+
+use sha2::{Digest as _, Sha256};
+use tumble::verify::figures::figures;
+use tumble::verify::golden::Golden;
+use tumble::verify::random::{RandomRound, round};
+use tumble::verify::renderer::renderer;
+use tumble::{
+    Device, Engine, EngineOptions, Mapping, ReadBack, Reads, Transfer, Uploads, VulkanDevice,
+};
+
+use crate::commands::prove::report::{
+    CompileTimes, DeviceSection, Differing, Digest, FORMAT, FORMAT_VERSION, GoldenSection,
+    GoldenSetting, Kernels, NegativeControl, Proof, RandomSection, ValidationSection, Verdict,
+};
+use crate::commands::prove::{compile, device};
+use crate::messages::words;
+
+/// What is asked for.
+pub(crate) struct Request {
+    pub(crate) device: Device,
+    pub(crate) seconds: u64,
+    /// Only what a proof cannot do without.
+    pub(crate) quick: bool,
+    pub(crate) seed: u64,
+    pub(crate) validate: bool,
+}
+
+/// Differences that are described; all are counted.
+const DESCRIBED: usize = 20;
+
+/// Seconds of a random round that is worth a word.
+const LONG: u64 = 5;
+
+/// Shares of the time that is allowed, by the end of which a step starts nothing more.
+const COMPILED_BY: f64 = 0.2;
+const MEASURED_BY: f64 = 0.45;
+const VALIDATED_BY: f64 = 0.65;
+const RECORDED_BY: f64 = 0.85;
+const ENDED_BY: f64 = 0.99;
+
+/// Why a step ended early, in words.
+struct Stopped(String);
+
+impl<E: std::error::Error> From<E> for Stopped {
+    fn from(error: E) -> Self {
+        Self(error.to_string())
+    }
+}
+
+/// A way to use the device.
+#[derive(Clone)]
+struct Setting {
+    name: String,
+    options: EngineOptions,
+}
+
+/// How kernels read and what an invocation takes; how results and uploads are moved; a memory budget.
+type Ways = (
+    (Reads, Mapping, &'static str),
+    (Transfer, Uploads, ReadBack, &'static str),
+    Option<u64>,
+);
+
+impl Setting {
+    fn new((reading, moving, memory): Ways) -> Self {
+        let mut options = EngineOptions::default();
+        options.allow_inexact = true;
+        (options.reads, options.mapping) = (reading.0, reading.1);
+        (options.transfer, options.uploads, options.read_back) = (moving.0, moving.1, moving.2);
+        options.memory = memory;
+        let budget = match memory {
+            Some(bytes) => format!("{} KiB of memory", bytes >> 10),
+            None => "all memory".to_owned(),
+        };
+        Self {
+            name: format!("{}, {}, {budget}", reading.2, moving.3),
+            options,
+        }
+    }
+
+    /// Every way to read with every way to move results and both budgets. The first four have each of all
+    /// of these once at least.
+    fn all() -> Vec<Self> {
+        let reading = [
+            (Reads::StorageBuffers, Mapping::Samples, "samples"),
+            (Reads::StorageBuffers, Mapping::Runs, "runs"),
+            (Reads::TexelBuffers, Mapping::Runs, "runs of texels"),
+        ];
+        let (uploads, read_back) = (Uploads::Automatic, ReadBack::Automatic);
+        let moving = [
+            (Transfer::Automatic, uploads, read_back, "moved as chosen"),
+            (
+                Transfer::Staged,
+                Uploads::Staged,
+                ReadBack::Overlapped,
+                "staged, copied beside",
+            ),
+            (Transfer::InPlace, Uploads::Direct, read_back, "in place"),
+            (
+                Transfer::Staged,
+                Uploads::Direct,
+                ReadBack::SameQueue,
+                "staged, uploaded directly",
+            ),
+        ];
+        let budgets = [None, Some(256 << 10)];
+        let diagonal = (0..4).map(|index| (index % 3, index, index % 2));
+        let whole = (0..24).map(|index| (index % 3, index / 3 % 4, index / 12));
+        let mut known = BTreeSet::new();
+        let ordered = diagonal.chain(whole).filter(|place| known.insert(*place));
+        ordered
+            .map(|(r, m, b)| Self::new((reading[r], moving[m], budgets[b])))
+            .collect()
+    }
+}
+
+/// How many of [`Setting::all`] share out the recorded results in the first round.
+const FIRST_SETTINGS: usize = 4;
+
+/// A run in progress.
+struct Run<'a> {
+    request: &'a Request,
+    vulkan: &'a VulkanDevice,
+    started: Instant,
+    cpu: Engine,
+    golden: Golden,
+    settings: Vec<Setting>,
+    /// The first engines, kept for random rounds.
+    engines: Vec<Engine>,
+    proof: Proof,
+}
+
+/// Runs everything on a Vulkan device.
+pub(crate) fn prove(request: &Request) -> Proof {
+    let started = Instant::now();
+    let Device::Vulkan(vulkan) = &request.device else {
+        unreachable!("the CPU is refused before")
+    };
+    let mut proof = empty(request, vulkan);
+    match Engine::new(Device::Cpu) {
+        Ok(cpu) => {
+            let mut run = Run {
+                request,
+                vulkan,
+                started,
+                cpu,
+                golden: Golden::new(),
+                settings: Setting::all(),
+                engines: Vec::new(),
+                proof,
+            };
+            run.all();
+            proof = run.proof;
+        }
+        Err(error) => proof.failures.push(format!("the CPU: {error}")),
+    }
+    proof.seconds = started.elapsed().as_secs_f64();
+    proof.judge();
+    proof
+}
+
+/// A proof of nothing.
+fn empty(request: &Request, vulkan: &VulkanDevice) -> Proof {
+    let info = vulkan.info().clone();
+    Proof {
+        format: FORMAT,
+        format_version: FORMAT_VERSION,
+        verdict: Verdict::NotProved,
+        reasons: Vec::new(),
+        program: device::program(),
+        date: device::now(),
+        seconds: 0.0,
+        seconds_allowed: request.seconds,
+        host: device::host(),
+        negative_control: NegativeControl::default(),
+        device: DeviceSection {
+            info,
+            details: None,
+            choices: None,
+            bus: None,
+            opened_in: [0.0; 2],
+        },
+        self_tests: Vec::new(),
+        kernels: Kernels::default(),
+        golden: GoldenSection::default(),
+        random: RandomSection {
+            seed: request.seed,
+            ..RandomSection::default()
+        },
+        renderer: None,
+        validation: request.validate.then(ValidationSection::default),
+        compile_times: CompileTimes::default(),
+        figures: None,
+        failures: Vec::new(),
+    }
+}
+
+impl Run<'_> {
+    fn all(&mut self) {
+        self.step("opening the device", Self::open);
+        if self.engines.len() < FIRST_SETTINGS {
+            return; // it does not open: nothing else can run
+        }
+        self.step("kernels", Self::kernels);
+        self.step("negative control", Self::negative_control);
+        self.step("recorded results", Self::recorded_once);
+        self.step("a renderer's device", Self::renderer);
+        self.step("random sets and crowds", Self::random_once);
+        self.step_if_time("compiling", COMPILED_BY, Self::compile);
+        self.step_if_time("speed", MEASURED_BY, Self::measure);
+        if self.request.validate {
+            self.step("the validation layer", Self::validate);
+        }
+        if self.request.quick {
+            return;
+        }
+        let everywhere = "recorded results in every setting";
+        self.step_if_time(everywhere, RECORDED_BY, Self::recorded_everywhere);
+        let more = "more random sets and crowds";
+        self.step_if_time(more, ENDED_BY, Self::random_to_the_end);
+    }
+
+    /// Runs a step without which nothing is proved. An error of it is told, and the others run all the same.
+    fn step(&mut self, name: &str, work: fn(&mut Self) -> Result<(), Stopped>) {
+        let elapsed = self.started.elapsed().as_secs();
+        if self.is_past(1.0) {
+            let allowed = self.request.seconds;
+            let reason = format!("{name}: the {allowed} s were over (--seconds)");
+            self.proof.failures.push(reason);
+            return;
+        }
+        words::note(&format!("{elapsed:>4} s  {name} …"));
+        if let Err(Stopped(reason)) = work(self) {
+            self.proof.failures.push(format!("{name}: {reason}"));
+        }
+    }
+
+    /// Runs a step where that share of the time is not over.
+    fn step_if_time(&mut self, name: &str, share: f64, work: fn(&mut Self) -> Result<(), Stopped>) {
+        if !self.is_past(share) {
+            self.step(name, work);
+        }
+    }
+
+    /// Whether that share of the time is over.
+    fn is_past(&self, share: f64) -> bool {
+        self.left_until(share).is_zero()
+    }
+
+    fn left_until(&self, share: f64) -> Duration {
+        let end = Duration::from_secs(self.request.seconds).mul_f64(share);
+        end.saturating_sub(self.started.elapsed())
+    }
+
+    fn open(&mut self) -> Result<(), Stopped> {
+        let mut options = EngineOptions::default();
+        options.allow_inexact = true;
+        let mut opened_in = [0.0; 2];
+        for milliseconds in &mut opened_in {
+            let started = Instant::now();
+            let engine = Engine::with_options(self.request.device.clone(), &options)?;
+            *milliseconds = started.elapsed().as_secs_f64() * 1e3;
+            let device = &mut self.proof.device;
+            device.details = engine.device_details();
+            device.choices = engine.choices();
+            self.proof.self_tests = engine.self_tests().to_vec();
+        }
+        let device = &mut self.proof.device;
+        device.opened_in = opened_in;
+        let address = device
+            .details
+            .as_ref()
+            .and_then(|own| own.pci_address.clone());
+        device.bus = address.and_then(|address| device::bus(&address));
+        for setting in &self.settings[..FIRST_SETTINGS] {
+            let engine = Engine::with_options(self.request.device.clone(), &setting.options)?;
+            self.engines.push(engine);
+        }
+        Ok(())
+    }
+
+    /// Every kernel beside its twin: in engines that read by storage buffers and, where the device can, by
+    /// texel buffers, for which most kernels have a form of their own.
+    fn kernels(&mut self) -> Result<(), Stopped> {
+        let mut ran = BTreeSet::new();
+        let mut expected: BTreeSet<&str> = BTreeSet::new();
+        for reads in [Reads::StorageBuffers, Reads::TexelBuffers] {
+            let mut options = EngineOptions::default();
+            options.allow_inexact = true;
+            options.reads = reads;
+            let engine = Engine::with_options(self.request.device.clone(), &options)?;
+            let texels = engine.choices().map(|own| own.reads) == Some("texel-buffers");
+            if reads == Reads::TexelBuffers && !texels {
+                continue;
+            }
+            let all = tumble::kernels().map(|(name, _)| name);
+            expected.extend(all.filter(|name| name.ends_with("_texels") == texels));
+            for check in engine.check_kernels()? {
+                if !ran.insert(check.name) {
+                    continue;
+                }
+                self.proof.kernels.values += check.total as u64;
+                if check.differing > 0 {
+                    self.proof.kernels.differing.push(Differing {
+                        name: check.name.to_owned(),
+                        values: check.total as u64,
+                        differing: check.differing as u64,
+                    });
+                }
+            }
+        }
+        let kernels = &mut self.proof.kernels;
+        kernels.count = expected.len();
+        kernels.ran = expected.intersection(&ran).count();
+        kernels.missing = expected
+            .difference(&ran)
+            .map(|&name| name.to_owned())
+            .collect();
+        Ok(())
+    }
+
+    fn negative_control(&mut self) -> Result<(), Stopped> {
+        let engine = &self.engines[0];
+        let Some(found) = engine.negative_control()? else {
+            return Ok(());
+        };
+        let control = &mut self.proof.negative_control;
+        control.has_run = true;
+        control.must_differ = found.must_differ;
+        for expression in &found.expressions {
+            control.values += expression.total as u64;
+            control.differing += expression.differing as u64;
+            if expression.differing > 0 {
+                control.expressions.push(Differing {
+                    name: expression.name.to_owned(),
+                    values: expression.total as u64,
+                    differing: expression.differing as u64,
+                });
+            }
+        }
+        Ok(())
+    }
+
+    /// Compares a recorded result, in a setting.
+    fn compare_recorded(
+        &mut self,
+        case: usize,
+        setting: usize,
+        engine: &Engine,
+        compared: &mut BTreeSet<usize>,
+    ) -> Result<(), Stopped> {
+        let name = self.golden.name(case);
+        let setting = &self.settings[setting].name;
+        let found = self.golden.evaluate(case, engine);
+        let found = found.map_err(|error| Stopped(format!("{name} ({setting}): {error}")))?;
+        let is_same = Golden::recorded(name) == Some(&found.hash);
+        let section = &mut self.proof.golden;
+        section.bytes += found.bytes;
+        compared.insert(case);
+        let known = section
+            .by_setting
+            .iter()
+            .position(|own| own.setting == *setting);
+        let known = known.unwrap_or_else(|| {
+            section.by_setting.push(GoldenSetting {
+                setting: setting.clone(),
+                cases: 0,
+                differing: 0,
+            });
+            section.by_setting.len() - 1
+        });
+        let by_setting = &mut section.by_setting[known];
+        by_setting.cases += 1;
+        if !is_same {
+            by_setting.differing += 1;
+            let what = format!("{name} ({setting})");
+            section.differing.push(what);
+        }
+        Ok(())
+    }
+
+    /// Each recorded result once, shared out among the first settings.
+    fn recorded_once(&mut self) -> Result<(), Stopped> {
+        let cases = self.golden.count();
+        self.proof.golden.cases = Golden::recorded_count().max(cases);
+        self.proof.golden.settings = self.settings.len();
+        let mut compared = BTreeSet::new();
+        let engines = self.engines.clone();
+        let mut outcome = Ok(());
+        for case in 0..cases {
+            if self.is_past(1.0) {
+                break;
+            }
+            // A method has six cases: of the next one each goes to the next setting.
+            let setting = (case + case / 6) % engines.len();
+            outcome = self.compare_recorded(case, setting, &engines[setting], &mut compared);
+            if outcome.is_err() {
+                break;
+            }
+        }
+        self.proof.golden.cases_compared = compared.len();
+        outcome
+    }
+
+    /// All recorded results in one setting after the other, beginning with those that have had a part.
+    fn recorded_everywhere(&mut self) -> Result<(), Stopped> {
+        let mut compared = BTreeSet::new();
+        for index in 0..self.settings.len() {
+            if self.is_past(RECORDED_BY) {
+                return Ok(());
+            }
+            let options = self.settings[index].options.clone();
+            let engine = match self.engines.get(index) {
+                Some(engine) => engine.clone(),
+                None => Engine::with_options(self.request.device.clone(), &options)?,
+            };
+            for case in 0..self.golden.count() {
+                let is_done = index < FIRST_SETTINGS && (case + case / 6) % FIRST_SETTINGS == index;
+                if is_done {
+                    continue;
+                }
+                if self.is_past(RECORDED_BY) {
+                    return Ok(());
+                }
+                self.compare_recorded(case, index, &engine, &mut compared)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn renderer(&mut self) -> Result<(), Stopped> {
+        self.proof.renderer = Some(renderer(self.vulkan, false, self.request.seed)?);
+        Ok(())
+    }
+
+    /// One round after the other, with the next of the engines each.
+    fn random_rounds(&mut self, mut goes_on: impl FnMut(&Self) -> bool) -> Result<(), Stopped> {
+        while goes_on(self) {
+            let number = self.proof.random.rounds;
+            let engine = &self.engines[number as usize % self.engines.len()];
+            let started = Instant::now();
+            let found = round(engine, &self.cpu, self.request.seed, number)?;
+            let seconds = started.elapsed().as_secs();
+            if seconds >= LONG {
+                let what = &found.description;
+                words::note(&format!("        round {number} took {seconds} s: {what}"));
+            }
+            self.proof.random.add(&found);
+        }
+        Ok(())
+    }
+
+    fn random_once(&mut self) -> Result<(), Stopped> {
+        self.random_rounds(|run| run.proof.random.rounds < 8 && !run.is_past(1.0))
+    }
+
+    fn random_to_the_end(&mut self) -> Result<(), Stopped> {
+        self.random_rounds(|run| !run.is_past(ENDED_BY))
+    }
+
+    fn compile(&mut self) -> Result<(), Stopped> {
+        let limit = self.left_until(COMPILED_BY);
+        // A figure, without which the bits are what they are.
+        match compile::measure(&self.vulkan.info().uuid, limit) {
+            Ok(times) => self.proof.compile_times = times,
+            Err(reason) => words::warning(&reason),
+        }
+        Ok(())
+    }
+
+    fn measure(&mut self) -> Result<(), Stopped> {
+        let budget = self.left_until(MEASURED_BY);
+        self.proof.figures = Some(figures(self.vulkan, budget)?);
+        Ok(())
+    }
+
+    /// Expressions, recorded results, random rounds and a renderer's device under the validation layer.
+    fn validate(&mut self) -> Result<(), Stopped> {
+        let uuid = self.vulkan.info().uuid.clone();
+        let devices = Device::list_with(true)?;
+        let same = |device: &Device| device.uuid().as_ref() == Some(&uuid);
+        let device = devices.into_iter().find(same);
+        let device = device.ok_or(tumble::VulkanError::NoDevice)?;
+        let mut options = EngineOptions::default();
+        options.allow_inexact = true;
+        let engine = Engine::with_options(device, &options)?;
+        let mut found = ValidationSection::default();
+        // Cases far from each other, so that all kinds come where the time is short.
+        let (count, step) = (self.golden.count(), 101);
+        for index in 0..count {
+            if index >= 24 && self.is_past(VALIDATED_BY) {
+                break;
+            }
+            let case = index * step % count;
+            let made = self.golden.evaluate(case, &engine)?;
+            found.golden_cases += 1;
+            let is_same = Golden::recorded(self.golden.name(case)) == Some(&made.hash);
+            found.differing += u64::from(!is_same);
+        }
+        for number in 0..8 {
+            let made = round(&engine, &self.cpu, self.request.seed, number)?;
+            found.random_rounds += 1;
+            found.differing += made.differing;
+        }
+        let renderer = renderer(self.vulkan, true, self.request.seed)?;
+        found.renderer_values = renderer.checks.iter().map(|check| check.values).sum();
+        found.differing += (renderer.checks.iter())
+            .map(|check| check.differing)
+            .sum::<u64>();
+        let mut messages = engine.validation_messages();
+        messages.extend(renderer.validation_messages);
+        found.message_count = messages.len();
+        messages.truncate(DESCRIBED);
+        found.messages = messages;
+        found.has_run = true;
+        self.proof.validation = Some(found);
+        Ok(())
+    }
+}
+
+impl RandomSection {
+    fn add(&mut self, found: &RandomRound) {
+        let number = self.rounds;
+        self.rounds += 1;
+        self.values += found.values;
+        self.bytes += found.bytes;
+        self.rounds_refused += u64::from(found.values == 0);
+        self.crowds += u64::from(found.description.starts_with("crowd") && found.values > 0);
+        self.values_differing += found.differing;
+        if found.differing > 0 && self.differing.len() < DESCRIBED {
+            let first = found.first_difference.unwrap_or_default();
+            self.differing.push(format!(
+                "round {number} of seed {}: {} of {} values, the first at {first}: {}",
+                self.seed, found.differing, found.values, found.description
+            ));
+        }
+        self.chain(&found.hash);
+    }
+
+    /// Goes on with the hash of all rounds, and keeps it where their number is a power of two. The last of
+    /// `digests` stands for all rounds until then.
+    fn chain(&mut self, hash: &[u8; 32]) {
+        let before = self.chained;
+        self.chained = Sha256::new()
+            .chain_update(before)
+            .chain_update(hash)
+            .finalize()
+            .into();
+        if self.rounds.is_power_of_two() {
+            self.digests.push(Digest {
+                rounds: self.rounds,
+                hash: device::hexadecimal(&self.chained[..8]),
+            });
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Each way to read, to move results and each budget is in the first settings, and no two are alike.
+    #[test]
+    fn settings_are_all_there_are_and_the_first_have_each_way_once() {
+        let all = Setting::all();
+        assert_eq!(all.len(), 24);
+        let names: BTreeSet<&str> = all.iter().map(|own| own.name.as_str()).collect();
+        assert_eq!(names.len(), 24);
+        let first = &all[..FIRST_SETTINGS];
+        let count =
+            |of: fn(&Setting) -> String| first.iter().map(of).collect::<BTreeSet<_>>().len();
+        assert_eq!(
+            count(|own| format!("{:?} {:?}", own.options.reads, own.options.mapping)),
+            3
+        );
+        assert_eq!(
+            count(|own| format!("{:?} {:?}", own.options.transfer, own.options.uploads)),
+            4
+        );
+        assert_eq!(count(|own| format!("{:?}", own.options.memory)), 2);
+        assert!(all.iter().all(|own| own.options.allow_inexact));
+    }
+}

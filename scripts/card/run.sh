@@ -1,0 +1,142 @@
+#!/usr/bin/env bash
+# Proves the card of this machine: which devices there are, that they give the CPU's bits, that the validation
+# layer has nothing to say, and how fast they are. It takes at most eight minutes, needs no network, and leaves
+# everything in one folder beside it, with a summary.
+#
+#   ./run.sh                      the first Vulkan device
+#   ./run.sh --device NAME        another: index, part of the name or uuid:UUID
+#   ./run.sh --driver FILE        a driver in an unusual place: its manifest (.json) or its library (.so)
+#   ./run.sh --quick              in two minutes
+set -u
+here=$(cd "$(dirname "$0")" && pwd)
+cd "$here" || exit 1
+
+# Seconds of each step: allowed by the program, and after which it is ended.
+prove_seconds=190 prove_limit=215
+validate_seconds=70 validate_limit=110
+devices_limit=45 bench_limit=95
+device=() driver=""
+while [ $# -gt 0 ]; do
+    case "$1" in
+    --device) device=(--device "${2:?--device needs a name}") && shift 2 ;;
+    --driver) driver=${2:?--driver needs a file} && shift 2 ;;
+    --quick)
+        prove_seconds=40 prove_limit=60 validate_seconds=25 validate_limit=40
+        devices_limit=15 bench_limit=20
+        shift
+        ;;
+    *) sed -n '2,10s/^# \{0,1\}//p' "$0" && exit 2 ;;
+    esac
+done
+
+# Where this folder cannot be written, the results go where they can.
+name="results-$(uname -n)-$(date -u +%Y%m%d-%H%M%S)"
+results=$here/$name
+mkdir "$results" 2>/dev/null || results=$(mktemp -d)/$name && mkdir -p "$results" || exit 1
+summary=$results/summary.txt
+say() { echo "$*" | tee -a "$summary"; }
+
+# The system's loader where there is one: it is what programs here have. Else Debian's.
+if ! (PATH=$PATH:/sbin:/usr/sbin ldconfig -p 2>/dev/null | grep -q 'libvulkan\.so\.1'); then
+    export LD_LIBRARY_PATH=$here/lib${LD_LIBRARY_PATH:+:$LD_LIBRARY_PATH}
+    loader="the loader of this archive"
+else
+    loader="the system's loader"
+fi
+export VK_LAYER_PATH=$here/layers
+# Nothing is left behind, and nothing is known from before.
+export TUMBLE_CACHE_DIR="" MESA_SHADER_CACHE_DISABLE=true __GL_SHADER_DISK_CACHE=0
+
+# A manifest for a driver's library.
+manifest() {
+    local file=$results/driver-$(basename "$1").json
+    printf '{"file_format_version": "1.0.0", "ICD": {"library_path": "%s", "api_version": "1.3.0"}}\n' \
+        "$1" >"$file"
+    echo "$file"
+}
+# Loaders before 1.3.207 know the older name alone.
+use() { export VK_DRIVER_FILES=$1 VK_ICD_FILENAMES=$1; }
+sees_devices() { timeout -k 5 "$devices_limit" ./tumble devices 2>/dev/null | grep -q '^0  '; }
+
+# Containers often have NVIDIA's library and no manifest; where there is no X, only the one for EGL loads.
+find_nvidia() {
+    local folder library
+    for library in libGLX_nvidia.so.0 libEGL_nvidia.so.0; do
+        for folder in /usr/lib/x86_64-linux-gnu /usr/lib/aarch64-linux-gnu /usr/lib64 /usr/lib \
+            /usr/lib/x86_64-linux-gnu/nvidia/current /usr/local/nvidia/lib64 /usr/local/lib \
+            /run/opengl-driver/lib /usr/lib/wsl/lib; do
+            [ -e "$folder/$library" ] || continue
+            use "$(manifest "$folder/$library")"
+            sees_devices && return 0
+        done
+    done
+    unset VK_DRIVER_FILES VK_ICD_FILENAMES
+    return 1
+}
+manifests() {
+    ls /etc/vulkan/icd.d/*.json /usr/share/vulkan/icd.d/*.json /usr/local/etc/vulkan/icd.d/*.json \
+        /usr/local/share/vulkan/icd.d/*.json 2>/dev/null
+}
+if [ -n "$driver" ]; then
+    case "$driver" in
+    *.json) use "$driver" ;;
+    *) use "$(manifest "$driver")" ;;
+    esac
+    chosen="the driver that was named: $driver"
+elif [ -n "${VK_DRIVER_FILES:-}" ]; then
+    chosen="VK_DRIVER_FILES=$VK_DRIVER_FILES"
+elif manifests | grep -qi nvidia || [ ! -e /dev/nvidiactl ] && [ -n "$(manifests)" ]; then
+    chosen="the manifests of this system: $(manifests | tr '\n' ' ')"
+elif find_nvidia; then
+    chosen="NVIDIA's library without a manifest: $VK_DRIVER_FILES"
+else
+    chosen="no driver was found: $(manifests | tr '\n' ' ')"
+    [ ! -e /dev/nvidiactl ] ||
+        chosen="$chosen(there is /dev/nvidiactl: a container needs NVIDIA's \`graphics\` capability)"
+fi
+
+say "tumble on $(uname -n), $(date -u '+%Y-%m-%d %H:%M:%S') UTC"
+say "$(cat VERSION | tr '\n' ';')"
+say "$loader; $chosen"
+{
+    uname -a
+    cat /etc/os-release 2>/dev/null
+    ldd --version 2>&1 | head -1
+    nproc
+    grep -m1 'model name' /proc/cpuinfo
+    free -m 2>/dev/null
+    ls -l /dev/nvidia* /dev/dri 2>/dev/null
+    manifests
+    command -v nvidia-smi >/dev/null && timeout 20 nvidia-smi -q
+} >"$results/environment.txt" 2>&1
+
+# A step: its name, its limit, the command. What it says goes into files; its last line into the summary.
+worst=0
+step() {
+    local name=$1 limit=$2 started=$SECONDS code=0 outcome
+    shift 2
+    timeout -k 5 "$limit" "$@" >"$results/$name.txt" 2>"$results/$name.log" || code=$?
+    case $code in
+    0) outcome="done" ;;
+    124 | 137) outcome="ENDED after $limit s" ;;
+    *) outcome="exit code $code" ;;
+    esac
+    say "$(printf '%-16s %4d s  %s' "$name" $((SECONDS - started)) "$outcome")"
+    [ "$code" -eq 0 ] || sed 's/^/                  /' "$results/$name.log" | tail -3 | tee -a "$summary"
+    [ "$code" -le "$worst" ] || worst=$code
+}
+say ""
+step devices "$devices_limit" ./tumble devices
+step prove "$prove_limit" ./tumble prove "${device[@]}" --seconds "$prove_seconds" -o "$results/proof.json"
+step prove-validate "$validate_limit" \
+    ./tumble prove "${device[@]}" --seconds "$validate_seconds" --validate -o "$results/proof-validated.json"
+step bench "$bench_limit" ./tumble bench --rounds 3 --json
+say ""
+for page in devices prove prove-validate; do
+    say "--- $page"
+    say "$(cat "$results/$page.txt")"
+done
+tar --create --gzip --directory "$(dirname "$results")" --file "$results.tar.gz" "$(basename "$results")" \
+    2>/dev/null && echo "all of it: $results.tar.gz"
+echo "the summary: $summary"
+exit "$worst"
