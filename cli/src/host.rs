@@ -39,10 +39,11 @@ impl From<Failure> for Refused {
 #[must_use]
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     words::explain_panics();
-    let arguments = match Arguments::try_parse_from(arguments) {
+    let given: Vec<OsString> = arguments.into_iter().collect();
+    let arguments = match Arguments::try_parse_from(&given) {
         Ok(arguments) => arguments,
         Err(error) => {
-            let _ = error.print(); // a stream that is closed has no reader
+            words::usage(&error, &given);
             return error.exit_code() as u8;
         }
     };
@@ -64,9 +65,10 @@ pub fn set_probe(command: Vec<OsString>) {
 }
 
 /// Loads the Vulkan drivers. A driver may end the process that loads it, so that a child process
-/// does this before anything else opens a device.
+/// does this before anything else opens a device, and says on standard output that it came through.
 pub fn load_drivers() {
     let _ = Device::list(); // what goes wrong here goes wrong again where it is told about
+    let _ = words::listing(&format!("{}\n", probe::LOADED)); // whoever asked may have gone away
 }
 
 /// The names of all Vulkan devices, in the order of their indices.

@@ -440,3 +440,86 @@ fn csv() {
     ];
     fuzz_motion("csv", targets::tables::csv, fixtures("csv"), &words);
 }
+
+#[test]
+fn meshes() {
+    let words = [
+        "v 0 0 0\n",
+        "v 1 0 0\n",
+        "v 0 1 0\n",
+        "f 1 2 3\n",
+        "f -1 -2 -3\n",
+        "f 1/1 2/2 3/3\n",
+        "usemtl\n",
+        "o \n",
+        "\\\n",
+        "nan",
+        "1e300",
+        "4294967296",
+        "ply\n",
+        "format ascii 1.0\n",
+        "format binary_little_endian 1.0\n",
+        "element vertex 3\n",
+        "element face 1\n",
+        "property list uchar int vertex_indices\n",
+        "end_header\n",
+        "3 0 1 2\n",
+        "\"mesh\":0",
+        "\"primitives\":[{\"attributes\":{\"POSITION\":1}}]",
+        "\"indices\":0",
+        "\"mode\":5",
+        "\"scene\":0",
+    ];
+    let ply = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n\
+               property float z\nelement face 1\nproperty list uchar int vertex_indices\n\
+               end_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+    let gltf = r#"{"asset":{"version":"2.0"},"nodes":[{"mesh":0}],
+        "meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}],
+        "accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3"}],
+        "bufferViews":[{"buffer":0,"byteLength":36}],"buffers":[{"byteLength":36,
+        "uri":"data:;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA"}]}"#;
+    let mut seeds: Vec<Vec<u8>> = vec![
+        b"v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n".to_vec(),
+        ply.into(),
+        gltf.into(),
+    ];
+    seeds.extend(fixtures("glb"));
+    fuzz_motion("meshes", targets::surfaces::meshes, seeds, &words);
+}
+
+/// Also headers that nest, and that say they are longer than any file.
+#[test]
+fn paths_and_numbers() {
+    let array = |shape: &str, numbers: usize| {
+        let dictionary = format!("{{'descr': '<f4', 'fortran_order': False, 'shape': {shape}, }}");
+        let header = format!("{dictionary:117}\n");
+        let start = &b"\x93NUMPY\x01\0\x76\0"[..];
+        [start, header.as_bytes(), &vec![0; 4 * numbers]].concat()
+    };
+    let mut seeds = vec![
+        array("(1, 3, 3)", 9),
+        array("(2, 2, 3)", 12),
+        b"\x93NUMPY\x02\0\xff\xff\xff\xff".to_vec(),
+        [&b"\x93NUMPY\x01\0\x80\0{'descr': "[..], &[b'['; 118]].concat(),
+    ];
+    let words = [
+        "'<f8'",
+        "'>f4'",
+        "'<f2'",
+        "True",
+        "(2, 2, 3)",
+        "(99999999999, 4, 3)",
+        "((",
+        "[[[[",
+        "{",
+        "}",
+    ];
+    let target = targets::surfaces::numbers;
+    fuzz_motion("numbers", target, seeds.clone(), &words);
+    seeds.push(b"t,x,y,z,ux,uy,uz\n0,0,0,0,0,1,0\n1,1,0,0,,,\n".to_vec());
+    seeds.push(b"x,y,z\n0,0,0\n1,1,0\n".to_vec());
+    let words = [
+        "t,", "x,y,z\n", "0,0,0,0\n", "1e39", "nan", "-1", ",,,", "\u{feff}", "(1, 3, 3)", "'<f8'",
+    ];
+    fuzz_motion("paths", targets::surfaces::paths, seeds, &words);
+}

@@ -73,6 +73,7 @@ const SILENT: &[&[&str]] = &[
     &["--overwrite"],
     &["--pipes"],
     &["--max-size", "1GiB"],
+    &["--max-memory", "1GiB"],
     &["--device", "cpu"],
     &["--explain-route"],
     &["--json"],

@@ -3,6 +3,8 @@
 
 use std::fmt;
 
+use crate::printable::printable;
+
 /// Whether an input is refused, or read with a reservation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Severity {
@@ -38,7 +40,8 @@ impl fmt::Display for Place {
 
 /// One thing to say about an input.
 ///
-/// Displayed as `FILE:PLACE: error[CODE]: what is wrong, the value, the fix`.
+/// Displayed as `FILE:PLACE: error[CODE]: what is wrong, the value, the fix`, on one line, without what a
+/// terminal would obey ([`printable`]).
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Diagnostic {
     /// The input's name, as it was given.
@@ -55,15 +58,15 @@ pub struct Diagnostic {
 
 impl fmt::Display for Diagnostic {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}:", self.file)?;
+        write!(f, "{}:", printable(&self.file))?;
         if let Some(place) = &self.place {
-            write!(f, "{place}:")?;
+            write!(f, "{}:", printable(&place.to_string()))?;
         }
         let severity = match self.code.severity() {
             Severity::Error => "error",
             Severity::Warning => "warning",
         };
-        write!(f, " {severity}[{}]: {}", self.code, self.message)?;
+        write!(f, " {severity}[{}]: {}", self.code, printable(&self.message))?;
         if self.count > 1 {
             write!(f, " ({} times; this is the first)", self.count)?;
         }
@@ -151,6 +154,7 @@ codes! {
     EqualTimes = "E028", "two keys at one time", "The values differ, so one of the keys has to go: --duplicates first or last says which.";
     Time = "E030", "not a list of times", "A list of times has finite numbers of seconds, separated by blanks, commas or line ends.";
     Map = "E032", "not a map of arrays or columns", "`--map` says what a file's arrays or columns are: entries `name=source[3:7]:order`, separated by commas, whose sources are in the file.";
+    Memory = "E034", "more memory than an input of its length may take", "An input gets 64 times its length and 64 MiB (`--max-memory`); this one says that it holds more, by counts, by data that is packed or by parts that name one part many times.";
     // E1xx and W1xx: glTF.
     Glb = "E100", "not a whole GLB", "A GLB has a header that says its length, a JSON chunk, and whole chunks behind it.";
     GltfVersion = "E101", "not glTF 2.0", "Only version 2.0 is read; every exporter of today writes it.";
@@ -230,6 +234,12 @@ codes! {
     // E6xx: paths.
     Path = "E601", "not a path", "A path is CSV with the header `t,x,y,z,ux,uy,uz`, of which `t` and `ux,uy,uz` may be missing, or NPY of shape (tracks, points, 3). An upward direction has a length; its cells may be blank.";
     PathTimes = "E602", "no times, or too many", "A path whose file has no times needs --seconds or --rate; one that has times takes neither.";
+    // E61x: what ways lead over, and who goes.
+    Mesh = "E610", "not a mesh", "A mesh is OBJ, PLY, GLB or glTF with faces of three corners or more, whose corners are there and are numbers.";
+    Net = "E611", "not a net", "A net of control points is NPY of floats and of shape (m, n, 3), each side 2 to 32.";
+    Pairs = "E612", "not a pair", "Each line has six numbers: x y z of the start, then of the goal.";
+    Walkers = "E613", "not a walker", "A walker has radius, speed, x, y, z, to_x, to_y and to_z, and a plain name; what moves on a track of its own has radius and track, whose rows are t, x, y, z with increasing times.";
+    Offsets = "E614", "offsets that do not fit", "There are three numbers for each joint: where it is in its parent, in the order of the joints.";
     ByteOrderMark = "W001", "a byte-order mark", "It is skipped; save the file without one.";
     MixedLineEnds = "W002", "mixed line ends", "Some lines end in CR LF, others in LF.";
     HeaderWords = "W003", "words after the header's numbers", "They are ignored.";

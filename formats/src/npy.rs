@@ -1,15 +1,17 @@
 //! NPY: float32 (or float16, or int16), C order, shape `(tracks, frames, …)` or
 //! `(frames, tracks, …)`, four numbers a rotation or as its encoding has it.
 
+use std::borrow::Cow;
 use std::io::{self, Write};
 
 use glam::Quat;
-use npyz::WriterBuilder;
-
 use tumble::{ComponentType, Encoding, Layout};
 
+use crate::diagnostic::{Code, Diagnostic};
 use crate::format::{Format, FormatOption, ResultShape, ResultWriter, WriteResults};
-use crate::npz::open_npy;
+use crate::npz::array::Array;
+use crate::npz::header::{Element, Header};
+use crate::npz::{Numbers, open_npy};
 
 /// The order of a quaternion's components in a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
@@ -51,6 +53,49 @@ pub static FORMAT: Format = Format {
     features: &[],
     options: &FormatOption::OF_ARRAYS,
 };
+
+/// Reads an array whose meaning its reader knows: points of paths, nets of control points. It is of floats
+/// (f2, f4 or f8, of either byte order, in C's or Fortran's order); `file` is what messages call it. `is_right` judges its shape before a number is read, and says in words what
+/// is wrong.
+///
+/// # Errors
+/// When the bytes are no such array, or the shape is wrong.
+pub fn read_numbers(
+    file: &str,
+    bytes: &[u8],
+    is_right: impl FnOnce(&[usize]) -> Result<(), String>,
+) -> Result<Numbers, Diagnostic> {
+    let refuse = |code, message: String| Diagnostic::new(file, code, message);
+    let header = Header::parse(bytes).map_err(|why| {
+        let message = format!("the array's header cannot be read: {why}");
+        refuse(Code::ArrayHeader, message)
+    })?;
+    if !header.element.is_float() {
+        let message = format!("the array is of {}; save it as float32 or float64", header.element);
+        return Err(refuse(Code::ElementType, message));
+    }
+    is_right(&header.shape).map_err(|message| refuse(Code::Shape, message))?;
+    let found = bytes.len() - header.start;
+    if header.byte_count() != Some(found) {
+        let message = format!("an array {header} has not the {found} bytes behind the header");
+        return Err(refuse(Code::ArraySize, message));
+    }
+    let array = Array {
+        header: &header,
+        bytes: Cow::Borrowed(bytes),
+    };
+    let values = array.numbers().unwrap_or_default();
+    Ok(Numbers {
+        shape: header.shape.clone(),
+        values,
+    })
+}
+
+/// The shape of the array that some bytes begin with; `None` where they are none, or its header is not
+/// whole.
+pub(crate) fn shape_of(start: &[u8]) -> Option<Vec<usize>> {
+    Header::parse(start).ok().map(|header| header.shape)
+}
 
 /// Rotations written at once, so that a signal is noticed soon: 4 MB.
 const PIECE: usize = 1 << 18;
@@ -110,19 +155,13 @@ impl<W: Write> NpyWriter<W> {
             let message = format!("{rows} × {columns} rotations are more than a file can hold");
             return Err(io::Error::new(io::ErrorKind::InvalidInput, message));
         };
-        let own = encoding.shape().iter().map(|&length| length as u64);
-        let shape: Vec<u64> = [rows as u64, columns as u64]
-            .into_iter()
-            .chain(own)
-            .collect();
-        let mut header = Vec::new();
-        // The values are written below, whole slices at a time.
-        match encoding.component_type() {
-            ComponentType::F32 => write_header::<f32>(&mut header, "<f4", &shape)?,
-            ComponentType::F16 => write_header::<half::f16>(&mut header, "<f2", &shape)?,
-            ComponentType::Snorm16 => write_header::<i16>(&mut header, "<i2", &shape)?,
-        }
-        writer.write_all(&header)?;
+        let shape = [&[rows, columns], encoding.shape()].concat();
+        let element = match encoding.component_type() {
+            ComponentType::F32 => Element::F32,
+            ComponentType::F16 => Element::F16,
+            ComponentType::Snorm16 => Element::Signed(2),
+        };
+        writer.write_all(&Header::write(&element, &shape))?;
         Ok(Self {
             writer,
             order,
@@ -182,19 +221,6 @@ impl<W: Write> NpyWriter<W> {
         self.writer.flush()?;
         Ok(self.writer)
     }
-}
-
-fn write_header<T: npyz::Serialize>(
-    header: &mut Vec<u8>,
-    dtype: &str,
-    shape: &[u64],
-) -> io::Result<()> {
-    npyz::WriteOptions::<T>::new()
-        .dtype(npyz::DType::Plain(dtype.parse().map_err(io::Error::other)?))
-        .shape(shape)
-        .writer(header)
-        .begin_nd()
-        .map(drop)
 }
 
 #[cfg(test)]

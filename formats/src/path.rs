@@ -9,6 +9,7 @@ use tumble::TrackSet;
 
 use crate::diagnostic::{Code, Diagnostic, Place};
 use crate::format::ReadOptions;
+use crate::npy;
 use crate::source::Source;
 use crate::text::number;
 
@@ -62,8 +63,7 @@ pub fn looks_like_paths(path: &Path) -> bool {
         return false;
     }
     if start.starts_with(b"\x93NUMPY") {
-        let header = npyz::NpyFile::new(&start[..]);
-        return header.is_ok_and(|array| matches!(array.shape(), [_, _, 3]));
+        return npy::shape_of(&start).is_some_and(|shape| matches!(shape[..], [_, _, 3]));
     }
     let line = start.split(|byte| matches!(byte, b'\n' | b'\r')).next();
     let line = String::from_utf8_lossy(line.unwrap_or_default()).to_lowercase();
@@ -218,46 +218,19 @@ fn of_text(file: &str, bytes: &[u8]) -> Result<Points, Diagnostic> {
 
 fn of_array(file: &str, bytes: &[u8]) -> Result<Vec<Points>, Diagnostic> {
     let refuse = |code, message: String| Diagnostic::new(file, code, message);
-    let array =
-        npyz::NpyFile::new(bytes).map_err(|error| refuse(Code::ArrayHeader, error.to_string()))?;
-    let shape = array.shape().to_vec();
-    let [tracks, points, 3] = shape[..] else {
-        let message = format!("the array has the shape {shape:?}; paths have (tracks, points, 3)");
-        return Err(refuse(Code::Shape, message));
-    };
-    let count = tracks
-        .checked_mul(points)
-        .and_then(|count| count.checked_mul(3));
-    if array.order() != npyz::Order::C {
-        return Err(refuse(
-            Code::Shape,
-            "the array is in Fortran's order; save it in C's".to_owned(),
-        ));
-    }
-    if count.is_none_or(|count| count > bytes.len() as u64) {
-        let message = format!("the file has not the bytes of an array of the shape {shape:?}");
-        return Err(refuse(Code::ArraySize, message));
-    }
+    let array = npy::read_numbers(file, bytes, |shape| match shape {
+        [_, _, 3] => Ok(()),
+        _ => Err(format!(
+            "the array has the shape {shape:?}; paths have (tracks, points, 3)"
+        )),
+    })?;
+    let (tracks, points) = (array.shape[0], array.shape[1]);
     if tracks == 0 || points == 0 {
         return Err(refuse(
             Code::NoKeys,
             "there is no point in the array".to_owned(),
         ));
     }
-    let size = |error: std::io::Error| refuse(Code::ArraySize, error.to_string());
-    let numbers: Vec<f64> = match array.dtype().descr().trim_matches(['\'', '"']) {
-        "<f8" | "=f8" | ">f8" => array.into_vec::<f64>().map_err(size)?,
-        "<f4" | "=f4" | ">f4" => array
-            .into_vec::<f32>()
-            .map_err(size)?
-            .into_iter()
-            .map(f64::from)
-            .collect(),
-        other => {
-            let message = format!("the array is of {other}; points are f4 or f8");
-            return Err(refuse(Code::ElementType, message));
-        }
-    };
     let of_track = |(track, own): (usize, &[f64])| -> Result<Points, Diagnostic> {
         let points = own
             .as_chunks::<3>()
@@ -276,8 +249,9 @@ fn of_array(file: &str, bytes: &[u8]) -> Result<Vec<Points>, Diagnostic> {
             }),
         }
     };
-    numbers
-        .chunks(points as usize * 3)
+    array
+        .values
+        .chunks(points * 3)
         .enumerate()
         .map(of_track)
         .collect()

@@ -2,9 +2,10 @@
 
 use std::io::{self, Write};
 
-use npyz::WriterBuilder;
-
 use tumble::{Timeline, TrackSet};
+
+use crate::csv::text_cell;
+use crate::npz::header::{Element, Header};
 
 /// What the numbers of a local transform are called: moved, turned, scaled.
 pub const TRANSFORM: [&str; 10] = ["tx", "ty", "tz", "x", "y", "z", "w", "sx", "sy", "sz"];
@@ -37,14 +38,12 @@ impl Poses<'_> {
             self.set.track_count(),
             self.components.len(),
         ];
-        let mut header = Vec::new();
-        npyz::WriteOptions::<f32>::new()
-            .default_dtype()
-            .shape(&shape.map(|length| length as u64))
-            .writer(&mut header)
-            .begin_nd()?
-            .extend(self.numbers.iter().copied())?;
-        writer.write_all(&header)
+        writer.write_all(&Header::write(&Element::F32, &shape))?;
+        if cfg!(target_endian = "little") {
+            return writer.write_all(bytemuck::cast_slice(self.numbers));
+        }
+        let mut numbers = self.numbers.iter();
+        numbers.try_for_each(|number| writer.write_all(&number.to_le_bytes()))
     }
 
     /// Writes CSV: `frame,time,<track>.<component>,…`, a line a frame.
@@ -58,7 +57,8 @@ impl Poses<'_> {
         let mut row = vec!["frame".to_owned(), "time".to_owned()];
         for track in 0..tracks {
             let name = self.set.track_name(track);
-            let component = |component| format!("{name}.{component}");
+            let component =
+                |component| text_cell(&format!("{name}.{component}")).into_owned();
             row.extend(self.components.iter().map(component));
         }
         csv.write_record(&row)?;

@@ -220,6 +220,7 @@ fn long_lines_are_read_once() {
     let limits = Limits {
         line: 20,
         file: 300,
+        memory: None,
     };
     let options = ReadOptions {
         limits,

@@ -52,6 +52,7 @@ fn limits_refuse_before_memory_runs_out() {
     let limits = Limits {
         line: 1000,
         file: 5000,
+        memory: None,
     };
     let options = ReadOptions {
         limits,

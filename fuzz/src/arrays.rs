@@ -14,6 +14,7 @@ fn options(map: Option<&str>) -> ReadOptions {
         limits: Limits {
             line: 4096,
             file: 65_536,
+            memory: None,
         },
         source_rate: FrameRate::new(30, 1).ok(),
         map: map.map(str::to_owned),

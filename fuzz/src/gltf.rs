@@ -16,6 +16,7 @@ pub(crate) fn gltf(bytes: &[u8]) -> u64 {
         limits: Limits {
             line: 4096,
             file: 65_536,
+            memory: None,
         },
         ..ReadOptions::default()
     };

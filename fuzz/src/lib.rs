@@ -20,6 +20,9 @@ pub fn target(name: &str, data: &[u8]) {
         "parquet" => targets::tables::parquet,
         "arrow" => targets::tables::arrow,
         "csv" => targets::tables::csv,
+        "meshes" => targets::surfaces::meshes,
+        "paths" => targets::surfaces::paths,
+        "numbers" => targets::surfaces::numbers,
         _ => panic!("there is no target {name}"),
     };
     target(data);

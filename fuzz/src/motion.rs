@@ -17,6 +17,7 @@ fn options() -> ReadOptions {
         limits: Limits {
             line: 4096,
             file: 65_536,
+            memory: None,
         },
         ..ReadOptions::default()
     }

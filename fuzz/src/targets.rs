@@ -31,6 +31,9 @@ pub(crate) mod gltf;
 #[path = "motion.rs"]
 pub(crate) mod motion;
 
+#[path = "surfaces.rs"]
+pub(crate) mod surfaces;
+
 #[path = "tables.rs"]
 pub(crate) mod tables;
 

@@ -1,7 +1,7 @@
 //! What a comparison of a device with the CPU and with the reference found.
 
 use pyo3::prelude::*;
-use tumble::verify::verify;
+use tumble::verify::{Verdict, verify};
 use tumble::{Engine, Quantity};
 use tumble_formats::motion::Motion;
 
@@ -29,9 +29,12 @@ pub(crate) struct Verification {
     max_norm_error: f64,
     /// The largest `max_error` that is allowed, rad.
     error_bound: f64,
-    /// Whether all bits agree and all errors are within their bounds, those of velocities,
-    /// matrices and other outputs included.
+    /// Whether a Vulkan device was compared with the CPU, all bits agree and all errors are within
+    /// their bounds, those of velocities, matrices and other outputs included.
     passes: bool,
+    /// "passed", "reference-only" (the CPU is near the reference, and no device took part), "nothing"
+    /// (there was no sample) or "failed".
+    verdict: &'static str,
 }
 
 impl Verification {
@@ -46,8 +49,10 @@ impl Verification {
             rms_error: 0.0,
             max_norm_error: 0.0,
             error_bound: 0.0,
-            passes: true,
+            passes: false,
+            verdict: Verdict::Nothing.name(),
         };
+        let mut verdict: Option<Verdict> = None;
         let with = request.with(Quantity::Rotation);
         let sets = sets(clip, request)?;
         let is_one = sets.len() == 1;
@@ -59,7 +64,7 @@ impl Verification {
             if is_one {
                 all.method = found.method;
             }
-            all.passes &= found.passes();
+            verdict = verdict.max(Some(found.verdict()));
             all.device = found.device;
             let squares = |rms: f64, count: u64| rms * rms * count as f64;
             let sum =
@@ -71,6 +76,8 @@ impl Verification {
             all.max_norm_error = all.max_norm_error.max(found.max_norm_error);
             all.error_bound = all.error_bound.max(found.error_bound);
         }
+        let verdict = verdict.unwrap_or(Verdict::Nothing);
+        (all.passes, all.verdict) = (verdict == Verdict::Passed, verdict.name());
         Ok(all)
     }
 }
@@ -83,7 +90,7 @@ impl Verification {
             self.rotations,
             self.method,
             self.device.as_deref().unwrap_or("CPU"),
-            if self.passes { "passes" } else { "fails" },
+            self.verdict,
             self.differing,
             self.max_error,
             self.error_bound,

@@ -232,7 +232,9 @@ def test_streams_of_mixed_samplers_are_the_whole(tmp_path, engine):
 
 def test_verification(clip, engine):
     found = engine.verify(clip, fps=25, method="c2")
-    assert found.passes and found.differing == 0 and found.rotations == 3 * 51
+    assert (found.verdict, found.passes) == ("reference-only", False)  # no device took part
+    assert found.differing == 0 and found.rotations == 3 * 51
+    assert engine.verify(clip, at=[], method="c2").verdict == "nothing"
     assert (found.method, found.device) == ("c2", None)
     assert 0 < found.rms_error <= found.max_error <= found.error_bound == 1e-6
 
@@ -244,7 +246,7 @@ def test_all_devices_have_the_same_bits(clip):
         assert engine.device == name
         assert np.array_equal(engine.evaluate(clip, fps=240), expected)
         found = engine.verify(clip, fps=24)
-        assert found.passes and found.device == name
+        assert found.passes and found.verdict == "passed" and found.device == name
 
 
 def test_every_method_is_there(clip):

@@ -14,8 +14,8 @@ pub enum VulkanError {
         /// What the system said.
         reason: String,
     },
-    /// A loader, but no device that can compute.
-    #[error("Vulkan is installed but offers no device with a compute queue")]
+    /// A loader, but no driver, or none with a device that can compute.
+    #[error("the Vulkan loader finds no driver with a device that can compute; install one (Debian: mesa-vulkan-drivers)")]
     NoDevice,
     /// A driver ends the process that loads it.
     #[error(
@@ -137,7 +137,6 @@ fn hint(result: vk::Result) -> &'static str {
             "; lower the memory budget"
         }
         vk::Result::ERROR_DEVICE_LOST => "; the driver gave up on the device",
-        vk::Result::ERROR_INCOMPATIBLE_DRIVER => "; no driver is installed",
         _ => "",
     }
 }

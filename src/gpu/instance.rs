@@ -29,12 +29,28 @@ struct Messenger {
 
 impl Instance {
     /// Loads Vulkan and creates an instance of version 1.1 or newer.
+    ///
+    /// # Errors
+    /// [`VulkanError::NoLoader`] without a loader, [`VulkanError::NoDevice`] without a driver; else the
+    /// call that failed.
     pub(crate) fn new(validation: bool) -> Result<Arc<Self>, VulkanError> {
         Self::of_version(validation, vk::API_VERSION_1_3)
     }
 
     /// The same for an application that asks for that version of Vulkan.
     pub(crate) fn of_version(validation: bool, api_version: u32) -> Result<Arc<Self>, VulkanError> {
+        // So say loaders that find no driver.
+        let is_absence = |error: &VulkanError| {
+            matches!(error, VulkanError::Call { result, .. }
+                if *result == vk::Result::ERROR_INCOMPATIBLE_DRIVER)
+        };
+        Self::create(validation, api_version).map_err(|error| match is_absence(&error) {
+            true => VulkanError::NoDevice,
+            false => error,
+        })
+    }
+
+    fn create(validation: bool, api_version: u32) -> Result<Arc<Self>, VulkanError> {
         // SAFETY: loading a library runs its initialisers; that is what is asked for.
         let entry = unsafe { ash::Entry::load() }.map_err(|error| VulkanError::NoLoader {
             reason: error.to_string(),

@@ -88,13 +88,62 @@ pub struct Place {
     pub time: f64,
 }
 
+/// What a comparison came to. Of several, the greatest is that of all.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
+#[non_exhaustive]
+pub enum Verdict {
+    /// A Vulkan device gives the CPU's bits, and they are within their bounds of the f64 reference.
+    Passed,
+    /// The CPU's results are within their bounds of the f64 reference. No Vulkan device took part, so
+    /// that no two devices were compared.
+    ReferenceOnly,
+    /// There was no sample: nothing was compared with anything.
+    Nothing,
+    /// Bits differ between the device and the CPU, or an error is over its bound.
+    Failed,
+}
+
+impl Verdict {
+    /// `passed`, `reference-only`, `nothing` or `failed`.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Passed => "passed",
+            Self::ReferenceOnly => "reference-only",
+            Self::Nothing => "nothing",
+            Self::Failed => "failed",
+        }
+    }
+}
+
+impl std::fmt::Display for Verdict {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.pad(self.name())
+    }
+}
+
 impl Verification {
-    /// Whether all bits agree and all errors are within their bounds.
-    pub fn passes(&self) -> bool {
-        self.differing == 0
-            && self.max_error <= self.error_bound
+    /// What was compared with what, and what came of it.
+    #[must_use]
+    pub fn verdict(&self) -> Verdict {
+        let is_within_bounds = self.max_error <= self.error_bound
             && self.max_norm_error <= self.norm_bound
-            && self.outputs.iter().all(OutputVerification::passes)
+            && self.outputs.iter().all(OutputVerification::passes);
+        match self.device {
+            _ if self.rotations == 0 => Verdict::Nothing,
+            _ if self.differing > 0 || !is_within_bounds => Verdict::Failed,
+            Some(_) => Verdict::Passed,
+            None => Verdict::ReferenceOnly,
+        }
+    }
+
+    /// Whether a Vulkan device was compared with the CPU, all bits agree and all errors are within
+    /// their bounds. `false` where nothing was compared, and on an engine of the CPU's: see
+    /// [`Verification::verdict`].
+    pub fn passes(&self) -> bool {
+        self.verdict() == Verdict::Passed
     }
 }
 
@@ -102,13 +151,18 @@ impl Verification {
 /// rotation and all that follows from it: velocities, accelerations, encodings.
 ///
 /// ```
-/// use tumble::{Engine, Frames, TrackSet, method, verify::verify};
+/// use tumble::{Engine, Frames, TrackSet, method};
+/// use tumble::verify::{Verdict, verify};
 /// # use glam::Quat;
 /// # let mut set = TrackSet::new();
 /// # set.push("", &[0.0, 1.0], &[Quat::IDENTITY, Quat::from_rotation_x(1.0)])?;
 /// let engine = Engine::auto()?;
 /// let found = verify(&engine, &set, method::SLERP.into(), &Frames::fps(25))?;
-/// assert!(found.passes());
+/// match found.verdict() {
+///     Verdict::Passed => println!("{} gives the CPU's bits", engine.device_name()),
+///     Verdict::ReferenceOnly => println!("no Vulkan device took part"),
+///     verdict => panic!("{verdict}: {found:?}"),
+/// }
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 ///

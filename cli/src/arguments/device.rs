@@ -152,6 +152,11 @@ impl DeviceArguments {
         self.open_any()
     }
 
+    /// Whether the CPU was asked for.
+    pub(crate) fn is_cpu(&self) -> bool {
+        self.device == Choice::Cpu
+    }
+
     /// The same device for commands that compare it with the CPU: the first Vulkan device where the
     /// command line names none.
     pub(crate) fn compared(&self, given: &Given) -> Self {
@@ -385,12 +390,8 @@ pub(crate) fn refused(error: &Error) -> Failure {
 pub(crate) fn is_absence(error: &VulkanError) -> bool {
     match error {
         VulkanError::NoLoader { .. } | VulkanError::NoDevice | VulkanError::Driver { .. } => true,
-        // So say loaders that find no driver, or none that works.
-        VulkanError::Call { result, .. } => [
-            vk::Result::ERROR_INCOMPATIBLE_DRIVER,
-            vk::Result::ERROR_INITIALIZATION_FAILED,
-        ]
-        .contains(result),
+        // So say loaders whose drivers do not work.
+        VulkanError::Call { result, .. } => *result == vk::Result::ERROR_INITIALIZATION_FAILED,
         _ => false,
     }
 }
@@ -399,11 +400,7 @@ pub(crate) fn is_absence(error: &VulkanError) -> bool {
 fn short_reason(error: &Error) -> String {
     match error {
         Error::Vulkan(VulkanError::NoLoader { .. }) => "no Vulkan: no loader library".to_owned(),
-        Error::Vulkan(VulkanError::NoDevice) => "no Vulkan: no device".to_owned(),
-        Error::Vulkan(VulkanError::Call {
-            result: vk::Result::ERROR_INCOMPATIBLE_DRIVER,
-            ..
-        }) => "no Vulkan: no driver is installed".to_owned(),
+        Error::Vulkan(VulkanError::NoDevice) => "no Vulkan: no driver".to_owned(),
         Error::Vulkan(error) if is_absence(error) => format!("no Vulkan: {error}"),
         _ => error.to_string(),
     }

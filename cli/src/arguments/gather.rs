@@ -9,6 +9,7 @@ use tumble_formats::Format;
 use walkdir::WalkDir;
 
 use crate::arguments::input::{self, is_standard};
+use crate::arguments::wildcard::{self, is_pattern};
 use crate::messages::exit::Failure;
 use crate::messages::words;
 
@@ -128,16 +129,11 @@ fn below(directory: &Path) -> Vec<Found> {
 /// The files that a pattern matches: shells expand patterns, but not in lists, not in
 /// quotes, and not on every system.
 fn matches(pattern: &Path) -> Vec<Found> {
-    let Some(text) = pattern
-        .to_str()
-        .filter(|text| text.contains(['*', '?', '[']))
-    else {
+    let Some(text) = pattern.to_str().filter(|text| is_pattern(text)) else {
         return Vec::new();
     };
-    let Ok(paths) = glob::glob(text) else {
-        return Vec::new();
-    };
-    let files = paths.filter_map(Result::ok).filter(|path| path.is_file());
+    let files = wildcard::paths(text).into_iter();
+    let files = files.filter(|path| path.is_file());
     files
         .map(|path| {
             let below = path.file_name().unwrap_or(path.as_os_str()).into();

@@ -19,13 +19,14 @@ pub(crate) struct Given {
 /// Options that decide over no byte of a result: which inputs and outputs there are, what may be
 /// read and replaced, who computes, and what is said. Times may come from standard input, so that
 /// who reads them says what they are.
-const SILENT: [&str; 16] = [
+const SILENT: [&str; 17] = [
     "allow_inexact",
     "device",
     "explain_route",
     "files_from",
     "format",
     "json",
+    "max_memory",
     "max_size",
     "memory",
     "out",

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use tumble_formats::motion::Motion;
+use tumble_formats::printable::{printable, printable_path};
 use tumble_formats::times::open_times;
 use tumble_formats::{Code, Diagnostic, Format, Limits, Loaded, ReadOptions};
 
@@ -30,6 +31,10 @@ pub(crate) struct Inputs {
     /// The largest input to read
     #[arg(long, value_name = "SIZE", default_value = "16GiB", value_parser = words::parse_bytes)]
     max_size: u64,
+    /// The most memory that reading an input may take beside the input itself [default: 64 times its
+    /// length, and 64MiB]
+    #[arg(long, value_name = "SIZE", value_parser = words::parse_bytes)]
+    max_memory: Option<u64>,
     #[command(flatten)]
     pub(crate) reading: Reading,
     #[command(flatten)]
@@ -46,14 +51,14 @@ pub(crate) fn name(path: &Path) -> String {
     if is_standard(path) {
         "standard input".to_owned()
     } else {
-        path.display().to_string()
+        printable_path(path)
     }
 }
 
 /// `folder/walk.dat` is `walk.dat` in titles.
 pub(crate) fn file_name(path: &Path) -> String {
     match path.file_name() {
-        Some(name) if !is_standard(path) => name.to_string_lossy().into_owned(),
+        Some(own) if !is_standard(path) => printable_path(Path::new(own)),
         _ => name(path),
     }
 }
@@ -114,12 +119,17 @@ impl Inputs {
     }
 
     /// As [`Inputs::load`], for commands that work on one clip.
-    pub(crate) fn load_one(&self, path: &Path) -> Result<Motion, Failure> {
+    pub(crate) fn load_one(&self, path: &Path) -> Result<OnlyClip, Failure> {
         let mut loaded = self.load(path)?;
-        if loaded.clips.len() > 1 {
-            return Err(several(path, &loaded));
+        let rest = whole(&name(path), &loaded);
+        match loaded.clips.pop() {
+            Some(clip) if loaded.clips.is_empty() => Ok(OnlyClip { clip, rest }),
+            Some(clip) => {
+                loaded.clips.push(clip);
+                Err(several(path, &loaded))
+            }
+            None => Err(no_clips(path)),
         }
-        Ok(loaded.clips.remove(0))
     }
 
     /// As [`Inputs::load`], without a word of its warnings.
@@ -131,6 +141,7 @@ impl Inputs {
     pub(crate) fn options(&self) -> ReadOptions {
         let limits = Limits {
             file: self.max_size,
+            memory: self.max_memory,
             ..Limits::default()
         };
         self.reading.options(limits, self.pipes)
@@ -142,6 +153,7 @@ impl Inputs {
         let refuse = |diagnostic: Diagnostic| {
             let hint = match diagnostic.code {
                 Code::FileTooLong => " (--max-size)",
+                Code::Memory => " (--max-memory)",
                 Code::NotAFile if !self.pipes => " (--pipes reads named pipes)",
                 _ => "",
             };
@@ -152,14 +164,38 @@ impl Inputs {
             None => Format::open_detected(path, &options),
         };
         let mut loaded = read.map_err(refuse)?;
-        if loaded.clips.is_empty()
-            && let Some(first) = loaded.refused.first()
-        {
-            return Err(Failure::input(first, ""));
+        match (loaded.clips.is_empty(), loaded.refused.is_empty()) {
+            (true, true) => return Err(no_clips(path)),
+            (true, false) => return Err(Failure::parts(&loaded.refused)),
+            (false, _) => {}
         }
         self.reading.apply(&mut loaded, path)?;
         Ok(loaded)
     }
+}
+
+/// The clip of a file, for commands that work on one.
+pub(crate) struct OnlyClip {
+    pub(crate) clip: Motion,
+    /// Fails where other animations of the file were refused: what is made of this one is not all that
+    /// was asked for.
+    pub(crate) rest: Result<(), Failure>,
+}
+
+/// Fails where animations of an input were refused; the others are done by then.
+pub(crate) fn whole(name: &str, loaded: &Loaded) -> Result<(), Failure> {
+    let refused: u64 = loaded.refused.iter().map(|fault| fault.count).sum();
+    if refused == 0 {
+        return Ok(());
+    }
+    let all = refused + loaded.clips.len() as u64;
+    let message = format!("{name}: {refused} of {all} animations failed");
+    Err(Failure::new(exit::SOME_INPUTS, message))
+}
+
+fn no_clips(path: &Path) -> Failure {
+    let message = format!("{}: has no animation that moves anything", name(path));
+    Failure::new(exit::ALL_INPUTS, message)
 }
 
 /// Says what is remarkable about an input.
@@ -180,8 +216,10 @@ pub(crate) fn several(path: &Path, loaded: &Loaded) -> Failure {
 
 /// What messages call a clip of a file with several.
 pub(crate) fn clip_name(clip: &Motion) -> String {
-    let place = clip.place;
-    clip.name.clone().unwrap_or_else(|| place.to_string())
+    match &clip.name {
+        Some(name) => printable(name).into_owned(),
+        None => clip.place.to_string(),
+    }
 }
 
 pub(crate) fn clip_names(loaded: &Loaded) -> String {

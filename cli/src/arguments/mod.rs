@@ -13,3 +13,4 @@ pub(crate) mod time;
 pub(crate) mod tolerance;
 pub(crate) mod tracks;
 pub(crate) mod what;
+pub(crate) mod wildcard;

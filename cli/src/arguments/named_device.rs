@@ -47,13 +47,13 @@ pub(super) fn named(given: &str, devices: &[Device]) -> Result<Device, Failure> 
             let hint = words::nearest(given, known)
                 .map(|near| format!("; did you mean `{near}`?"))
                 .unwrap_or_default();
-            Err(Failure::usage(format!(
-                "there is no device `{given}`{hint}\n{list}"
-            )))
+            let message = format!("there is no device `{given}`{hint}");
+            Err(Failure::usage(message).with_lines(list))
         }
         _ => Err(Failure::usage(format!(
-            "`{given}` could be several devices; give more of the name, or the index\n{list}"
-        ))),
+            "`{given}` could be several devices; give more of the name, or the index"
+        ))
+        .with_lines(list)),
     }
 }
 
@@ -67,24 +67,18 @@ fn by_uuid(given: &str, uuid: &str, devices: &[Device]) -> Result<Device, Failur
         None => {
             let lines = devices.iter().map(|device| {
                 let uuid = device.uuid().unwrap_or_default();
-                format!("\n  uuid:{uuid}  {}", device.name())
+                format!("  uuid:{uuid}  {}", device.name())
             });
-            let list: String = lines.collect();
-            Err(Failure::usage(format!(
-                "there is no device `{given}`; there are{list}"
-            )))
+            let message = format!("there is no device `{given}`; there are");
+            Err(Failure::usage(message).with_lines(lines))
         }
     }
 }
 
-fn listing(devices: &[Device]) -> String {
-    let lines: Vec<String> = devices
-        .iter()
-        .enumerate()
-        .map(|(index, device)| format!("  {index}  {}", device.name()))
-        .collect();
-    format!(
-        "  there are: auto, first, cpu, vulkan, and\n{}",
-        lines.join("\n")
-    )
+fn listing(devices: &[Device]) -> Vec<String> {
+    let lines = devices.iter().enumerate();
+    let lines = lines.map(|(index, device)| format!("  {index}  {}", device.name()));
+    std::iter::once("  there are: auto, first, cpu, vulkan, and".to_owned())
+        .chain(lines)
+        .collect()
 }

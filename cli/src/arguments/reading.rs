@@ -10,7 +10,7 @@ use tumble_formats::adjust::{adjust, set_offsets};
 use tumble_formats::format::{FormatOption, TimeUnit};
 use tumble_formats::keys::Duplicates;
 use tumble_formats::motion::Motion;
-use tumble_formats::{FORMATS, Format, Limits, Loaded, ReadOptions};
+use tumble_formats::{Code, Diagnostic, FORMATS, Format, Limits, Loaded, ReadOptions};
 
 use crate::arguments::input::{clip_names, name, times};
 use crate::messages::exit::{self, Failure};
@@ -205,11 +205,9 @@ impl Reading {
             let offsets = times(file)?;
             for clip in &mut loaded.clips {
                 set_offsets(clip, &offsets).map_err(|error| {
-                    let (name, file) = (name(path), file.display());
-                    Failure::new(
-                        exit::ALL_INPUTS,
-                        format!("{name}: --offsets {file}: {error}"),
-                    )
+                    let message = format!("{}: {error}", name(path));
+                    let file = file.display().to_string();
+                    Failure::input(&Diagnostic::new(file, Code::Offsets, message), "")
                 })?;
             }
         }

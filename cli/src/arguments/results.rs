@@ -10,7 +10,7 @@ use tumble_formats::motion::Motion;
 use tumble_formats::{Feature, Format, Loaded};
 
 use crate::arguments::gather::Gathered;
-use crate::arguments::input::{Inputs, clip_name, is_standard, name, several, tell_warnings};
+use crate::arguments::input::{Inputs, clip_name, is_standard, name, several, tell_warnings, whole};
 use crate::batch::digest::InputFile;
 use crate::batch::output::{self, Plan, Target, Wish};
 use crate::batch::place::Place;
@@ -210,14 +210,7 @@ pub(crate) fn each_file(
             done(target.name(), made)
         })?;
     }
-    match loaded.refused.len() {
-        0 => Ok(()),
-        refused => {
-            let all = refused + loaded.clips.len();
-            let message = format!("{name}: {refused} of {all} animations failed");
-            Err(Failure::new(SOME_INPUTS, message))
-        }
-    }
+    whole(name, loaded)
 }
 
 /// Makes something of each clip of an input. A failure is reported and the others go on, unless they
@@ -255,7 +248,7 @@ fn for_clips<T>(
 fn file_names(clips: &[Motion]) -> Vec<String> {
     let is_plain = |c: char| c.is_alphanumeric() || matches!(c, '-' | '_' | '.' | ' ');
     let plain = |clip: &Motion| -> String {
-        let name = clip_name(clip);
+        let name = clip.name.clone().unwrap_or_else(|| clip.place.to_string());
         let each = name.chars().map(|c| if is_plain(c) { c } else { '_' });
         each.collect()
     };

@@ -4,9 +4,9 @@ use std::borrow::Cow;
 use std::str::FromStr;
 
 use clap::Args;
-use glob::{MatchOptions, Pattern};
 use tumble_formats::motion::Motion;
 
+use crate::arguments::wildcard::{Wildcard, is_pattern};
 use crate::messages::exit::Failure;
 use crate::messages::words;
 
@@ -32,7 +32,7 @@ struct Selector {
 enum Meaning {
     Name,
     Places(usize, usize),
-    Pattern(Pattern),
+    Pattern(Wildcard),
 }
 
 impl FromStr for Selector {
@@ -50,9 +50,7 @@ impl FromStr for Selector {
             _ if text.is_empty() => {
                 return Err("give a name, a place, a range or a pattern".to_owned());
             }
-            _ if text.contains(['*', '?', '[']) => {
-                Meaning::Pattern(Pattern::new(text).map_err(|error| error.to_string())?)
-            }
+            _ if is_pattern(text) => Meaning::Pattern(Wildcard::new(text)?),
             _ => Meaning::Name,
         };
         Ok(Self {
@@ -76,10 +74,7 @@ impl Selector {
             Meaning::Places(_, last) if *last >= names.len() => Vec::new(),
             Meaning::Places(first, last) => (*first..=*last).collect(),
             Meaning::Pattern(pattern) => {
-                let options = MatchOptions::new();
-                all()
-                    .filter(|&track| pattern.matches_with(&names[track], options))
-                    .collect()
+                all().filter(|&track| pattern.matches(&names[track])).collect()
             }
         }
     }

@@ -34,6 +34,22 @@ pub(crate) fn in_memory(
     }
 }
 
+/// Refuses more samples than anybody waits for, or sees in a picture.
+pub(crate) fn to_draw(name: &str, samples: usize) -> Result<(), Failure> {
+    const MOST: usize = 1 << 24;
+    match samples <= MOST {
+        true => Ok(()),
+        false => Err(Failure::new(
+            USAGE,
+            format!(
+                "{name}: {} are more than the {MOST} that are drawn; ask for fewer (--fps, --start, \
+                 --end)",
+                words::count(samples, "frame")
+            ),
+        )),
+    }
+}
+
 /// Whether `bytes` more fit on the disk that holds `folder`.
 pub(crate) fn on_disk(
     name: &str,

@@ -13,7 +13,7 @@ use crate::batch::digest::InputFile;
 use crate::batch::manifest::{Entry, Previous, kernels_sha256};
 use crate::batch::output::Target;
 use crate::batch::place::Written;
-use crate::messages::exit::{Failure, for_all};
+use crate::messages::exit::{DEVICE, Failure, for_all};
 use crate::messages::{signals, words};
 
 /// How a batch is done.
@@ -83,7 +83,12 @@ impl<R: Fn(&Path) -> Result<Loaded, Failure> + Sync> Batch<R> {
         let outcome = thread::scope(|scope| {
             // One is waiting at most: two sets are in memory.
             let (hand_over, inputs) = sync_channel(0);
-            scope.spawn(move || self.read_all(jobs, &previous, &hand_over));
+            let reader = thread::Builder::new()
+                .spawn_scoped(scope, move || self.read_all(jobs, &previous, &hand_over));
+            if let Err(error) = reader {
+                let message = format!("the system refuses a thread: {error}; allow more (ulimit -u)");
+                return Err(Failure::new(DEVICE, message));
+            }
             let mut make = |path: &Path, target: &Target, records: &mut dyn Records| {
                 if let Some(stop) = signals::stopped() {
                     return Err(stop);
@@ -109,7 +114,7 @@ impl<R: Fn(&Path) -> Result<Loaded, Failure> + Sync> Batch<R> {
                         output: name.to_owned(),
                         output_bytes: digest.bytes(),
                         output_sha256: digest.finish(),
-                        input: input::name(path),
+                        input: path.display().to_string(),
                         input_sha256: file.sha256().map(str::to_owned),
                         options: self.options.clone(),
                         kernels_sha256: kernels_sha256().to_owned(),

@@ -6,6 +6,8 @@ use clap::Args;
 use serde::Serialize;
 use tumble::{Device, DeviceInfo, Engine, EngineOptions, SelfTestReport, VulkanError};
 
+use tumble_formats::printable::printable;
+
 use crate::commands::probe;
 use crate::messages::exit::Failure;
 use crate::messages::words;
@@ -116,9 +118,9 @@ impl Entry {
         let info = &self.info;
         let kind = serde_json::to_value(info.kind).unwrap_or_default();
         let [x, y, z] = info.max_compute_work_group_count;
-        let _ = writeln!(text, "{}  {}", self.index, info.name);
+        let _ = writeln!(text, "{}  {}", self.index, printable(&info.name));
         let _ = writeln!(text, "   kind        {}", kind.as_str().unwrap_or_default());
-        let _ = writeln!(text, "   driver      {}", info.driver);
+        let _ = writeln!(text, "   driver      {}", printable(&info.driver));
         let _ = writeln!(text, "   Vulkan      {}", info.api_version);
         let _ = writeln!(text, "   uuid        {}", info.uuid);
         let _ = writeln!(
@@ -142,7 +144,7 @@ impl Entry {
 
     fn verdict(&self) -> String {
         if let Some(error) = &self.error {
-            return format!("unknown: it could not be opened: {error}");
+            return format!("unknown: it could not be opened: {}", printable(error));
         }
         let failed: Vec<String> = self
             .self_tests

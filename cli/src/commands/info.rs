@@ -80,12 +80,12 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let inputs = arguments.inputs.distinct(false)?;
     let outcome = for_each(&inputs, |path| {
         let loaded = arguments.inputs.load_quietly(path)?;
+        let name = input::name(path);
         let several = loaded.clips.len() + loaded.refused.len() > 1;
         for (place, clip) in loaded.clips.iter().enumerate() {
             let animation = several.then(|| input::clip_name(clip));
-            let name = input::name(path);
             let clip = arguments.inputs.tracks.select(clip, &name)?;
-            let mut summary = Summary::new(name, animation, &clip, &loaded);
+            let mut summary = Summary::new(name.clone(), animation, &clip, &loaded);
             // They are those of the file.
             if place > 0 {
                 summary.warnings.clear();
@@ -95,7 +95,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         for refused in &loaded.refused {
             words::note(&refused.to_string());
         }
-        Ok(())
+        input::whole(&name, &loaded)
     });
     if arguments.json {
         words::json(&summaries)?;

@@ -1,6 +1,7 @@
 //! A driver may end the process that loads it. So a process of its own loads them first.
 
 use std::ffi::OsString;
+use std::io::Read;
 use std::process::{Command, ExitStatus, Stdio};
 use std::sync::OnceLock;
 use std::time::{Duration, Instant};
@@ -17,6 +18,12 @@ pub(crate) struct Arguments {}
 
 /// The command's name.
 const COMMAND: &str = "probe-drivers";
+
+/// What a process says that has loaded the drivers: one that a driver ended has not come so far.
+pub(crate) const LOADED: &str = "tumble: the Vulkan drivers are loaded";
+
+/// More is not read of what it says: as much as a pipe holds.
+const MOST_SAID: u64 = 1 << 16;
 
 /// Drivers answer in tens of milliseconds; one that has not by now does not.
 const PATIENCE: Duration = Duration::from_secs(10);
@@ -67,14 +74,20 @@ fn command() -> Option<Command> {
 fn load_elsewhere() -> Option<String> {
     let mut child = command()?
         .stdin(Stdio::null())
-        .stdout(Stdio::null())
+        .stdout(Stdio::piped())
         .stderr(Stdio::null())
         .spawn()
         .ok()?; // without processes there is nothing to learn
     let started = Instant::now();
     loop {
         match child.try_wait() {
-            Ok(Some(status)) => return fate(status),
+            Ok(Some(status)) => {
+                let mut said = String::new();
+                // A driver may have written much beside it, or left a process that holds the pipe open.
+                let out = child.stdout.take().map(|out| out.take(MOST_SAID));
+                let _ = out.map(|mut out| out.read_to_string(&mut said));
+                return fate(status, said.contains(LOADED));
+            }
             Ok(None) if started.elapsed() < PATIENCE => {
                 std::thread::sleep(Duration::from_millis(1));
             }
@@ -87,8 +100,10 @@ fn load_elsewhere() -> Option<String> {
     }
 }
 
-fn fate(status: ExitStatus) -> Option<String> {
-    (!status.success()).then(|| format!("the process that tried ended with {status}"))
+/// `has_come_through`: a driver may end the process with any status, 0 too.
+fn fate(status: ExitStatus, has_come_through: bool) -> Option<String> {
+    (!status.success() || !has_come_through)
+        .then(|| format!("the process that tried ended with {status}"))
 }
 
 #[cfg(test)]

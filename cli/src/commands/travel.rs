@@ -10,6 +10,7 @@ use tumble_formats::motion::Motion;
 use tumble_formats::path::looks_like_paths;
 use tumble_formats::sample::ChannelMethods;
 use tumble_formats::world::world;
+use tumble_formats::{Code, Diagnostic};
 use tumble_routes::mesh::Mesh;
 
 use crate::arguments::device::Opened;
@@ -48,8 +49,9 @@ impl Scenery {
         let read = |path: &PathBuf| match Surface::read(path)? {
             Surface::Mesh(mesh) => Ok(*mesh),
             Surface::Net(net) => net.facets(FACETS).map_err(|error| {
-                let message = format!("{}: cannot be drawn: {error}", path.display());
-                Failure::new(ALL_INPUTS, message)
+                let message = format!("cannot be drawn: {error}");
+                let fault = Diagnostic::new(path.display().to_string(), Code::Net, message);
+                Failure::input(&fault, "")
             }),
         };
         self.meshes.iter().map(read).collect()

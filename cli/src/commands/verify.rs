@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use clap::Args;
 use serde::Serialize;
-use tumble::verify::Verification;
+use tumble::verify::{Verdict, Verification};
 use tumble::{Method, TrackSet};
 
 use crate::arguments::device::{DeviceArguments, Opened};
@@ -14,7 +14,7 @@ use crate::arguments::input::Inputs;
 use crate::arguments::interpolation::{Manner, Selection, chosen, methods};
 use crate::arguments::time::{Samples, Sampling};
 use crate::batch::room;
-use crate::messages::exit::{DIFFERENCE, Failure, for_each};
+use crate::messages::exit::{ALL_INPUTS, DIFFERENCE, Failure, NO_VULKAN, for_each};
 use crate::messages::progress::Progress;
 use crate::messages::words;
 
@@ -25,7 +25,9 @@ Every rotation of every frame is computed three times: on the device, by its f32
 twin on the CPU, and by a textbook implementation in f64. The bits of the first two
 must agree; the error against the third has a bound. So is what follows from the
 rotations: velocities, accelerations, every encoding. Exit code 8 when not. The device is the
-first Vulkan device where --device names none: the CPU would be compared with itself.
+first Vulkan device where --device names none: the CPU would be compared with itself. Where there is
+none, the CPU is compared with f64 alone, and the exit code is 5; --device cpu asks for that, and it
+is 0.
 
 Examples:
   tumble verify data/pendulum.dat
@@ -63,7 +65,9 @@ struct Line {
     input: String,
     #[serde(flatten)]
     found: Verification,
+    /// A Vulkan device gives the CPU's bits, near the reference.
     pass: bool,
+    verdict: Verdict,
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
@@ -87,12 +91,19 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
             };
             let clip = arguments.inputs.tracks.select(clip, &name)?;
             let set = (&*name, &clip.set);
-            lines.extend(arguments.compare(&device, &samples, set, &methods, &mut progress)?);
+            let found = arguments.compare(&device, &samples, set, &methods, &mut progress)?;
+            let is_nothing = found.iter().any(|line| line.verdict == Verdict::Nothing);
+            lines.extend(found);
+            if is_nothing {
+                let message = "has no frames in this range: nothing was compared";
+                return Err(Failure::new(ALL_INPUTS, format!("{name}: {message}")));
+            }
         }
-        Ok(())
+        input::whole(&name, &loaded)
     });
     drop(progress);
-    let failing = lines.iter().filter(|line| !line.pass).count();
+    let is_failed = |line: &&Line| line.verdict == Verdict::Failed;
+    let failing = lines.iter().filter(is_failed).count();
     if arguments.json {
         words::json(&lines)?;
     } else {
@@ -104,6 +115,11 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
             lines.len()
         );
         return Err(Failure::new(DIFFERENCE, message));
+    }
+    if !device.is_vulkan() && !arguments.device.is_cpu() {
+        let message = "no Vulkan device took part: the CPU was compared with the f64 reference alone \
+                       (--device cpu asks for that)";
+        return outcome.and(Err(Failure::new(NO_VULKAN, message)));
     }
     outcome
 }
@@ -129,6 +145,7 @@ impl Arguments {
             lines.push(Line {
                 input: name.to_owned(),
                 pass: found.passes(),
+                verdict: found.verdict(),
                 found,
             });
             progress.advance(1);
@@ -195,7 +212,11 @@ impl Line {
             found.error_bound,
             found.rms_error,
             found.max_norm_error,
-            if self.pass { "pass" } else { "FAIL" },
+            match self.verdict {
+                Verdict::Passed => "pass",
+                Verdict::Failed => "FAIL",
+                other => other.name(),
+            },
         );
         for output in found.outputs.iter().filter(|output| !output.passes()) {
             let _ = writeln!(

@@ -5,6 +5,7 @@ use std::io;
 use tumble::{Error, VulkanError};
 use tumble_formats::Diagnostic;
 use tumble_formats::output::OutputError;
+use tumble_formats::printable::printable;
 
 use crate::messages::words;
 
@@ -25,6 +26,8 @@ pub(crate) const BROKEN_PIPE: u8 = 141;
 pub(crate) struct Failure {
     pub(crate) code: u8,
     message: String,
+    /// Lines below it.
+    more: Vec<String>,
     /// The message says itself that it is an error.
     plain: bool,
     /// An output that cannot be written, where another one may be.
@@ -36,6 +39,7 @@ impl Failure {
         Self {
             code,
             message: message.into(),
+            more: Vec::new(),
             plain: false,
             is_of_one: false,
         }
@@ -62,6 +66,12 @@ impl Failure {
         self
     }
 
+    /// The same with lines below it.
+    pub(crate) fn with_lines(mut self, lines: impl IntoIterator<Item = String>) -> Self {
+        self.more.extend(lines);
+        self
+    }
+
     /// Data could not be written. A reader that went away knows it already.
     pub(crate) fn writing(place: &str, error: &io::Error) -> Self {
         let message = match error.kind() {
@@ -74,6 +84,17 @@ impl Failure {
         Self {
             is_of_one: is_of_one(error),
             ..Self::new(OUTPUT, message)
+        }
+    }
+
+    /// An input of which nothing could be read: each of its parts was refused for a reason of its own.
+    pub(crate) fn parts(refused: &[Diagnostic]) -> Self {
+        let mut each = refused.iter().map(ToString::to_string);
+        let first = each.next().unwrap_or_default();
+        Self {
+            more: each.collect(),
+            plain: true,
+            ..Self::new(ALL_INPUTS, first)
         }
     }
 
@@ -112,9 +133,11 @@ impl Failure {
         Self::new(code, format!("{input}: {error}"))
     }
 
-    /// What it says.
+    /// What it says, as [`Failure::report`] shows it.
     pub(crate) fn into_message(self) -> String {
-        self.message
+        let lines = std::iter::once(&self.message).chain(&self.more);
+        let lines: Vec<_> = lines.map(|line| printable(line)).collect();
+        lines.join("\n")
     }
 
     /// What it says.
@@ -133,6 +156,9 @@ impl Failure {
             words::note(&self.message);
         } else if !self.message.is_empty() {
             words::error(&self.message);
+        }
+        for line in &self.more {
+            words::note(line);
         }
         self.code
     }
@@ -175,25 +201,34 @@ pub(crate) fn for_all<T>(
     work: impl FnMut(&T) -> Result<(), Failure>,
 ) -> Result<(), Failure> {
     let total = refused.len() + inputs.len();
-    let mut failed = 0;
+    // An input of which some animations are done has not failed as a whole.
+    let (mut failed, mut partly) = (0, 0);
     for outcome in (refused.into_iter().map(Err)).chain(inputs.iter().map(work)) {
         match outcome {
             Ok(()) => {}
             Err(failure) if failure.is_final() || total == 1 => return Err(failure),
             Err(failure) => {
                 failure.report();
-                failed += 1;
+                match failure.code {
+                    SOME_INPUTS => partly += 1,
+                    _ => failed += 1,
+                }
             }
         }
     }
-    match failed {
+    match failed + partly {
         0 => Ok(()),
         _ if failed == total => Err(Failure::new(
             ALL_INPUTS,
             format!("all {failed} inputs failed"),
         )),
         _ => {
-            let message = format!("{failed} of {total} inputs failed; the others are done");
+            let partly = match partly {
+                0 => String::new(),
+                partly => format!(" (and {partly} in part)"),
+            };
+            let message =
+                format!("{failed} of {total} inputs failed{partly}; the others are done");
             Err(Failure::new(SOME_INPUTS, message))
         }
     }

@@ -7,6 +7,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
+use tumble_formats::printable::printable;
 
 /// Work that shows no bar before this is over.
 const PATIENCE: Duration = Duration::from_secs(1);
@@ -74,13 +75,14 @@ pub(crate) fn busy<T>(what: &str, work: impl FnOnce() -> T) -> T {
     }
     let (done, finished) = mpsc::channel::<()>();
     thread::scope(|scope| {
-        scope.spawn(move || {
+        // Without a thread for it there is no spinner.
+        let _ = thread::Builder::new().spawn_scoped(scope, move || {
             // A sender that is dropped ends the wait, also when the work panics.
             if finished.recv_timeout(PATIENCE) == Err(mpsc::RecvTimeoutError::Timeout) {
                 let style = ProgressStyle::with_template("{spinner} {msg} {elapsed}")
                     .unwrap_or_else(|_| ProgressStyle::default_spinner());
                 let spinner = ProgressBar::new_spinner().with_style(style);
-                spinner.set_message(what.to_owned());
+                spinner.set_message(printable(what).into_owned());
                 spinner.enable_steady_tick(Duration::from_millis(100));
                 let _ = finished.recv();
                 spinner.finish_and_clear();

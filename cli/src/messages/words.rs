@@ -4,26 +4,60 @@
 //! set. A standard error that is closed must not end the program, so what it
 //! refuses is lost.
 
+use std::ffi::OsString;
 use std::io::{self, Write};
 use std::time::Duration;
+
+use tumble_formats::guarded::is_guarded;
+use tumble_formats::printable::{printable, printable_lines};
 
 use crate::messages::exit::Failure;
 
 pub(crate) fn error(message: &str) {
+    let message = printable(message);
     let _ = writeln!(anstream::stderr(), "\x1b[1;31merror:\x1b[0m {message}");
 }
 
 pub(crate) fn warning(message: &str) {
+    let message = printable(message);
     let _ = writeln!(anstream::stderr(), "\x1b[1;33mwarning:\x1b[0m {message}");
 }
 
+/// One line, whatever names are in it.
 pub(crate) fn note(message: &str) {
-    let _ = writeln!(anstream::stderr(), "{message}");
+    let _ = writeln!(anstream::stderr(), "{}", printable(message));
 }
 
-/// Writes a listing to standard output. A reader that has seen enough (`| head`)
-/// is no failure.
+/// Says what is wrong with the command line, or helps. clap writes words of the command line as they
+/// are, and a shell's pattern puts names of files among them.
+pub(crate) fn usage(error: &clap::Error, given: &[OsString]) {
+    let mut text = error.render().ansi().to_string();
+    for word in given {
+        let word = word.to_string_lossy();
+        let shown = printable(&word);
+        // Also the part behind `--option=`.
+        let parts = word.split('=').zip(shown.split('='));
+        for (word, shown) in std::iter::once((&*word, &*shown)).chain(parts) {
+            if word != shown {
+                text = text.replace(word, shown);
+            }
+        }
+    }
+    // A stream that is closed has no reader.
+    let _ = match error.use_stderr() {
+        true => write!(anstream::stderr(), "{text}"),
+        false => write!(anstream::stdout(), "{text}"),
+    };
+}
+
+/// Writes a listing to standard output. Names in it went through [`printable`], so that none begins a
+/// line. A reader that has seen enough (`| head`) is no failure.
 pub(crate) fn listing(text: &str) -> Result<(), Failure> {
+    styled_listing(&printable_lines(text))
+}
+
+/// As [`listing`], with colours: of names that all went through [`printable`].
+pub(crate) fn styled_listing(text: &str) -> Result<(), Failure> {
     let mut out = anstream::stdout().lock();
     match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
@@ -37,23 +71,45 @@ pub(crate) fn listing(text: &str) -> Result<(), Failure> {
 pub(crate) fn json(value: &impl serde::Serialize) -> Result<(), Failure> {
     let text =
         serde_json::to_string_pretty(value).expect("names are strings and numbers are numbers");
-    listing(&format!("{text}\n"))
+    styled_listing(&format!("{}\n", json_printable(&text)))
+}
+
+/// JSON whose strings have escapes for all that a terminal would obey: what is no ASCII stands in strings
+/// alone, and serde escapes the controls below it.
+fn json_printable(text: &str) -> String {
+    let mut shown = String::with_capacity(text.len());
+    for character in text.chars() {
+        let mut units = [0; 2];
+        if character == '\n' || printable(character.encode_utf8(&mut [0; 4])).len() == character.len_utf8() {
+            shown.push(character);
+        } else {
+            for unit in character.encode_utf16(&mut units) {
+                shown.push_str(&format!("\\u{unit:04x}"));
+            }
+        }
+    }
+    shown
 }
 
 /// A panic is a bug of ours: say so, and what to send.
 pub(crate) fn explain_panics() {
     std::panic::set_hook(Box::new(|info| {
         let what = info.payload_as_str().unwrap_or("no reason given");
+        // A library's, on broken bytes, which becomes a message about the input.
+        if is_guarded() {
+            return;
+        }
         let place = info.location().map(ToString::to_string).unwrap_or_default();
         let line: Vec<String> = std::env::args_os()
             .map(|a| a.to_string_lossy().into_owned())
             .collect();
-        error(&format!(
-            "internal error at {place}: {what}\n  this is a bug in tumble {}; please report it \
-             with the command line and, if it can be shared, the input:\n  {}",
+        error(&format!("internal error at {place}: {what}"));
+        note(&format!(
+            "  this is a bug in tumble {}; please report it with the command line and, if it can be \
+             shared, the input:",
             env!("CARGO_PKG_VERSION"),
-            line.join(" ")
         ));
+        note(&format!("  {}", line.join(" ")));
     }));
 }
 
@@ -150,6 +206,15 @@ pub(crate) fn parse_bytes(text: &str) -> Result<u64, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn json_says_the_same_without_what_a_terminal_obeys() {
+        let names = ["plain ä", "\u{9b}2J", "\u{202e}x", "a\u{e0041}", "\x1b[1m\n"];
+        let text = json_printable(&serde_json::to_string_pretty(&names).unwrap());
+        assert_eq!(serde_json::from_str::<Vec<String>>(&text).unwrap(), names);
+        assert_eq!(text.matches("\\u").count(), 6, "{text}");
+        assert_eq!(printable_lines(&text), text);
+    }
 
     #[test]
     fn sizes_have_units() {

@@ -2,6 +2,7 @@
 //! long the random parts run as in CI; 50 is a run on demand.
 
 mod files;
+mod input;
 mod names;
 mod stopped;
 

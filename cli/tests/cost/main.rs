@@ -1,6 +1,28 @@
 //! What evaluating and reading cost, counted, not timed: a program of its own, because the memory that
 //! is counted is the whole process's.
 
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use peak_alloc::PeakAlloc;
+
+mod bombs;
 #[cfg(target_arch = "x86_64")]
 mod instructions;
 mod memory;
+
+#[global_allocator]
+static ALLOCATOR: PeakAlloc = PeakAlloc;
+
+/// For as long as what is returned is kept, no other test allocates what would be counted.
+fn one_at_a_time() -> MutexGuard<'static, ()> {
+    static ONE: Mutex<()> = Mutex::new(());
+    ONE.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// What some work gives, and the most memory that it took beside what was there before, bytes.
+fn peak_of<T>(work: impl FnOnce() -> T) -> (T, usize) {
+    let before = ALLOCATOR.current_usage();
+    ALLOCATOR.reset_peak_usage();
+    let done = work();
+    (done, ALLOCATOR.peak_usage().saturating_sub(before))
+}

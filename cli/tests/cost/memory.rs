@@ -2,30 +2,21 @@
 //! other processes.
 
 use std::io::{BufReader, Read};
-use std::sync::Mutex;
 
-use peak_alloc::PeakAlloc;
 use tumble_formats::Loaded;
 use tumble_formats::ReadOptions;
 use tumble_formats::dat::read_dat;
 use tumble_formats::{Code, Diagnostic};
 
-#[global_allocator]
-static ALLOCATOR: PeakAlloc = PeakAlloc;
+use crate::{one_at_a_time, peak_of};
 
 const MIB: usize = 1 << 20;
 
 /// What reading cost at most, beside what was there before; one at a time.
 fn reading(input: impl Read) -> (Result<Loaded, Diagnostic>, usize) {
-    static ONE: Mutex<()> = Mutex::new(());
-    let _one = ONE
-        .lock()
-        .unwrap_or_else(std::sync::PoisonError::into_inner);
-    let before = ALLOCATOR.current_usage();
-    ALLOCATOR.reset_peak_usage();
+    let _one = one_at_a_time();
     let reader = BufReader::with_capacity(1 << 18, input);
-    let loaded = read_dat("t", reader, &ReadOptions::default());
-    (loaded, ALLOCATOR.peak_usage() - before)
+    peak_of(|| read_dat("t", reader, &ReadOptions::default()))
 }
 
 /// Lines made when they are read: a file that is nowhere.

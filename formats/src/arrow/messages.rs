@@ -7,7 +7,9 @@ use arrow_ipc::{
     root_as_footer, root_as_message,
 };
 
+use crate::budget::Budget;
 use crate::diagnostic::{Code, Diagnostic};
+use crate::text::lines::Limits;
 
 /// Files begin and end with it.
 pub(crate) const MAGIC: &[u8] = b"ARROW1";
@@ -21,6 +23,10 @@ const PREFIX: usize = 8;
 /// Compressed files hold at most so many bytes a byte, all together: equal numbers are packed to
 /// nothing, but the times beside them differ.
 const MOST_PACKED: u64 = 1024;
+
+/// Bytes that a row of a column, and a byte that was packed, take: as they are decoded, in the table's
+/// columns and in the keys that they become.
+const DECODED: usize = 8;
 
 /// Whether the first bytes are those of a stream: a message that is not endless.
 pub(crate) fn is_stream(start: &[u8]) -> bool {
@@ -54,12 +60,18 @@ pub(crate) struct Messages<'a> {
     at: usize,
     /// How many bytes may yet be unpacked, and numbers be there.
     left: u64,
+    budget: Budget,
 }
 
 impl<'a> Messages<'a> {
     /// Looks for the footer of a file; anything else is a stream.
-    pub(crate) fn of(name: &'a str, bytes: &'a Buffer) -> Result<Self, Diagnostic> {
+    pub(crate) fn of(
+        name: &'a str,
+        bytes: &'a Buffer,
+        limits: Limits,
+    ) -> Result<Self, Diagnostic> {
         let mut messages = Self {
+            budget: Budget::of(bytes.len(), limits),
             name,
             bytes,
             blocks: None,
@@ -275,6 +287,9 @@ impl<'a> Messages<'a> {
             return Err(self.claims());
         }
         self.left -= claimed;
-        Ok(())
+        let claimed = usize::try_from(claimed).unwrap_or(usize::MAX);
+        self.budget
+            .take(claimed, DECODED)
+            .map_err(|error| Diagnostic::new(self.name, Code::Memory, error.to_string()))
     }
 }

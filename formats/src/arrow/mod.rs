@@ -77,7 +77,7 @@ fn read_table(
         Diagnostic::new(name, Code::TableDamaged, message)
     };
     let bytes = Buffer::from_vec(bytes);
-    let mut messages = Messages::of(name, &bytes)?;
+    let mut messages = Messages::of(name, &bytes, options.limits)?;
     let ipc_schema = messages.schema()?;
     let schema = try_fb_to_schema(ipc_schema).map_err(|error| damaged(&error))?;
     let names: Vec<String> = schema

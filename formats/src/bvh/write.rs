@@ -303,7 +303,7 @@ fn hierarchy(nodes: &[Node]) -> String {
     let mut text = String::from("HIERARCHY\n");
     for (place, node) in nodes.iter().enumerate() {
         let (indent, keyword) = (
-            "  ".repeat(node.depth),
+            indentation(node.depth),
             if node.depth == 0 { "ROOT" } else { "JOINT" },
         );
         text += &format!(
@@ -323,10 +323,17 @@ fn hierarchy(nodes: &[Node]) -> String {
             text += &format!("{indent}  }}\n");
         }
         for depth in (next..=node.depth).rev() {
-            text += &format!("{}}}\n", "  ".repeat(depth));
+            text += &format!("{}}}\n", indentation(depth));
         }
     }
     text
+}
+
+/// The blanks before a line of a joint so deep. Deeper ones than chains of bones are have no more: the
+/// blanks of a long chain would be many times its joints.
+fn indentation(depth: usize) -> String {
+    const DEEPEST: usize = 64;
+    "  ".repeat(depth.min(DEEPEST))
 }
 
 fn push_vector(text: &mut String, vector: Vec3) {

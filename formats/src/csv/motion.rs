@@ -2,7 +2,7 @@
 
 use std::io::{self, Write};
 
-use crate::csv::{ORDER, io_error};
+use crate::csv::{ORDER, io_error, text_cell};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::format::{MotionOptions, WriteError};
 use crate::motion::Sampled;
@@ -56,7 +56,7 @@ pub(crate) fn write_motion(
         row.extend(
             components
                 .iter()
-                .map(|component| format!("{name}.{component}")),
+                .map(|component| text_cell(&format!("{name}.{component}")).into_owned()),
         );
     }
     writer.write_record(&row).map_err(io_error)?;

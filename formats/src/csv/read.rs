@@ -6,6 +6,7 @@ use std::path::Path;
 
 use ::csv::{ByteRecord, Reader, ReaderBuilder};
 
+use crate::csv::cell_text;
 use crate::diagnostic::{Code, Diagnostic, Place};
 use crate::format::{Loaded, ReadOptions};
 use crate::source::Source;
@@ -44,7 +45,7 @@ pub fn read_csv(name: &str, bytes: Vec<u8>, options: &ReadOptions) -> Result<Loa
     }
     let names = header
         .iter()
-        .map(|cell| String::from_utf8_lossy(cell).trim().to_owned());
+        .map(|cell| cell_text(String::from_utf8_lossy(cell).trim()).to_owned());
     let names: Vec<String> = names.collect();
     let plan = Plan::of(name, &names, options)?;
     let mut columns = Vec::with_capacity(plan.wanted.len());

@@ -39,6 +39,9 @@ pub(super) struct SampledChannel {
     pub(super) path: Path,
 }
 
+/// Bytes of a track beside its keys: its name, its joint, its channels, and its places in the lists.
+const TRACK: usize = 400;
+
 /// Reads the animation of that index; nothing if it moves no node.
 ///
 /// # Errors
@@ -62,6 +65,7 @@ pub(super) fn read(
     }
     let (times, stored, rate) = times(reader, &moved, options)?;
     let tracks = Tracks::of(nodes, &moved);
+    reader.take(tracks.nodes.len(), TRACK, &pointer)?;
     let mut motion = Motion {
         name: animation.name.filter(|name| !name.is_empty()),
         place: index,
@@ -69,7 +73,12 @@ pub(super) fn read(
         ..Motion::default()
     };
     let mut keys: Vec<ChannelKeys> = Vec::new();
+    let mut borrowed = Vec::new();
     for moved in &moved {
+        // Until the set has them, keys are there twice.
+        let count = times[&moved.sampler.input].len();
+        borrowed.push(reader.borrow(count, moved.key_bytes(), &pointer)?);
+        reader.take(count, moved.key_bytes(), &pointer)?;
         keys.push(moved.keys(reader, &times[&moved.sampler.input], options.duplicates)?);
     }
     let all_times = || keys.iter().flat_map(|keys| keys.times.iter().copied());

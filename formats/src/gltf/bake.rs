@@ -20,6 +20,7 @@ use crate::gltf::reader::Reader;
 use crate::gltf::uri;
 use crate::grid::Precision;
 use crate::motion::Sampled;
+use crate::text::lines::Limits;
 use crate::warnings::Warnings;
 
 /// A file that was read.
@@ -30,8 +31,8 @@ pub(super) struct Gltf {
     pub(super) container: Container,
     /// Where the files are that it names.
     pub(super) folder: Option<PathBuf>,
-    /// The longest of them that is read.
-    pub(super) most: u64,
+    /// How much of them is read.
+    pub(super) limits: Limits,
     /// `None` for those that are kept as they are.
     pub(super) animations: Vec<Option<Read>>,
 }
@@ -106,7 +107,7 @@ impl Document for Gltf {
         let json = Json::parse(&self.name, &self.container.text)?;
         let warnings = Warnings::new(&self.name);
         let folder = self.folder.as_deref();
-        let reader = Reader::new(&json, &self.container, folder, self.most, warnings)?;
+        let reader = Reader::new(&json, &self.container, folder, self.limits, warnings)?;
         let extension = path.extension().unwrap_or_default();
         let is_text = extension.eq_ignore_ascii_case("gltf");
         self.check_folder(&reader, path, is_text)?;

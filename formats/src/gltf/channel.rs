@@ -82,6 +82,10 @@ impl Times {
     pub(super) fn new(times: Vec<f64>) -> Self {
         Self(times)
     }
+
+    pub(super) fn len(&self) -> usize {
+        self.0.len()
+    }
 }
 
 /// The keys of one channel.
@@ -150,11 +154,22 @@ impl Moved {
         })
     }
 
+    /// Bytes of a key: its time, its value and its tangents.
+    pub(super) fn key_bytes(&self) -> usize {
+        let values = match self.interpolation {
+            motion::Sampler::Cubic => 3,
+            _ => 1,
+        };
+        size_of::<f64>() + values * size_of::<Quat>()
+    }
+
     /// The times as the file has them.
     ///
     /// # Errors
     /// When they are no floats, or missing.
     pub(super) fn stored_times(&self, reader: &Reader<'_>) -> Result<Vec<f64>, Diagnostic> {
+        let count = usize::try_from(self.times.count).unwrap_or(usize::MAX);
+        reader.take(count, 2 * size_of::<f64>(), &self.input)?;
         let times = reader.numbers(self.sampler.input, &self.times, 1, &self.input)?;
         reader.warn_of_stride(&self.times);
         if let Some(time) = times.iter().find(|time| **time < 0.0) {
@@ -176,6 +191,9 @@ impl Moved {
         duplicates: Duplicates,
     ) -> Result<ChannelKeys, Diagnostic> {
         let width = self.path.width();
+        // The numbers in f64, the keys that stay, and the quaternions that they become.
+        let each = 8 * self.values.count.div_ceil(times.len().max(1) as u64) as usize * width + 40;
+        let _borrowed = reader.borrow(times.len(), each, &self.output)?;
         let mut times = times.0.clone();
         if times.is_empty() {
             reader.warn(Code::EmptySampler, &self.input, || {

@@ -69,6 +69,11 @@ impl Container {
         Ok(Self { text, glb })
     }
 
+    /// Bytes of the file.
+    pub(super) fn length(&self) -> usize {
+        self.glb.as_ref().map_or(self.text.len(), |glb| glb.bytes.len())
+    }
+
     pub(super) fn is_glb(&self) -> bool {
         self.glb.is_some()
     }

@@ -1,5 +1,6 @@
 //! The triangles of a scene, where its nodes rest.
 
+use std::collections::HashSet;
 use std::path::Path;
 
 use glam::{DMat4, DQuat, DVec3};
@@ -32,20 +33,41 @@ pub struct Triangles {
 /// When the file or a mesh is broken, or its positions are compressed in a way that is not known.
 pub fn read_triangles(path: &Path, limits: Limits) -> Result<Triangles, Diagnostic> {
     let (name, bytes, folder) = bytes_of(path, limits, false)?;
-    let mut warnings = Warnings::new(&name);
-    let container = Container::parse(&name, bytes, &mut warnings)?;
-    let mut json = Json::parse(&name, &container.text)?;
+    triangles_of(&name, bytes, folder, limits)
+}
+
+/// As [`read_triangles`], of the bytes of a file; `name` is what messages call it, and `folder` where the
+/// files are that it names.
+///
+/// # Errors
+/// As [`read_triangles`].
+pub fn triangles_of(
+    name: &str,
+    bytes: Vec<u8>,
+    folder: Option<&Path>,
+    limits: Limits,
+) -> Result<Triangles, Diagnostic> {
+    let mut warnings = Warnings::new(name);
+    let container = Container::parse(name, bytes, &mut warnings)?;
+    let mut json = Json::parse(name, &container.text)?;
     json.take_apart("meshes")?;
     json.take_apart("scenes")?;
     check_version(&json)?;
-    let reader = Reader::new(&json, &container, folder, limits.file, warnings)?;
+    let reader = Reader::new(&json, &container, folder, limits, warnings)?;
     let nodes = Nodes::read(&json)?;
-    let is_shown = shown(&json, &nodes)?;
+    let order = parents_first(&nodes);
+    let is_shown = shown(&json, &nodes, &order)?;
+    let mut places = vec![DMat4::IDENTITY; nodes.count()];
+    for &index in &order {
+        let node: Node = json.entry("nodes", index, "/nodes")?;
+        let parent = nodes.parent(index).map(|parent| places[parent]);
+        places[index] = parent.unwrap_or(DMat4::IDENTITY) * place_in_parent(&node);
+    }
     let mut all = Triangles::default();
     for index in (0..nodes.count()).filter(|&index| is_shown[index]) {
         let node: Node = json.entry("nodes", index, "/nodes")?;
         if let Some(mesh) = node.mesh {
-            let place = world(&json, &nodes, index)?;
+            let place = places[index];
             let mesh_entry: Mesh = json.entry("meshes", mesh, &format!("/nodes/{index}/mesh"))?;
             for (own, primitive) in mesh_entry.primitives.iter().enumerate() {
                 let pointer = format!("/meshes/{mesh}/primitives/{own}");
@@ -57,45 +79,57 @@ pub fn read_triangles(path: &Path, limits: Limits) -> Result<Triangles, Diagnost
     Ok(all)
 }
 
+/// All nodes, each behind the one that it hangs on.
+fn parents_first(nodes: &Nodes) -> Vec<usize> {
+    let mut is_there = vec![false; nodes.count()];
+    let mut order = Vec::with_capacity(nodes.count());
+    let mut chain = Vec::new();
+    for start in 0..nodes.count() {
+        let mut next = Some(start);
+        while let Some(node) = next.filter(|&node| !is_there[node]) {
+            is_there[node] = true;
+            chain.push(node);
+            next = nodes.parent(node);
+        }
+        order.extend(chain.drain(..).rev());
+    }
+    order
+}
+
 /// The nodes of the scene and those that hang on them.
-fn shown(json: &Json<'_>, nodes: &Nodes) -> Result<Vec<bool>, Diagnostic> {
+fn shown(json: &Json<'_>, nodes: &Nodes, order: &[usize]) -> Result<Vec<bool>, Diagnostic> {
     let Some(raw) = json.member("scene")? else {
         return Ok(vec![true; nodes.count()]);
     };
     let scene: usize = json.typed(raw, "/scene")?;
     let scene: Scene = json.entry("scenes", scene, "/scene")?;
-    // The root of a node is in the scene.
-    let root = |mut node| {
-        while let Some(parent) = nodes.parent(node) {
-            node = parent;
-        }
-        node
-    };
-    Ok((0..nodes.count())
-        .map(|node| scene.nodes.contains(&root(node)))
-        .collect())
+    let roots: HashSet<usize> = scene.nodes.into_iter().collect();
+    let mut is_shown = vec![false; nodes.count()];
+    for &node in order {
+        is_shown[node] = match nodes.parent(node) {
+            Some(parent) => is_shown[parent],
+            None => roots.contains(&node),
+        };
+    }
+    Ok(is_shown)
 }
 
-/// Where a node rests in the scene.
-fn world(json: &Json<'_>, nodes: &Nodes, node: usize) -> Result<DMat4, Diagnostic> {
-    let mut place = DMat4::IDENTITY;
-    let mut next = Some(node);
-    while let Some(index) = next {
-        let node: Node = json.entry("nodes", index, "/nodes")?;
-        let own = match node.matrix {
-            Some(matrix) => DMat4::from_cols_array(&matrix),
-            None => DMat4::from_scale_rotation_translation(
-                node.scale.map_or(DVec3::ONE, DVec3::from_array),
-                node.rotation
-                    .map_or(DQuat::IDENTITY, |own| DQuat::from_array(own).normalize()),
-                node.translation.map_or(DVec3::ZERO, DVec3::from_array),
-            ),
-        };
-        place = own * place;
-        next = nodes.parent(index);
+/// Where a node rests in the one that it hangs on.
+fn place_in_parent(node: &Node) -> DMat4 {
+    match node.matrix {
+        Some(matrix) => DMat4::from_cols_array(&matrix),
+        None => DMat4::from_scale_rotation_translation(
+            node.scale.map_or(DVec3::ONE, DVec3::from_array),
+            node.rotation
+                .map_or(DQuat::IDENTITY, |own| DQuat::from_array(own).normalize()),
+            node.translation.map_or(DVec3::ZERO, DVec3::from_array),
+        ),
     }
-    Ok(place)
 }
+
+/// Bytes of a vertex and of a triangle: here, as numbers on the way, and in the mesh that is made of them.
+const VERTEX: usize = 200;
+const TRIANGLE: usize = 400;
 
 fn add(
     reader: &Reader<'_>,
@@ -122,6 +156,8 @@ fn add(
     };
     let from = format!("{pointer}/attributes/POSITION");
     let accessor = reader.accessor(position, &from)?;
+    let count = usize::try_from(accessor.count).unwrap_or(usize::MAX);
+    reader.take(count, VERTEX, pointer)?;
     let numbers = reader.numbers(position, &accessor, 3, &from)?;
     let first = all.positions.len();
     let count = numbers.len() / 3;
@@ -133,10 +169,16 @@ fn add(
     all.positions
         .extend(positions.map(|own| place.transform_point3(own)));
     let indices: Vec<u32> = match primitive.indices {
-        None => (0..count as u32).collect(),
+        None => {
+            reader.take(count, TRIANGLE, pointer)?;
+            (0..count as u32).collect()
+        }
         Some(indices) => {
             let from = format!("{pointer}/indices");
             let accessor = reader.accessor(indices, &from)?;
+            let count = usize::try_from(accessor.count).unwrap_or(usize::MAX);
+            let corners = if primitive.mode == 4 { 3 } else { 1 };
+            reader.take(count / corners, TRIANGLE, pointer)?;
             reader.indices(indices, &accessor, &from)?
         }
     };

@@ -26,11 +26,13 @@ mod uri;
 mod whole;
 pub mod write_new;
 
+use std::collections::HashMap;
+use std::collections::hash_map::Entry;
 use std::io::BufRead;
 use std::path::Path;
 use std::sync::Arc;
 
-use crate::diagnostic::{Code, Diagnostic};
+use crate::diagnostic::{Code, Diagnostic, Place};
 use crate::feature::Feature;
 use crate::format::{Format, FormatOption, Loaded, ReadOptions};
 use crate::gltf::bake::Gltf;
@@ -142,7 +144,7 @@ pub fn read_gltf(
         let message = "the file has no animations; is it the right one?";
         return Err(json.refuse("/animations", Code::NoAnimations, message));
     }
-    let reader = Reader::new(&json, &container, folder, options.limits.file, warnings)?;
+    let reader = Reader::new(&json, &container, folder, options.limits, warnings)?;
     for (place, required) in reader.required().iter().enumerate() {
         if !KNOWN.contains(&required.as_str()) {
             reader.warn(Code::RequiredExtension, &format!("/extensionsRequired/{place}"), || {
@@ -153,6 +155,7 @@ pub fn read_gltf(
     let nodes = Nodes::read(&json)?;
     let mut loaded = Loaded::default();
     let mut read = Vec::with_capacity(animations);
+    let mut faults: HashMap<(Option<Place>, String), usize> = HashMap::new();
     for index in 0..animations {
         match animation::read(index, &reader, &nodes, options) {
             Ok(found) => {
@@ -163,23 +166,29 @@ pub fn read_gltf(
             Err(fault) => {
                 read.push(None);
                 // Animations that share a broken buffer have one fault.
-                match loaded
-                    .refused
-                    .iter_mut()
-                    .find(|known| (&known.place, &known.message) == (&fault.place, &fault.message))
-                {
-                    Some(known) => known.count += 1,
-                    None => loaded.refused.push(fault),
+                match faults.entry((fault.place.clone(), fault.message.clone())) {
+                    Entry::Occupied(known) => loaded.refused[*known.get()].count += 1,
+                    Entry::Vacant(new) => {
+                        new.insert(loaded.refused.len());
+                        loaded.refused.push(fault);
+                    }
                 }
             }
         }
+    }
+    if loaded.clips.is_empty() && loaded.refused.is_empty() {
+        let message = match animations {
+            1 => "the only animation moves no node: there is nothing to sample".to_owned(),
+            _ => format!("none of {animations} animations moves a node: there is nothing to sample"),
+        };
+        return Err(json.refuse("/animations", Code::NoAnimations, message));
     }
     loaded.warnings = reader.warnings.into_inner().into_list();
     loaded.document = Some(Arc::new(Gltf {
         name: name.to_owned(),
         container,
         folder: folder.map(Path::to_owned),
-        most: options.limits.file,
+        limits: options.limits,
         animations: read,
     }));
     Ok(loaded)

@@ -5,6 +5,7 @@ use std::borrow::Cow;
 use std::cell::{OnceCell, RefCell};
 use std::path::Path;
 
+use crate::budget::{Borrowed, Budget};
 use crate::diagnostic::{Code, Diagnostic, Place};
 use crate::gltf::compressed;
 use crate::gltf::container::Container;
@@ -12,10 +13,14 @@ use crate::gltf::json::Json;
 use crate::gltf::schema::{Accessor, Buffer, BufferView, MeshoptView};
 use crate::gltf::uri;
 use crate::source::Source;
+use crate::text::lines::Limits;
 use crate::warnings::Warnings;
 
 /// The extensions that compress a buffer view.
 pub(super) const MESHOPT: [&str; 2] = ["EXT_meshopt_compression", "KHR_meshopt_compression"];
+
+/// Bytes that a node takes, with its name and where it rests.
+const NODE: usize = 640;
 
 /// Bytes that a BIN chunk may have behind what its buffer says: it is padded.
 const PADDING: u64 = 3;
@@ -26,10 +31,10 @@ pub(super) struct Reader<'a> {
     container: &'a Container,
     /// Where files beside are; there are none beside standard input.
     folder: Option<&'a Path>,
-    /// The longest file beside that is read.
-    most: u64,
+    limits: Limits,
     /// The extensions that the file requires.
     required: Vec<String>,
+    budget: Budget,
     buffers: Vec<OnceCell<Result<Cow<'a, [u8]>, Diagnostic>>>,
     /// Of compressed views.
     decoded: Vec<OnceCell<Result<Vec<u8>, Diagnostic>>>,
@@ -50,9 +55,13 @@ impl<'a> Reader<'a> {
         json: &'a Json<'a>,
         container: &'a Container,
         folder: Option<&'a Path>,
-        most: u64,
+        limits: Limits,
         warnings: Warnings,
     ) -> Result<Self, Diagnostic> {
+        let budget = Budget::of(container.length(), limits);
+        budget
+            .take(json.entries("nodes").len(), NODE)
+            .map_err(|error| json.refuse("/nodes", Code::Memory, error.to_string()))?;
         let required = json.member("extensionsRequired")?;
         let required = required.map(|raw| json.typed(raw, "/extensionsRequired"));
         let cells = |list| json.entries(list).len();
@@ -60,12 +69,38 @@ impl<'a> Reader<'a> {
             json,
             container,
             folder,
-            most,
+            limits,
+            budget,
             required: required.transpose()?.unwrap_or_default(),
             buffers: (0..cells("buffers")).map(|_| OnceCell::new()).collect(),
             decoded: (0..cells("bufferViews")).map(|_| OnceCell::new()).collect(),
             warnings: RefCell::new(warnings),
         })
+    }
+
+    /// Takes memory for `count` things of `bytes` each that the part at `pointer` is to have.
+    ///
+    /// # Errors
+    /// When the file has no right to so much.
+    pub(super) fn take(&self, count: usize, bytes: usize, pointer: &str) -> Result<(), Diagnostic> {
+        self.budget
+            .take(count, bytes)
+            .map_err(|error| self.json.refuse(pointer, Code::Memory, error.to_string()))
+    }
+
+    /// As [`Reader::take`], until the value is dropped.
+    ///
+    /// # Errors
+    /// As [`Reader::take`].
+    pub(super) fn borrow(
+        &self,
+        count: usize,
+        bytes: usize,
+        pointer: &str,
+    ) -> Result<Borrowed<'_>, Diagnostic> {
+        self.budget
+            .borrow(count, bytes)
+            .map_err(|error| self.json.refuse(pointer, Code::Memory, error.to_string()))
     }
 
     pub(super) fn required(&self) -> &[String] {
@@ -159,7 +194,9 @@ impl<'a> Reader<'a> {
                 format!("`{uri}` is a file beside, and standard input has none beside it");
             return Err(refuse(message));
         };
-        let read = Source::open_beneath(folder, &path).and_then(|file| file.into_bytes(self.most));
+        let read = Source::open_beneath(folder, &path)
+            .and_then(|file| file.into_bytes(self.limits.file));
+        let read = read.inspect(|bytes| self.budget.add_input(bytes.len()));
         read.map_err(|error| {
             let message = format!("{}: {}", path.display(), error.message);
             self.json.refuse(&pointer, error.code, message)
@@ -220,7 +257,8 @@ impl<'a> Reader<'a> {
 
     fn decode(&self, view: &MeshoptView, pointer: &str) -> Result<Vec<u8>, Diagnostic> {
         let bytes = self.part(view.buffer, view.byte_offset, view.byte_length, pointer)?;
-        compressed::decode(bytes, view, self.most)
+        self.take(view.count, view.byte_stride, pointer)?;
+        compressed::decode(bytes, view, self.limits.file)
             .map_err(|message| self.json.refuse(pointer, Code::Meshopt, message))
     }
 

@@ -14,9 +14,11 @@ use flate2::read::DeflateDecoder;
 use zip::result::ZipError;
 use zip::{CompressionMethod, ZipArchive};
 
+use crate::budget::Budget;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::npz::array::Array;
 use crate::npz::header::{Element, Header, LONGEST_START};
+use crate::text::lines::Limits;
 
 /// An open archive, all of whose bytes are held.
 pub(crate) struct Archive {
@@ -24,6 +26,7 @@ pub(crate) struct Archive {
     pub(crate) file: String,
     bytes: Vec<u8>,
     pub(crate) members: Vec<Member>,
+    budget: Budget,
 }
 
 /// One file in the archive.
@@ -47,8 +50,9 @@ pub(crate) const ONLY_ARRAY: &str = "arr_0";
 const LARGEST_RATIO: u64 = 1032;
 
 impl Archive {
-    /// Reads the directory of an NPZ file. All members together may be `most` bytes long.
-    pub(crate) fn open(file: &str, bytes: Vec<u8>, most: u64) -> Result<Self, Diagnostic> {
+    /// Reads the directory of an NPZ file. All members together may be as long as a file.
+    pub(crate) fn open(file: &str, bytes: Vec<u8>, limits: Limits) -> Result<Self, Diagnostic> {
+        let most = limits.file;
         let refuse = |code, message: String| Diagnostic::new(file, code, message);
         let broken = |error: ZipError| {
             let message = format!("the ZIP archive cannot be read: {error}; save the file again");
@@ -121,15 +125,17 @@ impl Archive {
             members.push(member);
         }
         drop(zip);
+        refuse_overlaps(file, &members)?;
         Ok(Self {
             file: file.to_owned(),
+            budget: Budget::of(bytes.len(), limits),
             bytes,
             members,
         })
     }
 
     /// An NPY file.
-    pub(crate) fn single(file: &str, bytes: Vec<u8>) -> Self {
+    pub(crate) fn single(file: &str, bytes: Vec<u8>, limits: Limits) -> Self {
         let member = Member {
             path: String::new(),
             name: ONLY_ARRAY.to_owned(),
@@ -141,9 +147,17 @@ impl Archive {
         };
         Self {
             file: file.to_owned(),
+            budget: Budget::of(bytes.len(), limits),
             bytes,
             members: vec![member],
         }
+    }
+
+    /// Takes memory for `count` things of `bytes` each that the file is to have.
+    pub(crate) fn take(&self, count: usize, bytes: usize) -> Result<(), Diagnostic> {
+        self.budget
+            .take(count, bytes)
+            .map_err(|error| Diagnostic::new(&self.file, Code::Memory, error.to_string()))
     }
 
     /// The place of the array of that name.
@@ -214,6 +228,9 @@ impl Archive {
         let packed = &self.bytes[self.members[member].data.clone()];
         let bytes = if self.members[member].is_deflated {
             let mut bytes = Vec::new();
+            self.budget
+                .take(1, usize::try_from(size).unwrap_or(usize::MAX))
+                .map_err(|error| self.refuse(member, Code::Memory, error.to_string()))?;
             // Checked: the packed bytes can stand for as many.
             let reserved = bytes.try_reserve_exact(size as usize);
             let unpacked = reserved.map_err(std::io::Error::from).and_then(|()| {
@@ -279,6 +296,26 @@ impl Member {
         // What cannot be unpacked ends early, and its header is cut.
         let _ = unpacked.read_to_end(&mut start);
         Cow::Owned(start)
+    }
+}
+
+/// Refuses members whose bytes are those of others too: a few bytes would unpack to any number.
+fn refuse_overlaps(file: &str, members: &[Member]) -> Result<(), Diagnostic> {
+    let mut places: Vec<(&Range<usize>, &str)> = members
+        .iter()
+        .filter(|member| !member.data.is_empty())
+        .map(|member| (&member.data, &*member.path))
+        .collect();
+    places.sort_unstable_by_key(|(data, _)| data.start);
+    match places.windows(2).find(|pair| pair[1].0.start < pair[0].0.end) {
+        None => Ok(()),
+        Some(pair) => {
+            let message = format!(
+                "the bytes of this member are those of `{}` too; save the file again",
+                pair[0].1
+            );
+            Err(Diagnostic::new(file, Code::Archive, message).inside(pair[1].1))
+        }
     }
 }
 

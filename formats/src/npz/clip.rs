@@ -18,6 +18,12 @@ use crate::quaternion::rounded;
 use crate::signs::continue_signs;
 use crate::warnings::Warnings;
 
+/// Bytes of a key, while it is read and in the set: its time, its rotation and its vectors.
+const KEY: usize = 64;
+
+/// Bytes of a track beside its keys.
+const TRACK: usize = 400;
+
 /// Reads the clip. The plan then knows its rate.
 pub(crate) fn read(
     archive: &Archive,
@@ -30,6 +36,8 @@ pub(crate) fn read(
         .iter()
         .map(|part| archive.array(part.member))
         .collect::<Result<_, _>>()?;
+    archive.take(plan.tracks.saturating_mul(plan.frames), KEY)?;
+    archive.take(plan.tracks, TRACK)?;
     // There are as many frames as the arrays have bytes for.
     let mut times = plan.read_times(archive, options)?;
     plan.all_times.clone_from(&times);

@@ -1,7 +1,8 @@
 //! The header of an NPY array: element type, order and shape.
 //!
-//! Parsed here, because the header of a damaged or hostile file can be anything: `npyz` multiplies
-//! shapes without a look at their size, and its grammar of Python literals recurses.
+//! Parsed here, whoever reads the array, because the header of a damaged or hostile file can be anything:
+//! the crate `npyz` multiplies shapes without a look at their size, allocates what a header says of its
+//! own length, and tries nested brackets twice at each level. Tests read with it what is written here.
 
 use std::fmt;
 

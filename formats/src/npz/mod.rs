@@ -2,11 +2,11 @@
 //! world, our own layout, and whatever else a person tells the meaning of.
 
 mod archive;
-mod array;
+pub(crate) mod array;
 mod bodies;
 mod clip;
 mod document;
-mod header;
+pub(crate) mod header;
 mod linear;
 mod mapped;
 mod own;
@@ -76,7 +76,7 @@ fn open_npz(path: &Path, options: &ReadOptions) -> Result<Loaded, Diagnostic> {
 /// # Errors
 /// The first fault that refuses it.
 pub fn read_npz(file: &str, bytes: Vec<u8>, options: &ReadOptions) -> Result<Loaded, Diagnostic> {
-    let archive = Archive::open(file, bytes, options.limits.file)?;
+    let archive = Archive::open(file, bytes, options.limits)?;
     let mut warnings = Warnings::new(file);
     if let Some(map) = map(file, options)? {
         let mut plan = mapped::plan(&archive, &map)?;
@@ -123,7 +123,7 @@ pub struct Numbers {
 pub fn open_numbers(path: &Path, options: &ReadOptions) -> Result<Numbers, Diagnostic> {
     let source = Source::open(path, options.pipes)?;
     let file = source.name.clone();
-    let archive = Archive::single(&file, source.into_bytes(options.limits.file)?);
+    let archive = Archive::single(&file, source.into_bytes(options.limits.file)?, options.limits);
     let array = archive.array(0)?;
     let values = array.numbers().ok_or_else(|| {
         let message = format!("holds {}, no numbers", array.header.element);
@@ -151,7 +151,7 @@ pub(crate) fn open_npy(path: &Path, options: &ReadOptions) -> Result<Loaded, Dia
 /// # Errors
 /// The first fault that refuses it.
 pub fn read_npy(file: &str, bytes: Vec<u8>, options: &ReadOptions) -> Result<Loaded, Diagnostic> {
-    let archive = Archive::single(file, bytes);
+    let archive = Archive::single(file, bytes, options.limits);
     let mut warnings = Warnings::new(file);
     let map = match map(file, options)? {
         Some(map) => map,

@@ -129,7 +129,7 @@ fn read_table(
     let mut roots: Vec<usize> = plan.wanted.iter().map(|wanted| wanted.index).collect();
     roots.sort_unstable();
     roots.dedup();
-    check_pages(name, &bytes, loaded.metadata(), &roots)?;
+    check_pages(name, &bytes, loaded.metadata(), &roots, options.limits)?;
 
     // Words stay in the dictionaries that they are stored in: names repeat.
     let names = plan

@@ -6,7 +6,9 @@ use std::ops::Range;
 use parquet::basic::Compression;
 use parquet::file::metadata::{ColumnChunkMetaData, ParquetMetaData};
 
+use crate::budget::{Budget, OverBudget};
 use crate::diagnostic::{Code, Diagnostic};
+use crate::text::lines::Limits;
 
 /// A file holds at most so many numbers a byte. Equal numbers are packed closest: a page of
 /// 2^20 of them may have 100 bytes, but the times beside them differ and take a byte each.
@@ -18,17 +20,23 @@ const FREE_PAGE: u64 = 16 << 20;
 /// A longer page is at most this many times as long as what it is packed into.
 const MOST_PACKED: u64 = 64;
 
+/// Bytes that a number takes: as it is decoded, in its column, and as a part of a key.
+const NUMBER: usize = 32;
+
 /// Checks the pages of some columns.
 ///
 /// # Errors
 /// When they lie outside the file, are compressed in a way that is not read, or claim more numbers
-/// or bytes than the file can hold.
+/// or bytes than the file can hold, or than its memory does.
 pub(crate) fn check_pages(
     name: &str,
     bytes: &[u8],
     metadata: &ParquetMetaData,
     roots: &[usize],
+    limits: Limits,
 ) -> Result<(), Diagnostic> {
+    let budget = Budget::of(bytes.len(), limits);
+    let over = |error: OverBudget| Diagnostic::new(name, Code::Memory, error.to_string());
     let refuse = |code, message: String| Diagnostic::new(name, code, message);
     let claims = |numbers: u64, what: &str| {
         let message = format!(
@@ -69,6 +77,9 @@ pub(crate) fn check_pages(
                     );
                     return Err(refuse(Code::TableClaims, message));
                 }
+                let count = |number: u64| usize::try_from(number).unwrap_or(usize::MAX);
+                budget.take(count(page.uncompressed), 1).map_err(over)?;
+                budget.take(count(page.values), NUMBER).map_err(over)?;
                 numbers = numbers.saturating_add(page.values);
                 if numbers > most {
                     return Err(claims(numbers, "numbers"));

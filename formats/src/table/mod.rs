@@ -21,10 +21,9 @@ pub(crate) mod rows;
 pub(crate) mod times;
 
 #[cfg(feature = "parquet")]
-use std::panic::{AssertUnwindSafe, catch_unwind};
-
-#[cfg(feature = "parquet")]
 use crate::diagnostic::{Code, Diagnostic};
+#[cfg(feature = "parquet")]
+use crate::guarded::guarded;
 
 /// What `decode` makes of a file by another crate's decoders, which assert what a damaged `part` of
 /// it does not keep. Nothing that they have touched is used after that.
@@ -34,7 +33,7 @@ pub(crate) fn decoded<T>(
     part: &str,
     decode: impl FnOnce() -> Result<T, Diagnostic>,
 ) -> Result<T, Diagnostic> {
-    catch_unwind(AssertUnwindSafe(decode)).unwrap_or_else(|_| {
+    guarded(decode).unwrap_or_else(|_| {
         let message = format!("{part} cannot be decoded; the file is damaged, write it again");
         Err(Diagnostic::new(name, Code::TableDamaged, message))
     })

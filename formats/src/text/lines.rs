@@ -31,6 +31,9 @@ pub struct Limits {
     pub line: u64,
     /// Bytes of the whole input.
     pub file: u64,
+    /// Bytes of memory that reading it may take beside the input itself [default:
+    /// [`FACTOR`](crate::budget::FACTOR) times its length and [`BASE`](crate::budget::BASE)].
+    pub memory: Option<u64>,
 }
 
 impl Default for Limits {
@@ -39,6 +42,7 @@ impl Default for Limits {
         Self {
             line: 1 << 26,
             file: MAX_BYTES,
+            memory: None,
         }
     }
 }

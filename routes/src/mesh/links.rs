@@ -42,6 +42,26 @@ pub(crate) fn at(faces: &[[u32; 3]], corner: u32) -> u32 {
     faces[(corner / 3) as usize][(corner % 3) as usize]
 }
 
+/// For each half-edge the one on the other side. Half-edges are sorted by their ends, so that an edge of
+/// thousands of faces takes no longer than thousands of edges.
+fn twins(faces: &[[u32; 3]]) -> Vec<u32> {
+    let ends = |half_edge: u32| {
+        let (a, b) = (at(faces, half_edge), at(faces, next(half_edge)));
+        (a.min(b), a.max(b))
+    };
+    let mut sorted: Vec<u32> = (0..3 * faces.len() as u32).collect();
+    sorted.sort_unstable_by_key(|&half_edge| ends(half_edge));
+    let mut twins = vec![NONE; sorted.len()];
+    for edge in sorted.chunk_by(|&a, &b| ends(a) == ends(b)) {
+        match *edge {
+            [_] => {}
+            [a, b] => (twins[a as usize], twins[b as usize]) = (b, a),
+            _ => edge.iter().for_each(|&own| twins[own as usize] = MANY),
+        }
+    }
+    twins
+}
+
 impl Links {
     pub(crate) fn new(vertices: usize, faces: &[[u32; 3]]) -> Self {
         let mut starts = vec![0u32; vertices + 1];
@@ -63,20 +83,8 @@ impl Links {
             starts,
             corners,
         };
-        links.twins = (0..3 * faces.len() as u32)
-            .map(|half_edge| links.find_twin(faces, half_edge))
-            .collect();
+        links.twins = twins(faces);
         links
-    }
-
-    fn find_twin(&self, faces: &[[u32; 3]], half_edge: u32) -> u32 {
-        let mut twin = NONE;
-        for other in self.on_edge(faces, half_edge) {
-            if other != half_edge {
-                twin = if twin == NONE { other } else { MANY };
-            }
-        }
-        twin
     }
 
     /// The half-edges of all faces on the edge of this one, itself among them. They are searched at

@@ -2,7 +2,6 @@
 
 mod bernstein;
 mod nearest;
-mod read;
 
 use glam::{DVec2, DVec3};
 use thiserror::Error;
@@ -59,12 +58,6 @@ pub enum NetError {
         column: usize,
         /// The control point.
         point: DVec3,
-    },
-    /// A file that is no net.
-    #[error("the NPY file is no net: {reason}")]
-    Npy {
-        /// What is wrong.
-        reason: String,
     },
     /// No facets, or too many.
     #[error("{facets} facets along a side; give 1 to {MOST_FACETS}")]

@@ -6,7 +6,6 @@ use std::path::{Path, PathBuf};
 
 use tumble_formats::output::{Output, remove_marked};
 
-use crate::arguments::input;
 use crate::batch::folder::{Name, Places};
 use crate::batch::manifest::{Entry, Previous};
 use crate::batch::output::Target;
@@ -172,7 +171,7 @@ impl Records for Shard<'_> {
 
     fn refuse(&mut self, path: &Path, failure: &Failure) {
         self.header.failed.push(Refusal {
-            input: input::name(path),
+            input: path.display().to_string(),
             code: failure.code,
             message: failure.message().to_owned(),
         });

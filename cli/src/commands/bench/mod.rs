@@ -97,7 +97,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     if arguments.json {
         words::json(&report)
     } else {
-        words::listing(&report.text())
+        words::styled_listing(&report.text())
     }
 }
 

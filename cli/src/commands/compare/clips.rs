@@ -7,6 +7,7 @@ use serde::Serialize;
 use tumble::reference::angle_between;
 use tumble::{Channel, Engine, Frames};
 use tumble_formats::motion::Motion;
+use tumble_formats::printable::printable;
 use tumble_formats::sample::{ChannelMethods, Samples};
 use tumble_formats::world::world;
 
@@ -258,7 +259,7 @@ impl Compared {
         let mut line = |what: &str, unit: &str, found: &Found| {
             let Spread { mean, rms, largest } = found.spread;
             let place = match largest > 0.0 {
-                true => format!(" at {}, {:.4} s", found.track, found.time),
+                true => format!(" at {}, {:.4} s", printable(&found.track), found.time),
                 false => String::new(),
             };
             text += &format!(
@@ -279,7 +280,7 @@ impl Compared {
         );
         for (side, missing) in self.missing.iter().enumerate() {
             if !missing.is_empty() {
-                text += &format!("  only in {}: {}\n", self.inputs[side], missing.join(", "));
+                text += &format!("  only in {}: {}\n", self.inputs[side], printable(&missing.join(", ")));
             }
         }
         text

@@ -81,9 +81,15 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         return Err(Failure::usage("--start and --end are for --fps; add it"));
     }
     let paths = [first.as_path(), second.as_path()];
-    let report = match arguments.are_arrays(paths)? {
-        true => Report::Array(arrays::compare(paths, &arguments.inputs.options())?),
-        false => Report::Clips(arguments.clips(paths)?),
+    let (report, rest) = match arguments.are_arrays(paths)? {
+        true => {
+            let found = arrays::compare(paths, &arguments.inputs.options())?;
+            (Report::Array(found), Ok(()))
+        }
+        false => {
+            let (found, rest) = arguments.clips(paths)?;
+            (Report::Clips(found), rest)
+        }
     };
     match (&report, arguments.json) {
         (report, true) => words::json(report)?,
@@ -93,7 +99,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
             words::listing(&told)?;
         }
     }
-    arguments.judge(&report)
+    arguments.judge(&report).and(rest)
 }
 
 impl Arguments {
@@ -114,9 +120,11 @@ impl Arguments {
         Ok(true)
     }
 
-    /// Every clip of one file with its like of the other.
-    fn clips(&self, paths: [&Path; 2]) -> Result<Vec<clips::Compared>, Failure> {
+    /// Every clip of one file with its like of the other; and the failure of those that were refused.
+    fn clips(&self, paths: [&Path; 2]) -> Result<(Vec<clips::Compared>, Result<(), Failure>), Failure> {
         let loaded = [self.inputs.load(paths[0])?, self.inputs.load(paths[1])?];
+        let rest = (paths.iter().zip(&loaded))
+            .try_for_each(|(path, loaded)| input::whole(&input::name(path), loaded));
         let counts = [0, 1].map(|side| loaded[side].clips.len());
         if counts[0] != counts[1] {
             return Err(Failure::new(
@@ -162,7 +170,7 @@ impl Arguments {
             let own = [select(first, &names[0])?, select(second, &names[1])?];
             found.push(comparison.compare([(&names[0], &own[0]), (&names[1], &own[1])])?);
         }
-        Ok(found)
+        Ok((found, rest))
     }
 
     /// Fails where a difference is over its bound.

@@ -1,8 +1,8 @@
 //! Results of numbers: rotations in any representation, streamed as they come, and whole poses.
 
-use glam::Vec3;
+use glam::{Quat, Vec3};
 use tumble::method::SLERP;
-use tumble::{Engine, Error, Frames, Layout, Timeline};
+use tumble::{Engine, Error, Frames, Layout, Quantity, Timeline};
 use tumble_formats::format::ResultShape;
 use tumble_formats::motion::Motion;
 use tumble_formats::npy::ComponentOrder;
@@ -69,8 +69,15 @@ impl Job<'_> {
                 .device
                 .choose(size.0 * size.1)
                 .and_then(|()| {
-                    let work =
-                        |engine: &Engine| methods.rotations(engine, clip, &frames, result.layout);
+                    let layout = result.layout;
+                    let work = |engine: &Engine| match arguments.what.quantity() {
+                        Quantity::Rotation => methods.rotations(engine, clip, &frames, layout),
+                        // Velocities are rows of four numbers too.
+                        _ => {
+                            let rates = methods.rates(engine, clip, &frames, layout)?;
+                            Ok(rates.into_iter().map(Quat::from_vec4).collect())
+                        }
+                    };
                     self.device.work(work)
                 })
                 .map_err(|error| Failure::evaluating(name, &error))?;

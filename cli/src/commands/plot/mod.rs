@@ -163,6 +163,9 @@ impl PictureFormat {
     }
 }
 
+/// Bodies on paths, what makes them, and the failure of animations that were refused.
+type Bodies = (travel::Source, Vec<Maker>, Result<(), Failure>);
+
 /// Where pictures go.
 enum Out {
     One(PathBuf),
@@ -195,7 +198,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let outcome = for_each(&inputs, |path| {
         let name = input::name(path);
         let stem = input::stem(path);
-        if let Some((source, makers)) = arguments.bodies(path, &interpolations)? {
+        if let Some((source, makers, rest)) = arguments.bodies(path, &interpolations)? {
             let title = (&*name, input::file_name(path));
             let figure = path::figure(&mut studio.device, title, &source, &makers)?;
             let file = match &out {
@@ -204,9 +207,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
                     folder.join(format!("{stem}-path.{}", studio.format.extension()))
                 }
             };
-            return studio.draw(&figure, &file);
+            return studio.draw(&figure, &file).and(rest);
         }
-        let clip = arguments.inputs.load_one(path)?;
+        let input::OnlyClip { clip, rest } = arguments.inputs.load_one(path)?;
         let tracks = arguments.inputs.tracks.of(&clip, &name)?;
         let set = clip.set;
         let source = Source::new(input::file_name(path), &set, &interpolations, &samples)?;
@@ -230,7 +233,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
             studio.draw(&figure, &file)?;
             progress.advance(1);
         }
-        Ok(())
+        rest
     });
     if studio.drawn == 0 {
         return outcome;
@@ -263,21 +266,22 @@ impl Arguments {
         self.show.unwrap_or(Show::Components)
     }
 
-    /// The bodies on the paths of a file, if these are to be drawn, and what makes them.
+    /// The bodies on the paths of a file, if these are to be drawn, what makes them, and the failure of
+    /// animations that were refused.
     fn bodies(
         &self,
         path: &Path,
         interpolations: &[Interpolation],
-    ) -> Result<Option<(travel::Source, Vec<Maker>)>, Failure> {
+    ) -> Result<Option<Bodies>, Failure> {
         let name = input::name(path);
         match self.show {
             None | Some(Show::Path) if is_path_file(path) => {
                 let frames = self.path.frames().into_iter().map(Maker::Frame);
                 let source = travel::Source::of_paths(path, &self.path, &self.inputs.tracks)?;
-                Ok(Some((source, frames.collect())))
+                Ok(Some((source, frames.collect(), Ok(()))))
             }
             Some(Show::Path) => {
-                let clip = self.inputs.load_one(path)?;
+                let input::OnlyClip { clip, rest } = self.inputs.load_one(path)?;
                 if !is_travel(&clip) {
                     let message = "is no file of paths, nor of joints without parents that move";
                     return Err(Failure::usage(format!("{name}: {message}")));
@@ -285,7 +289,7 @@ impl Arguments {
                 let methods = interpolations.iter().copied().map(Maker::Method);
                 let clip = self.inputs.tracks.select(&clip, &name)?.into_owned();
                 let source = travel::Source::Clip(Box::new(clip));
-                Ok(Some((source, methods.collect())))
+                Ok(Some((source, methods.collect(), rest)))
             }
             Some(_) if is_path_file(path) => Err(Failure::usage(format!(
                 "{name}: of paths --show path is drawn; for rotations follow them into a file first"

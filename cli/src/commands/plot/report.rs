@@ -16,7 +16,7 @@ use crate::commands::plot::curves::{NAMES, Subject};
 use crate::commands::plot::source::Source;
 use crate::commands::plot::subjects::PANELS;
 use crate::commands::plot::{Arguments, Studio};
-use crate::messages::exit::Failure;
+use crate::messages::exit::{Failure, for_each};
 use crate::messages::progress::Progress;
 use crate::messages::words;
 
@@ -49,8 +49,9 @@ pub(crate) fn write(
     let each = figures_of_one(interpolations.len());
     let mut progress = Progress::new("drawing", (inputs.len() * each) as u64);
     let mut chapters = Vec::new();
-    for path in &inputs {
-        let set = progress.suspend(|| arguments.inputs.load_one(path))?.set;
+    let outcome = for_each(&inputs, |path| {
+        let only = progress.suspend(|| arguments.inputs.load_one(path))?;
+        let set = only.clip.set;
         let chapter = Chapter {
             title: input::file_name(path),
             facts: facts(&set),
@@ -64,8 +65,12 @@ pub(crate) fn write(
             )?,
         };
         chapters.push(chapter);
-    }
+        only.rest
+    });
     drop(progress);
+    if chapters.is_empty() {
+        return outcome;
+    }
     let text = html(&chapters, &studio.device.label);
     page.write(None, |out| out.write_all(text.as_bytes()))?;
     words::note(&format!(
@@ -73,7 +78,7 @@ pub(crate) fn write(
         words::count(studio.drawn, "picture"),
         studio.device.label
     ));
-    Ok(())
+    outcome
 }
 
 fn figures_of_one(methods: usize) -> usize {

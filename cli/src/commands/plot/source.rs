@@ -43,6 +43,7 @@ impl<'a> Source<'a> {
         let timeline = frames
             .resolve(set.track_count(), set.time_span())
             .map_err(|error| Failure::evaluating(&name, &error.into()))?;
+        room::to_draw(&name, timeline.len())?;
         if timeline.is_empty() {
             return Err(Failure::usage(format!(
                 "{name}: there are no samples to plot"

@@ -182,7 +182,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         Place::new(&arguments.out, arguments.overwrite, &inputs)?.try_out()?;
     }
     let name = input::name(path);
-    let source = arguments.source(path, &name)?;
+    let (source, rest) = arguments.source(path, &name)?;
     let set = source.set();
     let mut frames = samples.of(set, &name);
     let mut timeline = frames
@@ -222,26 +222,27 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         device.label,
         arguments.out.display()
     ));
-    Ok(())
+    rest
 }
 
 impl Arguments {
     /// The paths or the clip of a file: of clips whose boxes hang on each other also what carries the
-    /// tracks that are asked for.
-    fn source(&self, path: &Path, name: &str) -> Result<Source, Failure> {
+    /// tracks that are asked for. And the failure of animations that were refused.
+    fn source(&self, path: &Path, name: &str) -> Result<(Source, Result<(), Failure>), Failure> {
         let tracks = &self.inputs.tracks;
         if is_path_file(path) {
-            return Source::of_paths(path, &self.path, tracks);
+            return Ok((Source::of_paths(path, &self.path, tracks)?, Ok(())));
         }
-        let clip = self.inputs.load_one(path)?;
+        let input::OnlyClip { clip, rest } = self.inputs.load_one(path)?;
         let wanted = match is_travel(&clip) {
             true => tracks.of(&clip, name)?,
             false => tracks.chain(&clip, name)?,
         };
-        Ok(Source::Clip(Box::new(match wanted {
+        let clip = match wanted {
             Some(wanted) => selected(&clip, &wanted, name)?,
             None => clip,
-        })))
+        };
+        Ok((Source::Clip(Box::new(clip)), rest))
     }
 
     /// What is drawn: bodies where there are paths, else a chain, by each frame or method.

@@ -4,13 +4,16 @@ use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
 
-use tumble_formats::Limits;
+use glam::DVec3;
 use tumble_formats::beneath::open_beneath;
 use tumble_formats::gltf::meshes::read_triangles;
+use tumble_formats::npy::read_numbers;
+use tumble_formats::{Code, Diagnostic, Limits};
 use tumble_routes::mesh::Mesh;
 use tumble_routes::net::Net;
 
-use crate::messages::exit::{ALL_INPUTS, Failure};
+use crate::arguments::input;
+use crate::messages::exit::Failure;
 use crate::messages::words;
 
 /// The largest file that is read.
@@ -24,9 +27,12 @@ pub(crate) enum Surface {
 impl Surface {
     /// Reads a file, known by its name.
     pub(crate) fn read(path: &Path) -> Result<Self, Failure> {
-        let name = path.display();
-        let refuse =
-            |error: &dyn std::fmt::Display| Failure::new(ALL_INPUTS, format!("{name}: {error}"));
+        let name = input::name(path);
+        let refused = |code, error: &dyn std::fmt::Display| {
+            let fault = Diagnostic::new(path.display().to_string(), code, error.to_string());
+            Failure::input(&fault, "")
+        };
+        let refuse = |error: &dyn std::fmt::Display| refused(Code::Mesh, error);
         let extension = path
             .extension()
             .and_then(|own| own.to_str())
@@ -43,8 +49,18 @@ impl Surface {
                 Mesh::new(&all.positions, &all.triangles).map_err(|error| refuse(&error))?
             }
             "npy" => {
-                let net = Net::of_npy(&bytes(path)?).map_err(|error| refuse(&error))?;
-                return Ok(Self::Net(net));
+                let array = read_numbers(&path.display().to_string(), &bytes(path)?, |shape| match shape {
+                    [_, _, 3] => Ok(()),
+                    _ => Err(format!(
+                        "the array has the shape {shape:?}; a net has (m, n, 3)"
+                    )),
+                });
+                let array = array.map_err(|fault| Failure::input(&fault, ""))?;
+                let points = array.values.chunks_exact(3).map(DVec3::from_slice);
+                let net = Net::new(array.shape[0], array.shape[1], points.collect());
+                return net
+                    .map(Self::Net)
+                    .map_err(|error| refused(Code::Net, &error));
             }
             _ => {
                 return Err(Failure::usage(format!(
@@ -81,9 +97,11 @@ pub(super) fn bytes_beneath(folder: &Path, name: &Path) -> Result<Vec<u8>, Failu
 }
 
 fn read(path: &Path, file: io::Result<File>) -> Result<Vec<u8>, Failure> {
-    let name = path.display();
-    let refuse =
-        |error: io::Error| Failure::new(ALL_INPUTS, format!("{name}: cannot be read: {error}"));
+    let refused = |code, message: String| {
+        let fault = Diagnostic::new(path.display().to_string(), code, message);
+        Failure::input(&fault, "")
+    };
+    let refuse = |error: io::Error| refused(Code::Open, format!("cannot be read: {error}"));
     let mut bytes = Vec::new();
     let file = file.map_err(refuse)?;
     file.take(MOST_BYTES + 1)
@@ -91,9 +109,9 @@ fn read(path: &Path, file: io::Result<File>) -> Result<Vec<u8>, Failure> {
         .map_err(refuse)?;
     match bytes.len() as u64 <= MOST_BYTES {
         true => Ok(bytes),
-        false => Err(Failure::new(
-            ALL_INPUTS,
-            format!("{name}: is longer than 4 GiB; simplify it"),
-        )),
+        false => {
+            let message = "is longer than 4 GiB; simplify it";
+            Err(refused(Code::FileTooLong, message.to_owned()))
+        }
     }
 }

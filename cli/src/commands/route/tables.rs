@@ -4,10 +4,11 @@ use std::path::Path;
 
 use glam::DVec3;
 use serde::Deserialize;
+use tumble_formats::{Code, Diagnostic, Place};
 use tumble_routes::walkers::Mover;
 
 use crate::commands::route::surface::{bytes, bytes_beneath};
-use crate::messages::exit::{ALL_INPUTS, Failure};
+use crate::messages::exit::Failure;
 
 /// Who goes from where to where.
 pub(crate) struct Party {
@@ -40,15 +41,20 @@ impl Party {
     }
 }
 
-fn refuse(path: &Path, line: u64, message: &str) -> Failure {
-    Failure::new(ALL_INPUTS, format!("{}:{line}: {message}", path.display()))
+fn whole(path: &Path, code: Code, message: &str) -> Failure {
+    let fault = Diagnostic::new(path.display().to_string(), code, message);
+    Failure::input(&fault, "")
+}
+
+fn refuse(path: &Path, line: u64, code: Code, message: &str) -> Failure {
+    let mut fault = Diagnostic::new(path.display().to_string(), code, message);
+    fault.place = Some(Place::Text { line, column: 1 });
+    Failure::input(&fault, "")
 }
 
 fn text(path: &Path, bytes: Vec<u8>) -> Result<String, Failure> {
-    String::from_utf8(bytes).map_err(|_| {
-        let message = format!("{}: is no UTF-8 text", path.display());
-        Failure::new(ALL_INPUTS, message)
-    })
+    let text = String::from_utf8(bytes);
+    text.map_err(|_| whole(path, Code::Encoding, "is no UTF-8 text; save it as UTF-8"))
 }
 
 /// Six numbers a line; lines with `#` in front and empty ones are skipped.
@@ -69,13 +75,12 @@ pub(super) fn read_pairs(path: &Path) -> Result<Party, Failure> {
             _ => {
                 let message =
                     format!("`{line}` is no pair; give x y z of the start and of the goal");
-                return Err(refuse(path, number, &message));
+                return Err(refuse(path, number, Code::Pairs, &message));
             }
         }
     }
     if pairs.is_empty() {
-        let message = format!("{}: has no pairs", path.display());
-        return Err(Failure::new(ALL_INPUTS, message));
+        return Err(whole(path, Code::Pairs, "has no pairs"));
     }
     let digits = pairs.len().to_string().len();
     Ok(Party {
@@ -125,7 +130,7 @@ fn rows<T: for<'de> Deserialize<'de>>(
         .from_reader(text.as_bytes());
     let unreadable = |error: csv::Error| {
         let line = error.position().map_or(1, csv::Position::line);
-        refuse(path, line, &format!("cannot be read: {error}"))
+        refuse(path, line, Code::Walkers, &format!("cannot be read: {error}"))
     };
     let headers = reader.headers().map_err(unreadable)?.clone();
     let mut rows = Vec::new();
@@ -151,12 +156,13 @@ pub(super) fn read_walkers(path: &Path) -> Result<Party, Failure> {
     for (line, row) in rows::<WalkerRow>(path, bytes(path)?)? {
         if let Some(track) = row.track.filter(|own| !own.is_empty()) {
             if !(row.radius >= 0.0 && row.radius.is_finite()) {
-                return Err(refuse(path, line, "a radius is a number of 0 or more"));
+                let message = "a radius is a number of 0 or more";
+                return Err(refuse(path, line, Code::Walkers, message));
             }
             let folder = path.parent().unwrap_or(Path::new(""));
             let file = folder.join(&track);
             let bytes = bytes_beneath(folder, Path::new(&track))
-                .map_err(|failure| refuse(path, line, failure.message()))?;
+                .map_err(|failure| refuse(path, line, Code::Walkers, failure.message()))?;
             party.movers.push(Mover {
                 track: read_track(&file, bytes)?,
                 radius: row.radius,
@@ -176,7 +182,7 @@ pub(super) fn read_walkers(path: &Path) -> Result<Party, Failure> {
         else {
             let message = "a walker has speed, x, y, z, to_x, to_y and to_z; what moves on a \
                            track of its own has track";
-            return Err(refuse(path, line, message));
+            return Err(refuse(path, line, Code::Walkers, message));
         };
         party
             .pairs
@@ -187,7 +193,7 @@ pub(super) fn read_walkers(path: &Path) -> Result<Party, Failure> {
         if !name.chars().all(is_plain) || name.starts_with('.') || party.names.contains(&name) {
             let message =
                 format!("`{name}` names a file: give each walker a plain name of its own");
-            return Err(refuse(path, line, &message));
+            return Err(refuse(path, line, Code::Walkers, &message));
         }
         party.names.push(name);
         let pace = Pace {
@@ -198,10 +204,7 @@ pub(super) fn read_walkers(path: &Path) -> Result<Party, Failure> {
         party.paces.get_or_insert_default().push(pace);
     }
     match party.pairs.is_empty() {
-        true => Err(Failure::new(
-            ALL_INPUTS,
-            format!("{}: has no walkers", path.display()),
-        )),
+        true => Err(whole(path, Code::Walkers, "has no walkers")),
         false => Ok(party),
     }
 }
@@ -212,22 +215,21 @@ fn read_track(path: &Path, bytes: Vec<u8>) -> Result<Vec<(f64, DVec3)>, Failure>
     for (line, row) in rows::<TrackRow>(path, bytes)? {
         let place = DVec3::new(row.x, row.y, row.z);
         if !(place.is_finite() && row.t.is_finite()) {
-            return Err(refuse(path, line, "times and places are finite numbers"));
+            let message = "times and places are finite numbers";
+            return Err(refuse(path, line, Code::Walkers, message));
         }
         if track.last().is_some_and(|last| last.0 >= row.t) {
             return Err(refuse(
                 path,
                 line,
+                Code::Walkers,
                 &format!("times increase, and {} does not", row.t),
             ));
         }
         track.push((row.t, place));
     }
     match track.is_empty() {
-        true => Err(Failure::new(
-            ALL_INPUTS,
-            format!("{}: has no places", path.display()),
-        )),
+        true => Err(whole(path, Code::Walkers, "has no places")),
         false => Ok(track),
     }
 }

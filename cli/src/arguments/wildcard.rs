@@ -1,0 +1,252 @@
+//! Patterns of names and of files: `*` is any characters, `?` one, `[a-z]` one of these, `[!a-z]` one of the
+//! others; between slashes `**` is any folders.
+//!
+//! A match takes at most the pattern's length times the name's: after a `*` nothing before it is tried
+//! again. Whoever tries every split of a name at every star needs longer than anybody waits for
+//! `*a*a*a*a*a*a*b`.
+
+use std::path::{Component, Path, PathBuf};
+
+use walkdir::WalkDir;
+
+/// A pattern of one name.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Wildcard {
+    parts: Vec<Part>,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+enum Part {
+    Character(char),
+    Any,
+    Many,
+    /// Ranges of characters, both ends of them; whether it is one of the others.
+    Class(Vec<(char, char)>, bool),
+}
+
+/// Whether a text has anything that makes it a pattern.
+pub(crate) fn is_pattern(text: &str) -> bool {
+    text.contains(['*', '?', '['])
+}
+
+impl Wildcard {
+    /// Reads a pattern.
+    ///
+    /// # Errors
+    /// When a class of characters has no end; in words.
+    pub(crate) fn new(text: &str) -> Result<Self, String> {
+        let mut parts = Vec::new();
+        let mut rest = text;
+        while let Some(first) = rest.chars().next() {
+            rest = &rest[first.len_utf8()..];
+            match first {
+                '*' if parts.last() == Some(&Part::Many) => {}
+                '*' => parts.push(Part::Many),
+                '?' => parts.push(Part::Any),
+                '[' => {
+                    let (class, behind) = class(rest).ok_or_else(|| {
+                        format!("the range pattern `[{rest}` in `{text}` has no end; write `[[]` for a bracket")
+                    })?;
+                    parts.push(class);
+                    rest = behind;
+                }
+                other => parts.push(Part::Character(other)),
+            }
+        }
+        Ok(Self { parts })
+    }
+
+    /// Whether it matches the whole of a name.
+    pub(crate) fn matches(&self, name: &str) -> bool {
+        let name: Vec<char> = name.chars().collect();
+        let (mut at, mut part) = (0, 0);
+        // Behind the last star: its part, and where what it stands for ends.
+        let mut star: Option<(usize, usize)> = None;
+        while at < name.len() {
+            match self.parts.get(part) {
+                Some(Part::Many) => {
+                    part += 1;
+                    star = Some((part, at));
+                }
+                Some(own) if own.is_one(name[at]) => {
+                    part += 1;
+                    at += 1;
+                }
+                _ => match &mut star {
+                    // The star takes one more.
+                    Some((behind, end)) => {
+                        *end += 1;
+                        (part, at) = (*behind, *end);
+                    }
+                    None => return false,
+                },
+            }
+        }
+        self.parts[part..].iter().all(|part| *part == Part::Many)
+    }
+}
+
+/// The class whose `[` is read, and what follows it. A `]` right behind the `[` is one of its characters.
+fn class(text: &str) -> Option<(Part, &str)> {
+    let (is_other, text) = match text.strip_prefix('!') {
+        Some(text) => (true, text),
+        None => (false, text),
+    };
+    let first = text.chars().next()?.len_utf8();
+    let end = first + text[first..].find(']')?;
+    let characters: Vec<char> = text[..end].chars().collect();
+    let mut ranges = Vec::new();
+    let mut rest = &characters[..];
+    while let Some((&first, behind)) = rest.split_first() {
+        match *behind {
+            ['-', last, ..] => {
+                ranges.push((first, last));
+                rest = &behind[2..];
+            }
+            _ => {
+                ranges.push((first, first));
+                rest = behind;
+            }
+        }
+    }
+    Some((Part::Class(ranges, is_other), &text[end + 1..]))
+}
+
+impl Part {
+    fn is_one(&self, character: char) -> bool {
+        match self {
+            Self::Character(own) => *own == character,
+            Self::Any => true,
+            Self::Many => false,
+            Self::Class(ranges, is_other) => {
+                let is_in = |&(first, last): &(char, char)| (first..=last).contains(&character);
+                ranges.iter().any(is_in) != *is_other
+            }
+        }
+    }
+}
+
+/// The files and folders that a pattern of paths matches, by name; none where one of its parts is no
+/// pattern. What cannot be looked into matches nothing.
+pub(crate) fn paths(pattern: &str) -> Vec<PathBuf> {
+    let mut found = vec![PathBuf::new()];
+    let components: Vec<Component<'_>> = Path::new(pattern).components().collect();
+    for (place, component) in components.iter().enumerate() {
+        let name = match component {
+            Component::Normal(name) => name.to_str().unwrap_or_default(),
+            other => {
+                found.iter_mut().for_each(|path| path.push(other));
+                continue;
+            }
+        };
+        if name == "**" {
+            // The folders themselves too; where it is last, all that is in them.
+            let is_last = place + 1 == components.len();
+            found = found.iter().flat_map(|path| tree(path, is_last)).collect();
+            continue;
+        }
+        if !is_pattern(name) {
+            found.iter_mut().for_each(|path| path.push(name));
+            continue;
+        }
+        let Ok(wildcard) = Wildcard::new(name) else {
+            return Vec::new();
+        };
+        found = found.iter().flat_map(|path| children(path, &wildcard)).collect();
+    }
+    found.retain(|path| path.symlink_metadata().is_ok());
+    found.sort_unstable();
+    found.dedup();
+    found
+}
+
+fn folder(path: &Path) -> &Path {
+    match path.as_os_str().is_empty() {
+        true => Path::new("."),
+        false => path,
+    }
+}
+
+fn children(path: &Path, wildcard: &Wildcard) -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(folder(path)).into_iter().flatten();
+    let names = entries.flatten().map(|entry| entry.file_name());
+    names
+        .filter(|name| wildcard.matches(&name.to_string_lossy()))
+        .map(|name| path.join(name))
+        .collect()
+}
+
+fn tree(path: &Path, with_files: bool) -> Vec<PathBuf> {
+    let walk = WalkDir::new(folder(path)).into_iter().flatten();
+    let kept = walk.filter(|entry| with_files || entry.file_type().is_dir());
+    kept.map(|entry| match path.as_os_str().is_empty() {
+        true => entry.path().strip_prefix(".").unwrap_or(entry.path()).to_owned(),
+        false => entry.into_path(),
+    })
+    .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use super::*;
+
+    #[test]
+    fn patterns_match_as_those_of_shells() {
+        for (pattern, name, is_match) in [
+            ("*Arm", "LeftArm", true),
+            ("*Arm", "LeftArmRoll", false),
+            ("*", "", true),
+            ("", "", true),
+            ("", "a", false),
+            ("a*b*c", "aXbYbZc", true),
+            ("a*b*c", "aXcYb", false),
+            ("?", "ä", true),
+            ("??", "ä", false),
+            ("[LR]*", "RightHand", true),
+            ("[!LR]*", "RightHand", false),
+            ("[a-c]x", "bx", true),
+            ("[]]", "]", true),
+            ("[[]*", "[0]", true),
+            ("[a-]", "-", true),
+            ("**", "anything", true),
+        ] {
+            let wildcard = Wildcard::new(pattern).unwrap();
+            assert_eq!(wildcard.matches(name), is_match, "{pattern} {name}");
+        }
+        assert!(Wildcard::new("[ab").unwrap_err().contains("no end"));
+        assert!(Wildcard::new("a[").is_err() && Wildcard::new("[!").is_err());
+    }
+
+    /// It would take longer than the universe is old to try every split.
+    #[test]
+    fn many_stars_take_no_time() {
+        let wildcard = Wildcard::new(&format!("{}b", "*a".repeat(200))).unwrap();
+        assert!(!wildcard.matches(&"a".repeat(20_000)));
+        assert!(wildcard.matches(&format!("{}b", "a".repeat(20_000))));
+    }
+
+    #[test]
+    fn patterns_find_files_in_folders() {
+        let place = tempfile::tempdir().unwrap();
+        for name in ["a/1.dat", "a/2.bvh", "b/c/3.dat", "4.dat"] {
+            let file = place.path().join(name);
+            fs::create_dir_all(file.parent().unwrap()).unwrap();
+            fs::write(file, "").unwrap();
+        }
+        let found = |pattern: &str| -> Vec<String> {
+            let pattern = place.path().join(pattern);
+            let found = paths(pattern.to_str().unwrap()).into_iter();
+            let below = found.map(|path| path.strip_prefix(place.path()).unwrap().to_owned());
+            below.map(|path| path.to_str().unwrap().to_owned()).collect()
+        };
+        assert_eq!(found("*.dat"), ["4.dat"]);
+        assert_eq!(found("*/*.dat"), ["a/1.dat"]);
+        assert_eq!(found("**/*.dat"), ["4.dat", "a/1.dat", "b/c/3.dat"]);
+        assert_eq!(found("a/[12].*"), ["a/1.dat", "a/2.bvh"]);
+        assert_eq!(found("b/?/3.dat"), ["b/c/3.dat"]);
+        assert_eq!(found("none/*"), [""; 0]);
+        assert_eq!(found("*/none"), [""; 0]);
+    }
+}

@@ -1,0 +1,135 @@
+//! How much memory reading one input may take.
+//!
+//! A file of a megabyte can say that it has gigabytes: by a count in a header, by data that is packed, by
+//! parts that name one part many times. Each reader asks here before it allocates what the file decides, and
+//! what would go over the budget is refused with the number. The budget is a promise about the whole input,
+//! so that no two parts of it add up to more.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use crate::text::lines::Limits;
+
+/// Bytes that any input may take.
+pub const BASE: u64 = 64 << 20;
+
+/// Bytes that each byte of an input may take besides: numbers of one byte become keys of f32 beside their
+/// times in f64, and packed files unpack to several times their length.
+pub const FACTOR: u64 = 64;
+
+/// The memory of one input: what may be taken, and what is.
+#[derive(Debug)]
+pub(crate) struct Budget {
+    most: AtomicU64,
+    taken: AtomicU64,
+    /// Whether it grows with the input.
+    grows: bool,
+}
+
+/// More than the budget has.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error(
+    "reading it takes {needed} bytes of memory at least, and an input of this length gets {most}; it says more \
+     than it has"
+)]
+pub(crate) struct OverBudget {
+    needed: u64,
+    most: u64,
+}
+
+impl Budget {
+    /// Of an input of so many bytes.
+    pub(crate) fn of(input: usize, limits: Limits) -> Self {
+        let most = match limits.memory {
+            Some(most) => most,
+            None => BASE.saturating_add(FACTOR.saturating_mul(input as u64)),
+        };
+        Self {
+            most: AtomicU64::new(most),
+            taken: AtomicU64::new(0),
+            grows: limits.memory.is_none(),
+        }
+    }
+
+    /// The input has so many bytes more: those of a file beside it.
+    pub(crate) fn add_input(&self, bytes: usize) {
+        if self.grows {
+            let more = FACTOR.saturating_mul(bytes as u64);
+            self.most.fetch_add(more, Ordering::Relaxed);
+        }
+    }
+
+    /// Takes memory for `count` things of `bytes` each, for as long as the input is read.
+    ///
+    /// # Errors
+    /// When that is more than there is.
+    pub(crate) fn take(&self, count: usize, bytes: usize) -> Result<(), OverBudget> {
+        let own = (count as u64).saturating_mul(bytes as u64);
+        let (taken, most) = (&self.taken, self.most.load(Ordering::Relaxed));
+        let before = taken.fetch_add(own, Ordering::Relaxed);
+        let needed = before.saturating_add(own);
+        if needed <= most && before <= most {
+            return Ok(());
+        }
+        taken.fetch_sub(own, Ordering::Relaxed);
+        Err(OverBudget { needed, most })
+    }
+
+    /// Takes memory that is given back when the value is dropped.
+    ///
+    /// # Errors
+    /// When that is more than there is.
+    pub(crate) fn borrow(&self, count: usize, bytes: usize) -> Result<Borrowed<'_>, OverBudget> {
+        self.take(count, bytes)?;
+        let bytes = (count as u64).saturating_mul(bytes as u64);
+        Ok(Borrowed {
+            budget: self,
+            bytes,
+        })
+    }
+}
+
+/// Memory of a budget, until it is dropped.
+#[must_use]
+pub(crate) struct Borrowed<'a> {
+    budget: &'a Budget,
+    bytes: u64,
+}
+
+impl Drop for Borrowed<'_> {
+    fn drop(&mut self) {
+        self.budget.taken.fetch_sub(self.bytes, Ordering::Relaxed);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parts_add_up_and_are_refused_together() {
+        let limits = Limits {
+            memory: Some(1000),
+            ..Limits::default()
+        };
+        let budget = Budget::of(1 << 40, limits);
+        budget.add_input(1 << 40);
+        budget.take(100, 6).unwrap();
+        let borrowed = budget.borrow(1, 400).unwrap();
+        let over = budget.take(1, 1).unwrap_err();
+        assert_eq!((over.needed, over.most), (1001, 1000));
+        drop(borrowed);
+        budget.take(4, 100).unwrap();
+        assert!(budget.take(usize::MAX, usize::MAX).is_err());
+        assert!(budget.take(1, 1).is_err());
+        assert!(budget.take(0, 99).is_ok());
+    }
+
+    #[test]
+    fn longer_inputs_get_more() {
+        let budget = Budget::of(10, Limits::default());
+        assert!(budget.take(1, (BASE + 10 * FACTOR) as usize).is_ok());
+        assert!(budget.take(1, 1).is_err());
+        budget.add_input(1);
+        assert!(budget.take(FACTOR as usize, 1).is_ok());
+    }
+}
