@@ -145,10 +145,10 @@ fn matches(pattern: &Path) -> Vec<Found> {
 /// A path on each line; blank lines and lines that begin with `#` are none.
 fn read_list(list: &Path) -> Result<Vec<PathBuf>, Failure> {
     let read = if is_standard(list) {
-        let mut text = String::new();
-        io::stdin().read_to_string(&mut text).map(|_| text)
+        let mut text = Vec::new();
+        io::stdin().read_to_end(&mut text).map(|_| text)
     } else {
-        std::fs::read_to_string(list)
+        std::fs::read(list)
     };
     let text = read.map_err(|error| {
         let name = input::name(list);
@@ -157,9 +157,19 @@ fn read_list(list: &Path) -> Result<Vec<PathBuf>, Failure> {
             format!("{name}: the list cannot be read: {error}"),
         )
     })?;
-    let paths = text
-        .lines()
-        .map(str::trim_end)
-        .filter(|line| !line.is_empty() && !line.starts_with('#'));
-    Ok(paths.map(PathBuf::from).collect())
+    let lines = text.split(|&byte| byte == b'\n').map(<[u8]>::trim_ascii_end);
+    let paths = lines.filter(|line| !line.is_empty() && !line.starts_with(b"#"));
+    Ok(paths.map(named).collect())
+}
+
+/// The path of these bytes: names of files need be no UTF-8.
+#[cfg(unix)]
+fn named(bytes: &[u8]) -> PathBuf {
+    use std::os::unix::ffi::OsStrExt;
+    std::ffi::OsStr::from_bytes(bytes).into()
+}
+
+#[cfg(not(unix))]
+fn named(bytes: &[u8]) -> PathBuf {
+    String::from_utf8_lossy(bytes).into_owned().into()
 }
