@@ -184,7 +184,14 @@ pub(crate) const SQUAD: Definition = by_handles!(Handles {
 
 /// Bézier curves, their control rotations the bisectors.
 pub(crate) const SHOEMAKE: Definition = by_handles!(Handles {
-    parabolic: |whole, other| 2.0 * whole - other,
+    parabolic: |whole, other| {
+        let handle: DVec3 = 2.0 * whole - other;
+        // No arc leads to the opposite of a quaternion more than any other: the turn itself then.
+        match (handle.length_squared() - std::f64::consts::PI.powi(2)).abs() < 1e-5 {
+            true => whole,
+            false => handle,
+        }
+    },
     ..Handles::bezier(|sides| shoemake(sides, |_, bisector| bisector))
 });
 

@@ -125,13 +125,9 @@ fn all_broken_animations_are_told() {
 }
 
 /// Escapes, line ends, and marks that turn text round.
-const NAMES: [&str; 6] = [
-    "\x1b]0;FORGED\x07",
-    "\x1b[2J\x1b[1;1HFORGED",
-    "a\nFORGED: every bit as written",
-    "\u{9b}31mFORGED",
-    "\u{202e}FORGED",
-    "x\r\x1b[KFORGED",
+const NAMES: [&str; 2] = [
+    "\x1b]0;FORGED\x07\x1b[2J\x1b[1;1H\u{9b}31mFORGED\u{202e}",
+    "a\nFORGED: every bit as written\r\x1b[KFORGED",
 ];
 
 fn is_quiet(text: &str, line: &[&str]) {
@@ -228,7 +224,7 @@ fn no_name_reaches_a_terminal_as_it_is() {
             seen += usize::from(run.words.contains("FORGED"));
         }
     }
-    assert!(seen > 100, "only {seen} messages had a name at all");
+    assert!(seen > 40, "only {seen} messages had a name at all");
 }
 
 /// Values that a field of a file is not expected to have.

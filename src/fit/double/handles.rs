@@ -123,11 +123,24 @@ pub(crate) trait HandleRule {
         match handle {
             EndHandle::Turn(turn) => scaled(turn, 1.0 / 3.0),
             // The tangent of a parabola changes at a constant rate.
-            EndHandle::Parabolic => sum(scaled(log, Self::HANDLES_OF_TURN), scaled(other, -1.0)),
+            EndHandle::Parabolic => {
+                let handle = sum(scaled(log, Self::HANDLES_OF_TURN), scaled(other, -1.0));
+                match !Self::IS_CUMULATIVE && is_opposite(handle) {
+                    true => log,
+                    false => handle,
+                }
+            }
             // No acceleration: the control rotation lies half way to the other one.
             EndHandle::Natural(rest) => scaled(rest, 0.5),
         }
     }
+}
+
+/// Whether a handle ends at the key's own quaternion with the other sign. No arc leads there more than any
+/// other, and so the construction by arcs has no curve: of the parabola through half turns there and back.
+fn is_opposite(handle: Vector) -> bool {
+    let square: f64 = handle.iter().map(|part| part * part).sum();
+    (square - std::f64::consts::PI.powi(2)).abs() < 1e-5
 }
 
 /// The condition for the handle of a track's first or last key.
