@@ -101,6 +101,11 @@ impl Inputs {
         Ok(gathered)
     }
 
+    /// The longest input that is read, bytes.
+    pub(crate) fn max_size(&self) -> u64 {
+        self.max_size
+    }
+
     /// What the command line names.
     pub(crate) fn given(&self) -> &[PathBuf] {
         &self.paths

@@ -103,13 +103,14 @@ impl Results {
         options: String,
         work: impl FnMut(&InputFile, &Loaded, &Target, &mut Done<'_>) -> Result<(), Failure>,
     ) -> Result<(), Failure> {
-        self.make_of(|path| inputs.read(path), plan, options, work)
+        let read = |path: &Path| inputs.read(path);
+        self.make_of((read, inputs.max_size()), plan, options, work)
     }
 
-    /// As [`Results::make`], of inputs that `read` reads.
+    /// As [`Results::make`], of inputs that `read` reads, each at most so many bytes long.
     pub(crate) fn make_of(
         &self,
-        read: impl Fn(&Path) -> Result<Loaded, Failure> + Sync,
+        (read, most): (impl Fn(&Path) -> Result<Loaded, Failure> + Sync, u64),
         plan: Plan,
         options: String,
         mut work: impl FnMut(&InputFile, &Loaded, &Target, &mut Done<'_>) -> Result<(), Failure>,
@@ -124,6 +125,7 @@ impl Results {
         if let Some(mut manifest) = manifest {
             let batch = Batch {
                 read,
+                most,
                 options,
                 resume: self.resume,
             };

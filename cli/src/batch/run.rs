@@ -20,6 +20,8 @@ use crate::messages::{signals, words};
 pub(crate) struct Batch<R> {
     /// Reads an input.
     pub(crate) read: R,
+    /// The longest input that it reads: a longer one is refused, and not hashed before.
+    pub(crate) most: u64,
     /// All that decides over a result besides its input.
     pub(crate) options: String,
     /// Results that are done are skipped.
@@ -167,7 +169,8 @@ impl<R: Fn(&Path) -> Result<Loaded, Failure> + Sync> Batch<R> {
             let file = InputFile::new(path);
             let is_done = |hash: &str| previous.is_done(target.name(), hash, &self.options);
             // The hash is of the bytes that are read next.
-            let sha256 = file.sha256();
+            let is_read = std::fs::metadata(path).is_ok_and(|found| found.len() <= self.most);
+            let sha256 = is_read.then(|| file.sha256()).flatten();
             let done = self.resume && sha256.is_some_and(is_done);
             let input = (!done).then(|| {
                 let loaded = (self.read)(path);

@@ -6,10 +6,10 @@ use std::time::Instant;
 use clap::{ArgAction, Args};
 use glam::Vec3;
 use tumble::{Engine, Error, Follow, FollowError, Followed, Frames, Layout, TrackSet};
-use tumble_formats::Loaded;
 use tumble_formats::motion::{Joint, Motion, Sampled, Transform};
 use tumble_formats::poses::{Poses, WORLD};
 use tumble_formats::sample::Samples as Baked;
+use tumble_formats::{Limits, Loaded};
 
 use crate::arguments::device::{DeviceArguments, Opened};
 use crate::arguments::gather::Gathered;
@@ -81,7 +81,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     };
     let options = arguments.options(&samples);
     let results = &arguments.results;
-    results.make_of(read, plan, options, |file, loaded, target, done| {
+    let most = Limits::default().file;
+    results.make_of((read, most), plan, options, |file, loaded, target, done| {
         let path = file.path();
         for clip in &loaded.clips {
             let made = arguments.body(path, &clip.set, &samples, target, &mut device)?;

@@ -347,8 +347,20 @@ fn nothing_small_takes_long() {
     write("faults.gltf", &text);
     write(&"a".repeat(200), "");
     let stars = format!("{}b", "*a".repeat(40));
+    let sparse = fs::File::create(place.path().join("folder/sparse.dat")).unwrap();
+    sparse.set_len(300 << 30).unwrap();
+    fs::create_dir_all(place.path().join("shards/manifest.d")).unwrap();
+    let plan = format!(
+        r#"{{"plan":"{0}","shards":{1},"inputs":{1},"shard_bytes":1,"outputs_sha256":"{0}","options":"","kernels_sha256":"{0}",
+        "tumble":""}}"#,
+        "0".repeat(64),
+        u64::MAX
+    );
+    write("shards/manifest.d/plan.json", &plan);
     for (line, code) in [
-        (&["plot", "far.dat", "-o", "far.svg"][..], 2),
+        (&["eval", "folder", "-o", "out"][..], 3),
+        (&["merge", "shards"], 4),
+        (&["plot", "far.dat", "-o", "far.svg"], 2),
         (&["plot", "long.dat", "-o", "long.svg"], 2),
         (&["plot", "nested.npy", "-o", "n.svg"], 4),
         (&["render", "nested.npy", "-o", "n.gif"], 4),

@@ -28,6 +28,12 @@ const STATED: &str = "plan.json";
 /// No shard has more inputs: what a lost worker had done of one is done again.
 const MOST_INPUTS: usize = 256;
 
+/// Shards of a list, at most: whoever merges them looks for each.
+const MOST_SHARDS: usize = 1 << 20;
+
+/// A longer file says nothing of shards.
+const LONGEST: u64 = 1 << 20;
+
 /// All inputs of a request, cut into shards.
 pub(crate) struct Plan {
     pub(crate) inputs: Vec<Found>,
@@ -203,7 +209,9 @@ impl Stated {
         let mut open = || {
             // What is in it is to be written and removed: it is no link.
             parent_beneath(folder, &Self::name())?;
-            open_beneath(folder, &Self::name())?.read_to_end(&mut bytes)
+            open_beneath(folder, &Self::name())?
+                .take(LONGEST)
+                .read_to_end(&mut bytes)
         };
         match open() {
             Ok(_) => {}
@@ -213,10 +221,11 @@ impl Stated {
         }
         let stated: Self = serde_json::from_slice(&bytes).map_err(|error| refuse(&error))?;
         let Self { shards, inputs, .. } = stated;
-        match (1..=inputs).contains(&shards) {
+        match (1..=inputs.min(MOST_SHARDS)).contains(&shards) {
             true => Ok(Some(stated)),
             false => Err(refuse(&format!(
-                "it says {shards} shards of {inputs} inputs, and each has one at least; remove it"
+                "it says {shards} shards of {inputs} inputs; each has one at least, and there are \
+                 {MOST_SHARDS} at most; remove it"
             ))),
         }
     }

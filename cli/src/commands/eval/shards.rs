@@ -182,6 +182,7 @@ impl Evaluator {
     ) -> Result<(), Failure> {
         let batch = Batch {
             read: |path: &Path| arguments.inputs.read(path),
+            most: arguments.inputs.max_size(),
             options: self.request.options.clone(),
             resume: arguments.results.is_resumed(),
         };
