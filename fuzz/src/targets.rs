@@ -112,6 +112,7 @@ pub(crate) fn dat(bytes: &[u8]) -> u64 {
         limits: Limits {
             line: 4096,
             file: 65_536,
+            memory: None,
         },
         ..ReadOptions::default()
     };
