@@ -297,9 +297,9 @@ fn chains_of_joints_are_written_in_their_own_length() {
     clip.rate = tumble::FrameRate::new(2, 1).ok();
     let samples = keyed(&clip).unwrap();
     let mut out = Vec::new();
-    let write = bvh::FORMAT.write_motion.unwrap();
-    let sampled = samples.of(&clip, clip.rate, &[]);
-    write(&[sampled], &MotionOptions::default(), &mut out).unwrap();
+    let sampled = [samples.of(&clip, clip.rate, &[])];
+    let options = MotionOptions::default();
+    bvh::FORMAT.write_clips(&sampled, &options, &mut out).unwrap();
     assert!(out.len() < joints * 1500, "{} bytes", out.len());
     let again = bvh::read_bvh("t", &*out, &ReadOptions::default()).unwrap();
     assert_eq!(again.clips[0].set.track_count(), joints);
