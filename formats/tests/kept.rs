@@ -10,6 +10,7 @@ use serde_json::{Value, json};
 use tumble::{Channel, Device, Engine};
 use tumble_formats::adjust::{adjust, set_offsets};
 use tumble_formats::bvh::read_bvh;
+use tumble_formats::csv::read::read_csv;
 use tumble_formats::format::MotionOptions;
 use tumble_formats::gltf::read_gltf;
 use tumble_formats::keyed::keyed;
@@ -427,4 +428,45 @@ fn the_pelvis_of_a_body_is_at_both_its_places() {
         loaded.clips[0].set.track(3).keys
     );
     assert_eq!(again.document.unwrap().beside(), document.beside());
+}
+
+/// The usual columns of trajectories, with others behind them, need no map; EuRoC's need one.
+#[test]
+fn tables_of_poses_are_read_by_their_usual_columns() {
+    let euroc = "time=#timestamp,tx=p_RS_R_x [m],ty=p_RS_R_y [m],tz=p_RS_R_z [m],x=q_RS_x [],\
+                 y=q_RS_y [],z=q_RS_z [],w=q_RS_w []";
+    for (header, map) in [
+        ("timestamp,tx,ty,tz,qx,qy,qz,qw,speed", None),
+        ("t,x,y,z,qx,qy,qz,qw,speed", None),
+        ("time,px,py,pz,x,y,z,w,speed", None),
+        (
+            "time,cam.x,cam.y,cam.z,cam.qx,cam.qy,cam.qz,cam.qw,speed",
+            None,
+        ),
+        (
+            "#timestamp, p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_x [], q_RS_y [], q_RS_z [], q_RS_w [],v",
+            Some(euroc),
+        ),
+    ] {
+        let text = format!("{header}\n0.5,1,2,3,0.6,0,0,0.8,7\n0.75,4,5,6,0,0,0.6,0.8,7\n");
+        let options = ReadOptions {
+            map: map.map(str::to_owned),
+            ..ReadOptions::default()
+        };
+        let loaded = read_csv("t.csv", text.into_bytes(), &options);
+        let loaded = loaded.unwrap_or_else(|error| panic!("{header}: {error}"));
+        let clip = &loaded.clips[0];
+        assert_eq!(clip.set.track(0).times, [0.5, 0.75], "{header}");
+        assert_eq!(
+            clip.set.track(0).keys[1],
+            Quat::from_xyzw(0.0, 0.0, 0.6, 0.8),
+            "{header}"
+        );
+        let moved = clip.set.vector_keys(Channel::Translation, 0).unwrap().keys;
+        assert_eq!(
+            moved,
+            [Vec3::new(1.0, 2.0, 3.0), Vec3::new(4.0, 5.0, 6.0)],
+            "{header}"
+        );
+    }
 }

@@ -1,6 +1,6 @@
 //! Which columns of a table are what, by their names and by what `--map` says of them.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use crate::diagnostic::{Code, Diagnostic};
 use crate::format::ReadOptions;
@@ -161,10 +161,21 @@ impl Names<'_> {
 
     /// The columns of one track; whether its translations are in the world.
     fn parts(&mut self, prefix: &str) -> Result<(Parts, bool), Diagnostic> {
-        let missing = "a rotation has the columns x, y, z and w".to_owned();
-        let rotation = self.group(prefix, ["x", "y", "z", "w"])?;
+        // Trajectories call their rotations qx qy qz qw, and may call their positions x y z.
+        let is_pose = self.find(&format!("{prefix}qw"))?.is_some();
+        let names = match is_pose {
+            true => ["qx", "qy", "qz", "qw"],
+            false => ["x", "y", "z", "w"],
+        };
+        let missing = "a rotation has the columns x, y, z and w, or qx, qy, qz and qw".to_owned();
+        let rotation = self.group(prefix, names)?;
         let rotation = rotation.ok_or_else(|| self.refuse(Code::NoRotations, missing))?;
-        let local = self.group(prefix, ["tx", "ty", "tz"])?;
+        let local = match self.group(prefix, ["tx", "ty", "tz"])? {
+            None if is_pose && self.find(&format!("{prefix}x"))?.is_some() => {
+                self.group(prefix, ["x", "y", "z"])?
+            }
+            local => local,
+        };
         let world = match local {
             Some(_) => None,
             None => self.group(prefix, ["px", "py", "pz"])?,
@@ -212,7 +223,7 @@ impl Plan {
         };
         let rows = if !lists.is_empty() {
             list_rows(&mut names, &lists)?
-        } else if names.find("w")?.is_some() {
+        } else if names.find("w")?.is_some() || names.find("qw")?.is_some() {
             let (parts, is_world) = names.parts("")?;
             Rows::Keys {
                 track: names.take("track", Need::Name)?,
@@ -262,8 +273,9 @@ fn rename(names: &mut Names<'_>, map: &str) -> Result<Vec<Entry>, Diagnostic> {
 /// Whether a column may have this name; other targets are tracks.
 fn is_column(target: &str) -> bool {
     const WHOLE: [&str; 6] = ["time", "timestamp", "t", "track", "clip", "frame_index"];
-    const NUMBERS: [&str; 13] = [
-        "x", "y", "z", "w", "tx", "ty", "tz", "px", "py", "pz", "sx", "sy", "sz",
+    const NUMBERS: [&str; 17] = [
+        "x", "y", "z", "w", "tx", "ty", "tz", "px", "py", "pz", "sx", "sy", "sz", "qx", "qy", "qz",
+        "qw",
     ];
     let last = target.rsplit('.').next().unwrap_or(target);
     WHOLE.contains(&target) || target == "episode_index" || NUMBERS.contains(&last)
@@ -298,9 +310,14 @@ fn wide_rows(names: &mut Names<'_>) -> Result<Rows, Diagnostic> {
     let mut prefixes: Vec<(String, usize)> = names
         .seen
         .iter()
-        .filter_map(|(name, at)| Some((name.strip_suffix(".w")?.to_owned(), *at.first()?)))
+        .filter_map(|(name, at)| {
+            let track = name.strip_suffix(".w").or(name.strip_suffix(".qw"))?;
+            Some((track.to_owned(), *at.first()?))
+        })
         .collect();
     prefixes.sort_by_key(|&(_, index)| index);
+    let mut known = HashSet::new();
+    prefixes.retain(|(track, _)| known.insert(track.clone()));
     if prefixes.is_empty() {
         let message = format!(
             "no columns are rotations: x y z w, or knee.x knee.y knee.z knee.w; there are {}; \
