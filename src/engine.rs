@@ -90,10 +90,7 @@ impl Engine {
                     return Err(Error::ThreadCount { given, most });
                 }
                 let width = options.vector_width.unwrap_or_else(VectorWidth::widest);
-                let engine = CpuEngine::new(width, options.streaming_stores, options.threads)
-                    .map_err(|error| Error::Threads {
-                        reason: error.to_string(),
-                    })?;
+                let engine = CpuEngine::new(width, options.streaming_stores, options.threads)?;
                 Ok(Self {
                     backend: Arc::new(Backend::Cpu(engine)),
                 })

@@ -11,6 +11,7 @@ use crate::path::options::FollowError;
 use crate::prepare::error::SetError;
 use crate::simd::dispatch::UnknownWidth;
 use crate::smooth::kernel::SmoothingError;
+use crate::threads::OutOfThreads;
 use crate::time::frames::FramesError;
 use crate::tracks::error::TrackError;
 
@@ -105,11 +106,8 @@ pub enum Error {
         most: usize,
     },
     /// The system refused worker threads.
-    #[error("worker threads could not be started: {reason}")]
-    Threads {
-        /// What the system said.
-        reason: String,
-    },
+    #[error(transparent)]
+    Threads(#[from] OutOfThreads),
 }
 
 impl From<SetError> for Error {
@@ -118,6 +116,7 @@ impl From<SetError> for Error {
             SetError::Frames(error) => Self::Frames(error),
             SetError::Interpolation(error) => Self::Interpolation(error),
             SetError::OutOfMemory(error) => Self::OutOfMemory(error),
+            SetError::Threads(error) => Self::Threads(error),
         }
     }
 }

@@ -19,6 +19,7 @@ use crate::output::window::Window;
 use crate::prepare::batch::Batch;
 use crate::prepare::clip_data::Wanted;
 use crate::prepare::request::Request;
+use crate::threads::OutOfThreads;
 use crate::time::frames::Frames;
 use crate::tracks::set::TrackSet;
 
@@ -299,9 +300,7 @@ fn run<E: From<Error>>(
         };
         thread::Builder::new()
             .spawn_scoped(scope, fill_all)
-            .map_err(|error| Error::Threads {
-                reason: error.to_string(),
-            })?;
+            .map_err(|error| Error::Threads(OutOfThreads::of_one(&error)))?;
         for result in filled {
             let (window, rotations) = result?;
             let own = window.len();

@@ -21,6 +21,7 @@ mod speed;
 mod spirv;
 mod stream;
 mod textbook;
+mod threads;
 mod tidy;
 mod transforms;
 mod validation;

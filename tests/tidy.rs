@@ -158,8 +158,9 @@ fn the_reference_shares_nothing_with_the_engine() {
 
 /// The folders of `src/`, from the bottom to the top, as ARCHITECTURE.md draws them: code may
 /// use what lies below it. The files directly in `src/` are the engine's public face.
-const LAYERS: [&str; 24] = [
+const LAYERS: [&str; 25] = [
     "memory",
+    "threads",
     "shader",
     "math",
     "simd",

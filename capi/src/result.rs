@@ -62,7 +62,7 @@ impl From<Error> for Failure {
     fn from(error: Error) -> Self {
         let code = match &error {
             Error::Vulkan(VulkanError::OwnBuffer { .. }) => TumbleResult::WrongSize,
-            Error::Vulkan(_) | Error::Threads { .. } => TumbleResult::Device,
+            Error::Vulkan(_) | Error::Threads(_) => TumbleResult::Device,
             Error::OutputLength { .. } | Error::OutputBytes { .. } => TumbleResult::WrongSize,
             Error::OutOfMemory(_) => TumbleResult::OutOfMemory,
             Error::ThreadCount { .. } | Error::VectorWidth(_) => TumbleResult::InvalidArgument,
@@ -105,7 +105,7 @@ impl From<CrowdError> for Failure {
             error => error,
         };
         let code = match reason {
-            CrowdError::Vulkan(_) => TumbleResult::Device,
+            CrowdError::Vulkan(_) | CrowdError::Threads(_) => TumbleResult::Device,
             CrowdError::OutOfMemory(_) => TumbleResult::OutOfMemory,
             CrowdError::Missing { .. } => TumbleResult::OutOfRange,
             CrowdError::OutputLength { .. } | CrowdError::Buffer { .. } => TumbleResult::WrongSize,

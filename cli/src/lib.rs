@@ -11,6 +11,7 @@ mod commands;
 pub mod host;
 mod messages;
 pub mod shards;
+mod together;
 
 use std::process::ExitCode;
 

@@ -143,7 +143,7 @@ pub(crate) fn of_track(error: &TrackError) -> PyErr {
 pub(crate) fn of_engine(error: &Error) -> PyErr {
     let message = error.to_string();
     match error {
-        Error::Vulkan(_) | Error::Threads { .. } => device(&message),
+        Error::Vulkan(_) | Error::Threads(_) => device(&message),
         Error::Frames(FramesError::TimeNotFinite { index, .. }) => {
             input_at(&message, Code::NotFinite, format!("at[{index}]"))
         }

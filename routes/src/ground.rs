@@ -3,12 +3,12 @@
 use std::collections::HashMap;
 
 use glam::DVec3;
-use rayon::prelude::*;
 use thiserror::Error;
 
 use crate::error::{MeshError, RouteError};
 use crate::mesh::Mesh;
 use crate::route::{By, Route};
+use crate::together;
 
 /// Triangles that halving may make.
 pub const MOST_TRIANGLES: usize = 4_000_000;
@@ -127,14 +127,12 @@ impl<'a> Ground<'a> {
         let mut fates = vec![Fate::Open; triangles.len()];
         loop {
             let corners = |own: &[u32; 3]| own.map(|vertex| positions[vertex as usize]);
-            fates
-                .par_iter_mut()
-                .zip(&triangles)
-                .for_each(|(own, triangle)| {
-                    if *own == Fate::Open {
-                        *own = fate(corners(triangle));
-                    }
-                });
+            let open = |own: &usize| fates[*own] == Fate::Open;
+            let open: Vec<usize> = (0..triangles.len()).filter(open).collect();
+            let found = together::map(&open, |&own| fate(corners(&triangles[own])));
+            for (own, fate) in open.into_iter().zip(found) {
+                fates[own] = fate;
+            }
             let is_coarse = |(own, triangle): (&Fate, &[u32; 3])| {
                 *own == Fate::Open
                     && sides(corners(triangle)).into_iter().fold(0.0, f64::max) > finest
@@ -193,7 +191,7 @@ impl<'a> Ground<'a> {
     #[must_use]
     pub fn routes(&self, pairs: &[[DVec3; 2]], by: By) -> Vec<Result<Route, RouteError>> {
         let route = |&[from, to]: &[DVec3; 2]| self.route(from, to, by);
-        pairs.par_iter().map(route).collect()
+        together::map(pairs, route)
     }
 }
 

@@ -16,5 +16,6 @@ pub mod net;
 mod places;
 mod plane;
 pub mod route;
+mod together;
 mod triangle;
 pub mod walkers;

@@ -4,13 +4,12 @@ use std::fmt;
 use std::str::FromStr;
 
 use glam::DVec3;
-use rayon::prelude::*;
 
 use crate::error::RouteError;
 use crate::mesh::Mesh;
 use crate::mesh::surface::Spot;
 use crate::places::{Task, place};
-use crate::{edges, exact, greedy, plane};
+use crate::{edges, exact, greedy, plane, together};
 
 /// How a route is found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -97,7 +96,7 @@ impl Mesh {
     #[must_use]
     pub fn routes(&self, pairs: &[[DVec3; 2]], by: By) -> Vec<Result<Route, RouteError>> {
         let route = |&[from, to]: &[DVec3; 2]| self.route(from, to, by);
-        pairs.par_iter().map(route).collect()
+        together::map(pairs, route)
     }
 }
 

@@ -37,7 +37,7 @@ impl CpuEngine {
         let (set, tracks, timeline) = (request.set, request.tracks.clone(), request.timeline);
         let output: &mut [[f32; 4]] = bytemuck::cast_slice_mut(output);
         let (samples, rotations) = (timeline.len(), output.len());
-        let threads = rayon::current_num_threads();
+        let threads = self.thread_count();
         // The more tracks a batch has, the better they fill the blocks that are prepared in lanes;
         // but about eight batches are left for each thread, so that all are busy to the end.
         let shared = tracks.len() / (8 * threads);
@@ -79,7 +79,7 @@ impl CpuEngine {
         // A task takes several batches, which share its scratch.
         let each = batches.len().div_ceil(32 * threads);
         let tasks = tasks(set, timeline, &batches, each, PART_INTERVALS, output);
-        self.on_threads(|| tasks.into_par_iter().try_for_each(task))
+        self.on_threads(|| tasks.into_par_iter().try_for_each(task))?
     }
 }
 

@@ -11,7 +11,9 @@ use crate::output::encoding::Encoding;
 use crate::output::rotations::Layout;
 use crate::output::window::Window;
 use crate::prepare::clip_data::ClipData;
+use crate::prepare::error::SetError;
 use crate::simd::dispatch::in_lanes_of;
+use crate::threads;
 use crate::time::frames::{FramesError, Ticks, Timeline};
 use crate::time::wrap::TrackCopy;
 
@@ -30,26 +32,26 @@ impl CpuEngine {
         timeline: &Timeline,
         window: &Window,
         output: &mut [Quat],
-    ) -> Result<(), FramesError> {
+    ) -> Result<(), SetError> {
         let output: &mut [[f32; 4]] = bytemuck::cast_slice_mut(output);
         if output.is_empty() {
             return Ok(());
         }
         // Waking a thread costs more than a task's worth of work.
         if output.len() <= TASK {
-            return self.window(clip, timeline, window, Some(output.len()), output);
+            return Ok(self.window(clip, timeline, window, Some(output.len()), output)?);
         }
         if window.layout == Layout::FrameMajor {
             let tasks = frame_tasks(window, output).into_par_iter();
-            return self.on_threads(|| {
+            return Ok(self.on_threads(|| {
                 tasks.try_for_each(|(window, frames)| self.frames(clip, timeline, &window, frames))
-            });
+            })??);
         }
         let rotations = Some(output.len());
-        self.on_threads(|| {
+        Ok(self.on_threads(|| {
             let tasks = tasks(window, 1, output).into_par_iter();
             tasks.try_for_each(|(window, own)| self.window(clip, timeline, &window, rotations, own))
-        })
+        })??)
     }
 
     /// As [`CpuEngine::evaluate`], encoded: a task's rotations are converted while they
@@ -61,25 +63,25 @@ impl CpuEngine {
         window: &Window,
         encoding: Encoding,
         output: &mut [u8],
-    ) -> Result<(), FramesError> {
+    ) -> Result<(), SetError> {
         let task = |rotations: &mut Vec<[f32; 4]>, window: &Window, output: &mut [u8]| {
             rotations.resize(window.len(), [0.0; 4]);
             self.window(clip, timeline, window, None, rotations)?;
             encoding.encode_all(rotations, output);
-            Ok(())
+            Ok::<_, FramesError>(())
         };
         if window.len() <= TASK {
             return match output {
                 [] => Ok(()),
-                _ => task(&mut Vec::new(), window, output),
+                _ => Ok(task(&mut Vec::new(), window, output)?),
             };
         }
-        self.on_threads(|| {
+        Ok(self.on_threads(|| {
             let tasks = tasks(window, encoding.bytes(), output).into_par_iter();
             tasks.try_for_each_init(Vec::new, |rotations, (window, own)| {
                 task(rotations, &window, own)
             })
-        })
+        })??)
     }
 
     /// Evaluates a window on this thread; the whole result has `rotations` rotations, or is read again
@@ -236,7 +238,7 @@ fn tasks<'a, T>(
     let limit = match window.layout {
         Layout::TrackMajor => TASK,
         Layout::FrameMajor => {
-            let share = window.samples.len() / (4 * rayon::current_num_threads());
+            let share = window.samples.len() / (4 * threads::count());
             TASK.max(share.min(TASK_FRAMES / 4) * window.tracks.len())
         }
     };

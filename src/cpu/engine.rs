@@ -6,6 +6,7 @@ use crate::cpu::streaming::Output;
 use crate::prepare::clip_data::PartRef;
 use crate::shader::Form;
 use crate::simd::dispatch::VectorWidth;
+use crate::threads::{self, OutOfThreads, Threads};
 use crate::time::frames::{FramesError, Timeline};
 use crate::time::wrap::TrackCopy;
 
@@ -18,7 +19,8 @@ pub(crate) struct CpuEngine {
     pub(crate) width: VectorWidth,
     /// Whether results are written by streaming stores; `None` where that depends on them.
     pub(crate) streaming_stores: Option<bool>,
-    pool: Option<rayon::ThreadPool>,
+    /// `None`: the process's.
+    own_threads: Option<Threads>,
     pub(crate) scratch_pool: ScratchPool,
 }
 
@@ -28,13 +30,14 @@ impl CpuEngine {
         width: VectorWidth,
         streaming_stores: Option<bool>,
         threads: Option<usize>,
-    ) -> Result<Self, rayon::ThreadPoolBuildError> {
-        let pool = threads
-            .map(|threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build())
-            .transpose()?;
+    ) -> Result<Self, OutOfThreads> {
+        let own_threads = threads.map(|count| Threads::new(Some(count)));
+        if let Some(own) = &own_threads {
+            own.start()?;
+        }
         Ok(Self {
             streaming_stores,
-            pool,
+            own_threads,
             ..Self::on_shared_threads(width)
         })
     }
@@ -44,17 +47,25 @@ impl CpuEngine {
         Self {
             width,
             streaming_stores: None,
-            pool: None,
+            own_threads: None,
             scratch_pool: ScratchPool::default(),
         }
     }
 
-    /// Runs `work` with the engine's own threads, where it has any.
-    pub(crate) fn on_threads<R: Send>(&self, work: impl FnOnce() -> R + Send) -> R {
-        match &self.pool {
-            Some(pool) => pool.install(work),
-            None => work(),
+    /// Runs `work` with the engine's own threads, or with the process's where it has none.
+    pub(crate) fn on_threads<R: Send>(
+        &self,
+        work: impl FnOnce() -> R + Send,
+    ) -> Result<R, OutOfThreads> {
+        match &self.own_threads {
+            Some(own) => own.run(work),
+            None => threads::on_threads(work),
         }
+    }
+
+    /// How many threads share work.
+    pub(crate) fn thread_count(&self) -> usize {
+        (self.own_threads.as_ref()).map_or_else(threads::count, Threads::count)
     }
 
     /// Evaluates the samples of a track copy that lie in one part of the track.

@@ -67,7 +67,10 @@ impl CpuEngine {
             self.scratch_pool.give_back(memory);
             Ok(())
         };
-        batches.into_par_iter().try_for_each(resolve)
+        if batches.len() <= 1 {
+            return batches.into_iter().try_for_each(resolve);
+        }
+        self.on_threads(|| batches.into_par_iter().try_for_each(resolve))?
     }
 }
 

@@ -56,6 +56,6 @@ impl CpuEngine {
             (tasks.into_par_iter()).try_for_each_init(new, |evaluator, (batch, output)| {
                 task(evaluator, &batch[0], output)
             })
-        })
+        })?
     }
 }

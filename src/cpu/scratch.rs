@@ -7,6 +7,7 @@ use crate::method::interpolation::Interpolation;
 use crate::prepare::preparation::Preparation;
 use crate::prepare::prepared::Prepared;
 use crate::prepare::request::Request;
+use crate::threads;
 
 /// The scratch buffers of one thread, for one interpolation.
 pub(crate) struct Memory {
@@ -47,7 +48,7 @@ impl ScratchPool {
     /// may leave them half filled.
     pub(crate) fn give_back(&self, memory: Memory) {
         let mut kept = self.kept();
-        if kept.len() >= KEPT_EACH * rayon::current_num_threads() {
+        if kept.len() >= KEPT_EACH * threads::count() {
             kept.remove(0);
         }
         kept.push(memory);
@@ -81,9 +82,9 @@ mod tests {
         pool.give_back(new(method::BESSEL_OVERHAUSER));
         assert!(find(method::C2).is_none() && pool.kept().len() == 2);
         assert!(find(method::SLERP).is_some() && pool.kept().len() == 1);
-        for _ in 0..9 * rayon::current_num_threads() {
+        for _ in 0..9 * threads::count() {
             pool.give_back(new(method::SLERP));
         }
-        assert_eq!(pool.kept().len(), KEPT_EACH * rayon::current_num_threads());
+        assert_eq!(pool.kept().len(), KEPT_EACH * threads::count());
     }
 }

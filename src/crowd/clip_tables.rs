@@ -208,8 +208,10 @@ impl ClipTables {
             Form::Arc => FORM_ARC,
             Form::Polynomial => FORM_POLYNOMIAL,
         };
-        let [translations, scales] = [Channel::Translation, Channel::Scale]
-            .map(|channel| ClipData::of_vectors(set, channel, vectors, &interpolation, None));
+        let of_vectors =
+            |channel| ClipData::of_vectors(set, channel, vectors, &interpolation, None);
+        let translations = of_vectors(Channel::Translation)?;
+        let scales = of_vectors(Channel::Scale)?;
         let mut curves = reserved(joints * CHANNELS as usize, "a clip of a crowd")?;
         for (joint, offset) in offsets.iter().enumerate() {
             curves.push(curve(&rotations, joint, form, clock)?);

@@ -3,6 +3,8 @@
 use crate::curve::options::InterpolationError;
 use crate::gpu::error::VulkanError;
 use crate::memory::OutOfMemory;
+use crate::prepare::error::SetError;
+use crate::threads::OutOfThreads;
 use crate::time::wrap::WrapMode;
 
 /// The most clips of a library.
@@ -211,4 +213,19 @@ pub enum CrowdError {
     /// There is not the memory.
     #[error(transparent)]
     OutOfMemory(#[from] OutOfMemory),
+    /// The system refused worker threads.
+    #[error(transparent)]
+    Threads(#[from] OutOfThreads),
+}
+
+impl From<SetError> for CrowdError {
+    fn from(error: SetError) -> Self {
+        match error {
+            SetError::Interpolation(error) => Self::Interpolation(error),
+            SetError::OutOfMemory(error) => Self::OutOfMemory(error),
+            SetError::Threads(error) => Self::Threads(error),
+            // No frames are asked for when a clip is prepared.
+            SetError::Frames(_) => Self::TooLarge,
+        }
+    }
 }

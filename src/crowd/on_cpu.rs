@@ -3,12 +3,16 @@
 use bytemuck::Zeroable as _;
 use rayon::prelude::*;
 
+use crate::cpu::engine::CpuEngine;
 use crate::crowd::clip_tables::ClipTables;
 use crate::crowd::library::CrowdLibrary;
 use crate::output::crowd::{CrowdOutput, CrowdValues};
-use crate::shader::{CHANNELS, CrowdPlace, FORM_ARC, ON_KEY, ROTATION, SCALE, TRANSLATION};
-use crate::simd::dispatch::{InLanes, VectorWidth, in_lanes_of};
+use crate::shader::{
+    CHANNELS, CrowdEntry, CrowdPlace, FORM_ARC, ON_KEY, ROTATION, SCALE, TRANSLATION,
+};
+use crate::simd::dispatch::{InLanes, in_lanes_of};
 use crate::simd::lanes::{Lanes, canonical};
+use crate::threads::OutOfThreads;
 use crate::twin::crowd_layers::Layers;
 use crate::twin::crowd_matrices::{affine_product, transform};
 use crate::twin::crowd_times::places;
@@ -26,29 +30,40 @@ pub(crate) struct Scene<'a> {
     pub(crate) context: Layers<'a>,
 }
 
-/// Evaluates all instances into vectors of four numbers, on rayon's current threads.
-pub(crate) fn evaluate(scene: Scene<'_>, width: VectorWidth, output: &mut [[f32; 4]]) {
-    let context = scene.context;
-    let tasks = output.par_chunks_mut(scene.vectors() * TASK);
-    let entries = context.entries.par_chunks(context.layers as usize * TASK);
-    tasks.zip(entries).for_each_init(
-        || (Vec::new(), Vec::new()),
-        |(places, rotations), (output, entries)| {
-            places.resize(entries.len() * context.bases as usize, CrowdPlace::zeroed());
-            rotations.resize(scene.library.joints(), [0.0; 4]);
-            let context = Layers { entries, ..context };
-            let scene = Scene { context, ..scene };
-            in_lanes_of(
-                width,
-                &mut Task {
-                    scene,
-                    places,
-                    rotations,
-                    output,
-                },
-            );
-        },
-    );
+/// Evaluates all instances into vectors of four numbers.
+pub(crate) fn evaluate(
+    scene: Scene<'_>,
+    engine: &CpuEngine,
+    output: &mut [[f32; 4]],
+) -> Result<(), OutOfThreads> {
+    let (context, width) = (scene.context, engine.width);
+    let task = |(places, rotations): &mut (Vec<_>, Vec<_>),
+                (output, entries): (&mut [[f32; 4]], &[CrowdEntry])| {
+        places.resize(entries.len() * context.bases as usize, CrowdPlace::zeroed());
+        rotations.resize(scene.library.joints(), [0.0; 4]);
+        let context = Layers { entries, ..context };
+        let scene = Scene { context, ..scene };
+        in_lanes_of(
+            width,
+            &mut Task {
+                scene,
+                places,
+                rotations,
+                output,
+            },
+        );
+    };
+    let entries = context.entries;
+    let (of_output, of_entries) = (scene.vectors() * TASK, context.layers as usize * TASK);
+    if entries.len() <= of_entries {
+        task(&mut Default::default(), (output, entries));
+        return Ok(());
+    }
+    engine.on_threads(|| {
+        let tasks = output.par_chunks_mut(of_output);
+        let tasks = tasks.zip(entries.par_chunks(of_entries));
+        tasks.for_each_init(Default::default, task);
+    })
 }
 
 /// Some instances, and memory for what is found on the way.

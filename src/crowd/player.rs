@@ -16,6 +16,7 @@ use crate::gpu::crowd_target::CrowdReader;
 use crate::memory::zeroed;
 use crate::output::crowd::{CrowdOutput, CrowdValues};
 use crate::shader::{CrowdDispatch, CrowdEntry};
+use crate::threads::OutOfThreads;
 use crate::twin::crowd_layers::Layers;
 use crate::twin::crowd_matrices::to_any_half;
 
@@ -231,8 +232,7 @@ impl Crowd {
             return self.wait_into(output);
         }
         self.check_idle(values.into())?;
-        self.on_cpu(values, output);
-        Ok(())
+        Ok(self.on_cpu(values, output)?)
     }
 
     /// As [`Crowd::evaluate_into`], in 16 bits: `[u16; 4]` are the bits of four halves.
@@ -260,7 +260,7 @@ impl Crowd {
         self.check_idle(output)?;
         let Some(device) = &self.device else {
             let mut found = zeroed(self.output_len(output), "a crowd's poses")?;
-            self.on_cpu(output.values, &mut found);
+            self.on_cpu(output.values, &mut found)?;
             self.submitted = Some((output, Some(found)));
             return Ok(());
         };
@@ -368,7 +368,7 @@ impl Crowd {
         }
     }
 
-    fn on_cpu(&self, values: CrowdValues, output: &mut [[f32; 4]]) {
+    fn on_cpu(&self, values: CrowdValues, output: &mut [[f32; 4]]) -> Result<(), OutOfThreads> {
         let own = &self.arguments;
         let scene = Scene {
             library: &self.library,
@@ -386,8 +386,9 @@ impl Crowd {
                 references: own.references,
             },
         };
-        if let Backend::Cpu(engine) = &*self.engine.backend {
-            engine.on_threads(|| on_cpu::evaluate(scene, engine.width, output));
+        match &*self.engine.backend {
+            Backend::Cpu(engine) => on_cpu::evaluate(scene, engine, output),
+            Backend::Vulkan(_) => Ok(()), // its crowds are on the device
         }
     }
 }

@@ -23,6 +23,7 @@ use crate::prepare::clip_data::Wanted;
 use crate::prepare::error::SetError;
 use crate::prepare::request::Request;
 use crate::simd::dispatch::VectorWidth;
+use crate::threads::on_threads;
 use crate::time::frames::FramesError;
 
 /// Bytes of segments that a Vulkan device gets at once where a set has far more keys than samples.
@@ -183,13 +184,16 @@ impl Opened {
         self.attempt_smaller(|engine| engine.evaluate_keys(job, output))?;
         let unresolved = |some: &[[f32; 4]]| some.contains(&UNRESOLVED);
         let is_cubic = matches!(job.curve, KeyCurve::Cubics(_));
-        if !is_cubic || !output.par_chunks(LOOK).any(unresolved) {
+        if !is_cubic || !on_threads(|| output.par_chunks(LOOK).any(unresolved))? {
             return Ok(());
         }
         let engine = CpuEngine::on_shared_threads(VectorWidth::widest());
-        let rows = output.par_chunks_mut(job.request.timeline.len());
-        rows.zip(job.request.tracks.clone())
-            .try_for_each(|(output, track)| engine.resolve(job.request, track, (0, 0), output))?;
+        let resolve =
+            |(output, track): (&mut _, _)| engine.resolve(job.request, track, (0, 0), output);
+        on_threads(|| {
+            let rows = output.par_chunks_mut(job.request.timeline.len());
+            rows.zip(job.request.tracks.clone()).try_for_each(resolve)
+        })??;
         Ok(())
     }
 }

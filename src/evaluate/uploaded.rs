@@ -6,13 +6,13 @@ use crate::cpu::engine::CpuEngine;
 use crate::gpu::engine::{ClipBuffers, Job, VulkanEngine, lock};
 use crate::gpu::error::{EvaluateError, VulkanError};
 use crate::gpu::recovery::Opened;
+use crate::gpu::turns::Turns;
 use crate::method::interpolation::Interpolation;
 use crate::output::buffer::OutputBuffer;
 use crate::output::encoding::Encoding;
 use crate::output::rotations::{Layout, Storage};
 use crate::output::window::Window;
 use crate::prepare::clip_data::{ClipData, Wanted};
-use crate::prepare::error::SetError;
 use crate::prepare::prepared::Prepared;
 use crate::time::frames::Timeline;
 use crate::tracks::set::TrackSet;
@@ -23,6 +23,7 @@ pub(crate) struct Uploaded {
     pub(crate) data: ClipData,
     /// Uploaded again after the device was lost.
     buffers: Mutex<Option<Arc<ClipBuffers>>>,
+    uploading: Turns<()>,
 }
 
 impl Uploaded {
@@ -36,7 +37,7 @@ impl Uploaded {
         spare: Option<ClipBuffers>,
     ) -> Result<Self, EvaluateError> {
         wanted.group_bytes = backend.group_bytes();
-        let data = ClipData::new(set, interpolation, wanted).map_err(SetError::from)?;
+        let data = ClipData::new(set, interpolation, wanted)?;
         Self::of_data(backend, data, spare)
     }
 
@@ -52,6 +53,7 @@ impl Uploaded {
             backend: Arc::clone(backend),
             data,
             buffers: Mutex::new(buffers),
+            uploading: Turns::default(),
         })
     }
 
@@ -130,14 +132,26 @@ impl Uploaded {
 
     /// The segments on a device; uploaded again where it is not the device that had them.
     fn buffers_on(&self, engine: &VulkanEngine) -> Result<Arc<ClipBuffers>, VulkanError> {
-        let mut buffers = lock(&self.buffers);
-        if let Some(there) = buffers.as_ref().filter(|there| engine.holds(there)) {
-            return Ok(Arc::clone(there));
+        let there = |buffers: &Option<Arc<ClipBuffers>>| {
+            let there = buffers.as_ref().filter(|there| engine.holds(there));
+            there.map(Arc::clone)
+        };
+        if let Some(there) = there(&lock(&self.buffers)) {
+            return Ok(there);
         }
-        *buffers = None;
-        let there = Arc::new(engine.upload(&self.data, None)?);
-        *buffers = Some(Arc::clone(&there));
-        Ok(there)
+        // One caller at a time uploads, and nothing is locked while it does.
+        let _turn = self.uploading.take();
+        let old = {
+            let mut buffers = lock(&self.buffers);
+            if let Some(there) = there(&buffers) {
+                return Ok(there);
+            }
+            buffers.take()
+        };
+        drop(old);
+        let made = Arc::new(engine.upload(&self.data, None)?);
+        *lock(&self.buffers) = Some(Arc::clone(&made));
+        Ok(made)
     }
 }
 

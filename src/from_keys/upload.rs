@@ -6,9 +6,11 @@ use rayon::prelude::*;
 
 use crate::fit::tangent_weights::TrackWeights;
 use crate::from_keys::dispatches::{KeyDispatch, Task};
+use crate::prepare::error::SetError;
 use crate::shader::{
     IS_KEY, KeySample, LINE, ROWS_PER_INVOCATION, RowShape, SIGN_TURNED, TangentWeights,
 };
+use crate::threads::on_threads;
 use crate::time::frames::{FramesError, Ticks};
 use crate::time::key_samples::FramePlan;
 use crate::time::times::key_sample;
@@ -63,7 +65,7 @@ impl KeyDispatch<'_, '_> {
         mut keys: &mut [[u32; 4]],
         mut samples: &mut [KeySample],
         mut weights: &mut [TangentWeights],
-    ) -> Result<(), FramesError> {
+    ) -> Result<(), SetError> {
         let mut next_key = 0;
         let mut places = Vec::with_capacity(self.tasks.len());
         for task in &self.tasks {
@@ -89,18 +91,21 @@ impl KeyDispatch<'_, '_> {
             frames: FramePlan::new(),
             weights: rule.map(|rule| TrackWeights::new(rule, request.interpolation.ends)),
         };
-        places
-            .into_par_iter()
-            .try_for_each_init(new, |known, (task, mut written)| {
-                if let Ticks::Times { times, stride } = &request.timeline.ticks {
-                    self.write_times(task, times, *stride, &mut written);
-                    if imported.is_some() {
-                        return Ok(());
+        let written = on_threads(|| {
+            places
+                .into_par_iter()
+                .try_for_each_init(new, |known, (task, mut written)| {
+                    if let Ticks::Times { times, stride } = &request.timeline.ticks {
+                        self.write_times(task, times, *stride, &mut written);
+                        if imported.is_some() {
+                            return Ok(());
+                        }
                     }
-                }
-                let mut tracks = self.job.keys_of(&task.batch);
-                tracks.try_for_each(|keys| self.write_track(keys, task, known, &mut written))
-            })
+                    let mut tracks = self.job.keys_of(&task.batch);
+                    tracks.try_for_each(|keys| self.write_track(keys, task, known, &mut written))
+                })
+        });
+        Ok(written??)
     }
 
     /// Writes keys and weights of a track, and the places of frames.

@@ -1,5 +1,6 @@
 //! Evaluation on a Vulkan device.
 
+use std::mem::take;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -16,6 +17,7 @@ use crate::gpu::memory_types::KernelReads;
 use crate::gpu::options::{EngineOptions, Timings, Transfer};
 use crate::gpu::pipeline::{Exactness, Pipeline};
 use crate::gpu::submission::{Access, Submission};
+use crate::gpu::turns::Turns;
 use crate::gpu::upload::writable;
 use crate::gpu::work_list::WorkLists;
 use crate::output::buffer::OutputBuffer;
@@ -44,8 +46,8 @@ pub(crate) struct VulkanEngine {
     pub(crate) device: Arc<LogicalDevice>,
     /// Made when they are first needed.
     pipelines: Mutex<[Option<Arc<Pipeline>>; KERNELS.len()]>,
-    pub(crate) in_flight: Mutex<Vec<InFlight<WorkLists>>>,
-    pub(crate) keys_in_flight: Mutex<Vec<InFlight<KeyUploads>>>,
+    pub(crate) in_flight: Turns<Vec<InFlight<WorkLists>>>,
+    pub(crate) keys_in_flight: Turns<Vec<InFlight<KeyUploads>>>,
     pub(crate) in_flight_count: usize,
     /// Whether neighbouring invocations take neighbouring samples; else each takes a run of them.
     pub(crate) maps_samples: bool,
@@ -114,8 +116,8 @@ impl VulkanEngine {
         let bytes = |bytes| usize::try_from(bytes).unwrap_or(usize::MAX);
         Self {
             pipelines: Mutex::new([const { None }; KERNELS.len()]),
-            in_flight: Mutex::default(),
-            keys_in_flight: Mutex::default(),
+            in_flight: Turns::default(),
+            keys_in_flight: Turns::default(),
             in_flight_count,
             maps_samples: device.physical.maps_samples(options.mapping),
             imports: options.transfer == Transfer::Automatic,
@@ -132,14 +134,16 @@ impl VulkanEngine {
     /// The pipeline of a kernel, made when it is first needed, and checked then unless this kernel is known to be
     /// exact on this device.
     pub(crate) fn pipeline(&self, kernel: Kernel) -> Result<Arc<Pipeline>, VulkanError> {
-        let mut all = lock(&self.pipelines);
-        let kept = &mut all[kernel as usize];
-        if let Some(pipeline) = kept {
-            return Ok(Arc::clone(pipeline));
+        let kept = || lock(&self.pipelines)[kernel as usize].clone();
+        if let Some(pipeline) = kept() {
+            return Ok(pipeline);
         }
-        let pipeline = Pipeline::new(&self.device, kernel, Exactness::Demanded)?;
-        self.trust(kernel, &pipeline)?;
-        Ok(Arc::clone(kept.insert(Arc::new(pipeline))))
+        // Drivers take up to seconds for it. Nobody who wants another waits meanwhile; of several callers
+        // who make this one, the first one's is kept.
+        let made = Arc::new(Pipeline::new(&self.device, kernel, Exactness::Demanded)?);
+        self.trust(kernel, &made)?;
+        let mut all = lock(&self.pipelines);
+        Ok(Arc::clone(all[kernel as usize].get_or_insert(made)))
     }
 
     /// Refuses a kernel that differs from the CPU, unless inexact devices are allowed.
@@ -241,16 +245,13 @@ impl VulkanEngine {
         smaller
     }
 
-    /// Frees the buffers that are kept for the next evaluation; false when there are none.
+    /// Frees the buffers that are kept for the next evaluation and not in use by another; false when
+    /// there are none.
     pub(crate) fn give_back(&self) -> bool {
-        let mut in_flight = lock(&self.in_flight);
-        let mut keys_in_flight = lock(&self.keys_in_flight);
-        let mut free = lock(&self.free);
-        let kept = in_flight.len() + keys_in_flight.len() + free.len();
-        in_flight.clear();
-        keys_in_flight.clear();
-        free.clear();
-        kept > 0
+        let in_flight = self.in_flight.idle().map_or(0, |kept| kept.len());
+        let keys_in_flight = self.keys_in_flight.idle().map_or(0, |kept| kept.len());
+        let free = take(&mut *lock(&self.free)).len();
+        in_flight + keys_in_flight + free > 0
     }
 
     /// A buffer with these bytes, in the memory that kernels read fastest.

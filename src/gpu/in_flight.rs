@@ -3,7 +3,7 @@
 
 use std::mem::take;
 use std::ops::Range;
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use ash::vk;
@@ -18,8 +18,10 @@ use crate::gpu::imported_memory::ImportedMemory;
 use crate::gpu::options::Timings;
 use crate::gpu::read_back::ReadBack;
 use crate::gpu::submission::Spent;
+use crate::gpu::turns::Turns;
 use crate::gpu::work_list::Patch;
 use crate::output::encoding::Encoding;
+use crate::threads::on_threads;
 
 /// What one piece of work in flight needs; `U` are its uploads.
 pub(crate) struct InFlight<U> {
@@ -111,15 +113,16 @@ impl<'a> Target<'a> {
 impl VulkanEngine {
     /// Starts pieces of work one after another, and finishes all that is in flight, also after an
     /// error: work that was submitted uses the caller's buffers. Where a piece takes long, windows are
-    /// halved before `work` is asked for more.
+    /// halved before `work` is asked for more. Of several callers each waits for its turn, so that the
+    /// memory in flight is that of one; nothing is locked meanwhile.
     pub(crate) fn fly<U: Default, W>(
         &self,
-        in_flight: &Mutex<Vec<InFlight<U>>>,
+        kept: &Turns<Vec<InFlight<U>>>,
         target: &mut Target<'_>,
         mut work: impl Iterator<Item = W>,
         mut start: impl FnMut(&mut InFlight<U>, &Target<'_>, W) -> Result<(), EvaluateError>,
     ) -> Result<(), EvaluateError> {
-        let mut in_flight = lock(in_flight);
+        let mut in_flight = kept.take();
         let mut stopwatch = Stopwatch::default();
         let mut next = 0;
         let mut result = work.try_for_each(|work| {
@@ -200,13 +203,17 @@ impl<U> InFlight<U> {
 /// Bytes that one thread copies at once.
 const COPIED: usize = 1 << 20;
 
-/// Copies a result or an upload, on all threads where it is long.
+/// Copies a result or an upload, on all threads where it is long and they can be had.
 pub(crate) fn copy(to: &mut [u8], from: &[u8]) {
-    if to.len() <= COPIED {
-        return to.copy_from_slice(from);
+    let copied = (to.len() > COPIED).then(|| {
+        on_threads(|| {
+            let pieces = to.par_chunks_mut(COPIED).zip(from.par_chunks(COPIED));
+            pieces.for_each(|(to, from)| to.copy_from_slice(from));
+        })
+    });
+    if !matches!(copied, Some(Ok(()))) {
+        to.copy_from_slice(from);
     }
-    let pieces = to.par_chunks_mut(COPIED).zip(from.par_chunks(COPIED));
-    pieces.for_each(|(to, from)| to.copy_from_slice(from));
 }
 
 #[cfg(test)]

@@ -36,5 +36,6 @@ pub(crate) mod sample_list;
 pub(crate) mod self_test;
 pub(crate) mod shared_memory;
 pub(crate) mod submission;
+pub(crate) mod turns;
 pub(crate) mod upload;
 pub(crate) mod work_list;

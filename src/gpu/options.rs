@@ -83,7 +83,8 @@ pub enum Mapping {
 pub struct EngineOptions {
     /// Bytes of device memory to use besides results; no limit by default.
     pub memory: Option<u64>,
-    /// Worker threads of the CPU; by default the process's shared ones.
+    /// Worker threads of the CPU; by default those that all engines of the process share, as many as the
+    /// environment's `RAYON_NUM_THREADS` says, else one for each core.
     pub threads: Option<usize>,
     /// The widest vector instructions to evaluate with on the CPU; by default
     /// [`VectorWidth::widest`].

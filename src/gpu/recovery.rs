@@ -10,6 +10,7 @@ use crate::gpu::error::{EvaluateError, VulkanError};
 use crate::gpu::options::EngineOptions;
 use crate::gpu::physical::{DeviceInfo, PhysicalDevice};
 use crate::gpu::self_test::{self, SelfTestReport};
+use crate::gpu::turns::Turns;
 use crate::prepare::clip_data::ClipData;
 
 /// How often a lost device is opened again for one call.
@@ -19,6 +20,8 @@ const REOPENINGS: usize = 3;
 pub(crate) struct Opened {
     /// Replaced when the device is lost.
     current: Mutex<Arc<VulkanEngine>>,
+    /// Of several callers that lost it, one opens it again.
+    reopening: Turns<()>,
     options: EngineOptions,
     pub(crate) self_tests: Vec<SelfTestReport>,
     pub(crate) info: DeviceInfo,
@@ -53,6 +56,7 @@ impl Opened {
             self_tests: trust(&engine, options)?,
             info: engine.device.physical.info.clone(),
             current: Mutex::new(Arc::new(engine)),
+            reopening: Turns::default(),
             options: options.clone(),
         })
     }
@@ -123,8 +127,8 @@ impl Opened {
     /// Opens a lost device again and replaces it; false for an application's own, which only the
     /// application can open.
     fn reopen(&self, lost: &Arc<VulkanEngine>) -> Result<bool, VulkanError> {
-        let mut current = lock(&self.current);
-        if !Arc::ptr_eq(&current, lost) {
+        let _turn = self.reopening.take();
+        if !Arc::ptr_eq(&self.engine(), lost) {
             return Ok(true); // another thread was faster
         }
         if !lost.device.owned {
@@ -134,7 +138,11 @@ impl Opened {
         let engine = VulkanEngine::new(device, &self.options);
         engine.window.store(lost.window(), Ordering::Relaxed);
         trust(&engine, &self.options)?;
-        *current = Arc::new(engine);
+        let mut current = lock(&self.current);
+        // The engine's own threads do not wait for each other's turns.
+        if Arc::ptr_eq(&current, lost) {
+            *current = Arc::new(engine);
+        }
         Ok(true)
     }
 }

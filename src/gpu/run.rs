@@ -12,6 +12,7 @@ use crate::gpu::work_list::WorkLists;
 use crate::output::encoding::Encoding;
 use crate::output::window::Window;
 use crate::shader::{Dispatch, Grid, Kernel, LINE, WORKGROUP};
+use crate::threads::on_threads;
 
 /// Bytes of the lines in which a card's memory is written, at most.
 const LINE_BYTES: u64 = 128;
@@ -69,7 +70,8 @@ impl VulkanEngine {
         let shift = (start - aligned) / rotation;
         let size = (window.len() as u64 + shift) * rotation;
         let lists = &mut own.uploads;
-        let work = lists.list(self, clip, job.timeline, window, shift as u32)?;
+        let list = || lists.list(self, clip, job.timeline, window, shift as u32);
+        let work = on_threads(list)??;
 
         let staged = !self.device.placing.in_place;
         let buffer = match place {

@@ -99,7 +99,7 @@ impl<'a> SampleList<'a> {
         row + (first as usize).clamp(samples.start, samples.end) - samples.start
     }
 
-    /// Writes the list; `shift` is added to every place in the output.
+    /// Writes the list, on the engine's threads; `shift` is added to every place in the output.
     pub(crate) fn write(
         &self,
         mut list: &mut [ListedSample],

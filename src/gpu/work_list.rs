@@ -82,7 +82,7 @@ pub(crate) struct WorkLists {
 impl WorkLists {
     /// Writes the work list of a window into its buffers, one group after another; `shift`
     /// is added to every place in the output. Where the engine maps samples, neighbouring
-    /// invocations take neighbouring samples if that can be.
+    /// invocations take neighbouring samples if that can be. Called on one of the engine's threads.
     pub(crate) fn list(
         &mut self,
         engine: &VulkanEngine,

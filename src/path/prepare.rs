@@ -39,7 +39,7 @@ const GAP: f64 = 1e-6;
 
 impl PreparedPaths {
     /// Prepares the paths of all tracks of a set. Segments of at most `group_bytes` go into one
-    /// buffer of a device.
+    /// buffer of a device. Called on the engine's threads.
     pub(crate) fn new(
         set: &TrackSet,
         follow: &Follow,

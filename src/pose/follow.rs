@@ -5,6 +5,7 @@ use crate::error::Error;
 use crate::output::rotations::{Layout, Rotations, Vectors};
 use crate::path::options::{Follow, FollowWarning};
 use crate::path::prepare::PreparedPaths;
+use crate::threads::on_threads;
 use crate::time::frames::Frames;
 use crate::tracks::set::TrackSet;
 
@@ -49,7 +50,7 @@ impl Engine {
         layout: Layout,
     ) -> Result<Followed, Error> {
         let group_bytes = self.backend.group_bytes();
-        let prepared = PreparedPaths::new(set, follow, group_bytes)?;
+        let prepared = on_threads(|| PreparedPaths::new(set, follow, group_bytes))??;
         Ok(Followed {
             positions: self.samples_of(prepared.positions, frames, layout)?,
             rotations: self.samples_of(prepared.rotations, frames, layout)?,

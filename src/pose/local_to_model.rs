@@ -15,6 +15,7 @@ use crate::output::rotations::Layout;
 use crate::pose::skeleton::Skeleton;
 use crate::pose::transforms::Transforms;
 use crate::shader::{Link, ROOT};
+use crate::threads::on_threads;
 use crate::twin::matrix;
 
 /// The three rows of an affine matrix for column vectors.
@@ -73,7 +74,7 @@ impl Engine {
         let links = skeleton.links();
         let bind: Option<Vec<Rows>> =
             inverse_bind.map(|all| all.iter().map(|&matrix| rows(matrix)).collect());
-        let mut walk = || {
+        let walk = || {
             let frames = matrices.par_chunks_mut(tracks.max(1)).enumerate();
             frames.for_each(|(sample, model)| {
                 for link in links {
@@ -88,9 +89,9 @@ impl Engine {
             });
         };
         match &*self.backend {
-            Backend::Cpu(engine) => engine.on_threads(&mut walk),
-            Backend::Vulkan(_) => walk(),
-        }
+            Backend::Cpu(engine) => engine.on_threads(walk),
+            Backend::Vulkan(_) => on_threads(walk),
+        }?;
         Ok(ModelMatrices {
             matrices,
             tracks,

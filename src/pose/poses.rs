@@ -17,6 +17,7 @@ use crate::pose::skeleton::Skeleton;
 use crate::shader::Kernel;
 use crate::simd::dispatch::{InLanes, in_lanes};
 use crate::simd::lanes::Lanes;
+use crate::threads::{OutOfThreads, on_threads};
 use crate::twin::{pose_add, pose_blend, pose_mix, pose_world};
 
 impl Engine {
@@ -48,8 +49,7 @@ impl Engine {
             let Some(device) = device else {
                 let count = output.len();
                 let blended = |place| pose_blend::pose(values, &weights, count, place);
-                set_all(output, blended);
-                return Ok(());
+                return Ok(set_all(output, blended)?);
             };
             let inputs = [bytes(values), bytes(&weights)];
             let counts = [output.len(), layers.len()];
@@ -69,8 +69,7 @@ impl Engine {
             let [a, b] = [from, to].map(|layer| values(layer, start, output.len()));
             let Some(device) = device else {
                 let mixed = |place: usize| pose_mix::pose(a[place], b[place], weight);
-                set_all(output, mixed);
-                return Ok(());
+                return Ok(set_all(output, mixed)?);
             };
             let weight = [weight];
             let inputs = [bytes(a), bytes(b), bytes(&weight)];
@@ -111,8 +110,7 @@ impl Engine {
             }));
             let Some(device) = device else {
                 let added = |place: usize| pose_add::pose(a[place], b[place], own[place], weight);
-                set_all(output, added);
-                return Ok(());
+                return Ok(set_all(output, added)?);
             };
             own.push([weight, 0.0, 0.0, 0.0]);
             let inputs = [bytes(a), bytes(b), bytes(&own)];
@@ -162,11 +160,11 @@ impl Engine {
                     frame_major.extend(own.map(|place| local.as_quats()[place].to_array()));
                 }
                 match device {
-                    None => {
+                    None => on_threads(|| {
                         let frames = output.par_chunks_mut(2 * tracks);
                         let frames = frames.zip(frame_major.par_chunks(tracks));
                         frames.for_each(|(world, local)| pose_world::pose(local, links, world));
-                    }
+                    })?,
                     Some(device) => {
                         let inputs = [bytes(&frame_major), bytes(links)];
                         device.pass(Kernel::PosesWorld, &inputs, [count, tracks], output)?;
@@ -315,13 +313,19 @@ impl<F: Fn(usize) -> [f32; 4]> InLanes for Task<'_, F> {
 }
 
 /// Sets the values at all places, on the CPU.
-fn set_all(output: &mut [[f32; 4]], pose: impl Fn(usize) -> [f32; 4] + Sync) {
-    let tasks = output.par_chunks_mut(TASK).enumerate();
-    tasks.for_each(|(task, output)| {
+fn set_all(
+    output: &mut [[f32; 4]],
+    pose: impl Fn(usize) -> [f32; 4] + Sync,
+) -> Result<(), OutOfThreads> {
+    let task = |(task, output): (usize, &mut [[f32; 4]])| {
         in_lanes(&mut Task {
             first: task * TASK,
             output,
             pose: &pose,
         });
-    });
+    };
+    match output.len() <= TASK {
+        true => Ok(task((0, output))),
+        false => on_threads(|| output.par_chunks_mut(TASK).enumerate().for_each(task)),
+    }
 }

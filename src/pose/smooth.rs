@@ -13,6 +13,7 @@ use crate::shader::Kernel;
 use crate::simd::dispatch::in_lanes;
 use crate::smooth::kernel::Smoothing;
 use crate::smooth::rows::{Block, Pass, Row};
+use crate::threads::on_threads;
 
 impl Engine {
     /// Smooths the rotations of every track over its samples, which are to be evenly spaced:
@@ -90,10 +91,7 @@ impl Engine {
             let to = bytemuck::cast_slice_mut(to);
             self.on_device(|device| match device {
                 Some(device) if !weights.is_empty() => Ok(set.on(&pass, device, to)?),
-                _ => {
-                    set.on_cpu(&pass, to);
-                    Ok(())
-                }
+                _ => Ok(on_threads(|| set.on_cpu(&pass, to))?),
             })?;
             for track in 0..tracks {
                 pass.set_ends(set.row(track), |sample, value| {
@@ -128,6 +126,7 @@ impl Set<'_> {
         }
     }
 
+    /// On the engine's threads.
     fn on_cpu(&self, pass: &Pass<'_>, output: &mut [[f32; 4]]) {
         let length = BLOCK.max(4 * pass.weights.len());
         let block = |steps: &mut _, output: &mut [[f32; 4]], track: usize, place, i: usize| {

@@ -82,7 +82,7 @@ impl Engine {
     ) -> Result<Vectors, Error> {
         let interpolation = interpolation.into();
         let group_bytes = self.backend.group_bytes();
-        let data = ClipData::of_vectors(set, channel, method, &interpolation, group_bytes);
+        let data = ClipData::of_vectors(set, channel, method, &interpolation, group_bytes)?;
         self.samples_of(data, frames, layout)
     }
 

@@ -13,10 +13,12 @@ use crate::memory::OutOfMemory;
 use crate::method::interpolation::Interpolation;
 use crate::method::vector_method::VectorMethod;
 use crate::prepare::batch::{Batch, BatchSize, PART_INTERVALS, batches};
+use crate::prepare::error::SetError;
 use crate::prepare::preparation::Preparation;
 use crate::prepare::prepared::Prepared;
 use crate::prepare::vectors;
 use crate::shader::Form;
+use crate::threads::{self, OutOfThreads, on_threads};
 use crate::time::frames::{Ticks, Timeline};
 use crate::time::spans::Part;
 use crate::time::wrap::{TrackCopy, WrapMode};
@@ -79,7 +81,7 @@ impl Wanted<'_> {
             return PART_INTERVALS;
         };
         let most = limit / (segment_size(form) + size_of::<Quat>()) / 2;
-        let each = set.keys_of(self.batch.tracks()) / (4 * rayon::current_num_threads());
+        let each = set.keys_of(self.batch.tracks()) / (4 * threads::count());
         each.min(most).max(PART_INTERVALS)
     }
 }
@@ -89,7 +91,7 @@ fn prepare(
     set: &TrackSet,
     interpolation: &Interpolation,
     wanted: Wanted<'_>,
-) -> Result<Vec<Prepared>, InterpolationError> {
+) -> Result<Vec<Prepared>, SetError> {
     let size = BatchSize {
         keys: wanted.group_keys(set, interpolation.form()),
         tracks: usize::MAX,
@@ -114,10 +116,14 @@ fn prepare(
         for part in &mut prepared.parts {
             part.track -= first_track;
         }
-        Ok(prepared)
+        Ok::<_, InterpolationError>(prepared)
     };
     let batches: Vec<Batch> = batches(set, wanted.batch, size);
-    batches.into_par_iter().map(group).collect()
+    let prepared: Result<Vec<Prepared>, InterpolationError> = match batches.len() {
+        0 | 1 => batches.into_iter().map(group).collect(),
+        _ => on_threads(|| batches.into_par_iter().map(group).collect())?,
+    };
+    Ok(prepared?)
 }
 
 impl ClipData {
@@ -126,11 +132,11 @@ impl ClipData {
         set: &TrackSet,
         interpolation: Interpolation,
         wanted: Wanted<'_>,
-    ) -> Result<Self, InterpolationError> {
+    ) -> Result<Self, SetError> {
         if matches!(interpolation.quantity, Quantity::Velocity(_))
             && [interpolation.before, interpolation.after].contains(&WrapMode::Mirror)
         {
-            return Err(InterpolationError::MirroredVelocity);
+            return Err(InterpolationError::MirroredVelocity.into());
         }
         let merged_bytes = wanted.group_bytes.filter(|_| !wanted.few_groups);
         let groups = prepare(set, &interpolation, wanted)?;
@@ -144,7 +150,7 @@ impl ClipData {
         method: VectorMethod,
         interpolation: &Interpolation,
         group_bytes: Option<usize>,
-    ) -> Self {
+    ) -> Result<Self, OutOfThreads> {
         let rest = match channel {
             Channel::Translation => Vec3::ZERO,
             Channel::Scale => Vec3::ONE,
@@ -170,8 +176,11 @@ impl ClipData {
             }
             prepared
         };
-        let groups = batches.into_par_iter().map(batch).collect();
-        Self::of_groups(groups, set, interpolation, group_bytes)
+        let groups = match batches.len() {
+            0 | 1 => batches.into_iter().map(batch).collect(),
+            _ => on_threads(|| batches.into_par_iter().map(batch).collect())?,
+        };
+        Ok(Self::of_groups(groups, set, interpolation, group_bytes))
     }
 
     pub(crate) fn of_groups(

@@ -2,6 +2,7 @@
 
 use crate::curve::options::InterpolationError;
 use crate::memory::OutOfMemory;
+use crate::threads::OutOfThreads;
 use crate::time::frames::FramesError;
 
 /// Why a set cannot be evaluated as asked, on any device.
@@ -13,4 +14,6 @@ pub(crate) enum SetError {
     Interpolation(#[from] InterpolationError),
     #[error(transparent)]
     OutOfMemory(#[from] OutOfMemory),
+    #[error(transparent)]
+    Threads(#[from] OutOfThreads),
 }

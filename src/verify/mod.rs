@@ -28,6 +28,7 @@ use crate::output::rotations::Rotations;
 use crate::reference;
 use crate::reference::quaternion::angle_between;
 use crate::shader::Form;
+use crate::threads::on_threads;
 use crate::time::frames::{Frames, Timeline};
 use crate::tracks::set::TrackSet;
 
@@ -184,10 +185,9 @@ pub fn verify(
         }
         None => (0, None),
     };
-    let tracks: Vec<TrackErrors> = (0..set.track_count())
-        .into_par_iter()
-        .map(|track| TrackErrors::measure(set, interpolation, &timeline, &found, track))
-        .collect();
+    let measured = |track| TrackErrors::measure(set, interpolation, &timeline, &found, track);
+    let tracks = 0..set.track_count();
+    let tracks: Vec<TrackErrors> = on_threads(|| tracks.into_par_iter().map(measured).collect())?;
 
     let place = |index: usize| {
         let (track, frame) = (index / timeline.len(), index % timeline.len());

@@ -14,6 +14,7 @@ use crate::output::rotations::{Layout, Rotations, Vectors};
 use crate::pose::skeleton::Skeleton;
 use crate::reference::curve::Curve;
 use crate::reference::quaternion::angle_between;
+use crate::threads::{OutOfThreads, on_threads};
 use crate::time::frames::{Frames, Timeline};
 use crate::tracks::set::TrackSet;
 use crate::verify::{differences, least_error, worse};
@@ -76,7 +77,7 @@ pub(crate) fn verify(
             output: name.to_owned(),
             values: found.as_slice().len() as u64,
             differing: differences(found.as_slice(), expected.as_slice(), 1).0,
-            max_error: rate_error(set, interpolation, timeline, &found),
+            max_error: rate_error(set, interpolation, timeline, &found)?,
             error_bound: match (interpolation.speed, quantity) {
                 (Speed::AsKeyed, _) => 1e-6,
                 // At constant speed a curve changes direction fast where it was slow as keyed.
@@ -153,7 +154,7 @@ fn rate_error(
     interpolation: Interpolation,
     timeline: &Timeline,
     found: &Vectors,
-) -> f64 {
+) -> Result<f64, OutOfThreads> {
     let samples = timeline.len();
     let each = (samples * set.track_count()).div_ceil(RATES_CHECKED).max(1);
     let track = |index: usize| {
@@ -183,8 +184,10 @@ fn rate_error(
         }
         error / largest
     };
-    let errors = (0..set.track_count()).into_par_iter().map(track);
-    errors.reduce(|| 0.0, f64::max)
+    on_threads(|| {
+        let errors = (0..set.track_count()).into_par_iter().map(track);
+        errors.reduce(|| 0.0, f64::max)
+    })
 }
 
 /// The least scale of errors: a thousandth of a radian in a key interval of mean length, or in its

@@ -14,6 +14,7 @@ use crate::batch::shards::record;
 use crate::messages::exit::{ALL_INPUTS, DIFFERENCE, Failure};
 use crate::messages::progress::busy;
 use crate::messages::words;
+use crate::together::on_threads;
 
 /// Check results against the manifest of their directory, bit for bit
 #[derive(Debug, Args)]
@@ -77,7 +78,10 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let entries: Vec<Entry> = entries.into_values().collect();
     let faults: Vec<(&Entry, Fault)> = busy("checking", || {
         let faulty = |entry| fault(folder, entry).map(|fault| (entry, fault));
-        entries.par_iter().filter_map(faulty).collect()
+        on_threads(
+            || entries.par_iter().filter_map(faulty).collect(),
+            || entries.iter().filter_map(faulty).collect(),
+        )
     });
     for (entry, fault) in &faults {
         let output = folder.join(&entry.output);

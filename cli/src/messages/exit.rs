@@ -126,7 +126,7 @@ impl Failure {
         let code = match error {
             Error::Frames(_) | Error::OutOfMemory(_) => USAGE,
             Error::Vulkan(VulkanError::NoLoader { .. } | VulkanError::NoDevice) => NO_VULKAN,
-            Error::Vulkan(_) => DEVICE,
+            Error::Vulkan(_) | Error::Threads(_) => DEVICE,
             Error::Interpolation(_) => ALL_INPUTS,
             _ => BUG,
         };

@@ -51,13 +51,13 @@ fn wait_for_signals() {
     // and a file to remove; the signal would end the program before that.
     let ignored = ignored();
     let all = [SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGXFSZ];
-    let heeded = all
-        .into_iter()
-        .filter(|signal| ignored >> (signal - 1) & 1 == 0);
-    let Ok(mut signals) = Signals::new(heeded) else {
-        return;
-    };
-    std::thread::spawn(move || {
+    let wait = move || {
+        let heeded = all
+            .into_iter()
+            .filter(|signal| ignored >> (signal - 1) & 1 == 0);
+        let Ok(mut signals) = Signals::new(heeded) else {
+            return;
+        };
         for signal in signals.forever().filter(|&signal| signal != SIGXFSZ) {
             let mut state = state();
             // A second signal means it: do not wait for the writer.
@@ -68,7 +68,8 @@ fn wait_for_signals() {
             }
             state.signal = Some(signal);
         }
-    });
+    };
+    let _ = std::thread::Builder::new().spawn(wait); // see `stop_on_signals`
 }
 
 /// The signals that this process was started to ignore, a bit each from that of 1 on; none where

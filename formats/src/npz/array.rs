@@ -113,8 +113,15 @@ impl Array<'_> {
         };
         let starts: Vec<usize> = tracks.clone().step_by(TOGETHER).collect();
         let at_least = FEW.div_ceil(TOGETHER * frames.max(1));
-        let blocks = starts.par_iter().with_min_len(at_least);
-        blocks.flat_map_iter(block).collect()
+        if starts.len() <= at_least {
+            return starts.iter().flat_map(block).collect();
+        }
+        let together = tumble::on_threads(|| {
+            let blocks = starts.par_iter().with_min_len(at_least);
+            blocks.flat_map_iter(block).collect()
+        });
+        // Where the system refuses threads this one does it all.
+        together.unwrap_or_else(|_| starts.iter().flat_map(block).collect())
     }
 
     /// The keys of some tracks, each a list.

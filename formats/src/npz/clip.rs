@@ -63,7 +63,7 @@ pub(crate) fn read(
         )
     };
     // While the keys of some tracks go into the set, those of the next ones are read.
-    let at_once = TOGETHER * rayon::current_num_threads();
+    let at_once = TOGETHER * std::thread::available_parallelism().map_or(1, usize::from);
     let jobs = plan.parts.iter().zip(&arrays).flat_map(|(part, array)| {
         let starts = part.tracks.clone().step_by(at_once);
         starts.map(move |start| (part, array, start..(start + at_once).min(part.tracks.end)))
@@ -93,7 +93,12 @@ pub(crate) fn read(
         let mut read = || read_keys(archive, part, array, tracks.clone(), plan.frames, warnings);
         let (pushed, read) = match are_few {
             true => (push_pending(), read()),
-            false => rayon::join(push_pending, read),
+            false => {
+                let together =
+                    tumble::on_threads(|| rayon::join(&mut push_pending, &mut read)).ok();
+                // Where the system refuses threads this one does it all.
+                together.unwrap_or_else(|| (push_pending(), read()))
+            }
         };
         pushed?;
         pending = tracks

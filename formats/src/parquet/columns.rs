@@ -107,9 +107,15 @@ impl File<'_> {
                 read_others(),
                 plain.iter().map(|&leaf| self.numbers(leaf)).collect(),
             ),
-            false => rayon::join(read_others, || {
-                plain.par_iter().map(|&leaf| self.numbers(leaf)).collect()
-            }),
+            false => {
+                let numbers = || plain.par_iter().map(|&leaf| self.numbers(leaf)).collect();
+                let together = tumble::on_threads(|| rayon::join(read_others, numbers));
+                // Where the system refuses threads this one does it all.
+                together.unwrap_or_else(|_| {
+                    let numbers = plain.iter().map(|&leaf| self.numbers(leaf));
+                    (read_others(), numbers.collect())
+                })
+            }
         };
         let (mut others, mut numbers) = (others?.into_iter(), numbers?.into_iter());
         let columns = wanted.iter().zip(&leaves).map(|((wanted, _), leaf)| {

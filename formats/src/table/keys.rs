@@ -66,10 +66,17 @@ impl Clip<'_> {
             .tracks
             .first()
             .map_or(0, |track| shared.places(track).len());
-        let quiet: Vec<Option<Keys>> = (shared.tracks.par_iter())
-            .with_min_len(FEW.div_ceil(rows.max(1)))
-            .map(quiet)
-            .collect();
+        let at_least = FEW.div_ceil(rows.max(1));
+        let alone = || shared.tracks.iter().map(quiet).collect();
+        let quiet: Vec<Option<Keys>> = match shared.tracks.len() <= at_least {
+            true => alone(),
+            false => tumble::on_threads(|| {
+                let tracks = shared.tracks.par_iter().with_min_len(at_least);
+                tracks.map(quiet).collect()
+            })
+            // Where the system refuses threads this one does it all.
+            .unwrap_or_else(|_| alone()),
+        };
         // Where there is something to be said it is said in the order of the rows: tracks that share
         // columns are read together.
         let mut known: Option<(&Parts, Keys)> = None;

@@ -10,6 +10,7 @@ pub(crate) mod smooth;
 pub(crate) mod stream;
 pub(crate) mod workload;
 
+use std::error::Error as _;
 use std::time::{Duration, Instant};
 
 use clap::Args;
@@ -22,7 +23,7 @@ use tumble::{
 use crate::commands::bench::report::{Report, Row, Section};
 use crate::commands::bench::workload::{Kind, Workload};
 use crate::commands::probe;
-use crate::messages::exit::Failure;
+use crate::messages::exit::{DEVICE, Failure};
 use crate::messages::words;
 
 /// Measure speed on this machine, as ratios taken in one run
@@ -51,6 +52,12 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     } else {
         probe::devices().unwrap_or_default()
     };
+    // What others would write uses rayon's own threads.
+    if let Err(error) = rayon::ThreadPoolBuilder::new().build_global()
+        && error.source().is_some()
+    {
+        return Err(Failure::new(DEVICE, format!("rayon's threads: {error}")));
+    }
     let mut sections = Vec::new();
     for &kind in &arguments.workloads {
         let Some(workload) = kind.workload(arguments.shrink as usize) else {

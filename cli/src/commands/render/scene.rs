@@ -14,6 +14,7 @@ use crate::commands::picture::halved;
 use crate::commands::render::film::overlay;
 use crate::commands::render::solids::{Body, Face};
 use crate::messages::colours::Colour;
+use crate::together::on_threads;
 
 /// How many times finer a picture is drawn than it becomes, to be smooth.
 const FINER: u32 = 2;
@@ -256,7 +257,11 @@ impl Scene {
     ) -> Result<(), E> {
         let frames: Vec<usize> = (0..self.frames()).collect();
         for some in frames.chunks(AT_ONCE) {
-            let drawn: Vec<Vec<u8>> = some.par_iter().map(|&frame| self.pixels(frame)).collect();
+            let pixels = |&frame: &usize| self.pixels(frame);
+            let drawn: Vec<Vec<u8>> = on_threads(
+                || some.par_iter().map(pixels).collect(),
+                || some.iter().map(pixels).collect(),
+            );
             for (&frame, pixels) in some.iter().zip(&drawn) {
                 take(frame, pixels)?;
             }
@@ -268,9 +273,11 @@ impl Scene {
     pub(crate) fn sample_colours(&self) -> Vec<u8> {
         let each = self.frames().div_ceil(8).max(1);
         let some: Vec<usize> = (0..self.frames()).step_by(each).collect();
-        some.par_iter()
-            .flat_map(|&frame| self.pixels(frame))
-            .collect()
+        let pixels = |&frame: &usize| self.pixels(frame);
+        on_threads(
+            || some.par_iter().flat_map(pixels).collect(),
+            || some.iter().flat_map(pixels).collect(),
+        )
     }
 
     /// One frame: red, green, blue.

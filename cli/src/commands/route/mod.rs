@@ -25,6 +25,7 @@ use crate::commands::route::tables::Party;
 use crate::messages::exit::{ALL_INPUTS, Failure, SOME_INPUTS};
 use crate::messages::progress::busy;
 use crate::messages::words;
+use crate::together::on_threads;
 
 /// What becomes of one route.
 struct Outcome {
@@ -124,7 +125,11 @@ fn find(
         }
         (Surface::Net(net), Manner::Net(by)) => {
             let route = |&[from, to]: &[DVec3; 2]| net.route(from, to, by);
-            let routes = party.pairs.par_iter().map(route);
+            let routes: Vec<_> = on_threads(
+                || party.pairs.par_iter().map(route).collect(),
+                || party.pairs.iter().map(route).collect(),
+            );
+            let routes = routes.into_iter();
             routes
                 .map(|own| own.map_err(|error| words(&error)))
                 .collect()

@@ -1,0 +1,367 @@
+//! Whoever calls from whatever thread: nothing hangs, and no thread that is refused ends the program.
+//! What may hang runs in a process of its own, which is ended after a while.
+#![allow(unsafe_code)] // the buffers of an application's own device
+
+use std::hash::{DefaultHasher, Hash, Hasher};
+use std::process::{Child, Command, Stdio};
+use std::sync::Mutex;
+use std::time::{Duration, Instant};
+
+use glam::{DQuat, Quat, Vec3};
+use rayon::prelude::*;
+use tumble::{
+    Axes, CrowdLayer, CrowdLibrary, CrowdValues, Device, Encoding, Engine, EngineOptions, Error,
+    Follow, Frames, Interpolation, Layout, Mapping, OutputBuffer, Quantity, Skeleton, Smoothing,
+    SmoothingKernel, TrackSet, VectorMethod, VulkanBuffer, method,
+};
+
+use crate::application::Application;
+use crate::support::{Random, vulkan_devices};
+
+/// One of the ignored tests below, in a process of its own.
+fn child(test: &str) -> Command {
+    let mut command = Command::new(std::env::current_exe().unwrap());
+    let test = format!("threads::{test}");
+    command.args(["--exact", &test, "--ignored", "--nocapture"]);
+    command
+}
+
+/// Waits for a process, and ends it after some seconds.
+fn finish(mut child: Child, seconds: u64) -> Result<(), String> {
+    let started = Instant::now();
+    loop {
+        match child.try_wait().unwrap() {
+            Some(status) if status.success() => return Ok(()),
+            Some(status) => return Err(status.to_string()),
+            None if started.elapsed() > Duration::from_secs(seconds) => {
+                child.kill().unwrap();
+                child.wait().unwrap();
+                return Err(format!("it hangs: ended after {seconds} s"));
+            }
+            None => std::thread::sleep(Duration::from_millis(5)),
+        }
+    }
+}
+
+fn runs(mut command: Command, seconds: u64) -> Result<(), String> {
+    finish(command.stdout(Stdio::null()).spawn().unwrap(), seconds)
+}
+
+/// Rayon's workers take up other tasks while they wait: what a call has locked meanwhile, the next task
+/// on the same thread would wait for, for ever.
+#[test]
+fn tasks_of_a_callers_own_pool_may_call_everything_at_once() {
+    let rounds = std::env::var("SOAK").map_or(2, |_| 200);
+    for round in 0..rounds {
+        let mut command = child("four_hundred_tasks");
+        command.env("RAYON_NUM_THREADS", "3");
+        runs(command, 60).unwrap_or_else(|error| panic!("round {round}: {error}"));
+    }
+}
+
+/// Bits of a result.
+fn sum<T: bytemuck::NoUninit>(values: &[T]) -> u64 {
+    let mut hasher = DefaultHasher::new();
+    bytemuck::cast_slice::<T, u8>(values).hash(&mut hasher);
+    hasher.finish()
+}
+
+/// More rotations than one task of the CPU has, so that every call shares its work.
+fn keys() -> TrackSet {
+    let mut random = Random(3);
+    let times: Vec<f64> = (0..26).map(|i| f64::from(i) * 0.4).collect();
+    let mut set = TrackSet::new();
+    for track in 0..64 {
+        let mut rotation = random.rotation();
+        let mut keys = Vec::new();
+        for _ in &times {
+            let turn = DQuat::from_axis_angle(random.direction(), random.between(0.0, 0.8));
+            rotation = (rotation * turn).normalize();
+            keys.push(rotation.as_quat());
+        }
+        set.push("", &times, &keys).unwrap();
+        let moved: Vec<Vec3> = times
+            .iter()
+            .map(|_| random.direction().as_vec3() * 0.3)
+            .collect();
+        set.set_translations(track, &times, &moved, &[]).unwrap();
+    }
+    set
+}
+
+fn paths() -> TrackSet {
+    let mut random = Random(4);
+    let mut set = TrackSet::new();
+    let times: Vec<f64> = (0..20).map(f64::from).collect();
+    for _ in 0..40 {
+        let points: Vec<Vec3> = (0..20u8)
+            .map(|i| Vec3::X * f32::from(i) * 2.0 + random.direction().as_vec3())
+            .collect();
+        set.push_path("", &times, &points, &[]).unwrap();
+    }
+    set
+}
+
+type Call = Box<dyn Fn(u32) -> u64 + Send + Sync>;
+
+/// Every public call that works, on one engine, one clip and one crowd; each takes a rate.
+fn calls(engine: &Engine) -> Vec<Call> {
+    let set: &'static TrackSet = Box::leak(Box::new(keys()));
+    let paths: &'static TrackSet = Box::leak(Box::new(paths()));
+    let clip: &'static _ = Box::leak(Box::new(engine.upload(set, method::SLERP).unwrap()));
+    let engine: &'static Engine = Box::leak(Box::new(engine.clone()));
+    let frames = |rate: u32| Frames::fps(rate);
+    let tracks = set.track_count();
+    let samples = move |rate: u32| clip.timeline(&frames(rate)).unwrap().len();
+    let chain: &'static _ = Box::leak(Box::new(Skeleton::chain(tracks, 0.5).unwrap()));
+    let poses = engine.evaluate(set, method::SLERP, &frames(50)).unwrap();
+    let poses: &'static _ = Box::leak(Box::new(poses));
+    let velocity = Interpolation {
+        quantity: Quantity::Velocity(Axes::Body),
+        ..method::SLERP.into()
+    };
+    let mut library = CrowdLibrary::new(chain).unwrap();
+    let moves = library.push(set, method::SLERP, VectorMethod::Linear);
+    moves.unwrap();
+    let mut crowd = engine.crowd(&library, 200, 1).unwrap();
+    crowd.set(7, 0, CrowdLayer::new(0)).unwrap();
+    // A lock of the caller's own, around a call.
+    let crowd = Mutex::new(crowd);
+    let (track_major, frame_major) = (Layout::TrackMajor, Layout::FrameMajor);
+    vec![
+        Box::new(move |rate| sum(clip.evaluate(&frames(rate)).unwrap().as_quats())),
+        Box::new(move |rate| {
+            let found = clip.evaluate_as(&frames(rate), frame_major).unwrap();
+            sum(found.as_quats())
+        }),
+        Box::new(move |rate| {
+            let mut output = OutputBuffer::new(tracks * samples(rate)).unwrap();
+            let (rate, layout) = (frames(rate), track_major);
+            clip.evaluate_into(&rate, layout, &mut output).unwrap();
+            sum(&output)
+        }),
+        Box::new(move |rate| {
+            let encoding = Encoding::F16;
+            sum(&clip
+                .evaluate_encoded(&frames(rate), track_major, encoding)
+                .unwrap())
+        }),
+        Box::new(move |rate| {
+            let part = (3..tracks, 5..samples(rate));
+            let mut output = vec![0; part.0.len() * part.1.len() * 16];
+            let (rate, encoding) = (frames(rate), Encoding::F32);
+            clip.evaluate_part_into(&rate, frame_major, part, encoding, &mut output)
+                .unwrap();
+            sum(&output)
+        }),
+        Box::new(move |rate| {
+            let mut all: Vec<[f32; 4]> = Vec::new();
+            clip.stream(&frames(rate), frame_major, 10_000, |chunk| {
+                all.extend(chunk.rows);
+                Ok::<(), Error>(())
+            })
+            .unwrap();
+            sum(&all)
+        }),
+        Box::new(move |rate| {
+            let mut all: Vec<[f32; 4]> = Vec::new();
+            let (rate, cubic) = (frames(rate), method::C2);
+            engine
+                .stream(set, cubic, &rate, track_major, 20_000, |chunk| {
+                    all.extend(chunk.rows);
+                    Ok::<(), Error>(())
+                })
+                .unwrap();
+            sum(&all)
+        }),
+        Box::new(move |rate| {
+            let found = engine.evaluate(set, method::BESSEL_OVERHAUSER, &frames(rate));
+            sum(found.unwrap().as_quats())
+        }),
+        // Straight from keys.
+        Box::new(move |rate| {
+            let few = Frames::at((0..20).map(|i| f64::from(i * rate) * 0.005).collect());
+            let found = engine.evaluate(set, method::CATMULL_ROM, &few);
+            sum(found.unwrap().as_quats())
+        }),
+        Box::new(move |rate| {
+            let mut output = vec![0; (tracks - 1) * samples(rate) * 16];
+            let (rate, encoding) = (frames(rate), Encoding::F32);
+            engine
+                .evaluate_tracks_into(set, method::SLERP, &rate, 1..tracks, encoding, &mut output)
+                .unwrap();
+            sum(&output)
+        }),
+        Box::new(move |rate| {
+            let found = engine.rates(set, velocity, &frames(rate), track_major);
+            sum(found.unwrap().as_slice())
+        }),
+        Box::new(move |rate| {
+            let (rate, linear) = (frames(rate), VectorMethod::Linear);
+            let local = engine
+                .transforms(set, method::SLERP, linear, &rate, frame_major)
+                .unwrap();
+            let model = engine.local_to_model(&local, chain, None).unwrap();
+            sum(model.as_arrays())
+        }),
+        Box::new(move |rate| {
+            let follow = Follow::default();
+            let found = engine.follow(paths, &follow, &frames(rate), track_major);
+            sum(found.unwrap().rotations.as_quats())
+        }),
+        Box::new(move |_| {
+            let smoothing = Smoothing::new(SmoothingKernel::Gaussian(2.0));
+            sum(engine.smooth(poses, &smoothing).unwrap().as_quats())
+        }),
+        Box::new(move |rate| {
+            let mixed = engine.mix(poses, poses, rate as f32 / 100.0).unwrap();
+            let blended = engine.blend(&[(&mixed, 0.5), (poses, 0.5)]).unwrap();
+            let reference = vec![Quat::IDENTITY; tracks];
+            let added = engine.add(&blended, poses, &reference, 0.5).unwrap();
+            sum(engine.world(&added, chain).unwrap().as_slice())
+        }),
+        Box::new(move |_| {
+            let mut crowd = crowd.lock().unwrap();
+            let mut output = vec![[0.0; 4]; crowd.output_len(CrowdValues::Model)];
+            crowd
+                .evaluate_into(CrowdValues::Model, &mut output)
+                .unwrap();
+            sum(&output)
+        }),
+        Box::new(move |rate| {
+            let mut own = engine.crowd(&library, 100, 1).unwrap();
+            own.submit(CrowdValues::Local).unwrap();
+            let mut output = vec![[0.0; 4]; own.output_len(CrowdValues::Local)];
+            own.wait_into(&mut output).unwrap();
+            sum(&output)
+                ^ sum(engine
+                    .upload(set, method::C2)
+                    .unwrap()
+                    .evaluate(&frames(rate))
+                    .unwrap()
+                    .as_quats())
+        }),
+    ]
+}
+
+/// Run by the test above, in a process of its own.
+#[test]
+#[ignore = "part of tasks_of_a_callers_own_pool_may_call_everything_at_once"]
+fn four_hundred_tasks() {
+    let cpu = Engine::new(Device::Cpu).unwrap();
+    let mut own = EngineOptions::default();
+    own.threads = Some(2);
+    let mut engines = vec![Engine::with_options(Device::Cpu, &own).unwrap()];
+    engines.extend(
+        vulkan_devices()
+            .into_iter()
+            .map(|device| Engine::new(device).unwrap()),
+    );
+    let rates = 30..34;
+    let expected = calls(&cpu);
+    let expected: Vec<Vec<u64>> = expected
+        .iter()
+        .map(|call| rates.clone().map(call).collect())
+        .collect();
+    for engine in [cpu].iter().chain(&engines) {
+        let calls = calls(engine);
+        let task = |task: usize| {
+            let (call, rate) = (task % calls.len(), task / calls.len() % rates.len());
+            let found = calls[call](rates.start + rate as u32);
+            let name = engine.device_name();
+            assert_eq!(found, expected[call][rate], "call {call}, {name}");
+        };
+        (0..400).into_par_iter().for_each(task);
+        // The engine's own threads may call it, too.
+        tumble::on_threads(|| (0..100).into_par_iter().for_each(task)).unwrap();
+    }
+    to_own_buffers();
+}
+
+/// Into buffers of an application's own, one for each task.
+fn to_own_buffers() {
+    if vulkan_devices().is_empty() {
+        return;
+    }
+    let application = Application::new();
+    let engine = application.engine(Mapping::Automatic);
+    let set = keys();
+    let clip = engine.upload(&set, method::SLERP).unwrap();
+    let expected = clip.evaluate(&Frames::fps(40)).unwrap();
+    let size = size_of_val(expected.as_quats()) as u64;
+    let buffers: Vec<_> = (0..60).map(|_| application.buffer(size)).collect();
+    let whole = |buffer| VulkanBuffer {
+        buffer,
+        offset: 0,
+        size,
+    };
+    buffers.par_iter().for_each(|&(buffer, _)| {
+        let (frames, encoding) = (Frames::fps(40), Encoding::F32);
+        let buffer = whole(buffer);
+        // SAFETY: each buffer is the device's, has memory, and is this task's alone.
+        let done =
+            unsafe { clip.evaluate_to_buffer(&frames, Layout::TrackMajor, encoding, buffer) };
+        done.unwrap();
+    });
+    for (_, memory) in &buffers {
+        let expected: &[u8] = bytemuck::cast_slice(expected.as_quats());
+        assert!(application.bytes(*memory, size) == expected);
+    }
+    drop((clip, engine));
+    for (buffer, memory) in buffers {
+        // SAFETY: nothing uses them any more.
+        unsafe {
+            application.device.destroy_buffer(buffer, None);
+            application.device.free_memory(memory, None);
+        }
+    }
+}
+
+/// What fits one thread needs no others; what does not is refused with an error, and a copy is made by
+/// one thread. Address space for a thousand stacks is more than this process may have.
+#[cfg(target_os = "linux")]
+#[test]
+fn threads_that_the_system_refuses_are_an_error() {
+    let own = child("refused_threads");
+    let mut command = Command::new("sh");
+    command
+        .args(["-c", "ulimit -v 2000000; exec \"$0\" \"$@\""])
+        .arg(own.get_program())
+        .args(own.get_args())
+        .env("RAYON_NUM_THREADS", "1000");
+    runs(command, 60).unwrap();
+}
+
+/// Run by the test above, in a process of its own.
+#[test]
+#[ignore = "part of threads_that_the_system_refuses_are_an_error"]
+fn refused_threads() {
+    let engine = Engine::new(Device::Cpu).unwrap();
+    let set = keys();
+    let one = set.select([1]).unwrap();
+    assert!(
+        engine
+            .evaluate(&one, method::SLERP, &Frames::fps(10))
+            .is_ok()
+    );
+    for _ in 0..2 {
+        let refused = engine.evaluate(&set, method::SLERP, &Frames::fps(60));
+        let Err(Error::Threads(refused)) = refused else {
+            panic!("a thousand threads");
+        };
+        assert_eq!(refused.count, 1000);
+        assert!(refused.to_string().contains("RAYON_NUM_THREADS"));
+    }
+    // Few are granted all the same.
+    let mut options = EngineOptions::default();
+    options.threads = Some(2);
+    let engine = Engine::with_options(Device::Cpu, &options).unwrap();
+    assert!(
+        engine
+            .evaluate(&set, method::SLERP, &Frames::fps(60))
+            .is_ok()
+    );
+    options.threads = Some(1000);
+    let refused = Engine::with_options(Device::Cpu, &options);
+    assert!(matches!(refused, Err(Error::Threads(_))));
+}
