@@ -167,10 +167,31 @@ impl Engine {
     /// # Errors
     /// When the device fails.
     pub fn check_kernels(&self) -> Result<Vec<KernelCheck>, Error> {
+        self.kernel_checks(false)
+    }
+
+    /// As [`Engine::check_kernels`], but for the kernels that are known to be exact on this device, which are
+    /// listed as [`remembered`](KernelCheck::remembered).
+    ///
+    /// # Errors
+    /// When the device fails.
+    pub fn check_unknown_kernels(&self) -> Result<Vec<KernelCheck>, Error> {
+        self.kernel_checks(true)
+    }
+
+    /// The kernels that the device may be given, without running any: those that are known to be exact on it are
+    /// [`remembered`](KernelCheck::remembered), and of the others nothing was compared. Empty on the CPU.
+    #[must_use]
+    pub fn known_kernels(&self) -> Vec<KernelCheck> {
+        let known = |opened: &Opened| opened.engine().known_kernels();
+        self.backend.opened().map_or_else(Vec::new, known)
+    }
+
+    fn kernel_checks(&self, only_unknown: bool) -> Result<Vec<KernelCheck>, Error> {
         let Some(opened) = self.backend.opened() else {
             return Ok(Vec::new());
         };
-        Ok(opened.engine().check_kernels()?)
+        Ok(opened.engine().check_kernels(only_unknown)?)
     }
 
     /// Runs the expressions of the self-test without what forbids the driver to compute them otherwise, to see that

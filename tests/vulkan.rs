@@ -41,7 +41,14 @@ fn every_kernel_has_the_bits_of_its_twin_on_every_device() {
             for check in engine.check_kernels().unwrap() {
                 assert!(check.total > 100, "{check:?}");
                 assert_eq!(check.differing, 0, "{}: {check:?}", device.name());
+                assert!(!check.remembered, "{check:?}");
                 checked.insert(check.name, check.total);
+            }
+            // Now all of them are known, to other engines of this process as well.
+            let engine = Engine::with_options(device.clone(), &options).unwrap();
+            for check in engine.check_unknown_kernels().unwrap() {
+                assert!(check.remembered && check.total == 0, "{check:?}");
+                assert!(checked.contains_key(check.name), "{check:?}");
             }
         }
         let has_texels = checked.keys().any(|name| name.ends_with("_texels"));

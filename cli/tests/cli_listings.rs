@@ -39,6 +39,8 @@ fn devices_and_info_speak_json() {
         assert_eq!(entry["name"], device.name());
         assert_eq!(entry["exact"], true, "{entry}");
         assert!(entry["self_tests"].as_array().unwrap().len() >= 8);
+        assert!(entry["kernels"]["all"].as_u64().unwrap() >= 98, "{entry}");
+        assert!(entry["kernels"]["differing"].as_array().unwrap().is_empty());
     }
     assert_eq!(found.len(), vulkan_devices().len());
 
@@ -170,6 +172,24 @@ fn bench_measures_every_workload_in_one_run() {
     line.extend(workloads);
     let report: serde_json::Value =
         serde_json::from_slice(&succeed(place.path(), &line).out).unwrap();
+    let devices = report["devices"].as_array().unwrap();
+    assert!(!devices.is_empty() || std::env::var_os("CI").is_none());
+    for device in devices {
+        for told in ["driver", "uuid"] {
+            assert!(!device[told].as_str().unwrap().is_empty(), "{device}");
+        }
+        for chosen in ["mapping", "transfer", "read_back", "uploads"] {
+            assert!(device["choices"][chosen].is_string(), "{device}");
+        }
+        assert!(device["choices"]["windows_in_flight"].as_u64().unwrap() >= 2);
+        assert!(device["driver_version"].as_u64().is_some(), "{device}");
+        for rate in ["store", "fill"] {
+            assert!(
+                device["write_rates"][rate].as_f64().unwrap() > 0.0,
+                "{device}"
+            );
+        }
+    }
     let sections = report["sections"].as_array().unwrap();
     assert_eq!(sections.len(), 2 * workloads.len());
     for section in sections {
@@ -178,7 +198,7 @@ fn bench_measures_every_workload_in_one_run() {
         assert_eq!(
             names[..3],
             [
-                "memory write rate",
+                "host memory write rate",
                 "naive (glam, rayon)",
                 "CPU, evaluation alone"
             ]
@@ -190,6 +210,16 @@ fn bench_measures_every_workload_in_one_run() {
         }
         // The segments of dense keys are not kept on a device.
         if std::env::var_os("CI").is_some() && section["workload"] != "dense" {
+            let resident: Vec<_> = (rows.iter())
+                .filter(|row| row["name"].as_str().unwrap().ends_with(", resident"))
+                .collect();
+            assert!(!resident.is_empty(), "{names:?}");
+            for row in resident {
+                // By the device's clock, which is its first part.
+                assert_eq!(row["parts"][0][1], row["milliseconds"], "{row}");
+                let share = row["share_of_device_write_rate"].as_f64().unwrap();
+                assert!(share > 0.0, "{row}");
+            }
             let device = rows
                 .iter()
                 .find(|row| row["parts"][1][0] == "submit to fence");

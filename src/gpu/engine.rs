@@ -149,7 +149,7 @@ impl VulkanEngine {
     /// Refuses a kernel that differs from the CPU, unless inexact devices are allowed.
     fn trust(&self, kernel: Kernel, pipeline: &Pipeline) -> Result<(), VulkanError> {
         let passes = Passes::of_user();
-        let pass = Pass::new(&self.device.physical, pipeline);
+        let pass = Pass::new(&self.device.physical, pipeline.code_hash);
         if passes.has(&pass) {
             return Ok(());
         }
@@ -167,29 +167,52 @@ impl VulkanEngine {
         Ok(())
     }
 
-    /// Checks every kernel, whatever is known of it.
-    pub(crate) fn check_kernels(&self) -> Result<Vec<KernelCheck>, VulkanError> {
+    /// Checks every kernel; with `only_unknown` those alone that are not known to pass.
+    pub(crate) fn check_kernels(
+        &self,
+        only_unknown: bool,
+    ) -> Result<Vec<KernelCheck>, VulkanError> {
+        let (passes, physical) = (Passes::of_user(), &self.device.physical);
         let mut passed = Vec::new();
         let mut check = |code: &KernelCode| {
+            let pass = Pass::new(physical, Pipeline::code_hash(&self.device, code.kernel));
+            if only_unknown && passes.has(&pass) {
+                return Ok(self.known_kernel(code));
+            }
             let kept = lock(&self.pipelines)[code.kernel as usize].clone();
             let pipeline = match kept {
                 Some(pipeline) => pipeline,
-                None => Arc::new(Pipeline::new(
-                    &self.device,
-                    code.kernel,
-                    Exactness::Demanded,
-                )?),
+                None => {
+                    let (device, kernel) = (&self.device, code.kernel);
+                    Arc::new(Pipeline::new(device, kernel, Exactness::Demanded)?)
+                }
             };
             let check = kernel_check::check(code.kernel, &pipeline)?;
             if check.differing == 0 {
-                passed.push(Pass::new(&self.device.physical, &pipeline));
+                passed.push(pass);
                 lock(&self.pipelines)[code.kernel as usize].get_or_insert(pipeline);
             }
             Ok(check)
         };
         let checks = KERNELS.iter().map(&mut check).collect::<Result<_, _>>();
-        Passes::of_user().remember(passed);
+        passes.remember(passed);
         checks
+    }
+
+    /// What is known of each kernel.
+    pub(crate) fn known_kernels(&self) -> Vec<KernelCheck> {
+        KERNELS.iter().map(|code| self.known_kernel(code)).collect()
+    }
+
+    fn known_kernel(&self, code: &KernelCode) -> KernelCheck {
+        let (name, ..) = code.kernel.code(self.device.reads_texels);
+        let hash = Pipeline::code_hash(&self.device, code.kernel);
+        KernelCheck {
+            name,
+            total: 0,
+            differing: 0,
+            remembered: Passes::of_user().has(&Pass::new(&self.device.physical, hash)),
+        }
     }
 
     /// Copies a clip's segments to the device. The buffers of `spare`, which are no longer needed,

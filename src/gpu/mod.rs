@@ -5,7 +5,6 @@
 #[cfg(feature = "prove")]
 pub(crate) mod application;
 pub(crate) mod buffer;
-#[allow(dead_code)] // until the next changes use it
 pub(crate) mod cache;
 #[cfg(test)]
 pub(crate) mod cards;
@@ -39,3 +38,5 @@ pub(crate) mod submission;
 pub(crate) mod turns;
 pub(crate) mod upload;
 pub(crate) mod work_list;
+#[cfg(feature = "prove")]
+pub(crate) mod write_rates;

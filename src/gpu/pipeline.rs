@@ -40,7 +40,22 @@ pub(crate) struct Pipeline {
     pub(crate) has_run: AtomicBool,
 }
 
+/// The code of a kernel as a driver gets it.
+fn words(device: &LogicalDevice, code: &[u32], exactness: Exactness) -> Vec<u32> {
+    let words = match exactness {
+        Exactness::Demanded => spirv::float_controls(code, device.physical.float_controls),
+        Exactness::LeftToTheDriver => spirv::without_decorations(code),
+    };
+    words.expect("the kernels passed when they were compiled")
+}
+
 impl Pipeline {
+    /// The hash that the code of a kernel's pipeline has.
+    pub(crate) fn code_hash(device: &LogicalDevice, kernel: Kernel) -> u64 {
+        let (_, code, _) = kernel.code(device.reads_texels);
+        spirv::hash(&words(device, code, Exactness::Demanded))
+    }
+
     pub(crate) fn new(
         device: &Arc<LogicalDevice>,
         kernel: Kernel,
@@ -84,11 +99,7 @@ impl Pipeline {
         pipeline.layout = unsafe { device.raw.create_pipeline_layout(&info, None) }
             .named("vkCreatePipelineLayout")?;
 
-        let words = match exactness {
-            Exactness::Demanded => spirv::float_controls(code, device.physical.float_controls),
-            Exactness::LeftToTheDriver => spirv::without_decorations(code),
-        };
-        let words = words.expect("the kernels passed when they were compiled");
+        let words = words(device, code, exactness);
         pipeline.code_hash = spirv::hash(&words);
         let info = vk::ShaderModuleCreateInfo::default().code(&words);
         // SAFETY: the words are valid SPIR-V: naga made and validated them, and the passes keep them valid.

@@ -307,6 +307,13 @@ impl<'a> Commands<'a> {
         unsafe { (self.device).cmd_copy_buffer(self.raw, from.raw, to.raw, &region) };
     }
 
+    /// Records that the first bytes of a buffer, a multiple of 4, are filled with a word.
+    #[cfg(feature = "prove")]
+    pub(crate) fn fill(self, to: &Buffer, bytes: u64, word: u32) {
+        // SAFETY: as in `dispatch`; the range lies within the buffer.
+        unsafe { (self.device).cmd_fill_buffer(self.raw, to.raw, 0, bytes.min(to.size), word) };
+    }
+
     /// Records that some bytes, a multiple of 4 and at most 65 536, are written into a buffer.
     pub(crate) fn update(self, to: vk::Buffer, offset: u64, bytes: &[u8]) {
         // SAFETY: as in `dispatch`; the range lies within the buffer, and the bytes are few and copied

@@ -14,6 +14,8 @@ pub mod random;
 #[cfg(feature = "prove")]
 pub mod renderer;
 #[cfg(feature = "prove")]
+pub mod resident;
+#[cfg(feature = "prove")]
 pub(crate) mod sets;
 
 pub use crate::verify::outputs::OutputVerification;

@@ -9,7 +9,6 @@ use std::sync::{Mutex, OnceLock};
 use crate::gpu::cache::Cache;
 use crate::gpu::engine::lock;
 use crate::gpu::physical::{DeviceKind, PhysicalDevice};
-use crate::gpu::pipeline::Pipeline;
 use crate::simd::dispatch::VectorWidth;
 
 /// The file's name.
@@ -29,8 +28,9 @@ const MOST_LINES: usize = 4096;
 pub(crate) struct Pass(String);
 
 impl Pass {
-    pub(crate) fn new(physical: &PhysicalDevice, pipeline: &Pipeline) -> Self {
-        Self::of(&of_device(physical, env::vars_os()), pipeline.code_hash)
+    /// Of code by its hash ([`Pipeline::code_hash`](crate::gpu::pipeline::Pipeline::code_hash)).
+    pub(crate) fn new(physical: &PhysicalDevice, code: u64) -> Self {
+        Self::of(&of_device(physical, env::vars_os()), code)
     }
 
     fn of(device: &str, code: u64) -> Self {

@@ -5,6 +5,7 @@ use glam::{DVec3, Mat3, Quat, Vec3};
 use rayon::prelude::*;
 use tumble::{Channel, Device, Engine, Follow, Frames, Layout, Method, TrackSet};
 
+use crate::commands::bench::device::BenchDevice;
 use crate::commands::bench::report::Section;
 use crate::commands::bench::workload::{Kind, Workload};
 use crate::commands::bench::{Contestant, Turns, race};
@@ -41,13 +42,13 @@ pub(crate) fn workload(tracks: usize) -> Workload {
 pub(crate) fn measure(
     workload: &Workload,
     method: Method,
-    devices: &[Device],
+    devices: &[BenchDevice],
     turns: Turns,
 ) -> Result<Section, tumble::Error> {
     let count = workload.set.track_count() * workload.times.len();
     let mut output = vec![Quat::IDENTITY; count];
     let mut contestants: Vec<Contestant<'_, tumble::Error>> = vec![
-        Contestant::new("memory write rate", |output: &mut [Quat]| {
+        Contestant::new("host memory write rate", |output: &mut [Quat]| {
             output.fill(std::hint::black_box(Quat::IDENTITY));
             Ok(Vec::new())
         }),
@@ -62,9 +63,7 @@ pub(crate) fn measure(
     ];
     let follow = Follow::default();
     let cpu = Engine::new(Device::Cpu)?;
-    let others = devices
-        .iter()
-        .filter_map(|device| Engine::new(device.clone()).ok());
+    let others = devices.iter().map(|device| device.engine.clone());
     for engine in std::iter::once(cpu).chain(others) {
         let follow = &follow;
         let name = format!("{}, from points", engine.device_name());

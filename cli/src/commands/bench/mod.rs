@@ -2,6 +2,7 @@
 //! would write. Everything is measured in one run, in turns, because machines are
 //! shared and their clocks drift; what counts are the ratios.
 
+pub(crate) mod device;
 pub(crate) mod files;
 pub(crate) mod follow;
 pub(crate) mod naive;
@@ -17,9 +18,11 @@ use clap::Args;
 use glam::Quat;
 use rayon::prelude::*;
 use tumble::{
-    Clip, Device, Engine, EngineOptions, Layout, Method, OutputBuffer, VectorWidth, method,
+    Clip, Device, Encoding, Engine, EngineOptions, Layout, Method, OutputBuffer, VectorWidth,
+    method,
 };
 
+use crate::commands::bench::device::BenchDevice;
 use crate::commands::bench::report::{Report, Row, Section};
 use crate::commands::bench::workload::{Kind, Workload};
 use crate::commands::probe;
@@ -58,6 +61,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     {
         return Err(Failure::new(DEVICE, format!("rayon's threads: {error}")));
     }
+    let devices: Vec<BenchDevice> = (devices.iter().filter_map(BenchDevice::open))
+        .collect::<Result<_, _>>()
+        .map_err(|error| crate::arguments::device::refused(&error))?;
     let mut sections = Vec::new();
     for &kind in &arguments.workloads {
         let Some(workload) = kind.workload(arguments.shrink as usize) else {
@@ -100,7 +106,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
             sections.push(section);
         }
     }
-    let report = Report::new(arguments.rounds, sections);
+    let devices = devices.into_iter().map(|device| device.report).collect();
+    let report = Report::new(arguments.rounds, devices, sections);
     if arguments.json {
         words::json(&report)
     } else {
@@ -127,6 +134,9 @@ struct Part {
 struct Contestant<'a, E> {
     name: String,
     action: Action<'a, E>,
+    /// Whether the first part is the time that counts, and not the host's from call to return: where a result
+    /// stays on a device. Then the bytes that the device writes, and the bytes a second that it can write.
+    on_device: Option<(u64, f64)>,
 }
 
 impl<'a, E> Contestant<'a, E> {
@@ -137,6 +147,7 @@ impl<'a, E> Contestant<'a, E> {
         Self {
             name: name.into(),
             action: Box::new(action),
+            on_device: None,
         }
     }
 }
@@ -145,7 +156,7 @@ fn measure(
     kind: Kind,
     workload: &Workload,
     method: Method,
-    devices: &[Device],
+    devices: &[BenchDevice],
     turns: Turns,
 ) -> Result<Section, tumble::Error> {
     let engine = Engine::new(Device::Cpu)?;
@@ -155,12 +166,19 @@ fn measure(
     output.fill(Quat::IDENTITY);
 
     let fill = |fill: fn(&mut [Quat], Quat)| {
-        Contestant::new("memory write rate", move |output: &mut [Quat]| {
+        Contestant::new("host memory write rate", move |output: &mut [Quat]| {
             let value = std::hint::black_box(Quat::IDENTITY);
             let chunk = output.len().div_ceil(rayon::current_num_threads());
             (output.par_chunks_mut(chunk)).for_each(|part| fill(part, value));
             Ok(Vec::new())
         })
+    };
+    // Segments of dense keys take gigabytes: there is room for them once.
+    let clips = match kind {
+        Kind::Dense => Vec::new(),
+        _ => (devices.iter())
+            .map(|device| device.engine.upload(&workload.set, method))
+            .collect::<Result<_, _>>()?,
     };
     let mut contestants = vec![
         fill(<[Quat]>::fill),
@@ -186,7 +204,6 @@ fn measure(
         })
     };
     contestants.push(evaluate("CPU, evaluation alone".into(), clip));
-    // Segments of dense keys take gigabytes: there is room for them once.
     if kind != Kind::Dense {
         let one = cpu_clip(&|options| options.threads = Some(1))?;
         contestants.push(evaluate("CPU, one thread".into(), one));
@@ -203,14 +220,15 @@ fn measure(
             Ok(Vec::new())
         },
     ));
-    for device in devices {
-        let Ok(engine) = Engine::new(device.clone()) else {
-            continue; // `tumble devices` says why
-        };
+    for (i, device) in devices.iter().enumerate() {
+        let engine = device.engine.clone();
         let name = engine.device_name().to_owned();
-        if kind != Kind::Dense {
-            let clip = engine.upload(&workload.set, method)?;
-            contestants.push(Contestant::new(&name, on_device(clip, workload)));
+        if let Some(clip) = clips.get(i) {
+            contestants.push(match device.copies_results() {
+                true => Contestant::new(&name, into_host_memory(clip, workload)),
+                false => Contestant::new(&name, on_device(clip, workload)),
+            });
+            contestants.extend(resident(device, clip, workload)?);
         }
         contestants.push(Contestant::new(
             format!("{name}, from keys"),
@@ -230,25 +248,58 @@ fn measure(
     Ok(Section::new(kind, method, count, rows))
 }
 
-/// Into memory of the device's choice, as a caller gets it fastest.
+/// Keys and results stay on the device, whose clock counts; `None` where it has none.
+fn resident<'a>(
+    device: &BenchDevice,
+    clip: &'a Clip,
+    workload: &'a Workload,
+) -> Result<Option<Contestant<'a, tumble::Error>>, tumble::Error> {
+    let Some(mut room) = clip.resident(&workload.frames, Layout::TrackMajor, Encoding::F32)? else {
+        return Ok(None);
+    };
+    let on_device = Some((room.bytes(), device.write_limit()));
+    let name = format!("{}, resident", device.engine.device_name());
+    let mut contestant = Contestant::new(name, move |_: &mut [Quat]| {
+        let took = room.evaluate()?;
+        let parts = [("device clock", took.on_device), ("host", took.on_host)];
+        Ok(parts.map(|(name, time)| Part { name, time }).into())
+    });
+    contestant.on_device = on_device;
+    Ok(Some(contestant))
+}
+
+/// Into memory of the caller's that is used again: that of a device that copies its results.
+fn into_host_memory<'a>(
+    clip: &'a Clip,
+    workload: &'a Workload,
+) -> impl FnMut(&mut [Quat]) -> Result<Vec<Part>, tumble::Error> + 'a {
+    move |output| {
+        clip.evaluate_into(&workload.frames, Layout::TrackMajor, output)?;
+        Ok(taken(clip))
+    }
+}
+
+/// Into memory of the device's choice, as a caller gets it fastest where that is the host's too.
 fn on_device<'a>(
-    clip: Clip,
+    clip: &'a Clip,
     workload: &'a Workload,
 ) -> impl FnMut(&mut [Quat]) -> Result<Vec<Part>, tumble::Error> + 'a {
     move |_| {
         std::hint::black_box(clip.evaluate(&workload.frames)?);
-        let timings = clip.engine().take_timings();
-        let parts = [
-            ("work lists", timings.work_lists),
-            ("submit to fence", timings.submit_to_fence),
-            ("device clock", timings.on_device),
-            ("read back", timings.read_back),
-        ];
-        Ok(parts
-            .map(|(name, time)| Part { name, time })
-            .into_iter()
-            .collect())
+        Ok(taken(clip))
     }
+}
+
+/// Where a device's time went.
+fn taken(clip: &Clip) -> Vec<Part> {
+    let timings = clip.engine().take_timings();
+    let parts = [
+        ("work lists", timings.work_lists),
+        ("submit to fence", timings.submit_to_fence),
+        ("device clock", timings.on_device),
+        ("read back", timings.read_back),
+    ];
+    parts.map(|(name, time)| Part { name, time }).into()
 }
 
 /// Every contestant in turn, round after round; the first round does not count.
@@ -266,7 +317,10 @@ fn race<E>(
             for _ in 0..calls {
                 own = (contestant.action)(output)?;
             }
-            let time = started.elapsed() / calls;
+            let mut time = started.elapsed() / calls;
+            if let (Some(_), Some(device)) = (contestant.on_device, own.first()) {
+                time = device.time;
+            }
             std::hint::black_box(&mut *output);
             if round == 0 {
                 parts[i] = own.iter().map(|part| (part.name, Vec::new())).collect();
@@ -282,7 +336,9 @@ fn race<E>(
     Ok(rows
         .map(|((contestant, times), parts)| {
             let parts = parts.into_iter().map(|(name, times)| (name, median(times)));
-            Row::new(contestant.name, median(times), parts.collect())
+            let mut row = Row::new(contestant.name, median(times), parts.collect());
+            row.share_of_device(contestant.on_device);
+            row
         })
         .collect())
 }

@@ -7,6 +7,7 @@ use std::time::Duration;
 use serde::Serialize;
 use tumble::{Method, VectorWidth};
 
+use crate::commands::bench::device::DeviceReport;
 use crate::commands::bench::workload::Kind;
 use crate::messages::words;
 
@@ -18,6 +19,7 @@ pub(crate) struct Report {
     /// Vector instructions of the CPU, the widest of which is used.
     vector_widths: Vec<String>,
     rounds: u32,
+    devices: Vec<DeviceReport>,
     sections: Vec<Section>,
 }
 
@@ -62,18 +64,22 @@ pub(crate) struct Row {
     /// Its speed beside what the section says.
     #[serde(flatten)]
     ratios: BTreeMap<&'static str, f64>,
+    /// Of a result that stays on a device: how fast it was written, beside what the device writes at most.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    share_of_device_write_rate: Option<f64>,
     /// Where the time went, milliseconds.
     parts: Vec<(&'static str, f64)>,
 }
 
 impl Report {
-    pub(crate) fn new(rounds: u32, sections: Vec<Section>) -> Self {
+    pub(crate) fn new(rounds: u32, devices: Vec<DeviceReport>, sections: Vec<Section>) -> Self {
         let widths = VectorWidth::available();
         Self {
             version: env!("CARGO_PKG_VERSION"),
             threads: rayon::current_num_threads(),
             vector_widths: widths.iter().map(|width| format!("{width:?}")).collect(),
             rounds,
+            devices,
             sections,
         }
     }
@@ -86,6 +92,9 @@ impl Report {
             self.vector_widths.join(", "),
             self.rounds
         );
+        for device in &self.devices {
+            device.tell(&mut text);
+        }
         for section in &self.sections {
             section.tell(&mut text);
         }
@@ -178,6 +187,10 @@ impl Section {
                 let _ = write!(text, "  {:>6.2}x", row.ratios[name]);
             }
             let _ = writeln!(text);
+            if let Some(share) = row.share_of_device_write_rate {
+                let label = "  share of the device's write rate";
+                let _ = writeln!(text, "{label:width$}  {share:>10.3}");
+            }
             for (name, milliseconds) in &row.parts {
                 let _ = writeln!(text, "{:width$}  {milliseconds:>10.3}", format!("  {name}"));
             }
@@ -203,6 +216,13 @@ fn peak_memory() -> Option<u64> {
 }
 
 impl Row {
+    /// Of the bytes that a device writes, and those that it can write in a second.
+    pub(crate) fn share_of_device(&mut self, on_device: Option<(u64, f64)>) {
+        let known = on_device.filter(|&(_, limit)| limit > 0.0 && self.milliseconds > 0.0);
+        self.share_of_device_write_rate =
+            known.map(|(bytes, limit)| bytes as f64 / (self.milliseconds / 1e3) / limit);
+    }
+
     pub(crate) fn new(name: String, time: Duration, parts: Vec<(&'static str, Duration)>) -> Self {
         let milliseconds = |time: Duration| time.as_secs_f64() * 1e3;
         Self {
@@ -211,6 +231,7 @@ impl Row {
             million_rotations_per_second: 0.0,
             nanoseconds_per_rotation: 0.0,
             ratios: BTreeMap::new(),
+            share_of_device_write_rate: None,
             parts: parts
                 .into_iter()
                 .map(|(name, time)| (name, milliseconds(time)))

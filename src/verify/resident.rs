@@ -1,0 +1,135 @@
+//! Results that stay on a device, timed by the device's own clock, and the rate at which it writes into its own
+//! memory: the limit of the former.
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use crate::clip::Clip;
+use crate::engine::Engine;
+use crate::error::Error;
+use crate::evaluate::uploaded::Backend;
+use crate::gpu::buffer::{Buffer, Residence};
+use crate::gpu::engine::VulkanEngine;
+use crate::gpu::error::VulkanError;
+use crate::gpu::handles::VulkanBuffer;
+use crate::gpu::in_flight::Target;
+pub use crate::gpu::write_rates::WriteRates;
+use crate::output::encoding::Encoding;
+use crate::output::rotations::Layout;
+use crate::time::frames::{Frames, Timeline};
+
+/// A clip with room for one of its results in the memory of its device.
+pub struct Resident<'a> {
+    clip: &'a Clip,
+    timeline: Timeline,
+    layout: Layout,
+    encoding: Encoding,
+    bytes: u64,
+    /// Made anew where the device was opened again.
+    buffer: Buffer,
+}
+
+/// How long one evaluation took whose result stayed on the device.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ResidentTime {
+    /// By the device's clock.
+    pub on_device: Duration,
+    /// By the host's clock, from the call to its return.
+    pub on_host: Duration,
+}
+
+impl Engine {
+    /// How fast its device writes into its own memory, by the device's clock; `None` on the CPU, and on devices
+    /// without a clock.
+    ///
+    /// # Errors
+    /// When the device fails, or has no room for a buffer to write.
+    pub fn write_rates(&self) -> Result<Option<WriteRates>, Error> {
+        let Some(opened) = self.backend.opened() else {
+            return Ok(None);
+        };
+        Ok(opened.engine().write_rates()?)
+    }
+}
+
+impl Clip {
+    /// Makes room for a result in the device's own memory, in which [`Resident::evaluate`] leaves it; `None` on the
+    /// CPU, and on devices without a clock or that have no room for it in one allocation.
+    ///
+    /// # Errors
+    /// When the frames do not fit the clip, or the device fails.
+    pub fn resident(
+        &self,
+        frames: &Frames,
+        layout: Layout,
+        encoding: Encoding,
+    ) -> Result<Option<Resident<'_>>, Error> {
+        let Some(opened) = self.engine().backend.opened() else {
+            return Ok(None);
+        };
+        encoding.check(self.quantity())?;
+        let timeline = self.timeline(frames)?;
+        let timeline = self.uploaded.data.folded(&timeline)?;
+        let engine = opened.engine();
+        let count = (self.track_count() * timeline.len()) as u64;
+        let bytes = count.saturating_mul(encoding.bytes() as u64);
+        let physical = &engine.device.physical;
+        if physical.timestamp_bits() == 0 || bytes > physical.info.max_memory_allocation_size {
+            return Ok(None);
+        }
+        let buffer = match room(&engine, bytes) {
+            Err(error) if error.is_out_of_memory() => return Ok(None),
+            buffer => buffer?,
+        };
+        Ok(Some(Resident {
+            clip: self,
+            timeline: timeline.into_owned(),
+            layout,
+            encoding,
+            bytes,
+            buffer,
+        }))
+    }
+}
+
+fn room(engine: &VulkanEngine, bytes: u64) -> Result<Buffer, VulkanError> {
+    Buffer::new(&engine.device, "tumble resident", bytes, Residence::Results)
+}
+
+impl Resident<'_> {
+    /// Bytes of the result.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        self.bytes
+    }
+
+    /// Evaluates into the device's memory. Nobody else may use the engine meanwhile: its timings
+    /// ([`Engine::take_timings`]) are taken.
+    ///
+    /// # Errors
+    /// As [`Clip::evaluate`].
+    pub fn evaluate(&mut self) -> Result<ResidentTime, Error> {
+        let Backend::Vulkan(opened) = &*self.clip.engine().backend else {
+            return Err(Error::BufferOnCpu);
+        };
+        let (layout, bytes, buffer) = (self.layout, self.bytes, &mut self.buffer);
+        let _ = self.clip.engine().take_timings();
+        let started = Instant::now();
+        self.clip
+            .uploaded
+            .on_device(opened, &self.timeline, self.encoding, |engine, job| {
+                if !Arc::ptr_eq(&engine.device, &buffer.device) {
+                    *buffer = room(engine, bytes)?;
+                }
+                let target = VulkanBuffer {
+                    buffer: buffer.raw,
+                    offset: 0,
+                    size: bytes,
+                };
+                engine.run(job, &job.whole(layout), Target::External(target))
+            })?;
+        let on_host = started.elapsed();
+        let on_device = self.clip.engine().take_timings().on_device;
+        Ok(ResidentTime { on_device, on_host })
+    }
+}
