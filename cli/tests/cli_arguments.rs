@@ -172,9 +172,17 @@ fn without_vulkan_the_cpu_stands_in_unless_vulkan_was_demanded() {
     let run = without(&["eval", "a.dat", "-o", "auto.npy"]);
     assert_eq!(run.code, 0, "{}", run.words);
     assert!(run.words.contains("on CPU in "), "{}", run.words);
-    let run = without(&["verify", "a.dat"]);
-    assert_eq!(run.code, 0, "{}", run.words);
-    assert!(String::from_utf8_lossy(&run.out).contains("NOTHING was compared"));
+    // The CPU is near the reference, and no two devices were compared.
+    for (line, code) in [
+        (&["verify", "a.dat"][..], 5),
+        (&["verify", "a.dat", "--device", "first"], 5),
+        (&["verify", "a.dat", "--device", "cpu"], 0),
+    ] {
+        let run = without(line);
+        assert_eq!(run.code, code, "{}", run.words);
+        let told = String::from_utf8_lossy(&run.out);
+        assert!(told.contains("NOTHING was compared") && told.contains("reference-only"));
+    }
     let run = without(&["devices"]);
     assert_eq!(run.code, 0);
     assert!(String::from_utf8_lossy(&run.out).contains("mesa-vulkan-drivers"));

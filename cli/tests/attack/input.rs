@@ -169,7 +169,7 @@ fn no_name_reaches_a_terminal_as_it_is() {
         write("flat.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n".to_owned());
         write("word.obj", format!("v 0 0 {word}\n"));
         write("word.ply", format!("ply\nformat {word}\n"));
-        write("list.txt", format!("{name}.dat\n"));
+        write("list.txt", format!("{word}.dat\n"));
         fs::create_dir(place.path().join("results")).unwrap();
         let entry = |output: &str| {
             format!(
@@ -287,7 +287,9 @@ fn mutated_files_end_with_a_code() {
     let folder = root().join("formats/tests/fixtures");
     let mut seeds = Vec::new();
     for format in fs::read_dir(folder).unwrap() {
-        let files = fs::read_dir(format.unwrap().path()).unwrap();
+        let Ok(files) = fs::read_dir(format.unwrap().path()) else {
+            continue; // a file beside the folders
+        };
         let files = files.map(|file| file.unwrap().path());
         seeds.extend(files.filter(|file| file.is_file() && file.extension().is_some_and(|own| own != "expected")));
     }
@@ -413,7 +415,9 @@ fn faults_of_inputs_are_no_bugs() {
         let second = &values[values.len() / 2..];
         if what != "rotation" {
             assert!(second.iter().all(|&value| value == 0.0), "a step stands still");
-            assert!(values.iter().any(|&value| value.abs() > 0.1), "an arc turns");
+        }
+        if what == "velocity" {
+            assert!((values[2] - 1.2870).abs() < 1e-4, "an arc turns by so much in a second");
         }
     }
     let mut told = String::new();

@@ -315,10 +315,11 @@ fn every_reader_of_binary_files_asks_for_its_memory() {
     for format in FORMATS {
         let text = ["dat", "bvh", "csv", "tum"].contains(&format.name);
         let folder = fixtures.join(format.name);
-        let Ok(files) = std::fs::read_dir(folder) else {
-            assert_eq!(format.name, "npy", "there are no fixtures of {}", format.name);
+        // An array alone says nothing without a map.
+        if format.name == "npy" {
             continue;
-        };
+        }
+        let files = std::fs::read_dir(folder).unwrap();
         let mut asked = 0;
         for file in files {
             let path = file.unwrap().path();

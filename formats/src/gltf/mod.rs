@@ -163,6 +163,8 @@ pub fn read_gltf(
                 loaded.clips.extend(clip);
                 read.push(own);
             }
+            // The others would be refused too, each after all that it names was looked at.
+            Err(fault) if fault.code == Code::Memory => return Err(fault),
             Err(fault) => {
                 read.push(None);
                 // Animations that share a broken buffer have one fault.
