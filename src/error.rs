@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use crate::crowd_error::CrowdError;
 use crate::curve::options::InterpolationError;
 use crate::gpu::error::{EvaluateError, VulkanError};
 use crate::memory::OutOfMemory;
@@ -34,6 +35,9 @@ pub enum Error {
     /// The Vulkan device could not be used, or stopped working.
     #[error(transparent)]
     Vulkan(#[from] VulkanError),
+    /// A crowd cannot be made, changed or evaluated as asked.
+    #[error(transparent)]
+    Crowd(#[from] CrowdError),
     /// The output given is not as large as the result.
     #[error("the output has room for {given} rotations; the result has {needed}")]
     OutputLength {

@@ -75,6 +75,7 @@ mod auto;
 mod clip;
 mod cpu;
 mod crowd;
+mod crowd_error;
 mod curve;
 mod device;
 mod engine;
@@ -104,11 +105,13 @@ mod twin;
 pub mod verify;
 
 pub use crate::clip::Clip;
-pub use crate::crowd::error::CrowdError;
+pub use crate::crowd_error::CrowdError;
 pub use crate::crowd::layer::CrowdLayer;
 pub use crate::crowd::library::CrowdLibrary;
 pub use crate::crowd::player::Crowd;
-pub use crate::curve::options::{Axes, Ends, InterpolationError, Path, Quantity, Speed};
+pub use crate::curve::options::{
+    Axes, Ends, InterpolationError, InterpolationWarning, Path, Quantity, Speed,
+};
 pub use crate::device::{Device, VulkanDevice};
 pub use crate::engine::Engine;
 pub use crate::error::Error;

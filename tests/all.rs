@@ -4,6 +4,7 @@
 
 mod accuracy;
 mod bit_identity;
+mod c2;
 mod crowd;
 mod encoding;
 mod examples;
@@ -13,6 +14,7 @@ mod follow;
 mod golden;
 mod mesa;
 mod motion;
+mod numbers;
 mod original;
 mod outside;
 mod poses;

@@ -25,10 +25,10 @@ fn laid_over(
         if is_additive {
             return turn_added(below, layer, reference, weight);
         }
-        return canonical(slerp(below, layer, weight));
+        return canonical(over(below, layer, weight));
     }
     if !is_additive {
-        return canonical(below + (layer - below) * weight);
+        return canonical(select(below + (layer - below) * weight, layer, weight == 1.0));
     }
     if kind == TRANSLATION {
         return canonical(below + (layer - reference) * weight);

@@ -50,6 +50,11 @@ fn slerp(a: vec4f, b: vec4f, t: f32) -> vec4f {
     return sum * reciprocal_root(whole) * turn.y + partner * turn.x;
 }
 
+// Slerp whose ends are the bits of a and b themselves.
+fn over(a: vec4f, b: vec4f, t: f32) -> vec4f {
+    return select(select(slerp(a, b, t), b, t == 1.0), a, t == 0.0);
+}
+
 fn flushed4(q: vec4f) -> vec4f {
     return vec4f(flushed(q.x), flushed(q.y), flushed(q.z), flushed(q.w));
 }

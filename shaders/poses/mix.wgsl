@@ -7,5 +7,5 @@
 @group(0) @binding(3) var<storage, read_write> mixed: array<vec4f>;
 
 fn pose(place: u32) {
-    mixed[place] = canonical(slerp(from_layer[place], to_layer[place], weights[0]));
+    mixed[place] = canonical(over(from_layer[place], to_layer[place], weights[0]));
 }

@@ -6,7 +6,7 @@ use std::ops::Range;
 use bytemuck::Zeroable as _;
 use glam::Vec3;
 
-use crate::crowd::error::{CrowdError, MOST_TICKS};
+use crate::crowd_error::{CrowdError, MOST_TICKS};
 use crate::curve::options::Quantity;
 use crate::math::canonical::round_f32;
 use crate::memory::reserved;

@@ -1,6 +1,6 @@
 //! The clock of a crowd, which all of its instances follow.
 
-use crate::crowd::error::CrowdError;
+use crate::crowd_error::CrowdError;
 use crate::crowd::player::Crowd;
 
 /// The farthest that a clock goes, ticks: whole numbers of f64.

@@ -1,6 +1,6 @@
 //! What one layer of an instance plays, and the 16 bytes that say so to the kernels.
 
-use crate::crowd::error::{CrowdError, FASTEST, MOST_MASKS};
+use crate::crowd_error::{CrowdError, FASTEST, MOST_MASKS};
 use crate::shader::{
     CrowdClip, CrowdEntry, RUNS_BACKWARDS, SPEED_MAGNITUDE, START_BIAS, WEIGHT_UNIT, WRAP_HOLD,
     WRAP_LOOP, WRAP_MIRROR,
@@ -170,7 +170,7 @@ mod tests {
             (clock, passed) in (0u64..1 << 50, 0u64..1 << 39),
             (speed, wrap) in (-127.9f32..127.9, 0usize..3),
         ) {
-            let period = period.min(crate::crowd::error::MOST_TICKS);
+            let period = period.min(crate::crowd_error::MOST_TICKS);
             let clips = [CrowdClip { period, first_base: 0, bases: 0 }];
             let wrap = [WrapMode::Hold, WrapMode::Loop, WrapMode::Mirror][wrap];
             let layer = CrowdLayer { time: time >> 2, speed, wrap, ..CrowdLayer::new(0) };

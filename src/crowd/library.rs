@@ -4,7 +4,7 @@ use bytemuck::Zeroable as _;
 use glam::{Affine3A, Vec3};
 
 use crate::crowd::clip_tables::{ClipTables, MOST_PLACES};
-use crate::crowd::error::{CrowdError, MOST_CLIPS, MOST_MASKS, MOST_TICKS};
+use crate::crowd_error::{CrowdError, MOST_CLIPS, MOST_MASKS, MOST_TICKS};
 use crate::math::canonical::canonical;
 use crate::memory::reserved;
 use crate::method::interpolation::Interpolation;

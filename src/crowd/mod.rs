@@ -3,7 +3,6 @@
 
 pub(crate) mod clip_tables;
 pub(crate) mod clock;
-pub(crate) mod error;
 pub(crate) mod instances;
 pub(crate) mod layer;
 pub(crate) mod library;

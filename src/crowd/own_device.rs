@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use ash::vk;
 
-use crate::crowd::error::{CrowdError, OFFSET_STEP};
+use crate::crowd_error::{CrowdError, OFFSET_STEP};
 use crate::crowd::player::Crowd;
 use crate::gpu::crowd_target::CrowdTarget;
 use crate::gpu::handles::VulkanBuffer;

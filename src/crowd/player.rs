@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use bytemuck::Pod;
 
-use crate::crowd::error::{CrowdError, MOST_INSTANCES, MOST_LAYERS};
+use crate::crowd_error::{CrowdError, MOST_INSTANCES, MOST_LAYERS};
 use crate::crowd::instances::Instances;
 use crate::crowd::layer::{CrowdLayer, tick};
 use crate::crowd::library::CrowdLibrary;

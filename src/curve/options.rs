@@ -6,6 +6,7 @@ use std::ops::Range;
 use glam::Quat;
 
 use crate::math::quaternion::{self, dot, length, log, unit};
+use crate::tracks::key_data::LARGEST_TCB;
 use crate::tracks::set::TrackSet;
 use crate::tracks::signs::Signs;
 
@@ -135,9 +136,8 @@ const LOOP_TOLERANCE: f64 = 1e-3;
 const FASTEST: f64 = 1e12;
 
 impl Ends {
-    /// Refuses end velocities that are not finite or too large, and loops whose last key is not
-    /// their first. `index` is the track's place in its set.
-    pub(crate) fn check(self, keys: &[Quat], index: usize) -> Result<(), InterpolationError> {
+    /// Refuses end velocities that are not finite or too large.
+    pub(crate) fn check_velocities(self) -> Result<(), InterpolationError> {
         if let Self::Clamped { start, end } = self {
             for velocity in [start, end] {
                 let speed = length(velocity.to_array());
@@ -146,6 +146,11 @@ impl Ends {
                 }
             }
         }
+        Ok(())
+    }
+
+    /// Refuses loops whose last key is not their first. `index` is the track's place in its set.
+    pub(crate) fn check_loop(self, keys: &[Quat], index: usize) -> Result<(), InterpolationError> {
         let (Self::Loop, [first, .., last]) = (self, keys) else {
             return Ok(());
         };
@@ -191,6 +196,16 @@ pub enum InterpolationError {
         /// What was given.
         velocity: glam::DVec3,
     },
+    /// A tension, a continuity or a bias is not finite, or too large.
+    #[error(
+        "the {option} {value} cannot be met; give a number between -{LARGEST_TCB:e} and {LARGEST_TCB:e}, mostly within -1 and 1"
+    )]
+    Tcb {
+        /// `tension`, `continuity` or `bias`.
+        option: &'static str,
+        /// What was given.
+        value: f64,
+    },
     /// Under [`Ends::Loop`] the last key must repeat the first.
     #[error(
         "track {track}: the last key is {degrees:.3}° from the first; a loop needs the last key to repeat the first"
@@ -200,5 +215,23 @@ pub enum InterpolationError {
         track: usize,
         /// Angle between first and last key, degrees.
         degrees: f64,
+    },
+}
+
+/// What is unusual about a track that is interpolated all the same. Places count from 0.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum InterpolationWarning {
+    /// [`C2`](crate::method::c2::C2) found no velocities that make the angular acceleration continuous.
+    #[error(
+        "track {track}: c2 found no curve with continuous angular acceleration; it jumps at {count} keys, the first is key {key}; add keys where steps are large, or use bessel-overhauser"
+    )]
+    AccelerationJumps {
+        /// The track's place in the set.
+        track: usize,
+        /// The first such key.
+        key: usize,
+        /// How many such keys the track has.
+        count: usize,
     },
 }

@@ -70,10 +70,11 @@ impl<'a> KeyJob<'a> {
         most: usize,
     ) -> Result<KeyDispatches<'a, '_>, InterpolationError> {
         let Request { set, timeline, .. } = *self.request;
-        let ends = self.request.interpolation.ends;
-        if matches!(ends, Ends::Loop | Ends::Clamped { .. }) {
+        let interpolation = self.request.interpolation;
+        interpolation.check()?;
+        if interpolation.ends == Ends::Loop {
             for track in self.request.tracks.clone() {
-                ends.check(set.times_and_keys(track).1, track)?;
+                interpolation.check_track(set.times_and_keys(track).1, track)?;
             }
         }
         let in_frames = matches!(timeline.ticks, Ticks::Frames { .. });

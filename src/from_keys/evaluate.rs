@@ -65,7 +65,7 @@ impl<'a> KeyEvaluator<'a> {
         let mut output = output.iter_mut();
         for (index, own) in batch.intervals(set) {
             let whole = TrackKeys::whole(set, index);
-            self.interpolation.ends.check(whole.keys, index)?;
+            self.interpolation.check_track(whole.keys, index)?;
             match &timeline.ticks {
                 Ticks::Frames { rate, start } => {
                     let clock = FrameClock::new(*rate, *start, whole.times[whole.all - 1]);

@@ -1,12 +1,17 @@
 //! A method with its options.
 
-use crate::curve::options::{Ends, Path, Quantity, Speed};
-use crate::method::{Curves, Method, Smooth};
+use glam::Quat;
+use rayon::prelude::*;
+
+use crate::curve::options::{
+    Ends, InterpolationError, InterpolationWarning, Path, Quantity, Speed,
+};
+use crate::method::{Curves, Given, Method, Smooth};
 use crate::reference::curve::Curve;
 use crate::shader::Form;
 use crate::time::wrap::{Wrap, WrapMode};
 use crate::tracks::key_data::Tcb;
-use crate::tracks::set::Track;
+use crate::tracks::set::{Track, TrackSet};
 
 /// A method with its options: what [`Engine::upload`](crate::engine::Engine::upload)
 /// takes. A bare [`Method`] has the default options.
@@ -65,6 +70,62 @@ impl Interpolation {
             Form::Arc if self.is_by_formula() => Form::Polynomial,
             form => form,
         }
+    }
+
+    /// Refuses numbers with which no curve can be made. Whoever evaluates calls it; it is here for those
+    /// who want to know before.
+    ///
+    /// # Errors
+    /// When an end velocity, a tension, a continuity or a bias is not finite, or too large.
+    pub fn check(&self) -> Result<(), InterpolationError> {
+        self.ends.check_velocities()?;
+        match self.tcb.refused() {
+            Some((option, value)) => Err(InterpolationError::Tcb { option, value }),
+            None => Ok(()),
+        }
+    }
+
+    /// As [`Interpolation::check`], and whether the ends can be met by the `index`th track of a set.
+    pub(crate) fn check_track(&self, keys: &[Quat], index: usize) -> Result<(), InterpolationError> {
+        self.check()?;
+        self.ends.check_loop(keys, index)
+    }
+
+    /// What is unusual about the curves of a set that are evaluated all the same: keys at which
+    /// [`C2`](crate::method::C2) found no velocities that make the angular acceleration continuous. It
+    /// costs as much as preparing the tracks; other methods have no warnings.
+    ///
+    /// ```
+    /// use tumble::glam::Quat;
+    /// use tumble::{Interpolation, TrackSet, method};
+    /// let mut set = TrackSet::new();
+    /// let keys = [0.0, 0.3, 0.7, 0.2].map(Quat::from_rotation_z);
+    /// set.push("elbow", &[0.0, 1.0, 1.05, 2.0], &keys)?;
+    /// assert!(Interpolation::from(method::C2).warnings(&set).is_empty());
+    /// # Ok::<(), tumble::TrackError>(())
+    /// ```
+    #[must_use]
+    pub fn warnings(&self, set: &TrackSet) -> Vec<InterpolationWarning> {
+        let (Curves::Smooth(smooth) | Curves::Arcs(smooth)) = *self.method.curves else {
+            return Vec::new();
+        };
+        let Given::Velocities(_, jumps) = smooth.given else {
+            return Vec::new();
+        };
+        let path = self.method.path.unwrap_or(self.path);
+        let of_track = |index: usize| {
+            if self.check_track(set.times_and_keys(index).1, index).is_err() {
+                return None;
+            }
+            let keys = jumps(set.track(index), path.signs(set, index), self);
+            Some(InterpolationWarning::AccelerationJumps {
+                track: index,
+                key: *keys.first()?,
+                count: keys.len(),
+            })
+        };
+        let tracks = (0..set.track_count()).into_par_iter();
+        tracks.filter_map(of_track).collect()
     }
 
     /// The smooth curves as keyed on the shortest path, if these are what is asked for.

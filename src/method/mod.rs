@@ -187,7 +187,13 @@ pub(crate) enum Given {
     Numbers(fn(Track, usize, &Interpolation) -> [[f64; 4]; 2]),
     /// The angular velocity at every key of some intervals (rad/s, body frame); each depends on
     /// all keys of the track.
-    Velocities(fn(Track, Signs<'_>, Range<usize>, &Interpolation) -> Vec<Vector>),
+    ///
+    /// And the keys of a track at which these velocities do not make the curve as smooth as the method
+    /// is.
+    Velocities(
+        fn(Track, Signs<'_>, Range<usize>, &Interpolation) -> Vec<Vector>,
+        fn(Track, Signs<'_>, &Interpolation) -> Vec<usize>,
+    ),
 }
 
 impl Smooth {

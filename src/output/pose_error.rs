@@ -25,8 +25,8 @@ pub enum PoseError {
         /// Those of the first layer.
         first: (usize, usize, Layout),
     },
-    /// A weight is NaN or infinite.
-    #[error("the weight of layer {layer} is {weight}; weights are finite numbers")]
+    /// A weight is NaN, infinite, or too large.
+    #[error("the weight of layer {layer} is {weight}; weights are finite, and within ±{LARGEST_WEIGHT:e}")]
     WeightNotFinite {
         /// The layer's place.
         layer: usize,
@@ -74,6 +74,9 @@ pub enum PoseError {
         tracks: usize,
     },
 }
+
+/// The largest magnitude of a weight of a blend: squares of sums of thousands of layers are finite.
+pub(crate) const LARGEST_WEIGHT: f32 = 1e9;
 
 /// The most tracks of a skeleton.
 pub(crate) const MOST_TRACKS: usize = u32::MAX as usize;

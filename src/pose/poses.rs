@@ -11,7 +11,7 @@ use crate::gpu::engine::VulkanEngine;
 use crate::gpu::error::EvaluateError;
 use crate::memory::zeroed;
 use crate::output::buffer::OutputBuffer;
-use crate::output::pose_error::PoseError;
+use crate::output::pose_error::{LARGEST_WEIGHT, PoseError};
 use crate::output::rotations::{Layout, Rotations};
 use crate::pose::skeleton::Skeleton;
 use crate::shader::Kernel;
@@ -25,7 +25,7 @@ impl Engine {
     /// sign that is nearer to the first layer's. Weights need not add up to 1.
     ///
     /// # Errors
-    /// When there is no layer, their shapes differ, a weight is not finite, or the device
+    /// When there is no layer, their shapes differ, a weight is not finite or beyond 1e9, or the device
     /// fails.
     pub fn blend(&self, layers: &[(&Rotations, f32)]) -> Result<Rotations, Error> {
         let Some((&(first, _), others)) = layers.split_first() else {
@@ -35,7 +35,8 @@ impl Engine {
             same_shape(first, layer, place)?;
         }
         let weights: Vec<f32> = layers.iter().map(|&(_, weight)| weight).collect();
-        if let Some(layer) = weights.iter().position(|weight| !weight.is_finite()) {
+        let is_refused = |weight: &f32| weight.is_nan() || weight.abs() > LARGEST_WEIGHT;
+        if let Some(layer) = weights.iter().position(is_refused) {
             let weight = weights[layer];
             return Err(PoseError::WeightNotFinite { layer, weight }.into());
         }

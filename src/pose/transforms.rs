@@ -81,6 +81,7 @@ impl Engine {
         layout: Layout,
     ) -> Result<Vectors, Error> {
         let interpolation = interpolation.into();
+        interpolation.check()?;
         let group_bytes = self.backend.group_bytes();
         let data = ClipData::of_vectors(set, channel, method, &interpolation, group_bytes)?;
         self.samples_of(data, frames, layout)

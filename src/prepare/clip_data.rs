@@ -133,6 +133,7 @@ impl ClipData {
         interpolation: Interpolation,
         wanted: Wanted<'_>,
     ) -> Result<Self, SetError> {
+        interpolation.check()?;
         if matches!(interpolation.quantity, Quantity::Velocity(_))
             && [interpolation.before, interpolation.after].contains(&WrapMode::Mirror)
         {

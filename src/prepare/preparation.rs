@@ -71,7 +71,7 @@ impl Preparation {
         let has_path = !matches!(way, Way::Steps) && interpolation.method.path.is_none();
         for (track, own) in intervals {
             let (_, keys) = set.times_and_keys(track);
-            interpolation.ends.check(keys, track)?;
+            interpolation.check_track(keys, track)?;
             if has_path {
                 interpolation.path.check(keys, own.clone(), track)?;
             }

@@ -106,7 +106,7 @@ impl SmoothPreparation {
         let alone = all == 1 && self.interpolation.method.interpolates;
         let context = if alone { 0 } else { CONTEXT };
         let velocities = match self.smooth.given {
-            Given::Velocities(solve) => solve(track, signs, intervals.clone(), &self.interpolation),
+            Given::Velocities(solve, _) => solve(track, signs, intervals.clone(), &self.interpolation),
             _ => Vec::new(),
         };
         let mut from = intervals.start;
@@ -189,7 +189,7 @@ impl SmoothPreparation {
         for (i, interval) in intervals.enumerate() {
             let [outward, inward] = match (self.smooth.given, velocities.get(i..i + 2)) {
                 (Given::Numbers(numbers), _) => numbers(track, interval, &self.interpolation),
-                (Given::Velocities(_), Some(both)) => {
+                (Given::Velocities(..), Some(both)) => {
                     [both[0], both[1]].map(|[x, y, z]| [x, y, z, 0.0])
                 }
                 _ => break, // the method has no numbers of its own for any interval

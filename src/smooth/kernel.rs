@@ -70,6 +70,12 @@ pub enum SmoothingError {
         /// The order.
         order: usize,
     },
+    /// Too many passes.
+    #[error("{passes} passes are too many; give at most {MOST_PASSES}, or a wider kernel")]
+    Passes {
+        /// What was given.
+        passes: u32,
+    },
     /// Only the cubic kernel has ends of its own.
     #[error("parabolic ends are the cubic kernel's; keep the ends of others")]
     Ends,
@@ -85,6 +91,9 @@ pub enum SmoothingError {
 
 /// The most samples to either side of a kernel.
 const MOST_RADIUS: usize = 1_000_000;
+
+/// The most passes: more take longer than anybody waits.
+const MOST_PASSES: u32 = 10_000;
 
 /// The highest order of Savitzky and Golay's polynomials for which f64 is exact enough.
 const MOST_ORDER: usize = 20;
@@ -112,6 +121,10 @@ impl Smoothing {
     pub(crate) fn step_weights(&self, samples: usize) -> Result<Vec<f32>, SmoothingError> {
         if self.ends == SmoothingEnds::Parabolic && self.kernel != SmoothingKernel::Cubic {
             return Err(SmoothingError::Ends);
+        }
+        if self.passes > MOST_PASSES {
+            let passes = self.passes;
+            return Err(SmoothingError::Passes { passes });
         }
         let kernel = match self.kernel {
             SmoothingKernel::Cubic if samples < 4 => SmoothingKernel::Linear,

@@ -96,6 +96,18 @@ pub enum TrackError {
         /// The point's place in the path.
         key: usize,
     },
+    /// A value beside a rotation is too large.
+    #[error("track {track}, key {key}: the {what} is too large; its numbers lie within ±{limit:e}")]
+    DataTooLarge {
+        /// The track's place in the set.
+        track: usize,
+        /// The key's place in the track.
+        key: usize,
+        /// What was given, such as `velocity`.
+        what: &'static str,
+        /// The largest magnitude.
+        limit: f64,
+    },
     /// A value beside a rotation is NaN or infinite.
     #[error("track {track}, key {key}: the {what} is not finite")]
     DataNotFinite {

@@ -19,6 +19,28 @@ pub struct Tcb {
     pub bias: f64,
 }
 
+/// The largest magnitude of a tension, a continuity or a bias: their products stay rotations.
+pub(crate) const LARGEST_TCB: f64 = 1e6;
+
+/// The largest angular velocity at a key, radians per second.
+const FASTEST: f64 = 1e12;
+
+impl Tcb {
+    fn named(&self) -> [(&'static str, f64); 3] {
+        [
+            ("tension", self.tension),
+            ("continuity", self.continuity),
+            ("bias", self.bias),
+        ]
+    }
+
+    /// The name and the value of the first number that is not finite, or too large.
+    pub(crate) fn refused(&self) -> Option<(&'static str, f64)> {
+        let is_refused = |(_, value): &(&str, f64)| value.is_nan() || value.abs() > LARGEST_TCB;
+        self.named().into_iter().find(is_refused)
+    }
+}
+
 /// One kind of data for a set: a track has a value for each of its keys, or none at all. The list
 /// may be shorter than the set.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -48,8 +70,8 @@ impl TrackSet {
     /// # Errors
     /// When there is no such track, or not one finite velocity for each of its keys.
     pub fn set_velocities(&mut self, track: usize, velocities: &[DVec3]) -> Result<(), TrackError> {
-        self.check_data(track, "velocity", velocities, |velocity| {
-            velocity.is_finite()
+        self.check_data(track, "velocity", velocities, FASTEST, |velocity| {
+            largest(velocity.to_array().into_iter())
         })?;
         self.velocities.set(track, velocities);
         Ok(())
@@ -61,9 +83,11 @@ impl TrackSet {
     /// # Errors
     /// When there is no such track, or not one finite pair for each of its keys.
     pub fn set_tangents(&mut self, track: usize, tangents: &[[Quat; 2]]) -> Result<(), TrackError> {
-        self.check_data(track, "tangent", tangents, |[arriving, leaving]| {
-            arriving.is_finite() && leaving.is_finite()
-        })?;
+        let largest = |both: &[Quat; 2]| {
+            let numbers = both.iter().flat_map(|tangent| tangent.to_array());
+            largest(numbers.map(f64::from))
+        };
+        self.check_data(track, "tangent", tangents, f64::MAX, largest)?;
         self.tangents.set(track, tangents);
         Ok(())
     }
@@ -74,10 +98,9 @@ impl TrackSet {
     /// # Errors
     /// When there is no such track, or not one finite triple for each of its keys.
     pub fn set_tcb(&mut self, track: usize, tcb: &[Tcb]) -> Result<(), TrackError> {
-        self.check_data(track, "tension, continuity or bias", tcb, |tcb| {
-            [tcb.tension, tcb.continuity, tcb.bias]
-                .iter()
-                .all(|value| value.is_finite())
+        let what = "tension, continuity or bias";
+        self.check_data(track, what, tcb, LARGEST_TCB, |tcb| {
+            largest(tcb.named().into_iter().map(|(_, value)| value))
         })?;
         self.tcb.set(track, tcb);
         Ok(())
@@ -88,12 +111,34 @@ impl TrackSet {
         track: usize,
         what: &'static str,
         values: &[T],
-        is_finite: impl Fn(&T) -> bool,
+        limit: f64,
+        magnitude: impl Fn(&T) -> f64,
     ) -> Result<(), TrackError> {
         self.check_track(track)?;
         check_length(track, what, self.track(track).keys.len(), values.len())?;
-        check_finite(track, what, values, is_finite)
+        check_finite(track, what, values, |value| magnitude(value) < f64::INFINITY)?;
+        match values.iter().position(|value| magnitude(value) > limit) {
+            Some(key) => Err(TrackError::DataTooLarge {
+                track,
+                key,
+                what,
+                limit,
+            }),
+            None => Ok(()),
+        }
     }
+}
+
+/// The largest magnitude; infinite if one is no number.
+fn largest(numbers: impl Iterator<Item = f64>) -> f64 {
+    let magnitude = |number: f64| {
+        if number.is_nan() {
+            f64::INFINITY
+        } else {
+            number.abs()
+        }
+    };
+    numbers.map(magnitude).fold(0.0, f64::max)
 }
 
 #[cfg(test)]

@@ -10,7 +10,7 @@ use crate::shader::{
 };
 use crate::simd::lanes::Number;
 use crate::twin::evaluate::Evaluate as _;
-use crate::twin::quaternion::slerp;
+use crate::twin::quaternion::over;
 
 /// The function of the shader with this name does what `pose` of `shaders/poses/add.wgsl` does.
 pub(crate) use crate::twin::pose_add::pose as turn_added;
@@ -50,14 +50,17 @@ pub(crate) fn laid_over(
     if kind == ROTATION {
         return match is_additive {
             true => turn_added(below, layer, reference, weight),
-            false => slerp(below, layer, weight).map(canonical),
+            false => over(below, layer, weight).map(canonical),
         };
     }
     let each = |f: fn(f32, f32, f32, f32) -> f32| {
         std::array::from_fn(|c| canonical(f(below[c], layer[c], reference[c], weight)))
     };
     if !is_additive {
-        return each(|below, layer, _, weight| below + (layer - below) * weight);
+        return each(|below, layer, _, weight| match weight == 1.0 {
+            true => layer,
+            false => below + (layer - below) * weight,
+        });
     }
     if kind == TRANSLATION {
         return each(|below, layer, reference, weight| below + (layer - reference) * weight);

@@ -37,3 +37,9 @@ pub(crate) fn slerp(a: [f32; 4], b: [f32; 4], t: f32) -> [f32; 4] {
     let to_unit = reciprocal_root(whole);
     std::array::from_fn(|c| sum[c] * to_unit * turn.1 + difference[c] * inverse * turn.0)
 }
+
+#[inline(always)]
+pub(crate) fn over(a: [f32; 4], b: [f32; 4], t: f32) -> [f32; 4] {
+    let inner = if t == 1.0 { b } else { slerp(a, b, t) };
+    if t == 0.0 { a } else { inner }
+}

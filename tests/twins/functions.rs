@@ -15,7 +15,7 @@ use crate::twin::evaluate_arc::norm_squared;
 use crate::twin::evaluate_polynomial::polynomial;
 use crate::twin::f16::to_half;
 use crate::twin::matrix::matrix_rows;
-use crate::twin::quaternion::{normalised, rotated, slerp};
+use crate::twin::quaternion::{normalised, over, rotated, slerp};
 use crate::twin::sine_cosine::{sine_cosine, sine_cosm1, sine_cosm1_quarter};
 use crate::twin::small_angle::{
     FromIdentity, canonical_product, composed, inverse_rotated, small_angle_cubic, small_exp,
@@ -106,6 +106,16 @@ pub(super) fn math() -> Vec<Twin> {
             "slerp",
             |random| (random.pair(), random.number()),
             |([a, b], t)| slerp(a, b, t),
+        ),
+        twin(
+            POSES,
+            "over",
+            |random| {
+                let inner = random.number();
+                let t = [0.0, 1.0, inner, inner][random.below(4)];
+                (random.pair(), t)
+            },
+            |([a, b], t)| over(a, b, t),
         ),
         twin(
             "polynomial_frames_f32",
