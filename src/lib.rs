@@ -105,10 +105,10 @@ mod twin;
 pub mod verify;
 
 pub use crate::clip::Clip;
-pub use crate::crowd_error::CrowdError;
 pub use crate::crowd::layer::CrowdLayer;
 pub use crate::crowd::library::CrowdLibrary;
 pub use crate::crowd::player::Crowd;
+pub use crate::crowd_error::CrowdError;
 pub use crate::curve::options::{
     Axes, Ends, InterpolationError, InterpolationWarning, Path, Quantity, Speed,
 };

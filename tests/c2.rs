@@ -2,8 +2,8 @@
 
 use glam::{DQuat, DVec3, Quat, Vec4};
 use tumble::{
-    Axes, Device, Ends, Engine, Frames, Interpolation, InterpolationWarning, Layout, Path, Quantity,
-    TrackSet, method,
+    Axes, Device, Ends, Engine, Frames, Interpolation, InterpolationWarning, Layout, Path,
+    Quantity, TrackSet, method,
 };
 
 use crate::support::Random;
@@ -23,7 +23,10 @@ fn walk(random: &mut Random, steps: impl Fn(&mut Random) -> f64, keys: usize) ->
 /// Times whose gaps are up to `ratio` apart: one is 1 and one is `ratio`.
 fn times(random: &mut Random, keys: usize, ratio: f64) -> Vec<f64> {
     let mut gaps: Vec<f64> = (1..keys).map(|_| ratio.powf(random.unit())).collect();
-    let (one, other) = (random.next() as usize % gaps.len(), random.next() as usize % gaps.len());
+    let (one, other) = (
+        random.next() as usize % gaps.len(),
+        random.next() as usize % gaps.len(),
+    );
     (gaps[one], gaps[other]) = (1.0, ratio);
     let mut time = 0.0;
     let mut all = vec![time];
@@ -44,7 +47,10 @@ fn accelerations(set: &TrackSet, interpolation: Interpolation) -> Vec<[DVec3; 2]
     };
     let keys = set.track(0).times.to_vec();
     let inner = &keys[1..keys.len() - 1];
-    let asked: Vec<f64> = inner.iter().flat_map(|&time| [time.next_down(), time]).collect();
+    let asked: Vec<f64> = inner
+        .iter()
+        .flat_map(|&time| [time.next_down(), time])
+        .collect();
     let found = engine
         .rates(set, of, &Frames::at(asked), Layout::TrackMajor)
         .unwrap();
@@ -63,7 +69,9 @@ fn one(times: &[f64], keys: &[Quat]) -> TrackSet {
 fn jump(set: &TrackSet, interpolation: Interpolation) -> f64 {
     let all = accelerations(set, interpolation);
     let largest = all.iter().flatten().map(|v| v.length()).fold(0.0, f64::max);
-    let jumps = all.iter().map(|[before, behind]| (*behind - *before).length());
+    let jumps = all
+        .iter()
+        .map(|[before, behind]| (*behind - *before).length());
     jumps.fold(0.0, f64::max) / largest
 }
 
@@ -148,12 +156,22 @@ fn what_has_no_solution_is_said() {
         ..method::C2.into()
     };
     let found = interpolation.warnings(&set);
-    let [InterpolationWarning::AccelerationJumps { track: 0, key: 1, count }] = *found else {
+    let [
+        InterpolationWarning::AccelerationJumps {
+            track: 0,
+            key: 1,
+            count,
+        },
+    ] = *found
+    else {
         panic!("{found:?}");
     };
     assert_eq!(count, 22);
     let text = found[0].to_string();
-    assert!(text.contains("jumps at 22 keys, the first is key 1"), "{text}");
+    assert!(
+        text.contains("jumps at 22 keys, the first is key 1"),
+        "{text}"
+    );
     assert!(jump(&set, interpolation) > 1e-3);
     // The shortest way round is an easy curve, and other methods have nothing to say.
     assert_eq!(Interpolation::from(method::C2).warnings(&set), []);

@@ -4,9 +4,9 @@
 use glam::{Affine3A, DQuat, DVec3, Quat, Vec3};
 use tumble::reduce::{ReducedCurve, reduce_rotations, reduce_vectors};
 use tumble::{
-    Crowd, CrowdError, CrowdLayer, CrowdLibrary, CrowdValues, Device, Direction, Ends, Engine, Error,
-    Follow, Frames, Interpolation, Layout, METHODS, PathSpeed, PoseError, Skeleton, Smoothing,
-    SmoothingKernel, Tcb, TrackSet, VectorMethod, method,
+    Crowd, CrowdError, CrowdLayer, CrowdLibrary, CrowdValues, Device, Direction, Ends, Engine,
+    Error, Follow, Frames, Interpolation, Layout, METHODS, PathSpeed, PoseError, Skeleton,
+    Smoothing, SmoothingKernel, Tcb, TrackSet, VectorMethod, method,
 };
 
 type Found = Result<Vec<f64>, Box<dyn std::error::Error>>;
@@ -21,7 +21,9 @@ struct Number {
 const TIMES: [f64; 5] = [0.0, 0.4, 0.5, 1.7, 2.0];
 
 fn keys() -> Vec<Quat> {
-    [0.0, 0.9, 1.3, 0.2, 0.7].map(Quat::from_rotation_y).to_vec()
+    [0.0, 0.9, 1.3, 0.2, 0.7]
+        .map(Quat::from_rotation_y)
+        .to_vec()
 }
 
 fn set() -> TrackSet {
@@ -35,7 +37,11 @@ fn cpu() -> Engine {
 }
 
 fn numbers(quats: &[Quat]) -> Vec<f64> {
-    quats.iter().flat_map(|q| q.to_array()).map(f64::from).collect()
+    quats
+        .iter()
+        .flat_map(|q| q.to_array())
+        .map(f64::from)
+        .collect()
 }
 
 /// Evaluates at a rate, few samples from keys, explicit times and as a clip: every route checks.
@@ -79,7 +85,10 @@ fn with_ends(start: DVec3, end: DVec3) -> Found {
     Ok(all)
 }
 
-fn with_set(method: tumble::Method, change: impl Fn(&mut TrackSet) -> Result<(), tumble::TrackError>) -> Found {
+fn with_set(
+    method: tumble::Method,
+    change: impl Fn(&mut TrackSet) -> Result<(), tumble::TrackError>,
+) -> Found {
     let mut set = set();
     change(&mut set)?;
     evaluated(&set, method.into())
@@ -94,7 +103,12 @@ fn vectors(set: &TrackSet, method: VectorMethod) -> Found {
         &Frames::fps(20),
         Layout::TrackMajor,
     )?;
-    Ok(found.as_slice().iter().flat_map(|v| v.to_array()).map(f64::from).collect())
+    Ok(found
+        .as_slice()
+        .iter()
+        .flat_map(|v| v.to_array())
+        .map(f64::from)
+        .collect())
 }
 
 fn with_translations(key: f32, tangent: f32) -> Found {
@@ -145,7 +159,11 @@ fn crowded(layer: usize, plays: CrowdLayer) -> Found {
     crowd.advance(0.3)?;
     let mut output = vec![[0.0; 4]; crowd.output_len(CrowdValues::Model)];
     crowd.evaluate_into(CrowdValues::Model, &mut output)?;
-    Ok(output.as_flattened().iter().map(|&c| f64::from(c)).collect())
+    Ok(output
+        .as_flattened()
+        .iter()
+        .map(|&c| f64::from(c))
+        .collect())
 }
 
 const NUMBERS: &[Number] = &[
@@ -412,7 +430,8 @@ const NUMBERS: &[Number] = &[
         word: "tolerance",
         try_with: |value| {
             let times = [0.0, 1.0, 2.0];
-            let found = reduce_rotations(&times, &[DQuat::IDENTITY; 3], value, ReducedCurve::Linear)?;
+            let found =
+                reduce_rotations(&times, &[DQuat::IDENTITY; 3], value, ReducedCurve::Linear)?;
             Ok(vec![found.error])
         },
     },
@@ -452,7 +471,10 @@ fn no_number_gives_a_result_that_is_none() {
         for value in tiny.into_iter().chain(large).chain([0.3, -1.0]) {
             let Ok(found) = try_with(value) else { continue };
             if let Some(place) = found.iter().position(|number| !number.is_finite()) {
-                wrong.push(format!("{name}: {value:e} gives {} at {place}", found[place]));
+                wrong.push(format!(
+                    "{name}: {value:e} gives {} at {place}",
+                    found[place]
+                ));
             }
         }
     }
@@ -476,14 +498,21 @@ fn errors_name_the_option_and_the_value() {
     );
     // An empty set is no reason to accept it.
     let empty = TrackSet::new();
-    assert!(cpu().evaluate(&empty, interpolation, &Frames::at(vec![0.0])).is_err());
+    assert!(
+        cpu()
+            .evaluate(&empty, interpolation, &Frames::at(vec![0.0]))
+            .is_err()
+    );
     let [a, b] = layers();
     let error = cpu().blend(&[(&a, 1.0), (&b, f32::INFINITY)]).unwrap_err();
     assert_eq!(
         error.to_string(),
         "the weight of layer 1 is inf; weights are finite, and within ±1e9"
     );
-    assert!(matches!(error, Error::Pose(PoseError::WeightNotFinite { layer: 1, .. })));
+    assert!(matches!(
+        error,
+        Error::Pose(PoseError::WeightNotFinite { layer: 1, .. })
+    ));
     let smoothing = Smoothing {
         passes: u32::MAX,
         ..Smoothing::new(SmoothingKernel::Linear)
@@ -511,7 +540,10 @@ fn a_crowd_fails_as_an_engine_does() {
 #[test]
 fn ends_of_a_mix_are_the_inputs() {
     let bits = |quats: &[Quat]| -> Vec<[u32; 4]> {
-        quats.iter().map(|q| q.to_array().map(f32::to_bits)).collect()
+        quats
+            .iter()
+            .map(|q| q.to_array().map(f32::to_bits))
+            .collect()
     };
     let [a, b] = layers();
     let mut engines = crate::support::vulkan_engines(|_| ());
@@ -519,17 +551,25 @@ fn ends_of_a_mix_are_the_inputs() {
     for engine in engines {
         for (weight, expected) in [(0.0, &a), (1.0, &b)] {
             let found = engine.mix(&a, &b, weight).unwrap();
-            assert_eq!(bits(found.as_quats()), bits(expected.as_quats()), "{weight}");
+            assert_eq!(
+                bits(found.as_quats()),
+                bits(expected.as_quats()),
+                "{weight}"
+            );
         }
     }
     let skeleton = Skeleton::new(vec![None], vec![Vec3::ZERO]).unwrap();
     let mut library = CrowdLibrary::new(&skeleton).unwrap();
     let mut other = TrackSet::new();
-    other.push("arm", &[0.0, 2.0], &[keys()[1], keys()[3]]).unwrap();
+    other
+        .push("arm", &[0.0, 2.0], &[keys()[1], keys()[3]])
+        .unwrap();
     let road = [Vec3::new(0.1, 0.2, 0.3), Vec3::new(7.7, -1.3, 1e-3)];
     other.set_translations(0, &[0.0, 2.0], &road, &[]).unwrap();
     for clip in [&set(), &other] {
-        library.push(clip, method::SLERP, VectorMethod::Linear).unwrap();
+        library
+            .push(clip, method::SLERP, VectorMethod::Linear)
+            .unwrap();
     }
     let at = |below: usize, above: Option<usize>| {
         let mut crowd = cpu().crowd(&library, 1, 2).unwrap();
@@ -538,7 +578,9 @@ fn ends_of_a_mix_are_the_inputs() {
             crowd.set(0, 1, CrowdLayer::new(clip).at(500_000)).unwrap();
         }
         let mut output = [[0.0f32; 4]; 3];
-        crowd.evaluate_into(CrowdValues::Model, &mut output).unwrap();
+        crowd
+            .evaluate_into(CrowdValues::Model, &mut output)
+            .unwrap();
         output.map(|row| row.map(f32::to_bits))
     };
     // `set` of another layer leaves the second at weight 1 of the first clip: it hides what is below.

@@ -47,6 +47,30 @@ pub enum MeshError {
         /// Where its corners are.
         corners: [DVec3; 3],
     },
+    /// The sides of a polygon cross each other.
+    #[error("the sides of face {face} (from 0) cross each other; cut it into triangles")]
+    Crosses {
+        /// Counted from 0.
+        face: usize,
+    },
+    /// A polygon of very many corners that is not convex.
+    #[error(
+        "face {face} (from 0) is not convex and has {corners} corners, and can have {most}; cut it into triangles"
+    )]
+    TooManyCorners {
+        /// Counted from 0.
+        face: usize,
+        /// How many it has.
+        corners: usize,
+        /// How many it can have.
+        most: usize,
+    },
+    /// A distance for welding that is none.
+    #[error("vertices cannot be welded within {tolerance}; give a distance from 0")]
+    Weld {
+        /// What was given.
+        tolerance: f64,
+    },
     /// More triangles than are counted in 32 bits, three corners each.
     #[error("the mesh has {triangles} triangles, and can have {most}; simplify it")]
     TooMany {
@@ -73,13 +97,39 @@ pub enum MeshWarning {
     },
     /// Polygons whose corners lie in no plane.
     #[error(
-        "{count} polygons are not flat; they are cut into triangles from their first corner on; the first is face {face} (from 0)"
+        "{count} polygons are not flat; they are cut into triangles as they lie in their mean plane; the first is face {face} (from 0)"
     )]
     NotFlat {
         /// How many.
         count: usize,
         /// The first, from 0.
         face: usize,
+    },
+    /// Triangles with the same corners as others.
+    #[error(
+        "{count} triangles lie on others with the same corners, as those of a sheet with a back; they count once; the first is of face {face} (from 0)"
+    )]
+    Doubled {
+        /// How many.
+        count: usize,
+        /// The face of the first, from 0.
+        face: usize,
+    },
+    /// Corners that lie on the sides of other faces.
+    #[error("{count} corners lie on the open sides of other faces, which are cut there")]
+    SidesCut {
+        /// How many.
+        count: usize,
+    },
+    /// Open sides that almost touch.
+    #[error(
+        "{count} corners are within {distance:e} of an open side that they do not touch, as at a seam; ways do not cross it: weld them (--weld DISTANCE)"
+    )]
+    Seam {
+        /// How many.
+        count: usize,
+        /// The distance that was looked at.
+        distance: f64,
     },
     /// Triangles that ran the other way round than their neighbours.
     #[error("{count} triangles wind otherwise than their neighbours; they are turned")]
@@ -105,7 +155,7 @@ pub enum RouteError {
     /// Start and goal lie on pieces that do not touch.
     #[error(
         "start and goal lie on pieces of the surface that do not touch: the start's has {start} \
-         triangles, the goal's {goal}"
+         triangles, the goal's {goal}; where a seam parts them, weld it (--weld DISTANCE)"
     )]
     OtherPiece {
         /// Triangles of the piece that the start lies on.

@@ -1,5 +1,6 @@
 //! Every test of routes. `cargo test -p tumble-routes --test all numbers::` runs those of one file.
 
+mod faces;
 mod grounds;
 mod inputs;
 mod nets;

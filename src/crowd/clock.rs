@@ -1,7 +1,7 @@
 //! The clock of a crowd, which all of its instances follow.
 
-use crate::crowd_error::CrowdError;
 use crate::crowd::player::Crowd;
+use crate::crowd_error::CrowdError;
 
 /// The farthest that a clock goes, ticks: whole numbers of f64.
 const FARTHEST: f64 = (1u64 << 52) as f64;

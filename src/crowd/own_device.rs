@@ -6,8 +6,8 @@ use std::sync::Arc;
 
 use ash::vk;
 
-use crate::crowd_error::{CrowdError, OFFSET_STEP};
 use crate::crowd::player::Crowd;
+use crate::crowd_error::{CrowdError, OFFSET_STEP};
 use crate::gpu::crowd_target::CrowdTarget;
 use crate::gpu::handles::VulkanBuffer;
 use crate::gpu::submission::Commands;

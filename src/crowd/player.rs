@@ -4,11 +4,11 @@ use std::sync::Arc;
 
 use bytemuck::Pod;
 
-use crate::crowd_error::{CrowdError, MOST_INSTANCES, MOST_LAYERS};
 use crate::crowd::instances::Instances;
 use crate::crowd::layer::{CrowdLayer, tick};
 use crate::crowd::library::CrowdLibrary;
 use crate::crowd::on_cpu::{self, Scene};
+use crate::crowd_error::{CrowdError, MOST_INSTANCES, MOST_LAYERS};
 use crate::engine::Engine;
 use crate::evaluate::uploaded::Backend;
 use crate::gpu::crowd::{CrowdTables, DeviceCrowd};

@@ -61,6 +61,7 @@ impl Backend {
         layout: Layout,
         output: &mut [Quat],
     ) -> Result<(), EvaluateError> {
+        request.interpolation.check().map_err(SetError::from)?;
         match (self.route(request, layout), &**self) {
             (Route::FromKeys(curve), Self::Cpu(engine)) => {
                 Ok(engine.evaluate_from_keys(request, curve, output)?)

@@ -46,8 +46,9 @@ pub const C2: Method = Method {
     ..USUAL
 };
 
-static CURVES: Curves =
-    Curves::Smooth(Smooth::new(Shape::ROTATION_VECTOR, curves).with(Given::Velocities(velocities, jumps)));
+static CURVES: Curves = Curves::Smooth(
+    Smooth::new(Shape::ROTATION_VECTOR, curves).with(Given::Velocities(velocities, jumps)),
+);
 
 fn curves(intervals: &mut Intervals, stretches: &[Stretch], _: Ends) {
     for lane in stretches.iter().flat_map(Stretch::lanes) {
@@ -105,7 +106,8 @@ fn jumps(track: Track, signs: Signs<'_>, interpolation: &Interpolation) -> Vec<u
     let first = usize::from(!matches!(interpolation.ends, Ends::Loop));
     let own = |window: usize| {
         let solved = Window::new(track, signs, window, interpolation);
-        (window.max(first)..last.min(window + WINDOW)).filter(move |&key| !solved.is_continuous(key))
+        (window.max(first)..last.min(window + WINDOW))
+            .filter(move |&key| !solved.is_continuous(key))
     };
     match last {
         0 | 1 => Vec::new(),

@@ -86,7 +86,11 @@ impl Interpolation {
     }
 
     /// As [`Interpolation::check`], and whether the ends can be met by the `index`th track of a set.
-    pub(crate) fn check_track(&self, keys: &[Quat], index: usize) -> Result<(), InterpolationError> {
+    pub(crate) fn check_track(
+        &self,
+        keys: &[Quat],
+        index: usize,
+    ) -> Result<(), InterpolationError> {
         self.check()?;
         self.ends.check_loop(keys, index)
     }
@@ -114,7 +118,10 @@ impl Interpolation {
         };
         let path = self.method.path.unwrap_or(self.path);
         let of_track = |index: usize| {
-            if self.check_track(set.times_and_keys(index).1, index).is_err() {
+            if self
+                .check_track(set.times_and_keys(index).1, index)
+                .is_err()
+            {
                 return None;
             }
             let keys = jumps(set.track(index), path.signs(set, index), self);

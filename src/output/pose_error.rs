@@ -26,7 +26,9 @@ pub enum PoseError {
         first: (usize, usize, Layout),
     },
     /// A weight is NaN, infinite, or too large.
-    #[error("the weight of layer {layer} is {weight}; weights are finite, and within ±{LARGEST_WEIGHT:e}")]
+    #[error(
+        "the weight of layer {layer} is {weight}; weights are finite, and within ±{LARGEST_WEIGHT:e}"
+    )]
     WeightNotFinite {
         /// The layer's place.
         layer: usize,

@@ -106,7 +106,9 @@ impl SmoothPreparation {
         let alone = all == 1 && self.interpolation.method.interpolates;
         let context = if alone { 0 } else { CONTEXT };
         let velocities = match self.smooth.given {
-            Given::Velocities(solve, _) => solve(track, signs, intervals.clone(), &self.interpolation),
+            Given::Velocities(solve, _) => {
+                solve(track, signs, intervals.clone(), &self.interpolation)
+            }
             _ => Vec::new(),
         };
         let mut from = intervals.start;

@@ -184,7 +184,8 @@ impl<'a> System<'a> {
             let off = excesses(&velocities);
             let mut band = Band::new(3 * keys);
             for key in 0..keys {
-                let own = self.own_slope(key, Self::around(&velocities, key), bends[key], sizes[key]);
+                let own =
+                    self.own_slope(key, Self::around(&velocities, key), bends[key], sizes[key]);
                 let [before, after] = self.beside[key];
                 for (block, at) in [(before, key.wrapping_sub(1)), (own, key), (after, key + 1)] {
                     if at < keys {

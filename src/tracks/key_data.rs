@@ -116,7 +116,9 @@ impl TrackSet {
     ) -> Result<(), TrackError> {
         self.check_track(track)?;
         check_length(track, what, self.track(track).keys.len(), values.len())?;
-        check_finite(track, what, values, |value| magnitude(value) < f64::INFINITY)?;
+        check_finite(track, what, values, |value| {
+            magnitude(value) < f64::INFINITY
+        })?;
         match values.iter().position(|value| magnitude(value) > limit) {
             Some(key) => Err(TrackError::DataTooLarge {
                 track,

@@ -21,6 +21,9 @@ pub(crate) struct VectorTrack {
     pub(crate) ups: Vec<Option<Vec3>>,
 }
 
+/// The largest magnitude of a number of a vector or of its tangent: curves between such stay finite.
+const LARGEST_VECTOR: f64 = 1e30;
+
 /// The vectors of a set's tracks, `None` for a track without. The list may be shorter than the set.
 pub(crate) type VectorTracks = Vec<Option<Arc<VectorTrack>>>;
 
@@ -66,7 +69,7 @@ impl TrackSet {
     /// ```
     ///
     /// # Errors
-    /// When there is no such track, the lengths differ, or a number is not finite.
+    /// When there is no such track, the lengths differ, or a number is not finite or beyond 1e30.
     pub fn set_translations<V: Copy + Into<Vec3>>(
         &mut self,
         track: usize,
@@ -148,6 +151,22 @@ impl TrackSet {
         check_finite(track, what, tangents, |[arriving, leaving]| {
             arriving.is_finite() && leaving.is_finite()
         })?;
+        let limit = LARGEST_VECTOR;
+        let is_too_large = |vector: &Vec3| vector.abs().max_element() > limit as f32;
+        let key = keys.iter().position(is_too_large);
+        let key = key.or_else(|| {
+            tangents
+                .iter()
+                .position(|both| both.iter().any(is_too_large))
+        });
+        if let Some(key) = key {
+            return Err(TrackError::DataTooLarge {
+                track,
+                key,
+                what,
+                limit,
+            });
+        }
         self.widen_span(times);
         let tracks = self.track_count();
         let vectors = &mut self.vectors[channel as usize];

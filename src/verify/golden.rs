@@ -22,7 +22,7 @@ use std::sync::OnceLock;
 use glam::{DVec3, Quat};
 use sha2::{Digest, Sha256};
 
-use crate::crowd::error::CrowdError;
+use crate::crowd_error::CrowdError;
 use crate::curve::options::{Axes, Ends, Path, Quantity, Speed};
 use crate::engine::Engine;
 use crate::error::Error;

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 
 use sha2::{Digest, Sha256};
 
-use crate::crowd::error::CrowdError;
+use crate::crowd_error::CrowdError;
 use crate::curve::options::{Axes, Ends, Path, Quantity, Speed};
 use crate::engine::Engine;
 use crate::error::Error;

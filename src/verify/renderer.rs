@@ -6,8 +6,8 @@
 use glam::Quat;
 
 use crate::clip::Clip;
-use crate::crowd::error::CrowdError;
 use crate::crowd::player::Crowd;
+use crate::crowd_error::CrowdError;
 use crate::device::{Device, VulkanDevice};
 use crate::engine::Engine;
 use crate::error::Error;

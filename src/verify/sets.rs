@@ -4,9 +4,9 @@
 
 use glam::{Affine3A, DVec3, Mat3A, Quat, Vec3};
 
-use crate::crowd::error::CrowdError;
 use crate::crowd::layer::CrowdLayer;
 use crate::crowd::library::CrowdLibrary;
+use crate::crowd_error::CrowdError;
 use crate::method::Method;
 use crate::method::vector_method::VectorMethod;
 use crate::pose::skeleton::Skeleton;

@@ -112,7 +112,7 @@ pub(super) fn math() -> Vec<Twin> {
             "over",
             |random| {
                 let inner = random.number();
-                let t = [0.0, 1.0, inner, inner][random.below(4)];
+                let t = [0.0, 1.0, inner, inner][random.below(4) as usize];
                 (random.pair(), t)
             },
             |([a, b], t)| over(a, b, t),

@@ -46,7 +46,7 @@ pub(crate) struct Scenery {
 impl Scenery {
     /// The meshes, in the order in which they were named.
     pub(crate) fn read(&self) -> Result<Vec<Mesh>, Failure> {
-        let read = |path: &PathBuf| match Surface::read(path)? {
+        let read = |path: &PathBuf| match Surface::read(path, 0.0)? {
             Surface::Mesh(mesh) => Ok(*mesh),
             Surface::Net(net) => net.facets(FACETS).map_err(|error| {
                 let message = format!("cannot be drawn: {error}");

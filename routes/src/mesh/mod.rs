@@ -1,5 +1,7 @@
 //! Meshes: what is read is checked, welded, cut into triangles and wound alike.
 
+mod cut;
+mod joints;
 pub(crate) mod links;
 
 pub mod read;
@@ -21,7 +23,8 @@ pub const MOST_TRIANGLES: usize = (u32::MAX / 3 - 8) as usize;
 
 /// A surface of triangles, on which routes are found.
 ///
-/// Vertices at equal positions are one. Faces wind alike within each piece, the way that most of
+/// Vertices at equal positions are one, and so are faces with the same corners: a sheet that is modelled
+/// from both sides is one sheet. A side on which a corner of another face lies is cut there. Faces wind alike within each piece, the way that most of
 /// them had.
 #[derive(Debug, Clone)]
 pub struct Mesh {
@@ -46,20 +49,33 @@ impl Mesh {
         Self::of_polygons(positions, triangles.iter().map(<[u32; 3]>::as_slice))
     }
 
-    /// Of positions and polygons, each some of the positions in their order round it. A polygon is
-    /// cut into triangles from its first corner on.
+    /// Of positions and polygons, each some of the positions in their order round it. Polygons are cut
+    /// into triangles within them, whether they are convex or not.
     ///
     /// # Errors
-    /// As [`Mesh::new`].
+    /// As [`Mesh::new`], and when the sides of a polygon cross each other.
     pub fn of_polygons<'a>(
         positions: &[DVec3],
         polygons: impl IntoIterator<Item = &'a [u32]>,
+    ) -> Result<Self, MeshError> {
+        Self::welded(positions, polygons, 0.0)
+    }
+
+    /// As [`Mesh::of_polygons`]; positions within a distance of each other become the first of them: for
+    /// seams whose two sides differ by rounding. Triangles that lose their area by it are dropped.
+    ///
+    /// # Errors
+    /// As [`Mesh::of_polygons`], and when the distance is negative or no number.
+    pub fn welded<'a>(
+        positions: &[DVec3],
+        polygons: impl IntoIterator<Item = &'a [u32]>,
+        distance: f64,
     ) -> Result<Self, MeshError> {
         let Welded {
             positions,
             mut faces,
             mut warnings,
-        } = weld::weld(positions, polygons)?;
+        } = weld::weld(positions, polygons, distance)?;
         let turned = windings::turn_alike(positions.len(), &mut faces);
         if turned.count > 0 {
             let count = turned.count;

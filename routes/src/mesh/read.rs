@@ -44,7 +44,16 @@ impl Polygons {
     /// # Errors
     /// As [`Mesh::new`].
     pub fn mesh(&self) -> Result<Mesh, MeshError> {
-        Mesh::of_polygons(&self.positions, self.polygons.iter().map(Vec::as_slice))
+        self.welded(0.0)
+    }
+
+    /// With positions within a distance of each other welded.
+    ///
+    /// # Errors
+    /// As [`Mesh::welded`].
+    pub fn welded(&self, distance: f64) -> Result<Mesh, MeshError> {
+        let polygons = self.polygons.iter().map(Vec::as_slice);
+        Mesh::welded(&self.positions, polygons, distance)
     }
 }
 
@@ -67,6 +76,40 @@ impl Mesh {
     }
 }
 
+/// The lines of an OBJ file that say positions and faces, with the corners' positions alone: what a mesh
+/// needs. Lines that `\` continues are one line. Objects, groups, materials, texture coordinates and
+/// normals are passed over, whether they are right or not.
+fn vertices_and_faces(text: &[u8]) -> Vec<u8> {
+    let mut lines = Vec::with_capacity(text.len());
+    let mut whole: Vec<u8> = Vec::new();
+    for line in text.split(|byte| *byte == b'\n') {
+        let line = line.trim_ascii_end();
+        if let Some(begun) = line.strip_suffix(b"\\") {
+            whole.extend_from_slice(begun);
+            whole.push(b' ');
+            continue;
+        }
+        whole.extend_from_slice(line);
+        let mut words = whole
+            .split(|byte| byte.is_ascii_whitespace())
+            .filter(|word| !word.is_empty());
+        match words.next() {
+            Some(b"v") => lines.extend_from_slice(&whole),
+            Some(b"f") => {
+                lines.push(b'f');
+                for word in words.take_while(|word| word[0] != b'#') {
+                    lines.push(b' ');
+                    lines.extend(word.iter().copied().take_while(|byte| *byte != b'/'));
+                }
+            }
+            _ => {}
+        }
+        lines.push(b'\n');
+        whole.clear();
+    }
+    lines
+}
+
 /// The faces of all objects and groups of an OBJ file.
 ///
 /// # Errors
@@ -79,6 +122,7 @@ pub fn obj(text: &[u8]) -> Result<Polygons, ReadError> {
     };
     // Materials are in other files, and nothing here depends on them.
     let none = |_: &std::path::Path| Ok((Vec::new(), std::collections::HashMap::default()));
+    let text = vertices_and_faces(text);
     let loaded = tobj::load_obj_buf(&mut BufReader::new(Cursor::new(text)), &options, none);
     let (models, _) = loaded.map_err(|error| ReadError::Obj {
         reason: error.to_string(),

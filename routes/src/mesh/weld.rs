@@ -1,11 +1,14 @@
-//! Faces as a file has them become triangles between different points.
+//! Faces as a file has them become triangles between different points: equal ones are welded, polygons
+//! are cut, faces that lie on each other become one, and sides are cut at corners that lie on them.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use glam::DVec3;
 
 use crate::error::{MeshError, MeshWarning};
 use crate::mesh::MOST_TRIANGLES;
+use crate::mesh::cut::{MOST_CORNERS, Uncut, cut};
+use crate::mesh::joints::{near_open_sides, on_open_sides};
 
 /// Triangles between different points, all of which are used.
 pub(super) struct Welded {
@@ -14,32 +17,49 @@ pub(super) struct Welded {
     pub(super) warnings: Vec<MeshWarning>,
 }
 
-/// A triangle is flat when its height is less than this fraction of its longest edge.
-const FLAT: f64 = 1e-12;
-/// A polygon is not flat when a corner is farther from its plane than this fraction of its size.
-const UNEVEN: f64 = 1e-6;
 /// Beyond this squares of areas are no finite numbers.
 const LARGEST: f64 = 1e75;
+/// A corner lies on a side that is nearer than this fraction of the mesh's size: positions in f32 are
+/// rounded by that much.
+const ON_SIDE: f64 = 1e-7;
+/// Open sides that are nearer to a corner than this fraction are a seam that somebody may want welded.
+const SEAM: f64 = 1e-5;
 
+/// Counts, and keeps the first face.
+#[derive(Default)]
+struct Count {
+    count: usize,
+    face: usize,
+}
+
+impl Count {
+    fn add(&mut self, more: usize, face: usize) {
+        if self.count == 0 {
+            self.face = face;
+        }
+        self.count += more;
+    }
+}
+
+/// Positions nearer to each other than `tolerance` become the first of them.
 pub(super) fn weld<'a>(
     given: &[DVec3],
     polygons: impl IntoIterator<Item = &'a [u32]>,
+    tolerance: f64,
 ) -> Result<Welded, MeshError> {
     for (vertex, &position) in given.iter().enumerate() {
         if !position.is_finite() || position.abs().max_element() > LARGEST {
             return Err(MeshError::NotFinite { vertex, position });
         }
     }
-    let mut welding = Welding {
-        given,
-        known: HashMap::new(),
-        positions: Vec::new(),
-    };
-    let mut faces = Vec::new();
-    let (mut dropped, mut uneven) = ((0, 0), (0, 0));
-    for (number, polygon) in polygons.into_iter().enumerate() {
+    if !(tolerance >= 0.0 && tolerance <= LARGEST) {
+        return Err(MeshError::Weld { tolerance });
+    }
+    let mut welding = Welding::new(given, tolerance);
+    let (mut dropped, mut uneven, mut doubled) = <(Count, Count, Count)>::default();
+    for (face, polygon) in polygons.into_iter().enumerate() {
         if polygon.len() < 3 {
-            let (face, corners) = (number, polygon.len());
+            let corners = polygon.len();
             return Err(MeshError::Corners { face, corners });
         }
         let outside = polygon
@@ -47,90 +67,270 @@ pub(super) fn weld<'a>(
             .find(|&&vertex| vertex as usize >= given.len());
         if let Some(&vertex) = outside {
             return Err(MeshError::Index {
-                face: number,
+                face,
                 vertex: u64::from(vertex),
                 count: given.len(),
             });
         }
-        if polygon.len() > 3 && !is_flat(given, polygon) {
-            count(&mut uneven, number);
+        // Equal neighbours are one corner.
+        let mut corners: Vec<u32> = polygon
+            .iter()
+            .map(|&vertex| welding.first_at(vertex))
+            .collect();
+        corners.dedup();
+        while corners.len() > 1 && corners.first() == corners.last() {
+            corners.pop();
         }
-        for pair in polygon[1..].windows(2) {
-            let corners = [polygon[0], pair[0], pair[1]].map(|vertex| given[vertex as usize]);
-            let [a, b, c] = corners;
-            if a == b || b == c || c == a {
-                count(&mut dropped, number);
+        if corners.len() < 3 {
+            dropped.add(polygon.len() - 2, face);
+            continue;
+        }
+        dropped.add(polygon.len() - corners.len(), face);
+        if corners.len() > 3 && !welding.polygons.insert(canonical(&corners)) {
+            doubled.add(corners.len() - 2, face);
+            continue;
+        }
+        let places: Vec<DVec3> = corners
+            .iter()
+            .map(|&vertex| given[vertex as usize])
+            .collect();
+        let made = match cut(&places) {
+            Ok(made) => made,
+            Err(Uncut::Flat) if tolerance > 0.0 => {
+                dropped.add(corners.len() - 2, face);
                 continue;
             }
-            let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
-            if (b - a).cross(c - a).length() <= FLAT * longest * longest {
-                return Err(MeshError::Flat {
-                    face: number,
-                    corners,
+            Err(Uncut::Flat) => {
+                let corners = [places[0], places[1], places[2]];
+                return Err(MeshError::Flat { face, corners });
+            }
+            Err(Uncut::Crosses) => return Err(MeshError::Crosses { face }),
+            Err(Uncut::TooMany) => {
+                return Err(MeshError::TooManyCorners {
+                    face,
+                    corners: corners.len(),
+                    most: MOST_CORNERS,
                 });
             }
-            faces.push([polygon[0], pair[0], pair[1]].map(|vertex| welding.vertex(vertex)));
+        };
+        if !made.is_flat {
+            uneven.add(1, face);
+        }
+        for triangle in made.triangles {
+            let own = triangle.map(|corner| corners[corner]);
+            if own[0] == own[1] || own[1] == own[2] || own[2] == own[0] {
+                dropped.add(1, face);
+            } else if !welding.triangles.insert(sorted(own)) {
+                doubled.add(1, face);
+            } else {
+                let own = own.map(|vertex| welding.vertex(vertex));
+                welding.faces.push(own);
+            }
+        }
+        if welding.faces.len() > MOST_TRIANGLES {
+            return Err(MeshError::TooMany {
+                triangles: welding.faces.len(),
+                most: MOST_TRIANGLES,
+            });
         }
     }
+    let Welding {
+        positions,
+        mut faces,
+        ..
+    } = welding;
     if faces.is_empty() {
         return Err(MeshError::Empty);
     }
-    if faces.len() > MOST_TRIANGLES {
-        return Err(MeshError::TooMany {
-            triangles: faces.len(),
-            most: MOST_TRIANGLES,
-        });
-    }
     let mut warnings = Vec::new();
-    if let (count @ 1.., face) = dropped {
+    if let Count {
+        count: count @ 1..,
+        face,
+    } = dropped
+    {
         warnings.push(MeshWarning::Dropped { count, face });
     }
-    if let (count @ 1.., face) = uneven {
+    if let Count {
+        count: count @ 1..,
+        face,
+    } = uneven
+    {
         warnings.push(MeshWarning::NotFlat { count, face });
     }
+    if let Count {
+        count: count @ 1..,
+        face,
+    } = doubled
+    {
+        warnings.push(MeshWarning::Doubled { count, face });
+    }
+    let (low, high) = (positions.iter()).fold((DVec3::MAX, DVec3::MIN), |(low, high), &own| {
+        (low.min(own), high.max(own))
+    });
+    let size = (high - low).max_element();
+    let count = cut_sides(&positions, &mut faces, tolerance.max(ON_SIDE * size));
+    if count > 0 {
+        warnings.push(MeshWarning::SidesCut { count });
+    }
+    let distance = SEAM * size;
+    let count = near_open_sides(&positions, &faces, distance);
+    if count > 0 {
+        warnings.push(MeshWarning::Seam { count, distance });
+    }
     Ok(Welded {
-        positions: welding.positions,
+        positions,
         faces,
         warnings,
     })
 }
 
-/// Counts, and keeps the first.
-fn count(counted: &mut (usize, usize), number: usize) {
-    if counted.0 == 0 {
-        counted.1 = number;
+/// Cuts faces where corners of others lie on their open sides; returns how many corners these are.
+fn cut_sides(positions: &[DVec3], faces: &mut Vec<[u32; 3]>, tolerance: f64) -> usize {
+    let mut sides: HashMap<usize, [Vec<u32>; 3]> = HashMap::new();
+    let mut order = Vec::new();
+    for (face, side, corners) in on_open_sides(positions, faces, tolerance) {
+        sides.entry(face).or_insert_with(|| {
+            order.push(face);
+            Default::default()
+        })[side] = corners;
     }
-    counted.0 += 1;
+    let mut count = 0;
+    for face in order {
+        let own = &sides[&face];
+        let [a, b, c] = faces[face];
+        let corners: Vec<u32> = [a]
+            .into_iter()
+            .chain(own[0].iter().copied())
+            .chain([b])
+            .chain(own[1].iter().copied())
+            .chain([c])
+            .chain(own[2].iter().copied())
+            .collect();
+        let places: Vec<DVec3> = corners
+            .iter()
+            .map(|&vertex| positions[vertex as usize])
+            .collect();
+        // A face so thin that it cannot be cut stays.
+        let Ok(made) = cut(&places) else { continue };
+        count += corners.len() - 3;
+        let mut triangles = made
+            .triangles
+            .into_iter()
+            .map(|own| own.map(|corner| corners[corner]));
+        if let Some(first) = triangles.next() {
+            faces[face] = first;
+        }
+        faces.extend(triangles);
+    }
+    count
 }
 
+fn sorted(mut triangle: [u32; 3]) -> [u32; 3] {
+    triangle.sort_unstable();
+    triangle
+}
+
+/// The same list for the same polygon, wherever it begins and whichever way it goes round.
+fn canonical(corners: &[u32]) -> Vec<u32> {
+    let count = corners.len();
+    let from =
+        |first: usize, step: usize| (0..count).map(move |k| corners[(first + k * step) % count]);
+    let least = corners.iter().min().copied().unwrap_or_default();
+    let firsts = (0..count).filter(|&first| corners[first] == least);
+    let both = firsts.flat_map(|first| [1, count - 1].map(|step| (first, step)));
+    let best = both.min_by(|&(first, step), &(other, other_step)| {
+        from(first, step).cmp(from(other, other_step))
+    });
+    best.map(|(first, step)| from(first, step).collect())
+        .unwrap_or_default()
+}
+
+/// Vertices that are met on the way.
 struct Welding<'a> {
     given: &'a [DVec3],
-    known: HashMap<[u64; 3], u32>,
+    tolerance: f64,
+    /// For cells of the tolerance's size, or exact positions, the first vertices there.
+    cells: HashMap<[u64; 3], Vec<u32>>,
+    /// For each given vertex the first at its position.
+    firsts: Vec<u32>,
+    /// For each of these its number among those that triangles use.
+    numbers: HashMap<u32, u32>,
     positions: Vec<DVec3>,
+    faces: Vec<[u32; 3]>,
+    /// What there is already.
+    triangles: HashSet<[u32; 3]>,
+    polygons: HashSet<Vec<u32>>,
 }
 
-impl Welding<'_> {
-    /// The number of a vertex among those at different positions.
-    fn vertex(&mut self, vertex: u32) -> u32 {
+const UNKNOWN: u32 = u32::MAX;
+
+impl<'a> Welding<'a> {
+    fn new(given: &'a [DVec3], tolerance: f64) -> Self {
+        Self {
+            given,
+            tolerance,
+            cells: HashMap::new(),
+            firsts: vec![UNKNOWN; given.len()],
+            numbers: HashMap::new(),
+            positions: Vec::new(),
+            faces: Vec::new(),
+            triangles: HashSet::new(),
+            polygons: HashSet::new(),
+        }
+    }
+
+    /// The first vertex at the position of this one, or within the tolerance of it.
+    fn first_at(&mut self, vertex: u32) -> u32 {
+        let known = self.firsts[vertex as usize];
+        if known != UNKNOWN {
+            return known;
+        }
         let position = self.given[vertex as usize];
         // Adding 0 makes 0 of -0.
-        let key = (position + DVec3::ZERO).to_array().map(f64::to_bits);
-        *self.known.entry(key).or_insert_with(|| {
+        let key = |cell: DVec3| (cell + DVec3::ZERO).to_array().map(f64::to_bits);
+        let cell = (position / self.tolerance).floor();
+        let own = if self.tolerance > 0.0 {
+            key(cell)
+        } else {
+            key(position)
+        };
+        let mut found = None;
+        if self.tolerance > 0.0 {
+            for step in 0..27 {
+                let step = DVec3::new(
+                    f64::from(step % 3 - 1),
+                    f64::from(step / 3 % 3 - 1),
+                    f64::from(step / 9 - 1),
+                );
+                let there = self
+                    .cells
+                    .get(&key(cell + step))
+                    .map_or(&[][..], Vec::as_slice);
+                let near = there.iter().copied().filter(|&other| {
+                    self.given[other as usize].distance(position) <= self.tolerance
+                });
+                found = found.into_iter().chain(near).min();
+            }
+        } else {
+            found = self
+                .cells
+                .get(&own)
+                .and_then(|there| there.first().copied());
+        }
+        let first = found.unwrap_or(vertex);
+        if found.is_none() {
+            self.cells.entry(own).or_default().push(vertex);
+        }
+        self.firsts[vertex as usize] = first;
+        first
+    }
+
+    /// The number of a first vertex among those that triangles use.
+    fn vertex(&mut self, vertex: u32) -> u32 {
+        let position = self.given[vertex as usize];
+        *self.numbers.entry(vertex).or_insert_with(|| {
             self.positions.push(position + DVec3::ZERO);
             self.positions.len() as u32 - 1
         })
     }
-}
-
-/// Whether the corners lie in the plane of Newell's normal.
-fn is_flat(given: &[DVec3], polygon: &[u32]) -> bool {
-    let at = |corner: usize| {
-        given[polygon[corner % polygon.len()] as usize] - given[polygon[0] as usize]
-    };
-    let normal: DVec3 = (0..polygon.len()).map(|i| at(i).cross(at(i + 1))).sum();
-    let normal = normal.normalize_or_zero();
-    let size = (0..polygon.len())
-        .map(|i| at(i).length())
-        .fold(0.0, f64::max);
-    (0..polygon.len()).all(|i| at(i).dot(normal).abs() <= UNEVEN * size)
 }

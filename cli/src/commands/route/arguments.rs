@@ -41,6 +41,10 @@ pub(crate) struct Arguments {
     /// Meshes: exact, plane, greedy or edges; nets: line or facets:N
     #[arg(long, value_name = "WAY", value_parser = manner)]
     by: Option<Manner>,
+    /// Vertices of a mesh that are within this distance of each other are one, so that ways cross
+    /// seams whose sides differ by rounding
+    #[arg(long, value_name = "DISTANCE", value_parser = not_negative, allow_hyphen_values = true, default_value = "0", hide_default_value = true)]
+    pub(crate) weld: f64,
     /// A mesh of obstacles that stand still
     #[arg(long, value_name = "FILE", requires = "clearance")]
     pub(crate) avoid: Option<PathBuf>,

@@ -53,9 +53,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let started = Instant::now();
     let party = arguments.party()?;
     let results = Results::new(arguments, &party)?;
-    let surface = Surface::read(&arguments.surface)?;
+    let surface = Surface::read(&arguments.surface, arguments.weld)?;
     let avoided = match &arguments.avoid {
-        Some(path) => match Surface::read(path)? {
+        Some(path) => match Surface::read(path, arguments.weld)? {
             Surface::Mesh(mesh) => Some(mesh),
             Surface::Net(_) => {
                 let message = format!("{}: obstacles are a mesh", path.display());

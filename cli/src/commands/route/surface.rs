@@ -9,7 +9,7 @@ use tumble_formats::beneath::open_beneath;
 use tumble_formats::gltf::meshes::read_triangles;
 use tumble_formats::npy::read_numbers;
 use tumble_formats::{Code, Diagnostic, Limits};
-use tumble_routes::mesh::Mesh;
+use tumble_routes::mesh::{Mesh, read};
 use tumble_routes::net::Net;
 
 use crate::arguments::input;
@@ -25,8 +25,8 @@ pub(crate) enum Surface {
 }
 
 impl Surface {
-    /// Reads a file, known by its name.
-    pub(crate) fn read(path: &Path) -> Result<Self, Failure> {
+    /// Reads a file, known by its name; vertices of a mesh within a distance of each other are welded.
+    pub(crate) fn read(path: &Path, weld: f64) -> Result<Self, Failure> {
         let name = input::name(path);
         let refused = |code, error: &dyn std::fmt::Display| {
             let fault = Diagnostic::new(path.display().to_string(), code, error.to_string());
@@ -38,15 +38,22 @@ impl Surface {
             .and_then(|own| own.to_str())
             .unwrap_or_default();
         let mesh = match extension.to_lowercase().as_str() {
-            "obj" => Mesh::of_obj(&bytes(path)?).map_err(|error| refuse(&error))?,
-            "ply" => Mesh::of_ply(&bytes(path)?).map_err(|error| refuse(&error))?,
+            "obj" => {
+                let polygons = read::obj(&bytes(path)?).map_err(|error| refuse(&error))?;
+                polygons.welded(weld).map_err(|error| refuse(&error))?
+            }
+            "ply" => {
+                let polygons = read::ply(&bytes(path)?).map_err(|error| refuse(&error))?;
+                polygons.welded(weld).map_err(|error| refuse(&error))?
+            }
             "glb" | "gltf" => {
                 let all = read_triangles(path, Limits::default())
                     .map_err(|error| Failure::input(&error, ""))?;
                 for warning in &all.warnings {
                     words::note(&warning.to_string());
                 }
-                Mesh::new(&all.positions, &all.triangles).map_err(|error| refuse(&error))?
+                let triangles = all.triangles.iter().map(<[u32; 3]>::as_slice);
+                Mesh::welded(&all.positions, triangles, weld).map_err(|error| refuse(&error))?
             }
             "npy" => {
                 let array = read_numbers(&path.display().to_string(), &bytes(path)?, |shape| match shape {
