@@ -68,7 +68,18 @@ impl From<Error> for Failure {
             Error::ThreadCount { .. } | Error::VectorWidth(_) => TumbleResult::InvalidArgument,
             _ => TumbleResult::InvalidInput,
         };
-        Self::new(code, error.to_string())
+        match error {
+            Error::Crowd(error) => error.into(),
+            Error::BufferOnCpu => Self::new(
+                code,
+                "this engine evaluates on the CPU and has no Vulkan device to which the buffer could belong; make one of the buffer's device with tumble_engine_from_vulkan",
+            ),
+            Error::NotRotations => Self::new(
+                code,
+                "the quantity is a velocity or an acceleration; ask for rotations here",
+            ),
+            error => Self::new(code, error.to_string()),
+        }
     }
 }
 
@@ -124,7 +135,45 @@ impl From<CrowdError> for Failure {
             | CrowdError::OtherDevice => TumbleResult::InvalidArgument,
             _ => TumbleResult::InvalidInput,
         };
-        Self::new(code, error.to_string())
+        Self::new(code, crowd_words(&error))
+    }
+}
+
+/// What is wrong with a crowd, in the words of this interface: its functions' names, and masks that count
+/// from 1.
+fn crowd_words(error: &CrowdError) -> String {
+    match error {
+        CrowdError::Missing {
+            what: "mask",
+            given,
+            count,
+        } => {
+            let mask = given.saturating_add(1);
+            format!("there is no mask {mask}; there are {count}, which count from 1")
+        }
+        CrowdError::Change { change, reason } => format!("change {change}: {}", crowd_words(reason)),
+        CrowdError::NoClips => {
+            "the library has no clips; tumble_crowd_library_push gives it one".to_owned()
+        }
+        CrowdError::NoInverseBind => {
+            "the library has no inverse bind matrices; tumble_crowd_library_set_inverse_bind gives it some".to_owned()
+        }
+        CrowdError::NothingSubmitted => {
+            "nothing is in flight; call tumble_crowd_submit first".to_owned()
+        }
+        CrowdError::StillSubmitted => {
+            "the result of the submission before was not taken; call tumble_crowd_wait first".to_owned()
+        }
+        CrowdError::Precision { is_half: true } => {
+            "the result is in 16 bits; take it with tumble_crowd_wait_half".to_owned()
+        }
+        CrowdError::Precision { is_half: false } => {
+            "the result is in 32 bits; take it with tumble_crowd_wait".to_owned()
+        }
+        CrowdError::OtherDevice => {
+            "the crowd was not made by an engine on the buffer's Vulkan device; make it with tumble_engine_from_vulkan".to_owned()
+        }
+        error => error.to_string(),
     }
 }
 

@@ -132,6 +132,9 @@ pub(crate) fn of_track(error: &TrackError) -> PyErr {
         TrackError::NotUnit { track, key, .. } => {
             input_at(&message, Code::NotFinite, at("keys", track, key))
         }
+        TrackError::DataTooLarge {
+            track, key, what, ..
+        } => input_at(&message, Code::TooLarge, at(what, track, key)),
         TrackError::DataNotFinite { track, key, what } => {
             input_at(&message, Code::NotFinite, at(what, track, key))
         }

@@ -134,10 +134,11 @@ impl Route {
         }
         let normals: Option<Vec<DVec3>> = kept.iter().map(|&spot| surface.normal(spot)).collect();
         Self {
+            // A sum of nothing is -0.
             length: points
                 .windows(2)
                 .map(|pair| pair[0].distance(pair[1]))
-                .sum(),
+                .fold(0.0, |sum, own| sum + own),
             points,
             normals,
             off: task.off,
