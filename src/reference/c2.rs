@@ -66,9 +66,10 @@ struct System<'a> {
     beside: Vec<[DMat3; 2]>,
 }
 
-/// Newton's steps from the solution of the linear part, and then for each sixteenth of the rest.
-const DIRECT: usize = 30;
-const EACH_PART: usize = 15;
+/// Newton's steps from the solution of the linear part; then for each part of the rest, and for all.
+const DIRECT: usize = 16;
+const EACH_PART: usize = 8;
+const ALL_PARTS: usize = 128;
 
 impl<'a> System<'a> {
     fn new(intervals: &'a [Interval], ends: [Option<DVec3>; 2]) -> Self {
@@ -134,90 +135,116 @@ impl<'a> System<'a> {
     /// half a turn, else everywhere.
     fn solve(&self) -> Vec<DVec3> {
         let keys = self.intervals.len() + 1;
-        let nothing = vec![0.0; keys];
         let start = vec![DVec3::ZERO; keys];
-        let linear = self.newton(&start, &nothing, 2).unwrap_or(start);
-        let is_long = |key: usize| {
-            key > 0 && self.intervals[key - 1].whole.length() > std::f64::consts::FRAC_PI_2
+        let none = vec![0.0; keys];
+        let Some(linear) = self.step(&start, &none, &vec![1.0; keys]) else {
+            return start;
         };
-        let short: Vec<f64> = (0..keys).map(|key| f64::from(!is_long(key))).collect();
-        let found = self.with_bends(&linear, &vec![1.0; keys]);
-        let found = found.or_else(|| self.with_bends(&linear, &short));
-        found.unwrap_or(linear)
-    }
-
-    fn with_bends(&self, linear: &[DVec3], bends: &[f64]) -> Option<Vec<DVec3>> {
-        if let Some(found) = self.newton(linear, bends, DIRECT) {
-            return Some(found);
-        }
-        let mut velocities = linear.to_vec();
-        for sixteenth in 1..=16 {
-            let part = f64::from(sixteenth) / 16.0;
-            let bends: Vec<f64> = bends.iter().map(|bend| bend * part).collect();
-            velocities = self.newton(&velocities, &bends, EACH_PART)?;
-        }
-        Some(velocities)
-    }
-
-    /// Newton's iteration; its steps are halved until they do not make things worse.
-    fn newton(&self, from: &[DVec3], bends: &[f64], most: usize) -> Option<Vec<DVec3>> {
-        let keys = from.len();
         let secant = |i: usize| {
             let interval = self.intervals.get(i);
             interval.map_or(0.0, |own| 2.0 * own.whole.length() / own.duration)
         };
         let sizes: Vec<f64> = (0..keys)
-            .map(|key| secant(key.wrapping_sub(1)) + secant(key) + from[key].length() + 1e-200)
+            .map(|key| secant(key.wrapping_sub(1)) + secant(key) + linear[key].length() + 1e-200)
             .collect();
-        let excesses = |velocities: &[DVec3]| -> Vec<DVec3> {
-            (0..keys)
-                .map(|key| self.excess(key, Self::around(velocities, key), bends[key]))
-                .collect()
+        let is_long = |key: usize| {
+            key > 0 && self.intervals[key - 1].whole.length() > std::f64::consts::FRAC_PI_2
         };
-        let worst = |values: &[DVec3]| {
-            let relative = values.iter().zip(&sizes);
-            let squares = relative.map(|(value, size)| (*value / *size).length_squared());
-            squares.sum::<f64>().sqrt()
-        };
-        let mut velocities = from.to_vec();
-        for _ in 0..most {
-            let off = excesses(&velocities);
-            let mut band = Band::new(3 * keys);
-            for key in 0..keys {
-                let own =
-                    self.own_slope(key, Self::around(&velocities, key), bends[key], sizes[key]);
-                let [before, after] = self.beside[key];
-                for (block, at) in [(before, key.wrapping_sub(1)), (own, key), (after, key + 1)] {
-                    if at < keys {
-                        for (row, column) in (0..9).map(|i| (i / 3, i % 3)) {
-                            band.set(3 * key + row, 3 * at + column, block.col(column)[row]);
-                        }
+        let short: Vec<f64> = (0..keys).map(|key| f64::from(!is_long(key))).collect();
+        let found = self.with_bends(&linear, &vec![1.0; keys], &sizes);
+        let found = found.or_else(|| self.with_bends(&linear, &short, &sizes));
+        found.unwrap_or(linear)
+    }
+
+    /// At once, else in parts that are halved where one fails.
+    fn with_bends(&self, linear: &[DVec3], bends: &[f64], sizes: &[f64]) -> Option<Vec<DVec3>> {
+        if let (Some(found), _) = self.newton(linear, bends, sizes, DIRECT) {
+            return Some(found);
+        }
+        let (mut part, mut more, mut taken) = (0.0, 0.25, 0);
+        let mut velocities = linear.to_vec();
+        while taken < ALL_PARTS && more >= 1.0 / 256.0 {
+            let next = f64::min(part + more, 1.0);
+            let some: Vec<f64> = bends.iter().map(|bend| bend * next).collect();
+            let (found, steps) = self.newton(&velocities, &some, sizes, EACH_PART);
+            taken += steps;
+            match found {
+                Some(found) if next >= 1.0 => return Some(found),
+                Some(found) => (velocities, part, more) = (found, next, 2.0 * more),
+                None => more /= 2.0,
+            }
+        }
+        None
+    }
+
+    fn excesses(&self, velocities: &[DVec3], bends: &[f64]) -> Vec<DVec3> {
+        (0..velocities.len())
+            .map(|key| self.excess(key, Self::around(velocities, key), bends[key]))
+            .collect()
+    }
+
+    /// One whole step of Newton's.
+    fn step(&self, velocities: &[DVec3], bends: &[f64], sizes: &[f64]) -> Option<Vec<DVec3>> {
+        let keys = velocities.len();
+        let mut band = Band::new(3 * keys);
+        for key in 0..keys {
+            let own = self.own_slope(key, Self::around(velocities, key), bends[key], sizes[key]);
+            let [before, after] = self.beside[key];
+            for (block, at) in [(before, key.wrapping_sub(1)), (own, key), (after, key + 1)] {
+                if at < keys {
+                    for (row, column) in (0..9).map(|i| (i / 3, i % 3)) {
+                        band.set(3 * key + row, 3 * at + column, block.col(column)[row]);
                     }
                 }
             }
-            let sides = off.iter().flat_map(|own| own.to_array()).collect();
-            let steps: Vec<DVec3> = (band.solve(sides)?.chunks(3))
-                .map(DVec3::from_slice)
-                .collect();
+        }
+        let off = self.excesses(velocities, bends);
+        let steps = band.solve(off.iter().flat_map(|own| own.to_array()).collect())?;
+        let steps = steps.chunks(3).map(DVec3::from_slice);
+        Some(velocities.iter().zip(steps).map(|(own, step)| *own - step).collect())
+    }
+
+    /// Newton's iteration, whose steps are halved until they help; and how many there were.
+    fn newton(
+        &self,
+        from: &[DVec3],
+        bends: &[f64],
+        sizes: &[f64],
+        most: usize,
+    ) -> (Option<Vec<DVec3>>, usize) {
+        let off = |velocities: &[DVec3]| -> f64 {
+            let all = self.excesses(velocities, bends);
+            let relative = all.iter().zip(sizes).map(|(own, size)| *own / *size);
+            relative.map(DVec3::length_squared).sum()
+        };
+        let mut velocities = from.to_vec();
+        for taken in 1..=most {
+            let Some(whole) = self.step(&velocities, bends, sizes) else {
+                return (None, taken);
+            };
+            let before = off(&velocities);
             let mut damping = 1.0;
-            loop {
-                let moved = velocities.iter().zip(&steps);
-                let next: Vec<DVec3> = moved.map(|(own, step)| *own - *step * damping).collect();
-                let now = worst(&excesses(&next));
-                if now < worst(&off) || now < 1e-11 {
-                    velocities = next;
-                    break;
+            let next: Vec<DVec3> = loop {
+                let both = velocities.iter().zip(&whole);
+                let next: Vec<DVec3> = both.map(|(own, to)| own.lerp(*to, damping)).collect();
+                let now = off(&next);
+                if now <= (1.0 - damping / 2.0) * before || now <= 1e-24 * next.len() as f64 {
+                    break next;
                 }
-                damping *= 0.5;
-                if damping < 1e-3 {
-                    return None;
+                damping /= 2.0;
+                if damping < 1.0 / 64.0 {
+                    return (None, taken);
                 }
-            }
-            if damping == 1.0 && worst(&steps) < 1e-10 * (keys as f64).sqrt() {
-                return Some(velocities);
+            };
+            let moved = velocities.iter().zip(&next).zip(sizes);
+            let largest = moved.map(|((own, next), size)| (*next - *own).length() / size);
+            let largest = largest.fold(0.0, f64::max);
+            velocities = next;
+            if damping >= 1.0 && largest <= 1e-8 {
+                return (Some(velocities), taken);
             }
         }
-        (bends.iter().all(|bend| *bend == 0.0)).then_some(velocities)
+        (None, most)
     }
 
     /// How the equations depend on the key's own velocity: of a quadratic function central differences
