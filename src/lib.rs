@@ -155,6 +155,7 @@ pub use crate::stream::Chunk;
 pub use crate::threads::{OutOfThreads, on_threads};
 pub use crate::time::frame_rate::FrameRate;
 pub use crate::time::frames::{Frames, FramesError, MAX_FRAMES, Timeline};
+pub use crate::time::time_base::TimeBase;
 pub use crate::time::wrap::WrapMode;
 pub use crate::tracks::check::{NORM_TOLERANCE, UNIT_TOLERANCE};
 pub use crate::tracks::error::TrackError;

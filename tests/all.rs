@@ -25,6 +25,7 @@ mod stream;
 mod textbook;
 mod threads;
 mod tidy;
+mod times;
 mod transforms;
 mod validation;
 mod verify;

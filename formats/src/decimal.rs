@@ -17,6 +17,11 @@ impl Decimal {
     /// A number as [`parse`](crate::text::number::parse) takes it; digits behind the 24th place
     /// are left out. `None` beyond ±1e14.
     pub(crate) fn parse(token: &str) -> Option<Self> {
+        Self::parse_in(token, 0)
+    }
+
+    /// The same of a number in a unit of `10^power` seconds: -9 for nanoseconds.
+    pub(crate) fn parse_in(token: &str, power: i32) -> Option<Self> {
         let (mantissa, exponent) = token.split_once(['e', 'E']).unwrap_or((token, "0"));
         let (whole, decimals) = mantissa.split_once('.').unwrap_or((mantissa, ""));
         let is_negative = whole.starts_with('-');
@@ -33,7 +38,7 @@ impl Decimal {
         };
         let zeros = exponent
             .saturating_sub(decimals.len() as i32)
-            .saturating_add(PLACES as i32);
+            .saturating_add(PLACES as i32 + power);
         let digits = match usize::try_from(zeros) {
             Ok(zeros) if zeros + digits.len() <= 39 => format!("{digits}{}", "0".repeat(zeros)),
             Ok(_) => return None,
@@ -44,6 +49,11 @@ impl Decimal {
         };
         let steps: i128 = digits.parse().ok().filter(|&steps| steps <= LARGEST)?;
         Some(Self(if is_negative { -steps } else { steps }))
+    }
+
+    /// A whole number in a unit of `10^power` seconds.
+    pub(crate) fn whole(number: i64, power: i32) -> Option<Self> {
+        Self::parse_in(&number.to_string(), power)
     }
 
     /// Whole seconds and the shortest decimals of a time behind them; `None` beyond ±1e14.
@@ -117,6 +127,16 @@ mod tests {
         for token in ["100000000000000.1", "-1e15", "1e38", "1e999999999999"] {
             assert_eq!(Decimal::parse(token), None, "{token}");
         }
+    }
+
+    #[test]
+    fn nanoseconds_keep_their_digits() {
+        for token in ["1403636579763555584", "1403636579763555584.000000"] {
+            let time = Decimal::parse_in(token, -9).unwrap();
+            assert_eq!(time.to_string(), "1403636579.763555584", "{token}");
+            assert_eq!(time.since(1_403_636_579), 0.763_555_584);
+        }
+        assert_eq!(Decimal::whole(-1_500, -3), Decimal::parse("-1.5"));
     }
 
     #[test]

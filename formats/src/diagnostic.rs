@@ -151,7 +151,7 @@ codes! {
     Norm = "E025", "not a unit quaternion", "A rotation is a quaternion of norm 1. Norms within 0.1 of it are normalised; others are more likely a mistake, such as a missing column.";
     TimeNotIncreasing = "E026", "times do not increase", "Key times increase strictly from line to line.";
     KeyNorm = "E027", "no rotation", "A key's quaternion has a norm under 1e-6; no rotation can be told from it.";
-    EqualTimes = "E028", "two keys at one time", "The values differ, so one of the keys has to go: --duplicates first or last says which.";
+    EqualTimes = "E028", "two keys at one time", "The values differ: --duplicates first or last keeps one of the keys, both keeps a jump.";
     Time = "E030", "not a list of times", "A list of times has finite numbers of seconds, separated by blanks, commas or line ends.";
     Map = "E032", "not a map of arrays or columns", "`--map` says what a file's arrays or columns are: entries `name=source[3:7]:order`, separated by commas, whose sources are in the file.";
     Memory = "E034", "more memory than an input of its length may take", "An input gets 64 times its length and 64 MiB (`--max-memory`); this one says that it holds more, by counts, by data that is packed or by parts that name one part many times.";
@@ -176,7 +176,7 @@ codes! {
     NothingToAnimate = "E180", "nothing to animate", "An animation in glTF has at least one time and one channel; clips without tracks or samples cannot be written.";
     NotTrees = "E181", "joints that are no trees", "Nodes of glTF have one parent, are not their own ancestors, and have finite transforms relative to it; the clip's joints are not such.";
     TimesInF32 = "E182", "times that f32 cannot tell apart", "Times in glTF are f32, which has 24 bits: after a day, times are 7.8 ms from each other. Use a lower rate, or times nearer to 0.";
-    TimesBelowZero = "E183", "times below 0", "Times in glTF begin at 0 or later.";
+    TimesBelowZero = "E183", "times below 0", "Times in glTF begin at 0 or later: `tumble convert --start 0` cuts what is before.";
     GlbTooLong = "E184", "too long for GLB", "A GLB has lengths of 32 bits, at most 4 GiB. Write fewer samples, or the clips to several files.";
     // E2xx and W2xx: BVH.
     BvhStart = "E200", "no HIERARCHY", "A BVH file begins with the word HIERARCHY, then its joints, then MOTION.";
@@ -210,6 +210,7 @@ codes! {
     OneClip = "E315", "not one clip", "An NPZ file holds one clip.";
     Layout = "E316", "samples that do not fit the layout", "A file whose layout is kept has as many tracks as before, and frames at a rate if it has no list of times.";
     NotPerFrame = "E317", "an array that cannot be interpolated", "`--linear NAME`, in Python `linear=[NAME]`, names arrays of numbers with an entry for each frame, which are not keys.";
+    RateBesideTimes = "E318", "a rate beside times", "`--source-fps` is for files that say no times: where a file has the time of every key, that is its own.";
     // E4xx and W4xx: tables (Parquet, Arrow, CSV).
     TableDamaged = "E401", "a table that cannot be read", "The file is cut or damaged, or written in a way that is not read here; the reason is given. Rows count from 0.";
     TableClaims = "E402", "more than the file can hold", "The file announces more rows or bytes than could be packed into its length; nothing was read.";
@@ -274,6 +275,8 @@ codes! {
     UnknownBody = "W301", "a body of an unknown number of joints", "SMPL has 24 joints, SMPL-H 52, SMPL-X 55, and 22 are common to them; others are read without names and parents.";
     LeftOut = "W302", "arrays that are left out", "They have an entry for each frame of the input, and it is not known how to sample them: `--linear NAME`, in Python `linear=[NAME]`, interpolates them linearly.";
     ObjectsBeside = "W303", "pickled Python objects beside the keys", "They are not looked into. Where the file is written again, they are copied as they are if they are no lists of frames.";
+    TwoRates = "W304", "two rates that differ", "A file says its rate twice, or a rate and times of another; `--source-fps` overrules rates.";
+    Nanoseconds = "W305", "times that are nanoseconds", "Seconds since 1970 have ten digits, nanoseconds nineteen, as ORB-SLAM writes them: `--time-unit ns` says it without this warning.";
 }
 
 impl Code {

@@ -147,6 +147,16 @@ pub enum TimeUnit {
 }
 
 impl TimeUnit {
+    /// The power of ten that it is of a second.
+    pub(crate) fn power(self) -> i32 {
+        match self {
+            Self::Seconds => 0,
+            Self::Milliseconds => -3,
+            Self::Microseconds => -6,
+            Self::Nanoseconds => -9,
+        }
+    }
+
     /// How many of them a second has.
     #[must_use]
     pub fn per_second(self) -> u64 {

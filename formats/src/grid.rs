@@ -1,124 +1,80 @@
 //! Times that a file rounded, put back on the frames that they were rounded from.
 //!
-//! glTF keeps times in f32, BVH prints its frame time with few digits. A key at frame 17 of 24 fps
-//! is then at 0.70833331 s, and sampling at 120 fps would miss it, and the end, by 2e-9 s.
+//! glTF keeps times in f32, text has few decimals. A key at frame 17 of 24 fps is then at 0.70833331 s,
+//! and sampling at 120 fps would miss it, and the end, by 2e-9 s.
 
 use tumble::{Channel, FrameRate};
 
 use crate::motion::Motion;
+use crate::rate::{Found, Precision, Written, frame_time, of};
 
-/// The rates that are tried, frames and seconds, from the lowest.
-const RATES: [(u64, u64); 14] = [
-    (24_000, 1_001),
-    (24, 1),
-    (25, 1),
-    (30_000, 1_001),
-    (30, 1),
-    (48, 1),
-    (50, 1),
-    (60_000, 1_001),
-    (60, 1),
-    (90, 1),
-    (100, 1),
-    (120_000, 1_001),
-    (120, 1),
-    (240, 1),
-];
-
-/// The type that a file kept its times in.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Precision {
-    /// IEEE 754 single precision.
-    F32,
-    /// IEEE 754 double precision.
-    F64,
-}
-
-impl Precision {
-    /// The distance from the number to the next one of this type, away from 0.
-    pub(crate) fn ulp(self, number: f64) -> f64 {
-        match self {
-            Self::F32 => {
-                let near = (number as f32).abs();
-                f64::from(near.next_up()) - f64::from(near)
-            }
-            Self::F64 => number.abs().next_up() - number.abs(),
-        }
-    }
-}
-
-/// Puts lists of times of one clip on the frames of one rate, the lowest that fits all of them;
-/// where there is none, each list on those of a rate of its own, or it stays as it is. Gives the
-/// common rate.
-///
-/// A time fits if it is within one ulp of its type of a frame's time; a rate is not considered if
-/// an ulp of the last time is more than 1/100 of a frame.
+/// Puts lists of times of one clip on the frames of the rate that fits all of them; where there is none,
+/// each list on those of a rate of its own, or it stays as it is. Gives the common rate of the keys, if
+/// there is one.
 pub(crate) fn restore(lists: &mut [Vec<f64>], precision: Precision) -> Option<FrameRate> {
-    let common = rate_of(lists.iter().flatten().copied(), precision);
+    let common = of(&Written::Times(lists, precision));
     for list in lists {
-        let rate = common.or_else(|| rate_of(list.iter().copied(), precision));
-        if let Some(rate) = rate {
-            for time in list {
-                *time = frame_time(rate, frame(rate, *time));
-            }
+        let found = common.or_else(|| of(&Written::Times(std::slice::from_ref(list), precision)));
+        let Some(found) = found else { continue };
+        // Frames that count from a first time somewhere are no nearer than those that f64 has already.
+        let was_rounded = |&time: &f64| {
+            let off = (time - frame_time(found.grid, found.phase, time)).abs();
+            off > 2.0 * Precision::F64.rounding(time)
+        };
+        if found.phase == 0.0 || list.iter().any(was_rounded) {
+            put(list, found);
         }
     }
-    common
+    common.and_then(Found::rate)
 }
 
-/// The lowest rate on whose frames all times lie; `None` for no times, or for 0 alone, which says
-/// nothing about a rate.
-pub(crate) fn rate_of(
-    times: impl Iterator<Item = f64> + Clone,
-    precision: Precision,
-) -> Option<FrameRate> {
-    let largest = times.clone().map(f64::abs).fold(0.0, f64::max);
-    if largest == 0.0 || !largest.is_finite() {
-        return None;
+/// Puts times on frames. Different times do not become one: of two in the same frame, as an exporter
+/// makes them of a cut, the nearer goes there, and the other stays as far from it as it was.
+fn put(list: &mut [f64], found: Found) {
+    let on_frame = |time: f64| frame_time(found.grid, found.phase, time);
+    let stored = list.to_vec();
+    let off = |place: usize| (stored[place] - on_frame(stored[place])).abs();
+    for (place, time) in list.iter_mut().enumerate() {
+        let exact = on_frame(stored[place]);
+        let beside = |other: usize| {
+            let is_other = stored.get(other).is_some_and(|&other| other != stored[place]);
+            is_other && on_frame(stored[other]) == exact && off(other) < off(place)
+        };
+        let neighbours = [place.wrapping_sub(1), place + 1];
+        let nearer = neighbours.into_iter().find(|&other| beside(other));
+        *time = nearer.map_or(exact, |other| exact + (stored[place] - stored[other]));
     }
-    let rates = RATES
-        .iter()
-        .filter_map(|&(frames, seconds)| FrameRate::new(frames, seconds).ok());
-    rates
-        .filter(|rate| precision.ulp(largest) * rate.per_second() < 0.01)
-        .find(|&rate| fits(times.clone(), rate, precision))
+    if !list.is_sorted() || same(list) != same(&stored) {
+        list.copy_from_slice(&stored);
+    }
+}
+
+/// Which times equal the one before.
+fn same(list: &[f64]) -> Vec<bool> {
+    list.windows(2).map(|pair| pair[0] == pair[1]).collect()
 }
 
 impl Motion {
-    /// The lowest of the usual rates on whose frames all key times lie, if there is one.
+    /// The rate of the keys, if there are keys on neighbouring frames of it, and all lie on its frames.
     #[must_use]
     pub fn rate_of_keys(&self) -> Option<FrameRate> {
         let channels = [Channel::Translation, Channel::Scale];
-        let times = (0..self.set.track_count()).flat_map(|track| {
+        let lists = (0..self.set.track_count()).flat_map(|track| {
             let vectors = channels
                 .into_iter()
                 .filter_map(move |channel| self.set.vector_keys(channel, track));
             let rotations = self.set.track(track).times;
             std::iter::once(rotations).chain(vectors.map(|keys| keys.times))
         });
-        rate_of(times.flatten().copied(), Precision::F64)
+        let mut all: Vec<Vec<f64>> = Vec::new();
+        for list in lists {
+            // Tracks mostly have the times of the track before.
+            if all.last().is_none_or(|last| last != list) {
+                all.push(list.to_vec());
+            }
+        }
+        of(&Written::Times(&all, Precision::F64))?.rate()
     }
-}
-
-/// Whether all times are within one ulp of frames of the rate.
-pub(crate) fn fits(
-    mut times: impl Iterator<Item = f64>,
-    rate: FrameRate,
-    precision: Precision,
-) -> bool {
-    times.all(|time| {
-        let exact = frame_time(rate, frame(rate, time));
-        (time - exact).abs() <= precision.ulp(exact)
-    })
-}
-
-/// The nearest frame, negative before time 0.
-fn frame(rate: FrameRate, time: f64) -> f64 {
-    (time * rate.per_second()).round()
-}
-
-fn frame_time(rate: FrameRate, frame: f64) -> f64 {
-    rate.time_of(frame.abs() as u64).copysign(frame)
 }
 
 #[cfg(test)]
@@ -161,15 +117,26 @@ mod tests {
 
     #[test]
     fn times_before_zero_are_frames_too() {
-        let mut lists = vec![vec![
-            f64::from(-1.0f32 / 30.0),
-            0.0,
-            f64::from(1.0f32 / 3.0),
-        ]];
+        let mut lists = vec![rounded([1, 0, 10, 11].into_iter(), 30.0)];
+        lists[0][0] = -lists[0][0];
         assert_eq!(
             restore(&mut lists, Precision::F32),
             FrameRate::new(30, 1).ok()
         );
-        assert_eq!(lists[0], [-1.0 / 30.0, 0.0, 10.0 / 30.0]);
+        assert_eq!(lists[0], [-1.0 / 30.0, 0.0, 10.0 / 30.0, 11.0 / 30.0]);
+    }
+
+    /// Two keys one step of f32 apart are a cut: rounding must not make one time of them.
+    #[test]
+    fn a_cut_of_one_step_stays_a_cut() {
+        let mut times = rounded(0..=30, 30.0);
+        let cut = times[17];
+        times.insert(17, f64::from((cut as f32).next_down()));
+        let mut lists = vec![times];
+        assert_eq!(restore(&mut lists, Precision::F32), FrameRate::new(30, 1).ok());
+        let list = &lists[0];
+        assert_eq!((list[16], list[18], list[31]), (16.0 / 30.0, 17.0 / 30.0, 1.0));
+        assert!(list[16] < list[17] && list[17] < list[18], "{:?}", &list[16..19]);
+        assert!((list[18] - list[17] - f64::from(f32::EPSILON) / 4.0).abs() < 1e-12);
     }
 }

@@ -17,6 +17,9 @@ pub enum Duplicates {
     First,
     /// The last of them stays.
     Last,
+    /// Both stay, and the value jumps: the first is moved to the f32 before its time (6e-8 s at 1 s), or
+    /// half-way to the key before it where that is nearer. Of three or more, the first and the last.
+    Both,
 }
 
 /// Norms within this of 1 are normalised without a word: six printed digits.
@@ -72,7 +75,8 @@ impl Origin<'_> {
         keys.into_iter().enumerate().map(unit).collect()
     }
 
-    /// Which keys stay, so that times increase strictly; `None` if all do. `equal(i, j)` says
+    /// Which keys stay, so that times increase strictly; `None` if all do. The times of some are moved for
+    /// [`Duplicates::Both`]. `equal(i, j)` says
     /// whether the values of two keys are the same.
     ///
     /// # Errors
@@ -80,7 +84,7 @@ impl Origin<'_> {
     /// [`Duplicates::Refuse`] is asked for.
     pub(crate) fn increasing(
         &self,
-        times: &[f64],
+        times: &mut [f64],
         equal: impl Fn(usize, usize) -> bool,
         warnings: &mut Warnings,
     ) -> Result<Option<Vec<usize>>, Diagnostic> {
@@ -92,7 +96,10 @@ impl Origin<'_> {
             return Ok(None);
         }
         let mut kept: Vec<usize> = Vec::with_capacity(times.len());
-        for (key, &time) in times.iter().enumerate() {
+        // Whether the key before the last one that stays was moved from the same time.
+        let mut jumps = false;
+        for key in 0..times.len() {
+            let time = times[key];
             let Some(&before) = kept.last() else {
                 kept.push(key);
                 continue;
@@ -100,6 +107,7 @@ impl Origin<'_> {
             let last = times[before];
             if time > last {
                 kept.push(key);
+                jumps = false;
             } else if time < last {
                 let message =
                     format!("time {time} comes before the one before it, {last}; times increase");
@@ -113,12 +121,25 @@ impl Origin<'_> {
                 match self.duplicates {
                     Duplicates::Refuse => {
                         let message = format!(
-                            "two different keys at time {time}; --duplicates first or last keeps one"
+                            "two different keys at time {time}; --duplicates first or last keeps one, both a jump"
                         );
                         return Err(self.refuse(key, Code::EqualTimes, message));
                     }
                     Duplicates::First => {}
-                    Duplicates::Last => {
+                    Duplicates::Both if !jumps => {
+                        let earlier = kept.len().checked_sub(2).map(|place| times[kept[place]]);
+                        let Some(moved) = just_before(time, earlier) else {
+                            let message = format!(
+                                "two different keys at time {time}, and no time is left before it; \
+                                 --duplicates first or last keeps one"
+                            );
+                            return Err(self.refuse(key, Code::EqualTimes, message));
+                        };
+                        times[before] = moved;
+                        kept.push(key);
+                        jumps = true;
+                    }
+                    Duplicates::Last | Duplicates::Both => {
                         kept.pop();
                         kept.push(key);
                     }
@@ -157,6 +178,16 @@ pub(crate) fn quiet_unit_f32(key: Quat) -> Quat {
 #[inline(always)]
 fn is_unit(key: DQuat) -> bool {
     (dot(key, key) - 1.0).abs() <= 1.9 * UNIT_TOLERANCE
+}
+
+/// A time a step of f32 before another, after an earlier one.
+fn just_before(time: f64, earlier: Option<f64>) -> Option<f64> {
+    let step = f64::from((time as f32).next_down());
+    let Some(earlier) = earlier else {
+        return Some(step);
+    };
+    let moved = if step > earlier { step } else { 0.5 * (earlier + time) };
+    (earlier < moved && moved < time).then_some(moved)
 }
 
 /// The entries of a list whose keys stay.
@@ -237,16 +268,28 @@ mod tests {
 
     #[test]
     fn equal_times_keep_one_key_or_are_refused() {
-        let (times, values) = ([0.0, 1.0, 1.0, 1.0, 2.0], [5, 6, 6, 7, 8]);
-        let kept = |duplicates| {
+        let values = [5, 6, 6, 7, 8];
+        let kept_of = |times: &mut [f64], duplicates| {
             let equal = |i: usize, j: usize| values[i] == values[j];
-            origin(duplicates).increasing(&times, equal, &mut Warnings::new("t"))
+            origin(duplicates).increasing(times, equal, &mut Warnings::new("t"))
         };
+        let kept = |duplicates| kept_of(&mut [0.0, 1.0, 1.0, 1.0, 2.0], duplicates);
         assert_eq!(kept(Duplicates::First).unwrap(), Some(vec![0, 1, 4]));
         assert_eq!(kept(Duplicates::Last).unwrap(), Some(vec![0, 3, 4]));
         assert_eq!(kept(Duplicates::Refuse).unwrap_err().code, Code::EqualTimes);
+        // A jump keeps both, the earlier one a step before; so does one at the start, and a short one.
+        let mut times = [0.0, 1.0, 1.0, 1.0, 2.0];
+        let jump = kept_of(&mut times, Duplicates::Both).unwrap();
+        assert_eq!(jump, Some(vec![0, 1, 3, 4]));
+        assert_eq!(times[1], 1.0 - f64::from(f32::EPSILON) / 2.0);
+        let mut times = [-2.0, 0.0, 1.0, 1.0 + 1e-12, 1.0 + 1e-12];
+        assert_eq!(kept_of(&mut times, Duplicates::Both).unwrap(), Some(vec![0, 1, 2, 3, 4]));
+        assert!(times.windows(2).all(|pair| pair[0] < pair[1]), "{times:?}");
+        let next = 1f64.next_up();
+        let full = kept_of(&mut [0.0, 0.5, 1.0, next, next], Duplicates::Both).unwrap_err();
+        assert_eq!(full.code, Code::EqualTimes);
         let falling = origin(Duplicates::Last).increasing(
-            &[0.0, 1.0, 0.5],
+            &mut [0.0, 1.0, 0.5],
             |_, _| true,
             &mut Warnings::new("t"),
         );

@@ -35,6 +35,7 @@ pub mod path;
 pub mod poses;
 pub mod printable;
 pub mod quaternion;
+mod rate;
 pub mod reduce;
 mod rotation_matrix;
 pub mod sample;

@@ -3,7 +3,7 @@
 use glam::Vec3;
 use tumble::{Channel, Engine, Error, Frames, TrackError, TrackSet};
 
-use crate::grid::{Precision, fits};
+use crate::rate::{Precision, on_frames};
 use crate::motion::Motion;
 use crate::sample::ChannelMethods;
 
@@ -130,7 +130,7 @@ pub fn trim(clip: &Motion, start: f64, end: f64, engine: &Engine) -> Result<Moti
     }
     let rate = clip.rate.filter(|&rate| {
         let times = trimmed.tracks().flat_map(|track| track.times);
-        fits(times.copied(), rate, Precision::F64)
+        on_frames(times.copied(), rate, 0.0, Precision::F64)
     });
     Ok(Motion {
         set: trimmed,

@@ -11,10 +11,13 @@ use tumble::{Channel, TrackError, TrackSet};
 use crate::decimal::Decimal;
 use crate::diagnostic::{Code, Diagnostic, Place};
 use crate::feature::Feature;
-use crate::format::{Format, FormatOption, Loaded, MotionOptions, ReadOptions, WriteError};
-use crate::grid::{Precision, restore};
+use crate::format::{
+    Format, FormatOption, Loaded, MotionOptions, ReadOptions, TimeUnit, WriteError,
+};
+use crate::grid::restore;
 use crate::keys::{Origin, select};
 use crate::motion::{Joint, Motion, Sampled, Transform};
+use crate::rate::{Precision, last_place};
 use crate::source::Source;
 use crate::text::lines::{Lines, tokens};
 use crate::text::number;
@@ -41,7 +44,11 @@ pub static FORMAT: Format = Format {
     write: None,
     write_motion: Some(write_motion),
     features: &[Feature::Translations, Feature::UnevenTimes, Feature::Start],
-    options: &[FormatOption::RawTimes, FormatOption::Duplicates],
+    options: &[
+        FormatOption::RawTimes,
+        FormatOption::Duplicates,
+        FormatOption::TimeUnit,
+    ],
 };
 
 /// Reads a file; `-` is standard input.
@@ -68,7 +75,10 @@ pub fn read_tum(
     options: &ReadOptions,
 ) -> Result<Loaded, Diagnostic> {
     let mut lines = Lines::with_names(name, reader, options.limits)?;
-    let mut poses = Poses::default();
+    let mut poses = Poses {
+        unit: options.time_unit,
+        ..Poses::default()
+    };
     while let Some(line) = lines.next()? {
         let numbers = line.split('#').next().unwrap_or_default();
         if !numbers.trim().is_empty() {
@@ -83,9 +93,16 @@ pub fn read_tum(
     poses.into_clip(name, lines.warnings, options)
 }
 
+/// A first time of this many seconds, three billion years, is nanoseconds since 1970.
+const NANOSECONDS: f64 = 1e17;
+
 #[derive(Default)]
 struct Poses {
     times: Vec<Decimal>,
+    /// The most decimals of a time in seconds.
+    places: u32,
+    /// The unit of the times.
+    unit: Option<TimeUnit>,
     positions: Vec<Vec3>,
     rotations: Vec<DQuat>,
     /// The line of each.
@@ -112,11 +129,21 @@ impl Poses {
             }
             *number = read.value;
         }
-        let (column, time) = tokens(line).next().unwrap_or((1, ""));
-        let Some(time) = Decimal::parse(time) else {
-            let message = format!("the time {time} is out of range; is it seconds?");
+        let (column, token) = tokens(line).next().unwrap_or((1, ""));
+        if self.unit.is_none() && self.times.is_empty() && numbers[0].abs() >= NANOSECONDS {
+            self.unit = Some(TimeUnit::Nanoseconds);
+            let message = format!("the time {token} is taken for nanoseconds");
+            lines.warn(column, Code::Nanoseconds, message);
+        }
+        let power = self.unit.map_or(0, TimeUnit::power);
+        let Some(time) = Decimal::parse_in(token, power) else {
+            let message = format!(
+                "the time {token} is out of range; --time-unit ms, us or ns says that it is none of seconds"
+            );
             return Err(lines.refuse(column, Code::TumTime, message));
         };
+        let places = last_place(token).saturating_add(power).min(0).unsigned_abs();
+        self.places = self.places.max(places);
         let [_, x, y, z, qx, qy, qz, qw] = numbers;
         self.times.push(time);
         self.positions.push(Vec3::new(x as f32, y as f32, z as f32));
@@ -145,7 +172,7 @@ impl Poses {
         let mut times = [self.times.iter().map(|time| time.since(offset)).collect()];
         let rate = match options.raw_times {
             true => None,
-            false => restore(&mut times, Precision::F64),
+            false => restore(&mut times, Precision::Decimals(self.places)),
         };
         let [mut times] = times;
         let mut positions = self.positions;
@@ -158,7 +185,7 @@ impl Poses {
             }
             said
         };
-        let kept = origin.increasing(&times, equal, &mut warnings);
+        let kept = origin.increasing(&mut times, equal, &mut warnings);
         let kept = kept.map_err(from_offset)?;
         select(&mut times, kept.as_deref());
         select(&mut positions, kept.as_deref());

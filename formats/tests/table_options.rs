@@ -73,6 +73,35 @@ fn units_of_times_are_obeyed() {
     assert_eq!(times(wide, Some(TimeUnit::Seconds)).0[0], 0.0);
 }
 
+/// Text keeps digits that f64 has not.
+#[test]
+fn decimals_of_unix_time_keep_their_digits() {
+    let text = "time,x,y,z,w\n1403636579.763555584,0,0,0,1\n1403636579.768555584,0,0,0,1\n";
+    let clip = &read(text, &ReadOptions::default()).unwrap().clips[0];
+    assert_eq!(clip.time_offset, 1_403_636_579);
+    assert_eq!(clip.set.track(0).times, [0.763_555_584, 0.768_555_584]);
+    assert_eq!(clip.rate, FrameRate::new(200, 1).ok());
+    let options = ReadOptions {
+        time_unit: Some(TimeUnit::Nanoseconds),
+        ..ReadOptions::default()
+    };
+    let text = text.replace("1403636579.", "1403636579").replace("84,", "84.0,");
+    let same = &read(&text, &options).unwrap().clips[0];
+    assert_eq!((same.time_offset, same.set.track(0).times), (clip.time_offset, clip.set.track(0).times));
+    let far = read(&text, &ReadOptions::default()).unwrap_err();
+    assert_eq!(far.code, Code::Time);
+}
+
+/// A rate beside times would be another, and one of them would be ignored.
+#[test]
+fn a_rate_beside_times_is_refused() {
+    let options = ReadOptions {
+        source_rate: FrameRate::new(30, 1).ok(),
+        ..ReadOptions::default()
+    };
+    assert_eq!(read(FOUR, &options).unwrap_err().code, Code::RateBesideTimes);
+}
+
 #[test]
 fn frames_are_times_at_the_rate_that_is_given() {
     let text = FOUR.replace("time", "frame_index");

@@ -121,9 +121,40 @@ fn times_on_frames_are_frames_of_a_rate() {
     );
 }
 
+/// ORB-SLAM writes nanoseconds, as whole numbers or with zeros behind them.
+#[test]
+fn nanoseconds_keep_their_digits() {
+    for end in ["", ".000000"] {
+        let line = |ns: u64| format!("{ns}{end} 0 0 0 0 0 0 1\n");
+        let text: String = (0..4).map(|k| line(1_403_636_579_763_555_584 + k * 50_000_000)).collect();
+        let options = ReadOptions::default();
+        let loaded = read_tum("t", text.as_bytes(), &options).unwrap();
+        let clip = &loaded.clips[0];
+        assert_eq!((clip.time_offset, clip.rate), (1_403_636_579, FrameRate::new(20, 1).ok()));
+        assert_eq!(clip.set.track(0).times[..2], [0.763_555_584, 0.813_555_584]);
+        assert_eq!(loaded.warnings[0].code, Code::Nanoseconds);
+        let options = ReadOptions {
+            time_unit: Some(tumble_formats::format::TimeUnit::Nanoseconds),
+            ..options
+        };
+        let said = read_tum("t", text.as_bytes(), &options).unwrap();
+        assert_eq!(bits(&said.clips[0]), bits(clip));
+        assert!(said.warnings.is_empty());
+        assert!(written(clip).contains("\n1403636579.813555584 0 0 0"));
+    }
+}
+
 #[test]
 fn equal_times_keep_the_pose_that_is_asked_for() {
     let text = "1 0 0 0 0 0 0 1\n2 1 0 0 0 0 0 1\n2 2 0 0 0 0 0 1\n3 3 0 0 0 0 0 1\n";
+    let both = ReadOptions {
+        duplicates: Duplicates::Both,
+        ..ReadOptions::default()
+    };
+    let loaded = read_tum("t", text.as_bytes(), &both).unwrap();
+    let jump = keyed(&loaded.clips[0]).unwrap();
+    assert_eq!(jump.translations, [0.0, 1.0, 2.0, 3.0].map(|x| Vec3::X * x));
+    assert_eq!(jump.times, [0.0, 1.0 - f64::from(f32::EPSILON) / 2.0, 1.0, 2.0]);
     for (duplicates, kept) in [(Duplicates::First, 1.0), (Duplicates::Last, 2.0)] {
         let options = ReadOptions {
             duplicates,

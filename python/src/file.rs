@@ -142,9 +142,9 @@ impl File {
 /// raw_times=False, scale=None, up=None)`
 ///
 /// `format`: of the file, instead of by its first bytes and its name. `source_fps`: the rate of
-/// keys, where the file does not say it. `map`: which array or column is what, where names do not
+/// keys of files without times. `map`: which array or column is what, where names do not
 /// tell: "rotations=keys:wxyz,time=t". `time_unit`: of times that are whole numbers, "s", "ms", "us"
-/// or "ns". `duplicates`: of two different keys at one time, keep the "first" or the "last".
+/// or "ns". `duplicates`: of two different keys at one time, keep the "first", the "last" or "both", for a jump.
 /// `raw_times`: leave times as they are, instead of on the frames that they were rounded from.
 /// `scale`: multiply translations. `up`: turn so that "y" or "z" is up, where the other was.
 ///
@@ -181,7 +181,11 @@ pub(crate) fn load(
             Some(which) => one_of(
                 which,
                 "duplicates",
-                &[("first", Duplicates::First), ("last", Duplicates::Last)],
+                &[
+                    ("first", Duplicates::First),
+                    ("last", Duplicates::Last),
+                    ("both", Duplicates::Both),
+                ],
             )?,
         },
         source_rate: source_fps.map(frame_rate).transpose()?,

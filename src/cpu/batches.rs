@@ -61,7 +61,7 @@ impl CpuEngine {
             let mut memory = self.scratch_pool.take(request);
             for batch in batches {
                 memory.prepare(set, batch.intervals(set))?;
-                let own = batch.samples(set, timeline, PART_INTERVALS);
+                let own = batch.samples(set, timeline, request.interpolation.steps());
                 for part in memory.parts() {
                     stage.row(own.len(), |row, output| {
                         let copy = TrackCopy::own(own.start + row.start..own.start + row.end);
@@ -78,24 +78,25 @@ impl CpuEngine {
         }
         // A task takes several batches, which share its scratch.
         let each = batches.len().div_ceil(32 * threads);
-        let tasks = tasks(set, timeline, &batches, each, PART_INTERVALS, output);
+        let steps = request.interpolation.steps();
+        let tasks = tasks(set, timeline, &batches, each, steps, output);
         self.on_threads(|| tasks.into_par_iter().try_for_each(task))?
     }
 }
 
-/// Cuts `output` among tasks of `each` consecutive batches; `part` is the argument of
-/// [`Batch::samples`].
+/// Cuts `output` among tasks of `each` consecutive batches; `steps` is the argument
+/// of [`Batch::samples`].
 pub(crate) fn tasks<'b, 'o>(
     set: &TrackSet,
     timeline: &Timeline,
     batches: &'b [Batch],
     each: usize,
-    part: usize,
+    steps: bool,
     mut output: &'o mut [[f32; 4]],
 ) -> Vec<(&'b [Batch], &'o mut [[f32; 4]])> {
     let with_place = |batches: &'b [Batch]| {
         let rotations = (batches.iter())
-            .map(|batch| batch.tracks().len() * batch.samples(set, timeline, part).len());
+            .map(|batch| batch.tracks().len() * batch.samples(set, timeline, steps).len());
         let own = output.split_off_mut(..rotations.sum());
         (batches, own.unwrap_or_default())
     };

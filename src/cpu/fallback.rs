@@ -94,7 +94,7 @@ fn unresolved(
         }
         return all;
     };
-    let clock = FrameClock::new(rate, start, times[last]);
+    let clock = FrameClock::new(rate, start, false);
     for (sample, rotation) in (first..).zip(output) {
         if *rotation != UNRESOLVED {
             continue;

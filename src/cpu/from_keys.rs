@@ -34,7 +34,7 @@ impl CpuEngine {
         };
         let new = || KeyEvaluator::new(request.interpolation, curve);
         let task = |evaluator: &mut KeyEvaluator<'a>, batch: &Batch, output: &mut [[f32; 4]]| {
-            let window = batch.samples(set, timeline, usize::MAX);
+            let window = batch.samples(set, timeline, false);
             let is_resolved = evaluator.evaluate(set, batch, timeline, &window, output)?;
             if is_resolved || window.is_empty() {
                 return Ok(());
@@ -51,7 +51,7 @@ impl CpuEngine {
         if let [batch] = &*batches {
             return task(&mut new(), batch, output);
         }
-        let tasks = tasks(set, timeline, &batches, 1, usize::MAX, output);
+        let tasks = tasks(set, timeline, &batches, 1, false, output);
         self.on_threads(|| {
             (tasks.into_par_iter()).try_for_each_init(new, |evaluator, (batch, output)| {
                 task(evaluator, &batch[0], output)

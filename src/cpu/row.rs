@@ -51,11 +51,9 @@ impl<S: Evaluate, O: Samples + ?Sized> InLanesInto<[S], O> for Row<'_> {
             return self.few(segments, output.samples());
         }
         if let (&Ticks::Frames { rate, start }, true) = (&self.timeline.ticks, self.copy.is_own()) {
-            let clock = FrameClock::new(rate, start, part.end);
+            let clock = FrameClock::new(rate, start, prepared.spans.steps);
             if self.spans::<L, S, O>(clock, segments, output) {
-                let starts = &prepared.spans.starts[part.spans.clone()];
-                let begin = starts.first().copied().unwrap_or(part.end);
-                let runs = part.runs_outside(begin, clock, &self.copy.samples);
+                let runs = (prepared.spans).runs_outside(part, clock, &self.copy.samples);
                 let mut outside = OneByOne {
                     row: self,
                     segments,

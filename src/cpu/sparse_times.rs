@@ -4,13 +4,12 @@
 use bytemuck::Zeroable;
 
 use crate::cpu::evaluate::one;
-use crate::math::canonical::round_f32;
 use crate::output::window::Window;
 use crate::prepare::clip_data::{ClipData, PartRef};
 use crate::shader::{ArcSegment, Form};
 use crate::simd::dispatch::InLanes;
 use crate::simd::lanes::{Lanes, canonical};
-use crate::time::runs::{Distance, RunSource};
+use crate::time::runs::RunSource;
 use crate::twin::evaluate_arc::{norm_squared, on_arc};
 
 /// Samples that are evaluated together.
@@ -54,20 +53,20 @@ impl InLanes for FewTimes<'_> {
             let times = &self.times[track * self.stride..][samples.clone()];
             for (k, &time) in times.iter().enumerate() {
                 let place = i * samples.len() + k;
-                let (index, middle, affine) = match prepared.spans.source_at(part, time) {
+                let (index, distance, affine) = match prepared.spans.source_at(part, time) {
                     Some(RunSource::Constant(index)) => {
                         self.output[place] = prepared.constants[index as usize];
                         continue;
                     }
-                    Some(RunSource::Segment(index, Distance::Seconds { middle }, affine)) => {
-                        (index as usize, middle, affine)
+                    Some(RunSource::Segment(index, distance, affine)) => {
+                        (index as usize, distance.of(0, || time), affine)
                     }
                     _ => {
                         self.others.push(i);
                         break;
                     }
                 };
-                let (segments, distance) = (&prepared.segments, round_f32(time - middle));
+                let segments = &prepared.segments;
                 match segments.form {
                     Form::Arc => {
                         let parameter = distance * affine.scale + affine.offset;

@@ -17,7 +17,7 @@ use crate::shader::{
     CHANNELS, CrowdBase, CrowdChannel, CrowdClip, CrowdSpan, FORM_ARC, FORM_CONSTANT, FORM_CUBIC,
     FORM_POLYNOMIAL, Form, ON_KEY, POWERS, SCALE,
 };
-use crate::time::frame_clock::{FrameClock, in_frames};
+use crate::time::frame_clock::{FrameClock, FrameStart, in_frames};
 use crate::time::frame_rate::FrameRate;
 use crate::time::spans::{NONE, Source};
 use crate::time::wrap::{TrackCopy, WrapMode};
@@ -104,7 +104,7 @@ fn curve(
     data: &ClipData,
     track: usize,
     form: u32,
-    (rate, start, period): (FrameRate, f64, u32),
+    (rate, start, period): (FrameRate, FrameStart, u32),
 ) -> Result<Curve, CrowdError> {
     let mut curve = Curve {
         form,
@@ -114,7 +114,7 @@ fn curve(
     let last_tick = f64::from(period);
     for own in data.parts_in(track, &whole) {
         let (prepared, part) = (own.prepared, own.part);
-        let frames = FrameClock::new(rate, start, part.end);
+        let frames = FrameClock::new(rate, start, prepared.spans.steps);
         let constant = |index: u32| prepared.constants[index as usize];
         let starts = &prepared.spans.starts[part.spans.clone()];
         let begin = frames.boundary(*starts.first().unwrap_or(&part.end));
@@ -202,7 +202,7 @@ impl ClipTables {
             });
         }
         let period = (ticks as u32).max(1);
-        let clock = (rate, start, period);
+        let clock = (rate, FrameStart::new(start, (start, end)), period);
         let rotations = ClipData::new(set, interpolation, Wanted::all(set))?;
         let form = match interpolation.form() {
             Form::Arc => FORM_ARC,

@@ -149,7 +149,7 @@ impl Backend {
             };
             let folded = clip.data.folded(&timeline)?;
             let window = Window {
-                samples: batch.samples(set, &timeline, PART_INTERVALS),
+                samples: batch.samples(set, &timeline, interpolation.steps()),
                 ..Window::whole(own.len(), timeline.len(), layout)
             };
             let evaluate = |output: &mut [Quat]| {

@@ -44,12 +44,11 @@ impl<'a> KeyJob<'a> {
         self.weights().is_none().then_some(self.request.set.keys())
     }
 
-    /// The clock of a track whose samples are frames.
-    pub(crate) fn clock(&self, track: usize) -> Option<FrameClock> {
+    /// The clock of samples that are frames.
+    pub(crate) fn clock(&self) -> Option<FrameClock> {
         match self.request.timeline.ticks {
             Ticks::Frames { rate, start } => {
-                let times = self.request.set.times_and_keys(track).0;
-                Some(FrameClock::new(rate, start, times[times.len() - 1]))
+                Some(FrameClock::new(rate, start, false))
             }
             Ticks::Times { .. } => None,
         }
@@ -99,7 +98,7 @@ impl<'a> KeyJob<'a> {
                     Batch::Tracks(tracks) => set.keys_of(tracks.clone()),
                     Batch::Intervals { .. } => self.keys_of(&batch).map(|own| own.keys.len()).sum(),
                 };
-                let all = batch.samples(set, timeline, usize::MAX);
+                let all = batch.samples(set, timeline, false);
                 tasks.extend(all.clone().step_by(most).map(|first| Task {
                     batch: batch.clone(),
                     samples: first..all.end.min(first + most),

@@ -68,7 +68,7 @@ impl<'a> KeyEvaluator<'a> {
             self.interpolation.check_track(whole.keys, index)?;
             match &timeline.ticks {
                 Ticks::Frames { rate, start } => {
-                    let clock = FrameClock::new(*rate, *start, whole.times[whole.all - 1]);
+                    let clock = FrameClock::new(*rate, *start, false);
                     let keys = whole.around(&own, self.curve.beside());
                     let samples = self.plan.samples(keys, clock, window)?;
                     let left = self.block.whole_vectors(keys, samples, &mut output);

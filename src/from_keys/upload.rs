@@ -131,7 +131,7 @@ impl KeyDispatch<'_, '_> {
             }
         }
         if !written.samples.is_empty()
-            && let Some(clock) = self.job.clock(track.index)
+            && let Some(clock) = self.job.clock()
         {
             let own = take_first(&mut written.samples, task.samples.len());
             let found = known.frames.samples(track, clock, &task.samples)?;

@@ -94,7 +94,7 @@ impl<'a> SampleList<'a> {
             return row;
         }
         let starts = &prepared.spans.starts[part.spans.clone()];
-        let clock = FrameClock::new(rate, start, part.end);
+        let clock = FrameClock::new(rate, start, prepared.spans.steps);
         let first = clock.first_frame(starts.first().copied().unwrap_or(part.end));
         row + (first as usize).clamp(samples.start, samples.end) - samples.start
     }

@@ -10,7 +10,6 @@ use crate::gpu::in_flight::copy;
 use crate::gpu::memory_types::KernelReads;
 use crate::gpu::sample_list::SampleList;
 use crate::gpu::upload::Upload;
-use crate::math::canonical::round_f32;
 use crate::output::window::Window;
 use crate::prepare::clip_data::ClipData;
 use crate::prepare::prepared::Prepared;
@@ -294,10 +293,10 @@ impl Emit for PartsList<'_> {
                 whole.first = match distance {
                     Distance::Near { first } => first as i32,
                     Distance::Frames { first } => first,
-                    Distance::Seconds { middle } => {
+                    Distance::Seconds { .. } => {
                         let own = chunk.distances.len() as i32;
                         let from_middle =
-                            |sample| round_f32(timeline.time_at(track, sample) - middle);
+                            |sample| distance.of(0, || timeline.time_at(track, sample));
                         chunk.distances.extend(samples.map(from_middle));
                         own
                     }

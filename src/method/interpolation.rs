@@ -159,6 +159,11 @@ impl Interpolation {
         self.quantity != Quantity::Rotation || extrapolates || constant
     }
 
+    /// Whether keys are held until the next one.
+    pub(crate) fn steps(&self) -> bool {
+        matches!(*self.method.curves, Curves::Steps)
+    }
+
     pub(crate) fn wrap(&self) -> Wrap {
         Wrap {
             before: self.before,

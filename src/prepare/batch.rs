@@ -44,34 +44,36 @@ impl Batch {
     }
 
     /// The samples that the batch gives: those from its first key up to its end, and those before a
-    /// track's first key or after its last. `part` is the number of intervals in each part of a
-    /// track: a sample counts as being on a key within a tolerance that depends on the time at
-    /// which the key's part ends.
-    pub(crate) fn samples(&self, set: &TrackSet, timeline: &Timeline, part: usize) -> Range<usize> {
+    /// track's first key or after its last. `steps` is whether keys are held until the next one.
+    pub(crate) fn samples(
+        &self,
+        set: &TrackSet,
+        timeline: &Timeline,
+        steps: bool,
+    ) -> Range<usize> {
         let Self::Intervals { track, intervals } = self else {
             return 0..timeline.len();
         };
         let (times, _) = set.times_and_keys(*track);
         let from = match intervals.start {
             0 => 0,
-            start => first_sample(times, timeline, start, part),
+            start => first_sample(times[start], timeline, steps),
         };
         let to = match intervals.end + 1 == times.len() {
             true => timeline.len(),
-            false => first_sample(times, timeline, intervals.end, part),
+            false => first_sample(times[intervals.end], timeline, steps),
         };
         from..to.max(from)
     }
 }
 
-/// The first sample of the part that starts with an interval.
-fn first_sample(times: &[f64], timeline: &Timeline, interval: usize, part: usize) -> usize {
+/// The first sample of the interval that starts at a time.
+fn first_sample(time: f64, timeline: &Timeline, steps: bool) -> usize {
     let Ticks::Frames { rate, start } = timeline.ticks else {
         return 0;
     };
-    let end = interval.saturating_add(part).min(times.len() - 1);
-    let clock = FrameClock::new(rate, start, times[end]);
-    (clock.first_frame(times[interval]) as usize).min(timeline.len())
+    let clock = FrameClock::new(rate, start, steps);
+    (clock.first_frame(time) as usize).min(timeline.len())
 }
 
 /// How a set is cut into batches.
@@ -154,10 +156,10 @@ mod tests {
         assert_eq!(found, expected);
         let timeline = Frames::fps(2).resolve(8, set.time_span()).unwrap();
         let samples: Vec<_> = (found[2..5].iter())
-            .map(|batch| batch.samples(&set, &timeline, PART_INTERVALS))
+            .map(|batch| batch.samples(&set, &timeline, false))
             .collect();
         assert_eq!(samples, [0..24, 24..48, 48..59]);
-        assert_eq!(found[0].samples(&set, &timeline, PART_INTERVALS), 0..59);
+        assert_eq!(found[0].samples(&set, &timeline, false), 0..59);
 
         let whole = BatchSize { cut: None, ..size };
         let long = batches(&set, Batch::Tracks(4..5), whole);

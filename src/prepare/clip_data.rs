@@ -171,6 +171,7 @@ impl ClipData {
         let batches: Vec<usize> = (0..set.track_count()).step_by(VECTOR_BATCH).collect();
         let batch = |first: usize| {
             let mut prepared = Prepared::new(&interpolation);
+            prepared.spans.steps = method == VectorMethod::Step;
             for index in first..set.track_count().min(first + VECTOR_BATCH) {
                 let track = set.vectors(channel, index).unwrap_or(&still);
                 vectors::add(&mut prepared, index, track, method, &interpolation);
@@ -272,7 +273,7 @@ impl ClipData {
         copy: &TrackCopy,
     ) -> impl Iterator<Item = PartRef<'_>> {
         let all = self.places(track);
-        let backwards = copy.sign < 0.0;
+        let backwards = copy.is_backwards();
         (0..all.len()).map(move |i| {
             let place = if backwards { all.len() - 1 - i } else { i };
             self.part(all[place])

@@ -49,7 +49,10 @@ impl Prepared {
             segments: Segments::new(interpolation.form()),
             constants: Vec::new(),
             exact: Vec::new(),
-            spans: Spans::default(),
+            spans: Spans {
+                steps: interpolation.steps(),
+                ..Spans::default()
+            },
             parts: Vec::new(),
             wrap: interpolation.wrap(),
         }
@@ -127,8 +130,7 @@ impl Prepared {
             // At times beyond those allowed for keys, a curve's powers would overflow.
             Ticks::Times { .. } => timeline.time_at(track, sample).clamp(-LATEST, LATEST),
         };
-        let t = (at - parameter.start) / parameter.length;
-        round_quat(self.exact[index as usize].value(t))
+        round_quat(self.exact[index as usize].value(parameter.at(at)))
     }
 
     /// The copies of a part's track among some samples.

@@ -20,7 +20,7 @@ use crate::prepare::fitting::Fitting;
 use crate::prepare::prepared::Prepared;
 use crate::shader::PolynomialSegment;
 use crate::simd::dispatch::in_lanes;
-use crate::time::frame_clock::FrameClock;
+use crate::time::frame_clock::{FrameClock, FrameStart};
 use crate::time::frame_rate::FrameRate;
 use crate::time::spans::{NONE, Source};
 use crate::time::wrap::WrapMode;
@@ -45,7 +45,7 @@ pub(crate) struct SmoothPreparation {
     /// Curves that are traversed at constant speed, until their whole track is there.
     waiting: Vec<Waiting>,
     /// The frames' rate and start, if only intervals that contain a frame are wanted.
-    pub(crate) frames: Option<(FrameRate, f64)>,
+    pub(crate) frames: Option<(FrameRate, FrameStart)>,
 }
 
 impl SmoothPreparation {
@@ -264,7 +264,7 @@ impl SmoothPreparation {
         let mut holds_frame = [true; LANES];
         if let Some((rate, start)) = self.frames {
             let mut frames = FramesHeld {
-                clock: FrameClock::new(rate, start, prepared.parts[stretch.part].end),
+                clock: FrameClock::new(rate, start, false),
                 intervals: &self.intervals,
                 lanes: stretch.lanes(),
                 held: holds_frame,

@@ -3,7 +3,7 @@
 
 use crate::math::canonical::{nearest_whole, round_f32};
 use crate::time::frame_rate::FrameRate;
-use crate::time::wrap::TrackCopy;
+use crate::time::wrap::{CopyPlace, TrackCopy};
 
 /// How the parameter of a frame within a span follows from the frame's number.
 pub(crate) struct InFrames {
@@ -36,16 +36,56 @@ pub(crate) fn finite_scale(scale: f64) -> f32 {
     round_f32(if scale < largest { scale } else { largest })
 }
 
+/// Two moments this close, in seconds, are one: 2^-33, so that a joint that turns 50 times a second is
+/// at most 4e-8 rad off.
+pub(crate) const RESOLUTION: f64 = 1.0 / (1u64 << 33) as f64;
+
+/// When frame 0 is, and the largest magnitude of a time beside it: its own, or that of the first key of the
+/// set or of its last. Times were computed from such, and have their rounding.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct FrameStart {
+    pub(crate) seconds: f64,
+    pub(crate) latest: f64,
+}
+
+impl FrameStart {
+    pub(crate) fn new(seconds: f64, (first, last): (f64, f64)) -> Self {
+        let latest = seconds.abs().max(first.abs()).max(last.abs());
+        Self { seconds, latest }
+    }
+}
+
+/// By how much the rounding of times of this magnitude may have moved a key, in seconds: times are often
+/// sums or products, so a few steps
+/// of f64. From two days on that would be longer than [`RESOLUTION`], and there a curve is evaluated where
+/// its frame lies. Only where keys are `held` until the next one, and which of two is shown hangs on the
+/// rounding, is a key moved by up to a step of its own f64.
+#[inline(always)]
+pub(crate) fn rounding(magnitude: f64, held: bool) -> f64 {
+    let few = 4.0 * f64::EPSILON * magnitude;
+    let step = if held { f64::EPSILON * magnitude } else { 0.0 };
+    let most = if step > RESOLUTION { step } else { RESOLUTION };
+    if few < most { few } else { most }
+}
+
 /// Converts the key times of a track, or of one of its copies, to frame coordinates, in f64 and by an
 /// exact frame rate.
+///
+/// It is the same for all parts of a track: they agree where they meet.
 #[derive(Clone, Copy, PartialEq)]
 pub(crate) struct FrameClock {
     rate: FrameRate,
+    /// When frame 0 is.
     start: f64,
-    /// As in [`TrackCopy`]; 1 and 0 for the track itself.
+    /// The track's time from which frames are counted, and its frame coordinate.
+    origin: f64,
+    at_origin: f64,
+    /// -1 in a copy that runs backwards.
     sign: f64,
-    offset: f64,
-    /// How far the rounding of a time to f64 may move a key, in frames.
+    /// Whether keys are held until the next one.
+    steps: bool,
+    /// The largest magnitude of a time, and by how much its rounding may move a key, in frames.
+    latest: f64,
     rounding: f64,
 }
 
@@ -59,26 +99,41 @@ pub(crate) struct Boundary {
 }
 
 impl FrameClock {
-    /// `latest` is the largest time that will be converted, in seconds.
-    pub(crate) fn new(rate: FrameRate, start: f64, latest: f64) -> Self {
-        let rounding = 4.0 * f64::EPSILON * rate.frames_in(latest.abs().max(start.abs()));
+    /// `steps` is whether the track's keys are held until the next one.
+    pub(crate) fn new(rate: FrameRate, start: FrameStart, steps: bool) -> Self {
+        let FrameStart { seconds, latest } = start;
         Self {
             rate,
-            start,
+            start: seconds,
+            origin: seconds,
+            at_origin: 0.0,
             sign: 1.0,
-            offset: 0.0,
-            rounding,
+            steps,
+            latest,
+            rounding: rate.frames_in(rounding(latest, steps)),
         }
     }
 
     /// The same in a copy of the track.
     #[inline]
     pub(crate) fn in_copy(self, copy: &TrackCopy) -> Self {
-        Self {
-            sign: copy.sign,
-            offset: copy.offset,
-            rounding: self.rounding + 4.0 * f64::EPSILON * copy.offset.abs(),
-            ..self
+        match copy.place {
+            CopyPlace::Own | CopyPlace::At(_) => self,
+            CopyPlace::Frames {
+                first,
+                at_first,
+                backwards,
+            } => {
+                let latest = self.latest + at_first.abs() / self.rate.per_second();
+                Self {
+                    origin: first,
+                    at_origin: at_first,
+                    sign: if backwards { -1.0 } else { 1.0 },
+                    latest,
+                    rounding: self.rate.frames_in(rounding(latest, self.steps)),
+                    ..self
+                }
+            }
         }
     }
 
@@ -93,7 +148,7 @@ impl FrameClock {
     /// on a key returns the key even at hour 24.
     #[inline(always)]
     pub(crate) fn boundary(self, time: f64) -> Boundary {
-        let exact = self.rate.frames_in(time - self.start) * self.sign + self.offset;
+        let exact = self.rate.frames_in(time - self.origin) * self.sign + self.at_origin;
         let whole = nearest_whole(exact);
         let is_whole = (exact - whole).abs() <= self.rounding;
         let frame = if is_whole { whole } else { exact };
@@ -111,7 +166,7 @@ impl FrameClock {
     /// The track's time at a frame; `None` in a copy.
     #[inline]
     pub(crate) fn own_time(self, frame: usize) -> Option<f64> {
-        let is_own = self.sign == 1.0 && self.offset == 0.0;
+        let is_own = self.sign == 1.0 && self.origin == self.start && self.at_origin == 0.0;
         is_own.then(|| self.start + self.rate.time_of(frame as u64))
     }
 

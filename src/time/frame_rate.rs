@@ -71,6 +71,20 @@ impl FrameRate {
         }
     }
 
+    /// The time of a frame after frame 0: whole seconds, and what is left of one.
+    #[inline]
+    pub(crate) fn seconds_of(self, frame: u64) -> (f64, f64) {
+        let (frames, product) = (u128::from(self.frames), u128::from(frame) * u128::from(self.seconds));
+        let rest = (product % frames) as f64;
+        ((product / frames) as f64, rest / self.frames as f64)
+    }
+
+    /// Frames and seconds, both exact in f64.
+    #[inline]
+    pub(crate) fn ratio(self) -> (f64, f64) {
+        (self.frames as f64, self.seconds as f64)
+    }
+
     /// The time of frame `frame`, seconds after frame 0.
     #[must_use]
     pub fn time_of(self, frame: u64) -> f64 {

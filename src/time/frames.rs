@@ -8,7 +8,9 @@
 use std::sync::Arc;
 
 use crate::memory::{OutOfMemory, reserved};
+use crate::time::frame_clock::FrameStart;
 use crate::time::frame_rate::FrameRate;
+use crate::time::moment::Moment;
 
 /// More samples of one track than this are refused.
 pub const MAX_FRAMES: u64 = 1 << 40;
@@ -193,9 +195,13 @@ impl Frames {
                 if end < start {
                     return Err(FramesError::ReversedRange { start, end });
                 }
-                let count = (rate.frames_in(end - start) + LAST_FRAME_TOLERANCE).floor() + 1.0;
+                // Times that were rounded to f64 may have moved by a step of it.
+                let step = f64::EPSILON * start.abs().max(end.abs());
+                let tolerance = rate.frames_in(step).clamp(LAST_FRAME_TOLERANCE, 0.5);
+                let count = (rate.frames_in(end - start) + tolerance).floor() + 1.0;
                 check_size(tracks, count)?;
-                (Ticks::Frames { rate: *rate, start }, count as usize)
+                let (rate, start) = (*rate, FrameStart::new(start, (first, last)));
+                (Ticks::Frames { rate, start }, count as usize)
             }
             Request::Shared(times) => {
                 finite(times)?;
@@ -244,7 +250,7 @@ pub struct Timeline {
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Ticks {
     /// Frame `k` lies at `start + k / rate`.
-    Frames { rate: FrameRate, start: f64 },
+    Frames { rate: FrameRate, start: FrameStart },
     /// Sample `k` of track `t` lies at `times[t × stride + k]`; a stride of 0 is
     /// one list for all tracks.
     Times { times: Arc<Vec<f64>>, stride: usize },
@@ -313,11 +319,19 @@ impl Timeline {
         (0..count).map(move |sample| self.time_at(track, sample))
     }
 
+    /// The exact time of a sample that there is.
+    pub(crate) fn moment_at(&self, track: usize, sample: usize) -> Moment {
+        match &self.ticks {
+            Ticks::Frames { rate, start } => Moment::of_frame(start.seconds, *rate, sample as u64),
+            Ticks::Times { .. } => Moment::new(self.time_at(track, sample)),
+        }
+    }
+
     /// The time of a sample that there is, in seconds.
     #[inline]
     pub(crate) fn time_at(&self, track: usize, sample: usize) -> f64 {
         match &self.ticks {
-            Ticks::Frames { rate, start } => start + rate.time_of(sample as u64),
+            Ticks::Frames { rate, start } => start.seconds + rate.time_of(sample as u64),
             Ticks::Times { times, stride } => times[track * stride + sample],
         }
     }
@@ -335,6 +349,15 @@ mod tests {
         assert_eq!(frames.len(), 501);
         assert_eq!(Frames::fps(25).resolve(1, set(20.09)).unwrap().len(), 500);
         assert_eq!(Frames::fps(1).resolve(1, set(0.1)).unwrap().len(), 1);
+    }
+
+    #[test]
+    fn the_last_key_of_unix_time_keeps_its_frame() {
+        for frames in 1..200u32 {
+            let last = 1.7e9 + f64::from(frames) / 100.0;
+            let timeline = Frames::fps(100).resolve(1, Some((1.7e9, last))).unwrap();
+            assert_eq!(timeline.len(), frames as usize + 1);
+        }
     }
 
     #[test]

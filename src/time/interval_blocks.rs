@@ -102,7 +102,7 @@ impl<'a> IntervalBlocks<'a> {
         clock: FrameClock,
         samples: Range<usize>,
     ) -> Self {
-        // Intervals before that of the first sample are skipped. The one before it is kept, because
+        // Intervals before that of the first sample are skipped. The two before it are kept, because
         // rounding may put the sample there.
         let mut done = 0;
         if samples.start > 0
@@ -114,7 +114,7 @@ impl<'a> IntervalBlocks<'a> {
                 Some(&last) if last <= first_time => starts.len(),
                 _ => starts.partition_point(|&start| start <= first_time),
             };
-            done = found.saturating_sub(2);
+            done = found.saturating_sub(3);
         }
         Self {
             clock,
@@ -229,6 +229,7 @@ fn within(sample: f64, [start, end]: [f64; 2]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::time::frame_clock::FrameStart;
     use crate::time::frame_rate::FrameRate;
 
     /// Steps of one frame add up without rounding only while f32 exactly holds every distance, also
@@ -238,7 +239,8 @@ mod tests {
         let rate = FrameRate::new(1, 1).unwrap();
         for (frames, are_near) in [((1u64 << 24) - 2, true), ((1 << 24) + 2, false)] {
             let (starts, end) = ([0.0], frames as f64);
-            let clock = FrameClock::new(rate, 0.0, end);
+            let start = FrameStart::new(0.0, (0.0, end));
+            let clock = FrameClock::new(rate, start, false);
             let mut intervals = IntervalBlocks::new(&starts, end, clock, 0..frames as usize);
             let mut block = IntervalBlock::zeroed();
             assert_eq!(intervals.fill(&mut block), Some(0..1));

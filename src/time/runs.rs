@@ -10,8 +10,9 @@ use crate::math::canonical::round_f32;
 use crate::time::frame_clock::FrameClock;
 use crate::time::frames::{FramesError, Ticks, Timeline};
 use crate::time::interval_blocks::{IntervalBlock, IntervalBlocks};
+use crate::time::moment::Moment;
 use crate::time::spans::{NONE, Part, Source, Spans};
-use crate::time::wrap::TrackCopy;
+use crate::time::wrap::{CopyPlace, TrackCopy};
 
 /// Consecutive samples of one track with one source.
 #[derive(Debug, Clone, Copy)]
@@ -60,6 +61,19 @@ impl RunSource {
         let curve = (index != NONE).then_some(Self::Exact { index, parameter });
         Self::held(constant).or(curve)
     }
+
+    /// A segment at one parameter, whatever the sample.
+    fn at(index: u32, parameter: f32) -> Self {
+        let (scale, offset) = (0.0, parameter);
+        Self::Segment(index, Distance::Near { first: 0.0 }, Affine { scale, offset })
+    }
+
+    /// A curve in f64 at one parameter, whatever the sample.
+    fn exact_at(index: u32, t: f64) -> Self {
+        let (start, length) = (t, f64::INFINITY);
+        let parameter = Parameter { start, length };
+        Self::Exact { index, parameter }
+    }
 }
 
 /// How a run's parameter follows from the distance to the segment's middle:
@@ -79,8 +93,8 @@ pub(crate) enum Distance {
     Near { first: f32 },
     /// The same where f32 may not hold them exactly.
     Frames { first: i32 },
-    /// Seconds from the middle: a sample's explicit time minus `middle`.
-    Seconds { middle: f64 },
+    /// Seconds from the middle, which is `half` a length after `start`, to a sample's explicit time.
+    Seconds { start: f64, half: f64 },
 }
 
 impl Distance {
@@ -91,17 +105,29 @@ impl Distance {
             Self::Near { first } => first + j as f32,
             // An integer converts with one rounding, like the shader's sum of two exact halves.
             Self::Frames { first } => first.wrapping_add(j as i32) as f32,
-            Self::Seconds { middle } => round_f32(time() - middle),
+            Self::Seconds { start, half } => round_f32((time() - start) - half),
         }
     }
 }
 
 /// Where the interval of a curve that is evaluated in f64 starts, and its length: in frames, or in
-/// seconds if samples have explicit times.
+/// seconds if samples have explicit times. If `length` is infinite, the curve is evaluated at the
+/// parameter `start` for all samples.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Parameter {
     pub(crate) start: f64,
     pub(crate) length: f64,
+}
+
+impl Parameter {
+    /// The curve's parameter at a frame or a time.
+    #[inline]
+    pub(crate) fn at(self, place: f64) -> f64 {
+        match self.length {
+            f64::INFINITY => self.start,
+            length => (place - self.start) / length,
+        }
+    }
 }
 
 /// Takes runs. A trait rather than a closure: a closure's body is not compiled for
@@ -126,12 +152,19 @@ impl Spans {
         copy: &TrackCopy,
         emit: &mut impl Emit,
     ) -> Result<(), FramesError> {
-        match &timeline.ticks {
-            Ticks::Frames { rate, start } => {
-                let clock = FrameClock::new(*rate, *start, part.end).in_copy(copy);
-                self.runs_of_frames(part, clock, &copy.samples, emit)
+        match (&timeline.ticks, copy.place) {
+            (_, CopyPlace::At(time)) => {
+                let run = |source| Run::new(copy.samples.start, copy.samples.len(), source);
+                if let Some(source) = self.source_within(part, time) {
+                    emit.run(run(source));
+                }
+                Ok(())
             }
-            Ticks::Times { times, stride } => {
+            (Ticks::Frames { rate, start }, _) => {
+                let clock = FrameClock::new(*rate, *start, self.steps).in_copy(copy);
+                self.runs_of_frames(part, clock, copy, emit)
+            }
+            (Ticks::Times { times, stride }, _) => {
                 let own = &times[part.track as usize * stride..];
                 self.runs_of_times(part, own, copy.samples.clone(), emit);
                 Ok(())
@@ -145,12 +178,14 @@ impl Spans {
         &self,
         part: &Part,
         clock: FrameClock,
-        samples: &Range<usize>,
+        copy: &TrackCopy,
         emit: &mut impl Emit,
     ) -> Result<(), FramesError> {
-        let starts = &self.starts[part.spans.clone()];
-        let begin = starts.first().copied().unwrap_or(part.end);
-        let [first, at_end, last] = part.runs_outside(begin, clock, samples);
+        let (starts, samples) = (&self.starts[part.spans.clone()], &copy.samples);
+        let [first, at_end, last] = match copy.is_own() {
+            true => self.runs_outside(part, clock, samples),
+            false => self.runs_at_ends(part, clock, samples),
+        };
         if let Some(run) = first {
             emit.run(run);
         }
@@ -208,41 +243,134 @@ impl Spans {
     }
 }
 
-impl Part {
-    /// The runs outside its keys, those of the requested samples that it has: before the first key,
-    /// at exactly the last one, and from there on. `begin` is when its first span starts, in seconds.
+impl Spans {
+    /// When the first span of a part starts, in seconds.
+    #[inline(always)]
+    pub(crate) fn begin(&self, part: &Part) -> f64 {
+        let starts = &self.starts[part.spans.clone()];
+        starts.first().copied().unwrap_or(part.end)
+    }
+
+    /// The runs outside a part's keys, those of the requested samples that it has: before the first key,
+    /// at exactly the last one, and from there on.
     pub(crate) fn runs_outside(
         &self,
-        begin: f64,
+        part: &Part,
         clock: FrameClock,
         samples: &Range<usize>,
     ) -> [Option<Run>; 3] {
-        let [at_end, from_before, from_after] = self.at_ends();
-        let (begin, end) = (clock.boundary(begin), clock.boundary(self.end));
+        let [at_end, from_before, from_after] = part.at_ends();
+        let (begin, end) = (clock.boundary(self.begin(part)), clock.boundary(part.end));
         let (from, to) = (begin.first as usize, end.first as usize);
-        let run = |outside: Range<usize>, source: Option<RunSource>| {
-            let first = outside.start.max(samples.start);
-            let last = outside.end.min(samples.end);
-            let source = source.filter(|_| first < last);
-            source.map(|source| Run::new(first, last - first, source))
-        };
-        if clock.is_reversed() {
-            // Frames meet the last key first. Nothing is extrapolated: only the track itself is,
-            // never a copy.
-            let (first, last) = (RunSource::held(self.after), RunSource::held(self.before));
-            return [run(0..to, first), None, run(from..usize::MAX, last)];
-        }
         let is_key = at_end != NONE && to as f64 == end.frame;
         let after = to.saturating_add(usize::from(is_key));
         let second = clock.rate();
-        let first = RunSource::outside(self.before, from_before, begin.frame, second);
-        let last = RunSource::outside(self.after, from_after, end.frame, second);
+        let first = RunSource::outside(part.before, from_before, begin.frame, second);
+        let last = RunSource::outside(part.after, from_after, end.frame, second);
         [
-            run(0..from, first),
-            run(to..after, RunSource::held(at_end)),
-            run(after..usize::MAX, last),
+            run_among(samples, 0..from, first),
+            run_among(samples, to..after, RunSource::held(at_end)),
+            run_among(samples, after..usize::MAX, last),
         ]
     }
+
+    /// The runs of a copy's samples that rounding put beyond its ends. Every sample of a copy is of its
+    /// track's keys, also where their own values outside are not constants.
+    fn runs_at_ends(
+        &self,
+        part: &Part,
+        clock: FrameClock,
+        samples: &Range<usize>,
+    ) -> [Option<Run>; 3] {
+        let begin = self.begin(part);
+        let [is_first, is_last] = part.is_at_ends(begin);
+        let at_start = is_first.then(|| self.at_start(part));
+        let at_end = is_last.then(|| self.at_end(part));
+        let (begin, end) = (clock.boundary(begin), clock.boundary(part.end));
+        let [(first, from), (last, to)] = match clock.is_reversed() {
+            true => [(at_end, end.first), (at_start, begin.first)],
+            false => [(at_start, begin.first), (at_end, end.first)],
+        };
+        [
+            run_among(samples, 0..from as usize, first),
+            None,
+            run_among(samples, to as usize..usize::MAX, last),
+        ]
+    }
+
+    /// The value of a part's curve where its first span starts.
+    fn at_start(&self, part: &Part) -> RunSource {
+        let first = part.spans.start;
+        let key = self.keys.get(first).filter(|_| !part.spans.is_empty());
+        let constant = [part.before, key.copied().unwrap_or(NONE)];
+        self.at_bound(constant, part.spans.clone().next(), -0.5, 0.0)
+    }
+
+    /// The value of a part's curve where its last span ends.
+    fn at_end(&self, part: &Part) -> RunSource {
+        let [at_end, ..] = part.at_ends();
+        self.at_bound([at_end, part.after], part.spans.clone().last(), 0.5, 1.0)
+    }
+
+    /// The first of two constants that there is, or else a span's value at this parameter; `t` is that of
+    /// a curve in f64.
+    fn at_bound(
+        &self,
+        constants: [u32; 2],
+        span: Option<usize>,
+        parameter: f32,
+        t: f64,
+    ) -> RunSource {
+        let constant = constants.into_iter().find(|&constant| constant != NONE);
+        match (constant, span.map(|span| self.sources[span])) {
+            (Some(constant), _) | (None, Some(Source::Constant(constant))) => {
+                RunSource::Constant(constant)
+            }
+            (None, Some(Source::Segment(index))) => RunSource::at(index, parameter),
+            (None, Some(Source::Exact(index))) => RunSource::exact_at(index, t),
+            (None, None) => RunSource::Constant(0),
+        }
+    }
+
+    /// What gives a part's rotation at one of its track's times; `None` if another part has it.
+    fn source_within(&self, part: &Part, time: Moment) -> Option<RunSource> {
+        let (begin, starts) = (self.begin(part), &self.starts[part.spans.clone()]);
+        let [is_first, is_last] = part.is_at_ends(begin);
+        if time.since(begin) < 0.0 {
+            return is_first.then(|| self.at_start(part));
+        }
+        if time.since(part.end) >= 0.0 {
+            return is_last.then(|| self.at_end(part));
+        }
+        let i = starts.partition_point(|&start| time.since(start) >= 0.0) - 1;
+        let span = part.spans.start + i;
+        let end = starts.get(i + 1).copied().unwrap_or(part.end);
+        let (from_start, length) = (time.since(starts[i]), end - starts[i]);
+        let key = self.keys[span];
+        if from_start == 0.0 && key != NONE {
+            return Some(RunSource::Constant(key));
+        }
+        Some(match self.sources[span] {
+            Source::Constant(constant) => RunSource::Constant(constant),
+            Source::Segment(index) => {
+                let parameter = (from_start - length * 0.5) / length;
+                RunSource::at(index, round_f32(parameter))
+            }
+            Source::Exact(index) => RunSource::exact_at(index, from_start / length),
+        })
+    }
+}
+
+/// The run of those requested samples that lie in a range, if anything gives them.
+fn run_among(
+    samples: &Range<usize>,
+    outside: Range<usize>,
+    source: Option<RunSource>,
+) -> Option<Run> {
+    let first = outside.start.max(samples.start);
+    let last = outside.end.min(samples.end);
+    let source = source.filter(|_| first < last);
+    source.map(|source| Run::new(first, last - first, source))
 }
 
 /// Distances in frames must be below this: they are kept in 32 bits.

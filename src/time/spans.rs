@@ -16,6 +16,8 @@ pub(crate) struct Spans {
     pub(crate) sources: Vec<Source>,
     /// The constant to store at exactly the start, or [`NONE`].
     pub(crate) keys: Vec<u32>,
+    /// Whether keys are held until the next one.
+    pub(crate) steps: bool,
 }
 
 /// What gives the rotations of a span: indices in the lists of `Prepared`.
@@ -78,6 +80,13 @@ impl Part {
         (self.beyond.as_ref()).map_or([NONE; 3], |beyond| {
             [beyond.at_end, beyond.from_before, beyond.from_after]
         })
+    }
+
+    /// Whether its track starts with it, and whether it ends with it; `begin` is when its first span
+    /// starts. Both for a track without [`Beyond`], which has one part or is not repeated.
+    pub(crate) fn is_at_ends(&self, begin: f64) -> [bool; 2] {
+        let span = self.beyond.as_ref().map(|beyond| beyond.span);
+        span.map_or([true; 2], |(first, last)| [begin <= first, self.end >= last])
     }
 
     /// Its [`Beyond`], which is created if it has none. `times` are when the whole track starts and

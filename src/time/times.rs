@@ -78,9 +78,9 @@ impl Spans {
                 RunSource::Exact { index, parameter }
             }
             Source::Segment(index) => {
-                let middle = start + seconds * 0.5;
+                let half = seconds * 0.5;
                 let (scale, offset) = (finite_scale(1.0 / seconds), 0.0);
-                let distance = Distance::Seconds { middle };
+                let distance = Distance::Seconds { start, half };
                 RunSource::Segment(index, distance, Affine { scale, offset })
             }
         }
@@ -118,8 +118,8 @@ pub(crate) fn key_sample(times: &[f64], time: f64, near: usize) -> KeySample {
 #[inline(always)]
 fn parameter(start: f64, end: f64, time: f64) -> f32 {
     let seconds = end - start;
-    let middle = start + seconds * 0.5;
-    round_f32(time - middle) * finite_scale(1.0 / seconds) + 0.0
+    let from_middle = (time - start) - seconds * 0.5;
+    round_f32(from_middle) * finite_scale(1.0 / seconds) + 0.0
 }
 
 /// The last key that is not after a time, or the first one for earlier times. The bit `IS_KEY` is

@@ -5,10 +5,10 @@ use std::ops::Range;
 
 use rayon::iter::Either;
 
-use crate::time::frame_clock::FrameClock;
+use crate::time::frame_clock::{FrameStart, rounding};
 use crate::time::frame_rate::FrameRate;
 use crate::time::frames::{Ticks, Timeline};
-use crate::tracks::check::LATEST;
+use crate::time::moment::{InCopy, Moment, Period};
 
 /// What happens before a track's first key, or after its last.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -38,9 +38,23 @@ impl WrapMode {
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct TrackCopy {
     pub(crate) samples: Range<usize>,
-    /// A frame coordinate in the copy is `sign` × the track's own + `offset`.
-    pub(crate) sign: f64,
-    pub(crate) offset: f64,
+    pub(crate) place: CopyPlace,
+}
+
+/// Where a copy lies.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum CopyPlace {
+    /// It is the track itself.
+    Own,
+    /// The track's first key, at `first` seconds, lies at the frame coordinate `at_first` in it.
+    Frames {
+        first: f64,
+        at_first: f64,
+        backwards: bool,
+    },
+    /// The track's own time at its only sample: copies that are too short, or too far out, to be laid
+    /// out in frames.
+    At(Moment),
 }
 
 impl TrackCopy {
@@ -48,15 +62,21 @@ impl TrackCopy {
     pub(crate) fn own(samples: Range<usize>) -> Self {
         Self {
             samples,
-            sign: 1.0,
-            offset: 0.0,
+            place: CopyPlace::Own,
         }
     }
 
     pub(crate) fn is_own(&self) -> bool {
-        self.sign == 1.0 && self.offset == 0.0
+        self.place == CopyPlace::Own
+    }
+
+    pub(crate) fn is_backwards(&self) -> bool {
+        matches!(self.place, CopyPlace::Frames { backwards: true, .. })
     }
 }
+
+/// A copy of fewer frames is not laid out in frames.
+const FEW_FRAMES: f64 = 2.0;
 
 /// The wrap modes on both sides of a track.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -73,20 +93,6 @@ impl Wrap {
 
     pub(crate) fn repeats(self) -> bool {
         self.before.repeats() || self.after.repeats()
-    }
-
-    /// The number of the copy at `place`, which is in lengths of the track from its first key, and
-    /// whether the copy runs backwards. Where end values are held or extrapolated it is copy 0, the
-    /// track itself.
-    fn copy_at(self, place: f64) -> (f64, bool) {
-        let number = place.floor();
-        let mode = if place < 0.0 { self.before } else { self.after };
-        match mode {
-            _ if number == 0.0 => (0.0, false),
-            WrapMode::Loop => (number, false),
-            WrapMode::Mirror => (number, number % 2.0 != 0.0),
-            WrapMode::Hold | WrapMode::Extrapolate => (0.0, false),
-        }
     }
 
     /// The samples of a track, cut where its copies meet. `span` holds the times of its first and
@@ -111,34 +117,84 @@ impl Wrap {
         }
     }
 
+    /// The copy in which a time lies, and whether that runs backwards; `None` in the track itself, also
+    /// where end values are held or extrapolated.
+    fn copy_at(self, period: &Period, time: Moment, rounding: f64) -> Option<(InCopy, bool)> {
+        let found = period.find(time, rounding);
+        let mode = match found.is_before {
+            true => self.before,
+            false => self.after,
+        };
+        match mode {
+            _ if found.number == Some(0.0) => None,
+            WrapMode::Loop => Some((found, false)),
+            WrapMode::Mirror => Some((found, found.is_odd)),
+            WrapMode::Hold | WrapMode::Extrapolate => None,
+        }
+    }
+
     fn copies_of_frames(
         self,
-        (first, last): (f64, f64),
-        (rate, start): (FrameRate, f64),
+        span: (f64, f64),
+        (rate, start): (FrameRate, FrameStart),
         samples: Range<usize>,
     ) -> Vec<TrackCopy> {
-        let clock = FrameClock::new(rate, start, last);
-        let (from, to) = (clock.boundary(first).frame, clock.boundary(last).frame);
-        let length = to - from;
-        let copy = |sample: usize| self.copy_at((sample as f64 - from) / length);
+        let Some(period) = Period::new(span) else {
+            return vec![TrackCopy::own(samples)];
+        };
+        let length = rate.frames_in(period.length().seconds());
+        let place = |sample: usize| {
+            let time = Moment::of_frame(start.seconds, rate, sample as u64);
+            let magnitude = time.high.abs().max(start.latest);
+            let found = self.copy_at(&period, time, rounding(magnitude, false));
+            let Some((found, backwards)) = found else {
+                return CopyPlace::Own;
+            };
+            match found.number.filter(|_| length >= FEW_FRAMES) {
+                Some(number) => CopyPlace::Frames {
+                    first: span.0,
+                    at_first: period.frame_of_first(number, backwards, (rate, start.seconds)),
+                    backwards,
+                },
+                None => CopyPlace::At(period.own_time(found.into, backwards)),
+            }
+        };
         let mut copies = Vec::new();
         let mut sample = samples.start;
+        let mut next_place = None;
         while sample < samples.end {
-            let (number, backwards) = copy(sample);
-            // The next copy starts near here; the loops find its first sample by `copy` alone.
-            let end = (from + (number + 1.0) * length).ceil();
-            let mut next = (end.clamp(0.0, samples.end as f64) as usize).max(sample + 1);
-            while next > sample + 1 && copy(next - 1).0 != number {
-                next -= 1;
+            let own = next_place.take().unwrap_or_else(|| place(sample));
+            let mut next = sample + 1;
+            // The next copy starts near here; the loops find its first sample by `place` alone.
+            let end = match own {
+                CopyPlace::At(_) => None,
+                CopyPlace::Own => {
+                    let is_in = |sample: usize| place(sample) == CopyPlace::Own;
+                    Some(first_beyond(sample + 1, samples.end, is_in))
+                }
+                CopyPlace::Frames {
+                    at_first,
+                    backwards,
+                    ..
+                } => Some((if backwards { at_first } else { at_first + length }).ceil() as usize),
+            };
+            if let Some(end) = end {
+                next = end.clamp(sample + 1, samples.end);
+                while next > sample + 1 && place(next - 1) != own {
+                    next -= 1;
+                }
+                while next < samples.end {
+                    let at_next = place(next);
+                    if at_next != own {
+                        next_place = Some(at_next);
+                        break;
+                    }
+                    next += 1;
+                }
             }
-            while next < samples.end && copy(next).0 == number {
-                next += 1;
-            }
-            let offset = number * length + if backwards { from + to } else { 0.0 };
             copies.push(TrackCopy {
                 samples: sample..next,
-                sign: if backwards { -1.0 } else { 1.0 },
-                offset,
+                place: own,
             });
             sample = next;
         }
@@ -147,22 +203,27 @@ impl Wrap {
 
     /// The time between the keys, from `first` to `last`, that is repeated at `time`; `time` itself
     /// if it lies in no other copy.
-    pub(crate) fn folded(self, (first, last): (f64, f64), time: f64) -> f64 {
-        let length = last - first;
-        if length <= 0.0 {
-            return time;
-        }
-        // Copies cannot be counted farther out than key times may be.
-        let far = time.clamp(-LATEST, LATEST);
-        let (number, backwards) = self.copy_at((far - first) / length);
-        // Far outside, a copy may be shorter than the distance between neighbouring f64 numbers.
-        let into = ((far - first) - number * length).clamp(0.0, length);
-        match (number, backwards) {
-            (0.0, _) => time,
-            (_, true) => last - into,
-            _ => first + into,
+    pub(crate) fn folded(self, span: (f64, f64), time: f64) -> f64 {
+        let own = || {
+            let period = Period::new(span)?;
+            let (found, backwards) = self.copy_at(&period, Moment::new(time), 0.0)?;
+            Some(period.own_time(found.into, backwards))
+        };
+        own().map_or(time, |own| own.seconds().clamp(span.0, span.1))
+    }
+}
+
+/// The first number from `from` on, up to `end`, that is not in a stretch which has those before it.
+fn first_beyond(from: usize, end: usize, is_in: impl Fn(usize) -> bool) -> usize {
+    let (mut from, mut end) = (from, end);
+    while from < end {
+        let middle = from + (end - from) / 2;
+        match is_in(middle) {
+            true => from = middle + 1,
+            false => end = middle,
         }
     }
+    from
 }
 
 #[cfg(test)]
@@ -186,18 +247,41 @@ mod tests {
             next = copy.samples.end;
         }
         assert_eq!(next, 71);
-        // Frame 0 is at -2 s, a copy and a quarter before the first key.
-        assert_eq!(
-            (whole[0].sign, whole[1].sign, whole[2].sign),
-            (-1.0, 1.0, -1.0)
-        );
-        assert!(whole[3..].iter().all(|copy| copy.sign == 1.0));
+        // Frame 0 is at -2 s, two copies and a quarter before the first key.
+        let backwards: Vec<bool> = whole.iter().map(TrackCopy::is_backwards).collect();
+        assert_eq!(backwards[..4], [true, false, true, false]);
+        assert!(!backwards[3..].contains(&true));
         for from in 0..70 {
             for copy in wrap.copies(span, &timeline, from..from + 1) {
                 let holds = |own: &&TrackCopy| own.samples.contains(&from);
                 let own = whole.iter().find(holds).unwrap();
-                assert_eq!((copy.sign, copy.offset), (own.sign, own.offset));
+                assert_eq!(copy.place, own.place);
             }
+        }
+    }
+
+    /// A billion copies out, each sample is where exact arithmetic has it.
+    #[test]
+    fn far_copies_lie_where_they_repeat() {
+        let wrap = Wrap {
+            before: WrapMode::Loop,
+            after: WrapMode::Mirror,
+        };
+        let start = 1.7e9 + 0.5;
+        let frames = Frames::fps(8).between(start, start + 3.0);
+        let timeline = frames.resolve(1, None).unwrap();
+        // 3.125 s: 1.7e9 s are 544 000 000 copies.
+        let span = Some((0.0, 3.125));
+        let copies: Vec<TrackCopy> = wrap.copies(span, &timeline, 0..25).collect();
+        let at = |at_first, backwards| CopyPlace::Frames {
+            first: 0.0,
+            at_first,
+            backwards,
+        };
+        let expected = [(0..21, at(-4.0, false)), (21..25, at(46.0, true))];
+        assert_eq!(copies.len(), 2);
+        for (copy, (samples, place)) in copies.iter().zip(expected) {
+            assert_eq!((copy.samples.clone(), copy.place), (samples, place));
         }
     }
 }

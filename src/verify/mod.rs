@@ -31,8 +31,9 @@ use crate::reference;
 use crate::reference::quaternion::angle_between;
 use crate::shader::Form;
 use crate::threads::on_threads;
+use crate::time::frame_clock::rounding;
 use crate::time::frames::{Frames, Timeline};
-use crate::tracks::set::TrackSet;
+use crate::tracks::set::{Track, TrackSet};
 
 /// Largest allowed distance of a quaternion's norm from 1.
 pub const NORM_BOUND: f64 = 4e-7;
@@ -232,16 +233,44 @@ fn beyond_rounding(set: &TrackSet) -> f64 {
     (off.fold(0.0, f64::max) - f64::from(f32::EPSILON)).max(0.0)
 }
 
-/// The least error at the moments that a sample may stand for: its time, and a key that is within
-/// the rounding of that time (`FrameClock`), to which it counts. There a curve may jump, or its
-/// velocity.
-fn least_error(keys: &[f64], time: f64, error: impl Fn(f64) -> f64) -> f64 {
-    let ends = [keys.first(), keys.last()].into_iter().flatten();
-    let latest = ends.fold(time.abs(), |latest, key| latest.max(key.abs()));
-    let rounding = 8.0 * f64::EPSILON * latest;
-    let near = keys.get(keys.partition_point(|&key| key < time - rounding));
-    let near = near.filter(|&&key| key <= time + rounding);
-    worse(error(time).min(near.map_or(f64::INFINITY, |&key| error(key))))
+/// The times of a track's keys, and what they count from: a whole second near the first, so that f64 has
+/// them and the samples between them without rounding however late they are.
+struct KeyTimes {
+    from: f64,
+    times: Vec<f64>,
+    /// The largest magnitude of a time as it is.
+    latest: f64,
+    steps: bool,
+}
+
+impl KeyTimes {
+    fn new(track: &Track<'_>, interpolation: &Interpolation) -> Self {
+        let (first, last) = (track.times[0], track.times[track.times.len() - 1]);
+        let from = first.floor();
+        Self {
+            from,
+            times: track.times.iter().map(|time| time - from).collect(),
+            latest: first.abs().max(last.abs()),
+            steps: interpolation.steps(),
+        }
+    }
+
+    /// The exact time of a sample.
+    fn of_sample(&self, timeline: &Timeline, track: usize, sample: usize) -> f64 {
+        timeline.moment_at(track, sample).since(self.from)
+    }
+
+    /// The least error at the moments that a sample may stand for: its time, and a key that is within
+    /// the rounding of that time ([`rounding`]), to which it counts. There a curve may jump, or its
+    /// velocity.
+    fn least_error(&self, time: f64, error: impl Fn(f64) -> f64) -> f64 {
+        let latest = self.latest.max((time + self.from).abs());
+        let rounding = 2.0 * rounding(latest, self.steps);
+        let keys = &self.times;
+        let near = keys.get(keys.partition_point(|&key| key < time - rounding));
+        let near = near.filter(|&&key| key <= time + rounding);
+        worse(error(time).min(near.map_or(f64::INFINITY, |&key| error(key))))
+    }
 }
 
 /// NaN is as wrong as can be, and must not slip through comparisons.
@@ -280,16 +309,17 @@ impl TrackErrors {
         index: usize,
     ) -> Self {
         let track = set.track(index);
-        let curve = reference::Curve::of(&interpolation, track);
+        let keys = KeyTimes::new(&track, &interpolation);
+        let times = &*keys.times;
+        let curve = reference::Curve::of(&interpolation, Track { times, ..track });
         let samples = timeline.len();
         let row = &found.as_quats()[index * samples..(index + 1) * samples];
         let mut errors = Self::default();
         for (sample, quat) in row.iter().enumerate() {
             let quat = quat.as_dquat();
             let norm = worse((quat.length() - 1.0).abs());
-            let angle = least_error(track.times, timeline.time_at(index, sample), |time| {
-                angle_between(quat, curve.rotation(time))
-            });
+            let time = keys.of_sample(timeline, index, sample);
+            let angle = keys.least_error(time, |time| angle_between(quat, curve.rotation(time)));
             if angle > errors.max {
                 (errors.max, errors.worst) = (angle, sample);
             }

@@ -16,8 +16,8 @@ use crate::reference::curve::Curve;
 use crate::reference::quaternion::angle_between;
 use crate::threads::{OutOfThreads, on_threads};
 use crate::time::frames::{Frames, Timeline};
-use crate::tracks::set::TrackSet;
-use crate::verify::{differences, least_error, worse};
+use crate::tracks::set::{Track, TrackSet};
+use crate::verify::{KeyTimes, differences, worse};
 
 /// What was found of one output.
 #[derive(Debug, Clone, PartialEq)]
@@ -159,7 +159,9 @@ fn rate_error(
     let each = (samples * set.track_count()).div_ceil(RATES_CHECKED).max(1);
     let track = |index: usize| {
         let track = set.track(index);
-        let curve = Curve::of(&interpolation, track);
+        let keys = KeyTimes::new(&track, &interpolation);
+        let times = &*keys.times;
+        let curve = Curve::of(&interpolation, Track { times, ..track });
         let expected = |time: f64| {
             let (body, axes) = match interpolation.quantity {
                 Quantity::Velocity(axes) => (curve.velocity(time), axes),
@@ -171,14 +173,14 @@ fn rate_error(
                 Axes::Parent => curve.rotation(time) * body,
             }
         };
-        let (mut error, mut largest) = (0.0f64, rate_floor(track.times, interpolation.quantity));
+        let (mut error, mut largest) = (0.0f64, rate_floor(times, interpolation.quantity));
         for sample in (0..samples).step_by(each) {
-            let time = timeline.time_at(index, sample);
+            let time = keys.of_sample(timeline, index, sample);
             let found = found.get(index, sample).unwrap_or(Vec3::NAN).as_dvec3();
             let error_at = |time: f64| (found - expected(time)).length();
-            error = error.max(least_error(track.times, time, error_at));
+            error = error.max(keys.least_error(time, error_at));
             // Samples may all lie on keys, where a rate can be 0 and large between them.
-            for near in within_interval(track.times, time).into_iter().chain([time]) {
+            for near in within_interval(times, time).into_iter().chain([time]) {
                 largest = largest.max(expected(near).length());
             }
         }

@@ -28,10 +28,10 @@ pub(crate) struct Reading {
     /// Leave key times as a file has them, instead of on the frames that they were rounded from
     #[arg(long)]
     raw_times: bool,
-    /// Of two different keys at one time, keep this one
+    /// What stays of two different keys at one time
     #[arg(long, value_enum, value_name = "WHICH")]
     duplicates: Option<DuplicatesArgument>,
-    /// The rate of the keys of files that do not say it
+    /// The rate of the keys of files without times: where they say one, this overrules it
     #[arg(long, value_name = "FPS")]
     source_fps: Option<FrameRate>,
     /// Which array or column is what, where names do not tell: rotations=keys:wxyz,time=t
@@ -76,6 +76,8 @@ enum DuplicatesArgument {
     First,
     /// the last of them
     Last,
+    /// both, for a jump: the first is moved a step of f32 before its time
+    Both,
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
@@ -147,6 +149,7 @@ impl Reading {
                 None => Duplicates::Refuse,
                 Some(DuplicatesArgument::First) => Duplicates::First,
                 Some(DuplicatesArgument::Last) => Duplicates::Last,
+                Some(DuplicatesArgument::Both) => Duplicates::Both,
             },
             source_rate: self.source_fps,
             map: self.map.clone(),

@@ -9,7 +9,6 @@ mod angles;
 mod hierarchy;
 mod joint;
 mod motion;
-mod rate;
 mod write;
 
 use std::io::BufRead;

@@ -6,10 +6,10 @@ use glam::{DQuat, Quat, Vec3};
 use tumble::{FrameRate, TrackSet};
 
 use crate::bvh::hierarchy::{FIRST_WORD, Hierarchy};
-use crate::bvh::rate;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::motion::{Joint, Motion, Transform};
 use crate::quaternion::rounded;
+use crate::rate::{Written, itself, of};
 use crate::text::blocks::Blocks;
 use crate::text::lines::{Lines, tokens};
 use crate::text::number;
@@ -189,10 +189,9 @@ fn read_rate<R: BufRead>(lines: &mut Lines<R>, raw: bool) -> Result<FrameRate, D
     let period = number::parse(&text)
         .map_err(|(code, message)| lines.refuse(column, code, message))?
         .value;
-    let rate = if raw {
-        rate::itself(period)
-    } else {
-        rate::of_period(&text, period)
+    let rate = match raw {
+        true => itself(period),
+        false => of(&Written::FrameTime(&text)).map(|found| found.grid),
     };
     rate.ok_or_else(|| {
         let message = format!("a frame time of {text} s; it is from 1e-9 to 1e9");

@@ -7,11 +7,12 @@ use std::io::{self, Write};
 use glam::Vec3;
 use tumble::{Channel, EulerSequence, FrameRate};
 
-use crate::bvh::{BvhChannel, angles, rate};
+use crate::bvh::{BvhChannel, angles};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::format::{MotionOptions, WriteError};
 use crate::motion::Sampled;
 use crate::names::line_name;
+use crate::rate::{Written, of};
 use crate::warnings::Warnings;
 
 /// Up to here an f32 is exact to 8e-6 degrees; larger angles are written with six decimals, so that
@@ -102,7 +103,8 @@ pub(super) fn write_motion(
 fn frame_time(rate: FrameRate) -> String {
     let period = rate.time_of(1);
     let mut digits = period.to_string();
-    if rate::of_period(&digits, period) != Some(rate) {
+    let read_back = of(&Written::FrameTime(&digits)).map(|found| found.grid);
+    if read_back != Some(rate) {
         digits += if digits.contains('.') { "" } else { "." };
         digits += "000000000000";
     }

@@ -7,8 +7,10 @@ use std::path::Path;
 use ::csv::{ByteRecord, Reader, ReaderBuilder};
 
 use crate::csv::cell_text;
+use crate::decimal::Decimal;
 use crate::diagnostic::{Code, Diagnostic, Place};
-use crate::format::{Loaded, ReadOptions};
+use crate::format::{Loaded, ReadOptions, TimeUnit};
+use crate::rate::last_place;
 use crate::source::Source;
 use crate::table::clips::clips;
 use crate::table::columns::{Column, Numbers, Table, Values};
@@ -36,6 +38,7 @@ pub fn read_csv(name: &str, bytes: Vec<u8>, options: &ReadOptions) -> Result<Loa
     let sheet = Sheet {
         name,
         bytes: &bytes[start..],
+        time_power: options.time_unit.map_or(0, TimeUnit::power),
     };
     let mut reader = sheet.reader();
     let mut header = ByteRecord::new();
@@ -133,6 +136,8 @@ fn check_encoding(name: &str, bytes: &[u8], warnings: &mut Warnings) -> Result<u
 struct Sheet<'a> {
     name: &'a str,
     bytes: &'a [u8],
+    /// Times are in units of 10 to this power of a second.
+    time_power: i32,
 }
 
 impl Sheet<'_> {
@@ -274,10 +279,13 @@ impl Cell<'_> {
                 match whole.and_then(|text| text.parse().ok()) {
                     Some(number) => numbers.push(number),
                     None if need == Need::Time => {
-                        let mut floats: Vec<f64> =
-                            numbers.iter().map(|&number| number as f64).collect();
-                        floats.push(self.number(text, warnings)?);
-                        *values = Values::Numbers(Numbers::F64(floats));
+                        let power = self.sheet.time_power;
+                        let times = numbers.iter().map(|&number| Decimal::whole(number, power));
+                        let times: Option<Vec<Decimal>> = times.collect();
+                        let mut times = times.ok_or_else(|| self.out_of_range(text))?;
+                        let mut places = power.unsigned_abs();
+                        self.time(text, &mut times, &mut places, warnings)?;
+                        *values = Values::Decimals(times, places);
                     }
                     None => {
                         let text = String::from_utf8_lossy(text);
@@ -287,10 +295,36 @@ impl Cell<'_> {
                 }
             }
             Values::Numbers(Numbers::F64(numbers)) => numbers.push(self.number(text, warnings)?),
+            Values::Decimals(times, places) => self.time(text, times, places, warnings)?,
             // Text has no other columns.
             Values::Numbers(Numbers::F32(_)) | Values::Stamps(..) | Values::Lists { .. } => {}
         }
         Ok(())
+    }
+
+    /// Appends a time with all its digits.
+    fn time(
+        &self,
+        text: &[u8],
+        times: &mut Vec<Decimal>,
+        places: &mut u32,
+        warnings: &mut Warnings,
+    ) -> Result<(), Diagnostic> {
+        self.number(text, warnings)?;
+        let (token, power) = (as_text(text), self.sheet.time_power);
+        let time = Decimal::parse_in(&token, power).ok_or_else(|| self.out_of_range(text))?;
+        times.push(time);
+        let last = last_place(&token).saturating_add(power);
+        *places = (*places).max(last.min(0).unsigned_abs());
+        Ok(())
+    }
+
+    fn out_of_range(&self, text: &[u8]) -> Diagnostic {
+        let text = as_text(text);
+        let message = format!(
+            "the time {text} is beyond 1e14 s; --time-unit ms, us or ns says that it is none of seconds"
+        );
+        self.refuse(Code::Time, message)
     }
 
     fn number(&self, text: &[u8], warnings: &mut Warnings) -> Result<f64, Diagnostic> {

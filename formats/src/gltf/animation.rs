@@ -11,8 +11,9 @@ use crate::gltf::channel::{ChannelKeys, Moved, Path, Times};
 use crate::gltf::nodes::Nodes;
 use crate::gltf::reader::Reader;
 use crate::gltf::schema::{Animation, Channel, Sampler};
-use crate::grid::{Precision, restore};
+use crate::grid::restore;
 use crate::motion::{self, Channels, Joint, Motion};
+use crate::rate::Precision;
 
 /// What writing has to know of an animation that was read.
 #[derive(Debug)]

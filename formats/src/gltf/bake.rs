@@ -18,7 +18,7 @@ use crate::gltf::gather;
 use crate::gltf::json::{Json, Members};
 use crate::gltf::reader::Reader;
 use crate::gltf::uri;
-use crate::grid::Precision;
+use crate::rate::Precision;
 use crate::motion::Sampled;
 use crate::text::lines::Limits;
 use crate::warnings::Warnings;

@@ -216,7 +216,7 @@ impl Moved {
             place: &at_input,
             duplicates,
         };
-        let kept = origin.increasing(&times, |i, j| of_key(i) == of_key(j), warnings)?;
+        let kept = origin.increasing(&mut times, |i, j| of_key(i) == of_key(j), warnings)?;
         select(&mut times, kept.as_deref());
         let kept = kept.unwrap_or_else(|| (0..times.len()).collect());
         if is_cubic && times.len() == 1 {

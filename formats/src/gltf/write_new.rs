@@ -250,8 +250,7 @@ fn f32_times(samples: Samples<'_>, seconds: &[f64]) -> Result<Vec<f32>, (Code, S
     }
     if first < 0.0 {
         let why = format!(
-            "its first sample is at {} s, and times in glTF begin at 0; start it at 0 s (tumble \
-             convert --start 0)",
+            "its first sample is at {} s, and times in glTF begin at 0; `tumble convert --start 0` cuts what is before",
             seconds[0]
         );
         return Err((Code::TimesBelowZero, why));

@@ -40,8 +40,11 @@ pub(crate) fn read(
     archive.take(plan.tracks, TRACK)?;
     // There are as many frames as the arrays have bytes for.
     let mut times = plan.read_times(archive, options)?;
+    if let Some(message) = plan.two_rates.take() {
+        warnings.warn(Code::TwoRates, || (None, message));
+    }
     plan.all_times.clone_from(&times);
-    let kept = kept_frames(archive, plan, &arrays, &times, options, warnings)?;
+    let kept = kept_frames(archive, plan, &arrays, &mut times, options, warnings)?;
     select(&mut times, kept.as_deref());
     let mut motion = Motion {
         name: plan.name.clone(),
@@ -124,7 +127,7 @@ fn kept_frames(
     archive: &Archive,
     plan: &Plan,
     arrays: &[Array<'_>],
-    times: &[f64],
+    times: &mut [f64],
     options: &ReadOptions,
     warnings: &mut Warnings,
 ) -> Result<Option<Vec<usize>>, Diagnostic> {

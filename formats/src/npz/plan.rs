@@ -33,6 +33,8 @@ pub(crate) struct Plan {
     /// The member of the rate.
     pub(crate) rate_member: Option<usize>,
     pub(crate) rate: Option<FrameRate>,
+    /// What there is to say of two rates in the file that differ.
+    pub(crate) two_rates: Option<String>,
     /// The times of all frames, those that are left out of the clip too.
     pub(crate) all_times: Vec<f64>,
     /// Members that hold the same for all frames, whatever their shape looks like.

@@ -1,34 +1,12 @@
 //! Frame rates as files have them: numbers that were rounded, perhaps more than once.
 
-use tumble::FrameRate;
-
 use crate::diagnostic::{Code, Diagnostic};
 use crate::format::ReadOptions;
-use crate::grid::{self, Precision};
+use crate::grid;
 use crate::npz::archive::Archive;
 use crate::npz::header::Element;
 use crate::npz::plan::{Plan, read_numbers};
-
-/// A number this near to a usual rate, as a part of it, is that rate: AMASS has 120.00004577, and
-/// 29.97 is short for 30000/1001.
-const NEAR: f64 = 2e-6;
-
-/// The rate that a number stands for: a whole number, 24, 30, 60 or 120 by 1.001, or the number
-/// itself to nine decimals. `None` for what is no rate.
-pub(crate) fn rate_of(number: f64) -> Option<FrameRate> {
-    let is_near = |rate: f64| (number - rate).abs() <= NEAR * rate;
-    let whole = number.round();
-    if whole >= 1.0 && whole <= f64::from(u32::MAX) && is_near(whole) {
-        return FrameRate::new(whole as u64, 1).ok();
-    }
-    for frames in [24_000, 30_000, 60_000, 120_000] {
-        let rate = FrameRate::new(frames, 1_001).ok()?;
-        if is_near(rate.per_second()) {
-            return Some(rate);
-        }
-    }
-    format!("{number:.9}").parse().ok()
-}
+use crate::rate::{Precision, Written, of, on_frames};
 
 impl Plan {
     /// The rate in the first of these arrays that there is.
@@ -40,19 +18,31 @@ impl Plan {
         archive: &Archive,
         names: &[&str],
     ) -> Result<(), Diagnostic> {
-        let Some(member) = names.iter().find_map(|name| archive.find(name)) else {
-            return Ok(());
-        };
-        let numbers = read_numbers(archive, member)?;
-        let rate = match *numbers {
-            [number] => rate_of(number).ok_or_else(|| number.to_string()),
-            _ => Err(format!("{} numbers", numbers.len())),
-        };
-        self.rate = Some(rate.map_err(|found| {
-            let message = format!("{found} is no frame rate; it is one number over 0");
-            archive.refuse(member, Code::FrameRate, message)
-        })?);
-        self.rate_member = Some(member);
+        let mut before = "";
+        for (name, member) in names.iter().filter_map(|&name| Some((name, archive.find(name)?))) {
+            let numbers = read_numbers(archive, member)?;
+            let rate = match *numbers {
+                [number] => {
+                    let found = of(&Written::Number(number)).map(|found| found.grid);
+                    found.ok_or_else(|| number.to_string())
+                }
+                _ => Err(format!("{} numbers", numbers.len())),
+            };
+            let rate = rate.map_err(|found| {
+                let message = format!("{found} is no frame rate; it is one number over 0");
+                archive.refuse(member, Code::FrameRate, message)
+            })?;
+            match self.rate {
+                None => (self.rate, self.rate_member, before) = (Some(rate), Some(member), name),
+                Some(first) if first != rate => {
+                    self.two_rates = Some(format!(
+                        "`{before}` says {first} frames a second, `{name}` {rate}; the first is taken, \
+                         --source-fps says another"
+                    ));
+                }
+                Some(_) => {}
+            }
+        }
         Ok(())
     }
 
@@ -66,16 +56,25 @@ impl Plan {
         options: &ReadOptions,
     ) -> Result<Vec<f64>, Diagnostic> {
         let Some(list) = self.times else {
-            let rate = self.rate.or(options.source_rate).ok_or_else(|| {
+            let rate = options.source_rate.or(self.rate).ok_or_else(|| {
                 let message =
                     "the file says neither times nor a frame rate; --source-fps gives one";
                 Diagnostic::new(&archive.file, Code::NoRate, message)
             })?;
             self.rate = Some(rate);
+            if options.source_rate.is_some() {
+                self.two_rates = None;
+            }
             return Ok((0..self.frames as u64)
                 .map(|frame| rate.time_of(frame))
                 .collect());
         };
+        if let Some(rate) = options.source_rate {
+            let message = format!(
+                "the file has the time of every frame; --source-fps {rate} would be another, leave it out"
+            );
+            return Err(archive.refuse(list.member, Code::RateBesideTimes, message));
+        }
         let array = archive.array(list.member)?;
         let columns = match array.header.shape[..] {
             [_, columns] => columns,
@@ -108,41 +107,20 @@ impl Plan {
         };
         let said = self
             .rate
-            .filter(|&rate| grid::fits(times.iter().copied(), rate, precision));
+            .filter(|&rate| on_frames(times.iter().copied(), rate, 0.0, precision));
         // Times in f64, as we write them, were not rounded, and are read back as they are.
         let found = if is_f32 && !options.raw_times {
             grid::restore(std::slice::from_mut(&mut times), precision)
         } else {
-            grid::rate_of(times.iter().copied(), precision)
+            let times = Written::Times(std::slice::from_ref(&times), precision);
+            of(&times).and_then(|found| found.rate())
         };
+        if let (Some(first), None, Some(found)) = (self.rate, said, found) {
+            self.two_rates = Some(format!(
+                "the file says {first} frames a second, and its times lie at {found}; the times are taken"
+            ));
+        }
         self.rate = said.or(found);
         Ok(times)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn rounded_rates_are_those_that_were_meant() {
-        for (number, rate) in [
-            (120.000_045_77, "120"),
-            (30.0, "30"),
-            (29.97, "30000/1001"),
-            (f64::from(59.94f32), "60000/1001"),
-            (23.976, "24000/1001"),
-            (12.5, "25/2"),
-            (119.9, "1199/10"),
-            (0.5, "1/2"),
-        ] {
-            assert_eq!(
-                rate_of(number).map(|r| r.to_string()).as_deref(),
-                Some(rate)
-            );
-        }
-        for number in [0.0, -30.0, f64::NAN, f64::INFINITY, 1e300, 1e-12] {
-            assert_eq!(rate_of(number), None, "{number}");
-        }
     }
 }

@@ -201,6 +201,8 @@ fn append(
         Values::Stamps(stamps, _) => append_stamps(stamps, array),
         Values::Words { codes, words } => append_words(codes, words, known, array, null),
         Values::Lists { ends, numbers } => append_lists(ends, numbers, array, null),
+        // Only text has such.
+        Values::Decimals(..) => None,
     }
 }
 

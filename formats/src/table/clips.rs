@@ -259,8 +259,8 @@ impl Clip<'_> {
                 place: &place,
                 duplicates: self.options.duplicates,
             };
-            let times = &shared.lists[list];
-            match origin.increasing(times, |i, j| keys.are_equal(i, j), warnings)? {
+            let mut times = shared.lists[list].clone();
+            match origin.increasing(&mut times, |i, j| keys.are_equal(i, j), warnings)? {
                 None => increases = Some(list),
                 Some(kept) => {
                     let times = kept.iter().map(|&key| times[key]).collect();

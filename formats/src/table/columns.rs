@@ -1,5 +1,6 @@
 //! The columns of a table, whatever file they came from, and where a fault in them is.
 
+use crate::decimal::Decimal;
 use crate::diagnostic::{Code, Diagnostic, Place};
 use crate::format::TimeUnit;
 use crate::table::plan::Need;
@@ -28,6 +29,8 @@ pub(crate) struct Column {
 /// What a column holds.
 pub(crate) enum Values {
     Numbers(Numbers),
+    /// Times as text has them, in seconds, and the most decimals that one of them has.
+    Decimals(Vec<Decimal>, u32),
     /// Points in time, counted from a day of their own.
     Stamps(Vec<i64>, TimeUnit),
     /// Each row is one of the words.
@@ -118,6 +121,7 @@ impl Column {
     pub(crate) fn len(&self) -> usize {
         match &self.values {
             Values::Numbers(numbers) => numbers.len(),
+            Values::Decimals(times, _) => times.len(),
             Values::Stamps(stamps, _) => stamps.len(),
             Values::Words { codes, .. } => codes.len(),
             Values::Lists { ends, .. } => ends.len(),

@@ -2,7 +2,7 @@
 
 use crate::diagnostic::{Code, Diagnostic};
 use crate::format::{ReadOptions, TimeUnit};
-use crate::grid::Precision;
+use crate::rate::Precision;
 use crate::table::columns::{Numbers, Table, Values};
 use crate::table::plan::Plan;
 
@@ -39,6 +39,13 @@ pub(crate) fn times(
             offset: 0,
         })
     };
+    if let (Some(rate), false) = (options.source_rate, plan.is_frames) {
+        let message = format!(
+            "`{}` has the time of every row; --source-fps {rate} would be another, leave it out",
+            column.name
+        );
+        return Err(table.refuse_at(plan.time, 0, Code::RateBesideTimes, message));
+    }
     // A unit that is given holds for numbers of every kind; stamps have their own.
     let per_second = options
         .time_unit
@@ -61,6 +68,15 @@ pub(crate) fn times(
         (Values::Numbers(Numbers::F64(times)), _) => {
             let seconds = times.iter().map(|&time| time / per_second);
             exact(seconds.collect(), Some(Precision::F64))
+        }
+        (Values::Decimals(times, places), _) => {
+            let first = times.iter().min().map_or(0, |first| first.whole_seconds());
+            let offset = if first.unsigned_abs() < FAR { 0 } else { first };
+            Ok(Times {
+                seconds: times.iter().map(|time| time.since(offset)).collect(),
+                precision: Some(Precision::Decimals(*places)),
+                offset,
+            })
         }
         (Values::Numbers(Numbers::Whole(times)), _) => {
             // Text does not tell 2 from 2.0: small whole numbers are seconds there.
@@ -96,7 +112,7 @@ fn stamps(times: &[i64], unit: TimeUnit) -> Times {
         .collect();
     Times {
         seconds,
-        precision: Some(Precision::F64),
+        precision: Some(Precision::Decimals(unit.power().unsigned_abs())),
         offset,
     }
 }

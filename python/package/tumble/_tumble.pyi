@@ -331,7 +331,7 @@ def load(
     source_fps: _Rate | None = None,
     map: str | None = None,
     time_unit: Literal["s", "ms", "us", "ns"] | None = None,
-    duplicates: Literal["first", "last"] | None = None,
+    duplicates: Literal["first", "last", "both"] | None = None,
     raw_times: bool = False,
     scale: float | None = None,
     up: Literal["y", "z"] | None = None,

@@ -78,7 +78,8 @@ impl Job<'_> {
         else {
             return Err(Failure::usage(format!(
                 "{name}: the animations of a file that is kept keep their lengths; leave out \
-                 --times, --start, --end and --from-zero, or write another format"
+                 --times, --start, --end and --from-zero (`tumble convert --start` cuts a file first), or \
+                 write another format"
             )));
         };
         let at = |clip: &&Motion| document.times(clip.place, rate).map(Frames::at);

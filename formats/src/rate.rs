@@ -1,0 +1,524 @@
+//! The rate of a file's keys, decided in one place from how its numbers were written: [`of`]. Times are
+//! seldom whole frames: they were rounded to f32, to some decimals, or multiplied from a period that
+//! was. What a rounding can have moved is known, so every rate is tried, and none is listed here but
+//! to choose between several that a few digits leave open.
+//!
+//! The table in `docs/formats.md` is its test.
+
+use tumble::FrameRate;
+
+/// How a number was kept, from which follows by how much it may be off.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Precision {
+    /// IEEE 754 single precision.
+    F32,
+    /// IEEE 754 double precision.
+    F64,
+    /// Text with this many decimals.
+    Decimals(u32),
+}
+
+impl Precision {
+    /// The distance from the number to the next one of this type, away from 0.
+    pub(crate) fn ulp(self, number: f64) -> f64 {
+        match self {
+            Self::F32 => {
+                let near = (number as f32).abs();
+                f64::from(near.next_up()) - f64::from(near)
+            }
+            Self::F64 => number.abs().next_up() - number.abs(),
+            Self::Decimals(count) => 10f64.powi(-(count.min(400) as i32)),
+        }
+    }
+
+    /// By how much a time may be off: it was rounded, and may be a multiple of a period that was.
+    pub(crate) fn rounding(self, time: f64) -> f64 {
+        match self {
+            Self::F32 => 0.5 * self.ulp(time) + time.abs() * f64::from(f32::EPSILON) * 0.500_1,
+            Self::F64 => 0.5 * self.ulp(time) + time.abs() * f64::EPSILON,
+            Self::Decimals(_) => 0.500_001 * self.ulp(time) + Self::F64.rounding(time),
+        }
+    }
+}
+
+/// What a file says of its rate.
+pub(crate) enum Written<'a> {
+    /// The times of its keys, seconds: a list for each track or channel.
+    Times(&'a [Vec<f64>], Precision),
+    /// The digits of a frame's time, seconds.
+    FrameTime(&'a str),
+    /// The frames of a second.
+    Number(f64),
+}
+
+/// What follows from it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Found {
+    /// The rate of the frames that all keys lie on.
+    pub(crate) grid: FrameRate,
+    /// When one of these frames is, seconds.
+    pub(crate) phase: f64,
+    /// Whether there are keys on neighbouring frames: the rate is that of the keys, too.
+    pub(crate) is_rate: bool,
+}
+
+impl Found {
+    fn at_zero(grid: FrameRate) -> Self {
+        Self {
+            grid,
+            phase: 0.0,
+            is_rate: true,
+        }
+    }
+
+    /// The rate of the keys.
+    pub(crate) fn rate(self) -> Option<FrameRate> {
+        self.is_rate.then_some(self.grid)
+    }
+}
+
+/// Decides what rate was meant.
+pub(crate) fn of(written: &Written<'_>) -> Option<Found> {
+    match *written {
+        Written::Times(lists, precision) => of_times(lists, precision),
+        Written::FrameTime(digits) => of_period(digits).map(Found::at_zero),
+        Written::Number(number) => of_number(number).map(Found::at_zero),
+    }
+}
+
+/// The rates that people use. One of them is taken where a few digits leave several rates open.
+const USUAL: [u64; 38] = [
+    1, 2, 4, 5, 6, 8, 10, 12, 15, 16, 20, 24, 25, 30, 48, 50, 60, 72, 75, 90, 96, 100, 120, 125, 144, 150,
+    165, 180, 200, 240, 250, 300, 360, 400, 480, 500, 600, 1000,
+];
+
+/// Rates that are whole, or whole by 1.001, are looked for up to this.
+const MOST: f64 = 1000.0;
+
+/// The largest numerator and denominator of a rate: those that f64 holds exactly.
+const LARGEST: u128 = 1 << f64::MANTISSA_DIGITS;
+
+/// One of the rates from `low` to `high` that fit: the only whole one, or the only usual one of
+/// several; else likewise one that is whole but for 1.001 (NTSC).
+fn choose(low: f64, high: f64, fits: impl Fn(FrameRate) -> bool) -> Option<FrameRate> {
+    for (frames, seconds) in [(1, 1), (1000, 1001)] {
+        let scale = seconds as f64 / frames as f64;
+        let from = (low * scale * (1.0 - 1e-9)).ceil().max(1.0);
+        let to = (high * scale * (1.0 + 1e-9)).floor().min(MOST);
+        let rate = |number: u64| FrameRate::new(number * frames, seconds).ok();
+        let fitting = || {
+            let all = (from as u64..=to as u64).filter(|_| from <= to);
+            all.filter(|&number| rate(number).is_some_and(&fits))
+        };
+        let mut first = fitting();
+        match (first.next(), first.next()) {
+            (Some(only), None) => return rate(only),
+            (Some(_), Some(_)) => {
+                let mut usual = fitting().filter(|number| USUAL.contains(number));
+                return match (usual.next(), usual.next()) {
+                    (Some(only), None) => rate(only),
+                    _ => None,
+                };
+            }
+            (None, _) => {}
+        }
+    }
+    None
+}
+
+/// The rate of times that are all one after another in equal steps as they are written.
+fn as_written(seconds: f64) -> Option<FrameRate> {
+    let whole = (1.0 / seconds).round();
+    let is_whole = whole >= 1.0 && whole < 1e9 && ((1.0 / whole) - seconds).abs() <= 1e-15 * seconds;
+    match is_whole {
+        true => FrameRate::new(whole as u64, 1).ok(),
+        false => itself(seconds),
+    }
+}
+
+fn is_whole(rate: FrameRate) -> bool {
+    rate.per_second().fract() == 0.0
+}
+
+// ---- a number of frames a second
+
+/// A number this near to a usual rate, as a part of it, is that rate: AMASS has 120.00004577, and
+/// 29.97 is short for 30000/1001.
+const NEAR: f64 = 2e-6;
+
+/// The rate that a number stands for: a whole number, one by 1.001, or the number itself to nine
+/// decimals. `None` for what is no rate.
+fn of_number(number: f64) -> Option<FrameRate> {
+    let is_near = |rate: f64| (number - rate).abs() <= NEAR * rate;
+    let whole = number.round();
+    if whole >= 1.0 && whole <= f64::from(u32::MAX) && is_near(whole) {
+        return FrameRate::new(whole as u64, 1).ok();
+    }
+    for frames in [24_000, 30_000, 48_000, 60_000, 120_000] {
+        let rate = FrameRate::new(frames, 1_001).ok()?;
+        if is_near(rate.per_second()) {
+            return Some(rate);
+        }
+    }
+    format!("{number:.9}").parse().ok()
+}
+
+// ---- a frame's time
+
+/// The rate of a frame time of these digits: the whole number of frames whose time is written so, or
+/// times 1000/1001, or the number itself. Of few digits, as 0.017, several are open: the usual one
+/// is taken, if there is only one, else the number itself. Some programs print the digits of an f32, so
+/// it may also be a time rounded to f32 that is so near. `None` for times beyond 1e-9 s to 1e9 s.
+fn of_period(digits: &str) -> Option<FrameRate> {
+    let period: f64 = digits.parse().ok()?;
+    if !(1e-9..=1e9).contains(&period) {
+        return None;
+    }
+    let written = as_written(period);
+    if written.is_some_and(is_whole) {
+        return written;
+    }
+    let half = 0.5 * 10f64.powi(last_place(digits));
+    let fits = |rate: FrameRate| {
+        let exact = rate.time_of(1);
+        let near = |time: f64| (time - period).abs() <= half;
+        near(exact) || near(f64::from(exact as f32))
+    };
+    let margin = half + period * f64::from(f32::EPSILON);
+    let high = if margin < period { 1.0 / (period - margin) } else { MOST };
+    choose(1.0 / (period + margin), high, fits).or(written)
+}
+
+/// The power of ten that the last digit of a number counts.
+pub(crate) fn last_place(token: &str) -> i32 {
+    let (mantissa, exponent) = token.split_once(['e', 'E']).unwrap_or((token, "0"));
+    let decimals = mantissa
+        .split_once('.')
+        .map_or(0, |(_, decimals)| decimals.len());
+    let exponent: i32 = exponent.parse().unwrap_or(0); // of at most 62 digits; it has been a number
+    exponent.saturating_sub(decimals as i32)
+}
+
+/// The rate whose period is the simplest fraction that is this number in f64: the first of its
+/// continued fraction's convergents that rounds to it. So a rate comes back from the shortest
+/// digits of its period.
+pub(crate) fn itself(period: f64) -> Option<FrameRate> {
+    if !(1e-9..=1e9).contains(&period) {
+        return None;
+    }
+    // The number as a ratio of whole numbers; it has at most 82 binary places.
+    let exponent = (period.to_bits() >> 52) as i32 - 1023;
+    let places = 52 - exponent;
+    let mut rest = ((period * 2f64.powi(places)) as u128, 1u128 << places);
+    let (mut before, mut last) = ((0u128, 1u128), (1u128, 0u128));
+    while rest.1 > 0 {
+        let whole = rest.0 / rest.1;
+        rest = (rest.1, rest.0 % rest.1);
+        let next = |last: u128, before: u128| whole.saturating_mul(last).saturating_add(before);
+        let next = (next(last.0, before.0), next(last.1, before.1));
+        (before, last) = (last, next);
+        if last.0.max(last.1) > LARGEST {
+            return None;
+        }
+        if last.0 as f64 / last.1 as f64 == period {
+            return FrameRate::new(last.1 as u64, last.0 as u64).ok();
+        }
+    }
+    None
+}
+
+// ---- the times of keys
+
+/// A frame that some times stand for: when it can be, from what they may have been rounded by.
+#[derive(Debug, Clone, Copy)]
+struct Window {
+    from: f64,
+    to: f64,
+}
+
+impl Window {
+    fn middle(self) -> f64 {
+        0.5 * (self.from + self.to)
+    }
+}
+
+fn of_times(lists: &[Vec<f64>], precision: Precision) -> Option<Found> {
+    let mut times: Vec<f64> = lists.iter().flatten().copied().collect();
+    if times.iter().any(|time| !time.is_finite()) {
+        return None;
+    }
+    times.sort_by(f64::total_cmp);
+    times.dedup();
+    if times.len() < 2 {
+        return None;
+    }
+    let found = of_distinct(&times, precision);
+    let Precision::Decimals(_) = precision else {
+        return found;
+    };
+    // Many digits may be those of an f32.
+    let half = 0.5 * precision.ulp(1.0);
+    let are_f32 = || {
+        let digits = |time: &f64| (f64::from(*time as f32) - time).abs() <= half;
+        half <= 1e-7 && times.iter().all(digits)
+    };
+    found.or_else(|| are_f32().then(|| of_distinct(&times, Precision::F32))?)
+}
+
+/// The rate of increasing times.
+fn of_distinct(times: &[f64], precision: Precision) -> Option<Found> {
+    let steps = || times.windows(2).map(|pair| pair[1] - pair[0]);
+    let step = steps().fold(f64::INFINITY, f64::min);
+    let (first, last) = (times[0], times[times.len() - 1]);
+    // What is written may be what is meant.
+    let exact = Precision::F64.rounding(first.abs().max(last.abs()));
+    let even = |&time: &f64| {
+        let count = ((time - first) / step).round();
+        (time - first - count * step).abs() <= 2.0 * exact + count * exact / 8.0
+    };
+    let mean = (last - first) / ((last - first) / step).round();
+    let as_written = times.iter().all(even).then(|| as_written(shortest(mean, exact)));
+    let as_written = as_written.flatten();
+    if let Some(rate) = as_written.filter(|&rate| is_whole(rate)) {
+        let on_frames = on_frames(times.iter().copied(), rate, 0.0, precision);
+        let phase = if on_frames { 0.0 } else { first };
+        if on_frames || precision != Precision::F32 {
+            return Some(Found { grid: rate, phase, is_rate: true });
+        }
+    }
+    let windows = windows(times, precision)?;
+    let steps = Steps::of(&windows);
+    let at_zero = steps.as_ref().and_then(|steps| steps.from_zero(&windows));
+    let found = |grid, phase| Found { grid, phase, is_rate: true };
+    let chosen = || Some(found(at_zero.as_ref()?.choose(|_| true)?, 0.0));
+    let written = || {
+        let grid = as_written?;
+        let is_at_zero = on_frames(times.iter().copied(), grid, 0.0, precision);
+        Some(found(grid, if is_at_zero { 0.0 } else { first }))
+    };
+    let from_first = || {
+        let steps = steps.as_ref()?;
+        let grid = steps.choose(|rate| steps.fit(&windows, rate))?;
+        Some(found(grid, first))
+    };
+    let simple = || {
+        let grid = at_zero.as_ref().and_then(Steps::simple);
+        let grid = grid.map(|grid| found(grid, 0.0));
+        grid.or_else(|| Some(found(steps.as_ref()?.simple()?, first)))
+    };
+    let some_grid = || {
+        let grid = on_some_grid(&windows)?;
+        Some(Found { is_rate: false, ..Found::at_zero(grid) })
+    };
+    chosen().or_else(written).or_else(from_first).or_else(simple).or_else(some_grid)
+}
+
+/// A number of as few decimals as there are near another.
+fn shortest(number: f64, near: f64) -> f64 {
+    let decimals = (0..17).map(|places| {
+        let text = format!("{number:.places$}");
+        text.parse().unwrap_or(number)
+    });
+    let is_near = |short: &f64| *short > 0.0 && (short - number).abs() <= near;
+    decimals.into_iter().find(is_near).unwrap_or(number)
+}
+
+/// The frames that times stand for; `None` if they cannot be told apart.
+fn windows(times: &[f64], precision: Precision) -> Option<Vec<Window>> {
+    let mut all: Vec<Window> = Vec::new();
+    for &time in times {
+        let off = precision.rounding(time);
+        let (from, to) = (time - off, time + off);
+        match all.last_mut() {
+            Some(last) if from <= last.to => {
+                // Two roundings of one time.
+                (last.from, last.to) = (last.from.max(from), last.to.min(to));
+            }
+            _ => all.push(Window { from, to }),
+        }
+    }
+    (all.len() > 1).then_some(all)
+}
+
+/// Rates at which the smallest step between times is one frame, and all others are whole numbers of
+/// them: those from `low` to `high`.
+struct Steps {
+    low: f64,
+    high: f64,
+    /// The number of each window's frame.
+    counts: Vec<f64>,
+}
+
+impl Steps {
+    /// Frames count from the first window.
+    fn of(windows: &[Window]) -> Option<Self> {
+        let widest = windows.iter().map(|window| window.to - window.from).fold(0.0, f64::max);
+        let steps = windows.windows(2).map(|pair| pair[1].middle() - pair[0].middle());
+        let step = steps.fold(f64::INFINITY, f64::min);
+        if widest > 0.5 * step {
+            return None;
+        }
+        // What one step leaves open, the following ones narrow.
+        let mut all = Self {
+            low: 1.0 / (step + widest),
+            high: 1.0 / (step - widest),
+            counts: vec![0.0],
+        };
+        let first = windows[0];
+        for window in &windows[1..] {
+            let (least, most) = (window.from - first.to, window.to - first.from);
+            let count = all.count(0.5 * (least + most))?;
+            let is_next = all.counts.last().is_none_or(|&before| before < count);
+            all.narrow(count, least, most).filter(|()| is_next)?;
+            all.counts.push(count);
+        }
+        Some(all)
+    }
+
+    /// The same where frames count from time 0.
+    fn from_zero(&self, windows: &[Window]) -> Option<Self> {
+        let mut all = Self {
+            counts: Vec::with_capacity(windows.len()),
+            ..*self
+        };
+        // Those near 0 tell how to count the others.
+        let mut order: Vec<usize> = (0..windows.len()).collect();
+        let near = |place: usize| windows[place].middle().abs();
+        order.sort_by(|&a, &b| near(a).total_cmp(&near(b)));
+        let mut numbered = vec![0.0; windows.len()];
+        for place in order {
+            let Window { from, to } = windows[place];
+            let count = all.count(windows[place].middle())?;
+            match count {
+                0.0 if from <= 0.0 && 0.0 <= to => {}
+                1.0.. => all.narrow(count, from, to)?,
+                ..=-1.0 => all.narrow(-count, -to, -from)?,
+                _ => return None,
+            }
+            numbered[place] = count;
+        }
+        all.counts = numbered;
+        let increase = all.counts.windows(2).all(|pair| pair[0] < pair[1]);
+        increase.then_some(all)
+    }
+
+    /// The number of frames in some seconds, if all the rates agree on it.
+    fn count(&self, seconds: f64) -> Option<f64> {
+        let is_sure = (self.high - self.low) * seconds.abs() <= 1.0;
+        is_sure.then(|| (0.5 * (self.low + self.high) * seconds).round())
+    }
+
+    /// Keeps the rates that have a number of frames in a time from `least` to `most`.
+    fn narrow(&mut self, count: f64, least: f64, most: f64) -> Option<()> {
+        if count < 1.0 || least <= 0.0 {
+            return None;
+        }
+        (self.low, self.high) = (self.low.max(count / most), self.high.min(count / least));
+        (self.low <= self.high).then_some(())
+    }
+
+    /// Whether some phase puts a frame of the rate into each window.
+    fn fit(&self, windows: &[Window], rate: FrameRate) -> bool {
+        let (mut from, mut to) = (f64::NEG_INFINITY, f64::INFINITY);
+        for (window, count) in windows.iter().zip(&self.counts) {
+            let behind = count / rate.per_second();
+            (from, to) = (from.max(window.from - behind), to.min(window.to - behind));
+        }
+        from <= to
+    }
+
+    fn choose(&self, fits: impl Fn(FrameRate) -> bool) -> Option<FrameRate> {
+        let (low, high) = (self.low, self.high);
+        let is_sure = high - low < 0.05 * high;
+        let is_within = |rate: FrameRate| {
+            let (rate, slack) = (rate.per_second(), high * f64::EPSILON);
+            low - slack <= rate && rate <= high + slack
+        };
+        choose(low, high, |rate| is_within(rate) && fits(rate)).filter(|_| is_sure)
+    }
+
+    /// A rate far simpler than those between two chance numbers are.
+    fn simple(&self) -> Option<FrameRate> {
+        let (frames, seconds) = simplest(self.low, self.high)?;
+        let width = (self.high - self.low).max(self.high * f64::EPSILON);
+        let is_simple = self.counts.len() > 3 && (seconds as f64).powi(2) * width < 0.01;
+        is_simple.then(|| FrameRate::new(frames, seconds).ok())?
+    }
+}
+
+/// The fraction of the smallest numbers from `low` to `high`.
+fn simplest(low: f64, high: f64) -> Option<(u64, u64)> {
+    // By the tree of Stern and Brocot, a run at a time.
+    let (mut low, mut high) = (low, high);
+    let (mut before, mut last) = ((0u128, 1u128), (1u128, 0u128));
+    for _ in 0..64 {
+        let whole = low.floor();
+        let is_last = low == whole || whole + 1.0 <= high;
+        let part = if low == whole { whole } else if is_last { whole + 1.0 } else { whole };
+        let part = part as u128;
+        let next = |last: u128, before: u128| part.saturating_mul(last).saturating_add(before);
+        let next = (next(last.0, before.0), next(last.1, before.1));
+        if next.0.max(next.1) > LARGEST {
+            return None;
+        }
+        if is_last {
+            return Some((next.0 as u64, next.1 as u64));
+        }
+        (before, last) = (last, next);
+        (low, high) = (1.0 / (high - whole), 1.0 / (low - whole));
+    }
+    None
+}
+
+/// The chance below which times do not lie on frames by accident.
+const ACCIDENT: f64 = 1e-3;
+
+/// A rate on whose frames, counted from 0, all times lie, though none on neighbouring ones: the lowest
+/// usual one, else the lowest.
+fn on_some_grid(windows: &[Window]) -> Option<FrameRate> {
+    let widest = windows.iter().map(|window| window.to - window.from).fold(0.0, f64::max);
+    let told = windows.iter().filter(|window| !(window.from <= 0.0 && 0.0 <= window.to)).count();
+    let fits = |rate: FrameRate| {
+        let per_second = rate.per_second();
+        let chance = (widest * per_second).powi(told as i32) * MOST;
+        if widest * per_second > 0.25 || chance > ACCIDENT {
+            return false;
+        }
+        let mut before = f64::NEG_INFINITY;
+        windows.iter().all(|window| {
+            let frame = (window.middle() * per_second).round();
+            let time = frame / per_second;
+            let is_next = frame > before;
+            before = frame;
+            is_next && window.from <= time && time <= window.to
+        })
+    };
+    let whole = USUAL.iter().filter(|&&rate| rate >= 24).copied().chain(1..=MOST as u64);
+    let whole = whole.map(|rate| (rate, 1));
+    let ntsc = [24, 30, 48, 60, 120].map(|rate| (rate * 1000, 1001));
+    let mut all = whole.chain(ntsc).filter_map(|(frames, seconds)| FrameRate::new(frames, seconds).ok());
+    all.find(|&rate| fits(rate))
+}
+
+/// Whether all times are frames of the rate, one of which is at `phase`, but for their rounding.
+pub(crate) fn on_frames(
+    mut times: impl Iterator<Item = f64>,
+    rate: FrameRate,
+    phase: f64,
+    precision: Precision,
+) -> bool {
+    times.all(|time| {
+        let exact = frame_time(rate, phase, time);
+        (time - exact).abs() <= precision.rounding(time)
+    })
+}
+
+/// The time of the frame nearest to a time.
+pub(crate) fn frame_time(rate: FrameRate, phase: f64, time: f64) -> f64 {
+    let frame = ((time - phase) * rate.per_second()).round();
+    let behind = rate.time_of(frame.abs() as u64).copysign(frame);
+    if phase == 0.0 { behind } else { phase + behind }
+}
+
+#[cfg(test)]
+mod tests;

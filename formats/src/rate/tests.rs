@@ -1,0 +1,133 @@
+//! Reads the table of `docs/formats.md`, and finds the rate of each of its rows.
+
+use super::*;
+
+const PAGE: &str = include_str!("../../../docs/formats.md");
+
+/// The rows of the table: how a number is written, what it is kept as, and its rate.
+fn rows() -> Vec<[&'static str; 3]> {
+    let table = PAGE.split("| written | kept as | rate |\n|---|---|---|\n").nth(1).unwrap();
+    let lines = table.lines().take_while(|line| line.starts_with('|'));
+    let cells = lines.map(|line| {
+        let mut cells = line.trim_matches('|').split('|').map(str::trim);
+        let mut next = || cells.next().unwrap();
+        [next().trim_matches('`'), next(), next()]
+    });
+    cells.collect()
+}
+
+fn shown(found: Option<Found>) -> String {
+    let rate = found.and_then(Found::rate);
+    rate.map_or("none".to_owned(), |rate| rate.to_string())
+}
+
+/// As a file keeps times that were computed so.
+fn kept(times: impl Iterator<Item = f64>, kept_as: &str) -> (Vec<f64>, Precision) {
+    match kept_as {
+        "f32" => (times.map(|time| f64::from(time as f32)).collect(), Precision::F32),
+        "f64" => (times.collect(), Precision::F64),
+        _ => {
+            let places: usize = kept_as.strip_suffix(" decimals").unwrap().parse().unwrap();
+            let text = times.map(|time| format!("{time:.places$}").parse().unwrap());
+            (text.collect(), Precision::Decimals(places as u32))
+        }
+    }
+}
+
+/// The times of keys by a formula such as `7.25 + k / 30` or `k * f32(1 / 30)`, at one of its rates.
+fn keys(formula: &str, rate: FrameRate, kept_as: &str) -> (Vec<f64>, Precision) {
+    let (start, formula) = formula.split_once(" + ").unwrap_or(("0", formula));
+    let start: f64 = start.parse().unwrap();
+    let frames = 0..100u32;
+    let period = rate.time_of(1);
+    if formula.starts_with("k * f32(") {
+        let times = frames.map(|k| f64::from(k as f32 * period as f32));
+        return kept(times, kept_as);
+    } else if formula.starts_with("k * f64(") {
+        return kept(frames.map(|k| f64::from(k) * period), kept_as);
+    }
+    assert!(formula.starts_with("k / "), "{formula}");
+    kept(frames.map(|k| start + rate.time_of(k.into())), kept_as)
+}
+
+#[test]
+fn the_table_of_the_documents_holds() {
+    let rows = rows();
+    assert!(rows.len() >= 40, "{} rows", rows.len());
+    let mut wrong = Vec::new();
+    let mut check = |row: &[&str; 3], found: String, expected: &str| {
+        if found != expected {
+            wrong.push(format!("{row:?}: found {found}, not {expected}"));
+        }
+    };
+    for row in &rows {
+        let [written, kept_as, rate] = *row;
+        if let Some(digits) = written.strip_prefix("Frame Time: ") {
+            check(row, shown(of(&Written::FrameTime(digits))), rate);
+        } else if let Some(number) = written.strip_prefix("fps = ") {
+            check(row, shown(of(&Written::Number(number.parse().unwrap()))), rate);
+        } else if written.contains('k') {
+            let (_, rates) = written.split_once(" / ").unwrap();
+            let rates = rates.trim_end_matches(')');
+            let all: Vec<FrameRate> = match rates.split_once("..") {
+                Some((from, to)) => {
+                    let all = from.parse().unwrap()..=to.parse().unwrap();
+                    all.map(|rate| FrameRate::new(rate, 1).unwrap()).collect()
+                }
+                None => vec![rates.parse().unwrap()],
+            };
+            for meant in all {
+                let (times, precision) = keys(written, meant, kept_as);
+                let found = shown(of(&Written::Times(&[times], precision)));
+                let meant = meant.to_string();
+                check(row, found, if rate == "the same" { &meant } else { rate });
+            }
+        } else {
+            let tokens = || written.split(' ');
+            let times = tokens().map(|token| token.parse::<f64>().unwrap());
+            let (times, precision) = match kept_as {
+                "text" => {
+                    let places = tokens().map(|token| last_place(token).min(0).unsigned_abs());
+                    (times.collect(), Precision::Decimals(places.max().unwrap()))
+                }
+                _ => kept(times, kept_as),
+            };
+            check(row, shown(of(&Written::Times(&[times], precision))), rate);
+        }
+    }
+    assert!(wrong.is_empty(), "{} wrong:\n{}", wrong.len(), wrong[..wrong.len().min(30)].join("\n"));
+}
+
+/// Times that were rounded become frames, to the last bit of f64.
+#[test]
+fn rounded_times_become_the_frames_of_any_rate() {
+    for number in 1..=1000 {
+        let rate = FrameRate::new(number, 1).unwrap();
+        for (formula, kept_as) in [("k / r", "f32"), ("k * f32(1 / r)", "f32"), ("k / r", "7 decimals")] {
+            let (times, precision) = keys(formula, rate, kept_as);
+            let mut lists = [times];
+            assert_eq!(crate::grid::restore(&mut lists, precision), Some(rate), "{formula}, {kept_as}");
+            let frames: Vec<f64> = (0..100).map(|k| rate.time_of(k)).collect();
+            assert_eq!(lists[0], frames, "{formula} at {rate}, {kept_as}");
+        }
+    }
+}
+
+#[test]
+fn rates_come_back_from_the_shortest_digits_of_their_period() {
+    let ratios = (1..400).flat_map(|frames| {
+        [1, 3, 100, 1001, 99_991].map(|seconds| (frames * 7919 % 100_003, seconds))
+    });
+    for (frames, seconds) in ratios {
+        let rate = FrameRate::new(frames, seconds).unwrap();
+        let digits = (seconds as f64 / frames as f64).to_string();
+        let found = of(&Written::FrameTime(&digits)).and_then(Found::rate);
+        assert_eq!(found, Some(rate), "{rate}");
+    }
+    for digits in ["1e10", "9e-10", "1e-30"] {
+        assert_eq!(of(&Written::FrameTime(digits)), None, "{digits}");
+    }
+    for number in [0.0, -30.0, f64::NAN, f64::INFINITY, 1e300, 1e-12] {
+        assert_eq!(of(&Written::Number(number)), None, "{number}");
+    }
+}

@@ -1,0 +1,300 @@
+//! At any time: no sample is left unwritten, and accuracy does not hang on when a motion is.
+
+use glam::{DQuat, DVec3, Quat};
+use proptest::prelude::*;
+use tumble::reference::{Curve, angle_between};
+use tumble::verify::verify;
+use tumble::{
+    Device, Engine, FrameRate, Frames, Interpolation, Layout, METHODS, Method, TrackSet, WrapMode,
+    method,
+};
+
+use crate::support::{Random, first_difference, vulkan_engines};
+
+const MODES: [WrapMode; 4] = [
+    WrapMode::Hold,
+    WrapMode::Loop,
+    WrapMode::Mirror,
+    WrapMode::Extrapolate,
+];
+
+/// What no result has.
+const POISON: [f32; 4] = [f32::NAN; 4];
+
+/// A time of any magnitude up to 1e18 s.
+fn any_time(random: &mut Random) -> f64 {
+    let sign = random.pick(&[-1.0, 1.0]);
+    match random.next() % 6 {
+        0 => 0.0,
+        1 => sign * random.pick(&[1.0, 2.5, 1.7e9, 86_400.0, 1e12, 4e16, 1e18]),
+        _ => sign * 10f64.powf(random.between(-9.0, 18.0)),
+    }
+}
+
+/// Tracks whose keys are from 1e-9 s to a million seconds apart, anywhere.
+fn any_set(random: &mut Random) -> TrackSet {
+    let mut set = TrackSet::new();
+    for _ in 0..1 + random.next() % 3 {
+        let first = match random.next() % 2 {
+            0 => 0.0,
+            _ => any_time(random),
+        };
+        let step = 10f64.powf(random.between(-9.0, 6.0));
+        let mut times = vec![first];
+        // Long tracks lie in several parts.
+        let count = random.pick(&[0, 1, 2, 3, 7, 7, 40, 5000]);
+        for key in 1..=count {
+            let time = first + step * (f64::from(key) + random.between(-0.3, 0.3));
+            times.push(time.max(times[times.len() - 1].next_up()));
+        }
+        let keys: Vec<Quat> = times.iter().map(|_| random.rotation().as_quat()).collect();
+        set.push("", &times, &keys).unwrap();
+    }
+    set
+}
+
+fn any_frames(random: &mut Random, set: &TrackSet) -> Frames {
+    let (first, last) = set.time_span().unwrap();
+    let near = |random: &mut Random| first + (last - first) * random.between(-3.0, 4.0);
+    if random.next() % 3 == 0 {
+        let mut any = || match random.next() % 2 {
+            0 => any_time(random),
+            _ => near(random),
+        };
+        return Frames::at((0..60).map(|_| any()).collect());
+    }
+    let start = match random.next() % 2 {
+        0 => any_time(random),
+        _ => near(random),
+    };
+    // From few frames for each track to few for each key.
+    let frames = [1u32, 24, 30, 1000, 1_000_000];
+    let rate = match random.next() % 3 {
+        0 => FrameRate::new(u64::from(random.pick(&frames)), 1001).unwrap(),
+        1 => FrameRate::new(u64::from(random.pick(&frames)), 1).unwrap(),
+        _ => {
+            let length = (last - first).clamp(1e-9, 1e6);
+            format!("{:.9}", random.between(1.0, 300.0) / length).parse().unwrap_or_else(|_| FrameRate::new(25, 1).unwrap())
+        }
+    };
+    let count = random.pick(&[1.0, 2.0, 30.0, 300.0]);
+    Frames::rate(rate).between(start, start + count / rate.per_second())
+}
+
+/// Every sample of a poisoned output is a rotation, or the call is an error.
+fn check_written(seed: u64, engines: &[Engine]) {
+    let mut random = Random(seed);
+    let set = any_set(&mut random);
+    let frames = any_frames(&mut random, &set);
+    let interpolation = Interpolation {
+        before: random.pick(&MODES),
+        after: random.pick(&MODES),
+        ..random.pick(&METHODS).into()
+    };
+    let layout = random.pick(&[Layout::TrackMajor, Layout::FrameMajor]);
+    let span = set.time_span();
+    let count = frames.resolve(set.track_count(), span).unwrap().len() * set.track_count();
+    let mut all: Vec<(String, Vec<[f32; 4]>)> = Vec::new();
+    for engine in engines {
+        for keeps in [false, true] {
+            let mut output = vec![POISON; count];
+            let done = match keeps {
+                false => engine.evaluate_into(&set, interpolation, &frames, layout, &mut output),
+                true => engine
+                    .upload(&set, interpolation)
+                    .and_then(|clip| clip.evaluate_into(&frames, layout, &mut output)),
+            };
+            let what = format!("seed {seed}, {interpolation:?}, {frames:?}, clip {keeps}, {}", engine.device_name());
+            if let Err(error) = done {
+                // Not every method can close a loop or has a path for each pair of keys.
+                let error = error.to_string();
+                assert!(!error.contains("bug"), "{what}: {error}");
+                continue;
+            }
+            for (sample, q) in output.iter().enumerate() {
+                let norm = Quat::from_array(*q).as_dquat().length();
+                assert!((norm - 1.0).abs() < 1e-5, "{what}: sample {sample} is {q:?}");
+            }
+            all.push((what, output));
+        }
+    }
+    for pair in all.windows(2) {
+        let [a, b] = [&pair[0].1, &pair[1].1].map(|own| bytemuck::cast_slice::<_, Quat>(own));
+        assert_eq!(first_difference(a, b), None, "{} and {}", pair[0].0, pair[1].0);
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 600, ..ProptestConfig::default() })]
+    #[test]
+    fn no_sample_is_left_unwritten_on_the_cpu(seed in any::<u64>()) {
+        let engine = Engine::new(Device::Cpu).unwrap();
+        check_written(seed, std::slice::from_ref(&engine));
+    }
+}
+
+#[test]
+fn no_sample_is_left_unwritten_on_a_device() {
+    let mut engines = vulkan_engines(|_| {});
+    engines.push(Engine::new(Device::Cpu).unwrap());
+    for seed in 0..80u64 {
+        check_written(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15), &engines);
+    }
+}
+
+/// Keys that turn at 50 rad/s, one way and then the other.
+fn fast_keys(count: usize) -> Vec<Quat> {
+    let mut random = Random(11);
+    let mut rotation = DQuat::IDENTITY;
+    let keys = (0..count).map(|_| {
+        let turn = DQuat::from_axis_angle(random.direction(), 50.0 / 64.0);
+        rotation = (rotation * turn).normalize();
+        rotation.as_quat()
+    });
+    keys.collect()
+}
+
+/// Units of a second in which times of the following tests are whole: 2^-20 of a frame's numerator.
+const UNIT: f64 = (1 << 20) as f64;
+
+/// At every base time from 0 to 1e12 s frames are as near to the textbook as at 0. Where frames lie is
+/// computed apart, in whole numbers of 128 bits.
+#[test]
+fn accuracy_is_the_same_at_every_time() {
+    let engine = Engine::new(Device::Cpu).unwrap();
+    let keys = fast_keys(40);
+    let places: Vec<f64> = (0..40).map(|key| f64::from(key) / 64.0).collect();
+    let rates = ["60", "1000", "24000/1001", "64"].map(|rate| rate.parse::<FrameRate>().unwrap());
+    for base in [0.0, 1.0, -1000.0, 86_400.0, 3e6, 1e9, 1.7e9, -1.7e9, 1e10, 1e11, 1e12] {
+        let times: Vec<f64> = places.iter().map(|place| base + place).collect();
+        let mut set = TrackSet::new();
+        set.push("", &times, &keys).unwrap();
+        for (r, rate) in rates.into_iter().enumerate() {
+            let numbers = rate.to_string();
+            let (frames, seconds) = numbers.split_once('/').unwrap_or((&numbers, "1"));
+            let [frames, seconds] = [frames, seconds].map(|own| own.parse::<i128>().unwrap());
+            for (w, method) in [method::SLERP, method::BESSEL_OVERHAUSER, method::SQUAD].into_iter().enumerate() {
+                let after = MODES[(r + w) % 3];
+                let interpolation = Interpolation { after, before: after, ..method.into() };
+                // From before the keys until behind them.
+                let start = base - 0.75 + 1.0 / 4096.0;
+                let wanted = Frames::rate(rate).between(start, start + 2.0);
+                let found = engine.evaluate(&set, interpolation, &wanted).unwrap();
+                let mut track = set.track(0);
+                track.times = &places;
+                let curve = Curve::of(&method.into(), track);
+                let unit = |seconds: f64| (seconds * UNIT) as i128 * frames;
+                let length = unit(places[39]);
+                for (k, q) in (0..).zip(found.as_quats()) {
+                    let place = unit(start - base) + k * seconds * (1 << 20);
+                    let place = match after {
+                        WrapMode::Loop => place.rem_euclid(length),
+                        WrapMode::Mirror => {
+                            let place = place.rem_euclid(2 * length);
+                            place.min(2 * length - place)
+                        }
+                        _ => place.clamp(0, length),
+                    };
+                    let place = place as f64 / UNIT / frames as f64;
+                    let off = angle_between(q.as_dquat(), curve.rotation(place));
+                    assert!(off < 1.1e-6, "{method} at {base} s, {rate} fps, frame {k}, {after:?}: {off:e}");
+                }
+                let explicit: Vec<f64> = (0..500).map(|k| base + f64::from(k) / 1024.0).collect();
+                if base.abs() < 1e12 {
+                    let found = engine.evaluate(&set, interpolation, &Frames::at(explicit.clone())).unwrap();
+                    for (time, q) in explicit.iter().zip(found.as_quats()) {
+                        let off = angle_between(q.as_dquat(), curve.rotation(time - base));
+                        assert!(off < 1.1e-6, "{method} at {time} s: {off:e}");
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// A motion that is repeated for 1e12 s is where exact arithmetic has it.
+#[test]
+fn repeated_motion_is_as_accurate_far_out() {
+    let engine = Engine::new(Device::Cpu).unwrap();
+    let keys = fast_keys(40);
+    let places: Vec<f64> = (0..40).map(|key| f64::from(key) / 64.0).collect();
+    let mut set = TrackSet::new();
+    set.push("", &places, &keys).unwrap();
+    let curve = Curve::of(&method::BESSEL_OVERHAUSER.into(), set.track(0));
+    let unit = |seconds: f64| (seconds * UNIT) as i128 * 1001;
+    let length = unit(places[39]);
+    for mode in [WrapMode::Loop, WrapMode::Mirror] {
+        let interpolation = Interpolation { before: mode, after: mode, ..method::BESSEL_OVERHAUSER.into() };
+        for start in [10.0, 1e6 + 0.5, 1.7e9, -1.7e9, 1e12, -1e12] {
+            let frames = Frames::rate(FrameRate::new(1001, 2).unwrap()).between(start, start + 1.0);
+            let found = engine.evaluate(&set, interpolation, &frames).unwrap();
+            let mut compared = 0;
+            for (k, q) in (0i128..).zip(found.as_quats()) {
+                let place = unit(start) + k * 2 * (1 << 20);
+                let seam = place.rem_euclid(length);
+                if mode == WrapMode::Loop && seam.min(length - seam) < unit(1e-9).max(1002) && seam != 0 {
+                    continue; // it jumps there
+                }
+                let twice = place.rem_euclid(2 * length);
+                let place = if mode == WrapMode::Loop { seam } else { twice.min(2 * length - twice) };
+                let expected = curve.rotation(place as f64 / UNIT / 1001.0);
+                let off = angle_between(q.as_dquat(), expected);
+                assert!(off < 1.1e-6, "{mode:?} from {start} s, frame {k}: {off:e}");
+                compared += 1;
+            }
+            assert!(compared > 450);
+        }
+    }
+}
+
+/// Seconds since 1970 of 0.24 µs a step: a frame at a key's time shows it, also where keys are held.
+#[test]
+fn frames_at_keys_of_unix_time_show_the_keys() {
+    let engine = Engine::new(Device::Cpu).unwrap();
+    let turned = |key: u32| Quat::from_rotation_z(0.01 * f64::from(key) as f32);
+    let times: Vec<f64> = (0..200).map(|key| 1.7e9 + 0.3 + f64::from(key) * 0.01).collect();
+    let keys: Vec<Quat> = (0..200).map(turned).collect();
+    let set = TrackSet::with_shared_times(&times, &keys).unwrap();
+    let found = engine.evaluate(&set, method::STEP, &Frames::fps(100)).unwrap();
+    assert_eq!(found.as_quats(), keys);
+    // Behind a key by more than its rounding is not the key: 1.2 µs are 6e-5 rad here.
+    let times: Vec<f64> = (0..200).map(|key| 1.7e9 + 0.01 * f64::from(key) + 1.2e-6).collect();
+    let frames = Frames::fps(1000).between(1.7e9, 1.7e9 + 1.9);
+    let verified = |keys: &[Quat], method: Method| {
+        let set = TrackSet::with_shared_times(&times, keys).unwrap();
+        let found = verify(&engine, &set, method.into(), &frames).unwrap();
+        assert!(found.max_error < 1e-6, "{method}: {:e} rad at {:?}", found.max_error, found.worst);
+    };
+    let slow: Vec<Quat> = (0..200).map(turned).collect();
+    METHODS.into_iter().for_each(|method| verified(&slow, method));
+    // 78 rad/s. Curves that are cut into pieces here are not as exact: pieces start at times in f64.
+    for method in [method::SLERP, method::BESSEL_OVERHAUSER, method::SQUAD] {
+        verified(&fast_keys(200), method);
+    }
+}
+
+/// The velocity at the end of a track goes on for as long as f64 can tell.
+#[test]
+fn far_extrapolation_is_finite() {
+    let mut set = TrackSet::new();
+    let keys = [Quat::IDENTITY, Quat::from_rotation_x(1.0), Quat::from_rotation_y(0.5)];
+    set.push("", &[0.0, 4e-5, 1e-4], &keys).unwrap();
+    let engine = Engine::new(Device::Cpu).unwrap();
+    for before in MODES {
+        for after in MODES {
+            let interpolation = Interpolation { before, after, ..method::BESSEL_OVERHAUSER.into() };
+            for start in [1.7e9, -4e16, 4e16, 1e18, -1e18] {
+                let frames = Frames::fps(1000).between(start, start + 2.0);
+                let mut output = vec![POISON; frames.resolve(1, None).unwrap().len()];
+                engine
+                    .evaluate_into(&set, interpolation, &frames, Layout::TrackMajor, &mut output)
+                    .unwrap();
+                for q in output {
+                    let vector = DVec3::new(q[0].into(), q[1].into(), q[2].into());
+                    let norm = vector.length().hypot(q[3].into());
+                    assert!((norm - 1.0).abs() < 1e-6, "{before:?} {after:?} at {start}: {q:?}");
+                }
+            }
+        }
+    }
+}
