@@ -74,7 +74,9 @@ fn any_frames(random: &mut Random, set: &TrackSet) -> Frames {
         1 => FrameRate::new(u64::from(random.pick(&frames)), 1).unwrap(),
         _ => {
             let length = (last - first).clamp(1e-9, 1e6);
-            format!("{:.9}", random.between(1.0, 300.0) / length).parse().unwrap_or_else(|_| FrameRate::new(25, 1).unwrap())
+            format!("{:.9}", random.between(1.0, 300.0) / length)
+                .parse()
+                .unwrap_or_else(|_| FrameRate::new(25, 1).unwrap())
         }
     };
     let count = random.pick(&[1.0, 2.0, 30.0, 300.0]);
@@ -104,7 +106,10 @@ fn check_written(seed: u64, engines: &[Engine]) {
                     .upload(&set, interpolation)
                     .and_then(|clip| clip.evaluate_into(&frames, layout, &mut output)),
             };
-            let what = format!("seed {seed}, {interpolation:?}, {frames:?}, clip {keeps}, {}", engine.device_name());
+            let what = format!(
+                "seed {seed}, {interpolation:?}, {frames:?}, clip {keeps}, {}",
+                engine.device_name()
+            );
             if let Err(error) = done {
                 // Not every method can close a loop or has a path for each pair of keys.
                 let error = error.to_string();
@@ -113,14 +118,23 @@ fn check_written(seed: u64, engines: &[Engine]) {
             }
             for (sample, q) in output.iter().enumerate() {
                 let norm = Quat::from_array(*q).as_dquat().length();
-                assert!((norm - 1.0).abs() < 1e-5, "{what}: sample {sample} is {q:?}");
+                assert!(
+                    (norm - 1.0).abs() < 1e-5,
+                    "{what}: sample {sample} is {q:?}"
+                );
             }
             all.push((what, output));
         }
     }
     for pair in all.windows(2) {
         let [a, b] = [&pair[0].1, &pair[1].1].map(|own| bytemuck::cast_slice::<_, Quat>(own));
-        assert_eq!(first_difference(a, b), None, "{} and {}", pair[0].0, pair[1].0);
+        assert_eq!(
+            first_difference(a, b),
+            None,
+            "{} and {}",
+            pair[0].0,
+            pair[1].0
+        );
     }
 }
 
@@ -165,7 +179,9 @@ fn accuracy_is_the_same_at_every_time() {
     let keys = fast_keys(40);
     let places: Vec<f64> = (0..40).map(|key| f64::from(key) / 64.0).collect();
     let rates = ["60", "1000", "24000/1001", "64"].map(|rate| rate.parse::<FrameRate>().unwrap());
-    for base in [0.0, 1.0, -1000.0, 86_400.0, 3e6, 1e9, 1.7e9, -1.7e9, 1e10, 1e11, 1e12] {
+    for base in [
+        0.0, 1.0, -1000.0, 86_400.0, 3e6, 1e9, 1.7e9, -1.7e9, 1e10, 1e11, 1e12,
+    ] {
         let times: Vec<f64> = places.iter().map(|place| base + place).collect();
         let mut set = TrackSet::new();
         set.push("", &times, &keys).unwrap();
@@ -173,9 +189,16 @@ fn accuracy_is_the_same_at_every_time() {
             let numbers = rate.to_string();
             let (frames, seconds) = numbers.split_once('/').unwrap_or((&numbers, "1"));
             let [frames, seconds] = [frames, seconds].map(|own| own.parse::<i128>().unwrap());
-            for (w, method) in [method::SLERP, method::BESSEL_OVERHAUSER, method::SQUAD].into_iter().enumerate() {
+            for (w, method) in [method::SLERP, method::BESSEL_OVERHAUSER, method::SQUAD]
+                .into_iter()
+                .enumerate()
+            {
                 let after = MODES[(r + w) % 3];
-                let interpolation = Interpolation { after, before: after, ..method.into() };
+                let interpolation = Interpolation {
+                    after,
+                    before: after,
+                    ..method.into()
+                };
                 // From before the keys until behind them.
                 let start = base - 0.75 + 1.0 / 4096.0;
                 let wanted = Frames::rate(rate).between(start, start + 2.0);
@@ -197,11 +220,16 @@ fn accuracy_is_the_same_at_every_time() {
                     };
                     let place = place as f64 / UNIT / frames as f64;
                     let off = angle_between(q.as_dquat(), curve.rotation(place));
-                    assert!(off < 1.1e-6, "{method} at {base} s, {rate} fps, frame {k}, {after:?}: {off:e}");
+                    assert!(
+                        off < 1.1e-6,
+                        "{method} at {base} s, {rate} fps, frame {k}, {after:?}: {off:e}"
+                    );
                 }
                 let explicit: Vec<f64> = (0..500).map(|k| base + f64::from(k) / 1024.0).collect();
                 if base.abs() < 1e12 {
-                    let found = engine.evaluate(&set, interpolation, &Frames::at(explicit.clone())).unwrap();
+                    let found = engine
+                        .evaluate(&set, interpolation, &Frames::at(explicit.clone()))
+                        .unwrap();
                     for (time, q) in explicit.iter().zip(found.as_quats()) {
                         let off = angle_between(q.as_dquat(), curve.rotation(time - base));
                         assert!(off < 1.1e-6, "{method} at {time} s: {off:e}");
@@ -224,7 +252,11 @@ fn repeated_motion_is_as_accurate_far_out() {
     let unit = |seconds: f64| (seconds * UNIT) as i128 * 1001;
     let length = unit(places[39]);
     for mode in [WrapMode::Loop, WrapMode::Mirror] {
-        let interpolation = Interpolation { before: mode, after: mode, ..method::BESSEL_OVERHAUSER.into() };
+        let interpolation = Interpolation {
+            before: mode,
+            after: mode,
+            ..method::BESSEL_OVERHAUSER.into()
+        };
         for start in [10.0, 1e6 + 0.5, 1.7e9, -1.7e9, 1e12, -1e12] {
             let frames = Frames::rate(FrameRate::new(1001, 2).unwrap()).between(start, start + 1.0);
             let found = engine.evaluate(&set, interpolation, &frames).unwrap();
@@ -232,11 +264,18 @@ fn repeated_motion_is_as_accurate_far_out() {
             for (k, q) in (0i128..).zip(found.as_quats()) {
                 let place = unit(start) + k * 2 * (1 << 20);
                 let seam = place.rem_euclid(length);
-                if mode == WrapMode::Loop && seam.min(length - seam) < unit(1e-9).max(1002) && seam != 0 {
+                if mode == WrapMode::Loop
+                    && seam.min(length - seam) < unit(1e-9).max(1002)
+                    && seam != 0
+                {
                     continue; // it jumps there
                 }
                 let twice = place.rem_euclid(2 * length);
-                let place = if mode == WrapMode::Loop { seam } else { twice.min(2 * length - twice) };
+                let place = if mode == WrapMode::Loop {
+                    seam
+                } else {
+                    twice.min(2 * length - twice)
+                };
                 let expected = curve.rotation(place as f64 / UNIT / 1001.0);
                 let off = angle_between(q.as_dquat(), expected);
                 assert!(off < 1.1e-6, "{mode:?} from {start} s, frame {k}: {off:e}");
@@ -252,21 +291,34 @@ fn repeated_motion_is_as_accurate_far_out() {
 fn frames_at_keys_of_unix_time_show_the_keys() {
     let engine = Engine::new(Device::Cpu).unwrap();
     let turned = |key: u32| Quat::from_rotation_z(0.01 * f64::from(key) as f32);
-    let times: Vec<f64> = (0..200).map(|key| 1.7e9 + 0.3 + f64::from(key) * 0.01).collect();
+    let times: Vec<f64> = (0..200)
+        .map(|key| 1.7e9 + 0.3 + f64::from(key) * 0.01)
+        .collect();
     let keys: Vec<Quat> = (0..200).map(turned).collect();
     let set = TrackSet::with_shared_times(&times, &keys).unwrap();
-    let found = engine.evaluate(&set, method::STEP, &Frames::fps(100)).unwrap();
+    let found = engine
+        .evaluate(&set, method::STEP, &Frames::fps(100))
+        .unwrap();
     assert_eq!(found.as_quats(), keys);
     // Behind a key by more than its rounding is not the key: 1.2 µs are 6e-5 rad here.
-    let times: Vec<f64> = (0..200).map(|key| 1.7e9 + 0.01 * f64::from(key) + 1.2e-6).collect();
+    let times: Vec<f64> = (0..200)
+        .map(|key| 1.7e9 + 0.01 * f64::from(key) + 1.2e-6)
+        .collect();
     let frames = Frames::fps(1000).between(1.7e9, 1.7e9 + 1.9);
     let verified = |keys: &[Quat], method: Method| {
         let set = TrackSet::with_shared_times(&times, keys).unwrap();
         let found = verify(&engine, &set, method.into(), &frames).unwrap();
-        assert!(found.max_error < 1e-6, "{method}: {:e} rad at {:?}", found.max_error, found.worst);
+        assert!(
+            found.max_error < 1e-6,
+            "{method}: {:e} rad at {:?}",
+            found.max_error,
+            found.worst
+        );
     };
     let slow: Vec<Quat> = (0..200).map(turned).collect();
-    METHODS.into_iter().for_each(|method| verified(&slow, method));
+    METHODS
+        .into_iter()
+        .for_each(|method| verified(&slow, method));
     // 78 rad/s. Curves that are cut into pieces here are not as exact: pieces start at times in f64.
     for method in [method::SLERP, method::BESSEL_OVERHAUSER, method::SQUAD] {
         verified(&fast_keys(200), method);
@@ -277,22 +329,39 @@ fn frames_at_keys_of_unix_time_show_the_keys() {
 #[test]
 fn far_extrapolation_is_finite() {
     let mut set = TrackSet::new();
-    let keys = [Quat::IDENTITY, Quat::from_rotation_x(1.0), Quat::from_rotation_y(0.5)];
+    let keys = [
+        Quat::IDENTITY,
+        Quat::from_rotation_x(1.0),
+        Quat::from_rotation_y(0.5),
+    ];
     set.push("", &[0.0, 4e-5, 1e-4], &keys).unwrap();
     let engine = Engine::new(Device::Cpu).unwrap();
     for before in MODES {
         for after in MODES {
-            let interpolation = Interpolation { before, after, ..method::BESSEL_OVERHAUSER.into() };
+            let interpolation = Interpolation {
+                before,
+                after,
+                ..method::BESSEL_OVERHAUSER.into()
+            };
             for start in [1.7e9, -4e16, 4e16, 1e18, -1e18] {
                 let frames = Frames::fps(1000).between(start, start + 2.0);
                 let mut output = vec![POISON; frames.resolve(1, None).unwrap().len()];
                 engine
-                    .evaluate_into(&set, interpolation, &frames, Layout::TrackMajor, &mut output)
+                    .evaluate_into(
+                        &set,
+                        interpolation,
+                        &frames,
+                        Layout::TrackMajor,
+                        &mut output,
+                    )
                     .unwrap();
                 for q in output {
                     let vector = DVec3::new(q[0].into(), q[1].into(), q[2].into());
                     let norm = vector.length().hypot(q[3].into());
-                    assert!((norm - 1.0).abs() < 1e-6, "{before:?} {after:?} at {start}: {q:?}");
+                    assert!(
+                        (norm - 1.0).abs() < 1e-6,
+                        "{before:?} {after:?} at {start}: {q:?}"
+                    );
                 }
             }
         }

@@ -66,7 +66,12 @@ impl fmt::Display for Diagnostic {
             Severity::Error => "error",
             Severity::Warning => "warning",
         };
-        write!(f, " {severity}[{}]: {}", self.code, printable(&self.message))?;
+        write!(
+            f,
+            " {severity}[{}]: {}",
+            self.code,
+            printable(&self.message)
+        )?;
         if self.count > 1 {
             write!(f, " ({} times; this is the first)", self.count)?;
         }

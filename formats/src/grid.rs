@@ -37,7 +37,9 @@ fn put(list: &mut [f64], found: Found) {
     for (place, time) in list.iter_mut().enumerate() {
         let exact = on_frame(stored[place]);
         let beside = |other: usize| {
-            let is_other = stored.get(other).is_some_and(|&other| other != stored[place]);
+            let is_other = stored
+                .get(other)
+                .is_some_and(|&other| other != stored[place]);
             is_other && on_frame(stored[other]) == exact && off(other) < off(place)
         };
         let neighbours = [place.wrapping_sub(1), place + 1];
@@ -133,10 +135,20 @@ mod tests {
         let cut = times[17];
         times.insert(17, f64::from((cut as f32).next_down()));
         let mut lists = vec![times];
-        assert_eq!(restore(&mut lists, Precision::F32), FrameRate::new(30, 1).ok());
+        assert_eq!(
+            restore(&mut lists, Precision::F32),
+            FrameRate::new(30, 1).ok()
+        );
         let list = &lists[0];
-        assert_eq!((list[16], list[18], list[31]), (16.0 / 30.0, 17.0 / 30.0, 1.0));
-        assert!(list[16] < list[17] && list[17] < list[18], "{:?}", &list[16..19]);
-        assert!((list[18] - list[17] - f64::from(f32::EPSILON) / 4.0).abs() < 1e-12);
+        assert_eq!(
+            (list[16], list[18], list[31]),
+            (16.0 / 30.0, 17.0 / 30.0, 1.0)
+        );
+        assert!(
+            list[16] < list[17] && list[17] < list[18],
+            "{:?}",
+            &list[16..19]
+        );
+        assert!((list[18] - list[17] - f64::from(f32::EPSILON) / 2.0).abs() < 1e-12);
     }
 }

@@ -186,7 +186,11 @@ fn just_before(time: f64, earlier: Option<f64>) -> Option<f64> {
     let Some(earlier) = earlier else {
         return Some(step);
     };
-    let moved = if step > earlier { step } else { 0.5 * (earlier + time) };
+    let moved = if step > earlier {
+        step
+    } else {
+        0.5 * (earlier + time)
+    };
     (earlier < moved && moved < time).then_some(moved)
 }
 
@@ -283,7 +287,10 @@ mod tests {
         assert_eq!(jump, Some(vec![0, 1, 3, 4]));
         assert_eq!(times[1], 1.0 - f64::from(f32::EPSILON) / 2.0);
         let mut times = [-2.0, 0.0, 1.0, 1.0 + 1e-12, 1.0 + 1e-12];
-        assert_eq!(kept_of(&mut times, Duplicates::Both).unwrap(), Some(vec![0, 1, 2, 3, 4]));
+        assert_eq!(
+            kept_of(&mut times, Duplicates::Both).unwrap(),
+            Some(vec![0, 1, 2, 3, 4])
+        );
         assert!(times.windows(2).all(|pair| pair[0] < pair[1]), "{times:?}");
         let next = 1f64.next_up();
         let full = kept_of(&mut [0.0, 0.5, 1.0, next, next], Duplicates::Both).unwrap_err();

@@ -87,9 +87,9 @@ pub(crate) fn of(written: &Written<'_>) -> Option<Found> {
 }
 
 /// The rates that people use. One of them is taken where a few digits leave several rates open.
-const USUAL: [u64; 38] = [
-    1, 2, 4, 5, 6, 8, 10, 12, 15, 16, 20, 24, 25, 30, 48, 50, 60, 72, 75, 90, 96, 100, 120, 125, 144, 150,
-    165, 180, 200, 240, 250, 300, 360, 400, 480, 500, 600, 1000,
+const USUAL: [u64; 32] = [
+    10, 12, 15, 16, 20, 24, 25, 30, 48, 50, 60, 72, 75, 90, 96, 100, 120, 125, 144, 150, 165, 180,
+    200, 240, 250, 300, 360, 400, 480, 500, 600, 1000,
 ];
 
 /// Rates that are whole, or whole by 1.001, are looked for up to this.
@@ -129,7 +129,8 @@ fn choose(low: f64, high: f64, fits: impl Fn(FrameRate) -> bool) -> Option<Frame
 /// The rate of times that are all one after another in equal steps as they are written.
 fn as_written(seconds: f64) -> Option<FrameRate> {
     let whole = (1.0 / seconds).round();
-    let is_whole = whole >= 1.0 && whole < 1e9 && ((1.0 / whole) - seconds).abs() <= 1e-15 * seconds;
+    let is_whole =
+        whole >= 1.0 && whole < 1e9 && ((1.0 / whole) - seconds).abs() <= 1e-15 * seconds;
     match is_whole {
         true => FrameRate::new(whole as u64, 1).ok(),
         false => itself(seconds),
@@ -185,7 +186,11 @@ fn of_period(digits: &str) -> Option<FrameRate> {
         near(exact) || near(f64::from(exact as f32))
     };
     let margin = half + period * f64::from(f32::EPSILON);
-    let high = if margin < period { 1.0 / (period - margin) } else { MOST };
+    let high = if margin < period {
+        1.0 / (period - margin)
+    } else {
+        MOST
+    };
     choose(1.0 / (period + margin), high, fits).or(written)
 }
 
@@ -277,22 +282,33 @@ fn of_distinct(times: &[f64], precision: Precision) -> Option<Found> {
         (time - first - count * step).abs() <= 2.0 * exact + count * exact / 8.0
     };
     let mean = (last - first) / ((last - first) / step).round();
-    let as_written = times.iter().all(even).then(|| as_written(shortest(mean, exact)));
+    let as_written = times
+        .iter()
+        .all(even)
+        .then(|| as_written(shortest(mean, exact)));
     let as_written = as_written.flatten();
     if let Some(rate) = as_written.filter(|&rate| is_whole(rate)) {
         let on_frames = on_frames(times.iter().copied(), rate, 0.0, precision);
         let phase = if on_frames { 0.0 } else { first };
         if on_frames || precision != Precision::F32 {
-            return Some(Found { grid: rate, phase, is_rate: true });
+            return Some(Found {
+                grid: rate,
+                phase,
+                is_rate: true,
+            });
         }
     }
     let windows = windows(times, precision)?;
     let steps = Steps::of(&windows);
     let at_zero = steps.as_ref().and_then(|steps| steps.from_zero(&windows));
-    let found = |grid, phase| Found { grid, phase, is_rate: true };
+    let found = |grid, phase| Found {
+        grid,
+        phase,
+        is_rate: true,
+    };
     let chosen = || Some(found(at_zero.as_ref()?.choose(|_| true)?, 0.0));
     let written = || {
-        let grid = as_written?;
+        let grid = as_written.filter(|_| precision != Precision::F32)?;
         let is_at_zero = on_frames(times.iter().copied(), grid, 0.0, precision);
         Some(found(grid, if is_at_zero { 0.0 } else { first }))
     };
@@ -308,9 +324,16 @@ fn of_distinct(times: &[f64], precision: Precision) -> Option<Found> {
     };
     let some_grid = || {
         let grid = on_some_grid(&windows)?;
-        Some(Found { is_rate: false, ..Found::at_zero(grid) })
+        Some(Found {
+            is_rate: false,
+            ..Found::at_zero(grid)
+        })
     };
-    chosen().or_else(written).or_else(from_first).or_else(simple).or_else(some_grid)
+    chosen()
+        .or_else(written)
+        .or_else(from_first)
+        .or_else(simple)
+        .or_else(some_grid)
 }
 
 /// A number of as few decimals as there are near another.
@@ -352,8 +375,13 @@ struct Steps {
 impl Steps {
     /// Frames count from the first window.
     fn of(windows: &[Window]) -> Option<Self> {
-        let widest = windows.iter().map(|window| window.to - window.from).fold(0.0, f64::max);
-        let steps = windows.windows(2).map(|pair| pair[1].middle() - pair[0].middle());
+        let widest = windows
+            .iter()
+            .map(|window| window.to - window.from)
+            .fold(0.0, f64::max);
+        let steps = windows
+            .windows(2)
+            .map(|pair| pair[1].middle() - pair[0].middle());
         let step = steps.fold(f64::INFINITY, f64::min);
         if widest > 0.5 * step {
             return None;
@@ -454,7 +482,13 @@ fn simplest(low: f64, high: f64) -> Option<(u64, u64)> {
     for _ in 0..64 {
         let whole = low.floor();
         let is_last = low == whole || whole + 1.0 <= high;
-        let part = if low == whole { whole } else if is_last { whole + 1.0 } else { whole };
+        let part = if low == whole {
+            whole
+        } else if is_last {
+            whole + 1.0
+        } else {
+            whole
+        };
         let part = part as u128;
         let next = |last: u128, before: u128| part.saturating_mul(last).saturating_add(before);
         let next = (next(last.0, before.0), next(last.1, before.1));
@@ -476,8 +510,14 @@ const ACCIDENT: f64 = 1e-3;
 /// A rate on whose frames, counted from 0, all times lie, though none on neighbouring ones: the lowest
 /// usual one, else the lowest.
 fn on_some_grid(windows: &[Window]) -> Option<FrameRate> {
-    let widest = windows.iter().map(|window| window.to - window.from).fold(0.0, f64::max);
-    let told = windows.iter().filter(|window| !(window.from <= 0.0 && 0.0 <= window.to)).count();
+    let widest = windows
+        .iter()
+        .map(|window| window.to - window.from)
+        .fold(0.0, f64::max);
+    let told = windows
+        .iter()
+        .filter(|window| !(window.from <= 0.0 && 0.0 <= window.to))
+        .count();
     let fits = |rate: FrameRate| {
         let per_second = rate.per_second();
         let chance = (widest * per_second).powi(told as i32) * MOST;
@@ -493,10 +533,16 @@ fn on_some_grid(windows: &[Window]) -> Option<FrameRate> {
             is_next && window.from <= time && time <= window.to
         })
     };
-    let whole = USUAL.iter().filter(|&&rate| rate >= 24).copied().chain(1..=MOST as u64);
+    let whole = USUAL
+        .iter()
+        .filter(|&&rate| rate >= 24)
+        .copied()
+        .chain(1..=MOST as u64);
     let whole = whole.map(|rate| (rate, 1));
     let ntsc = [24, 30, 48, 60, 120].map(|rate| (rate * 1000, 1001));
-    let mut all = whole.chain(ntsc).filter_map(|(frames, seconds)| FrameRate::new(frames, seconds).ok());
+    let mut all = whole
+        .chain(ntsc)
+        .filter_map(|(frames, seconds)| FrameRate::new(frames, seconds).ok());
     all.find(|&rate| fits(rate))
 }
 

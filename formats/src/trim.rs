@@ -3,8 +3,8 @@
 use glam::Vec3;
 use tumble::{Channel, Engine, Error, Frames, TrackError, TrackSet};
 
-use crate::rate::{Precision, on_frames};
 use crate::motion::Motion;
+use crate::rate::{Precision, on_frames};
 use crate::sample::ChannelMethods;
 
 /// Why a part of a clip cannot be cut out.

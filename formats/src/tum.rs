@@ -142,7 +142,10 @@ impl Poses {
             );
             return Err(lines.refuse(column, Code::TumTime, message));
         };
-        let places = last_place(token).saturating_add(power).min(0).unsigned_abs();
+        let places = last_place(token)
+            .saturating_add(power)
+            .min(0)
+            .unsigned_abs();
         self.places = self.places.max(places);
         let [_, x, y, z, qx, qy, qz, qw] = numbers;
         self.times.push(time);

@@ -85,9 +85,14 @@ fn decimals_of_unix_time_keep_their_digits() {
         time_unit: Some(TimeUnit::Nanoseconds),
         ..ReadOptions::default()
     };
-    let text = text.replace("1403636579.", "1403636579").replace("84,", "84.0,");
+    let text = text
+        .replace("1403636579.", "1403636579")
+        .replace("84,", "84.0,");
     let same = &read(&text, &options).unwrap().clips[0];
-    assert_eq!((same.time_offset, same.set.track(0).times), (clip.time_offset, clip.set.track(0).times));
+    assert_eq!(
+        (same.time_offset, same.set.track(0).times),
+        (clip.time_offset, clip.set.track(0).times)
+    );
     let far = read(&text, &ReadOptions::default()).unwrap_err();
     assert_eq!(far.code, Code::Time);
 }
@@ -99,7 +104,10 @@ fn a_rate_beside_times_is_refused() {
         source_rate: FrameRate::new(30, 1).ok(),
         ..ReadOptions::default()
     };
-    assert_eq!(read(FOUR, &options).unwrap_err().code, Code::RateBesideTimes);
+    assert_eq!(
+        read(FOUR, &options).unwrap_err().code,
+        Code::RateBesideTimes
+    );
 }
 
 #[test]

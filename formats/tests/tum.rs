@@ -126,11 +126,16 @@ fn times_on_frames_are_frames_of_a_rate() {
 fn nanoseconds_keep_their_digits() {
     for end in ["", ".000000"] {
         let line = |ns: u64| format!("{ns}{end} 0 0 0 0 0 0 1\n");
-        let text: String = (0..4).map(|k| line(1_403_636_579_763_555_584 + k * 50_000_000)).collect();
+        let text: String = (0..4)
+            .map(|k| line(1_403_636_579_763_555_584 + k * 50_000_000))
+            .collect();
         let options = ReadOptions::default();
         let loaded = read_tum("t", text.as_bytes(), &options).unwrap();
         let clip = &loaded.clips[0];
-        assert_eq!((clip.time_offset, clip.rate), (1_403_636_579, FrameRate::new(20, 1).ok()));
+        assert_eq!(
+            (clip.time_offset, clip.rate),
+            (1_403_636_579, FrameRate::new(20, 1).ok())
+        );
         assert_eq!(clip.set.track(0).times[..2], [0.763_555_584, 0.813_555_584]);
         assert_eq!(loaded.warnings[0].code, Code::Nanoseconds);
         let options = ReadOptions {
@@ -154,7 +159,10 @@ fn equal_times_keep_the_pose_that_is_asked_for() {
     let loaded = read_tum("t", text.as_bytes(), &both).unwrap();
     let jump = keyed(&loaded.clips[0]).unwrap();
     assert_eq!(jump.translations, [0.0, 1.0, 2.0, 3.0].map(|x| Vec3::X * x));
-    assert_eq!(jump.times, [0.0, 1.0 - f64::from(f32::EPSILON) / 2.0, 1.0, 2.0]);
+    assert_eq!(
+        jump.times,
+        [0.0, 1.0 - f64::from(f32::EPSILON) / 2.0, 1.0, 2.0]
+    );
     for (duplicates, kept) in [(Duplicates::First, 1.0), (Duplicates::Last, 2.0)] {
         let options = ReadOptions {
             duplicates,

@@ -47,9 +47,7 @@ impl<'a> KeyJob<'a> {
     /// The clock of samples that are frames.
     pub(crate) fn clock(&self) -> Option<FrameClock> {
         match self.request.timeline.ticks {
-            Ticks::Frames { rate, start } => {
-                Some(FrameClock::new(rate, start, false))
-            }
+            Ticks::Frames { rate, start } => Some(FrameClock::new(rate, start, false)),
             Ticks::Times { .. } => None,
         }
     }

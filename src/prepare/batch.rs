@@ -45,12 +45,7 @@ impl Batch {
 
     /// The samples that the batch gives: those from its first key up to its end, and those before a
     /// track's first key or after its last. `steps` is whether keys are held until the next one.
-    pub(crate) fn samples(
-        &self,
-        set: &TrackSet,
-        timeline: &Timeline,
-        steps: bool,
-    ) -> Range<usize> {
+    pub(crate) fn samples(&self, set: &TrackSet, timeline: &Timeline, steps: bool) -> Range<usize> {
         let Self::Intervals { track, intervals } = self else {
             return 0..timeline.len();
         };

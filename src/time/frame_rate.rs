@@ -74,7 +74,10 @@ impl FrameRate {
     /// The time of a frame after frame 0: whole seconds, and what is left of one.
     #[inline]
     pub(crate) fn seconds_of(self, frame: u64) -> (f64, f64) {
-        let (frames, product) = (u128::from(self.frames), u128::from(frame) * u128::from(self.seconds));
+        let (frames, product) = (
+            u128::from(self.frames),
+            u128::from(frame) * u128::from(self.seconds),
+        );
         let rest = (product % frames) as f64;
         ((product / frames) as f64, rest / self.frames as f64)
     }

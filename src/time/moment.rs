@@ -221,7 +221,12 @@ mod tests {
         let rate = FrameRate::new(1001, 1).unwrap();
         let frame = |k: u64| i128::from(k) << 20;
         for start in [0.0, -7.5, 86_400.25, 1.7e9, -4e16, 1e12 + 0.125, 1e18] {
-            for (first, last) in [(0.0, 2.5), (0.25, 0.28125), (1.7e9, 1.7e9 + 0.75), (-3.0, 1e6)] {
+            for (first, last) in [
+                (0.0, 2.5),
+                (0.25, 0.28125),
+                (1.7e9, 1.7e9 + 0.75),
+                (-3.0, 1e6),
+            ] {
                 let period = Period::new((first, last)).unwrap();
                 let length = unit(last) - unit(first);
                 for k in [0, 1, 2, 500, 1_000_000, (1 << 40) - 1] {

@@ -65,7 +65,11 @@ impl RunSource {
     /// A segment at one parameter, whatever the sample.
     fn at(index: u32, parameter: f32) -> Self {
         let (scale, offset) = (0.0, parameter);
-        Self::Segment(index, Distance::Near { first: 0.0 }, Affine { scale, offset })
+        Self::Segment(
+            index,
+            Distance::Near { first: 0.0 },
+            Affine { scale, offset },
+        )
     }
 
     /// A curve in f64 at one parameter, whatever the sample.

@@ -86,7 +86,9 @@ impl Part {
     /// starts. Both for a track without [`Beyond`], which has one part or is not repeated.
     pub(crate) fn is_at_ends(&self, begin: f64) -> [bool; 2] {
         let span = self.beyond.as_ref().map(|beyond| beyond.span);
-        span.map_or([true; 2], |(first, last)| [begin <= first, self.end >= last])
+        span.map_or([true; 2], |(first, last)| {
+            [begin <= first, self.end >= last]
+        })
     }
 
     /// Its [`Beyond`], which is created if it has none. `times` are when the whole track starts and

@@ -78,7 +78,14 @@ mod tests {
 
     #[test]
     fn stamps_come_back_from_seconds() {
-        for first in [0, -1, 999_999_999, -1_500_000_000, 1_403_636_579_763_555_584, i64::MIN] {
+        for first in [
+            0,
+            -1,
+            999_999_999,
+            -1_500_000_000,
+            1_403_636_579_763_555_584,
+            i64::MIN,
+        ] {
             let stamps: Vec<i64> = (0..1000).map(|k| first + k * 4_999_999).collect();
             let (base, times) = TimeBase::of_nanoseconds(&stamps);
             assert!(times[0] >= 0.0 && times[0] < 1.0 && times.is_sorted());

@@ -71,7 +71,13 @@ impl TrackCopy {
     }
 
     pub(crate) fn is_backwards(&self) -> bool {
-        matches!(self.place, CopyPlace::Frames { backwards: true, .. })
+        matches!(
+            self.place,
+            CopyPlace::Frames {
+                backwards: true,
+                ..
+            }
+        )
     }
 }
 
@@ -176,7 +182,14 @@ impl Wrap {
                     at_first,
                     backwards,
                     ..
-                } => Some((if backwards { at_first } else { at_first + length }).ceil() as usize),
+                } => Some(
+                    (if backwards {
+                        at_first
+                    } else {
+                        at_first + length
+                    })
+                    .ceil() as usize,
+                ),
             };
             if let Some(end) = end {
                 next = end.clamp(sample + 1, samples.end);

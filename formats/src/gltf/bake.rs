@@ -18,8 +18,8 @@ use crate::gltf::gather;
 use crate::gltf::json::{Json, Members};
 use crate::gltf::reader::Reader;
 use crate::gltf::uri;
-use crate::rate::Precision;
 use crate::motion::Sampled;
+use crate::rate::Precision;
 use crate::text::lines::Limits;
 use crate::warnings::Warnings;
 

@@ -19,7 +19,10 @@ impl Plan {
         names: &[&str],
     ) -> Result<(), Diagnostic> {
         let mut before = "";
-        for (name, member) in names.iter().filter_map(|&name| Some((name, archive.find(name)?))) {
+        for (name, member) in names
+            .iter()
+            .filter_map(|&name| Some((name, archive.find(name)?)))
+        {
             let numbers = read_numbers(archive, member)?;
             let rate = match *numbers {
                 [number] => {

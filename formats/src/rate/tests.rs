@@ -6,7 +6,10 @@ const PAGE: &str = include_str!("../../../docs/formats.md");
 
 /// The rows of the table: how a number is written, what it is kept as, and its rate.
 fn rows() -> Vec<[&'static str; 3]> {
-    let table = PAGE.split("| written | kept as | rate |\n|---|---|---|\n").nth(1).unwrap();
+    let table = PAGE
+        .split("| written | kept as | rate |\n|---|---|---|\n")
+        .nth(1)
+        .unwrap();
     let lines = table.lines().take_while(|line| line.starts_with('|'));
     let cells = lines.map(|line| {
         let mut cells = line.trim_matches('|').split('|').map(str::trim);
@@ -24,7 +27,10 @@ fn shown(found: Option<Found>) -> String {
 /// As a file keeps times that were computed so.
 fn kept(times: impl Iterator<Item = f64>, kept_as: &str) -> (Vec<f64>, Precision) {
     match kept_as {
-        "f32" => (times.map(|time| f64::from(time as f32)).collect(), Precision::F32),
+        "f32" => (
+            times.map(|time| f64::from(time as f32)).collect(),
+            Precision::F32,
+        ),
         "f64" => (times.collect(), Precision::F64),
         _ => {
             let places: usize = kept_as.strip_suffix(" decimals").unwrap().parse().unwrap();
@@ -65,7 +71,11 @@ fn the_table_of_the_documents_holds() {
         if let Some(digits) = written.strip_prefix("Frame Time: ") {
             check(row, shown(of(&Written::FrameTime(digits))), rate);
         } else if let Some(number) = written.strip_prefix("fps = ") {
-            check(row, shown(of(&Written::Number(number.parse().unwrap()))), rate);
+            check(
+                row,
+                shown(of(&Written::Number(number.parse().unwrap()))),
+                rate,
+            );
         } else if written.contains('k') {
             let (_, rates) = written.split_once(" / ").unwrap();
             let rates = rates.trim_end_matches(')');
@@ -95,7 +105,12 @@ fn the_table_of_the_documents_holds() {
             check(row, shown(of(&Written::Times(&[times], precision))), rate);
         }
     }
-    assert!(wrong.is_empty(), "{} wrong:\n{}", wrong.len(), wrong[..wrong.len().min(30)].join("\n"));
+    assert!(
+        wrong.is_empty(),
+        "{} wrong:\n{}",
+        wrong.len(),
+        wrong[..wrong.len().min(30)].join("\n")
+    );
 }
 
 /// Times that were rounded become frames, to the last bit of f64.
@@ -103,10 +118,18 @@ fn the_table_of_the_documents_holds() {
 fn rounded_times_become_the_frames_of_any_rate() {
     for number in 1..=1000 {
         let rate = FrameRate::new(number, 1).unwrap();
-        for (formula, kept_as) in [("k / r", "f32"), ("k * f32(1 / r)", "f32"), ("k / r", "7 decimals")] {
+        for (formula, kept_as) in [
+            ("k / r", "f32"),
+            ("k * f32(1 / r)", "f32"),
+            ("k / r", "7 decimals"),
+        ] {
             let (times, precision) = keys(formula, rate, kept_as);
             let mut lists = [times];
-            assert_eq!(crate::grid::restore(&mut lists, precision), Some(rate), "{formula}, {kept_as}");
+            assert_eq!(
+                crate::grid::restore(&mut lists, precision),
+                Some(rate),
+                "{formula}, {kept_as}"
+            );
             let frames: Vec<f64> = (0..100).map(|k| rate.time_of(k)).collect();
             assert_eq!(lists[0], frames, "{formula} at {rate}, {kept_as}");
         }
