@@ -44,7 +44,10 @@ fn what_compared_nothing_has_not_passed() {
 #[test]
 fn half_turns_there_and_back_are_within_their_bounds() {
     let engine = Engine::new(Device::Cpu).unwrap();
-    for axis in [Quat::from_xyzw(1.0, 0.0, 0.0, 0.0), Quat::from_xyzw(0.0, 0.6, -0.8, 0.0)] {
+    for axis in [
+        Quat::from_xyzw(1.0, 0.0, 0.0, 0.0),
+        Quat::from_xyzw(0.0, 0.6, -0.8, 0.0),
+    ] {
         for keys in [
             vec![Quat::IDENTITY, axis, Quat::IDENTITY],
             vec![axis, Quat::IDENTITY, axis, Quat::IDENTITY, -axis],
@@ -54,7 +57,11 @@ fn half_turns_there_and_back_are_within_their_bounds() {
             set.push("", &times, &keys).unwrap();
             for method in METHODS {
                 let found = verify(&engine, &set, method.into(), &Frames::fps(25)).unwrap();
-                assert_eq!(found.verdict(), Verdict::ReferenceOnly, "{method}: {found:?}");
+                assert_eq!(
+                    found.verdict(),
+                    Verdict::ReferenceOnly,
+                    "{method}: {found:?}"
+                );
             }
         }
     }

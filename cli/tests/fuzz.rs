@@ -519,7 +519,16 @@ fn paths_and_numbers() {
     seeds.push(b"t,x,y,z,ux,uy,uz\n0,0,0,0,0,1,0\n1,1,0,0,,,\n".to_vec());
     seeds.push(b"x,y,z\n0,0,0\n1,1,0\n".to_vec());
     let words = [
-        "t,", "x,y,z\n", "0,0,0,0\n", "1e39", "nan", "-1", ",,,", "\u{feff}", "(1, 3, 3)", "'<f8'",
+        "t,",
+        "x,y,z\n",
+        "0,0,0,0\n",
+        "1e39",
+        "nan",
+        "-1",
+        ",,,",
+        "\u{feff}",
+        "(1, 3, 3)",
+        "'<f8'",
     ];
     fuzz_motion("paths", targets::surfaces::paths, seeds, &words);
 }

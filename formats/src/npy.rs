@@ -71,7 +71,10 @@ pub fn read_numbers(
         refuse(Code::ArrayHeader, message)
     })?;
     if !header.element.is_float() {
-        let message = format!("the array is of {}; save it as float32 or float64", header.element);
+        let message = format!(
+            "the array is of {}; save it as float32 or float64",
+            header.element
+        );
         return Err(refuse(Code::ElementType, message));
     }
     is_right(&header.shape).map_err(|message| refuse(Code::Shape, message))?;

@@ -57,8 +57,7 @@ impl Poses<'_> {
         let mut row = vec!["frame".to_owned(), "time".to_owned()];
         for track in 0..tracks {
             let name = self.set.track_name(track);
-            let component =
-                |component| text_cell(&format!("{name}.{component}")).into_owned();
+            let component = |component| text_cell(&format!("{name}.{component}")).into_owned();
             row.extend(self.components.iter().map(component));
         }
         csv.write_record(&row)?;

@@ -15,7 +15,9 @@ pub enum VulkanError {
         reason: String,
     },
     /// A loader, but no driver, or none with a device that can compute.
-    #[error("the Vulkan loader finds no driver with a device that can compute; install one (Debian: mesa-vulkan-drivers)")]
+    #[error(
+        "the Vulkan loader finds no driver with a device that can compute; install one (Debian: mesa-vulkan-drivers)"
+    )]
     NoDevice,
     /// A driver ends the process that loads it.
     #[error(

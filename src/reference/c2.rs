@@ -201,7 +201,13 @@ impl<'a> System<'a> {
         let off = self.excesses(velocities, bends);
         let steps = band.solve(off.iter().flat_map(|own| own.to_array()).collect())?;
         let steps = steps.chunks(3).map(DVec3::from_slice);
-        Some(velocities.iter().zip(steps).map(|(own, step)| *own - step).collect())
+        Some(
+            velocities
+                .iter()
+                .zip(steps)
+                .map(|(own, step)| *own - step)
+                .collect(),
+        )
     }
 
     /// Newton's iteration, whose steps are halved until they help; and how many there were.

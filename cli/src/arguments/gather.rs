@@ -157,7 +157,9 @@ fn read_list(list: &Path) -> Result<Vec<PathBuf>, Failure> {
             format!("{name}: the list cannot be read: {error}"),
         )
     })?;
-    let lines = text.split(|&byte| byte == b'\n').map(<[u8]>::trim_ascii_end);
+    let lines = text
+        .split(|&byte| byte == b'\n')
+        .map(<[u8]>::trim_ascii_end);
     let paths = lines.filter(|line| !line.is_empty() && !line.starts_with(b"#"));
     Ok(paths.map(named).collect())
 }

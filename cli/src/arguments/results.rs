@@ -10,7 +10,9 @@ use tumble_formats::motion::Motion;
 use tumble_formats::{Feature, Format, Loaded};
 
 use crate::arguments::gather::Gathered;
-use crate::arguments::input::{Inputs, clip_name, is_standard, name, several, tell_warnings, whole};
+use crate::arguments::input::{
+    Inputs, clip_name, is_standard, name, several, tell_warnings, whole,
+};
 use crate::batch::digest::InputFile;
 use crate::batch::output::{self, Plan, Target, Wish};
 use crate::batch::place::Place;

@@ -73,9 +73,9 @@ impl Selector {
             // A range that is not there as a whole is a mistake.
             Meaning::Places(_, last) if *last >= names.len() => Vec::new(),
             Meaning::Places(first, last) => (*first..=*last).collect(),
-            Meaning::Pattern(pattern) => {
-                all().filter(|&track| pattern.matches(&names[track])).collect()
-            }
+            Meaning::Pattern(pattern) => all()
+                .filter(|&track| pattern.matches(&names[track]))
+                .collect(),
         }
     }
 }

@@ -152,7 +152,10 @@ pub(crate) fn paths(pattern: &str) -> Vec<PathBuf> {
         let Ok(wildcard) = Wildcard::new(name) else {
             return Vec::new();
         };
-        found = found.iter().flat_map(|path| children(path, &wildcard)).collect();
+        found = found
+            .iter()
+            .flat_map(|path| children(path, &wildcard))
+            .collect();
     }
     found.retain(|path| path.symlink_metadata().is_ok());
     found.sort_unstable();
@@ -180,7 +183,11 @@ fn tree(path: &Path, with_files: bool) -> Vec<PathBuf> {
     let walk = WalkDir::new(folder(path)).into_iter().flatten();
     let kept = walk.filter(|entry| with_files || entry.file_type().is_dir());
     kept.map(|entry| match path.as_os_str().is_empty() {
-        true => entry.path().strip_prefix(".").unwrap_or(entry.path()).to_owned(),
+        true => entry
+            .path()
+            .strip_prefix(".")
+            .unwrap_or(entry.path())
+            .to_owned(),
         false => entry.into_path(),
     })
     .collect()
@@ -239,7 +246,9 @@ mod tests {
             let pattern = place.path().join(pattern);
             let found = paths(pattern.to_str().unwrap()).into_iter();
             let below = found.map(|path| path.strip_prefix(place.path()).unwrap().to_owned());
-            below.map(|path| path.to_str().unwrap().to_owned()).collect()
+            below
+                .map(|path| path.to_str().unwrap().to_owned())
+                .collect()
         };
         assert_eq!(found("*.dat"), ["4.dat"]);
         assert_eq!(found("*/*.dat"), ["a/1.dat"]);

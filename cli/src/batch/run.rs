@@ -88,7 +88,8 @@ impl<R: Fn(&Path) -> Result<Loaded, Failure> + Sync> Batch<R> {
             let reader = thread::Builder::new()
                 .spawn_scoped(scope, move || self.read_all(jobs, &previous, &hand_over));
             if let Err(error) = reader {
-                let message = format!("the system refuses a thread: {error}; allow more (ulimit -u)");
+                let message =
+                    format!("the system refuses a thread: {error}; allow more (ulimit -u)");
                 return Err(Failure::new(DEVICE, message));
             }
             let mut make = |path: &Path, target: &Target, records: &mut dyn Records| {

@@ -227,8 +227,7 @@ pub(crate) fn for_all<T>(
                 0 => String::new(),
                 partly => format!(" (and {partly} in part)"),
             };
-            let message =
-                format!("{failed} of {total} inputs failed{partly}; the others are done");
+            let message = format!("{failed} of {total} inputs failed{partly}; the others are done");
             Err(Failure::new(SOME_INPUTS, message))
         }
     }

@@ -80,7 +80,9 @@ fn json_printable(text: &str) -> String {
     let mut shown = String::with_capacity(text.len());
     for character in text.chars() {
         let mut units = [0; 2];
-        if character == '\n' || printable(character.encode_utf8(&mut [0; 4])).len() == character.len_utf8() {
+        if character == '\n'
+            || printable(character.encode_utf8(&mut [0; 4])).len() == character.len_utf8()
+        {
             shown.push(character);
         } else {
             for unit in character.encode_utf16(&mut units) {
@@ -209,7 +211,13 @@ mod tests {
 
     #[test]
     fn json_says_the_same_without_what_a_terminal_obeys() {
-        let names = ["plain ä", "\u{9b}2J", "\u{202e}x", "a\u{e0041}", "\x1b[1m\n"];
+        let names = [
+            "plain ä",
+            "\u{9b}2J",
+            "\u{202e}x",
+            "a\u{e0041}",
+            "\x1b[1m\n",
+        ];
         let text = json_printable(&serde_json::to_string_pretty(&names).unwrap());
         assert_eq!(serde_json::from_str::<Vec<String>>(&text).unwrap(), names);
         assert_eq!(text.matches("\\u").count(), 6, "{text}");

@@ -14,8 +14,17 @@ use crate::support::Random;
 fn attempt(place: &Path, line: &[&str]) -> Run {
     let run = run(place, line);
     let known = [0, 2, 3, 4, 5, 7, 8];
-    assert!(known.contains(&run.code), "{line:?}: {} {}", run.code, run.words);
-    assert!(!run.words.contains("internal error"), "{line:?}: {}", run.words);
+    assert!(
+        known.contains(&run.code),
+        "{line:?}: {} {}",
+        run.code,
+        run.words
+    );
+    assert!(
+        !run.words.contains("internal error"),
+        "{line:?}: {}",
+        run.words
+    );
     run
 }
 
@@ -54,7 +63,12 @@ fn broken(place: &Path) -> Vec<(&'static str, i32)> {
         fs::write(place.join(name), text).unwrap();
     }
     let mut all: Vec<_> = cases.iter().map(|&(name, _, code)| (name, code)).collect();
-    all.extend([("bad.dat", 4), ("missing.dat", 4), ("empty", 4), ("a.dat", 0)]);
+    all.extend([
+        ("bad.dat", 4),
+        ("missing.dat", 4),
+        ("empty", 4),
+        ("a.dat", 0),
+    ]);
     all
 }
 
@@ -96,7 +110,10 @@ fn no_input_ends_without_a_line() {
             let line = [command, &names[..], &["--overwrite"]].concat();
             let line = &line[..line.len() - usize::from(["info", "verify"].contains(&command[0]))];
             let run = attempt(place.path(), line);
-            let worst = match (set.iter().all(|one| one.1 == 4), set.iter().all(|one| one.1 == 0)) {
+            let worst = match (
+                set.iter().all(|one| one.1 == 4),
+                set.iter().all(|one| one.1 == 0),
+            ) {
                 (true, _) => 4,
                 (_, true) => 0,
                 _ => 3,
@@ -105,7 +122,10 @@ fn no_input_ends_without_a_line() {
             let said = String::from_utf8_lossy(&run.out) + &*run.words;
             for (name, code) in &set {
                 let picture = ["plot", "render"].contains(&command[0]) && *code != 4;
-                assert!(said.contains(name) || picture, "{line:?} says nothing of {name}: {said}");
+                assert!(
+                    said.contains(name) || picture,
+                    "{line:?} says nothing of {name}: {said}"
+                );
             }
         }
     }
@@ -119,8 +139,16 @@ fn all_broken_animations_are_told() {
     for command in COMMANDS {
         let line = [command, &["two_broken.gltf"]].concat();
         let run = attempt(place.path(), &line);
-        assert!(run.words.contains("/animations/0/"), "{line:?}: {}", run.words);
-        assert!(run.words.contains("/animations/1/"), "{line:?}: {}", run.words);
+        assert!(
+            run.words.contains("/animations/0/"),
+            "{line:?}: {}",
+            run.words
+        );
+        assert!(
+            run.words.contains("/animations/1/"),
+            "{line:?}: {}",
+            run.words
+        );
     }
 }
 
@@ -152,21 +180,55 @@ fn no_name_reaches_a_terminal_as_it_is() {
         let named = whole.replacen(r#"{"name":"a"}"#, &format!(r#"{{"name":{own}}}"#), 1);
         let named = named.replace(r#"{"channels""#, &format!(r#"{{"name":{own},"channels""#));
         write("names.gltf", named.clone());
-        write("fault.gltf", named.replacen(r#""output":1"#, &format!(r#""output":1,"interpolation":{own}"#), 1));
-        write("uri.gltf", named.replacen("data:;base64,", &name.escape_default().to_string().replace('\\', "%5C"), 1));
-        write("uri2.gltf", whole.replacen(
-            r#""data:;base64,AAAAAAAAgD8AAAAAAAAAAAAAAAAAAIA/AAAAAAAAAACamRk/zcxMPw==""#, &own, 1));
+        write(
+            "fault.gltf",
+            named.replacen(
+                r#""output":1"#,
+                &format!(r#""output":1,"interpolation":{own}"#),
+                1,
+            ),
+        );
+        write(
+            "uri.gltf",
+            named.replacen(
+                "data:;base64,",
+                &name.escape_default().to_string().replace('\\', "%5C"),
+                1,
+            ),
+        );
+        write(
+            "uri2.gltf",
+            whole.replacen(
+                r#""data:;base64,AAAAAAAAgD8AAAAAAAAAAAAAAAAAAIA/AAAAAAAAAACamRk/zcxMPw==""#,
+                &own,
+                1,
+            ),
+        );
         let word = name.replace(['\n', '\r'], "_");
-        write("joint.bvh", format!("HIERARCHY\nROOT {word}\n{{\nOFFSET 0 0 0\nCHANNELS 1 {word}\n}}\n"));
-        write("header.csv", format!("time,\"{name}.x\",\"{name}.y\",\"{name}.z\",\"{name}.w\"\n0,0,0,0,1\n1,0,0,0,1\n"));
+        write(
+            "joint.bvh",
+            format!("HIERARCHY\nROOT {word}\n{{\nOFFSET 0 0 0\nCHANNELS 1 {word}\n}}\n"),
+        );
+        write(
+            "header.csv",
+            format!(
+                "time,\"{name}.x\",\"{name}.y\",\"{name}.z\",\"{name}.w\"\n0,0,0,0,1\n1,0,0,0,1\n"
+            ),
+        );
         write("columns.csv", format!("time,\"{name}\"\n0,0\n"));
         write("cell.csv", format!("time,x,y,z,w\n0,0,0,0,\"{name}\"\n"));
         write("token.dat", format!("# 1 1\n0 1 0 0 {word}\n"));
         write("token.tum", format!("0 0 0 0 0 0 0 {word}\n"));
         write("path.csv", format!("t,x,y,\"{name}\"\n"));
         write("pairs.txt", format!("{word}\n"));
-        write("walkers.csv", format!("name,radius,speed,x,y,z,to_x,to_y,to_z\n\"{name}\",1,1,0,0,0,1,1,0\n"));
-        write("flat.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n".to_owned());
+        write(
+            "walkers.csv",
+            format!("name,radius,speed,x,y,z,to_x,to_y,to_z\n\"{name}\",1,1,0,0,0,1,1,0\n"),
+        );
+        write(
+            "flat.obj",
+            "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n".to_owned(),
+        );
         write("word.obj", format!("v 0 0 {word}\n"));
         write("word.ply", format!("ply\nformat {word}\n"));
         write("list.txt", format!("{word}.dat\n"));
@@ -182,36 +244,94 @@ fn no_name_reaches_a_terminal_as_it_is() {
         let is_named = fs::copy(place.path().join("a.dat"), place.path().join(&file)).is_ok();
         let mut lines: Vec<Vec<&str>> = Vec::new();
         for input in [
-            "names.gltf", "fault.gltf", "uri.gltf", "uri2.gltf", "joint.bvh", "header.csv", "columns.csv", "cell.csv",
-            "token.dat", "token.tum", &file,
+            "names.gltf",
+            "fault.gltf",
+            "uri.gltf",
+            "uri2.gltf",
+            "joint.bvh",
+            "header.csv",
+            "columns.csv",
+            "cell.csv",
+            "token.dat",
+            "token.tum",
+            &file,
         ] {
             lines.push(vec!["info", input]);
             lines.push(vec!["convert", input, "--overwrite", "-o", "o.npz"]);
         }
         for input in ["names.gltf", "header.csv", &*file] {
             lines.push(vec!["info", "--json", input]);
-            lines.push(vec!["eval", input, "--animation", "1", "--overwrite", "-o", "o.npy"]);
-            lines.push(vec!["eval", input, "--overwrite", "-o", "out/", "--explain-route"]);
+            lines.push(vec![
+                "eval",
+                input,
+                "--animation",
+                "1",
+                "--overwrite",
+                "-o",
+                "o.npy",
+            ]);
+            lines.push(vec![
+                "eval",
+                input,
+                "--overwrite",
+                "-o",
+                "out/",
+                "--explain-route",
+            ]);
             lines.push(vec!["eval", input, "--tracks", "none"]);
             lines.push(vec!["verify", "--device", "cpu", "-m", "slerp", input]);
             lines.push(vec!["compare", input, "a.dat", "--fps", "2"]);
-            lines.push(vec!["reduce", input, "--to", "glb", "--overwrite", "-o", "small/"]);
+            lines.push(vec![
+                "reduce",
+                input,
+                "--to",
+                "glb",
+                "--overwrite",
+                "-o",
+                "small/",
+            ]);
             lines.push(vec!["plot", input, "--overwrite", "-o", "pictures"]);
             lines.push(vec!["view", input, "--overwrite", "-o", "page.html"]);
         }
         lines.push(vec!["smooth", &file, "--overwrite", "-o", "s.npy"]);
         lines.push(vec!["follow", "path.csv", "-o", "f.npy"]);
-        lines.push(vec!["route", "flat.obj", "--pairs", "pairs.txt", "-o", "ways/"]);
-        lines.push(vec!["route", "flat.obj", "--walkers", "walkers.csv", "-o", "ways/"]);
-        lines.push(vec!["route", "word.obj", "--from", "0,0,0", "--to", "1,0,0", "-o", "w.csv"]);
-        lines.push(vec!["route", "word.ply", "--from", "0,0,0", "--to", "1,0,0", "-o", "w.csv"]);
+        lines.push(vec![
+            "route",
+            "flat.obj",
+            "--pairs",
+            "pairs.txt",
+            "-o",
+            "ways/",
+        ]);
+        lines.push(vec![
+            "route",
+            "flat.obj",
+            "--walkers",
+            "walkers.csv",
+            "-o",
+            "ways/",
+        ]);
+        lines.push(vec![
+            "route", "word.obj", "--from", "0,0,0", "--to", "1,0,0", "-o", "w.csv",
+        ]);
+        lines.push(vec![
+            "route", "word.ply", "--from", "0,0,0", "--to", "1,0,0", "-o", "w.csv",
+        ]);
         lines.push(vec!["eval", "--files-from", "list.txt", "-o", "o/"]);
         lines.push(vec!["check", "results"]);
         lines.push(vec!["eval", "folder", "-o", "results", "--resume"]);
         lines.push(vec!["merge", "results"]);
         lines.push(vec!["info", name]);
         lines.push(vec!["eval", "a.dat", "-m", name]);
-        lines.push(vec!["eval", "a.dat", "--device", name, "--overwrite", "-o", "o.npy"]);
+        lines.push(vec![
+            "eval",
+            "a.dat",
+            "--device",
+            name,
+            "--overwrite",
+            "-o",
+            "o.npy",
+        ]);
         lines.push(vec!["explain", name]);
         lines.push(vec![name]);
         for line in lines {
@@ -229,8 +349,20 @@ fn no_name_reaches_a_terminal_as_it_is() {
 
 /// Values that a field of a file is not expected to have.
 const NUMBERS: [&str; 14] = [
-    "-1", "0", "1", "2147483648", "4294967295", "4294967296", "18446744073709551615", "1e39", "-1e308", "1e-320", "null",
-    "[]", "{}", "\"\"",
+    "-1",
+    "0",
+    "1",
+    "2147483648",
+    "4294967295",
+    "4294967296",
+    "18446744073709551615",
+    "1e39",
+    "-1e308",
+    "1e-320",
+    "null",
+    "[]",
+    "{}",
+    "\"\"",
 ];
 
 /// A file of a format, broken where its structure is: numbers of JSON and of text, words of four and eight
@@ -242,13 +374,19 @@ fn mutated(bytes: &[u8], random: &mut Random) -> Vec<u8> {
     for _ in 0..1 + below(3) {
         // A number of the text, or of the JSON of a GLB.
         let starts: Vec<usize> = (1..bytes.len())
-            .filter(|&i| bytes[i].is_ascii_digit() && matches!(bytes[i - 1], b' ' | b':' | b',' | b'[' | b'(' | b'\n'))
+            .filter(|&i| {
+                bytes[i].is_ascii_digit()
+                    && matches!(bytes[i - 1], b' ' | b':' | b',' | b'[' | b'(' | b'\n')
+            })
             .collect();
         let kind = below(6);
         match kind {
             0..=2 if !starts.is_empty() && (is_text || bytes.starts_with(b"glTF")) => {
                 let start = starts[below(starts.len())];
-                let length = bytes[start..].iter().take_while(|b| b.is_ascii_digit()).count();
+                let length = bytes[start..]
+                    .iter()
+                    .take_while(|b| b.is_ascii_digit())
+                    .count();
                 let number = NUMBERS[below(NUMBERS.len())];
                 bytes.splice(start..start + length, number.bytes());
             }
@@ -291,12 +429,22 @@ fn mutated_files_end_with_a_code() {
             continue; // a file beside the folders
         };
         let files = files.map(|file| file.unwrap().path());
-        seeds.extend(files.filter(|file| file.is_file() && file.extension().is_some_and(|own| own != "expected")));
+        seeds.extend(files.filter(|file| {
+            file.is_file() && file.extension().is_some_and(|own| own != "expected")
+        }));
     }
     seeds.sort();
     let place = sample_folder();
-    fs::write(place.path().join("flat.obj"), "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n").unwrap();
-    fs::write(place.path().join("path.csv"), "t,x,y,z,ux,uy,uz\n0,0,0,0,0,1,0\n1,1,0,0,,,\n2,3,1,0,,,\n").unwrap();
+    fs::write(
+        place.path().join("flat.obj"),
+        "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n",
+    )
+    .unwrap();
+    fs::write(
+        place.path().join("path.csv"),
+        "t,x,y,z,ux,uy,uz\n0,0,0,0,0,1,0\n1,1,0,0,,,\n2,3,1,0,,,\n",
+    )
+    .unwrap();
     seeds.extend(["flat.obj", "path.csv"].map(|name| place.path().join(name)));
     let mut refused = 0;
     let count = 120 * times() as usize;
@@ -307,18 +455,42 @@ fn mutated_files_end_with_a_code() {
         let name = format!("m.{extension}");
         fs::write(place.path().join(&name), &bytes).unwrap();
         let line: &[&str] = match (extension, round % 5) {
-            ("obj", _) => &["route", &name, "--from", "0,0,0", "--to", "1,1,0", "--overwrite", "-o", "w.csv"],
+            ("obj", _) => &[
+                "route",
+                &name,
+                "--from",
+                "0,0,0",
+                "--to",
+                "1,1,0",
+                "--overwrite",
+                "-o",
+                "w.csv",
+            ],
             (_, 0) => &["info", "--json", &name],
             (_, 1) => &["eval", &name, "--fps", "9", "--overwrite", "-o", "o.npy"],
             (_, 2) => &["convert", &name, "--overwrite", "-o", "o.glb"],
             (_, 3) => &["plot", &name, "--fps", "9", "--overwrite", "-o", "o.svg"],
-            _ => &["follow", &name, "--seconds", "2", "--overwrite", "-o", "o.npy"],
+            _ => &[
+                "follow",
+                &name,
+                "--seconds",
+                "2",
+                "--overwrite",
+                "-o",
+                "o.npy",
+            ],
         };
         let run = attempt(place.path(), line);
-        assert!(run.code == 0 || !run.words.trim().is_empty(), "{line:?} says nothing");
+        assert!(
+            run.code == 0 || !run.words.trim().is_empty(),
+            "{line:?} says nothing"
+        );
         refused += usize::from(run.code != 0);
     }
-    assert!(refused * 4 > count, "only {refused} of {count} were refused");
+    assert!(
+        refused * 4 > count,
+        "only {refused} of {count} were refused"
+    );
 }
 
 /// What once took minutes, or for ever.
@@ -327,7 +499,10 @@ fn nothing_small_takes_long() {
     let place = sample_folder();
     let write = |name: &str, text: &str| fs::write(place.path().join(name), text).unwrap();
     write("far.dat", "# 1 1\n0 1 0 0 0\n1000000000 0 1 0 0\n");
-    write("long.dat", &format!("# 1 1\n0 1 0 0 0\n{} 0 1 0 0\n", u32::MAX));
+    write(
+        "long.dat",
+        &format!("# 1 1\n0 1 0 0 0\n{} 0 1 0 0\n", u32::MAX),
+    );
     let mut nested = b"\x93NUMPY\x01\0\x80\0{'descr': ".to_vec();
     nested.extend(vec![b'['; 118]);
     fs::write(place.path().join("nested.npy"), &nested).unwrap();
@@ -339,12 +514,16 @@ fn nothing_small_takes_long() {
         })
         .collect();
     let mut text = animations([(0, 0), (0, 0)]);
-    let meshes = format!(r#""meshes":[{{"primitives":[]}}],"nodes":[{}],"#, nodes.join(","));
+    let meshes = format!(
+        r#""meshes":[{{"primitives":[]}}],"nodes":[{}],"#,
+        nodes.join(",")
+    );
     text = text.replacen(r#""nodes":[{"name":"a"}],"#, &meshes, 1);
     write("chain.gltf", &text);
     // Animations with faults of their own.
     let mut text = animations([(0, 0), (0, 7)]);
-    let fault = r#",{"channels":[{"sampler":9,"target":{"node":0,"path":"rotation"}}],"samplers":[]}"#;
+    let fault =
+        r#",{"channels":[{"sampler":9,"target":{"node":0,"path":"rotation"}}],"samplers":[]}"#;
     text = text.replacen("]}]}", &format!("]}}{}]}}", fault.repeat(20_000)), 1);
     write("faults.gltf", &text);
     write(&"a".repeat(200), "");
@@ -367,9 +546,36 @@ fn nothing_small_takes_long() {
         (&["plot", "nested.npy", "-o", "n.svg"], 4),
         (&["render", "nested.npy", "-o", "n.gif"], 4),
         (&["view", "nested.npy", "-o", "n.html"], 4),
-        (&["follow", "nested.npy", "--seconds", "1", "-o", "n.bvh"], 4),
-        (&["route", "nested.npy", "--from", "0,0,0", "--to", "1,1,1", "-o", "n.csv"], 4),
-        (&["route", "chain.gltf", "--from", "0,0,0", "--to", "1,1,1", "-o", "n.csv"], 4),
+        (
+            &["follow", "nested.npy", "--seconds", "1", "-o", "n.bvh"],
+            4,
+        ),
+        (
+            &[
+                "route",
+                "nested.npy",
+                "--from",
+                "0,0,0",
+                "--to",
+                "1,1,1",
+                "-o",
+                "n.csv",
+            ],
+            4,
+        ),
+        (
+            &[
+                "route",
+                "chain.gltf",
+                "--from",
+                "0,0,0",
+                "--to",
+                "1,1,1",
+                "-o",
+                "n.csv",
+            ],
+            4,
+        ),
         (&["info", "faults.gltf"], 3),
         (&["info", &stars], 4),
         (&["eval", "a.dat", "--tracks", &stars, "-o", "t.npy"], 2),
@@ -396,10 +602,24 @@ fn faults_of_inputs_are_no_bugs() {
             r#""path":"rotation"}},{"sampler":1,"target":{"node":1,"path":"rotation"}}],"#,
             1,
         )
-        .replacen(r#""output":1}]"#, r#""output":1},{"input":0,"output":1,"interpolation":"STEP"}]"#, 1);
+        .replacen(
+            r#""output":1}]"#,
+            r#""output":1},{"input":0,"output":1,"interpolation":"STEP"}]"#,
+            1,
+        );
     write("mixed.gltf", &mixed);
     for what in ["velocity", "acceleration", "rotation"] {
-        let line = ["eval", "mixed.gltf", "--animation", "0", "--output", what, "--overwrite", "-o", "v.npy"];
+        let line = [
+            "eval",
+            "mixed.gltf",
+            "--animation",
+            "0",
+            "--output",
+            what,
+            "--overwrite",
+            "-o",
+            "v.npy",
+        ];
         let line = match what {
             "rotation" => [&line[..4], &line[6..]].concat(),
             _ => line.to_vec(),
@@ -414,10 +634,16 @@ fn faults_of_inputs_are_no_bugs() {
         assert!(values.iter().all(|value| value.is_finite()));
         let second = &values[values.len() / 2..];
         if what != "rotation" {
-            assert!(second.iter().all(|&value| value == 0.0), "a step stands still");
+            assert!(
+                second.iter().all(|&value| value == 0.0),
+                "a step stands still"
+            );
         }
         if what == "velocity" {
-            assert!((values[2] - 1.2870).abs() < 1e-4, "an arc turns by so much in a second");
+            assert!(
+                (values[2] - 1.2870).abs() < 1e-4,
+                "an arc turns by so much in a second"
+            );
         }
     }
     let mut told = String::new();
@@ -426,19 +652,49 @@ fn faults_of_inputs_are_no_bugs() {
     write("pairs.txt", "0 0 0 1\n");
     write("walkers.csv", "name,radius\nx,1\n");
     write("offsets.txt", "0 0 1\n");
-    let array = format!("{:117}\n", "{'descr': '<f4', 'fortran_order': False, 'shape': (2, 2, 2), }");
+    let array = format!(
+        "{:117}\n",
+        "{'descr': '<f4', 'fortran_order': False, 'shape': (2, 2, 2), }"
+    );
     let net = [&b"\x93NUMPY\x01\0\x76\0"[..], array.as_bytes(), &[0; 32]].concat();
     fs::write(place.path().join("net.npy"), net).unwrap();
     for (line, code) in [
-        (&["route", "none.obj", "--from", "0,0,0", "--to", "1,0,0", "-o", "w.csv"][..], "E610"),
-        (&["route", "net.npy", "--from", "0,0,0", "--to", "1,0,0", "-o", "w.csv"], "E309"),
-        (&["route", "flat.obj", "--pairs", "pairs.txt", "-o", "ways/"], "E612"),
-        (&["route", "flat.obj", "--walkers", "walkers.csv", "-o", "ways/"], "E613"),
+        (
+            &[
+                "route", "none.obj", "--from", "0,0,0", "--to", "1,0,0", "-o", "w.csv",
+            ][..],
+            "E610",
+        ),
+        (
+            &[
+                "route", "net.npy", "--from", "0,0,0", "--to", "1,0,0", "-o", "w.csv",
+            ],
+            "E309",
+        ),
+        (
+            &["route", "flat.obj", "--pairs", "pairs.txt", "-o", "ways/"],
+            "E612",
+        ),
+        (
+            &[
+                "route",
+                "flat.obj",
+                "--walkers",
+                "walkers.csv",
+                "-o",
+                "ways/",
+            ],
+            "E613",
+        ),
         (&["info", "a.dat", "--offsets", "offsets.txt"], "E614"),
     ] {
         let run = attempt(place.path(), line);
         let _ = writeln!(told, "{}", run.words);
         assert_eq!(run.code, 4, "{line:?}: {}", run.words);
-        assert!(run.words.contains(&format!("error[{code}]")), "{line:?}: {}", run.words);
+        assert!(
+            run.words.contains(&format!("error[{code}]")),
+            "{line:?}: {}",
+            run.words
+        );
     }
 }

@@ -288,7 +288,9 @@ fn chains_of_joints_are_written_in_their_own_length() {
     let joints: usize = 20_000;
     for joint in 0..joints {
         let name = format!("j{joint}");
-        clip.set.push(&name, &[0.0, 0.5], &[Quat::IDENTITY; 2]).unwrap();
+        clip.set
+            .push(&name, &[0.0, 0.5], &[Quat::IDENTITY; 2])
+            .unwrap();
         clip.skeleton.push(Joint {
             parent: joint.checked_sub(1),
             rest: Transform::default(),
@@ -299,7 +301,9 @@ fn chains_of_joints_are_written_in_their_own_length() {
     let mut out = Vec::new();
     let sampled = [samples.of(&clip, clip.rate, &[])];
     let options = MotionOptions::default();
-    bvh::FORMAT.write_clips(&sampled, &options, &mut out).unwrap();
+    bvh::FORMAT
+        .write_clips(&sampled, &options, &mut out)
+        .unwrap();
     assert!(out.len() < joints * 1500, "{} bytes", out.len());
     let again = bvh::read_bvh("t", &*out, &ReadOptions::default()).unwrap();
     assert_eq!(again.clips[0].set.track_count(), joints);

@@ -65,11 +65,7 @@ pub(crate) struct Messages<'a> {
 
 impl<'a> Messages<'a> {
     /// Looks for the footer of a file; anything else is a stream.
-    pub(crate) fn of(
-        name: &'a str,
-        bytes: &'a Buffer,
-        limits: Limits,
-    ) -> Result<Self, Diagnostic> {
+    pub(crate) fn of(name: &'a str, bytes: &'a Buffer, limits: Limits) -> Result<Self, Diagnostic> {
         let mut messages = Self {
             budget: Budget::of(bytes.len(), limits),
             name,

@@ -71,7 +71,9 @@ impl Container {
 
     /// Bytes of the file.
     pub(super) fn length(&self) -> usize {
-        self.glb.as_ref().map_or(self.text.len(), |glb| glb.bytes.len())
+        self.glb
+            .as_ref()
+            .map_or(self.text.len(), |glb| glb.bytes.len())
     }
 
     pub(super) fn is_glb(&self) -> bool {

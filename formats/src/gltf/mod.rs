@@ -181,7 +181,9 @@ pub fn read_gltf(
     if loaded.clips.is_empty() && loaded.refused.is_empty() {
         let message = match animations {
             1 => "the only animation moves no node: there is nothing to sample".to_owned(),
-            _ => format!("none of {animations} animations moves a node: there is nothing to sample"),
+            _ => {
+                format!("none of {animations} animations moves a node: there is nothing to sample")
+            }
         };
         return Err(json.refuse("/animations", Code::NoAnimations, message));
     }

@@ -194,8 +194,8 @@ impl<'a> Reader<'a> {
                 format!("`{uri}` is a file beside, and standard input has none beside it");
             return Err(refuse(message));
         };
-        let read = Source::open_beneath(folder, &path)
-            .and_then(|file| file.into_bytes(self.limits.file));
+        let read =
+            Source::open_beneath(folder, &path).and_then(|file| file.into_bytes(self.limits.file));
         let read = read.inspect(|bytes| self.budget.add_input(bytes.len()));
         read.map_err(|error| {
             let message = format!("{}: {}", path.display(), error.message);

@@ -307,7 +307,10 @@ fn refuse_overlaps(file: &str, members: &[Member]) -> Result<(), Diagnostic> {
         .map(|member| (&member.data, &*member.path))
         .collect();
     places.sort_unstable_by_key(|(data, _)| data.start);
-    match places.windows(2).find(|pair| pair[1].0.start < pair[0].0.end) {
+    match places
+        .windows(2)
+        .find(|pair| pair[1].0.start < pair[0].0.end)
+    {
         None => Ok(()),
         Some(pair) => {
             let message = format!(

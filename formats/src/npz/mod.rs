@@ -123,7 +123,11 @@ pub struct Numbers {
 pub fn open_numbers(path: &Path, options: &ReadOptions) -> Result<Numbers, Diagnostic> {
     let source = Source::open(path, options.pipes)?;
     let file = source.name.clone();
-    let archive = Archive::single(&file, source.into_bytes(options.limits.file)?, options.limits);
+    let archive = Archive::single(
+        &file,
+        source.into_bytes(options.limits.file)?,
+        options.limits,
+    );
     let array = archive.array(0)?;
     let values = array.numbers().ok_or_else(|| {
         let message = format!("holds {}, no numbers", array.header.element);

@@ -280,7 +280,11 @@ impl Compared {
         );
         for (side, missing) in self.missing.iter().enumerate() {
             if !missing.is_empty() {
-                text += &format!("  only in {}: {}\n", self.inputs[side], printable(&missing.join(", ")));
+                text += &format!(
+                    "  only in {}: {}\n",
+                    self.inputs[side],
+                    printable(&missing.join(", "))
+                );
             }
         }
         text

@@ -121,7 +121,10 @@ impl Arguments {
     }
 
     /// Every clip of one file with its like of the other; and the failure of those that were refused.
-    fn clips(&self, paths: [&Path; 2]) -> Result<(Vec<clips::Compared>, Result<(), Failure>), Failure> {
+    fn clips(
+        &self,
+        paths: [&Path; 2],
+    ) -> Result<(Vec<clips::Compared>, Result<(), Failure>), Failure> {
         let loaded = [self.inputs.load(paths[0])?, self.inputs.load(paths[1])?];
         let rest = (paths.iter().zip(&loaded))
             .try_for_each(|(path, loaded)| input::whole(&input::name(path), loaded));

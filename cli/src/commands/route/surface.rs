@@ -56,12 +56,17 @@ impl Surface {
                 Mesh::welded(&all.positions, triangles, weld).map_err(|error| refuse(&error))?
             }
             "npy" => {
-                let array = read_numbers(&path.display().to_string(), &bytes(path)?, |shape| match shape {
-                    [_, _, 3] => Ok(()),
-                    _ => Err(format!(
-                        "the array has the shape {shape:?}; a net has (m, n, 3)"
-                    )),
-                });
+                let array =
+                    read_numbers(
+                        &path.display().to_string(),
+                        &bytes(path)?,
+                        |shape| match shape {
+                            [_, _, 3] => Ok(()),
+                            _ => Err(format!(
+                                "the array has the shape {shape:?}; a net has (m, n, 3)"
+                            )),
+                        },
+                    );
                 let array = array.map_err(|fault| Failure::input(&fault, ""))?;
                 let points = array.values.chunks_exact(3).map(DVec3::from_slice);
                 let net = Net::new(array.shape[0], array.shape[1], points.collect());

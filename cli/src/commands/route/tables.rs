@@ -130,7 +130,12 @@ fn rows<T: for<'de> Deserialize<'de>>(
         .from_reader(text.as_bytes());
     let unreadable = |error: csv::Error| {
         let line = error.position().map_or(1, csv::Position::line);
-        refuse(path, line, Code::Walkers, &format!("cannot be read: {error}"))
+        refuse(
+            path,
+            line,
+            Code::Walkers,
+            &format!("cannot be read: {error}"),
+        )
     };
     let headers = reader.headers().map_err(unreadable)?.clone();
     let mut rows = Vec::new();
