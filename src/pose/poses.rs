@@ -325,8 +325,9 @@ fn set_all(
             pose: &pose,
         });
     };
-    match output.len() <= TASK {
-        true => Ok(task((0, output))),
-        false => on_threads(|| output.par_chunks_mut(TASK).enumerate().for_each(task)),
+    if output.len() <= TASK {
+        task((0, output));
+        return Ok(());
     }
+    on_threads(|| output.par_chunks_mut(TASK).enumerate().for_each(task))
 }

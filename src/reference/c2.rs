@@ -199,7 +199,7 @@ impl<'a> System<'a> {
             }
         }
         let off = self.excesses(velocities, bends);
-        let steps = band.solve(off.iter().flat_map(|own| own.to_array()).collect())?;
+        let steps = band.solve(off.iter().flat_map(DVec3::to_array).collect())?;
         let steps = steps.chunks(3).map(DVec3::from_slice);
         Some(
             velocities

@@ -84,7 +84,7 @@ impl TrackSet {
     /// When there is no such track, or not one finite pair for each of its keys.
     pub fn set_tangents(&mut self, track: usize, tangents: &[[Quat; 2]]) -> Result<(), TrackError> {
         let largest = |both: &[Quat; 2]| {
-            let numbers = both.iter().flat_map(|tangent| tangent.to_array());
+            let numbers = both.iter().flat_map(Quat::to_array);
             largest(numbers.map(f64::from))
         };
         self.check_data(track, "tangent", tangents, f64::MAX, largest)?;

@@ -146,6 +146,7 @@ impl Verification {
     /// Whether a Vulkan device was compared with the CPU, all bits agree and all errors are within
     /// their bounds. `false` where nothing was compared, and on an engine of the CPU's: see
     /// [`Verification::verdict`].
+    #[must_use]
     pub fn passes(&self) -> bool {
         self.verdict() == Verdict::Passed
     }

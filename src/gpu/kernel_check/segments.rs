@@ -142,7 +142,7 @@ impl<S: Segment> Scene<S> {
         places: impl ExactSizeIterator<Item = usize>,
     ) {
         let count = places.len() as u32;
-        let (source, bit) = self.source(random);
+        let (source, bit) = Self::source(random);
         // Frames about the middle of a short run, or those at one end of a very long one.
         let (frame, scale) = match random.once_in(6) {
             true => (random.word() as i32 >> 9, 0.25 / (1 << 23) as f32),
@@ -184,7 +184,7 @@ impl<S: Segment> Scene<S> {
     }
 
     /// A segment, or a constant and the bit that says so.
-    fn source(&self, random: &mut Random) -> (u32, u32) {
+    fn source(random: &mut Random) -> (u32, u32) {
         match random.once_in(8) {
             true => (random.below(CONSTANTS as u32), IS_CONSTANT),
             false => (random.below(SEGMENTS as u32), 0),
@@ -258,7 +258,7 @@ impl<S: Segment> Scene<S> {
         let mut samples = Vec::new();
         let place = 4;
         for i in 0..SAMPLES + BEFORE {
-            let ((source, bit), parameter) = (self.source(random), random.parameter());
+            let ((source, bit), parameter) = (Self::source(random), random.parameter());
             samples.push(ListedSample {
                 source: source | bit,
                 parameter,
