@@ -320,7 +320,7 @@ fn frames_at_keys_of_unix_time_show_the_keys() {
         .into_iter()
         .for_each(|method| verified(&slow, method));
     // 78 rad/s. Curves that are cut into pieces here are not as exact: pieces start at times in f64.
-    for method in [method::SLERP, method::BESSEL_OVERHAUSER, method::SQUAD] {
+    for method in [method::SLERP, method::BESSEL_OVERHAUSER] {
         verified(&fast_keys(200), method);
     }
 }

@@ -202,7 +202,7 @@ impl ClipTables {
             });
         }
         let period = (ticks as u32).max(1);
-        let clock = (rate, FrameStart::new(start, (start, end)), period);
+        let clock = (rate, FrameStart::new(start), period);
         let rotations = ClipData::new(set, interpolation, Wanted::all(set))?;
         let form = match interpolation.form() {
             Form::Arc => FORM_ARC,

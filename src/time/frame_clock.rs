@@ -40,8 +40,8 @@ pub(crate) fn finite_scale(scale: f64) -> f32 {
 /// at most 4e-8 rad off.
 pub(crate) const RESOLUTION: f64 = 1.0 / (1u64 << 33) as f64;
 
-/// When frame 0 is, and the largest magnitude of a time beside it: its own, or that of the first key of the
-/// set or of its last. Times were computed from such, and have their rounding.
+/// When frame 0 is, and the magnitude of a time up to which all times are taken to be rounded alike: its
+/// own, and at least [`CLIP`]. It does not depend on the set: a track has the same bits alone and beside others.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct FrameStart {
     pub(crate) seconds: f64,
@@ -49,11 +49,14 @@ pub(crate) struct FrameStart {
 }
 
 impl FrameStart {
-    pub(crate) fn new(seconds: f64, (first, last): (f64, f64)) -> Self {
-        let latest = seconds.abs().max(first.abs()).max(last.abs());
+    pub(crate) fn new(seconds: f64) -> Self {
+        let latest = seconds.abs().max(CLIP);
         Self { seconds, latest }
     }
 }
+
+/// Times of a clip up to this long, in seconds, were often summed up, and have the rounding of its end.
+const CLIP: f64 = 64.0;
 
 /// By how much the rounding of times of this magnitude may have moved a key, in seconds: times are often
 /// sums or products, so a few steps
@@ -84,9 +87,9 @@ pub(crate) struct FrameClock {
     sign: f64,
     /// Whether keys are held until the next one.
     steps: bool,
-    /// The largest magnitude of a time, and by how much its rounding may move a key, in frames.
+    /// The magnitude of a time up to which all are rounded alike.
     latest: f64,
-    rounding: f64,
+    per_second: f64,
 }
 
 /// Where one span ends and the next starts.
@@ -110,7 +113,7 @@ impl FrameClock {
             sign: 1.0,
             steps,
             latest,
-            rounding: rate.frames_in(rounding(latest, steps)),
+            per_second: rate.frames_in(1.0),
         }
     }
 
@@ -130,7 +133,6 @@ impl FrameClock {
                     at_origin: at_first,
                     sign: if backwards { -1.0 } else { 1.0 },
                     latest,
-                    rounding: self.rate.frames_in(rounding(latest, self.steps)),
                     ..self
                 }
             }
@@ -150,7 +152,15 @@ impl FrameClock {
     pub(crate) fn boundary(self, time: f64) -> Boundary {
         let exact = self.rate.frames_in(time - self.origin) * self.sign + self.at_origin;
         let whole = nearest_whole(exact);
-        let is_whole = (exact - whole).abs() <= self.rounding;
+        let magnitude = time.abs();
+        let latest = self.latest;
+        let magnitude = if magnitude > latest {
+            magnitude
+        } else {
+            latest
+        };
+        let moved = rounding(magnitude, self.steps) * self.per_second;
+        let is_whole = (exact - whole).abs() <= moved;
         let frame = if is_whole { whole } else { exact };
         let first = if whole < frame { whole + 1.0 } else { whole };
         Boundary { frame, first }

@@ -200,7 +200,7 @@ impl Frames {
                 let tolerance = rate.frames_in(step).clamp(LAST_FRAME_TOLERANCE, 0.5);
                 let count = (rate.frames_in(end - start) + tolerance).floor() + 1.0;
                 check_size(tracks, count)?;
-                let (rate, start) = (*rate, FrameStart::new(start, (first, last)));
+                let (rate, start) = (*rate, FrameStart::new(start));
                 (Ticks::Frames { rate, start }, count as usize)
             }
             Request::Shared(times) => {

@@ -239,7 +239,7 @@ mod tests {
         let rate = FrameRate::new(1, 1).unwrap();
         for (frames, are_near) in [((1u64 << 24) - 2, true), ((1 << 24) + 2, false)] {
             let (starts, end) = ([0.0], frames as f64);
-            let start = FrameStart::new(0.0, (0.0, end));
+            let start = FrameStart::new(0.0);
             let clock = FrameClock::new(rate, start, false);
             let mut intervals = IntervalBlocks::new(&starts, end, clock, 0..frames as usize);
             let mut block = IntervalBlock::zeroed();

@@ -260,7 +260,7 @@ impl Bench {
         let mut first_call = None;
         let (_, runs) = measured(|| {
             let call = Instant::now();
-            renderer.to_buffer(&clip, &frames, (layout, encoding), (&buffer, 0))?;
+            Renderer::to_buffer(&clip, &frames, (layout, encoding), (&buffer, 0))?;
             let on_host = call.elapsed();
             first_call.get_or_insert_with(|| started.elapsed());
             Ok(taken(&renderer.engine, on_host))
@@ -346,7 +346,7 @@ impl Bench {
             for instance in 0..instances {
                 crowd.set(instance, 0, crowd_layer(&mut random, &library))?;
             }
-            let target = self.renderer.target(&crowd, output, &buffer)?;
+            let target = Renderer::target(&crowd, output, &buffer)?;
             let mut runs = Vec::new();
             let mut first_call = None;
             for _ in 0..8 {

@@ -147,10 +147,6 @@ fn shortest(method: Method) -> Interpolation {
 impl Golden {
     /// Makes the sets and names the cases. The sets take some ten megabytes.
     #[must_use]
-    #[expect(
-        clippy::missing_panics_doc,
-        reason = "the sets are the same at every call"
-    )]
     pub fn new() -> Self {
         let uneven = random_set(2, 7, 26, &[0.05, 0.3, 0.9], false);
         let sets = BTreeMap::from([

@@ -78,7 +78,6 @@ impl Renderer {
 
     /// Leaves a clip's result in a buffer, from `offset` on.
     pub(crate) fn to_buffer(
-        &self,
         clip: &Clip,
         frames: &Frames,
         (layout, encoding): (Layout, Encoding),
@@ -90,7 +89,6 @@ impl Renderer {
     }
 
     pub(crate) fn target(
-        &self,
         crowd: &Crowd,
         output: CrowdOutput,
         buffer: &ApplicationBuffer,
@@ -170,9 +168,11 @@ pub fn renderer(
     report.validation_messages = renderer.application.validation_messages();
     if let Some(queue) = renderer.application.copy_queue {
         drop(renderer);
-        let mut options = EngineOptions::default();
-        options.transfer = Transfer::Staged;
-        options.read_back = ReadBack::Overlapped;
+        let options = EngineOptions {
+            transfer: Transfer::Staged,
+            read_back: ReadBack::Overlapped,
+            ..EngineOptions::default()
+        };
         let renderer = Renderer::new(device, validation, &options)?;
         report
             .checks
@@ -227,7 +227,7 @@ fn buffer_to_buffer(
                     let each = encoding.bytes();
                     let offset = offset_rotations * each;
                     let expected = expected_clip.evaluate_encoded(frames, layout, encoding)?;
-                    renderer.to_buffer(
+                    Renderer::to_buffer(
                         &clip,
                         frames,
                         (layout, encoding),
@@ -279,7 +279,7 @@ fn frames_in_flight(
             }
             // Made after the buffers that they lead to, and dropped before.
             let targets = (buffers.iter())
-                .map(|(buffer, _)| renderer.target(&crowd, output, buffer))
+                .map(|(buffer, _)| Renderer::target(&crowd, output, buffer))
                 .collect::<Result<Vec<_>, _>>()?;
             let (mut frames, mut expected) = (Vec::new(), Vec::new());
             for (frame, (target, (buffer, host))) in targets.iter().zip(&buffers).enumerate() {

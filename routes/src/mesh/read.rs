@@ -91,7 +91,7 @@ fn vertices_and_faces(text: &[u8]) -> Vec<u8> {
         }
         whole.extend_from_slice(line);
         let mut words = whole
-            .split(|byte| byte.is_ascii_whitespace())
+            .split(u8::is_ascii_whitespace)
             .filter(|word| !word.is_empty());
         match words.next() {
             Some(b"v") => lines.extend_from_slice(&whole),

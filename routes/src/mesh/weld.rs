@@ -52,7 +52,7 @@ pub(super) fn weld<'a>(
             return Err(MeshError::NotFinite { vertex, position });
         }
     }
-    if !(tolerance >= 0.0 && tolerance <= LARGEST) {
+    if !(0.0..=LARGEST).contains(&tolerance) {
         return Err(MeshError::Weld { tolerance });
     }
     let mut welding = Welding::new(given, tolerance);
