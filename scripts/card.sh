@@ -73,7 +73,7 @@ build() {
         echo "glibc $newest or newer"
     } >"$card/VERSION"
     local archive=$place/tumble-card.tar.xz
-    tar --create --xz --directory "$place" --owner 0 --group 0 --file "$archive" tumble-card
+    tar --create --directory "$place" --owner 0 --group 0 tumble-card | xz -T0 -2 >"$archive"
     local bytes
     bytes=$(stat -c %s "$archive")
     [ "$bytes" -lt "$LARGEST" ] || fail "$archive has $bytes bytes, $LARGEST are allowed"
@@ -101,14 +101,15 @@ try() {
     fi
     rm -rf "$root/root/tumble-card"
     tar --extract --directory "$root/root" --file "$place/tumble-card.tar.xz"
-    mkdir -p "$root/proc" "$root/dev"
+    mkdir -p "$root/proc"
     mountpoint -q "$root/proc" || mount -t proc proc "$root/proc"
+    # shellcheck disable=SC2064 # the folder is known now
+    trap "umount '$root/proc' 2>/dev/null || true" EXIT
     local outcome=0
     # No network, where namespaces are allowed: nothing may be fetched.
     local alone=()
     unshare --net true 2>/dev/null && alone=(unshare --net)
     "${alone[@]}" chroot "$root" /root/tumble-card/run.sh "$@" || outcome=$?
-    umount "$root/proc" || true
     rm -rf "$place/tried"
     mkdir -p "$place/tried"
     cp -r "$root"/root/tumble-card/results-* "$place/tried/"
