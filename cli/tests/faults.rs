@@ -35,8 +35,14 @@ fn every_call_that_can_fail_is_made_to() {
     let root = crate::program::root();
     let loader = fs::read_to_string(root.join("cli/tests/fault_loader/lib.rs")).unwrap();
     let mut names = 0;
-    for entry in fs::read_dir(root.join("src/gpu")).unwrap() {
-        let text = fs::read_to_string(entry.unwrap().path()).unwrap();
+    let folders = ["src/gpu", "src/gpu/kernel_check"];
+    let entries = folders.map(|folder| fs::read_dir(root.join(folder)).unwrap());
+    let files = entries
+        .into_iter()
+        .flatten()
+        .map(|entry| entry.unwrap().path());
+    for file in files.filter(|path| path.is_file()) {
+        let text = fs::read_to_string(file).unwrap();
         for part in text.split("named(\"").skip(1) {
             let name = part.split('"').next().unwrap();
             assert!(loader.contains(&format!("{name}(")), "{name}");

@@ -90,11 +90,6 @@ const REMEDIES: &[(&str, &str, &[&str])] = &[
         &["eval a.dat --output velocity -o o.npy"],
     ),
     (
-        "convert negative.gltf -o o.glb",
-        "(tumble convert --start 0)",
-        &["convert negative.gltf --start 0 -o o.glb"],
-    ),
-    (
         "route hill.obj -o o.csv",
         "give --from and --to",
         &["route hill.obj --from 1,0,1 --to 8,0,8 -o o.csv"],
@@ -141,10 +136,6 @@ fn folder() -> tempfile::TempDir {
     let waves = (0..100).map(|i| format!("{} {} 0 0 0 0 0 1\n", f64::from(i) / 50.0, i % 7));
     write("waves.tum", &waves.collect::<String>());
     write("m.gltf", &crate::attack::two_animations());
-    write(
-        "negative.gltf",
-        &crate::attack::two_animations_at([-0.5, 1.0]),
-    );
     succeed(at, &["generate", "--hill", "-o", "hill.obj"]);
     // The ways of `route` have upward directions.
     let route = "route hill.obj --from 1,0,1 --to 8,0,8 -o ups.csv";

@@ -24,7 +24,7 @@ use crate::run::interruptible;
 /// >>> tumble.save(path, tumble.Clip([0.0, 1.0], [[0, 0, 0, 1], [0, 0, 1, 0]]))
 /// >>> file = tumble.load(path)
 /// >>> len(file), file.clip
-/// (1, Clip(1 track, 2 keys, 0 to 1 s, 24 fps))
+/// (1, Clip(1 track, 2 keys, 0 to 1 s, 1 fps))
 #[pyclass(frozen, module = "tumble", mapping)]
 pub(crate) struct File {
     clips: Vec<Clip>,

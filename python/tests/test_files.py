@@ -85,7 +85,7 @@ def test_files_are_mappings(shared):
     run = fox["Run"]
     assert fox[2].name == fox[-1].name == run.name == "Run" and "Run" in fox
     assert [clip.name for clip in fox] == fox.names
-    assert run.rate == 120 and len(run) == len(run.names)
+    assert run.rate is None and len(run) == len(run.names)
     with pytest.raises(tumble.InputError, match="Survey, Walk, Run"):
         fox.clip
     with pytest.raises(KeyError, match="Survey, Walk, Run"):

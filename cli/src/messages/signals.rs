@@ -51,13 +51,14 @@ fn wait_for_signals() {
     // and a file to remove; the signal would end the program before that.
     let ignored = ignored();
     let all = [SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGXFSZ];
+    let heeded = all
+        .into_iter()
+        .filter(|signal| ignored >> (signal - 1) & 1 == 0);
+    // Before this returns: the first file is opened then, and a thread may take long to start.
+    let Ok(mut signals) = Signals::new(heeded) else {
+        return;
+    };
     let wait = move || {
-        let heeded = all
-            .into_iter()
-            .filter(|signal| ignored >> (signal - 1) & 1 == 0);
-        let Ok(mut signals) = Signals::new(heeded) else {
-            return;
-        };
         for signal in signals.forever().filter(|&signal| signal != SIGXFSZ) {
             let mut state = state();
             // A second signal means it: do not wait for the writer.
