@@ -254,7 +254,17 @@ fn of_times(lists: &[Vec<f64>], precision: Precision) -> Option<Found> {
     }
     times.sort_by(f64::total_cmp);
     times.dedup();
-    if times.len() < 2 {
+    if let [time] = times[..] {
+        // A single time tells no rate, but it may be a frame of a usual one.
+        let off = precision.rounding(time);
+        let (from, to) = (time - off, time + off);
+        let grid = on_usual_grid(&[Window { from, to }]).filter(|_| time != 0.0)?;
+        return Some(Found {
+            is_rate: false,
+            ..Found::at_zero(grid)
+        });
+    }
+    if times.is_empty() {
         return None;
     }
     let found = of_distinct(&times, precision);
@@ -510,17 +520,30 @@ const ACCIDENT: f64 = 1e-3;
 /// A rate on whose frames, counted from 0, all times lie, though none on neighbouring ones: the lowest
 /// usual one, else the lowest.
 fn on_some_grid(windows: &[Window]) -> Option<FrameRate> {
-    let widest = windows
-        .iter()
-        .map(|window| window.to - window.from)
-        .fold(0.0, f64::max);
-    let told = windows
-        .iter()
-        .filter(|window| !(window.from <= 0.0 && 0.0 <= window.to))
-        .count();
-    let fits = |rate: FrameRate| {
+    let whole = || (1..=MOST as u64).map(|rate| (rate, 1));
+    let ntsc = || [24, 30, 48, 60, 120].map(|rate| (rate * 1000, 1001)).into_iter();
+    on_usual_grid(windows).or_else(|| on_one_of(windows, whole().chain(ntsc())))
+}
+
+/// The lowest usual rate on whose frames all times lie.
+fn on_usual_grid(windows: &[Window]) -> Option<FrameRate> {
+    let usual = USUAL.iter().filter(|&&rate| rate >= 24);
+    on_one_of(windows, usual.map(|&rate| (rate, 1)))
+}
+
+/// The first of some rates on whose frames all times lie, if that is no accident.
+fn on_one_of(
+    windows: &[Window],
+    rates: impl Iterator<Item = (u64, u64)> + Clone,
+) -> Option<FrameRate> {
+    let tried = rates.clone().count() as f64;
+    let widths = windows.iter().map(|window| window.to - window.from);
+    let widest = widths.fold(0.0, f64::max);
+    let at_zero = |window: &&Window| window.from <= 0.0 && 0.0 <= window.to;
+    let told = windows.len() - windows.iter().filter(at_zero).count();
+    let fits = |rate: &FrameRate| {
         let per_second = rate.per_second();
-        let chance = (widest * per_second).powi(told as i32) * MOST;
+        let chance = (widest * per_second).powi(told as i32) * tried;
         if widest * per_second > 0.25 || chance > ACCIDENT {
             return false;
         }
@@ -533,17 +556,8 @@ fn on_some_grid(windows: &[Window]) -> Option<FrameRate> {
             is_next && window.from <= time && time <= window.to
         })
     };
-    let whole = USUAL
-        .iter()
-        .filter(|&&rate| rate >= 24)
-        .copied()
-        .chain(1..=MOST as u64);
-    let whole = whole.map(|rate| (rate, 1));
-    let ntsc = [24, 30, 48, 60, 120].map(|rate| (rate * 1000, 1001));
-    let mut all = whole
-        .chain(ntsc)
-        .filter_map(|(frames, seconds)| FrameRate::new(frames, seconds).ok());
-    all.find(|&rate| fits(rate))
+    let mut all = rates.filter_map(|(frames, seconds)| FrameRate::new(frames, seconds).ok());
+    all.find(fits)
 }
 
 /// Whether all times are frames of the rate, one of which is at `phase`, but for their rounding.

@@ -146,13 +146,10 @@ fn quantized_keys_are_near_those_of_the_file_they_were_made_of() {
     assert_eq!(fox.clips.len(), 3);
     for (own, other) in fox.clips.iter().zip(&quantized.clips) {
         assert_eq!(own.name, other.name);
-        // Its last key comes between two frames of 24 fps.
-        let rate = if own.name.as_deref() == Some("Run") {
-            120
-        } else {
-            24
-        };
-        assert_eq!(own.rate, tumble::FrameRate::new(rate, 1).ok());
+        // Its last key comes between two frames of 24 fps, on one of 120 fps: that is not the rate of the keys.
+        let is_even = own.name.as_deref() != Some("Run");
+        let rate = tumble::FrameRate::new(24, 1).ok().filter(|_| is_even);
+        assert_eq!((own.rate, other.rate), (rate, rate));
         let (first, last) = own.set.time_span().unwrap();
         let times: Vec<f64> = (0..50)
             .map(|i| first + (last - first) * f64::from(i) / 49.0)

@@ -138,7 +138,7 @@ fn times_of_a_grid_are_frames_again_unless_they_are_wanted_raw() {
         let clip = read(&text, &options).unwrap().clips.remove(0);
         (clip.set.track(0).times[1], clip.rate)
     };
-    assert_eq!(read(false), (1.0 / 3.0, FrameRate::new(24, 1).ok()));
+    assert_eq!(read(false), (1.0 / 3.0, FrameRate::new(3, 1).ok()));
     assert_eq!(read(true), (third, None));
 }
 

@@ -190,8 +190,9 @@ fn offsets_of_times_are_written_and_lists_of_other_lengths_are_not() {
     for format in ["parquet", "arrow", "csv"] {
         let bytes = written(format, std::slice::from_ref(&sampled)).unwrap();
         let loaded = read(format, &bytes).unwrap();
-        let times = loaded.clips[0].set.track(0).times;
-        assert_eq!(times, [1_403_636_579.5, 1_403_636_580.25], "{format}");
+        let clip = &loaded.clips[0];
+        let times = (clip.time_offset, clip.set.track(0).times);
+        assert_eq!(times, (1_403_636_579, &[0.5, 1.25][..]), "{format}");
         let short = Sampled {
             times: &[0.5],
             ..sampled.clone()

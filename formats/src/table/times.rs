@@ -67,7 +67,7 @@ pub(crate) fn times(
         }
         (Values::Numbers(Numbers::F64(times)), _) => {
             let seconds = times.iter().map(|&time| time / per_second);
-            exact(seconds.collect(), Some(Precision::F64))
+            Ok(doubles(seconds.collect()))
         }
         (Values::Decimals(times, places), _) => {
             let first = times.iter().min().map_or(0, |first| first.whole_seconds());
@@ -97,6 +97,26 @@ pub(crate) fn times(
             let message = format!("`{}` holds no times", column.name);
             Err(table.refuse_at(plan.time, 0, Code::ColumnType, message))
         }
+    }
+}
+
+/// Times in f64. Those that begin far from 0 were rounded there: 1.7e9 s to a quarter of a microsecond.
+fn doubles(mut seconds: Vec<f64>) -> Times {
+    let first = seconds.iter().copied().fold(f64::INFINITY, f64::min).floor();
+    let is_far = first.abs() >= FAR as f64 && first.abs() <= MOST_SECONDS as f64;
+    if !is_far {
+        return Times {
+            seconds,
+            precision: Some(Precision::F64),
+            offset: 0,
+        };
+    }
+    let step = Precision::F64.ulp(first);
+    seconds.iter_mut().for_each(|time| *time -= first);
+    Times {
+        seconds,
+        precision: Some(Precision::Decimals(-step.log10().ceil() as u32)),
+        offset: first as i64,
     }
 }
 

@@ -103,7 +103,7 @@ fn columns_of_a_table_are_times_and_tracks() {
     };
     let bytes = npy("(3, 12)", (0..3).flat_map(row));
     let map = "time=arr_0[0],hip=arr_0[1:5]:wxyz,knee=arr_0[5:9]:wxyz,translations=arr_0[9:12]";
-    let clip = &read(bytes.clone(), Some(map), 1).unwrap().clips[0];
+    let clip = &read(bytes.clone(), Some(map), 0).unwrap().clips[0];
     check(&clip.set);
     assert_eq!(clip.set.track(0).times, [0.0, 0.25, 0.5]);
     assert_eq!(clip.set.track(1).name, Some("knee"));
