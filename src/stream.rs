@@ -19,7 +19,7 @@ use crate::output::window::Window;
 use crate::prepare::batch::Batch;
 use crate::prepare::clip_data::Wanted;
 use crate::prepare::request::Request;
-use crate::threads::OutOfThreads;
+use crate::threads::{self, OutOfThreads};
 use crate::time::frames::Frames;
 use crate::tracks::set::TrackSet;
 
@@ -284,6 +284,18 @@ fn run<E: From<Error>>(
         return sink(Chunk::new(window, &rotations, quantity));
     }
     let mut windows = first.into_iter().flatten().chain(windows);
+    // One of the engine's own threads must not wait for a thread that needs them: all of them may be here.
+    if threads::is_worker() {
+        let mut used = OutputBuffer::new(0).map_err(Error::from)?;
+        return windows.try_for_each(|window| {
+            let none = OutputBuffer::new(0).map_err(Error::from)?;
+            let (window, rotations) = fill_one(window, std::mem::replace(&mut used, none))?;
+            let own = window.len();
+            sink(Chunk::new(window, &rotations[..own], quantity))?;
+            used = rotations;
+            Ok(())
+        });
+    }
     thread::scope(|scope| {
         let (give_back, empty) = sync_channel::<OutputBuffer>(BUFFERS);
         let (hand_over, filled) = sync_channel(BUFFERS);
