@@ -215,8 +215,12 @@ fn buffers_without_a_uri_stay_such() {
     let mut none = file.clone();
     none["buffers"] = json!([unnamed]);
     none["bufferViews"] = json!([]);
-    none["accessors"] = json!([]);
-    none["animations"] = json!([{"channels": [], "samplers": []}]);
+    // Zeros, which need no bytes: one key.
+    none["accessors"] = json!([
+        {"componentType": 5126, "count": 1, "type": "SCALAR", "min": [0], "max": [0]},
+        {"componentType": 5126, "count": 1, "type": "VEC3"},
+    ]);
+    none["animations"][0]["channels"][0]["target"]["path"] = json!("translation");
     let mut made = Vec::new();
     for (name, file, buffers) in [("second", &file, 2), ("alone", &none, 2)] {
         let path = folder.path().join(format!("{name}.gltf"));
