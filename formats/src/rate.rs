@@ -521,7 +521,11 @@ const ACCIDENT: f64 = 1e-3;
 /// usual one, else the lowest.
 fn on_some_grid(windows: &[Window]) -> Option<FrameRate> {
     let whole = || (1..=MOST as u64).map(|rate| (rate, 1));
-    let ntsc = || [24, 30, 48, 60, 120].map(|rate| (rate * 1000, 1001)).into_iter();
+    let ntsc = || {
+        [24, 30, 48, 60, 120]
+            .map(|rate| (rate * 1000, 1001))
+            .into_iter()
+    };
     on_usual_grid(windows).or_else(|| on_one_of(windows, whole().chain(ntsc())))
 }
 

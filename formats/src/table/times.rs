@@ -102,7 +102,11 @@ pub(crate) fn times(
 
 /// Times in f64. Those that begin far from 0 were rounded there: 1.7e9 s to a quarter of a microsecond.
 fn doubles(mut seconds: Vec<f64>) -> Times {
-    let first = seconds.iter().copied().fold(f64::INFINITY, f64::min).floor();
+    let first = seconds
+        .iter()
+        .copied()
+        .fold(f64::INFINITY, f64::min)
+        .floor();
     let is_far = first.abs() >= FAR as f64 && first.abs() <= MOST_SECONDS as f64;
     if !is_far {
         return Times {
