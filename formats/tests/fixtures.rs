@@ -108,7 +108,6 @@ fn every_code_of_a_file_is_shown_by_a_fixture_or_a_test() {
         Code::Pairs,
         Code::Walkers,
         Code::Offsets,
-        Code::Memory,
         Code::StartMoved,
         Code::GltfFolder,
         Code::StaysOutside,
