@@ -120,7 +120,6 @@ fn every_code_of_a_file_is_shown_by_a_fixture_or_a_test() {
         Code::SeveralClips,
         Code::RateBesideTimes,
         Code::TwoRates,
-        Code::Nanoseconds,
     ];
     for &code in Code::ALL {
         let shown = all.contains(&format!("[{code}]"));
