@@ -168,9 +168,9 @@ impl Moved {
     /// # Errors
     /// When they are no floats, or missing.
     pub(super) fn stored_times(&self, reader: &Reader<'_>) -> Result<Vec<f64>, Diagnostic> {
-        // A count that the bytes do not hold is refused as such; what they hold is counted then.
+        let count = usize::try_from(self.times.count).unwrap_or(usize::MAX);
+        reader.take(count, 2 * size_of::<f64>(), &self.input)?;
         let times = reader.numbers(self.sampler.input, &self.times, 1, &self.input)?;
-        reader.take(times.len(), 2 * size_of::<f64>(), &self.input)?;
         reader.warn_of_stride(&self.times);
         if let Some(time) = times.iter().find(|time| **time < 0.0) {
             reader.warn(Code::NegativeTime, &self.input, || {
