@@ -75,7 +75,7 @@ fn the_software_drivers_are_proved_and_compared() {
         (LAVAPIPE, "llvmpipe", "one.json", "--validate"),
         (SWIFTSHADER, "SwiftShader", "two.json", "--overwrite"),
     ] {
-        let line = ["prove", "--quick", "--seconds", "90", "-o", file, more];
+        let line = ["prove", "--quick", "--seconds", "600", "-o", file, more];
         let run = finish(with_driver(place, driver, &line).output().unwrap());
         let proof = read(&place.join(file));
         expect_proof(&run, &proof, name);
