@@ -72,7 +72,7 @@ fn layers_are_all_set_or_none() {
         (
             TumbleCrowdLayer { mask: 2, ..good },
             range,
-            "no mask 1; there are 1",
+            "no mask 2; there are 1, which count from 1",
         ),
         (
             TumbleCrowdLayer {
@@ -250,7 +250,7 @@ fn results_and_states_are_checked() {
         fails(
             tumble_crowd_wait_half(crowd, half_into, count),
             state,
-            "half precision: false",
+            "the result is in 32 bits; take it with tumble_crowd_wait",
         );
         fails(tumble_crowd_wait(crowd, into, count - 1), size, "× 12");
         assert!(memory.iter().all(|&number| number == 7.0));

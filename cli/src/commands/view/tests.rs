@@ -274,11 +274,13 @@ fn what_has_no_place_or_no_room_is_refused() {
     let mut far = walk("Far", 0.4);
     let times = [0.3, 2.0];
     for joint in [1, 2] {
-        let places = [Vec3::X, Vec3::splat(3e38)];
+        let places = [Vec3::X, Vec3::splat(9e29)];
         far.set
             .set_translations(joint, &times, &places, &[])
             .unwrap();
     }
+    let sizes = [Vec3::ONE, Vec3::splat(9e29)];
+    far.set.set_scales(1, &times, &sizes, &[]).unwrap();
     let mut circle = walk("Circle", 0.4);
     circle.skeleton[1].parent = Some(0);
     for (clip, message) in [
