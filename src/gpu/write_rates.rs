@@ -11,13 +11,15 @@ use crate::gpu::error::VulkanError;
 use crate::gpu::physical::DeviceKind;
 use crate::gpu::submission::{Binding, Submission};
 use crate::shader::{
-    BLOCK_SAMPLES, Block, Grid, IS_CONSTANT, Item, Kernel, SAMPLES_EACH, WORKGROUP,
+    BLOCK_SAMPLES, Block, Dispatch, Grid, IS_CONSTANT, ITEM_SAMPLES, Item, Kernel, SAMPLES_EACH,
+    WORKGROUP,
 };
 
 /// Bytes a second that a device writes into its own memory: medians of several runs, by its own clock.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct WriteRates {
-    /// By the kernel of cards, whose neighbouring invocations store neighbouring rotations, over one constant.
+    /// By the engine's own kernel for the device, over one constant: on cards neighbouring invocations store
+    /// neighbouring rotations.
     pub store: f64,
     /// By `vkCmdFillBuffer`.
     pub fill: f64,
@@ -35,7 +37,7 @@ impl WriteRates {
 
 /// More than caches hold.
 const CARD_BYTES: u64 = 512 << 20;
-const SOFTWARE_BYTES: u64 = 64 << 20;
+const SOFTWARE_BYTES: u64 = 16 << 20;
 const LEAST_BYTES: u64 = 1 << 20;
 
 /// Runs that count, behind one that does not.
@@ -72,8 +74,33 @@ impl VulkanEngine {
         }))
     }
 
+    /// By the kernel that the device's mapping takes, over one constant.
     fn store_rate(&self, buffer: &Buffer, bytes: u64) -> Result<f64, VulkanError> {
         let samples = (bytes / size_of::<[f32; 4]>() as u64) as u32;
+        let upload = |bytes: &[u8]| self.resident("tumble write rate", bytes, &mut Vec::new());
+        // No segment is read but the first.
+        let constants = upload(bytemuck::cast_slice(&[[0.0_f32, 0.0, 0.0, 1.0]; 2]))?;
+        if !self.maps_samples {
+            let items: Vec<Item> = (0..samples / ITEM_SAMPLES)
+                .map(|item| Item {
+                    output: item * ITEM_SAMPLES,
+                    count: ITEM_SAMPLES | IS_CONSTANT,
+                    ..Item::zeroed()
+                })
+                .collect();
+            let dispatch = Dispatch {
+                item_count: items.len() as u32,
+                stride: 1,
+                ..Dispatch::zeroed()
+            };
+            let items = upload(bytemuck::cast_slice(&items))?;
+            let bindings = [&constants, &constants, &items, buffer].map(Binding::whole);
+            let pipeline = self.pipeline(Kernel::ArcFramesF32)?;
+            let groups = self.workgroups(dispatch.item_count);
+            return self.rate(bytes, |submission| {
+                submission.dispatch(&pipeline, &bindings, bytemuck::bytes_of(&dispatch), groups)
+            });
+        }
         let item = Item {
             count: samples | IS_CONSTANT,
             ..Item::zeroed()
@@ -85,17 +112,14 @@ impl VulkanEngine {
             ..Grid::zeroed()
         };
         let blocks = vec![Block::zeroed(); samples.div_ceil(BLOCK_SAMPLES) as usize];
-        let upload = |bytes: &[u8]| self.resident("tumble write rate", bytes, &mut Vec::new());
-        // The constant is the first of the segment's numbers.
-        let constants = upload(bytemuck::cast_slice(&[[0.0_f32, 0.0, 0.0, 1.0]; 2]))?;
         let items = upload(bytemuck::bytes_of(&item))?;
         let blocks = upload(bytemuck::cast_slice(&blocks))?;
         let bindings = [&constants, &constants, &items, &blocks, buffer].map(Binding::whole);
         let pipeline = self.pipeline(Kernel::ArcFramesCoalescedF32)?;
         let tiles = samples.div_ceil(WORKGROUP * SAMPLES_EACH);
         let x = tiles.min(self.device.physical.info.max_compute_work_group_count[0]);
+        let groups = [x, tiles.div_ceil(x), 1];
         self.rate(bytes, |submission| {
-            let groups = [x, tiles.div_ceil(x), 1];
             submission.dispatch(&pipeline, &bindings, bytemuck::bytes_of(&grid), groups)
         })
     }
