@@ -39,7 +39,7 @@ fn cpu() -> Engine {
 fn numbers(quats: &[Quat]) -> Vec<f64> {
     quats
         .iter()
-        .flat_map(|q| q.to_array())
+        .flat_map(glam::Quat::to_array)
         .map(f64::from)
         .collect()
 }
@@ -106,7 +106,7 @@ fn vectors(set: &TrackSet, method: VectorMethod) -> Found {
     Ok(found
         .as_slice()
         .iter()
-        .flat_map(|v| v.to_array())
+        .flat_map(glam::Vec4::to_array)
         .map(f64::from)
         .collect())
 }
@@ -128,7 +128,11 @@ fn followed(follow: &Follow) -> Found {
     let road = [[0.0, 0.0, 0.0], [4.0, 0.0, 1.0], [8.0, 1.0, 0.0]];
     set.push_path("car", &[0.0, 1.0, 3.0], &road, &[])?;
     let found = cpu().follow(&set, follow, &Frames::fps(10), Layout::TrackMajor)?;
-    let places = found.positions.as_slice().iter().flat_map(|v| v.to_array());
+    let places = found
+        .positions
+        .as_slice()
+        .iter()
+        .flat_map(glam::Vec4::to_array);
     let mut all: Vec<f64> = places.map(f64::from).collect();
     all.extend(numbers(found.rotations.as_quats()));
     Ok(all)

@@ -102,8 +102,8 @@ fn every_float_operation_of_every_shader_is_decorated_once() {
     }
 }
 
-/// OpVectorTimesScalar, OpMatrixTimesScalar, OpVectorTimesMatrix, OpMatrixTimesVector,
-/// OpMatrixTimesMatrix, OpOuterProduct and OpDot: drivers and translators have rules of their own for
+/// `OpVectorTimesScalar`, `OpMatrixTimesScalar`, `OpVectorTimesMatrix`, `OpMatrixTimesVector`,
+/// `OpMatrixTimesMatrix`, `OpOuterProduct` and `OpDot`: drivers and translators have rules of their own for
 /// each, and tests of the expressions cover none of them.
 #[test]
 fn every_product_of_every_shader_is_one_of_components() {

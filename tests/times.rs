@@ -56,7 +56,7 @@ fn any_set(random: &mut Random) -> TrackSet {
 fn any_frames(random: &mut Random, set: &TrackSet) -> Frames {
     let (first, last) = set.time_span().unwrap();
     let near = |random: &mut Random| first + (last - first) * random.between(-3.0, 4.0);
-    if random.next() % 3 == 0 {
+    if random.next().is_multiple_of(3) {
         let mut any = || match random.next() % 2 {
             0 => any_time(random),
             _ => near(random),

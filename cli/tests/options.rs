@@ -281,6 +281,7 @@ fn every_option_is_obeyed_somewhere() {
             "--offsets",
             "--map",
             "--scale",
+            "--source-fps",
         ];
         assert_eq!(is_obeyed, !wanting.contains(&option[0]), "{option:?}");
     }

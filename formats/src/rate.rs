@@ -130,7 +130,7 @@ fn choose(low: f64, high: f64, fits: impl Fn(FrameRate) -> bool) -> Option<Frame
 fn as_written(seconds: f64) -> Option<FrameRate> {
     let whole = (1.0 / seconds).round();
     let is_whole =
-        whole >= 1.0 && whole < 1e9 && ((1.0 / whole) - seconds).abs() <= 1e-15 * seconds;
+        (1.0..1e9).contains(&whole) && ((1.0 / whole) - seconds).abs() <= 1e-15 * seconds;
     match is_whole {
         true => FrameRate::new(whole as u64, 1).ok(),
         false => itself(seconds),
@@ -295,8 +295,9 @@ fn of_distinct(times: &[f64], precision: Precision) -> Option<Found> {
     let as_written = times
         .iter()
         .all(even)
-        .then(|| as_written(shortest(mean, exact)));
-    let as_written = as_written.flatten();
+        .then(|| shortest(mean, exact))
+        .filter(|&period| is_short(period))
+        .and_then(as_written);
     if let Some(rate) = as_written.filter(|&rate| is_whole(rate)) {
         let on_frames = on_frames(times.iter().copied(), rate, 0.0, precision);
         let phase = if on_frames { 0.0 } else { first };
@@ -310,7 +311,7 @@ fn of_distinct(times: &[f64], precision: Precision) -> Option<Found> {
     }
     let windows = windows(times, precision)?;
     let steps = Steps::of(&windows);
-    let at_zero = steps.as_ref().and_then(|steps| steps.from_zero(&windows));
+    let at_zero = steps.as_ref().and_then(|steps| steps.on_zero(&windows));
     let found = |grid, phase| Found {
         grid,
         phase,
@@ -344,6 +345,11 @@ fn of_distinct(times: &[f64], precision: Precision) -> Option<Found> {
         .or_else(from_first)
         .or_else(simple)
         .or_else(some_grid)
+}
+
+/// Whether somebody may have written a period of so many digits: 0.03333333333333333 is a quotient.
+fn is_short(period: f64) -> bool {
+    period.to_string().len() <= 14
 }
 
 /// A number of as few decimals as there are near another.
@@ -414,7 +420,7 @@ impl Steps {
     }
 
     /// The same where frames count from time 0.
-    fn from_zero(&self, windows: &[Window]) -> Option<Self> {
+    fn on_zero(&self, windows: &[Window]) -> Option<Self> {
         let mut all = Self {
             counts: Vec::with_capacity(windows.len()),
             ..*self

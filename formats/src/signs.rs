@@ -1,27 +1,12 @@
-//! The one rule of signs. `q` and `-q` are one rotation, but a player that joins samples without a
-//! test goes the long way round where neighbours differ in sign: of the two, whatever is written has
-//! the one that is nearer to the sample of the track before it.
+//! The one rule of signs, [`continue_signs`], for rotations that come some at a time.
 
 use std::borrow::Cow;
 
 use glam::Quat;
 use tumble::Layout;
 
-/// Gives each rotation, in the order `[sample][track]`, the sign that is nearer to the sample before.
-pub fn continue_signs(rotations: &mut [Quat], tracks: usize) {
-    for next in tracks..rotations.len() {
-        if rotations[next - tracks].dot(rotations[next]) < 0.0 {
-            rotations[next] = -rotations[next];
-        }
-    }
-}
-
-/// Whether [`continue_signs`] would change any of them.
-pub(crate) fn signs_jump(rotations: &[Quat], tracks: usize) -> bool {
-    let after = rotations.get(tracks..).unwrap_or_default();
-    let mut pairs = rotations.iter().zip(after);
-    pairs.any(|(before, after)| before.dot(*after) < 0.0)
-}
+pub use tumble::continue_signs;
+pub(crate) use tumble::signs_jump;
 
 /// Continues the signs of rotations that come some at a time, in the order of a layout.
 #[derive(Debug)]
@@ -51,10 +36,14 @@ impl Signs {
 
     /// The next rotations; nothing is copied where no sign changes.
     pub(crate) fn next<'a>(&mut self, rotations: &'a [Quat]) -> Cow<'a, [Quat]> {
+        if self.layout == Layout::TrackMajor && self.go_on(rotations) {
+            return Cow::Borrowed(rotations);
+        }
         let mut all = Cow::Borrowed(rotations);
         for (place, &own) in rotations.iter().enumerate() {
             let track = self.place % self.before.len().max(1);
-            let is_first = self.layout == Layout::TrackMajor && self.place % self.samples == 0;
+            let is_first =
+                self.layout == Layout::TrackMajor && self.place.is_multiple_of(self.samples);
             let Some(before) = self.before.get_mut(track) else {
                 break;
             };
@@ -66,6 +55,27 @@ impl Signs {
             self.place += 1;
         }
         all
+    }
+
+    /// Whether no sign of some samples of tracks, one after another, is to be changed; if so, they have been
+    /// taken.
+    fn go_on(&mut self, mut rotations: &[Quat]) -> bool {
+        let [mut before] = self.before[..] else {
+            return false;
+        };
+        let mut place = self.place;
+        while let [first, ..] = *rotations {
+            let done = place % self.samples;
+            let (row, rest) = rotations.split_at(rotations.len().min(self.samples - done));
+            if done > 0 && signs_jump(&[before, first], 1) || signs_jump(row, 1) {
+                return false;
+            }
+            (before, place) = (row[row.len() - 1], place + row.len());
+            rotations = rest;
+        }
+        self.before[0] = before;
+        self.place = place;
+        true
     }
 }
 

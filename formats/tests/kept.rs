@@ -430,7 +430,7 @@ fn the_pelvis_of_a_body_is_at_both_its_places() {
     assert_eq!(again.document.unwrap().beside(), document.beside());
 }
 
-/// The usual columns of trajectories, with others behind them, need no map; EuRoC's need one.
+/// The usual columns of trajectories, with others behind them, need no map; `EuRoC`'s need one.
 #[test]
 fn tables_of_poses_are_read_by_their_usual_columns() {
     let euroc = "time=#timestamp,tx=p_RS_R_x [m],ty=p_RS_R_y [m],tz=p_RS_R_z [m],x=q_RS_x [],\

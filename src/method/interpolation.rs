@@ -104,7 +104,7 @@ impl Interpolation {
     /// use tumble::{Interpolation, TrackSet, method};
     /// let mut set = TrackSet::new();
     /// let keys = [0.0, 0.3, 0.7, 0.2].map(Quat::from_rotation_z);
-    /// set.push("elbow", &[0.0, 1.0, 1.05, 2.0], &keys)?;
+    /// set.push("elbow", &[0.0, 1.0, 1.5, 2.0], &keys)?;
     /// assert!(Interpolation::from(method::C2).warnings(&set).is_empty());
     /// # Ok::<(), tumble::TrackError>(())
     /// ```

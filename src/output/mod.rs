@@ -9,4 +9,5 @@ pub(crate) mod euler;
 pub(crate) mod pose_error;
 pub(crate) mod rotations;
 pub(crate) mod row;
+pub(crate) mod signs;
 pub(crate) mod window;

@@ -200,7 +200,7 @@ pub(crate) fn names(inputs: &[Found], folder: &Path, format: &Format) -> Vec<Nam
                 target.display()
             ));
         }
-        let length = name.file_name().map_or(0, |name| name.len());
+        let length = name.file_name().map_or(0, std::ffi::OsStr::len);
         if length > MAX_NAME {
             return refuse(format!(
                 "the name of its result has {length} bytes, and may have {MAX_NAME}; give the input \

@@ -116,7 +116,7 @@ impl Plan {
             grid::restore(std::slice::from_mut(&mut times), precision)
         } else {
             let times = Written::Times(std::slice::from_ref(&times), precision);
-            of(&times).and_then(|found| found.rate())
+            of(&times).and_then(super::super::rate::Found::rate)
         };
         if let (Some(first), None, Some(found)) = (self.rate, said, found) {
             self.two_rates = Some(format!(

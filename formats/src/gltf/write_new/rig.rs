@@ -201,7 +201,7 @@ fn extras(joint: &BvhJoint) -> Extras {
     Extras {
         bvh: BvhExtras {
             channels: joint.channels_text(),
-            end_sites: sites.map(|site| site.to_array()).collect(),
+            end_sites: sites.map(glam::Vec3::to_array).collect(),
         },
     }
 }
