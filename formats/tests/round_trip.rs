@@ -98,7 +98,7 @@ fn clip(numbers: &mut Numbers) -> Motion {
     let from_bvh = has_skeleton && numbers.coin();
     for (track, name) in names.iter().enumerate().take(tracks) {
         let keys: Vec<Quat> = times.iter().map(|_| numbers.rotation()).collect();
-        motion.set.push(name, &times, &keys).unwrap();
+        motion.set.push(*name, &times, &keys).unwrap();
         let is_moved = is_world || moves && numbers.coin();
         if is_moved {
             let keys: Vec<Vec3> = times.iter().map(|_| numbers.vector(50.0)).collect();
