@@ -3,7 +3,7 @@
 use std::fs;
 use std::process::{Command, Stdio};
 
-use crate::program::{command, finish, is_writing, run, sample_folder};
+use crate::program::{command, finish, is_writing, run, sample_folder, with_signals};
 
 #[cfg(unix)]
 #[test]
@@ -63,7 +63,12 @@ fn signals_stop_the_program_and_leave_no_file() {
         fs::create_dir(place.path().join("out")).unwrap();
         // Some seconds of text.
         let line = ["eval", "a.dat", "--fps", "1000000", "-o", "out/o.csv"];
-        let mut child = command(place.path(), &line).spawn().unwrap();
+        let mut child = with_signals(env!("CARGO_BIN_EXE_tumble"))
+            .current_dir(place.path())
+            .args(line)
+            .stdin(Stdio::null())
+            .spawn()
+            .unwrap();
         let out = place.path().join("out");
         while !is_writing(&child, &out) {
             assert!(

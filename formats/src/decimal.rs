@@ -58,9 +58,19 @@ impl Decimal {
 
     /// Whole seconds and the shortest decimals of a time behind them; `None` beyond ±1e14.
     pub(crate) fn of(whole: i64, time: f64) -> Option<Self> {
-        let Self(time) = Self::parse(&time.to_string())?;
-        let sum = i128::from(whole).checked_mul(SECOND)?.checked_add(time)?;
+        // Seconds behind the first of all times may be twice as many as a time has.
+        let digits = time.to_string();
+        let (seconds, decimals) = digits.split_once('.').unwrap_or((&digits, "0"));
+        let seconds = i128::from(whole) + seconds.parse::<i128>().ok()?;
+        let Self(rest) = Self::parse(&format!("0.{decimals}"))?;
+        let rest = if time < 0.0 { -rest } else { rest };
+        let sum = seconds.checked_mul(SECOND)?.checked_add(rest)?;
         (sum.abs() <= LARGEST).then_some(Self(sum))
+    }
+
+    /// Whether it is a whole second.
+    pub(crate) fn is_whole(self) -> bool {
+        self.0 % SECOND == 0
     }
 
     /// The whole second at or before it.
@@ -82,15 +92,18 @@ impl Decimal {
     }
 }
 
+/// With at least as many decimals as `{:.9}` asks for.
 impl fmt::Display for Decimal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (sign, steps) = (if self.0 < 0 { "-" } else { "" }, self.0.unsigned_abs());
         let (whole, rest) = (steps / SECOND as u128, steps % SECOND as u128);
-        if rest == 0 {
+        let decimals = format!("{rest:0places$}", places = PLACES as usize);
+        let decimals = decimals.trim_end_matches('0');
+        let least = f.precision().unwrap_or(0);
+        if decimals.len().max(least) == 0 {
             return write!(f, "{sign}{whole}");
         }
-        let decimals = format!("{rest:0places$}", places = PLACES as usize);
-        write!(f, "{sign}{whole}.{}", decimals.trim_end_matches('0'))
+        write!(f, "{sign}{whole}.{decimals:0<least$}")
     }
 }
 
@@ -122,7 +135,18 @@ mod tests {
             ("00012", "12"),
             ("1e14", "100000000000000"),
         ] {
-            assert_eq!(Decimal::parse(token).unwrap().to_string(), shown, "{token}");
+            let number = Decimal::parse(token).unwrap();
+            assert_eq!(number.to_string(), shown, "{token}");
+            let decimals = shown
+                .split_once('.')
+                .map_or(0, |(_, decimals)| decimals.len());
+            let padded = format!("{number:.5}");
+            assert_eq!(Decimal::parse(&padded), Some(number));
+            assert_eq!(
+                padded.split_once('.').unwrap().1.len(),
+                decimals.max(5),
+                "{token}"
+            );
         }
         for token in ["100000000000000.1", "-1e15", "1e38", "1e999999999999"] {
             assert_eq!(Decimal::parse(token), None, "{token}");
@@ -150,6 +174,9 @@ mod tests {
         let before = Decimal::parse("-3.25").unwrap();
         assert_eq!((before.whole_seconds(), before.since(-4)), (-4, 0.75));
         assert_eq!(Decimal::of(-4, 0.75), Some(before));
+        let apart = Decimal::of(-99_999_999_999_999, 100_000_005_000_000.5);
+        assert_eq!(apart.unwrap().to_string(), "5000001.5");
+        assert_eq!(Decimal::of(-3, -0.25).unwrap().to_string(), "-3.25");
         assert_eq!(before.since(0), -3.25);
         assert_eq!(
             (Decimal::of(i64::MAX, 0.0), Decimal::of(0, f64::NAN)),

@@ -13,7 +13,7 @@ use crate::rate::{Found, Precision, Written, frame_time, of};
 /// there is one.
 pub(crate) fn restore(lists: &mut [Vec<f64>], precision: Precision) -> Option<FrameRate> {
     let common = of(&Written::Times(lists, precision));
-    for list in lists {
+    for list in &mut *lists {
         let found = common.or_else(|| of(&Written::Times(std::slice::from_ref(list), precision)));
         let Some(found) = found else { continue };
         // Frames that count from a first time somewhere are no nearer than those that f64 has already.
@@ -25,7 +25,10 @@ pub(crate) fn restore(lists: &mut [Vec<f64>], precision: Precision) -> Option<Fr
             put(list, found);
         }
     }
-    common.and_then(Found::rate)
+    // Exact times may show a rate that rounded ones did not.
+    let again = || of(&Written::Times(lists, Precision::F64)).and_then(Found::rate);
+    let common = common?;
+    common.rate().or_else(again)
 }
 
 /// Puts times on frames. Different times do not become one: of two in the same frame, as an exporter

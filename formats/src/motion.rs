@@ -4,6 +4,7 @@ use glam::{Quat, Vec3};
 use tumble::{FrameRate, TrackSet};
 
 use crate::bvh::BvhJoint;
+use crate::decimal::Decimal;
 
 /// One clip of a file.
 ///
@@ -157,4 +158,17 @@ pub struct Sampled<'a> {
     /// The samples are those of the clip's own keys: a format that has keys of each channel at times of
     /// their own (glTF) writes these instead, unless the clip is in the world.
     pub of_own_keys: bool,
+}
+
+impl Sampled<'_> {
+    /// The digits of a sample's time in text. Where samples are no frames of a rate there are at least
+    /// nine behind the point, which tell readers that nothing was rounded to fewer. `None` out of range.
+    pub(crate) fn time_digits(&self, sample: usize) -> Option<String> {
+        let time = Decimal::of(self.clip.time_offset, self.times[sample])?;
+        Some(match self.rate {
+            Some(_) => time.to_string(),
+            None if time.is_whole() => time.to_string(),
+            None => format!("{time:.9}"),
+        })
+    }
 }

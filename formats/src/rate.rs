@@ -287,15 +287,19 @@ fn of_distinct(times: &[f64], precision: Precision) -> Option<Found> {
     let (first, last) = (times[0], times[times.len() - 1]);
     // What is written may be what is meant.
     let exact = Precision::F64.rounding(first.abs().max(last.abs()));
-    let even = |&time: &f64| {
+    // Times may have been added up, key by key.
+    let added = |keys: usize| exact * (2.0 + keys as f64 / 8.0);
+    let even = |(key, &time): (usize, &f64)| {
         let count = ((time - first) / step).round();
-        (time - first - count * step).abs() <= 2.0 * exact + count * exact / 8.0
+        (time - first - count * step).abs() <= added(key) + count * exact / 8.0
     };
-    let mean = (last - first) / ((last - first) / step).round();
+    let count = ((last - first) / step).round();
+    let mean = (last - first) / count;
     let as_written = times
         .iter()
+        .enumerate()
         .all(even)
-        .then(|| shortest(mean, exact))
+        .then(|| shortest(mean, added(times.len()) / count))
         .filter(|&period| is_short(period))
         .and_then(as_written);
     if let Some(rate) = as_written.filter(|&rate| is_whole(rate)) {

@@ -249,7 +249,7 @@ fn write_motion(
     }
     let rest = sampled.clip.rest(Channel::Translation, 0);
     for (sample, &time) in sampled.times.iter().enumerate() {
-        let Some(time) = Decimal::of(sampled.clip.time_offset, time) else {
+        let Some(digits) = sampled.time_digits(sample) else {
             let message = format!("the time {time} s is out of range");
             return Err(refuse(message).into());
         };
@@ -259,7 +259,7 @@ fn write_motion(
             let message = format!("the pose at {time} s is not finite");
             return Err(refuse(message).into());
         }
-        let _ = write!(text, "{time}"); // memory takes everything
+        let _ = write!(text, "{digits}"); // memory takes everything
         for number in position.to_array().into_iter().chain(rotation.to_array()) {
             let number = if number.is_normal() { number } else { 0.0 };
             let _ = write!(text, " {number}");

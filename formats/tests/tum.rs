@@ -33,6 +33,24 @@ fn written(clip: &Motion) -> String {
         .0
 }
 
+/// Times that are near frames, but are none, are read again as they were.
+#[test]
+fn times_near_frames_stay_what_they_are() {
+    let line = |time: &str| format!("{time} 0 0 0 0 0 0 1\n");
+    let clip = read(&["0.12500", "0.15830", "0.19170"].map(line).concat());
+    assert_eq!(clip.set.track(0).times, [0.125, 0.1583, 0.1917]);
+    let text = written(&clip);
+    assert!(text.contains("\n0.158300000 "), "{text}");
+    assert_eq!(read(&text).set.track(0).times, [0.125, 0.1583, 0.1917]);
+    // What was rounded to four decimals lies on frames.
+    let clip = read(&["0.1250", "0.1583", "0.1917"].map(line).concat());
+    assert_eq!(clip.rate, FrameRate::new(30, 1).ok());
+    assert_eq!(
+        read(&written(&clip)).set.track(0).times,
+        clip.set.track(0).times
+    );
+}
+
 #[test]
 fn a_path_at_unix_times_keeps_every_digit() {
     let Some(data) = shared_data() else { return };

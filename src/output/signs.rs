@@ -2,7 +2,10 @@
 //! test goes the long way round where neighbours differ in sign: of the two, whatever is written has
 //! the one that is nearer to the sample of the track before it.
 
-use glam::Quat;
+use glam::{Quat, Vec4};
+
+use crate::simd::dispatch::{InLanes, in_lanes};
+use crate::simd::lanes::Lanes;
 
 /// Of half the angle between two rotations; negative where their signs differ.
 #[inline]
@@ -23,16 +26,121 @@ pub fn continue_signs(rotations: &mut [Quat], tracks: usize) {
 #[must_use]
 pub fn signs_jump(rotations: &[Quat], tracks: usize) -> bool {
     let after = rotations.get(tracks..).unwrap_or_default();
-    // Without a branch for each: lists are long, and seldom jump.
-    let (before, rest) = (rotations.chunks(BLOCK), after.chunks(BLOCK));
-    before.zip(rest).any(|(before, after)| {
-        let least = before.iter().zip(after).fold(0.0f32, |least, (a, b)| {
-            let cosine = cosine(*a, *b);
-            if cosine < least { cosine } else { least }
-        });
-        least < 0.0
-    })
+    if tracks != 1 {
+        // Without a branch for each: lists are long, and seldom jump.
+        let mut blocks = rotations.chunks(BLOCK).zip(after.chunks(BLOCK));
+        return blocks.any(|(before, after)| jump(before, after));
+    }
+    let mut rest = rotations;
+    loop {
+        let mut near = NearBlocks {
+            rotations: rest,
+            count: 0,
+        };
+        in_lanes(&mut near);
+        rest = &rest[near.count * BLOCK..];
+        let after = rest.get(1..).unwrap_or_default();
+        if after.is_empty() {
+            return false;
+        }
+        let count = after.len().min(BLOCK);
+        if jump(&rest[..count], &after[..count]) {
+            return true;
+        }
+        rest = &rest[count..];
+    }
+}
+
+/// Whether any of the second rotations has another sign than the first one beside it.
+#[inline]
+fn jump(before: &[Quat], after: &[Quat]) -> bool {
+    let least = before.iter().zip(after).fold(0.0f32, |least, (a, b)| {
+        let cosine = cosine(*a, *b);
+        if cosine < least { cosine } else { least }
+    });
+    least < 0.0
 }
 
 /// Rotations that are compared before it is asked whether any sign jumps.
-const BLOCK: usize = 64;
+const BLOCK: usize = 48;
+
+/// Counts the blocks of one track, up to the first that is too lively, whose sum shows that no two rotations differ
+/// in sign: one instruction a vector of any width, where cosines are seven a rotation.
+struct NearBlocks<'a> {
+    rotations: &'a [Quat],
+    count: usize,
+}
+
+impl NearBlocks<'_> {
+    /// A sum of `BLOCK + 1` unit vectors of which two are more than a right angle apart, and these two add up to less
+    /// than √2, is shorter than `BLOCK - 1 + √2`; the rest is more than norms and sums are off by.
+    const LONGEST: f32 = (BLOCK - 1) as f32 + 1.43;
+}
+
+impl InLanes for NearBlocks<'_> {
+    const WIDE_IN_TESTS: bool = true;
+
+    #[inline(always)]
+    fn run<L: Lanes>(&mut self) {
+        // Each block with the rotation behind it, with which the next one begins.
+        while let Some(block) = self
+            .rotations
+            .get(self.count * BLOCK..)
+            .and_then(|rest| rest.first_chunk::<{ BLOCK + 1 }>())
+        {
+            let components: &[f32] = bytemuck::cast_slice(&block[..BLOCK]);
+            // Those of four rotations side by side.
+            let mut sums = [0.0; 16];
+            for next in components.as_chunks::<16>().0 {
+                for (sum, component) in sums.iter_mut().zip(next) {
+                    *sum += component;
+                }
+            }
+            let part = |from: usize| Vec4::from_slice(&sums[from..from + 4]);
+            let sum = (part(0) + part(4)) + (part(8) + part(12)) + Vec4::from(block[BLOCK]);
+            let is_near = sum.length_squared() > Self::LONGEST * Self::LONGEST;
+            if !is_near {
+                return;
+            }
+            self.count += 1;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// As many rotations as a block has, one fewer and one more; slow and fast ones.
+    #[test]
+    fn a_jump_is_found_wherever_it_is() {
+        for step in [0.0, 0.01, 0.3, 1.5] {
+            let rotation = |at: usize| Quat::from_rotation_z(step * at as f32);
+            for count in [
+                2,
+                3,
+                17,
+                BLOCK - 1,
+                BLOCK,
+                BLOCK + 1,
+                BLOCK + 2,
+                3 * BLOCK + 5,
+            ] {
+                let smooth: Vec<Quat> = (0..count).map(rotation).collect();
+                assert!(!signs_jump(&smooth, 1), "{step} {count}");
+                for from in [1, count / 2, count - 2, count - 1, BLOCK, BLOCK + 1] {
+                    let from = from.clamp(1, count - 1);
+                    let mut jumps = smooth.clone();
+                    for behind in &mut jumps[from..] {
+                        *behind = -*behind;
+                    }
+                    assert!(signs_jump(&jumps, 1), "{step} {count} {from}");
+                    continue_signs(&mut jumps, 1);
+                    assert_eq!(jumps, smooth);
+                }
+            }
+        }
+        assert!(!signs_jump(&[], 1));
+        assert!(!signs_jump(&[Quat::IDENTITY], 1));
+    }
+}

@@ -8,7 +8,7 @@ use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use crate::attack::{ended, entries, parts, run, succeed, times, two_animations, wait};
-use crate::program::{command, is_writing, sample_folder};
+use crate::program::{command, is_writing, sample_folder, with_signals};
 use crate::support::Random;
 use crate::tree::tree;
 
@@ -144,7 +144,7 @@ fn writing(at: &Path, ignored: Option<&str>) -> Child {
     let line = "eval a.dat --fps 1000000 --device cpu -o out/o.csv";
     let program = env!("CARGO_BIN_EXE_tumble");
     let trap = ignored.map_or(String::new(), |signal| format!("trap '' {signal}; "));
-    let mut child = Command::new("sh")
+    let mut child = with_signals("sh")
         .args(["-c", &format!("{trap}exec '{program}' {line}")])
         .current_dir(at)
         .stdin(Stdio::null())

@@ -68,6 +68,18 @@ pub(crate) fn command(place: &Path, line: &[&str]) -> Command {
     command
 }
 
+/// A program that is ended by every signal: whoever started the tests may have had some ignored, as a shell
+/// does for what runs in the background.
+#[cfg(unix)]
+pub(crate) fn with_signals(program: &str) -> Command {
+    if cfg!(target_os = "linux") {
+        let mut command = Command::new("env");
+        command.args(["--default-signal=INT,QUIT,HUP,TERM", program]);
+        return command;
+    }
+    Command::new(program)
+}
+
 pub(crate) fn finish(output: Output) -> Run {
     Run {
         code: output.status.code().unwrap_or(-1),

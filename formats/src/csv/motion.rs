@@ -63,7 +63,11 @@ pub(crate) fn write_motion(
     for (frame, time) in sampled.times.iter().enumerate() {
         row.clear();
         row.push(frame.to_string());
-        row.push((time + sampled.clip.time_offset as f64).to_string());
+        let Some(digits) = sampled.time_digits(frame) else {
+            let message = format!("the time {time} s is out of range");
+            return Err(io::Error::new(io::ErrorKind::InvalidInput, message).into());
+        };
+        row.push(digits);
         for place in frame * tracks..(frame + 1) * tracks {
             let q = sampled.rotations[place];
             let numbers = match turned {

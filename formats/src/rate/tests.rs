@@ -154,3 +154,14 @@ fn rates_come_back_from_the_shortest_digits_of_their_period() {
         assert_eq!(of(&Written::Number(number)), None, "{number}");
     }
 }
+
+/// A few digits of the period would move a key after millions of frames.
+#[test]
+fn a_period_is_as_exact_as_its_last_frame_is_far() {
+    let times = [0.125, 0.158_333_333_33, 100_000.191_666_666_67];
+    let mut lists = [times.to_vec()];
+    crate::grid::restore(&mut lists, Precision::Decimals(11));
+    for (found, written) in lists[0].iter().zip(times) {
+        assert!((found - written).abs() < 1e-11, "{found} {written}");
+    }
+}
