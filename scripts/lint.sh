@@ -23,3 +23,8 @@ if cargo clippy --version >/dev/null 2>&1; then
     cargo clippy --workspace --test load --quiet -- -D warnings
 fi
 RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --document-private-items --quiet
+
+# What would be published can be packed: versions, licences, files. It is not built once more: that all
+# that a package includes lies in it is a test (tests/tidy.rs).
+cargo package --quiet --no-verify --allow-dirty --target-dir target/packages \
+    -p tumble -p tumble-formats -p tumble-routes -p tumble-cli

@@ -350,3 +350,34 @@ fn the_oldest_rust_is_declared_once() {
         "scripts/lint.sh checks with the oldest Rust where it is installed"
     );
 }
+
+/// Cargo packs the files of a package alone: a file that the sources include from elsewhere would be missing.
+#[test]
+fn packages_have_all_that_they_include() {
+    let mut found = 0;
+    for package in ["", "formats/", "routes/", "cli/"] {
+        let home = root().join(package);
+        for path in files(&format!("{package}src"), "rs") {
+            // Tests are run in the repository.
+            if path.ends_with("tests.rs") {
+                continue;
+            }
+            let text = read(&path);
+            for call in ["include_str!(\"", "include_bytes!(\""] {
+                for part in text.split(call).skip(1) {
+                    let file = part.split('"').next().unwrap();
+                    let file = path.parent().unwrap().join(file).canonicalize().unwrap();
+                    let inside = file.strip_prefix(home.canonicalize().unwrap());
+                    let packed = inside.is_ok_and(|inside| {
+                        ["src", "shaders", "docs/library.md", "README.md"]
+                            .iter()
+                            .any(|start| inside.starts_with(start))
+                    });
+                    assert!(packed, "{}: {} is not packed", path.display(), file.display());
+                    found += 1;
+                }
+            }
+        }
+    }
+    assert!(found >= 4, "only {found} files are included");
+}

@@ -1,8 +1,8 @@
-// Joins page, style, scripts and libraries into dist/view.html, which the program
-// carries. `npm ci && npm run build` after any change in src/.
+// Joins page, style, scripts and libraries into the page that the program carries.
+// `npm ci && npm run build` after any change in src/.
 
 import { createHash } from "node:crypto";
-import { mkdirSync, readFileSync, readdirSync, writeFileSync } from "node:fs";
+import { readFileSync, readdirSync, writeFileSync } from "node:fs";
 import { build } from "esbuild";
 
 const read = (path) => readFileSync(path, "utf8");
@@ -42,6 +42,6 @@ const page = read("src/page.html")
   .replace("/* SCRIPT */", () => script)
   .replace("LICENCES", () => licences)
   .replace("SOURCES", () => hash.digest("hex"));
-mkdirSync("dist", { recursive: true });
-writeFileSync("dist/view.html", page);
-console.log(`dist/view.html: ${(page.length / 1e3).toFixed(0)} kB`);
+const built = "../cli/src/commands/view/page.html";
+writeFileSync(built, page);
+console.log(`${built}: ${(page.length / 1e3).toFixed(0)} kB`);

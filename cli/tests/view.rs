@@ -72,10 +72,10 @@ fn the_page_is_built_from_its_sources() {
         .iter()
         .map(|byte| format!("{byte:02x}"))
         .collect();
-    let page = fs::read_to_string(web.join("dist/view.html")).unwrap();
+    let page = fs::read_to_string(root().join("cli/src/commands/view/page.html")).unwrap();
     assert!(
         page.contains(&format!("sources {hash}")),
-        "web/dist/view.html is older than web/src: npm ci && npm run build in web/"
+        "the page of the program is older than web/src: npm ci && npm run build in web/"
     );
     for licence in ["three 0.", "uplot 1.", "Permission is hereby granted"] {
         assert!(page.contains(licence), "no `{licence}` in the page");

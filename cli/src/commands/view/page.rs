@@ -10,8 +10,8 @@ use crate::commands::view::pack::{differences, doubles, words};
 use crate::commands::view::shown::{Choice, Shown};
 use crate::messages::colours::{BOXES, Colour};
 
-/// Built from `web/src` by `npm run build` there.
-const HTML: &str = include_str!("../../../../web/dist/view.html");
+/// Built from `web/src` by `npm run build` in `web/`; it lies here so that the package has all that it is built of.
+const HTML: &str = include_str!("page.html");
 const PLACE: &str = "/* DATA */";
 
 /// What the page's scripts read.
