@@ -24,6 +24,9 @@ if cargo clippy --version >/dev/null 2>&1; then
 fi
 RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --document-private-items --quiet
 
+# The engine without Vulkan, as an application builds it that wants the CPU alone.
+CARGO_TARGET_DIR=target/without_vulkan cargo run --quiet --manifest-path tests/without_vulkan/Cargo.toml
+
 # What would be published can be packed: versions, licences, files. It is not built once more: that all
 # that a package includes lies in it is a test (tests/tidy.rs).
 cargo package --quiet --no-verify --allow-dirty --target-dir target/packages \

@@ -15,11 +15,9 @@ use crate::evaluate::uploaded::{Backend, Uploaded};
 #[cfg(feature = "prove")]
 use crate::gpu::details::{DeviceDetails, EngineChoices};
 use crate::gpu::engine::lock;
-use crate::gpu::kernel_check::KernelCheck;
 use crate::gpu::options::{EngineOptions, Timings};
-use crate::gpu::physical::DeviceInfo;
 use crate::gpu::recovery::Opened;
-use crate::gpu::self_test::{NegativeControl, SelfTestReport};
+use crate::gpu::reports::{DeviceInfo, KernelCheck, NegativeControl, SelfTestReport};
 use crate::method::interpolation::Interpolation;
 use crate::output::buffer::OutputBuffer;
 use crate::output::rotations::{Layout, Rotations, Samples, Vectors};

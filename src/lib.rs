@@ -71,6 +71,9 @@
 //! * **Keys are met exactly**: a sample on a key returns the key's own bits (for
 //!   methods that pass through their keys).
 
+// What only Vulkan uses lies beside what the CPU does too.
+#![cfg_attr(not(feature = "vulkan"), allow(dead_code, unused_imports))]
+
 mod auto;
 mod clip;
 mod cpu;
@@ -83,11 +86,16 @@ mod error;
 mod evaluate;
 mod fit;
 mod from_keys;
+#[cfg(feature = "vulkan")]
+mod gpu;
+#[cfg(not(feature = "vulkan"))]
+#[path = "gpu/absent.rs"]
 mod gpu;
 mod math;
 mod memory;
 pub mod method;
 mod output;
+#[cfg(feature = "vulkan")]
 mod own_device;
 mod path;
 mod pose;
@@ -115,19 +123,21 @@ pub use crate::curve::options::{
 pub use crate::device::{Device, VulkanDevice};
 pub use crate::engine::Engine;
 pub use crate::error::Error;
+#[cfg(feature = "vulkan")]
 pub use crate::gpu::crowd_target::CrowdTarget;
 #[cfg(feature = "prove")]
 pub use crate::gpu::details::{
     DeviceDetails, EngineChoices, FloatControlsReport, Limits, MemoryHeap, MemoryType, QueueFamily,
 };
 pub use crate::gpu::error::VulkanError;
+#[cfg(feature = "vulkan")]
 pub use crate::gpu::handles::{VulkanBuffer, VulkanHandles, VulkanQueue};
-pub use crate::gpu::kernel_check::KernelCheck;
 pub use crate::gpu::options::{
     EngineOptions, Mapping, ReadBack, Reads, Timings, Transfer, Uploads,
 };
-pub use crate::gpu::physical::{DeviceInfo, DeviceKind};
-pub use crate::gpu::self_test::{NegativeControl, SelfTestReport};
+pub use crate::gpu::reports::{
+    DeviceInfo, DeviceKind, KernelCheck, NegativeControl, SelfTestReport,
+};
 pub use crate::memory::OutOfMemory;
 pub use crate::method::interpolation::Interpolation;
 pub use crate::method::vector_method::{UnknownVectorMethod, VectorMethod};
@@ -165,6 +175,7 @@ pub use crate::tracks::rotation::Rotation;
 pub use crate::tracks::set::{Track, TrackSet};
 pub use crate::tracks::vectors::{Channel, VectorKeys};
 
+#[cfg(feature = "vulkan")]
 pub use ash;
 pub use glam;
 

@@ -7,5 +7,6 @@ pub(crate) mod instances;
 pub(crate) mod layer;
 pub(crate) mod library;
 pub(crate) mod on_cpu;
+#[cfg(feature = "vulkan")]
 pub(crate) mod own_device;
 pub(crate) mod player;

@@ -1,5 +1,6 @@
 //! What can go wrong with Vulkan.
 
+#[cfg(feature = "vulkan")]
 use ash::vk;
 
 use crate::prepare::error::SetError;
@@ -8,6 +9,10 @@ use crate::prepare::error::SetError;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum VulkanError {
+    /// The engine was compiled without the feature `vulkan`.
+    #[cfg(not(feature = "vulkan"))]
+    #[error("this was built without Vulkan; build it with the feature `vulkan` of the crate `tumble`")]
+    NotBuilt,
     /// There is no Vulkan loader library.
     #[error("no Vulkan loader: {reason}; install it (Debian: libvulkan1 and mesa-vulkan-drivers)")]
     NoLoader {
@@ -28,6 +33,7 @@ pub enum VulkanError {
         how: String,
     },
     /// A Vulkan call failed.
+    #[cfg(feature = "vulkan")]
     #[error("{call} failed: {result:?}{}", hint(*result))]
     Call {
         /// The call's name.
@@ -113,26 +119,31 @@ pub enum VulkanError {
 impl VulkanError {
     /// The device is lost: what it held is gone, and it must be opened again.
     pub(crate) fn is_lost(&self) -> bool {
-        let lost = vk::Result::ERROR_DEVICE_LOST;
-        matches!(self, Self::Call { result, .. } if *result == lost)
+        #[cfg(feature = "vulkan")]
+        if let Self::Call { result, .. } = self {
+            return *result == vk::Result::ERROR_DEVICE_LOST;
+        }
+        false
     }
 
     /// Memory ran out: the same work in smaller windows may succeed.
     pub(crate) fn is_out_of_memory(&self) -> bool {
-        matches!(
-            self,
-            Self::Call {
-                result: vk::Result::ERROR_OUT_OF_HOST_MEMORY
+        #[cfg(feature = "vulkan")]
+        if let Self::Call { result, .. } = self {
+            return matches!(
+                *result,
+                vk::Result::ERROR_OUT_OF_HOST_MEMORY
                     | vk::Result::ERROR_OUT_OF_DEVICE_MEMORY
                     | vk::Result::ERROR_OUT_OF_POOL_MEMORY
                     | vk::Result::ERROR_FRAGMENTED_POOL
-                    | vk::Result::ERROR_TOO_MANY_OBJECTS,
-                ..
-            }
-        )
+                    | vk::Result::ERROR_TOO_MANY_OBJECTS
+            );
+        }
+        false
     }
 }
 
+#[cfg(feature = "vulkan")]
 fn hint(result: vk::Result) -> &'static str {
     match result {
         vk::Result::ERROR_OUT_OF_DEVICE_MEMORY | vk::Result::ERROR_OUT_OF_HOST_MEMORY => {
@@ -143,11 +154,13 @@ fn hint(result: vk::Result) -> &'static str {
     }
 }
 
+#[cfg(feature = "vulkan")]
 /// Keeps the name of the call that failed.
 pub(crate) trait Named<T> {
     fn named(self, call: &'static str) -> Result<T, VulkanError>;
 }
 
+#[cfg(feature = "vulkan")]
 impl<T> Named<T> for ash::prelude::VkResult<T> {
     fn named(self, call: &'static str) -> Result<T, VulkanError> {
         self.map_err(|result| VulkanError::Call { call, result })

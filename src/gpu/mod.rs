@@ -30,6 +30,7 @@ pub(crate) mod pipeline;
 pub(crate) mod queues;
 pub(crate) mod read_back;
 pub(crate) mod recovery;
+pub(crate) mod reports;
 pub(crate) mod run;
 pub(crate) mod sample_list;
 pub(crate) mod self_test;

@@ -10,64 +10,11 @@ use crate::gpu::instance::Instance;
 use crate::gpu::memory_types::is_unified;
 use crate::gpu::options::{EngineOptions, Mapping, Reads, Transfer};
 use crate::gpu::queues::{Copies, compute_family, copies};
+pub(crate) use crate::gpu::reports::{DeviceInfo, DeviceKind};
 use crate::shader::spirv::FloatControls;
-
-/// A Vulkan device that can compute: its name, and the limits that matter here.
-#[derive(Debug, Clone, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize))]
-#[non_exhaustive]
-pub struct DeviceInfo {
-    /// Name, as the driver gives it.
-    pub name: String,
-    /// The driver's name and version; empty where it does not report them.
-    pub driver: String,
-    /// Kind of device.
-    pub kind: DeviceKind,
-    /// Vulkan version that the device supports.
-    pub api_version: String,
-    /// PCI vendor.
-    pub vendor_id: u32,
-    /// The vendor's number for the device.
-    pub device_id: u32,
-    /// Vulkan's `deviceUUID`: 32 hexadecimal digits with dashes.
-    pub uuid: String,
-    /// Bytes that a kernel can see of one buffer.
-    pub max_storage_buffer_range: u64,
-    /// Bytes of the largest allocation.
-    pub max_memory_allocation_size: u64,
-    /// Invocations in one workgroup.
-    pub max_compute_work_group_invocations: u32,
-    /// Workgroups of one dispatch, along each axis.
-    pub max_compute_work_group_count: [u32; 3],
-    /// Alignment of offsets into buffers, bytes.
-    pub min_storage_buffer_offset_alignment: u64,
-    /// Bytes of memory local to the device.
-    pub device_local_memory: u64,
-    /// Signed zeros, infinities and NaN can be demanded (f32).
-    pub preserves_signed_zero_inf_nan: bool,
-    /// Rounding to nearest even can be demanded (f32).
-    pub rounds_to_nearest_even: bool,
-}
 
 /// Bytes of one texel of the texel buffers that kernels read.
 const TEXEL_BYTES: u64 = 16;
-
-/// Kinds of Vulkan devices, fastest first.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize))]
-#[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
-pub enum DeviceKind {
-    /// A card with memory of its own.
-    Discrete,
-    /// Shares the host's memory.
-    Integrated,
-    /// Part of a virtual machine.
-    Virtual,
-    /// A software rasteriser, such as lavapipe.
-    Cpu,
-    /// Anything else.
-    Other,
-}
 
 /// A physical device, not yet opened.
 #[derive(Clone)]

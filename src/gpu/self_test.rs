@@ -11,52 +11,16 @@ use crate::gpu::error::VulkanError;
 use crate::gpu::kernel_check::{Trial, bytes};
 use crate::gpu::physical::DeviceKind;
 use crate::gpu::pipeline::{Exactness, Pipeline};
+pub(crate) use crate::gpu::reports::{NegativeControl, SelfTestReport};
 use crate::shader::{Dispatch, Kernel, Probe, Reply, WORKGROUP};
 use crate::twin::self_test::reply;
-
-/// How a device did on one expression of the self-test.
-#[derive(Debug, Clone, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize))]
-pub struct SelfTestReport {
-    /// What it looks for: a way in which a driver can be inexact.
-    pub name: &'static str,
-    /// Results compared.
-    pub total: usize,
-    /// Results with other bits than the CPU's.
-    pub differing: usize,
-}
 
 /// Runs every expression on a device.
 pub(crate) fn run(engine: &VulkanEngine) -> Result<Vec<SelfTestReport>, VulkanError> {
     expressions(&engine.device, Exactness::Demanded)
 }
 
-/// What a device makes of the expressions of the self-test where its driver is left free to compute them
-/// otherwise: without the decorations that forbid it. Where no result differs, the comparison has not been seen to
-/// find anything on this device.
-#[derive(Debug, Clone, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize))]
-pub struct NegativeControl {
-    /// How many results of each expression have other bits than the CPU's.
-    pub expressions: Vec<SelfTestReport>,
-    /// Whether the device's driver is known to compute some of them otherwise: Mesa's lavapipe does.
-    pub must_differ: bool,
-}
-
 impl NegativeControl {
-    /// Results with other bits than the CPU's.
-    #[must_use]
-    pub fn differing(&self) -> usize {
-        self.expressions.iter().map(|own| own.differing).sum()
-    }
-
-    /// False where the driver is known to compute some expressions otherwise, and the comparison found none: then
-    /// it proves nothing.
-    #[must_use]
-    pub fn holds(&self) -> bool {
-        !self.must_differ || self.differing() > 0
-    }
-
     pub(crate) fn run(engine: &VulkanEngine) -> Result<Self, VulkanError> {
         let info = &engine.device.physical.info;
         Ok(Self {

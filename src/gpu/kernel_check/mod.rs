@@ -12,26 +12,12 @@ use bytemuck::NoUninit;
 
 use crate::gpu::error::VulkanError;
 use crate::gpu::pipeline::Pipeline;
+pub(crate) use crate::gpu::reports::KernelCheck;
 use crate::gpu::self_test;
 use crate::shader::Kernel;
 
 #[cfg(test)]
 pub(crate) use from_keys::StoredKey;
-
-/// How a device did on one kernel.
-#[derive(Debug, Clone, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize))]
-pub struct KernelCheck {
-    /// The kernel, as [`kernels`](crate::kernels) names it.
-    pub name: &'static str,
-    /// Values of 32 bits compared: those that the kernel has to store, and some around them that it has to
-    /// leave alone.
-    pub total: usize,
-    /// Values with other bits than the CPU's.
-    pub differing: usize,
-    /// Whether nothing was compared now, because the kernel is known to have passed on this device.
-    pub remembered: bool,
-}
 
 /// What lies in a result before a kernel runs, and stays where it stores nothing.
 const UNTOUCHED: u32 = u32::MAX;

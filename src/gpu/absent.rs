@@ -1,0 +1,306 @@
+//! What stands in the place of Vulkan in a build without the feature `vulkan`: the names that the rest of
+//! the engine uses, of types that have no value. No device is ever listed, so none is ever opened.
+
+#[path = "error.rs"]
+pub(crate) mod error;
+#[path = "options.rs"]
+pub(crate) mod options;
+#[path = "reports.rs"]
+pub(crate) mod reports;
+#[path = "turns.rs"]
+pub(crate) mod turns;
+
+/// There is none.
+#[derive(Clone, Copy)]
+pub(crate) enum Never {}
+
+pub(crate) mod physical {
+    use crate::gpu::Never;
+    use crate::gpu::error::VulkanError;
+    pub(crate) use crate::gpu::reports::{DeviceInfo, DeviceKind};
+
+    #[derive(Clone)]
+    pub(crate) struct PhysicalDevice {
+        pub(crate) info: DeviceInfo,
+        pub(crate) never: Never,
+    }
+
+    pub(crate) fn list(_validation: bool) -> Result<Vec<PhysicalDevice>, VulkanError> {
+        Err(VulkanError::NotBuilt)
+    }
+}
+
+pub(crate) mod engine {
+    use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+    use bytemuck::NoUninit;
+
+    use crate::from_keys::dispatches::KeyJob;
+    use crate::gpu::Never;
+    use crate::gpu::error::{EvaluateError, VulkanError};
+    use crate::gpu::options::Timings;
+    use crate::gpu::reports::{KernelCheck, NegativeControl};
+    use crate::output::encoding::Encoding;
+    use crate::output::rotations::{Layout, Storage};
+    use crate::output::window::Window;
+    use crate::prepare::clip_data::ClipData;
+    use crate::shader::Kernel;
+    use crate::time::frames::Timeline;
+
+    pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+        mutex.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    pub(crate) struct ClipBuffers {
+        pub(crate) never: Never,
+    }
+
+    pub(crate) struct Job<'a> {
+        pub(crate) clip: &'a ClipData,
+        pub(crate) buffers: &'a ClipBuffers,
+        pub(crate) timeline: &'a Timeline,
+        pub(crate) encoding: Encoding,
+    }
+
+    pub(crate) struct VulkanEngine {
+        pub(crate) never: Never,
+        pub(crate) group_bytes: usize,
+        pub(crate) clip_bytes: Option<usize>,
+        pub(crate) timings: Mutex<Timings>,
+        pub(crate) device: Arc<Device>,
+    }
+
+    pub(crate) struct Device {
+        pub(crate) physical: Physical,
+    }
+
+    pub(crate) struct Physical {
+        pub(crate) instance: Instance,
+    }
+
+    pub(crate) struct Instance {
+        never: Never,
+    }
+
+    impl Instance {
+        pub(crate) fn validation_messages(&self) -> Vec<String> {
+            match self.never {}
+        }
+    }
+
+    impl VulkanEngine {
+        pub(crate) fn window(&self) -> usize {
+            match self.never {}
+        }
+
+        pub(crate) fn holds(&self, _buffers: &ClipBuffers) -> bool {
+            match self.never {}
+        }
+
+        pub(crate) fn upload(
+            &self,
+            _clip: &ClipData,
+            _spare: Option<ClipBuffers>,
+        ) -> Result<ClipBuffers, VulkanError> {
+            match self.never {}
+        }
+
+        pub(crate) fn evaluate(
+            &self,
+            _job: Job<'_>,
+            _layout: Layout,
+        ) -> Result<Box<dyn Storage>, EvaluateError> {
+            match self.never {}
+        }
+
+        pub(crate) fn evaluate_into(
+            &self,
+            _job: Job<'_>,
+            _window: &Window,
+            _output: &mut [u8],
+        ) -> Result<(), EvaluateError> {
+            match self.never {}
+        }
+
+        pub(crate) fn evaluate_keys(
+            &self,
+            _job: &KeyJob<'_>,
+            _output: &mut [[f32; 4]],
+        ) -> Result<(), EvaluateError> {
+            match self.never {}
+        }
+
+        pub(crate) fn pass(
+            &self,
+            _kernel: Kernel,
+            _inputs: &[&[u8]],
+            _counts: [usize; 2],
+            _output: &mut [[f32; 4]],
+        ) -> Result<(), VulkanError> {
+            match self.never {}
+        }
+
+        pub(crate) fn crowd_table<T: NoUninit>(
+            &self,
+            _name: &str,
+            _table: &[T],
+        ) -> Result<Never, VulkanError> {
+            match self.never {}
+        }
+
+        pub(crate) fn known_kernels(&self) -> Vec<KernelCheck> {
+            match self.never {}
+        }
+
+        pub(crate) fn check_kernels(
+            &self,
+            _only_unknown: bool,
+        ) -> Result<Vec<KernelCheck>, VulkanError> {
+            match self.never {}
+        }
+    }
+
+    impl NegativeControl {
+        pub(crate) fn run(engine: &VulkanEngine) -> Result<Self, VulkanError> {
+            match engine.never {}
+        }
+    }
+}
+
+pub(crate) mod recovery {
+    use std::sync::Arc;
+
+    use crate::gpu::Never;
+    use crate::gpu::engine::{ClipBuffers, VulkanEngine};
+    use crate::gpu::error::{EvaluateError, VulkanError};
+    use crate::gpu::options::EngineOptions;
+    use crate::gpu::physical::{DeviceInfo, PhysicalDevice};
+    use crate::gpu::reports::SelfTestReport;
+    use crate::prepare::clip_data::ClipData;
+
+    pub(crate) struct Opened {
+        pub(crate) self_tests: Vec<SelfTestReport>,
+        pub(crate) info: DeviceInfo,
+        never: Never,
+    }
+
+    impl Opened {
+        pub(crate) fn new(
+            physical: &PhysicalDevice,
+            _options: &EngineOptions,
+        ) -> Result<Self, VulkanError> {
+            match physical.never {}
+        }
+
+        pub(crate) fn engine(&self) -> Arc<VulkanEngine> {
+            match self.never {}
+        }
+
+        pub(crate) fn upload(
+            &self,
+            _clip: &ClipData,
+            _spare: Option<ClipBuffers>,
+        ) -> Result<ClipBuffers, EvaluateError> {
+            match self.never {}
+        }
+
+        pub(crate) fn attempt_smaller<T>(
+            &self,
+            _work: impl FnMut(&VulkanEngine) -> Result<T, EvaluateError>,
+        ) -> Result<T, EvaluateError> {
+            match self.never {}
+        }
+    }
+}
+
+pub(crate) mod crowd {
+    use std::sync::Arc;
+
+    use crate::gpu::Never;
+    use crate::gpu::engine::VulkanEngine;
+    use crate::gpu::error::VulkanError;
+    use crate::shader::CrowdDispatch;
+
+    pub(crate) struct CrowdTables {
+        pub(crate) instances: u32,
+        pub(crate) levels: Vec<u32>,
+        pub(crate) only_arcs: bool,
+        pub(crate) arguments: CrowdDispatch,
+        pub(crate) clips: Never,
+        pub(crate) bases: Never,
+        pub(crate) spans: Never,
+        pub(crate) channels: Never,
+        pub(crate) cells: Never,
+        pub(crate) links: Never,
+        pub(crate) bind: Never,
+    }
+
+    pub(crate) struct DeviceCrowd {
+        pub(crate) never: Never,
+    }
+
+    impl DeviceCrowd {
+        pub(crate) fn new(
+            engine: Arc<VulkanEngine>,
+            _tables: CrowdTables,
+        ) -> Result<Self, VulkanError> {
+            match engine.never {}
+        }
+    }
+}
+
+pub(crate) mod crowd_target {
+    use std::sync::Arc;
+
+    use crate::gpu::Never;
+    use crate::gpu::crowd::DeviceCrowd;
+    use crate::gpu::error::VulkanError;
+    use crate::output::crowd::CrowdOutput;
+    use crate::shader::CrowdEntry;
+
+    pub(crate) struct CrowdReader {
+        pub(crate) target: Target,
+        pub(crate) results: Results,
+    }
+
+    pub(crate) struct Target {
+        never: Never,
+    }
+
+    impl Target {
+        pub(crate) fn output(&self) -> CrowdOutput {
+            match self.never {}
+        }
+    }
+
+    pub(crate) struct Results {
+        never: Never,
+    }
+
+    impl Results {
+        pub(crate) fn is_done(&self) -> Result<bool, VulkanError> {
+            match self.never {}
+        }
+    }
+
+    impl CrowdReader {
+        pub(crate) fn new(
+            crowd: &Arc<DeviceCrowd>,
+            _output: CrowdOutput,
+        ) -> Result<Self, VulkanError> {
+            match crowd.never {}
+        }
+
+        pub(crate) fn submit<'e>(
+            &mut self,
+            _clock: u64,
+            _changes: impl Iterator<Item = (usize, &'e [CrowdEntry])>,
+        ) -> Result<(), VulkanError> {
+            match self.target.never {}
+        }
+
+        pub(crate) fn wait_into(&mut self, _output: &mut [u8]) -> Result<(), VulkanError> {
+            match self.target.never {}
+        }
+    }
+}
