@@ -4,7 +4,7 @@
 #
 #   tar xf tumble-card.tar.xz && tumble-card/run.sh
 #
-# In it are the program (the profile `dist`), Debian's Vulkan loader and validation layer, unpacked from
+# In it are the program (the release build), Debian's Vulkan loader and validation layer, unpacked from
 # their packages, and scripts/card/run.sh, which finds the driver and runs everything with time limits.
 #
 #   scripts/card.sh             builds it
@@ -32,8 +32,8 @@ build() {
     if [ -n "${CARD_PROGRAM:-}" ]; then
         program=$CARD_PROGRAM
     else
-        TUMBLE_COMMIT=$commit cargo build --quiet --profile dist --package tumble-cli --bin tumble
-        program=target/dist/tumble
+        TUMBLE_COMMIT=$commit cargo build --quiet --release --package tumble-cli --bin tumble
+        program=target/release/tumble
     fi
     rm -rf "$card"
     mkdir -p "$card/lib" "$card/layers" "$card/licences" "$place/packages"
