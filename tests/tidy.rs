@@ -373,7 +373,12 @@ fn packages_have_all_that_they_include() {
                             .iter()
                             .any(|start| inside.starts_with(start))
                     });
-                    assert!(packed, "{}: {} is not packed", path.display(), file.display());
+                    assert!(
+                        packed,
+                        "{}: {} is not packed",
+                        path.display(),
+                        file.display()
+                    );
                     found += 1;
                 }
             }

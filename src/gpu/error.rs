@@ -11,7 +11,9 @@ use crate::prepare::error::SetError;
 pub enum VulkanError {
     /// The engine was compiled without the feature `vulkan`.
     #[cfg(not(feature = "vulkan"))]
-    #[error("this was built without Vulkan; build it with the feature `vulkan` of the crate `tumble`")]
+    #[error(
+        "this was built without Vulkan; build it with the feature `vulkan` of the crate `tumble`"
+    )]
     NotBuilt,
     /// There is no Vulkan loader library.
     #[error("no Vulkan loader: {reason}; install it (Debian: libvulkan1 and mesa-vulkan-drivers)")]
