@@ -135,9 +135,26 @@ impl Renderer {
     fn new() -> Result<Self, Box<dyn Error>> {
         // SAFETY: plain creation, with structures that are alive; `close` destroys it all.
         unsafe {
-            let entry = ash::Entry::load()?;
+            // On macOS, Homebrew's libraries are not where the system looks.
+            let homebrew = || ash::Entry::load_from("/opt/homebrew/lib/libvulkan.1.dylib");
+            let entry = ash::Entry::load().or_else(|error| homebrew().map_err(|_| error))?;
             let application = vk::ApplicationInfo::default().api_version(vk::API_VERSION_1_1);
-            let info = vk::InstanceCreateInfo::default().application_info(&application);
+            // Drivers that have not all of Vulkan (MoltenVK) are for those who say they know.
+            let portability = ash::khr::portability_enumeration::NAME;
+            let offered = entry.enumerate_instance_extension_properties(None)?;
+            let is_offered = (offered.iter())
+                .any(|offered| offered.extension_name_as_c_str() == Ok(portability));
+            let (names, flags) = match is_offered {
+                true => (
+                    vec![portability.as_ptr()],
+                    vk::InstanceCreateFlags::ENUMERATE_PORTABILITY_KHR,
+                ),
+                false => (Vec::new(), vk::InstanceCreateFlags::empty()),
+            };
+            let info = vk::InstanceCreateInfo::default()
+                .application_info(&application)
+                .enabled_extension_names(&names)
+                .flags(flags);
             let instance = entry.create_instance(&info, None)?;
             let all = instance.enumerate_physical_devices()?;
             let physical_device = *all.first().ok_or("there is no Vulkan device")?;
@@ -154,8 +171,16 @@ impl Renderer {
             let has = instance.get_physical_device_features(physical_device);
             let has_int64 = has.shader_int64 == vk::TRUE;
             let features = vk::PhysicalDeviceFeatures::default().shader_int64(has_int64);
+            let subset = ash::khr::portability_subset::NAME;
+            let offered = instance.enumerate_device_extension_properties(physical_device)?;
+            let names: Vec<_> = (offered.iter())
+                .any(|offered| offered.extension_name_as_c_str() == Ok(subset))
+                .then_some(subset.as_ptr())
+                .into_iter()
+                .collect();
             let info = vk::DeviceCreateInfo::default()
                 .queue_create_infos(&queues)
+                .enabled_extension_names(&names)
                 .enabled_features(&features);
             let device = instance.create_device(physical_device, &info, None)?;
             let queue = device.get_device_queue(family, 0);
@@ -183,6 +208,7 @@ impl Renderer {
             queue: self.queue,
             queue_family: self.family,
             copy_queue: None,
+            queue_lock: None,
         };
         // SAFETY: the handles belong together, and `main` closes the engine before them.
         unsafe { Engine::from_vulkan(handles, &EngineOptions::default()) }
@@ -201,10 +227,15 @@ impl Renderer {
             let types = self
                 .instance
                 .get_physical_device_memory_properties(self.physical_device);
-            let index = (0..types.memory_type_count).find(|&index| {
-                let flags = types.memory_types[index as usize].property_flags;
-                needs.memory_type_bits & 1 << index != 0 && flags.contains(wanted)
-            });
+            // The card's own memory, where the host sees it: the other is across the bus.
+            let local = wanted | vk::MemoryPropertyFlags::DEVICE_LOCAL;
+            let with = |wanted| {
+                (0..types.memory_type_count).find(|&index| {
+                    let flags = types.memory_types[index as usize].property_flags;
+                    needs.memory_type_bits & 1 << index != 0 && flags.contains(wanted)
+                })
+            };
+            let index = with(local).or_else(|| with(wanted));
             let info = vk::MemoryAllocateInfo::default()
                 .allocation_size(needs.size)
                 .memory_type_index(index.ok_or("no such memory")?);

@@ -36,9 +36,26 @@ impl Renderer {
     fn new() -> Result<Self, Box<dyn Error>> {
         // SAFETY: plain creation, with structures that are alive; `close` destroys it all.
         unsafe {
-            let entry = ash::Entry::load()?;
+            // On macOS, Homebrew's libraries are not where the system looks.
+            let homebrew = || ash::Entry::load_from("/opt/homebrew/lib/libvulkan.1.dylib");
+            let entry = ash::Entry::load().or_else(|error| homebrew().map_err(|_| error))?;
             let application = vk::ApplicationInfo::default().api_version(vk::API_VERSION_1_1);
-            let info = vk::InstanceCreateInfo::default().application_info(&application);
+            // Drivers that have not all of Vulkan (MoltenVK) are for those who say they know.
+            let portability = ash::khr::portability_enumeration::NAME;
+            let offered = entry.enumerate_instance_extension_properties(None)?;
+            let is_offered = (offered.iter())
+                .any(|offered| offered.extension_name_as_c_str() == Ok(portability));
+            let (names, flags) = match is_offered {
+                true => (
+                    vec![portability.as_ptr()],
+                    vk::InstanceCreateFlags::ENUMERATE_PORTABILITY_KHR,
+                ),
+                false => (Vec::new(), vk::InstanceCreateFlags::empty()),
+            };
+            let info = vk::InstanceCreateInfo::default()
+                .application_info(&application)
+                .enabled_extension_names(&names)
+                .flags(flags);
             let instance = entry.create_instance(&info, None)?;
             let all = instance.enumerate_physical_devices()?;
             let physical_device = *all.first().ok_or("there is no Vulkan device")?;
@@ -66,8 +83,16 @@ impl Renderer {
             let has = instance.get_physical_device_features(physical_device);
             let has_int64 = has.shader_int64 == vk::TRUE;
             let features = vk::PhysicalDeviceFeatures::default().shader_int64(has_int64);
+            let subset = ash::khr::portability_subset::NAME;
+            let offered = instance.enumerate_device_extension_properties(physical_device)?;
+            let names: Vec<_> = (offered.iter())
+                .any(|offered| offered.extension_name_as_c_str() == Ok(subset))
+                .then_some(subset.as_ptr())
+                .into_iter()
+                .collect();
             let info = vk::DeviceCreateInfo::default()
                 .queue_create_infos(&queues)
+                .enabled_extension_names(&names)
                 .enabled_features(&features);
             let device = instance.create_device(physical_device, &info, None)?;
             let queue = |family| (device.get_device_queue(family, 0), family);
@@ -96,6 +121,7 @@ impl Renderer {
             queue: self.compute.0,
             queue_family: self.compute.1,
             copy_queue: None,
+            queue_lock: None,
         };
         // SAFETY: the handles belong together, and `main` closes the engine before them.
         unsafe { Engine::from_vulkan(handles, &EngineOptions::default()) }

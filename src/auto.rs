@@ -1,5 +1,6 @@
 //! The choice of a device by measured time.
 
+use std::collections::HashSet;
 use std::time::{Duration, Instant};
 
 use glam::Quat;
@@ -7,6 +8,7 @@ use glam::Quat;
 use crate::device::Device;
 use crate::engine::Engine;
 use crate::error::Error;
+use crate::gpu::cache::{self, Cache};
 use crate::method::slerp::SLERP;
 use crate::output::buffer::OutputBuffer;
 use crate::output::rotations::Layout;
@@ -27,6 +29,30 @@ fn probe() -> Result<TrackSet, Error> {
     let keys = (0..18u8).map(|i| Quat::from_rotation_y(f32::from(i) * 0.7));
     let keys = keys.collect::<Vec<_>>().repeat(PROBE_TRACKS);
     Ok(TrackSet::from_shared_times(times, keys)?)
+}
+
+/// Under what the probe of a device's model is remembered: it is another with another driver, or another
+/// version of the engine.
+fn model(device: &Device) -> Option<String> {
+    let Device::Vulkan(device) = device else {
+        return None;
+    };
+    let info = device.info();
+    let (vendor, number) = (info.vendor_id, info.device_id);
+    let software = format!(
+        "{} {} {}",
+        info.driver,
+        info.api_version,
+        env!("CARGO_PKG_VERSION")
+    );
+    let software = cache::sum("probe", software.as_bytes());
+    Some(format!("probe-{vendor:x}-{number:x}-{software:016x}"))
+}
+
+/// How long a model took, if that is known.
+fn remembered(cache: &Cache, model: &str) -> Option<Duration> {
+    let nanoseconds = cache.read(model, size_of::<u64>())?.try_into().ok()?;
+    Some(Duration::from_nanos(u64::from_le_bytes(nanoseconds)))
 }
 
 impl Engine {
@@ -53,7 +79,9 @@ impl Engine {
     /// * Software devices (drivers such as Mesa's lavapipe and `SwiftShader`) never: they compute on
     ///   the CPU too, and slower.
     /// * Else every device that is exact, and the CPU, evaluate a probe of 2^19 rotations; what
-    ///   counts is the shortest of three times.
+    ///   counts is the shortest of three times. That of a model of card with its driver is remembered
+    ///   in the user's cache directory (`TUMBLE_CACHE_DIR`, else the system's; empty: nothing is
+    ///   remembered), so that later processes open the fastest alone.
     ///
     /// # Errors
     /// When the system refuses what the CPU needs.
@@ -62,25 +90,41 @@ impl Engine {
         if rotations < FEW_FOR_A_DEVICE {
             return Ok(cpu);
         }
-        let devices = Device::list().unwrap_or_default();
-        let mut others = devices
-            .into_iter()
-            .filter(|device| !device.is_software())
-            .filter_map(|device| Self::new(device).ok())
-            .peekable();
-        if others.peek().is_none() {
+        let cache = Cache::of_user();
+        let (mut models, mut timed) = (HashSet::new(), Vec::new());
+        for device in Device::list().unwrap_or_default() {
+            // Of several cards of one model the first serves as well as any.
+            let Some(model) = model(&device).filter(|_| !device.is_software()) else {
+                continue;
+            };
+            if models.contains(&model) {
+                continue;
+            }
+            if let Some(time) = remembered(&cache, &model) {
+                timed.push((time, device, None));
+            } else if let Ok(engine) = Self::new(device.clone())
+                && let Ok(time) = engine.probe_time()
+            {
+                cache.write(&model, &(time.as_nanos() as u64).to_le_bytes());
+                timed.push((time, device, Some(engine)));
+            } else {
+                continue; // one that fails is not chosen
+            }
+            models.insert(model);
+        }
+        if timed.is_empty() {
             return Ok(cpu);
         }
-        let mut best = (cpu.probe_time()?, cpu);
-        for engine in others {
-            // One that fails is not chosen.
-            if let Ok(time) = engine.probe_time()
-                && time < best.0
-            {
-                best = (time, engine);
-            }
-        }
-        Ok(best.1)
+        let of_cpu = cpu.probe_time()?;
+        timed.retain(|(time, ..)| *time < of_cpu);
+        timed.sort_by_key(|(time, ..)| *time);
+        let mut engines = timed
+            .into_iter()
+            .filter_map(|(_, device, open)| match open {
+                Some(engine) => Some(engine),
+                None => Self::new(device).ok(),
+            });
+        Ok(engines.next().unwrap_or(cpu))
     }
 
     /// How long this engine takes to evaluate a probe of 2^19 rotations: the shortest of three

@@ -99,7 +99,7 @@ impl Clip {
         let timeline = self.timeline(frames)?;
         let whole = Window::whole(self.track_count(), timeline.len(), layout);
         in_quats(output, whole.len(), |quats| {
-            let timeline = self.uploaded.data.folded(&timeline)?;
+            let timeline = self.uploaded.folded(&timeline)?;
             let bytes = bytemuck::cast_slice_mut(quats);
             Ok((self.uploaded).evaluate_into(&timeline, &whole, Encoding::F32, bytes)?)
         })
@@ -118,7 +118,7 @@ impl Clip {
         if output.is_empty() {
             return Ok(());
         }
-        let timeline = self.uploaded.data.folded(timeline)?;
+        let timeline = self.uploaded.folded(timeline)?;
         Ok((self.uploaded).evaluate_into(&timeline, window, encoding, output)?)
     }
 

@@ -20,6 +20,7 @@ use crate::gpu::recovery::Opened;
 use crate::gpu::reports::{DeviceInfo, KernelCheck, NegativeControl, SelfTestReport};
 use crate::method::interpolation::Interpolation;
 use crate::output::buffer::OutputBuffer;
+use crate::output::encoding::Encoding;
 use crate::output::rotations::{Layout, Rotations, Samples, Vectors};
 use crate::output::row::Row;
 use crate::prepare::clip_data::Wanted;
@@ -88,7 +89,8 @@ impl Engine {
                     return Err(Error::ThreadCount { given, most });
                 }
                 let width = options.vector_width.unwrap_or_else(VectorWidth::widest);
-                let engine = CpuEngine::new(width, options.streaming_stores, options.threads)?;
+                let (stores, memory) = (options.streaming_stores, options.memory);
+                let engine = CpuEngine::new(width, stores, options.threads, memory)?;
                 Ok(Self {
                     backend: Arc::new(Backend::Cpu(engine)),
                 })
@@ -222,17 +224,20 @@ impl Engine {
         self.backend.opened().map_or_else(Timings::default, timings)
     }
 
-    /// Prepares a set for a method and brings it to the device, where it stays.
+    /// Prepares a set for a method and brings it to the device, where it stays. Where that would take more than
+    /// [`EngineOptions::memory`], the clip has the keys instead, and each evaluation prepares them piece by
+    /// piece: the same bits, but slower.
     ///
     /// # Errors
-    /// When a track cannot be interpolated as asked, or the device has not the
-    /// memory; [`Engine::evaluate`] works through such a set piece by piece.
+    /// When a track cannot be interpolated as asked, or there is not the memory;
+    /// [`Engine::evaluate`] works through such a set piece by piece.
     pub fn upload(
         &self,
         set: &TrackSet,
         interpolation: impl Into<Interpolation>,
     ) -> Result<Clip, Error> {
-        self.upload_wanted(set, interpolation.into(), Wanted::all(set))
+        let uploaded = Uploaded::whole(&self.backend, set, interpolation.into())?;
+        Ok(Clip::new(self.clone(), uploaded))
     }
 
     pub(crate) fn upload_wanted(
@@ -334,6 +339,32 @@ impl Engine {
         in_quats(output, needed, |quats| {
             Ok((self.backend).evaluate_tracks(&request, layout, quats)?)
         })
+    }
+
+    /// Compiles the kernels for results of these, which a Vulkan device else does when the first of them
+    /// is asked for: some milliseconds each, on some drivers seconds. What was compiled is kept for later
+    /// processes. The CPU has nothing to compile.
+    ///
+    /// ```
+    /// # use tumble::{Device, Encoding, Engine, method};
+    /// # let engine = Engine::new(Device::Cpu)?;
+    /// engine.warm(method::BESSEL_OVERHAUSER, Encoding::F32)?; // while a level loads
+    /// # Ok::<(), tumble::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// When the encoding is for rotations and the quantity is another, or the device fails.
+    pub fn warm(
+        &self,
+        interpolation: impl Into<Interpolation>,
+        encoding: Encoding,
+    ) -> Result<(), Error> {
+        let interpolation = interpolation.into();
+        encoding.check(interpolation.quantity)?;
+        match self.backend.opened() {
+            Some(opened) => Ok(opened.warm(interpolation.form(), encoding)?),
+            None => Ok(()),
+        }
     }
 
     /// Describes in words how a set would be evaluated: whether it is prepared, and in what

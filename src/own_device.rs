@@ -25,7 +25,7 @@ impl Engine {
     /// # Safety
     /// The handles must be valid and belong together, must outlive the engine and
     /// all of its clips and results, and nobody else may use the queues while the
-    /// engine does.
+    /// engine does, unless both lock [`VulkanHandles::queue_lock`].
     pub unsafe fn from_vulkan(
         handles: VulkanHandles,
         options: &EngineOptions,
@@ -62,7 +62,7 @@ impl Clip {
         };
         encoding.check(self.quantity())?;
         let timeline = self.timeline(frames)?;
-        let timeline = self.uploaded.data.folded(&timeline)?;
+        let timeline = self.uploaded.folded(&timeline)?;
         let rotation = encoding.bytes() as u64;
         let needed = ((self.track_count() * timeline.len()) as u64).saturating_mul(rotation);
         if !buffer.offset.is_multiple_of(rotation) || buffer.size < needed {

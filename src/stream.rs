@@ -11,13 +11,14 @@ use crate::clip::Clip;
 use crate::curve::options::Quantity;
 use crate::engine::Engine;
 use crate::error::Error;
+use crate::evaluate::pieces::{Pieces, segment_bytes};
 use crate::method::interpolation::Interpolation;
 use crate::output::buffer::OutputBuffer;
 use crate::output::encoding::Encoding;
 use crate::output::rotations::Layout;
 use crate::output::window::Window;
 use crate::prepare::batch::Batch;
-use crate::prepare::clip_data::Wanted;
+use crate::prepare::clip_data::{ClipData, Wanted};
 use crate::prepare::request::Request;
 use crate::threads::{self, OutOfThreads};
 use crate::time::frames::Frames;
@@ -67,6 +68,10 @@ impl<'a> Chunk<'a> {
     }
 }
 
+/// Segments that are prepared before the first chunk, where the engine's options have no limit; more are prepared
+/// piece by piece.
+const SEGMENT_BYTES: usize = 256 << 20;
+
 /// Buffers that are used in turn: one is filled, one is read, one waits.
 const BUFFERS: usize = 3;
 
@@ -102,7 +107,7 @@ impl Clip {
     ) -> Result<(), E> {
         let timeline = self.timeline(frames).map_err(Error::from)?;
         let whole = Window::whole(self.track_count(), timeline.len(), layout);
-        let timeline = self.uploaded.data.folded(&timeline).map_err(Error::from)?;
+        let timeline = self.uploaded.folded(&timeline).map_err(Error::from)?;
         let fill = |window: &Window, output: &mut [Quat]| {
             let bytes = bytemuck::cast_slice_mut(output);
             Ok((self.uploaded).evaluate_into(&timeline, window, Encoding::F32, bytes)?)
@@ -113,7 +118,10 @@ impl Clip {
 
 impl Engine {
     /// As [`Clip::stream`], from a set: with [`Layout::TrackMajor`] only the tracks of
-    /// a chunk are prepared at a time.
+    /// a chunk are prepared at a time. Frame by frame, and where a chunk is less than a track, all are
+    /// prepared at once if that takes no more than
+    /// [`EngineOptions::memory`](crate::gpu::options::EngineOptions::memory), or 256 MiB where that has no limit;
+    /// else those that a chunk needs are.
     ///
     /// # Errors
     /// As [`Clip::stream`] and [`Engine::upload`].
@@ -132,7 +140,24 @@ impl Engine {
             .map_err(Error::from)?;
         if layout == Layout::FrameMajor || timeline.len() > chunk {
             // A chunk has some samples of many tracks, or some of one track: every chunk needs
-            // segments that others need too, so all are prepared at once.
+            // segments that others need too, so all are prepared at once, unless that takes too much.
+            let limit = self.backend.budget().unwrap_or(SEGMENT_BYTES);
+            if segment_bytes(set, &interpolation) > limit {
+                ClipData::unprepared(set, interpolation).map_err(Error::from)?;
+                let pieces = Pieces {
+                    backend: &self.backend,
+                    set,
+                    interpolation: &interpolation,
+                    timeline: &timeline,
+                    encoding: Encoding::F32,
+                    limit,
+                };
+                let whole = Window::whole(set.track_count(), timeline.len(), layout);
+                let fill = |window: &Window, output: &mut [Quat]| {
+                    Ok(pieces.evaluate_into(window, bytemuck::cast_slice_mut(output))?)
+                };
+                return run(whole.cut(chunk), interpolation.quantity, fill, sink);
+            }
             let wanted = Wanted {
                 only_for: Some(&timeline),
                 ..Wanted::all(set)
@@ -203,6 +228,18 @@ impl Engine {
                 ..Request::whole(set, &interpolation, &timeline)
             };
             return Ok((self.backend).evaluate_tracks(&request, Layout::TrackMajor, quats)?);
+        }
+        if let Some(limit) = self.backend.budget() {
+            let pieces = Pieces {
+                backend: &self.backend,
+                set,
+                interpolation: &interpolation,
+                timeline: &timeline,
+                encoding,
+                limit,
+            };
+            ClipData::unprepared(set, interpolation)?;
+            return Ok(pieces.evaluate_into(&part, output)?);
         }
         let timeline = timeline.of_tracks(tracks.clone());
         let wanted = Wanted {

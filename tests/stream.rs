@@ -1,9 +1,10 @@
 //! Results in chunks: the same bits as in one piece, in order, and nothing left out.
 
-use crate::support::{first_difference, hostile_set, is_turn, vulkan_devices};
-use glam::Quat;
+use crate::support::{Random, first_difference, hostile_set, is_turn, vulkan_devices};
+use glam::{DQuat, Quat};
 use tumble::{
-    Device, Encoding, Engine, Error, Frames, Interpolation, Layout, METHODS, WrapMode, method,
+    Device, Encoding, Engine, EngineOptions, Error, Frames, Interpolation, Layout, METHODS, Speed,
+    WrapMode, method,
 };
 
 fn devices() -> Vec<Device> {
@@ -231,4 +232,125 @@ fn parts_that_a_result_has_not_are_refused() {
     }
     assert!(of_clip(0..1, 0..8, &mut bytes).is_ok());
     assert!(of_clip(3..3, 0..8, &mut []).is_ok());
+}
+
+/// Sets whose segments take more than the engine may use, in every way in which samples are asked for. Catches a
+/// piece that lacks an interval, or whose numbers depend on where it was cut.
+#[test]
+fn what_takes_too_much_memory_is_made_piece_by_piece_with_the_same_bits() {
+    let mut set = hostile_set(11, 16);
+    // Long tracks, which are cut, beside many short ones.
+    let mut random = Random(12);
+    for count in [350, 300] {
+        let times: Vec<f64> = (0..count).map(|i| 0.01 * f64::from(i)).collect();
+        let keys: Vec<Quat> = times
+            .iter()
+            .map(|time| {
+                let noise = DQuat::from_axis_angle(random.direction(), 0.02);
+                (DQuat::from_rotation_y(time * 0.7) * noise).as_quat()
+            })
+            .collect();
+        set.push("", &times, &keys).unwrap();
+    }
+    let (tracks, unlimited) = (set.track_count(), Engine::new(Device::Cpu).unwrap());
+    let mut times: Vec<f64> = (0..24).map(|i| 0.15 * f64::from((i * 7) % 24)).collect();
+    let each = (0..tracks * 12).map(|i| 0.01 * ((i * 31) % 349) as f64);
+    let each = Frames::at_each(each.collect());
+    let unordered = Frames::at(times.clone());
+    times.sort_by(f64::total_cmp);
+    let requests = [
+        Frames::fps(13).between(-1.0, 4.5),
+        Frames::at(times),
+        unordered,
+        each,
+    ];
+    let interpolation = |method, after, speed| {
+        let mut interpolation = Interpolation::from(method);
+        (interpolation.after, interpolation.speed) = (after, speed);
+        interpolation
+    };
+    let interpolations = [
+        interpolation(method::SLERP, WrapMode::Hold, Speed::AsKeyed),
+        interpolation(method::C2, WrapMode::Hold, Speed::AsKeyed),
+        interpolation(method::STEP, WrapMode::Hold, Speed::AsKeyed),
+        interpolation(method::CATMULL_ROM, WrapMode::Loop, Speed::AsKeyed),
+        interpolation(
+            method::BESSEL_OVERHAUSER,
+            WrapMode::Extrapolate,
+            Speed::AsKeyed,
+        ),
+        interpolation(method::SQUAD, WrapMode::Hold, Speed::Constant),
+    ];
+    for (way, device) in devices().into_iter().enumerate() {
+        let mut options = EngineOptions::default();
+        options.memory = Some(50_000);
+        let engine = Engine::with_options(device, &options).unwrap();
+        for (round, interpolation) in interpolations.into_iter().enumerate() {
+            let whole = unlimited.upload(&set, interpolation).unwrap();
+            let clip = engine.upload(&set, interpolation).unwrap();
+            for (request, frames) in requests.iter().enumerate() {
+                if !is_turn(way + round, request, requests.len()) {
+                    continue;
+                }
+                let what = format!("{interpolation:?}, request {request}, {engine:?}");
+                for layout in [Layout::TrackMajor, Layout::FrameMajor] {
+                    let expected = whole.evaluate_as(frames, layout).unwrap();
+                    let expected = expected.as_quats();
+                    let same = |found: &[Quat], way: &str| {
+                        let difference = first_difference(expected, found);
+                        assert_eq!(difference, None, "{way}, {layout:?}, {what}");
+                    };
+                    same(clip.evaluate_as(frames, layout).unwrap().as_quats(), "clip");
+                    let found = engine.evaluate_as(&set, interpolation, frames, layout);
+                    same(found.unwrap().as_quats(), "set");
+                    let mut streamed = Collected::default();
+                    let taken = engine.stream(&set, interpolation, frames, layout, 300, |chunk| {
+                        streamed.take(&chunk);
+                        Ok::<(), Error>(())
+                    });
+                    taken.unwrap();
+                    same(&streamed.rotations, "stream");
+                    let (encoding, samples) = (Encoding::F16, clip.timeline(frames).unwrap().len());
+                    let expected = whole.evaluate_encoded(frames, layout, encoding).unwrap();
+                    let found = clip.evaluate_encoded(frames, layout, encoding).unwrap();
+                    assert!(found == expected, "encoded, {layout:?}, {what}");
+                    if layout == Layout::TrackMajor {
+                        let mut part = vec![0; 7 * samples * encoding.bytes()];
+                        let start = (tracks - 7) * samples * encoding.bytes();
+                        let last = tracks - 7..tracks;
+                        engine
+                            .evaluate_tracks_into(
+                                &set,
+                                interpolation,
+                                frames,
+                                last,
+                                encoding,
+                                &mut part,
+                            )
+                            .unwrap();
+                        assert!(part == expected[start..], "tracks, {what}");
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// What a set cannot be is refused when it is uploaded, also where nothing is prepared yet.
+#[test]
+fn what_cannot_be_interpolated_is_refused_before_it_is_made_piece_by_piece() {
+    let mut options = EngineOptions::default();
+    options.memory = Some(1);
+    let engine = Engine::with_options(Device::Cpu, &options).unwrap();
+    let mut set = hostile_set(4, 3);
+    let opposite = [Quat::IDENTITY, -Quat::IDENTITY];
+    set.push("", &[0.0, 1.0], &opposite).unwrap();
+    let mut interpolation = Interpolation::from(method::SLERP);
+    interpolation.path = tumble::Path::AsAuthored;
+    let error = engine.upload(&set, interpolation).unwrap_err();
+    assert!(matches!(error, Error::Interpolation(_)), "{error}");
+    let sink = |_: tumble::Chunk<'_>| -> Result<(), Error> { panic!("no chunk comes") };
+    let (frames, layout) = (Frames::fps(5), Layout::FrameMajor);
+    let error = engine.stream(&set, interpolation, &frames, layout, 10, sink);
+    assert!(matches!(error, Err(Error::Interpolation(_))));
 }

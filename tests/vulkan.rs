@@ -411,3 +411,83 @@ fn assert_between<T: Pod>(outside: &T, beside: usize, expected: &[T], work: impl
         );
     }
 }
+
+/// Queues that an application cannot have meant: of families that are not there or cannot compute, and one
+/// queue for both.
+#[test]
+fn queues_that_cannot_do_their_work_are_refused() {
+    use crate::application::Application;
+    use tumble::{Error, VulkanQueue};
+    if vulkan_devices().is_empty() {
+        return;
+    }
+    let application = Application::new();
+    for family in [1000, u32::MAX] {
+        let error = application.refused(|handles| handles.queue_family = family);
+        let Error::Vulkan(VulkanError::QueueFamily { family: found, .. }) = error else {
+            panic!("{error}");
+        };
+        assert_eq!(found, family);
+    }
+    let queue = application.queue;
+    let copies = |family| Some(VulkanQueue { queue, family });
+    let error = application.refused(|handles| handles.copy_queue = copies(1000));
+    assert!(
+        error.to_string().contains("family 1000, which cannot copy"),
+        "{error}"
+    );
+    let error = application.refused(|handles| handles.copy_queue = copies(0));
+    assert!(
+        matches!(error, Error::Vulkan(VulkanError::SameQueue)),
+        "{error}"
+    );
+}
+
+/// An application that submits from another thread while the engine evaluates, each with the queue's lock;
+/// the validation layer would tell of two at once, and lavapipe's fences never end.
+#[test]
+fn an_application_and_an_engine_share_a_queue_by_its_lock() {
+    use crate::application::{Application, Commands};
+    if vulkan_devices().is_empty() {
+        return;
+    }
+    let application = Application::new();
+    let engine = application.engine(Mapping::Automatic);
+    let set = hostile_set(3, 40);
+    let frames = Frames::fps(60).between(0.0, 5.0);
+    let expected = Engine::new(Device::Cpu)
+        .unwrap()
+        .evaluate(&set, method::C2, &frames);
+    let expected = expected.unwrap();
+    std::thread::scope(|scope| {
+        let submit = || {
+            let commands = Commands::new(&application);
+            let empty = commands.recorded(|_| ());
+            for _ in 0..200 {
+                commands.run(&[empty]);
+            }
+        };
+        let other = scope.spawn(submit);
+        while !other.is_finished() {
+            let found = engine.evaluate(&set, method::C2, &frames).unwrap();
+            assert_eq!(
+                first_difference(expected.as_quats(), found.as_quats()),
+                None
+            );
+        }
+    });
+}
+
+/// What is compiled beforehand is what evaluating uses, and it is kept for the next process.
+#[test]
+fn kernels_are_compiled_beforehand() {
+    for engine in vulkan_engines(|_| {}) {
+        engine.warm(method::C2, Encoding::F32).unwrap();
+        engine.warm(method::SLERP, Encoding::F16).unwrap();
+        let mut velocity = tumble::Interpolation::from(method::C2);
+        velocity.quantity = tumble::Quantity::Velocity(tumble::Axes::Body);
+        assert!(engine.warm(velocity, Encoding::F16).is_err());
+    }
+    let cpu = Engine::new(Device::Cpu).unwrap();
+    cpu.warm(method::C2, Encoding::F32).unwrap();
+}

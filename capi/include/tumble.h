@@ -562,6 +562,20 @@ typedef struct TumbleVulkan {
    The family of that queue.
    */
   uint32_t copy_queue_family;
+  /*
+   Locks `queue`, which the application uses too, maybe on another thread; called with `queue_user` before each
+   submission of the engine. With it goes `unlock_queue`. Null: nobody else may use the queue while the library
+   does. The application must not hold the lock while it calls the library.
+   */
+  void (*lock_queue)(void *user);
+  /*
+   Unlocks it, called after each submission on the same thread.
+   */
+  void (*unlock_queue)(void *user);
+  /*
+   What both get. It must stay valid as long as the engine and all that was made with it.
+   */
+  void *queue_user;
 } TumbleVulkan;
 
 /*

@@ -62,6 +62,9 @@ impl From<Error> for Failure {
     fn from(error: Error) -> Self {
         let code = match &error {
             Error::Vulkan(VulkanError::OwnBuffer { .. }) => TumbleResult::WrongSize,
+            Error::Vulkan(VulkanError::QueueFamily { .. } | VulkanError::SameQueue) => {
+                TumbleResult::InvalidArgument
+            }
             Error::Vulkan(_) | Error::Threads(_) => TumbleResult::Device,
             Error::OutputLength { .. } | Error::OutputBytes { .. } => TumbleResult::WrongSize,
             Error::OutOfMemory(_) => TumbleResult::OutOfMemory,

@@ -4,7 +4,7 @@ use std::ffi::{CStr, c_void};
 
 use tumble::ash::vk::Handle;
 use tumble::ash::{self, vk};
-use tumble::{Engine, VulkanBuffer, VulkanHandles, VulkanQueue};
+use tumble::{Engine, QueueLock, VulkanBuffer, VulkanHandles, VulkanQueue};
 
 use crate::arguments::{Out, flag, needed, vulkan};
 use crate::engine::{TumbleEngine, TumbleEngineOptions};
@@ -44,13 +44,55 @@ pub struct TumbleVulkan {
     pub copy_queue: *mut c_void,
     /// The family of that queue.
     pub copy_queue_family: u32,
+    /// Locks `queue`, which the application uses too, maybe on another thread; called with `queue_user` before each
+    /// submission of the engine. With it goes `unlock_queue`. Null: nobody else may use the queue while the library
+    /// does. The application must not hold the lock while it calls the library.
+    pub lock_queue: Option<unsafe extern "C" fn(user: *mut c_void)>,
+    /// Unlocks it, called after each submission on the same thread.
+    pub unlock_queue: Option<unsafe extern "C" fn(user: *mut c_void)>,
+    /// What both get. It must stay valid as long as the engine and all that was made with it.
+    pub queue_user: *mut c_void,
 }
+
+/// What an application's functions get.
+#[derive(Clone, Copy)]
+struct User(*mut c_void);
+
+impl User {
+    fn pointer(&self) -> *mut c_void {
+        self.0
+    }
+}
+
+// SAFETY: the application promises that its functions take it on any thread.
+unsafe impl Send for User {}
+// SAFETY: as above.
+unsafe impl Sync for User {}
 
 fn refused(message: String) -> Failure {
     Failure::argument(message)
 }
 
 impl TumbleVulkan {
+    /// The application's lock of the queue, if it has one.
+    fn queue_lock(&self) -> Result<Option<QueueLock>, Failure> {
+        let user = User(self.queue_user);
+        match (self.lock_queue, self.unlock_queue) {
+            (None, None) => Ok(None),
+            (Some(lock), Some(unlock)) => Ok(Some(QueueLock::new(move |submit| {
+                let user = user.pointer();
+                // SAFETY: the application's functions, with what they are to get.
+                unsafe { lock(user) };
+                submit();
+                // SAFETY: as above.
+                unsafe { unlock(user) };
+            }))),
+            _ => Err(refused(
+                "`vulkan->lock_queue` and `vulkan->unlock_queue` belong together; give both, or null for both".to_owned(),
+            )),
+        }
+    }
+
     /// The functions of the loader, the instance and the device.
     ///
     /// # Safety
@@ -121,6 +163,7 @@ impl TumbleVulkan {
             queue,
             queue_family: self.queue_family,
             copy_queue,
+            queue_lock: self.queue_lock()?,
         })
     }
 

@@ -4,6 +4,7 @@
 use std::ffi::{CStr, c_void};
 use std::process::Command;
 use std::ptr::{null, null_mut};
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use ash::vk::{self, Handle};
 use tumble_capi::clip::*;
@@ -59,7 +60,31 @@ fn handles(application: &Application) -> TumbleVulkan {
         shader_int64: application.shader_int64.into(),
         copy_queue: (application.copy_queue).map_or(null_mut(), |own| pointer(own.queue)),
         copy_queue_family: application.copy_queue.map_or(0, |own| own.family),
+        lock_queue: None,
+        unlock_queue: None,
+        queue_user: null_mut(),
     }
+}
+
+/// How often a queue was locked, and unlocked.
+#[derive(Default)]
+struct Uses([AtomicUsize; 2]);
+
+unsafe extern "C" fn lock_queue(user: *mut c_void) {
+    // SAFETY: what the application gave with the function.
+    let Uses([locked, unlocked]) = unsafe { &*user.cast() };
+    let before = locked.fetch_add(1, Ordering::SeqCst);
+    assert_eq!(
+        before,
+        unlocked.load(Ordering::SeqCst),
+        "it is locked already"
+    );
+}
+
+unsafe extern "C" fn unlock_queue(user: *mut c_void) {
+    // SAFETY: as above.
+    let Uses([_, unlocked]) = unsafe { &*user.cast() };
+    unlocked.fetch_add(1, Ordering::SeqCst);
 }
 
 fn pointer(handle: impl Handle) -> *mut c_void {
@@ -456,6 +481,23 @@ fn handles_that_do_not_belong_together_are_refused() {
             "does not know vkEnumeratePhysicalDevices",
         ),
         (truth, argument, "`vulkan->shader_int64` is 2"),
+        (
+            TumbleVulkan {
+                lock_queue: Some(lock_queue),
+                ..good
+            },
+            argument,
+            "`vulkan->lock_queue` and `vulkan->unlock_queue` belong together",
+        ),
+        (
+            TumbleVulkan {
+                copy_queue: good.queue,
+                copy_queue_family: good.queue_family,
+                ..good
+            },
+            argument,
+            "the queue for copies is the one that computes",
+        ),
         (controls, argument, "`vulkan->shader_float_controls` is 7"),
         (
             TumbleVulkan {
@@ -492,6 +534,17 @@ fn handles_that_do_not_belong_together_are_refused() {
     }
     done(open(&good, &mut engine));
     done(tumble_engine_free(engine));
+    let uses = Uses::default();
+    let locked = TumbleVulkan {
+        lock_queue: Some(lock_queue),
+        unlock_queue: Some(unlock_queue),
+        queue_user: (&raw const uses).cast_mut().cast(),
+        ..good
+    };
+    done(open(&locked, &mut engine));
+    done(tumble_engine_free(engine));
+    let [locked, unlocked] = uses.0.map(AtomicUsize::into_inner);
+    assert!(locked > 0 && locked == unlocked, "{locked}, {unlocked}");
 }
 
 /// The tests of this file once more, under the validation layers.

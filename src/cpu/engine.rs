@@ -22,6 +22,8 @@ pub(crate) struct CpuEngine {
     /// `None`: the process's.
     own_threads: Option<Threads>,
     pub(crate) scratch_pool: ScratchPool,
+    /// Bytes that the segments of a clip may take, if there is a limit.
+    pub(crate) memory: Option<usize>,
 }
 
 impl CpuEngine {
@@ -30,6 +32,7 @@ impl CpuEngine {
         width: VectorWidth,
         streaming_stores: Option<bool>,
         threads: Option<usize>,
+        memory: Option<u64>,
     ) -> Result<Self, OutOfThreads> {
         let own_threads = threads.map(|count| Threads::new(Some(count)));
         if let Some(own) = &own_threads {
@@ -38,6 +41,7 @@ impl CpuEngine {
         Ok(Self {
             streaming_stores,
             own_threads,
+            memory: memory.map(|bytes| usize::try_from(bytes).unwrap_or(usize::MAX)),
             ..Self::on_shared_threads(width)
         })
     }
@@ -49,6 +53,7 @@ impl CpuEngine {
             streaming_stores: None,
             own_threads: None,
             scratch_pool: ScratchPool::default(),
+            memory: None,
         }
     }
 

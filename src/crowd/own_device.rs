@@ -32,7 +32,10 @@ impl Crowd {
         buffer: VulkanBuffer,
     ) -> Result<CrowdTarget, CrowdError> {
         let output = output.into();
-        let device = self.device.as_ref().ok_or(CrowdError::OtherDevice)?;
+        // No application has a buffer on a device that the engine opened.
+        let device = self.device.as_ref();
+        let device = device.filter(|device| !device.engine.device.owned);
+        let device = device.ok_or(CrowdError::OtherDevice)?;
         self.check(output)?;
         let (offset, size) = (buffer.offset, buffer.size);
         let needed = device.bytes(output);

@@ -1,5 +1,7 @@
 //! Segments: the constants of a curve between two keys, as a kernel reads them.
 
+use std::collections::TryReserveError;
+
 use crate::shader::{ArcSegment, Form, PolynomialSegment};
 use crate::twin::evaluate::Evaluate as _;
 
@@ -28,6 +30,13 @@ impl Segments {
         match self.form {
             Form::Arc => self.arcs.reserve(count),
             Form::Polynomial => self.polynomials.reserve(count),
+        }
+    }
+
+    pub(crate) fn try_reserve(&mut self, count: usize) -> Result<(), TryReserveError> {
+        match self.form {
+            Form::Arc => self.arcs.try_reserve(count),
+            Form::Polynomial => self.polynomials.try_reserve(count),
         }
     }
 

@@ -8,6 +8,7 @@ use rayon::prelude::*;
 
 use crate::cpu::engine::CpuEngine;
 use crate::curve::segment::segment_size;
+use crate::evaluate::pieces::{Pieces, segment_bytes};
 use crate::evaluate::route::Route;
 use crate::evaluate::uploaded::{Backend, Uploaded};
 use crate::from_keys::dispatches::KeyJob;
@@ -39,7 +40,10 @@ impl Backend {
         request: &Request<'_>,
         layout: Layout,
     ) -> Result<Box<dyn Storage>, EvaluateError> {
+        let is_within = (self.budget())
+            .is_none_or(|limit| segment_bytes(request.set, request.interpolation) <= limit);
         if let Route::Clips { cuts_tracks } = self.route(request, layout)
+            && is_within
             && self.clips(request, cuts_tracks).len() == 1
         {
             let wanted = Wanted {
@@ -62,7 +66,21 @@ impl Backend {
         output: &mut [Quat],
     ) -> Result<(), EvaluateError> {
         request.interpolation.check().map_err(SetError::from)?;
-        match (self.route(request, layout), &**self) {
+        let route = self.route(request, layout);
+        if let (Route::Clips { .. }, Self::Cpu(_), Some(limit)) = (route, &**self, self.budget()) {
+            let (tracks, samples) = (request.tracks.clone(), 0..request.timeline.len());
+            let pieces = Pieces {
+                backend: self,
+                set: request.set,
+                interpolation: request.interpolation,
+                timeline: request.timeline,
+                encoding: Encoding::F32,
+                limit,
+            };
+            let window = Window::of(tracks, samples, layout.of(request.timeline.len()));
+            return pieces.evaluate_into(&window, bytemuck::cast_slice_mut(output));
+        }
+        match (route, &**self) {
             (Route::FromKeys(curve), Self::Cpu(engine)) => {
                 Ok(engine.evaluate_from_keys(request, curve, output)?)
             }
@@ -201,7 +219,7 @@ impl Opened {
 
 impl EvaluateError {
     /// Turns the index of a track in a batch, which starts at `first`, into its index in the set.
-    fn of_tracks_from(mut self, first: usize) -> Self {
+    pub(super) fn of_tracks_from(mut self, first: usize) -> Self {
         if let Self::Set(SetError::Frames(FramesError::GapTooLong { track, .. })) = &mut self {
             *track += first;
         }

@@ -1,19 +1,22 @@
 //! What an engine evaluates on, and prepared tracks there.
 
+use std::borrow::Cow;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::cpu::engine::CpuEngine;
+use crate::evaluate::pieces::{Pieces, segment_bytes};
 use crate::gpu::engine::{ClipBuffers, Job, VulkanEngine, lock};
 use crate::gpu::error::{EvaluateError, VulkanError};
 use crate::gpu::recovery::Opened;
 use crate::gpu::turns::Turns;
+use crate::memory::{OutOfMemory, refuse_more_than_there_is};
 use crate::method::interpolation::Interpolation;
 use crate::output::buffer::OutputBuffer;
 use crate::output::encoding::Encoding;
 use crate::output::rotations::{Layout, Storage};
 use crate::output::window::Window;
 use crate::prepare::clip_data::{ClipData, Wanted};
-use crate::prepare::prepared::Prepared;
+use crate::prepare::prepared::{Prepared, SEGMENTS};
 use crate::time::frames::Timeline;
 use crate::tracks::set::TrackSet;
 
@@ -24,6 +27,9 @@ pub(crate) struct Uploaded {
     /// Uploaded again after the device was lost.
     buffers: Mutex<Option<Arc<ClipBuffers>>>,
     uploading: Turns<()>,
+    /// The set, where its segments would take more memory than the engine may use, with how much that is: then
+    /// nothing is prepared before it is evaluated.
+    in_pieces: Option<(TrackSet, usize)>,
 }
 
 impl Uploaded {
@@ -54,7 +60,59 @@ impl Uploaded {
             data,
             buffers: Mutex::new(buffers),
             uploading: Turns::default(),
+            in_pieces: None,
         })
+    }
+
+    /// All of a set, for any timeline; in pieces where it would take more memory than the engine may use.
+    pub(crate) fn whole(
+        backend: &Arc<Backend>,
+        set: &TrackSet,
+        interpolation: Interpolation,
+    ) -> Result<Self, EvaluateError> {
+        let needed = segment_bytes(set, &interpolation);
+        let Some(limit) = backend.budget().filter(|&limit| needed > limit) else {
+            refuse_more_than_there_is::<u8>(needed, SEGMENTS)?;
+            return Self::new(backend, set, interpolation, Wanted::all(set), None);
+        };
+        Ok(Self {
+            backend: Arc::clone(backend),
+            data: ClipData::unprepared(set, interpolation)?,
+            buffers: Mutex::default(),
+            uploading: Turns::default(),
+            in_pieces: Some((set.clone(), limit)),
+        })
+    }
+
+    /// The timeline as [`Uploaded::evaluate_into`] takes it.
+    pub(crate) fn folded<'t>(
+        &self,
+        timeline: &'t Timeline,
+    ) -> Result<Cow<'t, Timeline>, OutOfMemory> {
+        match self.in_pieces {
+            Some(_) => Ok(Cow::Borrowed(timeline)), // each piece folds its own
+            None => self.data.folded(timeline),
+        }
+    }
+
+    /// A window of the result, in pieces.
+    fn evaluate_pieces(
+        &self,
+        (set, limit): &(TrackSet, usize),
+        timeline: &Timeline,
+        window: &Window,
+        encoding: Encoding,
+        output: &mut [u8],
+    ) -> Result<(), EvaluateError> {
+        let pieces = Pieces {
+            backend: &self.backend,
+            set,
+            interpolation: &self.data.interpolation,
+            timeline,
+            encoding,
+            limit: *limit,
+        };
+        pieces.evaluate_into(window, output)
     }
 
     /// The memory that the next clip can use: that of the segments, and their buffers on a device.
@@ -70,14 +128,14 @@ impl Uploaded {
         timeline: &Timeline,
         layout: Layout,
     ) -> Result<Box<dyn Storage>, EvaluateError> {
-        let timeline = self.data.folded(timeline)?;
+        let timeline = self.folded(timeline)?;
         match &*self.backend {
-            Backend::Vulkan(opened) => {
+            Backend::Vulkan(opened) if self.in_pieces.is_none() => {
                 self.on_device(opened, &timeline, Encoding::F32, |engine, job| {
                     engine.evaluate(job, layout)
                 })
             }
-            Backend::Cpu(_) => {
+            _ => {
                 let whole = Window::whole(self.data.track_count(), timeline.len(), layout);
                 let mut quats = OutputBuffer::new(whole.len())?;
                 let output = bytemuck::cast_slice_mut(&mut quats);
@@ -96,6 +154,9 @@ impl Uploaded {
         encoding: Encoding,
         output: &mut [u8],
     ) -> Result<(), EvaluateError> {
+        if let Some(set) = &self.in_pieces {
+            return self.evaluate_pieces(set, timeline, window, encoding, output);
+        }
         let data = &self.data;
         match &*self.backend {
             Backend::Cpu(engine) => Ok(match bytemuck::try_cast_slice_mut(&mut *output) {
@@ -118,6 +179,10 @@ impl Uploaded {
         encoding: Encoding,
         mut work: impl FnMut(&VulkanEngine, Job<'_>) -> Result<T, EvaluateError>,
     ) -> Result<T, EvaluateError> {
+        if let Some((set, _)) = &self.in_pieces {
+            let needed = segment_bytes(set, &self.data.interpolation);
+            return Err(OutOfMemory::new::<u8>(SEGMENTS, needed).into());
+        }
         opened.attempt_smaller(|engine| {
             let (clip, buffers) = (&self.data, &*self.buffers_on(engine)?);
             let job = Job {
@@ -165,6 +230,14 @@ impl Backend {
     /// Bytes of segments that go into one buffer of a Vulkan device.
     pub(crate) fn group_bytes(&self) -> Option<usize> {
         self.opened().map(|opened| opened.engine().group_bytes)
+    }
+
+    /// Bytes that segments may take, if there is a limit.
+    pub(crate) fn budget(&self) -> Option<usize> {
+        match self {
+            Self::Cpu(engine) => engine.memory,
+            Self::Vulkan(opened) => opened.engine().clip_bytes,
+        }
     }
 
     /// The Vulkan device; `None` for the CPU.

@@ -89,12 +89,14 @@ impl<'a> KeyJob<'a> {
         for batch in batches(set, Batch::Tracks(self.request.tracks.clone()), size) {
             let parts = match batch {
                 Batch::Tracks(_) => batches(set, batch, task_size),
-                Batch::Intervals { .. } => vec![batch],
+                Batch::Intervals { .. } | Batch::Span { .. } => vec![batch],
             };
             for batch in parts {
                 let keys = match &batch {
                     Batch::Tracks(tracks) => set.keys_of(tracks.clone()),
-                    Batch::Intervals { .. } => self.keys_of(&batch).map(|own| own.keys.len()).sum(),
+                    Batch::Intervals { .. } | Batch::Span { .. } => {
+                        self.keys_of(&batch).map(|own| own.keys.len()).sum()
+                    }
                 };
                 let all = batch.samples(set, timeline, false);
                 tasks.extend(all.clone().step_by(most).map(|first| Task {

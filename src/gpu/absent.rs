@@ -1,6 +1,8 @@
 //! What stands in the place of Vulkan in a build without the feature `vulkan`: the names that the rest of
 //! the engine uses, of types that have no value. No device is ever listed, so none is ever opened.
 
+#[path = "cache.rs"]
+pub(crate) mod cache;
 #[path = "error.rs"]
 pub(crate) mod error;
 #[path = "options.rs"]
@@ -176,7 +178,9 @@ pub(crate) mod recovery {
     use crate::gpu::options::EngineOptions;
     use crate::gpu::physical::{DeviceInfo, PhysicalDevice};
     use crate::gpu::reports::SelfTestReport;
+    use crate::output::encoding::Encoding;
     use crate::prepare::clip_data::ClipData;
+    use crate::shader::Form;
 
     pub(crate) struct Opened {
         pub(crate) self_tests: Vec<SelfTestReport>,
@@ -201,6 +205,10 @@ pub(crate) mod recovery {
             _clip: &ClipData,
             _spare: Option<ClipBuffers>,
         ) -> Result<ClipBuffers, EvaluateError> {
+            match self.never {}
+        }
+
+        pub(crate) fn warm(&self, _form: Form, _encoding: Encoding) -> Result<(), EvaluateError> {
             match self.never {}
         }
 

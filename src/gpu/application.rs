@@ -103,17 +103,23 @@ impl Application {
         let mut queues = vec![of_family(family)];
         queues.extend(copy_family.map(of_family));
         let features = vk::PhysicalDeviceFeatures::default().shader_int64(physical.has_int64);
-        let timeline = [khr::timeline_semaphore::NAME.as_ptr()];
+        let extensions = [
+            // An instance of Vulkan 1.1 has timelines by their extension.
+            (copy_family.is_some(), khr::timeline_semaphore::NAME),
+            (physical.portability_subset, khr::portability_subset::NAME),
+        ];
+        let extensions: Vec<_> = (extensions.iter())
+            .filter(|(there, _)| *there)
+            .map(|(_, name)| name.as_ptr())
+            .collect();
         let mut timelines =
             vk::PhysicalDeviceTimelineSemaphoreFeatures::default().timeline_semaphore(true);
         let mut info = vk::DeviceCreateInfo::default()
             .queue_create_infos(&queues)
-            .enabled_features(&features);
+            .enabled_features(&features)
+            .enabled_extension_names(&extensions);
         if copy_family.is_some() {
-            // An instance of Vulkan 1.1 has them by their extension.
-            info = info
-                .enabled_extension_names(&timeline)
-                .push_next(&mut timelines);
+            info = info.push_next(&mut timelines);
         }
         // SAFETY: the physical device belongs to the instance and has these families.
         let device = unsafe { instance.raw.create_device(physical.raw, &info, None) }
@@ -162,6 +168,7 @@ impl Application {
             queue: self.queue,
             queue_family: self.physical.queue_family,
             copy_queue: self.copy_queue,
+            queue_lock: None,
         }
     }
 

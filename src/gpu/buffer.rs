@@ -33,19 +33,39 @@ impl Residence {
     /// What its memory must have, and what it should have besides, the best first.
     fn properties(self) -> (vk::MemoryPropertyFlags, &'static [vk::MemoryPropertyFlags]) {
         use vk::MemoryPropertyFlags as Flags;
-        /// Reading memory that the host does not cache is dozens of times slower.
-        const CACHED: &[Flags] = &[Flags::HOST_CACHED];
+        const fn all(flags: &[Flags]) -> Flags {
+            let (mut all, mut i) = (0, 0);
+            while i < flags.len() {
+                all |= flags[i].as_raw();
+                i += 1;
+            }
+            Flags::from_raw(all)
+        }
+        /// Reading memory that the host does not cache is dozens of times slower, so cached memory is
+        /// taken also where it is not coherent (Adreno, older Mali).
+        const CACHED: &[Flags] = &[
+            all(&[Flags::HOST_COHERENT, Flags::HOST_CACHED]),
+            Flags::HOST_CACHED,
+            Flags::HOST_COHERENT,
+        ];
         /// Where memory is one, it is the device's as well.
         const UNIFIED: &[Flags] = &[
-            Flags::from_raw(Flags::HOST_CACHED.as_raw() | Flags::DEVICE_LOCAL.as_raw()),
+            all(&[
+                Flags::HOST_COHERENT,
+                Flags::HOST_CACHED,
+                Flags::DEVICE_LOCAL,
+            ]),
+            all(&[Flags::HOST_COHERENT, Flags::HOST_CACHED]),
+            all(&[Flags::HOST_CACHED, Flags::DEVICE_LOCAL]),
             Flags::HOST_CACHED,
+            Flags::HOST_COHERENT,
         ];
-        let mapped = Flags::HOST_VISIBLE | Flags::HOST_COHERENT;
+        let written = Flags::HOST_VISIBLE | Flags::HOST_COHERENT;
         match self {
-            Self::Upload => (mapped, &[]),
-            Self::Direct => (mapped | Flags::DEVICE_LOCAL, &[]),
-            Self::Readback => (mapped, CACHED),
-            Self::InPlace => (mapped, UNIFIED),
+            Self::Upload => (written, &[]),
+            Self::Direct => (written | Flags::DEVICE_LOCAL, &[]),
+            Self::Readback => (Flags::HOST_VISIBLE, CACHED),
+            Self::InPlace => (Flags::HOST_VISIBLE, UNIFIED),
             Self::Device | Self::Results => (Flags::DEVICE_LOCAL, &[]),
         }
     }
@@ -87,6 +107,8 @@ pub(crate) struct Buffer {
     /// A view of it as texels of 16 bytes; null unless kernels read it as a texel buffer.
     pub(crate) view: vk::BufferView,
     memory: Share,
+    /// Whether the host must ask to see what the device wrote, and to show what it wrote itself.
+    is_incoherent: bool,
     /// Bytes.
     pub(crate) size: u64,
 }
@@ -119,7 +141,8 @@ impl Buffer {
         let is_copied = matches!(residence, Residence::Results | Residence::Readback);
         let families = [Lane::Kernels, Lane::Copies].map(|lane| device.family(lane));
         let families = (is_copied && families[0] != families[1]).then_some(families);
-        let (mut buffer, needs) = Self::without_memory(device, size, is_texels, families, None)?;
+        let made = Self::without_memory(device, size, is_texels, families, None)?;
+        let (mut buffer, mut needs) = made;
         let (required, preferred) = residence.properties();
         let allowed = match (residence, device.placing.direct) {
             (Residence::Direct, Some(direct)) => needs.memory_type_bits & 1 << direct.memory_type,
@@ -127,10 +150,18 @@ impl Buffer {
         };
         let (physical, wanted) = (&device.physical, required.as_raw());
         let memory_type = physical.memory_type(allowed, required, preferred);
+        let memory_type = memory_type.ok_or(VulkanError::NoMemoryType { wanted })?;
         let kind = Kind {
-            memory_type: memory_type.ok_or(VulkanError::NoMemoryType { wanted })?,
+            memory_type,
             mapped: required.contains(vk::MemoryPropertyFlags::HOST_VISIBLE),
         };
+        buffer.is_incoherent = kind.mapped && !physical.is_coherent(memory_type);
+        if buffer.is_incoherent {
+            // What is made visible in one buffer must not be part of another.
+            let atom = physical.non_coherent_atom;
+            needs.alignment = needs.alignment.max(atom);
+            needs.size = needs.size.next_multiple_of(atom);
+        }
         let memory = device.shared.take(&device.raw, kind, &needs)?;
         buffer.bind(memory, is_texels, name)?;
         Ok(buffer)
@@ -162,7 +193,9 @@ impl Buffer {
         let (is_texels, handle_type) = (device.reads_texels, Some(HOST_ALLOCATION));
         let made = Self::without_memory(device, size, is_texels, None, handle_type);
         let (mut buffer, needs) = made.ok().filter(|(_, needs)| needs.size <= size)?;
-        let (required, preferred) = Residence::Readback.properties();
+        let required =
+            vk::MemoryPropertyFlags::HOST_VISIBLE | vk::MemoryPropertyFlags::HOST_COHERENT;
+        let preferred = &[vk::MemoryPropertyFlags::HOST_CACHED];
         let allowed = needs.memory_type_bits & properties.memory_type_bits;
         let memory_type = device.physical.memory_type(allowed, required, preferred)?;
         let mut import = vk::ImportMemoryHostPointerInfoEXT::default()
@@ -214,6 +247,7 @@ impl Buffer {
             raw,
             view: vk::BufferView::null(),
             memory: Share::default(),
+            is_incoherent: false,
             size,
         };
         Ok((buffer, needs))
@@ -242,6 +276,50 @@ impl Buffer {
     /// Whether the host sees its bytes.
     pub(crate) fn is_mapped(&self) -> bool {
         self.memory.mapped.is_some()
+    }
+
+    /// Whether the host and the device see each other's writes by themselves, once fences and barriers
+    /// have ordered them.
+    pub(crate) fn is_coherent(&self) -> bool {
+        !self.is_incoherent
+    }
+
+    /// Makes what the device wrote into some of the mapped bytes visible to the host, after the fence of
+    /// that work and before they are read.
+    pub(crate) fn invalidate(&self, range: &Range<usize>) -> Result<(), VulkanError> {
+        let Some(range) = self.atoms(range) else {
+            return Ok(());
+        };
+        // SAFETY: mapped memory of this device, and whole atoms of it that are the buffer's alone.
+        unsafe { self.device.raw.invalidate_mapped_memory_ranges(&[range]) }
+            .named("vkInvalidateMappedMemoryRanges")
+    }
+
+    /// Makes what the host wrote into some of the mapped bytes visible to the device, before that work is
+    /// submitted; the device must not write beside them meanwhile.
+    pub(crate) fn flush(&self, range: &Range<usize>) -> Result<(), VulkanError> {
+        let Some(range) = self.atoms(range) else {
+            return Ok(());
+        };
+        // SAFETY: as in `invalidate`.
+        unsafe { self.device.raw.flush_mapped_memory_ranges(&[range]) }
+            .named("vkFlushMappedMemoryRanges")
+    }
+
+    /// The atoms of the memory in which some bytes lie; `None` where none has to be made visible.
+    fn atoms(&self, range: &Range<usize>) -> Option<vk::MappedMemoryRange<'static>> {
+        if !self.is_incoherent || range.is_empty() {
+            return None;
+        }
+        let atom = self.device.physical.non_coherent_atom;
+        let start = (self.memory.offset + range.start as u64) / atom * atom;
+        let end = (self.memory.offset + range.end as u64).next_multiple_of(atom);
+        Some(
+            vk::MappedMemoryRange::default()
+                .memory(self.memory.memory)
+                .offset(start)
+                .size(end - start),
+        )
     }
 
     /// Some of the mapped bytes; empty where the buffer is not mapped, or shorter.

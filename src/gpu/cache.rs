@@ -116,7 +116,7 @@ fn folder(variable: impl Fn(&str) -> Option<OsString>) -> Option<PathBuf> {
 }
 
 /// A sum (64-bit FNV-1a) that tells files that were cut short or overwritten; it keeps nobody out.
-fn sum(name: &str, contents: &[u8]) -> u64 {
+pub(crate) fn sum(name: &str, contents: &[u8]) -> u64 {
     let all = name.bytes().chain(contents.iter().copied());
     all.fold(0xcbf2_9ce4_8422_2325, |sum, byte| {
         (sum ^ u64::from(byte)).wrapping_mul(0x100_0000_01b3)

@@ -206,7 +206,7 @@ impl CrowdReader {
     /// Waits, and copies the result, of which `output` has as many bytes.
     pub(crate) fn wait_into(&mut self, output: &mut [u8]) -> Result<(), VulkanError> {
         self.results.wait()?;
-        output.copy_from_slice(self.results.bytes(0..output.len()));
+        output.copy_from_slice(self.results.bytes(0..output.len())?);
         Ok(())
     }
 }

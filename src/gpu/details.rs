@@ -10,7 +10,6 @@ use crate::gpu::engine::VulkanEngine;
 use crate::gpu::error::VulkanError;
 use crate::gpu::physical::PhysicalDevice;
 use crate::gpu::pipeline::{Exactness, Pipeline};
-use crate::shader::KERNELS;
 
 /// What Vulkan tells of a device, for a report.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
@@ -242,7 +241,7 @@ impl VulkanEngine {
         &self,
         each: &mut dyn FnMut(&'static str, Duration) -> bool,
     ) -> Result<(), VulkanError> {
-        for code in &KERNELS {
+        for code in self.bindable() {
             let started = Instant::now();
             let pipeline = Pipeline::new(&self.device, code.kernel, Exactness::Demanded)?;
             if !each(pipeline.name, started.elapsed()) {

@@ -10,10 +10,11 @@ use ash::{ext, khr, vk};
 use crate::gpu::buffer::may_be_imported;
 use crate::gpu::engine::lock;
 use crate::gpu::error::{Named, VulkanError};
-use crate::gpu::handles::VulkanQueue;
+use crate::gpu::handles::{QueueLock, VulkanQueue};
 use crate::gpu::memory_types::{Placing, direct};
 use crate::gpu::options::{EngineOptions, ReadBack};
 use crate::gpu::physical::{DeviceKind, PhysicalDevice};
+use crate::gpu::pipeline_cache::PipelineCache;
 use crate::gpu::queues::{Copies, QueuePlace};
 use crate::gpu::shared_memory::SharedMemory;
 
@@ -26,10 +27,26 @@ pub(crate) enum Lane {
     Copies,
 }
 
+/// How often a fence is asked, each time for up to 10 ms: for a minute.
+const PATIENCE: usize = 6000;
+
 /// A queue, which Vulkan wants to have one user at a time.
 struct Queue {
     raw: Mutex<vk::Queue>,
     family: u32,
+    /// What an application that uses it too locks.
+    shared: Option<QueueLock>,
+}
+
+impl Queue {
+    /// Does work with it while nobody else uses it.
+    fn with<T>(&self, work: impl FnOnce(vk::Queue) -> T) -> Option<T> {
+        let queue = lock(&self.raw);
+        match &self.shared {
+            Some(shared) => shared.run(|| work(*queue)),
+            None => Some(work(*queue)),
+        }
+    }
 }
 
 /// An opened device, destroyed with its last user unless it was handed in.
@@ -53,6 +70,8 @@ pub(crate) struct LogicalDevice {
     pub(crate) shared: SharedMemory,
     /// A wait ran out of time: work may still run, so nothing may be destroyed.
     hung: AtomicBool,
+    /// What the driver compiled, kept from process to process.
+    pub(crate) pipelines: PipelineCache,
 }
 
 impl LogicalDevice {
@@ -90,6 +109,7 @@ impl LogicalDevice {
             (controls, khr::shader_float_controls::NAME),
             (borrows, ext::external_memory_host::NAME),
             (timelines, khr::timeline_semaphore::NAME),
+            (physical.portability_subset, khr::portability_subset::NAME),
         ];
         let wanted = extensions.iter().filter(|(wanted, _)| *wanted);
         let extensions: Vec<_> = wanted.map(|(_, name)| name.as_ptr()).collect();
@@ -115,7 +135,7 @@ impl LogicalDevice {
         });
         let first = queue(own, 0);
         let borrows = borrows.then(|| ext::external_memory_host::Device::new(instance, &raw));
-        let mut device = Self::borrowed(physical, raw, first, copy_queue, options);
+        let mut device = Self::borrowed(physical, raw, first, copy_queue, None, options);
         (device.owned, device.borrows) = (true, borrows);
         device.copies_apart = copies_apart;
         Ok(Arc::new(device))
@@ -128,15 +148,21 @@ impl LogicalDevice {
         raw: ash::Device,
         queue: vk::Queue,
         copy_queue: Option<VulkanQueue>,
+        queue_lock: Option<QueueLock>,
         options: &EngineOptions,
     ) -> Self {
         let in_place = physical.in_place(options.transfer);
         let stay = in_place || options.read_back == ReadBack::SameQueue;
         let named = copy_queue.filter(|_| !stay);
-        let queue_of_family = |(raw, family)| {
+        let queue_of_family = |(raw, family), shared| {
             let raw = Mutex::new(raw);
-            Queue { raw, family }
+            Queue {
+                raw,
+                family,
+                shared,
+            }
         };
+        let pipelines = PipelineCache::new(&raw, &physical);
         let instance = &physical.instance;
         let names = instance
             .debug_utils
@@ -149,8 +175,8 @@ impl LogicalDevice {
                 in_place,
                 direct: direct(&physical.memory),
             },
-            queue: queue_of_family((queue, physical.queue_family)),
-            copy_queue: named.map(|named| queue_of_family((named.queue, named.family))),
+            queue: queue_of_family((queue, physical.queue_family), queue_lock),
+            copy_queue: named.map(|named| queue_of_family((named.queue, named.family), None)),
             copies_apart: named.is_some(),
             physical,
             names,
@@ -158,12 +184,14 @@ impl LogicalDevice {
             owned: false,
             shared: SharedMemory::default(),
             hung: AtomicBool::new(false),
+            pipelines,
         }
     }
 
-    /// The queue of a lane, for one user at a time.
-    pub(crate) fn queue(&self, lane: Lane) -> MutexGuard<'_, vk::Queue> {
-        lock(&self.queue_of(lane).raw)
+    /// Does work with the queue of a lane, for one user at a time; `None` where an application's lock did not
+    /// call it.
+    pub(crate) fn with_queue<T>(&self, lane: Lane, work: impl FnOnce(vk::Queue) -> T) -> Option<T> {
+        self.queue_of(lane).with(work)
     }
 
     pub(crate) fn family(&self, lane: Lane) -> u32 {
@@ -183,7 +211,7 @@ impl LogicalDevice {
         self.copy_queue.is_some()
     }
 
-    /// Nobody else uses any queue meanwhile.
+    /// Nobody else uses any queue of a device of the engine's own meanwhile.
     fn all_queues(&self) -> (MutexGuard<'_, vk::Queue>, Option<MutexGuard<'_, vk::Queue>>) {
         let own = lock(&self.queue.raw);
         (own, self.copy_queue.as_ref().map(|other| lock(&other.raw)))
@@ -210,8 +238,29 @@ impl LogicalDevice {
         }
     }
 
-    /// Waits until the device is idle. If the wait fails, the device counts as hung.
-    pub(crate) fn wait_until_idle(&self) {
+    /// Waits until the work behind a fence has ended, after a first wait failed: a device of the engine's
+    /// own until it is idle. On an application's, others may submit meanwhile, which Vulkan forbids during
+    /// such a wait; there the fence is asked again and again. If all fails, the device counts as hung.
+    pub(crate) fn wait_until_done(&self, fence: vk::Fence) {
+        if !self.may_destroy() {
+            return; // a device that has hung is not waited for again
+        }
+        if self.owned {
+            return self.wait_until_idle();
+        }
+        for _ in 0..PATIENCE {
+            // SAFETY: the fence belongs to this device, and was submitted.
+            match unsafe { self.raw.wait_for_fences(&[fence], true, 10_000_000) } {
+                Ok(()) | Err(vk::Result::ERROR_DEVICE_LOST) => return,
+                Err(vk::Result::TIMEOUT) => {}
+                Err(_) => std::thread::sleep(Duration::from_millis(10)), // memory may come back
+            }
+        }
+        self.mark_hung();
+    }
+
+    /// Waits until the device, which is the engine's own, is idle. If the wait fails, it counts as hung.
+    fn wait_until_idle(&self) {
         let _queues = self.all_queues();
         // SAFETY: the device is alive, and its queues are locked.
         match unsafe { self.raw.device_wait_idle() } {
@@ -229,13 +278,15 @@ impl LogicalDevice {
             false => &[Lane::Copies],
         };
         for &lane in lanes {
-            let queue = self.queue(lane);
-            // SAFETY: the device is alive, and the queue is locked.
-            let _ = unsafe { self.raw.queue_wait_idle(*queue) };
+            self.with_queue(lane, |queue| {
+                // SAFETY: the device is alive, and the queue is locked.
+                let _ = unsafe { self.raw.queue_wait_idle(queue) };
+            });
         }
     }
 
-    /// Waits until the device is idle, and again if the wait fails for lack of memory.
+    /// Waits until the device, which is the engine's own (no other imports memory), is idle, and again if
+    /// the wait fails for lack of memory.
     pub(crate) fn wait_in_any_case(&self) {
         let _queues = self.all_queues();
         // SAFETY: as in `wait_until_idle`.
@@ -259,6 +310,8 @@ impl Drop for LogicalDevice {
         }
         // SAFETY: every object created from it held an `Arc` to this and is gone.
         unsafe { self.shared.free(&self.raw) };
+        // SAFETY: as above.
+        unsafe { self.pipelines.destroy(&self.raw) };
         if self.owned {
             // SAFETY: as above.
             unsafe { self.raw.destroy_device(None) };

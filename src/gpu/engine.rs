@@ -25,7 +25,7 @@ use crate::output::encoding::Encoding;
 use crate::output::rotations::{Layout, Storage};
 use crate::output::window::Window;
 use crate::prepare::clip_data::ClipData;
-use crate::shader::{Item, KERNELS, Kernel, KernelCode};
+use crate::shader::{Item, KERNELS, Kernel, KernelCode, List};
 use crate::time::frames::Timeline;
 
 /// Rotations of one window, 32 MiB, unless the device's limits, the memory budget or the device's
@@ -131,6 +131,18 @@ impl VulkanEngine {
         }
     }
 
+    /// The kinds of lists that its kernels over segments work on. What binds more storage buffers than the
+    /// device can is left out.
+    pub(crate) fn lists(&self) -> Vec<List> {
+        let mut all = vec![List::Samples, List::Frames];
+        let has_room = self.device.reads_texels || self.device.physical.storage_buffers > 4;
+        all.extend(has_room.then_some(List::Times));
+        if self.maps_samples {
+            all.extend([List::FramesCoalesced, List::TimesCoalesced]);
+        }
+        all
+    }
+
     /// The pipeline of a kernel, made when it is first needed, and checked then unless this kernel is known to be
     /// exact on this device.
     pub(crate) fn pipeline(&self, kernel: Kernel) -> Result<Arc<Pipeline>, VulkanError> {
@@ -194,14 +206,23 @@ impl VulkanEngine {
             }
             Ok(check)
         };
-        let checks = KERNELS.iter().map(&mut check).collect::<Result<_, _>>();
+        let checks = self.bindable().map(&mut check).collect::<Result<_, _>>();
         passes.remember(passed);
         checks
     }
 
     /// What is known of each kernel.
     pub(crate) fn known_kernels(&self) -> Vec<KernelCheck> {
-        KERNELS.iter().map(|code| self.known_kernel(code)).collect()
+        self.bindable()
+            .map(|code| self.known_kernel(code))
+            .collect()
+    }
+
+    /// The kernels that the device may be given: those that bind no more storage buffers than it allows.
+    pub(crate) fn bindable(&self) -> impl Iterator<Item = &'static KernelCode> {
+        let limit = self.device.physical.storage_buffers;
+        let needed = |code: &KernelCode| Pipeline::storage_buffers(&self.device, code.kernel);
+        KERNELS.iter().filter(move |code| needed(code) <= limit)
     }
 
     fn known_kernel(&self, code: &KernelCode) -> KernelCheck {
@@ -321,6 +342,9 @@ impl VulkanEngine {
             true => match self.output_buffer(bytes) {
                 // Window by window the result may still be made.
                 Err(error) if error.is_out_of_memory() => None,
+                // The host changes some rotations (`patches`). Where it must show that, it would show
+                // with them what lies beside, into which the device may be writing the next window.
+                Ok(buffer) if !buffer.is_coherent() => None,
                 buffer => Some(buffer?),
             },
             false => None,

@@ -16,16 +16,63 @@ pub enum VulkanError {
     )]
     NotBuilt,
     /// There is no Vulkan loader library.
-    #[error("no Vulkan loader: {reason}; install it (Debian: libvulkan1 and mesa-vulkan-drivers)")]
+    #[error(
+        "no Vulkan loader: {reason}; install it (Debian: libvulkan1 and mesa-vulkan-drivers; macOS: brew install vulkan-loader molten-vk)"
+    )]
     NoLoader {
         /// What the system said.
         reason: String,
     },
     /// A loader, but no driver, or none with a device that can compute.
     #[error(
-        "the Vulkan loader finds no driver with a device that can compute; install one (Debian: mesa-vulkan-drivers)"
+        "the Vulkan loader finds no driver with a device that can compute; install one (Debian: mesa-vulkan-drivers; macOS: brew install molten-vk)"
     )]
     NoDevice,
+    /// A card of NVIDIA's, and no file that names its Vulkan driver.
+    #[error(
+        "no Vulkan driver for the NVIDIA card that /dev/nvidiactl shows: in a container, add the capability `graphics` (NVIDIA_DRIVER_CAPABILITIES=all); slices of a card that MIG made have no Vulkan"
+    )]
+    NoNvidiaDriver,
+    /// The drivers did not answer in time.
+    #[error(
+        "the Vulkan drivers did not answer within {seconds} s; cards without NVIDIA's persistence daemon (nvidia-persistenced) and machines with many cards take long to start: run the daemon, wait longer (TUMBLE_DRIVER_SECONDS={}), or name the drivers to load in VK_DRIVER_FILES", seconds.saturating_mul(3)
+    )]
+    SlowDriver {
+        /// How long was waited.
+        seconds: u64,
+    },
+    /// A kernel binds more storage buffers than the device can.
+    #[error(
+        "the kernel {kernel} binds {needed} storage buffers, and the device allows {limit} (maxPerStageDescriptorStorageBuffers); frames at a rate and samples straight from keys need 4, explicit times 5, crowds 5: evaluate this on the CPU"
+    )]
+    StorageBuffers {
+        /// The kernel.
+        kernel: &'static str,
+        /// Storage buffers that it binds.
+        needed: u32,
+        /// The device's limit.
+        limit: u32,
+    },
+    /// An application's queue is of a family that the device has not, or that cannot do its work.
+    #[error(
+        "the queue is of family {family}, which cannot {work}; the device has {families} families, from 0"
+    )]
+    QueueFamily {
+        /// The family that was given.
+        family: u32,
+        /// What it is for.
+        work: &'static str,
+        /// How many the device has.
+        families: usize,
+    },
+    /// The application's lock did not run what it was given.
+    #[error(
+        "the application's lock of the queue (VulkanHandles::queue_lock) did not call the function that it was given"
+    )]
+    QueueLock,
+    /// The queue for copies is the one that computes.
+    #[error("the queue for copies is the one that computes; give another, or none")]
+    SameQueue,
     /// A driver ends the process that loads it.
     #[error(
         "a Vulkan driver fails as it is loaded: {how}; remove it, or name those to load in VK_DRIVER_FILES"

@@ -1,11 +1,12 @@
 //! Vulkan objects of an application's own.
 
-use std::sync::Arc;
+use std::fmt;
+use std::sync::{Arc, Mutex};
 
 use ash::vk;
 
 use crate::gpu::device::LogicalDevice;
-use crate::gpu::engine::VulkanEngine;
+use crate::gpu::engine::{VulkanEngine, lock};
 use crate::gpu::error::VulkanError;
 use crate::gpu::instance::Instance;
 use crate::gpu::options::EngineOptions;
@@ -41,6 +42,63 @@ pub struct VulkanHandles {
     /// computes ([`ReadBack`](crate::gpu::options::ReadBack)). Without one, only `queue` is used. The
     /// device must have the feature `timelineSemaphore` enabled then.
     pub copy_queue: Option<VulkanQueue>,
+    /// A lock that the application locks whenever it uses `queue`, from any thread; the engine locks it for
+    /// each of its submissions, so that both may submit at any time. It must not be locked while the
+    /// application calls the engine, which would wait for it for ever. Without one nobody else may use the
+    /// queue while the engine does. The queue for copies is the engine's alone.
+    pub queue_lock: Option<QueueLock>,
+}
+
+/// A lock for a queue that an application and an engine share: the application's own, of whatever kind.
+///
+/// ```
+/// use std::sync::{Arc, Mutex};
+/// use tumble::QueueLock;
+///
+/// let frames = Arc::new(Mutex::new(0)); // what the application's lock protects beside the queue
+/// let own = Arc::clone(&frames);
+/// let lock = QueueLock::new(move |submit| {
+///     let _locked = own.lock();
+///     submit();
+/// });
+/// ```
+#[derive(Clone)]
+pub struct QueueLock(Arc<Locked>);
+
+/// Runs work while a lock is locked.
+type Locked = dyn Fn(&mut dyn FnMut()) + Send + Sync;
+
+impl QueueLock {
+    /// A lock by a function that locks it, calls what it is given once, and unlocks it.
+    pub fn new(locked: impl Fn(&mut dyn FnMut()) + Send + Sync + 'static) -> Self {
+        Self(Arc::new(locked))
+    }
+
+    /// Does work while the lock is locked; `None` from a function that did not call it.
+    pub(crate) fn run<T>(&self, work: impl FnOnce() -> T) -> Option<T> {
+        let (mut work, mut done) = (Some(work), None);
+        (self.0)(&mut || {
+            if let Some(work) = work.take() {
+                done = Some(work());
+            }
+        });
+        done
+    }
+}
+
+impl From<Arc<Mutex<()>>> for QueueLock {
+    fn from(mutex: Arc<Mutex<()>>) -> Self {
+        Self::new(move |work| {
+            let _locked = lock(&mutex);
+            work();
+        })
+    }
+}
+
+impl fmt::Debug for QueueLock {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("QueueLock").finish_non_exhaustive()
+    }
 }
 
 /// A queue of an application's own device.
@@ -70,10 +128,20 @@ impl VulkanEngine {
         handles: VulkanHandles,
         options: &EngineOptions,
     ) -> Result<Self, VulkanError> {
+        use vk::QueueFlags as Flags;
         let instance = Instance::borrowed(handles.entry, handles.instance);
         let mut physical = PhysicalDevice::new(&instance, handles.physical_device)?
             .ok_or(VulkanError::NoDevice)?;
         physical.queue_family = handles.queue_family;
+        physical.check_family(handles.queue_family, Flags::COMPUTE, "compute")?;
+        if let Some(copies) = &handles.copy_queue {
+            // Whoever computes or draws can copy.
+            let can_copy = Flags::TRANSFER | Flags::COMPUTE | Flags::GRAPHICS;
+            physical.check_family(copies.family, can_copy, "copy")?;
+            if copies.queue == handles.queue {
+                return Err(VulkanError::SameQueue);
+            }
+        }
         if handles.api_version < vk::API_VERSION_1_2 && !handles.shader_float_controls {
             // The application did not enable what the device offers.
             physical.float_controls = FloatControls::default();
@@ -84,6 +152,7 @@ impl VulkanEngine {
             handles.device,
             handles.queue,
             handles.copy_queue,
+            handles.queue_lock,
             options,
         );
         Ok(Self::new(Arc::new(device), options))

@@ -185,7 +185,7 @@ impl<U> InFlight<U> {
             Target::External(_) => &mut [],
             Target::Slice(slice) => {
                 let output = &mut slice[done.output];
-                copy(output, self.results.bytes(0..output.len()));
+                copy(output, self.results.bytes(0..output.len())?);
                 output
             }
         };

@@ -1,9 +1,10 @@
 //! The Vulkan instance: loader, validation, and the physical devices.
 
 use std::ffi::{CStr, c_void};
+use std::path::Path;
 use std::sync::{Arc, Mutex};
 
-use ash::{ext, vk};
+use ash::{ext, khr, vk};
 
 use crate::gpu::engine::lock;
 use crate::gpu::error::{Named, VulkanError};
@@ -51,10 +52,7 @@ impl Instance {
     }
 
     fn create(validation: bool, api_version: u32) -> Result<Arc<Self>, VulkanError> {
-        // SAFETY: loading a library runs its initialisers; that is what is asked for.
-        let entry = unsafe { ash::Entry::load() }.map_err(|error| VulkanError::NoLoader {
-            reason: error.to_string(),
-        })?;
+        let entry = loader()?;
         // SAFETY: no requirements beyond a loaded entry.
         let layers = unsafe { entry.enumerate_instance_layer_properties() }
             .named("vkEnumerateInstanceLayerProperties")?;
@@ -72,7 +70,20 @@ impl Instance {
         let debug_utils = has_extension(None, ext::debug_utils::NAME)?
             || validation && has_extension(Some(VALIDATION), ext::debug_utils::NAME)?;
         let layers = [VALIDATION.as_ptr()];
-        let extensions = [ext::debug_utils::NAME.as_ptr()];
+        // Loaders list drivers that have not all of Vulkan (MoltenVK) only to those who say they know.
+        let portability = has_extension(None, khr::portability_enumeration::NAME)?;
+        let extensions = [
+            (debug_utils, ext::debug_utils::NAME),
+            (portability, khr::portability_enumeration::NAME),
+        ];
+        let extensions: Vec<_> = (extensions.iter())
+            .filter(|(there, _)| *there)
+            .map(|(_, name)| name.as_ptr())
+            .collect();
+        let flags = match portability {
+            true => vk::InstanceCreateFlags::ENUMERATE_PORTABILITY_KHR,
+            false => vk::InstanceCreateFlags::empty(),
+        };
         let application = vk::ApplicationInfo::default()
             .application_name(c"tumble")
             .engine_name(c"tumble")
@@ -95,13 +106,20 @@ impl Instance {
         let mut info = vk::InstanceCreateInfo::default()
             .application_info(&application)
             .enabled_layer_names(&layers[..usize::from(validation)])
-            .enabled_extension_names(&extensions[..usize::from(debug_utils)]);
+            .flags(flags)
+            .enabled_extension_names(&extensions);
         if validation {
             info = info.push_next(&mut features).push_next(&mut messenger_info);
         }
         // SAFETY: every pointer in `info` outlives the call; the messenger's user
         // data lives as long as the instance.
-        let raw = unsafe { entry.create_instance(&info, None) }.named("vkCreateInstance")?;
+        let raw = unsafe { entry.create_instance(&info, None) };
+        if raw.as_ref().err() == Some(&vk::Result::ERROR_INCOMPATIBLE_DRIVER)
+            && lacks_nvidia_driver()
+        {
+            return Err(VulkanError::NoNvidiaDriver);
+        }
+        let raw = raw.named("vkCreateInstance")?;
         let mut instance = Self {
             raw,
             debug_utils,
@@ -156,6 +174,48 @@ impl Instance {
     }
 }
 
+/// Whether this machine has a card of NVIDIA's and none of the files that name its Vulkan driver.
+pub(crate) fn lacks_nvidia_driver() -> bool {
+    let folders = [
+        "/usr/share/vulkan/icd.d",
+        "/usr/local/share/vulkan/icd.d",
+        "/etc/vulkan/icd.d",
+    ];
+    let is_named = ["VK_DRIVER_FILES", "VK_ICD_FILENAMES"];
+    let is_named = is_named.iter().any(|name| std::env::var_os(name).is_some());
+    !is_named && lacks_driver(Path::new("/dev/nvidiactl"), &folders.map(Path::new))
+}
+
+fn lacks_driver(card: &Path, folders: &[&Path]) -> bool {
+    let is_driver = |entry: std::io::Result<std::fs::DirEntry>| {
+        entry.is_ok_and(|entry| entry.file_name().to_string_lossy().contains("nvidia"))
+    };
+    let has_driver = |folder: &&Path| folder.read_dir().is_ok_and(|mut all| all.any(is_driver));
+    card.exists() && !folders.iter().any(has_driver)
+}
+
+/// Where Homebrew puts the loader, and `MoltenVK`, which is one too: neither is where macOS looks.
+const HOMEBREW: [&str; 4] = [
+    "/opt/homebrew/lib/libvulkan.1.dylib",
+    "/usr/local/lib/libvulkan.1.dylib",
+    "/opt/homebrew/lib/libMoltenVK.dylib",
+    "/usr/local/lib/libMoltenVK.dylib",
+];
+
+/// The loader's library.
+fn loader() -> Result<ash::Entry, VulkanError> {
+    // SAFETY: loading a library runs its initialisers; that is what is asked for.
+    let usual = unsafe { ash::Entry::load() };
+    usual.or_else(|error| {
+        let others = HOMEBREW.iter().filter(|_| cfg!(target_os = "macos"));
+        // SAFETY: as above.
+        let mut found = others.filter_map(|path| unsafe { ash::Entry::load_from(path) }.ok());
+        found.next().ok_or_else(|| VulkanError::NoLoader {
+            reason: error.to_string(),
+        })
+    })
+}
+
 impl Drop for Instance {
     fn drop(&mut self) {
         if let Some(messenger) = &self.messenger {
@@ -186,4 +246,26 @@ unsafe extern "system" fn record_message(
     };
     lock(messages).push(text);
     vk::FALSE
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use super::*;
+
+    #[test]
+    fn a_card_without_the_file_of_its_driver_is_noticed() {
+        let folder = tempfile::tempdir().unwrap();
+        let (card, drivers) = (folder.path().join("nvidiactl"), folder.path().join("icd.d"));
+        let lacks = || lacks_driver(&card, &[&folder.path().join("none"), &drivers]);
+        assert!(!lacks(), "no card");
+        fs::write(&card, "").unwrap();
+        assert!(lacks());
+        fs::create_dir(&drivers).unwrap();
+        fs::write(drivers.join("lvp_icd.x86_64.json"), "{}").unwrap();
+        assert!(lacks());
+        fs::write(drivers.join("nvidia_icd.json"), "{}").unwrap();
+        assert!(!lacks());
+    }
 }

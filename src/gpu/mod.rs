@@ -27,6 +27,7 @@ pub(crate) mod memory_types;
 pub(crate) mod options;
 pub(crate) mod physical;
 pub(crate) mod pipeline;
+pub(crate) mod pipeline_cache;
 pub(crate) mod queues;
 pub(crate) mod read_back;
 pub(crate) mod recovery;

@@ -81,7 +81,8 @@ pub enum Mapping {
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 #[non_exhaustive]
 pub struct EngineOptions {
-    /// Bytes of device memory to use besides results; no limit by default.
+    /// Bytes of the device's memory to use besides results, on the CPU for the segments of a set; no limit by
+    /// default. What needs more is prepared piece by piece.
     pub memory: Option<u64>,
     /// Worker threads of the CPU; by default those that all engines of the process share, as many as the
     /// environment's `RAYON_NUM_THREADS` says, else one for each core.

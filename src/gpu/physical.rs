@@ -6,15 +6,18 @@ use std::time::Duration;
 use ash::{ext, khr, vk};
 
 use crate::gpu::error::{Named, VulkanError};
-use crate::gpu::instance::Instance;
+use crate::gpu::instance::{self, Instance};
 use crate::gpu::memory_types::is_unified;
 use crate::gpu::options::{EngineOptions, Mapping, Reads, Transfer};
-use crate::gpu::queues::{Copies, compute_family, copies};
+use crate::gpu::queues::{Copies, check_family, compute_family, copies};
 pub(crate) use crate::gpu::reports::{DeviceInfo, DeviceKind};
 use crate::shader::spirv::FloatControls;
 
 /// Bytes of one texel of the texel buffers that kernels read.
 const TEXEL_BYTES: u64 = 16;
+
+/// The most storage buffers that a kernel binds where none is a texel buffer. Vulkan promises 4.
+const MAX_STORAGE_BUFFERS: u32 = 6;
 
 /// A physical device, not yet opened.
 #[derive(Clone)]
@@ -36,6 +39,14 @@ pub(crate) struct PhysicalDevice {
     /// Their extension must be enabled: the device is older than Vulkan 1.2.
     pub(crate) timelines_extension: bool,
     max_texel_buffer_elements: u32,
+    /// Bytes that memory which is not coherent becomes visible in, and a multiple of which they are.
+    pub(crate) non_coherent_atom: u64,
+    /// Storage buffers that one kernel may bind.
+    pub(crate) storage_buffers: u32,
+    /// It has not all of Vulkan (`MoltenVK`), and wants that said when it is opened.
+    pub(crate) portability_subset: bool,
+    /// What its driver wants to find in a pipeline cache: vendor, device and the cache's UUID.
+    pub(crate) pipeline_cache: (u32, u32, [u8; 16]),
     /// Shaders may have integers of 64 bits.
     pub(crate) has_int64: bool,
     /// The alignment of imported memory, bytes; `None` where memory cannot be imported.
@@ -60,6 +71,9 @@ pub(crate) fn list(validation: bool) -> Result<Vec<PhysicalDevice>, VulkanError>
     }
     if let (true, Some(error)) = (devices.is_empty(), failed) {
         return Err(error);
+    }
+    if devices.is_empty() && instance::lacks_nvidia_driver() {
+        return Err(VulkanError::NoNvidiaDriver);
     }
     devices.sort_by_key(|device| device.info.kind);
     Ok(devices)
@@ -174,6 +188,14 @@ impl PhysicalDevice {
             timelines_extension: reports_timelines && !core_1_2,
             has_int64,
             max_texel_buffer_elements: limits.max_texel_buffer_elements,
+            non_coherent_atom: limits.non_coherent_atom_size.max(1),
+            storage_buffers: limits.max_per_stage_descriptor_storage_buffers,
+            portability_subset: has(khr::portability_subset::NAME),
+            pipeline_cache: (
+                properties.vendor_id,
+                properties.device_id,
+                properties.pipeline_cache_uuid,
+            ),
             lent_alignment: borrows.then_some(imported.min_imported_host_pointer_alignment),
             info,
         }))
@@ -186,7 +208,11 @@ impl PhysicalDevice {
         let longest = u64::from(self.max_texel_buffer_elements) * TEXEL_BYTES;
         let can = self.has_int64 && longest >= self.info.max_memory_allocation_size;
         match reads {
-            Reads::Automatic => can && self.info.kind == DeviceKind::Cpu,
+            // Where few storage buffers can be bound, texel buffers count apart.
+            Reads::Automatic => {
+                can && (self.info.kind == DeviceKind::Cpu
+                    || self.storage_buffers < MAX_STORAGE_BUFFERS)
+            }
             Reads::StorageBuffers => false,
             Reads::TexelBuffers => can,
         }
@@ -196,7 +222,10 @@ impl PhysicalDevice {
     /// what they store at neighbouring places as whole lines; software devices store lane by lane.
     pub(crate) fn maps_samples(&self, mapping: Mapping) -> bool {
         match mapping {
-            Mapping::Automatic => !matches!(self.info.kind, DeviceKind::Cpu | DeviceKind::Other),
+            Mapping::Automatic => {
+                self.storage_buffers >= MAX_STORAGE_BUFFERS
+                    && !matches!(self.info.kind, DeviceKind::Cpu | DeviceKind::Other)
+            }
             Mapping::Runs => false,
             Mapping::Samples => true,
         }
@@ -229,6 +258,16 @@ impl PhysicalDevice {
         )
     }
 
+    /// Refuses a queue family that the device has not, or that can do none of some work.
+    pub(crate) fn check_family(
+        &self,
+        family: u32,
+        any_of: vk::QueueFlags,
+        work: &'static str,
+    ) -> Result<(), VulkanError> {
+        check_family(&self.families, family, any_of, work)
+    }
+
     /// Refuses what kernels cannot see as one buffer.
     pub(crate) fn check_range(&self, what: &'static str, bytes: u64) -> Result<(), VulkanError> {
         let limit = self.info.max_storage_buffer_range;
@@ -249,6 +288,12 @@ impl PhysicalDevice {
         let bits = self.timestamp_bits();
         let ticks = end.wrapping_sub(start) & (u64::MAX >> (64 - bits.clamp(1, 64)));
         Duration::from_nanos((ticks as f64 * self.timestamp_period) as u64)
+    }
+
+    /// Whether the host and the device see each other's writes into memory of a type by themselves.
+    pub(crate) fn is_coherent(&self, memory_type: u32) -> bool {
+        let flags = self.memory.memory_types[memory_type as usize].property_flags;
+        flags.contains(vk::MemoryPropertyFlags::HOST_COHERENT)
     }
 
     /// The first memory type allowed by `allowed` with all of `required`; one that also has the first

@@ -50,6 +50,15 @@ fn words(device: &LogicalDevice, code: &[u32], exactness: Exactness) -> Vec<u32>
 }
 
 impl Pipeline {
+    /// Storage buffers that a kernel binds on a device: all of its buffers, or only the one that it writes.
+    pub(crate) fn storage_buffers(device: &LogicalDevice, kernel: Kernel) -> u32 {
+        let (.., reads_texels) = kernel.code(device.reads_texels);
+        match reads_texels {
+            true => 1,
+            false => kernel.compiled().bindings,
+        }
+    }
+
     /// The hash that the code of a kernel's pipeline has.
     pub(crate) fn code_hash(device: &LogicalDevice, kernel: Kernel) -> u64 {
         let (_, code, _) = kernel.code(device.reads_texels);
@@ -74,6 +83,18 @@ impl Pipeline {
             code_hash: 0,
             has_run: AtomicBool::new(false),
         };
+        let (needed, limit) = (
+            Self::storage_buffers(device, kernel),
+            device.physical.storage_buffers,
+        );
+        if needed > limit {
+            let kernel = name;
+            return Err(VulkanError::StorageBuffers {
+                kernel,
+                needed,
+                limit,
+            });
+        }
         let list: Vec<_> = (0..bindings)
             .map(|binding| {
                 vk::DescriptorSetLayoutBinding::default()
@@ -112,7 +133,7 @@ impl Pipeline {
         let info = [vk::ComputePipelineCreateInfo::default()
             .stage(stage)
             .layout(pipeline.layout)];
-        let cache = vk::PipelineCache::null();
+        let cache = device.pipelines.raw;
         // SAFETY: the module has an entry point `main` that fits the layout.
         let created = unsafe { device.raw.create_compute_pipelines(cache, &info, None) };
         // SAFETY: a module is not needed once its pipeline exists.
@@ -120,6 +141,7 @@ impl Pipeline {
         pipeline.raw = created
             .map_err(|(_, result)| result)
             .named("vkCreateComputePipelines")?[0];
+        device.pipelines.note();
         device.name(pipeline.raw, name);
         Ok(pipeline)
     }
@@ -166,6 +188,7 @@ impl Pipeline {
         let mut found = Buffer::new(&self.device, name, bytes, Residence::InPlace)?;
         if is_filled {
             found.bytes_mut(0..output.len()).copy_from_slice(output);
+            found.flush(&(0..output.len()))?;
         }
         let mut bindings: Vec<Binding> = uploads.iter().filter_map(Upload::binding).collect();
         bindings.push(Binding::whole(&found));
@@ -177,6 +200,7 @@ impl Pipeline {
         (submission.commands()).barrier(Access::Kernel, Access::Host);
         submission.submit()?;
         submission.wait()?;
+        found.invalidate(&(0..output.len()))?;
         output.copy_from_slice(found.bytes(0..output.len()));
         Ok(())
     }

@@ -2,6 +2,7 @@
 
 use ash::vk;
 
+use crate::gpu::error::VulkanError;
 use crate::gpu::options::ReadBack;
 
 /// A queue of a device.
@@ -29,12 +30,37 @@ const OTHER_WORK: vk::QueueFlags = vk::QueueFlags::from_raw(
         | vk::QueueFlags::OPTICAL_FLOW_NV.as_raw(),
 );
 
-/// The family of the queue that computes: the first that can.
+/// The family of the queue that computes: the first that can and does not draw, which a desktop keeps
+/// busy; else the first that can.
 pub(crate) fn compute_family(families: &[vk::QueueFamilyProperties]) -> Option<u32> {
-    let computes = |own: &vk::QueueFamilyProperties| {
-        own.queue_count > 0 && own.queue_flags.contains(vk::QueueFlags::COMPUTE)
+    use vk::QueueFlags as Flags;
+    let computes = |family: &vk::QueueFamilyProperties| {
+        family.queue_count > 0 && family.queue_flags.contains(Flags::COMPUTE)
     };
-    families.iter().position(computes).map(|place| place as u32)
+    let computes_alone = |family: &vk::QueueFamilyProperties| {
+        computes(family) && !family.queue_flags.intersects(Flags::GRAPHICS | OTHER_WORK)
+    };
+    let alone = families.iter().position(computes_alone);
+    let index = alone.or_else(|| families.iter().position(computes));
+    index.map(|index| index as u32)
+}
+
+/// Refuses a family that is not there, or has none of some flags.
+pub(crate) fn check_family(
+    families: &[vk::QueueFamilyProperties],
+    family: u32,
+    any_of: vk::QueueFlags,
+    work: &'static str,
+) -> Result<(), VulkanError> {
+    let found = families.get(family as usize);
+    match found.is_some_and(|found| found.queue_flags.intersects(any_of)) {
+        true => Ok(()),
+        false => Err(VulkanError::QueueFamily {
+            family,
+            work,
+            families: families.len(),
+        }),
+    }
 }
 
 /// The queue that runs beside one of the family `compute` with the least in its way: a copy engine;
@@ -103,14 +129,44 @@ mod tests {
     fn each_card_copies_on_the_queue_that_is_least_in_the_way() {
         assert_eq!(of("H200"), place(1, 0));
         assert_eq!(of("RTX 4060"), place(1, 0));
-        assert_eq!(of("RX 7900 XTX, RADV"), place(1, 0));
+        assert_eq!(of("RX 7900 XTX, RADV"), place(1, 1));
         assert_eq!(of("RX 7900 XTX, AMD's driver"), place(2, 0));
-        assert_eq!(of("Steam Deck"), place(1, 0));
+        assert_eq!(of("Steam Deck"), place(1, 1));
         assert_eq!(of("Arc A770, Mesa 23"), None);
         assert_eq!(of("Arc A770, Mesa 24"), place(2, 0));
         assert_eq!(of("Apple M2, MoltenVK"), place(1, 0));
         assert_eq!(of("lavapipe"), None);
         assert_eq!(of("SwiftShader"), None);
+    }
+
+    /// Kernels stay out of the way of what draws, where a family computes alone.
+    #[test]
+    fn each_card_computes_where_it_does_not_draw() {
+        for (name, family) in [
+            ("H200", 2),
+            ("RTX 4060", 2),
+            ("RX 7900 XTX, RADV", 1),
+            ("RX 7900 XTX, AMD's driver", 1),
+            ("Arc A770, Mesa 23", 0),
+            ("Arc A770, Mesa 24", 1),
+            ("Apple M2, MoltenVK", 0),
+            ("lavapipe", 0),
+        ] {
+            assert_eq!(compute_family(&card(name).families), Some(family), "{name}");
+        }
+        assert_eq!(compute_family(&[]), None);
+    }
+
+    #[test]
+    fn families_that_are_not_there_or_cannot_are_refused() {
+        let families = card("RTX 4060").families;
+        let check = |family, flags| check_family(&families, family, flags, "compute");
+        assert_eq!(check(2, vk::QueueFlags::COMPUTE), Ok(()));
+        for family in [1, 5, u32::MAX] {
+            let refused = check(family, vk::QueueFlags::COMPUTE).unwrap_err();
+            let expected = format!("family {family}, which cannot compute; the device has 5");
+            assert!(refused.to_string().contains(&expected), "{refused}");
+        }
     }
 
     #[test]

@@ -103,9 +103,12 @@ impl ReadBack {
     }
 
     /// Some of the results, after the wait.
-    pub(crate) fn bytes(&self, range: Range<usize>) -> &[u8] {
-        let own = self.host.as_ref().or(self.output.as_ref());
-        own.map_or(&[], |own| own.bytes(range))
+    pub(crate) fn bytes(&self, range: Range<usize>) -> Result<&[u8], VulkanError> {
+        let Some(buffer) = self.host.as_ref().or(self.output.as_ref()) else {
+            return Ok(&[]);
+        };
+        buffer.invalidate(&range)?;
+        Ok(buffer.bytes(range))
     }
 }
 

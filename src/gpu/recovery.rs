@@ -11,7 +11,9 @@ use crate::gpu::options::EngineOptions;
 use crate::gpu::physical::{DeviceInfo, PhysicalDevice};
 use crate::gpu::self_test::{self, SelfTestReport};
 use crate::gpu::turns::Turns;
+use crate::output::encoding::Encoding;
 use crate::prepare::clip_data::ClipData;
+use crate::shader::{Form, Kernel};
 
 /// How often a lost device is opened again for one call.
 const REOPENINGS: usize = 3;
@@ -100,6 +102,28 @@ impl Opened {
                 Ok(engine.upload(clip, None)?)
             }
             done => Ok(done?),
+        })
+    }
+
+    /// Makes the pipelines for segments of a form and for what goes straight from keys, and keeps what the
+    /// driver compiled.
+    pub(crate) fn warm(&self, form: Form, encoding: Encoding) -> Result<(), EvaluateError> {
+        self.attempt(|engine| {
+            for list in engine.lists() {
+                engine.pipeline(Kernel::over_segments(form, list, encoding.row().store))?;
+            }
+            if encoding == Encoding::F32 {
+                for kernel in [
+                    Kernel::FromKeysArcs,
+                    Kernel::FromKeysTwoKeys,
+                    Kernel::FromKeysCubics,
+                ] {
+                    engine.pipeline(kernel)?;
+                }
+            }
+            let device = &engine.device;
+            device.pipelines.keep(&device.raw);
+            Ok(())
         })
     }
 

@@ -207,9 +207,13 @@ impl Submission {
             info = info.push_next(&mut timelines);
         }
         let info = [info];
-        let queue = self.device.queue(self.lane);
-        // SAFETY: the fence is unsignalled and the queue is locked.
-        unsafe { raw.queue_submit(*queue, &info, self.fence) }.named("vkQueueSubmit")?;
+        let submitted = self.device.with_queue(self.lane, |queue| {
+            // SAFETY: the fence is unsignalled and the queue is locked.
+            unsafe { raw.queue_submit(queue, &info, self.fence) }
+        });
+        submitted
+            .ok_or(VulkanError::QueueLock)?
+            .named("vkQueueSubmit")?;
         self.submitted = Some(Instant::now());
         Ok(())
     }
@@ -374,7 +378,7 @@ impl Drop for Submission {
     fn drop(&mut self) {
         // An error may have left work pending; nothing may go before it ends.
         if self.wait().is_err() && self.submitted.is_some() {
-            self.device.wait_until_idle();
+            self.device.wait_until_done(self.fence);
         }
         if self.device.may_destroy() {
             let raw = &self.device.raw;

@@ -20,26 +20,44 @@ pub(crate) enum Batch {
         track: usize,
         intervals: Range<usize>,
     },
+    /// The intervals of some tracks in which samples between two times lie, seconds, and some beside them: a time
+    /// within rounding of a key may lie on either side of it.
+    Span {
+        tracks: Range<usize>,
+        from: f64,
+        to: f64,
+    },
+}
+
+/// The intervals between keys at these times in which samples between two times lie, and one more on either side.
+/// Before the first key and after the last that is the interval beside it.
+pub(crate) fn around(times: &[f64], from: f64, to: f64) -> Range<usize> {
+    let all = times.len() - 1;
+    let first = times.partition_point(|&time| time <= from);
+    let last = times.partition_point(|&time| time <= to);
+    first.saturating_sub(2).min(all.saturating_sub(1))..(last + 1).min(all)
 }
 
 impl Batch {
     /// The tracks of which it has intervals.
     pub(crate) fn tracks(&self) -> Range<usize> {
         match *self {
-            Self::Tracks(ref tracks) => tracks.clone(),
+            Self::Tracks(ref tracks) | Self::Span { ref tracks, .. } => tracks.clone(),
             Self::Intervals { track, .. } => track..track + 1,
         }
     }
 
     /// Each track with the intervals of it that belong to the batch.
     pub(crate) fn intervals(&self, set: &TrackSet) -> impl Iterator<Item = (usize, Range<usize>)> {
-        let own = match self {
-            Self::Tracks(_) => None,
-            Self::Intervals { intervals, .. } => Some(intervals.clone()),
-        };
+        let batch = self.clone();
         self.tracks().map(move |track| {
-            let all = || 0..set.times_and_keys(track).1.len() - 1;
-            (track, own.clone().unwrap_or_else(all))
+            let (times, _) = set.times_and_keys(track);
+            let intervals = match &batch {
+                Self::Tracks(_) => 0..times.len() - 1,
+                Self::Intervals { intervals, .. } => intervals.clone(),
+                Self::Span { from, to, .. } => around(times, *from, *to),
+            };
+            (track, intervals)
         })
     }
 
@@ -92,11 +110,36 @@ pub(crate) fn batches(set: &TrackSet, whole: Batch, size: BatchSize) -> Vec<Batc
                 intervals: start..own.end.min(start.saturating_add(each)),
             })
     };
+    let mut all = Vec::new();
     let tracks = match whole {
         Batch::Tracks(tracks) => tracks,
         Batch::Intervals { track, intervals } => return parts(track, intervals).collect(),
+        Batch::Span {
+            ref tracks,
+            from,
+            to,
+        } => {
+            // Of tracks with few keys in the span as many as may be together.
+            let (mut start, mut keys) = (tracks.start, 0);
+            let span = |tracks| Batch::Span { tracks, from, to };
+            for (track, intervals) in whole.intervals(set) {
+                let needed = intervals.len() + 1;
+                if start < track && (keys + needed > size.keys || track - start >= size.tracks) {
+                    all.push(span(start..track));
+                    (start, keys) = (track, 0);
+                }
+                if each < intervals.len() {
+                    all.extend(parts(track, intervals));
+                    start = track + 1;
+                } else {
+                    keys += needed;
+                }
+            }
+            all.extend((start < tracks.end).then(|| span(start..tracks.end)));
+            return all;
+        }
     };
-    let (mut all, mut start) = (Vec::new(), tracks.start);
+    let mut start = tracks.start;
     while start < tracks.end {
         let most = (tracks.end).min(start.saturating_add(size.tracks.max(1)));
         let next = set.tracks_within(start..most, size.keys);

@@ -108,37 +108,65 @@ fn prepare(
         if let Some(timeline) = only_for {
             preparation.only_for(timeline, set);
         }
-        if let Batch::Tracks(tracks) = &batch {
-            prepared.reserve(set.keys_of(tracks.clone()));
+        match &batch {
+            Batch::Tracks(tracks) => prepared.reserve(set.keys_of(tracks.clone()))?,
+            Batch::Span { .. } => {
+                let keys = batch
+                    .intervals(set)
+                    .map(|(_, intervals)| intervals.len() + 1);
+                prepared.reserve(keys.sum())?;
+            }
+            Batch::Intervals { .. } => {}
         }
         preparation.push(&mut prepared, set, batch.intervals(set))?;
         // A part's track counts from the first of the tracks asked for.
         for part in &mut prepared.parts {
             part.track -= first_track;
         }
-        Ok::<_, InterpolationError>(prepared)
+        Ok(prepared)
     };
     let batches: Vec<Batch> = batches(set, wanted.batch, size);
-    let prepared: Result<Vec<Prepared>, InterpolationError> = match batches.len() {
+    match batches.len() {
         0 | 1 => batches.into_iter().map(group).collect(),
         _ => on_threads(|| batches.into_par_iter().map(group).collect())?,
-    };
-    Ok(prepared?)
+    }
 }
 
 impl ClipData {
+    fn check(interpolation: &Interpolation) -> Result<(), InterpolationError> {
+        interpolation.check()?;
+        let wraps = [interpolation.before, interpolation.after];
+        match interpolation.quantity {
+            Quantity::Velocity(_) if wraps.contains(&WrapMode::Mirror) => {
+                Err(InterpolationError::MirroredVelocity)
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Of a set that can be interpolated so, with nothing prepared: its tracks have no parts.
+    pub(crate) fn unprepared(
+        set: &TrackSet,
+        interpolation: Interpolation,
+    ) -> Result<Self, InterpolationError> {
+        Self::check(&interpolation)?;
+        Preparation::check(&interpolation, set)?;
+        Ok(Self {
+            interpolation,
+            groups: Vec::new(),
+            parts: Vec::new(),
+            tracks: vec![0; set.track_count() + 1],
+            time_span: set.time_span(),
+        })
+    }
+
     /// Prepares tracks of a set.
     pub(crate) fn new(
         set: &TrackSet,
         interpolation: Interpolation,
         wanted: Wanted<'_>,
     ) -> Result<Self, SetError> {
-        interpolation.check()?;
-        if matches!(interpolation.quantity, Quantity::Velocity(_))
-            && [interpolation.before, interpolation.after].contains(&WrapMode::Mirror)
-        {
-            return Err(InterpolationError::MirroredVelocity.into());
-        }
+        Self::check(&interpolation)?;
         let merged_bytes = wanted.group_bytes.filter(|_| !wanted.few_groups);
         let groups = prepare(set, &interpolation, wanted)?;
         Ok(Self::of_groups(groups, set, interpolation, merged_bytes))

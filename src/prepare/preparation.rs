@@ -45,6 +45,28 @@ impl Preparation {
         }
     }
 
+    /// Refuses a set whose tracks cannot be interpolated so.
+    pub(crate) fn check(
+        interpolation: &Interpolation,
+        set: &TrackSet,
+    ) -> Result<(), InterpolationError> {
+        let has_path = Self::has_path(interpolation);
+        (0..set.track_count()).try_for_each(|track| {
+            let (_, keys) = set.times_and_keys(track);
+            interpolation.check_track(keys, track)?;
+            match has_path {
+                true => interpolation.path.check(keys, 0..keys.len() - 1, track),
+                false => Ok(()),
+            }
+        })
+    }
+
+    /// Whether an option says which way the curves go. Steps have no path, and a method with a path of its own also
+    /// defines the curve between opposite keys.
+    fn has_path(interpolation: &Interpolation) -> bool {
+        !interpolation.steps() && interpolation.method.path.is_none()
+    }
+
     /// From now on intervals without a sample of this timeline may be left out, which is done if
     /// the timeline has fewer samples than tracks have keys on average. The segments then serve no
     /// other timeline.
@@ -66,9 +88,7 @@ impl Preparation {
         intervals: impl Iterator<Item = (usize, Range<usize>)>,
     ) -> Result<(), InterpolationError> {
         let Self { interpolation, way } = self;
-        // Steps have no path, and a method with a path of its own also defines the curve between
-        // opposite keys.
-        let has_path = !matches!(way, Way::Steps) && interpolation.method.path.is_none();
+        let has_path = Self::has_path(interpolation);
         for (track, own) in intervals {
             let (_, keys) = set.times_and_keys(track);
             interpolation.check_track(keys, track)?;

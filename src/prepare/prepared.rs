@@ -4,10 +4,11 @@ use std::ops::Range;
 
 use bytemuck::Zeroable;
 
-use crate::curve::segment::Segments;
+use crate::curve::segment::{Segments, segment_size};
 use crate::fit::double::curve::Curve;
 use crate::fit::double::intervals::LANES;
 use crate::math::canonical::round_quat;
+use crate::memory::OutOfMemory;
 use crate::method::interpolation::Interpolation;
 use crate::shader::PolynomialSegment;
 use crate::time::frames::{Ticks, Timeline};
@@ -29,6 +30,9 @@ pub(crate) struct Prepared {
     /// The wrap modes before the first key and after the last.
     pub(crate) wrap: Wrap,
 }
+
+/// What [`OutOfMemory`] calls it.
+pub(crate) const SEGMENTS: &str = "the segments of a set";
 
 /// Where a curve goes: its span, and the segment of that.
 #[derive(Debug, Clone, Copy, Zeroable)]
@@ -59,10 +63,12 @@ impl Prepared {
     }
 
     /// Makes room for this many keys, so that the lists are not copied as they grow.
-    pub(crate) fn reserve(&mut self, keys: usize) {
-        self.segments.reserve(keys);
-        self.constants.reserve(keys);
-        self.spans.reserve(keys);
+    pub(crate) fn reserve(&mut self, keys: usize) -> Result<(), OutOfMemory> {
+        let bytes = segment_size(self.segments.form) + size_of::<[f32; 4]>();
+        let refused = |_| OutOfMemory::new::<u8>(SEGMENTS, keys.saturating_mul(bytes));
+        self.segments.try_reserve(keys).map_err(refused)?;
+        self.constants.try_reserve(keys).map_err(refused)?;
+        self.spans.try_reserve(keys).map_err(refused)
     }
 
     /// Forgets everything and keeps the memory.

@@ -279,6 +279,32 @@ impl Timeline {
         own
     }
 
+    /// The same for some samples of some tracks, and which of its samples is the first of these: explicit times
+    /// are only theirs, frames are counted from the same start.
+    pub(crate) fn part(
+        &self,
+        tracks: &std::ops::Range<usize>,
+        samples: &std::ops::Range<usize>,
+    ) -> (Self, usize) {
+        let Ticks::Times { times, stride } = &self.ticks else {
+            return (self.clone(), samples.start);
+        };
+        let of_track = |track: usize| &times[track * stride..][samples.clone()];
+        let (times, stride) = match stride {
+            0 => (of_track(0).to_vec(), 0),
+            _ => (
+                tracks.clone().flat_map(of_track).copied().collect(),
+                samples.len(),
+            ),
+        };
+        let times = Arc::new(times);
+        let part = Self {
+            ticks: Ticks::Times { times, stride },
+            count: samples.len(),
+        };
+        (part, 0)
+    }
+
     /// A list of explicit times for every track, each time replaced by `map(track, time)`.
     pub(crate) fn map_times(
         &self,

@@ -1,5 +1,6 @@
 //! Where in time the segments of prepared tracks lie.
 
+use std::collections::TryReserveError;
 use std::ops::Range;
 
 use crate::time::frames::FramesError;
@@ -108,6 +109,12 @@ impl Spans {
         self.starts.reserve(count);
         self.sources.reserve(count);
         self.keys.reserve(count);
+    }
+
+    pub(crate) fn try_reserve(&mut self, count: usize) -> Result<(), TryReserveError> {
+        self.starts.try_reserve(count)?;
+        self.sources.try_reserve(count)?;
+        self.keys.try_reserve(count)
     }
 
     pub(crate) fn clear(&mut self) {

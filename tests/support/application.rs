@@ -2,8 +2,10 @@
 #![allow(unsafe_code)] // creating a device is the application's part
 #![allow(dead_code)] // each test program uses some of it
 
+use std::sync::{Arc, Mutex};
+
 use ash::vk;
-use tumble::{Engine, EngineOptions, Mapping, VulkanHandles, VulkanQueue};
+use tumble::{Engine, EngineOptions, Error, Mapping, QueueLock, VulkanHandles, VulkanQueue};
 
 pub(crate) struct Application {
     pub(crate) instance: ash::Instance,
@@ -14,6 +16,8 @@ pub(crate) struct Application {
     /// A queue that only copies, where the device has one.
     pub(crate) copy_queue: Option<VulkanQueue>,
     pub(crate) shader_int64: bool,
+    /// Held while the queue is used.
+    pub(crate) queue_lock: Arc<Mutex<()>>,
 }
 
 impl Application {
@@ -27,7 +31,16 @@ impl Application {
             let physical_device = instance.enumerate_physical_devices().unwrap()[0];
             let families = instance.get_physical_device_queue_family_properties(physical_device);
             let copies = |family: &vk::QueueFamilyProperties| {
-                family.queue_flags == vk::QueueFlags::TRANSFER && family.queue_count > 0
+                use vk::QueueFlags as Flags;
+                // NVIDIA's also binds sparse memory; families for video copy, and are not for this.
+                let others = Flags::GRAPHICS
+                    | Flags::COMPUTE
+                    | Flags::VIDEO_DECODE_KHR
+                    | Flags::VIDEO_ENCODE_KHR
+                    | Flags::OPTICAL_FLOW_NV;
+                let flags = family.queue_flags;
+                let only_copies = flags.contains(Flags::TRANSFER) && !flags.intersects(others);
+                only_copies && family.queue_count > 0
             };
             let copy_family = families.iter().position(copies).map(|place| place as u32);
             let of_family = |family| {
@@ -66,15 +79,33 @@ impl Application {
                 queue,
                 copy_queue,
                 shader_int64: has.shader_int64 == vk::TRUE,
+                queue_lock: Arc::default(),
             }
         }
     }
 
     /// An engine on it, which must go first.
     pub(crate) fn engine(&self, mapping: Mapping) -> Engine {
+        self.try_engine(mapping).unwrap()
+    }
+
+    pub(crate) fn try_engine(&self, mapping: Mapping) -> Result<Engine, Error> {
         let mut options = EngineOptions::default();
         options.mapping = mapping;
-        let handles = VulkanHandles {
+        // SAFETY: the handles belong together and outlive the engine.
+        unsafe { Engine::from_vulkan(self.handles(), &options) }
+    }
+
+    /// Why no engine can be made of handles that were changed.
+    pub(crate) fn refused(&self, change: impl FnOnce(&mut VulkanHandles)) -> Error {
+        let mut handles = self.handles();
+        change(&mut handles);
+        // SAFETY: what is changed is refused before it is used.
+        unsafe { Engine::from_vulkan(handles, &EngineOptions::default()) }.unwrap_err()
+    }
+
+    fn handles(&self) -> VulkanHandles {
+        VulkanHandles {
             entry: self.entry.clone(),
             instance: self.instance.clone(),
             api_version: vk::API_VERSION_1_1,
@@ -85,9 +116,8 @@ impl Application {
             queue: self.queue,
             queue_family: 0,
             copy_queue: self.copy_queue,
-        };
-        // SAFETY: the handles belong together and outlive the engine.
-        unsafe { Engine::from_vulkan(handles, &options) }.unwrap()
+            queue_lock: Some(QueueLock::from(Arc::clone(&self.queue_lock))),
+        }
     }
 
     /// A buffer in memory that the host can see.
@@ -180,7 +210,8 @@ impl<'a> Commands<'a> {
             let own = [commands];
             let submit = [vk::SubmitInfo::default().command_buffers(&own)];
             let fence = vk::Fence::null();
-            // SAFETY: nobody else uses the queue.
+            let _lock = self.application.queue_lock.lock().unwrap();
+            // SAFETY: whoever uses the queue has its lock.
             unsafe {
                 let device = &self.application.device;
                 device
@@ -188,6 +219,7 @@ impl<'a> Commands<'a> {
                     .unwrap();
             }
         }
+        let _lock = self.application.queue_lock.lock().unwrap();
         // SAFETY: as above.
         unsafe { self.application.device.device_wait_idle() }.unwrap();
     }

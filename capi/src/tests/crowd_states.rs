@@ -323,6 +323,9 @@ fn handles_of_vulkan_are_looked_at() {
         shader_int64: 0,
         copy_queue: null_mut(),
         copy_queue_family: 0,
+        lock_queue: None,
+        unlock_queue: None,
+        queue_user: null_mut(),
     };
     let mut engine = null_mut();
     // SAFETY: a structure and a place for the handle; what is null or wrong is refused.

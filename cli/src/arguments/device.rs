@@ -389,7 +389,11 @@ pub(crate) fn refused(error: &Error) -> Failure {
 /// Whether there is no Vulkan, rather than one that fails.
 pub(crate) fn is_absence(error: &VulkanError) -> bool {
     match error {
-        VulkanError::NoLoader { .. } | VulkanError::NoDevice | VulkanError::Driver { .. } => true,
+        VulkanError::NoLoader { .. }
+        | VulkanError::NoDevice
+        | VulkanError::NoNvidiaDriver
+        | VulkanError::SlowDriver { .. }
+        | VulkanError::Driver { .. } => true,
         // So say loaders whose drivers do not work.
         VulkanError::Call { result, .. } => *result == vk::Result::ERROR_INITIALIZATION_FAILED,
         _ => false,

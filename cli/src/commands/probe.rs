@@ -25,8 +25,19 @@ pub(crate) const LOADED: &str = "tumble: the Vulkan drivers are loaded";
 /// More is not read of what it says: as much as a pipe holds.
 const MOST_SAID: u64 = 1 << 16;
 
-/// Drivers answer in tens of milliseconds; one that has not by now does not.
-const PATIENCE: Duration = Duration::from_secs(10);
+/// Seconds that drivers have to answer. Most take tens of milliseconds; cards without the persistence
+/// daemon, and machines with eight of them, take tens of seconds.
+const PATIENCE: u64 = 60;
+
+/// The variable that says how many seconds instead.
+const PATIENCE_VARIABLE: &str = "TUMBLE_DRIVER_SECONDS";
+
+fn patience() -> u64 {
+    let named = std::env::var(PATIENCE_VARIABLE).ok();
+    named
+        .and_then(|seconds| seconds.parse().ok())
+        .unwrap_or(PATIENCE)
+}
 
 pub(crate) fn run(_: &Arguments) -> Result<(), Failure> {
     host::load_drivers();
@@ -43,10 +54,7 @@ pub(crate) fn devices() -> Result<Vec<Device>, VulkanError> {
 pub(crate) fn drivers() -> Result<(), VulkanError> {
     static OUTCOME: OnceLock<Result<(), VulkanError>> = OnceLock::new();
     OUTCOME
-        .get_or_init(|| match load_elsewhere() {
-            Some(how) => Err(VulkanError::Driver { how }),
-            None => Ok(()),
-        })
+        .get_or_init(|| load_elsewhere(patience()).map_or(Ok(()), Err))
         .clone()
 }
 
@@ -71,7 +79,7 @@ fn command() -> Option<Command> {
 }
 
 /// What became of a process that did not come through.
-fn load_elsewhere() -> Option<String> {
+fn load_elsewhere(seconds: u64) -> Option<VulkanError> {
     let mut child = command()?
         .stdin(Stdio::null())
         .stdout(Stdio::piped())
@@ -88,22 +96,22 @@ fn load_elsewhere() -> Option<String> {
                 let _ = out.map(|mut out| out.read_to_string(&mut said));
                 return fate(status, said.contains(LOADED));
             }
-            Ok(None) if started.elapsed() < PATIENCE => {
+            Ok(None) if started.elapsed() < Duration::from_secs(seconds) => {
                 std::thread::sleep(Duration::from_millis(1));
             }
             _ => {
                 let _ = child.kill();
                 let _ = child.wait();
-                return Some(format!("no answer within {} s", PATIENCE.as_secs()));
+                return Some(VulkanError::SlowDriver { seconds });
             }
         }
     }
 }
 
 /// `has_come_through`: a driver may end the process with any status, 0 too.
-fn fate(status: ExitStatus, has_come_through: bool) -> Option<String> {
-    (!status.success() || !has_come_through)
-        .then(|| format!("the process that tried ended with {status}"))
+fn fate(status: ExitStatus, has_come_through: bool) -> Option<VulkanError> {
+    let how = format!("the process that tried ended with {status}");
+    (!status.success() || !has_come_through).then_some(VulkanError::Driver { how })
 }
 
 #[cfg(test)]

@@ -125,7 +125,9 @@ impl Failure {
     pub(crate) fn evaluating(input: &str, error: &Error) -> Self {
         let code = match error {
             Error::Frames(_) | Error::OutOfMemory(_) => USAGE,
-            Error::Vulkan(VulkanError::NoLoader { .. } | VulkanError::NoDevice) => NO_VULKAN,
+            Error::Vulkan(
+                VulkanError::NoLoader { .. } | VulkanError::NoDevice | VulkanError::NoNvidiaDriver,
+            ) => NO_VULKAN,
             Error::Vulkan(_) | Error::Threads(_) => DEVICE,
             Error::Interpolation(_) => ALL_INPUTS,
             _ => BUG,

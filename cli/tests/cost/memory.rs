@@ -3,6 +3,10 @@
 
 use std::io::{BufReader, Read};
 
+use glam::Quat;
+use tumble::{
+    Chunk, Device, Encoding, Engine, EngineOptions, Error, Frames, Layout, TrackSet, method,
+};
 use tumble_formats::Loaded;
 use tumble_formats::ReadOptions;
 use tumble_formats::dat::read_dat;
@@ -113,6 +117,68 @@ fn resident(begin: bool) -> usize {
         .parse()
         .unwrap();
     kibibytes * 1024
+}
+
+/// A set whose segments would take ten times what the engine may use: an uploaded clip, and a stream frame by frame,
+/// stay within it. Without a limit both took all of it.
+#[test]
+fn clips_and_streams_keep_to_the_memory_of_the_engine() {
+    let _one = one_at_a_time();
+    let (tracks, keys) = (40, 10_000);
+    let times: Vec<f64> = (0..keys).map(|key| f64::from(key) * 0.01).collect();
+    let mut set = TrackSet::new();
+    for track in 0..tracks {
+        let key = |&time: &f64| Quat::from_rotation_y((time * 0.8 + f64::from(track)) as f32);
+        let keys: Vec<Quat> = times.iter().map(key).collect();
+        set.push("", &times, &keys).unwrap();
+    }
+    let of_keys = set.key_count() * size_of::<Quat>() + times.len() * size_of::<f64>();
+    let (frames, layout) = (Frames::fps(50), Layout::FrameMajor);
+    let method = method::BESSEL_OVERHAUSER;
+    let limit = 8 * MIB;
+    for memory in [None, Some(limit as u64)] {
+        let mut options = EngineOptions::default();
+        options.memory = memory;
+        let engine = Engine::with_options(Device::Cpu, &options).unwrap();
+        let (clip, uploading) = peak_of(|| engine.upload(&set, method).unwrap());
+        let mut rotations = vec![Quat::IDENTITY; tracks as usize * 100];
+        let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut rotations);
+        let ((), evaluating) = peak_of(|| {
+            let part = (0..tracks as usize, 200..300);
+            clip.evaluate_part_into(&frames, layout, part, Encoding::F32, bytes)
+                .unwrap();
+        });
+        drop(clip);
+        let (count, streaming) = peak_of(|| {
+            let mut count = 0;
+            let sink = |chunk: Chunk<'_>| {
+                count += chunk.rows.len();
+                Ok::<(), Error>(())
+            };
+            engine
+                .stream(&set, method, &frames, layout, 1 << 14, sink)
+                .unwrap();
+            count
+        });
+        assert_eq!(count, 40 * (9999 / 2 + 1));
+        println!(
+            "{memory:?}: uploading {} KiB, evaluating {} KiB, streaming {} KiB",
+            uploading >> 10,
+            evaluating >> 10,
+            streaming >> 10
+        );
+        let segments = set.key_count() * 176;
+        match memory {
+            None => assert!(uploading > segments && streaming > 4 * limit),
+            Some(_) => {
+                assert!(uploading <= of_keys + MIB, "{uploading}");
+                // Lists grow by doubling, and three chunks are on their way.
+                let allowed = 2 * limit + 4 * MIB;
+                assert!(evaluating <= allowed, "{evaluating}");
+                assert!(streaming <= allowed, "{streaming}");
+            }
+        }
+    }
 }
 
 /// What is refused costs no more than was read of it and 64 MiB, whatever it claims.

@@ -9,6 +9,7 @@
 //!   object that is created or destroyed, behind the number of the process.
 //! * `FAULT_DEVICES`: `none` hides every device, `no-compute` their compute queues.
 //! * `FAULT_CARD`: a card in the place of the device (`card.rs`).
+//! * Other drivers' limits and habits: `odd.rs`.
 //! * `REAL_LOADER`: the path of the loader behind it.
 //!
 //! Built as an example, so that `cargo test` builds it; `tests/faults.rs` puts it where a
@@ -16,6 +17,7 @@
 #![allow(unsafe_code, non_snake_case, clippy::missing_safety_doc, missing_docs)]
 
 mod card;
+mod odd;
 
 use std::collections::HashMap;
 use std::ffi::{CStr, c_char, c_void};
@@ -201,6 +203,11 @@ fallible! {
     vkCreateDescriptorSetLayout(device, info, allocator, out) creates;
     vkCreatePipelineLayout(device, info, allocator, out) creates;
     vkCreateShaderModule(device, info, allocator, out) creates;
+    vkCreatePipelineCache(device, info, allocator, out) creates;
+    vkGetPipelineCacheData(device, cache, size, out) asks;
+    vkMergePipelineCaches(device, cache, count, others) asks;
+    vkFlushMappedMemoryRanges(device, count, ranges) asks;
+    vkInvalidateMappedMemoryRanges(device, count, ranges) asks;
     vkCreateComputePipelines(device, cache, count, infos, allocator, out) creates;
 }
 
@@ -242,6 +249,7 @@ destroys! {
     vkDestroyDescriptorSetLayout of vkCreateDescriptorSetLayout;
     vkDestroyPipelineLayout of vkCreatePipelineLayout;
     vkDestroyShaderModule of vkCreateShaderModule;
+    vkDestroyPipelineCache of vkCreatePipelineCache;
     vkDestroyPipeline of vkCreateComputePipelines;
 }
 
@@ -416,8 +424,8 @@ unsafe extern "system" fn vkGetDeviceProcAddr(device: Word, name: *const c_char)
 }
 
 fn own(name: &CStr) -> Option<Pointer> {
-    if let Some(of_card) = card::own(name) {
-        return Some(of_card);
+    if let Some(special) = card::own(name).or_else(|| odd::function(name)) {
+        return Some(special);
     }
     let special = match name.to_str().unwrap_or_default() {
         "vkCreateInstance" => vkCreateInstance as *const (),

@@ -1,0 +1,202 @@
+//! Results of sets whose segments would take more memory than there may be: piece by piece, some samples of some
+//! tracks, each of which is prepared, evaluated and forgotten.
+
+use std::sync::Arc;
+
+use glam::Quat;
+
+use crate::curve::options::Speed;
+use crate::curve::segment::segment_size;
+use crate::evaluate::uploaded::{Backend, Uploaded};
+use crate::gpu::error::EvaluateError;
+use crate::method::interpolation::Interpolation;
+use crate::output::encoding::Encoding;
+use crate::output::rotations::Layout;
+use crate::output::window::Window;
+use crate::prepare::batch::Batch;
+use crate::prepare::clip_data::Wanted;
+use crate::time::frames::{Ticks, Timeline};
+use crate::tracks::set::TrackSet;
+
+/// Keys of a piece, at the least: with fewer, most of the work would be that of preparing the intervals beside it
+/// again.
+const MIN_KEYS: usize = 256;
+
+/// Values of a piece that are evaluated at once, where they do not lie together in the result.
+const SCATTERED: usize = 1 << 16;
+
+/// Keys of a track from which on a piece is cut at a sample: the intervals at the cut, which both pieces prepare, are
+/// then few beside the others.
+const KEYS_TO_CUT: usize = 8;
+
+/// Bytes that a key takes when it is prepared: its segment, its constant, and its place in time.
+fn key_bytes(interpolation: &Interpolation) -> usize {
+    const SPAN: usize = size_of::<f64>() + 3 * size_of::<u32>();
+    segment_size(interpolation.form()) + size_of::<Quat>() + SPAN
+}
+
+/// About how many bytes all segments of a set take.
+pub(crate) fn segment_bytes(set: &TrackSet, interpolation: &Interpolation) -> usize {
+    set.key_count().saturating_mul(key_bytes(interpolation))
+}
+
+/// What is evaluated in pieces.
+pub(crate) struct Pieces<'a> {
+    pub(crate) backend: &'a Arc<Backend>,
+    pub(crate) set: &'a TrackSet,
+    pub(crate) interpolation: &'a Interpolation,
+    /// That of the whole set, times as they were given.
+    pub(crate) timeline: &'a Timeline,
+    pub(crate) encoding: Encoding,
+    /// Bytes that the segments of a piece may take.
+    pub(crate) limit: usize,
+}
+
+impl Pieces<'_> {
+    /// Evaluates a window of the result into `output`, which is exactly as long.
+    pub(crate) fn evaluate_into(
+        &self,
+        window: &Window,
+        output: &mut [u8],
+    ) -> Result<(), EvaluateError> {
+        let (tracks, samples) = (window.tracks.clone(), window.samples.clone());
+        let mut scratch = Vec::new();
+        let mut pieces = vec![Window::of(tracks, samples, window.layout)];
+        while let Some(piece) = pieces.pop() {
+            match self.halves(&piece) {
+                Some([first, second]) => pieces.extend([second, first]),
+                None if piece.len() == 0 => {}
+                None => self.evaluate(&piece, window, &mut scratch, output)?,
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether a piece may have only the intervals in which its samples lie: not where tracks go on outside their
+    /// keys, and not where the whole track says how fast it is traversed.
+    fn cuts_tracks(&self) -> bool {
+        self.interpolation.wrap().are_held() && self.interpolation.speed == Speed::AsKeyed
+    }
+
+    /// What is prepared for a piece.
+    fn batch(&self, piece: &Window) -> Batch {
+        let tracks = piece.tracks.clone();
+        let Some((from, to)) = self.time_span(piece).filter(|_| self.cuts_tracks()) else {
+            return Batch::Tracks(tracks);
+        };
+        Batch::Span { tracks, from, to }
+    }
+
+    /// The first and the last time of a piece's samples.
+    fn time_span(&self, piece: &Window) -> Option<(f64, f64)> {
+        let (first, last) = (piece.samples.start, piece.samples.end.checked_sub(1)?);
+        let (timeline, track) = (self.timeline, piece.tracks.start);
+        let (times, tracks) = match &timeline.ticks {
+            Ticks::Frames { .. } => {
+                return Some((
+                    timeline.time_at(track, first),
+                    timeline.time_at(track, last),
+                ));
+            }
+            Ticks::Times { stride: 0, .. } => (timeline, track..track + 1),
+            Ticks::Times { .. } => (timeline, piece.tracks.clone()),
+        };
+        let all = tracks.flat_map(|track| {
+            let samples = piece.samples.clone();
+            samples.map(move |sample| times.time_at(track, sample))
+        });
+        all.fold(None, |span, time| {
+            let (from, to): (f64, f64) = span.unwrap_or((time, time));
+            Some((from.min(time), to.max(time)))
+        })
+    }
+
+    /// A piece in two, if its segments take too much and it can be cut.
+    fn halves(&self, piece: &Window) -> Option<[Window; 2]> {
+        let limit = (self.limit / key_bytes(self.interpolation)).max(MIN_KEYS);
+        let keys = match self.batch(piece) {
+            Batch::Tracks(tracks) => self.set.keys_of(tracks),
+            batch => batch
+                .intervals(self.set)
+                .map(|(_, intervals)| intervals.len() + 1)
+                .sum(),
+        };
+        let (tracks, samples) = (&piece.tracks, &piece.samples);
+        if keys <= limit {
+            return None;
+        }
+        let has_many = keys > KEYS_TO_CUT * tracks.len() || tracks.len() == 1;
+        if self.cuts_tracks() && samples.len() > 1 && has_many {
+            let middle = samples.start + samples.len() / 2;
+            let part = |samples| Window::of(tracks.clone(), samples, piece.layout);
+            return Some([part(samples.start..middle), part(middle..samples.end)]);
+        }
+        let middle = tracks.start + tracks.len() / 2;
+        let part = |tracks| Window::of(tracks, samples.clone(), piece.layout);
+        (tracks.len() > 1).then(|| [part(tracks.start..middle), part(middle..tracks.end)])
+    }
+
+    /// Evaluates one piece into its places in the window.
+    fn evaluate(
+        &self,
+        piece: &Window,
+        window: &Window,
+        scratch: &mut Vec<Quat>,
+        output: &mut [u8],
+    ) -> Result<(), EvaluateError> {
+        let first_track = piece.tracks.start;
+        let of_set = |error: EvaluateError| error.of_tracks_from(first_track);
+        let (timeline, first_sample) = self.timeline.part(&piece.tracks, &piece.samples);
+        let wanted = Wanted {
+            batch: self.batch(piece),
+            only_for: Some(&timeline),
+            ..Wanted::all(self.set)
+        };
+        let clip = Uploaded::new(self.backend, self.set, *self.interpolation, wanted, None)?;
+        let folded = clip.data.folded(&timeline)?;
+        let samples = Window::of(
+            0..piece.tracks.len(),
+            first_sample..first_sample + piece.samples.len(),
+            piece.layout,
+        );
+        let each = self.encoding.bytes();
+        let is_together = match piece.layout {
+            Layout::TrackMajor => piece.samples == window.samples || piece.tracks.len() == 1,
+            Layout::FrameMajor => piece.tracks == window.tracks || piece.samples.len() == 1,
+        };
+        if is_together {
+            let start = window.place(first_track, piece.samples.start) * each;
+            let output = &mut output[start..start + piece.len() * each];
+            let evaluated = clip.evaluate_into(&folded, &samples, self.encoding, output);
+            return evaluated.map_err(of_set);
+        }
+        for part in samples.cut(SCATTERED) {
+            let part = Window::of(part.tracks, part.samples, part.layout);
+            let bytes = part.len() * each;
+            scratch.resize(bytes.div_ceil(size_of::<Quat>()), Quat::IDENTITY);
+            let values: &mut [u8] = &mut bytemuck::cast_slice_mut(scratch)[..bytes];
+            let evaluated = clip.evaluate_into(&folded, &part, self.encoding, values);
+            evaluated.map_err(of_set)?;
+            let of_window = |track: usize, sample: usize| {
+                let sample = sample - first_sample + piece.samples.start;
+                window.place(first_track + track, sample) * each
+            };
+            let (row, starts): (usize, Vec<usize>) = match part.layout {
+                Layout::TrackMajor => {
+                    let starts = part.tracks.clone();
+                    let start = |track| of_window(track, part.samples.start);
+                    (part.samples.len(), starts.map(start).collect())
+                }
+                Layout::FrameMajor => {
+                    let starts = part.samples.clone();
+                    let start = |sample| of_window(part.tracks.start, sample);
+                    (part.tracks.len(), starts.map(start).collect())
+                }
+            };
+            for (row, start) in values.chunks(row * each).zip(starts) {
+                output[start..start + row.len()].copy_from_slice(row);
+            }
+        }
+        Ok(())
+    }
+}
