@@ -45,11 +45,13 @@ def sphere(width, roughness):
     return points, np.concatenate([part.reshape(-1, 3) for part in faces + caps])
 
 
-def compare(name, points, faces, pairs):
+def compare(name, points, faces, pairs, polygons=None):
+    """`polygons` are the faces that the program gets, where they are not pygeodesic's."""
     global worst
     obj, list_, out = FOLDER / f"{name}.obj", FOLDER / f"{name}.txt", FOLDER / name
     lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in points.tolist()]
-    lines += [f"f {a} {b} {c}" for a, b, c in (faces + 1).tolist()]
+    given = faces.tolist() if polygons is None else polygons
+    lines += ["f " + " ".join(str(corner + 1) for corner in face) for face in given]
     obj.write_text("\n".join(lines))
     rows = [" ".join(map(repr, points[[a, b]].reshape(-1).tolist())) for a, b in pairs]
     list_.write_text("\n".join(rows))
@@ -74,4 +76,32 @@ for number, (width, roughness) in enumerate([(12, 0.3), (25, 1.0), (25, 3.0), (5
 for number, (width, roughness) in enumerate([(8, 0.0), (12, 0.3), (16, 1.0)]):
     points, faces = sphere(width, roughness)
     compare(f"lump{number}", points, faces, pairs(12, len(points)))
+
+
+def prism(corners):
+    """A star about the z axis, with a bottom, a top and walls: faces of up to 12 corners, many of them
+    concave, for the program; and triangles about the middles of bottom and top, which are cut apart from
+    it, for pygeodesic."""
+    angles = (np.arange(corners) + random.uniform(0.1, 0.9, corners)) * 2 * np.pi / corners
+    radii, height = random.uniform(0.4, 2.0, corners), random.uniform(0.1, 1.5)
+    ring = np.stack([radii * np.cos(angles), radii * np.sin(angles)], -1)
+    tilt = np.linalg.qr(random.normal(size=(3, 3)))[0]
+    level = lambda z: np.concatenate([ring, np.full((corners, 1), z)], -1)
+    middles = np.array([[0, 0, 0], [0, 0, height]])
+    points = np.concatenate([level(0.0), level(height), middles]) @ tilt
+    low, high = list(range(corners)), list(range(corners, 2 * corners))
+    turn = int(random.integers(corners))
+    polygons, triangles = [(low[turn:] + low[:turn])[::-1], high[turn:] + high[:turn]], []
+    for i in range(corners):
+        a, b = low[i], low[(i + 1) % corners]
+        c, d = high[(i + 1) % corners], high[i]
+        polygons.append([a, b, c, d])
+        triangles += [(a, b, c), (a, c, d), (2 * corners, b, a), (2 * corners + 1, d, c)]
+    return points, polygons, np.array(triangles)
+
+
+for number in range(200):
+    points, polygons, triangles = prism(int(random.integers(4, 13)))
+    count = len(points) - 2
+    compare(f"prism{number}", points, triangles, pairs(3, count), polygons)
 print(f"routes: {worst:.1e}")
