@@ -1,31 +1,245 @@
-//! The method c2 says where its angular acceleration is not continuous.
+//! The method c2: its angular acceleration is continuous where a solution is found, else it says so.
 
-use glam::Quat;
-use tumble::{Interpolation, InterpolationWarning, TrackSet, method};
+use glam::{DQuat, DVec3, Quat, Vec4};
+use tumble::{
+    Axes, Device, Ends, Engine, Frames, Interpolation, InterpolationWarning, Layout, Path,
+    Quantity, TrackSet, method, reference::Curve,
+};
 
-fn warnings(times: &[f64]) -> Vec<InterpolationWarning> {
-    let angle = 20f32.to_radians();
-    let keys = [
-        Quat::IDENTITY,
-        Quat::from_rotation_x(angle),
-        Quat::from_rotation_y(angle),
-        Quat::from_rotation_z(angle),
-    ];
-    let mut set = TrackSet::new();
-    set.push("", times, &keys).unwrap();
-    Interpolation::from(method::C2).warnings(&set)
+use crate::support::{Random, hostile_set};
+
+/// Rotations whose steps have these sizes in radians, about any axes.
+fn walk(random: &mut Random, steps: impl Fn(&mut Random) -> f64, keys: usize) -> Vec<Quat> {
+    let mut rotation = random.rotation();
+    let mut all = vec![rotation.as_quat()];
+    for _ in 1..keys {
+        let step = DQuat::from_axis_angle(random.direction(), steps(random));
+        rotation = (rotation * step).normalize();
+        all.push(rotation.as_quat());
+    }
+    all
 }
 
-/// Even keys have a curve with continuous acceleration; a short interval beside long ones has none that
-/// the iteration finds, and that is said.
+/// Times whose gaps are up to `ratio` apart: one is 1 and one is `ratio`.
+fn times(random: &mut Random, keys: usize, ratio: f64) -> Vec<f64> {
+    let mut gaps: Vec<f64> = (1..keys).map(|_| ratio.powf(random.unit())).collect();
+    let ends = [0; 2].map(|_| random.next() as usize % gaps.len());
+    (gaps[ends[0]], gaps[ends[1]]) = (1.0, ratio);
+    let mut time = 0.0;
+    let mut all = vec![time];
+    for gap in gaps {
+        time += gap;
+        all.push(time);
+    }
+    all
+}
+
+/// The angular accelerations just before each inner key and just behind it, and the largest speed in
+/// radians per second, for the size of rounding.
+fn accelerations(set: &TrackSet, interpolation: Interpolation) -> Vec<[DVec3; 2]> {
+    let engine = Engine::new(Device::Cpu).unwrap();
+    let of = Interpolation {
+        quantity: Quantity::Acceleration(Axes::Body),
+        ..interpolation
+    };
+    let keys = set.track(0).times.to_vec();
+    let inner = &keys[1..keys.len() - 1];
+    let asked: Vec<f64> = inner
+        .iter()
+        .flat_map(|&time| [time.next_down(), time])
+        .collect();
+    let found = engine
+        .rates(set, of, &Frames::at(asked), Layout::TrackMajor)
+        .unwrap();
+    let vector = |v: &Vec4| v.truncate().as_dvec3();
+    let all: Vec<DVec3> = found.as_slice().iter().map(vector).collect();
+    all.as_chunks().0.to_vec()
+}
+
+fn one(times: &[f64], keys: &[Quat]) -> TrackSet {
+    let mut set = TrackSet::new();
+    set.push("", times, keys).unwrap();
+    set
+}
+
+/// By how much the acceleration jumps, as a part of the largest at any key.
+fn jump(set: &TrackSet, interpolation: Interpolation) -> f64 {
+    let all = accelerations(set, interpolation);
+    let largest = all.iter().flatten().map(|v| v.length()).fold(0.0, f64::max);
+    let jumps = all
+        .iter()
+        .map(|[before, behind]| (*behind - *before).length());
+    jumps.fold(0.0, f64::max) / largest
+}
+
+/// 20° about x, y and z, one step of them in a twentieth of the time: numbers of `SciPy`'s
+/// `RotationSpline`, iterated until it converges.
 #[test]
-fn jumps_of_the_acceleration_are_told() {
-    assert_eq!(warnings(&[0.0, 1.0, 2.0, 3.0]), []);
-    let found = warnings(&[0.0, 1.0, 1.05, 2.0]);
-    let [InterpolationWarning::AccelerationJumps { track, key, count }] = *found else {
+fn a_short_interval_between_long_ones_is_as_scipy_has_it() {
+    let angle = 20f64.to_radians();
+    let mut rotation = DQuat::IDENTITY;
+    let mut keys = vec![rotation.as_quat()];
+    for axis in [DVec3::X, DVec3::Y, DVec3::Z] {
+        rotation *= DQuat::from_axis_angle(axis, angle);
+        keys.push(rotation.as_quat());
+    }
+    let set = one(&[0.0, 1.0, 1.05, 2.0], &keys);
+    let [first, second] = *accelerations(&set, method::C2.into()) else {
+        panic!("two inner keys");
+    };
+    let expected = DVec3::new(1.191_498, 27.074_055, -0.045_048);
+    for side in first {
+        assert!((side - expected).length() < 2e-5, "{side}");
+    }
+    let expected = DVec3::new(-0.038_769, -28.355_148, 1.439_698);
+    for side in second {
+        assert!((side - expected).length() < 2e-5, "{side}");
+    }
+    let engine = Engine::new(Device::Cpu).unwrap();
+    let at = Frames::at(vec![0.5, 1.5]);
+    let found = engine.evaluate(&set, method::C2, &at).unwrap();
+    let expected = [
+        DQuat::from_xyzw(0.106_921_98, -0.405_388_18, -0.070_785_59, 0.905_106_36),
+        DQuat::from_xyzw(0.154_295_10, 0.540_664_39, 0.154_773_95, 0.812_354_64),
+    ];
+    for (found, expected) in found.as_quats().iter().zip(expected) {
+        let off = (found.as_dquat() - expected).length();
+        assert!(off < 2e-7, "{found}: {off:e}");
+    }
+}
+
+/// Steps of 0.3 to 2 radians, gaps up to 100 : 1 apart: every one is solved, with free and closed ends
+/// too.
+#[test]
+fn the_acceleration_is_continuous_however_keys_are_spaced() {
+    let mut random = Random(41);
+    let mut worst = 0.0f64;
+    for trial in 0..60 {
+        let keys = 3 + random.next() as usize % 14;
+        let ratio = 100f64.powf(random.unit());
+        let size = random.between(0.3, 2.0);
+        let mut rotations = walk(&mut random, |_| size, keys);
+        let ends = [Ends::Secant, Ends::Natural, Ends::Parabolic, Ends::Loop][trial % 4];
+        if ends == Ends::Loop {
+            rotations[keys - 1] = rotations[0];
+        }
+        let set = one(&times(&mut random, keys, ratio), &rotations);
+        let interpolation = Interpolation {
+            ends,
+            ..method::C2.into()
+        };
+        assert_eq!(interpolation.warnings(&set), []);
+        let jump = jump(&set, interpolation);
+        worst = worst.max(jump);
+        assert!(jump < 1e-4, "trial {trial}: {jump:e}");
+    }
+    println!("the largest jump is {worst:e} of the largest acceleration");
+}
+
+/// Steps of nearly a whole turn on the long way round are passed too fast: the curve is one with
+/// continuous velocity, and a warning names the first key.
+#[test]
+fn keys_at_which_the_acceleration_jumps_are_named() {
+    let mut random = Random(5);
+    let mut rotations = walk(&mut random, |_| 0.05, 24);
+    for (index, rotation) in rotations.iter_mut().enumerate() {
+        if index % 2 == 1 {
+            *rotation = -*rotation;
+        }
+    }
+    let set = one(&times(&mut random, 24, 10.0), &rotations);
+    let interpolation = Interpolation {
+        path: Path::AsAuthored,
+        ..method::C2.into()
+    };
+    let found = interpolation.warnings(&set);
+    let [
+        InterpolationWarning::AccelerationJumps {
+            track: 0,
+            key,
+            count,
+        },
+    ] = *found
+    else {
         panic!("{found:?}");
     };
-    assert_eq!((track, key), (0, 1));
-    assert!(count >= 1);
-    assert!(found[0].to_string().contains("key 1"), "{}", found[0]);
+    let text = format!("jumps at {count} keys, the first is key {key}");
+    assert!(found[0].to_string().contains(&text), "{}", found[0]);
+    assert!(jump(&set, interpolation) > 1e-3);
+    // The shortest way round is an easy curve, and other methods have nothing to say.
+    assert_eq!(Interpolation::from(method::C2).warnings(&set), []);
+    let other = Interpolation {
+        path: Path::AsAuthored,
+        ..method::BESSEL_OVERHAUSER.into()
+    };
+    assert_eq!(other.warnings(&set), []);
+}
+
+/// Of hostile keys the engine's curve and the reference's are one, and the reference's acceleration, which is
+/// taken of the curve, is the same on both sides of every key but those that the warning counts.
+#[test]
+fn engine_and_reference_take_one_solution_of_hostile_keys() {
+    let (mut jumping, mut continuous) = (0, 0);
+    for seed in 0..24 {
+        let set = hostile_set(seed, 64);
+        let interpolation = Interpolation::from(method::C2);
+        let mut counted = vec![0; 64];
+        for warning in interpolation.warnings(&set) {
+            let InterpolationWarning::AccelerationJumps { track, count, .. } = warning else {
+                panic!("{warning}");
+            };
+            counted[track] = count;
+        }
+        for (index, track) in set.tracks().enumerate() {
+            let curve = Curve::of(&interpolation, track);
+            let jumps = (1..track.times.len().saturating_sub(1)).filter(|&key| {
+                let steps = [key - 1, key].map(|i| track.times[i + 1] - track.times[i]);
+                let sides = [
+                    curve.segment_acceleration(key - 1, 1.0),
+                    curve.segment_acceleration(key, 0.0),
+                ];
+                let ends = [
+                    curve.segment_velocity(key - 1, 0.0),
+                    curve.segment_velocity(key, 0.0),
+                    curve.segment_velocity(key, 1.0),
+                ];
+                let fastest = ends.into_iter().map(DVec3::length).fold(0.0, f64::max);
+                let size = (fastest + 3.0) * (1.0 / steps[0] + 1.0 / steps[1]);
+                // The rotation vector at an interval's end is a sum in which many turns cancel.
+                let turned = ends[0].length().max(ends[1].length()) * steps[0];
+                let rounding = 1e-14 * turned.powi(3) / (steps[0] * steps[0]);
+                (sides[1] - sides[0]).length() > 1e-7 * size + rounding
+            });
+            let jumps = jumps.count();
+            assert!(
+                jumps <= counted[index],
+                "seed {seed}, track {index}: {jumps} jumps, {} counted",
+                counted[index]
+            );
+            jumping += counted[index];
+            continuous += track.times.len().saturating_sub(2) - counted[index];
+        }
+    }
+    println!("{continuous} keys with continuous acceleration, {jumping} without");
+    assert!(jumping > 0 && continuous > 10 * jumping);
+}
+
+/// Steps of nearly a whole turn cost the keys beside them the continuous acceleration, and no others.
+#[test]
+fn long_steps_cost_other_keys_nothing() {
+    let mut random = Random(8);
+    let mut rotations = walk(&mut random, |_| 0.1, 3000);
+    for index in (1300..1340).step_by(2) {
+        rotations[index] = -rotations[index];
+    }
+    let even: Vec<f64> = (0..3000).map(f64::from).collect();
+    let interpolation = Interpolation {
+        path: Path::AsAuthored,
+        ..method::C2.into()
+    };
+    let found = interpolation.warnings(&one(&even, &rotations));
+    let [InterpolationWarning::AccelerationJumps { key, count, .. }] = *found else {
+        panic!("{found:?}");
+    };
+    assert_eq!((key, count), (1299, 41));
 }

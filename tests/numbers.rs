@@ -552,7 +552,7 @@ fn ends_of_a_mix_are_the_inputs() {
     let [a, b] = layers();
     let mut engines = crate::support::vulkan_engines(|_| ());
     engines.push(cpu());
-    for engine in engines {
+    for engine in &engines {
         for (weight, expected) in [(0.0, &a), (1.0, &b)] {
             let found = engine.mix(&a, &b, weight).unwrap();
             assert_eq!(
@@ -575,8 +575,8 @@ fn ends_of_a_mix_are_the_inputs() {
             .push(clip, method::SLERP, VectorMethod::Linear)
             .unwrap();
     }
-    let at = |below: usize, above: Option<usize>| {
-        let mut crowd = cpu().crowd(&library, 1, 2).unwrap();
+    let at = |engine: &Engine, below: usize, above: Option<usize>| {
+        let mut crowd = engine.crowd(&library, 1, 2).unwrap();
         crowd.set(0, 0, CrowdLayer::new(below).at(500_000)).unwrap();
         if let Some(clip) = above {
             crowd.set(0, 1, CrowdLayer::new(clip).at(500_000)).unwrap();
@@ -588,5 +588,8 @@ fn ends_of_a_mix_are_the_inputs() {
         output.map(|row| row.map(f32::to_bits))
     };
     // `set` of another layer leaves the second at weight 1 of the first clip: it hides what is below.
-    assert_eq!(at(0, Some(1)), at(1, Some(1)));
+    let expected = at(&cpu(), 1, Some(1));
+    for engine in &engines {
+        assert_eq!(at(engine, 0, Some(1)), expected, "{engine:?}");
+    }
 }

@@ -227,3 +227,76 @@ fn bench_measures_every_workload_in_one_run() {
         }
     }
 }
+
+/// Ten microseconds beside intervals of a second: the curve through these keys with a continuous acceleration
+/// would turn thousands of times between them.
+#[test]
+fn an_acceleration_that_jumps_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, times: [f64; 6]| {
+        let mut rotation = glam::DQuat::IDENTITY;
+        let mut text = String::from("# 1 1\n");
+        let axes = [glam::DVec3::X, glam::DVec3::Y, glam::DVec3::Z];
+        for (time, axis) in times.into_iter().zip(axes.into_iter().cycle()) {
+            let [x, y, z, w] = rotation.to_array().map(|component| component as f32);
+            text += &format!("{time} {w} {x} {y} {z}\n");
+            rotation *= glam::DQuat::from_axis_angle(axis, 1.0);
+        }
+        fs::write(folder.path().join(name), text).unwrap();
+    };
+    write("short.dat", [0.0, 1.0, 2.0, 2.00001, 3.0, 4.0]);
+    write("even.dat", [0.0, 1.0, 2.0, 2.01, 3.0, 4.0]);
+    let said =
+        "short.dat:track 1: warning[W014]: the angular acceleration of c2 jumps at key 2, at 1 s";
+    for line in [
+        &[
+            "eval",
+            "short.dat",
+            "-m",
+            "c2",
+            "-o",
+            "out.npy",
+            "--overwrite",
+        ][..],
+        &[
+            "plot",
+            "short.dat",
+            "-m",
+            "slerp,c2",
+            "-o",
+            "out.svg",
+            "--overwrite",
+        ],
+        &["verify", "short.dat", "-m", "c2,squad", "--device", "cpu"],
+        &["info", "short.dat"],
+    ] {
+        let run = succeed(folder.path(), line);
+        let text = run.words + &String::from_utf8(run.out).unwrap();
+        assert_eq!(text.matches("W014").count(), 1, "{line:?}: {text}");
+        assert!(text.contains(said), "{line:?}: {text}");
+        // The same keys with intervals of a hundred to one have their curve, and other methods have no warning.
+        let even: Vec<&str> = line
+            .iter()
+            .map(|word| {
+                if *word == "short.dat" {
+                    "even.dat"
+                } else {
+                    word
+                }
+            })
+            .collect();
+        let run = succeed(folder.path(), &even);
+        let text = run.words + &String::from_utf8(run.out).unwrap();
+        assert!(!text.contains("W014"), "{even:?}: {text}");
+    }
+    let line = [
+        "eval",
+        "short.dat",
+        "-o",
+        "out.npy",
+        "--overwrite",
+        "--fps",
+        "9",
+    ];
+    assert!(!succeed(folder.path(), &line).words.contains("W014"));
+}

@@ -1,10 +1,10 @@
 //! Beside numbers that are not ours: `SciPy` and the Python package `splines`
-//! (`cli/tests/peers/check.py`). `scripts/test.sh` makes the environment.
+//! (`cli/tests/peers`). `scripts/test.sh` makes the environment.
 
 use std::process::Command;
 
-#[test]
-fn scipy_and_splines_agree() {
+/// Runs a script of `cli/tests/peers` with the program, an empty folder and further arguments.
+fn peer(script: &str, arguments: &[&str]) {
     let root = crate::program::root();
     let python = root.join("target/peers/bin/python");
     if !python.exists() {
@@ -17,12 +17,28 @@ fn scipy_and_splines_agree() {
     }
     let folder = tempfile::tempdir().unwrap();
     let output = Command::new(python)
-        .arg(root.join("cli/tests/peers/check.py"))
+        .arg(root.join("cli/tests/peers").join(script))
         .arg(env!("CARGO_BIN_EXE_tumble"))
         .arg(folder.path())
+        .args(arguments)
         .output()
         .unwrap();
     println!("{}", String::from_utf8_lossy(&output.stdout));
     let said = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{said}");
+}
+
+#[test]
+fn scipy_and_splines_agree() {
+    peer("check.py", &[]);
+}
+
+/// On hundreds of sets with unevenly spaced keys; `SOAK` tries 2 000.
+#[test]
+fn c2_is_scipy_s_spline_wherever_that_is_continuous() {
+    let sets = match std::env::var_os("SOAK") {
+        Some(_) => "2000",
+        None => "300",
+    };
+    peer("c2.py", &[sets]);
 }

@@ -259,6 +259,7 @@ codes! {
     OneKey = "W011", "only one key", "The set stands still.";
     HalfTurn = "W012", "neighbouring keys 180° apart", "Both ways round are equally short; the signs as stored decide.";
     EqualKeys = "W013", "a key given twice", "Two keys at one time with equal values; the second is dropped.";
+    AccelerationJumps = "W014", "an angular acceleration that jumps", "The method `c2` promises one that is continuous. At these keys no such curve was found, or they are passed so fast that it would whirl around; there only the velocity is continuous. Mostly a very short interval beside a very long one: add keys in the long one, or choose `-m bessel-overhauser`.";
     RequiredExtension = "W100", "an unknown required extension", "The animations are read without it; data that needs it is refused.";
     CubicOfOne = "W101", "a cubic of one key", "There is nothing to interpolate; it holds.";
     EmptySampler = "W102", "a sampler without keys", "What it is to move stays where it rests.";

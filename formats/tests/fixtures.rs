@@ -120,6 +120,7 @@ fn every_code_of_a_file_is_shown_by_a_fixture_or_a_test() {
         Code::SeveralClips,
         Code::RateBesideTimes,
         Code::TwoRates,
+        Code::AccelerationJumps,
     ];
     for &code in Code::ALL {
         let shown = all.contains(&format!("[{code}]"));

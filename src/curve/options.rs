@@ -224,7 +224,7 @@ pub enum InterpolationError {
 pub enum InterpolationWarning {
     /// [`C2`](crate::method::c2::C2) found no velocities that make the angular acceleration continuous.
     #[error(
-        "track {track}: c2 found no curve with continuous angular acceleration; it jumps at {count} keys, the first is key {key}; add keys where steps are large, or use bessel-overhauser"
+        "track {track}: c2 found no curve with continuous angular acceleration; it jumps at {count} keys, the first is key {key}; add keys in long intervals beside short ones, or use bessel-overhauser"
     )]
     AccelerationJumps {
         /// The track's place in the set.

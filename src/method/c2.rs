@@ -19,15 +19,18 @@ use crate::tracks::signs::Signs;
 /// and the angular velocities at the keys are such that the angular acceleration is
 /// continuous. Every key moves all of the curve, less and less with distance.
 ///
+/// The equations for the velocities are not linear, and may have several solutions. The curve is the one
+/// that grows continuously out of the linear equations' solution as the quadratic terms, the *bends*, are
+/// brought in from none to all. Bends are omitted where a key is passed so fast that the curve would turn
+/// hundreds of times in an interval, and where no such solution is found; beside steps of more than 200°, the
+/// long way round as authored, no equations are solved. There only the velocity is continuous, and
+/// [`Interpolation::warnings`](crate::method::interpolation::Interpolation::warnings) says at which keys.
+///
 /// Backwards in time it is another curve: a rotation vector that is a cubic as seen from one key is
 /// no cubic as seen from the next.
-///
-/// Where it would pass a key faster than one turn per interval, as at a short interval beside a
-/// long one, and where no solution is found, only its velocity is continuous;
-/// [`Interpolation::warnings`](crate::method::interpolation::Interpolation::warnings) says at which keys.
 pub const C2: Method = Method {
     name: "c2",
-    summary: "continuous angular acceleration through keys at any times",
+    summary: "continuous angular acceleration through keys at any times (W014 where there is none)",
     formula: "q(t) = q_i exp(θ(t)/2), θ cubic, θ(0) = 0, θ(1) = 2 log(q_i⁻¹ q_{i+1}), angular velocity and acceleration continuous",
     source: "Mayorov 2019, Smooth attitude interpolation (SciPy's RotationSpline)",
     continuity: Continuity::C2,
@@ -53,10 +56,10 @@ fn curves(intervals: &mut Intervals, stretches: &[Stretch], _: Ends) {
             at(&intervals.inward, lane + 1),
         );
         let log = at(&intervals.logs, lane);
-        let turn = Turn::new(DVec3::from_array(scaled(log, 2.0)));
+        let chart = Chart::new(DVec3::from_array(scaled(log, 2.0)));
         // Half of θ' at both ends, per unit of the parameter.
         let start = scaled([x, y, z], half);
-        let end = scaled((turn.to_rate * DVec3::new(u, v, w)).to_array(), half);
+        let end = scaled((chart.to_rate * DVec3::new(u, v, w)).to_array(), half);
         let both = sum(start, end);
         let second = sum(
             scaled(log, 3.0),
@@ -85,50 +88,62 @@ fn velocities(
 ) -> Vec<Vector> {
     let (first, end) = (intervals.start, intervals.end + 1);
     let windows = (first / WINDOW * WINDOW..end).step_by(WINDOW);
-    let own = |window: usize| {
+    let in_window = |window: usize| {
         let keys = first.max(window)..end.min(window + WINDOW);
         let from = window as isize - MARGIN as isize;
         let to = (window + WINDOW + MARGIN) as isize;
         let (first_solved, solved) = solve(track, signs, from..to, interpolation);
-        keys.map(move |key| solved.velocities[(key as isize - first_solved) as usize].to_array())
+        keys.map(move |key| solved[(key as isize - first_solved) as usize].to_array())
     };
-    windows.flat_map(own).collect()
+    windows.flat_map(in_window).collect()
 }
 
-/// The keys of a track at which the angular acceleration jumps.
+/// A jump of the acceleration counts from this part of the terms of its key's equation on.
+const JUMP: f64 = 1e-9;
+
+/// The keys of a track at which the angular acceleration jumps: as its curve is, not as the equations
+/// were solved.
 fn jumps(track: Track, signs: Signs<'_>, interpolation: &Interpolation) -> Vec<usize> {
     let last = track.keys.len().saturating_sub(1);
     if last < 2 {
         return Vec::new();
     }
-    let first = usize::from(!matches!(interpolation.ends, Ends::Loop));
-    let windows = (0..=last).step_by(WINDOW);
-    let of_window = |window: usize| {
-        let (from, to) = (window as isize - MARGIN as isize, window + WINDOW + MARGIN);
-        let (first_solved, solved) = solve(track, signs, from..to as isize, interpolation);
-        (window.max(first)..last.min(window + WINDOW))
-            .filter(move |&key| solved.jumps[(key as isize - first_solved) as usize])
-    };
-    windows.flat_map(of_window).collect()
+    let velocities: Vec<DVec3> = velocities(track, signs, 0..last, interpolation)
+        .into_iter()
+        .map(DVec3::from_array)
+        .collect();
+    let is_closed = matches!(interpolation.ends, Ends::Loop);
+    let mut before = Step::new(track, signs, if is_closed { last - 1 } else { 0 });
+    let mut jumps = Vec::new();
+    for key in usize::from(!is_closed)..last {
+        let after = Step::new(track, signs, key);
+        let equation = Equation::between(&before, &after);
+        let previous = if key == 0 { last - 1 } else { key - 1 };
+        let nearby = [previous, key, key + 1].map(|key| velocities[key]);
+        let bend = before.bend(nearby[1]) * equation.bend_scale;
+        // Not a number is a jump.
+        let is_continuous =
+            (equation.residual(nearby) + bend).length() <= JUMP * equation.size(nearby);
+        if !is_continuous {
+            jumps.push(key);
+        }
+        before = after;
+    }
+    jumps
 }
 
-/// The velocities at the keys of a window, and at which of them the acceleration jumps.
-struct Solved {
-    velocities: Vec<DVec3>,
-    jumps: Vec<bool>,
-}
-
-/// The velocities at a window of keys, and the place of the window's first key.
+/// The velocities at a window of keys, and the index of the window's first key, which is negative in
+/// a copy of a closed track before it.
 fn solve(
     track: Track,
     signs: Signs<'_>,
     window: Range<isize>,
     interpolation: &Interpolation,
-) -> (isize, Solved) {
+) -> (isize, Vec<DVec3>) {
     let all = track.keys.len() as isize - 1;
     let closed = matches!(interpolation.ends, Ends::Loop) && all > 1;
     let (first, last) = if closed {
-        (window.start, window.end)
+        (window.start, window.end.min(all + MARGIN as isize))
     } else {
         (window.start.max(0), window.end.min(all))
     };
@@ -136,9 +151,8 @@ fn solve(
         .map(|i| Step::new(track, signs, i.rem_euclid(all.max(1)) as usize))
         .collect();
     // Two keys are joined by slerp, whatever the ends.
-    let end_at = |at_end: bool, end: End| match at_end && all > 1 {
-        true => end,
-        false => End::Secant,
+    let end_at = |at_end: bool, end: End| {
+        if at_end && all > 1 { end } else { End::Secant }
     };
     let [start, end] = interpolation.ends.both();
     let start = end_at(!closed && first == 0, start);
@@ -150,11 +164,18 @@ fn solve(
 /// stay finite.
 const SHORTEST: f64 = 1e-150;
 
+/// The longest step in radians beside which equations are solved: up to it, each has more weight on the
+/// velocity at its key than on those beside it. The shortest way round is at most pi. Beside steps of nearly
+/// a whole turn the linear equations have solutions that grow without bound from key to key.
+const LONGEST: f64 = 3.5;
+
 /// One interval of a track.
 struct Step {
     /// Its length, seconds.
     duration: f64,
-    turn: Turn,
+    chart: Chart,
+    /// The factors of [`Step::bend`].
+    factors: [f64; 3],
 }
 
 impl Step {
@@ -164,27 +185,80 @@ impl Step {
             quaternion::unit(track.keys[key].to_array().map(|component| component * sign))
         };
         let step = quaternion::step(key(i), key(i + 1));
+        let vector = DVec3::from_array(scaled(log(step), 2.0));
         Self {
             duration: (track.times[i + 1] - track.times[i]).max(SHORTEST),
-            turn: Turn::new(DVec3::from_array(scaled(log(step), 2.0))),
+            chart: Chart::new(vector),
+            factors: bend_factors(vector),
         }
+    }
+
+    /// Whether it goes so far the long way round that the linear equations beside it may have no solution.
+    fn is_long(&self) -> bool {
+        self.chart.vector.dot(self.chart.vector) > LONGEST * LONGEST
     }
 
     /// The angular velocity of slerp, in radians per second.
     fn secant(&self) -> DVec3 {
-        self.turn.vector / self.duration
+        self.chart.vector / self.duration
+    }
+
+    /// The bend: the part of the angular acceleration at the interval's end that is quadratic in the
+    /// angular velocity there.
+    fn bend(&self, velocity: DVec3) -> DVec3 {
+        let (vector, rate) = (self.chart.vector, self.chart.to_rate * velocity);
+        let [k1, k2, k3] = self.factors;
+        let across = vector.cross(rate);
+        (across * k1 + vector.cross(across) * k2) * vector.dot(rate) + rate.cross(across) * k3
+    }
+
+    /// The derivative of [`Step::bend`] by the velocity.
+    fn bend_slope(&self, velocity: DVec3) -> DMat3 {
+        let (vector, rate) = (self.chart.vector, self.chart.to_rate * velocity);
+        let [k1, k2, k3] = self.factors;
+        let along = vector.dot(rate);
+        let across = vector.cross(rate);
+        let by_along = outer(across * k1 + vector.cross(across) * k2, vector);
+        // v × (v × r) = v (v · r) - r (v · v), and r × (v × r) = v (r · r) - r (r · v).
+        let twice = outer(vector, vector) - DMat3::from_diagonal(DVec3::splat(vector.dot(vector)));
+        let by_across = (skew(vector) * k1 + twice * k2) * along;
+        let triple = outer(vector, rate * 2.0)
+            - outer(rate, vector)
+            - DMat3::from_diagonal(DVec3::splat(along));
+        (by_along + by_across + triple * k3) * self.chart.to_rate
+    }
+}
+
+/// The factors of [`Step::bend`] for a rotation vector: Mayorov's, and their series for small angles.
+fn bend_factors(vector: DVec3) -> [f64; 3] {
+    let square = vector.dot(vector);
+    let angle = square.sqrt();
+    if angle > 0.2 {
+        let (sine, cosine) = sine_cosine(angle);
+        [
+            (2.0 - 2.0 * cosine - angle * sine) / (square * square),
+            (3.0 * sine - 2.0 * angle - angle * cosine) / (square * square * angle),
+            (angle - sine) / (square * angle),
+        ]
+    } else {
+        let fourth = square * square;
+        [
+            1.0 / 12.0 - square / 180.0 + fourth / 6_720.0,
+            -1.0 / 60.0 + square / 1_260.0 - fourth / 60_480.0,
+            1.0 / 6.0 - square / 120.0 + fourth / 5_040.0,
+        ]
     }
 }
 
 /// A rotation vector, with the matrices between its rate of change and the angular velocity.
-struct Turn {
+struct Chart {
     vector: DVec3,
     /// From the angular velocity at its end to the vector's rate of change, and back.
     to_rate: DMat3,
     from_rate: DMat3,
 }
 
-impl Turn {
+impl Chart {
     fn new(vector: DVec3) -> Self {
         let square = vector.dot(vector);
         let angle = square.sqrt();
@@ -211,30 +285,6 @@ impl Turn {
             from_rate: DMat3::IDENTITY - cross * k1 + twice * k2,
         }
     }
-
-    /// The part of the angular acceleration that is quadratic in the vector's rate of change.
-    fn bend(&self, rate: DVec3) -> DVec3 {
-        let square = self.vector.dot(self.vector);
-        let angle = square.sqrt();
-        let (sine, cosine) = sine_cosine(angle);
-        let (k1, k2, k3) = if angle > 0.2 {
-            (
-                (2.0 - 2.0 * cosine - angle * sine) / (square * square),
-                (3.0 * sine - 2.0 * angle - angle * cosine) / (square * square * angle),
-                (angle - sine) / (square * angle),
-            )
-        } else {
-            let fourth = square * square;
-            (
-                1.0 / 12.0 - square / 180.0 + fourth / 6_720.0,
-                -1.0 / 60.0 + square / 1_260.0 - fourth / 60_480.0,
-                1.0 / 6.0 - square / 120.0 + fourth / 5_040.0,
-            )
-        };
-        let across = self.vector.cross(rate);
-        let along = self.vector.dot(rate);
-        (across * k1 + self.vector.cross(across) * k2) * along + rate.cross(across) * k3
-    }
 }
 
 /// The matrix of `v ×`.
@@ -246,154 +296,320 @@ fn skew(v: DVec3) -> DMat3 {
     )
 }
 
-/// The equations for the velocities: three for each key, with its own velocity and those of its
-/// neighbours as unknowns. They are linear except for [`Turn::bend`], which is iterated.
-struct Spline<'a> {
-    steps: &'a [Step],
-    /// The 3×3 blocks below and above the diagonal, and the inverses of the diagonal blocks after
-    /// elimination from the first key on.
-    lower: Vec<DMat3>,
-    upper: Vec<DMat3>,
-    inverse: Vec<DMat3>,
-    /// The right sides without the bends, and the factor of the bend in each equation.
-    given: Vec<DVec3>,
-    scales: Vec<f64>,
-    /// The equations that contain the bend of the step before their key.
-    bent: Range<usize>,
+/// `a bᵀ`.
+fn outer(a: DVec3, b: DVec3) -> DMat3 {
+    DMat3::from_cols(a * b.x, a * b.y, a * b.z)
 }
 
-/// The largest rate in radians per interval. Where a key is passed faster, its equation omits the
-/// bend, and the acceleration is not continuous there. With the bend there may be no solution, or
-/// none that iteration finds.
-const FASTEST: f64 = std::f64::consts::TAU;
+/// The three equations of a key, of which the velocities at the key before it, at it and behind it are
+/// the unknowns: `lower·before + diagonal velocity + upper·behind + bend_scale bend(velocity) = right`.
+struct Equation {
+    lower: DMat3,
+    diagonal: f64,
+    upper: DMat3,
+    right: DVec3,
+    /// The factor of the bend of the interval before the key; 0 where the velocity is set.
+    bend_scale: f64,
+}
 
-/// The most iterations; a dozen suffice where steps are below a right angle.
-const SWEEPS: usize = 100;
+impl Equation {
+    /// The velocity is set.
+    fn set_to(velocity: DVec3) -> Self {
+        Self {
+            lower: DMat3::ZERO,
+            diagonal: 1.0,
+            upper: DMat3::ZERO,
+            right: velocity,
+            bend_scale: 0.0,
+        }
+    }
 
-/// After a last round that changed no velocity by more than this part of it, the acceleration counts as
-/// continuous.
-const SETTLED: f64 = 1e-9;
+    /// Of an inner key: [`Equation::between`], unless a step beside it is too long; then the velocity is the
+    /// mean of the secants, as Bessel's parabola has it.
+    fn inner(before: &Step, after: &Step) -> Self {
+        if before.is_long() || after.is_long() {
+            let weight = after.duration / (before.duration + after.duration);
+            return Self::set_to(before.secant() * weight + after.secant() * (1.0 - weight));
+        }
+        Self::between(before, after)
+    }
+
+    /// No acceleration at the start of a track.
+    fn natural_start(step: &Step) -> Self {
+        if step.is_long() {
+            return Self::set_to(step.secant());
+        }
+        Self {
+            diagonal: 2.0,
+            upper: step.chart.to_rate,
+            ..Self::set_to(step.secant() * 3.0)
+        }
+    }
+
+    /// No acceleration at the end of a track.
+    fn natural_end(step: &Step) -> Self {
+        if step.is_long() {
+            return Self::set_to(step.secant());
+        }
+        Self {
+            lower: step.chart.from_rate * 2.0,
+            diagonal: 4.0,
+            bend_scale: step.duration,
+            ..Self::set_to(step.secant() * 6.0)
+        }
+    }
+
+    /// The same acceleration on both sides of a key, divided by `1/h + 1/next_h`, so that no number
+    /// overflows.
+    fn between(before: &Step, after: &Step) -> Self {
+        let (h, next_h) = (before.duration, after.duration);
+        let (left, right) = (next_h / (h + next_h), h / (h + next_h));
+        Self {
+            lower: before.chart.from_rate * (2.0 * left),
+            diagonal: 4.0,
+            upper: after.chart.to_rate * (2.0 * right),
+            right: before.secant() * (6.0 * left) + after.secant() * (6.0 * right),
+            bend_scale: left * h,
+        }
+    }
+
+    /// What is left of it without its bend.
+    fn residual(&self, [before, velocity, behind]: [DVec3; 3]) -> DVec3 {
+        self.lower * before + velocity * self.diagonal + self.upper * behind - self.right
+    }
+
+    /// The size of its terms, in radians per second.
+    fn size(&self, [before, velocity, behind]: [DVec3; 3]) -> f64 {
+        let beside = (self.lower * before).length() + (self.upper * behind).length();
+        velocity.length() + (beside + self.right.length()) / self.diagonal
+    }
+}
+
+/// The equations for the velocities. But for [`Step::bend`], which depends on the velocity at its
+/// key alone, they are linear.
+///
+/// They are solved by Newton's iteration, each of whose steps is a block tridiagonal system, from the
+/// solution of the linear equations. A step must be at most half as long as the one before it; then the
+/// iteration stays near the solution that it starts towards, and which one is found does not hang on
+/// the rounding of a number. Where it is longer, bends are brought in by parts: a quarter, and twice
+/// as much when a part succeeds, half as much when it fails. Below two radians a step three to six
+/// of Newton's steps do, however unevenly keys are spaced.
+struct Spline<'a> {
+    steps: &'a [Step],
+    equations: Vec<Equation>,
+}
+
+/// How strong a bend may be that counts: the angle of the step before the key, times the rate of its rotation
+/// vector there in radians per interval, times the weight of the
+/// interval. Up to about 5 `SciPy` converges. At 1000 the curve makes a hundred turns in an
+/// interval, and the solutions lie near each other.
+const STRONGEST: f64 = 1024.0;
+/// Smaller angles count as this one: through hardly any angle a curve may be thousands of turns long.
+const SMALLEST_ANGLE: f64 = 0.1;
+/// If no solution is found, only bends up to half as strong count, and so on; below this none.
+const WEAKEST: f64 = 0.5;
+
+/// Bends are brought in all at once at first, then by a quarter, and at least by this part.
+const FIRST_PART: f64 = 0.25;
+const LEAST_PART: f64 = 1.0 / 1024.0;
+
+/// The most of Newton's steps for a part of the bends, and for all that is tried.
+const STEPS_FOR_PART: usize = 32;
+const ALL_STEPS: usize = 1024;
+
+/// The largest quotient of the lengths of two consecutive steps; steps below [`ROUNDING`] may be rounding.
+const CONTRACTION: f64 = 0.5;
+const ROUNDING: f64 = 1e-10;
+/// The iteration is done after a step that changed no velocity by more than this part of its size, if what is
+/// left, about its square, is nothing.
+const CONVERGED: f64 = 1e-8;
+const NOTHING: f64 = 1e-15;
 
 impl<'a> Spline<'a> {
     fn new(steps: &'a [Step], [start, end]: [End; 2]) -> Self {
-        let keys = steps.len() + 1;
-        let mut spline = Self {
-            steps,
-            lower: vec![DMat3::ZERO; keys],
-            upper: vec![DMat3::ZERO; keys],
-            inverse: vec![DMat3::IDENTITY; keys],
-            given: vec![DVec3::ZERO; keys],
-            scales: vec![0.0; keys],
-            bent: 1..keys,
-        };
-        let mut diagonal = vec![DMat3::IDENTITY; keys];
-        if let ([first, ..], [.., last]) = (steps, steps) {
-            let given = |end: End, step: &Step, next: Option<&Step>| match (end, next) {
-                (End::Clamped(half), _) => Some(DVec3::from_array(half) * 2.0),
-                (End::Secant, _) | (_, None) => Some(step.secant()),
-                // The parabola through three keys, in logarithms.
-                (End::Parabolic, Some(next)) => {
-                    let bend = (next.secant() - step.secant()) * step.duration;
-                    Some(step.secant() - bend / (step.duration + next.duration))
-                }
-                (End::Natural, Some(_)) => None,
-            };
-            match given(start, first, steps.get(1)) {
-                Some(velocity) => spline.given[0] = velocity,
-                None => {
-                    diagonal[0] = DMat3::IDENTITY * 2.0;
-                    spline.upper[0] = first.turn.to_rate;
-                    spline.given[0] = first.secant() * 3.0;
-                }
+        let set_velocity = |end: End, step: &Step, next: Option<&Step>| match (end, next) {
+            (End::Clamped(half), _) => Some(DVec3::from_array(half) * 2.0),
+            (End::Secant, _) | (_, None) => Some(step.secant()),
+            // The parabola through three keys, in logarithms.
+            (End::Parabolic, Some(next)) => {
+                let bend = (next.secant() - step.secant()) * step.duration;
+                Some(step.secant() - bend / (step.duration + next.duration))
             }
+            (End::Natural, Some(_)) => None,
+        };
+        let mut equations = Vec::with_capacity(steps.len() + 1);
+        if let [first, ..] = steps {
+            equations.push(match set_velocity(start, first, steps.get(1)) {
+                Some(velocity) => Equation::set_to(velocity),
+                None => Equation::natural_start(first),
+            });
+        }
+        let inner = steps
+            .windows(2)
+            .map(|pair| Equation::inner(&pair[0], &pair[1]));
+        equations.extend(inner);
+        if let [.., last] = steps {
             let before_last = steps.len().checked_sub(2).map(|i| &steps[i]);
-            match given(end, last, before_last) {
-                Some(velocity) => {
-                    spline.given[keys - 1] = velocity;
-                    spline.bent = 1..keys - 1;
-                }
-                None => {
-                    diagonal[keys - 1] = DMat3::IDENTITY * 4.0;
-                    spline.lower[keys - 1] = last.turn.from_rate * 2.0;
-                    spline.given[keys - 1] = last.secant() * 6.0;
-                    spline.scales[keys - 1] = last.duration;
-                }
-            }
+            equations.push(match set_velocity(end, last, before_last) {
+                Some(velocity) => Equation::set_to(velocity),
+                None => Equation::natural_end(last),
+            });
         }
-        for (i, pair) in (1..).zip(steps.windows(2)) {
-            let (h, next_h) = (pair[0].duration, pair[1].duration);
-            // The equation is divided by 1/h + 1/next_h, so that no number overflows.
-            let (left, right) = (next_h / (h + next_h), h / (h + next_h));
-            spline.lower[i] = pair[0].turn.from_rate * (2.0 * left);
-            spline.upper[i] = pair[1].turn.to_rate * (2.0 * right);
-            diagonal[i] = DMat3::IDENTITY * 4.0;
-            spline.given[i] = pair[0].secant() * (6.0 * left) + pair[1].secant() * (6.0 * right);
-            spline.scales[i] = left * h;
+        if equations.is_empty() {
+            equations.push(Equation::set_to(DVec3::ZERO));
         }
-        spline.inverse[0] = diagonal[0].inverse();
-        for (i, &own) in diagonal.iter().enumerate().skip(1) {
-            let above = spline.inverse[i - 1] * spline.upper[i - 1];
-            spline.inverse[i] = (own - spline.lower[i] * above).inverse();
-        }
-        spline
+        Self { steps, equations }
     }
 
-    fn solve(&self) -> Solved {
-        let mut velocities = self.given.clone();
-        self.sweep(self.given.clone(), &mut velocities);
-        let rate = |i: usize, velocity: DVec3| self.steps[i - 1].turn.to_rate * velocity;
-        let fast = |&i: &usize| {
-            let turn = rate(i, velocities[i]) * self.steps[i - 1].duration;
-            turn.length() <= FASTEST
+    fn solve(&self) -> Vec<DVec3> {
+        let keys = self.equations.len();
+        let mut newton = Newton {
+            spline: self,
+            bend_scales: vec![0.0; keys],
+            sizes: Vec::new(),
+            above: vec![DMat3::ZERO; keys],
+            changes: vec![DVec3::ZERO; keys],
+            steps_left: ALL_STEPS,
         };
-        let bent: Vec<usize> = self.bent.clone().filter(fast).collect();
-        let plain = velocities.clone();
-        let mut converged = false;
-        for _ in 0..SWEEPS {
-            let mut sides = self.given.clone();
-            for &i in &bent {
-                let bend = self.steps[i - 1].turn.bend(rate(i, velocities[i]));
-                sides[i] -= bend * self.scales[i];
+        newton.eliminate(&vec![DVec3::ZERO; keys], 0.0);
+        let linear: Vec<DVec3> = newton.changes.iter().map(|&change| -change).collect();
+        newton.sizes = (self.equations.iter().enumerate())
+            .map(|(key, equation)| equation.size(around(&linear, key)) + 1e-200)
+            .collect();
+        let strengths: Vec<f64> = (0..keys).map(|key| self.strength(key, &linear)).collect();
+        let mut strongest = STRONGEST;
+        while strongest >= WEAKEST {
+            for (key, scale) in newton.bend_scales.iter_mut().enumerate() {
+                let counts = strengths[key] <= strongest;
+                *scale = if counts {
+                    self.equations[key].bend_scale
+                } else {
+                    0.0
+                };
             }
-            let change = self.sweep(sides, &mut velocities);
-            converged = change < SETTLED;
-            if change < 1e-14 {
-                break;
+            if let Some(velocities) = newton.with_bends(&linear) {
+                return velocities;
             }
+            strongest *= 0.5;
         }
-        // If the iteration diverges, the bends are omitted everywhere.
-        let is_finite = velocities.iter().all(|velocity| velocity.is_finite());
-        let mut jumps = vec![false; velocities.len()];
-        jumps[self.bent.clone()].fill(true);
-        if converged && is_finite {
-            bent.iter().for_each(|&i| jumps[i] = false);
-        }
-        Solved {
-            velocities: if is_finite { velocities } else { plain },
-            jumps,
-        }
+        linear
     }
 
-    /// Solves for these right sides, and returns the largest relative change of a velocity.
-    fn sweep(&self, mut sides: Vec<DVec3>, velocities: &mut [DVec3]) -> f64 {
-        for i in 0..sides.len() {
-            let above = match i {
-                0 => DVec3::ZERO,
-                _ => self.lower[i] * sides[i - 1],
-            };
-            sides[i] = self.inverse[i] * (sides[i] - above);
+    /// How strong the bend at a key is. See [`STRONGEST`].
+    fn strength(&self, key: usize, velocities: &[DVec3]) -> f64 {
+        match self.equations[key].bend_scale {
+            0.0 => 0.0,
+            scale => {
+                let chart = &self.steps[key - 1].chart;
+                let angle = chart.vector.length();
+                let angle = if angle > SMALLEST_ANGLE {
+                    angle
+                } else {
+                    SMALLEST_ANGLE
+                };
+                scale * angle * (chart.to_rate * velocities[key]).length()
+            }
         }
-        let mut change = 0.0f64;
-        for i in (0..sides.len()).rev() {
-            let below = match velocities.get(i + 1) {
-                Some(&below) => self.inverse[i] * (self.upper[i] * below),
-                None => DVec3::ZERO,
-            };
-            let velocity = sides[i] - below;
-            let moved = (velocity - velocities[i]).length() / (1e-30 + velocity.length());
-            change = change.max(moved);
-            velocities[i] = velocity;
+    }
+}
+
+/// The velocities at the key before one, at it and behind it; 0 beyond the ends.
+fn around(velocities: &[DVec3], key: usize) -> [DVec3; 3] {
+    let at = |key: usize| velocities.get(key).copied().unwrap_or(DVec3::ZERO);
+    [at(key.wrapping_sub(1)), velocities[key], at(key + 1)]
+}
+
+/// Newton's iteration for the equations of a spline.
+struct Newton<'a> {
+    spline: &'a Spline<'a>,
+    /// The factors of the bends; 0 where a bend is omitted.
+    bend_scales: Vec<f64>,
+    /// The sizes of the equations' terms, to which changes are compared.
+    sizes: Vec<f64>,
+    /// What is above the diagonal after elimination, and the solution.
+    above: Vec<DMat3>,
+    changes: Vec<DVec3>,
+    steps_left: usize,
+}
+
+impl Newton<'_> {
+    /// The solution that goes on from that of the linear equations as bends are brought in.
+    fn with_bends(&mut self, linear: &[DVec3]) -> Option<Vec<DVec3>> {
+        let mut velocities = linear.to_vec();
+        let (mut part, mut more) = (0.0, 1.0);
+        while more >= LEAST_PART && self.steps_left > 0 {
+            let next = if part + more < 1.0 { part + more } else { 1.0 };
+            let mut found = velocities.clone();
+            if self.converges(&mut found, next) {
+                if next == 1.0 {
+                    return Some(found);
+                }
+                (velocities, part, more) = (found, next, 2.0 * more);
+            } else {
+                more *= if more == 1.0 { FIRST_PART } else { 0.5 };
+            }
         }
-        change
+        None
+    }
+
+    /// Goes from these velocities to the solution with this part of the bends.
+    fn converges(&mut self, velocities: &mut [DVec3], part: f64) -> bool {
+        let mut previous = f64::INFINITY;
+        for _ in 0..STEPS_FOR_PART.min(self.steps_left) {
+            self.steps_left -= 1;
+            self.eliminate(velocities, part);
+            let mut largest = 0.0;
+            for ((velocity, &change), size) in
+                velocities.iter_mut().zip(&self.changes).zip(&self.sizes)
+            {
+                let relative = change.length() / size;
+                if !relative.is_finite() {
+                    return false;
+                }
+                largest = if relative > largest {
+                    relative
+                } else {
+                    largest
+                };
+                *velocity -= change;
+            }
+            if largest > CONTRACTION * previous && largest > ROUNDING {
+                return false;
+            }
+            // The quotient of the last step and the square of the one before it goes on.
+            let rest = largest * largest * (largest / (previous * previous));
+            if largest <= CONVERGED && (rest <= NOTHING || previous <= CONVERGED) {
+                return true;
+            }
+            previous = largest;
+        }
+        false
+    }
+
+    /// Solves the equations, linear about these velocities, for how much these are too large: by elimination
+    /// from the first key on.
+    fn eliminate(&mut self, velocities: &[DVec3], part: f64) {
+        for (key, equation) in self.spline.equations.iter().enumerate() {
+            let velocity = velocities[key];
+            let mut diagonal = DMat3::from_diagonal(DVec3::splat(equation.diagonal));
+            let mut residual = equation.residual(around(velocities, key));
+            let scale = part * self.bend_scales[key];
+            if scale != 0.0 {
+                let step = &self.spline.steps[key - 1];
+                diagonal += step.bend_slope(velocity) * scale;
+                residual += step.bend(velocity) * scale;
+            }
+            if key > 0 {
+                diagonal -= equation.lower * self.above[key - 1];
+                residual -= equation.lower * self.changes[key - 1];
+            }
+            let inverse = diagonal.inverse();
+            self.above[key] = inverse * equation.upper;
+            self.changes[key] = inverse * residual;
+        }
+        for key in (0..self.changes.len() - 1).rev() {
+            let behind = self.changes[key + 1];
+            self.changes[key] -= self.above[key] * behind;
+        }
     }
 }

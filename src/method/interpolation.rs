@@ -95,8 +95,8 @@ impl Interpolation {
         self.ends.check_loop(keys, index)
     }
 
-    /// What is unusual about the curves of a set that are evaluated all the same: keys at which
-    /// [`C2`](crate::method::C2) found no velocities that make the angular acceleration continuous. It
+    /// What is unusual about the curves of a set that are evaluated all the same: keys at which the angular
+    /// acceleration of [`C2`](crate::method::C2) jumps, as its curve is. It
     /// costs as much as preparing the tracks; other methods have no warnings.
     ///
     /// ```
@@ -104,7 +104,7 @@ impl Interpolation {
     /// use tumble::{Interpolation, TrackSet, method};
     /// let mut set = TrackSet::new();
     /// let keys = [0.0, 0.3, 0.7, 0.2].map(Quat::from_rotation_z);
-    /// set.push("elbow", &[0.0, 1.0, 1.5, 2.0], &keys)?;
+    /// set.push("elbow", &[0.0, 1.0, 1.05, 2.0], &keys)?;
     /// assert!(Interpolation::from(method::C2).warnings(&set).is_empty());
     /// # Ok::<(), tumble::TrackError>(())
     /// ```

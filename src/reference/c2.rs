@@ -1,5 +1,6 @@
 //! The spline with continuous angular acceleration: between keys a cubic in the
-//! rotation vector, its velocities at the keys found by relaxation.
+//! rotation vector, its velocities at the keys found by Newton's iteration on accelerations that are
+//! taken of the curve itself.
 
 use glam::{DMat3, DQuat, DVec3};
 
@@ -19,76 +20,352 @@ pub(crate) const C2: Definition = Definition::new(|track, ends| {
     })
 });
 
+/// Copies of a closed track are joined until there are so many keys on either side of it.
+const KEYS_AROUND: usize = 48;
+
 /// The angular velocities at the keys (rad/s, body frame) that make the angular acceleration
-/// continuous. Each in turn is changed so that it is continuous at its key, until nothing changes
-/// any more.
+/// continuous.
 fn velocities(track: &Track, ends: Ends) -> Vec<DVec3> {
     let last = track.last();
-    let secant = |i: usize| 2.0 * logarithm(track.difference(i)) / track.step(i);
     if last < 2 {
         // Two keys are joined by an arc, and one has no curve.
         return vec![DVec3::ZERO; last + 1];
     }
-    let mut velocities: Vec<DVec3> = (0..=last).map(|key| secant(key.min(last - 1))).collect();
+    let is_closed = ends == Ends::Loop;
+    let copies = if is_closed {
+        KEYS_AROUND.div_ceil(last)
+    } else {
+        0
+    };
+    let intervals: Vec<Interval> = (0..last * (2 * copies + 1))
+        .map(|i| Interval::new(track, i % last))
+        .collect();
+    let secant = |i: usize| intervals[i].whole * 2.0 / intervals[i].duration;
     let parabola = |end: usize, next: usize| {
-        let (h, next_h) = (track.step(end), track.step(next));
+        let (h, next_h) = (intervals[end].duration, intervals[next].duration);
         let inner = (secant(next) * h + secant(end) * next_h) / (h + next_h);
         2.0 * secant(end) - inner
     };
-    match ends {
-        Ends::Clamped { start, end } => (velocities[0], velocities[last]) = (start, end),
-        Ends::Parabolic | Ends::Frozen => {
-            velocities[0] = parabola(0, 1);
-            velocities[last] = parabola(last - 1, last - 2);
-        }
-        Ends::Natural | Ends::Secant | Ends::Loop => {}
-    }
-    let intervals: Vec<Interval> = (0..last).map(|i| Interval::new(track, i)).collect();
-    relax(&intervals, ends, &mut velocities, &vec![false; last + 1]);
-    // The nonlinear part of the acceleration is left out at keys where the curve is faster than a
-    // full turn per interval: there the equations with it may have no solution.
-    let bent: Vec<bool> = (0..=last)
-        .map(|key| {
-            let before = if key == 0 { last - 1 } else { key - 1 };
-            let end = intervals[before].cubic(&velocities, before).slope(1.0);
-            end.length() <= std::f64::consts::TAU
-        })
-        .collect();
-    relax(&intervals, ends, &mut velocities, &bent);
-    velocities
+    let final_interval = intervals.len() - 1;
+    let at_ends = match ends {
+        Ends::Clamped { start, end } => [Some(start), Some(end)],
+        Ends::Parabolic | Ends::Frozen => [
+            Some(parabola(0, 1)),
+            Some(parabola(final_interval, final_interval - 1)),
+        ],
+        Ends::Natural => [None; 2],
+        Ends::Secant | Ends::Loop => [Some(secant(0)), Some(secant(final_interval))],
+    };
+    let solved = System::new(&intervals, at_ends).solve();
+    solved[last * copies..=last * (copies + 1)].to_vec()
 }
 
-fn relax(intervals: &[Interval], ends: Ends, velocities: &mut [DVec3], bent: &[bool]) {
-    let last = intervals.len();
-    for _ in 0..1000 {
-        let mut change = 0.0f64;
-        for key in 0..=last {
-            let (before, after) = match (key, ends) {
-                (0, Ends::Natural) => (None, Some(0)),
-                (0, Ends::Loop) => (Some(last - 1), Some(0)),
-                (key, Ends::Natural) if key == last => (Some(last - 1), None),
-                (key, Ends::Loop) if key == last => {
-                    velocities[last] = velocities[0];
-                    continue;
+/// For every key three equations: the angular acceleration is the same on both sides of it. They are
+/// linear in the velocities of the neighbouring keys, and quadratic in the key's velocity.
+///
+/// The quadratic part, the bend, counts where it is not too strong ([`System::strength`]). The solution
+/// is the one that grows out of the linear equations' as the bends are brought in, which Newton's iteration
+/// follows in steps so small that it contracts to half with each of its own.
+struct System<'a> {
+    intervals: &'a [Interval],
+    /// The velocities at the keys where they are not free.
+    set: Vec<Option<DVec3>>,
+    /// How the equations depend on the neighbours' velocities.
+    beside: Vec<[DMat3; 2]>,
+}
+
+/// The strongest bends that count at first; half as strong ones do where no solution is found, and so on.
+const STRONGEST: f64 = 1024.0;
+const WEAKEST: f64 = 0.5;
+/// The longest step, radians, beside which equations are solved.
+const LONGEST: f64 = 3.5;
+/// The smallest part by which bends are brought in.
+const LEAST_PART: f64 = 1.0 / 1024.0;
+/// Newton's steps for a part, and for all.
+const STEPS_FOR_PART: usize = 32;
+const ALL_STEPS: usize = 1024;
+
+impl<'a> System<'a> {
+    fn new(intervals: &'a [Interval], [start, end]: [Option<DVec3>; 2]) -> Self {
+        let last = intervals.len();
+        let secant = |i: usize| 2.0 * intervals[i].whole / intervals[i].duration;
+        // Beside long steps Bessel's mean.
+        let set = (0..=last).map(|key| {
+            let near = key.saturating_sub(1)..last.min(key + 1);
+            let is_long = near
+                .into_iter()
+                .any(|i| 2.0 * intervals[i].whole.length() > LONGEST);
+            match (key, is_long) {
+                (0, _) if start.is_some() => start,
+                _ if key == last && end.is_some() => end,
+                (_, false) => None,
+                (0, true) => Some(secant(0)),
+                (_, true) if key == last => Some(secant(last - 1)),
+                (_, true) => {
+                    let (h, next_h) = (intervals[key - 1].duration, intervals[key].duration);
+                    Some((secant(key - 1) * next_h + secant(key) * h) / (h + next_h))
                 }
-                (key, _) if key == 0 || key == last => continue,
-                _ => (Some(key - 1), Some(key)),
-            };
-            let (mut excess, mut stiffness) = (DVec3::ZERO, 0.0);
-            for (i, t, is_bent, sign) in [(before, 1.0, bent[key], 1.0), (after, 0.0, true, -1.0)] {
-                let Some(i) = i else { continue };
-                let h = intervals[i].duration;
-                let cubic = intervals[i].cubic(velocities, i);
-                excess += cubic.acceleration(t, is_bent) / (h * h) * sign;
-                stiffness += 4.0 / h;
             }
-            let step = excess / stiffness;
-            velocities[key] -= step;
-            change = change.max(step.length() / (1e-30 + velocities[key].length()));
+        });
+        let mut system = Self {
+            intervals,
+            set: set.collect(),
+            beside: Vec::new(),
+        };
+        let (zero, axes) = ([DVec3::ZERO; 3], [DVec3::X, DVec3::Y, DVec3::Z]);
+        let slopes = |key: usize| {
+            let still = system.excess(key, zero, 0.0);
+            [0, 2].map(|side: usize| {
+                let [x, y, z] = axes.map(|axis| {
+                    let mut moved = zero;
+                    moved[side] = axis;
+                    system.excess(key, moved, 0.0) - still
+                });
+                DMat3::from_cols(x, y, z)
+            })
+        };
+        system.beside = (0..=intervals.len()).map(slopes).collect();
+        system
+    }
+
+    /// By how much the acceleration is larger before a key than behind it, as a change of its velocity;
+    /// for the velocities at the key before it, at it and behind it, and the part of the bend that counts.
+    fn excess(&self, key: usize, [before, velocity, behind]: [DVec3; 3], part: f64) -> DVec3 {
+        if let Some(set) = self.set[key] {
+            return velocity - set;
         }
-        if change < 1e-14 {
-            break;
+        let last = self.intervals.len();
+        let (mut excess, mut stiffness) = (DVec3::ZERO, 0.0);
+        if key > 0 {
+            let interval = &self.intervals[key - 1];
+            excess += interval.acceleration_at_end(before, velocity, part);
+            stiffness += 4.0 / interval.duration;
         }
+        if key < last {
+            let interval = &self.intervals[key];
+            excess -= interval.acceleration_at_start(velocity, behind);
+            stiffness += 4.0 / interval.duration;
+        }
+        excess / stiffness
+    }
+
+    /// The three velocities that the equations of a key have.
+    fn around(velocities: &[DVec3], key: usize) -> [DVec3; 3] {
+        let at = |key: usize| velocities.get(key).copied().unwrap_or_default();
+        [at(key.wrapping_sub(1)), at(key), at(key + 1)]
+    }
+
+    /// How strong the bend at a key is beside the rest of its equations: the angle of the interval before it,
+    /// times the rate of the rotation vector at its end in radians per interval, times the weight of the
+    /// interval.
+    fn strength(&self, key: usize, velocities: &[DVec3]) -> f64 {
+        if key == 0 || self.set[key].is_some() {
+            return 0.0;
+        }
+        let before = &self.intervals[key - 1];
+        let weight = match self.intervals.get(key) {
+            Some(behind) => behind.duration / (before.duration + behind.duration),
+            None => 1.0,
+        };
+        let rate = before.to_rate * velocities[key] * before.duration;
+        let angle = 2.0 * before.whole.length();
+        weight * f64::max(angle, 0.1) * rate.length()
+    }
+
+    /// The size of what the equations of a key sum, as a velocity.
+    fn size(&self, key: usize, velocities: &[DVec3]) -> f64 {
+        let [before, velocity, behind] = Self::around(velocities, key);
+        let still = self.excess(key, [DVec3::ZERO; 3], 0.0);
+        let [of_before, of_behind] = self.beside[key];
+        let beside = (of_before * before).length() + (of_behind * behind).length();
+        velocity.length() + beside + still.length() + 1e-200
+    }
+
+    fn solve(&self) -> Vec<DVec3> {
+        let keys = self.intervals.len() + 1;
+        let (start, none) = (vec![DVec3::ZERO; keys], vec![0.0; keys]);
+        let Some(linear) = self.newton_step(&start, &none, &vec![1.0; keys]) else {
+            return start;
+        };
+        let sizes: Vec<f64> = (0..keys).map(|key| self.size(key, &linear)).collect();
+        let mut strongest = STRONGEST;
+        let mut steps_left = ALL_STEPS;
+        while strongest >= WEAKEST {
+            let counts = |key| f64::from(self.strength(key, &linear) <= strongest);
+            let bends: Vec<f64> = (0..keys).map(counts).collect();
+            if let Some(found) = self.with_bends(&linear, &bends, &sizes, &mut steps_left) {
+                return found;
+            }
+            strongest /= 2.0;
+        }
+        linear
+    }
+
+    /// All bends at once, else a quarter of them, then twice as much more where that succeeds and half as much
+    /// where it fails.
+    fn with_bends(
+        &self,
+        linear: &[DVec3],
+        bends: &[f64],
+        sizes: &[f64],
+        steps_left: &mut usize,
+    ) -> Option<Vec<DVec3>> {
+        let mut velocities = linear.to_vec();
+        let (mut part, mut more) = (0.0, 1.0);
+        while more >= LEAST_PART && *steps_left > 0 {
+            let next = f64::min(part + more, 1.0);
+            let some: Vec<f64> = bends.iter().map(|bend| bend * next).collect();
+            match self.newton(&velocities, &some, sizes, steps_left) {
+                Some(found) if next >= 1.0 => return Some(found),
+                Some(found) => (velocities, part, more) = (found, next, 2.0 * more),
+                None if more >= 1.0 => more = 0.25,
+                None => more /= 2.0,
+            }
+        }
+        None
+    }
+
+    /// Newton's iteration, if each step is at most half as long as the one before it.
+    fn newton(
+        &self,
+        from: &[DVec3],
+        bends: &[f64],
+        sizes: &[f64],
+        steps_left: &mut usize,
+    ) -> Option<Vec<DVec3>> {
+        let mut velocities = from.to_vec();
+        let mut previous = f64::INFINITY;
+        for _ in 0..STEPS_FOR_PART.min(*steps_left) {
+            *steps_left -= 1;
+            let next = self.newton_step(&velocities, bends, sizes)?;
+            let changes = velocities.iter().zip(&next).zip(sizes);
+            let relative = changes.map(|((from, to), size)| (*to - *from).length() / size);
+            let largest = relative.fold(0.0, f64::max);
+            if largest > previous / 2.0 && largest > 1e-10 {
+                return None;
+            }
+            velocities = next;
+            // The quotient of the last step and the square of the one before it goes on.
+            let rest = largest * largest * (largest / (previous * previous));
+            if largest <= 1e-8 && (rest <= 1e-15 || previous <= 1e-8) {
+                return Some(velocities);
+            }
+            previous = largest;
+        }
+        None
+    }
+
+    fn newton_step(
+        &self,
+        velocities: &[DVec3],
+        bends: &[f64],
+        sizes: &[f64],
+    ) -> Option<Vec<DVec3>> {
+        let keys = velocities.len();
+        let mut band = Band::new(3 * keys);
+        let mut excesses = Vec::with_capacity(3 * keys);
+        for key in 0..keys {
+            let around = Self::around(velocities, key);
+            let at_key = self.slope_at(key, around, bends[key], sizes[key]);
+            let [before, behind] = self.beside[key];
+            let blocks = [
+                (before, key.wrapping_sub(1)),
+                (at_key, key),
+                (behind, key + 1),
+            ];
+            for (block, column_key) in blocks.into_iter().filter(|&(_, key)| key < keys) {
+                for (row, column) in (0..9).map(|i| (i / 3, i % 3)) {
+                    let value = block.col(column)[row];
+                    band.set(3 * key + row, 3 * column_key + column, value);
+                }
+            }
+            excesses.extend(self.excess(key, around, bends[key]).to_array());
+        }
+        let changes = band.solve(excesses)?;
+        let changes = changes.chunks(3).map(DVec3::from_slice);
+        let next = velocities.iter().zip(changes);
+        let next: Vec<DVec3> = next.map(|(velocity, change)| *velocity - change).collect();
+        next.iter()
+            .all(|velocity| velocity.is_finite())
+            .then_some(next)
+    }
+
+    /// How the equations depend on the key's velocity: of a quadratic function central differences
+    /// are the derivative.
+    fn slope_at(&self, key: usize, around: [DVec3; 3], bend: f64, size: f64) -> DMat3 {
+        let [x, y, z] = [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| {
+            let at = |sign: f64| {
+                let velocity = around[1] + axis * (sign * size);
+                self.excess(key, [around[0], velocity, around[2]], bend)
+            };
+            (at(1.0) - at(-1.0)) / (2.0 * size)
+        });
+        DMat3::from_cols(x, y, z)
+    }
+}
+
+/// A matrix with five diagonals below the main one and five above it, and room for what exchanging rows
+/// fills.
+struct Band {
+    rows: Vec<[f64; 16]>,
+}
+
+impl Band {
+    fn new(size: usize) -> Self {
+        Self {
+            rows: vec![[0.0; 16]; size],
+        }
+    }
+
+    fn get(&self, row: usize, column: usize) -> f64 {
+        self.rows[row][column + 5 - row]
+    }
+
+    fn set(&mut self, row: usize, column: usize, value: f64) {
+        self.rows[row][column + 5 - row] = value;
+    }
+
+    /// Gauss' elimination with exchange of rows; none where the matrix is singular.
+    fn solve(mut self, mut sides: Vec<f64>) -> Option<Vec<f64>> {
+        let size = sides.len();
+        for pivot in 0..size {
+            let below = pivot..size.min(pivot + 6);
+            let columns = pivot..size.min(pivot + 11);
+            let largest = |a: &usize, b: &usize| {
+                let [a, b] = [*a, *b].map(|row| self.get(row, pivot).abs());
+                a.total_cmp(&b)
+            };
+            let best = below.clone().max_by(largest)?;
+            if best != pivot {
+                for column in columns.clone() {
+                    let (one, other) = (self.get(pivot, column), self.get(best, column));
+                    self.set(pivot, column, other);
+                    self.set(best, column, one);
+                }
+                sides.swap(pivot, best);
+            }
+            let divisor = self.get(pivot, pivot);
+            if divisor == 0.0 || !divisor.is_finite() {
+                return None;
+            }
+            for row in pivot + 1..below.end {
+                let factor = self.get(row, pivot) / divisor;
+                if factor != 0.0 {
+                    for column in columns.clone() {
+                        let value = self.get(row, column) - factor * self.get(pivot, column);
+                        self.set(row, column, value);
+                    }
+                    sides[row] -= factor * sides[pivot];
+                }
+            }
+        }
+        for row in (0..size).rev() {
+            for column in row + 1..size.min(row + 11) {
+                sides[row] -= self.get(row, column) * sides[column];
+            }
+            sides[row] /= self.get(row, row);
+        }
+        Some(sides)
     }
 }
 
@@ -112,9 +389,7 @@ impl Interval {
     }
 
     fn cubic(&self, velocities: &[DVec3], i: usize) -> Cubic {
-        let half = self.duration / 2.0;
-        let start = velocities[i] * half;
-        let end = self.to_rate * (velocities[i + 1] * half);
+        let [start, end] = self.slopes(velocities[i], velocities[i + 1]);
         Cubic {
             powers: [
                 start,
@@ -123,6 +398,30 @@ impl Interval {
             ],
         }
     }
+
+    /// Half of the derivative of the rotation vector at the interval's start and end, for the velocities there.
+    fn slopes(&self, from: DVec3, to: DVec3) -> [DVec3; 2] {
+        let half = self.duration / 2.0;
+        [from * half, self.to_rate * (to * half)]
+    }
+
+    /// The angular acceleration at the interval's start, where the rotation vector is 0 and its velocity
+    /// has no bend.
+    fn acceleration_at_start(&self, from: DVec3, to: DVec3) -> DVec3 {
+        let [start, end] = self.slopes(from, to);
+        let second = 6.0 * self.whole - 4.0 * start - 2.0 * end;
+        acceleration(DVec3::ZERO, DVec3::ZERO, second) / (self.duration * self.duration)
+    }
+
+    /// The angular acceleration at the interval's end, with that part of what is quadratic in the
+    /// velocity there.
+    fn acceleration_at_end(&self, from: DVec3, to: DVec3, part: f64) -> DVec3 {
+        let [start, end] = self.slopes(from, to);
+        let second = 2.0 * start + 4.0 * end - 6.0 * self.whole;
+        let linear = acceleration(self.whole, DVec3::ZERO, second);
+        let bend = acceleration(self.whole, end, DVec3::ZERO);
+        (linear + bend * part) / (self.duration * self.duration)
+    }
 }
 
 /// Half of a rotation vector as a cubic in `t`.
@@ -130,32 +429,16 @@ struct Cubic {
     powers: [DVec3; 3],
 }
 
-impl Cubic {
-    /// The derivative of the rotation vector.
-    fn slope(&self, t: f64) -> DVec3 {
-        let [a, b, c] = self.powers;
-        2.0 * (a + b * (2.0 * t) + c * (3.0 * t * t))
-    }
-
-    /// Twice `vec(e⁻¹ e'')` for the exponential `e` of the cubic. If `bent` is false, only the part
-    /// that is linear in the velocities.
-    fn acceleration(&self, t: f64, bent: bool) -> DVec3 {
-        let [a, b, c] = self.powers;
-        let v = a * t + b * (t * t) + c * (t * t * t);
-        let v1 = a + b * (2.0 * t) + c * (3.0 * t * t);
-        let v2 = 2.0 * b + c * (6.0 * t);
-        if !bent {
-            return 2.0 * (rates(v) * v2);
-        }
-        // e = [C; S v], with C and S functions of z = v·v.
-        let (s, k, slope) = waves(v.dot(v));
-        let (z1, z2) = (2.0 * v.dot(v1), 2.0 * (v1.dot(v1) + v.dot(v2)));
-        // S' = k/2, C' = -S/2.
-        let (s1, s2) = (0.5 * k * z1, 0.5 * (k * z2 + slope * z1 * z1));
-        let c2 = -0.5 * (s * z2 + 0.5 * k * z1 * z1);
-        let second = from_parts(c2, v * s2 + v1 * (2.0 * s1) + v2 * s);
-        2.0 * vector(multiply(invert(exponential(v)), second))
-    }
+/// Twice `vec(e⁻¹ e'')` for the exponential `e` of half a rotation vector with these derivatives.
+fn acceleration(v: DVec3, v1: DVec3, v2: DVec3) -> DVec3 {
+    // e = [C; S v], with C and S functions of z = v·v.
+    let (s, k, slope) = waves(v.dot(v));
+    let (z1, z2) = (2.0 * v.dot(v1), 2.0 * (v1.dot(v1) + v.dot(v2)));
+    // S' = k/2, C' = -S/2.
+    let (s1, s2) = (0.5 * k * z1, 0.5 * (k * z2 + slope * z1 * z1));
+    let c2 = -0.5 * (s * z2 + 0.5 * k * z1 * z1);
+    let second = from_parts(c2, v * s2 + v1 * (2.0 * s1) + v2 * s);
+    2.0 * vector(multiply(invert(exponential(v)), second))
 }
 
 /// With `z = x²`: `S = sin(x)/x`, `k = (cos(x) - S)/z`, and the derivative of `k` by `z`.

@@ -6,7 +6,10 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use glam::DVec3;
 use tumble::method::KOCHANEK_BARTELS;
-use tumble::{Ends, METHODS, Method, Path, Speed, WrapMode};
+use tumble::{
+    Ends, Interpolation, InterpolationWarning, METHODS, Method, Path, Speed, TrackSet, WrapMode,
+};
+use tumble_formats::{Code, Diagnostic};
 
 /// `--path` and `--ends`, which every method takes.
 #[derive(Debug, Clone, Copy, Args)]
@@ -181,6 +184,43 @@ enum PathArgument {
     Shortest,
     /// the way that the signs of the keys say
     AsAuthored,
+}
+
+/// Where the curves of a set are less smooth than their method promises: the first such key is named, others
+/// are counted.
+pub(crate) fn curve_warning(
+    name: &str,
+    set: &TrackSet,
+    interpolation: &Interpolation,
+) -> Option<Diagnostic> {
+    let mut first = None;
+    let (mut keys, mut tracks) = (0, 0);
+    for warning in interpolation.warnings(set) {
+        let InterpolationWarning::AccelerationJumps { track, key, count } = warning else {
+            continue;
+        };
+        first = first.or(Some((track, key)));
+        (keys, tracks) = (keys + count, tracks + 1);
+    }
+    let (index, key) = first?;
+    let track = set.track(index);
+    let time = track.times[key];
+    let others = match (keys, tracks) {
+        (1, _) => String::new(),
+        (_, 1) => format!(" (and at {} more)", keys - 1),
+        _ => format!(" (and at {} more, in {tracks} tracks)", keys - 1),
+    };
+    let message = format!(
+        "the angular acceleration of {} jumps at key {}, at {time} s{others}; add keys in long intervals \
+         beside short ones, or use -m bessel-overhauser",
+        interpolation.method,
+        key + 1
+    );
+    let inside = match track.name {
+        Some(name) => format!("track {name}"),
+        None => format!("track {}", index + 1),
+    };
+    Some(Diagnostic::new(name, Code::AccelerationJumps, message).inside(inside))
 }
 
 fn names() -> impl Iterator<Item = PossibleValue> {

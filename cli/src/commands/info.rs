@@ -5,13 +5,15 @@ use std::fmt::Write;
 
 use clap::Args;
 use serde::Serialize;
+use tumble::method::C2;
 use tumble::reference::angle_between;
-use tumble::{Channel, TrackSet};
+use tumble::{Channel, Interpolation, TrackSet};
 use tumble_formats::Loaded;
 use tumble_formats::motion::Motion;
 
 use crate::arguments::input;
 use crate::arguments::input::Inputs;
+use crate::arguments::interpolation::curve_warning;
 use crate::messages::exit::{Failure, for_each};
 use crate::messages::words;
 
@@ -71,7 +73,7 @@ struct Summary {
     samplers: BTreeMap<&'static str, usize>,
     #[serde(skip_serializing_if = "Option::is_none")]
     box_length: Option<f64>,
-    /// Of the whole file, with its first animation: `FILE:LINE:COLUMN: warning[CODE]: …`
+    /// Of the whole file, with its first animation, and of the curves of each: `FILE:PLACE: warning[CODE]: …`
     warnings: Vec<String>,
 }
 
@@ -90,6 +92,11 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
             if place > 0 {
                 summary.warnings.clear();
             }
+            let smoothest = Interpolation::from(C2);
+            let of_curves = curve_warning(&name, &clip.set, &smoothest);
+            summary
+                .warnings
+                .extend(of_curves.map(|warning| warning.to_string()));
             summaries.push(summary);
         }
         for refused in &loaded.refused {

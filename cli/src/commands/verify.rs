@@ -11,7 +11,7 @@ use crate::arguments::device::{DeviceArguments, Opened};
 use crate::arguments::given::Given;
 use crate::arguments::input;
 use crate::arguments::input::Inputs;
-use crate::arguments::interpolation::{Manner, Selection, chosen, methods};
+use crate::arguments::interpolation::{Manner, Selection, chosen, curve_warning, methods};
 use crate::arguments::time::{Samples, Sampling};
 use crate::batch::room;
 use crate::messages::exit::{ALL_INPUTS, DIFFERENCE, Failure, NO_VULKAN, for_each};
@@ -140,6 +140,9 @@ impl Arguments {
         let mut lines = Vec::new();
         for &method in methods {
             let interpolation = self.manner.with(method);
+            if let Some(warning) = curve_warning(name, set, &interpolation) {
+                progress.suspend(|| words::note(&warning.to_string()));
+            }
             let found = tumble::verify::verify(&device.engine, set, interpolation, &frames)
                 .map_err(|error| Failure::evaluating(name, &error))?;
             lines.push(Line {

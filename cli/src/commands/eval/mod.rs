@@ -21,7 +21,7 @@ use crate::arguments::device::{DeviceArguments, Opened};
 use crate::arguments::given::Given;
 use crate::arguments::input;
 use crate::arguments::input::Inputs;
-use crate::arguments::interpolation::{Manner, Wanted, wanted};
+use crate::arguments::interpolation::{Manner, Wanted, curve_warning, wanted};
 use crate::arguments::results::{Results, each_file, kept};
 use crate::arguments::time::{Samples, Sampling};
 use crate::arguments::what::{OrderArgument, What, quaternions};
@@ -265,6 +265,7 @@ impl Job<'_> {
     ) -> Result<(Evaluated, Told), Failure> {
         for clip in clips {
             self.check_manner(name, clip)?;
+            self.note_curves(name, clip)?;
         }
         let what = &self.arguments.what;
         let kind = match what.poses() {
@@ -302,6 +303,18 @@ impl Job<'_> {
             return self.poses(name, clip, poses, target);
         }
         self.rotations(name, &*tracks.select(clip, name)?, target)
+    }
+
+    /// Says where the curves of the tracks that are evaluated are less smooth than their method promises.
+    fn note_curves(&self, name: &str, clip: &Motion) -> Result<(), Failure> {
+        let (Some(method), with) = self.methods() else {
+            return Ok(()); // No file asks for such a method.
+        };
+        let selected = self.arguments.inputs.tracks.select(clip, name)?;
+        if let Some(warning) = curve_warning(name, &selected.set, &with(method)) {
+            words::note(&warning.to_string());
+        }
+        Ok(())
     }
 
     /// Refuses what says nothing to the methods of a clip's channels, and units of what has none.

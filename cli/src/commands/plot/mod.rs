@@ -19,7 +19,7 @@ use tumble::{Interpolation, Method, TrackSet, method};
 
 use crate::arguments::device::{DeviceArguments, Opened};
 use crate::arguments::input::{self, Inputs};
-use crate::arguments::interpolation::{Manner, Selection, chosen, methods};
+use crate::arguments::interpolation::{Manner, Selection, chosen, curve_warning, methods};
 use crate::arguments::path::{PATHS, PathArguments};
 use crate::arguments::time::Sampling;
 use crate::batch::place::{self, Place};
@@ -172,6 +172,16 @@ enum Out {
     Folder(PathBuf),
 }
 
+/// Says where curves are less smooth than their methods promise.
+fn note_curves(name: &str, set: &TrackSet, interpolations: &[Interpolation]) {
+    let warnings = interpolations
+        .iter()
+        .filter_map(|interpolation| curve_warning(name, set, interpolation));
+    for warning in warnings {
+        words::note(&warning.to_string());
+    }
+}
+
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let inputs = arguments
         .inputs
@@ -212,6 +222,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         let input::OnlyClip { clip, rest } = arguments.inputs.load_one(path)?;
         let tracks = arguments.inputs.tracks.of(&clip, &name)?;
         let set = clip.set;
+        note_curves(&name, &set, &interpolations);
         let source = Source::new(input::file_name(path), &set, &interpolations, &samples)?;
         let subjects = arguments.subjects(&set, tracks, &name)?;
         let pictures = match &out {

@@ -15,7 +15,7 @@ use crate::commands::info::Steps;
 use crate::commands::plot::curves::{NAMES, Subject};
 use crate::commands::plot::source::Source;
 use crate::commands::plot::subjects::PANELS;
-use crate::commands::plot::{Arguments, Studio};
+use crate::commands::plot::{Arguments, Studio, note_curves};
 use crate::messages::exit::{Failure, for_each};
 use crate::messages::progress::Progress;
 use crate::messages::words;
@@ -52,6 +52,7 @@ pub(crate) fn write(
     let outcome = for_each(&inputs, |path| {
         let only = progress.suspend(|| arguments.inputs.load_one(path))?;
         let set = only.clip.set;
+        progress.suspend(|| note_curves(&input::name(path), &set, interpolations));
         let chapter = Chapter {
             title: input::file_name(path),
             facts: facts(&set),
