@@ -38,7 +38,7 @@ fn scipy_and_splines_agree() {
 fn c2_is_scipy_s_spline_wherever_that_is_continuous() {
     let sets = match std::env::var_os("SOAK") {
         Some(_) => "2000",
-        None => "300",
+        None => "200",
     };
     peer("c2.py", &[sets]);
 }

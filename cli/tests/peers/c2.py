@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation, RotationSpline
 TUMBLE, FOLDER, SETS = sys.argv[1], pathlib.Path(sys.argv[2]), int(sys.argv[3])
 # Keys lie on every second frame.
 KEYS_PER_SECOND, FPS = 40, 80
-ITERATED = 200
+ITERATED = 60
 rng = np.random.default_rng(20)
 
 
