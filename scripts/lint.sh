@@ -31,3 +31,6 @@ CARGO_TARGET_DIR=target/without_vulkan cargo run --quiet --manifest-path tests/w
 # that a package includes lies in it is a test (tests/tidy.rs).
 cargo package --quiet --no-verify --allow-dirty --target-dir target/packages \
     -p tumble -p tumble-formats -p tumble-routes -p tumble-cli
+
+# The guide as a book, in which every link leads somewhere.
+./scripts/book.sh
