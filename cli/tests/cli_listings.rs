@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use crate::program::{sample_folder, succeed};
+use crate::program::{run, sample_folder, succeed};
 use crate::support::vulkan_devices;
 
 #[test]
@@ -270,8 +270,12 @@ fn an_acceleration_that_jumps_is_told() {
         &["verify", "short.dat", "-m", "c2,squad", "--device", "cpu"],
         &["info", "short.dat"],
     ] {
-        let run = succeed(folder.path(), line);
-        let text = run.words + &String::from_utf8(run.out).unwrap();
+        // `verify` may find such velocities off their bounds, by any method.
+        let told = match line[0] {
+            "verify" => run(folder.path(), line),
+            _ => succeed(folder.path(), line),
+        };
+        let text = told.words + &String::from_utf8(told.out).unwrap();
         assert_eq!(text.matches("W014").count(), 1, "{line:?}: {text}");
         assert!(text.contains(said), "{line:?}: {text}");
         // The same keys with intervals of a hundred to one have their curve, and other methods have no warning.
@@ -285,8 +289,8 @@ fn an_acceleration_that_jumps_is_told() {
                 }
             })
             .collect();
-        let run = succeed(folder.path(), &even);
-        let text = run.words + &String::from_utf8(run.out).unwrap();
+        let told = succeed(folder.path(), &even);
+        let text = told.words + &String::from_utf8(told.out).unwrap();
         assert!(!text.contains("W014"), "{even:?}: {text}");
     }
     let line = [
