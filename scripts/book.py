@@ -42,10 +42,11 @@ def rewritten(text, folder, pages):
         if target is None or "://" in target or target.startswith("#"):
             return match[0]
         path, _, anchor = target.partition("#")
-        path = posixpath.normpath(posixpath.join(folder, path))
+        # From a page above docs/, `docs/x.md` is x.md.
+        path = posixpath.relpath(posixpath.join("docs", folder, path), "docs")
         if path in pages:
             path = pages[path] + (f"#{anchor}" if anchor else "")
-        elif path.startswith("../"):
+        elif path.startswith("../") or path == "SUMMARY.md":
             return label
         return f"{image}[{label}]({path})"
 
@@ -103,6 +104,10 @@ def check(folder):
         sys.exit("\n".join(dead))
     if links < 200:
         sys.exit(f"only {links} links were found in {folder}")
+    for name in ("index.html", "architecture.html"):
+        linked = {link.partition("#")[0] for link in pages[name].links} & pages.keys()
+        if len(linked) < 10:
+            sys.exit(f"{name} leads to {len(linked)} pages only: the links of a page above docs/ were lost")
     print(f"{len(pages)} pages, {links} links, none of them dead: {folder}/index.html")
 
 
