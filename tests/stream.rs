@@ -279,7 +279,7 @@ fn what_takes_too_much_memory_is_made_piece_by_piece_with_the_same_bits() {
             WrapMode::Extrapolate,
             Speed::AsKeyed,
         ),
-        interpolation(method::SQUAD, WrapMode::Hold, Speed::Constant),
+        interpolation(method::SLERP, WrapMode::Hold, Speed::Constant),
     ];
     for (way, device) in devices().into_iter().enumerate() {
         let mut options = EngineOptions::default();
