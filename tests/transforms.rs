@@ -142,7 +142,7 @@ fn the_same_bits_on_every_device() {
         .into_iter()
         .flat_map(|memory| vulkan_engines(|options| options.memory = memory))
         .collect();
-    let frames = Frames::fps(30).between(-5.0, 20.0);
+    let frames = Frames::fps(12).between(-5.0, 20.0);
     for (i, vectors) in VectorMethod::ALL.into_iter().enumerate() {
         for (j, (before, after)) in sides.into_iter().zip(sides.into_iter().rev()).enumerate() {
             let interpolation = Interpolation {
