@@ -809,6 +809,18 @@ TumbleResult tumble_file_clip_time_offset(const struct TumbleFile *file,
                                           int64_t *seconds);
 
 /*
+ What was taken off the translations of a track of a clip, so that f32 holds what is left of positions
+ such as those of maps: add it to what is made of them, in doubles. Mostly 0, 0, 0.
+
+ # Safety
+ `origin` has room for three numbers.
+ */
+TumbleResult tumble_file_clip_origin(const struct TumbleFile *file,
+                                     size_t clip,
+                                     size_t track,
+                                     double *origin);
+
+/*
  How many messages there are about the file: warnings, and why clips could not be read; 0 for what
  is no file.
  */

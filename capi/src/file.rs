@@ -173,6 +173,32 @@ pub unsafe extern "C" fn tumble_file_clip_time_offset(
     })
 }
 
+/// What was taken off the translations of a track of a clip, so that f32 holds what is left of positions
+/// such as those of maps: add it to what is made of them, in doubles. Mostly 0, 0, 0.
+///
+/// # Safety
+/// `origin` has room for three numbers.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn tumble_file_clip_origin(
+    file: *const TumbleFile,
+    clip: usize,
+    track: usize,
+    origin: *mut f64,
+) -> TumbleResult {
+    code(|| {
+        let out = Out::new(origin.cast::<[f64; 3]>(), "origin")?;
+        let motion = &handle::get(file)?.clip(clip)?.motion;
+        let count = motion.set.track_count();
+        if track >= count {
+            let message = format!("there is no track {track}; the clip has {count}");
+            return Err(Failure::new(TumbleResult::OutOfRange, message));
+        }
+        // SAFETY: as the caller promises.
+        unsafe { out.set(motion.origin(track).to_array()) };
+        Ok(())
+    })
+}
+
 /// How many messages there are about the file: warnings, and why clips could not be read; 0 for what
 /// is no file.
 #[unsafe(no_mangle)]

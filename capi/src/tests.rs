@@ -393,6 +393,33 @@ fn devices_files_and_methods_are_found_or_named() {
 }
 
 #[test]
+fn a_map_s_origin_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("map.tum");
+    std::fs::write(
+        &file,
+        "0 458074.5 5429380.25 162.5 0 0 0 1\n1 458075 5429381 163 0 0 0 1\n",
+    )
+    .unwrap();
+    let path = std::ffi::CString::new(file.to_str().unwrap()).unwrap();
+    let mut file = null_mut();
+    // SAFETY: text, and a place for the handle.
+    let loaded = unsafe { tumble_file_load(path.as_ptr(), &raw mut file) };
+    assert_eq!(loaded, TumbleResult::Ok, "{}", words());
+    let mut origin = [1.0; 3];
+    // SAFETY: room for three numbers.
+    let done = unsafe { tumble_file_clip_origin(file, 0, 0, origin.as_mut_ptr()) };
+    assert_eq!(
+        (done, origin),
+        (TumbleResult::Ok, [458_075.0, 5_429_381.0, 0.0])
+    );
+    // SAFETY: as above.
+    let done = unsafe { tumble_file_clip_origin(file, 0, 1, origin.as_mut_ptr()) };
+    fails(done, TumbleResult::OutOfRange, "no track 1");
+    assert_eq!(tumble_file_free(file), TumbleResult::Ok);
+}
+
+#[test]
 fn a_panic_ends_as_a_code() {
     let result = code(|| panic!("on purpose"));
     fails(result, TumbleResult::Internal, "internal error: on purpose");

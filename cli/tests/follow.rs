@@ -356,3 +356,61 @@ fn what_cannot_be_smoothed_is_refused() {
         ],
     );
 }
+
+/// A path in UTM is followed as the same path about 0 is, and its positions come back in float64: in f32 the
+/// bodies would face as much as 17° beside the path.
+#[test]
+fn a_path_on_a_map_is_followed_as_one_at_zero() {
+    let folder = sample_folder();
+    let points = |origin: [f64; 3]| {
+        let mut text = String::from("t,x,y,z\n");
+        for i in 0..20 {
+            let angle = f64::from(i) * 0.3;
+            let at = [angle.cos() * 4.0, angle.sin() * 4.0, angle * 0.25];
+            // As many bits as an f32 has at 4, so that both files say the same points.
+            let at = at.map(|number| (number * 2f64.powi(20)).round() / 2f64.powi(20));
+            let [x, y, z] = [0, 1, 2].map(|axis| at[axis] + origin[axis]);
+            writeln!(text, "{},{x:?},{y:?},{z:?}", f64::from(i) * 0.5).unwrap();
+        }
+        text
+    };
+    fs::write(folder.path().join("zero.csv"), points([0.0; 3])).unwrap();
+    let origin = [458_075.0, 5_429_380.0, 0.0];
+    fs::write(folder.path().join("map.csv"), points(origin)).unwrap();
+    let follow = |name: &str, out: &str, at: &str| {
+        let line = [
+            "follow",
+            name,
+            "--fps",
+            "30",
+            "--frame",
+            "fixed",
+            "--direction",
+            at,
+            "-o",
+            out,
+        ];
+        succeed(folder.path(), &line);
+    };
+    follow("zero.csv", "zero.npy", "at:1,2,50");
+    follow("map.csv", "map.npy", "at:458076,5429382,50");
+    let (shape, zero) = numbers(&folder.path().join("zero.npy"));
+    let bytes = fs::read(folder.path().join("map.npy")).unwrap();
+    let file = npyz::NpyFile::new(&bytes[..]).unwrap();
+    assert_eq!(file.shape(), shape);
+    let map: Vec<f64> = file.into_vec().unwrap();
+    for (index, (map, zero)) in map.iter().zip(&zero).enumerate() {
+        let moved = origin.get(index % 7).copied().unwrap_or(0.0);
+        let off = (map - moved - f64::from(*zero)).abs();
+        assert!(off <= 1e-6, "{index}: {map} {zero}");
+    }
+    // Text has the digits, and clips of files do.
+    follow("map.csv", "map.out.csv", "tangent");
+    let text = fs::read_to_string(folder.path().join("map.out.csv")).unwrap();
+    let first = text.lines().nth(1).unwrap();
+    assert!(first.starts_with("0,0,458079,5429380,0,"), "{first}");
+    follow("map.csv", "map.tum", "tangent");
+    let text = fs::read_to_string(folder.path().join("map.tum")).unwrap();
+    let first = text.lines().find(|line| !line.starts_with('#')).unwrap();
+    assert!(first.starts_with("0 458079 5429380 0 "), "{first}");
+}

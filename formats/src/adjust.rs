@@ -4,6 +4,7 @@ use glam::{DQuat, DVec3, Quat, Vec3};
 use tumble::{Channel, TrackError};
 
 use crate::motion::{Body, Motion, Transform};
+use crate::origin::relative;
 
 /// The clip with all translations multiplied by `scale`, and with all roots turned by `turn`, keys
 /// and tangents alike. Computed in f64, rounded once.
@@ -27,7 +28,11 @@ pub fn adjust(clip: &Motion, scale: f64, turn: DQuat) -> Result<Motion, TrackErr
             true => (turn * key.as_dquat()).as_quat(),
             false => key,
         };
-        let moved = |vector: Vec3| (turn * (vector.as_dvec3() * scale)).as_vec3();
+        let exactly = |vector: DVec3| turn * (vector * scale);
+        let moved = |vector: Vec3| exactly(vector.as_dvec3()).as_vec3();
+        let before = clip.origin(index);
+        let mut origin = DVec3::ZERO;
+        let mut tangents = Vec::new();
         let keys: Vec<Quat> = track.keys.iter().map(|&key| turned(key)).collect();
         let set = &mut adjusted.set;
         set.push(track.name.unwrap_or_default(), track.times, &keys)?;
@@ -42,9 +47,19 @@ pub fn adjust(clip: &Motion, scale: f64, turn: DQuat) -> Result<Motion, TrackErr
             set.set_tcb(index, track.tcb)?;
         }
         if let Some(vectors) = clip.set.vector_keys(Channel::Translation, index) {
-            let keys: Vec<Vec3> = vectors.keys.iter().map(|&key| moved(key)).collect();
+            let keys = vectors.keys.iter().map(|key| before + key.as_dvec3());
+            let keys: Vec<DVec3> = keys.map(exactly).collect();
             let both = |both: &[Vec3; 2]| both.map(moved);
-            let tangents: Vec<_> = vectors.tangents.iter().map(both).collect();
+            tangents.extend(vectors.tangents.iter().map(both));
+            let keys = match before == DVec3::ZERO {
+                // Scaled positions count from 0 where they did before.
+                true => keys.iter().map(|key| key.as_vec3()).collect(),
+                false => {
+                    let (new, keys) = relative(&keys);
+                    origin = new;
+                    keys
+                }
+            };
             set.set_translations(index, vectors.times, &keys, &tangents)?;
         }
         if let Some(vectors) = clip.set.vector_keys(Channel::Scale, index) {
@@ -52,11 +67,13 @@ pub fn adjust(clip: &Motion, scale: f64, turn: DQuat) -> Result<Motion, TrackErr
         }
         if let Some(joint) = adjusted.skeleton.get_mut(index) {
             joint.rest = Transform {
-                translation: moved(joint.rest.translation),
+                translation: (exactly(before + joint.rest.translation.as_dvec3()) - origin)
+                    .as_vec3(),
                 rotation: turned(joint.rest.rotation),
                 ..joint.rest
             };
         }
+        adjusted.set_origin(index, origin);
     }
     Ok(adjusted)
 }
@@ -101,8 +118,9 @@ pub fn set_offsets(clip: &mut Motion, numbers: &[f64]) -> Result<(), OffsetsErro
         });
         clip.no_world = None;
     }
-    for (joint, &[x, y, z]) in clip.skeleton.iter_mut().zip(offsets) {
-        joint.rest.translation = DVec3::new(x, y, z).as_vec3();
+    for (track, &offset) in offsets.iter().enumerate() {
+        let origin = clip.origin(track);
+        clip.skeleton[track].rest.translation = (DVec3::from_array(offset) - origin).as_vec3();
     }
     Ok(())
 }

@@ -283,6 +283,8 @@ codes! {
     ObjectsBeside = "W303", "pickled Python objects beside the keys", "They are not looked into. Where the file is written again, they are copied as they are if they are no lists of frames.";
     TwoRates = "W304", "two rates that differ", "A file says its rate twice, or a rate and times of another; `--source-fps` overrules rates.";
     Nanoseconds = "W305", "times that are nanoseconds", "Seconds since 1970 have ten digits, nanoseconds nineteen, as ORB-SLAM writes them: `--time-unit ns` says it without this warning.";
+    Bridged = "W401", "keys that are missing", "Cells are blank or NaN, and `--bridge-gaps` asks for the track to be interpolated from its other keys there.";
+    FurtherNumbers = "W501", "further numbers behind a pose", "A line of a trajectory is `t x y z qx qy qz qw`; what follows, such as a covariance, is not read.";
 }
 
 impl Code {

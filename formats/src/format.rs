@@ -77,6 +77,8 @@ pub enum FormatOption {
     Map,
     /// [`ReadOptions::time_unit`].
     TimeUnit,
+    /// [`ReadOptions::bridge_gaps`].
+    BridgeGaps,
     /// [`MotionOptions::sequence`].
     Sequence,
     /// [`MotionOptions::linear`].
@@ -99,13 +101,14 @@ impl FormatOption {
         Self::TimeUnit,
     ];
 
-    /// The same, and the order of the columns that are written.
-    pub(crate) const OF_TABLES: [Self; 6] = [
+    /// The same, keys that are missing, and the order of the columns that are written.
+    pub(crate) const OF_TABLES: [Self; 7] = [
         Self::RawTimes,
         Self::Duplicates,
         Self::SourceRate,
         Self::Map,
         Self::TimeUnit,
+        Self::BridgeGaps,
         Self::Order,
     ];
 }
@@ -131,6 +134,9 @@ pub struct ReadOptions {
     pub map: Option<String>,
     /// The unit of times that are whole numbers: `s`, `ms`, `us` or `ns`.
     pub time_unit: Option<TimeUnit>,
+    /// Keys of a track some of whose numbers are missing (blank cells, nulls, NaN) are left out, so that it is
+    /// interpolated from those beside them; else they refuse the file.
+    pub bridge_gaps: bool,
 }
 
 /// The unit of times that are whole numbers.

@@ -4,7 +4,7 @@
 use std::io::BufRead;
 use std::path::Path;
 
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 use tumble::{TrackError, TrackSet};
 
 use crate::diagnostic::{Code, Diagnostic};
@@ -66,7 +66,7 @@ pub fn read_kitti(
                 return Err(lines.refuse(1, Code::NoRotation, message));
             };
             rotations.push(rounded(rotation));
-            positions.push(DVec3::new(a[3], b[3], c[3]).as_vec3());
+            positions.push(DVec3::new(a[3], b[3], c[3]));
         }
         lines.reuse(line);
     }
@@ -81,9 +81,7 @@ pub fn read_kitti(
     let mut set = TrackSet::new();
     let refuse = |error: TrackError| Diagnostic::new(name, Code::KittiPose, error.to_string());
     set.push(BODY, &times, &rotations).map_err(refuse)?;
-    let moved: Result<(), TrackError> = set.set_translations(0, &times, &positions as &[Vec3], &[]);
-    moved.map_err(refuse)?;
-    let clip = Motion {
+    let mut clip = Motion {
         set,
         skeleton: vec![Joint {
             parent: None,
@@ -92,6 +90,7 @@ pub fn read_kitti(
         rate: Some(rate),
         ..Motion::default()
     };
+    clip.set_positions(0, &times, &positions).map_err(refuse)?;
     Ok(Loaded::of(clip, lines.warnings))
 }
 
@@ -115,6 +114,8 @@ fn read_rows<R: BufRead>(lines: &Lines<R>, line: &str) -> Result<[[f64; 4]; 3], 
 
 #[cfg(test)]
 mod tests {
+    use glam::Vec3;
+
     use super::*;
 
     #[test]

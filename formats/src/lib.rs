@@ -28,6 +28,7 @@ pub mod motion;
 mod names;
 pub mod npy;
 pub mod npz;
+pub mod origin;
 pub mod output;
 #[cfg(feature = "parquet")]
 pub mod parquet;
@@ -37,6 +38,7 @@ pub mod printable;
 pub mod quaternion;
 mod rate;
 pub mod reduce;
+pub mod rotation_form;
 mod rotation_matrix;
 pub mod sample;
 mod select;

@@ -2,8 +2,10 @@
 //! `rotations=keys:wxyz,time=t`.
 //!
 //! Entries are separated by commas. Each is `name=source`, then perhaps some of the source's last
-//! axis (`[3:7]` from 3 and before 7, `[0]` one alone), then perhaps `:xyzw` or `:wxyz`, the order of
-//! a quaternion, and `:track` or `:frame`, the axis that comes first. A bracket behind a blank belongs
+//! axis (`[3:7]` from 3 and before 7, `[0]` one alone), then perhaps what its numbers are: `:xyzw` or `:wxyz`, the
+//! order of a quaternion, `:rotvec`, a rotation vector, `:matrix`, the rows of a matrix, or angles about axes such as
+//! `:ZXY` (about turned axes; `:zxy`: about fixed ones), with `:deg` in degrees; and `:track` or `:frame`, the axis
+//! that comes first. A bracket behind a blank belongs
 //! to the source's name: `time=#timestamp [ns]`.
 
 use std::ops::Range;
@@ -12,6 +14,7 @@ use std::str::FromStr;
 use tumble::Layout;
 
 use crate::npy::ComponentOrder;
+use crate::rotation_form::RotationForm;
 
 /// What each of some names is made of.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
@@ -31,6 +34,8 @@ pub struct Entry {
     pub columns: Option<Range<usize>>,
     /// The order of a quaternion's components, if it is said.
     pub order: Option<ComponentOrder>,
+    /// What the numbers of a rotation are, if they are no quaternion.
+    pub form: Option<RotationForm>,
     /// Whether tracks or frames come first, if it is said.
     pub layout: Option<Layout>,
 }
@@ -53,8 +58,11 @@ pub enum MapError {
         /// What stands for the columns.
         columns: String,
     },
-    /// A word behind the source is neither an order nor a layout.
-    #[error("`{word}` in `{entry}` is neither an order (xyzw, wxyz) nor a layout (track, frame)")]
+    /// A word behind the source is neither a form of rotations nor a layout.
+    #[error(
+        "`{word}` in `{entry}` is neither a form of rotations (xyzw, wxyz, rotvec, matrix, axes such as ZXY, of \
+         which rotvec and axes take deg) nor a layout (track, frame)"
+    )]
     Word {
         /// The entry as given.
         entry: String,
@@ -77,6 +85,7 @@ impl Map {
             source: source.to_owned(),
             columns: None,
             order: None,
+            form: None,
             layout: None,
         };
         Self {
@@ -137,8 +146,10 @@ impl FromStr for Entry {
             source: source.to_owned(),
             columns: columns.transpose()?,
             order: None,
+            form: None,
             layout: None,
         };
+        let mut degrees = false;
         let mut words = words.split(':');
         // What stands before the first colon is glued to the bracket.
         let glued = words.next().filter(|glued| !glued.is_empty());
@@ -150,15 +161,41 @@ impl FromStr for Entry {
             return Err(unknown(glued));
         }
         for word in words {
-            match (word.trim(), parsed.order, parsed.layout) {
-                ("xyzw", None, _) => parsed.order = Some(ComponentOrder::Xyzw),
-                ("wxyz", None, _) => parsed.order = Some(ComponentOrder::Wxyz),
+            let is_free = parsed.order.is_none() && parsed.form.is_none();
+            match (word.trim(), is_free, parsed.layout) {
+                ("xyzw", true, _) => parsed.order = Some(ComponentOrder::Xyzw),
+                ("wxyz", true, _) => parsed.order = Some(ComponentOrder::Wxyz),
+                ("rotvec", true, _) => parsed.form = Some(RotationForm::Vector { degrees }),
+                ("matrix", true, _) => parsed.form = Some(RotationForm::Matrix),
+                ("deg", _, _) if !degrees => degrees = true,
                 ("track", _, None) => parsed.layout = Some(Layout::TrackMajor),
                 ("frame", _, None) => parsed.layout = Some(Layout::FrameMajor),
+                (axes, true, _) => {
+                    let sequence = axes.parse().map_err(|_| unknown(word))?;
+                    parsed.form = Some(RotationForm::Euler { sequence, degrees });
+                }
                 _ => return Err(unknown(word)),
             }
         }
+        match &mut parsed.form {
+            Some(
+                RotationForm::Vector { degrees: unit } | RotationForm::Euler { degrees: unit, .. },
+            ) => {
+                *unit = degrees;
+            }
+            _ if degrees => return Err(unknown("deg")),
+            _ => {}
+        }
         Ok(parsed)
+    }
+}
+
+impl Entry {
+    /// What the numbers of a rotation are; a quaternion unless something else is said.
+    #[must_use]
+    pub fn form(&self) -> RotationForm {
+        let quaternion = || RotationForm::Quaternion(self.order.unwrap_or_default());
+        self.form.unwrap_or_else(quaternion)
     }
 }
 
@@ -200,6 +237,36 @@ mod tests {
         );
         assert_eq!(hand.order, Some(ComponentOrder::Xyzw));
         assert_eq!(map.get("z").unwrap().columns, Some(0..1));
+    }
+
+    #[test]
+    fn rotations_may_be_vectors_matrices_and_angles() {
+        let map: Map = "a=v:rotvec,b=m:matrix:track,c=e[0:3]:ZXY:deg,d=e:zyx,rotations=q"
+            .parse()
+            .unwrap();
+        let euler = |name: &str, degrees| RotationForm::Euler {
+            sequence: name.parse().unwrap(),
+            degrees,
+        };
+        let forms: Vec<_> = map.entries.iter().map(Entry::form).collect();
+        let expected = [
+            RotationForm::Vector { degrees: false },
+            RotationForm::Matrix,
+            euler("ZXY", true),
+            euler("zyx", false),
+            RotationForm::Quaternion(ComponentOrder::Xyzw),
+        ];
+        assert_eq!(forms, expected);
+        for wrong in [
+            "a=b:deg",
+            "a=b:matrix:deg",
+            "a=b:ZXY:xyzw",
+            "a=b:rotvec:deg:deg",
+            "a=b:XX",
+        ] {
+            let found = wrong.parse::<Map>().unwrap_err();
+            assert!(matches!(found, MapError::Word { .. }), "{wrong}: {found}");
+        }
     }
 
     #[test]

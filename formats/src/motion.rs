@@ -1,10 +1,11 @@
 //! What motion files hold: clips of keyed joints over a skeleton.
 
-use glam::{Quat, Vec3};
-use tumble::{FrameRate, TrackSet};
+use glam::{DVec3, Quat, Vec3};
+use tumble::{Channel, FrameRate, TrackError, TrackSet};
 
 use crate::bvh::BvhJoint;
 use crate::decimal::Decimal;
+use crate::origin::{coordinate, relative};
 
 /// One clip of a file.
 ///
@@ -30,6 +31,9 @@ pub struct Motion {
     /// Whole seconds that every time of the set is to be moved by. Clocks that count from 1970
     /// would leave f64 only 0.2 µs; times that count from near their first lose nothing.
     pub time_offset: i64,
+    /// What each track's translations, at rest and moving, are to be moved by, as positions of maps would
+    /// leave f32 only 0.5 m; empty where they count from 0.
+    pub origins: Vec<DVec3>,
     /// Why poses in the world cannot be told, where they cannot.
     pub no_world: Option<String>,
     /// How BVH writes each track down; empty for clips of which no file says it.
@@ -46,10 +50,44 @@ impl Motion {
             set: TrackSet::new(),
             skeleton: self.skeleton.clone(),
             channels: self.channels.clone(),
+            origins: self.origins.clone(),
             no_world: self.no_world.clone(),
             bvh: self.bvh.clone(),
             ..*self
         }
+    }
+
+    /// What a track's translations are to be moved by.
+    #[must_use]
+    pub fn origin(&self, track: usize) -> DVec3 {
+        self.origins.get(track).copied().unwrap_or_default()
+    }
+
+    /// Says what a track's translations are to be moved by.
+    pub fn set_origin(&mut self, track: usize, origin: DVec3) {
+        if origin == DVec3::ZERO && self.origins.is_empty() {
+            return;
+        }
+        let tracks = self.set.track_count().max(track + 1);
+        self.origins.resize(tracks, DVec3::ZERO);
+        self.origins[track] = origin;
+    }
+
+    /// Gives a track translation keys without tangents, about an [origin](Self::origins) where they
+    /// need one.
+    ///
+    /// # Errors
+    /// As [`TrackSet::set_translations`].
+    pub fn set_positions(
+        &mut self,
+        track: usize,
+        times: &[f64],
+        points: &[DVec3],
+    ) -> Result<(), TrackError> {
+        let (origin, points) = relative(points);
+        self.set.set_translations(track, times, &points, &[])?;
+        self.set_origin(track, origin);
+        Ok(())
     }
 }
 
@@ -170,5 +208,35 @@ impl Sampled<'_> {
             None if time.is_whole() => time.to_string(),
             None => format!("{time:.9}"),
         })
+    }
+
+    /// Whether the translations of any track are to be moved.
+    #[must_use]
+    pub fn has_origins(&self) -> bool {
+        self.clip
+            .origins
+            .iter()
+            .any(|&origin| origin != DVec3::ZERO)
+    }
+
+    /// Where a track is relative to its [origin](Motion::origins): of its
+    /// [`translations`](Self::translations) or, where there are none, at rest.
+    #[must_use]
+    pub fn translation(&self, sample: usize, track: usize) -> Vec3 {
+        let index = sample * self.clip.set.track_count() + track;
+        let sampled = self.translations.get(index).copied();
+        sampled.unwrap_or_else(|| self.clip.rest(Channel::Translation, track))
+    }
+
+    /// Where a track is.
+    #[must_use]
+    pub fn position(&self, sample: usize, track: usize) -> DVec3 {
+        self.clip.origin(track) + self.translation(sample, track).as_dvec3()
+    }
+
+    /// The digits of where a track is.
+    pub(crate) fn coordinates(&self, sample: usize, track: usize) -> [String; 3] {
+        let (origin, relative) = (self.clip.origin(track), self.translation(sample, track));
+        [0, 1, 2].map(|axis| coordinate(origin[axis], relative[axis]))
     }
 }

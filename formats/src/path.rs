@@ -9,7 +9,9 @@ use tumble::TrackSet;
 
 use crate::diagnostic::{Code, Diagnostic, Place};
 use crate::format::ReadOptions;
+use crate::motion::Motion;
 use crate::npy;
+use crate::origin::origin_of;
 use crate::source::Source;
 use crate::text::number;
 
@@ -28,13 +30,14 @@ pub enum Pace {
 struct Points {
     /// Empty if the file has none.
     times: Vec<f64>,
-    points: Vec<Vec3>,
+    points: Vec<DVec3>,
     ups: Vec<Option<Vec3>>,
     /// The lines of the points in text.
     lines: Vec<u64>,
 }
 
-/// Reads the paths of a file into a set, a track each, named `name`; `-` is standard input.
+/// Reads the paths of a file, a track each, named `name`; `-` is standard input. All have one
+/// [origin](Motion::origins), if any, so that one can look at another.
 ///
 /// # Errors
 /// The first fault that refuses the file.
@@ -43,7 +46,7 @@ pub fn open_paths(
     name: &str,
     pace: Option<Pace>,
     options: &ReadOptions,
-) -> Result<TrackSet, Diagnostic> {
+) -> Result<Motion, Diagnostic> {
     let source = Source::open(path, options.pipes)?;
     let file = source.name.clone();
     read_paths(&file, name, &source.into_bytes(options.limits.file)?, pace)
@@ -88,24 +91,34 @@ pub fn read_paths(
     name: &str,
     bytes: &[u8],
     pace: Option<Pace>,
-) -> Result<TrackSet, Diagnostic> {
+) -> Result<Motion, Diagnostic> {
     let paths = match bytes.starts_with(b"\x93NUMPY") {
         true => of_array(file, bytes)?,
         false => vec![of_text(file, bytes)?],
     };
     let mut set = TrackSet::new();
     let several = paths.len() > 1;
+    let origin = origin_of(paths.iter().flat_map(|path| path.points.iter().copied()));
     for (place, mut path) in paths.into_iter().enumerate() {
         path.give_times(file, pace)?;
+        let points = path.points.iter().map(|&point| (point - origin).as_vec3());
+        let points: Vec<Vec3> = points.collect();
         let own = if several {
             format!("{name}{place}")
         } else {
             name.to_owned()
         };
-        let pushed = set.push_path(&own, &path.times, &path.points, &path.ups);
+        let pushed = set.push_path(&own, &path.times, &points, &path.ups);
         pushed.map_err(|error| Diagnostic::new(file, Code::Path, error.to_string()))?;
     }
-    Ok(set)
+    let mut paths = Motion {
+        set,
+        ..Motion::default()
+    };
+    for track in 0..paths.set.track_count() {
+        paths.set_origin(track, origin);
+    }
+    Ok(paths)
 }
 
 /// Columns by their names, of which those of `t` and of the ups may be missing.
@@ -189,7 +202,7 @@ fn of_text(file: &str, bytes: &[u8]) -> Result<Points, Diagnostic> {
                 number(from + 2)?,
             ))
         };
-        path.points.push(vector(1)?.as_vec3());
+        path.points.push(vector(1)?);
         let is_blank = |place: &Option<usize>| {
             place
                 .and_then(|column| record.get(column))
@@ -236,9 +249,9 @@ fn of_array(file: &str, bytes: &[u8]) -> Result<Vec<Points>, Diagnostic> {
             .as_chunks::<3>()
             .0
             .iter()
-            .map(|&point| DVec3::from_array(point).as_vec3());
-        let points: Vec<Vec3> = points.collect();
-        match points.iter().position(|point| !point.is_finite()) {
+            .map(|&point| DVec3::from_array(point));
+        let points: Vec<DVec3> = points.collect();
+        match points.iter().position(|point| !point.as_vec3().is_finite()) {
             Some(point) => {
                 let message = "a coordinate is not a finite f32".to_owned();
                 Err(refuse(Code::NotFinite, message).inside(format!("[{track}, {point}]")))
@@ -276,7 +289,7 @@ impl Points {
         let mut way = 0.0;
         for (i, &point) in given.points.iter().enumerate() {
             if let Some(before) = self.points.last() {
-                let step = (point.as_dvec3() - before.as_dvec3()).length();
+                let step = (point - before).length();
                 if way + step <= way {
                     continue;
                 }
@@ -305,7 +318,7 @@ mod tests {
     use tumble::Channel;
 
     fn read(text: &str, pace: Option<Pace>) -> Result<TrackSet, Diagnostic> {
-        read_paths("way.csv", "way", text.as_bytes(), pace)
+        read_paths("way.csv", "way", text.as_bytes(), pace).map(|paths| paths.set)
     }
 
     #[test]
@@ -398,7 +411,9 @@ mod tests {
         };
         let numbers: Vec<f32> = (0..12u8).map(f32::from).collect();
         let pace = Some(Pace::Seconds(1.0));
-        let set = read_paths("a.npy", "a", &array(&[2, 2, 3], &numbers), pace).unwrap();
+        let set = read_paths("a.npy", "a", &array(&[2, 2, 3], &numbers), pace)
+            .unwrap()
+            .set;
         assert_eq!((set.track_count(), set.track_name(1)), (2, "a1".to_owned()));
         let refused = |bytes: &[u8]| read_paths("a.npy", "a", bytes, pace).unwrap_err().code;
         assert_eq!(refused(&array(&[2, 3, 2], &numbers)), Code::Shape);

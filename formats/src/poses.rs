@@ -2,10 +2,12 @@
 
 use std::io::{self, Write};
 
+use glam::DVec3;
 use tumble::{Timeline, TrackSet};
 
 use crate::csv::text_cell;
 use crate::npz::header::{Element, Header};
+use crate::origin::coordinate;
 
 /// What the numbers of a local transform are called: moved, turned, scaled.
 pub const TRANSFORM: [&str; 10] = ["tx", "ty", "tz", "x", "y", "z", "w", "sx", "sy", "sz"];
@@ -24,10 +26,33 @@ pub struct Poses<'a> {
     pub components: &'a [&'a str],
     /// `[frame][track][component]`.
     pub numbers: &'a [f32],
+    /// What the first three numbers of each track, which are its position, are to be moved by; empty
+    /// where they count from 0.
+    pub origins: &'a [DVec3],
 }
 
 impl Poses<'_> {
-    /// Writes NPY: float32 of shape (frames, tracks, components).
+    /// Whether the positions of any track are to be moved.
+    #[must_use]
+    pub fn has_origins(&self) -> bool {
+        self.origins.iter().any(|&origin| origin != DVec3::ZERO)
+    }
+
+    /// What the positions of a track are to be moved by.
+    #[must_use]
+    pub fn origin(&self, track: usize) -> DVec3 {
+        self.origins.get(track).copied().unwrap_or_default()
+    }
+
+    /// Each number, with its track and its place among those of a pose.
+    fn each(&self) -> impl Iterator<Item = (usize, usize, f32)> {
+        let (width, tracks) = (self.components.len().max(1), self.set.track_count().max(1));
+        let numbers = self.numbers.iter().enumerate();
+        numbers.map(move |(index, &number)| (index / width % tracks, index % width, number))
+    }
+
+    /// Writes NPY of shape (frames, tracks, components): float32, or float64 where positions count from
+    /// an origin, which is added.
     ///
     /// # Errors
     /// When writing fails, or (`InvalidInput`) there are not as many numbers.
@@ -38,6 +63,17 @@ impl Poses<'_> {
             self.set.track_count(),
             self.components.len(),
         ];
+        if self.has_origins() {
+            writer.write_all(&Header::write(&Element::F64, &shape))?;
+            return self.each().try_for_each(|(track, component, number)| {
+                let moved = if component < 3 {
+                    self.origin(track)[component]
+                } else {
+                    0.0
+                };
+                writer.write_all(&(f64::from(number) + moved).to_le_bytes())
+            });
+        }
         writer.write_all(&Header::write(&Element::F32, &shape))?;
         if cfg!(target_endian = "little") {
             return writer.write_all(bytemuck::cast_slice(self.numbers));
@@ -61,13 +97,17 @@ impl Poses<'_> {
             row.extend(self.components.iter().map(component));
         }
         csv.write_record(&row)?;
+        let mut numbers = self.each();
         let each = tracks * self.components.len();
         for (frame, time) in self.timeline.times(0).enumerate() {
             row.clear();
             row.push(frame.to_string());
             row.push(time.to_string());
-            let numbers = &self.numbers[frame * each..(frame + 1) * each];
-            row.extend(numbers.iter().map(f32::to_string));
+            let of_frame = numbers.by_ref().take(each);
+            row.extend(of_frame.map(|(track, component, number)| match component {
+                0..3 => coordinate(self.origin(track)[component], number),
+                _ => number.to_string(),
+            }));
             csv.write_record(&row)?;
         }
         csv.flush()
@@ -101,6 +141,7 @@ mod tests {
             timeline: &timeline,
             components: &WORLD,
             numbers: &numbers,
+            origins: &[],
         };
         let mut csv = Vec::new();
         poses.write_csv(&mut csv).unwrap();

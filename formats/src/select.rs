@@ -30,8 +30,13 @@ impl Motion {
         let bvh = tracks
             .iter()
             .filter_map(|&track| self.bvh.get(track).cloned());
+        let origins = match self.origins.is_empty() {
+            true => Vec::new(),
+            false => tracks.iter().map(|&track| self.origin(track)).collect(),
+        };
         Ok(Self {
             set,
+            origins,
             skeleton: skeleton.collect(),
             channels: channels.collect(),
             bvh: bvh.collect(),

@@ -5,8 +5,8 @@ use std::fmt::Write as _;
 use std::io::{self, BufRead, Write};
 use std::path::Path;
 
-use glam::{DQuat, Vec3};
-use tumble::{Channel, TrackError, TrackSet};
+use glam::{DQuat, DVec3};
+use tumble::{TrackError, TrackSet};
 
 use crate::decimal::Decimal;
 use crate::diagnostic::{Code, Diagnostic, Place};
@@ -82,7 +82,7 @@ pub fn read_tum(
     while let Some(line) = lines.next()? {
         let numbers = line.split('#').next().unwrap_or_default();
         if !numbers.trim().is_empty() {
-            poses.read(&mut lines, &numbers.replace(',', " "))?;
+            poses.read(&mut lines, numbers, &numbers.replace(',', " "))?;
         }
         lines.reuse(line);
     }
@@ -101,22 +101,46 @@ struct Poses {
     times: Vec<Decimal>,
     /// The most decimals of a time in seconds.
     places: u32,
+    /// The numbers of a line, of the first one; 0 before it.
+    columns: usize,
     /// The unit of the times.
     unit: Option<TimeUnit>,
-    positions: Vec<Vec3>,
+    positions: Vec<DVec3>,
     rotations: Vec<DQuat>,
     /// The line of each.
     lines: Vec<u64>,
 }
 
 impl Poses {
-    fn read<R: BufRead>(&mut self, lines: &mut Lines<R>, line: &str) -> Result<(), Diagnostic> {
+    /// Reads a line, given also as the file has it, with its commas.
+    fn read<R: BufRead>(
+        &mut self,
+        lines: &mut Lines<R>,
+        original: &str,
+        line: &str,
+    ) -> Result<(), Diagnostic> {
         let found = tokens(line).count();
-        if found != 8 {
+        if self.columns == 0 && found > 8 && !has_decimal_commas(original) {
+            let message = format!("{} numbers behind each pose are left out", found - 8);
+            lines.warn(
+                tokens(line).nth(8).map_or(1, |(at, _)| at),
+                Code::FurtherNumbers,
+                message,
+            );
+            self.columns = found;
+        }
+        let columns = self.columns.max(8);
+        if found != columns {
             let column = tokens(line)
-                .nth(8)
+                .nth(columns)
                 .map_or(line.trim_end().len() as u64 + 1, |(at, _)| at);
-            let message = format!("{found} numbers where 8 are expected: t x y z qx qy qz qw");
+            let more = if columns > 8 {
+                " and those behind the first pose"
+            } else {
+                ""
+            };
+            let message =
+                format!("{found} numbers where {columns} are expected: t x y z qx qy qz qw{more}");
             return Err(lines.refuse(column, Code::TumPose, message));
         }
         let mut numbers = [0.0; 8];
@@ -148,8 +172,9 @@ impl Poses {
             .unsigned_abs();
         self.places = self.places.max(places);
         let [_, x, y, z, qx, qy, qz, qw] = numbers;
+        self.columns = columns;
         self.times.push(time);
-        self.positions.push(Vec3::new(x as f32, y as f32, z as f32));
+        self.positions.push(DVec3::new(x, y, z));
         self.rotations.push(DQuat::from_xyzw(qx, qy, qz, qw));
         self.lines.push(lines.number);
         Ok(())
@@ -197,9 +222,7 @@ impl Poses {
         // Checked above; a set refuses what slipped through.
         let refuse = |error: TrackError| Diagnostic::new(name, Code::TumPose, error.to_string());
         set.push(BODY, &times, &keys).map_err(refuse)?;
-        set.set_translations(0, &times, &positions, &[])
-            .map_err(refuse)?;
-        let clip = Motion {
+        let mut clip = Motion {
             set,
             skeleton: vec![Joint {
                 parent: None,
@@ -209,6 +232,7 @@ impl Poses {
             time_offset: offset,
             ..Motion::default()
         };
+        clip.set_positions(0, &times, &positions).map_err(refuse)?;
         let warnings = of_lines
             .into_iter()
             .chain(warnings.into_list().into_iter().map(from_offset));
@@ -216,8 +240,14 @@ impl Poses {
     }
 }
 
+/// Whether commas within numbers look like decimal ones: blanks separate numbers, and commas too.
+fn has_decimal_commas(line: &str) -> bool {
+    let mut words = line.split_whitespace();
+    line.split_whitespace().count() > 1 && words.any(|word| word.trim_matches(',').contains(','))
+}
+
 /// Writes one clip of one track. Times keep all digits, also those that count from 1970; the other
-/// numbers have the fewest digits that read back as the same f32.
+/// numbers have the fewest digits that read back as the same f32, about an origin where there is one.
 fn write_motion(
     clips: &[Sampled<'_>],
     options: &MotionOptions,
@@ -247,20 +277,22 @@ fn write_motion(
         let value = value.replace(char::is_control, " ");
         text += &format!("# {key}: {value}\n");
     }
-    let rest = sampled.clip.rest(Channel::Translation, 0);
     for (sample, &time) in sampled.times.iter().enumerate() {
         let Some(digits) = sampled.time_digits(sample) else {
             let message = format!("the time {time} s is out of range");
             return Err(refuse(message).into());
         };
-        let position = sampled.translations.get(sample).copied().unwrap_or(rest);
+        let position = sampled.translation(sample, 0);
         let rotation = sampled.rotations[sample];
         if !position.is_finite() || !rotation.is_finite() {
             let message = format!("the pose at {time} s is not finite");
             return Err(refuse(message).into());
         }
         let _ = write!(text, "{digits}"); // memory takes everything
-        for number in position.to_array().into_iter().chain(rotation.to_array()) {
+        for number in sampled.coordinates(sample, 0) {
+            let _ = write!(text, " {number}");
+        }
+        for number in rotation.to_array() {
             let number = if number.is_normal() { number } else { 0.0 };
             let _ = write!(text, " {number}");
         }

@@ -9,7 +9,7 @@ use crate::sample::Samples;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WorldPose {
     /// Where its origin is.
-    pub position: Vec3,
+    pub position: DVec3,
     /// How it is turned: the product of its ancestors' rotations and its own, without their scales.
     pub rotation: Quat,
 }
@@ -43,7 +43,7 @@ pub enum HierarchyError {
 }
 
 /// The poses of all joints at all samples, `[sample][joint]`, computed in f64 along the hierarchy
-/// and rounded once. Joints of a clip without a skeleton are roots.
+/// and their rotations rounded once. Joints of a clip without a skeleton are roots.
 ///
 /// # Errors
 /// When the parents make no hierarchy, or the clip says why its poses cannot be told.
@@ -63,9 +63,10 @@ pub fn world(clip: &Motion, samples: &Samples) -> Result<Vec<WorldPose>, Hierarc
                 rotation: rotations[joint].as_dquat(),
                 turned_and_scaled: DMat3::from_quat(rotations[joint].as_dquat())
                     * DMat3::from_diagonal(at(&samples.scales, joint).unwrap_or(Vec3::ONE).into()),
-                position: at(&samples.translations, joint)
-                    .unwrap_or(Vec3::ZERO)
-                    .into(),
+                position: clip.origin(joint)
+                    + at(&samples.translations, joint)
+                        .unwrap_or(Vec3::ZERO)
+                        .as_dvec3(),
             };
             let parent = clip.skeleton.get(joint).and_then(|joint| joint.parent);
             done[joint] = match parent {
@@ -74,7 +75,7 @@ pub fn world(clip: &Motion, samples: &Samples) -> Result<Vec<WorldPose>, Hierarc
             };
         }
         poses.extend(done.iter().map(|pose| WorldPose {
-            position: pose.position.as_vec3(),
+            position: pose.position,
             rotation: pose.rotation.normalize().as_quat(),
         }));
     }
@@ -157,9 +158,9 @@ mod tests {
             scales: vec![Vec3::ONE, Vec3::splat(2.0)],
         };
         let found = world(&clip, &samples).unwrap();
-        assert!(found[0].position.distance(Vec3::new(0.0, 2.0, 1.0)) < 1e-6);
+        assert!(found[0].position.distance(DVec3::new(0.0, 2.0, 1.0)) < 1e-6);
         assert!(found[0].rotation.dot(quarter).abs() > 1.0 - 1e-6);
-        assert_eq!(found[1].position, Vec3::Z);
+        assert_eq!(found[1].position, DVec3::Z);
     }
 
     #[test]

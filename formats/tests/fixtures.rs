@@ -119,8 +119,8 @@ fn every_code_of_a_file_is_shown_by_a_fixture_or_a_test() {
         Code::ListLength,
         Code::SeveralClips,
         Code::RateBesideTimes,
-        Code::TwoRates,
         Code::AccelerationJumps,
+        Code::Bridged,
     ];
     for &code in Code::ALL {
         let shown = all.contains(&format!("[{code}]"));

@@ -182,7 +182,7 @@ fn tracks_are_nodes_that_are_moved_or_carry_such() {
         (&[0.0][..], &[rest.rotation][..])
     );
     let poses = world(clip, &sample(clip, vec![0.0])).unwrap();
-    assert_eq!(poses[1].position, rest.translation);
+    assert_eq!(poses[1].position, rest.translation.as_dvec3());
     let sheared = open(&fixture("matrix_that_shears.gltf"));
     let clip = &sheared.clips[0];
     let refused = world(clip, &sample(clip, vec![0.0])).unwrap_err();

@@ -55,9 +55,8 @@ fn apart(clip: &Motion, reduced: &Motion, shell: f64) -> [f64; 2] {
             DVec3::Z,
             DVec3::NEG_Z,
         ] {
-            let point = |pose: &WorldPose| {
-                pose.position.as_dvec3() + pose.rotation.as_dquat() * (axis * shell)
-            };
+            let point =
+                |pose: &WorldPose| pose.position + pose.rotation.as_dquat() * (axis * shell);
             largest[1] = largest[1].max(point(a).distance(point(&b)));
         }
     }

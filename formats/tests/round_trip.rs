@@ -213,7 +213,7 @@ fn poses(motion: &Motion, in_world: bool) -> (Vec<f64>, Vec<Quat>, Vec<Vec3>, Ve
     if in_world {
         let world = world(motion, &samples).unwrap();
         let rotations = world.iter().map(|pose| pose.rotation).collect();
-        let positions = world.iter().map(|pose| pose.position).collect();
+        let positions = world.iter().map(|pose| pose.position.as_vec3()).collect();
         return (times, rotations, positions, vec![Vec3::ONE; count]);
     }
     let full = |list: &[Vec3], empty| match list.is_empty() {

@@ -41,7 +41,8 @@ pub(crate) fn meshes(bytes: &[u8]) -> u64 {
 pub(crate) fn paths(bytes: &[u8]) -> u64 {
     let paces = [None, Some(Pace::Seconds(2.0)), Some(Pace::Rate(1.0))];
     let outcomes = paces.map(|pace| match read_paths("fuzz", "path", bytes, pace) {
-        Ok(set) => {
+        Ok(paths) => {
+            let set = paths.set;
             for track in 0..set.track_count() {
                 let path = set.vector_keys(tumble::Channel::Translation, track);
                 let path = path.expect("points");

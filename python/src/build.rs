@@ -182,20 +182,23 @@ impl Parts<'_, '_> {
     /// Gives them to a clip. Of `order` are the tangents.
     pub(crate) fn put_into(self, clip: &mut Motion, order: Order) -> PyResult<()> {
         self.hang(clip)?;
-        let set = &mut clip.set;
-        let tracks = set.track_count();
+        let tracks = clip.set.track_count();
         let of_track = |error: TrackError| of_track(&error);
         for (what, value) in [("translations", self.translations), ("scales", self.scales)] {
             for (track, row) in rows(value, what, tracks, &[3])? {
-                let times = set.track(track).times.to_vec();
-                let vectors: Vec<Vec3> = threes(&row).map(DVec3::as_vec3).collect();
-                match what {
-                    "scales" => set.set_scales(track, &times, &vectors, &[]),
-                    _ => set.set_translations(track, &times, &vectors, &[]),
+                let times = clip.set.track(track).times.to_vec();
+                let vectors: Vec<DVec3> = threes(&row).collect();
+                if what == "translations" {
+                    clip.set_positions(track, &times, &vectors)
+                        .map_err(of_track)?;
+                    continue;
                 }
-                .map_err(of_track)?;
+                let scales: Vec<Vec3> = vectors.iter().map(|scale| scale.as_vec3()).collect();
+                let scaled = clip.set.set_scales(track, &times, &scales, &[]);
+                scaled.map_err(of_track)?;
             }
         }
+        let set = &mut clip.set;
         for (track, row) in rows(self.velocities, "velocities", tracks, &[3])? {
             let velocities: Vec<DVec3> = threes(&row).collect();
             set.set_velocities(track, &velocities).map_err(of_track)?;

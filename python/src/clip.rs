@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::exceptions::{PyIndexError, PyKeyError, PyTypeError};
 use pyo3::prelude::*;
@@ -134,9 +134,26 @@ impl Clip {
     fn offsets<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
         let skeleton = &self.motion.skeleton;
         let offsets = skeleton.iter().map(|joint| joint.rest.translation);
-        match skeleton.is_empty() {
+        if skeleton.is_empty() {
+            return Ok(None);
+        }
+        if self.motion.origins.is_empty() {
+            return vectors(py, offsets).map(Some);
+        }
+        let each = offsets.enumerate();
+        let positions = each.map(|(track, offset)| self.motion.origin(track) + offset.as_dvec3());
+        doubles(py, positions).map(Some)
+    }
+
+    /// What was taken off the translations of each track, (tracks, 3), float64, so that f32 holds what
+    /// is left of positions such as those of maps; None where nothing was. Positions that the
+    /// package returns or writes have it added again, in float64.
+    #[getter]
+    fn origins<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
+        let tracks = 0..self.motion.set.track_count();
+        match self.motion.origins.is_empty() {
             true => Ok(None),
-            false => vectors(py, offsets).map(Some),
+            false => doubles(py, tracks.map(|track| self.motion.origin(track))).map(Some),
         }
     }
 
@@ -246,7 +263,8 @@ impl Clip {
     }
 
     /// The translation keys of a track, by its place or name: their times (keys,), seconds, and
-    /// their values (keys, 3), float32, in the file's units; None for a track without.
+    /// their values (keys, 3), float32 (float64 where the track has one of the `origins`), in the file's
+    /// units; None for a track without.
     fn translations<'py>(
         &self,
         py: Python<'py>,
@@ -347,6 +365,15 @@ pub(crate) fn counted(number: usize, noun: &str) -> String {
     }
 }
 
+/// Vectors as an array (n, 3) of float64.
+fn doubles(py: Python<'_>, of: impl Iterator<Item = DVec3>) -> PyResult<Bound<'_, PyAny>> {
+    let numbers: Vec<f64> = of.flat_map(|vector| vector.to_array()).collect();
+    let count = numbers.len() / 3;
+    Ok(PyArray1::from_vec(py, numbers)
+        .reshape([count, 3])?
+        .into_any())
+}
+
 /// Vectors as an array (n, 3).
 fn vectors(py: Python<'_>, of: impl Iterator<Item = Vec3>) -> PyResult<Bound<'_, PyAny>> {
     let numbers: Vec<f32> = of.flat_map(|vector| vector.to_array()).collect();
@@ -389,6 +416,11 @@ impl Clip {
             return Ok(None);
         };
         let times = PyArray1::from_slice(py, own.times).into_any();
+        let origin = self.motion.origin(track);
+        if channel == Channel::Translation && origin != DVec3::ZERO {
+            let positions = own.keys.iter().map(|key| origin + key.as_dvec3());
+            return Ok(Some((times, doubles(py, positions)?)));
+        }
         Ok(Some((times, vectors(py, own.keys.iter().copied())?)))
     }
 }

@@ -280,7 +280,7 @@ impl Engine {
 
     /// Whole poses relative to the parents: translations (tracks, frames, 3), rotations
     /// (tracks, frames, 4), x y z w, each with the sign that continues the one before it, and scales
-    /// (tracks, frames, 3), float32. Keywords are those of `evaluate`.
+    /// (tracks, frames, 3), float32; translations are float64 where the clip has `origins`. Keywords are those of `evaluate`.
     ///
     /// >>> import tumble
     /// >>> clip = tumble.Clip([0.0, 2.0], [[0, 0, 0, 1], [0, 0, 1, 0]],
@@ -301,7 +301,8 @@ impl Engine {
     }
 
     /// Where the joints of a skeleton are in the world: positions (tracks, frames, 3) and rotations
-    /// (tracks, frames, 4), x y z w, float32. Keywords are those of `evaluate`.
+    /// (tracks, frames, 4), x y z w, float32; positions are float64 where the clip has `origins`. Keywords are
+    /// those of `evaluate`.
     ///
     /// >>> import tumble
     /// >>> half = 0.5 ** 0.5

@@ -139,14 +139,15 @@ impl File {
 /// with the place.
 ///
 /// `load(path, *, format=None, source_fps=None, map=None, time_unit=None, duplicates=None,
-/// raw_times=False, scale=None, up=None)`
+/// raw_times=False, bridge_gaps=False, scale=None, up=None)`
 ///
 /// `format`: of the file, instead of by its first bytes and its name. `source_fps`: the rate of
 /// keys of files without times. `map`: which array or column is what, where names do not
 /// tell: "rotations=keys:wxyz,time=t". `time_unit`: of times that are whole numbers, "s", "ms", "us"
 /// or "ns". `duplicates`: of two different keys at one time, keep the "first", the "last" or "both", for a jump.
 /// `raw_times`: leave times as they are, instead of on the frames that they were rounded from.
-/// `scale`: multiply translations. `up`: turn so that "y" or "z" is up, where the other was.
+/// `bridge_gaps`: leave out keys of which a table lacks numbers, instead of refusing it. `scale`: multiply
+/// translations. `up`: turn so that "y" or "z" is up, where the other was.
 ///
 /// `read` is another name of it.
 ///
@@ -157,7 +158,7 @@ impl File {
 #[pyfunction]
 #[pyo3(signature = (
     path, *, format=None, source_fps=None, map=None, time_unit=None, duplicates=None,
-    raw_times=false, scale=None, up=None
+    raw_times=false, bridge_gaps=false, scale=None, up=None
 ))]
 #[allow(clippy::too_many_arguments, reason = "keywords")]
 pub(crate) fn load(
@@ -169,6 +170,7 @@ pub(crate) fn load(
     time_unit: Option<&Bound<'_, PyAny>>,
     duplicates: Option<&Bound<'_, PyAny>>,
     raw_times: bool,
+    bridge_gaps: bool,
     scale: Option<f64>,
     up: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<File> {
@@ -201,6 +203,7 @@ pub(crate) fn load(
                 one_of(unit, "time_unit", &units)
             })
             .transpose()?,
+        bridge_gaps,
     };
     let format = format.map(format_named).transpose()?;
     let quarter = std::f64::consts::FRAC_PI_2;

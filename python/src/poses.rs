@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use glam::{Quat, Vec3};
-use numpy::{PyArray1, PyArrayMethods, PyUntypedArrayMethods};
+use numpy::{Element, PyArray1, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::intern;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
@@ -35,11 +35,29 @@ pub(crate) fn local<'py>(
     };
     let rotations = samples.rotations.iter().flat_map(Quat::to_array);
     let three = (tracks, count, 3);
+    let motion = &clip.get().motion;
+    let translations = all(&samples.translations, Vec3::ZERO);
+    let translations = match motion.origins.is_empty() {
+        true => shaped(py, translations, three, layout)?,
+        false => {
+            let (points, _) = translations.as_chunks::<3>();
+            let points = points.iter().enumerate();
+            let moved = points.flat_map(|(index, &point)| {
+                (motion.origin(index % tracks) + Vec3::from(point).as_dvec3()).to_array()
+            });
+            shaped(py, moved.collect::<Vec<f64>>(), three, layout)?
+        }
+    };
     PyTuple::new(
         py,
         [
-            shaped(py, all(&samples.translations, Vec3::ZERO), three, layout)?,
-            shaped(py, rotations.collect(), (tracks, count, 4), layout)?,
+            translations,
+            shaped(
+                py,
+                rotations.collect::<Vec<f32>>(),
+                (tracks, count, 4),
+                layout,
+            )?,
             shaped(py, all(&samples.scales, Vec3::ONE), three, layout)?,
         ],
     )
@@ -60,12 +78,25 @@ pub(crate) fn in_world<'py>(
         world(&motion, &samples).map_err(|error| input(error.to_string()))
     })?;
     let positions = poses.iter().flat_map(|it| it.position.to_array());
+    let three = (tracks, count, 3);
+    let positions = match clip.get().motion.origins.is_empty() {
+        true => {
+            let rounded = positions.map(|number| number as f32);
+            shaped(py, rounded.collect::<Vec<f32>>(), three, layout)?
+        }
+        false => shaped(py, positions.collect::<Vec<f64>>(), three, layout)?,
+    };
     let rotations = poses.iter().flat_map(|it| it.rotation.to_array());
     PyTuple::new(
         py,
         [
-            shaped(py, positions.collect(), (tracks, count, 3), layout)?,
-            shaped(py, rotations.collect(), (tracks, count, 4), layout)?,
+            positions,
+            shaped(
+                py,
+                rotations.collect::<Vec<f32>>(),
+                (tracks, count, 4),
+                layout,
+            )?,
         ],
     )
 }
@@ -100,9 +131,9 @@ fn samples(
 
 /// Sampled numbers as an array, without a copy; `[sample][track]` is shown as `[track][sample]` if
 /// that is the layout.
-fn shaped<'py>(
+fn shaped<'py, T: Element>(
     py: Python<'py>,
-    numbers: Vec<f32>,
+    numbers: Vec<T>,
     (tracks, samples, components): (usize, usize, usize),
     layout: Layout,
 ) -> PyResult<Bound<'py, PyAny>> {

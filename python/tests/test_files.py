@@ -97,6 +97,36 @@ def test_files_are_mappings(shared):
     assert np.isfinite(positions).all()
 
 
+def test_positions_of_maps_keep_their_digits(tmp_path):
+    file = tmp_path / "map.tum"
+    file.write_text("0 458074.604 5429380.172 162.5 0 0 0 1\n1 458074.614 5429380.182 162.5 0 0 0 1\n")
+    clip = tumble.load(file).clip
+    assert clip.origins.tolist() == [[458075.0, 5429380.0, 0.0]]
+    positions, rotations = tumble.Engine("cpu").world(clip, fps=10)
+    assert (positions.dtype, rotations.dtype) == (np.float64, np.float32)
+    expected = np.linspace([458074.604, 5429380.172, 162.5], [458074.614, 5429380.182, 162.5], 11)
+    assert np.abs(positions[0] - expected).max() < 1e-6
+    # Arrays are kept likewise.
+    times, keys = clip.translations(0)
+    made = tumble.Clip(times, [np.tile([0, 0, 0, 1], (2, 1))], translations=[keys])
+    assert made.origins.tolist() == clip.origins.tolist()
+    translations, _, _ = tumble.Engine("cpu").poses(made, at=[0.5])
+    assert np.abs(translations[0, 0] - expected[5]).max() < 1e-6
+    tumble.save(tmp_path / "out.npz", made, fps=10)
+    assert np.load(tmp_path / "out.npz")["translations"].dtype == np.float64
+    assert tumble.Clip([0.0], [[[0, 0, 0, 1]]]).origins is None
+
+
+def test_tables_with_gaps_are_bridged_on_request(tmp_path):
+    file = tmp_path / "gaps.csv"
+    file.write_text("time,x,y,z,w\n0,0,0,0,1\n1,,,,\n2,0,0,0.6,0.8\n")
+    with pytest.raises(tumble.InputError, match="bridge-gaps"):
+        tumble.load(file)
+    with pytest.warns(tumble.InputWarning, match="W401"):
+        clip = tumble.load(file, bridge_gaps=True).clip
+    assert clip.times(0).tolist() == [0.0, 2.0]
+
+
 def test_baked_files_are_those_of_the_program(shared, tmp_path):
     source = shared / "gltf" / "Fox.glb"
     program("eval", source, "--fps", "60", "-o", tmp_path / "program.glb")

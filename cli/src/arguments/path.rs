@@ -9,6 +9,7 @@ use tumble::{
     BodyAxis, Channel, Direction, Follow, Frame, PathSpeed, TrackError, TrackSet, Twist,
     VectorKeys, VectorMethod,
 };
+use tumble_formats::motion::Motion;
 use tumble_formats::path::{Pace, open_paths};
 use tumble_formats::{Limits, ReadOptions};
 
@@ -234,7 +235,7 @@ impl PathArguments {
     }
 
     /// Reads the paths of a file, a track each.
-    pub(crate) fn read(&self, path: &Path) -> Result<TrackSet, Failure> {
+    pub(crate) fn read(&self, path: &Path) -> Result<Motion, Failure> {
         let pace = match (self.seconds, self.rate) {
             (Some(seconds), _) => Some(Pace::Seconds(seconds)),
             (None, rate) => rate.map(Pace::Rate),
@@ -243,26 +244,29 @@ impl PathArguments {
             limits: Limits::default(),
             ..ReadOptions::default()
         };
-        let set = open_paths(path, &input::stem(path), pace, &options)
+        let mut paths = open_paths(path, &input::stem(path), pace, &options)
             .map_err(|diagnostic| Failure::input(&diagnostic, ""))?;
-        match self.no_ups {
-            true => without_ups(&set)
-                .map_err(|error| Failure::evaluating(&input::name(path), &error.into())),
-            false => Ok(set),
+        if self.no_ups {
+            paths.set = without_ups(&paths.set)
+                .map_err(|error| Failure::evaluating(&input::name(path), &error.into()))?;
         }
+        Ok(paths)
     }
 
-    /// How the paths of a set, which messages call `name`, are followed in a frame.
+    /// How the paths of a file, which messages call `name`, are followed in a frame.
     pub(crate) fn follow(
         &self,
-        set: &TrackSet,
+        paths: &Motion,
         name: &str,
         frame: FrameArgument,
     ) -> Result<Follow, Failure> {
         Ok(Follow {
             method: self.path_method,
             ends: self.path_ends.ends(),
-            direction: self.direction.of(set, name)?,
+            direction: match self.direction.of(&paths.set, name)? {
+                Direction::Point(point) => Direction::Point(point - paths.origin(0)),
+                direction => direction,
+            },
             frame: match frame {
                 FrameArgument::Minimal => Frame::Minimal,
                 FrameArgument::Fixed => Frame::Fixed,

@@ -40,6 +40,10 @@ pub(crate) struct Reading {
     /// The unit of times that are whole numbers
     #[arg(long, value_enum, value_name = "UNIT")]
     time_unit: Option<TimeUnitArgument>,
+    /// Leave out keys of which a table lacks numbers (blank cells, nulls, NaN), so that the track is
+    /// interpolated from the keys beside them
+    #[arg(long)]
+    bridge_gaps: bool,
     /// Where each joint is relative to its parent, for bodies of SMPL, whose files do not say it:
     /// text with x y z a line, in the order of the joints
     #[arg(long, value_name = "FILE")]
@@ -111,6 +115,7 @@ impl Reading {
             || self.source_fps.is_some()
             || self.map.is_some()
             || self.time_unit.is_some()
+            || self.bridge_gaps
             || self.offsets.is_some()
     }
 
@@ -124,11 +129,13 @@ impl Reading {
             source_fps,
             map,
             time_unit,
+            bridge_gaps,
             offsets,
             scale,
             up,
         } = self;
         *raw_times
+            || *bridge_gaps
             || from.is_some()
             || animation.is_some()
             || duplicates.is_some()
@@ -159,6 +166,7 @@ impl Reading {
                 TimeUnitArgument::Us => TimeUnit::Microseconds,
                 TimeUnitArgument::Ns => TimeUnit::Nanoseconds,
             }),
+            bridge_gaps: self.bridge_gaps,
         }
     }
 
@@ -185,6 +193,7 @@ impl Reading {
                 self.time_unit.is_some(),
                 FormatOption::TimeUnit,
             ),
+            ("bridge-gaps", self.bridge_gaps, FormatOption::BridgeGaps),
         ] {
             if is_given && !formats().any(|format| format.takes(option)) {
                 let all = FORMATS.iter().filter(|format| format.takes(option));

@@ -40,8 +40,8 @@ use crate::messages::words;
 #[command(after_help = "\
 A path is CSV with the header `t,x,y,z` and, where wanted, `ux,uy,uz` (an upward direction at a
 point; it may be blank), or NPY of shape (tracks, points, 3). Without times --seconds or --rate says
-how long it takes. The result is float32 of shape (frames, tracks, 7), x y z of the position and
-x y z w of the rotation, in NPY or CSV; or a clip of a motion file. CPU and Vulkan give the same bits.
+how long it takes. The result is float32 (float64 of positions far from 0, such as those of maps) of
+shape (frames, tracks, 7), x y z of the position and x y z w of the rotation, in NPY or CSV; or a clip of a motion file. CPU and Vulkan give the same bits.
 
 Examples:
   tumble follow road.csv --fps 60 -o poses.npy
@@ -72,12 +72,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let plan = arguments.results.plan(&inputs)?;
     let mut device = arguments.device.open()?;
     let read = |path: &Path| -> Result<Loaded, Failure> {
-        let set = arguments.path.read(path)?;
-        let clip = Motion {
-            set,
-            ..Motion::default()
-        };
-        Ok(Loaded::of(clip, Vec::new()))
+        let paths = arguments.path.read(path)?;
+        Ok(Loaded::of(paths, Vec::new()))
     };
     let options = arguments.options(&samples);
     let results = &arguments.results;
@@ -85,7 +81,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     results.make_of((read, most), plan, options, |file, loaded, target, done| {
         let path = file.path();
         for clip in &loaded.clips {
-            let made = arguments.body(path, &clip.set, &samples, target, &mut device)?;
+            let made = arguments.body(path, clip, &samples, target, &mut device)?;
             done(target.name(), made)?;
         }
         Ok(())
@@ -103,20 +99,20 @@ impl Arguments {
     fn body(
         &self,
         path: &Path,
-        set: &TrackSet,
+        paths: &Motion,
         samples: &Samples,
         target: &Target,
         device: &mut Opened,
     ) -> Result<Evaluated, Failure> {
         let started = Instant::now();
-        let name = input::name(path);
+        let (name, set) = (input::name(path), &paths.set);
         let [frame] = self.path.frames()[..] else {
             return Err(Failure::usage("a body is followed in one frame at a time"));
         };
-        let follow = self.path.follow(set, &name, frame)?;
+        let follow = self.path.follow(paths, &name, frame)?;
         let frames = samples.of(set, &name);
         let found = followed(device, &name, set, &follow, &frames)?;
-        let written = write(set, &frames, samples, &found, target, &name)?;
+        let written = write(paths, &frames, samples, &found, target, &name)?;
         let told = format!(
             "{name}: {} × {}, {}, on {} in {} → {target}",
             words::count(set.track_count(), "track"),
@@ -169,13 +165,14 @@ fn failed(name: &str, error: &Error) -> Failure {
 
 /// Writes positions and rotations: numbers, or a clip with a joint for each body.
 fn write(
-    set: &TrackSet,
+    paths: &Motion,
     frames: &Frames,
     samples: &Samples,
     found: &Followed,
     target: &Target,
     name: &str,
 ) -> Result<Written, Failure> {
+    let set = &paths.set;
     let timeline = frames
         .resolve(set.track_count(), set.time_span())
         .map_err(|error| Failure::evaluating(name, &error.into()))?;
@@ -194,6 +191,7 @@ fn write(
             timeline: &timeline,
             components: &WORLD,
             numbers: &numbers,
+            origins: &paths.origins,
         };
         return target.prepare(|out| (results.poses)(&poses, out));
     }
@@ -209,6 +207,7 @@ fn write(
         set: set.clone(),
         skeleton: vec![rest; set.track_count()],
         rate,
+        origins: paths.origins.clone(),
         ..Motion::default()
     };
     let samples = Baked {

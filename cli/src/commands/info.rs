@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 
 use clap::Args;
+use glam::DVec3;
 use serde::Serialize;
 use tumble::method::C2;
 use tumble::reference::angle_between;
@@ -65,6 +66,12 @@ struct Summary {
     moved: usize,
     #[serde(skip_serializing_if = "is_zero")]
     scaled: usize,
+    /// Whole seconds that all times are to be moved by, as those of clocks that count from 1970 are.
+    #[serde(skip_serializing_if = "is_second_zero")]
+    time_offset: i64,
+    /// What the positions of each track are to be moved by in f64, where those of any are.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    origins: Vec<[f64; 3]>,
     /// The rate on whose frames all key times lie: a number or a ratio.
     #[serde(skip_serializing_if = "Option::is_none")]
     rate: Option<String>,
@@ -180,6 +187,8 @@ impl Summary {
             largest_rotation_degrees: rotation.to_degrees(),
             moved: with(Channel::Translation),
             scaled: with(Channel::Scale),
+            time_offset: clip.time_offset,
+            origins: clip.origins.iter().map(DVec3::to_array).collect(),
             rate: clip.rate.map(|rate| rate.to_string()),
             samplers,
             box_length: loaded.box_length,
@@ -200,7 +209,13 @@ impl Summary {
         line("keys", self.keys.to_string());
         line(
             "time",
-            format!("{} to {} s", self.first_time, self.last_time),
+            match self.time_offset {
+                0 => format!("{} to {} s", self.first_time, self.last_time),
+                from => format!(
+                    "{} to {} s, from second {from} on",
+                    self.first_time, self.last_time
+                ),
+            },
         );
         if let (Some(shortest), Some(longest)) = (self.shortest_step, self.longest_step) {
             line(
@@ -221,6 +236,9 @@ impl Summary {
                 "also",
                 format!("{moved} with translations, {scaled} with scales"),
             );
+        }
+        if let Some([x, y, z]) = self.origins.iter().find(|origin| **origin != [0.0; 3]) {
+            line("positions", format!("about {x} {y} {z}, in f64"));
         }
         if let Some(rate) = &self.rate {
             line("on frames of", format!("{rate} fps"));
@@ -251,6 +269,10 @@ impl Summary {
         }
         text
     }
+}
+
+fn is_second_zero(seconds: &i64) -> bool {
+    *seconds == 0
 }
 
 fn is_zero(count: &usize) -> bool {

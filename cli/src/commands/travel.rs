@@ -9,7 +9,7 @@ use tumble::{Channel, Engine, Error, Frames, Interpolation, Method, TrackSet};
 use tumble_formats::motion::Motion;
 use tumble_formats::path::looks_like_paths;
 use tumble_formats::sample::ChannelMethods;
-use tumble_formats::world::world;
+use tumble_formats::world::{WorldPose, world};
 use tumble_formats::{Code, Diagnostic};
 use tumble_routes::mesh::Mesh;
 
@@ -80,7 +80,7 @@ pub(crate) struct Travel {
     pub(crate) tracks: usize,
     /// `[sample][track]`.
     pub(crate) rotations: Vec<Quat>,
-    /// `[sample][track]`.
+    /// `[sample][track]`, relative to the [origin](Source::origin) of the source.
     pub(crate) places: Vec<Vec3>,
 }
 
@@ -153,10 +153,25 @@ fn between(before: DQuat, after: DQuat) -> DQuat {
     if step.w < 0.0 { -step } else { step }
 }
 
+/// What a picture of a clip takes off all places: the first origin that a track has.
+fn scene_origin(clip: &Motion) -> DVec3 {
+    let mut origins = clip.origins.iter().copied();
+    origins
+        .find(|&origin| origin != DVec3::ZERO)
+        .unwrap_or_default()
+}
+
+/// Where joints are in a picture of their clip.
+pub(crate) fn places_of(clip: &Motion, poses: &[WorldPose]) -> Vec<Vec3> {
+    let origin = scene_origin(clip);
+    let places = poses.iter().map(|pose| (pose.position - origin).as_vec3());
+    places.collect()
+}
+
 /// Where bodies come from.
 pub(crate) enum Source {
     /// Paths, and how they are followed.
-    Paths(Box<TrackSet>, Box<PathArguments>),
+    Paths(Box<Motion>, Box<PathArguments>),
     /// Roots that move by themselves.
     Clip(Box<Motion>),
 }
@@ -204,21 +219,22 @@ impl Source {
         arguments: &PathArguments,
         tracks: &Tracks,
     ) -> Result<Self, Failure> {
-        let paths = Motion {
-            set: arguments.read(path)?,
-            ..Motion::default()
-        };
+        let paths = arguments.read(path)?;
         let paths = tracks.select(&paths, &input::name(path))?.into_owned();
-        Ok(Self::Paths(
-            Box::new(paths.set),
-            Box::new(arguments.clone()),
-        ))
+        Ok(Self::Paths(Box::new(paths), Box::new(arguments.clone())))
     }
 
     pub(crate) fn set(&self) -> &TrackSet {
         match self {
-            Self::Paths(set, _) => set,
+            Self::Paths(paths, _) => &paths.set,
             Self::Clip(clip) => &clip.set,
+        }
+    }
+
+    /// What all places of the bodies are to be moved by.
+    pub(crate) fn origin(&self) -> DVec3 {
+        match self {
+            Self::Paths(clip, _) | Self::Clip(clip) => scene_origin(clip),
         }
     }
 
@@ -256,8 +272,8 @@ impl Source {
             .map_err(|error| Failure::evaluating(name, &error.into()))?;
         let times = timeline.times(0).collect();
         match (self, maker) {
-            (Self::Paths(set, arguments), Maker::Frame(frame)) => {
-                let follow = arguments.follow(set, name, frame)?;
+            (Self::Paths(paths, arguments), Maker::Frame(frame)) => {
+                let follow = arguments.follow(paths, name, frame)?;
                 let found = followed(device, name, set, &follow, frames)?;
                 let places = found.positions.as_slice().iter();
                 Ok(Travel {
@@ -290,7 +306,7 @@ impl Source {
                     times,
                     tracks,
                     rotations: poses.iter().map(|pose| pose.rotation).collect(),
-                    places: poses.iter().map(|pose| pose.position).collect(),
+                    places: places_of(clip, &poses),
                 })
             }
             _ => Err(Failure::usage(format!(

@@ -3,7 +3,7 @@
 use std::collections::HashSet;
 use std::io::BufRead;
 
-use glam::Vec3;
+use glam::DVec3;
 
 use crate::bvh::joint::{BvhChannel, BvhJoint};
 use crate::diagnostic::{Code, Diagnostic, Place};
@@ -29,7 +29,7 @@ pub(super) struct Hierarchy {
 pub(super) struct Joint {
     pub(super) name: String,
     pub(super) parent: Option<usize>,
-    pub(super) offset: Vec3,
+    pub(super) offset: DVec3,
     /// The axes that the joint turns about, in this order, each with its number's place in a row.
     pub(super) rotations: Vec<(usize, usize)>,
     /// The coordinates that a row has, each with its place there.
@@ -168,7 +168,7 @@ impl<R: BufRead> Parser<'_, R> {
         joints.push(Joint {
             name: own,
             parent,
-            offset: Vec3::ZERO,
+            offset: DVec3::ZERO,
             rotations: Vec::new(),
             positions: Vec::new(),
             written: BvhJoint::default(),
@@ -228,7 +228,7 @@ impl<R: BufRead> Parser<'_, R> {
             };
             let number = number::parse(&word.text)
                 .map_err(|(code, message)| self.refuse(&word, code, message))?;
-            *coordinate = number.value as f32;
+            *coordinate = number.value;
         }
         if let Some(block) = self.open.last_mut() {
             block.has_offset = true;
@@ -236,7 +236,7 @@ impl<R: BufRead> Parser<'_, R> {
                 (Some(joint), _) => self.hierarchy.joints[joint].offset = offset.into(),
                 (None, Some(joint)) => {
                     let sites = &mut self.hierarchy.joints[joint].written.end_sites;
-                    sites.push(offset.into());
+                    sites.push(DVec3::from_array(offset).as_vec3());
                 }
                 (None, None) => {}
             }

@@ -1,13 +1,15 @@
 //! The second half of a file: the frames, a row of numbers each, made into keys row by row.
 
+use std::borrow::Cow;
 use std::io::BufRead;
 
-use glam::{DQuat, Quat, Vec3};
+use glam::{DQuat, DVec3, Quat, Vec3};
 use tumble::{FrameRate, TrackSet};
 
 use crate::bvh::hierarchy::{FIRST_WORD, Hierarchy};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::motion::{Joint, Motion, Transform};
+use crate::origin::{SMALL, relative};
 use crate::quaternion::rounded;
 use crate::rate::{Written, itself, of};
 use crate::text::blocks::Blocks;
@@ -21,6 +23,8 @@ pub(super) struct Rows {
     count: usize,
     rotations: Blocks<Quat>,
     positions: Blocks<Vec3>,
+    /// What f32 left of the positions, where one of the first frame is large enough for an origin.
+    remainders: Option<Blocks<Vec3>>,
 }
 
 impl Rows {
@@ -40,6 +44,7 @@ impl Rows {
             count: 0,
             rotations: Blocks::new(rotating.count()),
             positions: Blocks::new(moving.count()),
+            remainders: None,
         };
         let mut row = Vec::new();
         while let Some(line) = lines.next()? {
@@ -79,6 +84,13 @@ impl Rows {
     }
 
     fn push(&mut self, hierarchy: &Hierarchy, row: &[f64]) {
+        if self.count == 0 {
+            // Positions that need an origin are at least half of what is large in every frame.
+            let is_large = |channel: &&(usize, usize)| row[channel.1].abs() >= 0.5 * SMALL;
+            let mut all = hierarchy.joints.iter().flat_map(|joint| &joint.positions);
+            let width = self.positions.width();
+            self.remainders = all.find(is_large).map(|_| Blocks::new(width));
+        }
         for joint in &hierarchy.joints {
             if !joint.rotations.is_empty() {
                 self.rotations.push(rotation(&joint.rotations, row));
@@ -86,9 +98,13 @@ impl Rows {
             if !joint.positions.is_empty() {
                 let mut position = joint.offset;
                 for &(coordinate, place) in &joint.positions {
-                    position[coordinate] = row[place] as f32;
+                    position[coordinate] = row[place];
                 }
-                self.positions.push(position);
+                let rounded = position.as_vec3();
+                self.positions.push(rounded);
+                if let Some(remainders) = &mut self.remainders {
+                    remainders.push((position - rounded.as_dvec3()).as_vec3());
+                }
             }
         }
         self.count += 1;
@@ -109,6 +125,12 @@ impl Rows {
         let positions = self.positions.into_columns();
         let mut rotations = rotations.chunks_exact(count);
         let mut positions = positions.chunks_exact(count);
+        let remainders = self
+            .remainders
+            .map(Blocks::into_columns)
+            .unwrap_or_default();
+        let mut remainders = remainders.chunks_exact(count);
+        let mut origins = vec![DVec3::ZERO; hierarchy.joints.len()];
         let mut set = TrackSet::new();
         let mut skeleton = Vec::with_capacity(hierarchy.joints.len());
         // What was read is unit and in order; a set refuses what slipped through.
@@ -124,11 +146,19 @@ impl Rows {
                 .map_err(refuse)?;
             let own = !joint.positions.is_empty();
             if let Some(keys) = own.then(|| positions.next()).flatten() {
-                set.set_translations(track, &times, keys, &[])
+                let mut points = Cow::Borrowed(keys);
+                if let Some(remainders) = remainders.next() {
+                    let whole = keys.iter().zip(remainders);
+                    let whole: Vec<DVec3> =
+                        whole.map(|(a, b)| a.as_dvec3() + b.as_dvec3()).collect();
+                    let (origin, about_it) = relative(&whole);
+                    (origins[track], points) = (origin, Cow::Owned(about_it));
+                }
+                set.set_translations(track, &times, &points, &[])
                     .map_err(refuse)?;
             }
             let rest = Transform {
-                translation: joint.offset,
+                translation: (joint.offset - origins[track]).as_vec3(),
                 ..Transform::default()
             };
             skeleton.push(Joint {
@@ -140,6 +170,10 @@ impl Rows {
             set,
             skeleton,
             rate: Some(self.rate),
+            origins: match origins.iter().all(|&origin| origin == DVec3::ZERO) {
+                true => Vec::new(),
+                false => origins,
+            },
             bvh: (hierarchy.joints.iter())
                 .map(|joint| joint.written.clone())
                 .collect(),

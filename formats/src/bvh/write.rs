@@ -4,7 +4,7 @@ use std::collections::HashSet;
 use std::fmt::Write as _;
 use std::io::{self, Write};
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use tumble::{Channel, EulerSequence, FrameRate};
 
 use crate::bvh::{BvhChannel, angles};
@@ -12,6 +12,7 @@ use crate::diagnostic::{Code, Diagnostic};
 use crate::format::{MotionOptions, WriteError};
 use crate::motion::Sampled;
 use crate::names::line_name;
+use crate::origin::coordinate;
 use crate::rate::{Written, of};
 use crate::warnings::Warnings;
 
@@ -25,6 +26,8 @@ struct Node {
     depth: usize,
     name: String,
     offset: Vec3,
+    /// What its offset and positions are to be moved by.
+    origin: DVec3,
     /// The numbers of a row, in their order.
     channels: Vec<BvhChannel>,
     /// The axes of its angles, three different ones; those that are no channels do not turn.
@@ -76,12 +79,15 @@ pub(super) fn write_motion(
     for sample in 0..frames {
         text.clear();
         for (node, before) in nodes.iter().zip(&mut before) {
-            let position = translation(sampled, sample, node.track);
+            let position = sampled.coordinates(sample, node.track);
             let rotation = sampled.rotations[sample * tracks + node.track];
             *before = angles::nearest(rotation.as_dquat().normalize(), node.axes, *before);
             for channel in &node.channels {
                 match channel {
-                    BvhChannel::Position(axis) => push_f32(&mut text, position[*axis]),
+                    BvhChannel::Position(axis) => {
+                        text.push_str(&position[*axis]);
+                        text.push(' ');
+                    }
                     BvhChannel::Rotation(axis) => {
                         let mut angles = node.axes.iter().zip(&*before);
                         let angle = angles.find(|(own, _)| *own == axis);
@@ -216,7 +222,7 @@ fn node(
     let clip = sampled.clip;
     let written = clip.bvh.get(track).filter(|_| !clip.is_world);
     let samples = 0..sampled.times.len();
-    let first = translation(sampled, 0, track);
+    let first = sampled.translation(0, track);
     let rest = clip.rest(Channel::Translation, track);
     let mut channels = written.map_or_else(Vec::new, |own| own.channels.clone());
     let has_positions = |channels: &[BvhChannel]| {
@@ -225,7 +231,7 @@ fn node(
     };
     let moves = |axis: usize| {
         let mut all = samples.clone();
-        all.any(|sample| translation(sampled, sample, track)[axis] != first[axis])
+        all.any(|sample| sampled.translation(sample, track)[axis] != first[axis])
     };
     let is_root = written.is_none() && depth == 0;
     let is_moved = is_root || (0..3).any(moves);
@@ -276,6 +282,7 @@ fn node(
         depth,
         name,
         offset,
+        origin: clip.origin(track),
         channels,
         axes,
         end_sites,
@@ -294,12 +301,6 @@ fn turns_more(sampled: &Sampled<'_>, track: usize, axes: [usize; 3], among: &[us
     })
 }
 
-fn translation(sampled: &Sampled<'_>, sample: usize, track: usize) -> Vec3 {
-    let tracks = sampled.clip.set.track_count();
-    let found = sampled.translations.get(sample * tracks + track).copied();
-    found.unwrap_or_else(|| sampled.clip.rest(Channel::Translation, track))
-}
-
 /// All up to `MOTION`.
 fn hierarchy(nodes: &[Node]) -> String {
     let mut text = String::from("HIERARCHY\n");
@@ -312,7 +313,7 @@ fn hierarchy(nodes: &[Node]) -> String {
             "{indent}{keyword} {}\n{indent}{{\n{indent}  OFFSET ",
             node.name
         );
-        push_vector(&mut text, node.offset);
+        push_vector(&mut text, node.origin, node.offset);
         text += &format!("{indent}  CHANNELS {}", node.channels.len());
         for channel in &node.channels {
             text += &format!(" {channel}");
@@ -321,7 +322,7 @@ fn hierarchy(nodes: &[Node]) -> String {
         let next = nodes.get(place + 1).map_or(0, |next| next.depth);
         for &site in &node.end_sites {
             text += &format!("{indent}  End Site\n{indent}  {{\n{indent}    OFFSET ");
-            push_vector(&mut text, site);
+            push_vector(&mut text, DVec3::ZERO, site);
             text += &format!("{indent}  }}\n");
         }
         for depth in (next..=node.depth).rev() {
@@ -338,9 +339,10 @@ fn indentation(depth: usize) -> String {
     "  ".repeat(depth.min(DEEPEST))
 }
 
-fn push_vector(text: &mut String, vector: Vec3) {
-    for coordinate in vector.to_array() {
-        push_f32(text, coordinate);
+fn push_vector(text: &mut String, origin: DVec3, vector: Vec3) {
+    for axis in 0..3 {
+        text.push_str(&coordinate(origin[axis], vector[axis]));
+        text.push(' ');
     }
     text.pop();
     text.push('\n');

@@ -75,9 +75,12 @@ pub(crate) fn write_motion(
                 false => q.to_array(),
             };
             row.extend(numbers.map(|number| number.to_string()));
-            let vectors = [(moved, sampled.translations), (scaled, sampled.scales)];
-            for (_, list) in vectors.into_iter().filter(|(there, _)| *there) {
-                row.extend(list[place].to_array().map(|number| number.to_string()));
+            if moved {
+                row.extend(sampled.coordinates(frame, place % tracks));
+            }
+            if scaled {
+                let scale = sampled.scales[place].to_array();
+                row.extend(scale.map(|number| number.to_string()));
             }
         }
         writer.write_record(&row).map_err(io_error)?;

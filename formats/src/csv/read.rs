@@ -39,6 +39,7 @@ pub fn read_csv(name: &str, bytes: Vec<u8>, options: &ReadOptions) -> Result<Loa
         name,
         bytes: &bytes[start..],
         time_power: options.time_unit.map_or(0, TimeUnit::power),
+        bridges_gaps: options.bridge_gaps,
     };
     let mut reader = sheet.reader();
     let mut header = ByteRecord::new();
@@ -138,6 +139,8 @@ struct Sheet<'a> {
     bytes: &'a [u8],
     /// Times are in units of 10 to this power of a second.
     time_power: i32,
+    /// Numbers that are missing, or called NaN, are NaN.
+    bridges_gaps: bool,
 }
 
 impl Sheet<'_> {
@@ -256,6 +259,14 @@ impl Cell<'_> {
         warnings: &mut Warnings,
     ) -> Result<(), Diagnostic> {
         // A cell without a value holds a place; its column is refused for it.
+        if need == Need::Number
+            && self.sheet.bridges_gaps
+            && (self.text.is_empty() || self.text.eq_ignore_ascii_case(b"nan"))
+            && let Values::Numbers(Numbers::F64(numbers)) = values
+        {
+            numbers.push(f64::NAN);
+            return Ok(());
+        }
         let text = match (self.text, need) {
             (b"", Need::Number | Need::Whole | Need::Time) => b"0",
             (text, _) => text,
@@ -329,7 +340,13 @@ impl Cell<'_> {
 
     fn number(&self, text: &[u8], warnings: &mut Warnings) -> Result<f64, Diagnostic> {
         let text = as_text(text);
-        let number = number::parse(&text).map_err(|(code, message)| self.refuse(code, message))?;
+        let number = number::parse(&text).map_err(|(code, message)| {
+            let remedy = match code {
+                Code::NotFinite => ", or leave it out with --bridge-gaps",
+                _ => "",
+            };
+            self.refuse(code, message + remedy)
+        })?;
         if number.vanished {
             warnings.warn(Code::Tiny, || {
                 let place = self.sheet.cell(self.record, self.column);

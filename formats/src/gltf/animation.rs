@@ -89,6 +89,7 @@ pub(super) fn read(
     let targets: HashMap<_, _> = targets
         .map(|(own, keys)| ((own.node, own.path), (own, keys)))
         .collect();
+    let mut origins = Vec::new();
     for &node in &tracks.nodes {
         motion.bvh.extend(nodes.bvh(node).cloned());
         let rest = rest(node, reader, nodes, &mut motion)?;
@@ -102,10 +103,12 @@ pub(super) fn read(
             translation: sampler(Path::Translation),
             scale: sampler(Path::Scale),
         });
+        let (carrier, origin) = nodes.carrier(node);
         motion.skeleton.push(Joint {
-            parent: nodes.parent(node).map(|parent| tracks.of_node(parent)),
+            parent: carrier.map(|parent| tracks.of_node(parent)),
             rest,
         });
+        origins.push(origin);
         let name = nodes.name(node);
         match own(Path::Rotation) {
             Some((_, keys)) => keys.push(&mut motion.set, name),
@@ -126,6 +129,9 @@ pub(super) fn read(
                 })?;
             }
         }
+    }
+    for (track, origin) in origins.into_iter().enumerate() {
+        motion.set_origin(track, origin);
     }
     let (sampled, others): (Vec<_>, Vec<_>) = moved.iter().zip(&keys).partition(|(moved, keys)| {
         keys.times.len() > 1 && moved.interpolation != motion::Sampler::Step
@@ -170,6 +176,12 @@ fn moved(
         let target = format!("{own}/target");
         if node >= nodes.count() {
             return Err(reader.json.no_such("nodes", node, nodes.count(), &target));
+        }
+        if nodes.is_origin(node) {
+            let message = format!(
+                "node {node} is marked as an origin (`tumbleOrigin`), and moves; remove the mark or the channel"
+            );
+            return Err(reader.json.refuse(&target, Code::NodeTree, message));
         }
         if !targets.insert((node, path)) {
             let message = format!("a second channel for the {path} of node {node}; remove one");

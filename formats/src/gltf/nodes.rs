@@ -11,7 +11,7 @@ use crate::diagnostic::{Code, Diagnostic, Place};
 use crate::gltf::json::Json;
 use crate::gltf::matrix::split;
 use crate::gltf::reader::Reader;
-use crate::gltf::schema::{Extras, Node, NodeBeside, Skin};
+use crate::gltf::schema::{Extras, Node, NodeBeside, OriginExtras, Skin};
 use crate::keys::{Duplicates, Origin};
 use crate::motion::Transform;
 
@@ -27,6 +27,8 @@ pub(super) struct Nodes {
     skins_of: HashMap<usize, Vec<usize>>,
     /// How BVH has the joints that nodes were made of; empty where the file says nothing of it.
     bvh: Vec<BvhJoint>,
+    /// Where the positions of the children of a node count from, if that is all that it says.
+    origins: Vec<Option<DVec3>>,
 }
 
 /// Where a node rests.
@@ -59,6 +61,7 @@ impl Nodes {
             skins,
             skins_of,
             bvh: bvh(json),
+            origins: origins(json, &list),
             parents: parents(json, &list)?,
             names: names(&list),
             rests: list.iter().map(|_| OnceCell::new()).collect(),
@@ -72,6 +75,24 @@ impl Nodes {
 
     pub(super) fn parent(&self, node: usize) -> Option<usize> {
         self.parents[node]
+    }
+
+    /// The node that carries a node, without those that are origins, and how far these move it.
+    pub(super) fn carrier(&self, node: usize) -> (Option<usize>, DVec3) {
+        let mut origin = DVec3::ZERO;
+        let mut next = self.parents[node];
+        while let Some(parent) = next
+            && let Some(moved) = self.origins.get(parent).copied().flatten()
+        {
+            origin += moved;
+            next = self.parents[parent];
+        }
+        (next, origin)
+    }
+
+    /// Whether a node is an origin.
+    pub(super) fn is_origin(&self, node: usize) -> bool {
+        self.origins.get(node).is_some_and(Option::is_some)
     }
 
     /// What the track of a node is called; no two nodes are called the same.
@@ -88,7 +109,7 @@ impl Nodes {
             if !nodes.insert(node) {
                 continue;
             }
-            open.extend(self.parents[node]);
+            open.extend(self.carrier(node).0);
             for &skin in self.skins_of.get(&node).into_iter().flatten() {
                 if !std::mem::replace(&mut is_done[skin], true) {
                     open.extend(&self.skins[skin]);
@@ -139,6 +160,28 @@ fn bvh(json: &Json<'_>) -> Vec<BvhJoint> {
         true => all.into_iter().map(Option::unwrap_or_default).collect(),
         false => Vec::new(),
     }
+}
+
+/// Which nodes are origins, as they are written: a node that does nothing but to move its children.
+fn origins(json: &Json<'_>, list: &[Node]) -> Vec<Option<DVec3>> {
+    if !json.text.contains("\"tumbleOrigin\"") {
+        return Vec::new();
+    }
+    let origin = |(node, raw): (&Node, &&RawValue)| {
+        let beside: NodeBeside<'_> = serde_json::from_str(raw.get()).ok()?;
+        let extras: OriginExtras = serde_json::from_str(beside.extras?.get()).ok()?;
+        let is_plain = node.matrix.is_none()
+            && node
+                .rotation
+                .is_none_or(|rotation| rotation == [0.0, 0.0, 0.0, 1.0])
+            && node.scale.is_none_or(|scale| scale == [1.0; 3]);
+        let at = node.translation.map(DVec3::from_array);
+        at.filter(|at| extras.tumble_origin && is_plain && at.is_finite())
+    };
+    list.iter()
+        .zip(json.entries("nodes").iter())
+        .map(origin)
+        .collect()
 }
 
 /// The parent of each node.

@@ -43,6 +43,13 @@ pub(super) struct Extras {
     pub(super) bvh: BvhExtras,
 }
 
+/// The mark of a node that is where positions count from.
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct OriginExtras {
+    pub(super) tumble_origin: bool,
+}
+
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub(super) struct BvhExtras {

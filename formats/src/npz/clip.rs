@@ -2,19 +2,22 @@
 
 use std::ops::Range;
 
-use glam::{DQuat, Quat, Vec3};
+use glam::{DQuat, DVec3, Quat, Vec3};
 use tumble::{TrackError, TrackSet};
 
 use crate::diagnostic::{Code, Diagnostic, Place};
 use crate::format::ReadOptions;
 use crate::keys::{Duplicates, Origin, quiet_unit, select};
-use crate::motion::{Body, Joint, Motion};
+use crate::motion::{Body, Joint, Motion, Transform};
 use crate::npy::ComponentOrder::{self, Wxyz, Xyzw};
 use crate::npz::archive::Archive;
 use crate::npz::array::{Array, AsStored, FEW, Make, TOGETHER};
+use crate::npz::header::Element;
 use crate::npz::plan::{Part, Plan, Values};
 use crate::npz::rotation_vector;
+use crate::origin::relative;
 use crate::quaternion::rounded;
+use crate::rotation_form::RotationForm;
 use crate::signs::continue_signs;
 use crate::warnings::Warnings;
 
@@ -71,13 +74,15 @@ pub(crate) fn read(
         let starts = part.tracks.clone().step_by(at_once);
         starts.map(move |start| (part, array, start..(start + at_once).min(part.tracks.end)))
     });
+    let mut origins = Vec::new();
     let mut push = |track: usize, values: Values, keys: Keys| match keys {
         Keys::Rotations(mut keys) => {
             select(&mut keys, kept.as_deref());
             let name = plan.names.get(track).map_or("", String::as_str);
             set.push(name, &times, &keys).map_err(refuse)
         }
-        Keys::Vectors(mut keys) => {
+        Keys::Vectors(origin, mut keys) => {
+            origins.push((track, origin));
             select(&mut keys, kept.as_deref());
             let set_keys = match values {
                 Values::Scale => TrackSet::set_scales,
@@ -112,10 +117,19 @@ pub(crate) fn read(
     pending
         .into_iter()
         .try_for_each(|(track, values, keys)| push(track, values, keys))?;
+    for (track, origin) in origins {
+        motion.set_origin(track, origin);
+    }
     if !plan.parents.is_empty() || !plan.rest.is_empty() {
-        let joint = |track| Joint {
-            parent: plan.parents.get(track).copied().flatten(),
-            rest: plan.rest.get(track).copied().unwrap_or_default(),
+        let joint = |track| {
+            let rest = plan.rest.get(track).map(|&(rest, position)| Transform {
+                translation: (position - motion.origin(track)).as_vec3(),
+                ..rest
+            });
+            Joint {
+                parent: plan.parents.get(track).copied().flatten(),
+                rest: rest.unwrap_or_default(),
+            }
         };
         motion.skeleton = (0..plan.tracks).map(joint).collect();
     }
@@ -154,6 +168,9 @@ fn frame_of(part: &Part, array: &Array<'_>, frame: usize) -> Vec<Vec<f64>> {
     let tracks = 0..part.tracks.len();
     match part.values {
         Values::Quaternion(_) => array.tracks::<AsStored, 4, _>(at, tracks, 1, |l| l.concat()),
+        Values::Form(RotationForm::Matrix) => {
+            array.tracks::<AsStored, 9, _>(at, tracks, 1, |l| l.concat())
+        }
         _ => array.tracks::<AsStored, 3, _>(at, tracks, 1, |l| l.concat()),
     }
 }
@@ -162,8 +179,8 @@ fn frame_of(part: &Part, array: &Array<'_>, frame: usize) -> Vec<Vec<f64>> {
 enum Keys {
     /// Unit quaternions.
     Rotations(Vec<Quat>),
-    /// Translations or scales.
-    Vectors(Vec<Vec3>),
+    /// Translations or scales, and what translations are to be moved by.
+    Vectors(DVec3, Vec<Vec3>),
 }
 
 /// The keys of some tracks of a part.
@@ -188,6 +205,9 @@ fn read_keys(
                 quiet(keys)
             };
             array.tracks::<FromVector, 3, _>(at, own.clone(), frames, finish)
+        }
+        Values::Form(form) => {
+            return of_form(archive, part, array, (form, own), frames);
         }
         _ => return vectors(archive, part, array, own, frames),
     };
@@ -288,6 +308,40 @@ fn remarkable(
     origin.unit(keys.map(|numbers| quaternion(order, numbers)), warnings)
 }
 
+/// The rotations of some tracks of a part that are no quaternions.
+fn of_form(
+    archive: &Archive,
+    part: &Part,
+    array: &Array<'_>,
+    (form, tracks): (RotationForm, Range<usize>),
+    frames: usize,
+) -> Result<Vec<Keys>, Diagnostic> {
+    fn keys<const N: usize>(form: RotationForm, list: &[[f64; N]]) -> Result<Vec<Quat>, usize> {
+        let key =
+            |(frame, numbers): (usize, &[f64; N])| form.rotation(numbers).map(rounded).ok_or(frame);
+        let mut keys = list
+            .iter()
+            .enumerate()
+            .map(key)
+            .collect::<Result<Vec<_>, _>>()?;
+        continue_signs(&mut keys, 1);
+        Ok(keys)
+    }
+    let range = tracks.clone();
+    let lists = match form.width() {
+        9 => array.tracks::<AsStored, 9, _>(part.at, range, frames, |list| keys(form, &list)),
+        _ => array.tracks::<AsStored, 3, _>(part.at, range, frames, |list| keys(form, &list)),
+    };
+    let check = |(track, found): (usize, Result<Vec<Quat>, usize>)| {
+        found.map(Keys::Rotations).map_err(|frame| {
+            let message = "these numbers are no rotation; repair the array, or say another form";
+            let refusal = Diagnostic::new(&archive.file, Code::NoRotation, message);
+            refusal.inside(part.place(archive, part.tracks.start + track, frame))
+        })
+    };
+    tracks.zip(lists).map(check).collect()
+}
+
 /// The vectors of some tracks of a part.
 fn vectors(
     archive: &Archive,
@@ -296,12 +350,24 @@ fn vectors(
     own: Range<usize>,
     frames: usize,
 ) -> Result<Vec<Keys>, Diagnostic> {
-    let lists = array.tracks::<InF32, 3, _>(part.at, own.clone(), frames, |list| {
+    let checked = |origin, list: Vec<Vec3>| {
         let bad = list.iter().position(|vector| !vector.is_finite());
-        (list, bad)
-    });
-    let check = |(own, (list, bad)): (usize, (Vec<Vec3>, Option<usize>))| match bad {
-        None => Ok(Keys::Vectors(list)),
+        (origin, list, bad)
+    };
+    // Positions in f32 have lost what an origin would keep.
+    let has_origin = part.values == Values::Translation && array.header.element == Element::F64;
+    let lists = match has_origin {
+        true => array.tracks::<AsStored, 3, _>(part.at, own.clone(), frames, |list| {
+            let points: Vec<DVec3> = list.into_iter().map(DVec3::from_array).collect();
+            let (origin, list) = relative(&points);
+            checked(origin, list)
+        }),
+        false => array.tracks::<InF32, 3, _>(part.at, own.clone(), frames, |list| {
+            checked(DVec3::ZERO, list)
+        }),
+    };
+    let check = |(own, (origin, list, bad)): (usize, (DVec3, Vec<Vec3>, Option<usize>))| match bad {
+        None => Ok(Keys::Vectors(origin, list)),
         Some(frame) => {
             let message = format!("the vector {} is not finite in f32", list[frame]);
             let refusal = Diagnostic::new(&archive.file, Code::NotFinite, message);

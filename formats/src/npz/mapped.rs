@@ -11,6 +11,7 @@ use crate::npz::archive::Archive;
 use crate::npz::array::Strides;
 use crate::npz::header::shape_text;
 use crate::npz::plan::{Part, Plan, TimeList, Values, check_float};
+use crate::rotation_form::RotationForm;
 
 /// Names in a map that are no tracks.
 const ROLES: [&str; 7] = [
@@ -58,8 +59,7 @@ pub(crate) fn plan(archive: &Archive, map: &Map) -> Result<Plan, Diagnostic> {
         },
     };
     if let Some(entry) = map.get("rotations") {
-        let order = Values::Quaternion(entry.order.unwrap_or_default());
-        let part = part(archive, entry, order, 0, lengths)?;
+        let part = part(archive, entry, rotations(entry), 0, lengths)?;
         plan.add(archive, part)?;
     }
     let mut names = vec![String::new(); plan.tracks];
@@ -67,8 +67,7 @@ pub(crate) fn plan(archive: &Archive, map: &Map) -> Result<Plan, Diagnostic> {
         if ROLES.contains(&&*entry.name) {
             continue;
         }
-        let order = Values::Quaternion(entry.order.unwrap_or_default());
-        let part = part(archive, entry, order, plan.tracks, lengths)?;
+        let part = part(archive, entry, rotations(entry), plan.tracks, lengths)?;
         plan.add(archive, part)?;
         names.resize(plan.tracks, entry.name.clone());
     }
@@ -99,6 +98,14 @@ pub(crate) fn plan(archive: &Archive, map: &Map) -> Result<Plan, Diagnostic> {
         }
     }
     Ok(plan)
+}
+
+/// What the numbers of an array of rotations are.
+fn rotations(entry: &Entry) -> Values {
+    match entry.form() {
+        RotationForm::Quaternion(order) => Values::Quaternion(order),
+        form => Values::Form(form),
+    }
 }
 
 /// What is known of the axes of arrays before they are looked at.
@@ -135,7 +142,29 @@ fn part(
     let member = source(archive, entry)?;
     check_float(archive, member)?;
     let header = archive.header(member)?;
-    let (shape, strides) = (&*header.shape, header.strides());
+    let (mut shape, mut strides) = (header.shape.clone(), header.strides());
+    // The rows of a matrix may have an axis of their own, if one follows the other in memory.
+    if values == Values::Form(RotationForm::Matrix)
+        && let [.., 3, 3] = shape[..]
+        && let [.., rows, columns] = strides[..]
+        && rows == 3 * columns
+    {
+        shape.truncate(shape.len() - 2);
+        shape.push(9);
+        strides.remove(strides.len() - 2);
+    }
+    let shape = &*shape;
+    if values == Values::Form(RotationForm::Matrix)
+        && let [.., 3, 3] = *shape
+        && shape.len() > 2
+    {
+        let message = format!(
+            "the array has shape {} in Fortran's order; matrices are read in C's: save it with \
+             numpy.ascontiguousarray",
+            shape_text(shape)
+        );
+        return Err(archive.refuse(member, Code::Shape, message));
+    }
     let refuse = |code, message: String| archive.refuse(member, code, message);
     if shape.contains(&0) {
         let message = format!("the array has shape {}: no keys", shape_text(shape));

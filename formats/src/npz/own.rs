@@ -1,6 +1,6 @@
 //! Our own layout: `rotations` (tracks, frames, x y z w) and what belongs to it.
 
-use glam::{DVec3, Quat, Vec3};
+use glam::{DQuat, DVec3};
 use tumble::Layout;
 
 use crate::bvh::BvhJoint;
@@ -162,7 +162,7 @@ fn read_rest(
     archive: &Archive,
     member: usize,
     tracks: usize,
-) -> Result<Vec<Transform>, Diagnostic> {
+) -> Result<Vec<(Transform, DVec3)>, Diagnostic> {
     let numbers = read_numbers(archive, member)?;
     if numbers.len() != 10 * tracks {
         let message = format!(
@@ -171,16 +171,22 @@ fn read_rest(
         );
         return Err(archive.refuse(member, Code::Shape, message));
     }
-    let numbers: Vec<f32> = numbers.into_iter().map(|number| number as f32).collect();
-    if let Some(bad) = numbers.iter().position(|number| !number.is_finite()) {
+    if let Some(bad) = numbers
+        .iter()
+        .position(|&number| !(number as f32).is_finite())
+    {
         let message = format!("number {bad} of the array is {}, not finite", numbers[bad]);
         return Err(archive.refuse(member, Code::NotFinite, message));
     }
     let (rows, _) = numbers.as_chunks::<10>();
-    let rest = |&[tx, ty, tz, x, y, z, w, sx, sy, sz]: &[f32; 10]| Transform {
-        translation: Vec3::new(tx, ty, tz),
-        rotation: Quat::from_xyzw(x, y, z, w),
-        scale: Vec3::new(sx, sy, sz),
+    let rest = |&[tx, ty, tz, x, y, z, w, sx, sy, sz]: &[f64; 10]| {
+        let position = DVec3::new(tx, ty, tz);
+        let rest = Transform {
+            translation: position.as_vec3(),
+            rotation: DQuat::from_xyzw(x, y, z, w).as_quat(),
+            scale: DVec3::new(sx, sy, sz).as_vec3(),
+        };
+        (rest, position)
     };
     Ok(rows.iter().map(rest).collect())
 }

@@ -3,6 +3,7 @@
 
 use std::ops::Range;
 
+use glam::DVec3;
 use tumble::{FrameRate, Layout};
 
 use crate::bvh::BvhJoint;
@@ -12,6 +13,7 @@ use crate::npy::ComponentOrder;
 use crate::npz::archive::Archive;
 use crate::npz::array::Strides;
 use crate::npz::header::shape_text;
+use crate::rotation_form::RotationForm;
 
 /// One clip, as arrays.
 #[derive(Debug, Clone, Default)]
@@ -26,8 +28,8 @@ pub(crate) struct Plan {
     pub(crate) names: Vec<String>,
     /// Likewise.
     pub(crate) parents: Vec<Option<usize>>,
-    /// Likewise.
-    pub(crate) rest: Vec<Transform>,
+    /// Likewise, and its translation in f64.
+    pub(crate) rest: Vec<(Transform, DVec3)>,
     /// The member of the times, seconds.
     pub(crate) times: Option<TimeList>,
     /// The member of the rate.
@@ -77,19 +79,25 @@ pub(crate) enum Values {
     Quaternion(ComponentOrder),
     /// An axis of rotation, as long as the angle in radians.
     RotationVector,
+    /// A rotation in a form that a map says, no quaternion.
+    Form(RotationForm),
     Translation,
     Scale,
 }
 
 impl Values {
     pub(crate) fn is_rotation(self) -> bool {
-        matches!(self, Self::Quaternion(_) | Self::RotationVector)
+        matches!(
+            self,
+            Self::Quaternion(_) | Self::RotationVector | Self::Form(_)
+        )
     }
 
     /// Numbers of a key.
     pub(crate) fn width(self) -> usize {
         match self {
             Self::Quaternion(_) => 4,
+            Self::Form(form) => form.width(),
             _ => 3,
         }
     }

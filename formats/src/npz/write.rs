@@ -133,7 +133,14 @@ pub(super) fn keys(
                 let before = &mut before[track - first_track];
                 *before.insert(rotation_vector::log(rotation, *before))
             }
-            Values::Translation => vector(sampled.translations, Vec3::ZERO),
+            Values::Form(form) => {
+                // Archives that a map explains are not written again in their layout.
+                let message = format!("rotations are not written as {form:?}");
+                return Err(io::Error::new(io::ErrorKind::InvalidInput, message));
+            }
+            Values::Translation => {
+                sampled.clip.origin(track) + vector(sampled.translations, Vec3::ZERO)
+            }
             Values::Scale => vector(sampled.scales, Vec3::ONE),
         };
         three.to_array().into_iter().try_for_each(&mut *put)
@@ -181,7 +188,7 @@ pub(super) fn notes(members: &mut Members, sampled: &Sampled<'_>) -> io::Result<
 
 /// Writes one clip in our own layout: `rotations` (tracks, frames, x y z w) in f32, `times` in f64,
 /// `fps` where there is a rate, `names` and `parents`; `translations` and `scales` (tracks, frames,
-/// 3), where tracks have them; `rest` (tracks, 10), as `tx ty tz x y z w sx sy sz`, where the
+/// 3), where tracks have them, translations in f64 where they count from an origin, which is added; `rest` (tracks, 10), as `tx ty tz x y z w sx sy sz`, where the
 /// skeleton has a rest pose; `samplers` (tracks, 3) where the clip says how its channels are
 /// interpolated; `bvh_channels` (tracks) and `end_sites` (sites, track x y z) of clips from BVH; and
 /// what made the samples.
@@ -216,7 +223,9 @@ pub fn write_npz(
     ] {
         if is_there {
             let shape = [tracks, frames, values.width()];
-            members.numbers(path, (&Element::F32, &shape), false, |put| {
+            let is_wide = values == Values::Translation && sampled.has_origins();
+            let element = if is_wide { Element::F64 } else { Element::F32 };
+            members.numbers(path, (&element, &shape), false, |put| {
                 keys(values, 0..tracks, Layout::TrackMajor, sampled, put)
             })?;
         }
@@ -234,7 +243,7 @@ pub fn write_npz(
     if names.iter().any(|name| !name.is_empty()) {
         members.texts("names.npy", &names, &[tracks])?;
     }
-    skeleton(&mut members, &clip.skeleton)?;
+    skeleton(&mut members, clip, sampled.has_origins())?;
     samplers(&mut members, clip)?;
     bvh(&mut members, &clip.bvh)?;
     if clip.is_world {
@@ -301,7 +310,8 @@ fn bvh(members: &mut Members, joints: &[BvhJoint]) -> io::Result<()> {
 }
 
 /// Writes parents, and the rest pose if there is one.
-fn skeleton(members: &mut Members, joints: &[Joint]) -> io::Result<()> {
+fn skeleton(members: &mut Members, clip: &Motion, has_origins: bool) -> io::Result<()> {
+    let joints = &clip.skeleton;
     if joints.is_empty() {
         return Ok(());
     }
@@ -316,15 +326,22 @@ fn skeleton(members: &mut Members, joints: &[Joint]) -> io::Result<()> {
         return Ok(());
     }
     let shape = [joints.len(), 10];
-    members.numbers("rest.npy", (&Element::F32, &shape), false, |put| {
-        joints.iter().try_for_each(|Joint { rest, .. }| {
-            let [tx, ty, tz] = rest.translation.to_array();
-            let [x, y, z, w] = rest.rotation.to_array();
-            let [sx, sy, sz] = rest.scale.to_array();
-            let numbers = [tx, ty, tz, x, y, z, w, sx, sy, sz];
-            numbers
-                .into_iter()
-                .try_for_each(|number| put(number.into()))
-        })
+    let element = if has_origins {
+        Element::F64
+    } else {
+        Element::F32
+    };
+    members.numbers("rest.npy", (&element, &shape), false, |put| {
+        joints
+            .iter()
+            .enumerate()
+            .try_for_each(|(track, Joint { rest, .. })| {
+                let position = clip.origin(track) + rest.translation.as_dvec3();
+                let [x, y, z, w] = rest.rotation.to_array();
+                let [sx, sy, sz] = rest.scale.to_array();
+                let others = [x, y, z, w, sx, sy, sz].map(f64::from);
+                let mut numbers = position.to_array().into_iter().chain(others);
+                numbers.try_for_each(&mut *put)
+            })
     })
 }

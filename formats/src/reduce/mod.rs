@@ -228,7 +228,7 @@ impl<'a> Reduction<'a> {
             let (sample, joint) = (place / joints, place % joints);
             let [a, b] = [wanted, found].map(|pose| pose.rotation.as_dquat());
             let angle = angle_between(a, b);
-            let moved = found.position.as_dvec3() - wanted.position.as_dvec3();
+            let moved = found.position - wanted.position;
             let mut distance = moved.length();
             if self.options.shell > 0.0 {
                 for axis in DVec3::AXES.map(|axis| axis * self.options.shell) {
@@ -315,7 +315,12 @@ fn poses(clip: &Motion, samples: &Samples) -> Result<Vec<WorldPose>, HierarchyEr
     let each = samples.rotations.iter().enumerate();
     Ok(each
         .map(|(place, &rotation)| WorldPose {
-            position: samples.translations.get(place).copied().unwrap_or_default(),
+            position: samples
+                .translations
+                .get(place)
+                .copied()
+                .unwrap_or_default()
+                .as_dvec3(),
             rotation,
         })
         .collect())

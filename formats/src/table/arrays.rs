@@ -78,6 +78,7 @@ impl Gather {
             .zip(&mut self.known)
             .zip(batch);
         for ((column, known), array) in columns {
+            let (rows, before) = (array.len(), column.len());
             if array.null_count() > 0 && column.null.is_none() {
                 let first = (0..array.len()).find(|&row| array.is_null(row));
                 column.null = first.map(|row| self.table.rows + row);
@@ -93,6 +94,17 @@ impl Gather {
                     Code::TableDamaged,
                     message,
                 ));
+            }
+            // What stands in memory for a null may be any number.
+            let nulls = (0..rows).filter(|&row| array.null_count() > 0 && array.is_null(row));
+            match &mut column.values {
+                Values::Numbers(Numbers::F32(list)) => {
+                    nulls.for_each(|row| list[before + row] = f32::NAN);
+                }
+                Values::Numbers(Numbers::F64(list)) => {
+                    nulls.for_each(|row| list[before + row] = f64::NAN);
+                }
+                _ => {}
             }
         }
         self.table.rows += rows;

@@ -4,13 +4,14 @@
 use std::borrow::Cow;
 use std::ops::Range;
 
-use tumble::TrackSet;
+use glam::DVec3;
 
 use crate::diagnostic::{Code, Diagnostic};
 use crate::format::{Loaded, ReadOptions};
 use crate::grid::restore;
 use crate::keys::Origin;
 use crate::motion::Motion;
+use crate::printable::printable;
 use crate::table::columns::Table;
 use crate::table::groups::{labels, numbered, share_out};
 use crate::table::keys::Keys;
@@ -34,7 +35,7 @@ pub(crate) fn clips(
         let message = format!("{} rows are more than 2^32; split the table", table.rows);
         return Err(table.refuse(Code::TableClaims, message));
     }
-    table.check_nulls()?;
+    table.check_nulls(options.bridge_gaps)?;
     let mut warnings = Warnings::new(&table.file);
     let times = times(table, plan, options)?;
     let mut loaded = Loaded::default();
@@ -135,6 +136,9 @@ impl Clip<'_> {
             } => (self.share_out(parts), *is_world),
             Rows::Times { tracks, is_world } => (self.share_all(tracks), *is_world),
         };
+        if self.options.bridge_gaps {
+            self.leave_out_gaps(plan, &mut shared, warnings)?;
+        }
         let mut keys = self.keys(&shared, warnings)?;
         let lists = &mut shared.lists;
         let rate = match self.times.precision {
@@ -143,11 +147,19 @@ impl Clip<'_> {
             None => self.options.source_rate,
         };
         self.increasing(plan, &mut shared, &mut keys, warnings)?;
-        let mut set = TrackSet::new();
+        let mut motion = Motion {
+            name,
+            rate,
+            is_world,
+            time_offset: self.times.offset,
+            ..Motion::default()
+        };
+        let set = &mut motion.set;
         set.reserve(
             keys.len(),
             keys.iter().map(|keys| keys.rotations.len()).sum(),
         );
+        let origins: Vec<DVec3> = keys.iter().map(|keys| keys.origin).collect();
         for (place, (track, keys)) in shared.tracks.into_iter().zip(keys).enumerate() {
             let times = &shared.lists[track.list];
             let pushed = set
@@ -162,14 +174,10 @@ impl Clip<'_> {
                 });
             pushed.map_err(|error| self.table.refuse(Code::Norm, error.to_string()))?;
         }
-        Ok(Motion {
-            name,
-            set,
-            rate,
-            is_world,
-            time_offset: self.times.offset,
-            ..Motion::default()
-        })
+        for (track, origin) in origins.into_iter().enumerate() {
+            motion.set_origin(track, origin);
+        }
+        Ok(motion)
     }
 
     /// Every row to every track: those of a wide table.
@@ -186,6 +194,56 @@ impl Clip<'_> {
             lists: vec![self.times_of(&order)],
             order,
         }
+    }
+
+    /// Takes from each track the rows in which a number of it is missing.
+    fn leave_out_gaps(
+        &self,
+        plan: &Plan,
+        shared: &mut Shared<'_>,
+        warnings: &mut Warnings,
+    ) -> Result<(), Diagnostic> {
+        let mut known: Option<(&Parts, Option<Vec<bool>>)> = None;
+        for track in 0..shared.tracks.len() {
+            let parts = shared.tracks[track].parts;
+            if !known
+                .as_ref()
+                .is_some_and(|(last, _)| std::ptr::eq(*last, parts))
+            {
+                known = Some((parts, self.gaps(parts)?));
+            }
+            let Some((_, Some(gaps))) = &known else {
+                continue;
+            };
+            let places = shared.places(&shared.tracks[track]).to_vec();
+            let (missing, there): (Vec<u32>, Vec<u32>) =
+                places.into_iter().partition(|&place| gaps[place as usize]);
+            if missing.is_empty() {
+                continue;
+            }
+            let name = printable(&shared.tracks[track].name).into_owned();
+            if there.is_empty() {
+                let message = format!("the track `{name}` has no key without a gap; remove it");
+                return Err(self.table.refuse(Code::Null, message));
+            }
+            for &key in &missing {
+                warnings.warn(Code::Bridged, || {
+                    let message = format!(
+                        "the track `{name}` lacks {} of its keys; it is interpolated from the others",
+                        missing.len()
+                    );
+                    let row = self.row(key as usize);
+                    (Some(self.table.place(plan.time, row)), message)
+                });
+            }
+            let times = self.times_of(&there);
+            let start = shared.order.len();
+            shared.order.extend(there);
+            shared.lists.push(times);
+            let changed = &mut shared.tracks[track];
+            (changed.places, changed.list) = (start..shared.order.len(), shared.lists.len() - 1);
+        }
+        Ok(())
     }
 
     /// Each row to the track that a column names.

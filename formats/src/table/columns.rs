@@ -101,12 +101,21 @@ impl Table {
         refusal
     }
 
-    /// Refuses the first null of any column.
-    pub(crate) fn check_nulls(&self) -> Result<(), Diagnostic> {
-        for (place, column) in self.columns.iter().enumerate() {
+    /// Refuses the first null of any column; of numbers not where gaps are bridged, as they are NaN then.
+    pub(crate) fn check_nulls(&self, bridges_gaps: bool) -> Result<(), Diagnostic> {
+        let is_bridged = |column: &Column| {
+            let is_float = matches!(
+                column.values,
+                Values::Numbers(Numbers::F32(_) | Numbers::F64(_))
+            );
+            bridges_gaps && is_float
+        };
+        let checked = self.columns.iter().enumerate();
+        for (place, column) in checked.filter(|(_, column)| !is_bridged(column)) {
             if let Some(row) = column.null {
                 let message = format!(
-                    "column `{}` has no value in row {row}; fill it in or remove the row",
+                    "column `{}` has no value in row {row}; fill it in, remove the row, or leave the key out with \
+                     --bridge-gaps",
                     column.name
                 );
                 return Err(self.refuse_at(place, row, Code::Null, message));

@@ -118,14 +118,17 @@ impl<S: Sink> ResultWriter for Rotations<'_, S> {
     }
 }
 
-/// Writes poses, whose numbers are f32.
+/// Writes poses, whose numbers are f32; positions that count from an origin are f64.
 pub(crate) fn write_poses<S: Sink>(
     poses: &Poses<'_>,
     begin: impl FnOnce(Head) -> io::Result<S>,
 ) -> io::Result<()> {
     poses.check()?;
     let components = poses.components.iter();
-    let columns = components.map(|name| ((*name).to_owned(), Component::F32(Vec::new())));
+    let columns = components.enumerate().map(|(index, name)| {
+        let is_wide = index < 3 && poses.has_origins();
+        ((*name).to_owned(), Component::of_positions(is_wide))
+    });
     let mut batch = Batch::new(columns, names(poses.set), None)?;
     let mut sink = begin(Head {
         schema: Arc::clone(&batch.schema),
@@ -140,19 +143,17 @@ pub(crate) fn write_poses<S: Sink>(
         let (frame, track) = (place / tracks, place % tracks);
         let time = poses.timeline.time(track, frame).unwrap_or(f64::NAN);
         batch.row(frame, time, track);
-        push_all(&mut batch.numbers, pose);
+        let origin = poses.origin(track);
+        for (i, (column, &number)) in batch.numbers.iter_mut().zip(pose).enumerate() {
+            let moved = if i < 3 { origin[i] } else { 0.0 };
+            column.push_number(f64::from(number) + moved);
+        }
         if batch.is_full() {
             batch.flush(&mut sink)?;
         }
     }
     batch.flush(&mut sink)?;
     sink.finish()
-}
-
-fn push_all(components: &mut [Component], numbers: &[f32]) {
-    for (component, number) in components.iter_mut().zip(numbers) {
-        component.push(bytemuck::bytes_of(number));
-    }
 }
 
 /// Writes sampled clips, one after another. Several clips, and one that has a name, have it in the
@@ -193,8 +194,11 @@ pub(crate) fn write_motion<S: Sink>(
         });
     let clip_names: ArrayRef = Arc::new(StringArray::from_iter_values(clip_names));
     let (track_names, codes) = track_names(clips);
-    let columns = components.iter();
-    let columns = columns.map(|name| ((*name).to_owned(), Component::F32(Vec::new())));
+    let has_origins = has(|clip| clip.has_origins());
+    let columns = components.iter().map(|&name| {
+        let is_wide = has_origins && translation.contains(&name);
+        (name.to_owned(), Component::of_positions(is_wide))
+    });
     let mut batch = Batch::new(columns, track_names, named.then_some((0, clip_names)))?;
     let mut sink = begin(Head {
         schema: Arc::clone(&batch.schema),
@@ -277,19 +281,22 @@ fn write_clip(
         let (frame, track) = (place / tracks, place % tracks);
         let time = sampled.times[frame] + sampled.clip.time_offset as f64;
         batch.row(frame, time, codes[track]);
-        let mut numbers = q.to_array().to_vec();
+        let mut numbers = q.to_array().map(f64::from).to_vec();
         if turned {
             numbers.rotate_right(1);
         }
         if moved {
-            let translation = sampled.translations.get(place);
-            numbers.extend(translation.copied().unwrap_or_default().to_array());
+            let relative = sampled.translations.get(place).copied().unwrap_or_default();
+            numbers.extend((sampled.clip.origin(track) + relative.as_dvec3()).to_array());
         }
         if scaled {
             let scale = sampled.scales.get(place);
-            numbers.extend(scale.copied().unwrap_or(glam::Vec3::ONE).to_array());
+            let scale = scale.copied().unwrap_or(glam::Vec3::ONE);
+            numbers.extend(scale.to_array().map(f64::from));
         }
-        push_all(&mut batch.numbers, &numbers);
+        for (column, number) in batch.numbers.iter_mut().zip(numbers) {
+            column.push_number(number);
+        }
         if batch.is_full() {
             batch.flush(sink)?;
         }

@@ -1,11 +1,13 @@
 //! Which columns of a table are what, by their names and by what `--map` says of them.
 
 use std::collections::{HashMap, HashSet};
+use std::ops::Range;
 
 use crate::diagnostic::{Code, Diagnostic};
 use crate::format::ReadOptions;
 use crate::map::{Entry, Map};
 use crate::npy::ComponentOrder;
+use crate::rotation_form::RotationForm;
 
 /// What a column has to hold.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -60,9 +62,27 @@ pub(crate) enum Rows {
 /// Where the numbers of a track's keys are.
 #[derive(Debug)]
 pub(crate) struct Parts {
-    pub(crate) rotation: [Cell; 4],
+    pub(crate) rotation: RotationCells,
     pub(crate) translation: Option<[Cell; 3]>,
     pub(crate) scale: Option<[Cell; 3]>,
+}
+
+/// Where the numbers of rotations are.
+#[derive(Debug)]
+pub(crate) enum RotationCells {
+    /// Of quaternions, x y z w.
+    Quaternion([Cell; 4]),
+    /// Of rotations in another form, as many as it takes.
+    Other(RotationForm, Vec<Cell>),
+}
+
+impl RotationCells {
+    pub(crate) fn all(&self) -> &[Cell] {
+        match self {
+            Self::Quaternion(cells) => cells,
+            Self::Other(_, cells) => cells,
+        }
+    }
 }
 
 /// A number of a row: a column, or a place in the list of a column.
@@ -181,7 +201,7 @@ impl Names<'_> {
             None => self.group(prefix, ["px", "py", "pz"])?,
         };
         let parts = Parts {
-            rotation,
+            rotation: RotationCells::Quaternion(rotation),
             translation: local.or(world),
             scale: self.group(prefix, ["sx", "sy", "sz"])?,
         };
@@ -249,6 +269,10 @@ fn rename(names: &mut Names<'_>, map: &str) -> Result<Vec<Entry>, Diagnostic> {
     let map = parsed.map_err(|error| names.refuse(Code::Map, error.to_string()))?;
     let mut lists = Vec::new();
     for entry in map.entries {
+        if column_range(names, &entry.source).is_some() {
+            lists.push(entry);
+            continue;
+        }
         let own = names.own.iter().position(|name| *name == entry.source);
         let Some(index) = own else {
             let message = format!(
@@ -258,7 +282,8 @@ fn rename(names: &mut Names<'_>, map: &str) -> Result<Vec<Entry>, Diagnostic> {
             );
             return Err(names.refuse(Code::ColumnMissing, message));
         };
-        if entry.columns.is_some() || entry.order.is_some() || !is_column(&entry.name) {
+        let is_rotation = entry.order.is_some() || entry.form.is_some();
+        if entry.columns.is_some() || is_rotation || !is_column(&entry.name) {
             lists.push(entry);
             continue;
         }
@@ -321,7 +346,7 @@ fn wide_rows(names: &mut Names<'_>) -> Result<Rows, Diagnostic> {
     if prefixes.is_empty() {
         let message = format!(
             "no columns are rotations: x y z w, or knee.x knee.y knee.z knee.w; there are {}; \
-             --map hand=LIST[3:7] takes a part of a list",
+             --map hand=LIST[3:7] takes a part of a list, hand=rx..rz:rotvec neighbouring columns",
             names.list()
         );
         return Err(names.refuse(Code::NoRotations, message));
@@ -345,10 +370,14 @@ fn list_rows(names: &mut Names<'_>, lists: &[Entry]) -> Result<Rows, Diagnostic>
     };
     let mut tracks: Vec<(String, Parts)> = Vec::new();
     for entry in lists.iter().filter(|entry| own(&entry.name).is_none()) {
-        let [a, b, c, d] = cells::<4>(names, entry)?;
-        let rotation = match entry.order.unwrap_or_default() {
-            ComponentOrder::Xyzw => [a, b, c, d],
-            ComponentOrder::Wxyz => [b, c, d, a],
+        let form = entry.form();
+        let cells = cells(names, entry, form.width())?;
+        let rotation = match (form, &*cells) {
+            (RotationForm::Quaternion(ComponentOrder::Xyzw), &[x, y, z, w])
+            | (RotationForm::Quaternion(ComponentOrder::Wxyz), &[w, x, y, z]) => {
+                RotationCells::Quaternion([x, y, z, w])
+            }
+            _ => RotationCells::Other(form, cells),
         };
         let parts = Parts {
             rotation,
@@ -361,7 +390,8 @@ fn list_rows(names: &mut Names<'_>, lists: &[Entry]) -> Result<Rows, Diagnostic>
         let Some((track, vector)) = own(&entry.name) else {
             continue;
         };
-        let cells = cells::<3>(names, entry)?;
+        let cells = cells(names, entry, 3)?;
+        let cells = [cells[0], cells[1], cells[2]];
         let Some((_, parts)) = tracks.iter_mut().find(|(name, _)| *name == track) else {
             let message = format!(
                 "`{}` has no rotations; --map {track}=LIST[3:7] gives the track `{track}` some",
@@ -380,24 +410,52 @@ fn list_rows(names: &mut Names<'_>, lists: &[Entry]) -> Result<Rows, Diagnostic>
     })
 }
 
-/// The places of the numbers that an entry takes from a list: the first of it, or its part.
-fn cells<const N: usize>(names: &mut Names<'_>, entry: &Entry) -> Result<[Cell; N], Diagnostic> {
-    let range = entry.columns.clone().unwrap_or(0..N);
-    if range.len() != N {
+/// The columns from one name to another, `first..last`, where no column is called so.
+fn column_range(names: &Names<'_>, source: &str) -> Option<Range<usize>> {
+    let index = |column: &str| names.own.iter().position(|name| name == column.trim());
+    if index(source).is_some() {
+        return None;
+    }
+    let (first, last) = source.split_once("..")?;
+    Some(index(first)?..index(last)? + 1)
+}
+
+/// The places of the numbers that an entry takes from a list: the first of it, or its part; or of
+/// neighbouring columns.
+fn cells(names: &mut Names<'_>, entry: &Entry, count: usize) -> Result<Vec<Cell>, Diagnostic> {
+    if let Some(columns) = column_range(names, &entry.source) {
+        if columns.len() != count {
+            let message = format!(
+                "`{}` is {} columns; `{}` needs {count}, neighbours in this order",
+                entry.source,
+                columns.len(),
+                entry.name
+            );
+            return Err(names.refuse(Code::ListLength, message));
+        }
+        let cell = |index| Cell {
+            column: names.want(index, Need::Number),
+            place: None,
+        };
+        return Ok(columns.map(cell).collect());
+    }
+    let range = entry.columns.clone().unwrap_or(0..count);
+    if range.len() != count {
         let message = format!(
-            "`{}` takes {} numbers of `{}`; it needs {N}, such as [{}:{}]",
+            "`{}` takes {} numbers of `{}`; it needs {count}, such as [{}:{}]",
             entry.name,
             range.len(),
             entry.source,
             range.start,
-            range.start.saturating_add(N)
+            range.start.saturating_add(count)
         );
         return Err(names.refuse(Code::ListLength, message));
     }
     let index = names.own.iter().position(|name| *name == entry.source);
     let column = names.want(index.unwrap_or_default(), Need::List);
-    Ok(std::array::from_fn(|i| Cell {
+    let cell = |place| Cell {
         column,
-        place: Some(range.start + i),
-    }))
+        place: Some(place),
+    };
+    Ok(range.map(cell).collect())
 }

@@ -52,6 +52,7 @@ pub(crate) struct Batch {
 
 /// The numbers of one component of all rows.
 pub(crate) enum Component {
+    F64(Vec<f64>),
     F32(Vec<f32>),
     F16(Vec<f16>),
     I16(Vec<i16>),
@@ -68,15 +69,33 @@ impl Component {
 
     pub(crate) fn data_type(&self) -> DataType {
         match self {
+            Self::F64(_) => DataType::Float64,
             Self::F32(_) => DataType::Float32,
             Self::F16(_) => DataType::Float16,
             Self::I16(_) => DataType::Int16,
         }
     }
 
+    /// Of coordinates: f64 where some count from an origin.
+    pub(crate) fn of_positions(has_origins: bool) -> Self {
+        match has_origins {
+            true => Self::F64(Vec::new()),
+            false => Self::F32(Vec::new()),
+        }
+    }
+
+    /// Takes a number, which is of f32 unless the column is wider.
+    pub(crate) fn push_number(&mut self, number: f64) {
+        match self {
+            Self::F64(list) => list.push(number),
+            other => other.push(bytemuck::bytes_of(&(number as f32))),
+        }
+    }
+
     /// Takes a number of an encoding, in the machine's byte order.
     pub(crate) fn push(&mut self, bytes: &[u8]) {
         match self {
+            Self::F64(list) => list.push(bytemuck::pod_read_unaligned(bytes)),
             Self::F32(list) => list.push(bytemuck::pod_read_unaligned(bytes)),
             Self::F16(list) => list.push(f16::from_bits(bytemuck::pod_read_unaligned(bytes))),
             Self::I16(list) => list.push(bytemuck::pod_read_unaligned(bytes)),
@@ -85,6 +104,7 @@ impl Component {
 
     fn take(&mut self) -> ArrayRef {
         match self {
+            Self::F64(list) => Arc::new(Float64Array::from(std::mem::take(list))),
             Self::F32(list) => Arc::new(Float32Array::from(std::mem::take(list))),
             Self::F16(list) => Arc::new(Float16Array::from(std::mem::take(list))),
             Self::I16(list) => Arc::new(Int16Array::from(std::mem::take(list))),

@@ -54,6 +54,8 @@ _Layout: TypeAlias = Literal["track", "frame"]
 _Axes: TypeAlias = Literal["body", "parent", "world"]
 _Wrap: TypeAlias = Literal["hold", "loop", "mirror", "extrapolate"]
 _Single: TypeAlias = NDArray[np.float32]
+# Double where positions count from an origin.
+_Places: TypeAlias = NDArray[np.float32] | NDArray[np.float64]
 
 class _Options(TypedDict, total=False):
     fps: _Rate | None
@@ -102,7 +104,9 @@ class Clip:
     @property
     def parents(self) -> list[int | None] | None: ...
     @property
-    def offsets(self) -> _Single | None: ...
+    def offsets(self) -> _Places | None: ...
+    @property
+    def origins(self) -> NDArray[np.float64] | None: ...
     @property
     def rate(self) -> Fraction | None: ...
     @property
@@ -122,7 +126,7 @@ class Clip:
     def keys(self, track: int | str, *, order: _Order = "xyzw") -> _Single: ...
     def translations(
         self, track: int | str
-    ) -> tuple[NDArray[np.float64], _Single] | None: ...
+    ) -> tuple[NDArray[np.float64], _Places] | None: ...
     def scales(
         self, track: int | str
     ) -> tuple[NDArray[np.float64], _Single] | None: ...
@@ -230,10 +234,10 @@ class Engine:
     ) -> _Single: ...
     def poses(
         self, clip: Clip, *, layout: _Layout = "track", **options: Unpack[_OptionsOrTimes]
-    ) -> tuple[_Single, _Single, _Single]: ...
+    ) -> tuple[_Places, _Single, _Single]: ...
     def world(
         self, clip: Clip, *, layout: _Layout = "track", **options: Unpack[_OptionsOrTimes]
-    ) -> tuple[_Single, _Single]: ...
+    ) -> tuple[_Places, _Single]: ...
     def stream(
         self,
         clip: Clip,
@@ -333,6 +337,7 @@ def load(
     time_unit: Literal["s", "ms", "us", "ns"] | None = None,
     duplicates: Literal["first", "last", "both"] | None = None,
     raw_times: bool = False,
+    bridge_gaps: bool = False,
     scale: float | None = None,
     up: Literal["y", "z"] | None = None,
 ) -> File: ...

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use glam::{Quat, Vec3};
+use glam::{DVec3, Quat, Vec3};
 use serde::Serialize;
 use tumble::reference::angle_between;
 use tumble::{Channel, Engine, Frames};
@@ -71,10 +71,9 @@ impl Comparison<'_> {
             Failure::new(ALL_INPUTS, message)
         })?;
         let frames = self.samples(names, own)?;
-        let sampled = [
-            self.poses(names[0], own[0], &frames)?,
-            self.poses(names[1], own[1], &frames)?,
-        ];
+        let (first, of_first) = self.poses(names[0], own[0], &frames)?;
+        let (second, of_second) = self.poses(names[1], own[1], &frames)?;
+        let (sampled, origins) = ([first, second], [of_first, of_second]);
         let times = &sampled[0].times;
         let counts = own.map(|clip| clip.set.track_count());
         // Differences at [sample][pair].
@@ -112,15 +111,16 @@ impl Comparison<'_> {
             }
             let value = |side: usize, place: usize| {
                 let rest = || own[side].rest(channel, place % counts[side]);
-                values(&sampled[side])
-                    .get(place)
-                    .copied()
-                    .unwrap_or_else(rest)
+                let relative = values(&sampled[side]).get(place).copied();
+                let origin = match channel {
+                    Channel::Translation => origins[side].get(place % counts[side]).copied(),
+                    Channel::Scale => None,
+                };
+                origin.unwrap_or_default() + relative.unwrap_or_else(rest).as_dvec3()
             };
             let mut tally = Tally::default();
             for [a, b] in each() {
-                let (a, b) = (value(0, a).as_dvec3(), value(1, b).as_dvec3());
-                tally.add(a.distance(b));
+                tally.add(value(0, a).distance(value(1, b)));
             }
             Some(found(tally, 1.0))
         };
@@ -177,8 +177,13 @@ impl Comparison<'_> {
         Ok(Frames::at(times))
     }
 
-    /// All poses of a clip.
-    fn poses(&self, name: &str, clip: &Motion, frames: &Frames) -> Result<Samples, Failure> {
+    /// All poses of a clip, and what the translations of each track are to be moved by.
+    fn poses(
+        &self,
+        name: &str,
+        clip: &Motion,
+        frames: &Frames,
+    ) -> Result<(Samples, Vec<DVec3>), Failure> {
         room::in_memory(name, &clip.set, frames, 7)?;
         let mut samples = ChannelMethods::AUTHORED
             .sample(self.engine, clip, frames)
@@ -187,10 +192,20 @@ impl Comparison<'_> {
             let poses = world(clip, &samples)
                 .map_err(|error| Failure::new(ALL_INPUTS, format!("{name}: {error}")))?;
             samples.rotations = poses.iter().map(|pose| pose.rotation).collect();
-            samples.translations = poses.iter().map(|pose| pose.position).collect();
+            let tracks = clip.set.track_count();
+            let mut origins = vec![DVec3::ZERO; tracks];
+            if !clip.origins.is_empty() {
+                let first = origins.iter_mut().zip(&poses);
+                first.for_each(|(origin, pose)| *origin = pose.position);
+            }
+            let each = poses.iter().enumerate();
+            samples.translations = each
+                .map(|(index, pose)| (pose.position - origins[index % tracks]).as_vec3())
+                .collect();
             samples.scales.clear();
+            return Ok((samples, origins));
         }
-        Ok(samples)
+        Ok((samples, clip.origins.clone()))
     }
 }
 

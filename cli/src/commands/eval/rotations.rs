@@ -1,11 +1,12 @@
 //! Results of numbers: rotations in any representation, streamed as they come, and whole poses.
 
-use glam::{Quat, Vec3};
+use glam::{DVec3, Quat, Vec3};
 use tumble::method::SLERP;
 use tumble::{Engine, Error, Frames, Layout, Quantity, Timeline};
 use tumble_formats::format::ResultShape;
 use tumble_formats::motion::Motion;
 use tumble_formats::npy::ComponentOrder;
+use tumble_formats::origin::origin_of;
 use tumble_formats::poses::{Poses, TRANSFORM, WORLD};
 use tumble_formats::sample::{ChannelMethods, Samples};
 use tumble_formats::world::{HierarchyError, world};
@@ -112,8 +113,8 @@ impl Job<'_> {
         room::in_memory(name, set, frames, 8)?;
         self.check_scale(name, clip, true)?;
         self.explain(name, clip, frames, Layout::FrameMajor)?;
-        let mut numbers = if clip.skeleton.is_empty() && !clip.has_vectors() {
-            self.chain(name, clip, frames, kind)?
+        let (mut numbers, mut origins) = if clip.skeleton.is_empty() && !clip.has_vectors() {
+            (self.chain(name, clip, frames, kind)?, Vec::new())
         } else {
             if self.arguments.what.has_parents() {
                 let message = "has a skeleton, or places, of its own; leave out --parents";
@@ -143,6 +144,9 @@ impl Job<'_> {
             let own =
                 frames.flat_map(|frame| tracks.iter().flat_map(move |&track| pose(frame, track)));
             numbers = own.collect();
+            if !origins.is_empty() {
+                origins = tracks.iter().map(|&track| origins[track]).collect();
+            }
         }
         let own = selected.map(|tracks| set.select(tracks)).transpose();
         let own = own.map_err(|error| Failure::evaluating(name, &error.into()))?;
@@ -153,6 +157,7 @@ impl Job<'_> {
             timeline: &timeline,
             components: &components,
             numbers: &numbers,
+            origins: &origins,
         };
         let write = target.results()?.poses;
         let written = target.prepare(|out| write(&poses, out))?;
@@ -237,21 +242,31 @@ fn span(timeline: &Timeline) -> Option<(f64, f64)> {
     Some((timeline.time(0, 0)?, timeline.time(0, last)?))
 }
 
-/// The numbers of the poses of a clip with a skeleton, or with translations or scales.
+/// The numbers of the poses of a clip with a skeleton, or with translations or scales, and what the
+/// positions of each track are to be moved by.
 fn numbers_of(
     clip: &Motion,
     samples: &Samples,
     kind: PoseKind,
-) -> Result<Vec<f32>, HierarchyError> {
+) -> Result<(Vec<f32>, Vec<DVec3>), HierarchyError> {
     Ok(match kind {
-        PoseKind::World => world(clip, samples)?
-            .iter()
-            .flat_map(|pose| {
-                let ([px, py, pz], [x, y, z, w]) =
-                    (pose.position.to_array(), pose.rotation.to_array());
+        PoseKind::World => {
+            let poses = world(clip, samples)?;
+            let tracks = clip.set.track_count();
+            let of_track = |track: usize| poses.iter().skip(track).step_by(tracks);
+            let mut origins = Vec::new();
+            if !clip.origins.is_empty() {
+                let origin = |track| origin_of(of_track(track).map(|pose| pose.position));
+                origins = (0..tracks).map(origin).collect();
+            }
+            let numbers = poses.iter().enumerate().flat_map(|(index, pose)| {
+                let origin = origins.get(index % tracks).copied().unwrap_or_default();
+                let [px, py, pz] = (pose.position - origin).as_vec3().to_array();
+                let [x, y, z, w] = pose.rotation.to_array();
                 [px, py, pz, x, y, z, w]
-            })
-            .collect(),
+            });
+            (numbers.collect(), origins)
+        }
         PoseKind::Transform => {
             let at = |list: &[Vec3], place: usize| list.get(place).copied();
             let numbers = samples
@@ -266,7 +281,7 @@ fn numbers_of(
                     let [x, y, z, w] = rotation.to_array();
                     [tx, ty, tz, x, y, z, w, sx, sy, sz]
                 });
-            numbers.collect()
+            (numbers.collect(), clip.origins.clone())
         }
     })
 }

@@ -101,7 +101,7 @@ pub(super) fn travellers(
         });
     }
     let surroundings = Surroundings {
-        ground: meshes(&ground),
+        ground: meshes(&ground, source.origin()),
         length: length.unwrap_or(1.0),
         margin: 0.0,
         shadows: true,

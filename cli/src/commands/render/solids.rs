@@ -1,6 +1,6 @@
 //! What is drawn, as triangles: boxes, curves, axes, ground.
 
-use glam::{Quat, Vec3};
+use glam::{DVec3, Quat, Vec3};
 use tumble_routes::mesh::Mesh;
 
 use crate::commands::travel::Travel;
@@ -187,13 +187,16 @@ const MOST_TRAILS: usize = 256;
 const GROUND: Colour = [0xa9, 0xc2, 0x8f];
 const OTHERS: Colour = [0x9c, 0x96, 0x90];
 
-/// The triangles of meshes: the ground, and what stands on it.
-pub(crate) fn meshes(meshes: &[Mesh]) -> Vec<Face> {
+/// The triangles of meshes relative to an origin: the ground, and what stands on it.
+pub(crate) fn meshes(meshes: &[Mesh], origin: DVec3) -> Vec<Face> {
     let mut faces = Vec::new();
     for (place, mesh) in meshes.iter().enumerate() {
         let colour = if place == 0 { GROUND } else { OTHERS };
         for triangle in mesh.triangles() {
-            let corners = triangle.map(|vertex| mesh.positions()[vertex as usize].as_vec3());
+            let corners = triangle.map(|vertex| {
+                let corner = mesh.positions()[vertex as usize];
+                (corner - origin).as_vec3()
+            });
             let [a, b, c] = corners;
             faces.push(Face {
                 corners,

@@ -17,7 +17,7 @@ use crate::arguments::input;
 use crate::arguments::interpolation::{Manner, Wanted, each_once};
 use crate::arguments::path::FrameArgument;
 use crate::batch::room;
-use crate::commands::travel::{Maker, Source, is_travel};
+use crate::commands::travel::{Maker, Source, is_travel, places_of};
 use crate::commands::view::page::StoredResult;
 use crate::messages::colours::{self, Colour};
 use crate::messages::exit::{ALL_INPUTS, Failure};
@@ -284,7 +284,7 @@ impl Shown {
             return Ok(result);
         }
         let poses = world(clip, &samples).map_err(|error| refused(&error.to_string()))?;
-        let places: Vec<Vec3> = poses.iter().map(|pose| pose.position).collect();
+        let places = places_of(clip, &poses);
         result.at(&places).ok_or_else(|| refused(far))
     }
 }

@@ -164,7 +164,7 @@ fn joints_are_drawn_where_the_engine_puts_them() {
             page.value("tumble.loaded().then(() => true)");
             let joints = one.clip.set.track_count();
             let expected = expected(one, wanted);
-            let positions = || expected.iter().map(|pose| pose.position.as_dvec3());
+            let positions = || expected.iter().map(|pose| pose.position);
             let size =
                 positions().reduce(DVec3::max).unwrap() - positions().reduce(DVec3::min).unwrap();
             // Half a step of 16 bits, and the rounding of f32, in which matrices are.
@@ -176,9 +176,7 @@ fn joints_are_drawn_where_the_engine_puts_them() {
             for (at, pose) in expected.iter().enumerate() {
                 let (sample, joint) = (at / joints, at % joints);
                 let ends = &drawn[sample][joint];
-                let off = (point(&ends[0]) - pose.position.as_dvec3())
-                    .abs()
-                    .max_element();
+                let off = (point(&ends[0]) - pose.position).abs().max_element();
                 assert!(off <= most, "{}, sample {sample}: {off}", one.title);
                 largest = largest.max(off);
                 let parent = one.clip.skeleton.get(joint).and_then(|joint| joint.parent);
@@ -186,7 +184,7 @@ fn joints_are_drawn_where_the_engine_puts_them() {
                     assert_eq!(ends.as_array().unwrap().len(), 1, "a root has no bone");
                     continue;
                 };
-                let parent = expected[sample * joints + parent].position.as_dvec3();
+                let parent = expected[sample * joints + parent].position;
                 let off = (point(&ends[1]) - parent).abs().max_element();
                 assert!(off <= 2.0 * most, "{}, parent, {sample}: {off}", one.title);
             }

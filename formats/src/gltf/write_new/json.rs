@@ -36,7 +36,8 @@ pub(super) struct Scene {
 #[derive(Serialize)]
 pub(super) struct Node {
     pub(super) name: String,
-    pub(super) translation: [f32; 3],
+    /// Whole numbers, or those of f32.
+    pub(super) translation: [f64; 3],
     pub(super) rotation: [f32; 4],
     pub(super) scale: [f32; 3],
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -47,8 +48,13 @@ pub(super) struct Node {
 
 /// What glTF itself has no room for, and is read again.
 #[derive(Serialize)]
+#[serde(rename_all = "camelCase")]
 pub(super) struct Extras {
-    pub(super) bvh: BvhExtras,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) bvh: Option<BvhExtras>,
+    /// The node is where the positions of its children count from.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub(super) tumble_origin: bool,
 }
 
 /// How BVH has a joint.

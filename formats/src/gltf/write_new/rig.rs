@@ -2,7 +2,7 @@
 
 use std::collections::{HashMap, HashSet};
 
-use glam::{DAffine3, DMat3, Vec3};
+use glam::{DAffine3, DMat3, DVec3, Quat, Vec3};
 use tumble::Skeleton;
 
 use crate::bvh::BvhJoint;
@@ -14,8 +14,8 @@ use crate::motion::{Motion, Transform};
 pub(super) struct Nodes {
     pub(super) list: Vec<Node>,
     pub(super) roots: Vec<usize>,
-    /// Where each node rests.
-    rests: Vec<Transform>,
+    /// Where each node rests, and what its translations are to be moved by.
+    rests: Vec<(Transform, DVec3)>,
     rigs: Vec<Rig>,
     names: UniqueNames,
     /// The nodes that are children of others already.
@@ -53,6 +53,11 @@ impl Nodes {
             let joint = clip.skeleton.get(track).map(|joint| joint.rest);
             joint.unwrap_or_default()
         };
+        // Of joints in the world, which become relative to their parents, roots alone have one.
+        let origin = |track: usize| match parents[track] {
+            Some(_) if clip.is_world => DVec3::ZERO,
+            _ => clip.origin(track),
+        };
         let is_finite = |rest: Transform| {
             rest.translation.is_finite() && rest.rotation.is_finite() && rest.scale.is_finite()
         };
@@ -68,7 +73,8 @@ impl Nodes {
             .collect();
         let has_skeleton = !clip.skeleton.is_empty();
         let fitting = self.rigs.iter().enumerate().find_map(|(place, rig)| {
-            let found = self.shared(rig, (&order, &parents, &names), &rest)?;
+            let both = |track| (rest(track), origin(track));
+            let found = self.shared(rig, (&order, &parents, &names), &both)?;
             (rig.has_skeleton == has_skeleton).then_some((place, found))
         });
         let (place, found) = fitting.unwrap_or_else(|| {
@@ -83,12 +89,12 @@ impl Nodes {
         let mut nodes = Vec::with_capacity(tracks);
         for (track, found) in found.into_iter().enumerate() {
             nodes.push(found.unwrap_or_else(|| {
-                let rest = rest(track);
+                let (rest, origin) = (rest(track), origin(track));
                 let node = self.list.len();
-                self.rests.push(rest);
+                self.rests.push((rest, origin));
                 self.list.push(Node {
                     name: self.names.unique(names[track].clone(), node),
-                    translation: rest.translation.to_array(),
+                    translation: rest.translation.to_array().map(shortest),
                     rotation: rest.rotation.to_array(),
                     scale: rest.scale.to_array(),
                     children: Vec::new(),
@@ -107,19 +113,46 @@ impl Nodes {
             *which += 1;
             if rig.nodes.insert(key, node).is_none() && parent.is_none() {
                 rig.roots.push(node);
-                self.roots.push(node);
             }
         }
         for (track, parent) in parents.iter().enumerate() {
-            if let Some(parent) = parent.map(|parent| nodes[parent]) {
-                // Nodes that are shared hang on theirs already.
-                if nodes[track] >= self.children_until {
-                    self.list[parent].children.push(nodes[track]);
+            // Nodes that are shared hang on theirs already.
+            if nodes[track] >= self.children_until {
+                let child = self.below_origin(nodes[track]);
+                match parent.map(|parent| nodes[parent]) {
+                    Some(parent) => self.list[parent].children.push(child),
+                    None => self.roots.push(child),
                 }
             }
         }
         self.children_until = self.list.len();
         Ok(nodes)
+    }
+
+    /// A node's origin, a new node whose child it is, where it has one, else itself: positions of maps
+    /// are more than f32 has digits for, and the sum of the two nodes' translations is as exact as the
+    /// player that computes it.
+    fn below_origin(&mut self, node: usize) -> usize {
+        let origin = self.rests[node].1;
+        if origin == DVec3::ZERO {
+            return node;
+        }
+        let carrier = self.list.len();
+        self.rests.push((Transform::default(), DVec3::ZERO));
+        self.list.push(Node {
+            name: self
+                .names
+                .unique(format!("{} origin", self.list[node].name), carrier),
+            translation: origin.to_array(),
+            rotation: Quat::IDENTITY.to_array(),
+            scale: [1.0; 3],
+            children: vec![node],
+            extras: Some(Extras {
+                bvh: None,
+                tumble_origin: true,
+            }),
+        });
+        carrier
     }
 
     /// The nodes that a clip shares with a rig, `None` for each that is to be made; nothing if they
@@ -128,7 +161,7 @@ impl Nodes {
         &self,
         rig: &Rig,
         (order, parents, names): (&[usize], &[Option<usize>], &[String]),
-        rest: &impl Fn(usize) -> Transform,
+        rest: &impl Fn(usize) -> (Transform, DVec3),
     ) -> Option<Vec<Option<usize>>> {
         let mut found: Vec<Option<usize>> = vec![None; names.len()];
         let mut seen = HashMap::new();
@@ -166,7 +199,7 @@ impl Nodes {
         let mut joints = vec![(root, DAffine3::IDENTITY)];
         let mut next = 0;
         while let Some(&(node, parent)) = joints.get(next) {
-            let own = parent * affine(&self.rests[node]);
+            let own = parent * affine(&self.rests[node].0);
             joints[next].1 = own;
             joints.extend(self.list[node].children.iter().map(|&child| (child, own)));
             next += 1;
@@ -199,11 +232,17 @@ fn parents_first(parents: &[Option<usize>]) -> Vec<usize> {
 fn extras(joint: &BvhJoint) -> Extras {
     let sites = joint.end_sites.iter();
     Extras {
-        bvh: BvhExtras {
+        bvh: Some(BvhExtras {
             channels: joint.channels_text(),
             end_sites: sites.map(glam::Vec3::to_array).collect(),
-        },
+        }),
+        tumble_origin: false,
     }
+}
+
+/// The f64 of an f32's shortest digits.
+fn shortest(number: f32) -> f64 {
+    number.to_string().parse().unwrap_or(f64::from(number))
 }
 
 fn affine(rest: &Transform) -> DAffine3 {

@@ -150,12 +150,10 @@ impl<'a> Samples<'a> {
     }
 
     fn translation(self, sample: usize, track: usize) -> Vec3 {
-        let translation = |track| self.clip.translations[sample * self.tracks + track];
-        let own = translation(track);
         match self.parent_in_world(track) {
-            None => own,
+            None => self.clip.translation(sample, track),
             Some(parent) => {
-                let arm = own.as_dvec3() - translation(parent).as_dvec3();
+                let arm = self.clip.position(sample, track) - self.clip.position(sample, parent);
                 (self.turned_back(sample, parent) * arm).as_vec3()
             }
         }

@@ -1,0 +1,160 @@
+//! Origins: positions far from 0, such as those of maps (UTM) and of the Earth (ECEF), keep all their
+//! digits, because kernels get f32 relative to a point near them, and writers add it again in f64.
+
+use glam::{DVec3, Vec3};
+
+/// Coordinates that stay below this have no origin: f32 rounds them by 1.2e-4 at most.
+pub(crate) const SMALL: f64 = 2048.0;
+
+/// Beyond this a coordinate is no position, and f64 holds no whole numbers of its size any more.
+const LARGE: f64 = 9_007_199_254_740_992.0;
+
+/// How many times finer f32 has to be about an origin than about 0.
+const GAIN: f64 = 4.0;
+
+/// The box that points fill.
+#[derive(Debug, Clone, Copy)]
+struct Bounds {
+    low: DVec3,
+    high: DVec3,
+}
+
+impl Bounds {
+    fn of(points: impl Iterator<Item = DVec3>) -> Option<Self> {
+        let one = points.map(|point| Self {
+            low: point,
+            high: point,
+        });
+        one.reduce(|a, b| Self {
+            low: a.low.min(b.low),
+            high: a.high.max(b.high),
+        })
+    }
+}
+
+/// The origin for some points. Each of its coordinates is a whole number, so that f64 takes it off and
+/// adds it exactly; 0 where f32 is about as fine without it.
+#[must_use]
+pub fn origin_of(points: impl Iterator<Item = DVec3>) -> DVec3 {
+    let Some(Bounds { low, high }) = Bounds::of(points) else {
+        return DVec3::ZERO;
+    };
+    let axis = |axis: usize| {
+        let (low, high) = (low[axis], high[axis]);
+        let largest = low.abs().max(high.abs());
+        let is_needed =
+            largest >= SMALL && largest <= LARGE && 0.5 * (high - low) * GAIN <= largest;
+        if is_needed {
+            f64::midpoint(low, high).round()
+        } else {
+            0.0
+        }
+    };
+    DVec3::new(axis(0), axis(1), axis(2))
+}
+
+/// The origin of some points, and the points relative to it.
+#[must_use]
+pub fn relative(points: &[DVec3]) -> (DVec3, Vec<Vec3>) {
+    let origin = origin_of(points.iter().copied());
+    let points = points.iter().map(|&point| (point - origin).as_vec3());
+    (origin, points.collect())
+}
+
+/// A coordinate in the fewest decimals that tell it from its neighbours in f32 about its origin.
+/// Subnormal numbers are 0, as when they are read.
+#[must_use]
+pub fn coordinate(origin: f64, relative: f32) -> String {
+    /// More decimals than f64 has for coordinates that need an origin.
+    const MOST: usize = 12;
+    let relative = if relative.is_normal() { relative } else { 0.0 };
+    let digits = relative.to_string();
+    if origin == 0.0 {
+        return digits;
+    }
+    let sum = origin + f64::from(relative);
+    if origin.fract() != 0.0 {
+        return sum.to_string();
+    }
+    let decimals = digits
+        .split_once('.')
+        .map_or(0, |(_, decimals)| decimals.len());
+    format!("{sum:.*}", decimals.min(MOST))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn coordinates_have_an_origin_where_f32_is_too_coarse() {
+        for (low, high, origin) in [
+            (-1.5, 3.0, 0.0),
+            (0.91, 0.93, 0.0),
+            (2000.0, 2001.0, 0.0),
+            (5_400_000.0, 5_400_000.02, 5_400_000.0),
+            (-5_400_000.75, -5_400_000.25, -5_400_001.0),
+            // The range is as large as the distance: an origin would gain nothing.
+            (0.0, 1e6, 0.0),
+            (1e20, 1e20, 0.0),
+            (f64::NAN, f64::NAN, 0.0),
+            (f64::INFINITY, f64::INFINITY, 0.0),
+        ] {
+            let points = [DVec3::new(low, 0.0, 1.0), DVec3::new(high, 0.0, 1.0)];
+            let found = origin_of(points.into_iter());
+            assert_eq!(found, DVec3::new(origin, 0.0, 0.0), "{low} to {high}");
+        }
+        assert_eq!(origin_of(std::iter::empty()), DVec3::ZERO);
+    }
+
+    #[test]
+    fn digits_are_those_of_the_file() {
+        for (text, origin) in [
+            ("5400000.01", 5_400_000.0),
+            ("-5400000.01", -5_400_000.0),
+            ("5399999.9", 5_400_000.0),
+            ("5400000", 5_400_000.0),
+            ("0.1", 0.0),
+        ] {
+            let number: f64 = text.parse().unwrap();
+            assert_eq!(coordinate(origin, (number - origin) as f32), text);
+        }
+        assert_eq!(coordinate(0.0, 1e-42), "0");
+        assert_eq!(coordinate(2500.5, 0.25), "2500.75");
+    }
+
+    /// Positions of maps come back within 1e-9 of themselves.
+    #[test]
+    fn nothing_of_a_map_is_lost() {
+        let mut state = 1u64;
+        let mut random = || {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1);
+            (state >> 11) as f64 / (1u64 << 53) as f64
+        };
+        for extent in [0.02, 1.0, 300.0, 20_000.0] {
+            let points: Vec<DVec3> = (0..500)
+                .map(|_| {
+                    DVec3::new(500_000.0, 5_400_000.0, 40.0)
+                        + extent * DVec3::new(random(), random(), 0.0)
+                })
+                .collect();
+            let (origin, offsets) = relative(&points);
+            assert_eq!(origin.z, 0.0);
+            for (point, offset) in points.iter().zip(&offsets) {
+                let found: Vec<f64> = (0..2)
+                    .map(|axis| coordinate(origin[axis], offset[axis]).parse().unwrap())
+                    .collect();
+                assert!(
+                    (found[0] - point.x).abs() <= 1e-9 * point.x,
+                    "{found:?} {point}"
+                );
+                assert!(
+                    (found[1] - point.y).abs() <= 1e-9 * point.y,
+                    "{found:?} {point}"
+                );
+            }
+        }
+    }
+}
