@@ -411,7 +411,7 @@ fn a_map_s_origin_is_told() {
     let done = unsafe { tumble_file_clip_origin(file, 0, 0, origin.as_mut_ptr()) };
     assert_eq!(
         (done, origin),
-        (TumbleResult::Ok, [458_075.0, 5_429_381.0, 0.0])
+        (TumbleResult::Ok, [458_075.0, 5_429_381.0, 163.0])
     );
     // SAFETY: as above.
     let done = unsafe { tumble_file_clip_origin(file, 0, 1, origin.as_mut_ptr()) };

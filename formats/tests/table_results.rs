@@ -371,6 +371,7 @@ fn poses_are_written_as_transforms_that_are_read() {
         timeline: &shape.timeline,
         components: &TRANSFORM,
         numbers: &numbers,
+        origins: &[],
     };
     for format in ["parquet", "arrow", "csv"] {
         let mut bytes = Vec::new();

@@ -96,12 +96,8 @@ fn bits(clip: &Motion) -> (i64, Vec<u64>, Vec<[u32; 7]>) {
     let samples = keyed(clip).unwrap();
     let times = samples.times.iter().map(|time| time.to_bits()).collect();
     let rows = samples.rotations.iter().enumerate().map(|(row, q)| {
-        let [x, y, z] = samples
-            .translations
-            .get(row)
-            .copied()
-            .unwrap_or_default()
-            .to_array();
+        let position = samples.translations.get(row).copied().unwrap_or_default();
+        let [x, y, z] = (clip.origin(0) + position.as_dvec3()).as_vec3().to_array();
         let [qx, qy, qz, qw] = q.to_array();
         [x, y, z, qx, qy, qz, qw].map(f32::to_bits)
     });

@@ -101,7 +101,7 @@ def test_positions_of_maps_keep_their_digits(tmp_path):
     file = tmp_path / "map.tum"
     file.write_text("0 458074.604 5429380.172 162.5 0 0 0 1\n1 458074.614 5429380.182 162.5 0 0 0 1\n")
     clip = tumble.load(file).clip
-    assert clip.origins.tolist() == [[458075.0, 5429380.0, 0.0]]
+    assert clip.origins.tolist() == [[458075.0, 5429380.0, 163.0]]
     positions, rotations = tumble.Engine("cpu").world(clip, fps=10)
     assert (positions.dtype, rotations.dtype) == (np.float64, np.float32)
     expected = np.linspace([458074.604, 5429380.172, 162.5], [458074.614, 5429380.182, 162.5], 11)

@@ -103,19 +103,21 @@ impl Table {
 
     /// Refuses the first null of any column; of numbers not where gaps are bridged, as they are NaN then.
     pub(crate) fn check_nulls(&self, bridges_gaps: bool) -> Result<(), Diagnostic> {
-        let is_bridged = |column: &Column| {
-            let is_float = matches!(
+        let is_float = |column: &Column| {
+            matches!(
                 column.values,
                 Values::Numbers(Numbers::F32(_) | Numbers::F64(_))
-            );
-            bridges_gaps && is_float
+            )
         };
         let checked = self.columns.iter().enumerate();
-        for (place, column) in checked.filter(|(_, column)| !is_bridged(column)) {
+        for (place, column) in checked.filter(|(_, column)| !(bridges_gaps && is_float(column))) {
             if let Some(row) = column.null {
+                let remedy = match is_float(column) {
+                    true => "fill it in, remove the row, or leave the key out with --bridge-gaps",
+                    false => "fill it in or remove the row",
+                };
                 let message = format!(
-                    "column `{}` has no value in row {row}; fill it in, remove the row, or leave the key out with \
-                     --bridge-gaps",
+                    "column `{}` has no value in row {row}; {remedy}",
                     column.name
                 );
                 return Err(self.refuse_at(place, row, Code::Null, message));
