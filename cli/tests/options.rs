@@ -58,6 +58,7 @@ const OPTIONS: &[&[&str]] = &[
     &["--up", "y"],
     &["--linear", "foot"],
     &["--raw-times"],
+    &["--bridge-gaps"],
     &["--duplicates", "last"],
     &["--source-fps", "10"],
     &["--map", "rotations=keys:wxyz"],
@@ -307,8 +308,9 @@ fn is_usual(input: &str, own: &[&str], other: &[&str]) -> bool {
         // Roots alone have no length between them.
         ["--scale", _] => has("--parents"),
         // They say what to do with what these files do not have: several animations, two keys at one
-        // time, no rate, rounded times.
+        // time, no rate, rounded times, keys that are missing.
         ["--animation", _] | ["--duplicates", _] | ["--source-fps", _] | ["--raw-times"] => true,
+        ["--bridge-gaps"] => true,
         _ => false,
     }
 }

@@ -4,7 +4,6 @@ use glam::{DQuat, DVec3, Quat, Vec3};
 use tumble::{Channel, TrackError};
 
 use crate::motion::{Body, Motion, Transform};
-use crate::origin::relative;
 
 /// The clip with all translations multiplied by `scale`, and with all roots turned by `turn`, keys
 /// and tangents alike. Computed in f64, rounded once.
@@ -31,8 +30,13 @@ pub fn adjust(clip: &Motion, scale: f64, turn: DQuat) -> Result<Motion, TrackErr
         let exactly = |vector: DVec3| turn * (vector * scale);
         let moved = |vector: Vec3| exactly(vector.as_dvec3()).as_vec3();
         let before = clip.origin(index);
-        let mut origin = DVec3::ZERO;
-        let mut tangents = Vec::new();
+        // Whole numbers, which f64 adds exactly, where these are as near to the positions as before.
+        let origin = exactly(before);
+        let origin = DVec3::select(
+            origin.abs().cmpge(DVec3::splat(16.0)),
+            origin.round(),
+            origin,
+        );
         let keys: Vec<Quat> = track.keys.iter().map(|&key| turned(key)).collect();
         let set = &mut adjusted.set;
         set.push(track.name.unwrap_or_default(), track.times, &keys)?;
@@ -47,19 +51,10 @@ pub fn adjust(clip: &Motion, scale: f64, turn: DQuat) -> Result<Motion, TrackErr
             set.set_tcb(index, track.tcb)?;
         }
         if let Some(vectors) = clip.set.vector_keys(Channel::Translation, index) {
-            let keys = vectors.keys.iter().map(|key| before + key.as_dvec3());
-            let keys: Vec<DVec3> = keys.map(exactly).collect();
+            let shifted = |key: &Vec3| (exactly(before + key.as_dvec3()) - origin).as_vec3();
+            let keys: Vec<Vec3> = vectors.keys.iter().map(shifted).collect();
             let both = |both: &[Vec3; 2]| both.map(moved);
-            tangents.extend(vectors.tangents.iter().map(both));
-            let keys = match before == DVec3::ZERO {
-                // Scaled positions count from 0 where they did before.
-                true => keys.iter().map(|key| key.as_vec3()).collect(),
-                false => {
-                    let (new, keys) = relative(&keys);
-                    origin = new;
-                    keys
-                }
-            };
+            let tangents: Vec<_> = vectors.tangents.iter().map(both).collect();
             set.set_translations(index, vectors.times, &keys, &tangents)?;
         }
         if let Some(vectors) = clip.set.vector_keys(Channel::Scale, index) {
