@@ -187,7 +187,8 @@ pub unsafe extern "C" fn tumble_file_clip_origin(
 ) -> TumbleResult {
     code(|| {
         let out = Out::new(origin.cast::<[f64; 3]>(), "origin")?;
-        let motion = &handle::get(file)?.clip(clip)?.motion;
+        let file = handle::get(file)?;
+        let motion = &file.clip(clip)?.motion;
         let count = motion.set.track_count();
         if track >= count {
             let message = format!("there is no track {track}; the clip has {count}");
