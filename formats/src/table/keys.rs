@@ -263,7 +263,7 @@ impl Clip<'_> {
             let row = self.row(place);
             let numbers = [0, 1, 2].map(|i: usize| columns[i].at(row));
             let is_bad = |number: f64| {
-                !(number as f32).is_finite() && !(self.options.bridge_gaps && number.is_nan())
+                !((number as f32).is_finite() || self.options.bridge_gaps && number.is_nan())
             };
             if let Some(i) = numbers.iter().position(|&number| is_bad(number)) {
                 let message = format!("{} is not finite in f32; repair it", columns[i].at(row));

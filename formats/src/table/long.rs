@@ -194,7 +194,7 @@ pub(crate) fn write_motion<S: Sink>(
         });
     let clip_names: ArrayRef = Arc::new(StringArray::from_iter_values(clip_names));
     let (track_names, codes) = track_names(clips);
-    let has_origins = has(|clip| clip.has_origins());
+    let has_origins = clips.iter().any(Sampled::has_origins);
     let columns = components.iter().map(|&name| {
         let is_wide = has_origins && translation.contains(&name);
         (name.to_owned(), Component::of_positions(is_wide))
