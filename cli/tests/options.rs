@@ -281,6 +281,7 @@ fn every_option_is_obeyed_somewhere() {
             "--linear",
             "--offsets",
             "--map",
+            "--bridge-gaps",
             "--scale",
             "--source-fps",
         ];

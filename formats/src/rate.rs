@@ -147,8 +147,8 @@ fn is_whole(rate: FrameRate) -> bool {
 /// 29.97 is short for 30000/1001.
 const NEAR: f64 = 2e-6;
 
-/// The rate that a number stands for: a whole number, one by 1.001, or the number itself to nine
-/// decimals. `None` for what is no rate.
+/// The rate that a number stands for: a whole number, one by 1.001, or the simplest fraction that is the
+/// number in f64. `None` for what is no rate.
 fn of_number(number: f64) -> Option<FrameRate> {
     let is_near = |rate: f64| (number - rate).abs() <= NEAR * rate;
     let whole = number.round();
@@ -161,7 +161,8 @@ fn of_number(number: f64) -> Option<FrameRate> {
             return Some(rate);
         }
     }
-    format!("{number:.9}").parse().ok()
+    let (frames, seconds) = ratio(number)?;
+    FrameRate::new(frames, seconds).ok()
 }
 
 // ---- a frame's time
@@ -204,17 +205,23 @@ pub(crate) fn last_place(token: &str) -> i32 {
     exponent.saturating_sub(decimals as i32)
 }
 
-/// The rate whose period is the simplest fraction that is this number in f64: the first of its
-/// continued fraction's convergents that rounds to it. So a rate comes back from the shortest
-/// digits of its period.
+/// The rate whose period is the simplest fraction that is this number in f64. So a rate comes back from
+/// the shortest digits of its period.
 pub(crate) fn itself(period: f64) -> Option<FrameRate> {
-    if !(1e-9..=1e9).contains(&period) {
+    let (seconds, frames) = ratio(period)?;
+    FrameRate::new(frames, seconds).ok()
+}
+
+/// The simplest fraction that is this number in f64: the first of its continued fraction's convergents
+/// that rounds to it. `None` for numbers beyond 1e-9 to 1e9.
+fn ratio(number: f64) -> Option<(u64, u64)> {
+    if !(1e-9..=1e9).contains(&number) {
         return None;
     }
     // The number as a ratio of whole numbers; it has at most 82 binary places.
-    let exponent = (period.to_bits() >> 52) as i32 - 1023;
+    let exponent = (number.to_bits() >> 52) as i32 - 1023;
     let places = 52 - exponent;
-    let mut rest = ((period * 2f64.powi(places)) as u128, 1u128 << places);
+    let mut rest = ((number * 2f64.powi(places)) as u128, 1u128 << places);
     let (mut before, mut last) = ((0u128, 1u128), (1u128, 0u128));
     while rest.1 > 0 {
         let whole = rest.0 / rest.1;
@@ -225,8 +232,8 @@ pub(crate) fn itself(period: f64) -> Option<FrameRate> {
         if last.0.max(last.1) > LARGEST {
             return None;
         }
-        if last.0 as f64 / last.1 as f64 == period {
-            return FrameRate::new(last.1 as u64, last.0 as u64).ok();
+        if last.0 as f64 / last.1 as f64 == number {
+            return Some((last.0 as u64, last.1 as u64));
         }
     }
     None
@@ -553,11 +560,18 @@ fn on_one_of(
     let tried = rates.clone().count() as f64;
     let widths = windows.iter().map(|window| window.to - window.from);
     let widest = widths.fold(0.0, f64::max);
-    let at_zero = |window: &&Window| window.from <= 0.0 && 0.0 <= window.to;
-    let told = windows.len() - windows.iter().filter(at_zero).count();
+    // Whole seconds are frames of every whole rate, and 0 is one of all: they show nothing.
+    let is_whole_second = |window: &Window| window.from.ceil() <= window.to;
+    let at_zero = |window: &Window| window.from <= 0.0 && 0.0 <= window.to;
+    let count = |shows_nothing: &dyn Fn(&Window) -> bool| {
+        let all = windows.iter().filter(|window| !shows_nothing(window));
+        all.count() as i32
+    };
+    let (of_whole, of_others) = (count(&is_whole_second), count(&at_zero));
     let fits = |rate: &FrameRate| {
         let per_second = rate.per_second();
-        let chance = (widest * per_second).powi(told as i32) * tried;
+        let told = if is_whole(*rate) { of_whole } else { of_others };
+        let chance = (widest * per_second).powi(told) * tried;
         if widest * per_second > 0.25 || chance > ACCIDENT {
             return false;
         }

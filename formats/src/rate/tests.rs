@@ -146,7 +146,15 @@ fn rates_come_back_from_the_shortest_digits_of_their_period() {
         let digits = (seconds as f64 / frames as f64).to_string();
         let found = of(&Written::FrameTime(&digits)).and_then(Found::rate);
         assert_eq!(found, Some(rate), "{rate}");
+        if frames < 1000 && rate.per_second().fract() != 0.0 && seconds != 1001 {
+            let number = of(&Written::Number(rate.per_second())).and_then(Found::rate);
+            assert_eq!(number, Some(rate), "{rate}");
+        }
     }
+    // A BVH file's frame time of 0.133333 s, as the number of an NPZ file.
+    let written = FrameRate::new(1_000_000, 133_333).unwrap();
+    let found = of(&Written::Number(written.per_second())).and_then(Found::rate);
+    assert_eq!(found, Some(written));
     for digits in ["1e10", "9e-10", "1e-30"] {
         assert_eq!(of(&Written::FrameTime(digits)), None, "{digits}");
     }
@@ -164,4 +172,16 @@ fn a_period_is_as_exact_as_its_last_frame_is_far() {
     for (found, written) in lists[0].iter().zip(times) {
         assert!((found - written).abs() < 1e-11, "{found} {written}");
     }
+}
+
+/// Whole seconds lie on the frames of every whole rate, and one more time on those of some.
+#[test]
+fn whole_seconds_show_no_rate() {
+    let times = [0.0, 413.0, 1_699_999_830.191_7];
+    let mut lists = [times.to_vec()];
+    assert_eq!(
+        crate::grid::restore(&mut lists, Precision::Decimals(9)),
+        None
+    );
+    assert_eq!(lists, [times]);
 }
