@@ -9,7 +9,7 @@ use std::cell::Cell;
 use std::io;
 use std::panic::resume_unwind;
 use std::process;
-use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError, mpsc};
 use std::thread;
 
 /// The system refused worker threads.
@@ -41,6 +41,9 @@ thread_local! {
 /// Bytes of a worker's stack. A worker that waits for parts of its work takes up that of other calls
 /// meanwhile, one on top of the other, as many as there are at a time.
 const STACK: usize = 4 << 20;
+
+/// What a thread is sure to begin with, in bytes, beside its stack.
+const BEGINNING: usize = 1 << 20;
 
 /// Threads that share work: the process's, or an engine's own. They are started when there is work for
 /// them for the first time; a forked process, in which they are not, starts its own.
@@ -182,11 +185,34 @@ fn start(count: usize) -> Result<rayon::ThreadPool, OutOfThreads> {
         .stack_size(STACK)
         .thread_name(|index| format!("tumble {index}"))
         .start_handler(|_| IS_WORKER.set(true))
+        .spawn_handler(start_one)
         .build()
         .map_err(|error| OutOfThreads {
             count,
             reason: error.to_string(),
         })
+}
+
+/// Starts one thread and waits until it has begun. Rust ends the process where a thread that has its stack
+/// lacks the little memory that it begins with: there is room for both, or it is not asked for.
+fn start_one(worker: rayon::ThreadBuilder) -> io::Result<()> {
+    let mut room = Vec::<u8>::new();
+    if room.try_reserve_exact(STACK + BEGINNING).is_err() {
+        return Err(io::ErrorKind::OutOfMemory.into());
+    }
+    drop(std::hint::black_box(room));
+    let mut thread = thread::Builder::new().stack_size(worker.stack_size().unwrap_or(STACK));
+    if let Some(name) = worker.name() {
+        thread = thread.name(name.to_owned());
+    }
+    let (sender, has_begun) = mpsc::channel();
+    thread.spawn(move || {
+        let _ = sender.send(()); // whoever waits is there
+        drop(sender);
+        worker.run();
+    })?;
+    let _ = has_begun.recv(); // a thread that ended has begun too
+    Ok(())
 }
 
 /// As many as `RAYON_NUM_THREADS` says, else one for each core that this process may use.
