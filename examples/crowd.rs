@@ -219,7 +219,8 @@ impl Renderer {
         let info = vk::BufferCreateInfo::default()
             .size(size)
             .usage(vk::BufferUsageFlags::STORAGE_BUFFER);
-        let wanted = vk::MemoryPropertyFlags::HOST_VISIBLE | vk::MemoryPropertyFlags::HOST_COHERENT;
+        let required =
+            vk::MemoryPropertyFlags::HOST_VISIBLE | vk::MemoryPropertyFlags::HOST_COHERENT;
         // SAFETY: plain creation on a device that is alive.
         unsafe {
             let buffer = self.device.create_buffer(&info, None)?;
@@ -228,14 +229,14 @@ impl Renderer {
                 .instance
                 .get_physical_device_memory_properties(self.physical_device);
             // The card's own memory, where the host sees it: the other is across the bus.
-            let local = wanted | vk::MemoryPropertyFlags::DEVICE_LOCAL;
-            let with = |wanted| {
+            let local = required | vk::MemoryPropertyFlags::DEVICE_LOCAL;
+            let with = |required| {
                 (0..types.memory_type_count).find(|&index| {
                     let flags = types.memory_types[index as usize].property_flags;
-                    needs.memory_type_bits & 1 << index != 0 && flags.contains(wanted)
+                    needs.memory_type_bits & 1 << index != 0 && flags.contains(required)
                 })
             };
-            let index = with(local).or_else(|| with(wanted));
+            let index = with(local).or_else(|| with(required));
             let info = vk::MemoryAllocateInfo::default()
                 .allocation_size(needs.size)
                 .memory_type_index(index.ok_or("no such memory")?);

@@ -321,14 +321,14 @@ fn run<E: From<Error>>(
         return sink(Chunk::new(window, &rotations, quantity));
     }
     let mut windows = first.into_iter().flatten().chain(windows);
-    // One of the engine's own threads must not wait for a thread that needs them: all of them may be here.
+    // One of the engine's threads must not wait for a thread that needs them: all of them may be here.
     if threads::is_worker() {
         let mut used = OutputBuffer::new(0).map_err(Error::from)?;
         return windows.try_for_each(|window| {
             let none = OutputBuffer::new(0).map_err(Error::from)?;
             let (window, rotations) = fill_one(window, std::mem::replace(&mut used, none))?;
-            let own = window.len();
-            sink(Chunk::new(window, &rotations[..own], quantity))?;
+            let count = window.len();
+            sink(Chunk::new(window, &rotations[..count], quantity))?;
             used = rotations;
             Ok(())
         });
@@ -352,8 +352,8 @@ fn run<E: From<Error>>(
             .map_err(|error| Error::Threads(OutOfThreads::of_one(&error)))?;
         for result in filled {
             let (window, rotations) = result?;
-            let own = window.len();
-            sink(Chunk::new(window, &rotations[..own], quantity))?;
+            let count = window.len();
+            sink(Chunk::new(window, &rotations[..count], quantity))?;
             let _ = give_back.send(rotations); // nobody needs it after the last
         }
         Ok(())

@@ -217,12 +217,12 @@ fn engine_and_reference_take_one_solution_of_hostile_keys() {
                     (fastest + 3.0 / steps[0] + 3.0 / steps[1]) * (1.0 / steps[0] + 1.0 / steps[1]);
                 jumps += usize::from((sides[1] - sides[0]).length() > 1e-7 * size);
             }
-            let told = of_tracks[index];
+            let warned = of_tracks[index];
             assert!(
-                jumps <= told,
-                "seed {seed}, track {index}: {jumps} jumps, {told} in the warning"
+                jumps <= warned,
+                "seed {seed}, track {index}: {jumps} jumps, {warned} in the warning"
             );
-            counted += told;
+            counted += warned;
         }
     }
     println!("{seen} keys seen, the acceleration jumps at {counted}");

@@ -217,11 +217,11 @@ const NUMBERS: &[Number] = &[
         try_with: |value| {
             with_set(method::KOCHANEK_BARTELS, |set| {
                 let tension = value;
-                let own = Tcb {
+                let tcb = Tcb {
                     tension,
                     ..Tcb::default()
                 };
-                set.set_tcb(0, &[own; 5])
+                set.set_tcb(0, &[tcb; 5])
             })
         },
     },

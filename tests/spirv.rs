@@ -103,7 +103,7 @@ fn every_float_operation_of_every_shader_is_decorated_once() {
 }
 
 /// `OpVectorTimesScalar`, `OpMatrixTimesScalar`, `OpVectorTimesMatrix`, `OpMatrixTimesVector`,
-/// `OpMatrixTimesMatrix`, `OpOuterProduct` and `OpDot`: drivers and translators have rules of their own for
+/// `OpMatrixTimesMatrix`, `OpOuterProduct` and `OpDot`: drivers and translators have other rules for
 /// each, and tests of the expressions cover none of them.
 #[test]
 fn every_product_of_every_shader_is_one_of_components() {

@@ -127,7 +127,7 @@ fn check_written(seed: u64, engines: &[Engine]) {
         }
     }
     for pair in all.windows(2) {
-        let [a, b] = [&pair[0].1, &pair[1].1].map(|own| bytemuck::cast_slice::<_, Quat>(own));
+        let [a, b] = [&pair[0].1, &pair[1].1].map(|result| bytemuck::cast_slice::<_, Quat>(result));
         assert_eq!(
             first_difference(a, b),
             None,
@@ -188,7 +188,7 @@ fn accuracy_is_the_same_at_every_time() {
         for (r, rate) in rates.into_iter().enumerate() {
             let numbers = rate.to_string();
             let (frames, seconds) = numbers.split_once('/').unwrap_or((&numbers, "1"));
-            let [frames, seconds] = [frames, seconds].map(|own| own.parse::<i128>().unwrap());
+            let [frames, seconds] = [frames, seconds].map(|text| text.parse::<i128>().unwrap());
             for (w, method) in [method::SLERP, method::BESSEL_OVERHAUSER, method::SQUAD]
                 .into_iter()
                 .enumerate()
@@ -201,8 +201,8 @@ fn accuracy_is_the_same_at_every_time() {
                 };
                 // From before the keys until behind them.
                 let start = base - 0.75 + 1.0 / 4096.0;
-                let wanted = Frames::rate(rate).between(start, start + 2.0);
-                let found = engine.evaluate(&set, interpolation, &wanted).unwrap();
+                let sampled = Frames::rate(rate).between(start, start + 2.0);
+                let found = engine.evaluate(&set, interpolation, &sampled).unwrap();
                 let mut track = set.track(0);
                 track.times = &places;
                 let curve = Curve::of(&method.into(), track);

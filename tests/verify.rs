@@ -55,9 +55,9 @@ fn half_turns_there_and_back_are_within_their_bounds() {
             let mut set = TrackSet::new();
             let times: Vec<f64> = (0..keys.len()).map(|i| i as f64).collect();
             set.push("", &times, &keys).unwrap();
-            // Between two inner half turns squad's own controls are opposite to each other: it has no arc.
+            // Between two inner half turns squad's controls are opposite to each other: it has no arc.
             let is_meant = |name: &str| keys.len() == 3 || name.starts_with("shoemake");
-            for method in METHODS.into_iter().filter(|own| is_meant(own.name)) {
+            for method in METHODS.into_iter().filter(|method| is_meant(method.name)) {
                 let found = verify(&engine, &set, method.into(), &Frames::fps(25)).unwrap();
                 assert_eq!(
                     found.verdict(),

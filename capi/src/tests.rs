@@ -393,7 +393,7 @@ fn devices_files_and_methods_are_found_or_named() {
 }
 
 #[test]
-fn a_map_s_origin_is_told() {
+fn a_map_s_origin_is_reported() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("map.tum");
     std::fs::write(

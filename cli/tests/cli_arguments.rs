@@ -180,8 +180,8 @@ fn without_vulkan_the_cpu_stands_in_unless_vulkan_was_demanded() {
     ] {
         let run = without(line);
         assert_eq!(run.code, code, "{}", run.words);
-        let told = String::from_utf8_lossy(&run.out);
-        assert!(told.contains("NOTHING was compared") && told.contains("reference-only"));
+        let text = String::from_utf8_lossy(&run.out);
+        assert!(text.contains("NOTHING was compared") && text.contains("reference-only"));
     }
     let run = without(&["devices"]);
     assert_eq!(run.code, 0);

@@ -231,7 +231,7 @@ fn bench_measures_every_workload_in_one_run() {
 /// Ten microseconds beside intervals of a second: the curve through these keys with a continuous acceleration
 /// would turn thousands of times between them.
 #[test]
-fn an_acceleration_that_jumps_is_told() {
+fn an_acceleration_that_jumps_is_warned_of() {
     let folder = tempfile::tempdir().unwrap();
     let write = |name: &str, times: [f64; 6]| {
         let mut rotation = glam::DQuat::IDENTITY;
@@ -271,11 +271,11 @@ fn an_acceleration_that_jumps_is_told() {
         &["info", "short.dat"],
     ] {
         // `verify` may find such velocities off their bounds, by any method.
-        let told = match line[0] {
+        let output = match line[0] {
             "verify" => run(folder.path(), line),
             _ => succeed(folder.path(), line),
         };
-        let text = told.words + &String::from_utf8(told.out).unwrap();
+        let text = output.words + &String::from_utf8(output.out).unwrap();
         assert_eq!(text.matches("W014").count(), 1, "{line:?}: {text}");
         assert!(text.contains(said), "{line:?}: {text}");
         // The same keys with intervals of a hundred to one have their curve, and other methods have no warning.
@@ -289,8 +289,8 @@ fn an_acceleration_that_jumps_is_told() {
                 }
             })
             .collect();
-        let told = succeed(folder.path(), &even);
-        let text = told.words + &String::from_utf8(told.out).unwrap();
+        let output = succeed(folder.path(), &even);
+        let text = output.words + &String::from_utf8(output.out).unwrap();
         assert!(!text.contains("W014"), "{even:?}: {text}");
     }
     let line = [

@@ -9,7 +9,7 @@ use crate::motion::Motion;
 use crate::rate::{Found, Precision, Written, frame_time, of};
 
 /// Puts lists of times of one clip on the frames of the rate that fits all of them; where there is none,
-/// each list on those of a rate of its own, or it stays as it is. Gives the common rate of the keys, if
+/// each list on those of the rate that fits it alone, or it stays as it is. Gives the common rate of the keys, if
 /// there is one.
 pub(crate) fn restore(lists: &mut [Vec<f64>], precision: Precision) -> Option<FrameRate> {
     let common = of(&Written::Times(lists, precision));

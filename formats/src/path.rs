@@ -103,12 +103,12 @@ pub fn read_paths(
         path.give_times(file, pace)?;
         let points = path.points.iter().map(|&point| (point - origin).as_vec3());
         let points: Vec<Vec3> = points.collect();
-        let own = if several {
+        let track_name = if several {
             format!("{name}{place}")
         } else {
             name.to_owned()
         };
-        let pushed = set.push_path(&own, &path.times, &points, &path.ups);
+        let pushed = set.push_path(&track_name, &path.times, &points, &path.ups);
         pushed.map_err(|error| Diagnostic::new(file, Code::Path, error.to_string()))?;
     }
     let mut paths = Motion {

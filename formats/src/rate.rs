@@ -373,7 +373,7 @@ fn shortest(number: f64, near: f64) -> f64 {
     decimals.into_iter().find(is_near).unwrap_or(number)
 }
 
-/// The frames that times stand for; `None` if they cannot be told apart.
+/// The frames that times stand for; `None` if they cannot be distinguished.
 fn windows(times: &[f64], precision: Precision) -> Option<Vec<Window>> {
     let mut all: Vec<Window> = Vec::new();
     for &time in times {
@@ -570,8 +570,8 @@ fn on_one_of(
     let (of_whole, of_others) = (count(&is_whole_second), count(&at_zero));
     let fits = |rate: &FrameRate| {
         let per_second = rate.per_second();
-        let told = if is_whole(*rate) { of_whole } else { of_others };
-        let chance = (widest * per_second).powi(told) * tried;
+        let evidence = if is_whole(*rate) { of_whole } else { of_others };
+        let chance = (widest * per_second).powi(evidence) * tried;
         if widest * per_second > 0.25 || chance > ACCIDENT {
             return false;
         }

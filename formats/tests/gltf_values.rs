@@ -144,17 +144,17 @@ fn quantized_keys_are_near_those_of_the_file_they_were_made_of() {
     let fox = open(&data.join("gltf/Fox.glb"));
     let quantized = open(&data.join("gltf/fox_quantized.glb"));
     assert_eq!(fox.clips.len(), 3);
-    for (own, other) in fox.clips.iter().zip(&quantized.clips) {
-        assert_eq!(own.name, other.name);
+    for (plain, other) in fox.clips.iter().zip(&quantized.clips) {
+        assert_eq!(plain.name, other.name);
         // Its last key comes between two frames of 24 fps, on one of 120 fps: that is not the rate of the keys.
-        let is_even = own.name.as_deref() != Some("Run");
+        let is_even = plain.name.as_deref() != Some("Run");
         let rate = tumble::FrameRate::new(24, 1).ok().filter(|_| is_even);
-        assert_eq!((own.rate, other.rate), (rate, rate));
-        let (first, last) = own.set.time_span().unwrap();
+        assert_eq!((plain.rate, other.rate), (rate, rate));
+        let (first, last) = plain.set.time_span().unwrap();
         let times: Vec<f64> = (0..50)
             .map(|i| first + (last - first) * f64::from(i) / 49.0)
             .collect();
-        let [mine, others] = [own, other].map(|clip| sample(clip, times.clone()));
+        let [mine, others] = [plain, other].map(|clip| sample(clip, times.clone()));
         let track = |name: &str| {
             other
                 .set
@@ -162,15 +162,15 @@ fn quantized_keys_are_near_those_of_the_file_they_were_made_of() {
                 .position(|track| track.name == Some(name))
         };
         let mut compared = 0;
-        for index in 0..own.set.track_count() {
-            let Some(same) = track(own.set.track(index).name.unwrap()) else {
+        for index in 0..plain.set.track_count() {
+            let Some(same) = track(plain.set.track(index).name.unwrap()) else {
                 continue;
             };
             for sample in 0..times.len() {
-                let a = mine.rotations[sample * own.set.track_count() + index];
+                let a = mine.rotations[sample * plain.set.track_count() + index];
                 let b = others.rotations[sample * other.set.track_count() + same];
                 let angle = 2.0 * a.as_dquat().dot(b.as_dquat()).abs().min(1.0).acos();
-                assert!(angle < 2e-3, "{:?}, track {index}: {angle}", own.name);
+                assert!(angle < 2e-3, "{:?}, track {index}: {angle}", plain.name);
             }
             compared += 1;
         }

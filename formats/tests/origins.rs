@@ -130,7 +130,7 @@ fn between_two_keys_of_a_map_lie_their_millimetres() {
 }
 
 #[test]
-fn tracks_have_origins_of_their_own() {
+fn each_track_has_its_origin() {
     let text = "time,a.x,a.y,a.z,a.w,a.tx,a.ty,a.tz,b.x,b.y,b.z,b.w,b.tx,b.ty,b.tz\n\
                 0,0,0,0,1,5400000.25,1,2,0,0,0,1,-70000.5,1,2\n\
                 1,0,0,0,1,5400000.75,1,3,0,0,0,1,-70000.25,1,2\n";

@@ -412,15 +412,18 @@ impl Clip {
         track: &Bound<'py, PyAny>,
     ) -> PyResult<Option<(Bound<'py, PyAny>, Bound<'py, PyAny>)>> {
         let track = self.track(track)?;
-        let Some(own) = self.motion.set.vector_keys(channel, track) else {
+        let Some(channel_keys) = self.motion.set.vector_keys(channel, track) else {
             return Ok(None);
         };
-        let times = PyArray1::from_slice(py, own.times).into_any();
+        let times = PyArray1::from_slice(py, channel_keys.times).into_any();
         let origin = self.motion.origin(track);
         if channel == Channel::Translation && origin != DVec3::ZERO {
-            let positions = own.keys.iter().map(|key| origin + key.as_dvec3());
+            let positions = channel_keys.keys.iter().map(|key| origin + key.as_dvec3());
             return Ok(Some((times, doubles(py, positions)?)));
         }
-        Ok(Some((times, vectors(py, own.keys.iter().copied())?)))
+        Ok(Some((
+            times,
+            vectors(py, channel_keys.keys.iter().copied())?,
+        )))
     }
 }

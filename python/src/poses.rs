@@ -2,12 +2,13 @@
 
 use std::sync::Arc;
 
-use glam::{Quat, Vec3};
+use glam::{DVec3, Quat, Vec3};
 use numpy::{Element, PyArray1, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::intern;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 use tumble::{Layout, Quantity};
+use tumble_formats::motion::Motion;
 use tumble_formats::sample::{ChannelMethods, Samples};
 use tumble_formats::world::world;
 
@@ -27,27 +28,18 @@ pub(crate) fn local<'py>(
     let py = clip.py();
     let (samples, tracks) = samples(engine, clip, options)?;
     let count = samples.times.len();
-    let all = |own: &[Vec3], rest: Vec3| -> Vec<f32> {
-        match own.is_empty() {
-            true => [rest.to_array()].repeat(tracks * count).into_flattened(),
-            false => own.iter().flat_map(Vec3::to_array).collect(),
-        }
+    let or_rest = |list: &[Vec3], rest: Vec3| match list.is_empty() {
+        true => vec![rest; tracks * count],
+        false => list.to_vec(),
     };
     let rotations = samples.rotations.iter().flat_map(Quat::to_array);
     let three = (tracks, count, 3);
     let motion = &clip.get().motion;
-    let translations = all(&samples.translations, Vec3::ZERO);
-    let translations = match motion.origins.is_empty() {
-        true => shaped(py, translations, three, layout)?,
-        false => {
-            let (points, _) = translations.as_chunks::<3>();
-            let points = points.iter().enumerate();
-            let moved = points.flat_map(|(index, &point)| {
-                (motion.origin(index % tracks) + Vec3::from(point).as_dvec3()).to_array()
-            });
-            shaped(py, moved.collect::<Vec<f64>>(), three, layout)?
-        }
-    };
+    let translations = or_rest(&samples.translations, Vec3::ZERO);
+    let moved = translations.iter().enumerate();
+    let moved = moved.map(|(index, point)| motion.origin(index % tracks) + point.as_dvec3());
+    let translations = positions(py, motion, moved, three, layout)?;
+    let scales = or_rest(&samples.scales, Vec3::ONE);
     PyTuple::new(
         py,
         [
@@ -58,7 +50,12 @@ pub(crate) fn local<'py>(
                 (tracks, count, 4),
                 layout,
             )?,
-            shaped(py, all(&samples.scales, Vec3::ONE), three, layout)?,
+            shaped(
+                py,
+                scales.iter().flat_map(Vec3::to_array).collect::<Vec<f32>>(),
+                three,
+                layout,
+            )?,
         ],
     )
 }
@@ -77,16 +74,9 @@ pub(crate) fn in_world<'py>(
     let poses = interruptible(py, move || {
         world(&motion, &samples).map_err(|error| input(error.to_string()))
     })?;
-    let positions = poses.iter().flat_map(|it| it.position.to_array());
-    let three = (tracks, count, 3);
-    let positions = match clip.get().motion.origins.is_empty() {
-        true => {
-            let rounded = positions.map(|number| number as f32);
-            shaped(py, rounded.collect::<Vec<f32>>(), three, layout)?
-        }
-        false => shaped(py, positions.collect::<Vec<f64>>(), three, layout)?,
-    };
-    let rotations = poses.iter().flat_map(|it| it.rotation.to_array());
+    let points = poses.iter().map(|pose| pose.position);
+    let positions = positions(py, &clip.get().motion, points, (tracks, count, 3), layout)?;
+    let rotations = poses.iter().flat_map(|pose| pose.rotation.to_array());
     PyTuple::new(
         py,
         [
@@ -127,6 +117,26 @@ fn samples(
             .map_err(|error| of_engine(&error))
     })?;
     Ok((samples, tracks))
+}
+
+/// Positions as an array, in f64 where any track has an origin and in f32 where they are f32.
+fn positions<'py>(
+    py: Python<'py>,
+    motion: &Motion,
+    points: impl Iterator<Item = DVec3>,
+    shape: (usize, usize, usize),
+    layout: Layout,
+) -> PyResult<Bound<'py, PyAny>> {
+    match motion.origins.is_empty() {
+        true => {
+            let rounded = points.flat_map(|point| point.as_vec3().to_array());
+            shaped(py, rounded.collect::<Vec<f32>>(), shape, layout)
+        }
+        false => {
+            let exact = points.flat_map(|point| point.to_array());
+            shaped(py, exact.collect::<Vec<f64>>(), shape, layout)
+        }
+    }
 }
 
 /// Sampled numbers as an array, without a copy; `[sample][track]` is shown as `[track][sample]` if

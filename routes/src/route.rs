@@ -138,7 +138,7 @@ impl Route {
             length: points
                 .windows(2)
                 .map(|pair| pair[0].distance(pair[1]))
-                .fold(0.0, |sum, own| sum + own),
+                .fold(0.0, |sum, distance| sum + distance),
             points,
             normals,
             off: task.off,

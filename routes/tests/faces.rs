@@ -87,8 +87,8 @@ fn concave_faces_are_covered_once() {
         let polygon: Vec<u32> = (0..positions.len() as u32).collect();
         let mesh = Mesh::of_polygons(&positions, [polygon.as_slice()]).unwrap();
         let all = mesh.positions();
-        let areas = mesh.triangles().iter().map(|own| {
-            let [a, b, c] = own.map(|vertex| all[vertex as usize]);
+        let areas = mesh.triangles().iter().map(|triangle| {
+            let [a, b, c] = triangle.map(|vertex| all[vertex as usize]);
             0.5 * (b - a).cross(c - a).length()
         });
         let count = outline.len();

@@ -61,10 +61,12 @@ impl CpuEngine {
             let mut memory = self.scratch_pool.take(request);
             for batch in batches {
                 memory.prepare(set, batch.intervals(set))?;
-                let own = batch.samples(set, timeline, request.interpolation.steps());
+                let batch_samples = batch.samples(set, timeline, request.interpolation.steps());
                 for part in memory.parts() {
-                    stage.row(own.len(), |row, output| {
-                        let copy = TrackCopy::own(own.start + row.start..own.start + row.end);
+                    stage.row(batch_samples.len(), |row, output| {
+                        let copy = TrackCopy::of_track(
+                            batch_samples.start + row.start..batch_samples.start + row.end,
+                        );
                         self.part(part, timeline, &copy, output)
                     })?;
                 }

@@ -179,7 +179,7 @@ impl CpuEngine {
     ) -> Result<(), FramesError> {
         let samples = first..first + output.samples().len();
         if !clip.interpolation.wrap().repeats() {
-            let copy = TrackCopy::own(samples.clone());
+            let copy = TrackCopy::of_track(samples.clone());
             return clip
                 .parts_of(track, timeline, samples)
                 .try_for_each(|part| self.part(part, timeline, &copy, output));

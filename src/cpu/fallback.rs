@@ -61,7 +61,7 @@ impl CpuEngine {
             let intervals = (batch.iter()).map(|(one, _)| (track, one.intervals.clone()));
             memory.prepare(request.set, intervals)?;
             for (part, (one, own)) in memory.parts().zip(batch) {
-                let (copy, own) = (TrackCopy::own(one.samples), &mut Output::Here(own));
+                let (copy, own) = (TrackCopy::of_track(one.samples), &mut Output::Here(own));
                 self.part(part, request.timeline, &copy, own)?;
             }
             self.scratch_pool.give_back(memory);

@@ -50,7 +50,8 @@ impl<S: Evaluate, O: Samples + ?Sized> InLanesInto<[S], O> for Row<'_> {
         if self.copy.samples.len() <= SAMPLES_ONE_BY_ONE {
             return self.few(segments, output.samples());
         }
-        if let (&Ticks::Frames { rate, start }, true) = (&self.timeline.ticks, self.copy.is_own()) {
+        if let (&Ticks::Frames { rate, start }, true) = (&self.timeline.ticks, self.copy.is_track())
+        {
             let clock = FrameClock::new(rate, start, prepared.spans.steps);
             if self.spans::<L, S, O>(clock, segments, output) {
                 let runs = (prepared.spans).runs_outside(part, clock, &self.copy.samples);

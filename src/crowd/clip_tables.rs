@@ -110,7 +110,7 @@ fn curve(
         form,
         ..Curve::default()
     };
-    let whole = TrackCopy::own(0..0);
+    let whole = TrackCopy::of_track(0..0);
     let last_tick = f64::from(period);
     for own in data.parts_in(track, &whole) {
         let (prepared, part) = (own.prepared, own.part);

@@ -147,12 +147,12 @@ impl Pieces<'_> {
         let first_track = piece.tracks.start;
         let of_set = |error: EvaluateError| error.of_tracks_from(first_track);
         let (timeline, first_sample) = self.timeline.part(&piece.tracks, &piece.samples);
-        let wanted = Wanted {
+        let request = Wanted {
             batch: self.batch(piece),
             only_for: Some(&timeline),
             ..Wanted::all(self.set)
         };
-        let clip = Uploaded::new(self.backend, self.set, *self.interpolation, wanted, None)?;
+        let clip = Uploaded::new(self.backend, self.set, *self.interpolation, request, None)?;
         let folded = clip.data.folded(&timeline)?;
         let samples = Window::of(
             0..piece.tracks.len(),

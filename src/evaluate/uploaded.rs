@@ -90,7 +90,7 @@ impl Uploaded {
         timeline: &'t Timeline,
     ) -> Result<Cow<'t, Timeline>, OutOfMemory> {
         match self.in_pieces {
-            Some(_) => Ok(Cow::Borrowed(timeline)), // each piece folds its own
+            Some(_) => Ok(Cow::Borrowed(timeline)), // each piece folds its samples
             None => self.data.folded(timeline),
         }
     }

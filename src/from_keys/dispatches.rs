@@ -95,7 +95,7 @@ impl<'a> KeyJob<'a> {
                 let keys = match &batch {
                     Batch::Tracks(tracks) => set.keys_of(tracks.clone()),
                     Batch::Intervals { .. } | Batch::Span { .. } => {
-                        self.keys_of(&batch).map(|own| own.keys.len()).sum()
+                        self.keys_of(&batch).map(|track| track.keys.len()).sum()
                     }
                 };
                 let all = batch.samples(set, timeline, false);

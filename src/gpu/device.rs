@@ -211,7 +211,7 @@ impl LogicalDevice {
         self.copy_queue.is_some()
     }
 
-    /// Nobody else uses any queue of a device of the engine's own meanwhile.
+    /// Nobody else uses any queue of a device that the engine opened meanwhile.
     fn all_queues(&self) -> (MutexGuard<'_, vk::Queue>, Option<MutexGuard<'_, vk::Queue>>) {
         let own = lock(&self.queue.raw);
         (own, self.copy_queue.as_ref().map(|other| lock(&other.raw)))
@@ -238,8 +238,8 @@ impl LogicalDevice {
         }
     }
 
-    /// Waits until the work behind a fence has ended, after a first wait failed: a device of the engine's
-    /// own until it is idle. On an application's, others may submit meanwhile, which Vulkan forbids during
+    /// Waits until the work behind a fence has ended, after a first wait failed: a device that the engine
+    /// opened until it is idle. On an application's, others may submit meanwhile, which Vulkan forbids during
     /// such a wait; there the fence is asked again and again. If all fails, the device counts as hung.
     pub(crate) fn wait_until_done(&self, fence: vk::Fence) {
         if !self.may_destroy() {
@@ -259,7 +259,7 @@ impl LogicalDevice {
         self.mark_hung();
     }
 
-    /// Waits until the device, which is the engine's own, is idle. If the wait fails, it counts as hung.
+    /// Waits until the device, which the engine opened, is idle. If the wait fails, it counts as hung.
     fn wait_until_idle(&self) {
         let _queues = self.all_queues();
         // SAFETY: the device is alive, and its queues are locked.
@@ -285,7 +285,7 @@ impl LogicalDevice {
         }
     }
 
-    /// Waits until the device, which is the engine's own (no other imports memory), is idle, and again if
+    /// Waits until the device, which the engine opened (no other imports memory), is idle, and again if
     /// the wait fails for lack of memory.
     pub(crate) fn wait_in_any_case(&self) {
         let _queues = self.all_queues();

@@ -49,16 +49,16 @@ pub struct VulkanHandles {
     pub queue_lock: Option<QueueLock>,
 }
 
-/// A lock for a queue that an application and an engine share: the application's own, of whatever kind.
+/// A lock for a queue that an application and an engine share: the application's, of whatever kind.
 ///
 /// ```
 /// use std::sync::{Arc, Mutex};
 /// use tumble::QueueLock;
 ///
 /// let frames = Arc::new(Mutex::new(0)); // what the application's lock protects beside the queue
-/// let own = Arc::clone(&frames);
+/// let shared = Arc::clone(&frames);
 /// let lock = QueueLock::new(move |submit| {
-///     let _locked = own.lock();
+///     let _locked = shared.lock();
 ///     submit();
 /// });
 /// ```

@@ -47,7 +47,7 @@ impl PipelineCache {
         cache
     }
 
-    /// What is kept for the driver; nothing where there is nothing of its own.
+    /// What is kept for the driver; nothing where only others' is kept.
     fn kept(&self) -> Vec<u8> {
         let kept = self.files.read(&self.name, MAX_BYTES);
         kept.filter(|kept| is_for(kept, self.driver))

@@ -1,4 +1,4 @@
-//! What is told of a Vulkan device and of its checks: plain values, which a build without Vulkan has too.
+//! What is reported of a Vulkan device and of its checks: plain values, which a build without Vulkan has too.
 
 /// A Vulkan device that can compute: its name, and the limits that matter here.
 #[derive(Debug, Clone, PartialEq)]
@@ -42,7 +42,7 @@ pub struct DeviceInfo {
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
 pub enum DeviceKind {
-    /// A card with memory of its own.
+    /// A card with its memory on it.
     Discrete,
     /// Shares the host's memory.
     Integrated,
@@ -82,7 +82,7 @@ impl NegativeControl {
     /// Results with other bits than the CPU's.
     #[must_use]
     pub fn differing(&self) -> usize {
-        self.expressions.iter().map(|own| own.differing).sum()
+        self.expressions.iter().map(|report| report.differing).sum()
     }
 
     /// False where the driver is known to compute some expressions otherwise, and the comparison found none: then

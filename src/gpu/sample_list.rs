@@ -181,7 +181,7 @@ impl InLanes for SampleChunk<'_> {
                 self.list_sparse_times(part, own);
             }
         } else {
-            let copy = TrackCopy::own(window.samples.clone());
+            let copy = TrackCopy::of_track(window.samples.clone());
             for part in parts {
                 self.track = part.track as usize;
                 let listed = prepared.spans.runs(part, timeline, &copy, self);

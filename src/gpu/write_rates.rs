@@ -18,7 +18,7 @@ use crate::shader::{
 /// Bytes a second that a device writes into its own memory: medians of several runs, by its own clock.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct WriteRates {
-    /// By the engine's own kernel for the device, over one constant: on cards neighbouring invocations store
+    /// By the kernel that the engine uses on the device, over one constant: on cards neighbouring invocations store
     /// neighbouring rotations.
     pub store: f64,
     /// By `vkCmdFillBuffer`.

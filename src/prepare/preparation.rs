@@ -61,7 +61,7 @@ impl Preparation {
         })
     }
 
-    /// Whether an option says which way the curves go. Steps have no path, and a method with a path of its own also
+    /// Whether an option says which way the curves go. Steps have no path, and a method that fixes the path also
     /// defines the curve between opposite keys.
     fn has_path(interpolation: &Interpolation) -> bool {
         !interpolation.steps() && interpolation.method.path.is_none()

@@ -65,7 +65,7 @@ fn velocities(track: &Track, ends: Ends) -> Vec<DVec3> {
 ///
 /// The quadratic part, the bend, counts where it is not too strong ([`System::strength`]). The solution
 /// is the one that grows out of the linear equations' as the bends are brought in, which Newton's iteration
-/// follows in steps so small that it contracts to half with each of its own.
+/// follows in steps so small that it contracts to half with each iteration.
 struct System<'a> {
     intervals: &'a [Interval],
     /// The velocities at the keys where they are not free.

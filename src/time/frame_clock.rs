@@ -40,8 +40,8 @@ pub(crate) fn finite_scale(scale: f64) -> f32 {
 /// at most 4e-8 rad off.
 pub(crate) const RESOLUTION: f64 = 1.0 / (1u64 << 33) as f64;
 
-/// When frame 0 is, and the magnitude of a time up to which all times are taken to be rounded alike: its
-/// own, and at least [`CLIP`]. It does not depend on the set: a track has the same bits alone and beside others.
+/// When frame 0 is, and the magnitude of a time up to which all times are taken to be rounded alike: that
+/// of frame 0, and at least [`CLIP`]. It does not depend on the set: a track has the same bits alone and beside others.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct FrameStart {
     pub(crate) seconds: f64,
@@ -62,7 +62,7 @@ const CLIP: f64 = 64.0;
 /// sums or products, so a few steps
 /// of f64. From two days on that would be longer than [`RESOLUTION`], and there a curve is evaluated where
 /// its frame lies. Only where keys are `held` until the next one, and which of two is shown hangs on the
-/// rounding, is a key moved by up to a step of its own f64.
+/// rounding, is a key moved by up to a step of its f64.
 #[inline(always)]
 pub(crate) fn rounding(magnitude: f64, held: bool) -> f64 {
     let few = 4.0 * f64::EPSILON * magnitude;
@@ -121,7 +121,7 @@ impl FrameClock {
     #[inline]
     pub(crate) fn in_copy(self, copy: &TrackCopy) -> Self {
         match copy.place {
-            CopyPlace::Own | CopyPlace::At(_) => self,
+            CopyPlace::Track | CopyPlace::At(_) => self,
             CopyPlace::Frames {
                 first,
                 at_first,
@@ -175,9 +175,9 @@ impl FrameClock {
 
     /// The track's time at a frame; `None` in a copy.
     #[inline]
-    pub(crate) fn own_time(self, frame: usize) -> Option<f64> {
-        let is_own = self.sign == 1.0 && self.origin == self.start && self.at_origin == 0.0;
-        is_own.then(|| self.start + self.rate.time_of(frame as u64))
+    pub(crate) fn time_of_track(self, frame: usize) -> Option<f64> {
+        let is_track = self.sign == 1.0 && self.origin == self.start && self.at_origin == 0.0;
+        is_track.then(|| self.start + self.rate.time_of(frame as u64))
     }
 
     /// Frames per second, as f64 has it.

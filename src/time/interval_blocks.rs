@@ -106,7 +106,7 @@ impl<'a> IntervalBlocks<'a> {
         // rounding may put the sample there.
         let mut done = 0;
         if samples.start > 0
-            && let Some(first_time) = clock.own_time(samples.start)
+            && let Some(first_time) = clock.time_of_track(samples.start)
         {
             // Most parts of a long track hold no requested sample. To compare with the last start
             // avoids a search through memory that is not in the caches.

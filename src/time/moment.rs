@@ -116,7 +116,7 @@ pub(crate) struct Period {
     length: Moment,
 }
 
-/// Copies with numbers below this are told apart. Farther out, more than one lies between neighbouring
+/// Copies with numbers below this are distinguished. Farther out, more than one lies between neighbouring
 /// f64 times.
 const COUNTED: f64 = (1u64 << 51) as f64;
 
@@ -200,8 +200,8 @@ impl Period {
         time.in_frames(rate)
     }
 
-    /// The track's own time at a place in a copy.
-    pub(crate) fn own_time(&self, into: Moment, backwards: bool) -> Moment {
+    /// The track's time at a place in a copy.
+    pub(crate) fn time_in_track(&self, into: Moment, backwards: bool) -> Moment {
         let from_first = match backwards {
             true => self.length.minus(into),
             false => into,

@@ -186,7 +186,7 @@ impl Spans {
         emit: &mut impl Emit,
     ) -> Result<(), FramesError> {
         let (starts, samples) = (&self.starts[part.spans.clone()], &copy.samples);
-        let [first, at_end, last] = match copy.is_own() {
+        let [first, at_end, last] = match copy.is_track() {
             true => self.runs_outside(part, clock, samples),
             false => self.runs_at_ends(part, clock, samples),
         };
@@ -279,7 +279,7 @@ impl Spans {
     }
 
     /// The runs of a copy's samples that rounding put beyond its ends. Every sample of a copy is of its
-    /// track's keys, also where their own values outside are not constants.
+    /// track's keys, also where the values outside are not constants.
     fn runs_at_ends(
         &self,
         part: &Part,

@@ -45,29 +45,29 @@ pub(crate) struct TrackCopy {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum CopyPlace {
     /// It is the track itself.
-    Own,
+    Track,
     /// The track's first key, at `first` seconds, lies at the frame coordinate `at_first` in it.
     Frames {
         first: f64,
         at_first: f64,
         backwards: bool,
     },
-    /// The track's own time at its only sample: copies that are too short, or too far out, to be laid
+    /// The track's time at the copy's only sample: copies that are too short, or too far out, to be laid
     /// out in frames.
     At(Moment),
 }
 
 impl TrackCopy {
     /// The track itself.
-    pub(crate) fn own(samples: Range<usize>) -> Self {
+    pub(crate) fn of_track(samples: Range<usize>) -> Self {
         Self {
             samples,
-            place: CopyPlace::Own,
+            place: CopyPlace::Track,
         }
     }
 
-    pub(crate) fn is_own(&self) -> bool {
-        self.place == CopyPlace::Own
+    pub(crate) fn is_track(&self) -> bool {
+        self.place == CopyPlace::Track
     }
 
     pub(crate) fn is_backwards(&self) -> bool {
@@ -119,7 +119,7 @@ impl Wrap {
                 Either::Right(copies.into_iter())
             }
             // Explicit times are moved between the keys by `folded` instead.
-            _ => Either::Left(std::iter::once(TrackCopy::own(samples))),
+            _ => Either::Left(std::iter::once(TrackCopy::of_track(samples))),
         }
     }
 
@@ -146,7 +146,7 @@ impl Wrap {
         samples: Range<usize>,
     ) -> Vec<TrackCopy> {
         let Some(period) = Period::new(span) else {
-            return vec![TrackCopy::own(samples)];
+            return vec![TrackCopy::of_track(samples)];
         };
         let length = rate.frames_in(period.length().seconds());
         let place = |sample: usize| {
@@ -154,7 +154,7 @@ impl Wrap {
             let magnitude = time.high.abs().max(start.latest);
             let found = self.copy_at(&period, time, rounding(magnitude, false));
             let Some((found, backwards)) = found else {
-                return CopyPlace::Own;
+                return CopyPlace::Track;
             };
             match found.number.filter(|_| length >= FEW_FRAMES) {
                 Some(number) => CopyPlace::Frames {
@@ -162,20 +162,20 @@ impl Wrap {
                     at_first: period.frame_of_first(number, backwards, (rate, start.seconds)),
                     backwards,
                 },
-                None => CopyPlace::At(period.own_time(found.into, backwards)),
+                None => CopyPlace::At(period.time_in_track(found.into, backwards)),
             }
         };
         let mut copies = Vec::new();
         let mut sample = samples.start;
         let mut next_place = None;
         while sample < samples.end {
-            let own = next_place.take().unwrap_or_else(|| place(sample));
+            let at_sample = next_place.take().unwrap_or_else(|| place(sample));
             let mut next = sample + 1;
             // The next copy starts near here; the loops find its first sample by `place` alone.
-            let end = match own {
+            let end = match at_sample {
                 CopyPlace::At(_) => None,
-                CopyPlace::Own => {
-                    let is_in = |sample: usize| place(sample) == CopyPlace::Own;
+                CopyPlace::Track => {
+                    let is_in = |sample: usize| place(sample) == CopyPlace::Track;
                     Some(first_beyond(sample + 1, samples.end, is_in))
                 }
                 CopyPlace::Frames {
@@ -193,12 +193,12 @@ impl Wrap {
             };
             if let Some(end) = end {
                 next = end.clamp(sample + 1, samples.end);
-                while next > sample + 1 && place(next - 1) != own {
+                while next > sample + 1 && place(next - 1) != at_sample {
                     next -= 1;
                 }
                 while next < samples.end {
                     let at_next = place(next);
-                    if at_next != own {
+                    if at_next != at_sample {
                         next_place = Some(at_next);
                         break;
                     }
@@ -207,7 +207,7 @@ impl Wrap {
             }
             copies.push(TrackCopy {
                 samples: sample..next,
-                place: own,
+                place: at_sample,
             });
             sample = next;
         }
@@ -217,12 +217,12 @@ impl Wrap {
     /// The time between the keys, from `first` to `last`, that is repeated at `time`; `time` itself
     /// if it lies in no other copy.
     pub(crate) fn folded(self, span: (f64, f64), time: f64) -> f64 {
-        let own = || {
+        let in_track = || {
             let period = Period::new(span)?;
             let (found, backwards) = self.copy_at(&period, Moment::new(time), 0.0)?;
-            Some(period.own_time(found.into, backwards))
+            Some(period.time_in_track(found.into, backwards))
         };
-        own().map_or(time, |own| own.seconds().clamp(span.0, span.1))
+        in_track().map_or(time, |within| within.seconds().clamp(span.0, span.1))
     }
 }
 
@@ -266,9 +266,9 @@ mod tests {
         assert!(!backwards[3..].contains(&true));
         for from in 0..70 {
             for copy in wrap.copies(span, &timeline, from..from + 1) {
-                let holds = |own: &&TrackCopy| own.samples.contains(&from);
-                let own = whole.iter().find(holds).unwrap();
-                assert_eq!(copy.place, own.place);
+                let has_sample = |copy: &&TrackCopy| copy.samples.contains(&from);
+                let of_whole = whole.iter().find(has_sample).unwrap();
+                assert_eq!(copy.place, of_whole.place);
             }
         }
     }

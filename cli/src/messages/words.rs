@@ -220,7 +220,7 @@ mod tests {
         ];
         let text = json_printable(&serde_json::to_string_pretty(&names).unwrap());
         assert_eq!(serde_json::from_str::<Vec<String>>(&text).unwrap(), names);
-        // A tag is two units of UTF-16; a line end has an escape of its own.
+        // A tag is two units of UTF-16; a line end has a shorter escape.
         assert_eq!(text.matches("\\u").count(), 5, "{text}");
         assert_eq!(printable_lines(&text), text);
     }

@@ -131,7 +131,7 @@ fn no_input_ends_without_a_line() {
     }
 }
 
-/// Each animation that is refused is told, and by every command.
+/// Every command reports each animation that is refused.
 #[test]
 fn all_broken_animations_are_told() {
     let place = sample_folder();
@@ -175,16 +175,19 @@ fn no_name_reaches_a_terminal_as_it_is() {
     for name in NAMES {
         let place = sample_folder();
         let write = |file: &str, text: String| fs::write(place.path().join(file), text).unwrap();
-        let own = json(name);
+        let quoted = json(name);
         let whole = animations([(0, 0), (0, 0)]);
-        let named = whole.replacen(r#"{"name":"a"}"#, &format!(r#"{{"name":{own}}}"#), 1);
-        let named = named.replace(r#"{"channels""#, &format!(r#"{{"name":{own},"channels""#));
+        let named = whole.replacen(r#"{"name":"a"}"#, &format!(r#"{{"name":{quoted}}}"#), 1);
+        let named = named.replace(
+            r#"{"channels""#,
+            &format!(r#"{{"name":{quoted},"channels""#),
+        );
         write("names.gltf", named.clone());
         write(
             "fault.gltf",
             named.replacen(
                 r#""output":1"#,
-                &format!(r#""output":1,"interpolation":{own}"#),
+                &format!(r#""output":1,"interpolation":{quoted}"#),
                 1,
             ),
         );
@@ -200,7 +203,7 @@ fn no_name_reaches_a_terminal_as_it_is() {
             "uri2.gltf",
             whole.replacen(
                 r#""data:;base64,AAAAAAAAgD8AAAAAAAAAAAAAAAAAAIA/AAAAAAAAAACamRk/zcxMPw==""#,
-                &own,
+                &quoted,
                 1,
             ),
         );
@@ -235,11 +238,14 @@ fn no_name_reaches_a_terminal_as_it_is() {
         fs::create_dir(place.path().join("results")).unwrap();
         let entry = |output: &str| {
             format!(
-                "{{\"output\":{output},\"output_bytes\":1,\"output_sha256\":{own},\"input\":{own},\"input_sha256\":{own},\
-                 \"options\":{own},\"kernels_sha256\":{own},\"tumble\":{own},\"device\":{own}}}\n"
+                "{{\"output\":{output},\"output_bytes\":1,\"output_sha256\":{quoted},\"input\":{quoted},\"input_sha256\":{quoted},\
+                 \"options\":{quoted},\"kernels_sha256\":{quoted},\"tumble\":{quoted},\"device\":{quoted}}}\n"
             )
         };
-        write("results/manifest.jsonl", entry(&own) + &entry("\"x.npy\""));
+        write(
+            "results/manifest.jsonl",
+            entry(&quoted) + &entry("\"x.npy\""),
+        );
         let file = format!("{}.dat", name.replace('/', "_"));
         let is_named = fs::copy(place.path().join("a.dat"), place.path().join(&file)).is_ok();
         let mut lines: Vec<Vec<&str>> = Vec::new();
@@ -430,7 +436,10 @@ fn mutated_files_end_with_a_code() {
         };
         let files = files.map(|file| file.unwrap().path());
         seeds.extend(files.filter(|file| {
-            file.is_file() && file.extension().is_some_and(|own| own != "expected")
+            file.is_file()
+                && file
+                    .extension()
+                    .is_some_and(|extension| extension != "expected")
         }));
     }
     seeds.sort();
@@ -520,7 +529,7 @@ fn nothing_small_takes_long() {
     );
     text = text.replacen(r#""nodes":[{"name":"a"}],"#, &meshes, 1);
     write("chain.gltf", &text);
-    // Animations with faults of their own.
+    // Animations, each with a fault.
     let mut text = animations([(0, 0), (0, 7)]);
     let fault =
         r#",{"channels":[{"sampler":9,"target":{"node":0,"path":"rotation"}}],"samplers":[]}"#;
@@ -646,7 +655,7 @@ fn faults_of_inputs_are_no_bugs() {
             );
         }
     }
-    let mut told = String::new();
+    let mut output = String::new();
     write("flat.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
     write("none.obj", "v 0 0 0\n");
     write("pairs.txt", "0 0 0 1\n");
@@ -689,7 +698,7 @@ fn faults_of_inputs_are_no_bugs() {
         (&["info", "a.dat", "--offsets", "offsets.txt"], "E614"),
     ] {
         let run = attempt(place.path(), line);
-        let _ = writeln!(told, "{}", run.words);
+        let _ = writeln!(output, "{}", run.words);
         assert_eq!(run.code, 4, "{line:?}: {}", run.words);
         assert!(
             run.words.contains(&format!("error[{code}]")),

@@ -1,27 +1,25 @@
 //! A Vulkan driver that ends the process when it is loaded, as a broken one may.
+//! Only the names that a loader looks for need `unsafe`.
 #![allow(unsafe_code, missing_docs)]
-
-unsafe extern "C" {
-    fn _exit(status: i32) -> !;
-}
 
 /// With the status that the environment names, 0 too.
 fn end() -> ! {
     match std::env::var("CRASH_STATUS") {
         // At once: what runs at an ordinary end may wait for the loader, which waits for us.
-        // SAFETY: it takes a number, and does not return.
-        Ok(status) => unsafe { _exit(status.parse().unwrap_or(1)) },
+        Ok(status) => signal_hook::low_level::exit(status.parse().unwrap_or(1)),
         Err(_) => std::process::abort(),
     }
 }
 
 /// What every loader calls first.
+// SAFETY: no other function of this library has the name.
 #[unsafe(no_mangle)]
 pub extern "system" fn vk_icdNegotiateLoaderICDInterfaceVersion(_version: *mut u32) -> i32 {
     end()
 }
 
 /// For loaders that do not negotiate.
+// SAFETY: likewise.
 #[unsafe(no_mangle)]
 pub extern "system" fn vk_icdGetInstanceProcAddr(
     _instance: u64,

@@ -58,15 +58,6 @@ fn queues() -> MutexGuard<'static, Queues> {
     QUEUES.lock().unwrap()
 }
 
-/// The real function of a name, of a type that the caller knows.
-macro_rules! real {
-    ($name:literal as fn($($argument:ty),*) $(-> $result:ty)?) => {
-        std::mem::transmute::<Pointer, unsafe extern "system" fn($($argument),*) $(-> $result)?>(
-            real($name),
-        )
-    };
-}
-
 /// The slice of a structure of Vulkan's.
 unsafe fn slice<'a, T>(first: *const T, count: u32) -> &'a [T] {
     match count {
@@ -390,9 +381,9 @@ unsafe extern "system" fn vkCreateBuffer(
 }
 
 /// The card's functions, where there is to be one.
-pub(crate) fn own(name: &CStr) -> Option<Pointer> {
+pub(crate) fn function(name: &CStr) -> Option<Pointer> {
     KIND.as_ref()?;
-    let own = match name.to_str().unwrap_or_default() {
+    let function = match name.to_str().unwrap_or_default() {
         "vkQueueSubmit" => vkQueueSubmit as *const (),
         "vkWaitForFences" => vkWaitForFences as *const (),
         "vkGetFenceStatus" => vkGetFenceStatus as *const (),
@@ -411,5 +402,5 @@ pub(crate) fn own(name: &CStr) -> Option<Pointer> {
         "vkCreateBuffer" => vkCreateBuffer as *const (),
         _ => return None,
     };
-    Some(own.cast())
+    Some(function.cast())
 }

@@ -16,6 +16,15 @@
 //! program finds it as `libvulkan.so.1`.
 #![allow(unsafe_code, non_snake_case, clippy::missing_safety_doc, missing_docs)]
 
+/// The real function of a name, of a type that the caller knows.
+macro_rules! real {
+    ($name:literal as fn($($argument:ty),*) $(-> $result:ty)?) => {
+        std::mem::transmute::<Pointer, unsafe extern "system" fn($($argument),*) $(-> $result)?>(
+            real($name),
+        )
+    };
+}
+
 mod card;
 mod odd;
 
@@ -424,7 +433,7 @@ unsafe extern "system" fn vkGetDeviceProcAddr(device: Word, name: *const c_char)
 }
 
 fn own(name: &CStr) -> Option<Pointer> {
-    if let Some(special) = card::own(name).or_else(|| odd::function(name)) {
+    if let Some(special) = card::function(name).or_else(|| odd::function(name)) {
         return Some(special);
     }
     let special = match name.to_str().unwrap_or_default() {

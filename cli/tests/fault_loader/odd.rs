@@ -4,7 +4,7 @@
 //! * `FAULT_PORTABILITY`: the device has not all of Vulkan: only instances that say they know are told of
 //!   it, and it is opened only with `VK_KHR_portability_subset`;
 //! * `FAULT_WAIT`: milliseconds until an instance is there;
-//! * `FAULT_INCOHERENT`: memory that the host caches is not coherent. The host then sees memory of its own,
+//! * `FAULT_INCOHERENT`: memory that the host caches is not coherent. The host then sees separate memory,
 //!   which holds rubbish at first, and bytes go from one to the other only where it asks for that. Logged as
 //!   `card invalidated` and `card flushed`.
 
@@ -65,8 +65,8 @@ unsafe extern "system" fn vkGetPhysicalDeviceProperties(
 ) {
     // SAFETY: the real function has this type; the caller's structure.
     unsafe {
-        let get: unsafe extern "system" fn(Word, *mut vk::PhysicalDeviceProperties) =
-            std::mem::transmute(real(c"vkGetPhysicalDeviceProperties"));
+        let get =
+            real!(c"vkGetPhysicalDeviceProperties" as fn(Word, *mut vk::PhysicalDeviceProperties));
         get(device, out);
         if let Some(count) = *STORAGE_BUFFERS {
             (*out).limits.max_per_stage_descriptor_storage_buffers = count;
@@ -105,8 +105,8 @@ unsafe extern "system" fn vkGetBufferMemoryRequirements(
 ) {
     // SAFETY: the real function has this type, and the caller's structure.
     unsafe {
-        let get: unsafe extern "system" fn(Word, Word, *mut vk::MemoryRequirements) =
-            std::mem::transmute(real(c"vkGetBufferMemoryRequirements"));
+        let get =
+            real!(c"vkGetBufferMemoryRequirements" as fn(Word, Word, *mut vk::MemoryRequirements));
         get(device, buffer, out);
         (*out).memory_type_bits = 3;
     }
@@ -213,7 +213,7 @@ unsafe extern "system" fn vkFlushMappedMemoryRanges(
 }
 
 unsafe extern "system" fn vkFreeMemory(device: Word, memory: Word, allocator: Word) {
-    // SAFETY: the arguments are the caller's, and the host's view is its own allocation.
+    // SAFETY: the arguments are the caller's, and the host's view is a separate allocation.
     unsafe {
         if let Some(freed) = MAPPED.lock().unwrap().remove(&memory)
             && let Some([_, host]) = freed.views

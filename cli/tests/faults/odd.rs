@@ -45,7 +45,7 @@ fn what_binds_more_storage_buffers_than_there_are_is_refused_by_name() {
     assert_eq!(log.left, BTreeMap::new());
 }
 
-/// Run by the test above, in a process of its own.
+/// Run by the test above, in another process.
 #[test]
 #[ignore = "part of what_binds_more_storage_buffers_than_there_are_is_refused_by_name"]
 fn four_buffers() {
@@ -104,7 +104,7 @@ fn memory_that_is_cached_and_not_coherent_is_made_visible() {
     assert!(log.card["flushed"] > 0, "{log:?}");
 }
 
-/// Run by the test above, in a process of its own.
+/// Run by the test above, in another process.
 #[test]
 #[ignore = "part of memory_that_is_cached_and_not_coherent_is_made_visible"]
 fn incoherent() {
@@ -196,7 +196,7 @@ fn a_card_is_probed_once() {
     assert!(run.words.contains("chosen: llvmpipe") || run.words.contains("chosen: lavapipe"));
 }
 
-/// Run by the test above, in processes of its own.
+/// Run by the test above, in other processes.
 #[test]
 #[ignore = "part of a_card_is_probed_once"]
 fn automatic() {
@@ -235,7 +235,7 @@ fn what_the_driver_compiled_is_kept() {
     }
 }
 
-/// Run by the test above, in processes of its own.
+/// Run by the test above, in other processes.
 #[test]
 #[ignore = "part of what_the_driver_compiled_is_kept"]
 fn warm() {
@@ -244,7 +244,7 @@ fn warm() {
 }
 
 /// An application's device is never waited for as a whole, because the application may submit meanwhile: not even
-/// where a wait for the engine's own work fails.
+/// where a wait for the engine's work fails.
 #[test]
 fn an_applications_device_is_not_waited_for() {
     let Some(loader) = Loader::new() else { return };
@@ -267,7 +267,7 @@ fn an_applications_device_is_not_waited_for() {
     }
 }
 
-/// Run by the test above, in processes of its own.
+/// Run by the test above, in other processes.
 #[test]
 #[ignore = "part of an_applications_device_is_not_waited_for"]
 fn borrowed() {
@@ -296,7 +296,7 @@ fn clips_and_streams_keep_to_the_memory_of_a_device() {
     assert_eq!((log.short, log.left), (0, BTreeMap::new()));
 }
 
-/// Run by the test above, in a process of its own.
+/// Run by the test above, in another process.
 #[test]
 #[ignore = "part of clips_and_streams_keep_to_the_memory_of_a_device"]
 fn bounded() {

@@ -119,15 +119,15 @@ for index, (times, quats) in enumerate(sets):
     velocities = np.load(rates / f"{index:05}.npy")[0].astype(float)
     assert velocities.shape[-1] == 3 and len(found) == len(velocities)
     frames = np.round(times * FPS).astype(int)
-    own = jump(times, rotations, velocities[frames])
+    our_jump = jump(times, rotations, velocities[frames])
     warned = f"{index:05}.dat:track" in said and "W014" in said
     counts["sets"] += 1
-    counts["c2 continuous"] += own < 1e-5
+    counts["c2 continuous"] += our_jump < 1e-5
     counts["warned"] += warned
-    if not (own < 1e-5 or warned):
-        sys.exit(f"set {index}: c2's acceleration jumps by {own:.1e}, and nothing is said")
-    if warned and own < 1e-7:
-        sys.exit(f"set {index}: a warning about a jump of {own:.1e}")
+    if not (our_jump < 1e-5 or warned):
+        sys.exit(f"set {index}: c2's acceleration jumps by {our_jump:.1e}, and nothing is said")
+    if warned and our_jump < 1e-7:
+        sys.exit(f"set {index}: a warning about a jump of {our_jump:.1e}")
     at = np.minimum(np.arange(len(found)) / FPS, times[-1])
     for rounds, name in [(10, "as it comes"), (ITERATED, "iterated")]:
         curve, theirs = spline(times, rotations, rounds)
@@ -139,7 +139,7 @@ for index, (times, quats) in enumerate(sets):
             farthest = max(farthest, apart)
             if apart > 1e-6:
                 sys.exit(f"set {index}: {apart:.1e} rad from SciPy's curve ({name})")
-    steepest = max(steepest, 0 if warned else own)
+    steepest = max(steepest, 0 if warned else our_jump)
 for name, count in counts.items():
     print(f"{name}: {count}")
 print(f"the farthest from SciPy: {farthest:.1e} rad; c2's largest jump: {steepest:.1e}")

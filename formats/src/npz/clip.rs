@@ -192,29 +192,36 @@ fn read_keys(
     frames: usize,
     warnings: &mut Warnings,
 ) -> Result<Vec<Keys>, Diagnostic> {
-    let own = tracks.start - part.tracks.start..tracks.end - part.tracks.start;
+    let in_part = tracks.start - part.tracks.start..tracks.end - part.tracks.start;
     let at = part.at;
     let quiet = |keys: Vec<Quat>| (keys.iter().all(|key| !key.w.is_nan())).then_some(keys);
     let lists = match part.values {
-        Values::Quaternion(Xyzw) => array.tracks::<QuietXyzw, 4, _>(at, own.clone(), frames, quiet),
-        Values::Quaternion(Wxyz) => array.tracks::<QuietWxyz, 4, _>(at, own.clone(), frames, quiet),
+        Values::Quaternion(Xyzw) => {
+            array.tracks::<QuietXyzw, 4, _>(at, in_part.clone(), frames, quiet)
+        }
+        Values::Quaternion(Wxyz) => {
+            array.tracks::<QuietWxyz, 4, _>(at, in_part.clone(), frames, quiet)
+        }
         Values::RotationVector => {
             // A vector that jumps to the other side of π goes on on this side.
             let finish = |mut keys: Vec<Quat>| {
                 continue_signs(&mut keys, 1);
                 quiet(keys)
             };
-            array.tracks::<FromVector, 3, _>(at, own.clone(), frames, finish)
+            array.tracks::<FromVector, 3, _>(at, in_part.clone(), frames, finish)
         }
         Values::Form(form) => {
-            return of_form(archive, part, array, (form, own), frames);
+            return of_form(archive, part, array, (form, in_part), frames);
         }
-        _ => return vectors(archive, part, array, own, frames),
+        _ => return vectors(archive, part, array, in_part, frames),
     };
-    let keys = lists.into_iter().zip(own).map(|(keys, own)| match keys {
-        Some(keys) => Ok(Keys::Rotations(keys)),
-        None => remarkable(archive, part, array, own, frames, warnings).map(Keys::Rotations),
-    });
+    let keys = lists
+        .into_iter()
+        .zip(in_part)
+        .map(|(keys, track)| match keys {
+            Some(keys) => Ok(Keys::Rotations(keys)),
+            None => remarkable(archive, part, array, track, frames, warnings).map(Keys::Rotations),
+        });
     keys.collect()
 }
 
@@ -347,7 +354,7 @@ fn vectors(
     archive: &Archive,
     part: &Part,
     array: &Array<'_>,
-    own: Range<usize>,
+    in_part: Range<usize>,
     frames: usize,
 ) -> Result<Vec<Keys>, Diagnostic> {
     let checked = |origin, list: Vec<Vec3>| {
@@ -357,22 +364,23 @@ fn vectors(
     // Positions in f32 have lost what an origin would keep.
     let has_origin = part.values == Values::Translation && array.header.element == Element::F64;
     let lists = match has_origin {
-        true => array.tracks::<AsStored, 3, _>(part.at, own.clone(), frames, |list| {
+        true => array.tracks::<AsStored, 3, _>(part.at, in_part.clone(), frames, |list| {
             let points: Vec<DVec3> = list.into_iter().map(DVec3::from_array).collect();
             let (origin, list) = relative(&points);
             checked(origin, list)
         }),
-        false => array.tracks::<InF32, 3, _>(part.at, own.clone(), frames, |list| {
+        false => array.tracks::<InF32, 3, _>(part.at, in_part.clone(), frames, |list| {
             checked(DVec3::ZERO, list)
         }),
     };
-    let check = |(own, (origin, list, bad)): (usize, (DVec3, Vec<Vec3>, Option<usize>))| match bad {
+    let check = |(track, (origin, list, bad)): (usize, (DVec3, Vec<Vec3>, Option<usize>))| match bad
+    {
         None => Ok(Keys::Vectors(origin, list)),
         Some(frame) => {
             let message = format!("the vector {} is not finite in f32", list[frame]);
             let refusal = Diagnostic::new(&archive.file, Code::NotFinite, message);
-            Err(refusal.inside(part.place(archive, part.tracks.start + own, frame)))
+            Err(refusal.inside(part.place(archive, part.tracks.start + track, frame)))
         }
     };
-    own.zip(lists).map(check).collect()
+    in_part.zip(lists).map(check).collect()
 }

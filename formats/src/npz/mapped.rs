@@ -143,7 +143,7 @@ fn part(
     check_float(archive, member)?;
     let header = archive.header(member)?;
     let (mut shape, mut strides) = (header.shape.clone(), header.strides());
-    // The rows of a matrix may have an axis of their own, if one follows the other in memory.
+    // The rows of a matrix may be an axis apart, if one follows the other in memory.
     if values == Values::Form(RotationForm::Matrix)
         && let [.., 3, 3] = shape[..]
         && let [.., rows, columns] = strides[..]

@@ -224,11 +224,11 @@ impl<'a> Reduction<'a> {
             worst: [(0, 0); 2],
         };
         let mut largest = [-1.0; 2];
-        for (place, (wanted, found)) in self.poses.iter().zip(&poses).enumerate() {
+        for (place, (expected, found)) in self.poses.iter().zip(&poses).enumerate() {
             let (sample, joint) = (place / joints, place % joints);
-            let [a, b] = [wanted, found].map(|pose| pose.rotation.as_dquat());
+            let [a, b] = [expected, found].map(|pose| pose.rotation.as_dquat());
             let angle = angle_between(a, b);
-            let moved = found.position - wanted.position;
+            let moved = found.position - expected.position;
             let mut distance = moved.length();
             if self.options.shell > 0.0 {
                 for axis in DVec3::AXES.map(|axis| axis * self.options.shell) {

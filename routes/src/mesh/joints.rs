@@ -124,8 +124,8 @@ impl Tree {
     fn build(&mut self, positions: &[DVec3], node: usize, range: Range<usize>) {
         let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         for &corner in &self.corners[range.clone()] {
-            let own = positions[corner as usize];
-            (low, high) = (low.min(own), high.max(own));
+            let position = positions[corner as usize];
+            (low, high) = (low.min(position), high.max(position));
         }
         self.boxes[node] = (low, high);
         if 2 * node + 1 >= self.boxes.len() {

@@ -117,14 +117,17 @@ pub(super) fn weld<'a>(
             uneven.add(1, face);
         }
         for triangle in made.triangles {
-            let own = triangle.map(|corner| corners[corner]);
-            if own[0] == own[1] || own[1] == own[2] || own[2] == own[0] {
+            let vertices = triangle.map(|corner| corners[corner]);
+            if vertices[0] == vertices[1]
+                || vertices[1] == vertices[2]
+                || vertices[2] == vertices[0]
+            {
                 dropped.add(1, face);
-            } else if !welding.triangles.insert(sorted(own)) {
+            } else if !welding.triangles.insert(sorted(vertices)) {
                 doubled.add(1, face);
             } else {
-                let own = own.map(|vertex| welding.vertex(vertex));
-                welding.faces.push(own);
+                let face = vertices.map(|vertex| welding.vertex(vertex));
+                welding.faces.push(face);
             }
         }
         if welding.faces.len() > MOST_TRIANGLES {
@@ -164,9 +167,10 @@ pub(super) fn weld<'a>(
     {
         warnings.push(MeshWarning::Doubled { count, face });
     }
-    let (low, high) = (positions.iter()).fold((DVec3::MAX, DVec3::MIN), |(low, high), &own| {
-        (low.min(own), high.max(own))
-    });
+    let (low, high) = (positions.iter())
+        .fold((DVec3::MAX, DVec3::MIN), |(low, high), &position| {
+            (low.min(position), high.max(position))
+        });
     let size = (high - low).max_element();
     let count = cut_sides(&positions, &mut faces, tolerance.max(ON_SIDE * size));
     if count > 0 {
@@ -196,15 +200,15 @@ fn cut_sides(positions: &[DVec3], faces: &mut Vec<[u32; 3]>, tolerance: f64) -> 
     }
     let mut count = 0;
     for face in order {
-        let own = &sides[&face];
+        let on_sides = &sides[&face];
         let [a, b, c] = faces[face];
         let corners: Vec<u32> = [a]
             .into_iter()
-            .chain(own[0].iter().copied())
+            .chain(on_sides[0].iter().copied())
             .chain([b])
-            .chain(own[1].iter().copied())
+            .chain(on_sides[1].iter().copied())
             .chain([c])
-            .chain(own[2].iter().copied())
+            .chain(on_sides[2].iter().copied())
             .collect();
         let places: Vec<DVec3> = corners
             .iter()
@@ -216,7 +220,7 @@ fn cut_sides(positions: &[DVec3], faces: &mut Vec<[u32; 3]>, tolerance: f64) -> 
         let mut triangles = made
             .triangles
             .into_iter()
-            .map(|own| own.map(|corner| corners[corner]));
+            .map(|triangle| triangle.map(|corner| corners[corner]));
         if let Some(first) = triangles.next() {
             faces[face] = first;
         }
@@ -289,7 +293,7 @@ impl<'a> Welding<'a> {
         // Adding 0 makes 0 of -0.
         let key = |cell: DVec3| (cell + DVec3::ZERO).to_array().map(f64::to_bits);
         let cell = (position / self.tolerance).floor();
-        let own = if self.tolerance > 0.0 {
+        let cell_key = if self.tolerance > 0.0 {
             key(cell)
         } else {
             key(position)
@@ -314,12 +318,12 @@ impl<'a> Welding<'a> {
         } else {
             found = self
                 .cells
-                .get(&own)
+                .get(&cell_key)
                 .and_then(|there| there.first().copied());
         }
         let first = found.unwrap_or(vertex);
         if found.is_none() {
-            self.cells.entry(own).or_default().push(vertex);
+            self.cells.entry(cell_key).or_default().push(vertex);
         }
         self.firsts[vertex as usize] = first;
         first

@@ -65,17 +65,17 @@ impl Comparison<'_> {
     /// Compares two clips.
     pub(crate) fn compare(&self, clips: [(&str, &Motion); 2]) -> Result<Compared, Failure> {
         let names = clips.map(|(name, _)| name);
-        let own = clips.map(|(_, clip)| clip);
-        let (pairs, missing) = pairs(own).map_err(|message| {
+        let motions = clips.map(|(_, clip)| clip);
+        let (pairs, missing) = pairs(motions).map_err(|message| {
             let message = format!("{} and {}: {message}", names[0], names[1]);
             Failure::new(ALL_INPUTS, message)
         })?;
-        let frames = self.samples(names, own)?;
-        let (first, of_first) = self.poses(names[0], own[0], &frames)?;
-        let (second, of_second) = self.poses(names[1], own[1], &frames)?;
+        let frames = self.samples(names, motions)?;
+        let (first, of_first) = self.poses(names[0], motions[0], &frames)?;
+        let (second, of_second) = self.poses(names[1], motions[1], &frames)?;
         let (sampled, origins) = ([first, second], [of_first, of_second]);
         let times = &sampled[0].times;
-        let counts = own.map(|clip| clip.set.track_count());
+        let counts = motions.map(|clip| clip.set.track_count());
         // Differences at [sample][pair].
         let each = || {
             let samples = 0..times.len();
@@ -98,7 +98,7 @@ impl Comparison<'_> {
             let pair = pairs.get(place % pairs.len().max(1));
             Found {
                 spread: tally.times(factor),
-                track: pair.map_or_else(String::new, |pair| own[0].set.track_name(pair[0])),
+                track: pair.map_or_else(String::new, |pair| motions[0].set.track_name(pair[0])),
                 time: times
                     .get(place / pairs.len().max(1))
                     .copied()
@@ -110,7 +110,7 @@ impl Comparison<'_> {
                 return None;
             }
             let value = |side: usize, place: usize| {
-                let rest = || own[side].rest(channel, place % counts[side]);
+                let rest = || motions[side].rest(channel, place % counts[side]);
                 let relative = values(&sampled[side]).get(place).copied();
                 let origin = match channel {
                     Channel::Translation => origins[side].get(place % counts[side]).copied(),
@@ -144,20 +144,20 @@ impl Comparison<'_> {
         let end = spans[0].1.min(spans[1].1);
         let far = |a: f64, b: f64| (a - b).abs() > SAME_TIME;
         if far(spans[0].0, spans[1].0) || far(spans[0].1, spans[1].1) {
-            let told = [0, 1].map(|side| {
+            let texts = [0, 1].map(|side| {
                 let (first, last) = spans[side];
                 format!("{} from {first} to {last} s", names[side])
             });
             if start > end {
                 return Err(Failure::new(
                     ALL_INPUTS,
-                    format!("no time lies in both: {}, {}", told[0], told[1]),
+                    format!("no time lies in both: {}, {}", texts[0], texts[1]),
                 ));
             }
             words::warning(&format!(
                 "the keys of both do not lie at the same times: {}, {}; compared from {start} to \
                  {end} s",
-                told[0], told[1]
+                texts[0], texts[1]
             ));
         }
         if let Some(frames) = (self.frames)(start, end) {

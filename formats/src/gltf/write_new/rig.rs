@@ -199,9 +199,9 @@ impl Nodes {
         let mut joints = vec![(root, DAffine3::IDENTITY)];
         let mut next = 0;
         while let Some(&(node, parent)) = joints.get(next) {
-            let own = parent * affine(&self.rests[node].0);
-            joints[next].1 = own;
-            joints.extend(self.list[node].children.iter().map(|&child| (child, own)));
+            let world = parent * affine(&self.rests[node].0);
+            joints[next].1 = world;
+            joints.extend(self.list[node].children.iter().map(|&child| (child, world)));
             next += 1;
         }
         let matrices = joints.iter().map(|(_, world)| inverse(*world)).collect();
