@@ -70,6 +70,10 @@ static SHARED: Threads = Threads::new(None);
 /// There is one such pool in a process. It has as many threads as the environment's
 /// `RAYON_NUM_THREADS` says, else one for each core. A forked process gets its own.
 ///
+/// As everywhere in rayon, one of these threads that waits takes up other tasks meanwhile: tasks that
+/// share a lock must not hold it across a call of the engine in here. In threads and pools of their own
+/// they may.
+///
 /// ```
 /// let threads = tumble::on_threads(rayon::current_num_threads)?;
 /// assert!(threads >= 1);
