@@ -240,6 +240,43 @@ fn accuracy_is_the_same_at_every_time() {
     }
 }
 
+/// Curves that turn far within an interval are cut at times that an f64 has, and fitted between these.
+#[test]
+fn curves_of_raw_unix_times_are_as_accurate_as_at_zero() {
+    let engine = Engine::new(Device::Cpu).unwrap();
+    let keys = fast_keys(60);
+    let methods = [
+        method::SQUAD,
+        method::SHOEMAKE,
+        method::C2,
+        method::CATMULL_ROM,
+        method::BESSEL_OVERHAUSER,
+        method::B_SPLINE,
+    ];
+    for (base, step) in [(1.7e9, 0.01), (1.7e9, 0.003), (-1.7e9, 0.01), (4e12, 0.3)] {
+        let times: Vec<f64> = (0..60).map(|key| base + f64::from(key) * step).collect();
+        let from_first: Vec<f64> = times.iter().map(|time| time - times[0]).collect();
+        let mut set = TrackSet::new();
+        set.push("", &times, &keys).unwrap();
+        let samples: Vec<f64> = (0..5000)
+            .map(|k| times[0] + (times[59] - times[0]) * f64::from(k) / 4999.0)
+            .collect();
+        for method in methods {
+            let mut track = set.track(0);
+            track.times = &from_first;
+            let curve = Curve::of(&method.into(), track);
+            let found = engine.evaluate(&set, method, &Frames::at(samples.clone()));
+            for (time, q) in samples.iter().zip(found.unwrap().as_quats()) {
+                let off = angle_between(q.as_dquat(), curve.rotation(time - times[0]));
+                assert!(
+                    off < 1.1e-6,
+                    "{method} at {time} s, keys each {step} s: {off:e}"
+                );
+            }
+        }
+    }
+}
+
 /// A motion that is repeated for 1e12 s is where exact arithmetic has it.
 #[test]
 fn repeated_motion_is_as_accurate_far_out() {

@@ -7,6 +7,7 @@ use std::ops::Range;
 use bytemuck::Zeroable;
 
 use crate::curve::options::Ends;
+use crate::fit::double::curve::INDISTINCT;
 use crate::fit::double::fit::{MOST, Samples};
 use crate::fit::double::intervals::{Intervals, LANES, ROOM, Stretch};
 use crate::fit::single::fit_range::{FEW_POWERS, LONGEST_OF_FEW, LONGEST_WHOLE, WHOLE};
@@ -108,17 +109,22 @@ impl Direct {
             let is_small = self.small_angle.holds[lane];
             // NaN is within nothing, and left over.
             let list = usize::from(!is_small) * (LEFT_OVER - within.iter().sum::<usize>());
+            // Where no f64 is at the middle, another cut is found.
+            let (start, end) = (intervals.starts[lane], intervals.ends[lane]);
+            let middle = start + (end - start) * 0.5;
+            let off = ((middle - start) - (end - middle)).abs();
+            let is_cut_off = list == HALVES && off > INDISTINCT * (end - start);
+            let list = list + usize::from(is_cut_off);
             self.lists[list].push(lane);
             self.places[lane] = Place {
                 span: first.span + count,
                 segment: first.segment + count,
             };
-            let (start, end) = (intervals.starts[lane], intervals.ends[lane]);
             let own = if key == NONE { NONE } else { key + i as u32 };
             let (this, next) = (count % (2 * LANES), (count + 1) % (2 * LANES));
             (self.starts[this], self.keys[this]) = (start, own);
             // The next lane writes over this unless the curve is split.
-            (self.starts[next], self.keys[next]) = (start + (end - start) * 0.5, NONE);
+            (self.starts[next], self.keys[next]) = (middle, NONE);
             count += 1 + usize::from(list == HALVES);
         }
         prepared.push_segments(&self.starts[..count], &self.keys[..count]);

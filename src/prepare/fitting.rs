@@ -50,7 +50,8 @@ impl Fitting {
             Tier::Full => &mut self.full,
             Tier::Piece => {
                 let curve = curves.curve(lane, self.shape, self.quantity);
-                return self.cutter.push(place.span, curve, Some(place.segment));
+                let (start, segment) = (curves.starts[lane], Some(place.segment));
+                return self.cutter.push(place.span, start, curve, segment);
             }
         };
         queue.lanes.push(lane as u8);
@@ -85,7 +86,7 @@ impl Fitting {
         start: f64,
         key: u32,
     ) {
-        self.cutter.push(prepared.spans.len(), curve, None);
+        self.cutter.push(prepared.spans.len(), start, curve, None);
         prepared.push_span(start, Source::Segment(NONE), key);
     }
 
@@ -118,7 +119,8 @@ fn run(
     let is_trusted = block.is_trusted();
     for (lane, place) in places.drain(..count).enumerate() {
         if !is_trusted && !block.fits(lane, segments) {
-            cutter.push(place.span, block.curve(lane), Some(place.segment));
+            let start = prepared.spans.starts[place.span];
+            cutter.push(place.span, start, block.curve(lane), Some(place.segment));
         }
     }
     block.clear();
@@ -161,7 +163,7 @@ impl Prepared {
                             Source::Exact(self.exact.len() as u32 - 1)
                         }
                     };
-                    self.push_span(start + (end - start) * from, source, key);
+                    self.push_span(subcurve.piece.begins(start, end - start), source, key);
                 }
                 cut = others;
             }

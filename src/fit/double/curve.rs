@@ -23,37 +23,63 @@ pub(crate) struct Curve {
     pub(crate) pace: Option<Arc<Pace>>,
 }
 
-/// The part of an interval that one polynomial fits: its start and its length in sixteenths of the
-/// interval.
+/// The part of an interval that one polynomial fits, from where until where, as fractions of the interval.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Piece {
-    pub(crate) from: u8,
-    length: u8,
+    from: f64,
+    to: f64,
+    /// How often the interval was halved.
+    cuts: u8,
 }
+
+/// A curve that no polynomial fits even after so many cuts turns by dozens of radians within one
+/// interval; the host evaluates it in f64 for every device.
+const MOST_CUTS: u8 = 4;
 
 impl Piece {
     pub(crate) const WHOLE: Self = Self {
-        from: 0,
-        length: 16,
+        from: 0.0,
+        to: 1.0,
+        cuts: 0,
     };
 
-    /// Whether the piece is cut no further. A curve that no polynomial fits even then turns by
-    /// dozens of radians within one interval; the host evaluates it in f64 for every device.
-    pub(crate) fn is_finest(self) -> bool {
-        self.length == 1
+    /// The time at which it begins in an interval that starts at `start` and takes `duration`, seconds.
+    pub(crate) fn begins(self, start: f64, duration: f64) -> f64 {
+        start + duration * self.from
     }
 
-    pub(crate) fn halves(self) -> [Self; 2] {
-        let length = self.length / 2;
-        [self.from, self.from + length].map(|from| Self { from, length })
+    /// Both halves of a piece of that interval; `None` if it is not cut further. They meet at a time
+    /// that an f64 has: far from 0 that is not quite the middle, and may be one of the ends.
+    pub(crate) fn halves(self, start: f64, duration: f64) -> Option<[Self; 2]> {
+        let cuts = self.cuts + 1;
+        let mut middle = 0.5 * (self.from + self.to);
+        let rounded = ((start + duration * middle) - start) / duration;
+        if (rounded - middle).abs() > INDISTINCT * (self.to - self.from) {
+            middle = rounded;
+        }
+        let is_between = self.from < middle && middle < self.to;
+        (cuts <= MOST_CUTS && is_between).then_some([
+            Self {
+                to: middle,
+                cuts,
+                ..self
+            },
+            Self {
+                from: middle,
+                cuts,
+                ..self
+            },
+        ])
     }
 
     /// Its start and its width as fractions of the interval.
     pub(crate) fn extent(self) -> (f64, f64) {
-        let part = |of: u8| f64::from(of) / f64::from(Self::WHOLE.length);
-        (part(self.from), part(self.length))
+        (self.from, self.to - self.from)
     }
 }
+
+/// A part of an interval's duration within which polynomials in f32 have the same coefficients.
+pub(crate) const INDISTINCT: f64 = 1.0 / (1u64 << 28) as f64;
 
 impl Curve {
     /// A whole curve, traversed as the key times say.

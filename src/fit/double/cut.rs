@@ -27,6 +27,8 @@ pub(crate) struct Subcurve {
     pub(crate) span: usize,
     /// The curve's place in [`Cutter::curves`].
     curve: usize,
+    /// Where its interval starts, and how long that is, seconds.
+    interval: (f64, f64),
     pub(crate) piece: Piece,
     /// Its place among the segments, chosen when it is fitted; `None` after that if it is one of
     /// the finest pieces and does not fit.
@@ -34,33 +36,43 @@ pub(crate) struct Subcurve {
 }
 
 impl Subcurve {
-    /// Both halves. The first keeps the segment of the whole, so that segments lie nearly in the
-    /// order in which they are evaluated.
-    fn halves(mut self) -> [Self; 2] {
-        let [first, piece] = self.piece.halves();
-        self.piece = first;
+    /// Both halves, if it is cut further. The first keeps the segment of the whole, so that segments
+    /// lie nearly in the order in which they are evaluated.
+    fn halves(self) -> Option<[Self; 2]> {
+        let (start, duration) = self.interval;
+        let [first, second] = self.piece.halves(start, duration)?;
+        let first = Self {
+            piece: first,
+            ..self
+        };
         let second = Self {
-            piece,
+            piece: second,
             segment: None,
             ..self
         };
-        [self, second]
+        Some([first, second])
     }
 }
 
 impl Cutter {
-    /// Adds the curve of a span. If the span has a segment, the curve is known not to fit as a whole
-    /// and is cut into at least two subcurves; else it is cut only if it does not fit.
-    pub(crate) fn push(&mut self, span: usize, curve: Curve, segment: Option<usize>) {
+    /// Adds the curve of a span that starts at a time. If the span has a segment, the curve is known
+    /// not to fit as a whole and is cut into at least two subcurves; else it is cut only if it does
+    /// not fit.
+    pub(crate) fn push(&mut self, span: usize, start: f64, curve: Curve, segment: Option<usize>) {
         let whole = Subcurve {
             span,
             curve: self.curves.len(),
+            interval: (start, 1.0 / curve.rate),
             piece: curve.piece,
             segment,
         };
-        match segment {
-            Some(_) => self.waiting.extend(whole.halves()),
-            None => self.waiting.push(whole),
+        match (segment, whole.halves()) {
+            (Some(_), Some(halves)) => self.waiting.extend(halves),
+            (Some(_), None) => self.subcurves.push(Subcurve {
+                segment: None,
+                ..whole
+            }),
+            (None, _) => self.waiting.push(whole),
         }
         self.curves.push(curve);
     }
@@ -91,22 +103,25 @@ impl Cutter {
                 let subcurve = self.waiting[subcurve];
                 if block.fits(lane, segments) {
                     self.subcurves.push(subcurve);
-                } else if subcurve.piece.is_finest() {
+                } else if let Some(halves) = subcurve.halves() {
+                    self.waiting.extend(halves);
+                } else {
                     segments[block.places[lane]] = PolynomialSegment::zeroed();
                     self.subcurves.push(Subcurve {
                         segment: None,
                         ..subcurve
                     });
-                } else {
-                    self.waiting.extend(subcurve.halves());
                 }
             }
             done = some.end;
         }
         self.waiting.clear();
         // Most subcurves are in order already.
-        self.subcurves
-            .sort_by_key(|subcurve| (subcurve.span, subcurve.piece.from));
+        let times = |subcurve: &Subcurve| subcurve.piece.extent().0;
+        self.subcurves.sort_by(|a, b| {
+            let by_time = || times(a).total_cmp(&times(b));
+            a.span.cmp(&b.span).then_with(by_time)
+        });
     }
 
     /// The subcurve as a curve of its own.
