@@ -170,6 +170,22 @@ impl Engine {
         self.kernel_checks(false)
     }
 
+    /// As [`Engine::check_kernels`], one kernel after the other: `each` gets the check, and goes on while it
+    /// returns true.
+    ///
+    /// # Errors
+    /// When the device fails.
+    #[cfg(feature = "prove")]
+    pub fn check_kernels_while(
+        &self,
+        each: &mut dyn FnMut(KernelCheck) -> bool,
+    ) -> Result<(), Error> {
+        let Some(opened) = self.backend.opened() else {
+            return Ok(());
+        };
+        Ok(opened.engine().check_kernels(false, each)?)
+    }
+
     /// As [`Engine::check_kernels`], but for the kernels that are known to be exact on this device, which are
     /// listed as [`remembered`](KernelCheck::remembered).
     ///
@@ -191,7 +207,13 @@ impl Engine {
         let Some(opened) = self.backend.opened() else {
             return Ok(Vec::new());
         };
-        Ok(opened.engine().check_kernels(only_unknown)?)
+        let mut checks = Vec::new();
+        let mut each = |check| {
+            checks.push(check);
+            true
+        };
+        opened.engine().check_kernels(only_unknown, &mut each)?;
+        Ok(checks)
     }
 
     /// Runs the expressions of the self-test without what forbids the driver to compute them otherwise, to see that

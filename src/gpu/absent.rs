@@ -157,7 +157,8 @@ pub(crate) mod engine {
         pub(crate) fn check_kernels(
             &self,
             _only_unknown: bool,
-        ) -> Result<Vec<KernelCheck>, VulkanError> {
+            _each: &mut dyn FnMut(KernelCheck) -> bool,
+        ) -> Result<(), VulkanError> {
             match self.never {}
         }
     }

@@ -179,11 +179,13 @@ impl VulkanEngine {
         Ok(())
     }
 
-    /// Checks every kernel; with `only_unknown` those alone that are not known to pass.
+    /// Checks every kernel, while `each` returns true; with `only_unknown` those alone that are not known to
+    /// pass.
     pub(crate) fn check_kernels(
         &self,
         only_unknown: bool,
-    ) -> Result<Vec<KernelCheck>, VulkanError> {
+        each: &mut dyn FnMut(KernelCheck) -> bool,
+    ) -> Result<(), VulkanError> {
         let (passes, physical) = (Passes::of_user(), &self.device.physical);
         let mut passed = Vec::new();
         let mut check = |code: &KernelCode| {
@@ -206,9 +208,21 @@ impl VulkanEngine {
             }
             Ok(check)
         };
-        let checks = self.bindable().map(&mut check).collect::<Result<_, _>>();
+        let mut outcome = Ok(());
+        for code in self.bindable() {
+            let goes_on = match check(code) {
+                Ok(check) => each(check),
+                Err(error) => {
+                    outcome = Err(error);
+                    false
+                }
+            };
+            if !goes_on {
+                break;
+            }
+        }
         passes.remember(passed);
-        checks
+        outcome
     }
 
     /// What is known of each kernel.

@@ -287,6 +287,7 @@ impl Run<'_> {
     /// Every kernel beside its twin: in engines that read by storage buffers and, where the device can, by
     /// texel buffers, for which most kernels have a form of their own.
     fn kernels(&mut self) -> Result<(), Stopped> {
+        let allowed = Duration::from_secs(self.request.seconds);
         let mut ran = BTreeSet::new();
         let mut expected: BTreeSet<&str> = BTreeSet::new();
         // Engines that stay: what they compile here serves the recorded results.
@@ -300,19 +301,20 @@ impl Run<'_> {
             if is_known || texels != (reads == Reads::TexelBuffers) {
                 continue;
             }
-            for check in engine.check_kernels()? {
-                if !ran.insert(check.name) {
-                    continue;
+            let (kernels, started) = (&mut self.proof.kernels, self.started);
+            engine.check_kernels_while(&mut |check| {
+                if ran.insert(check.name) {
+                    kernels.values += check.total as u64;
+                    if check.differing > 0 {
+                        kernels.differing.push(Differing {
+                            name: check.name.to_owned(),
+                            values: check.total as u64,
+                            differing: check.differing as u64,
+                        });
+                    }
                 }
-                self.proof.kernels.values += check.total as u64;
-                if check.differing > 0 {
-                    self.proof.kernels.differing.push(Differing {
-                        name: check.name.to_owned(),
-                        values: check.total as u64,
-                        differing: check.differing as u64,
-                    });
-                }
-            }
+                started.elapsed() < allowed
+            })?;
         }
         let kernels = &mut self.proof.kernels;
         kernels.count = expected.len();
@@ -321,7 +323,13 @@ impl Run<'_> {
             .difference(&ran)
             .map(|&name| name.to_owned())
             .collect();
-        Ok(())
+        match kernels.missing.is_empty() || !self.is_past(1.0) {
+            true => Ok(()),
+            false => Err(Stopped(format!(
+                "the {} s were over after {} of {} (--seconds)",
+                self.request.seconds, self.proof.kernels.ran, self.proof.kernels.count
+            ))),
+        }
     }
 
     fn negative_control(&mut self) -> Result<(), Stopped> {
