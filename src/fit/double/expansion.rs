@@ -127,14 +127,17 @@ fn exp_in_lanes<L: Lanes, const SHORT: bool>(vector: [L::Doubles; 3]) -> [L::Dou
     if squared.are_at_most(limit) {
         return turn;
     }
-    let (mut vectors, mut turns) = ([[0.0; MOST]; 3], [[0.0; MOST]; 4]);
-    store(&mut vectors, 0, vector);
-    store(&mut turns, 0, turn);
+    let mut lanes = ([[0.0; MOST]; 3], [[0.0; MOST]; 4]);
+    store(&mut lanes.0, 0, vector);
+    store(&mut lanes.1, 0, turn);
     let doubt = squared.up_to(all::<L>(limit), all::<L>(0.0), all::<L>(1.0));
-    redo(doubt, 0..L::COUNT, |lane| {
-        put(&mut turns, lane, quaternion::exp(at(&vectors, lane)));
-    });
-    load(&turns, 0)
+    redo(doubt, 0..L::COUNT, &mut lanes, exp_of_lane);
+    load(&lanes.1, 0)
+}
+
+/// The exponential of one lane's vector over the full range.
+fn exp_of_lane((vectors, turns): &mut ([[f64; MOST]; 3], [[f64; MOST]; 4]), lane: usize) {
+    put(turns, lane, quaternion::exp(at(vectors, lane)));
 }
 
 /// The sine of an angle divided by the length of its vector, and the angle's cosine minus one.

@@ -28,30 +28,42 @@ impl InLanes for Steps<'_> {
             let log = near.log(step);
             store(&mut own.steps, lane, step);
             store(&mut own.logs, lane, log);
-            redo(near.doubt, lane..own.count, |j| {
-                put(&mut own.logs, j, quaternion::log(at(&own.steps, j)));
-            });
+            redo(near.doubt, lane..own.count, own, Intervals::find_log);
         }
     }
 }
 
-/// Calls `again` for every lane in doubt. `doubt` has a number for each lane of a vector, the first of
+/// Calls `again` with `own` for every lane in doubt. `doubt` has a number for each lane of a vector, the first of
 /// which is the first of `lanes`; a lane is in doubt where its number is not 0, and NaN is not. Most vectors
-/// have none.
+/// have none. `again` is a function and no closure: a closure in code for vectors would be compiled anew
+/// for each width.
 #[inline(always)]
-pub(crate) fn redo<D: Doubles>(doubt: D, lanes: Range<usize>, again: impl FnMut(usize)) {
+pub(crate) fn redo<D: Doubles, S: ?Sized>(
+    doubt: D,
+    lanes: Range<usize>,
+    own: &mut S,
+    again: fn(&mut S, usize),
+) {
     if !doubt.are_at_most(0.0) {
         let mut doubts = [0.0; MOST];
         doubt.store(&mut doubts);
-        redo_lanes(lanes, doubts, again);
+        redo_lanes(lanes, &doubts, own, again);
     }
 }
 
 /// The rest of [`redo`], rarely needed and so not inlined into loops over vectors.
 #[inline(never)]
-fn redo_lanes(lanes: Range<usize>, doubts: [f64; MOST], again: impl FnMut(usize)) {
-    let lanes = lanes.zip(doubts).filter(|&(_, doubt)| doubt != 0.0);
-    lanes.map(|(lane, _)| lane).for_each(again);
+fn redo_lanes<S: ?Sized>(
+    lanes: Range<usize>,
+    doubts: &[f64; MOST],
+    own: &mut S,
+    again: fn(&mut S, usize),
+) {
+    for (lane, &doubt) in lanes.zip(doubts) {
+        if doubt != 0.0 {
+            again(own, lane);
+        }
+    }
 }
 
 /// Keys in f64, normalised.
@@ -164,22 +176,31 @@ pub(crate) struct KeyHandles<'a, R> {
 impl<R: HandleRule> InLanes for KeyHandles<'_, R> {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
-        let own = &mut *self.intervals;
-        for lane in (0..own.whole()).step_by(L::COUNT) {
+        for lane in (0..self.intervals.whole()).step_by(L::COUNT) {
             let mut near = PrincipalRange::<L::Doubles>::new();
-            own.find_handles::<R, _>(&mut near, lane + 1);
-            redo(near.doubt, lane + 1..own.count, |j| {
-                // The context lanes of two neighbouring stretches do not share a key.
-                let mut stretches = self.stretches.iter().map(Stretch::lanes);
-                if stretches.any(|lanes| (lanes.start..=lanes.end).contains(&j)) {
-                    own.find_handles::<R, _>(&mut FullRange, j);
-                }
-            });
+            self.intervals.find_handles::<R, _>(&mut near, lane + 1);
+            redo(near.doubt, lane + 1..self.intervals.count, self, Self::find);
+        }
+    }
+}
+
+impl<R: HandleRule> KeyHandles<'_, R> {
+    /// Computes the handles of one key over the full range.
+    fn find(&mut self, lane: usize) {
+        // The context lanes of two neighbouring stretches do not share a key.
+        let mut stretches = self.stretches.iter().map(Stretch::lanes);
+        if stretches.any(|lanes| (lanes.start..=lanes.end).contains(&lane)) {
+            self.intervals.find_handles::<R, _>(&mut FullRange, lane);
         }
     }
 }
 
 impl Intervals {
+    /// Computes the logarithm of one step over the full range.
+    fn find_log(&mut self, lane: usize) {
+        put(&mut self.logs, lane, quaternion::log(at(&self.steps, lane)));
+    }
+
     #[inline(always)]
     fn interval<D: Doubles>(&self, lane: usize) -> Interval<D> {
         Interval {
@@ -216,9 +237,12 @@ impl InLanes for BetweenHandles<'_> {
             own.store_base(lane, units::<L>(&own.from, lane));
             let mut near = PrincipalRange::<L::Doubles>::new();
             own.find_vectors(&mut near, lane);
-            redo(near.doubt, lane..own.count, |j| {
-                own.find_vectors(&mut FullRange, j);
-            });
+            redo(
+                near.doubt,
+                lane..own.count,
+                own,
+                Intervals::find_full_vectors,
+            );
         }
     }
 }
@@ -233,6 +257,11 @@ impl Intervals {
         let from_a = product(algebra.exp(scaled(first, back)), load(&self.steps, lane));
         let middle = product(from_a, algebra.exp(scaled(last, back)));
         self.store_vectors(lane, [first, algebra.log(middle), last]);
+    }
+
+    /// Computes the vectors of one curve over the full range.
+    fn find_full_vectors(&mut self, lane: usize) {
+        self.find_vectors(&mut FullRange, lane);
     }
 
     /// Stores the bases of [`Product`] from `lane` on.
@@ -302,9 +331,12 @@ impl InLanes for BetweenNeighbours<'_> {
             let (before, after) = (load(&own.logs, lane), load(&own.logs, lane + 2));
             let log = load::<L::Doubles, _, _>(&own.logs, lane + 1);
             own.store_vectors(lane + 1, [before, log, after]);
-            redo(near.doubt, lane + 1..own.count, |j| {
-                own.find_base(&mut FullRange, j, own.key(j));
-            });
+            redo(
+                near.doubt,
+                lane + 1..own.count,
+                own,
+                Intervals::find_full_base,
+            );
         }
     }
 }
@@ -320,5 +352,10 @@ impl Intervals {
     ) {
         let before = scaled(load(&self.logs, lane - 1), A::Number::all(-1.0));
         self.store_base(lane, product(start, algebra.exp(before)));
+    }
+
+    /// Computes the key before one interval over the full range.
+    fn find_full_base(&mut self, lane: usize) {
+        self.find_base(&mut FullRange, lane, self.key(lane));
     }
 }

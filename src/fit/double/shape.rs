@@ -143,9 +143,19 @@ impl<F: Formula> Sampling for Directly<F> {
                 // NaN if any component is NaN or infinite, else 0.
                 doubt = doubt + (x + y + z + w) * zero;
             }
-            redo(doubt, 0..L::COUNT, |j| {
-                sample_full_range::<F, L, PAIRS>(block, lane + j, nodes, j, &mut found);
-            });
+            let mut again = FullRangeSamples::<L, PAIRS> {
+                block,
+                first: lane,
+                nodes,
+                found,
+            };
+            redo(
+                doubt,
+                0..L::COUNT,
+                &mut again,
+                FullRangeSamples::sample::<F>,
+            );
+            let found = again.found;
             let middle = found[0];
             let mut samples = Samples::all(L::all(0.0));
             samples.middle = rounded(middle);
@@ -162,22 +172,27 @@ impl<F: Formula> Sampling for Directly<F> {
     }
 }
 
-/// Samples the curve in a lane over the full range, because its angles are too long for [`Near`],
-/// into the `j`th lane of the vectors found.
-fn sample_full_range<F: Formula, L: Lanes, const PAIRS: usize>(
-    block: &FitBlock,
-    lane: usize,
-    nodes: &Nodes<PAIRS>,
-    j: usize,
-    found: &mut [[L::Doubles; 4]],
-) {
-    let numbers = block.numbers_of(lane);
-    let (at, width) = (block.middles[lane], block.widths[lane]);
-    for (i, found) in found[..=2 * PAIRS].iter_mut().enumerate() {
-        let mut lanes = [[0.0; MOST]; 4];
-        store(&mut lanes, 0, *found);
-        let t = at + nodes.offset(i) * width;
-        put(&mut lanes, j, F::rotation(&numbers, t));
-        *found = load(&lanes, 0);
+/// Samples of curves whose angles are too long for [`Near`] in some lanes.
+struct FullRangeSamples<'a, L: Lanes, const PAIRS: usize> {
+    block: &'a FitBlock,
+    /// The curve in the first lane.
+    first: usize,
+    nodes: &'a Nodes<PAIRS>,
+    found: [[L::Doubles; 4]; POWERS],
+}
+
+impl<L: Lanes, const PAIRS: usize> FullRangeSamples<'_, L, PAIRS> {
+    /// Samples the curve in the `j`th lane over the full range.
+    fn sample<F: Formula>(&mut self, j: usize) {
+        let (block, lane) = (self.block, self.first + j);
+        let numbers = block.numbers_of(lane);
+        let (at, width) = (block.middles[lane], block.widths[lane]);
+        for (i, found) in self.found[..=2 * PAIRS].iter_mut().enumerate() {
+            let mut lanes = [[0.0; MOST]; 4];
+            store(&mut lanes, 0, *found);
+            let t = at + self.nodes.offset(i) * width;
+            put(&mut lanes, j, F::rotation(&numbers, t));
+            *found = load(&lanes, 0);
+        }
     }
 }
