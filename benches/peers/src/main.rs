@@ -1,96 +1,145 @@
-//! Tumble beside the libraries that people use today, in one run, in turns: 4096
-//! tracks of 26 uneven keys, 1200 frames, all threads, into memory that is used again.
+//! Tumble beside the Rust libraries that people use today, as one contestant of `run.sh`: 4096 tracks of
+//! 26 uneven keys, 1200 frames, into memory that is used again.
 //!
 //! ```text
-//! cd benches/peers && RUSTFLAGS="-C target-cpu=native" cargo run --release
+//! tumble-peers write KEYS         the keys, for all contestants
+//! tumble-peers race KEYS FOLDER   a line of JSON for each way, the first row of its result in FOLDER
 //! ```
-//!
-//! `native`, because the peers choose their vectors when they are compiled; Tumble
-//! chooses at run time and gains nothing by it.
 
+#[cfg(feature = "bevy")]
 mod bevy;
 mod wide;
 
+use std::path::Path;
 use std::time::{Duration, Instant};
+use std::{env, fs};
 
 use glam::{DQuat, DVec3, Quat};
 use rayon::prelude::*;
-use tumble::{Device, Engine, Frames, Layout, OutputBuffer, TrackSet, method};
+use tumble::{Device, Engine, EngineOptions, Frames, Layout, Method, OutputBuffer, TrackSet, method};
 
 const TRACKS: usize = 4096;
 const KEYS: usize = 26;
 const FRAMES: usize = 1200;
 const RATE: f64 = 60.0;
-const ROUNDS: usize = 9;
+const ROUNDS: usize = 3;
+/// Calls of which each gives one rotation.
+const CALLS: usize = 10_000;
 
 /// Something that fills the output, [track][frame].
-type Contestant<'a> = (&'static str, Box<dyn FnMut(&mut [Quat]) + 'a>);
+struct Contestant<'a> {
+    name: &'static str,
+    work: &'static str,
+    threads: &'static str,
+    fill: Box<dyn FnMut(&mut [Quat]) + 'a>,
+}
 
 fn main() {
-    let set = tracks();
-    let engine = Engine::new(Device::Cpu).expect("a CPU");
+    let arguments: Vec<String> = env::args().skip(1).collect();
+    match arguments.iter().map(String::as_str).collect::<Vec<_>>()[..] {
+        ["write", keys] => fs::write(keys, packed(&tracks())).expect("keys that can be written"),
+        ["race", keys, folder] => {
+            let set = unpacked(&fs::read(keys).expect("keys"));
+            race(contestants(&set), Path::new(folder));
+        }
+        _ => panic!("tumble-peers write KEYS | race KEYS FOLDER"),
+    }
+}
+
+fn contestants(set: &TrackSet) -> Vec<Contestant<'_>> {
     let frames = Frames::fps(RATE as u32).between(0.0, (FRAMES - 1) as f64 / RATE);
     let times: Vec<f32> = (0..FRAMES).map(|k| (k as f64 / RATE) as f32).collect();
-    let tumble = |method| {
-        let (engine, set, frames) = (&engine, &set, &frames);
-        let from_keys: Box<dyn FnMut(&mut [Quat])> = Box::new(move |output| {
-            let layout = Layout::TrackMajor;
-            let done = engine.evaluate_into(set, method, frames, layout, output);
+    let times: &'static [f32] = times.leak();
+    let engine = |threads| {
+        let mut options = EngineOptions::default();
+        options.threads = threads;
+        Engine::with_options(Device::Cpu, &options).expect("a CPU")
+    };
+    let tumble = |name, work, threads, method: Method| {
+        let engine = engine((threads == "1").then_some(1));
+        let fill = move |output: &mut [Quat]| {
+            let done = engine.evaluate_into(set, method, frames, Layout::TrackMajor, output);
             done.expect("what fits");
-        });
-        let clip = engine.upload(set, method).expect("good keys");
-        let evaluation: Box<dyn FnMut(&mut [Quat])> = Box::new(move |output| {
+        };
+        Contestant { name, work, threads, fill: Box::new(fill) }
+    };
+    let kept = |name, work, method: Method| {
+        let clip = engine(None).upload(set, method).expect("good keys");
+        let fill = move |output: &mut [Quat]| {
             let done = clip.evaluate_into(frames, Layout::TrackMajor, output);
             done.expect("what fits");
-        });
-        (from_keys, evaluation)
+        };
+        Contestant { name, work, threads: "all", fill: Box::new(fill) }
     };
-    let (slerp_from_keys, slerp) = tumble(method::SLERP);
-    let (cubic_from_keys, cubic) = tumble(method::BESSEL_OVERHAUSER);
-    let arcs = bevy::arcs(&set);
-    let hermite = bevy::hermite(&set);
-    let contestants: Vec<Contestant<'_>> = vec![
-        (
-            "memory write rate",
-            Box::new(|output| {
-                let value = std::hint::black_box(Quat::IDENTITY);
-                let each = output.len().div_ceil(rayon::current_num_threads());
-                output.par_chunks_mut(each).for_each(|part| part.fill(value));
-            }),
-        ),
-        ("tumble slerp, from keys", slerp_from_keys),
-        ("tumble slerp, evaluation alone", slerp),
-        (
-            "glam Quat::slerp, a cursor a track",
-            Box::new(|output| each_track(&set, output, |track, row| naive(track, &times, row))),
-        ),
-        (
-            "ultraviolet Rotor3x8::slerp",
-            Box::new(|output| each_track(&set, output, |track, row| wide::slerp(track, &times, row))),
-        ),
-        (
-            "bevy UnevenSampleAutoCurve (slerp)",
-            Box::new(|output| bevy::sample(&arcs, &times, output)),
-        ),
-        ("tumble bessel-overhauser, from keys", cubic_from_keys),
-        ("tumble bessel-overhauser, evaluation alone", cubic),
-        (
-            "bevy CubicRotationCurve (glTF Hermite)",
-            Box::new(|output| bevy::sample(&hermite, &times, output)),
-        ),
+    let of_each = |name, work, threads, row: fn(tumble::Track<'_>, &[f32], &mut [Quat])| {
+        let fill = move |output: &mut [Quat]| match threads {
+            "1" => {
+                let rows = output.chunks_mut(FRAMES).enumerate();
+                rows.for_each(|(index, output)| row(set.track(index), times, output));
+            }
+            _ => {
+                let rows = output.par_chunks_mut(FRAMES).enumerate();
+                rows.for_each(|(index, output)| row(set.track(index), times, output));
+            }
+        };
+        Contestant { name, work, threads, fill: Box::new(fill) }
+    };
+    let write = |output: &mut [Quat]| {
+        let value = std::hint::black_box(Quat::IDENTITY);
+        let each = output.len().div_ceil(rayon::current_num_threads());
+        output.par_chunks_mut(each).for_each(|part| part.fill(value));
+    };
+    let write = Contestant { name: "writing memory", work: "none", threads: "all", fill: Box::new(write) };
+    let mut first = TrackSet::new();
+    let track = set.track(0);
+    first.push("", track.times, track.keys).expect("unit keys in order");
+    let small = engine(Some(1)).upload(&first, method::SLERP).expect("good keys");
+    let one_tumble = move |output: &mut [Quat]| {
+        for call in 0..CALLS {
+            let at = (call * 7919 % (FRAMES - 1)) as f64 / RATE;
+            let one = Frames::fps(RATE as u32).between(at, at);
+            let done = small.evaluate_into(one, Layout::TrackMajor, &mut output[..1]);
+            done.expect("what fits");
+        }
+    };
+    let one_glam = move |output: &mut [Quat]| {
+        for call in 0..CALLS {
+            let at = times[call * 7919 % (FRAMES - 1)];
+            output[0] = one_sample(set.track(0), at);
+            std::hint::black_box(&mut *output);
+        }
+    };
+    let one = "one sample";
+    let contestants = vec![
+        write,
+        tumble("Tumble, from keys", "slerp", "all", method::SLERP),
+        tumble("Tumble, from keys, one thread", "slerp", "1", method::SLERP),
+        kept("Tumble, a kept clip", "slerp", method::SLERP),
+        of_each("glam Quat::slerp, by hand", "slerp", "all", naive),
+        of_each("glam Quat::slerp, by hand, one thread", "slerp", "1", naive),
+        of_each("ultraviolet Rotor3x8::slerp", "slerp", "all", wide::slerp),
+        tumble("Tumble, from keys", "smooth", "all", method::BESSEL_OVERHAUSER),
+        tumble("Tumble, from keys, one thread", "smooth", "1", method::BESSEL_OVERHAUSER),
+        kept("Tumble, a kept clip", "smooth", method::BESSEL_OVERHAUSER),
+        Contestant { name: "Tumble, a kept clip", work: one, threads: "1", fill: Box::new(one_tumble) },
+        Contestant { name: "glam Quat::slerp, by hand", work: one, threads: "1", fill: Box::new(one_glam) },
     ];
-    report(race(contestants));
+    #[cfg(feature = "bevy")]
+    let contestants = {
+        let mut contestants = contestants;
+        let (arcs, hermite) = (bevy::arcs(set), bevy::hermite(set));
+        let fill = move |output: &mut [Quat]| bevy::sample(&arcs, times, output);
+        let name = "Bevy UnevenSampleAutoCurve";
+        contestants.push(Contestant { name, work: "slerp", threads: "all", fill: Box::new(fill) });
+        let fill = move |output: &mut [Quat]| bevy::sample(&hermite, times, output);
+        let name = "Bevy CubicRotationCurve";
+        contestants.push(Contestant { name, work: "smooth", threads: "all", fill: Box::new(fill) });
+        contestants
+    };
+    contestants
 }
 
-fn each_track(
-    set: &TrackSet,
-    output: &mut [Quat],
-    evaluate: impl Fn(tumble::Track<'_>, &mut [Quat]) + Sync,
-) {
-    let rows = output.par_chunks_mut(FRAMES).enumerate();
-    rows.for_each(|(index, row)| evaluate(set.track(index), row));
-}
-
+/// A loop as one would write it: a cursor for each track.
 fn naive(track: tumble::Track<'_>, times: &[f32], row: &mut [Quat]) {
     let mut i = 0;
     for (&time, rotation) in times.iter().zip(row) {
@@ -103,42 +152,74 @@ fn naive(track: tumble::Track<'_>, times: &[f32], row: &mut [Quat]) {
     }
 }
 
-/// Medians, every contestant in turn, after a round that does not count.
-fn race(mut contestants: Vec<Contestant<'_>>) -> Vec<(&'static str, Duration)> {
-    let mut output = OutputBuffer::new(TRACKS * FRAMES).unwrap();
+fn one_sample(track: tumble::Track<'_>, time: f32) -> Quat {
+    let time = f64::from(time);
+    let i = track.times.partition_point(|&key| key <= time);
+    let i = i.clamp(1, track.times.len() - 1) - 1;
+    let t = (time - track.times[i]) / (track.times[i + 1] - track.times[i]);
+    track.keys[i].slerp(track.keys[i + 1], t as f32)
+}
+
+/// Every contestant in turn, after a round that does not count; the median of each.
+fn race(mut contestants: Vec<Contestant<'_>>, folder: &Path) {
+    let mut output = OutputBuffer::new(TRACKS * FRAMES).expect("memory");
     output.fill(Quat::IDENTITY);
     let mut times = vec![Vec::new(); contestants.len()];
     for round in 0..=ROUNDS {
-        for ((_, fill), times) in contestants.iter_mut().zip(&mut times) {
+        for (contestant, times) in contestants.iter_mut().zip(&mut times) {
             let started = Instant::now();
-            fill(&mut output);
+            (contestant.fill)(&mut output);
             if round > 0 {
                 times.push(started.elapsed());
+            } else {
+                let row = folder.join(row(contestant));
+                fs::write(row, bytemuck::cast_slice(&output[..FRAMES])).expect("a row");
             }
             std::hint::black_box(&mut output);
         }
     }
-    let names = contestants.iter().map(|(name, _)| *name);
-    let median = |mut times: Vec<Duration>| {
+    for (contestant, mut times) in contestants.iter().zip(times) {
         times.sort();
-        times[times.len() / 2]
-    };
-    names.zip(times.into_iter().map(median)).collect()
-}
-
-fn report(rows: Vec<(&'static str, Duration)>) {
-    let rotations = (TRACKS * FRAMES) as f64;
-    let write = rows[0].1.as_secs_f64();
-    println!("{:44} {:>8} {:>8} {:>8}", "", "ms", "M/s", "writing");
-    for (name, time) in rows {
-        let seconds = time.as_secs_f64();
+        let median: Duration = times[times.len() / 2];
         println!(
-            "{name:44} {:>8.2} {:>8.0} {:>7.2}x",
-            seconds * 1e3,
-            rotations / seconds / 1e6,
-            write / seconds
+            "{{\"name\": {:?}, \"work\": {:?}, \"threads\": {:?}, \"ms\": {}, \"row\": {:?}}}",
+            contestant.name,
+            contestant.work,
+            contestant.threads,
+            1e3 * median.as_secs_f64(),
+            row(contestant)
         );
     }
+}
+
+fn row(contestant: &Contestant<'_>) -> String {
+    let name = contestant.name.replace("::", "-");
+    format!("{name}, {}, {}.f32", contestant.work, contestant.threads)
+}
+
+/// Tracks, keys, frames and the rate; the times of all keys in f64, their rotations in f32.
+fn packed(set: &TrackSet) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    for count in [TRACKS, KEYS, FRAMES] {
+        bytes.extend_from_slice(&(count as u32).to_le_bytes());
+    }
+    bytes.extend_from_slice(&RATE.to_le_bytes());
+    let tracks = || (0..set.track_count()).map(|track| set.track(track));
+    tracks().for_each(|track| bytes.extend_from_slice(bytemuck::cast_slice(track.times)));
+    tracks().for_each(|track| bytes.extend_from_slice(bytemuck::cast_slice(track.keys)));
+    bytes
+}
+
+fn unpacked(bytes: &[u8]) -> TrackSet {
+    let numbers = &bytes[20..];
+    let (times, keys) = numbers.split_at(8 * TRACKS * KEYS);
+    let mut set = TrackSet::new();
+    for (times, keys) in times.chunks_exact(8 * KEYS).zip(keys.chunks_exact(16 * KEYS)) {
+        let times: Vec<f64> = bytemuck::pod_collect_to_vec(times);
+        let keys: Vec<Quat> = bytemuck::pod_collect_to_vec(keys);
+        set.push("", &times, &keys).expect("unit keys in order");
+    }
+    set
 }
 
 /// Keys at steps of 1/4 to 7/4 of the mean, each up to a radian from the last.

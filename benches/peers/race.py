@@ -1,0 +1,117 @@
+#!/usr/bin/env python3
+"""Tumble beside others: every program that `run.sh` built, in turns, on the keys of one file; prints the
+table of docs/figures.md, slowest first, or writes it there with --write."""
+
+import argparse
+import datetime
+import json
+import os
+import pathlib
+import platform
+import re
+import statistics
+import subprocess
+import sys
+
+import numpy
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
+PAGE = ROOT / "docs/figures.md"
+BEGIN, END = "<!-- written by benches/peers/run.sh -->", "<!-- to here -->"
+WORKS = {
+    "slerp": "Slerp, 4096 tracks × 26 uneven keys × 1200 frames",
+    "smooth": "Smooth curves through the same keys",
+    "one sample": "One sample of one track, ten thousand calls",
+}
+# Of the first row: what differs by more is other work. Smooth curves are each its own.
+SAME = 1e-3
+
+
+def machine():
+    model = re.search(r"model name\s*:\s*(.*)", pathlib.Path("/proc/cpuinfo").read_text())
+    flags = pathlib.Path("/proc/cpuinfo").read_text()
+    widest = next((name for flag, name in [("avx512f", "AVX-512"), ("avx2", "AVX2")] if flag in flags), "")
+    model = model[1] if model else platform.processor()
+    return f"{model}, {os.cpu_count()} cores, {widest}, Linux {platform.release().split('-')[0]}"
+
+
+def distance(a, b):
+    """The largest angle between the rotations of two rows."""
+    dot = numpy.abs(numpy.sum(a.astype(float) * b.astype(float), axis=1))
+    # Of small angles the arc sine of the chord is exact.
+    chord = numpy.minimum(numpy.linalg.norm(a - b, axis=1), numpy.linalg.norm(a + b, axis=1))
+    return float(numpy.max(numpy.where(dot > 0.999, 2 * numpy.arcsin((chord / 2).clip(0, 1)) * 2, 2 * numpy.arccos(dot.clip(0, 1)))))
+
+
+def run(command, rows):
+    """The lines of a program, each a contestant or one that is missing."""
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        sys.exit(f"{' '.join(map(str, command))} failed:\n{done.stderr}")
+    return [json.loads(line) for line in done.stdout.splitlines() if line.startswith("{")]
+
+
+def table(contestants, rows):
+    lines = []
+    for work, title in WORKS.items():
+        of_work = [one for one in contestants if one["work"] == work]
+        if not of_work:
+            continue
+        ours = {one["threads"]: one for one in of_work if one["name"].startswith("Tumble")}
+        best = ours.get("all") or ours["1"]
+        reference = numpy.fromfile(rows / best["row"], "<f4").reshape(-1, 4) if work == "slerp" else None
+        lines += [f"\n**{title}**\n"]
+        unit = "µs a call" if work == "one sample" else "ms"
+        lines += [f"| | threads | {unit} | Tumble is faster by | largest difference, rad |", "|---|---|---|---|---|"]
+        for one in sorted(of_work, key=lambda one: -one["ms"]):
+            beside = ours.get(one["threads"], best)
+            ratio = "" if one["name"].startswith("Tumble") else f"{one['ms'] / beside['ms']:.2g} ×"
+            difference = ""
+            if reference is not None and not one["name"].startswith("Tumble"):
+                row = numpy.fromfile(rows / one["row"], "<f4").reshape(-1, 4)
+                found = distance(row, reference)
+                if found > SAME:
+                    sys.exit(f"{one['name']} differs by {found} rad: it does other work")
+                difference = f"{found:.0e}"
+            # Ten thousand calls in ms are tenths of a microsecond each.
+            number = one["ms"] / 10 if work == "one sample" else one["ms"]
+            lines.append(f"| {one['name']} | {one['threads']} | {number:.3g} | {ratio} | {difference} |")
+    return lines
+
+
+parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+parser.add_argument("folder", type=pathlib.Path)
+parser.add_argument("--rounds", type=int, default=5)
+parser.add_argument("--write", action="store_true")
+parser.add_argument("--missing", action="append", default=[], help="name: why")
+parser.add_argument("--program", action="append", required=True, help="a command, its words divided by |")
+arguments = parser.parse_args()
+
+keys = arguments.folder / "keys.bin"
+found, missing = {}, list(arguments.missing)
+for turn in range(arguments.rounds):
+    for program in arguments.program:
+        for line in run([*program.split("|"), keys, arguments.folder], arguments.folder):
+            if "missing" in line:
+                if turn == 0:
+                    missing.append(f"{line['missing']}: {line['why']}")
+                continue
+            key = (line["name"], line["work"], line["threads"])
+            found.setdefault(key, []).append(line)
+contestants = [{**lines[0], "ms": statistics.median(line["ms"] for line in lines)} for lines in found.values()]
+spread = max(max(line["ms"] for line in lines) / min(line["ms"] for line in lines) for lines in found.values())
+writing = next(one["ms"] for one in contestants if one["work"] == "none")
+today = datetime.date.today().isoformat()
+text = [
+    f"Measured on {today}: {machine()}. Medians of {arguments.rounds} turns; between turns a row differs by up to",
+    f"{spread:.2g} ×. Writing the result's 79 MB alone takes {writing:.3g} ms. Slowest first.",
+    *table(contestants, arguments.folder),
+    "",
+    *(["Not there: " + "; ".join(missing) + "."] if missing else []),
+]
+text = "\n".join(text)
+print(text)
+if arguments.write:
+    page = PAGE.read_text()
+    before, rest = page.split(BEGIN)
+    PAGE.write_text(f"{before}{BEGIN}\n{text}\n{END}{rest.split(END)[1]}")

@@ -1,0 +1,53 @@
+#!/usr/bin/env bash
+# Tumble beside the libraries that people use today, on the same keys, in turns, in one run. It builds what
+# it needs into target/race: the Rust peers for this machine's own vectors (Tumble chooses them when it
+# runs), Python's from PyPI, three.js from npm; what is not to be had is named under the table.
+#
+#   benches/peers/run.sh                prints the table
+#   benches/peers/run.sh --write        writes it into docs/figures.md
+#   benches/peers/run.sh --bevy         with Bevy's curves, which take ten minutes to compile
+#   benches/peers/run.sh --rounds 9     turns; 5 by default
+#
+# PEERS_PYTHON names a Python that has NumPy, SciPy and what else is to be raced (roma and torch).
+set -euo pipefail
+cd "$(dirname "$0")/../.."
+
+place=$PWD/target/race
+mkdir -p "$place/rows"
+race=()
+features=()
+while [ $# -gt 0 ]; do
+    case "$1" in
+    --bevy) features=(--features bevy) ;;
+    --write) race+=(--write) ;;
+    --rounds) race+=(--rounds "$2") && shift ;;
+    *) sed -n '2,12s/^# \?//p' benches/peers/run.sh >&2 && exit 2 ;;
+    esac
+    shift
+done
+[ ${#features[@]} -gt 0 ] || race+=(--missing "Bevy: --bevy")
+
+RUSTFLAGS="-C target-cpu=native" CARGO_TARGET_DIR=$place \
+    cargo build --quiet --release --manifest-path benches/peers/Cargo.toml "${features[@]}"
+program=$place/release/tumble-peers
+"$program" write "$place/rows/keys.bin"
+race+=(--program "$program|race")
+
+python=${PEERS_PYTHON:-$place/python/bin/python}
+if [ -z "${PEERS_PYTHON:-}" ] && ! "$python" -c 'import numpy, scipy' 2>/dev/null; then
+    echo "installing NumPy and SciPy into $place/python" >&2
+    python3 -m venv "$place/python"
+    "$place/python/bin/pip" install --quiet --disable-pip-version-check numpy scipy
+fi
+race+=(--program "$python|benches/peers/scipy_peers.py")
+
+if command -v node >/dev/null; then
+    if ! [ -d "$place/node_modules/three" ]; then
+        npm install --silent --no-audit --no-fund --prefix "$place" three@0.187.0
+    fi
+    race+=(--program "env|NODE_PATH=$place/node_modules|node|benches/peers/three_peers.js")
+else
+    race+=(--missing "three.js: node is not installed")
+fi
+
+exec "$python" benches/peers/race.py "$place/rows" "${race[@]}"
