@@ -162,7 +162,7 @@ fn runs_of_every_length_have_the_bits_of_single_samples() {
 /// that is ignored until memory runs out.
 #[test]
 fn every_memory_budget_transfer_and_layout_gives_the_same_bits() {
-    let set = hostile_set(5, 100);
+    let set = hostile_set(5, 30);
     let frames = Frames::fps(25).between(-1.0, 20.0);
     let budgets = [None, Some(1), Some(10_000), Some(200_000), Some(5_000_000)];
     let expected = METHODS.map(|method| cpu().evaluate(&set, method, &frames).unwrap());
