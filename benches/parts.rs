@@ -1,6 +1,9 @@
 //! Parts of an evaluation, each alone: `cargo bench`. For comparisons with others, and
 //! of whole evaluations, see `tumble bench` and `benches/peers`.
 
+// Tests may use what systems round differently (clippy.toml).
+#![allow(clippy::disallowed_methods)]
+
 use divan::Bencher;
 use divan::counter::ItemsCount;
 use glam::Quat;

@@ -40,6 +40,24 @@ impl Device {
         Self::list_with(false)
     }
 
+    /// The first Vulkan device of [`Device::list`], for tests: where there is none it is an error, so that no
+    /// test passes on the CPU alone. Software drivers count; `VK_DRIVER_FILES` names the one to load.
+    ///
+    /// ```no_run
+    /// use tumble::{Device, Engine};
+    /// let engine = Engine::new(Device::first_vulkan()?)?;
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// When there is no Vulkan loader, no driver, or no device that can compute.
+    pub fn first_vulkan() -> Result<Self, VulkanError> {
+        Self::list()?
+            .into_iter()
+            .next()
+            .ok_or(VulkanError::NoDevice)
+    }
+
     /// As [`Device::list`], with the Khronos validation layer watching every call
     /// to the devices ([`Engine::validation_messages`](crate::engine::Engine::validation_messages)).
     ///

@@ -46,6 +46,14 @@ pub enum Error {
         /// Rotations of the result.
         needed: usize,
     },
+    /// Rotations that are to be compared with a result are not as many as it has.
+    #[error("{given} rotations are to be compared; the result has {needed}")]
+    ComparedLength {
+        /// Rotations that were given.
+        given: usize,
+        /// Rotations of the result: one for each sample of each track.
+        needed: usize,
+    },
     /// The memory given for an encoded result is not as large as it.
     #[error("the output has {given} bytes; the result has {needed}")]
     OutputBytes {

@@ -322,7 +322,7 @@ fn run<E: From<Error>>(
     }
     let mut windows = first.into_iter().flatten().chain(windows);
     // One of the engine's threads must not wait for a thread that needs them: all of them may be here.
-    if threads::is_worker() {
+    if threads::is_worker() || !threads::HAS_THREADS {
         let mut used = OutputBuffer::new(0).map_err(Error::from)?;
         return windows.try_for_each(|window| {
             let none = OutputBuffer::new(0).map_err(Error::from)?;

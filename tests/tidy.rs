@@ -96,6 +96,96 @@ fn no_multiply_add_is_fused_and_unsafe_code_has_its_reason() {
     assert!(unsafe_lines > 200, "only {unsafe_lines} were found");
 }
 
+/// Of the system's library, the compiler's (`powi`), or glam's that call them: their last bit is another on
+/// another system, or with another compiler. `libm`'s are the same everywhere, and so are those of
+/// `math::quaternion`.
+const DIFFERS_BY_SYSTEM: [&str; 36] = [
+    ".sin()",
+    ".cos()",
+    ".tan()",
+    ".sin_cos()",
+    ".asin()",
+    ".acos()",
+    ".atan()",
+    ".atan2(",
+    ".sinh()",
+    ".cosh()",
+    ".tanh()",
+    ".exp()",
+    ".exp2()",
+    ".exp_m1()",
+    ".ln()",
+    ".ln_1p()",
+    ".log2()",
+    ".log10()",
+    ".powf(",
+    ".powi(",
+    ".cbrt()",
+    ".hypot(",
+    "from_axis_angle(",
+    "from_scaled_axis(",
+    "from_rotation_x(",
+    "from_rotation_y(",
+    "from_rotation_z(",
+    "from_euler(",
+    ".to_euler(",
+    ".to_axis_angle(",
+    ".to_scaled_axis(",
+    ".angle_between(",
+    ".angle_to(",
+    ".rotate_towards(",
+    "f64::sin",
+    "f64::cos",
+];
+
+/// Where no result depends on it.
+const SEEN_ALONE: [&str; 5] = [
+    "src/auto.rs", // a probe to time
+    "cli/src/commands/bench",
+    "cli/src/commands/travel.rs", // bodies for pictures
+    "cli/src/commands/plot",
+    "cli/src/commands/render",
+];
+
+/// Clippy finds them by their types (`clippy.toml`); in CI it has the time for the engine's library alone.
+#[test]
+fn results_take_no_function_that_differs_from_system_to_system() {
+    let folders = [
+        "src",
+        "formats/src",
+        "routes/src",
+        "cli/src",
+        "capi/src",
+        "python/src",
+    ];
+    let (mut lines, mut exceptions) = (0, 0);
+    for path in folders.iter().flat_map(|folder| files(folder, "rs")) {
+        let relative = path.strip_prefix(root()).unwrap();
+        let is_test = relative
+            .iter()
+            .any(|part| part == "tests" || part == "tests.rs");
+        let text = read(&path);
+        let code = text.split("#[cfg(test)]\nmod tests").next().unwrap();
+        for (i, line) in code.lines().enumerate() {
+            let line = line.split("//").next().unwrap();
+            lines += 1;
+            let Some(name) = DIFFERS_BY_SYSTEM.iter().find(|name| line.contains(**name)) else {
+                continue;
+            };
+            let is_exception = SEEN_ALONE.iter().any(|path| relative.starts_with(path));
+            exceptions += usize::from(is_exception);
+            assert!(
+                is_test || is_exception,
+                "{}:{}: `{name}` differs from system to system: take `libm`'s",
+                relative.display(),
+                i + 1
+            );
+        }
+    }
+    assert!(lines > 50_000, "only {lines} lines were read");
+    assert!(exceptions > 4, "only {exceptions} exceptions were found");
+}
+
 /// A form, a helper or a check of the self-test in WGSL without its twin would go unchecked.
 #[test]
 fn every_shader_function_has_its_twin() {
@@ -369,7 +459,7 @@ fn packages_have_all_that_they_include() {
                     let file = path.parent().unwrap().join(file).canonicalize().unwrap();
                     let inside = file.strip_prefix(home.canonicalize().unwrap());
                     let packed = inside.is_ok_and(|inside| {
-                        ["src", "shaders", "docs/library.md", "README.md"]
+                        ["src", "shaders", "docs/library.md", "docs/your-tests.md", "README.md"]
                             .iter()
                             .any(|start| inside.starts_with(start))
                     });

@@ -1,8 +1,9 @@
 //! Results against the f64 reference, by the engine's own report.
 
 use glam::Quat;
+use tumble::method::SLERP;
 use tumble::reference::{Curve, angle_between};
-use tumble::verify::{Verdict, error_bound, verify};
+use tumble::verify::{Agreement, Verdict, compare, error_bound, verify};
 use tumble::{Device, Engine, Form, Frames, METHODS, TrackSet};
 
 fn set() -> TrackSet {
@@ -37,6 +38,52 @@ fn what_compared_nothing_has_not_passed() {
         assert!(!found.passes());
     }
     assert!(Verdict::Failed > Verdict::Nothing && Verdict::Nothing > Verdict::ReferenceOnly);
+}
+
+/// Somebody's results: the engine's bits, the other sign of one, glam's slerp, a wrong one, NaN and none.
+#[test]
+fn results_of_others_are_told_apart() {
+    let (set, frames) = (set(), Frames::fps(60));
+    let engine = Engine::new(Device::Cpu).unwrap();
+    let same = engine.evaluate(&set, SLERP, &frames).unwrap();
+    let found = |theirs: &[Quat]| compare(&set, SLERP.into(), &frames, theirs).unwrap();
+    let exact = found(same.as_quats());
+    assert_eq!(
+        (exact.agreement(), exact.rotations, exact.differing),
+        (Agreement::SameBits, 302, 0)
+    );
+    assert_eq!(exact.max_error, exact.engine_error);
+
+    let with = |index: usize, other: Quat| {
+        let mut theirs = same.as_quats().to_vec();
+        theirs[index] = other;
+        found(&theirs)
+    };
+    let signed = with(160, -same.as_quats()[160]);
+    assert_eq!((signed.differing, signed.of_other_sign), (1, 1));
+    assert_eq!(signed.agreement(), Agreement::WithinBounds);
+    let first = signed.first_difference.unwrap();
+    assert_eq!((first.track, first.frame), (1, 9));
+
+    let wrong = with(31, Quat::from_rotation_x(0.5));
+    assert_eq!(wrong.agreement(), Agreement::OutsideBounds);
+    assert_eq!(
+        wrong.worst.map(|worst| (worst.track, worst.frame)),
+        Some((0, 31))
+    );
+    assert!(wrong.to_string().contains("track 0, frame 31"), "{wrong}");
+    assert_eq!(with(0, Quat::NAN).agreement(), Agreement::OutsideBounds);
+    let long = with(7, same.as_quats()[7] * 1.001);
+    assert_eq!(long.agreement(), Agreement::OutsideBounds, "{long}");
+
+    let none = compare(&set, SLERP.into(), &Frames::at(Vec::new()), &[[0f32; 4]; 0]).unwrap();
+    assert_eq!((none.agreement(), none.rotations), (Agreement::Nothing, 0));
+    let error = compare(&set, SLERP.into(), &frames, &same.as_quats()[1..]).unwrap_err();
+    assert!(error.to_string().contains("301"), "{error}");
+    assert!(
+        Agreement::OutsideBounds > Agreement::Nothing
+            && Agreement::Nothing > Agreement::WithinBounds
+    );
 }
 
 /// A key and its opposite half turn, there and back: where a definition has no bisector, the engine and

@@ -66,7 +66,9 @@ impl From<Error> for Failure {
                 TumbleResult::InvalidArgument
             }
             Error::Vulkan(_) | Error::Threads(_) => TumbleResult::Device,
-            Error::OutputLength { .. } | Error::OutputBytes { .. } => TumbleResult::WrongSize,
+            Error::OutputLength { .. }
+            | Error::OutputBytes { .. }
+            | Error::ComparedLength { .. } => TumbleResult::WrongSize,
             Error::OutOfMemory(_) => TumbleResult::OutOfMemory,
             Error::ThreadCount { .. } | Error::VectorWidth(_) => TumbleResult::InvalidArgument,
             _ => TumbleResult::InvalidInput,

@@ -1,9 +1,32 @@
 //! Clips in other units and about other axes.
 
+use std::f64::consts::FRAC_1_SQRT_2;
+
 use glam::{DQuat, DVec3, Quat, Vec3};
 use tumble::{Channel, TrackError};
 
 use crate::motion::{Body, Motion, Transform};
+
+/// The axis that points up, of two of which one was the other before.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum UpAxis {
+    /// z was up, as in SMPL's files.
+    Y,
+    /// y was up, as in glTF and BVH.
+    Z,
+}
+
+impl UpAxis {
+    /// The quarter turn about x for [`adjust`]. By no sine: those of systems differ in the last bit.
+    #[must_use]
+    pub fn turn(self) -> DQuat {
+        let x = match self {
+            Self::Y => -FRAC_1_SQRT_2,
+            Self::Z => FRAC_1_SQRT_2,
+        };
+        DQuat::from_xyzw(x, 0.0, 0.0, FRAC_1_SQRT_2)
+    }
+}
 
 /// The clip with all translations multiplied by `scale`, and with all roots turned by `turn`, keys
 /// and tangents alike. Computed in f64, rounded once.
@@ -168,7 +191,9 @@ mod tests {
             clip.skeleton.push(Joint { parent, rest });
         }
         // z up becomes y up.
-        let turn = DQuat::from_rotation_x(-std::f64::consts::FRAC_PI_2);
+        let turn = UpAxis::Y.turn();
+        assert!(turn.abs_diff_eq(DQuat::from_rotation_x(-std::f64::consts::FRAC_PI_2), 2e-16));
+        assert_eq!(UpAxis::Z.turn(), turn.conjugate());
         let adjusted = adjust(&clip, 0.01, turn).unwrap();
         let at = |track| {
             adjusted

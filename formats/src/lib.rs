@@ -3,6 +3,9 @@
 //! ([`Motion`](motion::Motion)), and how they are sampled ([`sample`]); and sets of any size to play
 //! with ([`generate`](mod@generate)).
 
+// Tests may use what systems round differently (clippy.toml).
+#![cfg_attr(test, allow(clippy::disallowed_methods))]
+
 pub mod adjust;
 #[cfg(feature = "parquet")]
 pub mod arrow;

@@ -18,6 +18,20 @@ pub(crate) enum Precision {
     Decimals(u32),
 }
 
+/// A power with a whole exponent, by squaring: the same bits everywhere, which `f64::powi` does not
+/// promise. They decide which rate is found.
+fn whole_power(base: f64, exponent: i32) -> f64 {
+    let (mut rest, mut square, mut power) = (exponent.unsigned_abs(), base, 1.0);
+    while rest > 0 {
+        if rest & 1 == 1 {
+            power *= square;
+        }
+        square *= square;
+        rest >>= 1;
+    }
+    if exponent < 0 { 1.0 / power } else { power }
+}
+
 impl Precision {
     /// The distance from the number to the next one of this type, away from 0.
     pub(crate) fn ulp(self, number: f64) -> f64 {
@@ -27,7 +41,7 @@ impl Precision {
                 f64::from(near.next_up()) - f64::from(near)
             }
             Self::F64 => number.abs().next_up() - number.abs(),
-            Self::Decimals(count) => 10f64.powi(-(count.min(400) as i32)),
+            Self::Decimals(count) => whole_power(10.0, -(count.min(400) as i32)),
         }
     }
 
@@ -180,7 +194,7 @@ fn of_period(digits: &str) -> Option<FrameRate> {
     if written.is_some_and(is_whole) {
         return written;
     }
-    let half = 0.5 * 10f64.powi(last_place(digits));
+    let half = 0.5 * whole_power(10.0, last_place(digits));
     let fits = |rate: FrameRate| {
         let exact = rate.time_of(1);
         let near = |time: f64| (time - period).abs() <= half;
@@ -221,7 +235,7 @@ fn ratio(number: f64) -> Option<(u64, u64)> {
     // The number as a ratio of whole numbers; it has at most 82 binary places.
     let exponent = (number.to_bits() >> 52) as i32 - 1023;
     let places = 52 - exponent;
-    let mut rest = ((number * 2f64.powi(places)) as u128, 1u128 << places);
+    let mut rest = ((number * whole_power(2.0, places)) as u128, 1u128 << places);
     let (mut before, mut last) = ((0u128, 1u128), (1u128, 0u128));
     while rest.1 > 0 {
         let whole = rest.0 / rest.1;
@@ -496,7 +510,7 @@ impl Steps {
     fn simple(&self) -> Option<FrameRate> {
         let (frames, seconds) = simplest(self.low, self.high)?;
         let width = (self.high - self.low).max(self.high * f64::EPSILON);
-        let is_simple = self.counts.len() > 3 && (seconds as f64).powi(2) * width < 0.01;
+        let is_simple = self.counts.len() > 3 && (seconds as f64 * seconds as f64) * width < 0.01;
         is_simple.then(|| FrameRate::new(frames, seconds).ok())?
     }
 }
@@ -571,7 +585,7 @@ fn on_one_of(
     let fits = |rate: &FrameRate| {
         let per_second = rate.per_second();
         let evidence = if is_whole(*rate) { of_whole } else { of_others };
-        let chance = (widest * per_second).powi(evidence) * tried;
+        let chance = whole_power(widest * per_second, evidence) * tried;
         if widest * per_second > 0.25 || chance > ACCIDENT {
             return false;
         }

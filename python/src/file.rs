@@ -7,7 +7,7 @@ use glam::DQuat;
 use pyo3::exceptions::{PyIndexError, PyKeyError, PyTypeError};
 use pyo3::prelude::*;
 use pyo3::types::PyString;
-use tumble_formats::adjust::adjust;
+use tumble_formats::adjust::{UpAxis, adjust};
 use tumble_formats::format::TimeUnit;
 use tumble_formats::keys::Duplicates;
 use tumble_formats::{Format, Limits, Loaded, ReadOptions};
@@ -206,9 +206,8 @@ pub(crate) fn load(
         bridge_gaps,
     };
     let format = format.map(format_named).transpose()?;
-    let quarter = std::f64::consts::FRAC_PI_2;
     let turn = up
-        .map(|axis| one_of(axis, "up", &[("y", -quarter), ("z", quarter)]))
+        .map(|axis| one_of(axis, "up", &[("y", UpAxis::Y), ("z", UpAxis::Z)]))
         .transpose()?;
     if let Some(scale) = scale.filter(|scale| !scale.is_finite() || *scale <= 0.0) {
         return Err(input(format!("scale: {scale} is not a number over 0")));
@@ -221,7 +220,7 @@ pub(crate) fn load(
         };
         let mut loaded = read.map_err(|diagnostic| of_diagnostic(&diagnostic))?;
         if scale.is_some() || turn.is_some() {
-            let turn = DQuat::from_rotation_x(turn.unwrap_or(0.0));
+            let turn = turn.map_or(DQuat::IDENTITY, UpAxis::turn);
             for clip in &mut loaded.clips {
                 *clip =
                     adjust(clip, scale.unwrap_or(1.0), turn).map_err(|error| of_track(&error))?;

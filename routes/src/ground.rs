@@ -107,7 +107,7 @@ impl<'a> Ground<'a> {
         let up = clear.up.try_normalize().ok_or(GroundError::Slope)?;
         let least_up = match clear.max_slope {
             None => 0.0,
-            Some(slope) if (0.0..=std::f64::consts::FRAC_PI_2).contains(&slope) => slope.cos(),
+            Some(slope) if (0.0..=std::f64::consts::FRAC_PI_2).contains(&slope) => libm::cos(slope),
             Some(_) => return Err(GroundError::Slope),
         };
         let is_level = |[a, b, c]: [DVec3; 3]| {

@@ -63,6 +63,7 @@ impl KeyCurve {
 
 /// Whether, of at most 64 keys, more than two thirds are within a small angle of the next. With
 /// fewer, preparing all segments takes no longer. Only speed depends on this, no bit does.
+#[allow(clippy::disallowed_methods)] // as it says
 fn turns_little(set: &TrackSet) -> bool {
     const LOOKS: usize = 64;
     let (mut near, mut looks) = (0, 0);

@@ -100,7 +100,7 @@ fn probes() -> Vec<Probe> {
             a: next() * 4.0,
             b: next(),
             c: next() * std::f32::consts::FRAC_PI_2,
-            n: (next() * 2.0f32.powi(8 + i % 23)) as i32,
+            n: (next() * (1 << (8 + i % 23)) as f32) as i32,
         })
         .collect();
     let half_ulp = f32::EPSILON / 2.0;

@@ -295,6 +295,12 @@ pub(crate) fn exp(a: Vector) -> Quaternion {
     exp_by(a, full_waves(square(a)))
 }
 
+/// The rotation about an axis, a unit vector, by an angle in degrees.
+pub(crate) fn about([x, y, z]: Vector, degrees: f64) -> Quaternion {
+    let (sine, cosine) = sine_cosine(0.5 * degrees.to_radians());
+    [x * sine, y * sine, z * sine, cosine]
+}
+
 /// The logarithm of a unit quaternion, HALF of the rotation vector, of length at
 /// most pi. By the arc tangent, not by the arc cosine: the latter loses half of the
 /// digits of a small angle.

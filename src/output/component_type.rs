@@ -33,10 +33,13 @@ impl ComponentType {
     }
 }
 
+/// 2^-24.
+const SMALLEST_HALF: f32 = 1.0 / (1 << 24) as f32;
+
 fn from_half(half: u16) -> f32 {
     let magnitude = u32::from(half & 0x7fff);
     let value = if magnitude < 0x0400 {
-        magnitude as f32 * 2.0f32.powi(-24)
+        magnitude as f32 * SMALLEST_HALF
     } else {
         f32::from_bits((magnitude << 13) + 0x3800_0000)
     };

@@ -3,8 +3,9 @@
 
 use std::fmt;
 
-use glam::{Mat3, Quat, Vec3};
+use glam::{Mat3, Quat};
 
+use crate::math::quaternion::about;
 use crate::output::component_type::ComponentType;
 use crate::output::euler::EulerSequence;
 use crate::shader::Store;
@@ -189,8 +190,8 @@ representations! {
         store: Store::AxisAngle,
         encode: by!(axis_angle::store),
         decode: |number, _| {
-            let axis = Vec3::new(number(0), number(1), number(2));
-            Quat::from_axis_angle(axis, number(3).to_radians()).to_array()
+            let axis = [0, 1, 2].map(|place| f64::from(number(place)));
+            about(axis, f64::from(number(3))).map(|c| c as f32)
         },
         ..OF_ROTATIONS
     }

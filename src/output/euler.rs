@@ -3,9 +3,11 @@
 use std::fmt;
 use std::str::FromStr;
 
-use glam::{Quat, Vec3};
-
+use crate::math::quaternion::{Quaternion, about, product};
 use crate::shader::{INTRINSIC, NEGATIVE, SYMMETRIC};
+
+/// The axes x, y and z.
+const AXES: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
 /// The three axes of Euler angles: one of twelve sequences, about axes that turn with the body
 /// (intrinsic) or that stay fixed (extrinsic).
@@ -88,12 +90,13 @@ impl EulerSequence {
     /// The rotation of three angles in degrees, by the sequence that the parameter of the kernels'
     /// store stands for.
     pub(crate) fn decode(degrees: &dyn Fn(usize) -> f32, detail: u32) -> [f32; 4] {
-        let axis = |place: u32| Vec3::AXES[(detail >> (2 * place) & 3) as usize];
+        let axis = |place: u32| AXES[(detail >> (2 * place) & 3) as usize];
         let last_axis = axis(if detail & SYMMETRIC != 0 { 0 } else { 2 });
         let is_intrinsic = detail & INTRINSIC != 0;
         let (first, last) = if is_intrinsic { (2, 0) } else { (0, 2) };
-        let turn = |axis, angle| Quat::from_axis_angle(axis, degrees(angle).to_radians());
-        (turn(last_axis, last) * turn(axis(1), 1) * turn(axis(0), first)).to_array()
+        let turn = |axis, angle| -> Quaternion { about(axis, f64::from(degrees(angle))) };
+        let later = product(turn(last_axis, last), turn(axis(1), 1));
+        product(later, turn(axis(0), first)).map(|c| c as f32)
     }
 }
 
@@ -133,7 +136,7 @@ impl FromStr for EulerSequence {
 mod tests {
     use glam::{DQuat, DVec3};
 
-    use super::*;
+    use super::EulerSequence;
     use crate::twin::axis_angle::axis_angle;
     use crate::twin::euler::euler;
     use crate::twin::matrix::rows;

@@ -81,6 +81,7 @@ impl InLanes for NearBlocks<'_> {
     const WIDE_IN_TESTS: bool = true;
 
     #[inline(always)]
+    #[allow(clippy::disallowed_methods)] // the length of a sum, with room for its rounding
     fn run<L: Lanes>(&mut self) {
         // Each block with the rotation behind it, with which the next one begins.
         while let Some(block) = self

@@ -190,7 +190,7 @@ impl Engine {
     ) -> Result<Rotations, Error> {
         self.on_device(|device| {
             let mut made = OutputBuffer::new(like.as_quats().len())?;
-            let most = (limit(device) / layers).clamp(1, 1 << 40);
+            let most = (limit(device) / layers).clamp(1, usize::MAX / 4);
             for (start, output) in (0..).step_by(most).zip(made.chunks_mut(most)) {
                 work(device, start, bytemuck::cast_slice_mut(output))?;
             }

@@ -31,7 +31,7 @@ pub(crate) trait Value: Copy + Default + PartialEq {
 impl Value for DQuat {
     fn apart(self, other: Self) -> f64 {
         let step = self.conjugate() * other;
-        2.0 * step.xyz().length().atan2(step.w.abs())
+        2.0 * libm::atan2(step.xyz().length(), step.w.abs())
     }
 
     fn towards(self, other: Self, part: f64) -> Self {

@@ -450,8 +450,8 @@ fn waves(z: f64) -> (f64, f64, f64) {
         let slope = 1.0 / 30.0 - z / 420.0 + z * z / 15_120.0;
         return (s, k, slope);
     }
-    let s = x.sin() / x;
-    let k = (x.cos() - s) / z;
+    let s = libm::sin(x) / x;
+    let k = (libm::cos(x) - s) / z;
     (s, k, -(s + 3.0 * k) / (2.0 * z))
 }
 

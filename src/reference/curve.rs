@@ -156,7 +156,8 @@ impl Curve {
     /// As [`Curve::segment_velocity`], the angular acceleration.
     #[must_use]
     pub fn segment_acceleration(&self, i: usize, t: f64) -> DVec3 {
-        self.segments[i].acceleration(t) / self.track.step(i).powi(2)
+        let step = self.track.step(i);
+        self.segments[i].acceleration(t) / (step * step)
     }
 
     fn inside(&self, time: f64) -> Option<(usize, f64)> {

@@ -6,6 +6,7 @@ use std::fmt;
 use glam::{DMat3, DQuat, DVec3};
 
 use crate::reference::pace::{bisected, gauss};
+use crate::reference::quaternion::exponential;
 use crate::reference::vector::{VectorCurve, hermite};
 
 /// Steps of an interval: the error of Runge and Kutta's method of fourth order is below 1e-11 where
@@ -163,7 +164,7 @@ impl Followed<'_> {
             Frame::Minimal => {
                 let (step, from) = step_at(t);
                 let up = self.carried(i, from, t, self.ups[i * STEPS + step]);
-                DQuat::from_axis_angle(forward, self.roll(self.length_at(i, t))) * up
+                exponential(forward * (0.5 * self.roll(self.length_at(i, t)))) * up
             }
             Frame::Frenet => self.frenet(i, t),
         };
@@ -258,7 +259,7 @@ impl Followed<'_> {
     /// Adds the roll that turns `up` into the given one, nearest to the one before.
     fn give(&self, keys: &mut Vec<(f64, f64)>, step: usize, up: DVec3, given: DVec3, way: DVec3) {
         let given = across(given, way);
-        let angle = way.dot(up.cross(given)).atan2(up.dot(given));
+        let angle = libm::atan2(way.dot(up.cross(given)), up.dot(given));
         let before = keys[keys.len() - 1].1;
         let turn = std::f64::consts::TAU;
         let own = angle + turn * ((before - angle) / turn).round();

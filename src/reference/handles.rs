@@ -187,7 +187,7 @@ pub(crate) const SHOEMAKE: Definition = by_handles!(Handles {
     parabolic: |whole, other| {
         let handle: DVec3 = 2.0 * whole - other;
         // No arc leads to the opposite of a quaternion more than any other: the turn itself then.
-        match (handle.length_squared() - std::f64::consts::PI.powi(2)).abs() < 1e-5 {
+        match (handle.length_squared() - std::f64::consts::PI * std::f64::consts::PI).abs() < 1e-5 {
             true => whole,
             false => handle,
         }

@@ -39,7 +39,7 @@ pub(crate) fn normalise(q: DQuat) -> DQuat {
 pub(crate) fn exponential(a: DVec3) -> DQuat {
     match a.length() {
         0.0 => DQuat::IDENTITY,
-        angle => from_parts(angle.cos(), a * (angle.sin() / angle)),
+        angle => from_parts(libm::cos(angle), a * (libm::sin(angle) / angle)),
     }
 }
 
@@ -49,7 +49,7 @@ pub(crate) fn logarithm_or(q: DQuat, or: DVec3) -> DVec3 {
     let v = vector(q);
     let sine = v.length();
     if sine > 0.0 {
-        v / sine * sine.atan2(q.w)
+        v / sine * libm::atan2(sine, q.w)
     } else if q.w < 0.0 {
         or.normalize_or_zero() * std::f64::consts::PI
     } else {
@@ -72,13 +72,14 @@ pub(crate) fn power(q: DQuat, s: f64) -> DQuat {
 #[must_use]
 pub fn slerp(a: DQuat, b: DQuat, t: f64) -> DQuat {
     let chord = |q: DQuat| inner(q, q).sqrt();
-    let angle = 2.0 * chord(b - a).atan2(chord(b + a));
+    let angle = 2.0 * libm::atan2(chord(b - a), chord(b + a));
     if angle < 1e-8 {
         // Both weights' limits: the arc is straight to f64 rounding.
         return normalise(a * (1.0 - t) + b * t);
     }
-    let sine = angle.sin();
-    normalise(a * (((1.0 - t) * angle).sin() / sine) + b * ((t * angle).sin() / sine))
+    let sine = libm::sin(angle);
+    let part = |t: f64| libm::sin(t * angle) / sine;
+    normalise(a * part(1.0 - t) + b * part(t))
 }
 
 /// Slerp as `a (a⁻¹ b)^t`.
@@ -125,5 +126,5 @@ pub fn nlerp(a: DQuat, b: DQuat, t: f64) -> DQuat {
 pub fn angle_between(a: DQuat, b: DQuat) -> f64 {
     let (a, b) = (normalise(a), normalise(b));
     let (near, far) = ((a - b).length(), (a + b).length());
-    4.0 * near.min(far).atan2(near.max(far))
+    4.0 * libm::atan2(near.min(far), near.max(far))
 }

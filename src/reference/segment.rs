@@ -46,7 +46,10 @@ pub(crate) enum Basis {
 impl Basis {
     pub(crate) fn values(self, t: f64) -> [f64; 3] {
         match self {
-            Self::Bernstein => [1.0 - (1.0 - t).powi(3), t * t * (3.0 - 2.0 * t), t * t * t],
+            Self::Bernstein => {
+                let rest = 1.0 - t;
+                [1.0 - rest * rest * rest, t * t * (3.0 - 2.0 * t), t * t * t]
+            }
             Self::Knots(knots) => {
                 let [_, n1, n2, n3] = b_spline(knots, 3, knots[2] + t * (knots[3] - knots[2]));
                 [n1 + n2 + n3, n2 + n3, n3]

@@ -218,10 +218,13 @@ fn detect_streaming_stores() -> Option<VectorWidth> {
     {
         use std::arch::x86_64::__cpuid;
         const ZEN_5: u32 = 26;
-        let vendor = __cpuid(0);
+        // Newer compilers know that it is safe.
+        #[allow(unused_unsafe)]
+        // SAFETY: every x86-64 processor has this instruction.
+        let [vendor, model] = [0, 1].map(|leaf| unsafe { __cpuid(leaf) });
         let name = [vendor.ebx, vendor.edx, vendor.ecx].map(u32::to_le_bytes);
         // The family is a sum of two fields, the second of which is 0 for families below 15.
-        let signature = __cpuid(1).eax;
+        let signature = model.eax;
         let family = (signature >> 8 & 0xf) + (signature >> 20 & 0xff);
         match name.as_flattened() {
             b"GenuineIntel" => Some(VectorWidth::Avx2),

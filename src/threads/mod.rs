@@ -45,6 +45,10 @@ const STACK: usize = 4 << 20;
 /// What a thread is sure to begin with, in bytes, beside its stack.
 const BEGINNING: usize = 1 << 20;
 
+/// Whether this system has threads. WebAssembly has none as Rust compiles for it: there the calling
+/// thread does all work, and rayon's parallel loops run on it.
+pub(crate) const HAS_THREADS: bool = !cfg!(target_family = "wasm");
+
 /// Threads that share work: the process's, or an engine's own. They are started when there is work for
 /// them for the first time; a forked process, in which they are not, starts its own.
 pub(crate) struct Threads {
@@ -107,12 +111,16 @@ impl Threads {
 
     /// Starts them, if they are not there yet.
     pub(crate) fn start(&self) -> Result<(), OutOfThreads> {
-        self.pool().map(|_| ())
+        match HAS_THREADS {
+            true => self.pool().map(|_| ()),
+            false => Ok(()),
+        }
     }
 
     /// How many share work that is given to [`Threads::run`] here.
     pub(crate) fn count(&self) -> usize {
         match IS_WORKER.get() {
+            _ if !HAS_THREADS => 1,
             true => rayon::current_num_threads(),
             false => self.count.unwrap_or_else(usual_count),
         }
@@ -120,7 +128,7 @@ impl Threads {
 
     /// Runs `work` with these threads, or with those that run this already.
     pub(crate) fn run<R: Send>(&self, work: impl FnOnce() -> R + Send) -> Result<R, OutOfThreads> {
-        if IS_WORKER.get() {
+        if IS_WORKER.get() || !HAS_THREADS {
             return Ok(work());
         }
         let threads = self.pool()?;
@@ -137,7 +145,7 @@ impl Threads {
     }
 
     fn pool(&self) -> Result<Arc<rayon::ThreadPool>, OutOfThreads> {
-        let process = process::id();
+        let process = process_id();
         let of_first = || {
             let first = self.first.get();
             first.filter(|first| first.process == process)
@@ -178,9 +186,14 @@ impl Drop for Threads {
 /// what belongs to them may be in the middle of a change.
 fn abandon(pool: Option<Pool>) {
     match pool {
-        Some(pool) if pool.process != process::id() => std::mem::forget(pool),
+        Some(pool) if pool.process != process_id() => std::mem::forget(pool),
         _ => {}
     }
+}
+
+/// Of this process; systems without processes panic when asked.
+fn process_id() -> u32 {
+    if HAS_THREADS { process::id() } else { 0 }
 }
 
 fn start(count: usize) -> Result<rayon::ThreadPool, OutOfThreads> {

@@ -332,7 +332,10 @@ impl TrackSet {
     pub(crate) fn widen_span(&mut self, times: &[f64]) {
         let own = (times[0], times[times.len() - 1]);
         let (first, last) = self.span.unwrap_or(own);
-        self.span = Some((first.min(own.0), last.max(own.1)));
+        // Not by `min` and `max`: of zeros with two signs processors choose differently.
+        let first = if own.0 < first { own.0 } else { first };
+        let last = if own.1 > last { own.1 } else { last };
+        self.span = Some((first, last));
     }
 }
 

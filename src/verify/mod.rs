@@ -4,9 +4,10 @@
 //! The last word on every result: nothing here trusts what the engine says about
 //! itself. The reference shares no code with the kernels.
 
+mod comparison;
 #[cfg(feature = "prove")]
 pub mod figures;
-#[cfg(feature = "prove")]
+#[cfg(feature = "golden")]
 pub mod golden;
 pub(crate) mod outputs;
 #[cfg(feature = "prove")]
@@ -15,18 +16,19 @@ pub mod random;
 pub mod renderer;
 #[cfg(feature = "prove")]
 pub mod resident;
-#[cfg(feature = "prove")]
+#[cfg(feature = "golden")]
 pub(crate) mod sets;
 
+pub use crate::verify::comparison::{Agreement, Comparison, compare};
 pub use crate::verify::outputs::OutputVerification;
 use bytemuck::NoUninit;
+use glam::Quat;
 use rayon::prelude::*;
 
 use crate::device::Device;
 use crate::engine::Engine;
 use crate::error::Error;
 use crate::method::interpolation::Interpolation;
-use crate::output::rotations::Rotations;
 use crate::reference;
 use crate::reference::quaternion::angle_between;
 use crate::shader::Form;
@@ -90,6 +92,15 @@ pub struct Place {
     pub frame: usize,
     /// Its time, seconds.
     pub time: f64,
+}
+
+impl Place {
+    /// Of a rotation by its place in a track-major result.
+    fn new(timeline: &Timeline, index: usize) -> Self {
+        let (track, frame) = (index / timeline.len(), index % timeline.len());
+        let time = timeline.time_at(track, frame);
+        Self { track, frame, time }
+    }
 }
 
 /// What a comparison came to. Of several, the greatest is that of all.
@@ -189,36 +200,17 @@ pub fn verify(
         }
         None => (0, None),
     };
-    let measured = |track| TrackErrors::measure(set, interpolation, &timeline, &found, track);
-    let tracks = 0..set.track_count();
-    let tracks: Vec<TrackErrors> = on_threads(|| tracks.into_par_iter().map(measured).collect())?;
-
-    let place = |index: usize| {
-        let (track, frame) = (index / timeline.len(), index % timeline.len());
-        Place {
-            track,
-            frame,
-            time: timeline.time_at(track, frame),
-        }
-    };
-    let worst = tracks
-        .iter()
-        .enumerate()
-        .max_by(|a, b| a.1.max.total_cmp(&b.1.max));
-    let rotations = found.as_quats().len();
-    let squares: f64 = tracks.iter().map(|track| track.squares).sum();
+    let errors = Errors::measure(set, interpolation, &timeline, found.as_quats())?;
     Ok(Verification {
         method: interpolation.method.name,
         device,
-        rotations: rotations as u64,
+        rotations: found.as_quats().len() as u64,
         differing,
-        first_difference: first.map(place),
-        max_error: worst.map_or(0.0, |(_, track)| track.max),
-        rms_error: (squares / rotations.max(1) as f64).sqrt(),
-        worst: worst
-            .filter(|_| rotations > 0)
-            .map(|(track, errors)| place(track * timeline.len() + errors.worst)),
-        max_norm_error: tracks.iter().map(|track| track.norm).fold(0.0, f64::max),
+        first_difference: first.map(|index| Place::new(&timeline, index)),
+        max_error: errors.max,
+        rms_error: errors.rms,
+        worst: errors.worst,
+        max_norm_error: errors.norm,
         error_bound: error_bound(interpolation.form()),
         norm_bound: NORM_BOUND + beyond_rounding(set),
         outputs: outputs::verify(engine, set, interpolation, frames, &timeline)?,
@@ -289,6 +281,44 @@ fn differences<T: NoUninit>(a: &[T], b: &[T], size: usize) -> (u64, Option<usize
     (u64::from(first.is_some()) + differing.count() as u64, first)
 }
 
+/// A result against the reference.
+struct Errors {
+    /// Largest angle, and root mean square, radians.
+    max: f64,
+    rms: f64,
+    worst: Option<Place>,
+    /// Largest | |q| - 1 |.
+    norm: f64,
+}
+
+impl Errors {
+    /// Of a track-major result.
+    fn measure(
+        set: &TrackSet,
+        interpolation: Interpolation,
+        timeline: &Timeline,
+        found: &[Quat],
+    ) -> Result<Self, Error> {
+        let measured = |track| TrackErrors::measure(set, interpolation, timeline, found, track);
+        let tracks = 0..set.track_count();
+        let tracks: Vec<TrackErrors> =
+            on_threads(|| tracks.into_par_iter().map(measured).collect())?;
+        let worst = tracks
+            .iter()
+            .enumerate()
+            .max_by(|a, b| a.1.max.total_cmp(&b.1.max));
+        let squares: f64 = tracks.iter().map(|track| track.squares).sum();
+        Ok(Self {
+            max: worst.map_or(0.0, |(_, track)| track.max),
+            rms: (squares / found.len().max(1) as f64).sqrt(),
+            worst: worst
+                .filter(|_| !found.is_empty())
+                .map(|(track, errors)| Place::new(timeline, track * timeline.len() + errors.worst)),
+            norm: tracks.iter().map(|track| track.norm).fold(0.0, f64::max),
+        })
+    }
+}
+
 /// One track against the reference.
 #[derive(Default)]
 struct TrackErrors {
@@ -306,7 +336,7 @@ impl TrackErrors {
         set: &TrackSet,
         interpolation: Interpolation,
         timeline: &Timeline,
-        found: &Rotations,
+        found: &[Quat],
         index: usize,
     ) -> Self {
         let track = set.track(index);
@@ -314,7 +344,7 @@ impl TrackErrors {
         let times = &*keys.times;
         let curve = reference::Curve::of(&interpolation, Track { times, ..track });
         let samples = timeline.len();
-        let row = &found.as_quats()[index * samples..(index + 1) * samples];
+        let row = &found[index * samples..(index + 1) * samples];
         let mut errors = Self::default();
         for (sample, quat) in row.iter().enumerate() {
             let quat = quat.as_dquat();
@@ -333,12 +363,8 @@ impl TrackErrors {
 
 #[cfg(test)]
 mod tests {
-    use glam::Quat;
-
     use super::*;
     use crate::method::slerp::SLERP;
-    use crate::output::buffer::OutputBuffer;
-    use crate::output::rotations::Layout;
     use crate::reference::Curve;
 
     fn set() -> TrackSet {
@@ -361,11 +387,9 @@ mod tests {
             Quat::NAN,
             Quat::from_rotation_x(0.5),
         ] {
-            let mut quats = OutputBuffer::new(52).unwrap();
-            quats.copy_from_slice(&good);
-            quats[26 + 7] = wrong;
-            let bad = Rotations::new(Box::new(quats), 2, 26, Layout::TrackMajor);
-            let found = differences(&good, bad.as_quats(), 1);
+            let mut bad = good.clone();
+            bad[26 + 7] = wrong;
+            let found = differences(&good, &bad, 1);
             assert_eq!(found, (1, Some(33)));
             let errors = TrackErrors::measure(&set, SLERP.into(), &timeline, &bad, 1);
             assert!(errors.max > 1e-3 && errors.worst == 7, "{}", errors.max);

@@ -6,7 +6,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use glam::DQuat;
 use tumble::FrameRate;
-use tumble_formats::adjust::{adjust, set_offsets};
+use tumble_formats::adjust::{UpAxis, adjust, set_offsets};
 use tumble_formats::format::{FormatOption, TimeUnit};
 use tumble_formats::keys::Duplicates;
 use tumble_formats::motion::Motion;
@@ -231,10 +231,9 @@ impl Reading {
             *length *= scale;
         }
         if self.scale.is_some() || self.up.is_some() {
-            let quarter = std::f64::consts::FRAC_PI_2;
             let turn = self.up.map_or(DQuat::IDENTITY, |up| match up {
-                UpArgument::Y => DQuat::from_rotation_x(-quarter),
-                UpArgument::Z => DQuat::from_rotation_x(quarter),
+                UpArgument::Y => UpAxis::Y.turn(),
+                UpArgument::Z => UpAxis::Z.turn(),
             });
             for clip in &mut loaded.clips {
                 *clip = adjust(clip, self.scale.unwrap_or(1.0), turn).map_err(|error| {

@@ -1,5 +1,6 @@
 //! The commands: a file or a folder each, with its arguments and what it does with them.
 
+#[allow(clippy::disallowed_methods)] // workloads to time
 pub(crate) mod bench;
 pub(crate) mod check;
 pub(crate) mod compare;
@@ -14,13 +15,16 @@ pub(crate) mod info;
 pub(crate) mod merge;
 pub(crate) mod methods;
 pub(crate) mod picture;
+#[allow(clippy::disallowed_methods)] // pictures
 pub(crate) mod plot;
 pub(crate) mod probe;
 pub(crate) mod prove;
 pub(crate) mod reduce;
+#[allow(clippy::disallowed_methods)] // pictures
 pub(crate) mod render;
 pub(crate) mod route;
 pub(crate) mod smooth;
+#[allow(clippy::disallowed_methods)] // pictures
 pub(crate) mod travel;
 pub(crate) mod verify;
 pub(crate) mod view;

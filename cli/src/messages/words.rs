@@ -134,13 +134,10 @@ pub(crate) fn boxes(number: usize) -> String {
 /// `78.6 MB`, in decimal units, as file managers and drives count.
 pub(crate) fn bytes(bytes: f64) -> String {
     let units = ["bytes", "kB", "MB", "GB", "TB", "PB", "EB"];
-    let power = if bytes < 1000.0 {
-        0
-    } else {
-        (bytes.log10() / 3.0) as usize
-    };
-    let power = power.min(units.len() - 1);
-    let value = bytes / 1000f64.powi(power as i32);
+    let (mut value, mut power) = (bytes, 0);
+    while value >= 1000.0 && power < units.len() - 1 {
+        (value, power) = (value / 1000.0, power + 1);
+    }
     if power == 0 {
         format!("{value} bytes")
     } else {

@@ -119,7 +119,7 @@ fn doubles(mut seconds: Vec<f64>) -> Times {
     seconds.iter_mut().for_each(|time| *time -= first);
     Times {
         seconds,
-        precision: Some(Precision::Decimals(-step.log10().ceil() as u32)),
+        precision: Some(Precision::Decimals(-libm::log10(step).ceil() as u32)),
         offset: first as i64,
     }
 }

@@ -214,5 +214,5 @@ fn corner_angle(surface: &Surface, corner: u32) -> f64 {
     let here = surface.corner(corner);
     let one = surface.corner(next(corner)) - here;
     let other = surface.corner(previous(corner)) - here;
-    one.cross(other).length().atan2(one.dot(other))
+    libm::atan2(one.cross(other).length(), one.dot(other))
 }

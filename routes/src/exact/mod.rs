@@ -22,7 +22,7 @@ use crate::error::RouteError;
 use crate::exact::arrivals::{Arrival, Arrivals};
 use crate::exact::fan::{Fan, Sector};
 use crate::exact::trace::Trail;
-use crate::exact::window::{Shape, Window};
+use crate::exact::window::{Shape, Window, hypotenuse};
 use crate::mesh::links::{MANY, NONE, at, next, previous};
 use crate::mesh::surface::{Spot, Surface};
 use crate::places::Task;
@@ -229,7 +229,7 @@ impl<'a> Search<'a> {
         let near = TOLERANCE * shape.length;
         let (mut goes_left, mut goes_right) = (window.low < entry, entry < window.high);
         if entry >= window.low - near && entry <= window.high + near {
-            let length = window.length + (shape.x - window.x).hypot(shape.y + window.y);
+            let length = window.length + hypotenuse(shape.x - window.x, shape.y + window.y);
             if goes_left && goes_right {
                 (goes_left, goes_right) = self.occupy(half_edge, length, entry, near);
             }

@@ -5,6 +5,11 @@ use glam::DVec2;
 use crate::mesh::links::{next, previous};
 use crate::mesh::surface::Surface;
 
+/// `√(x² + y²)`. Systems round their own `hypot` differently.
+pub(super) fn hypotenuse(x: f64, y: f64) -> f64 {
+    DVec2::new(x, y).length()
+}
+
 /// A face in a plane: the half-edge from the origin along x, the corner opposite at positive y.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Shape {
@@ -31,22 +36,25 @@ impl Shape {
     /// Where a ray from the corner opposite meets the edge, which turned by `turned` of the face's
     /// `angle` there from the start of the edge to its end, rad.
     pub(super) fn met_by(&self, turned: f64, angle: f64) -> f64 {
-        let start = self.x.hypot(self.y) * turned.max(0.0).sin();
-        let end = (self.length - self.x).hypot(self.y) * (angle - turned).max(0.0).sin();
+        let start = hypotenuse(self.x, self.y) * libm::sin(turned.max(0.0));
+        let end = hypotenuse(self.length - self.x, self.y) * libm::sin((angle - turned).max(0.0));
         self.length * start / (start + end)
     }
 
     /// From the right corner to the point `along` the left edge, which is so long.
     pub(super) fn right_corner_to(&self, along: f64, length: f64) -> f64 {
         let part = along / length;
-        (self.length - part * self.x).hypot(part * self.y)
+        hypotenuse(self.length - part * self.x, part * self.y)
     }
 
     /// From the left corner to the point so far along the edge from the corner opposite to the right
     /// one, which is so long.
     pub(super) fn left_corner_to(&self, along: f64, length: f64) -> f64 {
         let part = along / length;
-        (self.x + part * (self.length - self.x)).hypot((1.0 - part) * self.y)
+        hypotenuse(
+            self.x + part * (self.length - self.x),
+            (1.0 - part) * self.y,
+        )
     }
 }
 
@@ -70,7 +78,7 @@ pub(super) struct Window {
 impl Window {
     /// From the source to a point of the edge.
     pub(super) fn distance(&self, along: f64) -> f64 {
-        (along - self.x).hypot(self.y)
+        hypotenuse(along - self.x, self.y)
     }
 
     /// The same, measured from the other end of its edge.
@@ -94,13 +102,14 @@ impl Window {
     pub(super) fn angle_at_corner(&self, shape: &Shape) -> f64 {
         let corner = DVec2::new(shape.x, shape.y);
         let source = DVec2::new(self.x, -self.y);
-        (source - corner).angle_to(-corner).abs()
+        let (way, edge) = (source - corner, -corner);
+        libm::atan2(way.perp_dot(edge), way.dot(edge)).abs()
     }
 
     /// What reaches the left edge, measured from the left corner. The half-edge is that of this
     /// face.
     pub(super) fn through_left(&self, shape: &Shape, entry: f64, parent: u32) -> Option<Self> {
-        let length = shape.x.hypot(shape.y);
+        let length = hypotenuse(shape.x, shape.y);
         let along = DVec2::new(shape.x, shape.y) / length;
         // The ray through a point of the edge meets the left edge so far from its start.
         let meets = |point: f64| {
@@ -162,6 +171,6 @@ impl Window {
             false => x,
         };
         let crossing = crossing.clamp(self.low, self.high);
-        self.length + self.distance(crossing) + (crossing - x).hypot(y)
+        self.length + self.distance(crossing) + hypotenuse(crossing - x, y)
     }
 }

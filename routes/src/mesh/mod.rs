@@ -199,7 +199,7 @@ fn normals(positions: &[DVec3], faces: &[[u32; 3]]) -> Vec<DVec3> {
                 corners[(k + 2) % 3] - corners[k],
             );
             let cross = one.cross(other);
-            let angle = cross.length().atan2(one.dot(other));
+            let angle = libm::atan2(cross.length(), one.dot(other));
             sums[face[k] as usize] += angle * cross.normalize_or_zero();
         }
     }

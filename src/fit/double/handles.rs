@@ -152,7 +152,7 @@ pub(crate) trait HandleRule {
 /// other, and so the construction by arcs has no curve: of the parabola through half turns there and back.
 fn is_opposite(handle: Vector) -> bool {
     let square: f64 = handle.iter().map(|part| part * part).sum();
-    (square - std::f64::consts::PI.powi(2)).abs() < 1e-5
+    (square - std::f64::consts::PI * std::f64::consts::PI).abs() < 1e-5
 }
 
 /// The condition for the handle of a track's first or last key.

@@ -5,6 +5,7 @@ use fastrand::Rng;
 use glam::Vec4;
 
 use crate::math::canonical::canonical;
+use crate::math::quaternion::sine_cosine;
 use crate::shader::{
     FLUSHED_BITS, GIMBAL, KEY_AT_END, KEY_INNER, KEY_UNKNOWN, LEAST_NORMAL, LONGEST_STEP,
     LONGEST_TANGENT_PART, PI, TINY_BITS, TangentWeights,
@@ -157,7 +158,7 @@ impl Random {
     pub(crate) fn near(&mut self, q: [f32; 4], angle: f32) -> [f32; 4] {
         let (q, toward) = (Vec4::from(q).as_dvec4(), Vec4::from(self.unit()).as_dvec4());
         let across = (toward - q * toward.dot(q)).normalize_or_zero();
-        let (sine, cosine) = f64::from(angle).sin_cos();
+        let (sine, cosine) = sine_cosine(f64::from(angle));
         let moved = q * cosine + across * sine;
         moved.to_array().map(|c| canonical(c as f32))
     }

@@ -65,8 +65,8 @@ impl Landscape {
     /// How high the ground is, by polynomials alone: the same on every machine.
     fn height(&self, at: DVec2) -> f64 {
         let bump = |&(middle, radius, height): &(DVec2, f64, f64)| {
-            let near = 1.0 - at.distance_squared(middle) / (radius * radius);
-            height * near.max(0.0).powi(3)
+            let near = (1.0 - at.distance_squared(middle) / (radius * radius)).max(0.0);
+            height * (near * near * near)
         };
         self.bumps.iter().map(bump).sum()
     }

@@ -1,0 +1,187 @@
+//! Results of somebody else's kernels, compared with the engine's bits and with the f64 reference.
+
+use std::borrow::Cow;
+
+use glam::Quat;
+
+use crate::device::Device;
+use crate::engine::Engine;
+use crate::error::Error;
+use crate::memory::{OutOfMemory, reserved};
+use crate::method::interpolation::Interpolation;
+use crate::time::frames::Frames;
+use crate::tracks::rotation::Rotation;
+use crate::tracks::set::TrackSet;
+use crate::verify::{Errors, NORM_BOUND, Place, beyond_rounding, differences, error_bound};
+
+/// What [`compare`] found of results that were not this engine's.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[non_exhaustive]
+pub struct Comparison {
+    /// The method's name.
+    pub method: &'static str,
+    /// Rotations compared.
+    pub rotations: u64,
+    /// Rotations whose bits are not the engine's, which are the same on every device.
+    pub differing: u64,
+    /// Those of them that are the engine's with the other sign: `q` and `-q` are one rotation.
+    pub of_other_sign: u64,
+    /// The first whose bits differ.
+    pub first_difference: Option<Place>,
+    /// Largest angle between their result and the reference, radians.
+    pub max_error: f64,
+    /// Root mean square of that angle, radians.
+    pub rms_error: f64,
+    /// Where the largest error is.
+    pub worst: Option<Place>,
+    /// Largest | |q| - 1 | of theirs.
+    pub max_norm_error: f64,
+    /// Largest angle between the engine's result and the reference, radians.
+    pub engine_error: f64,
+    /// The largest `max_error` that the engine allows itself, radians.
+    pub error_bound: f64,
+    /// The largest `max_norm_error` that the engine allows itself.
+    pub norm_bound: f64,
+}
+
+/// What results were like. Of several, the greatest is that of all.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
+#[non_exhaustive]
+pub enum Agreement {
+    /// They have the engine's bits, within their bounds of the f64 reference.
+    SameBits,
+    /// Other bits than the engine's, but as near to the f64 reference as the engine's have to be.
+    WithinBounds,
+    /// There was no rotation: nothing was compared with anything.
+    Nothing,
+    /// An error is over its bound, or a number is NaN.
+    OutsideBounds,
+}
+
+impl Comparison {
+    /// What came of it.
+    #[must_use]
+    pub fn agreement(&self) -> Agreement {
+        let is_within_bounds =
+            self.max_error <= self.error_bound && self.max_norm_error <= self.norm_bound;
+        match self.differing {
+            _ if self.rotations == 0 => Agreement::Nothing,
+            _ if !is_within_bounds => Agreement::OutsideBounds,
+            0 => Agreement::SameBits,
+            _ => Agreement::WithinBounds,
+        }
+    }
+}
+
+/// What was compared with what, and what came of it, in one line.
+impl std::fmt::Display for Comparison {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self {
+            method, rotations, ..
+        } = self;
+        if self.rotations == 0 {
+            return write!(f, "{method}: there was no rotation, nothing was compared");
+        }
+        let verdict = match self.agreement() {
+            Agreement::OutsideBounds => "outside the bounds",
+            _ => "within the bounds",
+        };
+        write!(
+            f,
+            "{method}: {rotations} rotations, {} with other bits than the engine's CPU ({} of them with the other \
+             sign), {verdict}: {:.2e} rad from the f64 reference (bound {:.0e}, the engine itself {:.2e}), norms \
+             within {:.1e} of 1 (bound {:.1e})",
+            self.differing,
+            self.of_other_sign,
+            self.max_error,
+            self.error_bound,
+            self.engine_error,
+            self.max_norm_error,
+            self.norm_bound
+        )?;
+        match self.worst {
+            Some(Place { track, frame, time }) if self.max_error > self.error_bound => {
+                write!(f, "; worst at track {track}, frame {frame}, {time} s")
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+/// Compares results of somebody else's kernels with the bits of the engine, which its CPU gives, and with the
+/// f64 reference: for tests of a renderer's or a game's own way to sample clips. `theirs` has the samples of
+/// the first track, then those of the second, and so on, `x y z w`.
+///
+/// It knows nothing of where `theirs` were made. A test of a GPU asks for one by
+/// [`Device::first_vulkan`](crate::Device::first_vulkan), and so fails where there is none.
+///
+/// ```
+/// use tumble::{Frames, TrackSet, method};
+/// use tumble::verify::{Agreement, compare};
+/// # use glam::Quat;
+/// # let mut set = TrackSet::new();
+/// # set.push("", &[0.0, 1.0], &[Quat::IDENTITY, Quat::from_rotation_x(1.0)])?;
+/// // What a kernel of yours left in its buffer.
+/// let theirs: Vec<[f32; 4]> = (0..=25)
+///     .map(|frame| Quat::IDENTITY.slerp(Quat::from_rotation_x(1.0), frame as f32 / 25.0).into())
+///     .collect();
+/// let found = compare(&set, method::SLERP.into(), &Frames::fps(25), &theirs)?;
+/// assert!(found.agreement() <= Agreement::WithinBounds, "{found}");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
+/// # Errors
+/// As [`Engine::evaluate`]; and [`Error::ComparedLength`] when `theirs` are not one rotation for each sample of
+/// each track.
+pub fn compare<R: Rotation>(
+    set: &TrackSet,
+    interpolation: Interpolation,
+    frames: &Frames,
+    theirs: &[R],
+) -> Result<Comparison, Error> {
+    let theirs = quats(theirs)?;
+    let theirs = &*theirs;
+    let timeline = frames.resolve(set.track_count(), set.time_span())?;
+    let engine = Engine::new(Device::Cpu)?.evaluate(set, interpolation, frames)?;
+    let engine = engine.as_quats();
+    if theirs.len() != engine.len() {
+        return Err(Error::ComparedLength {
+            given: theirs.len(),
+            needed: engine.len(),
+        });
+    }
+    let (differing, first) = differences(theirs, engine, 1);
+    let bits = |quat: Quat| quat.to_array().map(f32::to_bits);
+    let pairs = theirs.iter().zip(engine);
+    let of_other_sign = pairs
+        .filter(|&(&own, &engine)| bits(own) != bits(engine) && own == -engine)
+        .count();
+    let found = Errors::measure(set, interpolation, &timeline, theirs)?;
+    Ok(Comparison {
+        method: interpolation.method.name,
+        rotations: theirs.len() as u64,
+        differing,
+        of_other_sign: of_other_sign as u64,
+        first_difference: first.map(|index| Place::new(&timeline, index)),
+        max_error: found.max,
+        rms_error: found.rms,
+        worst: found.worst,
+        max_norm_error: found.norm,
+        engine_error: Errors::measure(set, interpolation, &timeline, engine)?.max,
+        error_bound: error_bound(interpolation.form()),
+        norm_bound: NORM_BOUND + beyond_rounding(set),
+    })
+}
+
+/// As quaternions, which lie at multiples of 16 bytes; copied where these do not.
+fn quats<R: Rotation>(rotations: &[R]) -> Result<Cow<'_, [Quat]>, OutOfMemory> {
+    if let Ok(quats) = bytemuck::try_cast_slice(rotations) {
+        return Ok(Cow::Borrowed(quats));
+    }
+    let mut quats = reserved(rotations.len(), "the rotations to compare")?;
+    quats.extend(rotations.iter().map(|own| own.quat()));
+    Ok(Cow::Owned(quats))
+}
