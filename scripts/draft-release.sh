@@ -1,0 +1,19 @@
+#!/usr/bin/env bash
+# Makes a draft of a release of the tag that GITHUB_REF_NAME names, with all files below a folder, by GitHub's
+# own program. The tag has to be the version of Cargo.toml; nothing is published.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+folder=${1:?the folder with the files}
+tag=${GITHUB_REF_NAME:?the tag}
+version=$(sed -n 's/^version = "\(.*\)"/\1/p' Cargo.toml | head -n 1)
+[ "$tag" = "v$version" ] || {
+    echo "the tag is $tag, and Cargo.toml has version $version" >&2
+    exit 1
+}
+files=()
+while IFS= read -r file; do files+=("$file"); done < <(find "$folder" -type f | sort)
+[ ${#files[@]} -gt 0 ] || {
+    echo "there is no file below $folder" >&2
+    exit 1
+}
+gh release create "$tag" --draft --title "Tumble $version" --notes-file CHANGELOG.md "${files[@]}"
