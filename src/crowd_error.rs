@@ -5,6 +5,7 @@ use crate::gpu::error::VulkanError;
 use crate::memory::OutOfMemory;
 use crate::prepare::error::SetError;
 use crate::threads::OutOfThreads;
+use crate::threads::stop::Stopped;
 use crate::time::wrap::WrapMode;
 
 /// The most clips of a library.
@@ -182,6 +183,11 @@ pub enum CrowdError {
         /// Whether the result is in 16 bits.
         is_half: bool,
     },
+    /// Tables of a library, as those of a file, that do not fit together.
+    #[error(
+        "the tables of the motion library do not fit together: the file is broken or of another version; save the library again"
+    )]
+    BrokenTables,
     /// Nothing was submitted that could be waited for.
     #[error("nothing is in flight; call submit first")]
     NothingSubmitted,
@@ -216,6 +222,9 @@ pub enum CrowdError {
     /// The system refused worker threads.
     #[error(transparent)]
     Threads(#[from] OutOfThreads),
+    /// Somebody asked the work to end.
+    #[error(transparent)]
+    Stopped(#[from] Stopped),
 }
 
 impl From<SetError> for CrowdError {
@@ -224,6 +233,7 @@ impl From<SetError> for CrowdError {
             SetError::Interpolation(error) => Self::Interpolation(error),
             SetError::OutOfMemory(error) => Self::OutOfMemory(error),
             SetError::Threads(error) => Self::Threads(error),
+            SetError::Stopped(stopped) => Self::Stopped(stopped),
             // No frames are asked for when a clip is prepared.
             SetError::Frames(_) => Self::TooLarge,
         }

@@ -13,6 +13,7 @@ use crate::prepare::error::SetError;
 use crate::simd::dispatch::UnknownWidth;
 use crate::smooth::kernel::SmoothingError;
 use crate::threads::OutOfThreads;
+use crate::threads::stop::Stopped;
 use crate::time::frames::FramesError;
 use crate::tracks::error::TrackError;
 
@@ -120,6 +121,9 @@ pub enum Error {
     /// The system refused worker threads.
     #[error(transparent)]
     Threads(#[from] OutOfThreads),
+    /// Somebody asked the work to end.
+    #[error(transparent)]
+    Stopped(#[from] Stopped),
 }
 
 impl From<SetError> for Error {
@@ -129,6 +133,7 @@ impl From<SetError> for Error {
             SetError::Interpolation(error) => Self::Interpolation(error),
             SetError::OutOfMemory(error) => Self::OutOfMemory(error),
             SetError::Threads(error) => Self::Threads(error),
+            SetError::Stopped(stopped) => Self::Stopped(stopped),
         }
     }
 }

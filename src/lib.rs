@@ -118,6 +118,7 @@ pub use crate::clip::Clip;
 pub use crate::crowd::layer::CrowdLayer;
 pub use crate::crowd::library::CrowdLibrary;
 pub use crate::crowd::player::Crowd;
+pub use crate::crowd::states::{MotionStates, MotionTables, MotionWords};
 pub use crate::crowd_error::CrowdError;
 pub use crate::curve::options::{
     Axes, Ends, InterpolationError, InterpolationWarning, Path, Quantity, Speed,
@@ -165,6 +166,7 @@ pub use crate::shader::{Form, kernels};
 pub use crate::simd::dispatch::{UnknownWidth, VectorWidth};
 pub use crate::smooth::kernel::{Smoothing, SmoothingEnds, SmoothingError, SmoothingKernel};
 pub use crate::stream::Chunk;
+pub use crate::threads::stop::{Stop, Stopped};
 pub use crate::threads::{OutOfThreads, on_threads};
 pub use crate::time::frame_rate::FrameRate;
 pub use crate::time::frames::{Frames, FramesError, MAX_FRAMES, Timeline};

@@ -213,9 +213,42 @@ impl Engine {
         output: &mut [u8],
     ) -> Result<(), Error> {
         let interpolation = interpolation.into();
+        let whole = (tracks, Layout::TrackMajor);
+        self.encode_into(set, interpolation, frames, whole, encoding, output)
+    }
+
+    /// All tracks of a set, encoded, in the given layout, into the caller's memory: what
+    /// [`Engine::upload`] and [`Clip::evaluate_encoded_into`] give, but only what the samples need is
+    /// prepared. Memory that is aligned to 16 bytes is filled without a copy.
+    ///
+    /// # Errors
+    /// As [`Engine::evaluate`]; also when `output` has not exactly the bytes of the result, or the
+    /// encoding is for rotations and these are none.
+    pub fn evaluate_encoded_into(
+        &self,
+        set: &TrackSet,
+        interpolation: impl Into<Interpolation>,
+        frames: &Frames,
+        layout: Layout,
+        encoding: Encoding,
+        output: &mut [u8],
+    ) -> Result<(), Error> {
+        let whole = (0..set.track_count(), layout);
+        self.encode_into(set, interpolation.into(), frames, whole, encoding, output)
+    }
+
+    fn encode_into(
+        &self,
+        set: &TrackSet,
+        interpolation: Interpolation,
+        frames: &Frames,
+        (tracks, layout): (Range<usize>, Layout),
+        encoding: Encoding,
+        output: &mut [u8],
+    ) -> Result<(), Error> {
         encoding.check(interpolation.quantity)?;
         let timeline = frames.resolve(set.track_count(), set.time_span())?;
-        let part = Window::of(tracks.clone(), 0..timeline.len(), Layout::TrackMajor);
+        let part = Window::of(tracks.clone(), 0..timeline.len(), layout);
         part.check(set.track_count(), timeline.len(), encoding, output)?;
         if output.is_empty() {
             return Ok(());
@@ -227,7 +260,18 @@ impl Engine {
                 tracks,
                 ..Request::whole(set, &interpolation, &timeline)
             };
-            return Ok((self.backend).evaluate_tracks(&request, Layout::TrackMajor, quats)?);
+            return Ok((self.backend).evaluate_tracks(&request, layout, quats)?);
+        }
+        let request = Request {
+            tracks: tracks.clone(),
+            ..Request::whole(set, &interpolation, &timeline)
+        };
+        if self.backend.route(&request, layout).is_of_few() {
+            // Few are evaluated, whatever they take when they are encoded.
+            let mut quats = OutputBuffer::new(part.len())?;
+            (self.backend).evaluate_tracks(&request, layout, &mut quats)?;
+            encoding.encode_all(bytemuck::cast_slice(&quats), output);
+            return Ok(());
         }
         if let Some(limit) = self.backend.budget() {
             let pieces = Pieces {
@@ -248,7 +292,7 @@ impl Engine {
             ..Wanted::all(set)
         };
         let clip = self.upload_wanted(set, interpolation, wanted)?;
-        let whole = Window::whole(tracks.len(), timeline.len(), Layout::TrackMajor);
+        let whole = Window::whole(tracks.len(), timeline.len(), layout);
         clip.encode_window_into(&timeline, &whole, encoding, output)
     }
 }

@@ -13,6 +13,7 @@ mod encoding;
 mod examples;
 mod external_vectors;
 mod extremes;
+mod few_samples;
 mod follow;
 mod golden;
 mod mesa;

@@ -5,11 +5,13 @@ use std::ffi::OsString;
 use std::path::Path;
 
 use clap::Parser;
-use tumble::{Device, Engine, EngineOptions};
+use tumble::{Device, Engine, EngineOptions, Interpolation, TrackSet};
+use tumble_formats::Diagnostic;
 use tumble_formats::motion::Motion;
 
 use crate::Arguments;
 use crate::arguments::device::DeviceArguments;
+use crate::arguments::interpolation;
 use crate::commands::{probe, view};
 use crate::messages::exit::{self, Failure};
 use crate::messages::{signals, words};
@@ -108,6 +110,16 @@ pub fn auto(rotations: usize) -> Result<Option<Engine>, Refused> {
         code: exit::DEVICE,
     })?;
     Ok(Some(engine))
+}
+
+/// Where the curves of a set are less smooth than their method promises, as a warning about `name`.
+#[must_use]
+pub fn curve_warning(
+    name: &str,
+    set: &TrackSet,
+    interpolation: &Interpolation,
+) -> Option<Diagnostic> {
+    interpolation::curve_warning(name, set, interpolation)
 }
 
 /// The page of `tumble view` with some clips, which messages and titles call by `path`. `options`

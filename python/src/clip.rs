@@ -1,5 +1,6 @@
 //! `tumble.Clip`: keyed tracks, from arrays or from a file.
 
+use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -7,7 +8,7 @@ use glam::{DVec3, Vec3};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::exceptions::{PyIndexError, PyKeyError, PyTypeError};
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyString};
+use pyo3::types::{PyDict, PyString, PyTuple};
 use tumble::Channel;
 use tumble_formats::format::Document;
 use tumble_formats::motion::Motion;
@@ -17,6 +18,7 @@ use crate::build::{Parts, clip_of};
 use crate::engine::default_engine;
 use crate::errors::guarded;
 use crate::options::frame_rate;
+use crate::pickle::{is_same, state};
 
 /// Tracks of rotation keys, with names, a skeleton, translations and scales where there are any.
 ///
@@ -203,6 +205,46 @@ impl Clip {
     #[getter]
     fn path(&self) -> Option<PathBuf> {
         Some(self.source.as_ref()?.path.clone())
+    }
+
+    /// Whether the other clip has the same tracks, keys and skeleton, whatever files they come from.
+    fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
+        let other = other.cast::<Self>();
+        other.is_ok_and(|other| is_same(&self.motion, &other.get().motion))
+    }
+
+    /// That of clips that are the same is the same.
+    fn __hash__(&self) -> u64 {
+        let set = &self.motion.set;
+        let (first, last) = self.span();
+        let mut hasher = DefaultHasher::new();
+        (set.track_count(), set.key_count(), &self.motion.name).hash(&mut hasher);
+        // Both zeros are the same time.
+        [first + 0.0, last + 0.0]
+            .map(f64::to_bits)
+            .hash(&mut hasher);
+        hasher.finish()
+    }
+
+    /// Its arrays, of which pickles of protocol 5 hand on the memory. What is kept of its file beside
+    /// the clip stays behind: a copy is saved as a clip without a file.
+    fn __reduce_ex__<'py>(
+        slf: &Bound<'py, Self>,
+        _protocol: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyTuple>> {
+        let py = slf.py();
+        let again = py.import("tumble._tumble")?.getattr("clip_of_state")?;
+        let state = guarded(|| state(py, slf.get()))?;
+        PyTuple::new(py, [again, PyTuple::new(py, [state])?.into_any()])
+    }
+
+    /// Clips do not change: the copy is the clip.
+    fn __copy__(slf: Bound<'_, Self>) -> Bound<'_, Self> {
+        slf
+    }
+
+    fn __deepcopy__<'py>(slf: Bound<'py, Self>, _memo: &Bound<'py, PyAny>) -> Bound<'py, Self> {
+        slf
     }
 
     /// The number of tracks.

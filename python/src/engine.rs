@@ -1,11 +1,15 @@
 //! `tumble.Engine`: one device, kept open.
 
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyDict, PyTuple};
-use tumble::{Axes, Device, Encoding, EngineOptions, EulerSequence, Layout, MatrixOrder, Quantity};
+use tumble::method::BESSEL_OVERHAUSER;
+use tumble::{
+    Axes, Device, Encoding, EngineOptions, EulerSequence, Interpolation, Layout, MatrixOrder,
+    Quantity,
+};
 use tumble_cli::host;
 
 use crate::arrays::Order;
@@ -14,6 +18,7 @@ use crate::errors::{device, guarded, input, of_engine};
 use crate::evaluate::Result;
 use crate::options::{Request, request_arrays};
 use crate::poses;
+use crate::run::{interruptible, stoppable};
 use crate::stream::Chunks;
 use crate::verify::Verification;
 
@@ -41,7 +46,18 @@ const FEW: usize = 1 << 20;
 pub(crate) struct Engine {
     own: tumble::Engine,
     /// For large calls, where the choice is by cost.
-    by_cost: Option<OnceLock<tumble::Engine>>,
+    by_cost: Option<OnceLock<(u32, tumble::Engine)>>,
+    /// What it was made with, for copies in other processes.
+    made: Made,
+}
+
+/// What an engine was made with.
+#[derive(Debug, Clone)]
+struct Made {
+    device: String,
+    memory: Option<u64>,
+    threads: Option<usize>,
+    allow_inexact: bool,
 }
 
 /// The engine that functions and methods without one share.
@@ -63,13 +79,15 @@ pub(crate) fn layout_named(name: &str) -> PyResult<Layout> {
     }
 }
 
-pub(crate) fn axes_named(name: &str) -> PyResult<Axes> {
+/// The axes of that name, and whether they are the world's, along the skeleton.
+pub(crate) fn axes_named(name: &str) -> PyResult<(Axes, bool)> {
     match name {
-        "body" => Ok(Axes::Body),
+        "body" => Ok((Axes::Body, false)),
+        "parent" => Ok((Axes::Parent, false)),
         // A track that has no parent turns in the world.
-        "parent" | "world" => Ok(Axes::Parent),
+        "world" => Ok((Axes::Parent, true)),
         _ => Err(input(format!(
-            "axes: there is no `{name}`; there are body, parent"
+            "axes: there is no `{name}`; there are body, parent, world"
         ))),
     }
 }
@@ -102,7 +120,13 @@ impl Engine {
                     false => host::open(&name, &options).map_err(|failure| of_host(&failure))?,
                 };
                 let by_cost = is_auto.then(OnceLock::new);
-                Ok(Self { own, by_cost })
+                let made = Made {
+                    device: name.clone(),
+                    memory,
+                    threads,
+                    allow_inexact,
+                };
+                Ok(Self { own, by_cost, made })
             })
         })
     }
@@ -113,11 +137,35 @@ impl Engine {
         self.own.device_name()
     }
 
+    /// Copies are engines of their own with the same options, opened where they are used: in another
+    /// process that is its device of that name.
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
+        let py = slf.py();
+        let made = &slf.get().made;
+        let options = PyDict::new(py);
+        options.set_item("memory", made.memory)?;
+        options.set_item("threads", made.threads)?;
+        options.set_item("allow_inexact", made.allow_inexact)?;
+        let class = py.get_type::<Self>();
+        let again = py.import("functools")?.getattr("partial")?;
+        let again = again.call((class, &made.device), Some(&options))?;
+        PyTuple::new(py, [again, PyTuple::empty(py).into_any()])
+    }
+
+    /// An engine may be shared.
+    fn __copy__(slf: Bound<'_, Self>) -> Bound<'_, Self> {
+        slf
+    }
+
+    fn __deepcopy__<'py>(slf: Bound<'py, Self>, _memo: &Bound<'py, PyAny>) -> Bound<'py, Self> {
+        slf
+    }
+
     fn __repr__(&self) -> String {
         match &self.by_cost {
             None => format!("Engine('{}')", self.own.device_name()),
             Some(large) => match large.get() {
-                Some(large) => format!(
+                Some((_, large)) => format!(
                     "Engine('auto': CPU; {} for large calls)",
                     large.device_name()
                 ),
@@ -173,9 +221,9 @@ impl Engine {
     }
 
     /// The angular velocity of every track at every sample: float32, (tracks, frames, 3), rad/s,
-    /// about the axes of the "body" or of its "parent" (of a track without one the world, and "world" is
-    /// taken too). Other keywords
-    /// are those of `evaluate`.
+    /// about the axes of the "body" or of its "parent", or in the "world": that of the rotation in the world,
+    /// along the skeleton, about the world's axes. Of a track without a parent the last two are the same. Other
+    /// keywords are those of `evaluate`.
     ///
     /// >>> import tumble
     /// >>> clip = tumble.Clip([0.0, 2.0], [[0, 0, 0, 1], [0, 0, 1, 0]])
@@ -190,8 +238,10 @@ impl Engine {
         layout: &str,
         options: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Bound<'py, PyAny>> {
+        let (axes, in_world) = axes_named(axes)?;
         let result = Result {
-            quantity: Quantity::Velocity(axes_named(axes)?),
+            quantity: Quantity::Velocity(axes),
+            in_world,
             encoding: Encoding::Vector,
             layout: layout_named(layout)?,
             ..Result::default()
@@ -214,8 +264,10 @@ impl Engine {
         layout: &str,
         options: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Bound<'py, PyAny>> {
+        let (axes, in_world) = axes_named(axes)?;
         let result = Result {
-            quantity: Quantity::Acceleration(axes_named(axes)?),
+            quantity: Quantity::Acceleration(axes),
+            in_world,
             encoding: Encoding::Vector,
             layout: layout_named(layout)?,
             ..Result::default()
@@ -346,7 +398,7 @@ impl Engine {
         let motion = &clip.get().motion;
         let engine = self.engine(chunk)?;
         clip.py()
-            .detach(|| guarded(|| Chunks::new(engine, motion, &request, chunk, form)))
+            .detach(|| stoppable(|| Chunks::new(engine, motion, &request, chunk, form)))
     }
 
     /// Clips as rows of a record batch, in and out by Arrow: for Spark, Daft and Ray Data. `rows`, of
@@ -372,6 +424,32 @@ impl Engine {
         arrow.call_method("batch", (slf, rows), Some(&given))
     }
 
+    /// Compiles what a Vulkan device runs for results of these, which else is done when the first of them is
+    /// asked for: some milliseconds, on some drivers seconds. The CPU has nothing to compile.
+    ///
+    /// >>> import tumble
+    /// >>> tumble.Engine("cpu").warm(method="slerp")
+    #[pyo3(signature = (*, method="bessel-overhauser"))]
+    fn warm(&self, py: Python<'_>, method: &str) -> PyResult<()> {
+        let method = crate::options::method_named(method)?.unwrap_or(BESSEL_OVERHAUSER);
+        let engine = self.engine(FEW)?;
+        interruptible(py, move || {
+            let kinds = [
+                (Quantity::Rotation, Encoding::F32),
+                (Quantity::Velocity(Axes::Body), Encoding::Vector),
+            ];
+            for (quantity, encoding) in kinds {
+                let interpolation = Interpolation {
+                    quantity,
+                    ..Interpolation::from(method)
+                };
+                let warmed = engine.warm(interpolation, encoding);
+                warmed.map_err(|error| of_engine(&error))?;
+            }
+            Ok(())
+        })
+    }
+
     /// Compares the device with the CPU, bit by bit, and both with a reference in float64 that
     /// shares no code with them. Keywords are those of `evaluate`.
     ///
@@ -390,8 +468,10 @@ impl Engine {
         let (motion, wanted) = (&clip.get().motion, request.samples()?);
         let (_, count) = wanted.resolved(&motion.set)?;
         let engine = self.engine(motion.set.track_count() * count)?;
-        clip.py()
-            .detach(|| guarded(|| Verification::of(&engine, motion, &request)))
+        let motion = Arc::clone(motion);
+        interruptible(clip.py(), move || {
+            Verification::of(&engine, &motion, &request)
+        })
     }
 }
 
@@ -401,8 +481,12 @@ impl Engine {
         let Some(large) = self.by_cost.as_ref().filter(|_| rotations >= FEW) else {
             return Ok(self.own.clone());
         };
-        if let Some(large) = large.get() {
-            return Ok(large.clone());
+        if let Some((process, large)) = large.get() {
+            // A device is not there in a process that was forked from that which opened it.
+            return Ok(match *process == std::process::id() {
+                true => large.clone(),
+                false => self.own.clone(),
+            });
         }
         Python::attach(|py| {
             py.detach(|| {
@@ -410,7 +494,8 @@ impl Engine {
                     let chosen = host::auto(rotations).map_err(|failure| of_host(&failure))?;
                     // Two threads may have chosen at once: both have the same bits.
                     let chosen = chosen.unwrap_or_else(|| self.own.clone());
-                    Ok(large.get_or_init(|| chosen).clone())
+                    let chosen = large.get_or_init(|| (std::process::id(), chosen));
+                    Ok(chosen.1.clone())
                 })
             })
         })

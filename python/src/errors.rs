@@ -3,8 +3,9 @@
 
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
 
-use pyo3::exceptions::PyRuntimeError;
+use pyo3::exceptions::{PyKeyboardInterrupt, PyRuntimeError};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyDict, PyType};
@@ -20,16 +21,18 @@ pub(crate) enum Class {
     Device,
     Output,
     Warning,
+    Missing,
 }
 
 impl Class {
     fn of(self, py: Python<'_>) -> PyResult<&Bound<'_, PyType>> {
-        static CLASSES: [PyOnceLock<Py<PyType>>; 4] = [const { PyOnceLock::new() }; 4];
+        static CLASSES: [PyOnceLock<Py<PyType>>; 5] = [const { PyOnceLock::new() }; 5];
         let name = match self {
             Self::Input => "InputError",
             Self::Device => "DeviceError",
             Self::Output => "OutputError",
             Self::Warning => "InputWarning",
+            Self::Missing => "MissingFileError",
         };
         CLASSES[self as usize].import(py, "tumble._errors", name)
     }
@@ -95,18 +98,86 @@ pub(crate) fn input_at(message: &str, code: Code, pointer: String) -> PyErr {
     Class::Input.error(message, &found)
 }
 
+/// A message of the program's with the keywords of Python in the place of options: `--map time=NAME` is
+/// `map="time=NAME"`.
+pub(crate) fn in_python(message: &str) -> String {
+    const WORDS: [(&str, &str); 9] = [
+        (
+            "--time-unit s, ms, us or ns",
+            r#"time_unit="s", "ms", "us" or "ns""#,
+        ),
+        (
+            "--time-unit ms, us or ns",
+            r#"time_unit="ms", "us" or "ns""#,
+        ),
+        (
+            "--duplicates first or last keeps one, both a jump",
+            r#"duplicates="first" or "last" keeps one, "both" a jump"#,
+        ),
+        (
+            "--duplicates first or last",
+            r#"duplicates="first" or "last""#,
+        ),
+        ("--linear NAME, in Python linear=[NAME]", "linear=[NAME]"),
+        (
+            "--source-fps, their rate (in Python source_fps)",
+            "source_fps, their rate",
+        ),
+        ("use -m ", "use method="),
+        ("`tumble eval --fps`", "`fps`"),
+        ("--animation", "its name or place"),
+    ];
+    const FLAGS: [&str; 3] = ["bridge_gaps", "overwrite", "raw_times"];
+    let message = WORDS
+        .iter()
+        .fold(message.to_owned(), |message, (program, python)| {
+            message.replace(program, python)
+        });
+    let mut parts = message.split("--");
+    let mut spoken = parts.next().unwrap_or_default().to_owned();
+    for part in parts {
+        let is_name = |c: char| c.is_ascii_lowercase() || c == '-';
+        let end = part.find(|c| !is_name(c)).unwrap_or(part.len());
+        let (name, rest) = part.split_at(end);
+        if name.is_empty() || spoken.ends_with(|c: char| c.is_alphanumeric() || c == '-') {
+            spoken.push_str("--");
+            spoken.push_str(part);
+            continue;
+        }
+        let name = name.replace('-', "_");
+        let value = rest.strip_prefix(' ').unwrap_or_default();
+        let value = value.split(' ').next().unwrap_or_default();
+        let value = value.trim_end_matches([';', ',', '`']);
+        spoken.push_str(&name);
+        match value.contains('=') {
+            true => {
+                spoken.push_str(&format!("=\"{value}\""));
+                spoken.push_str(&rest[1 + value.len()..]);
+            }
+            false => {
+                spoken.push_str(if FLAGS.contains(&&*name) { "=True" } else { "" });
+                spoken.push_str(rest);
+            }
+        }
+    }
+    spoken
+}
+
 /// What is wrong with a file.
 pub(crate) fn of_diagnostic(diagnostic: &Diagnostic) -> PyErr {
+    let is_missing = || !Path::new(&diagnostic.file).exists();
     let class = match diagnostic.code.severity() {
+        Severity::Error if diagnostic.code == Code::Open && is_missing() => Class::Missing,
         Severity::Error => Class::Input,
         Severity::Warning => Class::Warning,
     };
-    class.error(&diagnostic.to_string(), &diagnostic.into())
+    class.error(&in_python(&diagnostic.to_string()), &diagnostic.into())
 }
 
 /// What is remarkable about a file.
 pub(crate) fn warn(py: Python<'_>, diagnostic: &Diagnostic) -> PyResult<()> {
-    let warning = Class::Warning.error(&diagnostic.to_string(), &diagnostic.into());
+    let message = in_python(&diagnostic.to_string());
+    let warning = Class::Warning.error(&message, &diagnostic.into());
     py.import("warnings")?
         .call_method1("warn", (warning.value(py),))?;
     Ok(())
@@ -147,6 +218,7 @@ pub(crate) fn of_engine(error: &Error) -> PyErr {
     let message = error.to_string();
     match error {
         Error::Vulkan(_) | Error::Threads(_) => device(&message),
+        Error::Stopped(_) => PyKeyboardInterrupt::new_err(message),
         Error::Frames(FramesError::TimeNotFinite { index, .. }) => {
             input_at(&message, Code::NotFinite, format!("at[{index}]"))
         }
@@ -175,7 +247,7 @@ pub(crate) fn output(message: &str) -> PyErr {
 }
 
 pub(crate) fn of_output(error: &OutputError) -> PyErr {
-    output(&error.to_string())
+    output(&in_python(&error.to_string()))
 }
 
 pub(crate) fn of_write(error: &WriteError) -> PyErr {

@@ -1,20 +1,24 @@
 //! Results of clips: rotations, what follows from them, and whole poses.
 
-use std::sync::Arc;
+use std::collections::VecDeque;
+use std::sync::{Arc, Mutex, PoisonError, Weak};
 
+use glam::{DQuat, DVec3};
 use pyo3::intern;
 use pyo3::prelude::*;
 use pyo3::types::{PyList, PySlice};
-use tumble::method::SLERP;
+use tumble::method::{C2, SLERP};
 use tumble::{Encoding, Engine, Frames, Interpolation, Layout, Method, Quantity, TrackSet};
+use tumble_cli::host;
+use tumble_formats::Diagnostic;
 use tumble_formats::motion::Motion;
 use tumble_formats::sample::ChannelMethods;
 
 use crate::arrays::Order;
-use crate::errors::{guarded, input, of_engine};
+use crate::errors::{guarded, input, of_engine, warn};
 use crate::options::{Request, Samples};
 use crate::output::{array, filled};
-use crate::run::{Job, check_signals};
+use crate::run::{Job, check_signals, interruptible};
 
 /// What is made of a clip, and how it lies in memory.
 #[derive(Debug, Clone, Copy)]
@@ -24,6 +28,8 @@ pub(crate) struct Result {
     pub(crate) layout: Layout,
     pub(crate) order: Order,
     pub(crate) as_rotation: bool,
+    /// Rates are those of the rotations in the world, along the skeleton, not those in the parents' frames.
+    pub(crate) in_world: bool,
     /// Euler angles in radians instead of degrees.
     pub(crate) radians: bool,
     /// The only track has no axis.
@@ -39,6 +45,7 @@ impl Default for Result {
             layout: Layout::TrackMajor,
             order: Order::Xyzw,
             as_rotation: false,
+            in_world: false,
             radians: false,
             is_one_track: false,
         }
@@ -105,8 +112,18 @@ impl Result {
         let array = array(py, &shape, out, inputs)?;
         let engine = engine(tracks * count)?;
         filled(&array, |numbers| {
-            guarded(|| self.fill(&engine, clip, request, samples, &frames, count, numbers))
+            guarded(|| {
+                self.fill(&engine, clip, request, samples, &frames, count, numbers)?;
+                match self.in_world && !clip.is_world && !clip.skeleton.is_empty() {
+                    true => self
+                        .along_skeleton(&engine, clip, request, samples, &frames, count, numbers),
+                    false => Ok(()),
+                }
+            })
         })?;
+        for diagnostic in curve_warnings(py, clip, request, self.quantity, count)? {
+            warn(py, &diagnostic)?;
+        }
         match self.as_rotation {
             true => self.rotation(array.as_any(), self.is_one_track),
             false => Ok(array.into_any()),
@@ -169,6 +186,79 @@ impl Result {
             }
         }
         self.finish(numbers);
+        Ok(())
+    }
+
+    /// Makes rates in the parents' frames those in the world.
+    #[allow(clippy::too_many_arguments, reason = "as `fill`")]
+    fn along_skeleton(
+        &self,
+        engine: &Engine,
+        clip: &Motion,
+        request: &Request,
+        samples: &Samples,
+        frames: &Frames,
+        count: usize,
+        numbers: &mut [f32],
+    ) -> PyResult<()> {
+        let tracks = clip.set.track_count();
+        let other = |quantity, encoding: Encoding| -> PyResult<Vec<f32>> {
+            let other = Self {
+                quantity,
+                encoding,
+                ..*self
+            };
+            let mut found = vec![0.0; tracks * count * encoding.components().len()];
+            other.fill(engine, clip, request, samples, frames, count, &mut found)?;
+            Ok(found)
+        };
+        let rotations = other(Quantity::Rotation, Encoding::F32)?;
+        let velocities = match self.quantity {
+            Quantity::Acceleration(axes) => other(Quantity::Velocity(axes), Encoding::Vector)?,
+            _ => Vec::new(),
+        };
+        let order = parents_first(clip)?;
+        // A rotation in the world, and its velocity where accelerations are asked for.
+        let mut world = vec![(DQuat::IDENTITY, DVec3::ZERO); tracks];
+        for sample in 0..count {
+            for &track in &order {
+                let place = self.layout.index(track, sample, tracks, count).unwrap_or(0);
+                let three = |of: &[f32]| {
+                    DVec3::from_slice(&[0, 1, 2].map(|at| f64::from(of[3 * place + at])))
+                };
+                let local = [0, 1, 2, 3].map(|at| f64::from(rotations[4 * place + at]));
+                let rate = three(numbers);
+                let Some(parent) = clip.skeleton[track].parent else {
+                    let velocity = if velocities.is_empty() {
+                        rate
+                    } else {
+                        three(&velocities)
+                    };
+                    world[track] = (DQuat::from_array(local), velocity);
+                    continue;
+                };
+                let (above, carried) = world[parent];
+                let above_rate = |of: &[f32]| {
+                    let place = self
+                        .layout
+                        .index(parent, sample, tracks, count)
+                        .unwrap_or(0);
+                    DVec3::from_slice(&[0, 1, 2].map(|at| f64::from(of[3 * place + at])))
+                };
+                let turned = above * rate;
+                let mut found = above_rate(numbers) + turned;
+                let mut velocity = carried + turned;
+                if !velocities.is_empty() {
+                    let own = above * three(&velocities);
+                    found += carried.cross(own);
+                    velocity = carried + own;
+                }
+                let rotation = (above * DQuat::from_array(local)).normalize();
+                world[track] = (rotation, velocity);
+                let found = found.as_vec3().to_array();
+                numbers[3 * place..3 * place + 3].copy_from_slice(&found);
+            }
+        }
         Ok(())
     }
 
@@ -266,6 +356,85 @@ impl Result {
         }
         Ok(list.into_any())
     }
+}
+
+/// The tracks of a clip, parents before their children.
+fn parents_first(clip: &Motion) -> PyResult<Vec<usize>> {
+    let tracks = clip.skeleton.len();
+    let (mut order, mut known) = (Vec::with_capacity(tracks), vec![false; tracks]);
+    while order.len() < tracks {
+        let before = order.len();
+        for track in 0..tracks {
+            let is_next = match clip.skeleton[track].parent {
+                None => true,
+                Some(parent) => known.get(parent).copied().unwrap_or(false),
+            };
+            if !known[track] && is_next {
+                known[track] = true;
+                order.push(track);
+            }
+        }
+        if order.len() == before {
+            return Err(input("parents: tracks hang on each other in a circle"));
+        }
+    }
+    Ok(order)
+}
+
+/// Clips and how they were interpolated when it was last looked whether their curves are as smooth as the
+/// method promises: that takes as long as preparing them, and is done once.
+static LOOKED_AT: Mutex<VecDeque<(Weak<Motion>, Interpolation)>> = Mutex::new(VecDeque::new());
+
+/// How many are kept.
+const LOOKED: usize = 256;
+
+/// Samples for which a track is prepared as a whole: fewer keys than so many times these.
+const KEYS_OF_A_SAMPLE: usize = 2048;
+
+/// Where the curves of a clip are less smooth than their method promises, where that has not been told yet.
+/// Of a few samples of many keys it is not looked for.
+fn curve_warnings(
+    py: Python<'_>,
+    clip: &Arc<Motion>,
+    request: &Request,
+    quantity: Quantity,
+    samples: usize,
+) -> PyResult<Vec<Diagnostic>> {
+    let rotations = samples.saturating_mul(clip.set.track_count());
+    let has_warnings = |method: &Method| method.name == C2.name;
+    let method = request.method.filter(has_warnings);
+    let is_few = rotations.saturating_mul(KEYS_OF_A_SAMPLE) < clip.set.key_count();
+    let (Some(method), false) = (method, is_few) else {
+        return Ok(Vec::new());
+    };
+    let interpolation = Interpolation {
+        quantity: Quantity::Rotation,
+        ..request.with(quantity)(method)
+    };
+    let mut known = LOOKED_AT.lock().unwrap_or_else(PoisonError::into_inner);
+    let own = Arc::downgrade(clip);
+    if known
+        .iter()
+        .any(|(other, how)| other.ptr_eq(&own) && *how == interpolation)
+    {
+        return Ok(Vec::new());
+    }
+    known.truncate(LOOKED - 1);
+    known.push_front((own, interpolation));
+    drop(known);
+    let name = clip.name.clone().unwrap_or_else(|| "clip".to_owned());
+    let clip = Arc::clone(clip);
+    let look = move || Ok(host::curve_warning(&name, &clip.set, &interpolation));
+    let found = match clip_is_short(rotations) {
+        true => py.detach(|| guarded(look))?,
+        false => interruptible(py, look)?,
+    };
+    Ok(found.into_iter().collect())
+}
+
+/// Whether looking at a clip for so many rotations takes no longer than starting a thread.
+fn clip_is_short(rotations: usize) -> bool {
+    rotations < 4096
 }
 
 /// One track of a clip, with its channels.

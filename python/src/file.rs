@@ -6,12 +6,13 @@ use std::sync::Arc;
 use glam::DQuat;
 use pyo3::exceptions::{PyIndexError, PyKeyError, PyTypeError};
 use pyo3::prelude::*;
-use pyo3::types::PyString;
-use tumble_formats::adjust::{UpAxis, adjust};
+use pyo3::types::{PyString, PyTuple};
+use tumble_formats::adjust::{UpAxis, adjust, set_offsets};
 use tumble_formats::format::TimeUnit;
 use tumble_formats::keys::Duplicates;
 use tumble_formats::{Format, Limits, Loaded, ReadOptions};
 
+use crate::arrays::doubles;
 use crate::clip::{Clip, Source, counted};
 use crate::errors::{input, of_diagnostic, of_track, warn};
 use crate::options::{frame_rate, one_of};
@@ -79,6 +80,23 @@ impl File {
         self.refused.clone()
     }
 
+    /// Its clips, each as it is pickled: see `Clip`.
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
+        let (py, own) = (slf.py(), slf.get());
+        let again = py.import("tumble._tumble")?.getattr("file_of_state")?;
+        let state = (own.path.clone(), own.clips.clone(), own.refused.clone());
+        PyTuple::new(py, [again, state.into_pyobject(py)?.into_any()])
+    }
+
+    /// Files do not change: the copy is the file.
+    fn __copy__(slf: Bound<'_, Self>) -> Bound<'_, Self> {
+        slf
+    }
+
+    fn __deepcopy__<'py>(slf: Bound<'py, Self>, _memo: &Bound<'py, PyAny>) -> Bound<'py, Self> {
+        slf
+    }
+
     fn __len__(&self) -> usize {
         self.clips.len()
     }
@@ -139,26 +157,31 @@ impl File {
 /// with the place.
 ///
 /// `load(path, *, format=None, source_fps=None, map=None, time_unit=None, duplicates=None,
-/// raw_times=False, bridge_gaps=False, scale=None, up=None)`
+/// raw_times=False, bridge_gaps=False, offsets=None, scale=None, up=None)`
 ///
 /// `format`: of the file, instead of by its first bytes and its name. `source_fps`: the rate of
 /// keys of files without times. `map`: which array or column is what, where names do not
 /// tell: "rotations=keys:wxyz,time=t". `time_unit`: of times that are whole numbers, "s", "ms", "us"
-/// or "ns". `duplicates`: of two different keys at one time, keep the "first", the "last" or "both", for a jump.
+/// or "ns". A map has entries NAME=SOURCE, separated by commas: NAME is `rotations`, `translations` or
+/// `time` of arrays, a known column or a track's name of tables; SOURCE is an array, a column, a part of a list
+/// such as `state[3:7]`, or neighbouring columns `rx..rz`; `:wxyz`, `:rotvec`, `:euler-ZXY` and the like behind
+/// it say what its numbers are. Known columns are `time`, `track` (or `joint`, `body`), `clip` (`clip_id`,
+/// `motion_id`), `x y z w` or `qx qy qz qw`, `tx ty tz`, `sx sy sz`. `duplicates`: of two different keys at one time, keep the "first", the "last" or "both", for a jump.
 /// `raw_times`: leave times as they are, instead of on the frames that they were rounded from.
-/// `bridge_gaps`: leave out keys of which a table lacks numbers, instead of refusing it. `scale`: multiply
-/// translations. `up`: turn so that "y" or "z" is up, where the other was.
+/// `bridge_gaps`: leave out keys of which a table lacks numbers, instead of refusing it. `offsets`:
+/// where the joints of a body rest relative to their parents, (joints, 3), for files that do not say it, such
+/// as those of AMASS. `scale`: multiply translations. `up`: turn so that "y" or "z" is up, where the other was.
 ///
 /// `read` is another name of it.
 ///
 /// >>> import tumble
 /// >>> tumble.load("missing.glb")  # doctest: +IGNORE_EXCEPTION_DETAIL
 /// Traceback (most recent call last):
-/// tumble.InputError: missing.glb: error[E001]: ...
+/// tumble.MissingFileError: missing.glb: error[E001]: ...
 #[pyfunction]
 #[pyo3(signature = (
     path, *, format=None, source_fps=None, map=None, time_unit=None, duplicates=None,
-    raw_times=false, bridge_gaps=false, scale=None, up=None
+    raw_times=false, bridge_gaps=false, offsets=None, scale=None, up=None
 ))]
 #[allow(clippy::too_many_arguments, reason = "keywords")]
 pub(crate) fn load(
@@ -171,6 +194,7 @@ pub(crate) fn load(
     duplicates: Option<&Bound<'_, PyAny>>,
     raw_times: bool,
     bridge_gaps: bool,
+    offsets: Option<&Bound<'_, PyAny>>,
     scale: Option<f64>,
     up: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<File> {
@@ -212,6 +236,16 @@ pub(crate) fn load(
     if let Some(scale) = scale.filter(|scale| !scale.is_finite() || *scale <= 0.0) {
         return Err(input(format!("scale: {scale} is not a number over 0")));
     }
+    let offsets = offsets.map(|given| doubles(given, "offsets")).transpose()?;
+    if let Some(given) = offsets
+        .as_ref()
+        .filter(|given| given.shape.get(1) != Some(&3))
+    {
+        return Err(input(format!(
+            "offsets: the shape is {:?}; give (joints, 3)",
+            given.shape
+        )));
+    }
     let file = path.clone();
     let mut loaded = interruptible(py, move || {
         let read = match format {
@@ -219,6 +253,12 @@ pub(crate) fn load(
             None => Format::open_detected(&file, &options),
         };
         let mut loaded = read.map_err(|diagnostic| of_diagnostic(&diagnostic))?;
+        if let Some(offsets) = &offsets {
+            for clip in &mut loaded.clips {
+                let placed = set_offsets(clip, &offsets.values);
+                placed.map_err(|error| input(format!("offsets: {}: {error}", file.display())))?;
+            }
+        }
         if scale.is_some() || turn.is_some() {
             let turn = turn.map_or(DQuat::IDENTITY, UpAxis::turn);
             for clip in &mut loaded.clips {
@@ -256,6 +296,16 @@ impl File {
             path,
             refused: loaded.refused.iter().map(ToString::to_string).collect(),
         }
+    }
+}
+
+/// The file of these clips.
+#[pyfunction]
+pub(crate) fn file_of_state(path: PathBuf, clips: Vec<Clip>, refused: Vec<String>) -> File {
+    File {
+        clips,
+        path,
+        refused,
     }
 }
 

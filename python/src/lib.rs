@@ -14,8 +14,10 @@ mod errors;
 mod evaluate;
 mod file;
 mod function;
+mod motions;
 mod options;
 mod output;
+mod pickle;
 mod poses;
 mod program;
 mod run;
@@ -34,9 +36,15 @@ mod _tumble {
     #[pymodule_export]
     use crate::engine::Engine;
     #[pymodule_export]
+    use crate::file::file_of_state;
+    #[pymodule_export]
     use crate::file::{File, load};
     #[pymodule_export]
     use crate::function::evaluate;
+    #[pymodule_export]
+    use crate::motions::Motions;
+    #[pymodule_export]
+    use crate::pickle::clip_of_state;
     #[pymodule_export]
     use crate::program::{devices, load_drivers, methods, page, panic, run, set_probe};
     #[pymodule_export]

@@ -219,11 +219,15 @@ pub(crate) fn frame_rate(value: &Bound<'_, PyAny>) -> PyResult<FrameRate> {
 }
 
 fn method(value: &Bound<'_, PyAny>) -> PyResult<Option<Method>> {
-    let name = text(value, "method")?;
+    method_named(&text(value, "method")?)
+}
+
+/// The method of that name; `None` for "authored".
+pub(crate) fn method_named(name: &str) -> PyResult<Option<Method>> {
     if name == AUTHORED {
         return Ok(None);
     }
-    let found = Method::named(&name);
+    let found = Method::named(name);
     found.map(Some).ok_or_else(|| {
         let names: Vec<&str> = METHODS.iter().map(|method| method.name).collect();
         input(format!(

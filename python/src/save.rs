@@ -1,13 +1,14 @@
 //! `tumble.save`: clips into files, as `tumble eval` and `tumble convert` write them.
 
-use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::io::{self, Write};
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use tumble::{Encoding, Engine, Error, FrameRate, Frames, Layout, Quantity};
+use tumble::{Encoding, Engine, Error, FrameRate, Frames, Layout, Quantity, Stop};
 use tumble_formats::Diagnostic;
+use tumble_formats::diagnostic::Code;
 use tumble_formats::format::{
     Document, Format, MotionOptions, ResultShape, WriteError, WriteResults,
 };
@@ -20,11 +21,11 @@ use tumble_formats::sample::{ChannelMethods, Samples};
 use crate::arrays::Order;
 use crate::clip::Clip;
 use crate::engine::{default_engine, layout_named};
-use crate::errors::{guarded, input, of_engine, of_output, of_write, warn};
+use crate::errors::{input, of_engine, of_output, of_write, warn};
 use crate::evaluate::uniform;
 use crate::file::{File, format_named};
 use crate::options::{Request, Samples as Wanted};
-use crate::run::check_signals;
+use crate::run::interruptible;
 
 /// Rotations evaluated at once.
 const CHUNK: usize = 1 << 20;
@@ -102,25 +103,27 @@ pub(crate) fn save(
         },
         layout: layout_named(layout)?,
         engine: match engine {
-            Some(engine) => engine.get(),
-            None => default_engine(py)?.get(),
+            Some(engine) => engine.clone().unbind(),
+            None => default_engine(py)?.clone().unbind(),
         },
-        request: &request,
-        clips: &clips,
-        path: &path,
+        request,
+        clips,
+        path,
     };
-    let sources = clips
-        .iter()
-        .filter_map(|clip| Some(clip.source.as_ref()?.path.clone()));
-    let inputs: Vec<PathBuf> = sources.collect();
-    let warnings = py.detach(|| {
-        guarded(|| {
-            let create = || Output::create(&path, overwrite, &inputs);
-            let mut out = create().map_err(|error| of_output(&error))?;
-            let warnings = job.write(&mut out)?;
-            out.commit().map_err(|error| of_output(&error))?;
-            Ok(warnings)
-        })
+    let warnings = interruptible(py, move || {
+        let sources = job.clips.iter();
+        let sources = sources.filter_map(|clip| Some(clip.source.as_ref()?.path.clone()));
+        let inputs: Vec<PathBuf> = sources.collect();
+        let create = || Output::create(&job.path, overwrite, &inputs);
+        let out = create().map_err(|error| of_output(&error))?;
+        let stop = Stop::of_this_work();
+        let mut out = Stoppable { out, stop };
+        let warnings = job.write(&mut out)?;
+        if out.stop.is_stopped() {
+            return Err(of_engine(&Error::Stopped(tumble::Stopped)));
+        }
+        out.out.commit().map_err(|error| of_output(&error))?;
+        Ok(warnings)
     })?;
     warnings
         .iter()
@@ -148,17 +151,36 @@ pub(crate) fn clips_of(value: &Bound<'_, PyAny>) -> PyResult<Vec<Clip>> {
 }
 
 /// What is written, and how.
-struct Save<'a> {
+struct Save {
     format: &'static Format,
     motion: MotionOptions,
     layout: Layout,
-    engine: &'a crate::engine::Engine,
-    request: &'a Request,
-    clips: &'a [Clip],
-    path: &'a Path,
+    engine: Py<crate::engine::Engine>,
+    request: Request,
+    clips: Vec<Clip>,
+    path: PathBuf,
 }
 
-impl Save<'_> {
+/// Ends writing when the work is stopped.
+struct Stoppable<W> {
+    out: W,
+    stop: Stop,
+}
+
+impl<W: Write> Write for Stoppable<W> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        match self.stop.is_stopped() {
+            true => Err(io::Error::other("interrupted")),
+            false => self.out.write(bytes),
+        }
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.out.flush()
+    }
+}
+
+impl Save {
     fn write(&self, out: &mut dyn Write) -> PyResult<Vec<Diagnostic>> {
         let Some(samples) = &self.request.samples else {
             return self.keys(out);
@@ -176,7 +198,7 @@ impl Save<'_> {
         if self.format.takes_motion(&motions) {
             return self.sampled(&motions, samples, out);
         }
-        match (&*motions, &self.format.write) {
+        let written = match (&*motions, &self.format.write) {
             ([motion], Some(write)) => self.rotations(motion, samples, write, out),
             (_, None) => Err(input(format!(
                 "{} is read, and not written",
@@ -187,7 +209,28 @@ impl Save<'_> {
                 self.format.name,
                 motions.len()
             ))),
-        }
+        };
+        written.map(|mut warnings| {
+            warnings.extend(self.lost());
+            warnings
+        })
+    }
+
+    /// That the skeleton is left out, where rotations alone are written.
+    fn lost(&self) -> Option<Diagnostic> {
+        let hangs = |clip: &Clip| {
+            let rest = |joint: &tumble_formats::motion::Joint| {
+                joint.parent.is_some() || joint.rest.translation != glam::Vec3::ZERO
+            };
+            clip.motion.skeleton.iter().any(rest)
+        };
+        self.clips.iter().any(hangs).then(|| {
+            let message = format!(
+                "{} has no room for it, left out: the skeleton",
+                self.format.name.to_uppercase()
+            );
+            Diagnostic::new(self.path.display().to_string(), Code::NoRoom, message)
+        })
     }
 
     /// The file that all clips come from, if it can be written again.
@@ -211,7 +254,7 @@ impl Save<'_> {
         let source = self.clips.first().and_then(|clip| clip.source.as_ref());
         let is_whole = source.is_some_and(|source| source.clips == self.clips.len());
         if let Some(document) = self.document().filter(|_| is_whole) {
-            let written = document.write(&[], &self.motion, self.path, out);
+            let written = document.write(&[], &self.motion, &self.path, out);
             return written.map_err(|error| of_write(&error));
         }
         let keys = self.clips.iter().map(|clip| keyed(&clip.motion));
@@ -241,7 +284,7 @@ impl Save<'_> {
         self.written(clips, &frames, Some(rate), |sampled| {
             let places = clips.iter().map(|clip| clip.place);
             let clips: Vec<(usize, Sampled<'_>)> = places.zip(sampled.iter().cloned()).collect();
-            document.write(&clips, &self.motion, self.path, out)
+            document.write(&clips, &self.motion, &self.path, out)
         })
     }
 
@@ -272,10 +315,9 @@ impl Save<'_> {
     ) -> PyResult<Vec<Diagnostic>> {
         let mut all = Vec::new();
         for (clip, frames) in clips.iter().zip(frames) {
-            check_signals()?;
             let count = frames.resolve(clip.set.track_count(), clip.set.time_span());
             let count = count.map_err(|error| of_engine(&error.into()))?.len();
-            let engine = self.engine.engine(clip.set.track_count() * count)?;
+            let engine = self.engine.get().engine(clip.set.track_count() * count)?;
             let methods = ChannelMethods {
                 method: self.request.method,
                 with: &self.request.with(Quantity::Rotation),
@@ -325,12 +367,11 @@ impl Save<'_> {
         };
         let of_io = |error: std::io::Error| of_write(&error.into());
         let mut writer = format.begin(out, &shape).map_err(of_io)?;
-        let engine = self.engine.engine(clip.set.track_count() * count)?;
+        let engine = self.engine.get().engine(clip.set.track_count() * count)?;
         let with = self.request.with(Quantity::Rotation);
-        if let Some(method) = uniform(clip, self.request) {
+        if let Some(method) = uniform(clip, &self.request) {
             stream(&engine, clip, with(method), &frames, layout, |rotations| {
-                let written = writer.write(rotations).map_err(of_io);
-                written.and_then(|()| check_signals())
+                writer.write(rotations).map_err(of_io)
             })?;
         } else {
             let methods = ChannelMethods {

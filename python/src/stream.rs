@@ -10,11 +10,11 @@ use tumble::{Encoding, Engine, Frames, Interpolation, Layout, Quantity};
 use tumble_formats::motion::Motion;
 
 use crate::arrays::Order;
-use crate::errors::{guarded, input, of_engine};
+use crate::errors::{input, of_engine};
 use crate::evaluate::{OwnSet, sets, uniform};
 use crate::options::Request;
 use crate::output::{array, filled};
-use crate::run::Job;
+use crate::run::{Job, stoppable};
 
 /// An iterator of `Chunk`s; see `Engine.stream`.
 #[pyclass(frozen, module = "tumble")]
@@ -148,7 +148,7 @@ impl Chunks {
         let array = array(py, &shape, None, &[])?;
         let part = (tracks.clone(), frames.clone());
         filled(&array, |numbers| {
-            guarded(|| {
+            stoppable(|| {
                 let bytes = bytemuck::cast_slice_mut(&mut *numbers);
                 match &self.source {
                     Source::Tracks(interpolation, frames) => Job {

@@ -8,7 +8,6 @@ use tumble_formats::motion::Motion;
 use crate::errors::of_engine;
 use crate::evaluate::sets;
 use crate::options::Request;
-use crate::run::check_signals;
 
 /// What `Engine.verify` found.
 #[pyclass(frozen, get_all, module = "tumble")]
@@ -57,7 +56,6 @@ impl Verification {
         let sets = sets(clip, request)?;
         let is_one = sets.len() == 1;
         for (method, set, tracks) in sets {
-            check_signals()?;
             let frames = request.samples()?.frames(&clip.set, tracks.as_deref())?;
             let found = verify(engine, &set, with(method), &frames);
             let found = found.map_err(|error| of_engine(&error))?;

@@ -9,11 +9,11 @@ use rayon::prelude::*;
 use crate::cpu::engine::{CpuEngine, TASK};
 use crate::cpu::scratch::Memory;
 use crate::cpu::streaming::Stage;
-use crate::curve::options::InterpolationError;
 use crate::prepare::batch::{Batch, BatchSize, PART_INTERVALS, batches};
 use crate::prepare::clip_data::PartRef;
 use crate::prepare::error::SetError;
 use crate::prepare::request::Request;
+use crate::threads::stop;
 use crate::time::frames::Timeline;
 use crate::time::wrap::TrackCopy;
 use crate::tracks::set::TrackSet;
@@ -49,7 +49,8 @@ impl CpuEngine {
         let keys = set.keys_of(tracks.clone());
         let batches: Vec<Batch> = batches(set, Batch::Tracks(tracks), size);
         let samples_of_a_run = || rotations / keys.max(1);
-        let task = |(batches, output): (&[Batch], &mut [[f32; 4]])| {
+        let stop = stop::current();
+        let work = |(batches, output): (&[Batch], &mut [[f32; 4]])| {
             let mut stage = Stage::new(
                 self.width,
                 self.streaming_stores,
@@ -75,6 +76,7 @@ impl CpuEngine {
             self.scratch_pool.give_back(memory);
             Ok(())
         };
+        let task = |own| stop::during(stop.clone(), || work(own));
         if batches.len() <= 1 {
             return task((&batches, output));
         }
@@ -111,7 +113,7 @@ impl Memory {
         &mut self,
         set: &TrackSet,
         intervals: impl Iterator<Item = (usize, Range<usize>)>,
-    ) -> Result<(), InterpolationError> {
+    ) -> Result<(), SetError> {
         self.prepared.clear();
         self.preparation.push(&mut self.prepared, set, intervals)
     }

@@ -13,7 +13,7 @@ use crate::output::window::Window;
 use crate::prepare::clip_data::ClipData;
 use crate::prepare::error::SetError;
 use crate::simd::dispatch::in_lanes_of;
-use crate::threads;
+use crate::threads::{self, stop};
 use crate::time::frames::{FramesError, Ticks, Timeline};
 use crate::time::wrap::TrackCopy;
 
@@ -37,6 +37,7 @@ impl CpuEngine {
         if output.is_empty() {
             return Ok(());
         }
+        let stop = stop::current();
         // Waking a thread costs more than a task's worth of work.
         if output.len() <= TASK {
             return Ok(self.window(clip, timeline, window, Some(output.len()), output)?);
@@ -44,13 +45,19 @@ impl CpuEngine {
         if window.layout == Layout::FrameMajor {
             let tasks = frame_tasks(window, output).into_par_iter();
             return Ok(self.on_threads(|| {
-                tasks.try_for_each(|(window, frames)| self.frames(clip, timeline, &window, frames))
+                tasks.try_for_each(|(window, frames)| {
+                    stop::check_of(stop.as_ref())?;
+                    Ok::<_, SetError>(self.frames(clip, timeline, &window, frames)?)
+                })
             })??);
         }
         let rotations = Some(output.len());
         Ok(self.on_threads(|| {
             let tasks = tasks(window, 1, output).into_par_iter();
-            tasks.try_for_each(|(window, own)| self.window(clip, timeline, &window, rotations, own))
+            tasks.try_for_each(|(window, own)| {
+                stop::check_of(stop.as_ref())?;
+                Ok::<_, SetError>(self.window(clip, timeline, &window, rotations, own)?)
+            })
         })??)
     }
 
@@ -64,11 +71,13 @@ impl CpuEngine {
         encoding: Encoding,
         output: &mut [u8],
     ) -> Result<(), SetError> {
+        let stop = stop::current();
         let task = |rotations: &mut Vec<[f32; 4]>, window: &Window, output: &mut [u8]| {
+            stop::check_of(stop.as_ref())?;
             rotations.resize(window.len(), [0.0; 4]);
             self.window(clip, timeline, window, None, rotations)?;
             encoding.encode_all(rotations, output);
-            Ok::<_, FramesError>(())
+            Ok::<_, SetError>(())
         };
         if window.len() <= TASK {
             return match output {

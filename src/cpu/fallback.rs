@@ -2,11 +2,10 @@
 //! series is `UNRESOLVED`; here the intervals of such samples alone are prepared, and the samples
 //! are overwritten.
 
-use std::ops::Range;
-
 use rayon::prelude::*;
 
 use crate::cpu::engine::CpuEngine;
+use crate::cpu::few_samples::Group;
 use crate::cpu::streaming::Output;
 use crate::from_keys::UNRESOLVED;
 use crate::prepare::batch::PART_INTERVALS;
@@ -17,16 +16,10 @@ use crate::time::frames::Ticks;
 use crate::time::wrap::TrackCopy;
 
 /// Two unresolved intervals with at most this many others between them are prepared together.
-const APART: usize = 2;
-
-/// Intervals with unresolved samples, and the samples from the first of these to the last.
-struct Unresolved {
-    intervals: Range<usize>,
-    samples: Range<usize>,
-}
+pub(crate) const APART: usize = 2;
 
 /// What is prepared together, with their places in the result.
-type Group<'o> = Vec<(Unresolved, &'o mut [[f32; 4]])>;
+type Prepared<'o> = Vec<(Group, &'o mut [[f32; 4]])>;
 
 impl CpuEngine {
     /// Evaluates the unresolved ones of a track's consecutive samples from `first` on, by way of
@@ -39,9 +32,21 @@ impl CpuEngine {
         (first, key): (usize, usize),
         mut output: &mut [[f32; 4]],
     ) -> Result<(), SetError> {
+        if let Ticks::Times { .. } = request.timeline.ticks {
+            // In any order, and all samples of the track.
+            if output.contains(&UNRESOLVED) {
+                let tracks = track..track + 1;
+                let request = Request {
+                    tracks,
+                    ..request.clone()
+                };
+                self.evaluate_few(&request, output)?;
+            }
+            return Ok(());
+        }
         let all = unresolved(request, track, (first, key), output);
         let mut from = first;
-        let mut batches: Vec<Group<'_>> = Vec::new();
+        let mut batches: Vec<Prepared<'_>> = Vec::new();
         let mut intervals = PART_INTERVALS;
         for one in all {
             let others = &mut output[one.samples.start - from..];
@@ -56,7 +61,7 @@ impl CpuEngine {
                 batch.push((one, own));
             }
         }
-        let resolve = |batch: Group<'_>| -> Result<(), SetError> {
+        let resolve = |batch: Prepared<'_>| -> Result<(), SetError> {
             let mut memory = self.scratch_pool.take(request);
             let intervals = (batch.iter()).map(|(one, _)| (track, one.intervals.clone()));
             memory.prepare(request.set, intervals)?;
@@ -80,28 +85,32 @@ fn unresolved(
     track: usize,
     (first, key): (usize, usize),
     output: &[[f32; 4]],
-) -> Vec<Unresolved> {
+) -> Vec<Group> {
+    let samples = (first..).zip(output);
+    let samples = samples.filter(|(_, rotation)| **rotation == UNRESOLVED);
+    intervals_of_frames(request, track, key, samples.map(|(sample, _)| sample))
+}
+
+/// The intervals of a track in which frames at a rate lie, which increase. `key` is the index of a key at or
+/// before all of those between keys.
+pub(crate) fn intervals_of_frames(
+    request: &Request<'_>,
+    track: usize,
+    key: usize,
+    samples: impl Iterator<Item = usize>,
+) -> Vec<Group> {
     let (times, _) = request.set.times_and_keys(track);
     let last = times.len() - 1;
-    let mut all: Vec<Unresolved> = Vec::new();
+    let mut all = Vec::new();
     let Ticks::Frames { rate, start } = request.timeline.ticks else {
-        // Explicit times may be in any order, so the whole track is prepared.
-        if output.contains(&UNRESOLVED) {
-            all.push(Unresolved {
-                intervals: 0..last,
-                samples: first..first + output.len(),
-            });
-        }
-        return all;
+        return all; // explicit times have groups of their own
     };
-    let clock = FrameClock::new(rate, start, false);
-    for (sample, rotation) in (first..).zip(output) {
-        if *rotation != UNRESOLVED {
-            continue;
-        }
+    let clock = FrameClock::new(rate, start, request.interpolation.steps());
+    for sample in samples {
         let time = request.timeline.time_at(track, sample);
         let after = times.partition_point(|&key| key <= time);
-        let mut interval = after.saturating_sub(1).clamp(key, last - 1);
+        let most = last.saturating_sub(1);
+        let mut interval = after.saturating_sub(1).clamp(key.min(most), most);
         // A sample within rounding of a key is that key.
         while interval + 1 < last && clock.first_frame(times[interval + 1]) <= sample as f64 {
             interval += 1;
@@ -109,17 +118,7 @@ fn unresolved(
         while interval > key && clock.first_frame(times[interval]) > sample as f64 {
             interval -= 1;
         }
-        match all.last_mut() {
-            Some(Unresolved {
-                intervals, samples, ..
-            }) if interval <= intervals.end + APART && intervals.len() < PART_INTERVALS => {
-                (intervals.end, samples.end) = (interval + 1, sample + 1);
-            }
-            _ => all.push(Unresolved {
-                intervals: interval..interval + 1,
-                samples: sample..sample + 1,
-            }),
-        }
+        Group::put(&mut all, interval, last, sample);
     }
     all
 }

@@ -11,6 +11,7 @@ use crate::from_keys::evaluate::KeyEvaluator;
 use crate::prepare::batch::{Batch, BatchSize, batches};
 use crate::prepare::error::SetError;
 use crate::prepare::request::Request;
+use crate::threads::stop;
 use crate::time::frames::Ticks;
 
 /// Keys of one task.
@@ -32,8 +33,10 @@ impl CpuEngine {
             tracks: TASK / timeline.len(),
             cut: in_order.then_some(TASK_KEYS),
         };
+        let stop = stop::current();
         let new = || KeyEvaluator::new(request.interpolation, curve);
         let task = |evaluator: &mut KeyEvaluator<'a>, batch: &Batch, output: &mut [[f32; 4]]| {
+            stop::check_of(stop.as_ref())?;
             let window = batch.samples(set, timeline, false);
             let is_resolved = evaluator.evaluate(set, batch, timeline, &window, output)?;
             if is_resolved || window.is_empty() {

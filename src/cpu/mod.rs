@@ -6,6 +6,7 @@ pub(crate) mod clip;
 pub(crate) mod engine;
 pub(crate) mod evaluate;
 pub(crate) mod fallback;
+pub(crate) mod few_samples;
 mod fill;
 pub(crate) mod from_keys;
 pub(crate) mod row;

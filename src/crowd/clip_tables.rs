@@ -209,7 +209,7 @@ impl ClipTables {
             Form::Polynomial => FORM_POLYNOMIAL,
         };
         let of_vectors =
-            |channel| ClipData::of_vectors(set, channel, vectors, &interpolation, None);
+            |channel| ClipData::of_vectors(set, channel, vectors, &interpolation, None, None);
         let translations = of_vectors(Channel::Translation)?;
         let scales = of_vectors(Channel::Scale)?;
         let mut curves = reserved(joints * CHANNELS as usize, "a clip of a crowd")?;
@@ -298,7 +298,7 @@ impl ClipTables {
             first_base: first_base as u32,
             bases: (self.bases.len() - first_base) as u32,
         });
-        self.runs.push(self.runs_from(first_channel));
+        self.runs.push(runs_of(&self.channels[first_channel..]));
     }
 
     fn push_base(&mut self, spans: &[CrowdSpan]) {
@@ -318,25 +318,6 @@ impl ClipTables {
         let rotations = self.channels.iter().step_by(CHANNELS as usize);
         let mut forms = rotations.map(|channel| channel.form_and_base >> 24);
         forms.all(|form| form == FORM_ARC || form == FORM_CONSTANT)
-    }
-
-    /// The runs of rotations among the channels from here on.
-    fn runs_from(&self, first_channel: usize) -> Vec<Range<u32>> {
-        let channels = self.channels[first_channel..].iter();
-        let rotations: Vec<_> = channels.step_by(CHANNELS as usize).collect();
-        let mut end = 0;
-        rotations
-            .chunk_by(|before, own| {
-                before.form_and_base == own.form_and_base
-                    && before.first + 1 == own.first
-                    && before.count == own.count
-            })
-            .map(|run| {
-                let first = end;
-                end += run.len() as u32;
-                first..end
-            })
-            .collect()
     }
 
     /// Every channel of a clip at a tick, `[joint][kind]`, as reference poses hold it: of scales the
@@ -367,4 +348,22 @@ impl ClipTables {
             }
         })
     }
+}
+
+/// The runs of rotations among the channels of a clip.
+pub(super) fn runs_of(channels: &[CrowdChannel]) -> Vec<Range<u32>> {
+    let rotations: Vec<_> = channels.iter().step_by(CHANNELS as usize).collect();
+    let mut end = 0;
+    rotations
+        .chunk_by(|before, own| {
+            before.form_and_base == own.form_and_base
+                && before.first + 1 == own.first
+                && before.count == own.count
+        })
+        .map(|run| {
+            let first = end;
+            end += run.len() as u32;
+            first..end
+        })
+        .collect()
 }

@@ -10,3 +10,4 @@ pub(crate) mod on_cpu;
 #[cfg(feature = "vulkan")]
 pub(crate) mod own_device;
 pub(crate) mod player;
+pub(crate) mod states;

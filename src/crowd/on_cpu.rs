@@ -177,7 +177,7 @@ fn block<L: Lanes>(middles: &[[f32; 4]], tangents: &[[f32; 4]], parameter: f32) 
 
 /// Arcs of neighbouring joints at one parameter.
 #[inline(always)]
-fn arcs<L: Lanes>(
+pub(super) fn arcs<L: Lanes>(
     middles: &[[f32; 4]],
     tangents: &[[f32; 4]],
     parameter: f32,

@@ -14,6 +14,13 @@ use crate::time::frames::Ticks;
 /// cut: with longer tracks, too few threads would have work.
 const LONG_TRACK: usize = 16 * 1024;
 
+/// Key intervals that are prepared for one sample that stands alone, and as many again for what it costs
+/// to find them one by one: with fewer keys for each sample, preparing all takes no longer.
+const KEYS_OF_A_SAMPLE: usize = 8;
+
+/// The same where the velocities at the keys of a whole window of the track are solved for.
+const KEYS_OF_A_SOLUTION: usize = 2048;
+
 /// How a set becomes rotations.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Route {
@@ -25,6 +32,8 @@ pub(crate) enum Route {
         /// Whether a long track may be cut into several.
         cuts_tracks: bool,
     },
+    /// On the CPU: only the key intervals that have a sample are prepared.
+    FewSamples,
     /// The segments of all tracks are prepared before the first is evaluated. A Vulkan device
     /// takes as many tracks at a time as it has memory for.
     Clips {
@@ -41,10 +50,20 @@ impl Backend {
         let in_order = matches!(timeline.ticks, Ticks::Frames { .. });
         let are_held = interpolation.wrap().are_held();
         let cuts_tracks = in_rows && in_order && are_held && interpolation.speed == Speed::AsKeyed;
-        if !in_rows || timeline.is_empty() {
+        if timeline.is_empty() {
             return Route::Clips { cuts_tracks };
         }
-        let curve = KeyCurve::of_set(set, interpolation, timeline);
+        let is_few = matches!(self, Self::Cpu(_)) && request.has_few_samples();
+        let curve = match in_rows || is_few {
+            true => KeyCurve::of_set(set, interpolation, timeline),
+            false => None,
+        };
+        if is_few && curve.is_none() {
+            return Route::FewSamples;
+        }
+        if !in_rows && !is_few {
+            return Route::Clips { cuts_tracks };
+        }
         match (self, curve) {
             (Self::Cpu(_), Some(curve)) => Route::FromKeys(curve),
             (Self::Cpu(_), None) => {
@@ -67,6 +86,36 @@ impl Backend {
     }
 }
 
+impl Route {
+    /// Whether it is taken because there are few samples for many keys.
+    pub(crate) fn is_of_few(self) -> bool {
+        matches!(self, Self::FromKeys(_) | Self::FewSamples)
+    }
+
+    /// Whether it gives rows, each with the samples of a track, whatever the layout of the result.
+    pub(crate) fn is_of_rows(self) -> bool {
+        !matches!(self, Self::Clips { .. })
+    }
+}
+
+impl Request<'_> {
+    /// Whether there are so few samples for so many keys that only the intervals with a sample are worth
+    /// preparing, and each of these can be prepared without the others.
+    fn has_few_samples(&self) -> bool {
+        let (tracks, interpolation) = (self.tracks.clone(), self.interpolation);
+        let in_frames = matches!(self.timeline.ticks, Ticks::Frames { .. });
+        let are_together = in_frames && interpolation.wrap().repeats();
+        let each = match interpolation.method.is_solved() {
+            true => KEYS_OF_A_SOLUTION,
+            false => KEYS_OF_A_SAMPLE,
+        };
+        let samples = tracks.len().saturating_mul(self.timeline.len());
+        interpolation.speed == Speed::AsKeyed
+            && !are_together
+            && samples.saturating_mul(each) <= self.set.keys_of(tracks)
+    }
+}
+
 impl fmt::Display for Route {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -86,6 +135,9 @@ impl fmt::Display for Route {
                     false => Ok(()),
                 }
             }
+            Self::FewSamples => f.write_str(
+                "far fewer samples than keys: the intervals that have a sample are prepared, and no others",
+            ),
             Self::Clips { .. } => f.write_str(
                 "as a clip: all segments are prepared and brought to the device, as many tracks at a time as it has memory for, then evaluated",
             ),

@@ -24,7 +24,7 @@ use crate::prepare::clip_data::Wanted;
 use crate::prepare::error::SetError;
 use crate::prepare::request::Request;
 use crate::simd::dispatch::VectorWidth;
-use crate::threads::on_threads;
+use crate::threads::{on_threads, stop};
 use crate::time::frames::FramesError;
 
 /// Bytes of segments that a Vulkan device gets at once where a set has far more keys than samples.
@@ -66,7 +66,20 @@ impl Backend {
         output: &mut [Quat],
     ) -> Result<(), EvaluateError> {
         request.interpolation.check().map_err(SetError::from)?;
+        stop::check().map_err(SetError::from)?;
         let route = self.route(request, layout);
+        let (tracks, samples) = (request.tracks.len(), request.timeline.len());
+        if route.is_of_rows() && layout.of(samples) == Layout::FrameMajor && tracks > 1 {
+            let mut rows = OutputBuffer::new(output.len())?;
+            self.evaluate_tracks(request, Layout::TrackMajor, &mut rows)?;
+            for (sample, frame) in output.chunks_mut(tracks).enumerate() {
+                let column = rows[sample..].iter().step_by(samples);
+                for (own, &value) in frame.iter_mut().zip(column) {
+                    *own = value;
+                }
+            }
+            return Ok(());
+        }
         if let (Route::Clips { .. }, Self::Cpu(_), Some(limit)) = (route, &**self, self.budget()) {
             let (tracks, samples) = (request.tracks.clone(), 0..request.timeline.len());
             let pieces = Pieces {
@@ -84,6 +97,9 @@ impl Backend {
             (Route::FromKeys(curve), Self::Cpu(engine)) => {
                 Ok(engine.evaluate_from_keys(request, curve, output)?)
             }
+            (Route::FewSamples, Self::Cpu(engine)) => {
+                Ok(engine.evaluate_few(request, bytemuck::cast_slice_mut(output))?)
+            }
             (Route::FromKeys(curve), Self::Vulkan(opened)) => {
                 let job = KeyJob { request, curve };
                 opened.evaluate_from_keys(&job, bytemuck::cast_slice_mut(output))
@@ -91,7 +107,11 @@ impl Backend {
             (Route::Batches { cuts_tracks }, Self::Cpu(engine)) => {
                 Ok(engine.evaluate_batches(request, cuts_tracks, output)?)
             }
-            (Route::Batches { cuts_tracks } | Route::Clips { cuts_tracks }, _) => {
+            (route, _) => {
+                let cuts_tracks = matches!(
+                    route,
+                    Route::Batches { cuts_tracks: true } | Route::Clips { cuts_tracks: true }
+                );
                 let clips = self.clips(request, cuts_tracks);
                 let layout = layout.of(request.timeline.len());
                 self.evaluate_clips(request, layout, clips, output)
@@ -144,6 +164,7 @@ impl Backend {
         let mut used: Option<Uploaded> = None;
         let mut columns: Vec<Quat> = Vec::new();
         while let Some(batch) = clips.pop_front() {
+            stop::check().map_err(SetError::from)?;
             let own = batch.tracks();
             let timeline = timeline.of_tracks(own.clone());
             let (spare, buffers) = used

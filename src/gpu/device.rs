@@ -70,6 +70,8 @@ pub(crate) struct LogicalDevice {
     pub(crate) shared: SharedMemory,
     /// A wait ran out of time: work may still run, so nothing may be destroyed.
     hung: AtomicBool,
+    /// The process that opened it. In a process that was forked from it nothing may be done with it.
+    process: u32,
     /// What the driver compiled, kept from process to process.
     pub(crate) pipelines: PipelineCache,
 }
@@ -184,6 +186,7 @@ impl LogicalDevice {
             owned: false,
             shared: SharedMemory::default(),
             hung: AtomicBool::new(false),
+            process: std::process::id(),
             pipelines,
         }
     }
@@ -299,7 +302,15 @@ impl LogicalDevice {
 
     /// Whether objects may be destroyed.
     pub(crate) fn may_destroy(&self) -> bool {
-        !self.hung.load(Ordering::Relaxed)
+        !self.hung.load(Ordering::Relaxed) && self.check_process().is_ok()
+    }
+
+    /// Refuses the device in a process that was forked from that which opened it.
+    pub(crate) fn check_process(&self) -> Result<(), VulkanError> {
+        match self.process == std::process::id() {
+            true => Ok(()),
+            false => Err(VulkanError::Forked),
+        }
     }
 }
 

@@ -33,6 +33,11 @@ pub enum VulkanError {
         "no Vulkan driver for the NVIDIA card that /dev/nvidiactl shows: in a container, add the capability `graphics` (NVIDIA_DRIVER_CAPABILITIES=all); slices of a card that MIG made have no Vulkan"
     )]
     NoNvidiaDriver,
+    /// The process was forked from one that uses Vulkan, and no driver can be used on both sides of a fork.
+    #[error(
+        "Vulkan cannot be used in a process that was forked from one which uses it: start the process otherwise (spawn or forkserver in Python's multiprocessing), open the device in it alone, or use the CPU, which gives the same bits"
+    )]
+    Forked,
     /// The drivers did not answer in time.
     #[error(
         "the Vulkan drivers did not answer within {seconds} s; cards without NVIDIA's persistence daemon (nvidia-persistenced) and machines with many cards take long to start: run the daemon, wait longer (TUMBLE_DRIVER_SECONDS={}), or name the drivers to load in VK_DRIVER_FILES", seconds.saturating_mul(3)

@@ -21,7 +21,8 @@ use crate::gpu::submission::Spent;
 use crate::gpu::turns::Turns;
 use crate::gpu::work_list::Patch;
 use crate::output::encoding::Encoding;
-use crate::threads::on_threads;
+use crate::prepare::error::SetError;
+use crate::threads::{on_threads, stop};
 
 /// What one piece of work in flight needs; `U` are its uploads.
 pub(crate) struct InFlight<U> {
@@ -126,6 +127,7 @@ impl VulkanEngine {
         let mut stopwatch = Stopwatch::default();
         let mut next = 0;
         let mut result = work.try_for_each(|work| {
+            stop::check().map_err(SetError::from)?;
             if next == in_flight.len() {
                 in_flight.push(InFlight {
                     results: ReadBack::new(&self.device)?,

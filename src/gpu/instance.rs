@@ -2,7 +2,7 @@
 
 use std::ffi::{CStr, c_void};
 use std::path::Path;
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, OnceLock};
 
 use ash::{ext, khr, vk};
 
@@ -11,12 +11,18 @@ use crate::gpu::error::{Named, VulkanError};
 
 const VALIDATION: &CStr = c"VK_LAYER_KHRONOS_validation";
 
+/// The process that created the first instance. Drivers have threads of their own, which a process that is
+/// forked from it has not.
+static USED_BY: OnceLock<u32> = OnceLock::new();
+
 /// An instance, destroyed with its last user unless it was handed in.
 pub(crate) struct Instance {
     pub(crate) raw: ash::Instance,
     pub(crate) debug_utils: bool,
     messenger: Option<Messenger>,
     owned: bool,
+    /// The process that created it.
+    process: u32,
     /// Keeps the loader library open; last, so that it closes last.
     _entry: ash::Entry,
 }
@@ -52,6 +58,12 @@ impl Instance {
     }
 
     fn create(validation: bool, api_version: u32) -> Result<Arc<Self>, VulkanError> {
+        if USED_BY
+            .get()
+            .is_some_and(|&process| process != std::process::id())
+        {
+            return Err(VulkanError::Forked);
+        }
         let entry = loader()?;
         // SAFETY: no requirements beyond a loaded entry.
         let layers = unsafe { entry.enumerate_instance_layer_properties() }
@@ -120,11 +132,13 @@ impl Instance {
             return Err(VulkanError::NoNvidiaDriver);
         }
         let raw = raw.named("vkCreateInstance")?;
+        USED_BY.get_or_init(std::process::id);
         let mut instance = Self {
             raw,
             debug_utils,
             messenger: None,
             owned: true,
+            process: std::process::id(),
             _entry: entry,
         };
         if validation {
@@ -149,6 +163,7 @@ impl Instance {
             debug_utils: false,
             messenger: None,
             owned: false,
+            process: std::process::id(),
             _entry: entry,
         })
     }
@@ -218,6 +233,9 @@ fn loader() -> Result<ash::Entry, VulkanError> {
 
 impl Drop for Instance {
     fn drop(&mut self) {
+        if self.process != std::process::id() {
+            return; // the drivers' threads are not there
+        }
         if let Some(messenger) = &self.messenger {
             // SAFETY: created from this instance and destroyed once.
             unsafe { (messenger.functions).destroy_debug_utils_messenger(messenger.raw, None) };

@@ -75,6 +75,7 @@ impl Opened {
     ) -> Result<T, EvaluateError> {
         for _ in 0..REOPENINGS {
             let engine = self.engine();
+            engine.device.check_process()?;
             match work(&engine) {
                 Err(EvaluateError::Vulkan(error)) if error.is_lost() => {
                     match self.reopen(&engine) {

@@ -137,6 +137,7 @@ impl Submission {
     ///
     /// Must not be called while work is pending.
     pub(crate) fn begin(&mut self, sets: u32) -> Result<(), VulkanError> {
+        self.device.check_process()?;
         debug_assert!(self.submitted.is_none());
         self.descriptors.make_room(sets)?;
         let raw = &self.device.raw;
@@ -223,6 +224,7 @@ impl Submission {
         let Some(submitted) = self.submitted else {
             return Ok(None);
         };
+        self.device.check_process()?;
         let raw = &self.device.raw;
         let fences = [self.fence];
         // A device that has hung is not waited for again.
@@ -377,7 +379,7 @@ impl Access {
 impl Drop for Submission {
     fn drop(&mut self) {
         // An error may have left work pending; nothing may go before it ends.
-        if self.wait().is_err() && self.submitted.is_some() {
+        if self.wait().is_err() && self.submitted.is_some() && self.device.may_destroy() {
             self.device.wait_until_done(self.fence);
         }
         if self.device.may_destroy() {

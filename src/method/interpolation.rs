@@ -9,6 +9,7 @@ use crate::curve::options::{
 use crate::method::{Curves, Given, Method, Smooth};
 use crate::reference::curve::Curve;
 use crate::shader::Form;
+use crate::threads::on_threads;
 use crate::time::wrap::{Wrap, WrapMode};
 use crate::tracks::key_data::Tcb;
 use crate::tracks::set::{Track, TrackSet};
@@ -131,8 +132,16 @@ impl Interpolation {
                 count: keys.len(),
             })
         };
-        let tracks = (0..set.track_count()).into_par_iter();
-        tracks.filter_map(of_track).collect()
+        let tracks = 0..set.track_count();
+        let together = || {
+            tracks
+                .clone()
+                .into_par_iter()
+                .filter_map(of_track)
+                .collect()
+        };
+        // Without threads it takes longer.
+        on_threads(together).unwrap_or_else(|_| tracks.clone().filter_map(of_track).collect())
     }
 
     /// The smooth curves as keyed on the shortest path, if these are what is asked for.

@@ -196,6 +196,18 @@ pub(crate) enum Given {
     ),
 }
 
+impl Method {
+    /// Whether equations of many keys are solved for each of its curves.
+    pub(crate) fn is_solved(&self) -> bool {
+        match self.curves {
+            Curves::Smooth(smooth) | Curves::Arcs(smooth) => {
+                matches!(smooth.given, Given::Velocities(..))
+            }
+            Curves::Steps => false,
+        }
+    }
+}
+
 impl Smooth {
     const fn new(shape: &'static Shape, curves: fn(&mut Intervals, &[Stretch], Ends)) -> Self {
         Self {

@@ -83,7 +83,10 @@ impl Engine {
         let interpolation = interpolation.into();
         interpolation.check()?;
         let group_bytes = self.backend.group_bytes();
-        let data = ClipData::of_vectors(set, channel, method, &interpolation, group_bytes)?;
+        let timeline = frames.resolve(set.track_count(), set.time_span())?;
+        let only_for = Some(&timeline);
+        let data =
+            ClipData::of_vectors(set, channel, method, &interpolation, group_bytes, only_for)?;
         self.samples_of(data, frames, layout)
     }
 

@@ -18,7 +18,7 @@ use crate::prepare::preparation::Preparation;
 use crate::prepare::prepared::Prepared;
 use crate::prepare::vectors;
 use crate::shader::Form;
-use crate::threads::{self, OutOfThreads, on_threads};
+use crate::threads::{self, OutOfThreads, on_threads, stop};
 use crate::time::frames::{Ticks, Timeline};
 use crate::time::spans::Part;
 use crate::time::wrap::{TrackCopy, WrapMode};
@@ -100,6 +100,7 @@ fn prepare(
     let only_for = (wanted.only_for).filter(|_| interpolation.wrap().are_held());
     let first_track = wanted.batch.tracks().start as u32;
     let spare = Mutex::new(wanted.spare);
+    let stop = stop::current();
     let group = |batch: Batch| {
         let own = spare.lock().unwrap_or_else(PoisonError::into_inner).pop();
         let mut prepared = own.unwrap_or_else(|| Prepared::new(interpolation));
@@ -118,7 +119,9 @@ fn prepare(
             }
             Batch::Intervals { .. } => {}
         }
-        preparation.push(&mut prepared, set, batch.intervals(set))?;
+        stop::during(stop.clone(), || {
+            preparation.push(&mut prepared, set, batch.intervals(set))
+        })?;
         // A part's track counts from the first of the tracks asked for.
         for part in &mut prepared.parts {
             part.track -= first_track;
@@ -172,13 +175,14 @@ impl ClipData {
         Ok(Self::of_groups(groups, set, interpolation, merged_bytes))
     }
 
-    /// Prepares a set's translations or scales.
+    /// Prepares a set's translations or scales, for any timeline or only for one.
     pub(crate) fn of_vectors(
         set: &TrackSet,
         channel: Channel,
         method: VectorMethod,
         interpolation: &Interpolation,
         group_bytes: Option<usize>,
+        only_for: Option<&Timeline>,
     ) -> Result<Self, OutOfThreads> {
         let rest = match channel {
             Channel::Translation => Vec3::ZERO,
@@ -202,7 +206,14 @@ impl ClipData {
             prepared.spans.steps = method == VectorMethod::Step;
             for index in first..set.track_count().min(first + VECTOR_BATCH) {
                 let track = set.vectors(channel, index).unwrap_or(&still);
-                vectors::add(&mut prepared, index, track, method, &interpolation);
+                let track = match only_for {
+                    Some(timeline) => {
+                        let samples = timeline.times(index);
+                        vectors::thinned(track, method, interpolation.wrap(), samples)
+                    }
+                    None => Cow::Borrowed(track),
+                };
+                vectors::add(&mut prepared, index, &track, method, &interpolation);
             }
             prepared
         };

@@ -9,6 +9,7 @@ use crate::math::canonical::round_quat;
 use crate::math::quaternion::length;
 use crate::prepare::fitting::Fitting;
 use crate::prepare::prepared::Prepared;
+use crate::threads::stop;
 use crate::time::spans::{NONE, Part, Source};
 
 /// An interval that waits until all of its track is there.
@@ -40,6 +41,9 @@ fn retime_track(
 ) {
     let (start, first_key) = (intervals[0].start, intervals[0].key);
     let paced = |own: &mut Waiting| {
+        if stop::is_stopped() {
+            return None; // whoever prepares looks again when this is done
+        }
         let mut curve = own.curve.take()?;
         let pace = Pace::new(&curve);
         let length = pace.total();

@@ -3,6 +3,7 @@
 use crate::curve::options::InterpolationError;
 use crate::memory::OutOfMemory;
 use crate::threads::OutOfThreads;
+use crate::threads::stop::Stopped;
 use crate::time::frames::FramesError;
 
 /// Why a set cannot be evaluated as asked, on any device.
@@ -16,4 +17,6 @@ pub(crate) enum SetError {
     OutOfMemory(#[from] OutOfMemory),
     #[error(transparent)]
     Threads(#[from] OutOfThreads),
+    #[error(transparent)]
+    Stopped(#[from] Stopped),
 }

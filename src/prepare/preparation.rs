@@ -8,8 +8,10 @@ use crate::curve::options::{InterpolationError, Quantity};
 use crate::method::Curves;
 use crate::method::interpolation::Interpolation;
 use crate::prepare::arcs::ArcPreparation;
+use crate::prepare::error::SetError;
 use crate::prepare::prepared::Prepared;
 use crate::prepare::smooth::SmoothPreparation;
+use crate::threads::stop;
 use crate::time::frames::{Ticks, Timeline};
 use crate::time::spans::{NONE, Source};
 use crate::tracks::set::TrackSet;
@@ -86,10 +88,11 @@ impl Preparation {
         prepared: &mut Prepared,
         set: &TrackSet,
         intervals: impl Iterator<Item = (usize, Range<usize>)>,
-    ) -> Result<(), InterpolationError> {
+    ) -> Result<(), SetError> {
         let Self { interpolation, way } = self;
         let has_path = Self::has_path(interpolation);
         for (track, own) in intervals {
+            stop::check()?;
             let (_, keys) = set.times_and_keys(track);
             interpolation.check_track(keys, track)?;
             if has_path {
@@ -106,7 +109,8 @@ impl Preparation {
             Way::Arcs(arcs) => arcs.finish(prepared),
             Way::Smooth(smooth) => smooth.finish(prepared),
         }
-        Ok(())
+        // What gives up half way leaves something that must not be used.
+        Ok(stop::check()?)
     }
 }
 

@@ -1,6 +1,8 @@
 //! Prepares translations and scales: a segment is a cubic in each component about the middle of its
 //! interval. It is a polynomial already, so nothing is fitted.
 
+use std::borrow::Cow;
+
 use bytemuck::Zeroable;
 use glam::{DVec3, Vec3};
 
@@ -15,8 +17,56 @@ use crate::method::vector_method::VectorMethod;
 use crate::prepare::prepared::Prepared;
 use crate::shader::PolynomialSegment;
 use crate::time::spans::{NONE, Source};
-use crate::time::wrap::WrapMode;
+use crate::time::wrap::{Wrap, WrapMode};
 use crate::tracks::vectors::VectorTrack;
+
+/// Keys beside a sample on either side that its curve may depend on, and one for the rounding of times.
+const BESIDE: usize = 3;
+
+/// With fewer keys for each sample, thinning a track takes no less time than preparing all of it.
+const KEYS_OF_A_SAMPLE: usize = 8;
+
+/// The track with the keys that the curves at some times depend on, and those at its ends: what it is between
+/// others is of no use. All of it where there are many samples, and where every key counts.
+pub(crate) fn thinned<'t>(
+    track: &'t VectorTrack,
+    method: VectorMethod,
+    wrap: Wrap,
+    samples: impl ExactSizeIterator<Item = f64>,
+) -> Cow<'t, VectorTrack> {
+    let count = track.keys.len();
+    if method == VectorMethod::C2 || (samples.len() + 1) * KEYS_OF_A_SAMPLE > count {
+        return Cow::Borrowed(track);
+    }
+    let span = (track.times[0], track.times[count - 1]);
+    let mut near = Vec::with_capacity(samples.len() + 2);
+    near.extend([0, count - 1]);
+    near.extend(samples.map(|time| {
+        let time = match wrap.repeats() {
+            true => wrap.folded(span, time),
+            false => time,
+        };
+        track.times.partition_point(|&key| key <= time)
+    }));
+    near.sort_unstable();
+    let mut places: Vec<usize> = Vec::new();
+    for near in near {
+        let from = places.last().map_or(0, |&last| last + 1);
+        places.extend(from.max(near.saturating_sub(BESIDE + 1))..count.min(near + BESIDE + 1));
+    }
+    fn of<T: Copy>(all: &[T], places: &[usize]) -> Vec<T> {
+        match all {
+            [] => Vec::new(),
+            all => places.iter().map(|&place| all[place]).collect(),
+        }
+    }
+    Cow::Owned(VectorTrack {
+        times: of(&track.times, &places),
+        keys: of(&track.keys, &places),
+        tangents: of(&track.tangents, &places),
+        ups: of(&track.ups, &places),
+    })
+}
 
 /// Adds the vectors of the `index`th track.
 pub(crate) fn add(

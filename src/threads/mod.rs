@@ -5,6 +5,8 @@
 //! would else, as rayon's workers do, take up other tasks of that pool while it waits, and one of these
 //! may need what the waiting call, or the caller around it, has locked.
 
+pub(crate) mod stop;
+
 use std::cell::Cell;
 use std::io;
 use std::panic::resume_unwind;

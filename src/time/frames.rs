@@ -269,6 +269,14 @@ impl Timeline {
         self.count == 0
     }
 
+    /// Explicit times, the same for every track.
+    pub(crate) fn at(times: Arc<Vec<f64>>) -> Self {
+        Self {
+            count: times.len(),
+            ticks: Ticks::Times { times, stride: 0 },
+        }
+    }
+
     /// The same samples for a set that has only some of the tracks.
     pub(crate) fn of_tracks(&self, tracks: std::ops::Range<usize>) -> Self {
         let mut own = self.clone();

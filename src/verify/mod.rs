@@ -32,7 +32,7 @@ use crate::method::interpolation::Interpolation;
 use crate::reference;
 use crate::reference::quaternion::angle_between;
 use crate::shader::Form;
-use crate::threads::on_threads;
+use crate::threads::{on_threads, stop};
 use crate::time::frame_clock::rounding;
 use crate::time::frames::{Frames, Timeline};
 use crate::tracks::set::{Track, TrackSet};
@@ -201,6 +201,8 @@ pub fn verify(
         None => (0, None),
     };
     let errors = Errors::measure(set, interpolation, &timeline, found.as_quats())?;
+    let outputs = outputs::verify(engine, set, interpolation, frames, &timeline)?;
+    stop::check()?;
     Ok(Verification {
         method: interpolation.method.name,
         device,
@@ -213,7 +215,7 @@ pub fn verify(
         max_norm_error: errors.norm,
         error_bound: error_bound(interpolation.form()),
         norm_bound: NORM_BOUND + beyond_rounding(set),
-        outputs: outputs::verify(engine, set, interpolation, frames, &timeline)?,
+        outputs,
     })
 }
 
@@ -299,10 +301,16 @@ impl Errors {
         timeline: &Timeline,
         found: &[Quat],
     ) -> Result<Self, Error> {
-        let measured = |track| TrackErrors::measure(set, interpolation, timeline, found, track);
+        let stop = stop::current();
+        let measured = |track| {
+            stop::during(stop.clone(), || {
+                TrackErrors::measure(set, interpolation, timeline, found, track)
+            })
+        };
         let tracks = 0..set.track_count();
         let tracks: Vec<TrackErrors> =
             on_threads(|| tracks.into_par_iter().map(measured).collect())?;
+        stop::check()?;
         let worst = tracks
             .iter()
             .enumerate()
@@ -347,6 +355,9 @@ impl TrackErrors {
         let row = &found[index * samples..(index + 1) * samples];
         let mut errors = Self::default();
         for (sample, quat) in row.iter().enumerate() {
+            if sample % 64 == 0 && stop::is_stopped() {
+                return errors; // whoever verifies looks again
+            }
             let quat = quat.as_dquat();
             let norm = worse((quat.length() - 1.0).abs());
             let time = keys.of_sample(timeline, index, sample);

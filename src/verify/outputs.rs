@@ -14,7 +14,7 @@ use crate::output::rotations::{Layout, Rotations, Vectors};
 use crate::pose::skeleton::Skeleton;
 use crate::reference::curve::Curve;
 use crate::reference::quaternion::angle_between;
-use crate::threads::{OutOfThreads, on_threads};
+use crate::threads::{OutOfThreads, on_threads, stop};
 use crate::time::frames::{Frames, Timeline};
 use crate::tracks::set::{Track, TrackSet};
 use crate::verify::{KeyTimes, differences, worse};
@@ -157,6 +157,7 @@ fn rate_error(
 ) -> Result<f64, OutOfThreads> {
     let samples = timeline.len();
     let each = (samples * set.track_count()).div_ceil(RATES_CHECKED).max(1);
+    let stop = stop::current();
     let track = |index: usize| {
         let track = set.track(index);
         let keys = KeyTimes::new(&track, &interpolation);
@@ -175,6 +176,9 @@ fn rate_error(
         };
         let (mut error, mut largest) = (0.0f64, rate_floor(times, interpolation.quantity));
         for sample in (0..samples).step_by(each) {
+            if stop::check_of(stop.as_ref()).is_err() {
+                return 0.0; // whoever verifies looks again
+            }
             let time = keys.of_sample(timeline, index, sample);
             let found = found.get(index, sample).unwrap_or(Vec3::NAN).as_dvec3();
             let error_at = |time: f64| (found - expected(time)).length();

@@ -3,6 +3,7 @@
 
 mod own_device;
 mod refusals;
+mod states;
 
 use glam::{Affine3A, Quat, Vec3};
 use proptest::prelude::*;

@@ -9,6 +9,12 @@ use crate::map::{Entry, Map};
 use crate::npy::ComponentOrder;
 use crate::rotation_form::RotationForm;
 
+/// Columns that tell the tracks of long tables apart.
+const TRACK: [&str; 3] = ["track", "joint", "body"];
+
+/// Columns that tell clips apart.
+const CLIP: [&str; 3] = ["clip", "clip_id", "motion_id"];
+
 /// What a column has to hold.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) enum Need {
@@ -147,6 +153,16 @@ impl Names<'_> {
         Ok(self.find(name)?.map(|index| self.want(index, need)))
     }
 
+    /// The first column that has one of these names.
+    fn first_of(&mut self, all: &[&str]) -> Result<Option<usize>, Diagnostic> {
+        for name in all {
+            if let Some(found) = self.take(name, Need::Name)? {
+                return Ok(Some(found));
+            }
+        }
+        Ok(None)
+    }
+
     /// All columns of these names, or none of them.
     fn group<const N: usize>(
         &mut self,
@@ -235,7 +251,7 @@ impl Plan {
             None => Vec::new(),
         };
         let (time, is_frames) = time_column(&mut names, options)?;
-        let clip = match names.take("clip", Need::Name)? {
+        let clip = match names.first_of(&CLIP)? {
             Some(clip) => Some((clip, "")),
             None => names
                 .take("episode_index", Need::Whole)?
@@ -246,7 +262,7 @@ impl Plan {
         } else if names.find("w")?.is_some() || names.find("qw")?.is_some() {
             let (parts, is_world) = names.parts("")?;
             Rows::Keys {
-                track: names.take("track", Need::Name)?,
+                track: names.first_of(&TRACK)?,
                 parts: Box::new(parts),
                 is_world,
             }
@@ -297,13 +313,14 @@ fn rename(names: &mut Names<'_>, map: &str) -> Result<Vec<Entry>, Diagnostic> {
 
 /// Whether a column may have this name; other targets are tracks.
 fn is_column(target: &str) -> bool {
-    const WHOLE: [&str; 6] = ["time", "timestamp", "t", "track", "clip", "frame_index"];
+    const WHOLE: [&str; 4] = ["time", "timestamp", "t", "frame_index"];
     const NUMBERS: [&str; 17] = [
         "x", "y", "z", "w", "tx", "ty", "tz", "px", "py", "pz", "sx", "sy", "sz", "qx", "qy", "qz",
         "qw",
     ];
     let last = target.rsplit('.').next().unwrap_or(target);
-    WHOLE.contains(&target) || target == "episode_index" || NUMBERS.contains(&last)
+    let tells_apart = TRACK.contains(&target) || CLIP.contains(&target);
+    WHOLE.contains(&target) || tells_apart || target == "episode_index" || NUMBERS.contains(&last)
 }
 
 fn time_column(names: &mut Names<'_>, options: &ReadOptions) -> Result<(usize, bool), Diagnostic> {

@@ -20,7 +20,15 @@ from __future__ import annotations
 import sys as _sys
 
 from tumble import _notebook, _tumble
-from tumble._errors import DeviceError, Error, InputError, InputWarning, OutputError
+from tumble._errors import (
+    DeviceError,
+    Error,
+    InputError,
+    InputWarning,
+    MissingFileError,
+    OutputError,
+)
+from tumble._motion import MotionLibrary, MotionState
 from tumble._tumble import (
     Chunk,
     Chunks,
@@ -50,6 +58,9 @@ __all__ = [
     "File",
     "InputError",
     "InputWarning",
+    "MissingFileError",
+    "MotionLibrary",
+    "MotionState",
     "OutputError",
     "Verification",
     "devices",

@@ -55,6 +55,18 @@ class InputError(Error, ValueError):
     """
 
 
+class MissingFileError(InputError, FileNotFoundError):
+    """A file is not there.
+
+    >>> import tumble
+    >>> issubclass(tumble.MissingFileError, FileNotFoundError)
+    True
+    """
+
+    def __str__(self) -> str:
+        return str(self.args[0])
+
+
 class DeviceError(Error, RuntimeError):
     """A device cannot be opened, or has failed.
 

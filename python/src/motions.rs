@@ -1,0 +1,329 @@
+//! The tables behind `tumble.MotionLibrary`: clips of one skeleton, sampled at many times at once.
+
+use glam::Vec3;
+use numpy::{
+    PyArray1, PyArray2, PyArrayDyn, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2,
+    PyReadwriteArrayDyn, PyUntypedArrayMethods,
+};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use tumble::{
+    Channel, CrowdError, CrowdLibrary, Error, Interpolation, MotionStates, MotionTables,
+    MotionWords, Quantity, Skeleton,
+};
+use tumble_formats::motion::Motion;
+use tumble_formats::sample::ChannelMethods;
+
+use crate::clip::Clip;
+use crate::engine::Engine;
+use crate::errors::{guarded, input, of_engine};
+use crate::options::method_named;
+use crate::run::stoppable;
+
+/// A whole number of ticks is a frame of all usual rates.
+const TICKS: u32 = 705_600;
+
+/// At most as many times these ticks are a second's: then times are kept to 30 ns.
+const FINEST: f64 = 24.0;
+
+/// The longest clip, ticks.
+const LONGEST: f64 = 2.1e9;
+
+/// Joints of a call from which on Ctrl-C is looked for.
+const MANY: usize = 1 << 21;
+
+/// The clips of a motion library, prepared: what is sampled, and its arrays for files.
+#[pyclass(frozen, module = "tumble._tumble")]
+pub(crate) struct Motions {
+    tables: MotionTables,
+    spans: Py<PyArray2<u32>>,
+    cells: Py<PyArray2<f32>>,
+}
+
+fn of_crowd(error: CrowdError) -> PyErr {
+    of_engine(&Error::Crowd(error))
+}
+
+#[pymethods]
+impl Motions {
+    /// Prepares clips by a method. All have the tracks of the skeleton that `parents` and `offsets` say.
+    #[staticmethod]
+    fn of_clips(
+        py: Python<'_>,
+        clips: Vec<Clip>,
+        parents: Vec<i64>,
+        offsets: Vec<[f32; 3]>,
+        method: &str,
+    ) -> PyResult<Self> {
+        let method = method_named(method)?;
+        let prepared = py.detach(|| {
+            stoppable(|| {
+                let parents = parents.iter().map(|&parent| usize::try_from(parent).ok());
+                let offsets = offsets.into_iter().map(Vec3::from_array).collect();
+                let skeleton = Skeleton::new(parents.collect(), offsets);
+                let skeleton = skeleton.map_err(|error| input(format!("skeleton: {error}")))?;
+                let longest = clips.iter().map(|clip| length(&clip.motion));
+                let longest = longest.fold(1e-3, f64::max);
+                let whole = (LONGEST / longest / f64::from(TICKS)).floor().min(FINEST);
+                let ticks = match whole >= 1.0 {
+                    true => whole as u32 * TICKS,
+                    false => (LONGEST / longest).max(1.0) as u32,
+                };
+                let made = CrowdLibrary::with_ticks(&skeleton, ticks);
+                let mut library = made.map_err(of_crowd)?;
+                for (place, clip) in clips.iter().enumerate() {
+                    let named = |error: &str| input(format!("{}: {error}", shown(place, clip)));
+                    let motion = &clip.motion;
+                    check(motion).map_err(named)?;
+                    let methods = ChannelMethods {
+                        method,
+                        with: &Interpolation::from,
+                    };
+                    let (Some(of_rotations), Some(of_vectors)) =
+                        (methods.method_of(motion), methods.vector_method_of(motion))
+                    else {
+                        return Err(named(
+                            "its tracks have several methods; name one as `method`",
+                        ));
+                    };
+                    let interpolation = Interpolation {
+                        quantity: Quantity::Rotation,
+                        ..Interpolation::from(of_rotations)
+                    };
+                    library
+                        .push(&motion.set, interpolation, of_vectors)
+                        .map_err(|error| match error {
+                            CrowdError::Stopped(_) => of_crowd(error),
+                            error => named(&error.to_string()),
+                        })?;
+                }
+                Ok(library.into_tables())
+            })
+        })?;
+        let (tables, spans, cells) = prepared;
+        let [spans_count, cells_count] = [spans.len(), cells.len()];
+        let spans = PyArray1::from_vec(py, spans.into_flattened()).reshape([spans_count, 4])?;
+        let cells = PyArray1::from_vec(py, cells.into_flattened()).reshape([cells_count, 4])?;
+        Ok(Self {
+            tables,
+            spans: spans.unbind(),
+            cells: cells.unbind(),
+        })
+    }
+
+    /// What `arrays` gave; `spans` and `cells` stay where they are.
+    #[staticmethod]
+    fn of_arrays(arrays: &Bound<'_, PyDict>) -> PyResult<Self> {
+        fn words<const N: usize>(
+            arrays: &Bound<'_, PyDict>,
+            name: &str,
+        ) -> PyResult<Vec<[u32; N]>> {
+            let array: PyReadonlyArray2<'_, u32> = array(arrays, name)?.extract()?;
+            let chunks = array.as_slice()?.as_chunks();
+            match chunks.1 {
+                [] => Ok(chunks.0.to_vec()),
+                _ => Err(of_crowd(CrowdError::BrokenTables)),
+            }
+        }
+        let [sizes, ..] = words::<2>(arrays, "sizes")?[..] else {
+            return Err(of_crowd(CrowdError::BrokenTables));
+        };
+        let words = MotionWords {
+            clips: words(arrays, "clips")?,
+            bases: words(arrays, "bases")?,
+            channels: words(arrays, "channels")?,
+            links: words(arrays, "links")?,
+            joints: sizes[0] as usize,
+            ticks_per_second: sizes[1],
+        };
+        let spans = array(arrays, "spans")?.cast_into::<PyArray2<u32>>()?;
+        let cells = array(arrays, "cells")?.cast_into::<PyArray2<f32>>()?;
+        let tables = {
+            let (spans, cells) = (spans.try_readonly()?, cells.try_readonly()?);
+            let parts = (spans.as_slice()?.as_chunks(), cells.as_slice()?.as_chunks());
+            if !(parts.0.1.is_empty() && parts.1.1.is_empty()) {
+                return Err(of_crowd(CrowdError::BrokenTables));
+            }
+            guarded(|| MotionTables::new(words, (parts.0.0, parts.1.0)).map_err(of_crowd))?
+        };
+        Ok(Self {
+            tables,
+            spans: spans.unbind(),
+            cells: cells.unbind(),
+        })
+    }
+
+    /// Everything, as arrays.
+    fn arrays<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let words = self.tables.words();
+        let found = PyDict::new(py);
+        fn put<const N: usize>(
+            found: &Bound<'_, PyDict>,
+            name: &str,
+            words: Vec<[u32; N]>,
+        ) -> PyResult<()> {
+            let count = words.len();
+            let flat = PyArray1::from_vec(found.py(), words.into_flattened());
+            found.set_item(name, flat.reshape([count, N])?)
+        }
+        put(&found, "clips", words.clips)?;
+        put(&found, "bases", words.bases)?;
+        put(&found, "channels", words.channels)?;
+        put(&found, "links", words.links)?;
+        put(
+            &found,
+            "sizes",
+            vec![[words.joints as u32, words.ticks_per_second]],
+        )?;
+        found.set_item("spans", &self.spans)?;
+        found.set_item("cells", &self.cells)?;
+        Ok(found)
+    }
+
+    /// Number of joints.
+    #[getter]
+    fn joints(&self) -> usize {
+        self.tables.joints()
+    }
+
+    /// Fills arrays: rotations, positions, world rotations, velocities and angular velocities, each None
+    /// where it is left out.
+    #[allow(clippy::too_many_arguments, reason = "five arrays")]
+    fn sample(
+        &self,
+        py: Python<'_>,
+        engine: &Bound<'_, Engine>,
+        clip_ids: PyReadonlyArray1<'_, i64>,
+        times: PyReadonlyArray1<'_, f64>,
+        rotations: Option<&Bound<'_, PyArrayDyn<f32>>>,
+        positions: Option<&Bound<'_, PyArrayDyn<f32>>>,
+        world_rotations: Option<&Bound<'_, PyArrayDyn<f32>>>,
+        velocities: Option<&Bound<'_, PyArrayDyn<f32>>>,
+        angular_velocities: Option<&Bound<'_, PyArrayDyn<f32>>>,
+    ) -> PyResult<()> {
+        let at = self.instances(&clip_ids, &times)?;
+        let (spans, cells) = (
+            self.spans.bind(py).try_readonly()?,
+            self.cells.bind(py).try_readonly()?,
+        );
+        let tables = (
+            spans.as_slice()?.as_chunks().0,
+            cells.as_slice()?.as_chunks().0,
+        );
+        let mut outputs = [
+            rotations,
+            positions,
+            world_rotations,
+            velocities,
+            angular_velocities,
+        ]
+        .into_iter()
+        .map(|own| own.map(|own| own.try_readwrite()).transpose())
+        .collect::<Result<Vec<_>, _>>()
+        .map_err(|error| input(format!("out: {error}")))?;
+        let [r, p, w, v, a] = &mut outputs[..] else {
+            return Ok(());
+        };
+        let joints = at.len() * self.tables.joints();
+        let states = MotionStates {
+            rotations: rows(r, joints)?,
+            positions: rows(p, joints)?,
+            world_rotations: rows(w, joints)?,
+            velocities: rows(v, joints)?,
+            angular_velocities: rows(a, joints)?,
+        };
+        let engine = engine.get().engine(1)?;
+        let work = || {
+            let sampled = self.tables.sample_into(&engine, tables, &at, states);
+            sampled.map_err(of_crowd)
+        };
+        py.detach(|| match joints < MANY {
+            true => guarded(work),
+            false => stoppable(work),
+        })
+    }
+}
+
+impl Motions {
+    /// The clip and the tick of each instance; times outside of a clip are its ends.
+    fn instances(
+        &self,
+        clip_ids: &PyReadonlyArray1<'_, i64>,
+        times: &PyReadonlyArray1<'_, f64>,
+    ) -> PyResult<Vec<(u32, u32)>> {
+        let (ids, times) = (clip_ids.as_array(), times.as_array());
+        if ids.len() != times.len() {
+            return Err(input(format!(
+                "times: there are {} for {} clip_ids",
+                times.len(),
+                ids.len()
+            )));
+        }
+        let per_second = f64::from(self.tables.ticks_per_second());
+        let one = |(place, (&clip, &time)): (usize, (&i64, &f64))| {
+            let ticks = u32::try_from(clip).ok();
+            let ticks = ticks.and_then(|clip| Some((clip, self.tables.ticks(clip as usize)?)));
+            let Some((clip, ticks)) = ticks else {
+                let count = self.tables.clips();
+                return Err(input(format!(
+                    "clip_ids[{place}]: there is no clip {clip}; there are {count}, from 0"
+                )));
+            };
+            if time.is_nan() {
+                return Err(input(format!("times[{place}]: it is no number")));
+            }
+            let tick = (time * per_second).round().clamp(0.0, f64::from(ticks));
+            Ok((clip, tick as u32))
+        };
+        ids.iter().zip(times.iter()).enumerate().map(one).collect()
+    }
+}
+
+/// The memory of an output as rows, as many as there are joints.
+fn rows<'a, const N: usize>(
+    of: &'a mut Option<PyReadwriteArrayDyn<'_, f32>>,
+    joints: usize,
+) -> PyResult<&'a mut [[f32; N]]> {
+    let Some(array) = of else {
+        return Ok(&mut []);
+    };
+    if array.shape().last() != Some(&N) || array.len() != N * joints {
+        return Err(input(format!(
+            "out: an array of shape {:?} for {joints} joints with {N} numbers each",
+            array.shape()
+        )));
+    }
+    Ok(array.as_slice_mut()?.as_chunks_mut().0)
+}
+
+fn array<'py>(arrays: &Bound<'py, PyDict>, name: &str) -> PyResult<Bound<'py, PyAny>> {
+    let found = arrays.get_item(name)?;
+    found.ok_or_else(|| input(format!("no motion library: there is no array `{name}`")))
+}
+
+fn length(motion: &Motion) -> f64 {
+    motion
+        .set
+        .time_span()
+        .map_or(0.0, |(first, last)| last - first)
+}
+
+/// Refuses what positions along the skeleton would leave out without a word.
+fn check(motion: &Motion) -> Result<(), &'static str> {
+    let has_scales = |track| motion.set.vector_keys(Channel::Scale, track).is_some();
+    if motion.is_world {
+        return Err("its rotations are relative to the world, not to the parents");
+    }
+    if !motion.origins.is_empty() {
+        return Err("its positions count from an origin (`clip.origins`); subtract it first");
+    }
+    match (0..motion.set.track_count()).any(has_scales) {
+        true => Err("it has keys of scales, which a motion library has no room for"),
+        false => Ok(()),
+    }
+}
+
+fn shown(place: usize, clip: &Clip) -> String {
+    let path = clip.source.as_ref().map(|source| source.path.display());
+    path.map_or_else(|| format!("clips[{place}]"), |path| path.to_string())
+}

@@ -1,0 +1,368 @@
+//! Clips as plain arrays, for pickles and copies, and whether two clips are the same.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use glam::{DVec3, Quat, Vec3};
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyList};
+use tumble::{Channel, Tcb, Track, TrackError, TrackSet};
+use tumble_formats::bvh::{BvhChannel, BvhJoint};
+use tumble_formats::motion::{Body, Channels, Joint, Motion, Sampler, Transform};
+
+use crate::clip::{Clip, Source};
+use crate::errors::{guarded, input, of_track};
+
+/// The kinds of vectors, as they are numbered in a pickle.
+const VECTORS: [Channel; 2] = [Channel::Translation, Channel::Scale];
+
+/// The samplers, as they are numbered in a pickle, from 1; 0 is none.
+const SAMPLERS: [Sampler; 3] = [Sampler::Step, Sampler::Linear, Sampler::Cubic];
+
+/// An array of rows with so many numbers each.
+fn rows<T: numpy::Element>(
+    py: Python<'_>,
+    numbers: Vec<T>,
+    each: usize,
+) -> PyResult<Bound<'_, PyArray2<T>>> {
+    let count = numbers.len() / each;
+    PyArray1::from_vec(py, numbers).reshape([count, each])
+}
+
+/// Everything that a clip is, but what is kept of its file beside.
+pub(crate) fn state<'py>(py: Python<'py>, clip: &Clip) -> PyResult<Bound<'py, PyDict>> {
+    let motion = &*clip.motion;
+    let tracks: Vec<Track<'_>> = motion.set.tracks().collect();
+    let state = PyDict::new(py);
+    let names: Vec<Option<&str>> = tracks.iter().map(|track| track.name).collect();
+    state.set_item("names", names)?;
+    // Times that tracks share are there once.
+    let (times, mut times_of) = (PyList::empty(py), Vec::<i64>::new());
+    let mut last: Option<&[f64]> = None;
+    for track in &tracks {
+        if !last.is_some_and(|last| std::ptr::eq(last, track.times)) {
+            times.append(PyArray1::from_slice(py, track.times))?;
+            last = Some(track.times);
+        }
+        times_of.push(times.len() as i64 - 1);
+    }
+    state.set_item("times", times)?;
+    state.set_item("times_of", PyArray1::from_vec(py, times_of))?;
+    let mut keys = Vec::with_capacity(4 * motion.set.key_count());
+    for track in &tracks {
+        keys.extend(track.keys.iter().flat_map(Quat::to_array));
+    }
+    state.set_item("keys", rows(py, keys, 4)?)?;
+    let numbers = PyList::empty(py);
+    for (place, track) in tracks.iter().enumerate() {
+        let velocities: Vec<f64> = (track.velocities.iter())
+            .flat_map(DVec3::to_array)
+            .collect();
+        let tangents: Vec<f32> = (track.tangents.iter().flatten())
+            .flat_map(Quat::to_array)
+            .collect();
+        let tcb = |of: &Tcb| [of.tension, of.continuity, of.bias];
+        let tcb: Vec<f64> = track.tcb.iter().flat_map(tcb).collect();
+        if !(velocities.is_empty() && tangents.is_empty() && tcb.is_empty()) {
+            let tangents = rows(py, tangents, 4)?;
+            numbers.append((place, rows(py, velocities, 3)?, tangents, rows(py, tcb, 3)?))?;
+        }
+    }
+    state.set_item("numbers", numbers)?;
+    let vectors = PyList::empty(py);
+    for (kind, channel) in VECTORS.into_iter().enumerate() {
+        for place in 0..tracks.len() {
+            let Some(own) = motion.set.vector_keys(channel, place) else {
+                continue;
+            };
+            let keys: Vec<f32> = own.keys.iter().flat_map(Vec3::to_array).collect();
+            let tangents: Vec<f32> = (own.tangents.iter().flatten())
+                .flat_map(Vec3::to_array)
+                .collect();
+            let times = PyArray1::from_slice(py, own.times);
+            vectors.append((
+                kind,
+                place,
+                times,
+                rows(py, keys, 3)?,
+                rows(py, tangents, 3)?,
+            ))?;
+        }
+    }
+    state.set_item("vectors", vectors)?;
+    let parent = |joint: &Joint| joint.parent.map_or(-1, |parent| parent as i64);
+    let parents: Vec<i64> = motion.skeleton.iter().map(parent).collect();
+    state.set_item("parents", PyArray1::from_vec(py, parents))?;
+    let rest = |joint: &Joint| {
+        let Transform {
+            translation,
+            rotation,
+            scale,
+        } = joint.rest;
+        let parts = [
+            &translation.to_array()[..],
+            &rotation.to_array(),
+            &scale.to_array(),
+        ];
+        parts.concat()
+    };
+    let rests: Vec<f32> = motion.skeleton.iter().flat_map(rest).collect();
+    state.set_item("rests", rows(py, rests, 10)?)?;
+    let number = |sampler: Option<Sampler>| {
+        let place = SAMPLERS.iter().position(|&own| Some(own) == sampler);
+        place.map_or(0, |place| place as i64 + 1)
+    };
+    let channels = motion.channels.iter();
+    let channels: Vec<i64> = channels
+        .flat_map(|own| [own.rotation, own.translation, own.scale].map(number))
+        .collect();
+    state.set_item("channels", rows(py, channels, 3)?)?;
+    let origins: Vec<f64> = motion.origins.iter().flat_map(DVec3::to_array).collect();
+    state.set_item("origins", rows(py, origins, 3)?)?;
+    let bvh = PyList::empty(py);
+    for joint in &motion.bvh {
+        let number = |channel: &BvhChannel| match *channel {
+            BvhChannel::Position(axis) => axis,
+            BvhChannel::Rotation(axis) => 3 + axis,
+        };
+        let channels: Vec<usize> = joint.channels.iter().map(number).collect();
+        let sites: Vec<f32> = joint.end_sites.iter().flat_map(Vec3::to_array).collect();
+        bvh.append((channels, rows(py, sites, 3)?))?;
+    }
+    state.set_item("bvh", bvh)?;
+    state.set_item("name", &motion.name)?;
+    state.set_item("place", motion.place)?;
+    state.set_item("rate", motion.rate.map(|rate| rate.to_string()))?;
+    state.set_item("is_world", motion.is_world)?;
+    state.set_item("time_offset", motion.time_offset)?;
+    state.set_item("no_world", &motion.no_world)?;
+    state.set_item("pelvis", motion.body.map(|body| body.pelvis.to_array()))?;
+    if let Some(source) = &clip.source {
+        state.set_item("path", &source.path)?;
+        state.set_item("clips", source.clips)?;
+        state.set_item("box_length", source.box_length)?;
+    }
+    Ok(state)
+}
+
+/// The entry of a state, which another version of the package may have left out.
+fn entry<'py>(state: &Bound<'py, PyDict>, name: &str) -> PyResult<Bound<'py, PyAny>> {
+    state.get_item(name)?.ok_or_else(|| {
+        input(format!(
+            "the pickle of a clip has no `{name}`: it was written by another version of tumble"
+        ))
+    })
+}
+
+/// Rows of so many numbers, of an array of a state.
+fn chunks<T: numpy::Element + Copy, const N: usize>(
+    of: &Bound<'_, PyAny>,
+) -> PyResult<Vec<[T; N]>> {
+    let array: PyReadonlyArray2<'_, T> = of.extract()?;
+    let array = array.as_array();
+    let row = |row: numpy::ndarray::ArrayView1<'_, T>| -> PyResult<[T; N]> {
+        let numbers: Vec<T> = row.iter().copied().collect();
+        numbers
+            .try_into()
+            .map_err(|_| input("the pickle of a clip has an array of another shape"))
+    };
+    array.outer_iter().map(row).collect()
+}
+
+fn list<T: numpy::Element + Copy>(of: &Bound<'_, PyAny>) -> PyResult<Vec<T>> {
+    let array: PyReadonlyArray1<'_, T> = of.extract()?;
+    Ok(array.as_array().iter().copied().collect())
+}
+
+/// The clip of a state.
+#[pyfunction]
+pub(crate) fn clip_of_state(state: &Bound<'_, PyDict>) -> PyResult<Clip> {
+    guarded(|| {
+        let motion = motion_of(state)?;
+        let source = match state.get_item("path")? {
+            None => None,
+            Some(path) => Some(Arc::new(Source {
+                path: path.extract::<PathBuf>()?,
+                document: None,
+                clips: entry(state, "clips")?.extract()?,
+                box_length: entry(state, "box_length")?.extract()?,
+            })),
+        };
+        Ok(Clip {
+            motion: Arc::new(motion),
+            source,
+        })
+    })
+}
+
+fn motion_of(state: &Bound<'_, PyDict>) -> PyResult<Motion> {
+    let of_set = |error: TrackError| of_track(&error);
+    let broken = || input("the pickle of a clip is broken");
+    let names: Vec<Option<String>> = entry(state, "names")?.extract()?;
+    let times: Vec<Bound<'_, PyAny>> = entry(state, "times")?.extract()?;
+    let times: Vec<Vec<f64>> = times.iter().map(list).collect::<PyResult<_>>()?;
+    let times_of: Vec<i64> = list(&entry(state, "times_of")?)?;
+    let keys: Vec<[f32; 4]> = chunks(&entry(state, "keys")?)?;
+    let keys: Vec<Quat> = keys.into_iter().map(Quat::from_array).collect();
+    let mut set = TrackSet::new();
+    set.reserve(names.len(), keys.len());
+    let mut left = &keys[..];
+    for (place, name) in names.iter().enumerate() {
+        let times = times_of
+            .get(place)
+            .and_then(|&own| times.get(usize::try_from(own).ok()?));
+        let times = times.ok_or_else(broken)?;
+        let (own, others) = left.split_at_checked(times.len()).ok_or_else(broken)?;
+        left = others;
+        set.push(name.as_deref().unwrap_or_default(), times, own)
+            .map_err(of_set)?;
+    }
+    type Numbers<'py> = (
+        usize,
+        Bound<'py, PyAny>,
+        Bound<'py, PyAny>,
+        Bound<'py, PyAny>,
+    );
+    let numbers: Vec<Numbers<'_>> = entry(state, "numbers")?.extract()?;
+    for (track, velocities, tangents, tcb) in numbers {
+        if track >= names.len() {
+            return Err(broken());
+        }
+        let velocities: Vec<[f64; 3]> = chunks(&velocities)?;
+        if !velocities.is_empty() {
+            let velocities: Vec<DVec3> = velocities.into_iter().map(DVec3::from_array).collect();
+            set.set_velocities(track, &velocities).map_err(of_set)?;
+        }
+        let tangents: Vec<[f32; 4]> = chunks(&tangents)?;
+        if !tangents.is_empty() {
+            let pairs = tangents.as_chunks::<2>().0.iter();
+            let pairs: Vec<[Quat; 2]> = pairs.map(|pair| pair.map(Quat::from_array)).collect();
+            set.set_tangents(track, &pairs).map_err(of_set)?;
+        }
+        let tcb: Vec<[f64; 3]> = chunks(&tcb)?;
+        if !tcb.is_empty() {
+            let one = |[tension, continuity, bias]: [f64; 3]| Tcb {
+                tension,
+                continuity,
+                bias,
+            };
+            let tcb: Vec<Tcb> = tcb.into_iter().map(one).collect();
+            set.set_tcb(track, &tcb).map_err(of_set)?;
+        }
+    }
+    type Vectors<'py> = (
+        usize,
+        usize,
+        Bound<'py, PyAny>,
+        Bound<'py, PyAny>,
+        Bound<'py, PyAny>,
+    );
+    let vectors: Vec<Vectors<'_>> = entry(state, "vectors")?.extract()?;
+    for (kind, track, times, keys, tangents) in vectors {
+        if track >= names.len() {
+            return Err(broken());
+        }
+        let (times, keys) = (list(&times)?, chunks::<f32, 3>(&keys)?);
+        let tangents: Vec<[f32; 3]> = chunks(&tangents)?;
+        let pairs = tangents.as_chunks::<2>().0.iter();
+        let tangents: Vec<[Vec3; 2]> = pairs.map(|pair| pair.map(Vec3::from_array)).collect();
+        let added = match VECTORS.get(kind).ok_or_else(broken)? {
+            Channel::Translation => set.set_translations(track, &times, &keys, &tangents),
+            Channel::Scale => set.set_scales(track, &times, &keys, &tangents),
+        };
+        added.map_err(of_set)?;
+    }
+    let parents: Vec<i64> = list(&entry(state, "parents")?)?;
+    let rests: Vec<[f32; 10]> = chunks(&entry(state, "rests")?)?;
+    let joint = |(parent, rest): (i64, [f32; 10])| Joint {
+        parent: usize::try_from(parent).ok(),
+        rest: Transform {
+            translation: Vec3::from_slice(&rest[..3]),
+            rotation: Quat::from_slice(&rest[3..7]),
+            scale: Vec3::from_slice(&rest[7..]),
+        },
+    };
+    let sampler = |number: i64| {
+        let place = usize::try_from(number).ok()?.checked_sub(1)?;
+        SAMPLERS.get(place).copied()
+    };
+    let channels: Vec<[i64; 3]> = chunks(&entry(state, "channels")?)?;
+    let channels = channels.into_iter().map(|own| {
+        let [rotation, translation, scale] = own.map(sampler);
+        Channels {
+            rotation,
+            translation,
+            scale,
+        }
+    });
+    let origins: Vec<[f64; 3]> = chunks(&entry(state, "origins")?)?;
+    let bvh: Vec<(Vec<usize>, Bound<'_, PyAny>)> = entry(state, "bvh")?.extract()?;
+    let bvh = bvh.into_iter().map(|(channels, sites)| {
+        let channel = |number: usize| match number {
+            0..3 => BvhChannel::Position(number),
+            _ => BvhChannel::Rotation((number - 3).min(2)),
+        };
+        let sites: Vec<[f32; 3]> = chunks(&sites)?;
+        Ok(BvhJoint {
+            channels: channels.into_iter().map(channel).collect(),
+            end_sites: sites.into_iter().map(Vec3::from_array).collect(),
+        })
+    });
+    let rate: Option<String> = entry(state, "rate")?.extract()?;
+    let rate = rate.map(|rate| rate.parse()).transpose();
+    let pelvis: Option<[f32; 3]> = entry(state, "pelvis")?.extract()?;
+    Ok(Motion {
+        name: entry(state, "name")?.extract()?,
+        place: entry(state, "place")?.extract()?,
+        set,
+        skeleton: parents.into_iter().zip(rests).map(joint).collect(),
+        channels: channels.collect(),
+        rate: rate.map_err(|error: tumble::FramesError| input(error.to_string()))?,
+        is_world: entry(state, "is_world")?.extract()?,
+        time_offset: entry(state, "time_offset")?.extract()?,
+        origins: origins.into_iter().map(DVec3::from_array).collect(),
+        no_world: entry(state, "no_world")?.extract()?,
+        bvh: bvh.collect::<PyResult<_>>()?,
+        body: pelvis.map(|pelvis| Body {
+            pelvis: Vec3::from_array(pelvis),
+        }),
+    })
+}
+
+/// Whether two clips have the same tracks, keys, names and all else that is said of them, whatever files
+/// they come from.
+pub(crate) fn is_same(a: &Motion, b: &Motion) -> bool {
+    let tracks = a.set.track_count();
+    let is_same_track = |track: usize| {
+        let (own, other) = (a.set.track(track), b.set.track(track));
+        let tcb = |of: &Tcb| [of.tension, of.continuity, of.bias];
+        let vectors = |channel: Channel| {
+            let [own, other] = [a, b].map(|of| of.set.vector_keys(channel, track));
+            let parts = |of: Option<tumble::VectorKeys<'_>>| {
+                of.map(|of| (of.times.to_vec(), of.keys.to_vec(), of.tangents.to_vec()))
+            };
+            parts(own) == parts(other)
+        };
+        own.name == other.name
+            && own.times == other.times
+            && own.keys == other.keys
+            && own.velocities == other.velocities
+            && own.tangents == other.tangents
+            && own.tcb.iter().map(tcb).eq(other.tcb.iter().map(tcb))
+            && VECTORS.into_iter().all(vectors)
+    };
+    tracks == b.set.track_count()
+        && a.set.key_count() == b.set.key_count()
+        && a.name == b.name
+        && a.skeleton == b.skeleton
+        && a.channels == b.channels
+        && a.rate == b.rate
+        && a.is_world == b.is_world
+        && a.time_offset == b.time_offset
+        && a.origins == b.origins
+        && a.no_world == b.no_world
+        && a.bvh == b.bvh
+        && a.body == b.body
+        && (0..tracks).all(is_same_track)
+}

@@ -1,0 +1,238 @@
+"""Motion libraries."""
+
+from __future__ import annotations
+
+import multiprocessing
+import pickle
+
+import numpy as np
+import pytest
+from conftest import unit
+from scipy.spatial.transform import Rotation, Slerp
+
+import tumble
+
+JOINTS = 7
+PARENTS = [None, 0, 1, 1, 0, 4, 5]
+
+
+def smooth(rng, frames):
+    """Rotations that turn a little from frame to frame."""
+    steps = Rotation.from_rotvec(0.1 * rng.normal(size=(frames, 3)))
+    keys = [Rotation.random(random_state=rng)]
+    for step in steps[1:]:
+        keys.append(keys[-1] * step)
+    return np.array([key.as_quat() for key in keys], np.float32)
+
+
+@pytest.fixture
+def clips(rng):
+    def clip(frames, rate):
+        keys = np.stack([smooth(rng, frames) for _ in range(JOINTS)])
+        root = np.cumsum(0.05 * rng.normal(size=(frames, 3)), axis=0)
+        return tumble.Clip(
+            3.0 + np.arange(frames) / rate,
+            keys,
+            name=f"{frames} at {rate}",
+            parents=PARENTS,
+            offsets=OFFSETS,
+            translations=[root, *[None] * (JOINTS - 1)],
+        )
+
+    return [clip(40, 30), clip(7, 24), clip(200, 120), clip(2, 10)]
+
+
+OFFSETS = np.random.default_rng(3).normal(size=(JOINTS, 3))
+
+
+def test_states_are_those_of_the_engine(clips, rng):
+    library = tumble.MotionLibrary(clips)
+    engine = tumble.Engine("cpu")
+    ids = rng.integers(0, len(clips), 60)
+    times = library.sample_times(ids, rng)
+    times[:4] = [0.0, library.lengths[ids[1]], -5.0, 1e9]
+    state = library.sample(ids, times)
+    for place, (clip, time) in enumerate(zip(ids, times)):
+        own = clips[clip]
+        at = np.clip(3.0 + time, *own.span)
+        expected = engine.evaluate(own, at=at, method="slerp")
+        signs = np.sign((expected * state.rotations[place]).sum(-1, keepdims=True))
+        np.testing.assert_allclose(state.rotations[place] * signs, expected, atol=2e-6)
+        positions, world = engine.world(own, at=[at], method="slerp")
+        np.testing.assert_allclose(state.positions[place], positions[:, 0], atol=2e-5)
+        signs = np.sign((world[:, 0] * state.world_rotations[place]).sum(-1, keepdims=True))
+        np.testing.assert_allclose(state.world_rotations[place] * signs, world[:, 0], atol=5e-6)
+        rates = engine.velocity(own, at=[at], method="slerp", axes="world")[:, 0]
+        if 0 < time < library.lengths[clip]:
+            np.testing.assert_allclose(state.angular_velocities[place], rates, atol=2e-3)
+    assert state.rotations.dtype == np.float32 and state.positions.shape == (60, JOINTS, 3)
+
+
+@pytest.mark.parametrize("method", ["slerp", "bessel-overhauser", "c2"])
+def test_velocities_are_those_of_differences(clips, rng, method):
+    library = tumble.MotionLibrary(clips, method=method)
+    ids = np.full(200, 2)
+    # Within a frame: rates of slerp jump between frames.
+    times = (rng.integers(0, 190, 200) + rng.uniform(0.1, 0.9, 200)) / 120
+    state, step = library.sample(ids, times), 2e-4
+    before, after = library.sample(ids, times - step), library.sample(ids, times + step)
+    rate = (after.positions - before.positions) / (2 * step)
+    np.testing.assert_allclose(state.velocities, rate, rtol=1e-2, atol=0.1)
+    a, b = (Rotation.from_quat(own.world_rotations.reshape(-1, 4)) for own in (before, after))
+    turned = (b * a.inv()).as_rotvec().reshape(200, JOINTS, 3) / (2 * step)
+    np.testing.assert_allclose(state.angular_velocities, turned, rtol=1e-2, atol=0.1)
+
+
+def test_finite_differences_are_those_of_two_frames(clips):
+    library = tumble.MotionLibrary(clips)
+    state = library.sample([0, 0], [5.5 / 30, 100.0], finite=True)
+    frames = library.sample([0] * 4, np.array([5, 6, 38, 39]) / 30)
+    expected = 30 * (frames.positions[1::2] - frames.positions[::2])
+    np.testing.assert_allclose(state.velocities, expected, atol=1e-3)
+    world = Rotation.from_quat(frames.world_rotations[1].astype(float))
+    world = world * Rotation.from_quat(frames.world_rotations[0].astype(float)).inv()
+    np.testing.assert_allclose(state.angular_velocities[0], 30 * world.as_rotvec(), atol=1e-3)
+    exact = library.sample([0, 0], [5.5 / 30, 100.0])
+    assert np.array_equal(state.positions, exact.positions)
+
+
+def test_outputs_are_used_again_and_left_out(clips, rng):
+    library = tumble.MotionLibrary(clips)
+    ids, times = rng.integers(0, 4, 300), rng.uniform(0, 1, 300)
+    whole = library.sample(ids, times)
+    some = library.sample(ids, times, arrays=["velocities", "rotations"])
+    assert some.positions is None and np.array_equal(some.velocities, whole.velocities)
+    assert np.array_equal(some.rotations, whole.rotations)
+    memory = some.rotations
+    again = library.sample(ids[::-1], times[::-1], out=some)
+    assert again is some and some.rotations is memory
+    assert np.array_equal(memory, whole.rotations[::-1])
+    assert library.sample([], []).positions.shape == (0, JOINTS, 3)
+
+
+def test_wrong_arguments_are_refused(clips, rng):
+    library = tumble.MotionLibrary(clips)
+    for arguments, words in [
+        (([4], [0.0]), "there is no clip 4; there are 4"),
+        (([-1], [0.0]), "there is no clip -1"),
+        (([0], [np.nan]), r"times\[0\]"),
+        (([0, 1], [0.0]), "shapes"),
+        (([0.5], [0.0]), "whole numbers"),
+    ]:
+        with pytest.raises(tumble.InputError, match=words):
+            library.sample(*arguments)
+    with pytest.raises(tumble.InputError, match="there is no `speeds`"):
+        library.sample([0], [0.0], arrays=["speeds"])
+    with pytest.raises(tumble.InputError, match="out"):
+        library.sample([0, 0], [0.0, 0.0], out=library.sample([0], [0.0]))
+    read_only = library.sample([0], [0.0])
+    read_only.rotations.flags.writeable = False
+    with pytest.raises(tumble.InputError, match="out"):
+        library.sample([0], [0.0], out=read_only)
+    with pytest.raises(tumble.InputError, match="there is none"):
+        tumble.MotionLibrary([])
+    other = tumble.Clip([0.0, 1.0], unit(rng, 2, 2))
+    with pytest.raises(tumble.InputError, match="2 tracks; the skeleton has 7"):
+        tumble.MotionLibrary([clips[0], other])
+    with pytest.raises(tumble.InputError, match="hang together"):
+        tumble.MotionLibrary([other])
+    scaled = tumble.Clip([0.0, 1.0], unit(rng, 1, 2), parents=[None], scales=np.ones((1, 2, 3)))
+    with pytest.raises(tumble.InputError, match="scales"):
+        tumble.MotionLibrary([scaled])
+
+
+def test_a_library_is_kept_in_a_file(clips, rng, tmp_path):
+    library = tumble.MotionLibrary(clips, method="bessel-overhauser")
+    path = tmp_path / "motions.npz"
+    library.save(path)
+    assert [entry.name for entry in tmp_path.iterdir()] == ["motions.npz"]
+    ids, times = rng.integers(0, 4, 100), rng.uniform(0, 1, 100)
+    expected = library.sample(ids, times)
+    assert np.load(path)["cells"].shape[1] == 4, "NumPy reads it"
+    again = [tumble.MotionLibrary.open(path, mmap=mmap) for mmap in (True, False)]
+    again += [pickle.loads(pickle.dumps(own)) for own in (library, *again)]
+    for own in again:
+        found = own.sample(ids, times)
+        for name in ("rotations", "positions", "world_rotations", "velocities"):
+            assert np.array_equal(getattr(found, name), getattr(expected, name))
+        assert own.names == library.names and np.array_equal(own.lengths, library.lengths)
+        assert (own.method, repr(own)) == ("bessel-overhauser", repr(library))
+    mapped = again[0]._motions.arrays()["cells"]
+    assert isinstance(mapped, np.memmap) and mapped.ctypes.data % 64 == 0
+
+
+def test_broken_files_are_refused(clips, tmp_path):
+    library = tumble.MotionLibrary(clips[:2])
+    path = tmp_path / "motions.npz"
+    library.save(path)
+    whole = path.read_bytes()
+    broken = tmp_path / "broken.npz"
+    for size in [0, 10, 1000, len(whole) // 2, len(whole) - 1]:
+        broken.write_bytes(whole[:size])
+        with pytest.raises(tumble.InputError):
+            tumble.MotionLibrary.open(broken)
+    np.savez(broken, version=1)
+    with pytest.raises(tumble.InputError):
+        tumble.MotionLibrary.open(broken)
+    np.savez(broken, x=1)
+    with pytest.raises(tumble.InputError, match="no motion library"):
+        tumble.MotionLibrary.open(broken)
+
+
+def sampled(arguments):
+    library, ids, times = arguments
+    return library.sample(ids, times).positions.tobytes()
+
+
+def test_workers_share_a_file(clips, rng, tmp_path):
+    tumble.MotionLibrary(clips).save(tmp_path / "motions.npz")
+    library = tumble.MotionLibrary.open(tmp_path / "motions.npz")
+    ids, times = rng.integers(0, 4, 100), rng.uniform(0, 1, 100)
+    pool = multiprocessing.get_context("spawn").Pool(1)
+    try:
+        found = pool.map_async(sampled, [(library, ids, times)]).get(60)
+    finally:
+        pool.terminate()
+    assert found == [sampled((library, ids, times))]
+
+
+def test_libraries_are_read_from_files(clips, tmp_path):
+    for place, clip in enumerate(clips[:3]):
+        rate = [30, 24, 120][place]
+        tumble.save(tmp_path / f"{place}.bvh", clip, fps=rate, method="slerp")
+    library = tumble.MotionLibrary.load(tmp_path / "*.bvh")
+    assert (library.names, len(library), library.joints) == (["0", "1", "2"], 3, JOINTS)
+    np.testing.assert_allclose(library.lengths, [39 / 30, 6 / 24, 199 / 120], atol=1e-4)
+    np.testing.assert_allclose(library.rates, [30, 24, 120], rtol=1e-4)
+    skeleton = tmp_path / "0.bvh"
+    files = [tmp_path / "1.bvh", tmp_path / "2.bvh"]
+    assert len(tumble.MotionLibrary.load(files, skeleton=skeleton)) == 2
+    with pytest.raises(FileNotFoundError):
+        tumble.MotionLibrary.load(tmp_path / "*.glb")
+    with pytest.raises(FileNotFoundError):
+        tumble.MotionLibrary.load(tmp_path / "missing.bvh")
+
+
+def test_nothing_grows_over_many_steps(clips, rng):
+    import resource
+
+    library = tumble.MotionLibrary(clips)
+    ids, times = rng.integers(0, 4, 50), rng.uniform(0, 1, 50)
+    out = library.sample(ids, times)
+    for _ in range(500):
+        library.sample(ids, times, out=out)
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    for _ in range(5000):
+        library.sample(ids, times, out=out)
+    grown = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before
+    assert grown < 2048, f"{grown} KiB more"
+
+
+def test_slerp_is_scipys(rng):
+    keys = smooth(rng, 30)
+    clip = tumble.Clip(np.arange(30.0), keys[None], parents=[None])
+    times = rng.uniform(0, 29, 100)
+    found = tumble.MotionLibrary([clip]).sample([0] * 100, times).rotations[:, 0]
+    expected = Slerp(np.arange(30.0), Rotation.from_quat(keys))(times)
+    angle = (Rotation.from_quat(found.astype(float)).inv() * expected).magnitude()
+    assert angle.max() < 6e-7

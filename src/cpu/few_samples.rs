@@ -1,0 +1,178 @@
+//! Few samples of long tracks on the CPU: only the key intervals that have a sample are prepared.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use rayon::prelude::*;
+
+use crate::cpu::engine::CpuEngine;
+use crate::cpu::fallback::{APART, intervals_of_frames};
+use crate::cpu::streaming::Output;
+use crate::prepare::batch::PART_INTERVALS;
+use crate::prepare::error::SetError;
+use crate::prepare::request::Request;
+use crate::threads::stop;
+use crate::time::frames::{Ticks, Timeline};
+use crate::time::times::interval_at;
+use crate::time::wrap::TrackCopy;
+
+/// Samples of one task: enough to fill the blocks of intervals that are prepared in lanes.
+const TASK_SAMPLES: usize = 512;
+
+/// Consecutive samples, and the key intervals of a track in which they lie.
+pub(crate) struct Group {
+    pub(crate) intervals: Range<usize>,
+    pub(crate) samples: Range<usize>,
+}
+
+/// The samples of a track in order of time, and the groups that they form.
+struct Sorted {
+    timeline: Timeline,
+    /// Which sample of the request each of them is; `None` where they are these.
+    places: Option<Vec<u32>>,
+    groups: Vec<Group>,
+}
+
+impl CpuEngine {
+    /// Evaluates some tracks, `[track][sample]`. Frames at a rate must not lie in copies of a track.
+    pub(crate) fn evaluate_few(
+        &self,
+        request: &Request<'_>,
+        output: &mut [[f32; 4]],
+    ) -> Result<(), SetError> {
+        let samples = request.timeline.len();
+        if output.is_empty() {
+            return Ok(());
+        }
+        let each = (TASK_SAMPLES / samples).max(1);
+        let first = request.tracks.start;
+        let stop = stop::current();
+        let task = |(place, output): (usize, &mut [[f32; 4]])| {
+            stop::during(stop.clone(), || {
+                self.few_of(request, first + place * each, output)
+            })
+        };
+        if output.len() <= each * samples {
+            return task((0, output));
+        }
+        self.on_threads(|| {
+            let tasks = output.par_chunks_mut(each * samples).enumerate();
+            tasks.try_for_each(task)
+        })?
+    }
+
+    /// Evaluates the samples of consecutive tracks from `first` on.
+    fn few_of(
+        &self,
+        request: &Request<'_>,
+        first: usize,
+        output: &mut [[f32; 4]],
+    ) -> Result<(), SetError> {
+        stop::check()?;
+        let samples = request.timeline.len();
+        let tracks = first..first + output.len() / samples;
+        // Tracks that share key times and sample times share their groups too.
+        let mut sorted: Vec<(usize, Sorted)> = Vec::new();
+        let shares = !matches!(request.timeline.ticks, Ticks::Times { stride: 1.., .. });
+        let mut of_track = Vec::with_capacity(tracks.len());
+        for track in tracks.clone() {
+            let (times, _) = request.set.times_and_keys(track);
+            let is_known = |(known, _): &(usize, Sorted)| {
+                let (others, _) = request.set.times_and_keys(*known);
+                shares && std::ptr::eq(times, others)
+            };
+            if !sorted.last().is_some_and(is_known) {
+                sorted.push((track, Sorted::new(request, track)?));
+            }
+            of_track.push(sorted.len() - 1);
+        }
+        let mut memory = self.scratch_pool.take(request);
+        let groups_of = |place: usize| sorted[of_track[place]].1.groups.iter();
+        let intervals = tracks.clone().enumerate().flat_map(|(place, track)| {
+            groups_of(place).map(move |own| (track, own.intervals.clone()))
+        });
+        memory.prepare(request.set, intervals)?;
+        let mut parts = memory.parts();
+        let mut in_order = vec![[0.0; 4]; samples];
+        for (place, output) in output.chunks_exact_mut(samples).enumerate() {
+            let sorted = &sorted[of_track[place]].1;
+            let row: &mut [[f32; 4]] = match sorted.places {
+                Some(_) => &mut in_order,
+                None => &mut *output,
+            };
+            for (group, part) in sorted.groups.iter().zip(parts.by_ref()) {
+                let copy = TrackCopy::of_track(group.samples.clone());
+                let own = &mut Output::Here(&mut row[group.samples.clone()]);
+                self.part(part, &sorted.timeline, &copy, own)?;
+            }
+            if let Some(places) = &sorted.places {
+                for (&place, &value) in places.iter().zip(&in_order) {
+                    output[place as usize] = value;
+                }
+            }
+        }
+        drop(parts);
+        self.scratch_pool.give_back(memory);
+        Ok(())
+    }
+}
+
+impl Sorted {
+    fn new(request: &Request<'_>, track: usize) -> Result<Self, SetError> {
+        let timeline = request.timeline;
+        let samples = 0..timeline.len();
+        let Ticks::Times { .. } = timeline.ticks else {
+            return Ok(Self {
+                groups: intervals_of_frames(request, track, 0, samples),
+                timeline: timeline.clone(),
+                places: None,
+            });
+        };
+        let (times, _) = request.set.times_and_keys(track);
+        let last = times.len() - 1;
+        let wrap = request.interpolation.wrap();
+        let time_of = |sample: usize| {
+            let time = timeline.time_at(track, sample);
+            match wrap.repeats() {
+                true => wrap.folded((times[0], times[last]), time),
+                false => time,
+            }
+        };
+        let mut order: Vec<(f64, u32)> = samples
+            .map(|sample| (time_of(sample), sample as u32))
+            .collect();
+        order.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+        let mut groups: Vec<Group> = Vec::new();
+        let mut near = 0;
+        for (sample, &(time, _)) in order.iter().enumerate() {
+            near = interval_at(times, time, near);
+            let interval = near.min(last.saturating_sub(1));
+            Group::put(&mut groups, interval, last, sample);
+        }
+        let sorted = Arc::new(order.iter().map(|&(time, _)| time).collect());
+        Ok(Self {
+            timeline: Timeline::at(sorted),
+            places: Some(order.into_iter().map(|(_, sample)| sample).collect()),
+            groups,
+        })
+    }
+}
+
+impl Group {
+    /// Adds the next sample, which lies in an interval of a track whose last key is `last`, to the last
+    /// group, or as a new one.
+    pub(crate) fn put(groups: &mut Vec<Self>, interval: usize, last: usize, sample: usize) {
+        match groups.last_mut() {
+            Some(Self { intervals, samples })
+                if interval <= intervals.end + APART && intervals.len() < PART_INTERVALS =>
+            {
+                intervals.end = (interval + 1).clamp(intervals.end, last);
+                samples.end = sample + 1;
+            }
+            _ => groups.push(Self {
+                intervals: interval..(interval + 1).min(last),
+                samples: sample..sample + 1,
+            }),
+        }
+    }
+}

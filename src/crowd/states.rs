@@ -1,0 +1,586 @@
+//! States of a library's clips at any times: rotations, positions and velocities of all joints, as those
+//! ask who train on motion. The rotations have a crowd's bits; what follows from them takes only sums and
+//! products, so that every machine has the same bits.
+
+use std::ops::Range;
+
+use rayon::prelude::*;
+
+use crate::crowd::clip_tables::{constants_of, runs_of};
+use crate::crowd::library::CrowdLibrary;
+use crate::crowd::on_cpu::arcs;
+use crate::crowd_error::CrowdError;
+use crate::engine::Engine;
+use crate::evaluate::uploaded::Backend;
+use crate::math::canonical::canonical;
+use crate::math::quaternion::{cross3, dot, product, scaled, sum};
+use crate::shader::{
+    CHANNELS, CrowdBase, CrowdChannel, CrowdClip, CrowdLink, CrowdPlace, CrowdSpan, FORM_ARC,
+    FORM_CONSTANT, FORM_CUBIC, FORM_POLYNOMIAL, ON_KEY, POWERS, TICKS, TRANSLATION,
+};
+use crate::simd::dispatch::{InLanes, VectorWidth, in_lanes_of};
+use crate::simd::lanes::Lanes;
+use crate::threads::{on_threads, stop};
+use crate::twin::crowd_layers::sampled;
+use crate::twin::crowd_times::place_at;
+use crate::twin::quaternion::rotated;
+
+/// Instances of one task.
+const TASK: usize = 64;
+
+/// Where each joint of each instance is, and how it moves, `[instance][joint]`. What is empty is left out.
+/// Seconds, radians, and the unit of length of the clips.
+#[derive(Debug, Default)]
+pub struct MotionStates<'a> {
+    /// The rotation in the parent's frame, `x y z w`.
+    pub rotations: &'a mut [[f32; 4]],
+    /// The position in the world, along the skeleton.
+    pub positions: &'a mut [[f32; 3]],
+    /// The rotation in the world, `x y z w`.
+    pub world_rotations: &'a mut [[f32; 4]],
+    /// The velocity in the world: the derivative of the position.
+    pub velocities: &'a mut [[f32; 3]],
+    /// The angular velocity about the world's axes: the derivative of the world's rotation.
+    pub angular_velocities: &'a mut [[f32; 3]],
+}
+
+/// The clips of a [`CrowdLibrary`] as plain tables, of which the large ones may lie in a file that several
+/// processes map.
+///
+/// ```
+/// use tumble::glam::{Quat, Vec3};
+/// use tumble::{CrowdLibrary, Device, Engine, MotionStates, Skeleton, TrackSet, VectorMethod, method};
+/// let mut door = TrackSet::new();
+/// door.push("door", &[0.0, 2.0], &[Quat::IDENTITY, Quat::from_rotation_y(1.0)])?;
+/// let mut library = CrowdLibrary::new(&Skeleton::new(vec![None], vec![Vec3::X])?)?;
+/// library.push(&door, method::SLERP, VectorMethod::Linear)?;
+/// let (tables, spans, cells) = library.into_tables();
+///
+/// let engine = Engine::new(Device::Cpu)?;
+/// let mut angular_velocities = [[0.0; 3]; 1];
+/// let second = tables.ticks_per_second();
+/// let states = MotionStates { angular_velocities: &mut angular_velocities, ..MotionStates::default() };
+/// tables.sample_into(&engine, (&spans, &cells), &[(0, second)], states)?;
+/// assert!((angular_velocities[0][1] - 0.5).abs() < 1e-6);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug, Clone)]
+pub struct MotionTables {
+    clips: Vec<CrowdClip>,
+    bases: Vec<CrowdBase>,
+    channels: Vec<CrowdChannel>,
+    links: Vec<CrowdLink>,
+    runs: Vec<Vec<Range<u32>>>,
+    joints: usize,
+    ticks_per_second: u32,
+    /// How many spans and cells there must be.
+    sizes: (usize, usize),
+}
+
+/// The small tables as words, for files.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct MotionWords {
+    /// Of each clip its length in ticks, and which time bases are its.
+    pub clips: Vec<[u32; 3]>,
+    /// Of each time base which spans are its.
+    pub bases: Vec<[u32; 3]>,
+    /// Of each channel of each joint of each clip its form, its time base and its cells.
+    pub channels: Vec<[u32; 4]>,
+    /// The joints that have a parent, and it, level by level.
+    pub links: Vec<[u32; 2]>,
+    /// Joints of the skeleton.
+    pub joints: usize,
+    /// Ticks of a second.
+    pub ticks_per_second: u32,
+}
+
+impl CrowdLibrary {
+    /// The library's clips as tables, with the spans and the cells that belong to them. Masks, reference
+    /// poses and inverse bind matrices stay behind.
+    #[must_use]
+    pub fn into_tables(self) -> (MotionTables, Vec<[u32; 4]>, Vec<[f32; 4]>) {
+        let ticks_per_second = self.ticks_per_second();
+        let joints = self.joints();
+        let own = self.tables;
+        let spans: Vec<[u32; 4]> = bytemuck::cast_vec(own.spans);
+        let tables = MotionTables {
+            sizes: (spans.len(), own.cells.len()),
+            clips: own.clips,
+            bases: own.bases,
+            channels: own.channels,
+            links: self.links,
+            runs: own.runs,
+            joints,
+            ticks_per_second,
+        };
+        (tables, spans, own.cells)
+    }
+}
+
+impl MotionTables {
+    /// The tables of these words, with these spans and cells.
+    ///
+    /// # Errors
+    /// When they do not fit together: they are of another version, or broken.
+    pub fn new(
+        words: MotionWords,
+        (spans, cells): (&[[u32; 4]], &[[f32; 4]]),
+    ) -> Result<Self, CrowdError> {
+        let channels: Vec<CrowdChannel> = bytemuck::cast_vec(words.channels);
+        let each = words.joints.saturating_mul(CHANNELS as usize);
+        let runs = match each {
+            0 => Vec::new(),
+            each => channels.chunks(each).map(runs_of).collect(),
+        };
+        let own = Self {
+            clips: bytemuck::cast_vec(words.clips),
+            bases: bytemuck::cast_vec(words.bases),
+            channels,
+            links: bytemuck::cast_vec(words.links),
+            runs,
+            joints: words.joints,
+            ticks_per_second: words.ticks_per_second,
+            sizes: (spans.len(), cells.len()),
+        };
+        match own.are_sound(bytemuck::cast_slice(spans), cells.len()) {
+            true => Ok(own),
+            false => Err(CrowdError::BrokenTables),
+        }
+    }
+
+    /// Whether every place that a table names is there.
+    fn are_sound(&self, spans: &[CrowdSpan], cells: usize) -> bool {
+        let each = self.joints.saturating_mul(CHANNELS as usize);
+        let is_sound_base = |base: &CrowdBase| {
+            let end = base.first as usize + base.count as usize;
+            let step = match base.count {
+                ..2 => 0,
+                count => 1 << (count - 1).ilog2(),
+            };
+            base.count > 0 && end <= spans.len() && base.step == step
+        };
+        let mut has_parents = vec![true; self.joints];
+        for link in &self.links {
+            match has_parents.get_mut(link.joint as usize) {
+                Some(own) => *own = false,
+                None => return false,
+            }
+        }
+        let mut is_sound_link = |link: &CrowdLink| {
+            let is_there = has_parents.get(link.parent as usize) == Some(&true);
+            let own = &mut has_parents[link.joint as usize];
+            is_there && !std::mem::replace(own, true)
+        };
+        let is_sound_clip = |(place, clip): (usize, &CrowdClip)| {
+            let first = clip.first_base as usize;
+            let Some(bases) = self.bases.get(first..first + clip.bases as usize) else {
+                return false;
+            };
+            let is_sound_channel = |channel: &CrowdChannel| {
+                let form = channel.form_and_base >> 24;
+                let Some(base) = bases.get((channel.form_and_base & 0x00ff_ffff) as usize) else {
+                    return false;
+                };
+                let last = (base.count as usize - 1) * channel.count as usize;
+                let constants = constants_of(form);
+                let end = match form {
+                    FORM_CONSTANT => channel.first as usize,
+                    _ => {
+                        let behind = (constants - 1) * channel.count as usize;
+                        channel.first as usize + last * constants + behind
+                    }
+                };
+                let own = &spans[base.first as usize..][..base.count as usize];
+                let has_keys =
+                    form != FORM_CONSTANT && own.iter().any(|span| span.start & ON_KEY != 0);
+                let keys = channel.keys as usize + last;
+                [FORM_CONSTANT, FORM_ARC, FORM_CUBIC, FORM_POLYNOMIAL].contains(&form)
+                    && end < cells
+                    && (!has_keys || keys < cells)
+            };
+            let channels = &self.channels[place * each..][..each];
+            clip.bases > 0 && clip.period > 0 && channels.iter().all(is_sound_channel)
+        };
+        each > 0
+            && self.ticks_per_second > 0
+            && self.channels.len() == self.clips.len() * each
+            && self.bases.iter().all(is_sound_base)
+            && self.links.iter().all(&mut is_sound_link)
+            && self.clips.iter().enumerate().all(is_sound_clip)
+    }
+
+    /// The small tables as words.
+    #[must_use]
+    pub fn words(&self) -> MotionWords {
+        MotionWords {
+            clips: bytemuck::cast_slice(&self.clips).to_vec(),
+            bases: bytemuck::cast_slice(&self.bases).to_vec(),
+            channels: bytemuck::cast_slice(&self.channels).to_vec(),
+            links: bytemuck::cast_slice(&self.links).to_vec(),
+            joints: self.joints,
+            ticks_per_second: self.ticks_per_second,
+        }
+    }
+
+    /// Number of clips.
+    #[must_use]
+    pub fn clips(&self) -> usize {
+        self.clips.len()
+    }
+
+    /// Number of joints.
+    #[must_use]
+    pub fn joints(&self) -> usize {
+        self.joints
+    }
+
+    /// Ticks of a second.
+    #[must_use]
+    pub fn ticks_per_second(&self) -> u32 {
+        self.ticks_per_second
+    }
+
+    /// How long a clip is, ticks, and at least 1.
+    #[must_use]
+    pub fn ticks(&self, clip: usize) -> Option<u32> {
+        self.clips.get(clip).map(|clip| clip.period)
+    }
+
+    /// The states of instances, of each of which a clip and a tick of it are said; later ticks than the last
+    /// give the clip's end. `tables` are the spans and the cells.
+    ///
+    /// # Errors
+    /// When there is no such clip, an array is neither empty nor as long as it should be, the tables are
+    /// others, or the work is stopped.
+    pub fn sample_into(
+        &self,
+        engine: &Engine,
+        (spans, cells): (&[[u32; 4]], &[[f32; 4]]),
+        at: &[(u32, u32)],
+        states: MotionStates<'_>,
+    ) -> Result<(), CrowdError> {
+        if (spans.len(), cells.len()) != self.sizes {
+            return Err(CrowdError::BrokenTables);
+        }
+        let count = self.clips.len();
+        if let Some(&(clip, _)) = at.iter().find(|(clip, _)| *clip as usize >= count) {
+            let (what, given) = ("clip", clip as usize);
+            return Err(CrowdError::Missing { what, given, count });
+        }
+        let needed = at.len() * self.joints;
+        let lengths = [
+            states.rotations.len(),
+            states.positions.len(),
+            states.world_rotations.len(),
+            states.velocities.len(),
+            states.angular_velocities.len(),
+        ];
+        if let Some(&given) = lengths.iter().find(|&&own| own != 0 && own != needed) {
+            return Err(CrowdError::OutputLength { given, needed });
+        }
+        let width = match &*engine.backend {
+            Backend::Cpu(engine) => engine.width,
+            Backend::Vulkan(_) => VectorWidth::widest(),
+        };
+        let stop = stop::current();
+        let each = TASK * self.joints;
+        let task = |memory: &mut Memory, (at, states): (&[(u32, u32)], MotionStates<'_>)| {
+            stop::check_of(stop.as_ref())?;
+            let spans = bytemuck::cast_slice(spans);
+            let tables = self;
+            in_lanes_of(
+                width,
+                &mut Task {
+                    tables,
+                    spans,
+                    cells,
+                    at,
+                    states,
+                    memory,
+                },
+            );
+            Ok(())
+        };
+        if at.len() <= TASK {
+            return task(&mut Memory::default(), (at, states));
+        }
+        let mut left = states;
+        let tasks: Vec<_> = at
+            .chunks(TASK)
+            .map(|at| (at, left.split_off(each)))
+            .collect();
+        let work = || (tasks.into_par_iter()).try_for_each_init(Memory::default, task);
+        match &*engine.backend {
+            Backend::Cpu(engine) => engine.on_threads(work)?,
+            Backend::Vulkan(_) => on_threads(work)?,
+        }
+    }
+}
+
+impl<'a> MotionStates<'a> {
+    /// The states of so many first joints, which are taken away.
+    fn split_off(&mut self, joints: usize) -> Self {
+        fn first<'a, T>(of: &mut &'a mut [T], count: usize) -> &'a mut [T] {
+            of.split_off_mut(..count.min(of.len())).unwrap_or_default()
+        }
+        Self {
+            rotations: first(&mut self.rotations, joints),
+            positions: first(&mut self.positions, joints),
+            world_rotations: first(&mut self.world_rotations, joints),
+            velocities: first(&mut self.velocities, joints),
+            angular_velocities: first(&mut self.angular_velocities, joints),
+        }
+    }
+}
+
+/// What one thread needs on the way.
+#[derive(Default)]
+struct Memory {
+    places: Vec<CrowdPlace>,
+    rotations: Vec<[f32; 4]>,
+    joints: Vec<Joint>,
+}
+
+/// A joint in the world.
+#[derive(Clone, Copy, Default)]
+struct Joint {
+    rotation: [f32; 4],
+    position: [f32; 3],
+    velocity: [f32; 3],
+    angular_velocity: [f32; 3],
+}
+
+/// Some instances.
+struct Task<'a, 'b> {
+    tables: &'a MotionTables,
+    spans: &'a [CrowdSpan],
+    cells: &'a [[f32; 4]],
+    at: &'a [(u32, u32)],
+    states: MotionStates<'a>,
+    memory: &'b mut Memory,
+}
+
+impl InLanes for Task<'_, '_> {
+    #[inline(always)]
+    fn run<L: Lanes>(&mut self) {
+        let (tables, joints) = (self.tables, self.tables.joints);
+        let states = &mut self.states;
+        let moves = !(states.velocities.is_empty() && states.angular_velocities.is_empty());
+        let in_world = moves || !(states.positions.is_empty() && states.world_rotations.is_empty());
+        let Memory {
+            places,
+            rotations,
+            joints: world,
+        } = &mut *self.memory;
+        rotations.resize(joints, [0.0; 4]);
+        world.resize(joints, Joint::default());
+        for (instance, &(clip, tick)) in self.at.iter().enumerate() {
+            let own = &tables.clips[clip as usize];
+            let tick = tick.min(own.period);
+            let bases = &tables.bases[own.first_base as usize..][..own.bases as usize];
+            places.clear();
+            places.extend(bases.iter().map(|base| place_at(base, self.spans, tick)));
+            let each = joints * CHANNELS as usize;
+            let channels = &tables.channels[clip as usize * each..][..each];
+            let at = instance * joints..(instance + 1) * joints;
+            let local = match states.rotations.get_mut(at.clone()) {
+                Some(own) => own,
+                None => &mut rotations[..],
+            };
+            local_rotations::<L>(
+                &tables.runs[clip as usize],
+                channels,
+                self.cells,
+                places,
+                local,
+            );
+            if !in_world {
+                continue;
+            }
+            let moment = Moment {
+                bases,
+                spans: self.spans,
+                cells: self.cells,
+                places,
+                tick,
+                per_second: tables.ticks_per_second as f32,
+            };
+            for (joint, own) in world.iter_mut().enumerate() {
+                let [turn, moved] = [
+                    &channels[joint * 3],
+                    &channels[joint * 3 + TRANSLATION as usize],
+                ];
+                let [x, y, z, _] = moment.value(moved);
+                *own = Joint {
+                    rotation: local[joint],
+                    position: [x, y, z],
+                    ..Joint::default()
+                };
+                if moves {
+                    own.angular_velocity = moment.angular_velocity(turn);
+                    own.velocity = moment.velocity(moved);
+                }
+            }
+            for link in &tables.links {
+                let parent = world[link.parent as usize];
+                let own = &mut world[link.joint as usize];
+                own.hang_on(&parent, moves);
+            }
+            fn put<T: Copy>(to: &mut [T], at: Range<usize>, world: &[Joint], of: fn(&Joint) -> T) {
+                for (own, joint) in to.get_mut(at).into_iter().flatten().zip(world) {
+                    *own = of(joint);
+                }
+            }
+            put(states.positions, at.clone(), world, |own| own.position);
+            put(states.world_rotations, at.clone(), world, |own| {
+                own.rotation
+            });
+            put(states.velocities, at.clone(), world, |own| own.velocity);
+            put(states.angular_velocities, at, world, |own| {
+                own.angular_velocity
+            });
+        }
+    }
+}
+
+impl Joint {
+    /// Turns what is relative to the parent into what is in the world.
+    #[inline(always)]
+    fn hang_on(&mut self, parent: &Self, moves: bool) {
+        let arm = rotated(parent.rotation, self.position);
+        self.position = sum(parent.position, arm).map(canonical);
+        let turned = product(parent.rotation, self.rotation);
+        // One step of Newton's: rounding does not add up along the skeleton.
+        let scale = 1.5 - 0.5 * dot(turned, turned);
+        self.rotation = turned.map(|component| canonical(component * scale));
+        if !moves {
+            return;
+        }
+        let own = rotated(parent.rotation, self.velocity);
+        let carried = sum(parent.velocity, cross3(parent.angular_velocity, arm));
+        self.velocity = sum(carried, own).map(canonical);
+        let own = rotated(parent.rotation, self.angular_velocity);
+        self.angular_velocity = sum(parent.angular_velocity, own).map(canonical);
+    }
+}
+
+/// The rotations of an instance: as a crowd's, with one layer.
+#[inline(always)]
+fn local_rotations<L: Lanes>(
+    runs: &[Range<u32>],
+    channels: &[CrowdChannel],
+    cells: &[[f32; 4]],
+    places: &[CrowdPlace],
+    output: &mut [[f32; 4]],
+) {
+    for run in runs {
+        let own = &mut output[run.start as usize..run.end as usize];
+        let of = |joint: u32| &channels[(joint * CHANNELS) as usize];
+        let channel = of(run.start);
+        let stands = places[(channel.form_and_base & 0x00ff_ffff) as usize];
+        if channel.form_and_base >> 24 == FORM_ARC && stands.span & ON_KEY == 0 {
+            let middle = (channel.first + stands.span * channel.count * 2) as usize;
+            let tangent = middle + channel.count as usize;
+            let cells = |first: usize| &cells[first..first + own.len()];
+            arcs::<L>(cells(middle), cells(tangent), stands.parameter, own);
+            continue;
+        }
+        for (joint, value) in run.clone().zip(own) {
+            *value = sampled(cells, of(joint), stands);
+        }
+    }
+}
+
+/// A moment of a clip.
+struct Moment<'a> {
+    bases: &'a [CrowdBase],
+    spans: &'a [CrowdSpan],
+    cells: &'a [[f32; 4]],
+    places: &'a [CrowdPlace],
+    tick: u32,
+    per_second: f32,
+}
+
+impl Moment<'_> {
+    #[inline(always)]
+    fn value(&self, channel: &CrowdChannel) -> [f32; 4] {
+        let place = self.places[(channel.form_and_base & 0x00ff_ffff) as usize];
+        sampled(self.cells, channel, place)
+    }
+
+    /// The span of a channel, the parameter in it and its rate a second: at the last key those of the span
+    /// that ends there.
+    #[inline(always)]
+    fn along(&self, channel: &CrowdChannel) -> (u32, f32, f32) {
+        let base = (channel.form_and_base & 0x00ff_ffff) as usize;
+        let place = self.places[base];
+        let mut index = place.span & TICKS;
+        let first = self.bases[base].first;
+        let mut span = &self.spans[(first + index) as usize];
+        let mut parameter = place.parameter;
+        let is_end = span.scale == 0.0 && span.start & TICKS == self.tick;
+        if is_end && index > 0 {
+            index -= 1;
+            span = &self.spans[(first + index) as usize];
+            let distance = (self.tick as i32).wrapping_sub(span.whole) as f32;
+            parameter = distance * span.scale + span.offset;
+        }
+        (index, parameter, span.scale * self.per_second)
+    }
+
+    /// The derivative of a rotation, about the parent's axes.
+    #[inline(always)]
+    fn angular_velocity(&self, channel: &CrowdChannel) -> [f32; 3] {
+        let form = channel.form_and_base >> 24;
+        if form == FORM_CONSTANT {
+            return [0.0; 3];
+        }
+        let (span, s, rate) = self.along(channel);
+        let (rotation, slope) = match form {
+            // An arc turns as fast everywhere as in its middle.
+            FORM_ARC => {
+                let first = channel.first + span * channel.count * 2;
+                let [middle, tangent] =
+                    [first, first + channel.count].map(|place| self.cells[place as usize]);
+                (middle, tangent)
+            }
+            _ => self.polynomial::<POWERS>(channel, span, s),
+        };
+        let [x, y, z, w] = rotation;
+        let [x, y, z, _] = product(slope, [-x, -y, -z, w]);
+        scaled([x, y, z], 2.0 * rate).map(canonical)
+    }
+
+    /// The derivative of a translation, in the parent's frame.
+    #[inline(always)]
+    fn velocity(&self, channel: &CrowdChannel) -> [f32; 3] {
+        if channel.form_and_base >> 24 == FORM_CONSTANT {
+            return [0.0; 3];
+        }
+        let (span, s, rate) = self.along(channel);
+        let (_, [x, y, z, _]) = match channel.form_and_base >> 24 {
+            FORM_CUBIC => self.polynomial::<4>(channel, span, s),
+            _ => self.polynomial::<POWERS>(channel, span, s),
+        };
+        scaled([x, y, z], rate).map(canonical)
+    }
+
+    /// A polynomial's value and its derivative by its parameter.
+    #[inline(always)]
+    fn polynomial<const N: usize>(
+        &self,
+        channel: &CrowdChannel,
+        span: u32,
+        s: f32,
+    ) -> ([f32; 4], [f32; 4]) {
+        let first = channel.first + span * channel.count * N as u32;
+        let power = |power: usize| self.cells[(first + power as u32 * channel.count) as usize];
+        let (mut value, mut slope) = (power(N - 1), [0.0; 4]);
+        for below in (0..N - 1).rev() {
+            slope = std::array::from_fn(|c| slope[c] * s + value[c]);
+            let own = power(below);
+            value = std::array::from_fn(|c| value[c] * s + own[c]);
+        }
+        (value, slope)
+    }
+}
