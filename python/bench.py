@@ -65,6 +65,87 @@ def rust() -> float:
     return float(done.stdout)
 
 
+def few(rng: np.random.Generator) -> None:
+    """A few samples of long tracks."""
+    tracks, count = 24, 100_000
+    keys = np.concatenate(
+        [0.1 * rng.normal(size=(tracks, count, 3)), np.ones((tracks, count, 1))], axis=-1
+    )
+    keys /= np.linalg.norm(keys, axis=-1, keepdims=True)
+    moved = [rng.normal(size=(count, 3)), *[None] * (tracks - 1)]
+    clip = tumble.Clip(np.arange(count) / 60, keys, translations=moved)
+    engine, at = tumble.Engine("cpu"), rng.uniform(0.0, count / 60, 64)
+    works: dict[str, Callable[[], Any]] = {
+        "rotations, by track": lambda: engine.evaluate(clip, at=at, method="slerp"),
+        "rotations, by frame": lambda: engine.evaluate(clip, at=at, method="slerp", layout="frame"),
+        "rotations, looped": lambda: engine.evaluate(clip, at=at, method="slerp", after="loop"),
+        "poses": lambda: engine.poses(clip, at=at, method="slerp"),
+        "velocities": lambda: engine.velocity(clip, at=at, method="slerp"),
+        "velocities, smooth": lambda: engine.velocity(clip, at=at, method="bessel-overhauser"),
+    }
+    print(f"64 times of {tracks} tracks x {count} keys")
+    for name, work in works.items():
+        print(f"  {name:26s}  {1e3 * shortest(work, 5):9.2f} ms")
+
+
+def motions(rng: np.random.Generator) -> None:
+    """4 096 instances of 1 000 clips with 24 joints, as they are asked for in every step of training."""
+    clips, joints, pairs = 1000, 24, 4096
+    frames = rng.integers(60, 600, clips)
+    made = []
+    for count in frames:
+        turn = np.cumsum(0.02 * rng.normal(size=(joints, count, 3)), axis=1)
+        angle = np.linalg.norm(turn, axis=-1, keepdims=True)
+        axis = turn / np.maximum(angle, 1e-9)
+        keys = np.concatenate([axis * np.sin(angle / 2), np.cos(angle / 2)], axis=-1)
+        root = np.cumsum(0.01 * rng.normal(size=(count, 3)), axis=0)
+        made.append(
+            tumble.Clip(
+                np.arange(count) / 30,
+                keys,
+                parents=[None, *rng.integers(0, np.arange(1, joints))],
+                offsets=0.1 * rng.normal(size=(joints, 3)),
+                translations=[root, *[None] * (joints - 1)],
+            )
+        )
+    library = tumble.MotionLibrary(made, skeleton=made[0])
+    flat = np.concatenate(
+        [np.stack([clip.keys(joint) for joint in range(joints)], axis=1) for clip in made]
+    )
+    starts = np.cumsum(frames) - frames
+    ids = rng.integers(0, clips, pairs)
+    times = library.sample_times(ids, rng)
+
+    def gathered(ids: Any, times: Any) -> Any:
+        """As the libraries of training projects have it."""
+        place = np.minimum((times * 30).astype(int), frames[ids] - 2)
+        t = (times * 30 - place).astype(np.float32)[:, None, None]
+        a, b = flat[starts[ids] + place], flat[starts[ids] + place + 1]
+        cosine = (a * b).sum(axis=-1, keepdims=True)
+        b, cosine = np.where(cosine < 0, -b, b), np.abs(cosine)
+        half = np.arccos(np.clip(cosine, -1, 1))
+        sine = np.sin(half)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            found = (np.sin((1 - t) * half) * a + np.sin(t * half) * b) / sine
+        return np.where(sine < 1e-3, a * (1 - t) + b * t, found)
+
+    def loop() -> None:
+        for place in range(pairs):
+            gathered(ids[place : place + 1], times[place : place + 1])
+
+    out = library.sample(ids, times)
+    rotations = library.sample(ids, times, arrays=["rotations"])
+    theirs = shortest(lambda: gathered(ids, times), 10)
+    ours = shortest(lambda: library.sample(ids, times, out=rotations), 30)
+    all_five = shortest(lambda: library.sample(ids, times, out=out), 30)
+    one_by_one = shortest(loop, 1)
+    print(f"{pairs} instances of {clips} clips x {joints} joints")
+    print(f"  NumPy, gathered, rotations  {1e3 * theirs:9.2f} ms")
+    print(f"  a loop over the instances   {1e3 * one_by_one:9.2f} ms")
+    print(f"  rotations                   {1e3 * ours:9.2f} ms   {ours / theirs:.2f} x as long")
+    print(f"  all five arrays             {1e3 * all_five:9.2f} ms   {all_five / theirs:.2f} x as long")
+
+
 def main() -> None:
     rng = np.random.default_rng(1)
     times = np.linspace(0.0, 20.0, KEYS)
@@ -123,6 +204,9 @@ def main() -> None:
     print(f"one pose of 4 tracks          {1e6 * one:9.2f} us")
 
     poses = rng.uniform(0.0, 20.0, 10_000)
+    few(rng)
+    motions(rng)
+
     grown = []
     for _ in range(3):
         before = resident()

@@ -379,7 +379,8 @@ impl InLanes for Task<'_, '_> {
             let tick = tick.min(own.period);
             let bases = &tables.bases[own.first_base as usize..][..own.bases as usize];
             places.clear();
-            places.extend(bases.iter().map(|base| place_at(base, self.spans, tick)));
+            let place = |base| place_of(base, self.spans, tick, own.period);
+            places.extend(bases.iter().map(place));
             let each = joints * CHANNELS as usize;
             let channels = &tables.channels[clip as usize * each..][..each];
             let at = instance * joints..(instance + 1) * joints;
@@ -462,6 +463,32 @@ impl Joint {
         let own = rotated(parent.rotation, self.angular_velocity);
         self.angular_velocity = sum(parent.angular_velocity, own).map(canonical);
     }
+}
+
+/// Where a time base stands, as [`place_at`] says. Keys mostly lie at even times: where the span is that would
+/// hold the tick then, no search is needed, each step of which waits for memory.
+#[inline(always)]
+fn place_of(base: &CrowdBase, spans: &[CrowdSpan], tick: u32, period: u32) -> CrowdPlace {
+    let count = base.count as usize;
+    let own = &spans[base.first as usize..][..count];
+    let even = (u64::from(tick) * (count as u64 - 1)).checked_div(u64::from(period));
+    let guess = (even.unwrap_or(0) as usize).min(count - 1);
+    let start = |index: usize| own[index].start & TICKS;
+    // Rounding may have put the key on the other side of the tick.
+    for index in [guess, guess + 1, guess.saturating_sub(1)] {
+        if index < count && start(index) <= tick && (index + 1 == count || tick < start(index + 1))
+        {
+            let only = CrowdBase {
+                first: base.first + index as u32,
+                count: 1,
+                step: 0,
+            };
+            let place = place_at(&only, spans, tick);
+            let span = place.span + index as u32;
+            return CrowdPlace { span, ..place };
+        }
+    }
+    place_at(base, spans, tick)
 }
 
 /// The rotations of an instance: as a crowd's, with one layer.
