@@ -123,7 +123,10 @@ pub(crate) fn in_python(message: &str) -> String {
             "--source-fps, their rate (in Python source_fps)",
             "source_fps, their rate",
         ),
-        ("use -m ", "use method="),
+        (
+            "use -m bessel-overhauser",
+            r#"use method="bessel-overhauser""#,
+        ),
         ("`tumble eval --fps`", "`fps`"),
         ("--animation", "its name or place"),
     ];

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -259,3 +260,50 @@ def test_representations_help(clip):
     assert repr(clip) == "Clip(3 tracks, 12 keys, 0 to 2 s)"
     assert repr(tumble.Engine()) == "Engine('auto': CPU)"
     assert repr(tumble.Engine("cpu")) == "Engine('CPU')"
+
+
+def skeletal(rng):
+    keys = unit(rng, 4, 9)
+    return tumble.Clip(np.arange(9.0), keys, parents=[2, 0, None, 1], offsets=np.ones((4, 3)))
+
+
+@pytest.mark.parametrize("layout", ["track", "frame"])
+def test_rates_in_the_world_are_those_of_the_world(layout, rng):
+    clip, engine, step = skeletal(rng), tumble.Engine("cpu"), 1e-3
+    at = np.arange(8) + 0.3
+    how = dict(method="squad", layout=layout)
+
+    def world(times):
+        rotations = engine.world(clip, at=times, **how)[1].astype(float)
+        return Rotation.from_quat(rotations.reshape(-1, 4))
+
+    found = engine.velocity(clip, at=at, axes="world", **how)
+    turned = (world(at + step) * world(at - step).inv()).as_rotvec() / (2 * step)
+    assert np.abs(found.reshape(-1, 3) - turned).max() < 5e-3 * (1 + np.abs(turned).max())
+    assert np.abs(found - engine.velocity(clip, at=at, axes="parent", **how)).max() > 0.1
+    out = np.empty_like(found)
+    assert engine.velocity(clip, at=at, axes="world", out=out, **how) is out
+    assert np.array_equal(out, found)
+
+    found = engine.acceleration(clip, at=at, axes="world", **how)
+    before, after = (engine.velocity(clip, at=at + by, axes="world", **how) for by in (-step, step))
+    rate = (after.astype(float) - before) / (2 * step)
+    assert np.abs(found - rate).max() < 1e-2 * (1 + np.abs(rate).max())
+
+
+def test_keys_without_a_smooth_curve_are_told_once():
+    keys = [Rotation.identity()]
+    for axis in "xyzxy":
+        keys.append(keys[-1] * Rotation.from_euler(axis, 1.0))
+    keys = np.array([key.as_quat() for key in keys], np.float32)
+    clip = tumble.Clip([0.0, 1.0, 2.0, 2.00001, 3.0, 4.0], keys, name="jerk")
+    words = r'jerk:track 1: warning.W014.*at key 2, at 1 s.*use method="bessel-overhauser"'
+    with pytest.warns(tumble.InputWarning, match=words) as told:
+        clip.evaluate(fps=10, method="c2")
+    assert told[0].message.code == "W014"
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        clip.evaluate(fps=20, method="c2")
+        clip.evaluate(fps=20, method="slerp")
+    with pytest.warns(tumble.InputWarning, match="W014"):
+        clip.evaluate(fps=10, method="c2", ends="natural")

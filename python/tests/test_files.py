@@ -117,6 +117,60 @@ def test_positions_of_maps_keep_their_digits(tmp_path):
     assert tumble.Clip([0.0], [[[0, 0, 0, 1]]]).origins is None
 
 
+def test_a_file_that_is_missing_is_not_found(tmp_path):
+    with pytest.raises(FileNotFoundError, match="missing.glb: error.E001") as found:
+        tumble.load(tmp_path / "missing.glb")
+    assert isinstance(found.value, tumble.InputError) and found.value.code == "E001"
+    with pytest.raises(tumble.InputError, match="is a directory") as found:
+        tumble.load(tmp_path)
+    assert not isinstance(found.value, FileNotFoundError)
+
+
+@pytest.mark.parametrize("track", ["track", "joint", "body"])
+@pytest.mark.parametrize("clip", ["clip", "clip_id", "motion_id"])
+def test_columns_that_tell_apart_are_known(track, clip, tmp_path):
+    rows = ["time,qw,qx,qy,qz," + f"{track},{clip}"]
+    for name in ("walk", "run"):
+        for joint in ("hip", "knee"):
+            rows += [f"{time},1,0,0,0,{joint},{name}" for time in (0.0, 0.5)]
+    (tmp_path / "long.csv").write_text("\n".join(rows) + "\n")
+    file = tumble.load(tmp_path / "long.csv")
+    assert file.names == ["walk", "run"] and file["run"].names == ["hip", "knee"]
+
+
+def test_messages_name_keywords(tmp_path):
+    path = tmp_path / "poses.csv"
+    path.write_text("stamp,x,y,z,w\n0,0,0,0,1\n")
+    with pytest.raises(tumble.InputError, match='; map="time=NAME"'):
+        tumble.load(path)
+    path.write_text("time,x,y,z,w\n0,0,0,0,1\n0,1,0,0,0\n")
+    with pytest.raises(tumble.InputError, match='duplicates="first" or "last" keeps one'):
+        tumble.load(path)
+    np.savez(tmp_path / "own.npz", foo=np.zeros((10, 4)))
+    with pytest.raises(tumble.InputError, match='map="rotations=ARRAY:wxyz,time=ARRAY" tells'):
+        tumble.load(tmp_path / "own.npz")
+
+
+def test_bodies_get_their_offsets(tmp_path):
+    path = tmp_path / "walk.npz"
+    poses = np.zeros((5, 3 * 22))
+    np.savez(path, poses=poses, trans=np.zeros((5, 3)), mocap_framerate=np.float64(30))
+    offsets = np.arange(66.0).reshape(22, 3)
+    clip = tumble.load(path, offsets=offsets).clip
+    assert np.array_equal(clip.offsets[1:], offsets[1:].astype(np.float32))
+    with pytest.raises(tumble.InputError, match="offsets: the shape is"):
+        tumble.load(path, offsets=[1, 2, 3])
+    with pytest.raises(tumble.InputError, match="offsets: .*walk.npz"):
+        tumble.load(path, offsets=offsets[:3])
+
+
+def test_a_skeleton_that_is_left_out_is_told(tmp_path):
+    keys = np.tile([0, 0, 0, 1], (2, 3, 1))
+    clip = tumble.Clip([0.0, 1.0, 2.0], keys, parents=[None, 0])
+    with pytest.warns(tumble.InputWarning, match="left out: the skeleton"):
+        tumble.save(tmp_path / "x.npy", clip, fps=30)
+
+
 def test_tables_with_gaps_are_bridged_on_request(tmp_path):
     file = tmp_path / "gaps.csv"
     file.write_text("time,x,y,z,w\n0,0,0,0,1\n1,,,,\n2,0,0,0.6,0.8\n")

@@ -162,17 +162,17 @@ def test_ctrl_c_ends_everything_within_a_tenth_of_a_second(tmp_path):
     script = f"""
 import os, signal, sys, threading, time, numpy as np, tumble
 signal.signal(signal.SIGINT, signal.default_int_handler)
-keys = np.ones((24, 60_000, 4), np.float32)
-keys[..., :3] = np.random.default_rng(1).normal(size=(24, 60_000, 3)) * 0.3
+keys = np.ones((24, 30_000, 4), np.float32)
+keys[..., :3] = np.random.default_rng(1).normal(size=(24, 30_000, 3)) * 0.3
 keys /= np.linalg.norm(keys, axis=-1, keepdims=True)
-clip = tumble.Clip(np.arange(60_000) / 30, keys, parents=[None, *range(23)],
+clip = tumble.Clip(np.arange(30_000) / 30, keys, parents=[None, *range(23)],
                    offsets=np.ones((24, 3)))
 engine = tumble.Engine("cpu")
 path = {str(tmp_path / "out.bvh")!r}
 sent = 0.0
 def send():
     global sent
-    time.sleep(0.15)
+    time.sleep(0.1)
     sent = time.perf_counter()
     os.kill(os.getpid(), signal.SIGINT)
 def check(name, call):
@@ -206,23 +206,19 @@ print("still", engine.evaluate(clip, at=0.5).shape, os.path.exists(path), flush=
 def copies(value):
     yield copy.copy(value)
     yield copy.deepcopy(value)
-    for protocol in range(2, pickle.HIGHEST_PROTOCOL + 1):
+    for protocol in (2, pickle.HIGHEST_PROTOCOL):
         yield pickle.loads(pickle.dumps(value, protocol))
 
 
 def test_clips_are_pickled_whole(clip, tmp_path, shared):
-    files = ["gltf/Fox.glb", "gltf/BoxAnimated.glb"]
-    clips = [clip, tumble.Clip([0.0], [[0, 0, 0, 1]])]
-    for name in files:
-        if (shared / name).exists():
-            clips += tumble.load(shared / name).clips
-    clips += [tumble.load(path).clips[0] for path in sorted(shared.glob("bvh/*.bvh"))[:3]]
+    clips = [clip, tumble.Clip([0.0], [[0, 0, 0, 1]]), tumble.load(shared / "gltf/Fox.glb")["Run"]]
+    clips += [tumble.load(path).clips[0] for path in sorted(shared.glob("bvh/*.bvh"))[:1]]
     for own in clips:
         for other in copies(own):
             assert other == own and hash(other) == hash(own)
             assert (other.names, other.parents, other.rate) == (own.names, own.parents, own.rate)
             assert (other.path, other.span, repr(other)) == (own.path, own.span, repr(own))
-            for method in ("authored", "hermite", "kochanek-bartels", "squad"):
+            for method in ("hermite", "kochanek-bartels"):
                 try:
                     expected = own.evaluate(fps=30, method=method)
                 except tumble.InputError:

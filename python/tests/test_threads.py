@@ -1,12 +1,7 @@
-"""Threads, Ctrl-C, and panics."""
+"""Threads and panics; Ctrl-C is with the processes."""
 
 from __future__ import annotations
 
-import os
-import signal
-import subprocess
-import sys
-import textwrap
 import threading
 import time
 
@@ -82,60 +77,6 @@ def test_one_output_is_not_written_by_two(long, rng):
             refused += 1
         time.sleep(0.01)
     assert refused > 0
-
-
-EVALUATE = """
-    times = np.arange(2000.0)
-    keys = np.random.default_rng(1).normal(size=(200, 2000, 4))
-    keys /= np.linalg.norm(keys, axis=-1, keepdims=True)
-    clip = tumble.Clip(times, keys)
-    # Minutes of work.
-    def long():
-        clip.evaluate(fps=1000, method="c2", speed="constant", end=10.0)
-"""
-
-POSES = """
-    keys = np.zeros((60, 2, 4))
-    keys[..., 3] = 1.0
-    clip = tumble.Clip([0.0, 600.0], keys)
-    # Some seconds of work in one piece, again and again.
-    def long():
-        while True:
-            tumble.Engine("cpu").poses(clip, fps=1000)
-"""
-
-
-@pytest.mark.skipif(os.name != "posix", reason="signals are sent as on Unix")
-@pytest.mark.parametrize("work", [EVALUATE, POSES])
-def test_ctrl_c_ends_long_work(work):
-    script = f"""
-import signal, sys, numpy as np, tumble
-# Shells start what runs in the background with the signal ignored.
-signal.signal(signal.SIGINT, signal.default_int_handler)
-{textwrap.dedent(work)}
-print("ready", flush=True)
-try:
-    long()
-except KeyboardInterrupt:
-    print("interrupted", flush=True)
-    print(clip.evaluate(at=0.0).shape[-1], flush=True)
-"""
-    command = [sys.executable, "-c", script]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as child:
-        assert child.stdout is not None
-        # A child that does not hear the signal ends, and the test fails instead of waiting.
-        late = threading.Timer(90, child.kill)
-        late.start()
-        assert child.stdout.readline() == "ready\n"
-        time.sleep(0.5)
-        sent = time.perf_counter()
-        child.send_signal(signal.SIGINT)
-        assert child.stdout.readline() == "interrupted\n"
-        waited = time.perf_counter() - sent
-        assert child.stdout.readline() == "4\n", "the clip can be used again"
-        assert child.wait(timeout=60) == 0
-        late.cancel()
-    assert waited < 20, f"{waited:.1f} s after Ctrl-C"
 
 
 def test_a_panic_is_an_exception_that_asks_for_a_report():

@@ -1,7 +1,7 @@
 //! States of a library's clips: a crowd's rotations, and what follows from them as differences say.
 
 use super::{clip, skeleton};
-use crate::support::Random;
+use crate::support::{Random, vulkan_devices};
 use glam::{DQuat, DVec3, Quat, Vec3};
 use tumble::{
     CrowdError, CrowdLayer, CrowdLibrary, CrowdValues, Device, Engine, EngineOptions, Method,
@@ -86,28 +86,36 @@ fn instances(random: &mut Random, tables: &MotionTables, count: usize) -> Vec<(u
 }
 
 #[test]
-fn rotations_are_a_crowds_at_every_width() {
+fn rotations_are_a_crowds_on_every_device_and_at_every_width() {
     let mut random = Random(61);
     for method in [method::SLERP, method::BESSEL_OVERHAUSER, method::STEP] {
         let library = library(&mut random, 11, method);
         let engine = Engine::new(Device::Cpu).unwrap();
         let (tables, spans, cells) = library.clone().into_tables();
         let at = instances(&mut random, &tables, 300);
-        let mut crowd = engine.crowd(&library, at.len(), 1).unwrap();
-        for (instance, &(clip, tick)) in at.iter().enumerate() {
-            let layer = CrowdLayer {
-                speed: 0.0,
-                wrap: WrapMode::Hold,
-                ..CrowdLayer::new(clip as usize).at(tick.into())
-            };
-            crowd.set(instance, 0, layer).unwrap();
-        }
-        let mut expected = vec![[0.0; 4]; at.len() * 11];
-        crowd
-            .evaluate_into(CrowdValues::Rotations, &mut expected)
-            .unwrap();
         let first = states(&engine, &tables, (&spans, &cells), &at);
-        assert_eq!(first.rotations, expected, "{}", method.name);
+        let expected = first.rotations.clone();
+        let devices = vulkan_devices().into_iter().chain([Device::Cpu]);
+        for device in devices {
+            let engine = Engine::new(device).unwrap();
+            let mut crowd = engine.crowd(&library, at.len(), 1).unwrap();
+            for (instance, &(clip, tick)) in at.iter().enumerate() {
+                let layer = CrowdLayer {
+                    speed: 0.0,
+                    wrap: WrapMode::Hold,
+                    ..CrowdLayer::new(clip as usize).at(tick.into())
+                };
+                crowd.set(instance, 0, layer).unwrap();
+            }
+            let mut found = vec![[0.0; 4]; at.len() * 11];
+            crowd
+                .evaluate_into(CrowdValues::Rotations, &mut found)
+                .unwrap();
+            assert_eq!(found, expected, "{} {engine:?}", method.name);
+            // Whatever the engine's device, states are the same.
+            let found = states(&engine, &tables, (&spans, &cells), &at);
+            assert_eq!(found.velocities, first.velocities, "{engine:?}");
+        }
         for width in VectorWidth::available() {
             let mut options = EngineOptions::default();
             options.vector_width = Some(width);
