@@ -342,7 +342,7 @@ impl Clip {
     /// >>> clip.evaluate(at=[0.0, 2.0], method="slerp")[0]
     /// array([[0., 0., 0., 1.],
     ///        [1., 0., 0., 0.]], dtype=float32)
-    #[pyo3(signature = (*, out=None, order="xyzw", layout="track", as_rotation=false, **options))]
+    #[pyo3(signature = (*, out=None, order="xyzw", layout="track", as_rotation=false, **options), text_signature = "($self, *, fps=None, at=None, times=None, start=None, end=None, method=None, path=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, out=None, order='xyzw', layout='track', as_rotation=False)")]
     fn evaluate<'py>(
         slf: &Bound<'py, Self>,
         out: Option<&Bound<'py, PyAny>>,
@@ -359,13 +359,13 @@ impl Clip {
 
     /// Draws the components of a track over time, its keys as dots, with matplotlib; gives its axes.
     ///
-    /// `plot(track=0, *, fps=120, axes=None, **options)`: `track` is a place or a name, `axes` those
+    /// `plot(track=0, *, fps=120, axes=None, …)`: `track` is a place or a name, `axes` those
     /// of matplotlib to draw on, the other options are those of `evaluate`.
     ///
     /// >>> import tumble
     /// >>> clip = tumble.Clip([0.0, 2.0], [[0, 0, 0, 1], [1, 0, 0, 0]])
     /// >>> axes = clip.plot(method="slerp")  # doctest: +SKIP
-    #[pyo3(signature = (track=None, *, fps=None, axes=None, **options))]
+    #[pyo3(signature = (track=None, *, fps=None, axes=None, **options), text_signature = "($self, track=None, *, fps=None, method=None, path=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, axes=None)")]
     fn plot<'py>(
         slf: &Bound<'py, Self>,
         track: Option<&Bound<'py, PyAny>>,
@@ -389,7 +389,7 @@ impl Clip {
     /// >>> page = clip.view(methods=["slerp"])
     /// >>> page.html.startswith("<!doctype html>")
     /// True
-    #[pyo3(signature = (**options))]
+    #[pyo3(signature = (**options), text_signature = "($self, *, methods=None, fps=60, start=None, end=None, height=520)")]
     fn view<'py>(
         slf: &Bound<'py, Self>,
         options: Option<&Bound<'py, PyDict>>,

@@ -178,7 +178,7 @@ impl Engine {
     /// float32, (tracks, frames, 4), unit quaternions.
     ///
     /// `evaluate(clip, *, fps=None, at=None, out=None, order="xyzw", layout="track",
-    /// as_rotation=False, **options)`
+    /// as_rotation=False, …)`
     ///
     /// Which samples: `fps`, a rate ("30000/1001" is exact, 29.97 is not it), with `start` and
     /// `end`, seconds, else from the first key to the last; or `at` (or `times`), seconds, in any
@@ -201,7 +201,7 @@ impl Engine {
     /// >>> out = np.empty((1, 25, 4), np.float32)
     /// >>> tumble.Engine().evaluate(clip, fps=24, method="slerp", out=out) is out
     /// True
-    #[pyo3(signature = (clip, *, out=None, order="xyzw", layout="track", as_rotation=false, **options))]
+    #[pyo3(signature = (clip, *, out=None, order="xyzw", layout="track", as_rotation=false, **options), text_signature = "($self, clip, *, fps=None, at=None, times=None, start=None, end=None, method=None, path=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, out=None, order='xyzw', layout='track', as_rotation=False)")]
     pub(crate) fn evaluate<'py>(
         &self,
         clip: &Bound<'py, Clip>,
@@ -229,7 +229,7 @@ impl Engine {
     /// >>> clip = tumble.Clip([0.0, 2.0], [[0, 0, 0, 1], [0, 0, 1, 0]])
     /// >>> tumble.Engine().velocity(clip, at=[1.0], method="slerp").round(4)
     /// array([[[0.    , 0.    , 1.5708]]], dtype=float32)
-    #[pyo3(signature = (clip, *, axes="body", out=None, layout="track", **options))]
+    #[pyo3(signature = (clip, *, axes="body", out=None, layout="track", **options), text_signature = "($self, clip, *, fps=None, at=None, times=None, start=None, end=None, method=None, path=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, axes='body', out=None, layout='track')")]
     fn velocity<'py>(
         &self,
         clip: &Bound<'py, Clip>,
@@ -255,7 +255,7 @@ impl Engine {
     /// >>> clip = tumble.Clip([0.0, 2.0], [[0, 0, 0, 1], [0, 0, 1, 0]])
     /// >>> tumble.Engine().acceleration(clip, at=[1.0], method="slerp").shape
     /// (1, 1, 3)
-    #[pyo3(signature = (clip, *, axes="body", out=None, layout="track", **options))]
+    #[pyo3(signature = (clip, *, axes="body", out=None, layout="track", **options), text_signature = "($self, clip, *, fps=None, at=None, times=None, start=None, end=None, method=None, path=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, axes='body', out=None, layout='track')")]
     fn acceleration<'py>(
         &self,
         clip: &Bound<'py, Clip>,
@@ -284,7 +284,7 @@ impl Engine {
     /// array([[-1.,  0.,  0.],
     ///        [ 0., -1.,  0.],
     ///        [ 0.,  0.,  1.]], dtype=float32)
-    #[pyo3(signature = (clip, *, out=None, layout="track", **options))]
+    #[pyo3(signature = (clip, *, out=None, layout="track", **options), text_signature = "($self, clip, *, fps=None, at=None, times=None, start=None, end=None, method=None, path=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, out=None, layout='track')")]
     fn matrices<'py>(
         &self,
         clip: &Bound<'py, Clip>,
@@ -308,7 +308,7 @@ impl Engine {
     /// >>> clip = tumble.Clip([0.0, 2.0], [[0, 0, 0, 1], [0, 0, 1, 0]])
     /// >>> tumble.Engine().euler(clip, at=1.0, sequence="ZXY", method="slerp").round(3)
     /// array([[90.,  0.,  0.]], dtype=float32)
-    #[pyo3(signature = (clip, *, sequence="XYZ", degrees=true, out=None, layout="track", **options))]
+    #[pyo3(signature = (clip, *, sequence="XYZ", degrees=true, out=None, layout="track", **options), text_signature = "($self, clip, *, fps=None, at=None, times=None, start=None, end=None, method=None, path=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, sequence='XYZ', degrees=True, out=None, layout='track')")]
     fn euler<'py>(
         &self,
         clip: &Bound<'py, Clip>,
@@ -342,7 +342,7 @@ impl Engine {
     /// array([[0., 0., 0.],
     ///        [2., 0., 0.],
     ///        [4., 0., 0.]], dtype=float32)
-    #[pyo3(signature = (clip, *, layout="track", **options))]
+    #[pyo3(signature = (clip, *, layout="track", **options), text_signature = "($self, clip, *, fps=None, at=None, times=None, start=None, end=None, method=None, path=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, layout='track')")]
     fn poses<'py>(
         &self,
         clip: &Bound<'py, Clip>,
@@ -363,7 +363,7 @@ impl Engine {
     /// >>> positions, rotations = tumble.Engine().world(clip, at=[0.0])
     /// >>> positions[1, 0].round(3)
     /// array([0., 1., 0.], dtype=float32)
-    #[pyo3(signature = (clip, *, layout="track", **options))]
+    #[pyo3(signature = (clip, *, layout="track", **options), text_signature = "($self, clip, *, fps=None, at=None, times=None, start=None, end=None, method=None, path=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, layout='track')")]
     fn world<'py>(
         &self,
         clip: &Bound<'py, Clip>,
@@ -384,7 +384,7 @@ impl Engine {
     /// slice(0, 1, None) slice(0, 4, None) (1, 4, 4)
     /// slice(0, 1, None) slice(4, 8, None) (1, 4, 4)
     /// slice(0, 1, None) slice(8, 10, None) (1, 2, 4)
-    #[pyo3(signature = (clip, *, chunk=1_048_576, order="xyzw", layout="track", **options))]
+    #[pyo3(signature = (clip, *, chunk=1_048_576, order="xyzw", layout="track", **options), text_signature = "($self, clip, *, fps=None, at=None, times=None, start=None, end=None, method=None, path=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, chunk=1048576, order='xyzw', layout='track')")]
     fn stream(
         &self,
         clip: &Bound<'_, Clip>,
@@ -411,7 +411,7 @@ impl Engine {
     /// >>> rows = pyarrow.table({"times": [[0.0, 1.0]], "keys": [[0, 0, 0, 1, 1, 0, 0, 0]]})
     /// >>> tumble.Engine("cpu").batch(rows, fps=2, method="slerp")["frames"].to_pylist()
     /// [3]
-    #[pyo3(signature = (rows, *, order="xyzw", **options))]
+    #[pyo3(signature = (rows, *, order="xyzw", **options), text_signature = "($self, rows, *, fps=None, at=None, times=None, start=None, end=None, method=None, path=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, order='xyzw')")]
     fn batch<'py>(
         slf: &Bound<'py, Self>,
         rows: &Bound<'py, PyAny>,
@@ -458,7 +458,7 @@ impl Engine {
     /// >>> found = tumble.Engine("cpu").verify(clip, fps=25, method="slerp")
     /// >>> found.differing, found.max_error < 6e-7
     /// (0, True)
-    #[pyo3(signature = (clip, **options))]
+    #[pyo3(signature = (clip, **options), text_signature = "($self, clip, *, fps=None, at=None, times=None, start=None, end=None, method=None, path=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None)")]
     fn verify(
         &self,
         clip: &Bound<'_, Clip>,

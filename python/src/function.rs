@@ -13,7 +13,7 @@ use crate::options::{Request, request_arrays};
 /// Interpolates keys: `Clip(times, keys, order=order)`, evaluated by a shared engine.
 ///
 /// `evaluate(times, keys, *, fps=None, at=None, order="xyzw", out=None, layout="track",
-/// as_rotation=False, **options)`
+/// as_rotation=False, …)`
 ///
 /// `times` and `keys` are as those of `Clip`; `order` is that of the keys and of the result. Keys
 /// (keys, 4) of one track give (frames, 4), (tracks, keys, 4) give (tracks, frames, 4). `fps`, `at`
@@ -26,7 +26,7 @@ use crate::options::{Request, request_arrays};
 /// array([[1.    , 0.    , 0.    , 0.    ],
 ///        [0.7071, 0.    , 0.    , 0.7071]], dtype=float32)
 #[pyfunction]
-#[pyo3(signature = (times, keys, *, out=None, order="xyzw", layout="track", as_rotation=false, **options))]
+#[pyo3(signature = (times, keys, *, out=None, order="xyzw", layout="track", as_rotation=false, **options), text_signature = "(times, keys, *, fps=None, at=None, start=None, end=None, method=None, path=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, out=None, order='xyzw', layout='track', as_rotation=False)")]
 #[allow(clippy::too_many_arguments, reason = "keywords")]
 pub(crate) fn evaluate<'py>(
     times: &Bound<'py, PyAny>,

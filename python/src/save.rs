@@ -33,7 +33,7 @@ const CHUNK: usize = 1 << 20;
 /// Writes clips to a file, whole or not at all; its format is that of the name's ending.
 ///
 /// `save(path, clips, *, fps=None, at=None, format=None, sequence=None, linear=(), order=None,
-/// layout="track", overwrite=True, engine=None, **options)`
+/// layout="track", overwrite=True, engine=None, …)`
 ///
 /// `clips`: a `Clip`, the `File` of `load`, or a list of clips. With `fps` or `at` they are sampled
 /// as `Engine.evaluate` does, the other options being as there; a clip of a glTF or NPZ file goes
@@ -59,7 +59,7 @@ const CHUNK: usize = 1 << 20;
 #[pyo3(signature = (
     path, clips, /, *, format=None, sequence=None, linear=vec![], order=None, layout="track",
     overwrite=true, engine=None, **options
-))]
+), text_signature = "(file, clips, /, *, fps=None, at=None, times=None, start=None, end=None, method=None, path=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, format=None, sequence=None, linear=(), order=None, layout='track', overwrite=True, engine=None)")]
 #[allow(clippy::too_many_arguments, reason = "keywords")]
 pub(crate) fn save(
     py: Python<'_>,

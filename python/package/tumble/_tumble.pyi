@@ -1,11 +1,11 @@
 import os
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
-from typing import Any, Literal, Protocol, TypeAlias, TypedDict, final, overload
+from typing import Any, Literal, Protocol, TypeAlias, final, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from typing_extensions import Buffer, Unpack
+from typing_extensions import Buffer
 
 from tumble._notebook import View
 
@@ -60,27 +60,29 @@ _Single: TypeAlias = NDArray[np.float32]
 # Double where positions count from an origin.
 _Places: TypeAlias = NDArray[np.float32] | NDArray[np.float64]
 
-class _Options(TypedDict, total=False):
-    fps: _Rate | None
-    at: _Arrays | None
-    start: float | None
-    end: float | None
-    method: str | None
-    path: Literal["shortest", "as-authored"] | None
-    ends: (
-        Literal["parabolic", "natural", "clamped", "secant", "loop", "frozen"]
-        | ArrayLike
-        | None
-    )
-    speed: Literal["as-keyed", "constant"] | None
-    before: _Wrap | None
-    after: _Wrap | None
-    tension: float | None
-    continuity: float | None
-    bias: float | None
-
-class _OptionsOrTimes(_Options, total=False):
-    times: _Arrays | None
+_Method: TypeAlias = Literal[
+    "authored",
+    "b-spline",
+    "bessel-overhauser",
+    "bessel-overhauser-mean",
+    "c2",
+    "catmull-rom",
+    "gltf-cubic",
+    "hermite",
+    "kochanek-bartels",
+    "nlerp",
+    "shoemake",
+    "shoemake-1985",
+    "shoemake-2",
+    "slerp",
+    "squad",
+    "step",
+]
+_Way: TypeAlias = Literal["shortest", "as-authored"]
+_Ends: TypeAlias = (
+    Literal["parabolic", "natural", "clamped", "secant", "loop", "frozen"] | ArrayLike
+)
+_Speed: TypeAlias = Literal["as-keyed", "constant"]
 
 @final
 class Clip:
@@ -147,7 +149,20 @@ class Clip:
         order: _Order = "xyzw",
         layout: _Layout = "track",
         as_rotation: Literal[False] = False,
-        **options: Unpack[_OptionsOrTimes],
+        fps: _Rate | None = None,
+        at: _Arrays | None = None,
+        times: _Arrays | None = None,
+        start: float | None = None,
+        end: float | None = None,
+        method: _Method | None = None,
+        path: _Way | None = None,
+        ends: _Ends | None = None,
+        speed: _Speed | None = None,
+        before: _Wrap | None = None,
+        after: _Wrap | None = None,
+        tension: float | None = None,
+        continuity: float | None = None,
+        bias: float | None = None,
     ) -> _Single: ...
     @overload
     def evaluate(
@@ -157,17 +172,46 @@ class Clip:
         order: Literal["xyzw"] = "xyzw",
         layout: _Layout = "track",
         as_rotation: Literal[True],
-        **options: Unpack[_OptionsOrTimes],
+        fps: _Rate | None = None,
+        at: _Arrays | None = None,
+        times: _Arrays | None = None,
+        start: float | None = None,
+        end: float | None = None,
+        method: _Method | None = None,
+        path: _Way | None = None,
+        ends: _Ends | None = None,
+        speed: _Speed | None = None,
+        before: _Wrap | None = None,
+        after: _Wrap | None = None,
+        tension: float | None = None,
+        continuity: float | None = None,
+        bias: float | None = None,
     ) -> Any: ...
     def plot(
         self,
         track: int | str | None = None,
         *,
-        fps: _Rate | None = None,
         axes: Any = None,
-        **options: Any,
+        fps: _Rate | None = None,
+        method: _Method | None = None,
+        path: _Way | None = None,
+        ends: _Ends | None = None,
+        speed: _Speed | None = None,
+        before: _Wrap | None = None,
+        after: _Wrap | None = None,
+        tension: float | None = None,
+        continuity: float | None = None,
+        bias: float | None = None,
     ) -> Any: ...
-    def view(self, **options: Any) -> View: ...
+    def view(
+        self,
+        *,
+        methods: str | Sequence[str] | None = None,
+        fps: _Rate = 60,
+        start: float | None = None,
+        end: float | None = None,
+        height: int = 520,
+    ) -> View: ...
 
 @final
 class Engine:
@@ -193,7 +237,20 @@ class Engine:
         order: _Order = "xyzw",
         layout: _Layout = "track",
         as_rotation: Literal[False] = False,
-        **options: Unpack[_OptionsOrTimes],
+        fps: _Rate | None = None,
+        at: _Arrays | None = None,
+        times: _Arrays | None = None,
+        start: float | None = None,
+        end: float | None = None,
+        method: _Method | None = None,
+        path: _Way | None = None,
+        ends: _Ends | None = None,
+        speed: _Speed | None = None,
+        before: _Wrap | None = None,
+        after: _Wrap | None = None,
+        tension: float | None = None,
+        continuity: float | None = None,
+        bias: float | None = None,
     ) -> _Single: ...
     @overload
     def evaluate(
@@ -204,7 +261,20 @@ class Engine:
         order: Literal["xyzw"] = "xyzw",
         layout: _Layout = "track",
         as_rotation: Literal[True],
-        **options: Unpack[_OptionsOrTimes],
+        fps: _Rate | None = None,
+        at: _Arrays | None = None,
+        times: _Arrays | None = None,
+        start: float | None = None,
+        end: float | None = None,
+        method: _Method | None = None,
+        path: _Way | None = None,
+        ends: _Ends | None = None,
+        speed: _Speed | None = None,
+        before: _Wrap | None = None,
+        after: _Wrap | None = None,
+        tension: float | None = None,
+        continuity: float | None = None,
+        bias: float | None = None,
     ) -> Any: ...
     def velocity(
         self,
@@ -213,7 +283,20 @@ class Engine:
         axes: _Axes = "body",
         out: _Single | None = None,
         layout: _Layout = "track",
-        **options: Unpack[_OptionsOrTimes],
+        fps: _Rate | None = None,
+        at: _Arrays | None = None,
+        times: _Arrays | None = None,
+        start: float | None = None,
+        end: float | None = None,
+        method: _Method | None = None,
+        path: _Way | None = None,
+        ends: _Ends | None = None,
+        speed: _Speed | None = None,
+        before: _Wrap | None = None,
+        after: _Wrap | None = None,
+        tension: float | None = None,
+        continuity: float | None = None,
+        bias: float | None = None,
     ) -> _Single: ...
     def acceleration(
         self,
@@ -222,7 +305,20 @@ class Engine:
         axes: _Axes = "body",
         out: _Single | None = None,
         layout: _Layout = "track",
-        **options: Unpack[_OptionsOrTimes],
+        fps: _Rate | None = None,
+        at: _Arrays | None = None,
+        times: _Arrays | None = None,
+        start: float | None = None,
+        end: float | None = None,
+        method: _Method | None = None,
+        path: _Way | None = None,
+        ends: _Ends | None = None,
+        speed: _Speed | None = None,
+        before: _Wrap | None = None,
+        after: _Wrap | None = None,
+        tension: float | None = None,
+        continuity: float | None = None,
+        bias: float | None = None,
     ) -> _Single: ...
     def matrices(
         self,
@@ -230,7 +326,20 @@ class Engine:
         *,
         out: _Single | None = None,
         layout: _Layout = "track",
-        **options: Unpack[_OptionsOrTimes],
+        fps: _Rate | None = None,
+        at: _Arrays | None = None,
+        times: _Arrays | None = None,
+        start: float | None = None,
+        end: float | None = None,
+        method: _Method | None = None,
+        path: _Way | None = None,
+        ends: _Ends | None = None,
+        speed: _Speed | None = None,
+        before: _Wrap | None = None,
+        after: _Wrap | None = None,
+        tension: float | None = None,
+        continuity: float | None = None,
+        bias: float | None = None,
     ) -> _Single: ...
     def euler(
         self,
@@ -240,13 +349,60 @@ class Engine:
         degrees: bool = True,
         out: _Single | None = None,
         layout: _Layout = "track",
-        **options: Unpack[_OptionsOrTimes],
+        fps: _Rate | None = None,
+        at: _Arrays | None = None,
+        times: _Arrays | None = None,
+        start: float | None = None,
+        end: float | None = None,
+        method: _Method | None = None,
+        path: _Way | None = None,
+        ends: _Ends | None = None,
+        speed: _Speed | None = None,
+        before: _Wrap | None = None,
+        after: _Wrap | None = None,
+        tension: float | None = None,
+        continuity: float | None = None,
+        bias: float | None = None,
     ) -> _Single: ...
     def poses(
-        self, clip: Clip, *, layout: _Layout = "track", **options: Unpack[_OptionsOrTimes]
+        self,
+        clip: Clip,
+        *,
+        layout: _Layout = "track",
+        fps: _Rate | None = None,
+        at: _Arrays | None = None,
+        times: _Arrays | None = None,
+        start: float | None = None,
+        end: float | None = None,
+        method: _Method | None = None,
+        path: _Way | None = None,
+        ends: _Ends | None = None,
+        speed: _Speed | None = None,
+        before: _Wrap | None = None,
+        after: _Wrap | None = None,
+        tension: float | None = None,
+        continuity: float | None = None,
+        bias: float | None = None,
     ) -> tuple[_Places, _Single, _Single]: ...
     def world(
-        self, clip: Clip, *, layout: _Layout = "track", **options: Unpack[_OptionsOrTimes]
+        self,
+        clip: Clip,
+        *,
+        layout: _Layout = "track",
+        fps: _Rate | None = None,
+        at: _Arrays | None = None,
+        times: _Arrays | None = None,
+        start: float | None = None,
+        end: float | None = None,
+        method: _Method | None = None,
+        path: _Way | None = None,
+        ends: _Ends | None = None,
+        speed: _Speed | None = None,
+        before: _Wrap | None = None,
+        after: _Wrap | None = None,
+        tension: float | None = None,
+        continuity: float | None = None,
+        bias: float | None = None,
     ) -> tuple[_Places, _Single]: ...
     def stream(
         self,
@@ -255,12 +411,60 @@ class Engine:
         chunk: int = 1048576,
         order: _Order = "xyzw",
         layout: _Layout = "track",
-        **options: Unpack[_OptionsOrTimes],
+        fps: _Rate | None = None,
+        at: _Arrays | None = None,
+        times: _Arrays | None = None,
+        start: float | None = None,
+        end: float | None = None,
+        method: _Method | None = None,
+        path: _Way | None = None,
+        ends: _Ends | None = None,
+        speed: _Speed | None = None,
+        before: _Wrap | None = None,
+        after: _Wrap | None = None,
+        tension: float | None = None,
+        continuity: float | None = None,
+        bias: float | None = None,
     ) -> Chunks: ...
     def batch(
-        self, rows: Any, *, order: _Order = "xyzw", **options: Unpack[_OptionsOrTimes]
+        self,
+        rows: Any,
+        *,
+        order: _Order = "xyzw",
+        fps: _Rate | None = None,
+        at: _Arrays | None = None,
+        times: _Arrays | None = None,
+        start: float | None = None,
+        end: float | None = None,
+        method: _Method | None = None,
+        path: _Way | None = None,
+        ends: _Ends | None = None,
+        speed: _Speed | None = None,
+        before: _Wrap | None = None,
+        after: _Wrap | None = None,
+        tension: float | None = None,
+        continuity: float | None = None,
+        bias: float | None = None,
     ) -> Any: ...
-    def verify(self, clip: Clip, **options: Unpack[_OptionsOrTimes]) -> Verification: ...
+    def verify(
+        self,
+        clip: Clip,
+        *,
+        fps: _Rate | None = None,
+        at: _Arrays | None = None,
+        times: _Arrays | None = None,
+        start: float | None = None,
+        end: float | None = None,
+        method: _Method | None = None,
+        path: _Way | None = None,
+        ends: _Ends | None = None,
+        speed: _Speed | None = None,
+        before: _Wrap | None = None,
+        after: _Wrap | None = None,
+        tension: float | None = None,
+        continuity: float | None = None,
+        bias: float | None = None,
+    ) -> Verification: ...
 
 @final
 class Chunks:
@@ -327,7 +531,19 @@ def evaluate(
     order: _Order = "xyzw",
     layout: _Layout = "track",
     as_rotation: Literal[False] = False,
-    **options: Unpack[_Options],
+    fps: _Rate | None = None,
+    at: _Arrays | None = None,
+    start: float | None = None,
+    end: float | None = None,
+    method: _Method | None = None,
+    path: _Way | None = None,
+    ends: _Ends | None = None,
+    speed: _Speed | None = None,
+    before: _Wrap | None = None,
+    after: _Wrap | None = None,
+    tension: float | None = None,
+    continuity: float | None = None,
+    bias: float | None = None,
 ) -> _Single: ...
 @overload
 def evaluate(
@@ -338,7 +554,19 @@ def evaluate(
     order: _Order = "xyzw",
     layout: _Layout = "track",
     as_rotation: Literal[True],
-    **options: Unpack[_Options],
+    fps: _Rate | None = None,
+    at: _Arrays | None = None,
+    start: float | None = None,
+    end: float | None = None,
+    method: _Method | None = None,
+    path: _Way | None = None,
+    ends: _Ends | None = None,
+    speed: _Speed | None = None,
+    before: _Wrap | None = None,
+    after: _Wrap | None = None,
+    tension: float | None = None,
+    continuity: float | None = None,
+    bias: float | None = None,
 ) -> Any: ...
 def load(
     path: _Path,
@@ -355,7 +583,7 @@ def load(
     up: Literal["y", "z"] | None = None,
 ) -> File: ...
 def save(
-    path: _Path,
+    file: _Path,
     clips: Clip | File | Sequence[Clip],
     /,
     *,
@@ -366,7 +594,20 @@ def save(
     layout: _Layout = "track",
     overwrite: bool = True,
     engine: Engine | None = None,
-    **options: Unpack[_OptionsOrTimes],
+    fps: _Rate | None = None,
+    at: _Arrays | None = None,
+    times: _Arrays | None = None,
+    start: float | None = None,
+    end: float | None = None,
+    method: _Method | None = None,
+    path: _Way | None = None,
+    ends: _Ends | None = None,
+    speed: _Speed | None = None,
+    before: _Wrap | None = None,
+    after: _Wrap | None = None,
+    tension: float | None = None,
+    continuity: float | None = None,
+    bias: float | None = None,
 ) -> None: ...
 def devices() -> list[str]: ...
 def clip_of_state(state: dict[str, Any]) -> Clip: ...
