@@ -4,6 +4,7 @@
 //! frame into these: a few bytes for each character that does something new, and nothing for the others.
 //! The matrices stay in the renderer's buffer. Two frames are in flight. At the end the bits are
 //! compared with the CPU's, the characters are drawn as a picture, and the times are told.
+#![allow(clippy::disallowed_methods)] // poses to look at
 #![allow(unsafe_code)] // Vulkan's handles are the application's to promise; an allocator that counts
 
 use std::alloc::{GlobalAlloc, Layout, System};

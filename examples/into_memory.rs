@@ -1,6 +1,8 @@
 //! How long slerp takes into memory that exists already: `into_memory [TRACKS KEYS FRAMES]`.
 //! Prints the seconds of the shortest of twenty runs; `python/bench.py` compares itself with it.
 
+#![allow(clippy::disallowed_methods)] // poses to look at
+
 use std::time::Instant;
 
 use glam::Quat;

@@ -4,6 +4,7 @@
 //! a queue of it, and lets it write the poses of every frame into a buffer of the renderer's own, from
 //! which another queue family, where there is one, copies them. At the end the bits are compared with
 //! the CPU's.
+#![allow(clippy::disallowed_methods)] // poses to look at
 #![allow(unsafe_code)] // Vulkan's handles are the application's to promise
 
 use std::error::Error;

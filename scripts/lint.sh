@@ -8,7 +8,7 @@ cd "$(dirname "$0")/.."
 oldest=$(sed -n 's/^rust-version = "\(.*\)"/\1/p' Cargo.toml)
 if ! rustc --version | grep -q "^rustc $oldest\b" &&
     command -v rustup >/dev/null && rustup run "$oldest" rustc --version >/dev/null 2>&1; then
-    CARGO_TARGET_DIR=target/oldest rustup run "$oldest" cargo check --workspace --all-targets --quiet
+    ./scripts/oldest.sh
 fi
 
 # What the dependencies may be (deny.toml), where the tool is installed.

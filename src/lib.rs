@@ -153,7 +153,7 @@ pub use crate::output::euler::{EulerSequence, UnknownSequence};
 pub use crate::output::pose_error::{PoseError, SkeletonError};
 pub use crate::output::rotations::{Layout, Rotations, Samples, SamplesError, Vectors};
 pub use crate::output::row::Row;
-pub use crate::output::signs::{continue_signs, signs_jump};
+pub use crate::output::signs::{continue_signs, signs_differ, signs_jump};
 pub use crate::path::options::{
     BodyAxis, Direction, Follow, FollowError, FollowWarning, Frame, PathSpeed, Twist,
 };

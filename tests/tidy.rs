@@ -459,9 +459,15 @@ fn packages_have_all_that_they_include() {
                     let file = path.parent().unwrap().join(file).canonicalize().unwrap();
                     let inside = file.strip_prefix(home.canonicalize().unwrap());
                     let packed = inside.is_ok_and(|inside| {
-                        ["src", "shaders", "docs/library.md", "docs/your-tests.md", "README.md"]
-                            .iter()
-                            .any(|start| inside.starts_with(start))
+                        [
+                            "src",
+                            "shaders",
+                            "docs/library.md",
+                            "docs/your-tests.md",
+                            "README.md",
+                        ]
+                        .iter()
+                        .any(|start| inside.starts_with(start))
                     });
                     assert!(
                         packed,

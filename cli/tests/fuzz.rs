@@ -4,6 +4,8 @@
 //! `FUZZ_SECONDS` says how long each target runs; 600 is a run on demand, `scripts/test.sh`
 //! takes 3. A failing input is kept under `target/fuzz/`.
 
+#![allow(clippy::disallowed_methods)] // as in tests/all.rs
+
 #[path = "../../tests/support/mod.rs"]
 mod support;
 #[path = "../../fuzz/src/targets.rs"]

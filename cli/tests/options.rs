@@ -2,6 +2,8 @@
 //!
 //! A program of its own, since it runs the commands in its own process, a thousand times.
 
+#![allow(clippy::disallowed_methods)] // as in tests/all.rs
+
 use std::collections::HashMap;
 use std::ffi::OsString;
 use std::fmt::Write;

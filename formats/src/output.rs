@@ -328,7 +328,11 @@ impl Temporary {
                     true => file.persist(path),
                     false => file.persist_noclobber(path),
                 };
-                persisted.map_err(|error| error.error)
+                let file = persisted.map_err(|error| error.error)?;
+                // It has a writer still, perhaps, but nobody looks for it any more. Windows lets nobody else
+                // read what is locked.
+                let _ = file.unlock();
+                Ok(file)
             }
         }
     }

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 
 use glam::Quat;
-use tumble::Layout;
+use tumble::{Layout, signs_differ};
 
 pub use tumble::continue_signs;
 pub(crate) use tumble::signs_jump;
@@ -47,7 +47,7 @@ impl Signs {
             let Some(before) = self.before.get_mut(track) else {
                 break;
             };
-            let turns = !is_first && before.dot(own) < 0.0;
+            let turns = !is_first && signs_differ(*before, own);
             *before = if turns { -own } else { own };
             if turns {
                 all.to_mut()[place] = *before;

@@ -1,7 +1,7 @@
 //! A part of a clip, from one time to another.
 
 use glam::Vec3;
-use tumble::{Channel, Engine, Error, Frames, TrackError, TrackSet};
+use tumble::{Channel, Engine, Error, Frames, TrackError, TrackSet, signs_differ};
 
 use crate::motion::Motion;
 use crate::rate::{Precision, on_frames};
@@ -84,13 +84,13 @@ pub fn trim(clip: &Motion, start: f64, end: f64, engine: &Engine) -> Result<Moti
         let (times, mut keys) = part.keys(track.times, track.keys, values);
         // The sign in which the curve goes on.
         for place in 1..keys.len() {
-            if part.is_made(place) && keys[place].dot(keys[place - 1]) < 0.0 {
+            if part.is_made(place) && signs_differ(keys[place - 1], keys[place]) {
                 keys[place] = -keys[place];
             }
         }
         if let [first, second, ..] = &mut keys[..]
             && part.before
-            && first.dot(*second) < 0.0
+            && signs_differ(*second, *first)
         {
             *first = -*first;
         }

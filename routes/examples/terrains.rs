@@ -2,6 +2,8 @@
 //!
 //! `cargo run --release -p tumble-routes --example terrains [-- TRIANGLES BY ROUGHNESS]`
 
+#![allow(clippy::disallowed_methods)] // a terrain to time
+
 use std::time::Instant;
 
 use glam::{DVec3, dvec3};

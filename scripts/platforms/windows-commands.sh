@@ -36,14 +36,16 @@ windows eval "$(at "$root/data/pendulum.dat")" -o "$(at "$long/größe.npy")"
 same linux.npy "$long/größe.npy"
 
 echo "convert, to a binary format and to text and back"
-linux convert "$root/data/pendulum.dat" -o linux.glb
-windows convert "$(at "$root/data/pendulum.dat")" -o out.glb
+# Files say what they were made of, as it was called.
+cp "$root/data/pendulum.dat" .
+linux convert pendulum.dat -o linux.glb
+windows convert pendulum.dat -o out.glb
 same linux.glb out.glb
-linux convert linux.glb -o linux.bvh
+linux convert out.glb -o linux.bvh
 windows convert out.glb -o out.bvh
 same linux.bvh out.bvh
 windows eval out.bvh --fps 30 -o baked.glb
-linux eval linux.bvh --fps 30 -o linux-baked.glb
+linux eval out.bvh --fps 30 -o linux-baked.glb
 same linux-baked.glb baked.glb
 
 echo "reduce and smooth"
@@ -88,6 +90,23 @@ windows check results >check.log 2>&1 || failed=$?
 [ $failed -eq 8 ] && grep -q 'clip7' check.log || {
     echo "check gave $failed:" >&2
     cat check.log >&2
+    exit 1
+}
+
+echo "Ctrl-C while a file is written leaves none"
+x86_64-w64-mingw32-gcc -O1 -o ctrl-c.exe "$root/scripts/platforms/ctrl-c.c"
+mkdir pressed
+failed=0
+# Wine has a console where there is a terminal, of which `script` makes one.
+cat >press.sh <<END
+cd pressed
+"$WINE" ../ctrl-c.exe .tumble- '$(at "$TUMBLE_WINDOWS")' eval '..\library\clip1.dat' --fps 40000 -o never.npy
+END
+script -qec 'bash press.sh' /dev/null </dev/null >pressed.log 2>&1 || failed=$?
+[ $failed -eq 130 ] && [ -z "$(ls -A pressed)" ] || {
+    echo "it gave $failed, and left:" >&2
+    ls -A pressed >&2
+    cat pressed.log >&2
     exit 1
 }
 

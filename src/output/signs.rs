@@ -13,10 +13,18 @@ fn cosine(a: Quat, b: Quat) -> f32 {
     (a.x * b.x + a.y * b.y) + (a.z * b.z + a.w * b.w)
 }
 
+/// Whether two neighbours differ in sign: the second one is nearer to the first with the other sign. Near half turns
+/// rounding decides, here in one order on every processor.
+#[must_use]
+#[inline]
+pub fn signs_differ(before: Quat, own: Quat) -> bool {
+    cosine(before, own) < 0.0
+}
+
 /// Gives each rotation, in the order `[sample][track]`, the sign that is nearer to the sample before.
 pub fn continue_signs(rotations: &mut [Quat], tracks: usize) {
     for next in tracks..rotations.len() {
-        if cosine(rotations[next - tracks], rotations[next]) < 0.0 {
+        if signs_differ(rotations[next - tracks], rotations[next]) {
             rotations[next] = -rotations[next];
         }
     }

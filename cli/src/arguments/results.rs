@@ -280,8 +280,9 @@ const MAX_CLIP_NAME: usize = 120;
 
 /// As much of a name as has room before its end, and the end.
 fn short(name: &str, end: &str) -> String {
-    let most = MAX_CLIP_NAME.saturating_sub(end.len());
-    format!("{}{end}", &name[..name.floor_char_boundary(most)])
+    let most = MAX_CLIP_NAME.saturating_sub(end.len()).min(name.len());
+    let most = (0..=most).rfind(|&place| name.is_char_boundary(place));
+    format!("{}{end}", &name[..most.unwrap_or(0)])
 }
 
 #[cfg(test)]

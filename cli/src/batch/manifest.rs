@@ -259,7 +259,9 @@ impl Manifest {
     }
 
     /// Puts the lines in order.
-    pub(crate) fn finish(self) -> Result<(), Failure> {
+    pub(crate) fn finish(mut self) -> Result<(), Failure> {
+        // Windows replaces no file that is open.
+        self.journal = None;
         if !self.is_empty() {
             let mut entries: BTreeMap<&String, &Entry> = self.previous.iter().collect();
             entries.extend(&self.added);

@@ -1,4 +1,5 @@
-//! Ctrl-C, SIGTERM, SIGHUP and SIGQUIT: stop soon, and leave no half-written file.
+//! Ctrl-C, SIGTERM, SIGHUP and SIGQUIT, on Windows Ctrl-C, Ctrl-Break and a closed window: stop soon, and
+//! leave no half-written file.
 //!
 //! A thread waits for the signal. While no output file is open it ends the program
 //! at once; while one is, it leaves a mark that the writer finds at its next
@@ -34,9 +35,20 @@ fn code(signal: i32) -> u8 {
     128 + signal as u8
 }
 
-/// Starts the waiting thread, once for the process. Without it (a system that refuses, or has no
-/// such signals) they end the program in their default way.
-#[cfg(unix)]
+/// Ends the program, or leaves a mark for the writer of a file.
+fn heed(signal: i32) {
+    let mut state = state();
+    // A second signal means it: do not wait for the writer.
+    if state.writing == 0 || state.signal.is_some() {
+        // The locks are held: no file can be opened meanwhile.
+        let _no_more = remove_unfinished();
+        signal_hook::low_level::exit(i32::from(code(signal)));
+    }
+    state.signal = Some(signal);
+}
+
+/// Starts the waiting thread, once for the process. Without it (a system that refuses) they end the
+/// program in their default way.
 pub(crate) fn stop_on_signals() {
     static STARTED: std::sync::Once = std::sync::Once::new();
     STARTED.call_once(wait_for_signals);
@@ -60,14 +72,7 @@ fn wait_for_signals() {
     };
     let wait = move || {
         for signal in signals.forever().filter(|&signal| signal != SIGXFSZ) {
-            let mut state = state();
-            // A second signal means it: do not wait for the writer.
-            if state.writing == 0 || state.signal.is_some() {
-                // The locks are held: no file can be opened meanwhile.
-                let _no_more = remove_unfinished();
-                signal_hook::low_level::exit(i32::from(code(signal)));
-            }
-            state.signal = Some(signal);
+            heed(signal);
         }
     };
     let _ = std::thread::Builder::new().spawn(wait); // see `stop_on_signals`
@@ -89,8 +94,14 @@ fn ignored_in(status: &str) -> Option<u64> {
     u64::from_str_radix(mask.trim(), 16).ok()
 }
 
-#[cfg(not(unix))]
-pub(crate) fn stop_on_signals() {}
+/// Windows runs a handler on a thread of its own: it is the waiting thread.
+#[cfg(windows)]
+fn wait_for_signals() {
+    let _ = ctrlc::set_handler(|| heed(signal_hook::consts::SIGINT)); // see `stop_on_signals`
+}
+
+#[cfg(not(any(unix, windows)))]
+fn wait_for_signals() {}
 
 /// Held while an output file is open.
 pub(crate) struct Writing(());

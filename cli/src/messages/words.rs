@@ -4,6 +4,7 @@
 //! set. A standard error that is closed must not end the program, so what it
 //! refuses is lost.
 
+use std::any::Any;
 use std::ffi::OsString;
 use std::io::{self, Write};
 use std::time::Duration;
@@ -93,10 +94,17 @@ fn json_printable(text: &str) -> String {
     shown
 }
 
+/// What a panic says, which is text unless a crate panics with something else.
+fn reason(payload: &(dyn Any + Send)) -> &str {
+    let literal = payload.downcast_ref::<&str>().copied();
+    let text = literal.or_else(|| payload.downcast_ref::<String>().map(String::as_str));
+    text.unwrap_or("no reason given")
+}
+
 /// A panic is a bug of ours: say so, and what to send.
 pub(crate) fn explain_panics() {
     std::panic::set_hook(Box::new(|info| {
-        let what = info.payload_as_str().unwrap_or("no reason given");
+        let what = reason(info.payload());
         // A library's, on broken bytes, which becomes a message about the input.
         if is_guarded() {
             return;

@@ -1,6 +1,8 @@
 //! What evaluating and reading cost, counted, not timed: a program of its own, because the memory that
 //! is counted is the whole process's.
 
+#![allow(clippy::disallowed_methods)] // as in tests/all.rs
+
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use peak_alloc::PeakAlloc;

@@ -5,6 +5,7 @@
 //! ```
 //!
 //! Each prints its figures; docs/testing.md has those of one machine.
+#![allow(clippy::disallowed_methods)] // as in tests/all.rs
 #![cfg(target_os = "linux")]
 
 #[path = "../support/program.rs"]

@@ -1,5 +1,6 @@
 //! `tumble smooth`: motion without its noise.
 
+#[allow(clippy::disallowed_methods)] // a picture
 mod picture;
 
 use std::borrow::Cow;

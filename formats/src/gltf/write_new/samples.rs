@@ -5,6 +5,8 @@ use std::io;
 
 use glam::{DQuat, Quat, Vec3};
 
+use tumble::signs_differ;
+
 use crate::gltf::channel::Path;
 use crate::motion::{Channels, Sampled, Sampler, Transform};
 
@@ -113,7 +115,7 @@ impl<'a> Samples<'a> {
         let mut before = None;
         (0..self.len()).map(move |sample| {
             let own = self.rotation(sample, track);
-            let turns = before.is_some_and(|before: Quat| before.dot(own) < 0.0);
+            let turns = before.is_some_and(|before: Quat| signs_differ(before, own));
             before.insert(if turns { -own } else { own }).to_array()
         })
     }
