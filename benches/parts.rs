@@ -89,6 +89,16 @@ fn encode(bencher: Bencher<'_, '_>, encoding: Encoding) {
 /// A frame of a crowd, each character at its own time in a clip of arcs, per joint.
 #[divan::bench(args = [CrowdValues::Rotations, CrowdValues::Model])]
 fn crowd(bencher: Bencher<'_, '_>, values: CrowdValues) {
+    frame_of_crowd(bencher, values, 1, false);
+}
+
+/// The same with a second layer over the first, as in a fade, and with one that is added.
+#[divan::bench(args = [false, true])]
+fn crowd_of_two_layers(bencher: Bencher<'_, '_>, additive: bool) {
+    frame_of_crowd(bencher, CrowdValues::Rotations, 2, additive);
+}
+
+fn frame_of_crowd(bencher: Bencher<'_, '_>, values: CrowdValues, layers: usize, additive: bool) {
     const CHARACTERS: usize = 1000;
     let skeleton = Skeleton::chain(TRACKS / 4, 0.1).expect("a skeleton");
     let mut library = CrowdLibrary::new(&skeleton).expect("joints");
@@ -96,11 +106,16 @@ fn crowd(bencher: Bencher<'_, '_>, values: CrowdValues) {
     let clip = library.push(&set, method::SLERP, VectorMethod::Linear);
     let clip = clip.expect("a clip");
     let mut crowd = one_thread()
-        .crowd(&library, CHARACTERS, 1)
+        .crowd(&library, CHARACTERS, layers)
         .expect("a crowd");
     for instance in 0..CHARACTERS {
         let plays = CrowdLayer::new(clip).at(instance as i64 * 9_973);
         crowd.set(instance, 0, plays).expect("an instance");
+        if layers > 1 {
+            let mut above = plays.at(instance as i64 * 7_919);
+            (above.weight, above.additive) = (0.3, additive);
+            crowd.set(instance, 1, above).expect("an instance");
+        }
     }
     let mut output = vec![[0.0; 4]; crowd.output_len(values)];
     bencher

@@ -4,6 +4,7 @@
 pub(crate) mod clip_tables;
 pub(crate) mod clock;
 pub(crate) mod instances;
+pub(crate) mod lay_over;
 pub(crate) mod layer;
 pub(crate) mod library;
 pub(crate) mod on_cpu;

@@ -5,6 +5,7 @@ use rayon::prelude::*;
 
 use crate::cpu::engine::CpuEngine;
 use crate::crowd::clip_tables::ClipTables;
+use crate::crowd::lay_over::lay_over;
 use crate::crowd::library::CrowdLibrary;
 use crate::output::crowd::{CrowdOutput, CrowdValues};
 use crate::shader::{
@@ -40,7 +41,7 @@ pub(crate) fn evaluate(
     let task = |(places, rotations): &mut (Vec<_>, Vec<_>),
                 (output, entries): (&mut [[f32; 4]], &[CrowdEntry])| {
         places.resize(entries.len() * context.bases as usize, CrowdPlace::zeroed());
-        rotations.resize(scene.library.joints(), [0.0; 4]);
+        rotations.resize(2 * scene.library.joints(), [0.0; 4]);
         let context = Layers { entries, ..context };
         let scene = Scene { context, ..scene };
         in_lanes_of(
@@ -70,6 +71,7 @@ pub(crate) fn evaluate(
 struct Task<'a, 'b> {
     scene: Scene<'a>,
     places: &'b mut Vec<CrowdPlace>,
+    /// Those of an instance, and those of one of its layers.
     rotations: &'b mut Vec<[f32; 4]>,
     output: &'b mut [[f32; 4]],
 }
@@ -91,15 +93,16 @@ impl InLanes for Task<'_, '_> {
             places: &self.places[..],
             ..context
         };
+        let (found, layered) = self.rotations.split_at_mut(scene.library.joints());
         for (instance, output) in self.output.chunks_exact_mut(scene.vectors()).enumerate() {
             if scene.values == CrowdValues::Rotations {
-                rotations::<L>(&context, tables, instance, output);
+                rotations::<L>(&context, tables, instance, layered, output);
                 continue;
             }
-            rotations::<L>(&context, tables, instance, self.rotations);
+            rotations::<L>(&context, tables, instance, layered, found);
             let (matrices, _) = output.as_chunks_mut::<3>();
             let instance = instance as u32;
-            for ((joint, &rotation), matrix) in (0..).zip(&*self.rotations).zip(&mut *matrices) {
+            for ((joint, &rotation), matrix) in (0..).zip(&*found).zip(&mut *matrices) {
                 let moved = context.layered(instance, joint, TRANSLATION);
                 let scale = context.layered(instance, joint, SCALE);
                 *matrix = transform(rotation, moved, scale);
@@ -126,37 +129,51 @@ impl Scene<'_> {
     }
 }
 
-/// The rotations of an instance.
+/// The rotations of an instance: those of its first layer, with the others laid over. `layered` is room for
+/// the rotations of one layer.
 #[inline(always)]
 fn rotations<L: Lanes>(
     context: &Layers<'_>,
     tables: &ClipTables,
     instance: usize,
+    layered: &mut [[f32; 4]],
     output: &mut [[f32; 4]],
 ) {
     let first = instance * context.layers as usize;
-    let clip = context.entries[first].clip_and_weight & 0xffff;
+    of_layer::<L>(context, tables, first, output);
+    for layer in first + 1..first + context.layers as usize {
+        if context.entries[layer].clip_and_weight >> 16 != 0 {
+            of_layer::<L>(context, tables, layer, layered);
+            lay_over::<L>(context, layer, layered, output);
+        }
+    }
+}
+
+/// The rotations of one layer.
+#[inline(always)]
+fn of_layer<L: Lanes>(
+    context: &Layers<'_>,
+    tables: &ClipTables,
+    layer: usize,
+    output: &mut [[f32; 4]],
+) {
+    let entry = &context.entries[layer];
+    let clip = entry.clip_and_weight & 0xffff;
     for run in &tables.runs[clip as usize] {
-        let own = &mut output[run.start as usize..run.end as usize];
+        let values = &mut output[run.start as usize..run.end as usize];
         let place = ((clip * context.joints + run.start) * CHANNELS) as usize;
         let channel = &context.channels[place];
         let base = (channel.form_and_base & 0x00ff_ffff) as usize;
-        let stands = context.places[first * context.bases as usize + base];
+        let stands = context.places[layer * context.bases as usize + base];
         if channel.form_and_base >> 24 == FORM_ARC && stands.span & ON_KEY == 0 {
             let middle = (channel.first + stands.span * channel.count * 2) as usize;
             let tangent = middle + channel.count as usize;
-            let cells = |first: usize| &context.cells[first..first + own.len()];
-            arcs::<L>(cells(middle), cells(tangent), stands.parameter, own);
+            let cells = |first: usize| &context.cells[first..first + values.len()];
+            arcs::<L>(cells(middle), cells(tangent), stands.parameter, values);
             continue;
         }
-        for (joint, value) in run.clone().zip(own) {
-            let entry = &context.entries[first];
-            *value = context.layer_value(first as u32, entry, joint, ROTATION);
-        }
-    }
-    if context.layers > 1 {
-        for (joint, value) in (0..).zip(output) {
-            *value = context.over(instance as u32, joint, ROTATION, *value);
+        for (joint, value) in run.clone().zip(values) {
+            *value = context.layer_value(layer as u32, entry, joint, ROTATION);
         }
     }
 }

@@ -2,6 +2,7 @@
 //! chosen at run time. Unsafe code is allowed here, for the processor's own vector instructions.
 #![allow(unsafe_code)]
 
+pub(crate) mod components;
 pub(crate) mod dispatch;
 pub(crate) mod doubles;
 #[cfg(wide_vectors)]

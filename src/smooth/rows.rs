@@ -4,6 +4,7 @@ use glam::DQuat;
 
 use crate::math::canonical::{canonical, round_quat};
 use crate::math::quaternion::{exp, product, unit};
+use crate::simd::components::{BLOCK, Components, at, put, put_together, take_apart};
 use crate::simd::dispatch::InLanes;
 use crate::simd::lanes::Lanes;
 use crate::smooth::kernel::{Smoothing, SmoothingEnds, SmoothingKernel};
@@ -107,28 +108,11 @@ fn turned_by(value: [f32; 4], half: [f64; 3]) -> [f32; 4] {
     round_quat(own.normalize().to_array())
 }
 
-/// Samples that are worked on together, so that each number of them is in vectors.
-const LANES: usize = 64;
-
-type Components = [[f32; LANES]; 4];
-
-#[inline(always)]
-fn at(rows: &Components, lane: usize) -> [f32; 4] {
-    [rows[0][lane], rows[1][lane], rows[2][lane], rows[3][lane]]
-}
-
-#[inline(always)]
-fn put(rows: &mut Components, lane: usize, value: [f32; 4]) {
-    for (row, own) in rows.iter_mut().zip(value) {
-        row[lane] = own;
-    }
-}
-
 /// Whether any rotation is 0, without a branch for each.
 #[inline(always)]
 fn are_any_zero([x, y, z, w]: &Components) -> bool {
     let mut found = 0;
-    for i in 0..LANES {
+    for i in 0..BLOCK {
         let is_zero = (x[i] == 0.0) & (y[i] == 0.0) & (z[i] == 0.0) & (w[i] == 0.0);
         found |= u32::from(is_zero);
     }
@@ -136,17 +120,11 @@ fn are_any_zero([x, y, z, w]: &Components) -> bool {
 }
 
 impl Row<'_> {
-    /// The components of consecutive samples, at most [`LANES`] of them.
+    /// The components of consecutive samples, at most [`BLOCK`] of them.
     #[inline(always)]
     fn load<L: Lanes>(&self, first: usize, count: usize, components: &mut Components) {
-        if self.stride == 1 && count == LANES {
-            let values = &self.values[self.first + first..][..LANES];
-            for lane in (0..LANES).step_by(L::COUNT) {
-                let loaded = L::load_rotations(&values[lane..]);
-                for (row, own) in components.iter_mut().zip(loaded) {
-                    own.store(&mut row[lane..][..L::COUNT]);
-                }
-            }
+        if self.stride == 1 {
+            take_apart::<L>(&self.values[self.first + first..][..count], components);
         } else {
             for lane in 0..count {
                 put(components, lane, self.get(first + lane));
@@ -159,7 +137,7 @@ impl Row<'_> {
 /// its own, in which a processor works on several vectors at once.
 #[inline(always)]
 fn rotation_steps(from: &Components, to: &Components, found: &mut Components) {
-    let [mut squares, mut sines, mut ratios] = [[0.0; LANES]; 3];
+    let [mut squares, mut sines, mut ratios] = [[0.0; BLOCK]; 3];
     for (i, square) in squares.iter_mut().enumerate() {
         let turn = pose_steps::turn(at(from, i), at(to, i));
         *square = pose_steps::square_of(turn);
@@ -198,15 +176,15 @@ impl Block<'_> {
     fn find_steps<L: Lanes, const ARE_ROTATIONS: bool>(&mut self) {
         let (row, radius) = (self.row, self.pass.weights.len());
         let count = self.count + 2 * radius - 1;
-        let rounded = count.next_multiple_of(LANES);
+        let rounded = count.next_multiple_of(BLOCK);
         for steps in self.steps.iter_mut() {
             // The last sums read as many as the others.
-            steps.resize(rounded + LANES, 0.0);
+            steps.resize(rounded + BLOCK, 0.0);
         }
         let before = self.first as isize - radius as isize;
-        let (mut from, mut to): (Components, Components) = ([[0.0; LANES]; 4], [[0.0; LANES]; 4]);
-        for lane in (0..rounded).step_by(LANES) {
-            let own = LANES.min(count - lane);
+        let (mut from, mut to): (Components, Components) = ([[0.0; BLOCK]; 4], [[0.0; BLOCK]; 4]);
+        for lane in (0..rounded).step_by(BLOCK) {
+            let own = BLOCK.min(count - lane);
             let place = before + lane as isize;
             if place >= 0 && place + (own as isize) < row.count as isize {
                 row.load::<L>(place as usize, own, &mut from);
@@ -218,17 +196,17 @@ impl Block<'_> {
                     put(&mut to, i, row.get(step + 1));
                 }
             }
-            let mut found: Components = [[0.0; LANES]; 4];
+            let mut found: Components = [[0.0; BLOCK]; 4];
             if ARE_ROTATIONS {
                 rotation_steps(&from, &to, &mut found);
             } else {
-                for i in 0..LANES {
+                for i in 0..BLOCK {
                     let step = pose_steps::pose(at(&from, i), at(&to, i), false);
                     put(&mut found, i, step);
                 }
             }
             for (steps, found) in self.steps.iter_mut().zip(&found) {
-                steps[lane..lane + LANES].copy_from_slice(found);
+                steps[lane..lane + BLOCK].copy_from_slice(found);
             }
         }
     }
@@ -237,12 +215,12 @@ impl Block<'_> {
     #[inline(always)]
     fn sums(&self, lane: usize) -> Components {
         let radius = self.pass.weights.len();
-        let mut sums: Components = [[0.0; LANES]; 4];
+        let mut sums: Components = [[0.0; BLOCK]; 4];
         for (sum, steps) in sums.iter_mut().zip(self.steps.iter()) {
             for (m, weight) in self.pass.weights.iter().enumerate() {
-                let after = &steps[lane + radius + m..][..LANES];
-                let before = &steps[lane + radius - 1 - m..][..LANES];
-                for i in 0..LANES {
+                let after = &steps[lane + radius + m..][..BLOCK];
+                let before = &steps[lane + radius - 1 - m..][..BLOCK];
+                for i in 0..BLOCK {
                     sum[i] += (after[i] - before[i]) * weight;
                 }
             }
@@ -253,13 +231,13 @@ impl Block<'_> {
     #[inline(always)]
     fn find_values<L: Lanes, const ARE_ROTATIONS: bool>(&mut self) {
         let (row, radius) = (self.row, self.pass.weights.len());
-        let mut values: Components = [[0.0; LANES]; 4];
-        for lane in (0..self.count).step_by(LANES) {
-            let own = LANES.min(self.count - lane);
+        let mut values: Components = [[0.0; BLOCK]; 4];
+        for lane in (0..self.count).step_by(BLOCK) {
+            let own = BLOCK.min(self.count - lane);
             row.load::<L>(self.first + lane, own, &mut values);
             let sums = self.sums(lane);
-            let mut moved: Components = [[0.0; LANES]; 4];
-            for i in 0..LANES {
+            let mut moved: Components = [[0.0; BLOCK]; 4];
+            for i in 0..BLOCK {
                 let value = pose_smooth::moved(at(&values, i), at(&sums, i), ARE_ROTATIONS);
                 put(&mut moved, i, value);
             }
@@ -277,21 +255,9 @@ impl Block<'_> {
                     put(&mut moved, i, value);
                 }
             }
-            if row.stride == 1 && own == LANES {
-                let output = &mut self.output[self.place + lane..][..LANES];
-                for (lane, output) in (0..)
-                    .step_by(L::COUNT)
-                    .zip(output.chunks_exact_mut(L::COUNT))
-                {
-                    let [x, y, z, w] = &moved;
-                    let components = [
-                        L::load(&x[lane..]),
-                        L::load(&y[lane..]),
-                        L::load(&z[lane..]),
-                        L::load(&w[lane..]),
-                    ];
-                    L::store_rotations(components, output);
-                }
+            if row.stride == 1 {
+                let output = &mut self.output[self.place + lane..][..own];
+                put_together::<L>(&moved, output);
             } else {
                 for i in 0..own {
                     self.output[self.place + (lane + i) * row.stride] = at(&moved, i);
@@ -304,7 +270,7 @@ impl Block<'_> {
     /// taken apart.
     #[inline(always)]
     fn smooth_side_by_side(&mut self) {
-        const EACH: usize = 4 * LANES;
+        const EACH: usize = 4 * BLOCK;
         let (row, radius) = (self.row, self.pass.weights.len());
         let values: &[f32] = bytemuck::cast_slice(&row.values[row.first..][..row.count]);
         let count = self.count + 2 * radius - 1;

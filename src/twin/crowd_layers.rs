@@ -104,6 +104,22 @@ impl Layers<'_> {
         self.cells[place as usize]
     }
 
+    /// The weight of a layer, and the cells of its mask: the first number of each is its joint's part of it.
+    #[inline(always)]
+    pub(crate) fn weight_and_mask(&self, entry: &CrowdEntry) -> (f32, &[[f32; 4]]) {
+        let mask = self.masks + ((entry.speed_and_modes >> 24) & 0x1f) * self.joints;
+        let weight = (entry.clip_and_weight >> 16) as f32 * WEIGHT_UNIT;
+        (weight, &self.cells[mask as usize..][..self.joints as usize])
+    }
+
+    /// The pose that a layer's additive clip adds the difference from: the channels of each joint.
+    #[inline(always)]
+    pub(crate) fn references_of(&self, entry: &CrowdEntry) -> &[[f32; 4]] {
+        let of_clip = self.joints * CHANNELS;
+        let first = self.references + (entry.clip_and_weight & 0xffff) * of_clip;
+        &self.cells[first as usize..][..of_clip as usize]
+    }
+
     /// The `kind`th channel of a joint in one layer.
     #[inline(always)]
     pub(crate) fn layer_value(

@@ -20,22 +20,47 @@ pub(crate) fn normalised(q: [f32; 4]) -> [f32; 4] {
     q.map(|c| c * scale)
 }
 
+/// The sum of two rotations, and what leads from the first to the nearer sign of the second.
 #[inline(always)]
-pub(crate) fn slerp(a: [f32; 4], b: [f32; 4], t: f32) -> [f32; 4] {
+pub(crate) fn chord(a: [f32; 4], b: [f32; 4]) -> ([f32; 4], [f32; 4]) {
     let near = if dot(a, b) < 0.0 { b.map(|c| -c) } else { b };
     let sum: [f32; 4] = std::array::from_fn(|c| a[c] + near[c]);
-    let difference: [f32; 4] = std::array::from_fn(|c| flushed(near[c] - a[c]));
+    (sum, std::array::from_fn(|c| flushed(near[c] - a[c])))
+}
+
+/// 0 for 0.
+#[inline(always)]
+pub(crate) fn inverse_root(square: f32) -> f32 {
+    if square == 0.0 {
+        0.0
+    } else {
+        reciprocal_root(square)
+    }
+}
+
+/// The rotation at an angle from the middle of a chord, whose sine and cosine are `turn`, with the inverse
+/// lengths of the sum and of the difference.
+#[inline(always)]
+pub(crate) fn along(
+    sum: [f32; 4],
+    difference: [f32; 4],
+    (to_unit, inverse): (f32, f32),
+    turn: (f32, f32),
+) -> [f32; 4] {
+    std::array::from_fn(|c| sum[c] * to_unit * turn.1 + difference[c] * inverse * turn.0)
+}
+
+/// The function of the shader, whose parts are functions of their own for blocks of rotations
+/// ([`lay_over`](crate::crowd::lay_over)).
+#[inline(always)]
+pub(crate) fn slerp(a: [f32; 4], b: [f32; 4], t: f32) -> [f32; 4] {
+    let (sum, difference) = chord(a, b);
     let square = dot(difference, difference);
     let whole = dot(sum, sum);
     let half = arc_tangent(root(square), root(whole));
     let turn = sine_cosine((t + t - 1.0) * half);
-    let inverse = if square == 0.0 {
-        0.0
-    } else {
-        reciprocal_root(square)
-    };
-    let to_unit = reciprocal_root(whole);
-    std::array::from_fn(|c| sum[c] * to_unit * turn.1 + difference[c] * inverse * turn.0)
+    let scales = (reciprocal_root(whole), inverse_root(square));
+    along(sum, difference, scales, turn)
 }
 
 #[inline(always)]

@@ -1,0 +1,57 @@
+//! Rotations of a block, component by component: loops over them that have no branches are compiled for the
+//! vector width.
+
+use crate::simd::lanes::Lanes;
+
+/// Rotations that are worked on together, so that several vectors of each component are in flight.
+pub(crate) const BLOCK: usize = 64;
+
+/// A row for each of `x y z w`.
+pub(crate) type Components = [[f32; BLOCK]; 4];
+
+#[inline(always)]
+pub(crate) fn at(components: &Components, lane: usize) -> [f32; 4] {
+    let [x, y, z, w] = components;
+    [x[lane], y[lane], z[lane], w[lane]]
+}
+
+#[inline(always)]
+pub(crate) fn put(components: &mut Components, lane: usize, value: [f32; 4]) {
+    for (row, own) in components.iter_mut().zip(value) {
+        row[lane] = own;
+    }
+}
+
+/// Takes apart the first rotations, at most a block. The others of the block stay.
+#[inline(always)]
+pub(crate) fn take_apart<L: Lanes>(rotations: &[[f32; 4]], components: &mut Components) {
+    let whole = rotations.len().min(BLOCK) / L::COUNT * L::COUNT;
+    for lane in (0..whole).step_by(L::COUNT) {
+        let loaded = L::load_rotations(&rotations[lane..]);
+        for (row, own) in components.iter_mut().zip(loaded) {
+            own.store(&mut row[lane..][..L::COUNT]);
+        }
+    }
+    for lane in whole..rotations.len().min(BLOCK) {
+        put(components, lane, rotations[lane]);
+    }
+}
+
+/// Puts together the first rotations of a block, as many as there is room for.
+#[inline(always)]
+pub(crate) fn put_together<L: Lanes>(components: &Components, rotations: &mut [[f32; 4]]) {
+    let [x, y, z, w] = components;
+    let whole = rotations.len().min(BLOCK) / L::COUNT * L::COUNT;
+    for lane in (0..whole).step_by(L::COUNT) {
+        let own = [
+            L::load(&x[lane..]),
+            L::load(&y[lane..]),
+            L::load(&z[lane..]),
+            L::load(&w[lane..]),
+        ];
+        L::store_rotations(own, &mut rotations[lane..][..L::COUNT]);
+    }
+    for lane in whole..rotations.len().min(BLOCK) {
+        rotations[lane] = at(components, lane);
+    }
+}
