@@ -151,6 +151,19 @@ def test_messages_name_keywords(tmp_path):
         tumble.load(tmp_path / "own.npz")
 
 
+def test_a_list_of_more_numbers_is_not_cut_without_a_word(tmp_path):
+    arrow = pytest.importorskip("pyarrow")
+    from pyarrow import parquet
+
+    path = tmp_path / "state.parquet"
+    state = [[0.0] * 3 + [0, 0, 0, 1.0] + [0.5] * 13] * 5
+    parquet.write_table(arrow.table({"time": np.arange(5.0), "state": state}), path)
+    with pytest.raises(tumble.InputError, match=r"has 20 numbers, and 4 are needed; say which"):
+        tumble.load(path, map="hand=state")
+    clip = tumble.load(path, map="hand=state[3:7]").clip
+    assert np.array_equal(clip.keys("hand")[0], [0, 0, 0, 1])
+
+
 def test_bodies_get_their_offsets(tmp_path):
     path = tmp_path / "walk.npz"
     poses = np.zeros((5, 3 * 22))

@@ -44,21 +44,21 @@ impl CpuEngine {
         }
         if window.layout == Layout::FrameMajor {
             let tasks = frame_tasks(window, output).into_par_iter();
-            return Ok(self.on_threads(|| {
+            return self.on_threads(|| {
                 tasks.try_for_each(|(window, frames)| {
                     stop::check_of(stop.as_ref())?;
                     Ok::<_, SetError>(self.frames(clip, timeline, &window, frames)?)
                 })
-            })??);
+            })?;
         }
         let rotations = Some(output.len());
-        Ok(self.on_threads(|| {
+        self.on_threads(|| {
             let tasks = tasks(window, 1, output).into_par_iter();
             tasks.try_for_each(|(window, own)| {
                 stop::check_of(stop.as_ref())?;
                 Ok::<_, SetError>(self.window(clip, timeline, &window, rotations, own)?)
             })
-        })??)
+        })?
     }
 
     /// As [`CpuEngine::evaluate`], encoded: a task's rotations are converted while they
@@ -85,12 +85,12 @@ impl CpuEngine {
                 _ => Ok(task(&mut Vec::new(), window, output)?),
             };
         }
-        Ok(self.on_threads(|| {
+        self.on_threads(|| {
             let tasks = tasks(window, encoding.bytes(), output).into_par_iter();
             tasks.try_for_each_init(Vec::new, |rotations, (window, own)| {
                 task(rotations, &window, own)
             })
-        })??)
+        })?
     }
 
     /// Evaluates a window on this thread; the whole result has `rotations` rotations, or is read again

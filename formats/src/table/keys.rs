@@ -310,17 +310,22 @@ impl Clip<'_> {
                 place: 0,
             }),
             (Values::Lists { ends, numbers }, Some(place)) => {
-                let short = (0..self.len()).map(|at| self.row(at)).find(|&row| {
-                    let start = if row == 0 { 0 } else { ends[row - 1] };
-                    ends[row] - start <= place
+                let length = |row: usize| ends[row] - if row == 0 { 0 } else { ends[row - 1] };
+                let rows = (0..self.len()).map(|at| self.row(at));
+                let misfit = { rows }.find(|&row| match cell.whole {
+                    Some(whole) => length(row) != whole,
+                    None => length(row) <= place,
                 });
-                if let Some(row) = short {
-                    let start = if row == 0 { 0 } else { ends[row - 1] };
-                    let message = format!(
-                        "the list `{}` has {} numbers; number {place} of it is wanted, from 0",
-                        column.name,
-                        ends[row] - start
-                    );
+                if let Some(row) = misfit {
+                    let (name, length) = (&column.name, length(row));
+                    let message = match cell.whole {
+                        Some(whole) => format!(
+                            "the list `{name}` has {length} numbers, and {whole} are needed; say which, such as {name}[0:{whole}]"
+                        ),
+                        None => format!(
+                            "the list `{name}` has {length} numbers; number {place} of it is wanted, from 0"
+                        ),
+                    };
                     return Err(self
                         .table
                         .refuse_at(cell.column, row, Code::ListLength, message));

@@ -96,6 +96,8 @@ impl RotationCells {
 pub(crate) struct Cell {
     pub(crate) column: usize,
     pub(crate) place: Option<usize>,
+    /// How many numbers the list must have, where it is taken as a whole.
+    pub(crate) whole: Option<usize>,
 }
 
 /// The names of a file's columns, after `--map` has given some of them other names.
@@ -180,6 +182,7 @@ impl Names<'_> {
         let mut cells = [Cell {
             column: 0,
             place: None,
+            whole: None,
         }; N];
         for ((cell, found), name) in cells.iter_mut().zip(found).zip(&names) {
             let Some(index) = found else {
@@ -453,6 +456,7 @@ fn cells(names: &mut Names<'_>, entry: &Entry, count: usize) -> Result<Vec<Cell>
         let cell = |index| Cell {
             column: names.want(index, Need::Number),
             place: None,
+            whole: None,
         };
         return Ok(columns.map(cell).collect());
     }
@@ -473,6 +477,7 @@ fn cells(names: &mut Names<'_>, entry: &Entry, count: usize) -> Result<Vec<Cell>
     let cell = |place| Cell {
         column,
         place: Some(place),
+        whole: entry.columns.is_none().then_some(count),
     };
     Ok(range.map(cell).collect())
 }
