@@ -1,7 +1,7 @@
 //! The scratch pool: the buffers that preparing needs are kept from call to call, because
 //! allocating them takes as long as preparing a hundred keys.
 
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Mutex, MutexGuard, TryLockError};
 
 use crate::method::interpolation::Interpolation;
 use crate::prepare::preparation::Preparation;
@@ -20,9 +20,14 @@ pub(crate) struct Memory {
 /// use three.
 const KEPT_EACH: usize = 4;
 
-/// What threads have given back, the latest last.
+/// What threads have given back, the latest last. Nobody waits for it: a process may be forked while a thread
+/// that is not in it has it locked.
 #[derive(Default)]
 pub(crate) struct ScratchPool(Mutex<Vec<Memory>>);
+
+/// How often a thread looks whether the pool is free before it does without: others have it for some
+/// nanoseconds.
+const LOOKS: usize = 1000;
 
 impl ScratchPool {
     /// Takes scratch buffers for an interpolation out of the pool, or allocates them. They prepare
@@ -39,7 +44,7 @@ impl ScratchPool {
     }
 
     fn find(&self, interpolation: &Interpolation) -> Option<Memory> {
-        let mut kept = self.kept();
+        let mut kept = self.kept()?;
         let place = (kept.iter()).rposition(|memory| memory.interpolation == *interpolation)?;
         Some(kept.remove(place))
     }
@@ -47,15 +52,24 @@ impl ScratchPool {
     /// Puts scratch buffers back into the pool. Call it only after success: a failed preparation
     /// may leave them half filled.
     pub(crate) fn give_back(&self, memory: Memory) {
-        let mut kept = self.kept();
+        let Some(mut kept) = self.kept() else {
+            return;
+        };
         if kept.len() >= KEPT_EACH * threads::count() {
             kept.remove(0);
         }
         kept.push(memory);
     }
 
-    fn kept(&self) -> MutexGuard<'_, Vec<Memory>> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    fn kept(&self) -> Option<MutexGuard<'_, Vec<Memory>>> {
+        for _ in 0..LOOKS {
+            match self.0.try_lock() {
+                Ok(kept) => return Some(kept),
+                Err(TryLockError::Poisoned(kept)) => return Some(kept.into_inner()),
+                Err(TryLockError::WouldBlock) => std::hint::spin_loop(),
+            }
+        }
+        None
     }
 }
 
@@ -80,11 +94,26 @@ mod tests {
         let find = |method: Method| pool.find(&method.into());
         pool.give_back(new(method::SLERP));
         pool.give_back(new(method::BESSEL_OVERHAUSER));
-        assert!(find(method::C2).is_none() && pool.kept().len() == 2);
-        assert!(find(method::SLERP).is_some() && pool.kept().len() == 1);
+        assert!(find(method::C2).is_none() && pool.kept().unwrap().len() == 2);
+        assert!(find(method::SLERP).is_some() && pool.kept().unwrap().len() == 1);
         for _ in 0..9 * threads::count() {
             pool.give_back(new(method::SLERP));
         }
-        assert_eq!(pool.kept().len(), KEPT_EACH * threads::count());
+        assert_eq!(pool.kept().unwrap().len(), KEPT_EACH * threads::count());
+    }
+
+    /// As in a process that was forked while another thread had the pool.
+    #[test]
+    fn a_pool_that_stays_locked_is_done_without() {
+        let pool = ScratchPool::default();
+        let locked = pool.kept().unwrap();
+        let interpolation = method::SLERP.into();
+        assert!(pool.find(&interpolation).is_none());
+        pool.give_back(Memory {
+            interpolation,
+            prepared: Prepared::new(&interpolation),
+            preparation: Preparation::new(&interpolation),
+        });
+        assert!(locked.is_empty());
     }
 }
