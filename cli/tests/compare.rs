@@ -207,3 +207,68 @@ fn keys_come_back_as_dat() {
     let told = String::from_utf8(succeed(place, &line).out).unwrap();
     assert!(told.contains("translation"), "{told}");
 }
+
+/// Trajectories in Unix time, of which one starts a second later: the poses of the first that the second
+/// reaches, without its gaps.
+#[test]
+fn an_estimate_beside_its_reference() {
+    let folder = sample_folder();
+    let place = folder.path();
+    let pose = |seconds: f64, x: f64| format!("{} {x} 0 0 0 0 0 1\n", 1_700_000_000.0 + seconds);
+    let truth: String = [0.5, 1.0, 1.5, 2.0, 2.5, 3.0]
+        .map(|time| pose(time, time))
+        .concat();
+    let estimate: String = [1.0, 2.0, 4.0].map(|time| pose(time, time + 1.0)).concat();
+    std::fs::write(place.join("truth.tum"), truth).unwrap();
+    std::fs::write(place.join("estimate.tum"), estimate).unwrap();
+    let both = ["compare", "truth.tum", "estimate.tum", "--json"];
+    let line = |more: &[&str]| [&both[..], more].concat().join(" ");
+    let measure = |more: &[&str]| json(place, &line(more).split(' ').collect::<Vec<_>>());
+
+    let (_, found) = measure(&["--ape", "--max-gap", "1.5", "--rpe", "1s"]);
+    let found = &found["trajectory"];
+    let counts = ["poses", "outside", "in_gaps"].map(|name| found[name].as_u64());
+    assert_eq!(counts, [Some(3), Some(1), Some(2)]);
+    let number = |value: &Value| value.as_f64().unwrap();
+    assert!((number(&found["ape"]["translation"]["rmse"]) - 1.0).abs() < 1e-6);
+    assert!(number(&found["ape"]["rotation"]["max"]) < 1e-4);
+    assert_eq!(found["rpe"]["count"], 1);
+    assert!(number(&found["rpe"]["translation"]["max"]) < 1e-6);
+    let (_, found) = measure(&["--align", "position"]);
+    let found = &found["trajectory"];
+    assert_eq!(found["poses"], 5);
+    assert!(
+        number(&found["ape"]["translation"]["max"]) < 1e-6,
+        "{found}"
+    );
+    assert!((number(&found["alignment"]["translation"][0]) + 1.0).abs() < 1e-6);
+    // Without them the motions are compared at the times that both have, in whichever second each begins.
+    let (_, found) = measure(&[]);
+    let moved = &found["clips"][0]["translation"];
+    assert!((number(&moved["largest"]) - 1.0).abs() < 1e-6, "{found}");
+
+    for (line, code, says) in [
+        (
+            &["--ape", "--distance", "0.5"][..],
+            8,
+            "distance of 1.000e0 over 0.5",
+        ),
+        (&["--ape", "--fps", "10"], 2, "leave out --fps"),
+        (&["--rpe", "100m"], 4, "longer than the whole path"),
+        (&["--rpe", "1km"], 2, "1s or 0.5m"),
+    ] {
+        let line = [&["compare", "truth.tum", "estimate.tum"][..], line].concat();
+        let run = run(place, &line);
+        assert_eq!(run.code, code, "{line:?}: {}", run.words);
+        assert!(run.words.contains(says), "{line:?}: {}", run.words);
+    }
+    let text = succeed(
+        place,
+        &["compare", "truth.tum", "estimate.tum", "--align", "yaw"],
+    );
+    let text = String::from_utf8(text.out).unwrap();
+    assert!(
+        text.contains("5 poses from 1700000001 to 1700000003 s, 1 outside"),
+        "{text}"
+    );
+}

@@ -213,6 +213,28 @@ fn bvh() {
 }
 
 #[test]
+fn fbx() {
+    let words = [
+        "Kaydara FBX Binary  \0\u{1a}\0",
+        "; FBX 7.4.0 project file\n",
+        "Model: 2, \"Model::n\", \"LimbNode\" {\n}\n",
+        "AnimationLayer: 3, \"AnimLayer::n\", \"\" {\n}\n",
+        "C: \"OO\",2,1\n",
+        "C: \"OP\",11,1, \"Lcl Scaling\"\n",
+        "P: \"InheritType\", \"enum\", \"\", \"\",2\n",
+        "P: \"RotationOrder\", \"enum\", \"\", \"\",4\n",
+        "46186158000",
+        "9223372036854775807",
+        "*1000000000",
+        "1e300",
+        "-1",
+        "{",
+        "}",
+    ];
+    fuzz_motion("fbx", targets::motion::fbx, fixtures("fbx"), &words);
+}
+
+#[test]
 fn kitti() {
     let words = [
         "1 0 0 0 ",

@@ -5,6 +5,7 @@ use std::f64::consts::FRAC_1_SQRT_2;
 use glam::{DQuat, DVec3, Quat, Vec3};
 use tumble::{Channel, TrackError};
 
+use crate::format::{Loaded, Space};
 use crate::motion::{Body, Motion, Transform};
 
 /// The axis that points up, of two of which one was the other before.
@@ -26,6 +27,50 @@ impl UpAxis {
         };
         DQuat::from_xyzw(x, 0.0, 0.0, FRAC_1_SQRT_2)
     }
+
+    /// The rotation that makes this axis the one that is up: from the one that a file says, else by
+    /// [`turn`](Self::turn).
+    #[must_use]
+    pub fn turn_from(self, space: Option<Space>) -> DQuat {
+        let axis = match self {
+            Self::Y => DVec3::Y,
+            Self::Z => DVec3::Z,
+        };
+        let quarter = |axis: DVec3| {
+            let [x, y, z] = (axis * FRAC_1_SQRT_2).to_array();
+            DQuat::from_xyzw(x, y, z, FRAC_1_SQRT_2)
+        };
+        match space.map(|space| space.up) {
+            None => self.turn(),
+            Some(up) if up == axis => DQuat::IDENTITY,
+            Some(up) if up == -axis => DQuat::from_xyzw(1.0, 0.0, 0.0, 0.0),
+            Some(up) => quarter(up.cross(axis)),
+        }
+    }
+}
+
+/// All clips of a file by [`adjust`], and the length of its boxes.
+///
+/// # Errors
+/// As [`adjust`].
+pub fn adjust_all(loaded: &mut Loaded, scale: f64, up: Option<UpAxis>) -> Result<(), TrackError> {
+    let turn = up.map_or(DQuat::IDENTITY, |up| up.turn_from(loaded.space));
+    for clip in &mut loaded.clips {
+        *clip = adjust(clip, scale, turn)?;
+    }
+    if let Some(length) = &mut loaded.box_length {
+        *length *= scale;
+    }
+    loaded.space = loaded.space.map(|space| Space {
+        up: match up {
+            Some(UpAxis::Y) => DVec3::Y,
+            Some(UpAxis::Z) => DVec3::Z,
+            None => space.up,
+        },
+        metres: space.metres / scale,
+    });
+    loaded.is_adjusted = true;
+    Ok(())
 }
 
 /// The clip with all translations multiplied by `scale`, and with all roots turned by `turn`, keys
@@ -120,7 +165,7 @@ pub fn set_offsets(clip: &mut Motion, numbers: &[f64]) -> Result<(), OffsetsErro
         return Err(OffsetsError::Moved { joint, name });
     }
     // SMPL's `trans` counts from where the shape puts the pelvis.
-    if let Some(body) = clip.body
+    if let Some(body) = clip.body.clone()
         && let Some(&pelvis) = offsets.first()
     {
         let pelvis = DVec3::from_array(pelvis);
@@ -133,6 +178,7 @@ pub fn set_offsets(clip: &mut Motion, numbers: &[f64]) -> Result<(), OffsetsErro
         }
         clip.body = Some(Body {
             pelvis: pelvis.as_vec3(),
+            ..body
         });
         clip.no_world = None;
     }
@@ -172,6 +218,21 @@ pub enum OffsetsError {
 mod tests {
     use super::*;
     use crate::motion::Joint;
+
+    /// An axis that is up goes where it is to be, from wherever it was.
+    #[test]
+    fn up_is_turned_from_the_axis_that_was_up() {
+        let axes = [DVec3::X, DVec3::Y, DVec3::Z];
+        for up in axes.into_iter().flat_map(|axis| [axis, -axis]) {
+            let space = Some(Space { up, metres: 1.0 });
+            for (to, axis) in [(UpAxis::Y, DVec3::Y), (UpAxis::Z, DVec3::Z)] {
+                let found = to.turn_from(space) * up;
+                assert!(found.distance(axis) < 1e-15, "{up} to {axis}: {found}");
+            }
+        }
+        assert!((UpAxis::Y.turn_from(None) * DVec3::Z).distance(DVec3::Y) < 1e-15);
+        assert!((UpAxis::Z.turn_from(None) * DVec3::Y).distance(DVec3::Z) < 1e-15);
+    }
 
     #[test]
     fn roots_are_turned_and_all_translations_scaled() {

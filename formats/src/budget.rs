@@ -58,6 +58,13 @@ impl Budget {
         }
     }
 
+    /// Bytes that are not taken.
+    #[cfg(feature = "fbx")]
+    pub(crate) fn left(&self) -> u64 {
+        let most = self.most.load(Ordering::Relaxed);
+        most.saturating_sub(self.taken.load(Ordering::Relaxed))
+    }
+
     /// Takes memory for `count` things of `bytes` each, for as long as the input is read.
     ///
     /// # Errors

@@ -216,6 +216,7 @@ codes! {
     Layout = "E316", "samples that do not fit the layout", "A file whose layout is kept has as many tracks as before, and frames at a rate if it has no list of times.";
     NotPerFrame = "E317", "an array that cannot be interpolated", "`--linear NAME`, in Python `linear=[NAME]`, names arrays of numbers with an entry for each frame, which are not keys.";
     RateBesideTimes = "E318", "a rate beside times", "`--source-fps` is for files that say no times: where a file has the time of every key, these times are its rate.";
+    BodyModel = "E319", "not a model of the body", "`--body` takes a model of SMPL, SMPL-H or SMPL-X as NPZ, or a folder with one for each gender, for motion of such bodies. It says where the joints of a shape are.";
     // E4xx and W4xx: tables (Parquet, Arrow, CSV).
     TableDamaged = "E401", "a table that cannot be read", "The file is cut or damaged, or written in a way that is not read here; the reason is given. Rows count from 0.";
     TableClaims = "E402", "more than the file can hold", "The file announces more rows or bytes than could be packed into its length; nothing was read.";
@@ -246,6 +247,11 @@ codes! {
     Pairs = "E612", "not a pair", "Each line has six numbers: x y z of the start, then of the goal.";
     Walkers = "E613", "not a walker", "A walker has radius, speed, x, y, z, to_x, to_y and to_z, and a plain name; what moves on a track of its own has radius and track, whose rows are t, x, y, z with increasing times.";
     Offsets = "E614", "offsets that do not fit", "There are three numbers for each joint: where it is in its parent, in the order of the joints.";
+    // E7xx and W7xx: FBX.
+    FbxDamaged = "E701", "an FBX file that cannot be read", "It is cut or damaged, or no FBX file at all; the reason is that of the library that reads it, which tells no place.";
+    FbxVersion = "E702", "an unknown version of FBX", "Versions 3.0 to 7.7 are read, as text and as binary.";
+    FbxDepth = "E703", "nodes too deep below each other", "No skeleton is a thousand joints deep.";
+    FbxWork = "E704", "curves that take too much work", "Curves are evaluated as often as following them takes, and a file gets a number of evaluations by its length; one that takes more is damaged, or made to.";
     ByteOrderMark = "W001", "a byte-order mark", "It is skipped; save the file without one.";
     MixedLineEnds = "W002", "mixed line ends", "Some lines end in CR LF, others in LF.";
     HeaderWords = "W003", "words after the header's numbers", "They are ignored.";
@@ -285,6 +291,13 @@ codes! {
     Nanoseconds = "W305", "times that are nanoseconds", "Seconds since 1970 have ten digits, nanoseconds nineteen, as ORB-SLAM writes them: `--time-unit ns` says it without this warning.";
     Bridged = "W401", "keys that are missing", "Cells are blank or NaN, and `--bridge-gaps` asks for the track to be interpolated from its other keys there.";
     FurtherNumbers = "W501", "further numbers behind a pose", "A line of a trajectory is `t x y z qx qy qz qw`; what follows, such as a covariance, is not read.";
+    FbxBeside = "W701", "what is not motion", "Meshes, skins, materials and the like are not read from FBX; nodes, and what moves them, are.";
+    FbxProperties = "W702", "curves of other properties", "They move what is no transform, such as blend shapes, visibility or a lens.";
+    FbxOutside = "W703", "keys outside the take", "An animation stack says when it begins and ends. Curves have keys before or after, which a player does not show.";
+    FbxScaleNodes = "W704", "nodes that carry scales", "In FBX a node may keep its scale from its children. Where that changes something, the scale gets a node of its own beside them.";
+    FbxWild = "W705", "a curve that is not followed", "Between two keys it changes so fast that a thousand times as many keys do not follow it within the bound.";
+    FbxRests = "W706", "a stack that moves nothing", "It has no curves of nodes; each node rests at its one key.";
+    FbxOdd = "W707", "an oddity that was mended", "The library that reads FBX found something that is not as it should be, and goes on.";
 }
 
 impl Code {

@@ -6,10 +6,12 @@ use std::io::{self, Write};
 use std::path::Path;
 use std::sync::Arc;
 
-use glam::Quat;
+use glam::{DVec3, Quat};
 use tumble::{Encoding, EulerSequence, FrameRate, Layout, Timeline, TrackSet};
 
 use crate::diagnostic::Diagnostic;
+#[cfg(feature = "fbx")]
+use crate::fbx;
 use crate::feature::{self, Feature};
 use crate::keys::Duplicates;
 use crate::motion::{Motion, Sampled};
@@ -29,6 +31,8 @@ pub static FORMATS: [&Format; COUNT] = [
     &dat::FORMAT,
     &gltf::FORMAT,
     &bvh::FORMAT,
+    #[cfg(feature = "fbx")]
+    &fbx::FORMAT,
     &npz::FORMAT,
     &npy::FORMAT,
     #[cfg(feature = "parquet")]
@@ -40,7 +44,7 @@ pub static FORMATS: [&Format; COUNT] = [
     &kitti::FORMAT,
 ];
 
-const COUNT: usize = if cfg!(feature = "parquet") { 10 } else { 8 };
+const COUNT: usize = 8 + 2 * cfg!(feature = "parquet") as usize + cfg!(feature = "fbx") as usize;
 
 /// A file format.
 pub struct Format {
@@ -79,6 +83,8 @@ pub enum FormatOption {
     TimeUnit,
     /// [`ReadOptions::bridge_gaps`].
     BridgeGaps,
+    /// [`ReadOptions::keyframes`].
+    Keyframes,
     /// [`MotionOptions::sequence`].
     Sequence,
     /// [`MotionOptions::linear`].
@@ -137,6 +143,9 @@ pub struct ReadOptions {
     /// Keys of a track some of whose numbers are missing (blank cells, nulls, NaN) are left out, so that it is
     /// interpolated from those beside them; else they refuse the file.
     pub bridge_gaps: bool,
+    /// Of a file whose curves are of another kind than a clip's (FBX) the keys at its key times alone, and as
+    /// many more as its turns take; else as many as it takes to follow the curves.
+    pub keyframes: bool,
 }
 
 /// The unit of times that are whole numbers.
@@ -191,6 +200,17 @@ pub struct Loaded {
     /// The clips are in other units or about other axes than the file: whatever else it holds does not
     /// go with them, so that it is not written again.
     pub is_adjusted: bool,
+    /// The unit and the axes of the clips, where the file says them.
+    pub space: Option<Space>,
+}
+
+/// The unit of lengths, and the axis that is up.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Space {
+    /// Up, a unit vector along an axis.
+    pub up: DVec3,
+    /// A unit of length, metres.
+    pub metres: f64,
 }
 
 impl Loaded {

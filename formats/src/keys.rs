@@ -181,7 +181,7 @@ fn is_unit(key: DQuat) -> bool {
 }
 
 /// A time a step of f32 before another, after an earlier one.
-fn just_before(time: f64, earlier: Option<f64>) -> Option<f64> {
+pub(crate) fn just_before(time: f64, earlier: Option<f64>) -> Option<f64> {
     let step = f64::from((time as f32).next_down());
     let Some(earlier) = earlier else {
         return Some(step);

@@ -17,6 +17,8 @@ pub mod dat;
 mod decimal;
 mod dense;
 pub mod diagnostic;
+#[cfg(feature = "fbx")]
+pub mod fbx;
 pub mod feature;
 pub mod format;
 pub mod generate;
@@ -50,6 +52,7 @@ mod source;
 mod table;
 mod text;
 pub mod times;
+pub mod trajectory;
 pub mod trim;
 pub mod tum;
 mod warnings;

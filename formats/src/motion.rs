@@ -53,6 +53,7 @@ impl Motion {
             origins: self.origins.clone(),
             no_world: self.no_world.clone(),
             bvh: self.bvh.clone(),
+            body: self.body.clone(),
             ..*self
         }
     }
@@ -92,12 +93,23 @@ impl Motion {
 }
 
 /// A body of SMPL, whose joints lie where its shape puts them.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Body {
     /// Where the shape puts the pelvis when `trans` is 0, in the clip's units and about its axes: it is
     /// part of the translations of the first track, and no part of the file's `trans`. 0 as long as
     /// no offsets are given.
     pub pelvis: Vec3,
+    /// What the file says of the shape.
+    pub shape: Shape,
+}
+
+/// The shape of a body of SMPL.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Shape {
+    /// How far it goes in each direction of the model; empty for the mean shape.
+    pub betas: Vec<f64>,
+    /// `male`, `female`, `neutral`, or empty where the file does not say it.
+    pub gender: String,
 }
 
 /// A joint of a skeleton.

@@ -17,7 +17,7 @@ pub(crate) fn line_name(name: &str, index: usize, taken: &mut HashSet<String>) -
 }
 
 /// The name itself; one that is taken gets the number behind it, and as many `_` as it takes.
-fn untaken(mut name: String, index: usize, taken: &mut HashSet<String>) -> String {
+pub(crate) fn untaken(mut name: String, index: usize, taken: &mut HashSet<String>) -> String {
     if taken.contains(&name) {
         name = format!("{name}#{index}");
     }

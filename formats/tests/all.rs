@@ -3,9 +3,12 @@
 // Tests may use what systems round differently (clippy.toml).
 #![allow(clippy::disallowed_methods)]
 
+mod body;
 mod bvh;
 mod bvh_write;
 mod dat_fixtures;
+#[cfg(feature = "fbx")]
+mod fbx;
 mod fixtures;
 mod glb;
 mod gltf;

@@ -121,6 +121,9 @@ fn every_code_of_a_file_is_shown_by_a_fixture_or_a_test() {
         Code::RateBesideTimes,
         Code::AccelerationJumps,
         Code::Bridged,
+        Code::BodyModel,
+        Code::FbxDepth,
+        Code::FbxWork,
     ];
     for &code in Code::ALL {
         let shown = all.contains(&format!("[{code}]"));

@@ -8,6 +8,7 @@ pub fn target(name: &str, data: &[u8]) {
         "dat" => targets::dat,
         "gltf" => targets::gltf::gltf,
         "bvh" => targets::motion::bvh,
+        "fbx" => targets::motion::fbx,
         "tum" => targets::motion::tum,
         "kitti" => targets::motion::kitti,
         "npz" => targets::arrays::npz,

@@ -3,6 +3,7 @@
 use glam::{Quat, Vec3};
 use tumble::FrameRate;
 use tumble_formats::bvh::{self, read_bvh};
+use tumble_formats::fbx::read_fbx;
 use tumble_formats::format::{Format, Loaded, MotionOptions};
 use tumble_formats::keyed::keyed;
 use tumble_formats::kitti::read_kitti;
@@ -94,6 +95,34 @@ pub(crate) fn bvh(bytes: &[u8]) -> u64 {
         assert!(off < 1e-6, "{wanted} {off:e}");
     }
     of
+}
+
+/// The reader of FBX: clips of unit rotations at increasing times, over trees.
+pub(crate) fn fbx(bytes: &[u8]) -> u64 {
+    let loaded = match read_fbx("fuzz", bytes, &options()) {
+        Ok(loaded) => loaded,
+        Err(error) => {
+            assert!(!error.message.is_empty());
+            return signature(error.code);
+        }
+    };
+    for clip in &loaded.clips {
+        for (index, track) in clip.set.tracks().enumerate() {
+            assert!(track.times.windows(2).all(|pair| pair[0] < pair[1]));
+            for key in track.keys {
+                assert!((key.as_dquat().length() - 1.0).abs() < 1e-6, "{key}");
+            }
+            let parent = clip.skeleton[index].parent;
+            assert!(parent.is_none_or(|parent| parent < index), "{parent:?}");
+        }
+    }
+    let codes: Vec<_> = loaded.warnings.iter().map(|own| own.code).collect();
+    let tracks = loaded.clips.first().map(|clip| clip.set.track_count());
+    signature((
+        codes,
+        loaded.refused.len().min(2),
+        tracks.map(|count| count.min(4)),
+    ))
 }
 
 /// The reader of matrices: poses of unit rotations, one for each frame.

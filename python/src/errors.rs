@@ -130,7 +130,7 @@ pub(crate) fn in_python(message: &str) -> String {
         ("`tumble eval --fps`", "`fps`"),
         ("--animation", "its name or place"),
     ];
-    const FLAGS: [&str; 3] = ["bridge_gaps", "overwrite", "raw_times"];
+    const FLAGS: [&str; 4] = ["bridge_gaps", "keyframes", "overwrite", "raw_times"];
     let message = WORDS
         .iter()
         .fold(message.to_owned(), |message, (program, python)| {

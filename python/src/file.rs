@@ -3,13 +3,13 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use glam::DQuat;
 use pyo3::exceptions::{PyIndexError, PyKeyError, PyTypeError};
 use pyo3::prelude::*;
 use pyo3::types::{PyString, PyTuple};
-use tumble_formats::adjust::{UpAxis, adjust, set_offsets};
+use tumble_formats::adjust::{UpAxis, adjust_all, set_offsets};
 use tumble_formats::format::TimeUnit;
 use tumble_formats::keys::Duplicates;
+use tumble_formats::npz::body_offsets;
 use tumble_formats::{Format, Limits, Loaded, ReadOptions};
 
 use crate::arrays::doubles;
@@ -152,12 +152,12 @@ impl File {
     }
 }
 
-/// Reads a motion file of any format: glTF and GLB, BVH, NPZ and NPY, Parquet, Arrow, CSV, TUM,
+/// Reads a motion file of any format: glTF and GLB, BVH, FBX, NPZ and NPY, Parquet, Arrow, CSV, TUM,
 /// `.dat`. What is remarkable about it becomes an `InputWarning`; what is wrong, an `InputError`
 /// with the place.
 ///
 /// `load(path, *, format=None, source_fps=None, map=None, time_unit=None, duplicates=None,
-/// raw_times=False, bridge_gaps=False, offsets=None, scale=None, up=None)`
+/// raw_times=False, bridge_gaps=False, keyframes=False, offsets=None, body=None, scale=None, up=None)`
 ///
 /// `format`: of the file, instead of by its first bytes and its name. `source_fps`: the rate of
 /// keys of files without times. `map`: which array or column is what, where names do not
@@ -168,9 +168,12 @@ impl File {
 /// it say what its numbers are. Known columns are `time`, `track` (or `joint`, `body`), `clip` (`clip_id`,
 /// `motion_id`), `x y z w` or `qx qy qz qw`, `tx ty tz`, `sx sy sz`. `duplicates`: of two different keys at one time, keep the "first", the "last" or "both", for a jump.
 /// `raw_times`: leave times as they are, instead of on the frames that they were rounded from.
-/// `bridge_gaps`: leave out keys of which a table lacks numbers, instead of refusing it. `offsets`:
+/// `bridge_gaps`: leave out keys of which a table lacks numbers, instead of refusing it. `keyframes`: of FBX
+/// the keys at the key times of the file alone, instead of as many as following its curves takes. `offsets`:
 /// where the joints of a body rest relative to their parents, (joints, 3), for files that do not say it, such
-/// as those of AMASS. `scale`: multiply translations. `up`: turn so that "y" or "z" is up, where the other was.
+/// as those of AMASS; `body`: the same by a model of SMPL, SMPL-H or SMPL-X as NPZ, or a folder of them by gender.
+/// `scale`: multiply translations, and the length of boxes; "metres" by the unit that an FBX file says. `up`:
+/// turn so that "y" or "z" is up, from the axis that an FBX file says, else where the other was.
 ///
 /// `read` is another name of it.
 ///
@@ -181,7 +184,7 @@ impl File {
 #[pyfunction]
 #[pyo3(signature = (
     path, *, format=None, source_fps=None, map=None, time_unit=None, duplicates=None,
-    raw_times=false, bridge_gaps=false, offsets=None, scale=None, up=None
+    raw_times=false, bridge_gaps=false, keyframes=false, offsets=None, body=None, scale=None, up=None
 ))]
 #[allow(clippy::too_many_arguments, reason = "keywords")]
 pub(crate) fn load(
@@ -194,8 +197,10 @@ pub(crate) fn load(
     duplicates: Option<&Bound<'_, PyAny>>,
     raw_times: bool,
     bridge_gaps: bool,
+    keyframes: bool,
     offsets: Option<&Bound<'_, PyAny>>,
-    scale: Option<f64>,
+    body: Option<PathBuf>,
+    scale: Option<&Bound<'_, PyAny>>,
     up: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<File> {
     let options = ReadOptions {
@@ -228,13 +233,17 @@ pub(crate) fn load(
             })
             .transpose()?,
         bridge_gaps,
+        keyframes,
     };
     let format = format.map(format_named).transpose()?;
-    let turn = up
+    let up = up
         .map(|axis| one_of(axis, "up", &[("y", UpAxis::Y), ("z", UpAxis::Z)]))
         .transpose()?;
-    if let Some(scale) = scale.filter(|scale| !scale.is_finite() || *scale <= 0.0) {
-        return Err(input(format!("scale: {scale} is not a number over 0")));
+    let scale = scale.map(Scale::of).transpose()?;
+    if offsets.is_some() && body.is_some() {
+        return Err(input(
+            "offsets and body both place the joints; give one".to_owned(),
+        ));
     }
     let offsets = offsets.map(|given| doubles(given, "offsets")).transpose()?;
     if let Some(given) = offsets
@@ -259,12 +268,25 @@ pub(crate) fn load(
                 placed.map_err(|error| input(format!("offsets: {}: {error}", file.display())))?;
             }
         }
-        if scale.is_some() || turn.is_some() {
-            let turn = turn.map_or(DQuat::IDENTITY, UpAxis::turn);
+        if let Some(model) = &body {
             for clip in &mut loaded.clips {
-                *clip =
-                    adjust(clip, scale.unwrap_or(1.0), turn).map_err(|error| of_track(&error))?;
+                let offsets = body_offsets(model, clip, Limits::default());
+                let offsets = offsets.map_err(|diagnostic| of_diagnostic(&diagnostic))?;
+                let placed = set_offsets(clip, &offsets);
+                placed.map_err(|error| input(format!("body: {}: {error}", file.display())))?;
             }
+        }
+        if scale.is_some() || up.is_some() {
+            let factor = match (scale, loaded.space) {
+                (None, _) => 1.0,
+                (Some(Scale::Factor(factor)), _) => factor,
+                (Some(Scale::Metres), Some(space)) => space.metres,
+                (Some(Scale::Metres), None) => {
+                    let message = "scale: the file does not say its unit; give a number";
+                    return Err(input(message.to_owned()));
+                }
+            };
+            adjust_all(&mut loaded, factor, up).map_err(|error| of_track(&error))?;
             // What is kept of the file has its own units and axes.
             loaded.document = None;
         }
@@ -277,6 +299,26 @@ pub(crate) fn load(
         warn(py, diagnostic)?;
     }
     Ok(File::new(path, &mut loaded))
+}
+
+/// By how much translations are multiplied.
+#[derive(Debug, Clone, Copy)]
+enum Scale {
+    Factor(f64),
+    /// By as much as makes metres of the file's unit.
+    Metres,
+}
+
+impl Scale {
+    fn of(scale: &Bound<'_, PyAny>) -> PyResult<Self> {
+        if scale.is_instance_of::<PyString>() {
+            return one_of(scale, "scale", &[("metres", Self::Metres)]);
+        }
+        match scale.extract::<f64>()? {
+            factor if factor.is_finite() && factor > 0.0 => Ok(Self::Factor(factor)),
+            factor => Err(input(format!("scale: {factor} is not a number over 0"))),
+        }
+    }
 }
 
 impl File {

@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 use tumble::{Channel, Tcb, Track, TrackError, TrackSet};
 use tumble_formats::bvh::{BvhChannel, BvhJoint};
-use tumble_formats::motion::{Body, Channels, Joint, Motion, Sampler, Transform};
+use tumble_formats::motion::{Body, Channels, Joint, Motion, Sampler, Shape, Transform};
 
 use crate::clip::{Clip, Source};
 use crate::errors::{guarded, input, of_track};
@@ -137,7 +137,10 @@ pub(crate) fn state<'py>(py: Python<'py>, clip: &Clip) -> PyResult<Bound<'py, Py
     state.set_item("is_world", motion.is_world)?;
     state.set_item("time_offset", motion.time_offset)?;
     state.set_item("no_world", &motion.no_world)?;
-    state.set_item("pelvis", motion.body.map(|body| body.pelvis.to_array()))?;
+    let body = motion.body.as_ref();
+    state.set_item("pelvis", body.map(|body| body.pelvis.to_array()))?;
+    state.set_item("betas", body.map(|body| body.shape.betas.clone()))?;
+    state.set_item("gender", body.map(|body| body.shape.gender.clone()))?;
     if let Some(source) = &clip.source {
         state.set_item("path", &source.path)?;
         state.set_item("clips", source.clips)?;
@@ -312,6 +315,12 @@ fn motion_of(state: &Bound<'_, PyDict>) -> PyResult<Motion> {
     let rate: Option<String> = entry(state, "rate")?.extract()?;
     let rate = rate.map(|rate| rate.parse()).transpose();
     let pelvis: Option<[f32; 3]> = entry(state, "pelvis")?.extract()?;
+    let betas: Option<Vec<f64>> = entry(state, "betas")?.extract()?;
+    let gender: Option<String> = entry(state, "gender")?.extract()?;
+    let shape = Shape {
+        betas: betas.unwrap_or_default(),
+        gender: gender.unwrap_or_default(),
+    };
     Ok(Motion {
         name: entry(state, "name")?.extract()?,
         place: entry(state, "place")?.extract()?,
@@ -326,6 +335,7 @@ fn motion_of(state: &Bound<'_, PyDict>) -> PyResult<Motion> {
         bvh: bvh.collect::<PyResult<_>>()?,
         body: pelvis.map(|pelvis| Body {
             pelvis: Vec3::from_array(pelvis),
+            shape,
         }),
     })
 }

@@ -1,15 +1,16 @@
 //! Arguments that say how motion files are read, and what becomes of their clips.
 
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
-use glam::DQuat;
 use tumble::FrameRate;
-use tumble_formats::adjust::{UpAxis, adjust, set_offsets};
+use tumble_formats::adjust::{UpAxis, adjust_all, set_offsets};
 use tumble_formats::format::{FormatOption, TimeUnit};
 use tumble_formats::keys::Duplicates;
 use tumble_formats::motion::Motion;
+use tumble_formats::npz::body_offsets;
 use tumble_formats::{Code, Diagnostic, FORMATS, Format, Limits, Loaded, ReadOptions};
 
 use crate::arguments::input::{clip_names, name, times};
@@ -44,14 +45,27 @@ pub(crate) struct Reading {
     /// interpolated from the keys beside them
     #[arg(long)]
     bridge_gaps: bool,
+    /// Of FBX the keys at the key times of the file alone, instead of as many as following its curves takes
+    /// [default: where `eval -m` names a method for them]
+    #[arg(long)]
+    keyframes: bool,
+    /// The same, because a method is named that makes curves of them.
+    #[arg(skip)]
+    names_method: OnceLock<()>,
     /// Where each joint is relative to its parent, for bodies of SMPL, whose files do not say it:
     /// text with x y z a line, in the order of the joints
     #[arg(long, value_name = "FILE")]
     offsets: Option<PathBuf>,
-    /// Multiply all translations, and the length of boxes, by this
-    #[arg(long, value_name = "FACTOR", value_parser = positive)]
-    scale: Option<f64>,
-    /// Turn all roots by a quarter about x, so that this axis is up where the other was
+    /// A model of SMPL, SMPL-H or SMPL-X as NPZ, or a folder of them by gender: each joint is where it has it for the
+    /// shape that the motion says
+    #[arg(long, value_name = "MODEL", conflicts_with = "offsets")]
+    body: Option<PathBuf>,
+    /// Multiply all translations, and the length of boxes, by this number; `metres`: by as much as makes metres
+    /// of the unit that an FBX file says
+    #[arg(long, value_name = "FACTOR|metres", value_parser = scale)]
+    scale: Option<ScaleArgument>,
+    /// Turn all roots so that this axis is up: from the axis that an FBX file says, and by a quarter about x where
+    /// a file says none
     #[arg(long, value_enum, value_name = "AXIS")]
     up: Option<UpArgument>,
 }
@@ -64,10 +78,17 @@ enum UpArgument {
     Z,
 }
 
-fn positive(text: &str) -> Result<f64, String> {
+#[derive(Debug, Clone, Copy)]
+enum ScaleArgument {
+    Factor(f64),
+    Metres,
+}
+
+fn scale(text: &str) -> Result<ScaleArgument, String> {
     match text.parse::<f64>() {
-        Ok(value) if value.is_finite() && value > 0.0 => Ok(value),
-        _ => Err("not a number over 0".to_owned()),
+        _ if text == "metres" => Ok(ScaleArgument::Metres),
+        Ok(value) if value.is_finite() && value > 0.0 => Ok(ScaleArgument::Factor(value)),
+        _ => Err("not a number over 0, nor `metres`".to_owned()),
     }
 }
 
@@ -104,6 +125,11 @@ fn format() -> impl TypedValueParser<Value = &'static Format> {
 }
 
 impl Reading {
+    /// A method makes curves of the keys: they are those of the file alone.
+    pub(crate) fn take_keyframes(&self) {
+        self.names_method.get_or_init(|| ());
+    }
+
     /// Whether one animation was asked for.
     pub(crate) fn chooses(&self) -> bool {
         self.animation.is_some()
@@ -116,7 +142,9 @@ impl Reading {
             || self.map.is_some()
             || self.time_unit.is_some()
             || self.bridge_gaps
+            || self.keyframes
             || self.offsets.is_some()
+            || self.body.is_some()
     }
 
     /// Whether the command line says anything of how files are read.
@@ -130,12 +158,16 @@ impl Reading {
             map,
             time_unit,
             bridge_gaps,
+            keyframes,
+            names_method: _,
             offsets,
+            body,
             scale,
             up,
         } = self;
         *raw_times
             || *bridge_gaps
+            || *keyframes
             || from.is_some()
             || animation.is_some()
             || duplicates.is_some()
@@ -143,6 +175,7 @@ impl Reading {
             || map.is_some()
             || time_unit.is_some()
             || offsets.is_some()
+            || body.is_some()
             || scale.is_some()
             || up.is_some()
     }
@@ -167,6 +200,7 @@ impl Reading {
                 TimeUnitArgument::Ns => TimeUnit::Nanoseconds,
             }),
             bridge_gaps: self.bridge_gaps,
+            keyframes: self.keyframes || self.names_method.get().is_some(),
         }
     }
 
@@ -194,6 +228,7 @@ impl Reading {
                 FormatOption::TimeUnit,
             ),
             ("bridge-gaps", self.bridge_gaps, FormatOption::BridgeGaps),
+            ("keyframes", self.keyframes, FormatOption::Keyframes),
         ] {
             if is_given && !formats().any(|format| format.takes(option)) {
                 let all = FORMATS.iter().filter(|format| format.takes(option));
@@ -223,24 +258,40 @@ impl Reading {
                 })?;
             }
         }
+        if let Some(model) = &self.body {
+            for clip in &mut loaded.clips {
+                let offsets = body_offsets(model, clip, Limits::default());
+                let offsets = offsets.map_err(|fault| Failure::input(&fault, ""))?;
+                set_offsets(clip, &offsets).map_err(|error| {
+                    let model = model.display().to_string();
+                    Failure::input(
+                        &Diagnostic::new(model, Code::BodyModel, error.to_string()),
+                        "",
+                    )
+                })?;
+            }
+        }
         if self.up.is_some() && loaded.box_length.is_some() {
             let message = "boxes of a chain hang down, whatever is up; leave out --up";
             return Err(Failure::usage(format!("{}: {message}", name(path))));
         }
-        if let (Some(scale), Some(length)) = (self.scale, &mut loaded.box_length) {
-            *length *= scale;
-        }
         if self.scale.is_some() || self.up.is_some() {
-            let turn = self.up.map_or(DQuat::IDENTITY, |up| match up {
-                UpArgument::Y => UpAxis::Y.turn(),
-                UpArgument::Z => UpAxis::Z.turn(),
+            let scale = match (self.scale, loaded.space) {
+                (None, _) => 1.0,
+                (Some(ScaleArgument::Factor(factor)), _) => factor,
+                (Some(ScaleArgument::Metres), Some(space)) => space.metres,
+                (Some(ScaleArgument::Metres), None) => {
+                    let message = "does not say its unit; give --scale as a number";
+                    return Err(Failure::usage(format!("{}: {message}", name(path))));
+                }
+            };
+            let up = self.up.map(|up| match up {
+                UpArgument::Y => UpAxis::Y,
+                UpArgument::Z => UpAxis::Z,
             });
-            for clip in &mut loaded.clips {
-                *clip = adjust(clip, self.scale.unwrap_or(1.0), turn).map_err(|error| {
-                    Failure::new(exit::ALL_INPUTS, format!("{}: {error}", name(path)))
-                })?;
-            }
-            loaded.is_adjusted = true;
+            adjust_all(loaded, scale, up).map_err(|error| {
+                Failure::new(exit::ALL_INPUTS, format!("{}: {error}", name(path)))
+            })?;
         }
         Ok(())
     }

@@ -80,6 +80,11 @@ struct Summary {
     samplers: BTreeMap<&'static str, usize>,
     #[serde(skip_serializing_if = "Option::is_none")]
     box_length: Option<f64>,
+    /// A unit of length, metres, and the axis that is up, where the file says them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    metres: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    up: Option<[f64; 3]>,
     /// Of the whole file, with its first animation, and of the curves of each: `FILE:PLACE: warning[CODE]: …`
     warnings: Vec<String>,
 }
@@ -192,6 +197,8 @@ impl Summary {
             rate: clip.rate.map(|rate| rate.to_string()),
             samplers,
             box_length: loaded.box_length,
+            metres: loaded.space.map(|space| space.metres),
+            up: loaded.space.map(|space| space.up.to_array()),
             warnings: loaded.warnings.iter().map(ToString::to_string).collect(),
         }
     }
@@ -260,6 +267,16 @@ impl Summary {
                 "skeleton",
                 format!("{} joints, {roots} roots", self.parents.len()),
             );
+        }
+        if let (Some(metres), Some(up)) = (self.metres, self.up) {
+            let axes = ["x", "y", "z"].into_iter().zip(up);
+            let axis = axes.map(|(name, number)| match number {
+                0.0 => String::new(),
+                1.0.. => name.to_owned(),
+                _ => format!("-{name}"),
+            });
+            let axis: String = axis.collect();
+            line("space", format!("{metres} m a unit, {axis} is up"));
         }
         if let Some(length) = self.box_length {
             line("box length", length.to_string());

@@ -12,6 +12,7 @@ use crate::motion::{Body, Joint, Motion, Transform};
 use crate::npy::ComponentOrder::{self, Wxyz, Xyzw};
 use crate::npz::archive::Archive;
 use crate::npz::array::{Array, AsStored, FEW, Make, TOGETHER};
+use crate::npz::body::shape_of;
 use crate::npz::header::Element;
 use crate::npz::plan::{Part, Plan, Values};
 use crate::npz::rotation_vector;
@@ -54,7 +55,13 @@ pub(crate) fn read(
         rate: plan.rate,
         is_world: plan.is_world,
         no_world: plan.no_world.clone(),
-        body: plan.is_body.then(Body::default),
+        body: match plan.is_body {
+            true => Some(Body {
+                shape: shape_of(archive)?,
+                ..Body::default()
+            }),
+            false => None,
+        },
         channels: plan.channels.clone(),
         bvh: plan.bvh.clone(),
         ..Motion::default()

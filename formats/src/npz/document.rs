@@ -315,7 +315,11 @@ impl Document for NpzDocument {
             return Err(self.refuse(Code::OneClip, message));
         };
         // `trans` counts from where the shape puts the pelvis.
-        let pelvis = sampled.clip.body.map_or(Vec3::ZERO, |body| body.pelvis);
+        let pelvis = sampled
+            .clip
+            .body
+            .as_ref()
+            .map_or(Vec3::ZERO, |body| body.pelvis);
         let mut translations = sampled.translations.to_vec();
         let roots = translations.iter_mut();
         for root in roots.step_by(sampled.clip.set.track_count().max(1)) {

@@ -4,6 +4,7 @@
 mod archive;
 pub(crate) mod array;
 mod bodies;
+mod body;
 mod clip;
 mod document;
 pub(crate) mod header;
@@ -24,6 +25,7 @@ use crate::feature::Feature;
 use crate::format::{Format, FormatOption, Loaded, ReadOptions};
 use crate::map::Map;
 use crate::npz::archive::{Archive, ONLY_ARRAY};
+pub use crate::npz::body::body_offsets;
 use crate::npz::document::NpzDocument;
 use crate::source::Source;
 use crate::warnings::Warnings;

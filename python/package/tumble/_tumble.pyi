@@ -578,8 +578,10 @@ def load(
     duplicates: Literal["first", "last", "both"] | None = None,
     raw_times: bool = False,
     bridge_gaps: bool = False,
+    keyframes: bool = False,
     offsets: ArrayLike | None = None,
-    scale: float | None = None,
+    body: _Path | None = None,
+    scale: float | Literal["metres"] | None = None,
     up: Literal["y", "z"] | None = None,
 ) -> File: ...
 def save(

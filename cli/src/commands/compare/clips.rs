@@ -72,6 +72,17 @@ impl Comparison<'_> {
         })?;
         let frames = self.samples(names, motions)?;
         let (first, of_first) = self.poses(names[0], motions[0], &frames)?;
+        let shift = shift(motions);
+        let frames = match shift == 0.0 {
+            true => frames,
+            false => Frames::at(
+                first
+                    .times
+                    .iter()
+                    .map(|time| time + shift)
+                    .collect::<Vec<_>>(),
+            ),
+        };
         let (second, of_second) = self.poses(names[1], motions[1], &frames)?;
         let (sampled, origins) = ([first, second], [of_first, of_second]);
         let times = &sampled[0].times;
@@ -139,7 +150,11 @@ impl Comparison<'_> {
 
     /// The times to compare at: those that both clips have.
     fn samples(&self, names: [&str; 2], clips: [&Motion; 2]) -> Result<Frames, Failure> {
-        let spans = clips.map(|clip| clip.set.time_span().unwrap_or((0.0, 0.0)));
+        let shifts = [0.0, shift(clips)];
+        let spans = [0, 1].map(|side| {
+            let (first, last) = clips[side].set.time_span().unwrap_or((0.0, 0.0));
+            (first - shifts[side], last - shifts[side])
+        });
         let start = spans[0].0.max(spans[1].0);
         let end = spans[0].1.min(spans[1].1);
         let far = |a: f64, b: f64| (a - b).abs() > SAME_TIME;
@@ -163,7 +178,8 @@ impl Comparison<'_> {
         if let Some(frames) = (self.frames)(start, end) {
             return Ok(frames);
         }
-        let mut times: Vec<f64> = clips.iter().flat_map(|clip| clip.key_times()).collect();
+        let mut times: Vec<f64> = clips[0].key_times();
+        times.extend(clips[1].key_times().iter().map(|time| time - shifts[1]));
         times.retain(|time| (start..=end).contains(time));
         times.extend([start, end]);
         times.sort_by(f64::total_cmp);
@@ -207,6 +223,11 @@ impl Comparison<'_> {
         }
         Ok((samples, clip.origins.clone()))
     }
+}
+
+/// What turns times of the first clip into times of the second: each counts from whole seconds of its own.
+fn shift([first, second]: [&Motion; 2]) -> f64 {
+    (first.time_offset - second.time_offset) as f64
 }
 
 /// The tracks that belong together, and the names of those that only one clip has: by their names,

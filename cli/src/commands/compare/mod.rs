@@ -3,6 +3,7 @@
 mod arrays;
 mod clips;
 mod tally;
+mod trajectory;
 
 use std::path::Path;
 
@@ -10,11 +11,14 @@ use clap::Args;
 use serde::Serialize;
 use tumble::{Device, Engine, FrameRate, Frames};
 use tumble_formats::Format;
+use tumble_formats::motion::Motion;
+use tumble_formats::trajectory::Step;
 
 use crate::arguments::input::{self, Inputs, clip_name};
 use crate::arguments::time::{check_range, finite_seconds};
 use crate::arguments::tolerance::{degrees, not_negative};
 use crate::commands::compare::clips::Comparison;
+use crate::commands::compare::trajectory::{AlignArgument, Measure};
 use crate::messages::exit::{ALL_INPUTS, DIFFERENCE, Failure};
 use crate::messages::words;
 
@@ -27,11 +31,16 @@ their places where the names differ. Two NPY files are compared number by number
 where they hold rotations. Exit code 8 where a difference is over --tolerance or --distance, or
 where one of two motions that have one of these lacks a track of the other.
 
+With --ape, --rpe or --align the second is an estimate of the path of the first: it is interpolated by lines
+and arcs at the times of the first's poses, laid over it by --align, and compared as evo compares
+trajectories. --tolerance and --distance are then of the absolute errors.
+
 Examples:
   tumble compare walk.bvh walk.glb
   tumble compare walk.bvh reduced.glb --world --tolerance 0.1deg --distance 0.5
   tumble compare one.npy other.npy --tolerance 0
-  tumble compare a.dat b.dat --fps 240 --json")]
+  tumble compare a.dat b.dat --fps 240 --json
+  tumble compare truth.tum estimate.tum --align sim3 --ape --rpe 1m")]
 pub(crate) struct Arguments {
     /// Two keyframe files, or two results of `tumble eval`
     #[command(flatten)]
@@ -55,10 +64,25 @@ pub(crate) struct Arguments {
     /// The largest distance of two translations that passes
     #[arg(long, value_name = "LENGTH", value_parser = not_negative, allow_hyphen_values = true)]
     distance: Option<f64>,
+    /// Lay the second path over the first by least squares, with what is free in it
+    #[arg(long, value_enum, value_name = "FREEDOM", help_heading = TRAJECTORIES)]
+    align: Option<AlignArgument>,
+    /// Absolute errors: pose by pose
+    #[arg(long, help_heading = TRAJECTORIES)]
+    ape: bool,
+    /// Relative errors: over steps of so many seconds, or so many units of length along the second
+    #[arg(long, value_name = "1s|1m", value_parser = trajectory::step, help_heading = TRAJECTORIES)]
+    rpe: Option<Step>,
+    /// Leave out poses between two of the second that are more than so many seconds apart
+    #[arg(long, value_name = "SECONDS", value_parser = not_negative, help_heading = TRAJECTORIES)]
+    max_gap: Option<f64>,
     /// Print JSON
     #[arg(long)]
     json: bool,
 }
+
+/// The heading of what is about paths in help.
+const TRAJECTORIES: &str = "Trajectories";
 
 /// What was found, as JSON has it.
 #[derive(Serialize)]
@@ -66,6 +90,7 @@ pub(crate) struct Arguments {
 enum Report {
     Clips(Vec<clips::Compared>),
     Array(arrays::Compared),
+    Trajectory(Box<trajectory::Compared>),
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
@@ -82,6 +107,10 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
     let paths = [first.as_path(), second.as_path()];
     let (report, rest) = match arguments.are_arrays(paths)? {
+        _ if arguments.is_of_trajectories() => {
+            let (found, rest) = arguments.trajectory(paths)?;
+            (Report::Trajectory(Box::new(found)), rest)
+        }
         true => {
             let found = arrays::compare(paths, &arguments.inputs.options())?;
             (Report::Array(found), Ok(()))
@@ -94,6 +123,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     match (&report, arguments.json) {
         (report, true) => words::json(report)?,
         (Report::Array(found), false) => words::listing(&found.told())?,
+        (Report::Trajectory(found), false) => words::listing(&found.lines())?,
         (Report::Clips(found), false) => {
             let told: String = found.iter().map(clips::Compared::told).collect();
             words::listing(&told)?;
@@ -103,6 +133,59 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
 }
 
 impl Arguments {
+    /// Whether the second is an estimate of the path of the first.
+    fn is_of_trajectories(&self) -> bool {
+        self.align.is_some() || self.ape || self.rpe.is_some() || self.max_gap.is_some()
+    }
+
+    /// The one track of both files, as paths.
+    fn trajectory(
+        &self,
+        paths: [&Path; 2],
+    ) -> Result<(trajectory::Compared, Result<(), Failure>), Failure> {
+        if self.fps.is_some() || self.world {
+            let message = "trajectories are compared in the world at the poses of the first; leave out --fps and --world";
+            return Err(Failure::usage(message));
+        }
+        let [first, second] = [
+            self.inputs.load_one(paths[0])?,
+            self.inputs.load_one(paths[1])?,
+        ];
+        let names = paths.map(input::name);
+        let track = |clip: &Motion, name: &str| {
+            let chosen = self.inputs.tracks.select(clip, name)?;
+            let [track] = &chosen.set.tracks().collect::<Vec<_>>()[..] else {
+                let message = format!(
+                    "{name}: has {}; a path is one, choose it with --tracks",
+                    words::count(chosen.set.track_count(), "track")
+                );
+                return Err(Failure::new(ALL_INPUTS, message));
+            };
+            // Where it is depends on all that it hangs on.
+            let all = clip.set.tracks();
+            let index = all.enumerate().find(|(_, other)| other.name == track.name);
+            Ok(index.map_or(0, |(index, _)| index))
+        };
+        let tracks = [
+            track(&first.clip, &names[0])?,
+            track(&second.clip, &names[1])?,
+        ];
+        let engine =
+            Engine::new(Device::Cpu).map_err(|error| Failure::evaluating(&names[0], &error))?;
+        let measure = Measure {
+            align: self.align.unwrap_or(AlignArgument::None),
+            absolute: self.ape || self.rpe.is_none(),
+            step: self.rpe,
+            max_gap: self.max_gap,
+        };
+        let clips = [
+            (&*names[0], &first.clip, tracks[0]),
+            (&*names[1], &second.clip, tracks[1]),
+        ];
+        let found = trajectory::compare(&engine, clips, &measure)?;
+        Ok((found, first.rest.and(second.rest)))
+    }
+
     /// Whether both are arrays whose meaning nobody needs to know.
     fn are_arrays(&self, paths: [&Path; 2]) -> Result<bool, Failure> {
         let is_array = |path: &Path| Format::detected(path).name == "npy";
@@ -155,9 +238,7 @@ impl Arguments {
         let mut found = Vec::new();
         for (place, first) in loaded[0].clips.iter().enumerate() {
             // Of the same name, else at the same place.
-            let same = |clip: &&tumble_formats::motion::Motion| {
-                first.name.is_some() && clip.name == first.name
-            };
+            let same = |clip: &&Motion| first.name.is_some() && clip.name == first.name;
             let second = loaded[1].clips.iter().find(same);
             let second = second.unwrap_or(&loaded[1].clips[place]);
             let names =
@@ -188,6 +269,17 @@ impl Arguments {
                 Some(turn) => over("angle", turn.largest, self.tolerance, "°"),
                 None => over("difference", found.difference.largest, self.tolerance, ""),
             }),
+            Report::Trajectory(found) => {
+                if let Some(absolute) = &found.ape {
+                    faults.extend(over("angle", absolute.rotation.max, self.tolerance, "°"));
+                    faults.extend(over(
+                        "distance",
+                        absolute.translation.max,
+                        self.distance,
+                        "",
+                    ));
+                }
+            }
             Report::Clips(all) => {
                 for found in all {
                     let angle = found.rotation.spread.largest;

@@ -172,6 +172,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
             "--json and the result cannot both go to standard output; give -o FILE",
         ));
     }
+    arguments.take_keys();
     let mut device = arguments.device.open()?;
     let options = arguments.options(&samples);
     let results = &arguments.results;
@@ -206,6 +207,13 @@ impl Arguments {
             checked.map_err(Failure::usage)?;
         }
         self.sampling.samples()
+    }
+
+    /// Says which keys are read.
+    fn take_keys(&self) {
+        if self.method.0.is_some() {
+            self.inputs.reading.take_keyframes();
+        }
     }
 
     /// All that decides over the bytes of a result besides its input.

@@ -180,6 +180,7 @@ impl Evaluator {
         shard: &mut Shard<'_>,
         told: &mut Vec<Told>,
     ) -> Result<(), Failure> {
+        arguments.take_keys();
         let batch = Batch {
             read: |path: &Path| arguments.inputs.read(path),
             most: arguments.inputs.max_size(),

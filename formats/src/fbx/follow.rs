@@ -1,0 +1,529 @@
+//! One channel of a node: the curve that a file's keys describe, as keys of our own that follow it.
+//!
+//! Curves of FBX are of Euler angles, weighted cubics and layers, which no sampler of a clip is. Between
+//! two key times the curve is evaluated at thirds, where a cubic of glTF meets it too; where the two are
+//! apart by more than a bound in between, the interval is cut in two, on a frame if there is one.
+
+use glam::DVec4;
+use tumble::FrameRate;
+
+use crate::keys::just_before;
+use crate::rate::frame_time;
+
+/// The largest distance between a curve and the keys that follow it: radians for rotations, else a part of
+/// the channel's largest number.
+pub(super) const BOUND: f64 = 1e-6;
+
+/// Where the two are compared, in parts of an interval: no simple fractions, at which whole turns hide.
+const COMPARED: [f64; 3] = [0.839, 0.487, 0.171];
+
+/// How often an interval is cut in two at most.
+const MOST_CUTS: u32 = 12;
+
+/// Between neighbouring keys that stand for the curve alone, a rotation is at most so far, radians: the
+/// shorter way is then the curve's.
+const LONGEST_ARC: f64 = 2.1;
+
+/// What a channel is of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Kind {
+    Rotation,
+    Vector,
+}
+
+/// x y z w of a unit quaternion, or x y z and 0.
+pub(super) type Value = DVec4;
+
+/// A time of the file's keys: what the channel is at it, and on either side of it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Stop {
+    /// Seconds as the file has them, and as the clip has them.
+    pub(super) file: f64,
+    pub(super) clip: f64,
+    pub(super) before: Value,
+    pub(super) at: Value,
+    pub(super) after: Value,
+}
+
+/// The keys of a channel.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Keys {
+    /// It rests there.
+    Rest(Value),
+    /// Each key holds until the next one.
+    Step(Vec<(f64, Value)>),
+    /// Straight lines and arcs.
+    Linear(Vec<(f64, Value)>),
+    /// With the tangents with which the curve arrives and leaves, a second.
+    Cubic(Vec<(f64, Value, [Value; 2])>),
+}
+
+/// How a channel is followed.
+pub(super) struct Follow<'a> {
+    pub(super) kind: Kind,
+    /// The channel at a time of the file.
+    pub(super) value: &'a dyn Fn(f64) -> Option<Value>,
+    /// The rate of the file, on whose frames intervals are cut.
+    pub(super) rate: Option<FrameRate>,
+    /// The file's keys stand for the curve: it is followed only as far as its turns want it.
+    pub(super) keyframes: bool,
+}
+
+/// An interval in which the channel does not jump.
+#[derive(Debug, Clone, Copy)]
+struct Piece {
+    file: [f64; 2],
+    clip: [f64; 2],
+    ends: [Value; 2],
+    thirds: [Value; 2],
+    cuts: u32,
+}
+
+/// A cubic from one end of an interval to the other.
+struct Cubic {
+    ends: [Value; 2],
+    /// A part of the interval's length, not a second.
+    tangents: [Value; 2],
+}
+
+impl Cubic {
+    /// The one that meets a curve at its thirds.
+    fn through(ends: [Value; 2], thirds: [Value; 2]) -> Self {
+        let ([p, q], [a, b]) = (ends, thirds);
+        Self {
+            ends,
+            tangents: [
+                -5.5 * p + 9.0 * a - 4.5 * b + q,
+                5.5 * q - 9.0 * b + 4.5 * a - p,
+            ],
+        }
+    }
+
+    fn at(&self, u: f64) -> Value {
+        let ([p, q], [m, n]) = (self.ends, self.tangents);
+        let (u2, v) = (u * u, 1.0 - u);
+        p * (v * v * (1.0 + 2.0 * u)) + q * (u2 * (3.0 - 2.0 * u)) + m * (u * v * v) - n * (u2 * v)
+    }
+}
+
+impl Follow<'_> {
+    /// The keys for a channel with these stops, between which it was evaluated at thirds; and whether
+    /// they follow it everywhere. `None` where the channel cannot be evaluated so often.
+    pub(super) fn keys(&self, stops: &[Stop], thirds: &[[Value; 2]]) -> Option<(Keys, bool)> {
+        let first = stops[0].at;
+        let each = stops
+            .iter()
+            .flat_map(|stop| [stop.before, stop.at, stop.after]);
+        let largest = each
+            .clone()
+            .map(|value| value.abs().max_element())
+            .fold(0.0, f64::max);
+        let all = each.chain(thirds.iter().flatten().copied());
+        let still = 1e-9 * largest.max(1e-9);
+        let is_still = |value: Value| (value - first).abs().max_element() <= still;
+        if stops.len() == 1 || all.clone().all(is_still) && self.stays_between(stops)? {
+            return Some((Keys::Rest(first), true));
+        }
+        if let Some(steps) = steps(stops, thirds)
+            && self.stays_between(stops)?
+        {
+            return Some((Keys::Step(steps), true));
+        }
+        let bound = match self.kind {
+            Kind::Rotation => BOUND,
+            Kind::Vector => BOUND * largest,
+        };
+        let (stops, pieces) = self.pieces(stops, thirds);
+        if self.keyframes {
+            return Some((Keys::Linear(self.few(&stops, &pieces)?), true));
+        }
+        let mut are_lines = true;
+        for piece in pieces.iter().flatten() {
+            are_lines = are_lines && self.is_line(piece, bound)?;
+        }
+        match are_lines {
+            true => Some((Keys::Linear(stops), true)),
+            false => self.cubics(&stops, &pieces, bound),
+        }
+    }
+
+    /// Whether a rotation that is the same at the ends of each interval, and at its thirds, does not turn
+    /// about in between.
+    fn stays_between(&self, stops: &[Stop]) -> Option<bool> {
+        if self.kind == Kind::Vector {
+            return Some(true);
+        }
+        for pair in stops.windows(2) {
+            let [from, to] = [pair[0].file, pair[1].file];
+            let middle = (self.value)(from + COMPARED[1] * (to - from))?;
+            if self.off(pair[0].after, middle) > BOUND {
+                return Some(false);
+            }
+        }
+        Some(true)
+    }
+
+    /// The stops as keys, those at a jump as two, with signs that continue; and the pieces between them,
+    /// none where the channel jumps.
+    fn pieces(
+        &self,
+        stops: &[Stop],
+        thirds: &[[Value; 2]],
+    ) -> (Vec<(f64, Value)>, Vec<Option<Piece>>) {
+        let mut keys: Vec<(f64, Value)> = vec![(stops[0].clip, stops[0].at)];
+        let mut pieces = Vec::with_capacity(thirds.len());
+        let leave = |keys: &mut Vec<(f64, Value)>, stop: &Stop, next: f64, pieces: &mut Vec<_>| {
+            let after = self.near(stop.after, keys[keys.len() - 1].1);
+            let late = f64::from((stop.clip as f32).next_up());
+            if stop.after != stop.at && late < next {
+                keys.push((late, after));
+                pieces.push(None);
+            }
+        };
+        for (pair, thirds) in stops.windows(2).zip(thirds) {
+            let [stop, next] = [&pair[0], &pair[1]];
+            leave(&mut keys, stop, next.clip, &mut pieces);
+            let (start, p) = keys[keys.len() - 1];
+            let a = self.near(thirds[0], p);
+            let b = self.near(thirds[1], a);
+            let q = self.near(next.before, b);
+            let jumps = next.before != next.at;
+            let early = jumps.then(|| just_before(next.clip, Some(start))).flatten();
+            let end = early.unwrap_or(next.clip);
+            pieces.push(Some(Piece {
+                file: [stop.file, next.file],
+                clip: [start, end],
+                ends: [p, q],
+                thirds: [a, b],
+                cuts: 0,
+            }));
+            keys.push((end, q));
+            if early.is_some() {
+                keys.push((next.clip, self.near(next.at, q)));
+                pieces.push(None);
+            }
+        }
+        (keys, pieces)
+    }
+
+    /// Of the two quaternions of a rotation the one near to another.
+    fn near(&self, value: Value, to: Value) -> Value {
+        match self.kind {
+            Kind::Rotation if value.dot(to) < 0.0 => -value,
+            _ => value,
+        }
+    }
+
+    /// How far a value of our own is from the channel's.
+    fn off(&self, ours: Value, exact: Value) -> f64 {
+        match self.kind {
+            Kind::Vector => (ours - exact).abs().max_element(),
+            Kind::Rotation => {
+                let ours = ours.normalize_or_zero();
+                2.0 * (ours - self.near(exact, ours)).length()
+            }
+        }
+    }
+
+    fn is_line(&self, piece: &Piece, bound: f64) -> Option<bool> {
+        let [p, q] = piece.ends;
+        // Of half a turn an arc may go either way.
+        if self.kind == Kind::Rotation && p.dot(q) < 0.1 {
+            return Some(false);
+        }
+        let at = |u: f64| match self.kind {
+            Kind::Vector => p.lerp(q, u),
+            Kind::Rotation => {
+                // Of unit quaternions that are no half turn apart; libm's sine is the same on every system.
+                let half = libm::atan2((q - p).length(), (q + p).length());
+                let weight = |u: f64| match half < 1e-9 {
+                    true => u,
+                    false => libm::sin(2.0 * half * u) / libm::sin(2.0 * half),
+                };
+                p * weight(1.0 - u) + q * weight(u)
+            }
+        };
+        let thirds = [1.0 / 3.0, 2.0 / 3.0].into_iter().zip(piece.thirds);
+        if thirds
+            .into_iter()
+            .any(|(u, exact)| self.off(at(u), exact) > bound)
+        {
+            return Some(false);
+        }
+        let middle = COMPARED[1];
+        Some(self.off(at(middle), (self.value)(piece.time(middle))?) <= bound)
+    }
+
+    /// Keys with tangents that follow all pieces.
+    fn cubics(
+        &self,
+        stops: &[(f64, Value)],
+        pieces: &[Option<Piece>],
+        bound: f64,
+    ) -> Option<(Keys, bool)> {
+        let mut keys = vec![(stops[0].0, stops[0].1, [Value::ZERO; 2])];
+        let mut is_whole = true;
+        let mut open: Vec<Piece> = Vec::new();
+        for (piece, &(end, value)) in pieces.iter().zip(&stops[1..]) {
+            let Some(piece) = piece else {
+                keys.push((end, value, [Value::ZERO; 2]));
+                continue;
+            };
+            open.push(*piece);
+            while let Some(mut piece) = open.pop() {
+                // A cut lies on the other side of 0 from what was there before.
+                let last = keys.len() - 1;
+                piece = self.after(piece, keys[last].1);
+                let cubic = Cubic::through(piece.ends, piece.thirds);
+                let mut fits = true;
+                for u in COMPARED {
+                    fits = fits && self.off(cubic.at(u), (self.value)(piece.time(u))?) <= bound;
+                }
+                if !fits && let Some(halves) = self.cut(&piece)? {
+                    open.extend(halves);
+                    continue;
+                }
+                is_whole &= fits;
+                let seconds = piece.clip[1] - piece.clip[0];
+                let [leaves, arrives] = cubic.tangents.map(|tangent| tangent / seconds);
+                keys[last].2[1] = leaves;
+                keys.push((piece.clip[1], piece.ends[1], [arrives, Value::ZERO]));
+            }
+        }
+        Some((Keys::Cubic(keys), is_whole))
+    }
+
+    /// The stops, and as many keys between them as it takes that arcs turn as the channel does.
+    fn few(&self, stops: &[(f64, Value)], pieces: &[Option<Piece>]) -> Option<Vec<(f64, Value)>> {
+        let mut keys = vec![stops[0]];
+        let mut open: Vec<Piece> = Vec::new();
+        for (piece, &stop) in pieces.iter().zip(&stops[1..]) {
+            let Some(piece) = piece.filter(|_| self.kind == Kind::Rotation) else {
+                keys.push((stop.0, self.near(stop.1, keys[keys.len() - 1].1)));
+                continue;
+            };
+            open.push(piece);
+            while let Some(piece) = open.pop() {
+                let piece = self.after(piece, keys[keys.len() - 1].1);
+                let ([p, q], [a, b]) = (piece.ends, piece.thirds);
+                let middle = (self.value)(piece.time(COMPARED[1]))?;
+                let steps = [(p, a), (a, middle), (middle, b), (b, q)];
+                let arc = |(from, to)| self.off(from, to);
+                let turned: f64 = steps.into_iter().map(arc).sum();
+                if turned > LONGEST_ARC
+                    && let Some(halves) = self.cut(&piece)?
+                {
+                    open.extend(halves);
+                    continue;
+                }
+                keys.push((piece.clip[1], q));
+            }
+        }
+        Some(keys)
+    }
+
+    /// A piece whose signs continue those of the key before it.
+    fn after(&self, piece: Piece, last: Value) -> Piece {
+        let a = self.near(piece.thirds[0], last);
+        let b = self.near(piece.thirds[1], a);
+        Piece {
+            ends: [last, self.near(piece.ends[1], b)],
+            thirds: [a, b],
+            ..piece
+        }
+    }
+
+    /// Two halves, the later one first; `None` where there is no more room between them.
+    fn cut(&self, piece: &Piece) -> Option<Option<[Piece; 2]>> {
+        let [from, to] = piece.file;
+        let length = to - from;
+        if piece.cuts >= MOST_CUTS || length < 1e-7 {
+            return Some(None);
+        }
+        let middle = f64::midpoint(from, to);
+        let frame = self.rate.map(|rate| frame_time(rate, 0.0, middle));
+        let is_inside = |time: &f64| *time - from > 0.05 * length && to - *time > 0.05 * length;
+        let time = frame.filter(is_inside).unwrap_or(middle);
+        let u = (time - from) / length;
+        let clip = match piece.clip == piece.file {
+            true => time,
+            false => piece.clip[0] + u * (piece.clip[1] - piece.clip[0]),
+        };
+        let value = (self.value)(time)?;
+        let half = |file: [f64; 2], clip, ends| {
+            let third = |u: f64| (self.value)(file[0] + u * (file[1] - file[0]));
+            Some(Piece {
+                file,
+                clip,
+                ends,
+                thirds: [third(1.0 / 3.0)?, third(2.0 / 3.0)?],
+                cuts: piece.cuts + 1,
+            })
+        };
+        Some(Some([
+            half([time, to], [clip, piece.clip[1]], [value, piece.ends[1]])?,
+            half([from, time], [piece.clip[0], clip], [piece.ends[0], value])?,
+        ]))
+    }
+}
+
+impl Piece {
+    /// The time of the file at a part of the piece.
+    fn time(&self, u: f64) -> f64 {
+        self.file[0] + u * (self.file[1] - self.file[0])
+    }
+}
+
+/// The keys of a channel that does nothing but jump.
+fn steps(stops: &[Stop], thirds: &[[Value; 2]]) -> Option<Vec<(f64, Value)>> {
+    let intervals = stops.windows(2).zip(thirds);
+    let mut hold = intervals.map(|(pair, [a, b])| {
+        let from = pair[0].after;
+        from == *a && from == *b && from == pair[1].before
+    });
+    if !hold.all(|holds| holds) {
+        return None;
+    }
+    let mut keys = Vec::with_capacity(stops.len());
+    for (index, stop) in stops.iter().enumerate() {
+        keys.push((stop.clip, stop.at));
+        let late = f64::from((stop.clip as f32).next_up());
+        let next = stops.get(index + 1);
+        if stop.after != stop.at && next.is_some_and(|next| late < next.clip) {
+            keys.push((late, stop.after));
+        }
+    }
+    Some(keys)
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DQuat;
+
+    use super::*;
+
+    fn rotation(angle: f64) -> Value {
+        DVec4::from(DQuat::from_rotation_x(angle))
+    }
+
+    /// The keys of a curve without jumps through some times.
+    fn followed(
+        kind: Kind,
+        times: &[f64],
+        keyframes: bool,
+        curve: &dyn Fn(f64) -> Value,
+    ) -> (Keys, bool) {
+        let stop = |&time: &f64| Stop {
+            file: time,
+            clip: time,
+            before: curve(time),
+            at: curve(time),
+            after: curve(time),
+        };
+        let stops: Vec<Stop> = times.iter().map(stop).collect();
+        let third = |pair: &[f64]| {
+            let length = pair[1] - pair[0];
+            [pair[0] + length / 3.0, pair[0] + 2.0 * length / 3.0].map(curve)
+        };
+        let thirds: Vec<_> = times.windows(2).map(third).collect();
+        let follow = Follow {
+            kind,
+            value: &|time| Some(curve(time)),
+            rate: FrameRate::new(24, 1).ok(),
+            keyframes,
+        };
+        follow.keys(&stops, &thirds).unwrap()
+    }
+
+    #[test]
+    fn what_rests_and_what_goes_straight_has_no_more_keys_than_its_file() {
+        let still = followed(Kind::Vector, &[0.0, 1.0, 2.0], false, &|_| Value::X);
+        assert_eq!(still, (Keys::Rest(Value::X), true));
+        let line = followed(Kind::Vector, &[0.0, 2.0], false, &|time| Value::X * time);
+        assert_eq!(
+            line.0,
+            Keys::Linear(vec![(0.0, Value::ZERO), (2.0, Value::X * 2.0)])
+        );
+        let arc = followed(Kind::Rotation, &[0.0, 2.0], false, &rotation);
+        assert!(matches!(arc.0, Keys::Linear(keys) if keys.len() == 2));
+    }
+
+    /// Turns of 360° hide between keys, at thirds and at halves.
+    #[test]
+    fn whole_turns_are_followed() {
+        let turn = std::f64::consts::TAU;
+        for turns in [1.0, 3.0, 6.0, 12.0] {
+            let curve = |time: f64| rotation(turn * turns * time);
+            let (keys, is_whole) = followed(Kind::Rotation, &[0.0, 1.0], false, &curve);
+            let Keys::Cubic(keys) = keys else {
+                panic!("{turns}: {keys:?}");
+            };
+            assert!(is_whole && keys.len() as f64 > 6.0 * turns, "{turns}");
+            let (few, _) = followed(Kind::Rotation, &[0.0, 1.0], true, &curve);
+            let Keys::Linear(few) = few else {
+                panic!("{turns}: {few:?}");
+            };
+            let arcs = few.windows(2).map(|pair| {
+                assert!(pair[0].1.dot(pair[1].1) > 0.0);
+                let [p, q] = [pair[0].1, pair[1].1].map(DQuat::from_vec4);
+                p.angle_between(q)
+            });
+            assert!((arcs.sum::<f64>() - turn * turns).abs() < 1e-6, "{turns}");
+        }
+    }
+
+    #[test]
+    fn intervals_are_cut_on_frames() {
+        let curve = |time: f64| rotation((3.0 * time).sin());
+        let (keys, is_whole) = followed(Kind::Rotation, &[0.0, 1.0], false, &curve);
+        let Keys::Cubic(keys) = keys else {
+            panic!("{keys:?}");
+        };
+        assert!(is_whole && (5..=25).contains(&keys.len()), "{}", keys.len());
+        for &(time, value, _) in &keys {
+            assert_eq!(time * 24.0, (time * 24.0).round());
+            assert!((value.dot(curve(time)).abs() - 1.0).abs() < 1e-15);
+        }
+    }
+
+    #[test]
+    fn steps_hold_and_jumps_have_two_keys() {
+        let stop = |time: f64, before: f64, at: f64, after: f64| Stop {
+            file: time,
+            clip: time,
+            before: Value::X * before,
+            at: Value::X * at,
+            after: Value::X * after,
+        };
+        let held = |time: f64| Some(Value::X * if time < 1.0 { 1.0 } else { 2.0 });
+        let mut follow = Follow {
+            kind: Kind::Vector,
+            value: &held,
+            rate: None,
+            keyframes: false,
+        };
+        let stops = [
+            stop(0.0, 1.0, 1.0, 1.0),
+            stop(1.0, 1.0, 2.0, 2.0),
+            stop(2.0, 2.0, 2.0, 2.0),
+        ];
+        let thirds = [[Value::X; 2], [Value::X * 2.0; 2]];
+        let keys = [(0.0, 1.0), (1.0, 2.0), (2.0, 2.0)].map(|(time, x)| (time, Value::X * x));
+        let found = follow.keys(&stops, &thirds).unwrap();
+        assert_eq!(found, (Keys::Step(keys.to_vec()), true));
+        // Straight up to 1, where it falls to 0, and stays.
+        let saw = |time: f64| Some(Value::X * if time < 1.0 { time } else { 0.0 });
+        follow.value = &saw;
+        let stops = [
+            stop(0.0, 0.0, 0.0, 0.0),
+            stop(1.0, 1.0, 0.0, 0.0),
+            stop(2.0, 0.0, 0.0, 0.0),
+        ];
+        let thirds = [[Value::X / 3.0, Value::X * (2.0 / 3.0)], [Value::ZERO; 2]];
+        let before = f64::from(1f32.next_down());
+        let keys = [(0.0, 0.0), (before, 1.0), (1.0, 0.0), (2.0, 0.0)];
+        let keys = keys.map(|(time, x)| (time, Value::X * x));
+        let found = follow.keys(&stops, &thirds).unwrap();
+        assert_eq!(found, (Keys::Linear(keys.to_vec()), true));
+    }
+}

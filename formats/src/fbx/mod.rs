@@ -1,0 +1,740 @@
+//! FBX, as Maya, 3ds Max, Blender, MotionBuilder and Mixamo write it, binary or text.
+//!
+//! The file is read by `ufbx`, which also evaluates what a node's layers, curves, pivots and rotation orders
+//! say together. Each animation stack becomes a clip, each node a track: keys that follow its curves within
+//! [a bound](follow), or those at the file's key times alone ([`ReadOptions::keyframes`]).
+
+mod follow;
+mod times;
+
+use std::cell::Cell;
+use std::collections::HashSet;
+use std::path::Path;
+use std::sync::atomic::{AtomicI64, Ordering};
+
+use glam::{DQuat, DVec3, DVec4, Quat, Vec3};
+use rayon::prelude::*;
+use tumble::{FrameRate, TrackError};
+use ufbx::{
+    AllocatorOpts, CoordinateAxis, ErrorType, FileFormat, InheritModeHandling, LoadOpts, SceneRoot,
+    Transform,
+};
+
+use crate::budget::{Budget, OverBudget};
+use crate::diagnostic::{Code, Diagnostic, Place};
+use crate::fbx::follow::{Follow, Keys, Kind, Stop, Value};
+use crate::fbx::times::{NodeTimes, Takes, Times};
+use crate::feature::Feature;
+use crate::format::{Format, FormatOption, Loaded, ReadOptions, Space};
+use crate::motion::{self, Channels, Joint, Motion, Sampler};
+use crate::names::untaken;
+use crate::origin::relative;
+use crate::quaternion::unit;
+use crate::rate::{Written, frame_time, of};
+use crate::source::Source;
+use crate::warnings::Warnings;
+
+/// Scenes with their animations.
+pub static FORMAT: Format = Format {
+    name: "fbx",
+    summary: "scenes of Maya, Blender, MotionBuilder, Mixamo, as binary or text",
+    extensions: &[],
+    probe: is_fbx,
+    read: open_fbx,
+    write: None,
+    write_motion: None,
+    features: &[
+        Feature::TrackNames,
+        Feature::ClipName,
+        Feature::Skeleton,
+        Feature::RestRotations,
+        Feature::Translations,
+        Feature::Scales,
+        Feature::Steps,
+        Feature::SeveralClips,
+        Feature::OwnTimes,
+        Feature::UnevenTimes,
+        Feature::Start,
+    ],
+    options: &[FormatOption::RawTimes, FormatOption::Keyframes],
+};
+
+/// The first bytes of a binary file.
+const MAGIC: &[u8] = b"Kaydara FBX Binary";
+
+/// How deep nodes hang below each other at most.
+const DEPTH: u32 = 1024;
+
+/// Half the distance on either side of a key at which a curve is asked whether it jumps there, seconds.
+const BESIDE: f64 = 1e-10;
+
+/// How often a curve of any input is evaluated at most, and how often more for each byte of it: a layer
+/// counts for an eighth.
+const EVALUATIONS: (i64, i64) = (1 << 23, 256);
+
+/// Bytes of a track beside its keys, of a key time while it is looked at, and of a key.
+const TRACK: usize = 600;
+const STOP: usize = 10 * size_of::<Transform>();
+const KEY: usize = 4 * (size_of::<(f64, Value, [Value; 2])>());
+
+fn is_fbx(start: &[u8]) -> bool {
+    let text = start.strip_prefix(b"\xef\xbb\xbf").unwrap_or(start);
+    let text = text.trim_ascii_start();
+    let has = |word: &[u8]| text.windows(word.len()).any(|part| part == word);
+    start.starts_with(MAGIC) || text.starts_with(b"; FBX ") || has(b"FBXHeaderExtension:")
+}
+
+/// Reads a file; `-` is standard input.
+///
+/// # Errors
+/// The first fault that refuses the file; those of single stacks are in [`Loaded::refused`].
+pub fn open_fbx(path: &Path, options: &ReadOptions) -> Result<Loaded, Diagnostic> {
+    let source = Source::open(path, options.pipes)?;
+    let name = source.name.clone();
+    let bytes = source.into_bytes(options.limits.file)?;
+    read_fbx(&name, &bytes, options)
+}
+
+/// Reads the bytes of a file; `name` is what messages call it. Units and axes are those of the file, which
+/// [`Loaded::space`] has.
+///
+/// # Errors
+/// As [`open_fbx`].
+pub fn read_fbx(name: &str, bytes: &[u8], options: &ReadOptions) -> Result<Loaded, Diagnostic> {
+    let budget = Budget::of(bytes.len(), options.limits);
+    let scene = load(name, bytes, &budget)?;
+    let over = |error: OverBudget| Diagnostic::new(name, Code::Memory, error.to_string());
+    budget
+        .take(1, scene.metadata.result_memory_used)
+        .map_err(over)?;
+    if scene.anim_stacks.is_empty() {
+        let message = "the file has no animation stack; is it the right one?";
+        return Err(Diagnostic::new(name, Code::NoAnimations, message));
+    }
+    let mut warnings = Warnings::new(name);
+    warn_of_scene(&scene, &mut warnings);
+    let reader = Reader {
+        name,
+        budget: &budget,
+        scene: &scene,
+        nodes: Nodes::of(&scene),
+        rate: of(&Written::Number(scene.settings.frames_per_second)).map(|found| found.grid),
+        options,
+        evaluations: AtomicI64::new(
+            EVALUATIONS.0 + EVALUATIONS.1.saturating_mul(bytes.len() as i64),
+        ),
+    };
+    let mut loaded = Loaded {
+        space: space(&scene),
+        ..Loaded::default()
+    };
+    for stack in 0..scene.anim_stacks.len() {
+        match reader.clip(stack, &mut warnings) {
+            Ok(clip) => loaded.clips.push(clip),
+            // The others would be refused too.
+            Err(fault) if [Code::Memory, Code::FbxWork].contains(&fault.code) => return Err(fault),
+            Err(fault) => loaded.refused.push(fault),
+        }
+    }
+    loaded.warnings = warnings.into_list();
+    Ok(loaded)
+}
+
+fn load(name: &str, bytes: &[u8], budget: &Budget) -> Result<SceneRoot, Diagnostic> {
+    let half = usize::try_from(budget.left() / 2).unwrap_or(usize::MAX);
+    // None at all is no limit to it.
+    let half = half.max(1);
+    let allocator = || AllocatorOpts {
+        memory_limit: half,
+        ..AllocatorOpts::default()
+    };
+    let options = LoadOpts {
+        temp_allocator: allocator(),
+        result_allocator: allocator(),
+        ignore_geometry: true,
+        ignore_embedded: true,
+        skip_skin_vertices: true,
+        skip_mesh_parts: true,
+        node_depth_limit: DEPTH,
+        file_format: FileFormat::Fbx,
+        // Nodes then scale their children as in every other format.
+        inherit_mode_handling: InheritModeHandling::Compensate,
+        ..LoadOpts::default()
+    };
+    ufbx::load_memory(bytes, options).map_err(|error| {
+        let (code, message) = match error.type_ {
+            ErrorType::EmptyFile => (Code::Empty, "the file is empty".to_owned()),
+            ErrorType::OutOfMemory | ErrorType::MemoryLimit | ErrorType::AllocationLimit => (
+                Code::Memory,
+                format!(
+                    "reading it takes more than the {half} bytes that an input of this length gets"
+                ),
+            ),
+            ErrorType::NodeDepthLimit => (
+                Code::FbxDepth,
+                format!("nodes hang more than {DEPTH} deep below each other; is the file damaged?"),
+            ),
+            ErrorType::UnsupportedVersion => (
+                Code::FbxVersion,
+                "the version of the file is not known; export it as FBX 2014 (7.4) or later"
+                    .to_owned(),
+            ),
+            _ => {
+                let info = match error.info() {
+                    "" => String::new(),
+                    info => format!(" ({info})"),
+                };
+                let reason = &*error.description;
+                let message = format!(
+                    "cannot be read as FBX: {reason}{info}; is it cut, or of another format?"
+                );
+                (Code::FbxDamaged, message)
+            }
+        };
+        Diagnostic::new(name, code, message)
+    })
+}
+
+/// The unit of lengths and the axis that is up, where the file says them.
+fn space(scene: &SceneRoot) -> Option<Space> {
+    let up = match scene.settings.axes.up {
+        CoordinateAxis::PositiveX => DVec3::X,
+        CoordinateAxis::NegativeX => DVec3::NEG_X,
+        CoordinateAxis::PositiveY => DVec3::Y,
+        CoordinateAxis::NegativeY => DVec3::NEG_Y,
+        CoordinateAxis::PositiveZ => DVec3::Z,
+        CoordinateAxis::NegativeZ => DVec3::NEG_Z,
+        CoordinateAxis::Unknown => return None,
+    };
+    // Exact for 1 cm and 1 inch, which files give as a factor of 1 cm.
+    let metres = (scene.settings.unit_meters * 1e9).round() / 1e9;
+    (metres.is_finite() && metres > 0.0).then_some(Space { up, metres })
+}
+
+/// What the file holds that no clip holds.
+fn warn_of_scene(scene: &SceneRoot, warnings: &mut Warnings) {
+    let count = |count: usize, one: &str| match count {
+        0 => None,
+        1 => Some(format!("1 {one}")),
+        many => Some(format!("{many} {one}s")),
+    };
+    let beside = [
+        count(scene.meshes.len(), "mesh").map(|text| text.replace("meshs", "meshes")),
+        count(scene.skin_deformers.len(), "skin"),
+        count(scene.blend_deformers.len(), "blend shape"),
+        count(scene.materials.len(), "material"),
+        count(scene.cameras.len(), "camera"),
+        count(scene.lights.len(), "light"),
+        count(scene.constraints.len(), "constraint"),
+    ];
+    let beside: Vec<String> = beside.into_iter().flatten().collect();
+    if !beside.is_empty() {
+        warnings.warn(Code::FbxBeside, || {
+            (
+                None,
+                format!("only motion is read; left out: {}", beside.join(", ")),
+            )
+        });
+    }
+    for warning in &scene.metadata.warnings {
+        warnings.warn(Code::FbxOdd, || (None, warning.description.to_string()));
+    }
+    let helpers = scene
+        .nodes
+        .iter()
+        .filter(|node| node.is_scale_helper)
+        .count();
+    if helpers > 0 {
+        warnings.warn(Code::FbxScaleNodes, || {
+            let nodes = count(helpers, "node").unwrap_or_default();
+            (
+                None,
+                format!("{nodes} more, for scales that children do not inherit"),
+            )
+        });
+    }
+}
+
+/// The nodes that are tracks: all but the root, which every file has.
+struct Nodes {
+    /// Their indices in the file, parents before children.
+    tracks: Vec<usize>,
+    /// The track of each node of the file.
+    track_of: Vec<Option<usize>>,
+    names: Vec<String>,
+}
+
+impl Nodes {
+    fn of(scene: &SceneRoot) -> Self {
+        let is_track = |index: &usize| !scene.nodes[*index].is_root;
+        let tracks: Vec<usize> = (0..scene.nodes.len()).filter(is_track).collect();
+        let mut track_of = vec![None; scene.nodes.len()];
+        for (track, &node) in tracks.iter().enumerate() {
+            track_of[node] = Some(track);
+        }
+        let mut taken = HashSet::new();
+        let name = |(track, &node): (usize, &usize)| {
+            let name = &scene.nodes[node].element.name;
+            let name = match name.is_empty() {
+                true => format!("node{track}"),
+                false => name.to_string(),
+            };
+            untaken(name, track, &mut taken)
+        };
+        Self {
+            names: tracks.iter().enumerate().map(name).collect(),
+            track_of,
+            tracks,
+        }
+    }
+}
+
+/// A file that is being read.
+struct Reader<'a> {
+    name: &'a str,
+    budget: &'a Budget,
+    scene: &'a SceneRoot,
+    nodes: Nodes,
+    rate: Option<FrameRate>,
+    options: &'a ReadOptions,
+    /// How many are left.
+    evaluations: AtomicI64,
+}
+
+/// The channels of a node as keys, where it rests, and whether all keys follow their curves.
+struct NodeKeys {
+    rest: Transform,
+    translation: Keys,
+    rotation: Keys,
+    scale: Keys,
+    is_whole: bool,
+}
+
+impl NodeKeys {
+    fn rests(&self) -> bool {
+        let channels = [&self.translation, &self.rotation, &self.scale];
+        channels.iter().all(|keys| matches!(keys, Keys::Rest(_)))
+    }
+}
+
+/// Why a node cannot be followed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Fault {
+    NotFinite { time: f64 },
+    Work,
+}
+
+/// Which of a node's channels an evaluation gives: `ufbx`'s `TransformFlags`, whose bits it does not let out.
+const EXPLICIT: u32 = 0x4;
+const TRANSLATION: u32 = 0x10;
+const ROTATION: u32 = 0x20;
+const SCALE: u32 = 0x40;
+
+/// A channel: its flag, and the value in a transform.
+type ChannelOf = (u32, Kind, fn(&Transform) -> Value);
+
+const CHANNELS: [ChannelOf; 3] = [
+    (TRANSLATION, Kind::Vector, |all| {
+        DVec4::new(all.translation.x, all.translation.y, all.translation.z, 0.0)
+    }),
+    (ROTATION, Kind::Rotation, |all| {
+        let q = &all.rotation;
+        DVec4::new(q.x, q.y, q.z, q.w)
+    }),
+    (SCALE, Kind::Vector, |all| {
+        DVec4::new(all.scale.x, all.scale.y, all.scale.z, 0.0)
+    }),
+];
+
+impl Reader<'_> {
+    fn refuse(&self, stack: usize, code: Code, message: impl Into<String>) -> Diagnostic {
+        let name = self.scene.anim_stacks[stack].element.name.to_string();
+        Diagnostic::new(self.name, code, message).inside(name)
+    }
+
+    fn clip(&self, stack: usize, warnings: &mut Warnings) -> Result<Motion, Diagnostic> {
+        let over = |error: OverBudget| self.refuse(stack, Code::Memory, error.to_string());
+        let (scene, tracks) = (self.scene, &self.nodes.tracks);
+        self.budget.take(tracks.len(), TRACK).map_err(over)?;
+        let takes = Takes::of(scene, &scene.anim_stacks[stack], self.budget).map_err(over)?;
+        self.warn_of_takes(stack, &takes, warnings);
+        let nodes: Vec<Result<NodeKeys, Diagnostic>> = tracks
+            .par_iter()
+            .map(|&node| self.node(stack, node, &takes))
+            .collect();
+        let mut clip = Motion {
+            name: Some(scene.anim_stacks[stack].element.name.to_string())
+                .filter(|name| !name.is_empty()),
+            place: stack,
+            ..Motion::default()
+        };
+        let mut nodes: Vec<NodeKeys> = nodes.into_iter().collect::<Result<_, _>>()?;
+        let [start, end] = takes.span.map(|time| self.clip_time(time));
+        // A take in which nothing moves is as long as it says: its first track has a key at either end.
+        if start < end
+            && nodes.iter().all(NodeKeys::rests)
+            && let Some(NodeKeys { rotation, .. }) = nodes.first_mut()
+            && let Keys::Rest(value) = *rotation
+        {
+            *rotation = Keys::Linear(vec![(start, value), (end, value)]);
+        }
+        for (track, keys) in nodes.into_iter().enumerate() {
+            if !keys.is_whole {
+                warnings.warn(Code::FbxWild, || {
+                    let message = format!(
+                        "the curves of `{}` change faster than keys follow them; they are near there, not on it",
+                        self.nodes.names[track]
+                    );
+                    (None, message)
+                });
+            }
+            let parent = scene.nodes[tracks[track]].parent.as_deref();
+            let parent =
+                parent.and_then(|parent| self.nodes.track_of[parent.element.typed_id as usize]);
+            let too_large = |reason: String| {
+                let message = format!("`{}`: {reason}", self.nodes.names[track]);
+                self.refuse(stack, Code::TooLarge, message)
+            };
+            let rest = self
+                .push(&mut clip, parent, start, keys)
+                .map_err(|error| too_large(error.to_string()))?;
+            if !(rest.translation.is_finite() && rest.scale.is_finite()) {
+                let reason = "a number passes the largest f32, 3.4e38".to_owned();
+                return Err(too_large(reason));
+            }
+        }
+        clip.rate = clip.rate_of_keys().filter(|&rate| Some(rate) == self.rate);
+        Ok(clip)
+    }
+
+    fn warn_of_takes(&self, stack: usize, takes: &Takes, warnings: &mut Warnings) {
+        let name = &self.scene.anim_stacks[stack].element.name;
+        let inside = || Some(Place::Inside(name.to_string()));
+        if takes.outside > 0 {
+            warnings.warn(Code::FbxOutside, || {
+                let [begin, end] = takes.span;
+                let keys = match takes.outside {
+                    1 => "1 key lies".to_owned(),
+                    count => format!("{count} keys lie"),
+                };
+                (inside(), format!("{keys} outside the take, {begin} to {end} s, and what lies there is left out"))
+            });
+        }
+        if !takes.others.is_empty() {
+            warnings.warn(Code::FbxProperties, || {
+                let names: Vec<String> = takes
+                    .others
+                    .iter()
+                    .map(|name| format!("`{name}`"))
+                    .collect();
+                (
+                    inside(),
+                    format!(
+                        "curves of what is no transform are left out: {}",
+                        names.join(", ")
+                    ),
+                )
+            });
+        }
+        if takes.nodes.values().all(NodeTimes::is_empty) {
+            warnings.warn(Code::FbxRests, || {
+                (inside(), "the stack moves no node; the skeleton rests")
+            });
+        }
+    }
+
+    /// A time of the file on the frame that it was rounded from: ticks hold no frames of 29.97.
+    fn clip_time(&self, time: f64) -> f64 {
+        let tick = 1.1 / self.scene.metadata.ktime_second.max(1) as f64;
+        let frame = self.rate.map(|rate| frame_time(rate, 0.0, time));
+        let is_near = |frame: &f64| (frame - time).abs() <= tick && !self.options.raw_times;
+        frame.filter(is_near).unwrap_or(time)
+    }
+
+    fn node(&self, stack: usize, node: usize, takes: &Takes) -> Result<NodeKeys, Diagnostic> {
+        let none = Times::default();
+        let moved = takes.nodes.get(&node);
+        let times = moved.map_or([&none; 3], |moved| {
+            [&moved.translation, &moved.rotation, &moved.scale]
+        });
+        let lists = times.map(|times| times.within(takes.span));
+        let mut keys: [Option<Keys>; 3] = [None, None, None];
+        let mut is_whole = true;
+        for channel in 0..3 {
+            if keys[channel].is_some() {
+                continue;
+            }
+            // Channels with keys at the same times are evaluated together.
+            let group: Vec<usize> = (channel..3)
+                .filter(|&other| lists[other] == lists[channel])
+                .collect();
+            let jump = group.iter().any(|&channel| times[channel].jump);
+            let found = self.follow(stack, node, takes.layers, (&lists[channel], jump), &group)?;
+            for (channel, (found, follows)) in group.into_iter().zip(found) {
+                keys[channel] = Some(found);
+                is_whole &= follows;
+            }
+        }
+        let [Some(translation), Some(rotation), Some(scale)] = keys else {
+            unreachable!("each channel is in a group");
+        };
+        Ok(NodeKeys {
+            rest: self.scene.nodes[node].local_transform,
+            translation,
+            rotation,
+            scale,
+            is_whole,
+        })
+    }
+
+    /// The keys of some channels of a node that have keys at the same times.
+    fn follow(
+        &self,
+        stack: usize,
+        node: usize,
+        layers: usize,
+        (times, jump): (&[f64], bool),
+        group: &[usize],
+    ) -> Result<Vec<(Keys, bool)>, Diagnostic> {
+        let memory = |error: OverBudget| self.refuse(stack, Code::Memory, error.to_string());
+        let _borrowed = self.budget.borrow(times.len(), STOP).map_err(memory)?;
+        let (anim, of_node) = (&self.scene.anim_stacks[stack].anim, &self.scene.nodes[node]);
+        let fault = Cell::new(None);
+        let cost = 1 + layers as i64 / 8;
+        let evaluate = |time: f64, flags: u32| {
+            if self.evaluations.fetch_sub(cost, Ordering::Relaxed) < 0 {
+                fault.set(Some(Fault::Work));
+                return None;
+            }
+            let found = ufbx::evaluate_transform_flags(anim, of_node, time, EXPLICIT | flags);
+            let is_finite = CHANNELS
+                .iter()
+                .all(|channel| (channel.2)(&found).is_finite());
+            if !is_finite {
+                fault.set(Some(Fault::NotFinite { time }));
+            }
+            is_finite.then_some(found)
+        };
+        let refuse = || {
+            match fault.get() {
+            Some(Fault::NotFinite { time }) => self.refuse(
+                stack,
+                Code::NotFinite,
+                format!("`{}` is nowhere at {time} s: a number is not finite", &*of_node.element.name),
+            ),
+            _ => self.refuse(
+                stack,
+                Code::FbxWork,
+                "following the curves takes more work than a file of this length gets; is it damaged?",
+            ),
+        }
+        };
+        let all = group
+            .iter()
+            .fold(0, |all, &channel| all | CHANNELS[channel].0);
+        let stops = || {
+            let mut at = Vec::with_capacity(times.len());
+            let mut thirds = Vec::with_capacity(times.len());
+            for (index, &time) in times.iter().enumerate() {
+                let here = evaluate(time, all)?;
+                let [before, after] = match jump {
+                    true => {
+                        let room = |other: Option<&f64>| {
+                            let gap = other.map_or(f64::INFINITY, |other| (other - time).abs());
+                            BESIDE.min(gap / 8.0)
+                        };
+                        let earlier = index.checked_sub(1).and_then(|index| times.get(index));
+                        let (back, on) = (room(earlier), room(times.get(index + 1)));
+                        [
+                            if index == 0 {
+                                here
+                            } else {
+                                evaluate(time - back, all)?
+                            },
+                            match index + 1 < times.len() {
+                                true => evaluate(time + on, all)?,
+                                false => here,
+                            },
+                        ]
+                    }
+                    false => [here; 2],
+                };
+                at.push([before, here, after]);
+                if let Some(&next) = times.get(index + 1) {
+                    let third = |u: f64| evaluate(time + u * (next - time), all);
+                    thirds.push([third(1.0 / 3.0)?, third(2.0 / 3.0)?]);
+                }
+            }
+            Some((at, thirds))
+        };
+        let (at, thirds) = stops().ok_or_else(refuse)?;
+        let mut found = Vec::with_capacity(group.len());
+        for &channel in group {
+            let (flag, kind, part) = CHANNELS[channel];
+            let one = |time: f64| Some(part(&evaluate(time, flag)?));
+            let channel_stops: Vec<Stop> = (times.iter().zip(&at))
+                .map(|(&file, all)| {
+                    stop(file, self.clip_time(file), kind, all.each_ref().map(part))
+                })
+                .collect();
+            let channel_thirds: Vec<[Value; 2]> = thirds
+                .iter()
+                .map(|both| both.each_ref().map(part))
+                .collect();
+            let follow = Follow {
+                kind,
+                value: &one,
+                rate: self.rate,
+                keyframes: self.options.keyframes,
+            };
+            let keys = follow
+                .keys(&channel_stops, &channel_thirds)
+                .ok_or_else(refuse)?;
+            let count = match &keys.0 {
+                Keys::Rest(_) => 1,
+                Keys::Step(keys) | Keys::Linear(keys) => keys.len(),
+                Keys::Cubic(keys) => keys.len(),
+            };
+            self.budget.take(count, KEY).map_err(memory)?;
+            found.push(keys);
+        }
+        Ok(found)
+    }
+
+    /// Adds a node's track to a clip; gives where it rests.
+    fn push(
+        &self,
+        clip: &mut Motion,
+        parent: Option<usize>,
+        start: f64,
+        keys: NodeKeys,
+    ) -> Result<motion::Transform, TrackError> {
+        let track = clip.set.track_count();
+        let name = &self.nodes.names[track];
+        let mut channels = Channels::default();
+        let [translation, rotation, scale] = CHANNELS.map(|channel| (channel.2)(&keys.rest));
+        let quat = |value: Value| unit(DQuat::from_vec4(value));
+        let resting = quat(rotation);
+        match keys.rotation {
+            Keys::Rest(value) => {
+                let key = quat(value);
+                // Clips of one file share where their nodes rest; one that is elsewhere in this clip has a key.
+                if key != resting && key != -resting {
+                    channels.rotation = Some(Sampler::Linear);
+                }
+                clip.set.push(name, &[start], &[key])?;
+            }
+            Keys::Step(keys) => {
+                channels.rotation = Some(Sampler::Step);
+                let (times, values) = split(&keys, quat);
+                clip.set.push(name, &times, &values)?;
+            }
+            Keys::Linear(keys) => {
+                channels.rotation = Some(Sampler::Linear);
+                let (times, values) = split(&keys, quat);
+                clip.set.push(name, &times, &values)?;
+            }
+            Keys::Cubic(keys) => {
+                channels.rotation = Some(Sampler::Cubic);
+                let plain: Vec<(f64, Value)> = keys.iter().map(|key| (key.0, key.1)).collect();
+                let (times, values) = split(&plain, quat);
+                clip.set.push(name, &times, &values)?;
+                let tangents: Vec<[Quat; 2]> = keys
+                    .iter()
+                    .map(|key| key.2.map(|tangent| Quat::from_vec4(tangent.as_vec4())))
+                    .collect();
+                clip.set.set_tangents(track, &tangents)?;
+            }
+        }
+        let (sampler, moved) = vectors(keys.translation, translation, start);
+        channels.translation = sampler;
+        let points: Vec<DVec3> = moved.values.iter().map(|value| value.truncate()).collect();
+        let (origin, points) = relative(&points);
+        if sampler.is_some() {
+            clip.set
+                .set_translations(track, &moved.times, &points, &moved.tangents)?;
+        }
+        let (sampler, scaled) = vectors(keys.scale, scale, start);
+        channels.scale = sampler;
+        let values = scaled.values.iter();
+        let sizes: Vec<Vec3> = values.map(|value| value.truncate().as_vec3()).collect();
+        if sampler.is_some() {
+            clip.set
+                .set_scales(track, &scaled.times, &sizes, &scaled.tangents)?;
+        }
+        let rest = motion::Transform {
+            translation: (translation.truncate() - origin).as_vec3(),
+            rotation: resting,
+            scale: scale.truncate().as_vec3(),
+        };
+        clip.skeleton.push(Joint { parent, rest });
+        clip.channels.push(channels);
+        clip.set_origin(track, origin);
+        Ok(rest)
+    }
+}
+
+/// A stop of one channel, with one sign on all sides; sides that differ by rounding alone do not.
+fn stop(file: f64, clip: f64, kind: Kind, [before, at, after]: [Value; 3]) -> Stop {
+    let beside = |value: Value| {
+        let value = match kind {
+            Kind::Rotation if value.dot(at) < 0.0 => -value,
+            _ => value,
+        };
+        // What a curve does in 1e-10 s is no jump.
+        let is_same = (value - at).abs().max_element() <= 1e-7 * at.abs().max_element().max(1e-3);
+        if is_same { at } else { value }
+    };
+    Stop {
+        file,
+        clip,
+        before: beside(before),
+        at,
+        after: beside(after),
+    }
+}
+
+fn split<T>(keys: &[(f64, Value)], value: impl Fn(Value) -> T) -> (Vec<f64>, Vec<T>) {
+    keys.iter().map(|key| (key.0, value(key.1))).unzip()
+}
+
+/// The keys of a translation or a scale.
+struct VectorKeys {
+    times: Vec<f64>,
+    values: Vec<Value>,
+    tangents: Vec<[Vec3; 2]>,
+}
+
+/// With the sampler; none for a channel that is where its node rests.
+fn vectors(keys: Keys, rest: Value, start: f64) -> (Option<Sampler>, VectorKeys) {
+    let plain = |keys: Vec<(f64, Value)>| {
+        let (times, values) = keys.into_iter().unzip();
+        VectorKeys {
+            times,
+            values,
+            tangents: Vec::new(),
+        }
+    };
+    match keys {
+        Keys::Rest(value) => {
+            let sampler = (value.as_vec4() != rest.as_vec4()).then_some(Sampler::Linear);
+            (sampler, plain(vec![(start, value)]))
+        }
+        Keys::Step(keys) => (Some(Sampler::Step), plain(keys)),
+        Keys::Linear(keys) => (Some(Sampler::Linear), plain(keys)),
+        Keys::Cubic(keys) => {
+            let tangents = keys
+                .iter()
+                .map(|key| key.2.map(|tangent| tangent.truncate().as_vec3()));
+            let tangents = tangents.collect();
+            let keys = keys.iter().map(|key| (key.0, key.1)).collect();
+            (
+                Some(Sampler::Cubic),
+                VectorKeys {
+                    tangents,
+                    ..plain(keys)
+                },
+            )
+        }
+    }
+}

@@ -1,0 +1,312 @@
+//! When the curves of each node have keys: plain numbers, which threads may share.
+
+use std::collections::{HashMap, HashSet};
+
+use ufbx::{
+    AnimCurve, AnimLayer, AnimStack, ElementType, ExtrapolationMode, Interpolation, Node, Scene,
+};
+
+use crate::budget::{Budget, OverBudget};
+
+/// Times closer than this are one, seconds: FBX counts in ticks of 2.2e-11 s.
+pub(super) const SAME: f64 = 1e-9;
+
+/// Keys that an extrapolated curve may repeat, beside those that it has.
+const REPEATED: f64 = 1e6;
+
+/// When one of a node's channels has keys.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(super) struct Times {
+    /// Seconds, as the file has them, in any order.
+    list: Vec<f64>,
+    /// Whether a curve may jump at one of them.
+    pub(super) jump: bool,
+}
+
+/// The channels of a node.
+#[derive(Debug, Clone, Default)]
+pub(super) struct NodeTimes {
+    pub(super) translation: Times,
+    pub(super) rotation: Times,
+    pub(super) scale: Times,
+}
+
+impl NodeTimes {
+    /// Whether no curve moves it.
+    pub(super) fn is_empty(&self) -> bool {
+        let channels = [&self.translation, &self.rotation, &self.scale];
+        channels.iter().all(|times| times.list.is_empty())
+    }
+}
+
+/// The curves of an animation stack.
+#[derive(Debug, Default)]
+pub(super) struct Takes {
+    /// The first and the last time of the clip.
+    pub(super) span: [f64; 2],
+    /// By the index of the node.
+    pub(super) nodes: HashMap<usize, NodeTimes>,
+    /// Keys that lie outside the span.
+    pub(super) outside: usize,
+    /// Names of properties with curves that are no transforms.
+    pub(super) others: Vec<String>,
+    /// The layers, of which each is evaluated for each value.
+    pub(super) layers: usize,
+}
+
+/// What of a node a property decides.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Part {
+    Translation,
+    Rotation,
+    Scale,
+}
+
+fn part_of(property: &str) -> Option<Part> {
+    Some(match property {
+        "Lcl Translation" | "RotationOffset" | "ScalingOffset" | "RotationPivot"
+        | "ScalingPivot" => Part::Translation,
+        "Lcl Rotation" | "PreRotation" | "PostRotation" | "RotationOrder" => Part::Rotation,
+        "Lcl Scaling" => Part::Scale,
+        _ => return None,
+    })
+}
+
+impl Takes {
+    /// # Errors
+    /// When extrapolated curves have more keys than the file has a right to.
+    pub(super) fn of(
+        scene: &Scene,
+        stack: &AnimStack,
+        budget: &Budget,
+    ) -> Result<Self, OverBudget> {
+        let mut takes = Self {
+            span: span(stack),
+            layers: stack.layers.len(),
+            ..Self::default()
+        };
+        let mut others = HashSet::new();
+        for layer in &stack.layers {
+            let weight = takes.weight(layer, budget)?;
+            for property in &layer.anim_props {
+                let curves = || property.anim_value.curves.iter().flatten();
+                let part = part_of(&property.prop_name);
+                let is_node = property.element.type_ == ElementType::Node;
+                let Some(part) = part.filter(|_| is_node) else {
+                    let moves = curves().any(|curve| curve.keyframes.len() > 1);
+                    let is_weight = property.element.type_ == ElementType::AnimLayer;
+                    if moves && !is_weight && others.insert(property.prop_name.to_string()) {
+                        takes.others.push(property.prop_name.to_string());
+                    }
+                    continue;
+                };
+                let mut times = Times::default();
+                for curve in curves() {
+                    takes.outside += times.add(curve, takes.span, budget)?;
+                }
+                times.append(&weight, budget)?;
+                let node = property.element.typed_id as usize;
+                let moved = takes.nodes.entry(node).or_default();
+                match part {
+                    Part::Translation => moved.translation.append(&times, budget)?,
+                    Part::Rotation => moved.rotation.append(&times, budget)?,
+                    Part::Scale => moved.scale.append(&times, budget)?,
+                }
+            }
+        }
+        for node in &scene.nodes {
+            takes.carry(node, budget)?;
+        }
+        Ok(takes)
+    }
+
+    /// When the weight of a layer has keys.
+    fn weight(&mut self, layer: &AnimLayer, budget: &Budget) -> Result<Times, OverBudget> {
+        let mut times = Times::default();
+        let weights = layer.anim_props.iter().filter(|property| {
+            let element = &property.element;
+            &*property.prop_name == "Weight" && element.element_id == layer.element.element_id
+        });
+        for weight in weights {
+            for curve in weight.anim_value.curves.iter().flatten() {
+                self.outside += times.add(curve, self.span, budget)?;
+            }
+        }
+        Ok(times)
+    }
+
+    /// What moves a node by way of its pivots, and of scales that nodes above it have.
+    fn carry(&mut self, node: &Node, budget: &Budget) -> Result<(), OverBudget> {
+        let index = node.element.typed_id as usize;
+        let pivot = |name| {
+            let found = ufbx::find_prop(&node.element.props, name);
+            found.is_some_and(|found| {
+                let at = &found.value_vec4;
+                [at.x, at.y, at.z] != [0.0; 3]
+            })
+        };
+        if let Some(moved) = self.nodes.get_mut(&index)
+            && (pivot("RotationPivot") || pivot("ScalingPivot"))
+        {
+            let NodeTimes {
+                translation,
+                rotation,
+                scale,
+            } = moved;
+            translation.append(rotation, budget)?;
+            translation.append(scale, budget)?;
+        }
+        let parent = node.parent.as_deref();
+        let inherits = node.is_scale_helper
+            || parent.is_some_and(|parent| {
+                parent.inherit_scale_node.is_some()
+                    || parent.scale_helper.is_some()
+                    || parent.is_scale_compensate_parent
+            });
+        if !inherits {
+            return Ok(());
+        }
+        let mut scales = Times::default();
+        let mut next = parent;
+        while let Some(above) = next {
+            let helper = above.scale_helper.as_deref().into_iter();
+            for carrier in helper.chain([above]) {
+                if let Some(moved) = self.nodes.get(&(carrier.element.typed_id as usize)) {
+                    scales.append(&moved.scale, budget)?;
+                }
+            }
+            next = above.parent.as_deref();
+        }
+        if !scales.list.is_empty() {
+            let moved = self.nodes.entry(index).or_default();
+            moved.translation.append(&scales, budget)?;
+            moved.scale.append(&scales, budget)?;
+        }
+        Ok(())
+    }
+}
+
+/// The first and the last time of a stack: those that it says or, where it says none, of its keys.
+fn span(stack: &AnimStack) -> [f64; 2] {
+    let (begin, end) = (stack.time_begin, stack.time_end);
+    if begin.is_finite() && end.is_finite() && begin < end {
+        return [begin, end];
+    }
+    let layers = stack.layers.iter();
+    let curves = layers.flat_map(|layer| layer.anim_values.iter());
+    let curves = curves.flat_map(|value| value.curves.iter().flatten());
+    let times = curves.flat_map(|curve| curve.keyframes.iter().map(|key| key.time));
+    let each = times.filter(|time| time.is_finite()).map(|time| [time; 2]);
+    let span = each.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]);
+    span.unwrap_or(if begin.is_finite() {
+        [begin; 2]
+    } else {
+        [0.0; 2]
+    })
+}
+
+impl Times {
+    /// Adds the times of a curve, as often as it is repeated within a span. Gives how many of its keys lie
+    /// outside.
+    fn add(
+        &mut self,
+        curve: &AnimCurve,
+        span: [f64; 2],
+        budget: &Budget,
+    ) -> Result<usize, OverBudget> {
+        let keys = curve.keyframes.as_ref();
+        let [Some(first), Some(last)] =
+            [keys.first(), keys.last()].map(|key| key.map(|key| key.time))
+        else {
+            return Ok(0);
+        };
+        if keys.len() < 2 {
+            return Ok(0);
+        }
+        budget.take(keys.len(), size_of::<f64>())?;
+        self.list.extend(keys.iter().map(|key| key.time));
+        self.jump |= keys.windows(2).any(|pair| {
+            let holds = |key: &ufbx::Keyframe| {
+                matches!(
+                    key.interpolation,
+                    Interpolation::ConstantPrev | Interpolation::ConstantNext
+                )
+            };
+            holds(&pair[0]) || pair[1].time - pair[0].time < 2.0 * SAME
+        });
+        let duration = last - first;
+        for (extrapolation, is_before) in [
+            (&curve.pre_extrapolation, true),
+            (&curve.post_extrapolation, false),
+        ] {
+            let mirrors = match extrapolation.mode {
+                ExtrapolationMode::Repeat | ExtrapolationMode::RepeatRelative => false,
+                ExtrapolationMode::Mirror => true,
+                ExtrapolationMode::Constant | ExtrapolationMode::Slope => continue,
+            };
+            let beyond = if is_before {
+                first - span[0]
+            } else {
+                span[1] - last
+            };
+            if beyond <= 0.0 || duration <= SAME || extrapolation.repeat_count == 0 {
+                continue;
+            }
+            self.jump |= extrapolation.mode == ExtrapolationMode::Repeat;
+            let most = match extrapolation.repeat_count {
+                count if count > 0 => f64::from(count),
+                _ => f64::INFINITY,
+            };
+            let periods = (beyond / duration).ceil().min(most);
+            let count = periods * keys.len() as f64;
+            // What is refused here is refused by the number of bytes.
+            let bytes = if count > REPEATED {
+                usize::MAX
+            } else {
+                size_of::<f64>()
+            };
+            budget.take(count as usize, bytes)?;
+            for period in 1..=periods as u64 {
+                let shift = period as f64 * duration;
+                for key in keys {
+                    let time = match mirrors && period % 2 == 1 {
+                        true => first + last - key.time,
+                        false => key.time,
+                    };
+                    self.list.push(if is_before {
+                        time - shift
+                    } else {
+                        time + shift
+                    });
+                }
+            }
+        }
+        let is_outside = |time: f64| time < span[0] - SAME || time > span[1] + SAME;
+        Ok(keys.iter().filter(|key| is_outside(key.time)).count())
+    }
+
+    fn append(&mut self, other: &Self, budget: &Budget) -> Result<(), OverBudget> {
+        // Curves of one node mostly have keys at the same times.
+        if self.list != other.list {
+            budget.take(other.list.len(), size_of::<f64>())?;
+            self.list.extend_from_slice(&other.list);
+        }
+        self.jump |= other.jump;
+        Ok(())
+    }
+
+    /// The times within a span, in order, each once, and its ends; the first alone where there are no keys.
+    pub(super) fn within(&self, [begin, end]: [f64; 2]) -> Vec<f64> {
+        let is_inside = |time: &f64| *time > begin + SAME && *time < end - SAME;
+        let mut list = vec![begin];
+        if self.list.is_empty() || begin == end {
+            return list;
+        }
+        let mut inner: Vec<f64> = self.list.iter().copied().filter(is_inside).collect();
+        inner.sort_by(f64::total_cmp);
+        inner.dedup_by(|later, earlier| *later - *earlier < SAME);
+        list.append(&mut inner);
+        list.push(end);
+        list
+    }
+}

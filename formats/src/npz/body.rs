@@ -1,0 +1,231 @@
+//! Bodies of SMPL, SMPL-H and SMPL-X as their models have them: where the joints of a shape are. The models
+//! have a licence of their own, and are brought by whoever has one.
+
+use std::path::{Path, PathBuf};
+
+use crate::diagnostic::{Code, Diagnostic};
+use crate::motion::{Motion, Shape};
+use crate::npz::archive::Archive;
+use crate::npz::plan::read_numbers;
+use crate::source::Source;
+use crate::text::lines::Limits;
+
+/// What a motion's file says of the shape; nothing of what it does not say in numbers and text.
+pub(crate) fn shape_of(archive: &Archive) -> Result<Shape, Diagnostic> {
+    let mut shape = Shape::default();
+    if let Some(member) = archive.find("betas") {
+        let axes = archive.header(member)?.shape.clone();
+        let betas = read_numbers(archive, member).unwrap_or_default();
+        // A row for each frame says the same in each.
+        let count = axes.last().copied().unwrap_or(0).min(betas.len());
+        shape.betas = betas[..count].to_vec();
+    }
+    if let Some(member) = archive.find("gender")
+        && let Ok(array) = archive.array(member)
+        && let Ok(texts) = array.texts()
+    {
+        let text = texts.concat().to_lowercase();
+        shape.gender = text.trim_matches(['b', '\'', '"', ' ']).to_owned();
+    }
+    Ok(shape)
+}
+
+/// Where each joint of a clip's body is relative to its parent, x y z of each in the order of the tracks and
+/// of the first where `trans` is 0, by a model: `J_regressor (v_template + shapedirs betas)`. Of a folder the
+/// model for the body's gender is taken.
+///
+/// # Errors
+/// When the clip is no body of SMPL, there is no such model, or it has other joints or fewer betas.
+pub fn body_offsets(path: &Path, clip: &Motion, limits: Limits) -> Result<Vec<f64>, Diagnostic> {
+    let refuse =
+        |message: String| Diagnostic::new(path.display().to_string(), Code::BodyModel, message);
+    let shape = match &clip.body {
+        Some(body) => &body.shape,
+        None => {
+            return Err(refuse(
+                "the motion is of no SMPL body, whose joints a model has".to_owned(),
+            ));
+        }
+    };
+    let file = match path.is_dir() {
+        true => of_gender(path, &shape.gender)?,
+        false => path.to_owned(),
+    };
+    let source = Source::open(&file, false)?;
+    let name = source.name.clone();
+    let archive = Archive::open(&name, source.into_bytes(limits.file)?, limits)?;
+    let model = Model::read(&archive)?;
+    let joints = model.joints(&archive, &shape.betas)?;
+    let tracks = clip.skeleton.len();
+    let is_same = |track: usize| model.parents.get(track) == Some(&clip.skeleton[track].parent);
+    if tracks > joints.len() || !(0..tracks).all(is_same) {
+        let message = format!(
+            "the model has {} joints that hang together in another way than the {tracks} of the motion",
+            joints.len()
+        );
+        return Err(Diagnostic::new(&name, Code::BodyModel, message));
+    }
+    let offset = |track: usize| {
+        let [x, y, z] = joints[track];
+        match clip.skeleton[track].parent {
+            None => [x, y, z],
+            Some(parent) => {
+                let [px, py, pz] = joints[parent];
+                [x - px, y - py, z - pz]
+            }
+        }
+    };
+    Ok((0..tracks).flat_map(offset).collect())
+}
+
+/// The one model of a folder for a gender: `SMPLH_FEMALE.npz`, `female/model.npz`.
+fn of_gender(folder: &Path, gender: &str) -> Result<PathBuf, Diagnostic> {
+    let refuse =
+        |message: String| Diagnostic::new(folder.display().to_string(), Code::BodyModel, message);
+    let gender = if gender.is_empty() { "neutral" } else { gender };
+    let files = |folder: &Path| -> Vec<PathBuf> {
+        let entries = std::fs::read_dir(folder).into_iter().flatten();
+        let paths = entries.flatten().map(|entry| entry.path());
+        paths
+            .filter(|path| {
+                path.extension()
+                    .is_some_and(|ending| ending.eq_ignore_ascii_case("npz"))
+            })
+            .collect()
+    };
+    let stem = |path: &Path| {
+        path.file_stem()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .to_lowercase()
+    };
+    let is_of = |path: &PathBuf| {
+        stem(path)
+            .split(['_', '-', '.', ' '])
+            .any(|word| word == gender)
+    };
+    let mut found: Vec<PathBuf> = files(folder).into_iter().filter(is_of).collect();
+    let inner = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    for entry in inner {
+        let name = entry.file_name().to_string_lossy().to_lowercase();
+        if name == gender && entry.path().is_dir() {
+            found.extend(files(&entry.path()));
+        }
+    }
+    found.sort();
+    match &found[..] {
+        [only] => Ok(only.clone()),
+        [] => Err(refuse(format!(
+            "no model of gender `{gender}` is in the folder, as `…_{}.npz` or `{gender}/….npz`; name the file",
+            gender.to_uppercase()
+        ))),
+        [first, second, ..] => Err(refuse(format!(
+            "{} and {} are both of gender `{gender}`; name the file",
+            first.display(),
+            second.display()
+        ))),
+    }
+}
+
+/// The arrays that say where joints are.
+struct Model {
+    vertices: usize,
+    betas: usize,
+    parents: Vec<Option<usize>>,
+}
+
+impl Model {
+    fn read(archive: &Archive) -> Result<Self, Diagnostic> {
+        let shape = |name: &str| {
+            archive.shape(name).ok_or_else(|| {
+                let message = format!(
+                    "there is no array `{name}`; a model has v_template, shapedirs, J_regressor and kintree_table, and \
+                     there are {}",
+                    archive.listing()
+                );
+                Diagnostic::new(&archive.file, Code::BodyModel, message)
+            })
+        };
+        let (template, directions) = (shape("v_template")?, shape("shapedirs")?);
+        let (regressor, tree) = (shape("J_regressor")?, shape("kintree_table")?);
+        let (&[vertices, 3], &[of, 3, betas], &[joints, to], &[2, all]) =
+            (template, directions, regressor, tree)
+        else {
+            return Err(Self::unlike(archive));
+        };
+        if of != vertices || to != vertices || all != joints {
+            return Err(Self::unlike(archive));
+        }
+        let tree = Self::numbers(archive, "kintree_table")?;
+        let parents = tree[..joints].iter().enumerate();
+        // That of the root is -1 or 4294967295.
+        let parent = |(joint, &parent): (usize, &f64)| match parent {
+            _ if joint == 0 => Some(None),
+            parent if (0.0..joint as f64).contains(&parent) => Some(Some(parent as usize)),
+            _ => None,
+        };
+        let parents: Option<Vec<_>> = parents.map(parent).collect();
+        Ok(Self {
+            vertices,
+            betas,
+            parents: parents.ok_or_else(|| Self::unlike(archive))?,
+        })
+    }
+
+    fn unlike(archive: &Archive) -> Diagnostic {
+        let message = "v_template (V, 3), shapedirs (V, 3, B), J_regressor (J, V) and kintree_table (2, J), parents before \
+                       children, do not fit each other";
+        Diagnostic::new(&archive.file, Code::BodyModel, message)
+    }
+
+    fn numbers(archive: &Archive, name: &str) -> Result<Vec<f64>, Diagnostic> {
+        let member = archive.find(name).ok_or_else(|| Self::unlike(archive))?;
+        read_numbers(archive, member)
+    }
+
+    /// Where the joints of a shape are.
+    fn joints(&self, archive: &Archive, betas: &[f64]) -> Result<Vec<[f64; 3]>, Diagnostic> {
+        if betas.len() > self.betas {
+            let message = format!(
+                "the motion has {} betas and the model {}; take the model with more",
+                betas.len(),
+                self.betas
+            );
+            return Err(Diagnostic::new(&archive.file, Code::BodyModel, message));
+        }
+        let mut vertices = Self::numbers(archive, "v_template")?;
+        let directions = Self::numbers(archive, "shapedirs")?;
+        for (number, weights) in vertices
+            .iter_mut()
+            .zip(directions.chunks_exact(self.betas.max(1)))
+        {
+            *number += betas
+                .iter()
+                .zip(weights)
+                .map(|(beta, weight)| beta * weight)
+                .sum::<f64>();
+        }
+        let regressor = Self::numbers(archive, "J_regressor")?;
+        let (vertices, _) = vertices.as_chunks::<3>();
+        let joint = |weights: &[f64]| {
+            weights
+                .iter()
+                .zip(vertices)
+                .fold([0.0; 3], |sum, (weight, vertex)| {
+                    [0, 1, 2].map(|axis| sum[axis] + weight * vertex[axis])
+                })
+        };
+        let joints: Vec<[f64; 3]> = regressor
+            .chunks_exact(self.vertices.max(1))
+            .map(joint)
+            .collect();
+        match joints
+            .as_flattened()
+            .iter()
+            .all(|number| number.is_finite())
+        {
+            true => Ok(joints),
+            false => Err(Self::unlike(archive)),
+        }
+    }
+}

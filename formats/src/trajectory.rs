@@ -1,0 +1,538 @@
+//! How far an estimated path of one body is from a reference, as benchmarks of odometry and SLAM say it: after
+//! an alignment, pose by pose (absolute), or over steps of some seconds or metres (relative). The numbers are
+//! those of `evo`.
+
+use glam::{DQuat, DVec3};
+
+/// Where a body is, and how it is turned.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pose {
+    /// In the world.
+    pub position: DVec3,
+    /// A unit quaternion.
+    pub rotation: DQuat,
+}
+
+/// What is free when an estimate is laid over its reference by least squares of the positions.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Align {
+    /// Nothing: both are in one frame.
+    #[default]
+    None,
+    /// Where it is.
+    Position,
+    /// Where it is, and its turn about z.
+    Yaw,
+    /// Where it is and how it is turned (Horn 1987, the rotation of Umeyama 1991).
+    Se3,
+    /// The same and its scale (Umeyama 1991), for a single camera's.
+    Sim3,
+}
+
+/// What lays an estimate over its reference: `scale`, then `rotation`, then `translation`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Alignment {
+    /// 1 but for [`Align::Sim3`].
+    pub scale: f64,
+    /// Of the whole path.
+    pub rotation: DQuat,
+    /// Of the whole path.
+    pub translation: DVec3,
+}
+
+/// The step of relative errors.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Step {
+    /// Of time.
+    Seconds(f64),
+    /// Along the estimate.
+    Metres(f64),
+}
+
+/// The errors of some poses, or of the steps between some.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Errors {
+    /// Lengths.
+    pub distances: Vec<f64>,
+    /// Radians.
+    pub angles: Vec<f64>,
+}
+
+/// What some errors come to.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Statistics {
+    /// The root of the mean square.
+    pub rmse: f64,
+    /// The mean.
+    pub mean: f64,
+    /// The middle one, or the mean of the middle two.
+    pub median: f64,
+    /// The deviation from the mean, of all (not of a sample).
+    pub deviation: f64,
+    /// The smallest.
+    pub smallest: f64,
+    /// The largest.
+    pub largest: f64,
+}
+
+impl Alignment {
+    /// The best one for two paths of the same poses. Where the positions leave a rotation open, as those of a
+    /// straight line do, it is one of the best.
+    #[must_use]
+    pub fn of(reference: &[Pose], estimate: &[Pose], align: Align) -> Self {
+        let nothing = Self {
+            scale: 1.0,
+            rotation: DQuat::IDENTITY,
+            translation: DVec3::ZERO,
+        };
+        let count = reference.len().min(estimate.len());
+        if align == Align::None || count == 0 {
+            return nothing;
+        }
+        let mean = |poses: &[Pose]| {
+            let sum: DVec3 = poses[..count].iter().map(|pose| pose.position).sum();
+            sum / count as f64
+        };
+        let (to, from) = (mean(reference), mean(estimate));
+        let pairs = || {
+            let both = reference.iter().zip(estimate);
+            both.map(|(a, b)| (a.position - to, b.position - from))
+        };
+        let rotation = match align {
+            Align::None | Align::Position => DQuat::IDENTITY,
+            Align::Yaw => {
+                let (sine, cosine) = pairs().fold((0.0, 0.0), |(sine, cosine), (a, b)| {
+                    (sine + b.x * a.y - b.y * a.x, cosine + b.x * a.x + b.y * a.y)
+                });
+                let (sine, cosine) = libm::sincos(0.5 * libm::atan2(sine, cosine));
+                DQuat::from_xyzw(0.0, 0.0, sine, cosine)
+            }
+            Align::Se3 | Align::Sim3 => best_rotation(pairs()),
+        };
+        let scale = match align {
+            Align::Sim3 => {
+                let along: f64 = pairs().map(|(a, b)| a.dot(rotation * b)).sum();
+                let size: f64 = pairs().map(|(_, b)| b.length_squared()).sum();
+                // An estimate that stands still has any.
+                if size > 0.0 && along > 0.0 {
+                    along / size
+                } else {
+                    1.0
+                }
+            }
+            _ => 1.0,
+        };
+        Self {
+            scale,
+            rotation,
+            translation: to - rotation * (from * scale),
+        }
+    }
+
+    /// By how much it turns, radians.
+    #[must_use]
+    pub fn angle(&self) -> f64 {
+        angle(self.rotation)
+    }
+
+    /// Where a pose of the estimate lies then.
+    #[must_use]
+    pub fn apply(&self, pose: Pose) -> Pose {
+        Pose {
+            position: self.rotation * (pose.position * self.scale) + self.translation,
+            rotation: self.rotation * pose.rotation,
+        }
+    }
+}
+
+/// Of a rotation, radians.
+fn angle(rotation: DQuat) -> f64 {
+    2.0 * libm::atan2(rotation.xyz().length(), rotation.w.abs())
+}
+
+/// The rotation that lays the second vectors over the first, by least squares: the eigenvector of the largest
+/// eigenvalue of Horn's matrix.
+fn best_rotation(pairs: impl Iterator<Item = (DVec3, DVec3)>) -> DQuat {
+    let mut s = [[0.0; 3]; 3];
+    for (a, b) in pairs {
+        for (row, b) in s.iter_mut().zip(b.to_array()) {
+            for (sum, a) in row.iter_mut().zip(a.to_array()) {
+                *sum += b * a;
+            }
+        }
+    }
+    let [[xx, xy, xz], [yx, yy, yz], [zx, zy, zz]] = s;
+    let matrix = [
+        [xx + yy + zz, yz - zy, zx - xz, xy - yx],
+        [yz - zy, xx - yy - zz, xy + yx, zx + xz],
+        [zx - xz, xy + yx, yy - xx - zz, yz + zy],
+        [xy - yx, zx + xz, yz + zy, zz - xx - yy],
+    ];
+    let [w, x, y, z] = largest_eigenvector(matrix);
+    let rotation = DQuat::from_xyzw(x, y, z, w);
+    match rotation.length_squared() > 0.5 && rotation.is_finite() {
+        true => rotation.normalize(),
+        false => DQuat::IDENTITY,
+    }
+}
+
+/// Of a symmetric matrix, by Jacobi's rotations.
+fn largest_eigenvector(mut a: [[f64; 4]; 4]) -> [f64; 4] {
+    let mut vectors = [[0.0; 4]; 4];
+    for (index, row) in vectors.iter_mut().enumerate() {
+        row[index] = 1.0;
+    }
+    // Each round squares what is off the diagonal; six are enough for f64.
+    for _ in 0..16 {
+        for p in 0..3 {
+            for q in p + 1..4 {
+                if a[p][q] == 0.0 {
+                    continue;
+                }
+                let theta = (a[q][q] - a[p][p]) / (2.0 * a[p][q]);
+                let t = theta.signum() / (theta.abs() + (theta * theta + 1.0).sqrt());
+                let cosine = 1.0 / (t * t + 1.0).sqrt();
+                let sine = t * cosine;
+                for row in &mut a {
+                    (row[p], row[q]) = (
+                        cosine * row[p] - sine * row[q],
+                        sine * row[p] + cosine * row[q],
+                    );
+                }
+                for column in 0..4 {
+                    let (at_p, at_q) = (a[p][column], a[q][column]);
+                    a[p][column] = cosine * at_p - sine * at_q;
+                    a[q][column] = sine * at_p + cosine * at_q;
+                }
+                for row in &mut vectors {
+                    (row[p], row[q]) = (
+                        cosine * row[p] - sine * row[q],
+                        sine * row[p] + cosine * row[q],
+                    );
+                }
+            }
+        }
+    }
+    // Of equal ones the first, which is no turn.
+    let mut largest = 0;
+    for index in 1..4 {
+        if a[index][index] > a[largest][largest] {
+            largest = index;
+        }
+    }
+    vectors.map(|row| row[largest])
+}
+
+impl Errors {
+    fn add(&mut self, distance: f64, between: DQuat) {
+        self.distances.push(distance);
+        self.angles.push(angle(between));
+    }
+
+    /// Of each pose of an estimate that is aligned already.
+    #[must_use]
+    pub fn absolute(reference: &[Pose], estimate: &[Pose]) -> Self {
+        let mut errors = Self::default();
+        for (a, b) in reference.iter().zip(estimate) {
+            errors.add(
+                a.position.distance(b.position),
+                a.rotation.conjugate() * b.rotation,
+            );
+        }
+        errors
+    }
+
+    /// Of steps one after another, each from a pose to the first one that is so far behind it.
+    #[must_use]
+    pub fn relative(reference: &[Pose], estimate: &[Pose], times: &[f64], step: Step) -> Self {
+        let mut errors = Self::default();
+        let count = reference.len().min(estimate.len()).min(times.len());
+        let (mut start, mut path) = (0, 0.0);
+        for end in 1..count {
+            path += estimate[end].position.distance(estimate[end - 1].position);
+            let is_end = match step {
+                // Times of decimals: 0.3 - 0.2 is less than 0.1.
+                Step::Seconds(seconds) => {
+                    times[end] - times[start] >= seconds * (1.0 - 1e-9) - 1e-9
+                }
+                Step::Metres(metres) => path >= metres,
+            };
+            if !is_end {
+                continue;
+            }
+            let between = |poses: &[Pose]| {
+                let (a, b) = (poses[start], poses[end]);
+                let back = a.rotation.conjugate();
+                (back * (b.position - a.position), back * b.rotation)
+            };
+            let (q, p) = (between(reference), between(estimate));
+            errors.add(q.0.distance(p.0), q.1.conjugate() * p.1);
+            (start, path) = (end, 0.0);
+        }
+        errors
+    }
+}
+
+impl Statistics {
+    /// `None` of nothing.
+    #[must_use]
+    pub fn of(errors: &[f64]) -> Option<Self> {
+        let mut sorted = errors.to_vec();
+        sorted.sort_by(f64::total_cmp);
+        let (&smallest, &largest) = (sorted.first()?, sorted.last()?);
+        let count = sorted.len();
+        let mean = sorted.iter().sum::<f64>() / count as f64;
+        let squares = |from: f64| {
+            let each = sorted.iter().map(|error| (error - from) * (error - from));
+            (each.sum::<f64>() / count as f64).sqrt()
+        };
+        Some(Self {
+            rmse: squares(0.0),
+            mean,
+            median: f64::midpoint(sorted[(count - 1) / 2], sorted[count / 2]),
+            deviation: squares(mean),
+            smallest,
+            largest,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn pose(x: f64, y: f64, z: f64, rotation: DQuat) -> Pose {
+        Pose {
+            position: DVec3::new(x, y, z),
+            rotation,
+        }
+    }
+
+    fn euler(z: f64, y: f64, x: f64) -> DQuat {
+        DQuat::from_rotation_z(z) * DQuat::from_rotation_y(y) * DQuat::from_rotation_x(x)
+    }
+
+    /// Two paths by the formulas from which `evo` had them, as text of nine decimals.
+    fn paths() -> (Vec<f64>, Vec<Pose>, Vec<Pose>) {
+        let times: Vec<f64> = (0..120).map(|index| f64::from(index) * 0.1).collect();
+        let off = euler(0.7, 0.1, -0.2);
+        let reference = |&t: &f64| {
+            pose(
+                3.0 * (0.4 * t).sin(),
+                2.0 * (0.3 * t).cos() - 1.0,
+                0.5 * (0.9 * t).sin(),
+                euler(0.5 * t, 0.3 * t.sin(), 0.2 * (0.7 * t).cos()),
+            )
+        };
+        let estimate = |t: &f64| {
+            let exact = reference(t);
+            let noise = DVec3::new(
+                0.05 * (7.0 * t).sin(),
+                0.04 * (5.0 * t).cos(),
+                0.03 * (11.0 * t + 1.0).sin(),
+            );
+            let turn = 0.05 * DVec3::new((3.0 * t).sin(), (4.0 * t).cos(), (5.0 * t).sin());
+            Pose {
+                position: 1.25 * (off * exact.position) + DVec3::new(4.0, -2.0, 1.0) + noise,
+                rotation: off * exact.rotation * DQuat::from_scaled_axis(turn),
+            }
+        };
+        let poses = (
+            times.iter().map(reference).collect(),
+            times.iter().map(estimate).collect(),
+        );
+        (times, poses.0, poses.1)
+    }
+
+    #[track_caller]
+    fn check(
+        errors: &[f64],
+        factor: f64,
+        [rmse, mean, median, deviation, smallest, largest]: [f64; 6],
+    ) {
+        let found = Statistics::of(errors).unwrap();
+        for (found, expected) in [
+            (found.rmse, rmse),
+            (found.mean, mean),
+            (found.median, median),
+            (found.deviation, deviation),
+            (found.smallest, smallest),
+            (found.largest, largest),
+        ] {
+            assert!(
+                (found * factor - expected).abs() < 1e-6,
+                "{found} {expected}"
+            );
+        }
+    }
+
+    /// Literal numbers of `evo` 1.38.1: rmse, mean, median, std, min, max.
+    #[test]
+    fn errors_are_those_of_evo() {
+        let (times, reference, estimate) = paths();
+        let degrees = 1f64.to_degrees();
+        let aligned = |align| {
+            let alignment = Alignment::of(&reference, &estimate, align);
+            let all = estimate.iter().map(|&pose| alignment.apply(pose));
+            (alignment.scale, all.collect::<Vec<_>>())
+        };
+        let none = Errors::absolute(&reference, &aligned(Align::None).1);
+        check(
+            &none.distances,
+            1.0,
+            [
+                5.70475805, 5.45271117, 5.15185502, 1.67696312, 3.31084375, 8.06736306,
+            ],
+        );
+        check(
+            &none.angles,
+            degrees,
+            [
+                42.7809509, 42.7261062, 42.689417, 2.16555186, 38.9251173, 47.1649698,
+            ],
+        );
+        let position = Errors::absolute(&reference, &aligned(Align::Position).1);
+        check(
+            &position.distances,
+            1.0,
+            [
+                2.08598359,
+                1.95953544,
+                1.95948477,
+                0.715226114,
+                0.679865527,
+                3.38582153,
+            ],
+        );
+        let se3 = Errors::absolute(&reference, &aligned(Align::Se3).1);
+        check(
+            &se3.distances,
+            1.0,
+            [
+                0.638505822,
+                0.603669464,
+                0.597885181,
+                0.208021306,
+                0.198268225,
+                1.00501381,
+            ],
+        );
+        check(
+            &se3.angles,
+            degrees,
+            [
+                3.50706813,
+                3.41344266,
+                3.59005662,
+                0.804944776,
+                1.53257007,
+                4.96704601,
+            ],
+        );
+        let (scale, poses) = aligned(Align::Sim3);
+        assert!((scale - 0.799_940_846_216_258_6).abs() < 1e-8, "{scale}");
+        let sim3 = Errors::absolute(&reference, &poses);
+        check(
+            &sim3.distances,
+            1.0,
+            [
+                0.0400288007,
+                0.0388615379,
+                0.0406924848,
+                0.00959613238,
+                0.00982890054,
+                0.0549403507,
+            ],
+        );
+        let second = Errors::relative(&reference, &poses, &times, Step::Seconds(1.0));
+        assert_eq!(second.distances.len(), 11);
+        check(
+            &second.distances,
+            1.0,
+            [
+                0.060853912,
+                0.0564546076,
+                0.0512817392,
+                0.0227173038,
+                0.0232432218,
+                0.0986007447,
+            ],
+        );
+        check(
+            &second.angles,
+            degrees,
+            [
+                5.73713238, 5.54525287, 5.69377606, 1.47134583, 1.86443607, 7.65201317,
+            ],
+        );
+        let metre = Errors::relative(&reference, &poses, &times, Step::Metres(1.0));
+        assert_eq!(metre.distances.len(), 11);
+        check(
+            &metre.distances,
+            1.0,
+            [
+                0.0519096417,
+                0.0488516065,
+                0.0482844605,
+                0.0175536732,
+                0.0220203884,
+                0.0795260893,
+            ],
+        );
+        check(
+            &metre.angles,
+            degrees,
+            [
+                4.72658892, 4.32203473, 4.68539992, 1.91328479, 1.44900056, 7.03341964,
+            ],
+        );
+        let metre = Errors::relative(&reference, &estimate, &times, Step::Metres(1.0));
+        check(
+            &metre.distances,
+            1.0,
+            [
+                0.214158861,
+                0.210378619,
+                0.211151169,
+                0.0400606301,
+                0.14974747,
+                0.274945469,
+            ],
+        );
+    }
+
+    /// A turn about z and a shift are found, and nothing of another turn.
+    #[test]
+    fn yaw_turns_about_z_alone() {
+        let (_, reference, _) = paths();
+        let turn = DQuat::from_rotation_z(-2.5);
+        let moved = |turn: DQuat| -> Vec<Pose> {
+            let all = reference.iter().map(|own| Pose {
+                position: turn * own.position + DVec3::new(1.0, 2.0, 3.0),
+                rotation: turn * own.rotation,
+            });
+            all.collect()
+        };
+        let found = Alignment::of(&reference, &moved(turn), Align::Yaw);
+        assert!(found.rotation.angle_between(turn.conjugate()) < 1e-7);
+        let errors = Errors::absolute(
+            &reference,
+            &moved(turn)
+                .into_iter()
+                .map(|pose| found.apply(pose))
+                .collect::<Vec<_>>(),
+        );
+        assert!(Statistics::of(&errors.distances).unwrap().largest < 1e-12);
+        let tilted = Alignment::of(&reference, &moved(euler(0.4, 0.3, 0.0)), Align::Yaw);
+        assert!(tilted.rotation.xyz().truncate().length() < 1e-15);
+    }
+
+    #[test]
+    fn paths_without_a_direction_stay_as_they_are() {
+        let still = vec![pose(1.0, 2.0, 3.0, DQuat::IDENTITY); 3];
+        let found = Alignment::of(&still, &still, Align::Sim3);
+        assert_eq!(found.apply(still[0]), still[0]);
+        assert_eq!(Alignment::of(&[], &[], Align::Se3).scale, 1.0);
+        assert_eq!(Statistics::of(&[]), None);
+    }
+}
