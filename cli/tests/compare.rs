@@ -262,6 +262,42 @@ fn an_estimate_beside_its_reference() {
         assert_eq!(run.code, code, "{line:?}: {}", run.words);
         assert!(run.words.contains(says), "{line:?}: {}", run.words);
     }
+    // Sampled at the times of the other, in whichever second each begins.
+    let at = [
+        "eval",
+        "estimate.tum",
+        "--at",
+        "truth.tum",
+        "--max-gap",
+        "1.5",
+        "-o",
+        "at.tum",
+    ];
+    let run = succeed(place, &at);
+    assert!(
+        run.words.contains("2 of 6 times lie between keys"),
+        "{}",
+        run.words
+    );
+    assert!(
+        run.words.contains("beyond them tracks are held"),
+        "{}",
+        run.words
+    );
+    let text = std::fs::read_to_string(place.join("at.tum")).unwrap();
+    let poses: Vec<Vec<f64>> = text
+        .lines()
+        .filter(|line| !line.starts_with('#'))
+        .map(|line| {
+            line.split(' ')
+                .map(|number| number.parse().unwrap())
+                .collect()
+        })
+        .collect();
+    let times: Vec<f64> = poses.iter().map(|pose| pose[0] - 1_700_000_000.0).collect();
+    assert_eq!(times, [0.5, 1.0, 1.5, 2.0]);
+    assert_eq!((poses[0][1], poses[1][1], poses[3][1]), (2.0, 2.0, 3.0));
+    assert!((poses[2][1] - 2.5).abs() < 0.1, "{}", poses[2][1]);
     let text = succeed(
         place,
         &["compare", "truth.tum", "estimate.tum", "--align", "yaw"],

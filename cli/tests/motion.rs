@@ -358,3 +358,67 @@ fn angles_of_bvh_keep_their_order_or_get_the_one_that_is_asked_for() {
     let run = refused(at, "convert in.bvh --sequence ZYX -o out.glb");
     assert!(run.words.contains("leave out --sequence"), "{}", run.words);
 }
+
+/// FBX is read as every other format: its curves, or with a method its keys alone; in its units and axes, or
+/// in others.
+#[test]
+fn fbx_goes_into_other_formats() {
+    let folder = sample_folder();
+    let place = folder.path();
+    let fixtures = concat!(env!("CARGO_MANIFEST_DIR"), "/../formats/tests/fixtures/fbx");
+    std::fs::copy(format!("{fixtures}/walk.fbx"), place.join("walk.fbx")).unwrap();
+    let info = |line: &[&str]| -> serde_json::Value {
+        let line = [&["info", "walk.fbx", "--json"][..], line].concat();
+        serde_json::from_slice(&succeed(place, &line).out).unwrap()
+    };
+    let found = &info(&[])[0];
+    assert_eq!(found["metres"], 0.01);
+    assert_eq!(found["up"], serde_json::json!([0.0, 0.0, 1.0]));
+    assert!(found["keys"].as_u64().unwrap() > 20, "{found}");
+    // One of the hips, which do not turn, and three of the knee.
+    assert_eq!(info(&["--keyframes"])[0]["keys"], 4);
+
+    succeed(place, &["convert", "walk.fbx", "-o", "walk.glb"]);
+    let alike = ["--world", "--tolerance", "1e-4", "--distance", "1e-4"];
+    succeed(
+        place,
+        &[&["compare", "walk.fbx", "walk.glb"][..], &alike].concat(),
+    );
+    let metres = ["--scale", "metres", "--up", "y", "-o", "metres.bvh"];
+    succeed(
+        place,
+        &[&["eval", "walk.fbx", "--fps", "30"][..], &metres].concat(),
+    );
+    let text = std::fs::read_to_string(place.join("metres.bvh")).unwrap();
+    // The hips go 30 cm along x; z was up.
+    let last = text.lines().last().unwrap();
+    assert!(last.starts_with("0.3 0 0 0 -90 0 "), "{last}");
+    assert!(text.contains("OFFSET 0 -0.5 0"), "{text}");
+
+    for (name, more) in [
+        ("slerp.npy", &["-m", "slerp"][..]),
+        ("keys.npy", &["--keyframes"]),
+        ("curves.npy", &[]),
+    ] {
+        let line = ["eval", "walk.fbx", "--fps", "30", "-o", name];
+        succeed(place, &[&line[..], more].concat());
+    }
+    let zero = ["--tolerance", "0"];
+    succeed(
+        place,
+        &[&["compare", "slerp.npy", "keys.npy"][..], &zero].concat(),
+    );
+    let apart = run(
+        place,
+        &[&["compare", "keys.npy", "curves.npy"][..], &zero].concat(),
+    );
+    assert_eq!(apart.code, 8, "{}", apart.words);
+    let refused = run(place, &["convert", "walk.glb", "-o", "back.fbx"]);
+    assert_ne!(refused.code, 0, "{}", refused.words);
+    let scaled = run(place, &["info", "walk.glb", "--scale", "metres"]);
+    assert!(
+        scaled.words.contains("does not say its unit"),
+        "{}",
+        scaled.words
+    );
+}

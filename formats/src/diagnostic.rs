@@ -216,7 +216,7 @@ codes! {
     Layout = "E316", "samples that do not fit the layout", "A file whose layout is kept has as many tracks as before, and frames at a rate if it has no list of times.";
     NotPerFrame = "E317", "an array that cannot be interpolated", "`--linear NAME`, in Python `linear=[NAME]`, names arrays of numbers with an entry for each frame, which are not keys.";
     RateBesideTimes = "E318", "a rate beside times", "`--source-fps` is for files that say no times: where a file has the time of every key, these times are its rate.";
-    BodyModel = "E319", "not a model of the body", "`--body` takes a model of SMPL, SMPL-H or SMPL-X as NPZ, or a folder with one for each gender, for motion of such bodies. It says where the joints of a shape are.";
+    BodyModel = "E319", "not a model of the body", "`--body-model` takes a model of SMPL, SMPL-H or SMPL-X as NPZ, or a folder with one for each gender, for motion of such bodies. It says where the joints of a shape are.";
     // E4xx and W4xx: tables (Parquet, Arrow, CSV).
     TableDamaged = "E401", "a table that cannot be read", "The file is cut or damaged, or written in a way that is not read here; the reason is given. Rows count from 0.";
     TableClaims = "E402", "more than the file can hold", "The file announces more rows or bytes than could be packed into its length; nothing was read.";

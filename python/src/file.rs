@@ -157,7 +157,7 @@ impl File {
 /// with the place.
 ///
 /// `load(path, *, format=None, source_fps=None, map=None, time_unit=None, duplicates=None,
-/// raw_times=False, bridge_gaps=False, keyframes=False, offsets=None, body=None, scale=None, up=None)`
+/// raw_times=False, bridge_gaps=False, keyframes=False, offsets=None, body_model=None, scale=None, up=None)`
 ///
 /// `format`: of the file, instead of by its first bytes and its name. `source_fps`: the rate of
 /// keys of files without times. `map`: which array or column is what, where names do not
@@ -171,7 +171,7 @@ impl File {
 /// `bridge_gaps`: leave out keys of which a table lacks numbers, instead of refusing it. `keyframes`: of FBX
 /// the keys at the key times of the file alone, instead of as many as following its curves takes. `offsets`:
 /// where the joints of a body rest relative to their parents, (joints, 3), for files that do not say it, such
-/// as those of AMASS; `body`: the same by a model of SMPL, SMPL-H or SMPL-X as NPZ, or a folder of them by gender.
+/// as those of AMASS; `body_model`: the same by a model of SMPL, SMPL-H or SMPL-X as NPZ, or a folder of them by gender.
 /// `scale`: multiply translations, and the length of boxes; "metres" by the unit that an FBX file says. `up`:
 /// turn so that "y" or "z" is up, from the axis that an FBX file says, else where the other was.
 ///
@@ -184,7 +184,7 @@ impl File {
 #[pyfunction]
 #[pyo3(signature = (
     path, *, format=None, source_fps=None, map=None, time_unit=None, duplicates=None,
-    raw_times=false, bridge_gaps=false, keyframes=false, offsets=None, body=None, scale=None, up=None
+    raw_times=false, bridge_gaps=false, keyframes=false, offsets=None, body_model=None, scale=None, up=None
 ))]
 #[allow(clippy::too_many_arguments, reason = "keywords")]
 pub(crate) fn load(
@@ -199,7 +199,7 @@ pub(crate) fn load(
     bridge_gaps: bool,
     keyframes: bool,
     offsets: Option<&Bound<'_, PyAny>>,
-    body: Option<PathBuf>,
+    body_model: Option<PathBuf>,
     scale: Option<&Bound<'_, PyAny>>,
     up: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<File> {
@@ -240,9 +240,9 @@ pub(crate) fn load(
         .map(|axis| one_of(axis, "up", &[("y", UpAxis::Y), ("z", UpAxis::Z)]))
         .transpose()?;
     let scale = scale.map(Scale::of).transpose()?;
-    if offsets.is_some() && body.is_some() {
+    if offsets.is_some() && body_model.is_some() {
         return Err(input(
-            "offsets and body both place the joints; give one".to_owned(),
+            "offsets and body_model both place the joints; give one".to_owned(),
         ));
     }
     let offsets = offsets.map(|given| doubles(given, "offsets")).transpose()?;
@@ -268,12 +268,13 @@ pub(crate) fn load(
                 placed.map_err(|error| input(format!("offsets: {}: {error}", file.display())))?;
             }
         }
-        if let Some(model) = &body {
+        if let Some(model) = &body_model {
             for clip in &mut loaded.clips {
                 let offsets = body_offsets(model, clip, Limits::default());
                 let offsets = offsets.map_err(|diagnostic| of_diagnostic(&diagnostic))?;
                 let placed = set_offsets(clip, &offsets);
-                placed.map_err(|error| input(format!("body: {}: {error}", file.display())))?;
+                placed
+                    .map_err(|error| input(format!("body_model: {}: {error}", file.display())))?;
             }
         }
         if scale.is_some() || up.is_some() {

@@ -59,7 +59,7 @@ pub(crate) struct Reading {
     /// A model of SMPL, SMPL-H or SMPL-X as NPZ, or a folder of them by gender: each joint is where it has it for the
     /// shape that the motion says
     #[arg(long, value_name = "MODEL", conflicts_with = "offsets")]
-    body: Option<PathBuf>,
+    body_model: Option<PathBuf>,
     /// Multiply all translations, and the length of boxes, by this number; `metres`: by as much as makes metres
     /// of the unit that an FBX file says
     #[arg(long, value_name = "FACTOR|metres", value_parser = scale)]
@@ -144,7 +144,7 @@ impl Reading {
             || self.bridge_gaps
             || self.keyframes
             || self.offsets.is_some()
-            || self.body.is_some()
+            || self.body_model.is_some()
     }
 
     /// Whether the command line says anything of how files are read.
@@ -161,7 +161,7 @@ impl Reading {
             keyframes,
             names_method: _,
             offsets,
-            body,
+            body_model,
             scale,
             up,
         } = self;
@@ -175,7 +175,7 @@ impl Reading {
             || map.is_some()
             || time_unit.is_some()
             || offsets.is_some()
-            || body.is_some()
+            || body_model.is_some()
             || scale.is_some()
             || up.is_some()
     }
@@ -258,7 +258,7 @@ impl Reading {
                 })?;
             }
         }
-        if let Some(model) = &self.body {
+        if let Some(model) = &self.body_model {
             for clip in &mut loaded.clips {
                 let offsets = body_offsets(model, clip, Limits::default());
                 let offsets = offsets.map_err(|fault| Failure::input(&fault, ""))?;

@@ -4,8 +4,11 @@ use std::path::PathBuf;
 
 use clap::Args;
 use tumble::{FrameRate, Frames, TrackSet};
+use tumble_formats::motion::Motion;
+use tumble_formats::{Format, ReadOptions};
 
 use crate::arguments::input;
+use crate::arguments::tolerance::not_negative;
 use crate::batch::digest;
 use crate::messages::exit::Failure;
 use crate::messages::words;
@@ -52,6 +55,48 @@ pub(crate) enum Samples {
         from_zero: bool,
     },
     Times(Vec<f64>),
+    /// The key times of another file.
+    Keys(KeyTimes),
+}
+
+/// The key times of another file.
+pub(crate) struct KeyTimes {
+    /// Seconds, increasing, counted from a whole second.
+    times: Vec<f64>,
+    from: i64,
+    /// Seconds between neighbouring keys of a clip beyond which it is not sampled in between.
+    max_gap: Option<f64>,
+}
+
+/// `--at`, `--max-gap`: the times of another file.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct AtKeys {
+    /// Evaluate at the key times of another motion file instead
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["fps", "times", "start", "end", "from_zero"])]
+    at: Option<PathBuf>,
+    /// Leave out times between two keys that are more than so many seconds apart
+    #[arg(long, value_name = "SECONDS", requires = "at", value_parser = not_negative)]
+    max_gap: Option<f64>,
+}
+
+impl AtKeys {
+    /// The times of the file; nothing where none is named.
+    pub(crate) fn samples(&self) -> Result<Option<Samples>, Failure> {
+        let Some(path) = &self.at else {
+            return Ok(None);
+        };
+        let loaded = Format::open_detected(path, &ReadOptions::default())
+            .map_err(|diagnostic| Failure::input(&diagnostic, ""))?;
+        let [clip] = &loaded.clips[..] else {
+            let message = "--at is the file of one animation";
+            return Err(Failure::usage(format!("{}: {message}", input::name(path))));
+        };
+        Ok(Some(Samples::Keys(KeyTimes {
+            times: clip.key_times(),
+            from: clip.time_offset,
+            max_gap: self.max_gap,
+        })))
+    }
 }
 
 impl Sampling {
@@ -89,8 +134,50 @@ impl Samples {
                 let bytes: Vec<u8> = times.iter().flat_map(|time| time.to_le_bytes()).collect();
                 digest::of_bytes([&*bytes])
             }
+            Self::Keys(KeyTimes {
+                times,
+                from,
+                max_gap,
+            }) => {
+                let numbers = times.iter().map(|time| time.to_le_bytes());
+                let bytes: Vec<u8> = numbers.flatten().chain(from.to_le_bytes()).collect();
+                let gap = max_gap.unwrap_or(f64::INFINITY);
+                digest::of_bytes([&*bytes, &gap.to_le_bytes()])
+            }
             Self::Rate { .. } => String::new(),
         }
+    }
+
+    /// The samples for one clip; says when they pass its keys, and how many are left out.
+    pub(crate) fn of_clip(&self, clip: &Motion, name: &str) -> Frames {
+        let Self::Keys(keys) = self else {
+            return self.of(&clip.set, name);
+        };
+        // Each clip counts from whole seconds of its own.
+        let shift = (keys.from - clip.time_offset) as f64;
+        let mut times: Vec<f64> = keys.times.iter().map(|time| time + shift).collect();
+        if let Some(most) = keys.max_gap {
+            let known = clip.key_times();
+            let is_in_gap = |time: f64| {
+                let next = known.partition_point(|&key| key < time);
+                let before = next.checked_sub(1).map(|before| known[before]);
+                let gap = known.get(next).filter(|&&key| key != time).zip(before);
+                gap.is_some_and(|(next, before)| next - before > most)
+            };
+            let count = times.len();
+            times.retain(|&time| !is_in_gap(time));
+            let left_out = count - times.len();
+            if left_out > 0 {
+                words::warning(&format!(
+                    "{name}: {left_out} of {} lie between keys that are more than {most} s apart; they are left out",
+                    words::count(count, "time")
+                ));
+            }
+        }
+        if let [first, .., last] = times[..] {
+            warn_beyond(first, last, &clip.set, name);
+        }
+        Frames::at(times)
     }
 
     /// The samples for one set; says when they pass its keys.
@@ -110,7 +197,7 @@ impl Samples {
             Self::Rate {
                 rate, start, end, ..
             } => in_frames(*rate, *start, *end, set, name),
-            Self::Times(times) => {
+            Self::Keys(KeyTimes { times, .. }) | Self::Times(times) => {
                 let start = times.iter().copied().fold(f64::INFINITY, f64::min);
                 let end = times.iter().copied().fold(f64::NEG_INFINITY, f64::max);
                 warn_beyond(start, end, set, name);

@@ -201,7 +201,7 @@ fn write(
     };
     let rate = match samples {
         Samples::Rate { rate, .. } => Some(*rate),
-        Samples::Times(_) => None,
+        Samples::Times(_) | Samples::Keys(_) => None,
     };
     let clip = Motion {
         set: set.clone(),

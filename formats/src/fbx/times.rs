@@ -14,6 +14,10 @@ pub(super) const SAME: f64 = 1e-9;
 /// Keys that an extrapolated curve may repeat, beside those that it has.
 const REPEATED: f64 = 1e6;
 
+/// An angle that turns further than this between two keys, degrees, is looked at in so many parts in between.
+const LARGEST_STEP: f64 = 120.0;
+const MOST_PARTS: f64 = 4096.0;
+
 /// When one of a node's channels has keys.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct Times {
@@ -102,7 +106,8 @@ impl Takes {
                 };
                 let mut times = Times::default();
                 for curve in curves() {
-                    takes.outside += times.add(curve, takes.span, budget)?;
+                    takes.outside +=
+                        times.add(curve, takes.span, part == Part::Rotation, budget)?;
                 }
                 times.append(&weight, budget)?;
                 let node = property.element.typed_id as usize;
@@ -129,7 +134,7 @@ impl Takes {
         });
         for weight in weights {
             for curve in weight.anim_value.curves.iter().flatten() {
-                self.outside += times.add(curve, self.span, budget)?;
+                self.outside += times.add(curve, self.span, false, budget)?;
             }
         }
         Ok(times)
@@ -212,6 +217,7 @@ impl Times {
         &mut self,
         curve: &AnimCurve,
         span: [f64; 2],
+        is_angle: bool,
         budget: &Budget,
     ) -> Result<usize, OverBudget> {
         let keys = curve.keyframes.as_ref();
@@ -234,6 +240,15 @@ impl Times {
             };
             holds(&pair[0]) || pair[1].time - pair[0].time < 2.0 * SAME
         });
+        // Whole turns between two keys would not show at a few times between them.
+        for pair in keys.windows(2).filter(|_| is_angle) {
+            let parts = ((pair[1].value - pair[0].value).abs() / LARGEST_STEP).ceil();
+            let parts = parts.min(MOST_PARTS) as usize;
+            budget.take(parts, size_of::<f64>())?;
+            let length = pair[1].time - pair[0].time;
+            let part = |index: usize| pair[0].time + length * index as f64 / parts as f64;
+            self.list.extend((1..parts).map(part));
+        }
         let duration = last - first;
         for (extrapolation, is_before) in [
             (&curve.pre_extrapolation, true),

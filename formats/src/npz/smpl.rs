@@ -199,7 +199,7 @@ pub(crate) fn plan(archive: &Archive, warnings: &mut Warnings) -> Result<Option<
         (plan.names, plan.parents) = (skeleton.names, skeleton.parents);
         plan.is_body = true;
         plan.no_world = Some(
-            "where a body's joints are depends on its shape; give a model of it with --body, or their places with --offsets"
+            "where a body's joints are depends on its shape; give a model of it with --body-model, or their places with --offsets"
                 .to_owned(),
         );
     }

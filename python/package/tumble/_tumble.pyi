@@ -580,7 +580,7 @@ def load(
     bridge_gaps: bool = False,
     keyframes: bool = False,
     offsets: ArrayLike | None = None,
-    body: _Path | None = None,
+    body_model: _Path | None = None,
     scale: float | Literal["metres"] | None = None,
     up: Literal["y", "z"] | None = None,
 ) -> File: ...

@@ -23,7 +23,7 @@ use crate::arguments::input;
 use crate::arguments::input::Inputs;
 use crate::arguments::interpolation::{Manner, Wanted, curve_warning, wanted};
 use crate::arguments::results::{Results, each_file, kept};
-use crate::arguments::time::{Samples, Sampling};
+use crate::arguments::time::{AtKeys, Samples, Sampling};
 use crate::arguments::what::{OrderArgument, What, quaternions};
 use crate::batch::digest::InputFile;
 use crate::batch::output::Target;
@@ -74,6 +74,8 @@ pub(crate) struct Arguments {
     method: Wanted,
     #[command(flatten)]
     sampling: Sampling,
+    #[command(flatten)]
+    at_keys: AtKeys,
     #[command(flatten)]
     manner: Manner,
     #[command(flatten)]
@@ -206,7 +208,10 @@ impl Arguments {
             let checked = self.manner.check(&[method]);
             checked.map_err(Failure::usage)?;
         }
-        self.sampling.samples()
+        match self.at_keys.samples()? {
+            Some(samples) => Ok(samples),
+            None => self.sampling.samples(),
+        }
     }
 
     /// Says which keys are read.
@@ -219,7 +224,7 @@ impl Arguments {
     /// All that decides over the bytes of a result besides its input.
     fn options(&self, samples: &Samples) -> String {
         let mut options = self.given.options();
-        if let Samples::Times(_) = samples {
+        if let Samples::Times(_) | Samples::Keys(_) = samples {
             options += &format!(" times={}", samples.digest());
         }
         options

@@ -43,14 +43,14 @@ impl Job<'_> {
         clips: &[&Motion],
         target: &Target,
     ) -> Result<(Evaluated, Told), Failure> {
-        let frames = |clip: &Motion| Ok(self.samples.of(&clip.set, name));
+        let frames = |clip: &Motion| Ok(self.samples.of_clip(clip, name));
         let times: Vec<Frames> = clips
             .iter()
             .map(|clip| frames(clip))
             .collect::<Result<_, _>>()?;
         let rate = match self.samples {
             Samples::Rate { rate, .. } => Some(*rate),
-            Samples::Times(_) => None,
+            Samples::Times(_) | Samples::Keys(_) => None,
         };
         let format = target.format();
         let options = self.options(target);
@@ -78,7 +78,7 @@ impl Job<'_> {
         else {
             return Err(Failure::usage(format!(
                 "{name}: the animations of a file that is kept keep their lengths; leave out \
-                 --times, --start, --end and --from-zero (`tumble convert --start` cuts a file first), or \
+                 --times, --at, --start, --end and --from-zero (`tumble convert --start` cuts a file first), or \
                  write another format"
             )));
         };

@@ -28,7 +28,7 @@ impl Job<'_> {
         target: &Target,
     ) -> Result<(Evaluated, Told), Failure> {
         let (arguments, set) = (self.arguments, &clip.set);
-        let frames = self.samples.of(set, name);
+        let frames = self.samples.of_clip(clip, name);
         let timeline = frames
             .resolve(set.track_count(), set.time_span())
             .map_err(|error| Failure::evaluating(name, &error.into()))?;
@@ -105,7 +105,7 @@ impl Job<'_> {
         target: &Target,
     ) -> Result<(Evaluated, Told), Failure> {
         let set = &clip.set;
-        let frames = &self.samples.of(set, name);
+        let frames = &self.samples.of_clip(clip, name);
         let timeline = frames
             .resolve(set.track_count(), set.time_span())
             .map_err(|error| Failure::evaluating(name, &error.into()))?;

@@ -60,7 +60,7 @@ impl<'a> Source<'a> {
                     format!("{count}, {rate} per second"),
                 )
             }
-            Samples::Times(_) => (
+            Samples::Times(_) | Samples::Keys(_) => (
                 "time, s".to_owned(),
                 Box::new(|time| time),
                 words::count(timeline.len(), "time"),
