@@ -1,4 +1,4 @@
-//! FBX, as Maya, 3ds Max, Blender, MotionBuilder and Mixamo write it, binary or text.
+//! FBX, as programs of Autodesk, Blender and Mixamo write it, binary or text.
 //!
 //! The file is read by `ufbx`, which also evaluates what a node's layers, curves, pivots and rotation orders
 //! say together. Each animation stack becomes a clip, each node a track: keys that follow its curves within

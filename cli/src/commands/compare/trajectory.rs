@@ -258,8 +258,7 @@ impl Compared {
         } = &self.alignment;
         if by != "none" {
             text += &format!(
-                "\n  aligned      by {by}: scale {scale:.6}, turned {:.4}°, moved {x:.6} {y:.6} {z:.6}",
-                degrees
+                "\n  aligned      by {by}: scale {scale:.6}, turned {degrees:.4}°, moved {x:.6} {y:.6} {z:.6}"
             );
         }
         for (what, found) in [("absolute", &self.ape), ("relative", &self.rpe)] {
