@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # The same bits on processors and systems that this machine is not, under emulators. On demand: it takes
-# half an hour on two cores, and CI has no room for it. docs/platforms.md has what it found.
+# an hour on two cores, and CI has no room for it. docs/platforms.md has what it found.
 #
 #   scripts/platforms.sh                     all parts
 #   scripts/platforms.sh wasm windows        these
