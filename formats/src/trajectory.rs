@@ -199,11 +199,9 @@ fn largest_eigenvector(mut a: [[f64; 4]; 4]) -> [f64; 4] {
                         sine * row[p] + cosine * row[q],
                     );
                 }
-                for column in 0..4 {
-                    let (at_p, at_q) = (a[p][column], a[q][column]);
-                    a[p][column] = cosine * at_p - sine * at_q;
-                    a[q][column] = sine * at_p + cosine * at_q;
-                }
+                let (row_p, row_q) = (a[p], a[q]);
+                a[p] = std::array::from_fn(|c| cosine * row_p[c] - sine * row_q[c]);
+                a[q] = std::array::from_fn(|c| sine * row_p[c] + cosine * row_q[c]);
                 for row in &mut vectors {
                     (row[p], row[q]) = (
                         cosine * row[p] - sine * row[q],

@@ -95,17 +95,10 @@ fn slerps(from: &Components, to: &Components, weights: &[f32; BLOCK], found: &mu
 #[inline(always)]
 fn go_over(below: &Components, above: &Components, weights: &[f32; BLOCK], found: &mut Components) {
     slerps(below, above, weights, found);
-    for j in 0..BLOCK {
-        let inner = if weights[j] == 1.0 {
-            at(above, j)
-        } else {
-            at(found, j)
-        };
-        let value = if weights[j] == 0.0 {
-            at(below, j)
-        } else {
-            inner
-        };
+    for (j, &weight) in weights.iter().enumerate() {
+        let (below, above) = (at(below, j), at(above, j));
+        let inner = if weight == 1.0 { above } else { at(found, j) };
+        let value = if weight == 0.0 { below } else { inner };
         put(found, j, value.map(canonical));
     }
 }

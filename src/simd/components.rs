@@ -32,8 +32,8 @@ pub(crate) fn take_apart<L: Lanes>(rotations: &[[f32; 4]], components: &mut Comp
             own.store(&mut row[lane..][..L::COUNT]);
         }
     }
-    for lane in whole..rotations.len().min(BLOCK) {
-        put(components, lane, rotations[lane]);
+    for (lane, &rotation) in rotations.iter().enumerate().take(BLOCK).skip(whole) {
+        put(components, lane, rotation);
     }
 }
 
@@ -51,7 +51,7 @@ pub(crate) fn put_together<L: Lanes>(components: &Components, rotations: &mut [[
         ];
         L::store_rotations(own, &mut rotations[lane..][..L::COUNT]);
     }
-    for lane in whole..rotations.len().min(BLOCK) {
-        rotations[lane] = at(components, lane);
+    for (lane, rotation) in rotations.iter_mut().enumerate().take(BLOCK).skip(whole) {
+        *rotation = at(components, lane);
     }
 }
