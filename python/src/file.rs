@@ -242,7 +242,7 @@ pub(crate) fn load(
     let scale = scale.map(Scale::of).transpose()?;
     if offsets.is_some() && body_model.is_some() {
         return Err(input(
-            "offsets and body_model both place the joints; give one".to_owned(),
+            "offsets and body_model both place the joints; give one",
         ));
     }
     let offsets = offsets.map(|given| doubles(given, "offsets")).transpose()?;
@@ -284,7 +284,7 @@ pub(crate) fn load(
                 (Some(Scale::Metres), Some(space)) => space.metres,
                 (Some(Scale::Metres), None) => {
                     let message = "scale: the file does not say its unit; give a number";
-                    return Err(input(message.to_owned()));
+                    return Err(input(message));
                 }
             };
             adjust_all(&mut loaded, factor, up).map_err(|error| of_track(&error))?;
