@@ -1,4 +1,4 @@
-//! FBX as it is read: files of Maya, 3ds Max, MotionBuilder and Blender, beside the numbers of Autodesk's
+//! FBX as it is read: files of Maya, 3ds Max, `MotionBuilder` and Blender, beside the numbers of Autodesk's
 //! SDK and beside `ufbx` itself; and made ones.
 
 use std::fs;
@@ -104,7 +104,7 @@ fn clips_follow_the_curves_of_files() {
     }
 }
 
-/// Where FBX2glTF 0.9.7, that is Autodesk's SDK, has the point 1 2 3 of these nodes in the world, in metres and
+/// Where `FBX2glTF` 0.9.7, that is Autodesk's SDK, has the point 1 2 3 of these nodes in the world, in metres and
 /// with y up: file, clip, node, time in frames of 24, position.
 #[rustfmt::skip]
 const SDK: &[(&str, usize, &str, u32, [f64; 3])] = &[
