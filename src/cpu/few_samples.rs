@@ -76,7 +76,10 @@ impl CpuEngine {
         let shares = !matches!(request.timeline.ticks, Ticks::Times { stride: 1.., .. });
         let mut of_track = Vec::with_capacity(tracks.len());
         for track in tracks.clone() {
-            let (times, _) = request.set.times_and_keys(track);
+            let (times, keys) = request.set.times_and_keys(track);
+            // Keys that nobody samples are refused too, as on every other way.
+            let every_interval = 0..keys.len().saturating_sub(1);
+            (request.interpolation.path).check(keys, every_interval, track)?;
             let is_known = |(known, _): &(usize, Sorted)| {
                 let (others, _) = request.set.times_and_keys(*known);
                 shares && std::ptr::eq(times, others)
