@@ -10,6 +10,7 @@ use crate::cpu::fallback::{APART, intervals_of_frames};
 use crate::cpu::streaming::Output;
 use crate::prepare::batch::PART_INTERVALS;
 use crate::prepare::error::SetError;
+use crate::prepare::preparation::Preparation;
 use crate::prepare::request::Request;
 use crate::threads::stop;
 use crate::time::frames::{Ticks, Timeline};
@@ -78,8 +79,7 @@ impl CpuEngine {
         for track in tracks.clone() {
             let (times, keys) = request.set.times_and_keys(track);
             // Keys that nobody samples are refused too, as on every other way.
-            let every_interval = 0..keys.len().saturating_sub(1);
-            (request.interpolation.path).check(keys, every_interval, track)?;
+            Preparation::check_track(request.interpolation, keys, track)?;
             let is_known = |(known, _): &(usize, Sorted)| {
                 let (others, _) = request.set.times_and_keys(*known);
                 shares && std::ptr::eq(times, others)

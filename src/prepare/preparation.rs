@@ -52,15 +52,23 @@ impl Preparation {
         interpolation: &Interpolation,
         set: &TrackSet,
     ) -> Result<(), InterpolationError> {
-        let has_path = Self::has_path(interpolation);
         (0..set.track_count()).try_for_each(|track| {
             let (_, keys) = set.times_and_keys(track);
-            interpolation.check_track(keys, track)?;
-            match has_path {
-                true => interpolation.path.check(keys, 0..keys.len() - 1, track),
-                false => Ok(()),
-            }
+            Self::check_track(interpolation, keys, track)
         })
+    }
+
+    /// Refuses keys of the `track`th track that cannot be interpolated so, wherever they lie.
+    pub(crate) fn check_track(
+        interpolation: &Interpolation,
+        keys: &[Quat],
+        track: usize,
+    ) -> Result<(), InterpolationError> {
+        interpolation.check_track(keys, track)?;
+        match Self::has_path(interpolation) {
+            true => (interpolation.path).check(keys, 0..keys.len() - 1, track),
+            false => Ok(()),
+        }
     }
 
     /// Whether an option says which way the curves go. Steps have no path, and a method that fixes the path also
