@@ -170,8 +170,8 @@ fn few_frames_have_the_bits_of_many() {
             }
 
             let each = vec![first, last, last - 0.25, first + 0.125];
-            let own = Frames::at_each(each.clone());
-            let found = values(&engine, &set, interpolation, &own, Layout::TrackMajor);
+            let at_each = Frames::at_each(each.clone());
+            let found = values(&engine, &set, interpolation, &at_each, Layout::TrackMajor);
             let mut together = each;
             together.extend((0..9000).map(|k| first + (last - first) * f64::from(k) / 9000.0));
             let shared = Frames::at(together);

@@ -14,8 +14,8 @@ const times = new Float64Array(from(20, 8 * tracks * keys));
 const values = new Float32Array(from(20 + 8 * tracks * keys, 16 * tracks * keys));
 
 const interpolants = Array.from({ length: tracks }, (_, track) => {
-  const own = (list, size) => list.subarray(track * keys * size, (track + 1) * keys * size);
-  const keyframes = new QuaternionKeyframeTrack("a.quaternion", Array.from(own(times, 1)), Array.from(own(values, 4)));
+  const ofTrack = (list, size) => list.subarray(track * keys * size, (track + 1) * keys * size);
+  const keyframes = new QuaternionKeyframeTrack("a.quaternion", Array.from(ofTrack(times, 1)), Array.from(ofTrack(values, 4)));
   return keyframes.createInterpolant(new Float32Array(4));
 });
 const output = new Float32Array(4 * tracks * frames);

@@ -40,15 +40,15 @@ impl Signs {
             return Cow::Borrowed(rotations);
         }
         let mut all = Cow::Borrowed(rotations);
-        for (place, &own) in rotations.iter().enumerate() {
+        for (place, &rotation) in rotations.iter().enumerate() {
             let track = self.place % self.before.len().max(1);
             let is_first =
                 self.layout == Layout::TrackMajor && self.place.is_multiple_of(self.samples);
             let Some(before) = self.before.get_mut(track) else {
                 break;
             };
-            let turns = !is_first && signs_differ(*before, own);
-            *before = if turns { -own } else { own };
+            let turns = !is_first && signs_differ(*before, rotation);
+            *before = if turns { -rotation } else { rotation };
             if turns {
                 all.to_mut()[place] = *before;
             }

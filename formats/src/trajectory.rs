@@ -505,9 +505,9 @@ mod tests {
         let (_, reference, _) = paths();
         let turn = DQuat::from_rotation_z(-2.5);
         let moved = |turn: DQuat| -> Vec<Pose> {
-            let all = reference.iter().map(|own| Pose {
-                position: turn * own.position + DVec3::new(1.0, 2.0, 3.0),
-                rotation: turn * own.rotation,
+            let all = reference.iter().map(|pose| Pose {
+                position: turn * pose.position + DVec3::new(1.0, 2.0, 3.0),
+                rotation: turn * pose.rotation,
             });
             all.collect()
         };

@@ -116,7 +116,7 @@ pub(crate) fn fbx(bytes: &[u8]) -> u64 {
             assert!(parent.is_none_or(|parent| parent < index), "{parent:?}");
         }
     }
-    let codes: Vec<_> = loaded.warnings.iter().map(|own| own.code).collect();
+    let codes: Vec<_> = loaded.warnings.iter().map(|warning| warning.code).collect();
     let tracks = loaded.clips.first().map(|clip| clip.set.track_count());
     signature((
         codes,

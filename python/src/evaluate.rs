@@ -249,9 +249,9 @@ impl Result {
                 let mut found = above_rate(numbers) + turned;
                 let mut velocity = carried + turned;
                 if !velocities.is_empty() {
-                    let own = above * three(&velocities);
-                    found += carried.cross(own);
-                    velocity = carried + own;
+                    let relative = above * three(&velocities);
+                    found += carried.cross(relative);
+                    velocity = carried + relative;
                 }
                 let rotation = (above * DQuat::from_array(local)).normalize();
                 world[track] = (rotation, velocity);
@@ -391,7 +391,7 @@ const LOOKED: usize = 256;
 /// Samples for which a track is prepared as a whole: fewer keys than so many times these.
 const KEYS_OF_A_SAMPLE: usize = 2048;
 
-/// Where the curves of a clip are less smooth than their method promises, where that has not been told yet.
+/// Where the curves of a clip are less smooth than their method promises, of which nobody was warned yet.
 /// Of a few samples of many keys it is not looked for.
 fn curve_warnings(
     py: Python<'_>,
@@ -412,15 +412,15 @@ fn curve_warnings(
         ..request.with(quantity)(method)
     };
     let mut known = LOOKED_AT.lock().unwrap_or_else(PoisonError::into_inner);
-    let own = Arc::downgrade(clip);
+    let this = Arc::downgrade(clip);
     if known
         .iter()
-        .any(|(other, how)| other.ptr_eq(&own) && *how == interpolation)
+        .any(|(other, how)| other.ptr_eq(&this) && *how == interpolation)
     {
         return Ok(Vec::new());
     }
     known.truncate(LOOKED - 1);
-    known.push_front((own, interpolation));
+    known.push_front((this, interpolation));
     drop(known);
     let name = clip.name.clone().unwrap_or_else(|| "clip".to_owned());
     let clip = Arc::clone(clip);

@@ -82,9 +82,9 @@ impl File {
 
     /// Its clips, each as it is pickled: see `Clip`.
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
-        let (py, own) = (slf.py(), slf.get());
+        let (py, file) = (slf.py(), slf.get());
         let again = py.import("tumble._tumble")?.getattr("file_of_state")?;
-        let state = (own.path.clone(), own.clips.clone(), own.refused.clone());
+        let state = (file.path.clone(), file.clips.clone(), file.refused.clone());
         PyTuple::new(py, [again, state.into_pyobject(py)?.into_any()])
     }
 

@@ -218,7 +218,7 @@ impl Motions {
             angular_velocities,
         ]
         .into_iter()
-        .map(|own| own.map(PyArrayMethods::try_readwrite).transpose())
+        .map(|array| array.map(PyArrayMethods::try_readwrite).transpose())
         .collect::<Result<Vec<_>, _>>()
         .map_err(|error| input(format!("out: {error}")))?;
         let [r, p, w, v, a] = &mut outputs[..] else {

@@ -73,14 +73,14 @@ pub(crate) fn state<'py>(py: Python<'py>, clip: &Clip) -> PyResult<Bound<'py, Py
     let vectors = PyList::empty(py);
     for (kind, channel) in VECTORS.into_iter().enumerate() {
         for place in 0..tracks.len() {
-            let Some(own) = motion.set.vector_keys(channel, place) else {
+            let Some(vector_keys) = motion.set.vector_keys(channel, place) else {
                 continue;
             };
-            let keys: Vec<f32> = own.keys.iter().flat_map(Vec3::to_array).collect();
-            let tangents: Vec<f32> = (own.tangents.iter().flatten())
+            let keys: Vec<f32> = vector_keys.keys.iter().flat_map(Vec3::to_array).collect();
+            let tangents: Vec<f32> = (vector_keys.tangents.iter().flatten())
                 .flat_map(Vec3::to_array)
                 .collect();
-            let times = PyArray1::from_slice(py, own.times);
+            let times = PyArray1::from_slice(py, vector_keys.times);
             vectors.append((
                 kind,
                 place,
@@ -110,12 +110,12 @@ pub(crate) fn state<'py>(py: Python<'py>, clip: &Clip) -> PyResult<Bound<'py, Py
     let rests: Vec<f32> = motion.skeleton.iter().flat_map(rest).collect();
     state.set_item("rests", rows(py, rests, 10)?)?;
     let number = |sampler: Option<Sampler>| {
-        let place = SAMPLERS.iter().position(|&own| Some(own) == sampler);
+        let place = SAMPLERS.iter().position(|&one| Some(one) == sampler);
         place.map_or(0, |place| place as i64 + 1)
     };
     let channels = motion.channels.iter();
     let channels: Vec<i64> = channels
-        .flat_map(|own| [own.rotation, own.translation, own.scale].map(number))
+        .flat_map(|channel| [channel.rotation, channel.translation, channel.scale].map(number))
         .collect();
     state.set_item("channels", rows(py, channels, 3)?)?;
     let origins: Vec<f64> = motion.origins.iter().flat_map(DVec3::to_array).collect();
@@ -214,11 +214,11 @@ fn motion_of(state: &Bound<'_, PyDict>) -> PyResult<Motion> {
     for (place, name) in names.iter().enumerate() {
         let times = times_of
             .get(place)
-            .and_then(|&own| times.get(usize::try_from(own).ok()?));
+            .and_then(|&index| times.get(usize::try_from(index).ok()?));
         let times = times.ok_or_else(broken)?;
-        let (own, others) = left.split_at_checked(times.len()).ok_or_else(broken)?;
+        let (track_keys, others) = left.split_at_checked(times.len()).ok_or_else(broken)?;
         left = others;
-        set.push(name.as_deref().unwrap_or_default(), times, own)
+        set.push(name.as_deref().unwrap_or_default(), times, track_keys)
             .map_err(of_set)?;
     }
     type Numbers<'py> = (
@@ -291,8 +291,8 @@ fn motion_of(state: &Bound<'_, PyDict>) -> PyResult<Motion> {
         SAMPLERS.get(place).copied()
     };
     let channels: Vec<[i64; 3]> = chunks(&entry(state, "channels")?)?;
-    let channels = channels.into_iter().map(|own| {
-        let [rotation, translation, scale] = own.map(sampler);
+    let channels = channels.into_iter().map(|numbers| {
+        let [rotation, translation, scale] = numbers.map(sampler);
         Channels {
             rotation,
             translation,
@@ -345,21 +345,21 @@ fn motion_of(state: &Bound<'_, PyDict>) -> PyResult<Motion> {
 pub(crate) fn is_same(a: &Motion, b: &Motion) -> bool {
     let tracks = a.set.track_count();
     let is_same_track = |track: usize| {
-        let (own, other) = (a.set.track(track), b.set.track(track));
+        let (first, second) = (a.set.track(track), b.set.track(track));
         let tcb = |of: &Tcb| [of.tension, of.continuity, of.bias];
         let vectors = |channel: Channel| {
-            let [own, other] = [a, b].map(|of| of.set.vector_keys(channel, track));
+            let [first, second] = [a, b].map(|of| of.set.vector_keys(channel, track));
             let parts = |of: Option<tumble::VectorKeys<'_>>| {
                 of.map(|of| (of.times.to_vec(), of.keys.to_vec(), of.tangents.to_vec()))
             };
-            parts(own) == parts(other)
+            parts(first) == parts(second)
         };
-        own.name == other.name
-            && own.times == other.times
-            && own.keys == other.keys
-            && own.velocities == other.velocities
-            && own.tangents == other.tangents
-            && own.tcb.iter().map(tcb).eq(other.tcb.iter().map(tcb))
+        first.name == second.name
+            && first.times == second.times
+            && first.keys == second.keys
+            && first.velocities == second.velocities
+            && first.tangents == second.tangents
+            && first.tcb.iter().map(tcb).eq(second.tcb.iter().map(tcb))
             && VECTORS.into_iter().all(vectors)
     };
     tracks == b.set.track_count()

@@ -71,11 +71,11 @@ pub(crate) fn interruptible<T: Send + 'static>(
 ) -> PyResult<T> {
     py.detach(|| {
         let stop = Stop::new();
-        let own = stop.clone();
+        let flag = stop.clone();
         let (sender, receiver) = mpsc::sync_channel(1);
         let thread = thread::Builder::new().name("tumble".to_owned());
         thread.spawn(move || {
-            let _ = sender.send(own.during(|| guarded(work))); // nobody listens after Ctrl-C
+            let _ = sender.send(flag.during(|| guarded(work))); // nobody listens after Ctrl-C
         })?;
         wait(&receiver, &stop)
     })
@@ -85,12 +85,12 @@ pub(crate) fn interruptible<T: Send + 'static>(
 /// GIL it is called.
 pub(crate) fn stoppable<T: Send>(work: impl FnOnce() -> PyResult<T> + Send) -> PyResult<T> {
     let stop = Stop::new();
-    let own = stop.clone();
+    let flag = stop.clone();
     thread::scope(|scope| {
         let (sender, receiver) = mpsc::sync_channel(1);
         let thread = thread::Builder::new().name("tumble".to_owned());
         thread.spawn_scoped(scope, move || {
-            let _ = sender.send(own.during(|| guarded(work))); // nobody listens after Ctrl-C
+            let _ = sender.send(flag.during(|| guarded(work))); // nobody listens after Ctrl-C
         })?;
         wait(&receiver, &stop)
     })
@@ -133,12 +133,12 @@ impl Job<'_> {
 
     /// About what it costs one thread at the most.
     fn nanoseconds(&self) -> f64 {
-        let own = self.interpolation.method.cost;
+        let cost = self.interpolation.method.cost;
         let key = match self.interpolation.speed {
             Speed::Constant => CONSTANT_SPEED,
-            Speed::AsKeyed => own.key,
+            Speed::AsKeyed => cost.key,
         };
         let rotations = self.set.track_count() as f64 * self.samples as f64;
-        key * self.set.key_count() as f64 + own.rotation * rotations
+        key * self.set.key_count() as f64 + cost.rotation * rotations
     }
 }

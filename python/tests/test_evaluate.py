@@ -298,9 +298,9 @@ def test_keys_without_a_smooth_curve_are_told_once():
     keys = np.array([key.as_quat() for key in keys], np.float32)
     clip = tumble.Clip([0.0, 1.0, 2.0, 2.00001, 3.0, 4.0], keys, name="jerk")
     words = r'jerk:track 1: warning.W014.*at key 2, at 1 s.*use method="bessel-overhauser"'
-    with pytest.warns(tumble.InputWarning, match=words) as told:
+    with pytest.warns(tumble.InputWarning, match=words) as warned:
         clip.evaluate(fps=10, method="c2")
-    assert told[0].message.code == "W014"
+    assert warned[0].message.code == "W014"
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         clip.evaluate(fps=20, method="c2")

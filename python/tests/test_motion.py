@@ -54,16 +54,16 @@ def test_states_are_those_of_the_engine(clips, rng):
     times[:4] = [0.0, library.lengths[ids[1]], -5.0, 1e9]
     state = library.sample(ids, times)
     for place, (clip, time) in enumerate(zip(ids, times)):
-        own = clips[clip]
-        at = np.clip(3.0 + time, *own.span)
-        expected = engine.evaluate(own, at=at, method="slerp")
+        played = clips[clip]
+        at = np.clip(3.0 + time, *played.span)
+        expected = engine.evaluate(played, at=at, method="slerp")
         signs = np.sign((expected * state.rotations[place]).sum(-1, keepdims=True))
         np.testing.assert_allclose(state.rotations[place] * signs, expected, atol=2e-6)
-        positions, world = engine.world(own, at=[at], method="slerp")
+        positions, world = engine.world(played, at=[at], method="slerp")
         np.testing.assert_allclose(state.positions[place], positions[:, 0], atol=2e-5)
         signs = np.sign((world[:, 0] * state.world_rotations[place]).sum(-1, keepdims=True))
         np.testing.assert_allclose(state.world_rotations[place] * signs, world[:, 0], atol=5e-6)
-        rates = engine.velocity(own, at=[at], method="slerp", axes="world")[:, 0]
+        rates = engine.velocity(played, at=[at], method="slerp", axes="world")[:, 0]
         if 0 < time < library.lengths[clip]:
             np.testing.assert_allclose(state.angular_velocities[place], rates, atol=2e-3)
     assert state.rotations.dtype == np.float32 and state.positions.shape == (60, JOINTS, 3)
@@ -79,7 +79,7 @@ def test_velocities_are_those_of_differences(clips, rng, method):
     before, after = library.sample(ids, times - step), library.sample(ids, times + step)
     rate = (after.positions - before.positions) / (2 * step)
     np.testing.assert_allclose(state.velocities, rate, rtol=1e-2, atol=0.1)
-    a, b = (Rotation.from_quat(own.world_rotations.reshape(-1, 4)) for own in (before, after))
+    a, b = (Rotation.from_quat(state.world_rotations.reshape(-1, 4)) for state in (before, after))
     turned = (b * a.inv()).as_rotvec().reshape(200, JOINTS, 3) / (2 * step)
     np.testing.assert_allclose(state.angular_velocities, turned, rtol=1e-2, atol=0.1)
 
@@ -151,13 +151,13 @@ def test_a_library_is_kept_in_a_file(clips, rng, tmp_path):
     expected = library.sample(ids, times)
     assert np.load(path)["cells"].shape[1] == 4, "NumPy reads it"
     again = [tumble.MotionLibrary.open(path, mmap=mmap) for mmap in (True, False)]
-    again += [pickle.loads(pickle.dumps(own)) for own in (library, *again)]
-    for own in again:
-        found = own.sample(ids, times)
+    again += [pickle.loads(pickle.dumps(copied)) for copied in (library, *again)]
+    for copied in again:
+        found = copied.sample(ids, times)
         for name in ("rotations", "positions", "world_rotations", "velocities"):
             assert np.array_equal(getattr(found, name), getattr(expected, name))
-        assert own.names == library.names and np.array_equal(own.lengths, library.lengths)
-        assert (own.method, repr(own)) == ("bessel-overhauser", repr(library))
+        assert copied.names == library.names and np.array_equal(copied.lengths, library.lengths)
+        assert (copied.method, repr(copied)) == ("bessel-overhauser", repr(library))
     mapped = again[0]._motions.arrays()["cells"]
     assert isinstance(mapped, np.memmap) and mapped.ctypes.data % 64 == 0
 

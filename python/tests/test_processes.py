@@ -213,19 +213,19 @@ def copies(value):
 def test_clips_are_pickled_whole(clip, tmp_path, shared):
     clips = [clip, tumble.Clip([0.0], [[0, 0, 0, 1]]), tumble.load(shared / "gltf/Fox.glb")["Run"]]
     clips += [tumble.load(path).clips[0] for path in sorted(shared.glob("bvh/*.bvh"))[:1]]
-    for own in clips:
-        for other in copies(own):
-            assert other == own and hash(other) == hash(own)
-            assert (other.names, other.parents, other.rate) == (own.names, own.parents, own.rate)
-            assert (other.path, other.span, repr(other)) == (own.path, own.span, repr(own))
+    for original in clips:
+        for other in copies(original):
+            assert other == original and hash(other) == hash(original)
+            assert (other.names, other.parents, other.rate) == (original.names, original.parents, original.rate)
+            assert (other.path, other.span, repr(other)) == (original.path, original.span, repr(original))
             for method in ("hermite", "kochanek-bartels"):
                 try:
-                    expected = own.evaluate(fps=30, method=method)
+                    expected = original.evaluate(fps=30, method=method)
                 except tumble.InputError:
                     continue
                 assert np.array_equal(other.evaluate(fps=30, method=method), expected)
             for array, expected in zip(
-                tumble.Engine("cpu").poses(other, fps=30), tumble.Engine("cpu").poses(own, fps=30)
+                tumble.Engine("cpu").poses(other, fps=30), tumble.Engine("cpu").poses(original, fps=30)
             ):
                 assert np.array_equal(array, expected)
 

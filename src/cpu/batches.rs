@@ -76,7 +76,7 @@ impl CpuEngine {
             self.scratch_pool.give_back(memory);
             Ok(())
         };
-        let task = |own| stop::during(stop.clone(), || work(own));
+        let task = |batch| stop::during(stop.clone(), || work(batch));
         if batches.len() <= 1 {
             return task((&batches, output));
         }

@@ -54,9 +54,9 @@ impl CpuEngine {
         let rotations = Some(output.len());
         self.on_threads(|| {
             let tasks = tasks(window, 1, output).into_par_iter();
-            tasks.try_for_each(|(window, own)| {
+            tasks.try_for_each(|(window, part)| {
                 stop::check_of(stop.as_ref())?;
-                Ok::<_, SetError>(self.window(clip, timeline, &window, rotations, own)?)
+                Ok::<_, SetError>(self.window(clip, timeline, &window, rotations, part)?)
             })
         })?
     }

@@ -50,7 +50,7 @@ impl CpuEngine {
         let mut intervals = PART_INTERVALS;
         for one in all {
             let others = &mut output[one.samples.start - from..];
-            let (own, others) = others.split_at_mut(one.samples.len());
+            let (values, others) = others.split_at_mut(one.samples.len());
             (from, output) = (one.samples.end, others);
             if intervals >= PART_INTERVALS {
                 batches.push(Vec::new());
@@ -58,16 +58,16 @@ impl CpuEngine {
             }
             intervals += one.intervals.len();
             if let Some(batch) = batches.last_mut() {
-                batch.push((one, own));
+                batch.push((one, values));
             }
         }
         let resolve = |batch: Prepared<'_>| -> Result<(), SetError> {
             let mut memory = self.scratch_pool.take(request);
             let intervals = (batch.iter()).map(|(one, _)| (track, one.intervals.clone()));
             memory.prepare(request.set, intervals)?;
-            for (part, (one, own)) in memory.parts().zip(batch) {
-                let (copy, own) = (TrackCopy::of_track(one.samples), &mut Output::Here(own));
-                self.part(part, request.timeline, &copy, own)?;
+            for (part, (one, values)) in memory.parts().zip(batch) {
+                let (copy, values) = (TrackCopy::of_track(one.samples), &mut Output::Here(values));
+                self.part(part, request.timeline, &copy, values)?;
             }
             self.scratch_pool.give_back(memory);
             Ok(())

@@ -92,7 +92,7 @@ impl CpuEngine {
         let mut memory = self.scratch_pool.take(request);
         let groups_of = |place: usize| sorted[of_track[place]].1.groups.iter();
         let intervals = tracks.clone().enumerate().flat_map(|(place, track)| {
-            groups_of(place).map(move |own| (track, own.intervals.clone()))
+            groups_of(place).map(move |group| (track, group.intervals.clone()))
         });
         memory.prepare(request.set, intervals)?;
         let mut parts = memory.parts();
@@ -105,8 +105,8 @@ impl CpuEngine {
             };
             for (group, part) in sorted.groups.iter().zip(parts.by_ref()) {
                 let copy = TrackCopy::of_track(group.samples.clone());
-                let own = &mut Output::Here(&mut row[group.samples.clone()]);
-                self.part(part, &sorted.timeline, &copy, own)?;
+                let values = &mut Output::Here(&mut row[group.samples.clone()]);
+                self.part(part, &sorted.timeline, &copy, values)?;
             }
             if let Some(places) = &sorted.places {
                 for (&place, &value) in places.iter().zip(&in_order) {

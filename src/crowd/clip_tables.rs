@@ -355,10 +355,10 @@ pub(super) fn runs_of(channels: &[CrowdChannel]) -> Vec<Range<u32>> {
     let rotations: Vec<_> = channels.iter().step_by(CHANNELS as usize).collect();
     let mut end = 0;
     rotations
-        .chunk_by(|before, own| {
-            before.form_and_base == own.form_and_base
-                && before.first + 1 == own.first
-                && before.count == own.count
+        .chunk_by(|before, next| {
+            before.form_and_base == next.form_and_base
+                && before.first + 1 == next.first
+                && before.count == next.count
         })
         .map(|run| {
             let first = end;

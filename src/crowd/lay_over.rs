@@ -28,8 +28,8 @@ pub(crate) fn lay_over<L: Lanes>(
     let mut weights = [0.0; BLOCK];
     let blocks = output.chunks_mut(BLOCK).zip(layered.chunks(BLOCK));
     for ((block, mask), (values, layered)) in (0..).zip(mask.chunks(BLOCK)).zip(blocks) {
-        for (own, cell) in weights.iter_mut().zip(mask) {
-            *own = weight * cell[0];
+        for (joint_weight, cell) in weights.iter_mut().zip(mask) {
+            *joint_weight = weight * cell[0];
         }
         take_apart::<L>(values, &mut below);
         take_apart::<L>(layered, &mut above);

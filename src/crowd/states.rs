@@ -101,19 +101,19 @@ impl CrowdLibrary {
     pub fn into_tables(self) -> (MotionTables, Vec<[u32; 4]>, Vec<[f32; 4]>) {
         let ticks_per_second = self.ticks_per_second();
         let joints = self.joints();
-        let own = self.tables;
-        let spans: Vec<[u32; 4]> = bytemuck::cast_vec(own.spans);
+        let library_tables = self.tables;
+        let spans: Vec<[u32; 4]> = bytemuck::cast_vec(library_tables.spans);
         let tables = MotionTables {
-            sizes: (spans.len(), own.cells.len()),
-            clips: own.clips,
-            bases: own.bases,
-            channels: own.channels,
+            sizes: (spans.len(), library_tables.cells.len()),
+            clips: library_tables.clips,
+            bases: library_tables.bases,
+            channels: library_tables.channels,
             links: self.links,
-            runs: own.runs,
+            runs: library_tables.runs,
             joints,
             ticks_per_second,
         };
-        (tables, spans, own.cells)
+        (tables, spans, library_tables.cells)
     }
 }
 
@@ -132,7 +132,7 @@ impl MotionTables {
             0 => Vec::new(),
             each => channels.chunks(each).map(runs_of).collect(),
         };
-        let own = Self {
+        let tables = Self {
             clips: bytemuck::cast_vec(words.clips),
             bases: bytemuck::cast_vec(words.bases),
             channels,
@@ -142,8 +142,8 @@ impl MotionTables {
             ticks_per_second: words.ticks_per_second,
             sizes: (spans.len(), cells.len()),
         };
-        match own.are_sound(bytemuck::cast_slice(spans), cells.len()) {
-            true => Ok(own),
+        match tables.are_sound(bytemuck::cast_slice(spans), cells.len()) {
+            true => Ok(tables),
             false => Err(CrowdError::BrokenTables),
         }
     }
@@ -162,14 +162,14 @@ impl MotionTables {
         let mut has_parents = vec![true; self.joints];
         for link in &self.links {
             match has_parents.get_mut(link.joint as usize) {
-                Some(own) => *own = false,
+                Some(has_parent) => *has_parent = false,
                 None => return false,
             }
         }
         let mut is_sound_link = |link: &CrowdLink| {
             let is_there = has_parents.get(link.parent as usize) == Some(&true);
-            let own = &mut has_parents[link.joint as usize];
-            is_there && !std::mem::replace(own, true)
+            let has_parent = &mut has_parents[link.joint as usize];
+            is_there && !std::mem::replace(has_parent, true)
         };
         let is_sound_clip = |(place, clip): (usize, &CrowdClip)| {
             let first = clip.first_base as usize;
@@ -190,9 +190,9 @@ impl MotionTables {
                         channel.first as usize + last * constants + behind
                     }
                 };
-                let own = &spans[base.first as usize..][..base.count as usize];
+                let base_spans = &spans[base.first as usize..][..base.count as usize];
                 let has_keys =
-                    form != FORM_CONSTANT && own.iter().any(|span| span.start & ON_KEY != 0);
+                    form != FORM_CONSTANT && base_spans.iter().any(|span| span.start & ON_KEY != 0);
                 let keys = channel.keys as usize + last;
                 [FORM_CONSTANT, FORM_ARC, FORM_CUBIC, FORM_POLYNOMIAL].contains(&form)
                     && end < cells
@@ -275,7 +275,10 @@ impl MotionTables {
             states.velocities.len(),
             states.angular_velocities.len(),
         ];
-        if let Some(&given) = lengths.iter().find(|&&own| own != 0 && own != needed) {
+        if let Some(&given) = lengths
+            .iter()
+            .find(|&&length| length != 0 && length != needed)
+        {
             return Err(CrowdError::OutputLength { given, needed });
         }
         let width = match &*engine.backend {
@@ -375,17 +378,18 @@ impl InLanes for Task<'_, '_> {
         rotations.resize(joints, [0.0; 4]);
         world.resize(joints, Joint::default());
         for (instance, &(clip, tick)) in self.at.iter().enumerate() {
-            let own = &tables.clips[clip as usize];
-            let tick = tick.min(own.period);
-            let bases = &tables.bases[own.first_base as usize..][..own.bases as usize];
+            let clip_entry = &tables.clips[clip as usize];
+            let tick = tick.min(clip_entry.period);
+            let bases =
+                &tables.bases[clip_entry.first_base as usize..][..clip_entry.bases as usize];
             places.clear();
-            let place = |base| place_of(base, self.spans, tick, own.period);
+            let place = |base| place_of(base, self.spans, tick, clip_entry.period);
             places.extend(bases.iter().map(place));
             let each = joints * CHANNELS as usize;
             let channels = &tables.channels[clip as usize * each..][..each];
             let at = instance * joints..(instance + 1) * joints;
             let local = match states.rotations.get_mut(at.clone()) {
-                Some(own) => own,
+                Some(rotations) => rotations,
                 None => &mut rotations[..],
             };
             local_rotations::<L>(
@@ -406,39 +410,39 @@ impl InLanes for Task<'_, '_> {
                 tick,
                 per_second: tables.ticks_per_second as f32,
             };
-            for (joint, own) in world.iter_mut().enumerate() {
+            for (joint, state) in world.iter_mut().enumerate() {
                 let [turn, moved] = [
                     &channels[joint * 3],
                     &channels[joint * 3 + TRANSLATION as usize],
                 ];
                 let [x, y, z, _] = moment.value(moved);
-                *own = Joint {
+                *state = Joint {
                     rotation: local[joint],
                     position: [x, y, z],
                     ..Joint::default()
                 };
                 if moves {
-                    own.angular_velocity = moment.angular_velocity(turn);
-                    own.velocity = moment.velocity(moved);
+                    state.angular_velocity = moment.angular_velocity(turn);
+                    state.velocity = moment.velocity(moved);
                 }
             }
             for link in &tables.links {
                 let parent = world[link.parent as usize];
-                let own = &mut world[link.joint as usize];
-                own.hang_on(&parent, moves);
+                let child = &mut world[link.joint as usize];
+                child.hang_on(&parent, moves);
             }
             fn put<T: Copy>(to: &mut [T], at: Range<usize>, world: &[Joint], of: fn(&Joint) -> T) {
-                for (own, joint) in to.get_mut(at).into_iter().flatten().zip(world) {
-                    *own = of(joint);
+                for (value, joint) in to.get_mut(at).into_iter().flatten().zip(world) {
+                    *value = of(joint);
                 }
             }
-            put(states.positions, at.clone(), world, |own| own.position);
-            put(states.world_rotations, at.clone(), world, |own| {
-                own.rotation
+            put(states.positions, at.clone(), world, |joint| joint.position);
+            put(states.world_rotations, at.clone(), world, |joint| {
+                joint.rotation
             });
-            put(states.velocities, at.clone(), world, |own| own.velocity);
-            put(states.angular_velocities, at, world, |own| {
-                own.angular_velocity
+            put(states.velocities, at.clone(), world, |joint| joint.velocity);
+            put(states.angular_velocities, at, world, |joint| {
+                joint.angular_velocity
             });
         }
     }
@@ -457,11 +461,11 @@ impl Joint {
         if !moves {
             return;
         }
-        let own = rotated(parent.rotation, self.velocity);
+        let relative = rotated(parent.rotation, self.velocity);
         let carried = sum(parent.velocity, cross3(parent.angular_velocity, arm));
-        self.velocity = sum(carried, own).map(canonical);
-        let own = rotated(parent.rotation, self.angular_velocity);
-        self.angular_velocity = sum(parent.angular_velocity, own).map(canonical);
+        self.velocity = sum(carried, relative).map(canonical);
+        let relative = rotated(parent.rotation, self.angular_velocity);
+        self.angular_velocity = sum(parent.angular_velocity, relative).map(canonical);
     }
 }
 
@@ -470,10 +474,10 @@ impl Joint {
 #[inline(always)]
 fn place_of(base: &CrowdBase, spans: &[CrowdSpan], tick: u32, period: u32) -> CrowdPlace {
     let count = base.count as usize;
-    let own = &spans[base.first as usize..][..count];
+    let base_spans = &spans[base.first as usize..][..count];
     let even = (u64::from(tick) * (count as u64 - 1)).checked_div(u64::from(period));
     let guess = (even.unwrap_or(0) as usize).min(count - 1);
-    let start = |index: usize| own[index].start & TICKS;
+    let start = |index: usize| base_spans[index].start & TICKS;
     // Rounding may have put the key on the other side of the tick.
     for index in [guess, guess + 1, guess.saturating_sub(1)] {
         if index < count && start(index) <= tick && (index + 1 == count || tick < start(index + 1))
@@ -501,18 +505,18 @@ fn local_rotations<L: Lanes>(
     output: &mut [[f32; 4]],
 ) {
     for run in runs {
-        let own = &mut output[run.start as usize..run.end as usize];
+        let values = &mut output[run.start as usize..run.end as usize];
         let of = |joint: u32| &channels[(joint * CHANNELS) as usize];
         let channel = of(run.start);
         let stands = places[(channel.form_and_base & 0x00ff_ffff) as usize];
         if channel.form_and_base >> 24 == FORM_ARC && stands.span & ON_KEY == 0 {
             let middle = (channel.first + stands.span * channel.count * 2) as usize;
             let tangent = middle + channel.count as usize;
-            let cells = |first: usize| &cells[first..first + own.len()];
-            arcs::<L>(cells(middle), cells(tangent), stands.parameter, own);
+            let cells = |first: usize| &cells[first..first + values.len()];
+            arcs::<L>(cells(middle), cells(tangent), stands.parameter, values);
             continue;
         }
-        for (joint, value) in run.clone().zip(own) {
+        for (joint, value) in run.clone().zip(values) {
             *value = sampled(cells, of(joint), stands);
         }
     }
@@ -605,8 +609,8 @@ impl Moment<'_> {
         let (mut value, mut slope) = (power(N - 1), [0.0; 4]);
         for below in (0..N - 1).rev() {
             slope = std::array::from_fn(|c| slope[c] * s + value[c]);
-            let own = power(below);
-            value = std::array::from_fn(|c| value[c] * s + own[c]);
+            let coefficient = power(below);
+            value = std::array::from_fn(|c| value[c] * s + coefficient[c]);
         }
         (value, slope)
     }

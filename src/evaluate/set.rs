@@ -74,8 +74,8 @@ impl Backend {
             self.evaluate_tracks(request, Layout::TrackMajor, &mut rows)?;
             for (sample, frame) in output.chunks_mut(tracks).enumerate() {
                 let column = rows[sample..].iter().step_by(samples);
-                for (own, &value) in frame.iter_mut().zip(column) {
-                    *own = value;
+                for (sample, &value) in frame.iter_mut().zip(column) {
+                    *sample = value;
                 }
             }
             return Ok(());

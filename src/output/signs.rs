@@ -17,8 +17,8 @@ fn cosine(a: Quat, b: Quat) -> f32 {
 /// rounding decides, here in one order on every processor.
 #[must_use]
 #[inline]
-pub fn signs_differ(before: Quat, own: Quat) -> bool {
-    cosine(before, own) < 0.0
+pub fn signs_differ(before: Quat, after: Quat) -> bool {
+    cosine(before, after) < 0.0
 }
 
 /// Gives each rotation, in the order `[sample][track]`, the sign that is nearer to the sample before.

@@ -17,8 +17,8 @@ pub(crate) fn at(components: &Components, lane: usize) -> [f32; 4] {
 
 #[inline(always)]
 pub(crate) fn put(components: &mut Components, lane: usize, value: [f32; 4]) {
-    for (row, own) in components.iter_mut().zip(value) {
-        row[lane] = own;
+    for (row, component) in components.iter_mut().zip(value) {
+        row[lane] = component;
     }
 }
 
@@ -28,8 +28,8 @@ pub(crate) fn take_apart<L: Lanes>(rotations: &[[f32; 4]], components: &mut Comp
     let whole = rotations.len().min(BLOCK) / L::COUNT * L::COUNT;
     for lane in (0..whole).step_by(L::COUNT) {
         let loaded = L::load_rotations(&rotations[lane..]);
-        for (row, own) in components.iter_mut().zip(loaded) {
-            own.store(&mut row[lane..][..L::COUNT]);
+        for (row, vector) in components.iter_mut().zip(loaded) {
+            vector.store(&mut row[lane..][..L::COUNT]);
         }
     }
     for (lane, &rotation) in rotations.iter().enumerate().take(BLOCK).skip(whole) {
@@ -43,13 +43,13 @@ pub(crate) fn put_together<L: Lanes>(components: &Components, rotations: &mut [[
     let [x, y, z, w] = components;
     let whole = rotations.len().min(BLOCK) / L::COUNT * L::COUNT;
     for lane in (0..whole).step_by(L::COUNT) {
-        let own = [
+        let vectors = [
             L::load(&x[lane..]),
             L::load(&y[lane..]),
             L::load(&z[lane..]),
             L::load(&w[lane..]),
         ];
-        L::store_rotations(own, &mut rotations[lane..][..L::COUNT]);
+        L::store_rotations(vectors, &mut rotations[lane..][..L::COUNT]);
     }
     for (lane, rotation) in rotations.iter_mut().enumerate().take(BLOCK).skip(whole) {
         *rotation = at(components, lane);

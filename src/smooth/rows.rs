@@ -184,13 +184,13 @@ impl Block<'_> {
         let before = self.first as isize - radius as isize;
         let (mut from, mut to): (Components, Components) = ([[0.0; BLOCK]; 4], [[0.0; BLOCK]; 4]);
         for lane in (0..rounded).step_by(BLOCK) {
-            let own = BLOCK.min(count - lane);
+            let lanes = BLOCK.min(count - lane);
             let place = before + lane as isize;
-            if place >= 0 && place + (own as isize) < row.count as isize {
-                row.load::<L>(place as usize, own, &mut from);
-                row.load::<L>(place as usize + 1, own, &mut to);
+            if place >= 0 && place + (lanes as isize) < row.count as isize {
+                row.load::<L>(place as usize, lanes, &mut from);
+                row.load::<L>(place as usize + 1, lanes, &mut to);
             } else {
-                for i in 0..own {
+                for i in 0..lanes {
                     let step = self.pass.step_at(place + i as isize, row.count);
                     put(&mut from, i, row.get(step));
                     put(&mut to, i, row.get(step + 1));
@@ -233,8 +233,8 @@ impl Block<'_> {
         let (row, radius) = (self.row, self.pass.weights.len());
         let mut values: Components = [[0.0; BLOCK]; 4];
         for lane in (0..self.count).step_by(BLOCK) {
-            let own = BLOCK.min(self.count - lane);
-            row.load::<L>(self.first + lane, own, &mut values);
+            let lanes = BLOCK.min(self.count - lane);
+            row.load::<L>(self.first + lane, lanes, &mut values);
             let sums = self.sums(lane);
             let mut moved: Components = [[0.0; BLOCK]; 4];
             for i in 0..BLOCK {
@@ -242,7 +242,7 @@ impl Block<'_> {
                 put(&mut moved, i, value);
             }
             if ARE_ROTATIONS && are_any_zero(&moved) {
-                for i in 0..own {
+                for i in 0..lanes {
                     if at(&moved, i) != [0.0; 4] {
                         continue;
                     }
@@ -256,10 +256,10 @@ impl Block<'_> {
                 }
             }
             if row.stride == 1 {
-                let output = &mut self.output[self.place + lane..][..own];
+                let output = &mut self.output[self.place + lane..][..lanes];
                 put_together::<L>(&moved, output);
             } else {
-                for i in 0..own {
+                for i in 0..lanes {
                     self.output[self.place + (lane + i) * row.stride] = at(&moved, i);
                 }
             }

@@ -330,11 +330,19 @@ impl TrackSet {
 
     /// Widens the time span to these times.
     pub(crate) fn widen_span(&mut self, times: &[f64]) {
-        let own = (times[0], times[times.len() - 1]);
-        let (first, last) = self.span.unwrap_or(own);
+        let track_span = (times[0], times[times.len() - 1]);
+        let (first, last) = self.span.unwrap_or(track_span);
         // Not by `min` and `max`: of zeros with two signs processors choose differently.
-        let first = if own.0 < first { own.0 } else { first };
-        let last = if own.1 > last { own.1 } else { last };
+        let first = if track_span.0 < first {
+            track_span.0
+        } else {
+            first
+        };
+        let last = if track_span.1 > last {
+            track_span.1
+        } else {
+            last
+        };
         self.span = Some((first, last));
     }
 }

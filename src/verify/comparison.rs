@@ -157,7 +157,7 @@ pub fn compare<R: Rotation>(
     let bits = |quat: Quat| quat.to_array().map(f32::to_bits);
     let pairs = theirs.iter().zip(engine);
     let of_other_sign = pairs
-        .filter(|&(&own, &engine)| bits(own) != bits(engine) && own == -engine)
+        .filter(|&(&their, &our)| bits(their) != bits(our) && their == -our)
         .count();
     let found = Errors::measure(set, interpolation, &timeline, theirs)?;
     Ok(Comparison {
@@ -182,6 +182,6 @@ fn quats<R: Rotation>(rotations: &[R]) -> Result<Cow<'_, [Quat]>, OutOfMemory> {
         return Ok(Cow::Borrowed(quats));
     }
     let mut quats = reserved(rotations.len(), "the rotations to compare")?;
-    quats.extend(rotations.iter().map(|own| own.quat()));
+    quats.extend(rotations.iter().map(|rotation| rotation.quat()));
     Ok(Cow::Owned(quats))
 }

@@ -14,9 +14,9 @@ const TICKS: u32 = 705_600;
 fn library(random: &mut Random, joints: usize, method: Method) -> CrowdLibrary {
     let mut library = CrowdLibrary::with_ticks(&skeleton(random, joints), TICKS).unwrap();
     for keys in [1, 2, 40] {
-        let own = clip(random, joints, keys);
+        let tracks = clip(random, joints, keys);
         let mut set = TrackSet::new();
-        for track in own.tracks() {
+        for track in tracks.tracks() {
             set.push("", track.times, track.keys).unwrap();
         }
         let times: Vec<f64> = (0..30).map(|k| f64::from(k) * 0.11).collect();
@@ -164,7 +164,7 @@ fn rates_are_those_of_differences() {
         let (mut compared, mut jumps) = (0, 0);
         for place in 0..found.rotations.len() {
             let rate = (three(after.positions[place]) - three(before.positions[place])) / seconds;
-            let own = three(found.velocities[place]);
+            let velocity = three(found.velocities[place]);
             let (a, b) = (
                 four(before.world_rotations[place]),
                 four(after.world_rotations[place]),
@@ -173,7 +173,7 @@ fn rates_are_those_of_differences() {
             let turn = if turn.w < 0.0 { -turn } else { turn };
             let turned: DVec3 = turn.to_scaled_axis() / seconds;
             let angular = three(found.angular_velocities[place]);
-            let is_near = (rate - own).length() <= 2e-3 * (1.0 + own.length())
+            let is_near = (rate - velocity).length() <= 2e-3 * (1.0 + velocity.length())
                 && (turned - angular).length() <= 2e-3 * (1.0 + angular.length());
             compared += usize::from(is_near);
             jumps += usize::from(!is_near);

@@ -323,7 +323,7 @@ impl Clip<'_> {
                             "the list `{name}` has {length} numbers, and {whole} are needed; say which, such as {name}[0:{whole}]"
                         ),
                         None => format!(
-                            "the list `{name}` has {length} numbers; number {place} of it is wanted, from 0"
+                            "the list `{name}` has {length} numbers; number {place} of it is asked for, counted from 0"
                         ),
                     };
                     return Err(self

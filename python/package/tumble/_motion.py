@@ -106,7 +106,7 @@ class MotionLibrary:
                 raise InputError(f"{clip.path or f'clips[{place}]'}: {message}")
         if names is not None and len(names) != len(clips):
             raise InputError(f"names: there are {len(names)} for {len(clips)} clips")
-        self.names = list(names) if names is not None else [_name(own) for own in clips]
+        self.names = list(names) if names is not None else [_name(clip) for clip in clips]
         self.lengths = np.array([clip.duration for clip in clips])
         self.rates = np.array([_rate(clip) for clip in clips])
         self._motions = Motions.of_clips(clips, parents, offsets.tolist(), method)
@@ -136,7 +136,7 @@ class MotionLibrary:
         """
         given = [files] if isinstance(files, str | os.PathLike) else list(files)
         paths: list[str] = []
-        for one in (os.fspath(own) for own in given):
+        for one in (os.fspath(path) for path in given):
             found = sorted(_glob.glob(one, recursive=True)) if _glob.has_magic(one) else [one]
             if not found:
                 raise FileNotFoundError(f"no file matches {one}")
@@ -158,7 +158,7 @@ class MotionLibrary:
         """The states of N instances: `clip_ids` and `times`, (N,), say which clip each plays and the second
         of it at which it stands.
 
-        `arrays`: names of those that are wanted; rotations alone take a third of the time. `out`: a state
+        `arrays`: the names of those to compute; rotations alone take a third of the time. `out`: a state
         whose arrays are filled again, those that it has. `finite`: velocities as differences of the two
         frames of the clip's rate around a time, as other motion libraries have them, instead of the exact
         derivatives.

@@ -20,20 +20,28 @@ pub(crate) struct Steps<'a>(pub(crate) &'a mut Intervals);
 impl InLanes for Steps<'_> {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
-        let own = &mut *self.0;
-        for lane in (0..own.whole()).step_by(L::COUNT) {
-            let (from, to) = (units::<L>(&own.from, lane), units::<L>(&own.to, lane));
+        let intervals = &mut *self.0;
+        for lane in (0..intervals.whole()).step_by(L::COUNT) {
+            let (from, to) = (
+                units::<L>(&intervals.from, lane),
+                units::<L>(&intervals.to, lane),
+            );
             let step = quaternion::step(from, to);
             let mut near = PrincipalRange::new();
             let log = near.log(step);
-            store(&mut own.steps, lane, step);
-            store(&mut own.logs, lane, log);
-            redo(near.doubt, lane..own.count, own, Intervals::find_log);
+            store(&mut intervals.steps, lane, step);
+            store(&mut intervals.logs, lane, log);
+            redo(
+                near.doubt,
+                lane..intervals.count,
+                intervals,
+                Intervals::find_log,
+            );
         }
     }
 }
 
-/// Calls `again` with `own` for every lane in doubt. `doubt` has a number for each lane of a vector, the first of
+/// Calls `again` with `state` for every lane in doubt. `doubt` has a number for each lane of a vector, the first of
 /// which is the first of `lanes`; a lane is in doubt where its number is not 0, and NaN is not. Most vectors
 /// have none. `again` is a function and no closure: a closure in code for vectors would be compiled anew
 /// for each width.
@@ -41,13 +49,13 @@ impl InLanes for Steps<'_> {
 pub(crate) fn redo<D: Doubles, S: ?Sized>(
     doubt: D,
     lanes: Range<usize>,
-    own: &mut S,
+    state: &mut S,
     again: fn(&mut S, usize),
 ) {
     if !doubt.are_at_most(0.0) {
         let mut doubts = [0.0; MOST];
         doubt.store(&mut doubts);
-        redo_lanes(lanes, &doubts, own, again);
+        redo_lanes(lanes, &doubts, state, again);
     }
 }
 
@@ -56,12 +64,12 @@ pub(crate) fn redo<D: Doubles, S: ?Sized>(
 fn redo_lanes<S: ?Sized>(
     lanes: Range<usize>,
     doubts: &[f64; MOST],
-    own: &mut S,
+    state: &mut S,
     again: fn(&mut S, usize),
 ) {
     for (lane, &doubt) in lanes.zip(doubts) {
         if doubt != 0.0 {
-            again(own, lane);
+            again(state, lane);
         }
     }
 }
@@ -232,15 +240,15 @@ pub(crate) struct BetweenHandles<'a>(pub(crate) &'a mut Intervals);
 impl InLanes for BetweenHandles<'_> {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
-        let own = &mut *self.0;
-        for lane in (0..own.whole()).step_by(L::COUNT) {
-            own.store_base(lane, units::<L>(&own.from, lane));
+        let intervals = &mut *self.0;
+        for lane in (0..intervals.whole()).step_by(L::COUNT) {
+            intervals.store_base(lane, units::<L>(&intervals.from, lane));
             let mut near = PrincipalRange::<L::Doubles>::new();
-            own.find_vectors(&mut near, lane);
+            intervals.find_vectors(&mut near, lane);
             redo(
                 near.doubt,
-                lane..own.count,
-                own,
+                lane..intervals.count,
+                intervals,
                 Intervals::find_full_vectors,
             );
         }
@@ -277,8 +285,8 @@ impl Intervals {
         let numbers = self.numbers[Product::VECTORS..].first_chunk_mut();
         let numbers: &mut [Lane; 9] = numbers.expect("three vectors");
         let [a, b, c] = vectors;
-        let own = [a[0], a[1], a[2], b[0], b[1], b[2], c[0], c[1], c[2]];
-        store(numbers, lane, own);
+        let components = [a[0], a[1], a[2], b[0], b[1], b[2], c[0], c[1], c[2]];
+        store(numbers, lane, components);
         squared_extent(vectors).store(&mut self.squared_extents[lane..]);
     }
 }
@@ -301,11 +309,11 @@ impl InLanes for ControlRotations<'_> {
 }
 
 #[inline(always)]
-fn control_lanes(own: &Intervals, controls: &mut [Lane; 16], squared_extents: &mut Lane) {
-    for j in 0..own.whole() {
-        let (first, last) = (at(&own.outgoing, j), at(&own.incoming, j + 1));
-        let start = own.key(j);
-        let end = product(start, at(&own.steps, j));
+fn control_lanes(intervals: &Intervals, controls: &mut [Lane; 16], squared_extents: &mut Lane) {
+    for j in 0..intervals.whole() {
+        let (first, last) = (at(&intervals.outgoing, j), at(&intervals.incoming, j + 1));
+        let start = intervals.key(j);
+        let end = product(start, at(&intervals.steps, j));
         let a = product(start, quaternion::exp(first));
         let b = product(end, quaternion::exp(scaled(last, -1.0)));
         for (place, control) in [start, a, b, end].into_iter().enumerate() {
@@ -313,7 +321,7 @@ fn control_lanes(own: &Intervals, controls: &mut [Lane; 16], squared_extents: &m
                 controls[4 * place + c][j] = control[c];
             }
         }
-        squared_extents[j] = squared_extent([first, at(&own.logs, j), last]);
+        squared_extents[j] = squared_extent([first, at(&intervals.logs, j), last]);
     }
 }
 
@@ -324,17 +332,17 @@ pub(crate) struct BetweenNeighbours<'a>(pub(crate) &'a mut Intervals);
 impl InLanes for BetweenNeighbours<'_> {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
-        let own = &mut *self.0;
-        for lane in (0..own.whole()).step_by(L::COUNT) {
+        let intervals = &mut *self.0;
+        for lane in (0..intervals.whole()).step_by(L::COUNT) {
             let mut near = PrincipalRange::<L::Doubles>::new();
-            own.find_base(&mut near, lane + 1, units::<L>(&own.from, lane + 1));
-            let (before, after) = (load(&own.logs, lane), load(&own.logs, lane + 2));
-            let log = load::<L::Doubles, _, _>(&own.logs, lane + 1);
-            own.store_vectors(lane + 1, [before, log, after]);
+            intervals.find_base(&mut near, lane + 1, units::<L>(&intervals.from, lane + 1));
+            let (before, after) = (load(&intervals.logs, lane), load(&intervals.logs, lane + 2));
+            let log = load::<L::Doubles, _, _>(&intervals.logs, lane + 1);
+            intervals.store_vectors(lane + 1, [before, log, after]);
             redo(
                 near.doubt,
-                lane + 1..own.count,
-                own,
+                lane + 1..intervals.count,
+                intervals,
                 Intervals::find_full_base,
             );
         }

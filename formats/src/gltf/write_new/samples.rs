@@ -114,9 +114,11 @@ impl<'a> Samples<'a> {
     pub(super) fn rotations(self, track: usize) -> impl Iterator<Item = [f32; 4]> + use<'a> {
         let mut before = None;
         (0..self.len()).map(move |sample| {
-            let own = self.rotation(sample, track);
-            let turns = before.is_some_and(|before: Quat| signs_differ(before, own));
-            before.insert(if turns { -own } else { own }).to_array()
+            let rotation = self.rotation(sample, track);
+            let turns = before.is_some_and(|before: Quat| signs_differ(before, rotation));
+            before
+                .insert(if turns { -rotation } else { rotation })
+                .to_array()
         })
     }
 
