@@ -71,6 +71,18 @@ fn groups(clip: &Motion, method: Option<Method>) -> Vec<Group> {
     }
 }
 
+/// What is evaluated: a clip, on an engine, at some times of each track.
+#[derive(Clone, Copy)]
+struct Work<'a> {
+    engine: &'a Engine,
+    clip: &'a Motion,
+    request: &'a Request,
+    samples: &'a Samples,
+    frames: &'a Frames,
+    /// Samples of a track.
+    count: usize,
+}
+
 impl Result {
     /// Evaluates a clip into an array of NumPy's.
     pub(crate) fn of<'py>(
@@ -90,6 +102,13 @@ impl Result {
             ));
         }
         let tracks = clip.set.track_count();
+        let along_skeleton = self.in_world && !clip.is_world && !clip.skeleton.is_empty();
+        if along_skeleton && matches!(samples, Samples::Each { .. } | Samples::Ragged(_)) {
+            return Err(input(
+                "axes=\"world\": what a joint does in the world follows from its parents at the same times; \
+                 give one list of times for all tracks, or take the parent's axes",
+            ));
+        }
         if let Samples::Ragged(lists) = samples {
             if out.is_some() || self.layout == Layout::FrameMajor || lists.len() != tracks {
                 return Err(input(format!(
@@ -113,12 +132,19 @@ impl Result {
         let engine = engine(tracks * count)?;
         filled(&array, |numbers| {
             guarded(|| {
-                self.fill(&engine, clip, request, samples, &frames, count, numbers)?;
-                match self.in_world && !clip.is_world && !clip.skeleton.is_empty() {
-                    true => self
-                        .along_skeleton(&engine, clip, request, samples, &frames, count, numbers),
-                    false => Ok(()),
+                let work = Work {
+                    engine: &engine,
+                    clip,
+                    request,
+                    samples,
+                    frames: &frames,
+                    count,
+                };
+                self.fill(work, numbers)?;
+                if along_skeleton {
+                    self.along_skeleton(work, numbers)?;
                 }
+                Ok(())
             })
         })?;
         for diagnostic in curve_warnings(py, clip, request, self.quantity, count)? {
@@ -130,17 +156,15 @@ impl Result {
         }
     }
 
-    #[allow(clippy::too_many_arguments, reason = "what a result is made of")]
-    fn fill(
-        &self,
-        engine: &Engine,
-        clip: &Motion,
-        request: &Request,
-        samples: &Samples,
-        frames: &Frames,
-        count: usize,
-        numbers: &mut [f32],
-    ) -> PyResult<()> {
+    fn fill(&self, work: Work<'_>, numbers: &mut [f32]) -> PyResult<()> {
+        let Work {
+            engine,
+            clip,
+            request,
+            samples,
+            frames,
+            count,
+        } = work;
         let with = request.with(self.quantity);
         let job = Job {
             engine,
@@ -190,17 +214,8 @@ impl Result {
     }
 
     /// Makes rates in the parents' frames those in the world.
-    #[allow(clippy::too_many_arguments, reason = "as `fill`")]
-    fn along_skeleton(
-        &self,
-        engine: &Engine,
-        clip: &Motion,
-        request: &Request,
-        samples: &Samples,
-        frames: &Frames,
-        count: usize,
-        numbers: &mut [f32],
-    ) -> PyResult<()> {
+    fn along_skeleton(&self, work: Work<'_>, numbers: &mut [f32]) -> PyResult<()> {
+        let Work { clip, count, .. } = work;
         let tracks = clip.set.track_count();
         let other = |quantity, encoding: Encoding| -> PyResult<Vec<f32>> {
             let other = Self {
@@ -209,7 +224,7 @@ impl Result {
                 ..*self
             };
             let mut found = vec![0.0; tracks * count * encoding.components().len()];
-            other.fill(engine, clip, request, samples, frames, count, &mut found)?;
+            other.fill(work, &mut found)?;
             Ok(found)
         };
         let rotations = other(Quantity::Rotation, Encoding::F32)?;
@@ -305,15 +320,15 @@ impl Result {
                         is_one: false,
                     };
                     let frames = samples.frames(&one.set, None)?;
-                    self.fill(
-                        &engine,
-                        &one,
+                    let work = Work {
+                        engine: &engine,
+                        clip: &one,
                         request,
-                        &samples,
-                        &frames,
-                        list.len(),
-                        numbers_of_track,
-                    )?;
+                        samples: &samples,
+                        frames: &frames,
+                        count: list.len(),
+                    };
+                    self.fill(work, numbers_of_track)?;
                 }
                 Ok(())
             })

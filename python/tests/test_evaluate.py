@@ -285,6 +285,10 @@ def test_rates_in_the_world_are_those_of_the_world(layout, rng):
     assert engine.velocity(clip, at=at, axes="world", out=out, **how) is out
     assert np.array_equal(out, found)
 
+    for times in ([at, at, at, at + 0.1], [at, at[:3], at, at[:0]]):
+        with pytest.raises(tumble.InputError, match="same times"):
+            engine.velocity(clip, times=times, axes="world", method="squad")
+
     found = engine.acceleration(clip, at=at, axes="world", **how)
     before, after = (engine.velocity(clip, at=at + by, axes="world", **how) for by in (-step, step))
     rate = (after.astype(float) - before) / (2 * step)
