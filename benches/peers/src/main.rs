@@ -47,7 +47,9 @@ fn main() {
 }
 
 fn contestants(set: &TrackSet) -> Vec<Contestant<'_>> {
-    let frames = Frames::fps(RATE as u32).between(0.0, (FRAMES - 1) as f64 / RATE);
+    let frames = &*Box::leak(Box::new(
+        Frames::fps(RATE as u32).between(0.0, (FRAMES - 1) as f64 / RATE),
+    ));
     let times: Vec<f32> = (0..FRAMES).map(|k| (k as f64 / RATE) as f32).collect();
     let times: &'static [f32] = times.leak();
     let engine = |threads| {
@@ -98,7 +100,7 @@ fn contestants(set: &TrackSet) -> Vec<Contestant<'_>> {
         for call in 0..CALLS {
             let at = (call * 7919 % (FRAMES - 1)) as f64 / RATE;
             let one = Frames::fps(RATE as u32).between(at, at);
-            let done = small.evaluate_into(one, Layout::TrackMajor, &mut output[..1]);
+            let done = small.evaluate_into(&one, Layout::TrackMajor, &mut output[..1]);
             done.expect("what fits");
         }
     };
