@@ -8,7 +8,7 @@ import { build } from "esbuild";
 const read = (path) => readFileSync(path, "utf8");
 
 // A test compares this with what it finds: a page older than its sources is noticed.
-const sources = [...readdirSync("src").sort().map((name) => `src/${name}`), "build.mjs", "package-lock.json"];
+const sources = [...readdirSync("src").sort().map((name) => `src/${name}`), "build.mjs", "package-lock.json", "../npm/package/core.js"];
 const hash = createHash("sha1");
 for (const path of sources) hash.update(read(path));
 

@@ -31,6 +31,7 @@ mod travel;
 mod validation;
 mod view;
 mod view_controls;
+mod view_live;
 mod view_skeletons;
 
 #[path = "../../tests/support/application.rs"]

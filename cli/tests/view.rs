@@ -27,7 +27,7 @@ pub(crate) fn page(place: &Path, line: &[&str]) -> Option<Page> {
 }
 
 /// Rotations `[track][sample]` by `tumble eval`.
-fn evaluated(place: &Path, line: &[&str]) -> (Vec<u64>, Vec<Quat>) {
+pub(crate) fn evaluated(place: &Path, line: &[&str]) -> (Vec<u64>, Vec<Quat>) {
     let line = [&["eval", "-o", "out.npy", "--overwrite"], line].concat();
     succeed(place, &line);
     let bytes = fs::read(place.join("out.npy")).unwrap();
@@ -38,13 +38,13 @@ fn evaluated(place: &Path, line: &[&str]) -> (Vec<u64>, Vec<Quat>) {
     (shape, quats)
 }
 
-fn quat(value: &serde_json::Value) -> Quat {
+pub(crate) fn quat(value: &serde_json::Value) -> Quat {
     let component = |place: usize| value[place].as_f64().unwrap() as f32;
     Quat::from_xyzw(component(0), component(1), component(2), component(3))
 }
 
 /// How far two rotations are apart, component by component; the sign does not matter.
-fn apart(a: Quat, b: Quat) -> f32 {
+pub(crate) fn apart(a: Quat, b: Quat) -> f32 {
     let b = if a.dot(b) < 0.0 { -b } else { b };
     (a - b)
         .to_array()
@@ -62,7 +62,8 @@ fn the_page_is_built_from_its_sources() {
         .map(|entry| entry.unwrap().path())
         .collect();
     names.sort();
-    names.extend([web.join("build.mjs"), web.join("package-lock.json")]);
+    let others = ["build.mjs", "package-lock.json", "../npm/package/core.js"];
+    names.extend(others.map(|name| web.join(name)));
     let mut hash = Sha1::new();
     for name in names {
         hash.update(fs::read(name).unwrap());

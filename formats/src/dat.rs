@@ -41,6 +41,7 @@ pub static FORMAT: Format = Format {
     extensions: &[],
     probe: |_| false,
     read: open_dat,
+    read_bytes: |name, bytes, options| read_dat(name, &bytes[..], options),
     write: None,
     write_motion: Some(write::write_motion),
     features: &[Feature::BoxLength, Feature::UnevenTimes, Feature::Start],

@@ -66,6 +66,7 @@ impl Feature {
     ];
 
     /// What tables of many clips hold.
+    #[cfg(feature = "parquet")]
     pub(crate) const OF_TABLES: [Self; 8] = [
         Self::TrackNames,
         Self::ClipName,

@@ -13,12 +13,13 @@ use crate::diagnostic::Diagnostic;
 #[cfg(feature = "fbx")]
 use crate::fbx;
 use crate::feature::{self, Feature};
+use crate::gltf::skins::CarriedMesh;
 use crate::keys::Duplicates;
 use crate::motion::{Motion, Sampled};
 use crate::npy::ComponentOrder;
 use crate::poses::Poses;
 use crate::signs::{Signs, continue_signs, signs_jump};
-use crate::source::Source;
+use crate::source::{START, Source};
 use crate::text::lines::Limits;
 #[cfg(feature = "parquet")]
 use crate::{arrow, parquet};
@@ -58,6 +59,8 @@ pub struct Format {
     pub probe: fn(&[u8]) -> bool,
     /// Reads keyframes from a file; `-` is standard input.
     pub read: ReadKeys,
+    /// Reads keyframes from the bytes of a file; files beside it are not read.
+    pub read_bytes: ReadBytes,
     /// How rotations are written as they come.
     pub write: Option<WriteResults>,
     /// How sampled clips are written: see [`Format::write_clips`].
@@ -121,6 +124,9 @@ impl FormatOption {
 
 /// Reads the keyframes of a file.
 pub type ReadKeys = fn(&Path, &ReadOptions) -> Result<Loaded, Diagnostic>;
+
+/// Reads the keyframes of the bytes of a file; the text is what messages call it.
+pub type ReadBytes = fn(&str, Vec<u8>, &ReadOptions) -> Result<Loaded, Diagnostic>;
 
 /// How inputs are read.
 #[derive(Debug, Clone, Default)]
@@ -239,6 +245,15 @@ pub trait Document: fmt::Debug + Send + Sync {
 
     /// What the file holds that no clip holds, by names that its format has for it (`meshes`).
     fn beside(&self) -> Vec<String>;
+
+    /// The meshes that tracks of one of its clips carry, where the format has meshes.
+    ///
+    /// # Errors
+    /// When a mesh is broken, or is stored in a way that is not known.
+    fn carried_mesh(&self, clip: &Motion) -> Result<Option<CarriedMesh>, Diagnostic> {
+        let _ = clip;
+        Ok(None)
+    }
 
     /// Writes the file, as the one that `path` names, with the samples of some of its clips, each
     /// with the clip's place, instead of their keys; without any, everything stays as it is. Gives
@@ -507,6 +522,20 @@ impl Format {
     /// The first fault that refuses the file.
     pub fn open_detected(path: &Path, options: &ReadOptions) -> Result<Loaded, Diagnostic> {
         Self::detected(path).open(path, options)
+    }
+
+    /// Reads the bytes of a file in the format that they are in: see [`Format::detect`]. Files that it names
+    /// beside itself are not read.
+    ///
+    /// # Errors
+    /// The first fault that refuses the file.
+    pub fn read_detected(
+        name: &str,
+        bytes: Vec<u8>,
+        options: &ReadOptions,
+    ) -> Result<Loaded, Diagnostic> {
+        let start = &bytes[..bytes.len().min(START)];
+        (Self::detect(Path::new(name), start).read_bytes)(name, bytes, options)
     }
 
     /// The format that a file is in: see [`Format::detect`]. Nothing is known of one that cannot be

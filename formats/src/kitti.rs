@@ -26,6 +26,7 @@ pub static FORMAT: Format = Format {
     extensions: &[],
     probe: |_| false,
     read: open_kitti,
+    read_bytes: |name, bytes, options| read_kitti(name, &bytes[..], options),
     write: None,
     write_motion: None,
     features: &[Feature::Translations],

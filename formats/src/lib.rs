@@ -35,6 +35,7 @@ pub mod npy;
 pub mod npz;
 pub mod origin;
 pub mod output;
+pub mod packed;
 #[cfg(feature = "parquet")]
 pub mod parquet;
 pub mod path;

@@ -164,7 +164,10 @@ impl Channels {
 }
 
 /// How a channel is interpolated between its keys, as glTF 2.0 defines it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize, serde::Deserialize,
+)]
+#[serde(rename_all = "lowercase")]
 pub enum Sampler {
     /// The key at or before the time.
     Step,

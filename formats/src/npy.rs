@@ -11,7 +11,7 @@ use crate::diagnostic::{Code, Diagnostic};
 use crate::format::{Format, FormatOption, ResultShape, ResultWriter, WriteResults};
 use crate::npz::array::Array;
 use crate::npz::header::{Element, Header};
-use crate::npz::{Numbers, open_npy};
+use crate::npz::{Numbers, open_npy, read_npy};
 
 /// The order of a quaternion's components in a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
@@ -41,6 +41,7 @@ pub static FORMAT: Format = Format {
     extensions: &[],
     probe: |start| start.starts_with(b"\x93NUMPY"),
     read: open_npy,
+    read_bytes: read_npy,
     write: Some(WriteResults {
         is_text: false,
         order: ComponentOrder::Xyzw,

@@ -387,6 +387,7 @@ fn link(file: &File, path: &Path) -> io::Result<()> {
 /// A file system without locks has no such files removed.
 fn named_in(parent: &Path, mark: &str) -> io::Result<Temporary> {
     let prefix = format!("{PREFIX}{mark}");
+    #[cfg_attr(not(unix), expect(unused_mut, reason = "Unix alone has permissions"))]
     let mut builder = builder(&prefix);
     #[cfg(unix)]
     {

@@ -135,7 +135,7 @@ impl Source {
 }
 
 /// As many of the first bytes as tell a format.
-const START: usize = 512;
+pub(super) const START: usize = 512;
 
 /// Large enough that reading is not a matter of system calls.
 const BUFFER: usize = 1 << 18;

@@ -41,6 +41,7 @@ pub static FORMAT: Format = Format {
         line.starts_with(b"#") && (has(b"ground truth trajectory") || has(b"tx ty tz"))
     },
     read: open_tum,
+    read_bytes: |name, bytes, options| read_tum(name, &bytes[..], options),
     write: None,
     write_motion: Some(write_motion),
     features: &[Feature::Translations, Feature::UnevenTimes, Feature::Start],

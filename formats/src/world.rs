@@ -1,6 +1,6 @@
 //! Where the joints of a sampled clip are in the world.
 
-use glam::{DMat3, DQuat, DVec3, Quat, Vec3};
+use glam::{DAffine3, DMat3, DQuat, DVec3, Quat, Vec3};
 
 use crate::motion::Motion;
 use crate::sample::Samples;
@@ -48,6 +48,28 @@ pub enum HierarchyError {
 /// # Errors
 /// When the parents make no hierarchy, or the clip says why its poses cannot be told.
 pub fn world(clip: &Motion, samples: &Samples) -> Result<Vec<WorldPose>, HierarchyError> {
+    along_hierarchy(clip, samples, |pose| WorldPose {
+        position: pose.position,
+        rotation: pose.rotation.normalize().as_quat(),
+    })
+}
+
+/// As [`world`], where all points that go with the joints are: their scales too.
+///
+/// # Errors
+/// As there.
+pub fn world_matrices(clip: &Motion, samples: &Samples) -> Result<Vec<DAffine3>, HierarchyError> {
+    along_hierarchy(clip, samples, |pose| {
+        DAffine3::from_mat3_translation(pose.turned_and_scaled, pose.position)
+    })
+}
+
+/// What is made of the transforms of all joints at all samples, `[sample][joint]`.
+fn along_hierarchy<T>(
+    clip: &Motion,
+    samples: &Samples,
+    make: impl Fn(&Accumulated) -> T,
+) -> Result<Vec<T>, HierarchyError> {
     if let Some(reason) = &clip.no_world {
         let reason = reason.clone();
         return Err(HierarchyError::Refused { reason });
@@ -74,10 +96,7 @@ pub fn world(clip: &Motion, samples: &Samples) -> Result<Vec<WorldPose>, Hierarc
                 _ => own,
             };
         }
-        poses.extend(done.iter().map(|pose| WorldPose {
-            position: pose.position,
-            rotation: pose.rotation.normalize().as_quat(),
-        }));
+        poses.extend(done.iter().map(&make));
     }
     Ok(poses)
 }

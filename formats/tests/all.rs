@@ -24,6 +24,7 @@ mod origins;
 mod readme;
 mod reduce;
 mod round_trip;
+mod skins;
 mod support;
 mod table_options;
 #[cfg(feature = "parquet")]

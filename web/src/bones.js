@@ -5,6 +5,7 @@ import {
   Quaternion, Vector3,
 } from "three";
 import { position } from "./data.js";
+import { Skin } from "./skin.js";
 
 // How far a bone is broad, of its length; and where, from the joint to the parent.
 const BREADTH = 0.18;
@@ -75,6 +76,8 @@ export class Bones {
       return mesh;
     });
     this.object = new Group().add(...this.meshes);
+    this.skin = input.skin ? new Skin(input.skin, ghost) : null;
+    if (this.skin) this.object.add(this.skin.mesh);
     this.paint(-1);
   }
 
@@ -117,8 +120,14 @@ export class Bones {
     }
   }
 
-  place(result, sample, { shift }) {
+  place(result, sample, { shift, matrices, hasSkin }) {
     this.find(result, sample);
+    if (this.skin) {
+      // Scales are in the engine's matrices alone.
+      const canFollow = matrices || !this.input.stored.hasScales;
+      this.skin.mesh.visible = Boolean(hasSkin && canFollow);
+      if (canFollow) this.skin.follow({ matrices, places: this.places, turned: this.turned }, shift);
+    }
     const matrix = new Matrix4();
     const across = new Vector3();
     const third = new Vector3();
@@ -166,6 +175,14 @@ export class Bones {
       }
       for (const i of [least, most]) points.push(new Vector3(...position(result, boxes, 0, Math.floor(i / 3))));
     }
+    if (this.skin && !this.input.stored.hasScales) {
+      const step = Math.max(1, Math.floor(samples / 6));
+      for (let sample = 0; sample < samples; sample += step) {
+        this.find(result, sample);
+        this.skin.follow({ places: this.places, turned: this.turned }, 0);
+        points.push(...this.skin.points());
+      }
+    }
     return points;
   }
 
@@ -183,6 +200,7 @@ export class Bones {
   }
 
   dispose() {
+    this.skin?.dispose();
     for (const mesh of this.meshes) {
       mesh.geometry.dispose();
       mesh.material.dispose();

@@ -1,9 +1,12 @@
-// The results that the page carries: unpacked, and looked at. Nothing here makes a
+// The results that the page carries, unpacked, and those that its engine makes of the keys. Nothing here makes a
 // rotation that the engine has not made.
 
-async function inflated(text) {
+import { Live } from "./live.js";
+
+/** What base64 and an archive hold. */
+export async function inflated(text, format = "deflate") {
   const bytes = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
-  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
+  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream(format));
   return new Uint8Array(await new Response(stream).arrayBuffer());
 }
 
@@ -12,6 +15,17 @@ export async function mesh({ places, triangles }) {
   return {
     places: new Float32Array((await inflated(places)).buffer),
     triangles: new Uint32Array((await inflated(triangles)).buffer),
+  };
+}
+
+/** What joints carry. */
+export async function skin({ places, triangles, bonesOf, weights, joints, toJoints }) {
+  return {
+    ...(await mesh({ places, triangles })),
+    bonesOf: new Uint16Array((await inflated(bonesOf)).buffer),
+    weights: new Uint16Array((await inflated(weights)).buffer),
+    joints,
+    toJoints: new Float32Array((await inflated(toJoints)).buffer),
   };
 }
 
@@ -45,13 +59,27 @@ export class Set {
     // How bodies on paths are drawn, where tracks are these.
     this.bodies = stored.bodies;
     this.hasFrames = stored.hasFrames;
-    this.methods = stored.results.map((result) => result.method);
+    // Those that the page has frames of.
+    this.written = stored.results.map((result) => result.method);
+    this.methods = this.written;
     this.results = new Map();
+    // What its keys are evaluated by, where the page can; frames a second, where not those that were written.
+    this.live = null;
+    this.rate = null;
+  }
+
+  /** Lets the engine evaluate the keys. */
+  async enliven(engine, options) {
+    if (!engine || !this.stored.clip) return;
+    const { bytes, methods, origin } = this.stored.clip;
+    this.live = new Live(engine.unpack(await inflated(bytes)), { options, origin, isPlaced: this.isSkeleton });
+    this.methods = [...this.written, ...methods.filter((name) => !this.written.includes(name))];
   }
 
   async unpack() {
     if (this.times) return;
-    this.times = await doubles(this.stored.times);
+    this.writtenTimes = await doubles(this.stored.times);
+    this.times = this.writtenTimes;
     this.keyTimes = await doubles(this.stored.keyTimes);
     this.keys = new Int16Array((await differences(this.stored.keys, 4)).buffer);
   }
@@ -59,22 +87,56 @@ export class Set {
   /** The rotations by a method, [sample][box][xyzw] as 16-bit integers, the speeds, and where joints are. */
   async result(method) {
     if (!this.results.has(method)) {
-      const stored = this.stored.results.find((result) => result.method === method);
+      const stored = this.rate === null && this.stored.results.find((result) => result.method === method);
+      if (!stored) {
+        this.results.set(method, this.live.result(method, this.times));
+        return this.results.get(method);
+      }
       const rotations = await differences(stored.rotations, this.boxes * 4);
       const speeds = await differences(stored.speeds, this.boxes);
       const positions = stored.positions && {
         ...stored.positions,
+        scale: stored.positions.size.map((size) => size / 65535),
         packed: await differences(stored.positions.packed, this.boxes * 3),
       };
       this.results.set(method, {
         method,
         rotations: new Int16Array(rotations.buffer),
+        unit: 32767,
         speeds,
-        fastest: stored.fastest,
+        speedUnit: stored.fastest / 65535,
         positions,
       });
     }
     return this.results.get(method);
+  }
+
+  /** Frames at another rate, and the keys between them; null: those that were written. */
+  setRate(rate) {
+    const times = rate === null ? this.writtenTimes : this.live.times(rate, this.writtenTimes, this.boxes, this.keyTimes);
+    this.results.clear();
+    this.rate = rate;
+    this.times = times;
+  }
+
+  /** The key of a box at a time, from 0; -1 between keys. */
+  keyAt(box, time) {
+    const near = 1e-9 * Math.max(1, Math.abs(time));
+    return this.keysOf(box).times.findIndex((key) => Math.abs(key - time) <= near);
+  }
+
+  /** The box that turns most: the sum of all that it turns by. */
+  busiest(result) {
+    let [most, found] = [0, 0];
+    for (let box = 0; box < this.boxes; box++) {
+      let turned = 0;
+      for (let sample = 1; sample < this.samples; sample++) {
+        const speed = result.speeds[sample * this.boxes + box];
+        turned += speed * (this.times[sample] - this.times[sample - 1]);
+      }
+      if (turned > most) [most, found] = [turned, box];
+    }
+    return found;
   }
 
   get samples() {
@@ -108,16 +170,16 @@ export class Set {
 /** A stored rotation's components x y z w, of length 1. */
 export function rotation(result, boxes, sample, box) {
   const at = (sample * boxes + box) * 4;
-  const q = [0, 1, 2, 3].map((i) => result.rotations[at + i] / 32767);
+  const q = [0, 1, 2, 3].map((i) => result.rotations[at + i] / result.unit);
   const length = Math.hypot(...q) || 1;
   return q.map((component) => component / length);
 }
 
 /** Where a joint is in the world, x y z. */
 export function position({ positions }, joints, sample, joint) {
-  const { low, size, packed } = positions;
+  const { low, scale, packed } = positions;
   const at = (sample * joints + joint) * 3;
-  return low.map((least, axis) => least + (packed[at + axis] / 65535) * size[axis]);
+  return low.map((least, axis) => least + packed[at + axis] * scale[axis]);
 }
 
 /** The same in words, to about a thousandth of a percent of the clip's extent. */

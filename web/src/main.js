@@ -1,6 +1,7 @@
 // What is shown, and what people do to it.
 
-import { Set as Input, mesh, placeInWords, rotation } from "./data.js";
+import { Set as Input, mesh, placeInWords, rotation, skin } from "./data.js";
+import { engine } from "./live.js";
 import { Plots } from "./plots.js";
 import { Stage } from "./scene.js";
 import { colours, switchTheme } from "./theme.js";
@@ -19,8 +20,12 @@ const state = {
   other: "",
   pairing: "ghost",
   apart: isTangle(inputs[0]),
-  box: 0,
+  // None until the first result says which moves most.
+  box: -1,
   picked: false,
+  // Pictures between frames are evaluated, too.
+  between: false,
+  hasSkin: true,
   time: 0,
   sample: 0,
   playing: false,
@@ -41,30 +46,50 @@ function fill(select, entries) {
   );
 }
 
-/** Loads the results asked for and draws everything anew. */
+/** Loads the results asked for and draws everything anew. What the engine refuses is said, and what was written shown. */
 let loading = Promise.resolve();
 function load(refit = false) {
   loading = loading.then(async () => {
-    const { input, method, other } = state;
-    await input.unpack();
-    const names = other && other !== method ? [method, other] : [method];
-    results = await Promise.all(names.map((name) => input.result(name)));
-    state.box = Math.min(state.box, input.boxes - 1);
-    if (stage) {
-      const ghost = state.pairing === "ghost";
-      const pair = results.length > 1 ? { ghost, colours: ghost ? [colourOf(other)] : stored.boxColours } : null;
-      stage.fill(input, results, stored.boxColours, pair);
-      if (refit) {
-        stage.measure(results, input.samples, state.apart);
-        stage.frame(side());
-      }
-      stage.paint(picked());
+    try {
+      await redraw(refit);
+      complain("");
+    } catch (error) {
+      const [written] = state.input.written;
+      if (state.method === written && state.other === "") throw error;
+      Object.assign(state, { method: written, other: "" });
+      await redraw(refit);
+      complain(error.message);
     }
-    tell();
-    drawPlots();
-    show(Math.min(state.sample, input.samples - 1));
   });
   return loading;
+}
+
+async function redraw(refit) {
+  const { input, method, other } = state;
+  await input.unpack();
+  const names = other && other !== method ? [method, other] : [method];
+  results = await Promise.all(names.map((name) => input.result(name)));
+  if (state.box < 0) state.box = input.isSkeleton ? input.busiest(results[0]) : 0;
+  state.box = Math.min(state.box, input.boxes - 1);
+  if (stage) {
+    const ghost = state.pairing === "ghost";
+    const pair = results.length > 1 ? { ghost, colours: ghost ? [colourOf(other)] : stored.boxColours } : null;
+    stage.fill(input, results, stored.boxColours, pair);
+    if (refit) {
+      stage.measure(results, input.samples, state.apart);
+      stage.frame(side());
+    }
+    stage.paint(picked());
+  }
+  tell();
+  drawPlots();
+  show(Math.min(state.sample, input.samples - 1));
+}
+
+function complain(message) {
+  if (!stage) return; // why nothing is drawn is said there
+  element("trouble").hidden = message === "";
+  element("trouble").textContent = message;
 }
 
 // The first box is shown until somebody chooses one, which is lit then.
@@ -90,6 +115,12 @@ function tell() {
   element("method-label").textContent = input.hasFrames ? "Frame" : "Method";
   element("box-name").textContent = input.isSkeleton ? input.names[state.box] : "";
   element("stage").ariaLabel = `The ${input.bodies ? "paths" : input.isSkeleton ? "bones" : "boxes"}. Drag, or use the arrow keys, to turn the view.`;
+  element("rate-field").style.display = input.live ? "" : "none";
+  element("between-field").style.display = input.live ? "" : "none";
+  element("skin-field").style.display = input.skin ? "" : "none";
+  element("rate").value = input.rate ?? "";
+  element("between").checked = state.between;
+  element("skin").checked = state.hasSkin;
   element("speed").value = String(state.speed);
   element("loop").checked = state.loop;
   element("box").max = String(input.boxes);
@@ -103,20 +134,51 @@ function tell() {
     return entry;
   });
   element("legend").replaceChildren(...legend);
+  markKeys();
   const square = input.isSkeleton && stage?.floor?.visible && stage.square;
   element("floor").textContent = square ? `squares of ${Number(square.toPrecision(1))}` : "";
 }
 
-/** The methods that this input is shown by. */
+/** The methods that this input is shown by: those that were written, then those that the page evaluates. */
 function fillMethods() {
-  const names = state.input.methods.join();
+  const { methods, written } = state.input;
+  const names = methods.join();
   if (element("method").dataset.names === names) return;
   element("method").dataset.names = names;
-  const methods = stored.methods
-    .filter(({ name }) => state.input.methods.includes(name))
-    .map(({ name, summary }) => [name, name, summary]);
-  fill(element("method"), methods);
-  fill(element("other"), [["", "nothing"], ...methods]);
+  const entries = (isWritten) =>
+    stored.methods
+      .filter(({ name }) => methods.includes(name) && written.includes(name) === isWritten)
+      .map(({ name, summary }) => [name, name, summary]);
+  fill(element("method"), entries(true));
+  fill(element("other"), [["", "nothing"], ...entries(true)]);
+  const others = entries(false);
+  if (others.length === 0) return;
+  for (const id of ["method", "other"]) {
+    const group = document.createElement("optgroup");
+    group.label = "evaluated in this page";
+    fill(group, others);
+    element(id).append(group);
+  }
+}
+
+// More marks than this would be a line.
+const MOST_MARKS = 200;
+
+/** Marks below the slider of time where the keys of the chosen box are. */
+function markKeys() {
+  const { input } = state;
+  const { times } = input.keysOf(state.box);
+  const [first, last] = [input.times[0], input.times[input.samples - 1]];
+  const within = Array.from(times).filter((time) => time >= first && time <= last);
+  const marks = within.length > MOST_MARKS ? [] : within.map((time) => new Option("", String(nearest(time))));
+  element("key-marks").replaceChildren(...marks);
+}
+
+/** The sample nearest to a time. */
+function nearest(time) {
+  const { times, samples } = state.input;
+  const sample = state.input.sampleAt(time);
+  return sample + 1 < samples && times[sample + 1] - time < time - times[sample] ? sample + 1 : sample;
 }
 
 function drawPlots() {
@@ -124,31 +186,50 @@ function drawPlots() {
   plots.now(state.input.times[state.sample] ?? 0);
 }
 
-/** Shows a sample. */
-function show(sample) {
+/** Shows a sample; with a time between it and the next, what the engine makes of that. */
+function show(sample, time = state.input.times[sample]) {
   const { input } = state;
   state.sample = sample;
-  const time = input.times[sample];
   if (!state.playing) state.time = time;
-  if (stage) stage.place(results, sample, { apart: state.apart, side: side() });
+  const isBetween = time !== input.times[sample];
+  const shown = isBetween ? results.map(({ method }) => input.live.pose(method, [time])) : results;
+  const at = isBetween ? 0 : sample;
+  if (stage) {
+    // Matrices where scales are part of them.
+    const isScaled = input.skin && input.stored.hasScales && input.live;
+    const matrices = isScaled && results.map(({ method }) => input.live.matrices(method, time));
+    stage.place(shown, at, { apart: state.apart, side: side(), matrices, hasSkin: state.hasSkin });
+  }
   plots.now(time);
   element("time").value = String(sample);
   element("time").setAttribute("aria-valuetext", `${time.toFixed(3)} seconds`);
-  element("clock").textContent = `${time.toFixed(3)} s, sample ${sample + 1} of ${input.samples}`;
-  const [x, y, z, w] = rotation(results[0], input.boxes, sample, state.box);
+  const key = input.keyAt(state.box, time);
+  const keys = input.keysOf(state.box).times.length;
+  element("clock").textContent =
+    `${time.toFixed(3)} s, ${isBetween ? "after " : ""}sample ${sample + 1} of ${input.samples}` +
+    (key >= 0 ? `, key ${key + 1} of ${keys}` : "");
+  const [x, y, z, w] = rotation(shown[0], input.boxes, at, state.box);
   const turned = `w ${signed(w)}  x ${signed(x)}  y ${signed(y)}  z ${signed(z)}`;
-  element("box-values").textContent = turned + (input.isSkeleton ? `, at ${placeInWords(results[0], input.boxes, sample, state.box)}` : "");
+  // As many digits at every time: those of the whole result.
+  const { positions } = shown[0];
+  const place = positions && { positions: { ...positions, size: results[0].positions.size } };
+  element("box-values").textContent = turned + (input.isSkeleton ? `, at ${placeInWords(place, input.boxes, at, state.box)}` : "");
+}
+
+/** Shows a time, or the frame that is shown at it. */
+function showTime(time, sample) {
+  if (state.between && state.input.live) show(state.input.sampleAt(time), time);
+  else show(sample);
 }
 
 const signed = (value) => (value < 0 ? "−" : "+") + Math.abs(value).toFixed(4);
 
-/** Goes to the sample nearest to a time. */
+/** Goes to a time, or to the sample nearest to it. */
 function seek(time) {
   const { times, samples } = state.input;
-  let sample = state.input.sampleAt(time);
-  if (sample + 1 < samples && times[sample + 1] - time < time - times[sample]) sample += 1;
+  const sample = nearest(time);
   state.time = times[sample];
-  show(sample);
+  showTime(Math.min(Math.max(time, times[0]), times[samples - 1]), sample);
 }
 
 function step(samples) {
@@ -158,7 +239,7 @@ function step(samples) {
 
 function toKey(direction) {
   play(false);
-  const now = state.input.times[state.sample];
+  const now = state.time;
   const { times } = state.input.keysOf(state.box);
   const near = 1e-9 * Math.max(1, Math.abs(now));
   const found = direction > 0 ? times.find((time) => time > now + near) : times.findLast((time) => time < now - near);
@@ -189,7 +270,36 @@ function advance(seconds) {
       play(false);
     }
   }
-  show(state.input.sampleAt(state.time));
+  showTime(state.time, state.input.sampleAt(state.time));
+}
+
+/** Frames at another rate, evaluated here; null: those that were written. */
+function setRate(rate) {
+  const { input, time } = state;
+  if (!input.live) return;
+  const before = input.rate;
+  try {
+    input.setRate(rate);
+  } catch (error) {
+    complain(error.message);
+    element("rate").value = before ?? "";
+    return;
+  }
+  state.sample = nearest(time);
+  load();
+}
+
+function setBetween(on) {
+  if (!state.input.live) return;
+  state.between = on;
+  tell();
+  seek(state.time);
+}
+
+function setSkin(on) {
+  state.hasSkin = on;
+  tell();
+  show(state.sample, state.time);
 }
 
 function setMethod(name) {
@@ -244,6 +354,7 @@ function loop(on) {
 
 function setInput(input) {
   Object.assign(state, { input, sample: 0, time: 0, apart: isTangle(input) });
+  if (!state.picked) state.box = -1;
   if (!input.methods.includes(state.method)) state.method = input.methods[0];
   if (!input.methods.includes(state.other)) state.other = "";
   load(true);
@@ -275,6 +386,8 @@ const KEYS = [
   ["a", "a", "boxes as a chain, or apart", () => arrange(!state.apart)],
   ["n p", ["n", "p"], "curves of the next box, joint or body, of the one before", (key) => chooseBox(state.box + (key === "n" ? 1 : -1))],
   ["- +", ["-", "+", "="], "slower, faster", (key) => faster(key === "-" ? -1 : 1)],
+  ["e", "e", "between frames, too, or frames alone", () => setBetween(!state.between)],
+  ["k", "k", "what the joints carry", () => setSkin(!state.hasSkin)],
   ["l", "l", "loop", () => loop(!state.loop)],
   ["r", "r", "the whole view again", () => stage?.frame(side())],
   ["t", "t", "light or dark", theme],
@@ -321,6 +434,9 @@ function listen() {
     state.speed = Number(event.target.value);
   });
   on("loop", "change", (event) => loop(event.target.checked));
+  on("between", "change", (event) => setBetween(event.target.checked));
+  on("skin", "change", (event) => setSkin(event.target.checked));
+  on("rate", "change", (event) => setRate(event.target.value === "" ? null : Number(event.target.value)));
   on("set", "change", (event) => setInput(inputs[Number(event.target.value)]));
   on("method", "change", (event) => setMethod(event.target.value));
   on("other", "change", (event) => setOther(event.target.value));
@@ -355,10 +471,19 @@ function menus() {
   element("about").textContent =
     `${inputs.some((input) => input.isSkeleton) ? "Rotations and positions" : "Rotations"} made by tumble ` +
     `${stored.version} on ${stored.device}, kept in 16 bits a component; ` +
-    "this page interpolates nothing. three.js and uPlot are under the MIT licence; see the page's source.";
+    (inputs.some((input) => input.live)
+      ? "other methods, rates and times are evaluated in this page, by the same engine with the same bits. "
+      : "this page interpolates nothing. ") +
+    "three.js and uPlot are under the MIT licence; see the page's source.";
 }
 
 async function start() {
+  const here = await engine(stored.engine);
+  const skins = await Promise.all(stored.skins.map(skin));
+  for (const input of inputs) {
+    await input.enliven(here, stored.options);
+    input.skin = skins[input.stored.skin] ?? null;
+  }
   menus();
   listen();
   try {
@@ -391,6 +516,9 @@ globalThis.tumble = {
   loaded: () => loading,
   shown: (box, group = 0) => stage.groups[group].shown(box, state.apart),
   ends: (joint, group = 0) => stage.groups[group].ends(joint),
+  vertex: (vertex, group = 0) => stage.groups[group].skin.vertex(vertex).toArray(),
+  vertices: (group = 0) => stage.groups[group].skin?.mesh.geometry.attributes.position.count ?? 0,
+  results: () => results,
   frames: () => stage.drawn,
   pixelRatio: () => stage.ratio,
   inView: () => stage.inView(),

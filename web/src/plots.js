@@ -11,7 +11,7 @@ function components(result, boxes, box, samples) {
   const before = [0, 0, 0, 0];
   for (let sample = 0; sample < samples; sample++) {
     const at = (sample * boxes + box) * 4;
-    const values = PLACES.map((place) => result.rotations[at + place] / 32767);
+    const values = PLACES.map((place) => result.rotations[at + place] / result.unit);
     const product = values.reduce((sum, value, i) => sum + value * before[i], 0);
     const sign = product < 0 ? -1 : 1;
     for (let i = 0; i < 4; i++) {
@@ -80,7 +80,7 @@ export class Plots {
     const speeds = results.map((result) => {
       const column = new Float64Array(samples);
       for (let sample = 0; sample < samples; sample++) {
-        column[sample] = (result.speeds[sample * boxes + box] / 65535) * result.fastest;
+        column[sample] = result.speeds[sample * boxes + box] * result.speedUnit;
       }
       return column;
     });

@@ -187,11 +187,11 @@ export class Stage {
     this.stale = true;
   }
 
-  place(results, sample, { apart, side }) {
+  place(results, sample, { apart, side, matrices, hasSkin }) {
     const gap = side ? this.span : 0;
     this.groups.forEach((group, i) => {
       const shift = results.length > 1 ? (i - 0.5) * gap : 0;
-      group.place(results[i], sample, { apart, shift });
+      group.place(results[i], sample, { apart, shift, matrices: matrices?.[i], hasSkin });
     });
     this.stale = true;
   }

@@ -1,5 +1,6 @@
 //! Arguments that say how to interpolate: method, path, ends.
 
+use std::collections::BTreeMap;
 use std::fmt;
 
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
@@ -73,6 +74,28 @@ impl Manner {
             PathArgument::Shortest => Path::Shortest,
             PathArgument::AsAuthored => Path::AsAuthored,
         })
+    }
+
+    /// The options by the names that the npm package has for them, those that were given.
+    pub(crate) fn named(self) -> BTreeMap<&'static str, String> {
+        fn name(value: impl ValueEnum) -> Option<String> {
+            Some(value.to_possible_value()?.get_name().to_owned())
+        }
+        let number = |value: Option<f64>| value.map(|value| value.to_string());
+        let options = [
+            ("ends", self.ends.and_then(name)),
+            ("path", self.path.and_then(name)),
+            ("speed", name(self.speed)),
+            ("before", name(self.before)),
+            ("after", name(self.after)),
+            ("tension", number(self.tension)),
+            ("continuity", number(self.continuity)),
+            ("bias", number(self.bias)),
+        ];
+        let given = options
+            .into_iter()
+            .filter_map(|(name, value)| Some((name, value?)));
+        given.collect()
     }
 
     /// Refuses what says nothing to any of these methods.

@@ -154,7 +154,7 @@ fn between(before: DQuat, after: DQuat) -> DQuat {
 }
 
 /// What a picture of a clip takes off all places: the first origin that a track has.
-fn scene_origin(clip: &Motion) -> DVec3 {
+pub(crate) fn scene_origin(clip: &Motion) -> DVec3 {
     let mut origins = clip.origins.iter().copied();
     origins
         .find(|&origin| origin != DVec3::ZERO)

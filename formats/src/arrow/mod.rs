@@ -32,6 +32,7 @@ pub static FORMAT: Format = Format {
     extensions: &["arrows", "feather", "ipc"],
     probe: |start| start.starts_with(messages::MAGIC) || messages::is_stream(start),
     read: open_arrow,
+    read_bytes: read_arrow,
     write: Some(WriteResults {
         is_text: false,
         order: ComponentOrder::Xyzw,

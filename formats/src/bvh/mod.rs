@@ -35,6 +35,7 @@ pub static FORMAT: Format = Format {
         word.is_some_and(|word| word.eq_ignore_ascii_case(hierarchy::FIRST_WORD.as_bytes()))
     },
     read: open_bvh,
+    read_bytes: |name, bytes, options| read_bvh(name, &bytes[..], options),
     write: None,
     write_motion: Some(write_motion),
     features: &[

@@ -26,6 +26,7 @@ pub static FORMAT: Format = Format {
     extensions: &[],
     probe: |_| false,
     read: read::open_csv,
+    read_bytes: read::read_csv,
     write: Some(WriteResults {
         is_text: true,
         order: ORDER,

@@ -41,6 +41,7 @@ pub static FORMAT: Format = Format {
     extensions: &[],
     probe: is_fbx,
     read: open_fbx,
+    read_bytes: |name, bytes, options| read_fbx(name, &bytes, options),
     write: None,
     write_motion: None,
     features: &[

@@ -81,6 +81,17 @@ impl Elements<'_> {
     }
 }
 
+/// What glTF calls elements of so many components.
+fn kind(width: usize) -> &'static str {
+    match width {
+        1 => "SCALAR",
+        2 => "VEC2",
+        3 => "VEC3",
+        4 => "VEC4",
+        _ => "MAT4",
+    }
+}
+
 impl<'a> Reader<'a> {
     /// An accessor that `from`, a pointer, names.
     ///
@@ -103,7 +114,7 @@ impl<'a> Reader<'a> {
         width: usize,
         from: &str,
     ) -> Result<Vec<f64>, Diagnostic> {
-        let kind = ["SCALAR", "VEC2", "VEC3", "VEC4"][width - 1];
+        let kind = kind(width);
         let component = Component::of(accessor.component_type).filter(|component| {
             let is_fraction = accessor.normalized && component.size() < 4 && width > 1;
             *component == Component::F32 || is_fraction
@@ -164,9 +175,23 @@ impl<'a> Reader<'a> {
         accessor: &Accessor,
         from: &str,
     ) -> Result<Vec<u32>, Diagnostic> {
+        self.whole_numbers(index, accessor, 1, from)
+    }
+
+    /// As [`Reader::indices`], of elements that have `width` of them.
+    ///
+    /// # Errors
+    /// As there.
+    pub(super) fn whole_numbers(
+        &self,
+        index: usize,
+        accessor: &Accessor,
+        width: usize,
+        from: &str,
+    ) -> Result<Vec<u32>, Diagnostic> {
         let component = Component::of(accessor.component_type).filter(|own| {
             let is_index = matches!(own, Component::U8 | Component::U16 | Component::U32);
-            is_index && accessor.kind == "SCALAR" && accessor.sparse.is_none()
+            is_index && accessor.kind == kind(width) && accessor.sparse.is_none()
         });
         let (Some(component), Some(view)) = (component, accessor.buffer_view) else {
             let message = format!(
@@ -179,7 +204,7 @@ impl<'a> Reader<'a> {
         let pointer = format!("/accessors/{index}");
         let named = format!("{pointer}/bufferView");
         let place = (view, accessor.byte_offset, accessor.count);
-        let elements = self.elements(place, (component, 1), (&pointer, &named))?;
+        let elements = self.elements(place, (component, width), (&pointer, &named))?;
         Ok(elements.numbers().map(|number| number as u32).collect())
     }
 

@@ -17,8 +17,9 @@ use crate::gltf::edits::Edits;
 use crate::gltf::gather;
 use crate::gltf::json::{Json, Members};
 use crate::gltf::reader::Reader;
+use crate::gltf::skins::{self, CarriedMesh};
 use crate::gltf::uri;
-use crate::motion::Sampled;
+use crate::motion::{Motion, Sampled};
 use crate::rate::Precision;
 use crate::text::lines::Limits;
 use crate::warnings::Warnings;
@@ -95,6 +96,10 @@ impl Document for Gltf {
         ];
         let has = |list: &&str| !json.optional::<&RawValue>(list).is_empty();
         lists.into_iter().filter(has).map(str::to_owned).collect()
+    }
+
+    fn carried_mesh(&self, clip: &Motion) -> Result<Option<CarriedMesh>, Diagnostic> {
+        skins::carried(self, clip)
     }
 
     fn write(

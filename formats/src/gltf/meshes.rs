@@ -80,7 +80,7 @@ pub fn triangles_of(
 }
 
 /// All nodes, each behind the one that it hangs on.
-fn parents_first(nodes: &Nodes) -> Vec<usize> {
+pub(super) fn parents_first(nodes: &Nodes) -> Vec<usize> {
     let mut is_there = vec![false; nodes.count()];
     let mut order = Vec::with_capacity(nodes.count());
     let mut chain = Vec::new();
@@ -97,7 +97,11 @@ fn parents_first(nodes: &Nodes) -> Vec<usize> {
 }
 
 /// The nodes of the scene and those that hang on them.
-fn shown(json: &Json<'_>, nodes: &Nodes, order: &[usize]) -> Result<Vec<bool>, Diagnostic> {
+pub(super) fn shown(
+    json: &Json<'_>,
+    nodes: &Nodes,
+    order: &[usize],
+) -> Result<Vec<bool>, Diagnostic> {
     let Some(raw) = json.member("scene")? else {
         return Ok(vec![true; nodes.count()]);
     };
@@ -115,7 +119,7 @@ fn shown(json: &Json<'_>, nodes: &Nodes, order: &[usize]) -> Result<Vec<bool>, D
 }
 
 /// Where a node rests in the one that it hangs on.
-fn place_in_parent(node: &Node) -> DMat4 {
+pub(super) fn place_in_parent(node: &Node) -> DMat4 {
     match node.matrix {
         Some(matrix) => DMat4::from_cols_array(&matrix),
         None => DMat4::from_scale_rotation_translation(
@@ -131,7 +135,8 @@ fn place_in_parent(node: &Node) -> DMat4 {
 const VERTEX: usize = 200;
 const TRIANGLE: usize = 400;
 
-fn add(
+/// Adds the triangles of a primitive, moved to a place.
+pub(super) fn add(
     reader: &Reader<'_>,
     primitive: &Primitive<'_>,
     pointer: &str,

@@ -22,6 +22,7 @@ mod nodes;
 mod own_keys;
 mod reader;
 mod schema;
+pub mod skins;
 mod uri;
 mod whole;
 pub mod write_new;
@@ -52,6 +53,7 @@ pub static FORMAT: Format = Format {
     extensions: &["gltf"],
     probe: is_gltf,
     read: open_gltf,
+    read_bytes: |name, bytes, options| read_gltf(name, bytes, None, options),
     write: None,
     write_motion: Some(write_new::write_new),
     features: &[

@@ -190,8 +190,9 @@ impl<'a> Reader<'a> {
         }
         let path = uri::relative(uri).map_err(refuse)?;
         let Some(folder) = self.folder else {
-            let message =
-                format!("`{uri}` is a file beside, and standard input has none beside it");
+            let message = format!(
+                "`{uri}` is a file beside, and there is none beside standard input or bytes in memory"
+            );
             return Err(refuse(message));
         };
         let read =

@@ -28,6 +28,8 @@ pub(super) struct Node {
     pub(super) scale: Option<[f64; 3]>,
     #[serde(default, deserialize_with = "whole::optional")]
     pub(super) mesh: Option<usize>,
+    #[serde(default, deserialize_with = "whole::optional")]
+    pub(super) skin: Option<usize>,
 }
 
 /// What else a node says; read only where a file says it.
@@ -59,9 +61,12 @@ pub(super) struct BvhExtras {
 }
 
 #[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
 pub(super) struct Skin {
     #[serde(deserialize_with = "whole::list")]
     pub(super) joints: Vec<usize>,
+    #[serde(default, deserialize_with = "whole::optional")]
+    pub(super) inverse_bind_matrices: Option<usize>,
 }
 
 #[derive(Deserialize)]
@@ -105,6 +110,12 @@ pub(super) struct Attributes {
     #[serde(rename = "POSITION")]
     #[serde(default, deserialize_with = "whole::optional")]
     pub(super) position: Option<usize>,
+    #[serde(rename = "JOINTS_0")]
+    #[serde(default, deserialize_with = "whole::optional")]
+    pub(super) joints: Option<usize>,
+    #[serde(rename = "WEIGHTS_0")]
+    #[serde(default, deserialize_with = "whole::optional")]
+    pub(super) weights: Option<usize>,
 }
 
 #[derive(Deserialize)]

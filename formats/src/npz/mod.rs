@@ -38,6 +38,7 @@ pub static FORMAT: Format = Format {
     // A local file header, or the end of an archive without files.
     probe: |start| start.starts_with(b"PK\x03\x04") || start.starts_with(b"PK\x05\x06"),
     read: open_npz,
+    read_bytes: read_npz,
     write: None,
     write_motion: Some(write::write_npz),
     features: &[

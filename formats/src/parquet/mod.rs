@@ -35,6 +35,7 @@ pub static FORMAT: Format = Format {
     extensions: &["pq"],
     probe: |start| start.starts_with(MAGIC),
     read: open_parquet,
+    read_bytes: read_parquet,
     write: Some(WriteResults {
         is_text: false,
         order: ComponentOrder::Xyzw,

@@ -11,6 +11,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use tumble::{FrameRate, Method};
+use tumble_formats::gltf::skins::CarriedMesh;
 use tumble_formats::motion::Motion;
 
 use crate::arguments::device::{DeviceArguments, Opened};
@@ -36,8 +37,9 @@ const SMALL: f64 = 24e6;
 #[derive(Debug, Args)]
 #[command(after_help = "\
 The file needs no network and nothing beside it. It shows the engine's own rotations and
-positions, at the frames asked for and at the keys between them; it interpolates nothing
-itself. Files with skeletons are shown as bones, all their animations in a menu; files of
+positions, at the frames asked for and at the keys between them; other methods, rates and times
+are evaluated in the page, by the same engine with the same bits. Files with skeletons are shown
+as bones, all their animations in a menu, in the meshes of glTF files that they move; files of
 paths, and joints without parents that move, as boxes on their paths, with frames as small axes.
 
 Examples:
@@ -81,6 +83,10 @@ pub(crate) struct Arguments {
     /// Where to end, seconds [default: the last key]
     #[arg(long, value_name = "SECONDS", value_parser = finite_seconds, allow_hyphen_values = true)]
     end: Option<f64>,
+    /// Leave the engine and the keys in full out of the page: a smaller one, which shows the methods and the
+    /// frames that are asked for and no others
+    #[arg(long)]
+    frames_only: bool,
     #[command(flatten, next_help_heading = PATHS)]
     scenery: Scenery,
     #[command(flatten, next_help_heading = PATHS)]
@@ -108,14 +114,22 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         let loaded = arguments.inputs.load(path)?;
         refused += loaded.refused.len();
         let several = loaded.clips.len() + loaded.refused.len() > 1;
+        let document = loaded.document.filter(|_| !loaded.is_adjusted);
         for clip in loaded.clips {
             let clip = arguments.own_tracks(clip, path)?;
-            let one = Shown::new(path, clip, loaded.box_length, several);
+            let mut one = Shown::new(path, clip, loaded.box_length, several);
             if one.clip.set.is_empty() {
                 words::note(&format!("{}: nothing moves; it is left out", one.name));
-            } else {
-                shown.push(arguments.sampled(one)?);
+                continue;
             }
+            match document.as_ref().map(|own| own.carried_mesh(&one.clip)) {
+                Some(Ok(mesh)) => one.mesh = mesh.filter(|mesh| is_small(mesh, &one.name)),
+                Some(Err(fault)) => {
+                    words::note(&format!("{fault}; bones are shown without meshes"))
+                }
+                None => {}
+            }
+            shown.push(arguments.sampled(one)?);
         }
     }
     let methods = arguments.methods(&shown)?;
@@ -273,12 +287,50 @@ impl Arguments {
             if let Some(&first) = own.first() {
                 one.give_keys(first, device)?;
             }
-            sets.push(StoredSet::new(one, results, &self.scenery));
+            sets.push(StoredSet::new(
+                one,
+                results,
+                &self.scenery,
+                !self.frames_only,
+            ));
         }
         drop(progress);
         let meshes = self.scenery.read()?;
-        Ok(Page::new(&methods.concat(), sets, &meshes, menu, &device.label).html())
+        // The animations of a file mostly move one mesh.
+        let mut skins: Vec<&CarriedMesh> = Vec::new();
+        for (one, set) in shown.iter().zip(&mut sets) {
+            if let Some(mesh) = &one.mesh {
+                let known = skins.iter().position(|&known| known == mesh);
+                set.skin = Some(known.unwrap_or(skins.len()));
+                if known.is_none() {
+                    skins.push(mesh);
+                }
+            }
+        }
+        let methods = methods.concat();
+        let page = Page::new(
+            &methods,
+            sets,
+            &meshes,
+            &skins,
+            menu,
+            &device.label,
+            self.manner,
+        );
+        Ok(page.html())
     }
+}
+
+/// Whether a page can hold a mesh.
+fn is_small(mesh: &CarriedMesh, name: &str) -> bool {
+    let vertices = mesh.positions.len();
+    let bytes = vertices * 28 + mesh.triangles.len() * 12;
+    if bytes as f64 > SMALL {
+        words::note(&format!(
+            "{name}: {vertices} vertices are more than a page shows well; bones are shown without meshes"
+        ));
+    }
+    bytes as f64 <= SMALL
 }
 
 /// Bytes of all results before they are packed.

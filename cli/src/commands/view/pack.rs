@@ -22,6 +22,21 @@ pub(crate) fn words(values: impl Iterator<Item = u32>) -> String {
     deflated(&values.flat_map(u32::to_le_bytes).collect::<Vec<_>>())
 }
 
+/// Bytes as they are.
+pub(crate) fn bytes(bytes: &[u8]) -> String {
+    deflated(bytes)
+}
+
+/// 16-bit integers as they are, little-endian.
+pub(crate) fn shorts(values: impl Iterator<Item = u16>) -> String {
+    deflated(&values.flat_map(u16::to_le_bytes).collect::<Vec<_>>())
+}
+
+/// Bytes that are packed already.
+pub(crate) fn text(packed: &[u8]) -> String {
+    STANDARD.encode(packed)
+}
+
 /// 16-bit integers, each as its difference from the one `stride` before it, which is
 /// small where those are a component of neighbouring samples; all low bytes first, then
 /// all high bytes, which are mostly alike.

@@ -1,18 +1,26 @@
 //! The page: what `web/` was built into, and the results in it.
 
+use std::collections::BTreeMap;
+
 use glam::{DVec3, Quat, Vec3, Vec4};
 use serde::Serialize;
-use tumble::Encoding;
+use tumble::{Channel, Encoding};
+use tumble_formats::gltf::skins::CarriedMesh;
+use tumble_formats::packed;
 use tumble_routes::mesh::Mesh;
 
-use crate::commands::travel::Scenery;
-use crate::commands::view::pack::{differences, doubles, words};
+use crate::arguments::interpolation::{Manner, Wanted};
+use crate::commands::travel::{Scenery, scene_origin};
+use crate::commands::view::pack::{bytes, differences, doubles, shorts, text, words};
 use crate::commands::view::shown::{Choice, Shown};
 use crate::messages::colours::{BOXES, Colour};
 
 /// Built from `web/src` by `npm run build` in `web/`; it lies here so that the package has all that it is built of.
 const HTML: &str = include_str!("page.html");
 const PLACE: &str = "/* DATA */";
+
+/// The module of the npm package, packed by gzip: `scripts/npm.sh --page` puts it here.
+const ENGINE: &[u8] = include_bytes!("tumble.wasm.gz");
 
 /// What the page's scripts read.
 #[derive(Serialize)]
@@ -27,6 +35,11 @@ pub(crate) struct Page<'a> {
     sets: Vec<StoredSet>,
     /// The ground first, then what stands on it.
     meshes: Vec<StoredMesh>,
+    skins: Vec<StoredSkin>,
+    /// The engine, packed by gzip, where a set is to be evaluated in the page.
+    engine: Option<String>,
+    /// How it interpolates, by the names of the npm package.
+    options: BTreeMap<&'static str, String>,
 }
 
 /// Triangles that stand beside everything.
@@ -47,6 +60,70 @@ impl StoredMesh {
         }
     }
 }
+
+/// Triangles that follow joints.
+#[derive(Serialize)]
+#[serde(rename_all = "camelCase")]
+struct StoredSkin {
+    /// x y z of each vertex, f32.
+    places: String,
+    /// Three vertices each, u32.
+    triangles: String,
+    /// Four bones of each vertex, u16.
+    bones_of: String,
+    /// How much of each it follows, to be divided by 65535.
+    weights: String,
+    /// The joint of each bone.
+    joints: Vec<usize>,
+    /// What takes vertices to each bone's joint, 16 f32, column after column.
+    to_joints: String,
+}
+
+impl StoredSkin {
+    fn new(mesh: &CarriedMesh) -> Self {
+        let bits = |numbers: &[f32]| words(numbers.iter().map(|number| number.to_bits()));
+        let weights = mesh.weights.as_flattened().iter();
+        let to_joints: Vec<f32> = mesh.bones.iter().flat_map(|bone| bone.to_joint).collect();
+        Self {
+            places: bits(mesh.positions.as_flattened()),
+            triangles: words(mesh.triangles.as_flattened().iter().copied()),
+            bones_of: shorts(mesh.bones_of.as_flattened().iter().copied()),
+            weights: shorts(weights.map(|weight| (weight * 65535.0).round() as u16)),
+            joints: mesh.bones.iter().map(|bone| bone.track).collect(),
+            to_joints: bits(&to_joints),
+        }
+    }
+}
+
+/// A clip that the page evaluates.
+#[derive(Serialize)]
+struct StoredClip {
+    /// As `tumble_formats::packed` has it.
+    bytes: String,
+    /// By which methods.
+    methods: Vec<&'static str>,
+    /// Where positions count from.
+    origin: [f64; 3],
+}
+
+impl StoredClip {
+    /// Nothing for paths, and for clips whose keys would make a large page.
+    fn new(shown: &Shown) -> Option<Self> {
+        let keys = packed::to_bytes(&shown.clip);
+        if shown.path.is_some() || keys.len() > MOST_KEYS {
+            return None;
+        }
+        let all: Vec<Wanted> = Wanted::all().collect();
+        Some(Self {
+            bytes: bytes(&keys),
+            methods: shown.methods(&all).into_iter().map(Choice::name).collect(),
+            origin: scene_origin(&shown.clip).to_array(),
+        })
+    }
+}
+
+/// Bytes of a clip's keys that the page carries for its engine, before they are packed.
+const MOST_KEYS: usize = 32_000_000;
 
 /// How bodies on paths are drawn.
 #[derive(Serialize)]
@@ -93,6 +170,12 @@ pub(crate) struct StoredSet {
     keys: String,
     /// The first of them is shown first.
     results: Vec<StoredResult>,
+    /// What the page's engine evaluates.
+    clip: Option<StoredClip>,
+    /// Whether joints have scales: what follows them is drawn by the engine's matrices alone then.
+    has_scales: bool,
+    /// What the joints carry, by its place among the page's.
+    pub(crate) skin: Option<usize>,
 }
 
 /// What one method makes of it.
@@ -190,7 +273,12 @@ fn short(rotations: &[Quat]) -> Vec<u16> {
 }
 
 impl StoredSet {
-    pub(crate) fn new(shown: &Shown, results: Vec<StoredResult>, scenery: &Scenery) -> Self {
+    pub(crate) fn new(
+        shown: &Shown,
+        results: Vec<StoredResult>,
+        scenery: &Scenery,
+        has_engine: bool,
+    ) -> Self {
         let (set, skeleton) = (&shown.clip.set, &shown.clip.skeleton);
         let joints = if shown.has_places() {
             set.track_count()
@@ -217,8 +305,15 @@ impl StoredSet {
             stand: !scenery.meshes.is_empty(),
             axes: scenery.axes,
         });
+        let scales = (0..set.track_count()).any(|track| {
+            let rest = shown.clip.rest(Channel::Scale, track);
+            rest != Vec3::ONE || set.vector_keys(Channel::Scale, track).is_some()
+        });
         Self {
             name: shown.title.clone(),
+            clip: has_engine.then(|| StoredClip::new(shown)).flatten(),
+            has_scales: scales,
+            skin: None,
             bodies,
             has_frames: shown.path.is_some(),
             boxes: set.track_count(),
@@ -248,23 +343,32 @@ impl<'a> Page<'a> {
         methods: &[Choice],
         sets: Vec<StoredSet>,
         meshes: &[Mesh],
+        skins: &[&CarriedMesh],
         menu: &'static str,
         device: &'a str,
+        manner: Manner,
     ) -> Self {
+        let live: Vec<&str> = (sets.iter().filter_map(|set| set.clip.as_ref()))
+            .flat_map(|clip| clip.methods.iter().copied())
+            .collect();
         let stored = |method: Choice| StoredMethod {
             name: method.name(),
             summary: method.summary(),
             colour: css(method.colour()),
         };
-        let all = Choice::all().filter(|method| methods.contains(method));
+        let is_shown = |choice: &Choice| methods.contains(choice) || live.contains(&choice.name());
+        let all = Choice::all().filter(is_shown);
         Self {
             version: env!("CARGO_PKG_VERSION"),
             device,
             menu,
             box_colours: BOXES.map(css).to_vec(),
             methods: all.map(stored).collect(),
-            sets,
             meshes: meshes.iter().map(StoredMesh::new).collect(),
+            skins: skins.iter().map(|skin| StoredSkin::new(skin)).collect(),
+            engine: (!live.is_empty()).then(|| text(ENGINE)),
+            options: manner.named(),
+            sets,
         }
     }
 

@@ -8,6 +8,7 @@ use tumble::method::BESSEL_OVERHAUSER;
 use tumble::{
     Axes, Channel, Error, Frames, Interpolation, Layout, Quantity, Timeline, TrackError, TrackSet,
 };
+use tumble_formats::gltf::skins::CarriedMesh;
 use tumble_formats::motion::Motion;
 use tumble_formats::sample::ChannelMethods;
 use tumble_formats::world::world;
@@ -74,6 +75,8 @@ pub(crate) struct Shown {
     /// The paths that bodies follow, where the input has these.
     pub(crate) path: Option<Source>,
     pub(crate) box_length: f64,
+    /// What its joints carry.
+    pub(crate) mesh: Option<CarriedMesh>,
     /// Seconds, increasing.
     pub(crate) times: Vec<f64>,
 }
@@ -98,6 +101,7 @@ impl Shown {
             clip,
             path: None,
             box_length: box_length.unwrap_or(1.0),
+            mesh: None,
             times: Vec::new(),
         }
     }

@@ -1,0 +1,244 @@
+//! The meshes that the tracks of a clip carry: bent by a skin's joints, or fixed to one.
+
+use std::collections::HashMap;
+
+use glam::DMat4;
+
+use crate::diagnostic::{Code, Diagnostic};
+use crate::gltf::bake::Gltf;
+use crate::gltf::json::Json;
+use crate::gltf::meshes::{Triangles, add, parents_first, place_in_parent, shown};
+use crate::gltf::nodes::Nodes;
+use crate::gltf::reader::Reader;
+use crate::gltf::schema::{Mesh, Node, Primitive, Skin};
+use crate::motion::Motion;
+use crate::warnings::Warnings;
+
+/// Triangles that follow the tracks of a clip.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct CarriedMesh {
+    /// Of the vertices, where the mesh itself has them.
+    pub positions: Vec<[f32; 3]>,
+    /// Three vertices each.
+    pub triangles: Vec<[u32; 3]>,
+    /// The bones that each vertex follows, by their places in [`bones`](Self::bones).
+    pub bones_of: Vec<[u16; 4]>,
+    /// How much of each it follows; together 1.
+    pub weights: Vec<[f32; 4]>,
+    /// What vertices follow.
+    pub bones: Vec<Bone>,
+}
+
+/// A track that vertices follow.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bone {
+    /// The track of the clip.
+    pub track: usize,
+    /// What takes a vertex from the mesh to the track's joint, column after column.
+    pub to_joint: [f32; 16],
+}
+
+/// Bytes of a vertex with its bones and weights, as numbers on the way.
+const VERTEX: usize = 160;
+
+/// More bones than this have no number.
+const MOST_BONES: usize = u16::MAX as usize + 1;
+
+/// The meshes of the file's scene that tracks of a clip carry; nothing where there are none.
+///
+/// # Errors
+/// When a mesh or a skin is broken or compressed in a way that is not known, or a joint of a skin is no track
+/// of the clip.
+pub(super) fn carried(gltf: &Gltf, clip: &Motion) -> Result<Option<CarriedMesh>, Diagnostic> {
+    let mut json = Json::parse(&gltf.name, &gltf.container.text)?;
+    for list in ["meshes", "scenes", "skins"] {
+        json.take_apart(list)?;
+    }
+    let warnings = Warnings::new(&gltf.name);
+    let folder = gltf.folder.as_deref();
+    let reader = Reader::new(&json, &gltf.container, folder, gltf.limits, warnings)?;
+    let nodes = Nodes::read(&json)?;
+    let order = parents_first(&nodes);
+    let is_shown = shown(&json, &nodes, &order)?;
+    let tracks = (0..clip.set.track_count()).map(|track| (clip.set.track_name(track), track));
+    let mut making = Making {
+        reader: &reader,
+        nodes: &nodes,
+        tracks: tracks.collect(),
+        mesh: CarriedMesh::default(),
+    };
+    for index in (0..nodes.count()).filter(|&index| is_shown[index]) {
+        let node: Node = json.entry("nodes", index, "/nodes")?;
+        if let Some(mesh) = node.mesh {
+            making.add_node(index, mesh, node.skin)?;
+        }
+    }
+    let found = making.mesh;
+    Ok((!found.triangles.is_empty()).then_some(found))
+}
+
+struct Making<'a> {
+    reader: &'a Reader<'a>,
+    nodes: &'a Nodes,
+    /// By their names, which are those of their nodes.
+    tracks: HashMap<String, usize>,
+    mesh: CarriedMesh,
+}
+
+impl Making<'_> {
+    fn add_node(
+        &mut self,
+        index: usize,
+        mesh: usize,
+        skin: Option<usize>,
+    ) -> Result<(), Diagnostic> {
+        let json = self.reader.json;
+        let first_bone = self.mesh.bones.len();
+        match skin {
+            Some(skin) => self.add_bones(skin, index)?,
+            None => match self.carrier(index)? {
+                Some(bone) => self.mesh.bones.push(bone),
+                // Nothing of the clip moves it.
+                None => return Ok(()),
+            },
+        }
+        let bones = self.mesh.bones.len();
+        if bones > MOST_BONES {
+            let message = format!("meshes follow {bones} joints, more than {MOST_BONES}");
+            return Err(json.refuse(&format!("/nodes/{index}"), Code::IndexRange, message));
+        }
+        let entry: Mesh<'_> = json.entry("meshes", mesh, &format!("/nodes/{index}/mesh"))?;
+        for (place, primitive) in entry.primitives.iter().enumerate() {
+            let pointer = format!("/meshes/{mesh}/primitives/{place}");
+            self.add_primitive(primitive, &pointer, first_bone, skin.is_some())?;
+        }
+        Ok(())
+    }
+
+    /// The joints of a skin.
+    fn add_bones(&mut self, index: usize, node: usize) -> Result<(), Diagnostic> {
+        let json = self.reader.json;
+        let pointer = format!("/skins/{index}");
+        let skin: Skin = json.entry("skins", index, &format!("/nodes/{node}/skin"))?;
+        let inverses = match skin.inverse_bind_matrices {
+            None => Vec::new(),
+            Some(accessor) => {
+                let from = format!("{pointer}/inverseBindMatrices");
+                let own = self.reader.accessor(accessor, &from)?;
+                self.reader.numbers(accessor, &own, 16, &from)?
+            }
+        };
+        let inverses: Vec<&[f64]> = inverses.chunks_exact(16).collect();
+        if !inverses.is_empty() && inverses.len() < skin.joints.len() {
+            let message = format!(
+                "{} matrices for {} joints",
+                inverses.len(),
+                skin.joints.len()
+            );
+            return Err(json.refuse(&pointer, Code::TooShort, message));
+        }
+        for (place, &joint) in skin.joints.iter().enumerate() {
+            let from = format!("{pointer}/joints/{place}");
+            if joint >= self.nodes.count() {
+                return Err(json.no_such("nodes", joint, self.nodes.count(), &from));
+            }
+            let Some(&track) = self.tracks.get(self.nodes.name(joint)) else {
+                let name = self.nodes.name(joint);
+                let message = format!("the joint {name} of the skin is no track of the clip");
+                return Err(json.refuse(&from, Code::Property, message));
+            };
+            let to_joint = match inverses.get(place) {
+                Some(inverse) => DMat4::from_cols_slice(inverse),
+                None => DMat4::IDENTITY,
+            };
+            let to_joint = to_joint.as_mat4().to_cols_array();
+            self.mesh.bones.push(Bone { track, to_joint });
+        }
+        Ok(())
+    }
+
+    /// The track that carries a node, and where the node rests in it.
+    fn carrier(&self, node: usize) -> Result<Option<Bone>, Diagnostic> {
+        let mut to_joint = DMat4::IDENTITY;
+        let mut next = Some(node);
+        while let Some(own) = next {
+            if let Some(&track) = self.tracks.get(self.nodes.name(own)) {
+                let to_joint = to_joint.as_mat4().to_cols_array();
+                return Ok(Some(Bone { track, to_joint }));
+            }
+            let entry: Node = self.reader.json.entry("nodes", own, "/nodes")?;
+            to_joint = place_in_parent(&entry) * to_joint;
+            next = self.nodes.parent(own);
+        }
+        Ok(None)
+    }
+
+    fn add_primitive(
+        &mut self,
+        primitive: &Primitive<'_>,
+        pointer: &str,
+        first_bone: usize,
+        has_skin: bool,
+    ) -> Result<(), Diagnostic> {
+        let json = self.reader.json;
+        let mut own = Triangles::default();
+        add(self.reader, primitive, pointer, DMat4::IDENTITY, &mut own)?;
+        let count = own.positions.len();
+        self.reader.take(count, VERTEX, pointer)?;
+        let attributes = &primitive.attributes;
+        let (bones_of, weights) = match (has_skin, attributes.joints, attributes.weights) {
+            (true, Some(joints), Some(weights)) => {
+                let from = format!("{pointer}/attributes/JOINTS_0");
+                let accessor = self.reader.accessor(joints, &from)?;
+                let joints = self.reader.whole_numbers(joints, &accessor, 4, &from)?;
+                let from = format!("{pointer}/attributes/WEIGHTS_0");
+                let accessor = self.reader.accessor(weights, &from)?;
+                let weights = self.reader.numbers(weights, &accessor, 4, &from)?;
+                (joints, weights)
+            }
+            // Of a skin's mesh without them, the first joint carries all.
+            _ => {
+                let all = |first: f64| [first, 0.0, 0.0, 0.0].repeat(count);
+                (vec![0; count * 4], all(1.0))
+            }
+        };
+        let lengths = [bones_of.len(), weights.len()].map(|length| length / 4);
+        if lengths != [count, count] {
+            let [joints, weights] = lengths;
+            let message =
+                format!("{count} positions, {joints} times joints, {weights} times weights");
+            return Err(json.refuse(pointer, Code::TooShort, message));
+        }
+        let bones = self.mesh.bones.len() - first_bone;
+        if let Some(&outside) = bones_of.iter().find(|&&bone| bone as usize >= bones) {
+            return Err(json.no_such("the skin's joints", outside as usize, bones, pointer));
+        }
+        let first = self.mesh.positions.len();
+        if first + count > u32::MAX as usize {
+            let message = "the file has more than 4294967295 vertices; simplify it";
+            return Err(json.refuse(pointer, Code::IndexRange, message));
+        }
+        let corners = own.triangles.iter();
+        let moved = corners.map(|three| three.map(|corner| corner + first as u32));
+        self.mesh.triangles.extend(moved);
+        let places = own.positions.iter().map(|place| place.as_vec3().to_array());
+        self.mesh.positions.extend(places);
+        let bones_of = bones_of.as_chunks().0.iter();
+        let numbers =
+            bones_of.map(|four: &[u32; 4]| four.map(|bone| (first_bone + bone as usize) as u16));
+        self.mesh.bones_of.extend(numbers);
+        let weights = weights.as_chunks().0.iter();
+        self.mesh.weights.extend(weights.map(whole));
+        Ok(())
+    }
+}
+
+/// Weights whose sum is 1; those of a vertex that follows nothing are the first bone's.
+fn whole(four: &[f64; 4]) -> [f32; 4] {
+    let four = four.map(|weight| if weight > 0.0 { weight } else { 0.0 });
+    let sum: f64 = four.iter().sum();
+    match sum > 0.0 && sum.is_finite() {
+        true => four.map(|weight| (weight / sum) as f32),
+        false => [1.0, 0.0, 0.0, 0.0],
+    }
+}

@@ -1,0 +1,318 @@
+// The border to the WebAssembly module: clips, and what they are at times. `index.js` and `node.js` say where
+// the module lies.
+
+const CALLS = { about: 0, unpack: 1, read: 2, sample: 3, keys: 4, free: 5 };
+const text = new TextEncoder();
+const words = new TextDecoder();
+
+/** What the engine, a file or an argument is refused for. `code` is a file's fault by the name in docs/codes.md. */
+export class TumbleError extends Error {
+  constructor(message, code = null) {
+    super(message);
+    this.name = "TumbleError";
+    this.code = code;
+  }
+}
+
+/** The engine: one instance of the module, with its memory. */
+class Module {
+  constructor(instance) {
+    this.exports = instance.exports;
+    this.broken = null;
+  }
+
+  /** Makes a call; its answer's JSON, with a property for each array. */
+  call(name, header, numbers = new Uint8Array(0)) {
+    if (this.broken) throw new TumbleError(`${this.broken}; load the package's engine anew (load())`);
+    const json = text.encode(JSON.stringify(header));
+    const bytes = json.length + numbers.byteLength;
+    try {
+      const at = this.exports.tumble_input(bytes) >>> 0;
+      if (at === 0) throw new TumbleError(`there is no memory for ${bytes} bytes of input`);
+      const memory = new Uint8Array(this.exports.memory.buffer, at, bytes);
+      memory.set(json);
+      memory.set(numbers, json.length);
+      const isDone = this.exports.tumble_call(CALLS[name], json.length) === 1;
+      return this.answer(isDone);
+    } catch (error) {
+      if (error instanceof TumbleError) throw error;
+      // An instance that stopped in the middle of a call is in no state to be called again.
+      this.broken = `the engine stopped: ${error.message}; it may have run out of memory`;
+      throw new TumbleError(this.broken);
+    }
+  }
+
+  answer(isDone) {
+    const { memory, tumble_answer, tumble_answer_bytes, tumble_array } = this.exports;
+    const json = new Uint8Array(memory.buffer, tumble_answer() >>> 0, tumble_answer_bytes() >>> 0);
+    const answer = JSON.parse(words.decode(json));
+    if (!isDone) throw new TumbleError(answer.message, answer.code);
+    answer.arrays.forEach(({ name, kind, bytes }, i) => {
+      const at = tumble_array(i) >>> 0;
+      const copy = memory.buffer.slice(at, at + bytes);
+      answer[name] = kind === "f64" ? new Float64Array(copy) : new Float32Array(copy);
+    });
+    delete answer.arrays;
+    return answer;
+  }
+}
+
+const isNumbers = (value) => ArrayBuffer.isView(value) || Array.isArray(value);
+
+function numbers(value, kind, components, what) {
+  if (!isNumbers(value)) throw new TumbleError(`${what} are no array of numbers, but ${typeof value}`);
+  const flat = Array.isArray(value) ? value.flat(2) : value;
+  for (let i = 0; i < flat.length; i++) {
+    // A hole or a text would become NaN or a number in silence.
+    if (typeof flat[i] !== "number") throw new TumbleError(`${what}: number ${i} is ${String(flat[i])}, no number`);
+  }
+  const array = kind.from(flat);
+  if (array.length % components !== 0) {
+    throw new TumbleError(`${what}: ${array.length} numbers are no whole number of ${components}`);
+  }
+  return array;
+}
+
+/** Bytes of a track's numbers in the order of formats/src/packed.rs, and its header. */
+function packedTrack(track, index, before) {
+  const what = (name) => `track ${index}${track.name ? ` (${track.name})` : ""}: ${name}`;
+  const known = ["name", "times", "rotations", "translations", "scales", "parent", "rest", "interpolation", "tangents"];
+  for (const name of Object.keys(track)) {
+    if (!known.includes(name)) throw new TumbleError(`${what(`there is no \`${name}\``)}; there are ${known.join(", ")}`);
+  }
+  const times = numbers(track.times ?? [0], Float64Array, 1, what("times"));
+  const rotations = numbers(track.rotations ?? [0, 0, 0, 1], Float32Array, 4, what("rotations"));
+  if (rotations.length !== times.length * 4) {
+    throw new TumbleError(`${what("")}${rotations.length / 4} rotations at ${times.length} times`);
+  }
+  const shares = before !== null && before.length === times.length && before.every((time, i) => time === times[i]);
+  const header = { name: String(track.name ?? ""), keys: times.length, sharesTimes: shares };
+  const parts = shares ? [rotations] : [times, rotations];
+  const sampler = track.interpolation ?? null;
+  if (track.tangents !== undefined) {
+    const tangents = numbers(track.tangents, Float32Array, 8, what("tangents"));
+    if (tangents.length !== times.length * 8) throw new TumbleError(`${what("tangents")}: two quaternions a key are expected`);
+    header.tangents = true;
+    parts.push(tangents);
+  }
+  for (const [name, tangentsName] of [["translations", "translationTangents"], ["scales", "scaleTangents"]]) {
+    const own = track[name];
+    if (own === undefined) continue;
+    const at = numbers(own.times, Float64Array, 1, what(`times of ${name}`));
+    const values = numbers(own.values, Float32Array, 3, what(name));
+    if (values.length !== at.length * 3) {
+      throw new TumbleError(`${what("")}${values.length / 3} ${name} at ${at.length} times`);
+    }
+    header[name] = at.length;
+    parts.push(at, values);
+    if (own.tangents !== undefined) {
+      const tangents = numbers(own.tangents, Float32Array, 6, what(`tangents of ${name}`));
+      if (tangents.length !== at.length * 6) throw new TumbleError(`${what(`tangents of ${name}`)}: two vectors a key are expected`);
+      header[tangentsName] = true;
+      parts.push(tangents);
+    }
+  }
+  if (sampler !== null) {
+    header.rotationSampler = sampler;
+    if (track.translations) header.translationSampler = sampler;
+    if (track.scales) header.scaleSampler = sampler;
+  }
+  header.parent = track.parent ?? null;
+  const { translation = [0, 0, 0], rotation = [0, 0, 0, 1], scale = [1, 1, 1], ...rest } = track.rest ?? {};
+  if (Object.keys(rest).length > 0) throw new TumbleError(`${what("rest")} has no \`${Object.keys(rest)[0]}\``);
+  const pose = numbers([...translation, ...rotation, ...scale], Float32Array, 10, what("rest"));
+  header.rest = true;
+  parts.push(pose);
+  return { header, parts, times };
+}
+
+/** Tracks in one piece, as formats/src/packed.rs has them. */
+function packed(tracks, { name = null, isWorld = false } = {}) {
+  if (!Array.isArray(tracks)) throw new TumbleError("tracks are no array");
+  let before = null;
+  const made = tracks.map((track, index) => {
+    const own = packedTrack(track, index, before);
+    before = own.times;
+    return own;
+  });
+  const isSkeleton = tracks.some((track) => track.parent !== undefined || track.rest !== undefined || track.translations !== undefined);
+  const hasChannels = tracks.some((track) => track.interpolation !== undefined);
+  for (const own of made) {
+    if (isSkeleton) continue;
+    own.header.rest = false;
+    own.parts.pop();
+  }
+  const header = { name, isWorld, hasSkeleton: isSkeleton, hasChannels, tracks: made.map((own) => own.header) };
+  const json = text.encode(JSON.stringify(header));
+  const parts = made.flatMap((own) => own.parts);
+  const bytes = new Uint8Array(4 + json.length + parts.reduce((sum, part) => sum + part.byteLength, 0));
+  new DataView(bytes.buffer).setUint32(0, json.length, true);
+  bytes.set(json, 4);
+  let at = 4 + json.length;
+  for (const part of parts) {
+    bytes.set(new Uint8Array(part.buffer, part.byteOffset, part.byteLength), at);
+    at += part.byteLength;
+  }
+  return bytes;
+}
+
+const OPTIONS = [
+  "method", "layout", "axes", "ends", "path", "speed", "before", "after", "tension", "continuity", "bias",
+];
+
+/** Tracks that belong together, ready to be sampled. */
+export class Clip {
+  #module;
+  #handle;
+
+  /** For this package alone: clips are made by `Tumble.clip`, `Tumble.read` and `Tumble.unpack`. */
+  constructor(module, found) {
+    this.#module = module;
+    this.#handle = { module, clip: found.clip, isFreed: false };
+    this.name = found.name;
+    this.names = found.names;
+    this.parents = found.parents;
+    this.isWorld = found.isWorld;
+    this.start = found.span ? found.span[0] : 0;
+    this.end = found.span ? found.span[1] : 0;
+    this.keyCount = found.keys;
+    this.rate = found.rate;
+    forgotten?.register(this, this.#handle, this.#handle);
+  }
+
+  #call(name, header, bytes) {
+    if (this.#handle.isFreed) throw new TumbleError("the clip was freed");
+    return this.#module.call(name, { clip: this.#handle.clip, ...header }, bytes);
+  }
+
+  #sample(quantity, times, options) {
+    const header = { quantity };
+    for (const [name, value] of Object.entries(options)) {
+      if (!OPTIONS.includes(name)) throw new TumbleError(`there is no option \`${name}\`; there are ${OPTIONS.join(", ")}`);
+      // Digits are kept as text: JSON's readers may round a number in its last place.
+      if (value !== undefined) header[name] = typeof value === "number" ? String(value) : value;
+    }
+    let list;
+    if (isNumbers(times)) {
+      list = numbers(times, Float64Array, 1, "times");
+    } else if (typeof times === "number") {
+      list = Float64Array.of(times);
+    } else if (times !== null && typeof times === "object" && times.fps !== undefined) {
+      const { fps, start = this.start, end = this.end, ...rest } = times;
+      if (Object.keys(rest).length > 0) throw new TumbleError(`frames have no \`${Object.keys(rest)[0]}\`; there are fps, start, end`);
+      header.rate = String(fps);
+      list = numbers([start, end], Float64Array, 1, "start and end");
+    } else {
+      throw new TumbleError("times are a number, an array of seconds, or frames: {fps, start, end}");
+    }
+    return this.#call("sample", header, new Uint8Array(list.buffer, list.byteOffset, list.byteLength));
+  }
+
+  /** Rotations, and translations and scales where there are any. */
+  sample(times, options = {}) {
+    const found = this.#sample("pose", times, options);
+    return { translations: null, scales: null, ...found };
+  }
+
+  /** Angular velocities, rad/s: x y z. */
+  velocities(times, options = {}) {
+    return this.#sample("velocities", times, options);
+  }
+
+  /** Angular accelerations, rad/s²: x y z. */
+  accelerations(times, options = {}) {
+    return this.#sample("accelerations", times, options);
+  }
+
+  /** Positions and rotations of all joints in the world. */
+  world(times, options = {}) {
+    return this.#sample("world", times, options);
+  }
+
+  /** A matrix for each joint that takes it to the world, column after column. */
+  matrices(times, options = {}) {
+    return this.#sample("matrices", times, options);
+  }
+
+  /** The keys of a track. */
+  keys(track) {
+    const found = this.#call("keys", { track });
+    return { translationTimes: null, translations: null, scaleTimes: null, scales: null, ...found };
+  }
+
+  /** Gives its memory back; the clip is of no use then. */
+  free() {
+    if (this.#handle.isFreed) return;
+    forgotten?.unregister(this.#handle);
+    release(this.#handle);
+  }
+}
+
+function release(handle) {
+  handle.isFreed = true;
+  if (!handle.module.broken) handle.module.call("free", { clip: handle.clip });
+}
+
+// Clips that nobody has any more give their memory back when the garbage is collected.
+const forgotten = globalThis.FinalizationRegistry && new FinalizationRegistry(release);
+
+/** The engine in this page, worker or process. */
+export class Tumble {
+  #module;
+
+  /** For this package alone: `load` makes it. */
+  constructor(instance) {
+    this.#module = new Module(instance);
+    const { version, methods, formats } = this.#module.call("about", {});
+    this.version = version;
+    this.methods = methods;
+    this.formats = formats;
+  }
+
+  /** A clip of arrays. */
+  clip(tracks, options) {
+    return this.unpack(packed(tracks, options));
+  }
+
+  /** A clip in one piece of bytes, as the program's pages carry it. */
+  unpack(bytes) {
+    return new Clip(this.#module, this.#module.call("unpack", {}, bytesOf(bytes)));
+  }
+
+  /** The clips of a file. */
+  read(bytes, { name = "file", sourceRate } = {}) {
+    const header = { name, sourceRate: sourceRate === undefined ? null : String(sourceRate) };
+    const { clips, warnings, refused } = this.#module.call("read", header, bytesOf(bytes));
+    return { clips: clips.map((found) => new Clip(this.#module, found)), warnings, refused };
+  }
+}
+
+function bytesOf(value) {
+  if (ArrayBuffer.isView(value)) return new Uint8Array(value.buffer, value.byteOffset, value.byteLength);
+  if (value instanceof ArrayBuffer) return new Uint8Array(value);
+  throw new TumbleError("bytes are an ArrayBuffer, or an array of bytes such as Uint8Array");
+}
+
+/** What a clip is at times: `clip.sample(times, options)`. */
+export function sample(clip, times, options) {
+  return clip.sample(times, options);
+}
+
+/** The engine of a module: its bytes, or what WebAssembly.compile makes of them. */
+export async function loadFrom(module) {
+  const isCompiled = module instanceof WebAssembly.Module;
+  const compiled = isCompiled ? module : await WebAssembly.compile(bytesOf(module));
+  return new Tumble(await WebAssembly.instantiate(compiled, imports(compiled)));
+}
+
+/** The engine needs nothing of the page. What a library in it asks for (random numbers, to encrypt archives) is never called. */
+function imports(compiled) {
+  const found = {};
+  for (const { module, name } of WebAssembly.Module.imports(compiled)) {
+    found[module] ??= {};
+    found[module][name] = () => {
+      throw new Error(`${name} was called`);
+    };
+  }
+  return found;
+}

@@ -1,0 +1,196 @@
+/** The methods between keys, by the names that the program has for them. */
+export type Method =
+  | "authored"
+  | "slerp"
+  | (string & {});
+
+/** The order of results: all samples of the first track first, or all tracks of the first sample. */
+export type Layout = "track" | "frame";
+
+/** How clips are sampled. */
+export interface SampleOptions {
+  /** `authored`, which is the default: as the file says of each channel, bessel-overhauser where it says nothing. */
+  method?: Method;
+  /** Default: `track`. */
+  layout?: Layout;
+  /** What happens in the first and the last segment. Default: the method's own. */
+  ends?: "parabolic" | "natural" | "clamped" | "secant" | "loop" | "frozen";
+  /** Which way round between neighbouring keys. Default: `shortest`. */
+  path?: "shortest" | "as-authored";
+  /** How fast the curve is run through. Default: `as-keyed`. */
+  speed?: "as-keyed" | "constant";
+  /** What lies before the first key. Default: `hold`. */
+  before?: "hold" | "loop" | "mirror" | "extrapolate";
+  /** What lies after the last key. Default: `hold`. */
+  after?: "hold" | "loop" | "mirror" | "extrapolate";
+  /** For kochanek-bartels. Default: 0. */
+  tension?: number;
+  /** For kochanek-bartels. Default: 0. */
+  continuity?: number;
+  /** For kochanek-bartels. Default: 0. */
+  bias?: number;
+}
+
+/** How angular velocities and accelerations are sampled. */
+export interface RateOptions extends SampleOptions {
+  /** The axes in which they are: the body's, which is the default, or its parent's. */
+  axes?: "body" | "parent";
+}
+
+/** Frames at an exact rate: `60`, `"30000/1001"`. */
+export interface Frames {
+  fps: number | string;
+  /** Seconds. Default: the clip's first key. */
+  start?: number;
+  /** Seconds. Default: the clip's last key. */
+  end?: number;
+}
+
+/** Seconds, in any order; or frames. */
+export type Times = number | ArrayLike<number> | Frames;
+
+/** What all results have. */
+export interface Result {
+  tracks: number;
+  /** Of each track. */
+  samples: number;
+  /** Seconds, where frames were asked for. */
+  times?: Float64Array;
+}
+
+/** Each track as its file has it, relative to its parent. */
+export interface Pose extends Result {
+  /** Unit quaternions `x y z w`; neighbouring samples of a track have the nearer signs. */
+  rotations: Float32Array;
+  /** `x y z`; null where no track has any. */
+  translations: Float32Array | null;
+  /** `x y z`; null where no track has any. */
+  scales: Float32Array | null;
+}
+
+/** Angular velocities, rad/s, or accelerations, rad/s². */
+export interface Rates extends Result {
+  /** `x y z`. */
+  values: Float32Array;
+}
+
+/** Where joints are. */
+export interface World extends Result {
+  /** `x y z`. */
+  positions: Float64Array;
+  /** `x y z w`. */
+  rotations: Float32Array;
+}
+
+/** Where points go that go with joints. */
+export interface Matrices extends Result {
+  /** 16 numbers a joint, column after column. */
+  matrices: Float32Array;
+}
+
+/** Keys of a track. */
+export interface Keys {
+  /** Seconds. */
+  times: Float64Array;
+  /** `x y z w`. */
+  rotations: Float32Array;
+  translationTimes: Float64Array | null;
+  translations: Float32Array | null;
+  scaleTimes: Float64Array | null;
+  scales: Float32Array | null;
+}
+
+/** Vectors at times of their own. */
+export interface VectorKeys {
+  /** Seconds, increasing. */
+  times: ArrayLike<number>;
+  /** `x y z` for each time. */
+  values: ArrayLike<number>;
+  /** For `cubic`: the arriving and the leaving tangent of each key, units per second. */
+  tangents?: ArrayLike<number>;
+}
+
+/** A track that is given as arrays. */
+export interface Track {
+  name?: string;
+  /** Seconds, increasing. Default: one key at 0. */
+  times?: ArrayLike<number>;
+  /** Unit quaternions `x y z w`, one for each time. */
+  rotations?: ArrayLike<number>;
+  /** For `cubic`: the arriving and the leaving tangent of each key, per second. */
+  tangents?: ArrayLike<number>;
+  translations?: VectorKeys;
+  scales?: VectorKeys;
+  /** The index of the track that it hangs on. */
+  parent?: number;
+  /** Where it is without keys. */
+  rest?: { translation?: ArrayLike<number>; rotation?: ArrayLike<number>; scale?: ArrayLike<number> };
+  /** What `authored` means for it, as glTF has it. */
+  interpolation?: "step" | "linear" | "cubic";
+}
+
+/** Tracks that belong together, ready to be sampled. */
+export class Clip {
+  private constructor();
+  readonly name: string | null;
+  /** Of the tracks. */
+  readonly names: readonly string[];
+  /** What each track hangs on; null for roots. */
+  readonly parents: readonly (number | null)[];
+  /** Whether rotations and translations are relative to the world instead of the parent. */
+  readonly isWorld: boolean;
+  /** The first key, seconds. */
+  readonly start: number;
+  /** The last key, seconds. */
+  readonly end: number;
+  readonly keyCount: number;
+  /** The rate on whose frames all keys lie, if there is one. */
+  readonly rate: string | null;
+  /** What each track is at times. */
+  sample(times: Times, options?: SampleOptions): Pose;
+  /** Angular velocities, rad/s. */
+  velocities(times: Times, options?: RateOptions): Rates;
+  /** Angular accelerations, rad/s². */
+  accelerations(times: Times, options?: RateOptions): Rates;
+  /** Where all joints are in the world. */
+  world(times: Times, options?: SampleOptions): World;
+  /** A matrix for each joint that takes it to the world. */
+  matrices(times: Times, options?: SampleOptions): Matrices;
+  /** The keys of a track, which counts from 0. */
+  keys(track: number): Keys;
+  /** Gives its memory back; else the garbage collector does, some time. */
+  free(): void;
+}
+
+/** The engine in this page, worker or process. */
+export class Tumble {
+  private constructor();
+  readonly version: string;
+  readonly methods: readonly { name: string; summary: string; interpolates: boolean }[];
+  /** The formats that `read` knows. */
+  readonly formats: readonly string[];
+  /** A clip of arrays. */
+  clip(tracks: Track[], options?: { name?: string | null; isWorld?: boolean }): Clip;
+  /**
+   * The clips of a file; by their first bytes, then by the ending of `name`, it is known which it is. `refused`:
+   * what is wrong with those that cannot be read.
+   */
+  read(
+    bytes: ArrayBuffer | ArrayBufferView,
+    options?: { name?: string; sourceRate?: number | string },
+  ): { clips: Clip[]; warnings: string[]; refused: string[] };
+  /** A clip in one piece of bytes, as the pages of `tumble view` carry it. */
+  unpack(bytes: ArrayBuffer | ArrayBufferView): Clip;
+}
+
+/** What the engine, a file or an argument is refused for. */
+export class TumbleError extends Error {
+  /** The fault of a file, by its name in the program's list. */
+  readonly code: string | null;
+}
+
+/** What a clip is at times: `clip.sample(times, options)`. */
+export function sample(clip: Clip, times: Times, options?: SampleOptions): Pose;
+
+/** The engine. `source`: the module's bytes, its address, or the answer to a request for it; else the file beside. */
+export function load(source?: URL | string | Response | WebAssembly.Module | ArrayBuffer | ArrayBufferView): Promise<Tumble>;

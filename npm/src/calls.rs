@@ -1,0 +1,294 @@
+//! The calls, by their numbers, and the clips that JavaScript has handles of.
+
+use std::error::Error;
+
+use glam::{Quat, Vec3};
+use serde::Deserialize;
+use serde::de::DeserializeOwned;
+use serde_json::{Value, json};
+use tumble::{Channel, Device, Engine, METHODS};
+use tumble_formats::motion::Motion;
+use tumble_formats::packed;
+#[cfg(feature = "files")]
+use tumble_formats::{Diagnostic, Format, ReadOptions};
+
+use crate::sampling::{self, Request};
+
+/// What a call comes to.
+#[derive(Default)]
+pub(crate) struct Answer {
+    pub(crate) json: String,
+    pub(crate) arrays: Vec<Array>,
+}
+
+/// Numbers of an answer.
+pub(crate) enum Array {
+    F64(Vec<f64>),
+    F32(Vec<f32>),
+    Quats(Vec<Quat>),
+    Vectors(Vec<Vec3>),
+}
+
+impl Array {
+    pub(crate) fn bytes(&self) -> &[u8] {
+        match self {
+            Self::F64(numbers) => bytemuck::cast_slice(numbers),
+            Self::F32(numbers) => bytemuck::cast_slice(numbers),
+            Self::Quats(quats) => bytemuck::cast_slice(quats),
+            Self::Vectors(vectors) => bytemuck::cast_slice(vectors),
+        }
+    }
+
+    fn kind(&self) -> &'static str {
+        match self {
+            Self::F64(_) => "f64",
+            _ => "f32",
+        }
+    }
+}
+
+impl Answer {
+    /// The JSON, with the names, kinds and lengths of the arrays in it.
+    pub(crate) fn new(mut json: Value, arrays: Vec<(&'static str, Array)>) -> Self {
+        let listed = arrays.iter().map(|(name, array)| {
+            json!({"name": name, "kind": array.kind(), "bytes": array.bytes().len()})
+        });
+        json["arrays"] = listed.collect();
+        Self {
+            json: json.to_string(),
+            arrays: arrays.into_iter().map(|(_, array)| array).collect(),
+        }
+    }
+}
+
+/// Why a call was not done.
+#[derive(Debug)]
+pub(crate) struct Fault {
+    code: Option<&'static str>,
+    pub(crate) message: String,
+}
+
+impl Fault {
+    pub(crate) fn new(message: impl Into<String>) -> Self {
+        Self {
+            code: None,
+            message: message.into(),
+        }
+    }
+
+    pub(crate) fn into_answer(self) -> Answer {
+        let json = json!({"code": self.code, "message": self.message});
+        Answer::new(json, Vec::new())
+    }
+
+    #[cfg(feature = "files")]
+    fn of_file(fault: &Diagnostic) -> Self {
+        Self {
+            code: Some(fault.code.name()),
+            message: fault.to_string(),
+        }
+    }
+}
+
+impl<E: Error> From<E> for Fault {
+    fn from(error: E) -> Self {
+        Self::new(error.to_string())
+    }
+}
+
+/// All that lasts from call to call.
+#[derive(Default)]
+pub(crate) struct Calls {
+    engine: Option<Engine>,
+    clips: Vec<Option<Motion>>,
+}
+
+/// A clip that a call is about.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct OfClip {
+    clip: usize,
+}
+
+/// A track of a clip.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct OfTrack {
+    clip: usize,
+    track: usize,
+}
+
+/// A file whose bytes come behind.
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase", deny_unknown_fields)]
+struct OfFile {
+    name: String,
+    /// The rate of the keys, where the file does not say it.
+    source_rate: Option<String>,
+}
+
+impl Calls {
+    /// Makes a call. `numbers` is what came behind the header.
+    pub(crate) fn call(
+        &mut self,
+        call: u32,
+        header: &[u8],
+        numbers: Vec<u8>,
+    ) -> Result<Answer, Fault> {
+        match call {
+            0 => Ok(about()),
+            1 => self.unpack(&numbers),
+            2 => self.read(read_header(header)?, numbers),
+            3 => self.sample(&read_header(header)?, &numbers),
+            4 => self.keys(&read_header(header)?),
+            5 => self.free(&read_header(header)?),
+            _ => Err(Fault::new(format!("there is no call {call}"))),
+        }
+    }
+
+    /// Makes a clip of its packed bytes.
+    fn unpack(&mut self, bytes: &[u8]) -> Result<Answer, Fault> {
+        let clip = packed::from_bytes(bytes)?;
+        Ok(Answer::new(self.keep(clip), Vec::new()))
+    }
+
+    /// Refuses files.
+    #[cfg(not(feature = "files"))]
+    #[allow(clippy::unused_self)] // as where files are read
+    fn read(&mut self, file: OfFile, _: Vec<u8>) -> Result<Answer, Fault> {
+        let OfFile {
+            name,
+            source_rate: _,
+        } = file;
+        Err(Fault::new(format!("{name}: this engine reads no files")))
+    }
+
+    /// Reads the clips of a file.
+    #[cfg(feature = "files")]
+    fn read(&mut self, file: OfFile, bytes: Vec<u8>) -> Result<Answer, Fault> {
+        let mut options = ReadOptions::default();
+        if let Some(rate) = &file.source_rate {
+            options.source_rate = Some(rate.parse()?);
+        }
+        let loaded = Format::read_detected(&file.name, bytes, &options)
+            .map_err(|fault| Fault::of_file(&fault))?;
+        let texts = |list: &[Diagnostic]| -> Vec<String> {
+            list.iter().map(Diagnostic::to_string).collect()
+        };
+        if let (true, [fault, ..]) = (loaded.clips.is_empty(), &loaded.refused[..]) {
+            return Err(Fault::of_file(fault));
+        }
+        let (warnings, refused) = (texts(&loaded.warnings), texts(&loaded.refused));
+        let clips: Vec<Value> = (loaded.clips.into_iter())
+            .map(|clip| self.keep(clip))
+            .collect();
+        let json = json!({"clips": clips, "warnings": warnings, "refused": refused});
+        Ok(Answer::new(json, Vec::new()))
+    }
+
+    fn sample(&mut self, request: &Request, numbers: &[u8]) -> Result<Answer, Fault> {
+        let engine = match &mut self.engine {
+            Some(engine) => engine,
+            none => none.insert(Engine::new(Device::Cpu)?),
+        };
+        sampling::sample(engine, find(&self.clips, request.clip)?, request, numbers)
+    }
+
+    /// The keys of a track.
+    fn keys(&self, of: &OfTrack) -> Result<Answer, Fault> {
+        let set = &find(&self.clips, of.clip)?.set;
+        let track = set.get(of.track).ok_or_else(|| {
+            let tracks = set.track_count();
+            Fault::new(format!(
+                "there is no track {} of {tracks}; they count from 0",
+                of.track
+            ))
+        })?;
+        let mut arrays = vec![
+            ("times", Array::F64(track.times.to_vec())),
+            ("rotations", Array::Quats(track.keys.to_vec())),
+        ];
+        for (channel, times, values) in [
+            (Channel::Translation, "translationTimes", "translations"),
+            (Channel::Scale, "scaleTimes", "scales"),
+        ] {
+            if let Some(keys) = set.vector_keys(channel, of.track) {
+                arrays.push((times, Array::F64(keys.times.to_vec())));
+                arrays.push((values, Array::Vectors(keys.keys.to_vec())));
+            }
+        }
+        Ok(Answer::new(json!({}), arrays))
+    }
+
+    fn free(&mut self, of: &OfClip) -> Result<Answer, Fault> {
+        find(&self.clips, of.clip)?;
+        self.clips[of.clip] = None;
+        Ok(Answer::new(json!({}), Vec::new()))
+    }
+
+    /// Keeps a clip, and says what JavaScript is to know of it.
+    fn keep(&mut self, clip: Motion) -> Value {
+        let set = &clip.set;
+        let tracks = 0..set.track_count();
+        let parents = tracks.clone().map(|track| {
+            let joint = clip.skeleton.get(track);
+            joint.and_then(|joint| joint.parent)
+        });
+        let mut found = json!({
+            "name": clip.name,
+            "names": tracks.clone().map(|track| set.track_name(track)).collect::<Vec<_>>(),
+            "parents": parents.collect::<Vec<_>>(),
+            "isWorld": clip.is_world,
+            "span": set.time_span(),
+            "keys": set.key_count(),
+            "rate": clip.rate.map(|rate| rate.to_string()),
+        });
+        let free = self.clips.iter().position(Option::is_none);
+        let place = free.unwrap_or(self.clips.len());
+        if free.is_none() {
+            self.clips.push(None);
+        }
+        self.clips[place] = Some(clip);
+        found["clip"] = place.into();
+        found
+    }
+}
+
+fn find(clips: &[Option<Motion>], clip: usize) -> Result<&Motion, Fault> {
+    let found = clips.get(clip).and_then(Option::as_ref);
+    found.ok_or_else(|| Fault::new(format!("there is no clip {clip}; it was freed")))
+}
+
+fn read_header<T: DeserializeOwned>(header: &[u8]) -> Result<T, Fault> {
+    serde_json::from_slice(header).map_err(|error| {
+        // Where in a text that nobody wrote says nothing to anybody.
+        let text = error.to_string();
+        let message = text.split(" at line ").next().unwrap_or(&text);
+        Fault::new(message)
+    })
+}
+
+/// The version, the methods and the formats.
+fn about() -> Answer {
+    let methods = METHODS.iter().map(|method| {
+        json!({
+            "name": method.name,
+            "summary": method.summary,
+            "interpolates": method.interpolates,
+        })
+    });
+    let json = json!({
+        "version": env!("CARGO_PKG_VERSION"),
+        "methods": methods.collect::<Vec<_>>(),
+        "formats": formats(),
+    });
+    Answer::new(json, Vec::new())
+}
+
+/// The names of the formats that are read.
+fn formats() -> Vec<&'static str> {
+    #[cfg(feature = "files")]
+    return tumble_formats::FORMATS.map(|format| format.name).to_vec();
+    #[cfg(not(feature = "files"))]
+    Vec::new()
+}

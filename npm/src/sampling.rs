@@ -1,0 +1,302 @@
+//! What clips are at times: the samples that JavaScript asks for.
+
+use glam::{DVec3, Quat, Vec3};
+use serde::Deserialize;
+use serde_json::json;
+use tumble::{
+    Axes, Ends, Engine, FrameRate, Frames, Interpolation, Layout, METHODS, Method, Path, Quantity,
+    Speed, Tcb, WrapMode,
+};
+use tumble_formats::motion::Motion;
+use tumble_formats::sample::{ChannelMethods, Samples};
+use tumble_formats::world::{world, world_matrices};
+
+use crate::calls::{Answer, Array, Fault};
+
+/// What is asked for. Decimal numbers come as text, which keeps all their digits.
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase", deny_unknown_fields)]
+pub(crate) struct Request {
+    pub(crate) clip: usize,
+    quantity: Sampled,
+    /// Of frames; the numbers are their start and end then, and else the times.
+    rate: Option<String>,
+    /// `authored`, as the file says of each channel, where nothing is said.
+    method: Option<String>,
+    #[serde(default)]
+    layout: Order,
+    axes: Option<AxesName>,
+    ends: Option<EndsName>,
+    path: Option<PathName>,
+    speed: Option<SpeedName>,
+    before: Option<WrapName>,
+    after: Option<WrapName>,
+    tension: Option<String>,
+    continuity: Option<String>,
+    bias: Option<String>,
+}
+
+/// What is sampled.
+#[derive(Deserialize, Clone, Copy, PartialEq)]
+#[serde(rename_all = "kebab-case")]
+enum Sampled {
+    /// Rotations, translations and scales.
+    Pose,
+    /// Angular velocities.
+    Velocities,
+    /// Angular accelerations.
+    Accelerations,
+    /// Positions and rotations in the world.
+    World,
+    /// Matrices in the world.
+    Matrices,
+}
+
+#[derive(Deserialize, Clone, Copy, Default, PartialEq)]
+#[serde(rename_all = "kebab-case")]
+enum Order {
+    #[default]
+    Track,
+    Frame,
+}
+
+#[derive(Deserialize, Clone, Copy)]
+#[serde(rename_all = "kebab-case")]
+enum AxesName {
+    Body,
+    Parent,
+}
+
+#[derive(Deserialize, Clone, Copy)]
+#[serde(rename_all = "kebab-case")]
+enum EndsName {
+    Parabolic,
+    Natural,
+    Clamped,
+    Secant,
+    Loop,
+    Frozen,
+}
+
+#[derive(Deserialize, Clone, Copy)]
+#[serde(rename_all = "kebab-case")]
+enum PathName {
+    Shortest,
+    AsAuthored,
+}
+
+#[derive(Deserialize, Clone, Copy)]
+#[serde(rename_all = "kebab-case")]
+enum SpeedName {
+    AsKeyed,
+    Constant,
+}
+
+#[derive(Deserialize, Clone, Copy)]
+#[serde(rename_all = "kebab-case")]
+enum WrapName {
+    Hold,
+    Loop,
+    Mirror,
+    Extrapolate,
+}
+
+impl WrapName {
+    fn mode(self) -> WrapMode {
+        match self {
+            Self::Hold => WrapMode::Hold,
+            Self::Loop => WrapMode::Loop,
+            Self::Mirror => WrapMode::Mirror,
+            Self::Extrapolate => WrapMode::Extrapolate,
+        }
+    }
+}
+
+impl EndsName {
+    fn ends(self) -> Ends {
+        let still = DVec3::ZERO;
+        match self {
+            Self::Parabolic => Ends::Parabolic,
+            Self::Natural => Ends::Natural,
+            Self::Clamped => Ends::Clamped {
+                start: still,
+                end: still,
+            },
+            Self::Secant => Ends::Secant,
+            Self::Loop => Ends::Loop,
+            Self::Frozen => Ends::Frozen,
+        }
+    }
+}
+
+impl Request {
+    fn method(&self) -> Result<Option<Method>, Fault> {
+        let name = match self.method.as_deref() {
+            None | Some("authored") => return Ok(None),
+            Some(name) => name,
+        };
+        let unknown = || {
+            let names: Vec<&str> = METHODS.iter().map(|method| method.name).collect();
+            let names = names.join(", ");
+            Fault::new(format!(
+                "there is no method `{name}`; there are authored, {names}"
+            ))
+        };
+        Method::named(name).map(Some).ok_or_else(unknown)
+    }
+
+    fn frames(&self, numbers: &[f64]) -> Result<Frames, Fault> {
+        let Some(rate) = &self.rate else {
+            return Ok(Frames::at(numbers.to_vec()));
+        };
+        let rate: FrameRate = rate.parse()?;
+        match *numbers {
+            [start, end] => Ok(Frames::rate(rate).between(start, end)),
+            [] => Ok(Frames::rate(rate)),
+            _ => Err(Fault::new("frames have a start and an end")),
+        }
+    }
+
+    fn tcb(&self) -> Result<Tcb, Fault> {
+        let number = |name: &str, text: &Option<String>| match text {
+            None => Ok(0.0),
+            Some(text) => text
+                .parse()
+                .map_err(|_| Fault::new(format!("{name} is `{text}`, no number"))),
+        };
+        Ok(Tcb {
+            tension: number("tension", &self.tension)?,
+            continuity: number("continuity", &self.continuity)?,
+            bias: number("bias", &self.bias)?,
+        })
+    }
+
+    fn quantity(&self) -> Quantity {
+        let axes = match self.axes {
+            Some(AxesName::Parent) => Axes::Parent,
+            _ => Axes::Body,
+        };
+        match self.quantity {
+            Sampled::Velocities => Quantity::Velocity(axes),
+            Sampled::Accelerations => Quantity::Acceleration(axes),
+            _ => Quantity::Rotation,
+        }
+    }
+
+    /// Values that came a sample after the other, in the order asked for.
+    fn ordered<T: Copy>(&self, values: Vec<T>, tracks: usize) -> Vec<T> {
+        if self.layout == Order::Frame || tracks < 2 {
+            return values;
+        }
+        let samples = values.len() / tracks;
+        let of_track = |track: usize| (0..samples).map(move |sample| sample * tracks + track);
+        (0..tracks)
+            .flat_map(of_track)
+            .map(|index| values[index])
+            .collect()
+    }
+}
+
+/// Bytes that a sample of a track takes at most while it is made: its rotation, translation, scale, and what
+/// becomes of them, in both orders.
+const SAMPLE: f64 = 200.0;
+
+/// What a clip is at the times of a request.
+pub(crate) fn sample(
+    engine: &Engine,
+    clip: &Motion,
+    request: &Request,
+    numbers: &[u8],
+) -> Result<Answer, Fault> {
+    let (numbers, _) = numbers.as_chunks();
+    let numbers: Vec<f64> = numbers.iter().copied().map(f64::from_le_bytes).collect();
+    let tracks = clip.set.track_count();
+    let frames = request.frames(&numbers)?;
+    let timeline = frames.resolve(tracks, clip.set.time_span())?;
+    let bytes = tracks as f64 * timeline.len() as f64 * SAMPLE;
+    // To ask is to know: what is there is not said.
+    let has_room = bytes < usize::MAX as f64 / 2.0
+        && Vec::<u8>::new().try_reserve_exact(bytes as usize).is_ok();
+    if !has_room {
+        return Err(Fault::new(format!(
+            "{} samples of {tracks} tracks take {:.0} MB, more memory than there is; ask for fewer at a time",
+            timeline.len(),
+            bytes / 1e6
+        )));
+    }
+    let (tcb, quantity) = (request.tcb()?, request.quantity());
+    let with = |method: Method| Interpolation {
+        method,
+        path: method.path.unwrap_or(match request.path {
+            Some(PathName::AsAuthored) => Path::AsAuthored,
+            _ => Path::Shortest,
+        }),
+        ends: request.ends.map_or(method.ends, EndsName::ends),
+        tcb,
+        quantity,
+        speed: match request.speed {
+            Some(SpeedName::Constant) => Speed::Constant,
+            _ => Speed::AsKeyed,
+        },
+        before: request.before.map(WrapName::mode).unwrap_or_default(),
+        after: request.after.map(WrapName::mode).unwrap_or_default(),
+    };
+    let methods = ChannelMethods {
+        method: request.method()?,
+        with: &with,
+    };
+    let samples = timeline.len();
+    let mut arrays = match request.quantity {
+        Sampled::Velocities | Sampled::Accelerations => {
+            let rates = methods.rates(engine, clip, &frames, Layout::FrameMajor)?;
+            let rates: Vec<Vec3> = rates.iter().map(|rate| rate.truncate()).collect();
+            vec![("values", Array::Vectors(request.ordered(rates, tracks)))]
+        }
+        Sampled::Pose => pose(methods.sample(engine, clip, &frames)?, request, tracks),
+        Sampled::World => {
+            let poses = world(clip, &methods.sample(engine, clip, &frames)?)?;
+            let poses = request.ordered(poses, tracks);
+            let positions = poses.iter().flat_map(|pose| pose.position.to_array());
+            let rotations: Vec<Quat> = poses.iter().map(|pose| pose.rotation).collect();
+            vec![
+                ("positions", Array::F64(positions.collect())),
+                ("rotations", Array::Quats(rotations)),
+            ]
+        }
+        Sampled::Matrices => {
+            let matrices = world_matrices(clip, &methods.sample(engine, clip, &frames)?)?;
+            let matrices = request.ordered(matrices, tracks);
+            let columns = matrices.iter().flat_map(|matrix| {
+                let [x, y, z] = matrix.matrix3.to_cols_array_2d();
+                let at = matrix.translation;
+                [
+                    x[0], x[1], x[2], 0.0, y[0], y[1], y[2], 0.0, z[0], z[1], z[2], 0.0, at.x,
+                    at.y, at.z, 1.0,
+                ]
+            });
+            let columns = columns.map(|number| number as f32);
+            vec![("matrices", Array::F32(columns.collect()))]
+        }
+    };
+    if request.rate.is_some() {
+        arrays.push(("times", Array::F64(timeline.times(0).collect())));
+    }
+    Ok(Answer::new(
+        json!({"tracks": tracks, "samples": samples}),
+        arrays,
+    ))
+}
+
+fn pose(samples: Samples, request: &Request, tracks: usize) -> Vec<(&'static str, Array)> {
+    let rotations = request.ordered(samples.rotations, tracks);
+    let mut arrays = vec![("rotations", Array::Quats(rotations))];
+    for (name, vectors) in [
+        ("translations", samples.translations),
+        ("scales", samples.scales),
+    ] {
+        if !vectors.is_empty() {
+            arrays.push((name, Array::Vectors(request.ordered(vectors, tracks))));
+        }
+    }
+    arrays
+}

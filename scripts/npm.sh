@@ -1,0 +1,51 @@
+#!/usr/bin/env bash
+# Builds the npm package in npm/package and tests it: under Node its bits beside the program's, in Chromium
+# its bits beside Node's. The archive that npm installs comes to lie in target/npm.
+#
+#   scripts/npm.sh            builds and tests
+#   scripts/npm.sh --page     also puts the module into the program, for the pages of `tumble view`
+set -euo pipefail
+cd "$(dirname "$0")/.."
+target=${CARGO_TARGET_DIR:-target}
+name=wasm32-unknown-unknown
+if ! rustup target list --installed | grep -qx $name; then rustup target add $name; fi
+
+# Paths of this machine would be in the messages of panics.
+registry=${CARGO_HOME:-$HOME/.cargo}/registry/src
+# module PROFILE FEATURES: compiles it.
+module() {
+    RUSTFLAGS="${RUSTFLAGS:-} -C target-feature=+simd128 --remap-path-prefix=$PWD= --remap-path-prefix=$registry=" \
+        cargo build --quiet --profile "$1" -p tumble-npm --target $name --no-default-features --features "$2"
+    built=$target/$name/$1/tumble_npm.wasm
+}
+
+# What decides the module's border and its bits; a test of the program compares it (cli/tests/view_live.rs).
+sources() {
+    cat npm/Cargo.toml npm/src/*.rs formats/src/packed.rs formats/src/sample.rs formats/src/world.rs \
+        src/verify/golden.txt | sha1sum | cut -d ' ' -f 1
+}
+if [ "${1:-}" = --page ]; then
+    command -v wasm-opt >/dev/null && command -v zopfli >/dev/null || {
+        echo "the engine of pages is made small by wasm-opt and zopfli (Debian's packages binaryen and zopfli)" >&2
+        exit 1
+    }
+    # Pages bring no files for it to read.
+    module page ""
+    small=$target/$name/page/tumble.wasm
+    wasm-opt -Oz --enable-simd --enable-bulk-memory --enable-nontrapping-float-to-int --enable-sign-ext \
+        --enable-mutable-globals --enable-reference-types --enable-multivalue "$built" -o "$small"
+    zopfli --i5 -c "$small" >cli/src/commands/view/tumble.wasm.gz
+    sources >cli/src/commands/view/tumble.wasm.sources
+    printf 'the engine of pages: %s bytes, %s packed\n' "$(stat -c %s "$small")" \
+        "$(stat -c %s cli/src/commands/view/tumble.wasm.gz)"
+fi
+module wasm files
+printf 'the module: %s bytes, %s by gzip -9\n' "$(stat -c %s "$built")" "$(gzip -9c "$built" | wc -c)"
+cp "$built" npm/package/tumble.wasm
+cp LICENSE-* npm/package
+
+cargo build --quiet -p tumble-cli --bin tumble
+TUMBLE=$(realpath "$target/debug/tumble") node --test --test-concurrency=1 --test-reporter=spec npm/tests/
+mkdir -p "$target/npm"
+archives=$(realpath "$target/npm")
+(cd npm/package && npm pack --silent --pack-destination "$archives")

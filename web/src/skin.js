@@ -1,0 +1,73 @@
+// What joints carry: triangles that follow them, drawn by three.js around the bones.
+
+import {
+  Bone, BufferAttribute, BufferGeometry, DoubleSide, Matrix4, MeshLambertMaterial, Quaternion, Skeleton, SkinnedMesh,
+  Vector3,
+} from "three";
+
+// Bones are seen through it.
+const OPACITY = 0.4;
+const COLOUR = 0x9aa3ad;
+// Vertices that say how much room it takes.
+const MEASURED = 300;
+
+export class Skin {
+  constructor({ places, triangles, bonesOf, weights, joints, toJoints }, ghost) {
+    const geometry = new BufferGeometry();
+    geometry.setAttribute("position", new BufferAttribute(places, 3));
+    geometry.setAttribute("skinIndex", new BufferAttribute(bonesOf, 4));
+    geometry.setAttribute("skinWeight", new BufferAttribute(weights, 4, true));
+    geometry.setIndex(new BufferAttribute(triangles, 1));
+    geometry.computeVertexNormals();
+    const opacity = ghost ? OPACITY / 2 : OPACITY;
+    const look = { color: COLOUR, transparent: true, opacity, depthWrite: false, side: DoubleSide };
+    this.joints = joints;
+    this.bones = joints.map(() => {
+      const bone = new Bone();
+      // Their matrices are the engine's.
+      bone.matrixAutoUpdate = false;
+      bone.matrixWorldAutoUpdate = false;
+      return bone;
+    });
+    const inverses = joints.map((_, i) => new Matrix4().fromArray(toJoints, 16 * i));
+    this.mesh = new SkinnedMesh(geometry, new MeshLambertMaterial(look));
+    this.mesh.bindMode = "detached";
+    this.mesh.bind(new Skeleton(this.bones, inverses), new Matrix4());
+    this.mesh.frustumCulled = false;
+    // Behind what is inside it.
+    this.mesh.renderOrder = 1;
+  }
+
+  /** Follows joints: by their matrices, 16 numbers each, or by where they are and how they are turned. */
+  follow({ matrices, places, turned }, shift) {
+    const one = new Vector3(1, 1, 1);
+    this.bones.forEach((bone, i) => {
+      const joint = this.joints[i];
+      if (matrices) bone.matrixWorld.fromArray(matrices, 16 * joint);
+      else bone.matrixWorld.compose(places[joint], new Quaternion().copy(turned[joint]), one);
+    });
+    this.mesh.position.x = shift;
+    this.mesh.skeleton.update();
+  }
+
+  /** Where some of its vertices are now. */
+  points() {
+    const count = this.mesh.geometry.attributes.position.count;
+    const step = Math.max(1, Math.floor(count / MEASURED));
+    const points = [];
+    for (let vertex = 0; vertex < count; vertex += step) points.push(this.vertex(vertex));
+    return points;
+  }
+
+  /** Where a vertex is now. */
+  vertex(vertex) {
+    const at = new Vector3().fromBufferAttribute(this.mesh.geometry.attributes.position, vertex);
+    return this.mesh.applyBoneTransform(vertex, at);
+  }
+
+  dispose() {
+    this.mesh.geometry.dispose();
+    this.mesh.material.dispose();
+    this.mesh.skeleton.dispose();
+  }
+}
