@@ -27,6 +27,7 @@ mod remedies;
 mod render;
 mod route;
 mod shards;
+mod trajectories;
 mod travel;
 mod validation;
 mod view;

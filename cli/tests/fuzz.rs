@@ -251,6 +251,68 @@ fn kitti() {
 }
 
 #[test]
+fn euroc() {
+    let words = [
+        "1403636580838555648,",
+        "-1,",
+        "1e-10,",
+        "0,0,0,1,0,0,0\n",
+        "0.6,0.8",
+        "#",
+        ",",
+        " ",
+        "\n",
+        "1.403636580838555648e18",
+        "nan",
+    ];
+    fuzz_motion("euroc", targets::motion::euroc, fixtures("euroc"), &words);
+}
+
+#[test]
+fn mcap() {
+    let words = [
+        "geometry_msgs/msg/PoseStamped",
+        "tf2_msgs/msg/TFMessage",
+        "nav_msgs/Path",
+        "cdr",
+        "zstd",
+        "lz4",
+        "\0\x01\0\0",
+        "\x05",
+        "\x06",
+        "\x0f",
+        "\u{89}MCAP0\r\n",
+    ];
+    let mut corpus = fixtures("mcap");
+    // Longer ones are cut, and a chunk that is cut is nothing.
+    corpus.extend(
+        corpus
+            .clone()
+            .into_iter()
+            .filter(|own| own.starts_with(b"\x89MCAP0\r\n"))
+            .map(|own| unpacked(&own)),
+    );
+    fuzz_motion("mcap", targets::motion::mcap, corpus, &words);
+}
+
+/// The first records of a log whose first chunk is not compressed, without the chunk.
+fn unpacked(log: &[u8]) -> Vec<u8> {
+    let mut at = 8;
+    while let Some(&kind) = log.get(at) {
+        let length = log.get(at + 1..at + 9).and_then(|own| own.first_chunk());
+        let Some(length) = length.map(|own| u64::from_le_bytes(*own) as usize) else {
+            break;
+        };
+        if kind == 6 && log.get(at + 37..at + 41) == Some(&[0; 4]) {
+            let records = &log[at + 9 + 40..(at + 9 + length).min(log.len())];
+            return [&log[..8], records].concat();
+        }
+        at = at.saturating_add(9).saturating_add(length);
+    }
+    log.to_vec()
+}
+
+#[test]
 fn tum() {
     let words = [
         "1700000000.125 0 0 0 0 0 0 1\n",

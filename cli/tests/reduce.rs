@@ -97,6 +97,24 @@ fn a_gltf_keeps_all_but_its_keys() {
     for kept in ["meshes", "materials", "skins", "nodes", "images", "scenes"] {
         assert_eq!(before[kept], after[kept], "{kept}");
     }
+    // Rotations of 16 bits stand in the file beside all else, or in a new one, compressed.
+    let bounds = ["--world", "--tolerance", "0.1001"];
+    for (name, more) in [
+        ("short.glb", &["--quantize"][..]),
+        ("packed.glb", &["--quantize", "--meshopt"]),
+    ] {
+        let told = succeed(place, &[&["reduce", fox, "-o", name][..], more].concat());
+        let is_new = told
+            .words
+            .contains("compression makes a new file; stays behind: meshes");
+        assert_eq!(is_new, name == "packed.glb", "{}", told.words);
+        let found = json(&place.join(name));
+        let accessors = found["accessors"].as_array().unwrap();
+        let is_short = |own: &&Value| own["componentType"] == 5122 && own["normalized"] == true;
+        assert!(accessors.iter().filter(is_short).count() > 20, "{found}");
+        assert_eq!(before["meshes"] == found["meshes"], !is_new);
+        succeed(place, &[&["compare", fox, name][..], &bounds].concat());
+    }
     let samplers = after["animations"][0]["samplers"].as_array().unwrap();
     let cubics = samplers
         .iter()
@@ -178,6 +196,29 @@ fn what_cannot_be_reduced_is_refused() {
             "give a larger one",
         ),
         (&["reduce", "walk.bvh", "-o", "a.npy"], 2, "holds results"),
+        (
+            &["reduce", "walk.bvh", "-o", "a.npz", "--quantize"],
+            2,
+            "--quantize is for glTF",
+        ),
+        (
+            &["reduce", "walk.bvh", "-o", "a.bvh", "--meshopt"],
+            2,
+            "--meshopt is for glTF",
+        ),
+        (
+            &[
+                "reduce",
+                "walk.bvh",
+                "-o",
+                "a.glb",
+                "--quantize",
+                "--curve",
+                "cubic",
+            ],
+            2,
+            "leave out --curve cubic",
+        ),
         (
             &["reduce", "walk.bvh", "-o", "a.npz", "--curve", "cubic"],
             4,

@@ -73,6 +73,12 @@ impl Decimal {
         self.0 % SECOND == 0
     }
 
+    /// The nearest whole nanosecond.
+    pub(crate) fn nanoseconds(self) -> i128 {
+        const NANOSECOND: i128 = SECOND / 1_000_000_000;
+        (self.0 + NANOSECOND / 2).div_euclid(NANOSECOND)
+    }
+
     /// The whole second at or before it.
     pub(crate) fn whole_seconds(self) -> i64 {
         self.0.div_euclid(SECOND) as i64
@@ -159,8 +165,21 @@ mod tests {
             let time = Decimal::parse_in(token, -9).unwrap();
             assert_eq!(time.to_string(), "1403636579.763555584", "{token}");
             assert_eq!(time.since(1_403_636_579), 0.763_555_584);
+            assert_eq!(time.nanoseconds(), 1_403_636_579_763_555_584);
         }
         assert_eq!(Decimal::whole(-1_500, -3), Decimal::parse("-1.5"));
+        for (token, nearest) in [
+            ("-0.0000000016", -2),
+            ("-1e-10", 0),
+            ("15e-10", 2),
+            ("1.4e-9", 1),
+        ] {
+            assert_eq!(
+                Decimal::parse(token).unwrap().nanoseconds(),
+                nearest,
+                "{token}"
+            );
+        }
     }
 
     #[test]

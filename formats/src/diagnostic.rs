@@ -235,8 +235,9 @@ codes! {
     TumPose = "E501", "not a pose", "A line has eight numbers: `t x y z qx qy qz qw`.";
     TumTime = "E502", "a time out of range", "Times are seconds, up to 1e14 before or after 0.";
     TumEmpty = "E503", "no poses", "All lines are blank or comments.";
-    TumWrite = "E504", "not to be written as a trajectory", "A trajectory is one clip of one track.";
+    TumWrite = "E504", "not to be written as a trajectory", "A trajectory is one clip of one track, at times that the format tells apart. KITTI has no times: poses that are no frames of a rate need a file of them, `--times-out`, in Python `times_out`.";
     KittiPose = "E505", "not a pose", "A line has twelve numbers: the three rows of a matrix, a rotation and a translation.";
+    FrameTimes = "E507", "not a time for each pose", "A file of times has the seconds of each pose, a number a line, in the order of the poses.";
     NoRotation = "E506", "a matrix that is no rotation", "The rows of a rotation have length 1, stand at right angles, and do not mirror.";
     // E6xx: paths.
     Path = "E601", "not a path", "A path is CSV with the header `t,x,y,z,ux,uy,uz`, of which `t` and `ux,uy,uz` may be missing, or NPY of shape (tracks, points, 3). An upward direction has a length; its cells may be blank.";
@@ -252,6 +253,10 @@ codes! {
     FbxVersion = "E702", "an unknown version of FBX", "Versions 3.0 to 7.7 are read, as text and as binary.";
     FbxDepth = "E703", "nodes too deep below each other", "No skeleton is a thousand joints deep.";
     FbxWork = "E704", "curves that take too much work", "Curves are evaluated as often as following them takes, and a file gets a number of evaluations by its length; one that takes more is damaged, or made to.";
+    // E8xx and W8xx: MCAP.
+    McapDamaged = "E801", "an MCAP file that cannot be read", "It is damaged, or no MCAP file at all; the place is that of the record in the file.";
+    McapMessage = "E802", "a message that cannot be read", "It is not as its type says; the topic is refused, and the others are read.";
+    McapEmpty = "E803", "no poses in the log", "Topics of the types PoseStamped, PoseWithCovarianceStamped, Odometry, TransformStamped, TFMessage and Path, encoded in CDR, are read.";
     ByteOrderMark = "W001", "a byte-order mark", "It is skipped; save the file without one.";
     MixedLineEnds = "W002", "mixed line ends", "Some lines end in CR LF, others in LF.";
     HeaderWords = "W003", "words after the header's numbers", "They are ignored.";
@@ -287,16 +292,18 @@ codes! {
     UnknownBody = "W301", "a body of an unknown number of joints", "SMPL has 24 joints, SMPL-H 52, SMPL-X 55, and 22 are common to them; others are read without names and parents.";
     LeftOut = "W302", "arrays that are left out", "They have an entry for each frame of the input, and it is not known how to sample them: `--linear NAME`, in Python `linear=[NAME]`, interpolates them linearly.";
     ObjectsBeside = "W303", "pickled Python objects beside the keys", "They are not looked into. Where the file is written again, they are copied as they are if they are no lists of frames.";
-    TwoRates = "W304", "two rates that differ", "A file says its rate twice, or a rate and times of another; `--source-fps` overrules rates.";
+    TwoRates = "W304", "two rates that differ", "A file says its rate twice, or a rate and times or a length of another; `--source-fps` overrules rates.";
     Nanoseconds = "W305", "times that are nanoseconds", "Seconds since 1970 have ten digits, nanoseconds nineteen, as ORB-SLAM writes them: `--time-unit ns` says it without this warning.";
     Bridged = "W401", "keys that are missing", "Cells are blank or NaN, and `--bridge-gaps` asks for the track to be interpolated from its other keys there.";
-    FurtherNumbers = "W501", "further numbers behind a pose", "A line of a trajectory is `t x y z qx qy qz qw`; what follows, such as a covariance, is not read.";
+    FurtherNumbers = "W501", "further numbers behind a pose", "A line of a trajectory is a time, a position and a quaternion; what follows, such as a covariance or velocities, is not read.";
     FbxBeside = "W701", "what is not motion", "Meshes, skins, materials and the like are not read from FBX; nodes, and what moves them, are.";
     FbxProperties = "W702", "curves of other properties", "They move what is no transform, such as blend shapes, visibility or a lens.";
     FbxOutside = "W703", "keys outside the take", "An animation stack says when it begins and ends. Curves have keys before or after, which a player does not show.";
     FbxScaleNodes = "W704", "nodes that carry scales", "In FBX a node may keep its scale from its children. Where that changes something, the scale gets a node of its own beside them.";
     FbxWild = "W705", "a curve that is not followed", "Between two keys it changes so fast that a thousand times as many keys do not follow it within the bound.";
     FbxRests = "W706", "a stack that moves nothing", "It has no curves of nodes; each node rests at its one key.";
+    McapCut = "W801", "a log that is cut", "It ends within a record, as when its writer lost power. What is before is read.";
+    McapOthers = "W802", "topics of other types", "They hold no poses, or messages that are not in CDR.";
     FbxOdd = "W707", "an oddity that was mended", "The library that reads FBX found something that is not as it should be, and goes on.";
 }
 

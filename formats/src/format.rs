@@ -15,6 +15,9 @@ use crate::fbx;
 use crate::feature::{self, Feature};
 use crate::gltf::skins::CarriedMesh;
 use crate::keys::Duplicates;
+use crate::kitti::FrameTimes;
+#[cfg(feature = "mcap")]
+use crate::mcap;
 use crate::motion::{Motion, Sampled};
 use crate::npy::ComponentOrder;
 use crate::poses::Poses;
@@ -23,7 +26,7 @@ use crate::source::{START, Source};
 use crate::text::lines::Limits;
 #[cfg(feature = "parquet")]
 use crate::{arrow, parquet};
-use crate::{bvh, csv, dat, gltf, kitti, npy, npz, tum};
+use crate::{bvh, csv, dat, euroc, gltf, kitti, npy, npz, tum};
 
 /// Every format. All of them are read. Inputs are known by their first bytes, then by the ending of
 /// their name; the first format is that of inputs which tell neither way, the first of
@@ -42,10 +45,16 @@ pub static FORMATS: [&Format; COUNT] = [
     &arrow::FORMAT,
     &csv::FORMAT,
     &tum::FORMAT,
+    &euroc::FORMAT,
     &kitti::FORMAT,
+    #[cfg(feature = "mcap")]
+    &mcap::FORMAT,
 ];
 
-const COUNT: usize = 8 + 2 * cfg!(feature = "parquet") as usize + cfg!(feature = "fbx") as usize;
+const COUNT: usize = 9
+    + 2 * cfg!(feature = "parquet") as usize
+    + cfg!(feature = "fbx") as usize
+    + cfg!(feature = "mcap") as usize;
 
 /// A file format.
 pub struct Format {
@@ -80,6 +89,8 @@ pub enum FormatOption {
     Duplicates,
     /// [`ReadOptions::source_rate`].
     SourceRate,
+    /// [`ReadOptions::frame_times`] and [`MotionOptions::times_apart`].
+    TimesApart,
     /// [`ReadOptions::map`].
     Map,
     /// [`ReadOptions::time_unit`].
@@ -98,6 +109,8 @@ pub enum FormatOption {
     BoxLength,
     /// [`Sampled::of_own_keys`].
     OwnKeys,
+    /// [`MotionOptions::quantize`] and [`MotionOptions::meshopt`].
+    Quantize,
 }
 
 impl FormatOption {
@@ -141,6 +154,9 @@ pub struct ReadOptions {
     pub duplicates: Duplicates,
     /// The rate of the keys, for files that do not say it.
     pub source_rate: Option<FrameRate>,
+    /// The times of the poses, for files that do not say them and whose format has them in a file of their own
+    /// (KITTI).
+    pub frame_times: Option<Arc<FrameTimes>>,
     /// Which of a file's columns or arrays are what, for files that do not say it:
     /// `rotations=keys:wxyz,time=t`.
     pub map: Option<String>,
@@ -291,6 +307,13 @@ pub struct MotionOptions {
     pub order: Option<ComponentOrder>,
     /// The length of each box, for chains of boxes [default: 1].
     pub box_length: Option<f64>,
+    /// The times are written into a file of their own ([`write_frame_times`](crate::kitti::write_frame_times)),
+    /// for formats that have none (KITTI).
+    pub times_apart: bool,
+    /// Rotations have 16 bits a component instead of f32 (glTF); those of cubics with tangents stay f32.
+    pub quantize: bool,
+    /// Animations are compressed by `EXT_meshopt_compression` (glTF).
+    pub meshopt: bool,
 }
 
 /// Why samples could not be written.

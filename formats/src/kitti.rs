@@ -1,37 +1,97 @@
 //! Trajectories as the KITTI odometry benchmark has them: twelve numbers a line, the rows of a
-//! rotation matrix with a translation, `r11 r12 r13 tx r21 r22 r23 ty r31 r32 r33 tz`, one line a frame.
+//! rotation matrix with a translation, `r11 r12 r13 tx r21 r22 r23 ty r31 r32 r33 tz`, one line a frame. When
+//! the frames are stands in a file of its own, a number of seconds a line.
 
-use std::io::BufRead;
+use std::fmt::Write as _;
+use std::io::{self, BufRead, Write};
 use std::path::Path;
 
-use glam::DVec3;
-use tumble::{TrackError, TrackSet};
+use glam::{DMat3, DQuat, DVec3};
 
+use crate::decimal::Decimal;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::feature::Feature;
-use crate::format::{Format, FormatOption, Loaded, ReadOptions};
-use crate::motion::{Joint, Motion, Transform};
-use crate::quaternion::rounded;
+use crate::format::{Format, FormatOption, Loaded, MotionOptions, ReadOptions, WriteError};
+use crate::motion::Sampled;
 use crate::rotation_matrix::of_matrix;
-use crate::signs::continue_signs;
 use crate::source::Source;
-use crate::text::lines::{Lines, tokens};
+use crate::text::lines::{Limits, Lines, tokens};
 use crate::text::number;
-use crate::tum::BODY;
+use crate::tum::{Poses, Trajectory, places};
 
 /// A path of one body, without times.
 pub static FORMAT: Format = Format {
     name: "kitti",
-    summary: "a trajectory, the rows of a matrix a line, without times",
+    summary: "a trajectory, the rows of a matrix a line, times apart",
     extensions: &[],
     probe: |_| false,
     read: open_kitti,
     read_bytes: |name, bytes, options| read_kitti(name, &bytes[..], options),
     write: None,
-    write_motion: None,
+    write_motion: Some(write_motion),
     features: &[Feature::Translations],
-    options: &[FormatOption::SourceRate],
+    options: &[
+        FormatOption::SourceRate,
+        FormatOption::TimesApart,
+        FormatOption::RawTimes,
+        FormatOption::Duplicates,
+    ],
 };
+
+/// The times of frames, as a file has them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FrameTimes {
+    times: Vec<Decimal>,
+    /// The most decimals of one.
+    places: u32,
+}
+
+/// Reads the times of frames: numbers of seconds, a line each; `-` is standard input.
+///
+/// # Errors
+/// The first fault that refuses the file.
+pub fn open_frame_times(path: &Path, limits: Limits) -> Result<FrameTimes, Diagnostic> {
+    let mut source = Source::open(path, true)?;
+    let name = source.name.clone();
+    let times = read_frame_times(&name, &mut source.reader, limits)?;
+    source.check_unchanged()?;
+    Ok(times)
+}
+
+/// Reads the times of frames; `name` is what messages call the input.
+///
+/// # Errors
+/// The first fault that refuses the input.
+pub fn read_frame_times(
+    name: &str,
+    reader: impl BufRead,
+    limits: Limits,
+) -> Result<FrameTimes, Diagnostic> {
+    let mut lines = Lines::with_names(name, reader, limits)?;
+    let mut found = FrameTimes {
+        times: Vec::new(),
+        places: 0,
+    };
+    while let Some(line) = lines.next()? {
+        let text = line.split('#').next().unwrap_or_default().replace(',', " ");
+        for (column, token) in tokens(&text) {
+            let read = number::parse(token);
+            read.map_err(|(code, message)| lines.refuse(column, code, message))?;
+            let Some(time) = Decimal::parse(token) else {
+                let message = format!("the time {token} is out of range");
+                return Err(lines.refuse(column, Code::TumTime, message));
+            };
+            found.places = found.places.max(places(token, 0));
+            found.times.push(time);
+        }
+        lines.reuse(line);
+    }
+    if found.times.is_empty() {
+        let message = "no times; write the seconds of each frame, one a line".to_owned();
+        return Err(lines.refuse_end(Code::Time, message));
+    }
+    Ok(found)
+}
 
 fn open_kitti(path: &Path, options: &ReadOptions) -> Result<Loaded, Diagnostic> {
     let mut source = Source::open(path, options.pipes)?;
@@ -41,22 +101,23 @@ fn open_kitti(path: &Path, options: &ReadOptions) -> Result<Loaded, Diagnostic> 
     Ok(loaded)
 }
 
-/// Reads poses, one a frame of the rate that the options say; the one track is named `body`.
+/// Reads poses, one a frame of the rate that the options say or at the times that they name; the one track is
+/// named `body`.
 ///
 /// # Errors
-/// The first fault that refuses the input; options without a rate are one.
+/// The first fault that refuses the input; options with neither a rate nor times are one.
 pub fn read_kitti(
     name: &str,
     reader: impl BufRead,
     options: &ReadOptions,
 ) -> Result<Loaded, Diagnostic> {
     let mut lines = Lines::with_names(name, reader, options.limits)?;
-    let Some(rate) = options.source_rate else {
-        let message =
-            "KITTI's poses have no times; give --source-fps, their rate (in Python source_fps)";
+    if options.source_rate.is_none() && options.frame_times.is_none() {
+        let message = "KITTI's poses have no times; give --source-fps, their rate, or --source-times, a file \
+                       of them";
         return Err(Diagnostic::new(name, Code::NoRate, message));
-    };
-    let (mut rotations, mut positions) = (Vec::new(), Vec::new());
+    }
+    let mut poses = Poses::default();
     while let Some(line) = lines.next()? {
         let text = line.split('#').next().unwrap_or_default().replace(',', " ");
         if !text.trim().is_empty() {
@@ -66,33 +127,43 @@ pub fn read_kitti(
                 let message = "the first three columns of the matrix are no rotation".to_owned();
                 return Err(lines.refuse(1, Code::NoRotation, message));
             };
-            rotations.push(rounded(rotation));
-            positions.push(DVec3::new(a[3], b[3], c[3]));
+            // A matrix has no sign.
+            let last = poses.rotations.last();
+            let turns_back = last.is_some_and(|last: &DQuat| last.dot(rotation) < 0.0);
+            poses
+                .rotations
+                .push(if turns_back { -rotation } else { rotation });
+            poses.positions.push(DVec3::new(a[3], b[3], c[3]));
+            poses.lines.push(lines.number);
         }
         lines.reuse(line);
     }
-    if rotations.is_empty() {
+    let count = poses.rotations.len();
+    if count == 0 {
         let message = "no poses; a line is the three rows of a matrix".to_owned();
         return Err(lines.refuse_end(Code::TumEmpty, message));
     }
-    continue_signs(&mut rotations, 1);
-    let times: Vec<f64> = (0..rotations.len() as u64)
-        .map(|frame| rate.time_of(frame))
-        .collect();
-    let mut set = TrackSet::new();
-    let refuse = |error: TrackError| Diagnostic::new(name, Code::KittiPose, error.to_string());
-    set.push(BODY, &times, &rotations).map_err(refuse)?;
-    let mut clip = Motion {
-        set,
-        skeleton: vec![Joint {
-            parent: None,
-            rest: Transform::default(),
-        }],
-        rate: Some(rate),
-        ..Motion::default()
-    };
-    clip.set_positions(0, &times, &positions).map_err(refuse)?;
-    Ok(Loaded::of(clip, lines.warnings))
+    match (&options.frame_times, options.source_rate) {
+        (Some(found), _) => {
+            if found.times.len() != count {
+                let message = format!(
+                    "{count} poses, and {} times for them; is it another sequence's file of times?",
+                    found.times.len()
+                );
+                return Err(Diagnostic::new(name, Code::FrameTimes, message));
+            }
+            poses.times.clone_from(&found.times);
+            poses.places = found.places;
+            poses.into_clip(name, lines.warnings, options)
+        }
+        (None, Some(rate)) => {
+            let times = (0..count as u64).map(|frame| rate.time_of(frame)).collect();
+            let mut loaded = poses.at(name, 0, times, lines.warnings, options)?;
+            loaded.clips[0].rate = Some(rate);
+            Ok(loaded)
+        }
+        (None, None) => unreachable!("refused above"),
+    }
 }
 
 fn read_rows<R: BufRead>(lines: &Lines<R>, line: &str) -> Result<[[f64; 4]; 3], Diagnostic> {
@@ -113,11 +184,77 @@ fn read_rows<R: BufRead>(lines: &Lines<R>, line: &str) -> Result<[[f64; 4]; 3], 
     Ok(rows)
 }
 
+/// Decimals of a matrix' numbers: read back, they are the same rotation in f32.
+const DECIMALS: usize = 12;
+
+/// Writes the poses of one clip of one track. Their times go into a file of their own
+/// ([`write_frame_times`]), where there is one; else they are frames of a rate, which is said.
+fn write_motion(
+    clips: &[Sampled<'_>],
+    options: &MotionOptions,
+    out: &mut dyn Write,
+) -> Result<Vec<Diagnostic>, WriteError> {
+    let path = Trajectory::of(clips, options)?;
+    let mut warnings = Vec::new();
+    if !options.times_apart {
+        let Some(rate) = path.sampled.rate else {
+            let message = "its times are no frames of a rate, and KITTI has no times; give --times-out, a file of them";
+            return Err(path.refuse(message.to_owned()));
+        };
+        let first = path.sampled.time_digits(0).unwrap_or_default();
+        let message = format!(
+            "KITTI has no times; left out: poses come at {rate} a second, from {first} s on (--times-out writes them)"
+        );
+        warnings.push(Diagnostic::new(&options.name, Code::NoRoom, message));
+    }
+    let mut text = String::new();
+    for sample in 0..path.sampled.times.len() {
+        let (rotation, position) = path.pose(sample)?;
+        let rows = DMat3::from_quat(rotation.as_dquat().normalize()).transpose();
+        let each = rows.to_cols_array_2d().into_iter().zip(position);
+        for (row, (numbers, position)) in each.enumerate() {
+            let blank = if row == 0 { "" } else { " " };
+            let [a, b, c] = numbers.map(decimals);
+            let _ = write!(text, "{blank}{a} {b} {c} {position}"); // memory takes everything
+        }
+        text.push('\n');
+        out.write_all(text.as_bytes())?;
+        text.clear();
+    }
+    Ok(warnings)
+}
+
+/// A number of a matrix, without zeros at its end.
+fn decimals(number: f64) -> String {
+    let text = format!("{number:.DECIMALS$}");
+    let text = text.trim_end_matches('0').trim_end_matches('.');
+    if text == "-0" { "0" } else { text }.to_owned()
+}
+
+/// Writes the times of a clip's samples, a line each.
+///
+/// # Errors
+/// When writing fails, or (`InvalidInput`) a time is out of range.
+pub fn write_frame_times(sampled: &Sampled<'_>, out: &mut dyn Write) -> io::Result<()> {
+    for sample in 0..sampled.times.len() {
+        let Some(digits) = sampled.time_digits(sample) else {
+            let message = format!("the time {} s is out of range", sampled.times[sample]);
+            return Err(io::Error::new(io::ErrorKind::InvalidInput, message));
+        };
+        writeln!(out, "{digits}")?;
+    }
+    Ok(())
+}
+
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use glam::Vec3;
 
     use super::*;
+    use crate::keyed::keyed;
+    use crate::motion::Motion;
 
     #[test]
     fn rows_of_matrices_are_poses_at_a_rate() {
@@ -148,5 +285,77 @@ mod tests {
         let mirrored = "1 0 0 0 0 1 0 0 0 0 -1 0\n";
         assert_eq!(refused(mirrored, &options), Code::NoRotation);
         assert_eq!(refused("\n", &options), Code::TumEmpty);
+    }
+
+    fn write(
+        clip: &Motion,
+        options: &MotionOptions,
+    ) -> Result<(String, Vec<Diagnostic>), WriteError> {
+        let samples = keyed(clip).unwrap();
+        let mut out = Vec::new();
+        let sampled = [samples.of(clip, clip.rate, &[])];
+        let warnings = FORMAT.write_clips(&sampled, options, &mut out)?;
+        let mut times = Vec::new();
+        write_frame_times(&sampled[0], &mut times).unwrap();
+        out.extend(times);
+        Ok((String::from_utf8(out).unwrap(), warnings))
+    }
+
+    /// Times of their own, which lie on no frames, and seconds since 1970 among them.
+    #[test]
+    fn poses_have_the_times_of_a_file() {
+        let poses = "1 0 0 1.5 0 1 0 -2 0 0 1 3\n0 -1 0 2 1 0 0 0 0 0 1 0\n0.8 -0.6 0 0 0.6 0.8 0 0 0 0 1 0\n";
+        let times = "1.305031098665900000e+09\n1305031098.7\n1305031099.25\n";
+        let read = |poses: &str, times: &str| {
+            let times = read_frame_times("times.txt", times.as_bytes(), Limits::default())?;
+            let options = ReadOptions {
+                frame_times: Some(Arc::new(times)),
+                ..ReadOptions::default()
+            };
+            read_kitti("k.txt", poses.as_bytes(), &options)
+        };
+        let clip = &read(poses, times).unwrap().clips[0];
+        assert_eq!(clip.time_offset, 1_305_031_098);
+        assert_eq!(clip.set.track(0).times, [0.6659, 0.7, 1.25]);
+        let apart = MotionOptions {
+            times_apart: true,
+            ..MotionOptions::default()
+        };
+        let (text, warnings) = write(clip, &apart).unwrap();
+        assert_eq!(warnings, []);
+        let (matrices, own) = text.split_at(text.find("1305").unwrap());
+        assert_eq!(
+            own,
+            "1305031098.665900000\n1305031098.700000000\n1305031099.250000000\n"
+        );
+        let again = &read(matrices, own).unwrap().clips[0];
+        assert_eq!(again.set.track(0).times, clip.set.track(0).times);
+        assert_eq!(again.set.track(0).keys, clip.set.track(0).keys);
+        // Without a file of times such poses cannot be told.
+        let refused = write(clip, &MotionOptions::default());
+        assert!(matches!(refused, Err(WriteError::Refused(fault)) if fault.code == Code::TumWrite));
+        let code = |poses: &str, times: &str| read(poses, times).unwrap_err().code;
+        assert_eq!(code(poses, "0\n1\n"), Code::FrameTimes);
+        assert_eq!(code(poses, "0\n1\n1\n"), Code::EqualTimes);
+        assert_eq!(code(poses, "0\n2\n1\n"), Code::TimeNotIncreasing);
+        assert_eq!(code(poses, "0\nx\n1\n"), Code::Number);
+        assert_eq!(code(poses, "0\n1e15\n1\n"), Code::TumTime);
+        assert_eq!(code(poses, "# none\n"), Code::Time);
+    }
+
+    #[test]
+    fn a_rate_is_said_where_times_are_not_written() {
+        let options = ReadOptions {
+            source_rate: tumble::FrameRate::new(10, 1).ok(),
+            ..ReadOptions::default()
+        };
+        let text = "1 0 0 1.5 0 1 0 -2 0 0 1 3\n0 -1 0 2 1 0 0 0 0 0 1 0\n";
+        let clip = &read_kitti("k.txt", text.as_bytes(), &options)
+            .unwrap()
+            .clips[0];
+        let (written, warnings) = write(clip, &MotionOptions::default()).unwrap();
+        assert_eq!(written, format!("{text}0\n0.1\n"));
+        assert_eq!(warnings[0].code, Code::NoRoom);
+        assert!(warnings[0].message.contains("10 a second, from 0 s"));
     }
 }

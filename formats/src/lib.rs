@@ -17,6 +17,7 @@ pub mod dat;
 mod decimal;
 mod dense;
 pub mod diagnostic;
+pub mod euroc;
 #[cfg(feature = "fbx")]
 pub mod fbx;
 pub mod feature;
@@ -29,6 +30,8 @@ pub mod keyed;
 pub mod keys;
 pub mod kitti;
 pub mod map;
+#[cfg(feature = "mcap")]
+pub mod mcap;
 pub mod motion;
 mod names;
 pub mod npy;

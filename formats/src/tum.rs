@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use std::io::{self, BufRead, Write};
 use std::path::Path;
 
-use glam::{DQuat, DVec3};
+use glam::{DQuat, DVec3, Quat};
 use tumble::{TrackError, TrackSet};
 
 use crate::decimal::Decimal;
@@ -25,6 +25,22 @@ use crate::warnings::Warnings;
 
 /// What the one track is called.
 pub(crate) const BODY: &str = "body";
+
+/// How a trajectory's line has a pose.
+pub(crate) struct PoseLine {
+    /// Its numbers, for messages.
+    pub(crate) numbers: &'static str,
+    /// w comes before the other components of the quaternion.
+    pub(crate) is_w_first: bool,
+    /// The unit of the times, where the format says it.
+    pub(crate) unit: Option<TimeUnit>,
+}
+
+const LINE: PoseLine = PoseLine {
+    numbers: "t x y z qx qy qz qw",
+    is_w_first: false,
+    unit: None,
+};
 
 /// A path of one body.
 pub static FORMAT: Format = Format {
@@ -75,20 +91,30 @@ pub fn read_tum(
     reader: impl BufRead,
     options: &ReadOptions,
 ) -> Result<Loaded, Diagnostic> {
+    read_lines(name, reader, options, &LINE)
+}
+
+/// Reads poses, one a line.
+pub(crate) fn read_lines(
+    name: &str,
+    reader: impl BufRead,
+    options: &ReadOptions,
+    format: &PoseLine,
+) -> Result<Loaded, Diagnostic> {
     let mut lines = Lines::with_names(name, reader, options.limits)?;
     let mut poses = Poses {
-        unit: options.time_unit,
+        unit: options.time_unit.or(format.unit),
         ..Poses::default()
     };
     while let Some(line) = lines.next()? {
         let numbers = line.split('#').next().unwrap_or_default();
         if !numbers.trim().is_empty() {
-            poses.read(&mut lines, numbers, &numbers.replace(',', " "))?;
+            poses.read(&mut lines, numbers, &numbers.replace(',', " "), format)?;
         }
         lines.reuse(line);
     }
     if poses.times.is_empty() {
-        let message = "no poses; a line is `t x y z qx qy qz qw`".to_owned();
+        let message = format!("no poses; a line is `{}`", format.numbers);
         return Err(lines.refuse_end(Code::TumEmpty, message));
     }
     poses.into_clip(name, lines.warnings, options)
@@ -97,19 +123,20 @@ pub fn read_tum(
 /// A first time of this many seconds, three billion years, is nanoseconds since 1970.
 const NANOSECONDS: f64 = 1e17;
 
+/// The poses of a body as a file has them.
 #[derive(Default)]
-struct Poses {
-    times: Vec<Decimal>,
+pub(crate) struct Poses {
+    pub(crate) times: Vec<Decimal>,
     /// The most decimals of a time in seconds.
-    places: u32,
+    pub(crate) places: u32,
     /// The numbers of a line, of the first one; 0 before it.
     columns: usize,
     /// The unit of the times.
     unit: Option<TimeUnit>,
-    positions: Vec<DVec3>,
-    rotations: Vec<DQuat>,
+    pub(crate) positions: Vec<DVec3>,
+    pub(crate) rotations: Vec<DQuat>,
     /// The line of each.
-    lines: Vec<u64>,
+    pub(crate) lines: Vec<u64>,
 }
 
 impl Poses {
@@ -119,6 +146,7 @@ impl Poses {
         lines: &mut Lines<R>,
         original: &str,
         line: &str,
+        format: &PoseLine,
     ) -> Result<(), Diagnostic> {
         let found = tokens(line).count();
         if self.columns == 0 && found > 8 && !has_decimal_commas(original) {
@@ -140,8 +168,10 @@ impl Poses {
             } else {
                 ""
             };
-            let message =
-                format!("{found} numbers where {columns} are expected: t x y z qx qy qz qw{more}");
+            let message = format!(
+                "{found} numbers where {columns} are expected: {}{more}",
+                format.numbers
+            );
             return Err(lines.refuse(column, Code::TumPose, message));
         }
         let mut numbers = [0.0; 8];
@@ -167,11 +197,10 @@ impl Poses {
             );
             return Err(lines.refuse(column, Code::TumTime, message));
         };
-        let places = last_place(token)
-            .saturating_add(power)
-            .min(0)
-            .unsigned_abs();
-        self.places = self.places.max(places);
+        self.places = self.places.max(places(token, power));
+        if format.is_w_first {
+            numbers[4..].rotate_left(1);
+        }
         let [_, x, y, z, qx, qy, qz, qw] = numbers;
         self.columns = columns;
         self.times.push(time);
@@ -181,9 +210,31 @@ impl Poses {
         Ok(())
     }
 
-    fn into_clip(
+    /// The clip. Times count from the whole second at or before the first.
+    pub(crate) fn into_clip(
         self,
         name: &str,
+        of_lines: Vec<Diagnostic>,
+        options: &ReadOptions,
+    ) -> Result<Loaded, Diagnostic> {
+        let offset = self.times[0].whole_seconds();
+        let mut times = [self.times.iter().map(|time| time.since(offset)).collect()];
+        let rate = match options.raw_times {
+            true => None,
+            false => restore(&mut times, Precision::Decimals(self.places)),
+        };
+        let [times] = times;
+        let mut loaded = self.at(name, offset, times, of_lines, options)?;
+        loaded.clips[0].rate = rate;
+        Ok(loaded)
+    }
+
+    /// The clip, whose poses are at these times, seconds from a whole second on.
+    pub(crate) fn at(
+        self,
+        name: &str,
+        offset: i64,
+        mut times: Vec<f64>,
         of_lines: Vec<Diagnostic>,
         options: &ReadOptions,
     ) -> Result<Loaded, Diagnostic> {
@@ -197,13 +248,6 @@ impl Poses {
             duplicates: options.duplicates,
         };
         let mut warnings = Warnings::new(name);
-        let offset = self.times[0].whole_seconds();
-        let mut times = [self.times.iter().map(|time| time.since(offset)).collect()];
-        let rate = match options.raw_times {
-            true => None,
-            false => restore(&mut times, Precision::Decimals(self.places)),
-        };
-        let [mut times] = times;
         let mut positions = self.positions;
         let mut keys = origin.unit(self.rotations, &mut warnings)?;
         let equal = |i: usize, j: usize| keys[i] == keys[j] && positions[i] == positions[j];
@@ -229,7 +273,6 @@ impl Poses {
                 parent: None,
                 rest: Transform::default(),
             }],
-            rate,
             time_offset: offset,
             ..Motion::default()
         };
@@ -241,10 +284,80 @@ impl Poses {
     }
 }
 
+/// How many decimals a number has in a unit of `10^power` seconds, as seconds.
+pub(crate) fn places(token: &str, power: i32) -> u32 {
+    last_place(token)
+        .saturating_add(power)
+        .min(0)
+        .unsigned_abs()
+}
+
 /// Whether commas within numbers look like decimal ones: blanks separate numbers, and commas too.
 fn has_decimal_commas(line: &str) -> bool {
     let mut words = line.split_whitespace();
     line.split_whitespace().count() > 1 && words.any(|word| word.trim_matches(',').contains(','))
+}
+
+/// The samples of the one track of one clip, which are to be written as a trajectory.
+pub(crate) struct Trajectory<'a> {
+    pub(crate) sampled: &'a Sampled<'a>,
+    options: &'a MotionOptions,
+}
+
+impl<'a> Trajectory<'a> {
+    /// # Errors
+    /// When there is not one clip of one track, or lists of samples differ in length.
+    pub(crate) fn of(
+        clips: &'a [Sampled<'a>],
+        options: &'a MotionOptions,
+    ) -> Result<Self, WriteError> {
+        let refuse = |message: String| Diagnostic::new(&options.name, Code::TumWrite, message);
+        let [sampled] = clips else {
+            let message = format!("{} clips; a trajectory is one, choose one", clips.len());
+            return Err(refuse(message).into());
+        };
+        let tracks = sampled.clip.set.track_count();
+        if tracks != 1 {
+            let message = format!("{tracks} tracks; a trajectory is one, choose one");
+            return Err(refuse(message).into());
+        }
+        let samples = sampled.times.len();
+        let fits = |count: usize| count == 0 || count == samples;
+        if sampled.rotations.len() != samples
+            || !fits(sampled.translations.len())
+            || !fits(sampled.scales.len())
+        {
+            let message = "lists of samples whose lengths are not those of times and tracks";
+            return Err(io::Error::new(io::ErrorKind::InvalidInput, message).into());
+        }
+        Ok(Self { sampled, options })
+    }
+
+    pub(crate) fn refuse(&self, message: String) -> WriteError {
+        Diagnostic::new(&self.options.name, Code::TumWrite, message).into()
+    }
+
+    /// The rotation of a sample and the digits of its position.
+    ///
+    /// # Errors
+    /// When one is not finite.
+    pub(crate) fn pose(&self, sample: usize) -> Result<(Quat, [String; 3]), WriteError> {
+        let position = self.sampled.translation(sample, 0);
+        let rotation = self.sampled.rotations[sample];
+        if !position.is_finite() || !rotation.is_finite() {
+            let time = self.sampled.times[sample];
+            return Err(self.refuse(format!("the pose at {time} s is not finite")));
+        }
+        let normal = |number: f32| if number.is_normal() { number } else { 0.0 };
+        let rotation = Quat::from_array(rotation.to_array().map(normal));
+        Ok((rotation, self.sampled.coordinates(sample, 0)))
+    }
+
+    /// What is said of a time that no file holds.
+    pub(crate) fn out_of_range(&self, sample: usize) -> WriteError {
+        let time = self.sampled.times[sample];
+        self.refuse(format!("the time {time} s is out of range"))
+    }
 }
 
 /// Writes one clip of one track. Times keep all digits, also those that count from 1970; the other
@@ -254,50 +367,20 @@ fn write_motion(
     options: &MotionOptions,
     out: &mut dyn Write,
 ) -> Result<Vec<Diagnostic>, WriteError> {
-    let refuse = |message: String| Diagnostic::new(&options.name, Code::TumWrite, message);
-    let [sampled] = clips else {
-        let message = format!("{} clips; a trajectory is one, choose one", clips.len());
-        return Err(refuse(message).into());
-    };
-    let tracks = sampled.clip.set.track_count();
-    if tracks != 1 {
-        let message = format!("{tracks} tracks; a trajectory is one, choose one");
-        return Err(refuse(message).into());
-    }
-    let samples = sampled.times.len();
-    let fits = |count: usize| count == 0 || count == samples;
-    if sampled.rotations.len() != samples
-        || !fits(sampled.translations.len())
-        || !fits(sampled.scales.len())
-    {
-        let message = "lists of samples whose lengths are not those of times and tracks";
-        return Err(io::Error::new(io::ErrorKind::InvalidInput, message).into());
-    }
+    let path = Trajectory::of(clips, options)?;
     let mut text = String::from("# timestamp tx ty tz qx qy qz qw\n");
-    for (key, value) in sampled.notes {
+    for (key, value) in path.sampled.notes {
         let value = value.replace(char::is_control, " ");
         text += &format!("# {key}: {value}\n");
     }
-    for (sample, &time) in sampled.times.iter().enumerate() {
-        let Some(digits) = sampled.time_digits(sample) else {
-            let message = format!("the time {time} s is out of range");
-            return Err(refuse(message).into());
-        };
-        let position = sampled.translation(sample, 0);
-        let rotation = sampled.rotations[sample];
-        if !position.is_finite() || !rotation.is_finite() {
-            let message = format!("the pose at {time} s is not finite");
-            return Err(refuse(message).into());
-        }
-        let _ = write!(text, "{digits}"); // memory takes everything
-        for number in sampled.coordinates(sample, 0) {
-            let _ = write!(text, " {number}");
-        }
-        for number in rotation.to_array() {
-            let number = if number.is_normal() { number } else { 0.0 };
-            let _ = write!(text, " {number}");
-        }
-        text.push('\n');
+    for sample in 0..path.sampled.times.len() {
+        let digits = path.sampled.time_digits(sample);
+        let digits = digits.ok_or_else(|| path.out_of_range(sample))?;
+        let (rotation, position) = path.pose(sample)?;
+        let [x, y, z] = position;
+        let [qx, qy, qz, qw] = rotation.to_array();
+        // Memory takes everything.
+        let _ = writeln!(text, "{digits} {x} {y} {z} {qx} {qy} {qz} {qw}");
         out.write_all(text.as_bytes())?;
         text.clear();
     }

@@ -19,6 +19,7 @@ mod gltf_times;
 mod gltf_values;
 mod kept;
 mod maps;
+mod mcap;
 mod npz;
 mod origins;
 mod readme;

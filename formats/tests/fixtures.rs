@@ -102,6 +102,7 @@ fn every_code_of_a_file_is_shown_by_a_fixture_or_a_test() {
         Code::NoRoom,
         Code::StaysWhole,
         Code::KittiPose,
+        Code::FrameTimes,
         Code::NoRotation,
         Code::Mesh,
         Code::Net,

@@ -5,11 +5,14 @@ use std::path::Path;
 use glam::{DVec3, Quat, Vec3};
 use tumble::reduce::ReducedCurve;
 use tumble::{Channel, Device, Engine, Frames, Interpolation};
-use tumble_formats::motion::{Channels, Joint, Motion, Sampler, Transform};
+use tumble_formats::format::MotionOptions;
+use tumble_formats::motion::{Channels, Joint, Motion, Sampled, Sampler, Transform};
 use tumble_formats::reduce::{ReduceMotionError, ReduceOptions, Reduced, reduce};
 use tumble_formats::sample::ChannelMethods;
 use tumble_formats::world::{WorldPose, world};
 use tumble_formats::{Format, ReadOptions};
+
+use crate::validator::validate;
 
 const TENTH: f64 = 0.1 * std::f64::consts::PI / 180.0;
 
@@ -20,6 +23,7 @@ fn options(curve: ReducedCurve) -> ReduceOptions {
         distance: None,
         shell: 0.0,
         together: false,
+        quantize: false,
     }
 }
 
@@ -191,6 +195,81 @@ fn steps_rests_and_scales_are_kept() {
         assert_eq!(set.vector_keys(Channel::Scale, 0).unwrap().times.len(), 2);
         assert!(reduced.keys[1] < reduced.keys[0] / 2, "{:?}", reduced.keys);
     }
+}
+
+/// What is read of rotations of 16 bits is within the bounds, compressed or not, and a file is smaller; the
+/// validator finds nothing in it.
+#[test]
+fn rotations_of_16_bits_stay_within_the_bounds() {
+    let engine = Engine::new(Device::Cpu).unwrap();
+    let mut clip = chain();
+    clip.skeleton[3].rest.rotation = clip.set.track(3).keys[0];
+    let folder = tempfile::tempdir().unwrap();
+    let (mut files, mut sizes) = (Vec::new(), Vec::new());
+    for (quantize, meshopt) in [(false, false), (true, false), (true, true)] {
+        let options = ReduceOptions {
+            quantize,
+            ..options(ReducedCurve::Linear)
+        };
+        let reduced = reduce(&clip, &engine, &options).unwrap();
+        let ends = reduced.clip.ends(&engine).unwrap();
+        let sampled = Sampled {
+            of_own_keys: true,
+            ..ends.of(&reduced.clip, None, &[])
+        };
+        let mut bytes = Vec::new();
+        let motion = MotionOptions {
+            quantize,
+            meshopt,
+            ..MotionOptions::default()
+        };
+        let glb = Format::named("glb").unwrap();
+        glb.write_clips(&[sampled], &motion, &mut bytes).unwrap();
+        sizes.push(bytes.len());
+        let file = folder.path().join(format!("{quantize}{meshopt}.glb"));
+        std::fs::write(&file, &bytes).unwrap();
+        let loaded = glb.open(&file, &ReadOptions::default()).unwrap();
+        assert_eq!(loaded.warnings, []);
+        let [again] = &loaded.clips[..] else {
+            panic!("{}", loaded.clips.len());
+        };
+        let found = apart(&clip, again, 0.0);
+        assert!(found[0] <= TENTH + 1e-7, "{found:?}");
+        assert!(found[1] <= reduced.bounds[1] * (1.0 + 1e-6), "{found:?}");
+        // What is told is what is read.
+        let told = reduced.errors.iter().map(|own| own[0]).fold(0.0, f64::max);
+        assert!((told - found[0]).abs() < 2e-7, "{told:e} {found:?}");
+        let off = |track: usize| {
+            let pairs = again
+                .set
+                .track(track)
+                .keys
+                .iter()
+                .zip(reduced.clip.set.track(track).keys);
+            pairs
+                .map(|(a, b)| (*a - *b).length().min((*a + *b).length()))
+                .fold(0.0, f32::max)
+        };
+        assert_eq!(off(0) > 1e-6, quantize, "{:e}", off(0));
+        assert_eq!(again.set.track(3).keys, reduced.clip.set.track(3).keys);
+        files.push(file);
+    }
+    // So short a file is mostly text.
+    assert!(sizes[1] < sizes[0] && sizes[2] < sizes[0], "{sizes:?}");
+    for report in validate(&files).into_iter().flatten() {
+        assert_eq!(report.errors, [] as [String; 0]);
+    }
+    // Half a step of 16 bits is more than this.
+    let fine = ReduceOptions {
+        angle: 1e-5,
+        quantize: true,
+        ..options(ReducedCurve::Linear)
+    };
+    let refused = reduce(&clip, &engine, &fine).unwrap_err().to_string();
+    assert!(
+        refused.contains("keys are of 16 bits: give a larger one"),
+        "{refused}"
+    );
 }
 
 #[test]

@@ -112,11 +112,13 @@ fn files_are_known_by_their_heading_or_ending() {
         "tum"
     );
     assert_eq!(detect("path.tum", "0 0 0 0 0 0 0 1\n"), "tum");
-    // EuRoC's, which is a table.
-    assert_eq!(
-        detect("data.csv", "#timestamp [ns],p_RS_R_x [m],p_RS_R_y [m]"),
-        "csv"
-    );
+    // EuRoC's positions alone are a table.
+    let positions = "#timestamp [ns],p_RS_R_x [m],p_RS_R_y [m],p_RS_R_z [m]";
+    assert_eq!(detect("data.csv", positions), "csv");
+    let poses = format!("{positions},q_RS_w [],q_RS_x [],q_RS_y [],q_RS_z []\n");
+    assert_eq!(detect("data.csv", &poses), "euroc");
+    let turned = format!("{positions},q_RS_x [],q_RS_y [],q_RS_z [],q_RS_w []\n");
+    assert_eq!(detect("data.csv", &turned), "csv");
     assert_eq!(detect("a.dat", "# 4 3.0\n# tx ty tz"), "dat");
 }
 

@@ -3,10 +3,12 @@
 use glam::{Quat, Vec3};
 use tumble::FrameRate;
 use tumble_formats::bvh::{self, read_bvh};
+use tumble_formats::euroc::{self, read_euroc};
 use tumble_formats::fbx::read_fbx;
 use tumble_formats::format::{Format, Loaded, MotionOptions};
 use tumble_formats::keyed::keyed;
-use tumble_formats::kitti::read_kitti;
+use tumble_formats::kitti::{self, read_kitti};
+use tumble_formats::mcap::read_mcap;
 use tumble_formats::motion::Motion;
 use tumble_formats::tum::{self, read_tum};
 use tumble_formats::{Diagnostic, Limits, ReadOptions};
@@ -125,27 +127,76 @@ pub(crate) fn fbx(bytes: &[u8]) -> u64 {
     ))
 }
 
-/// The reader of matrices: poses of unit rotations, one for each frame.
+/// The reader of matrices: poses of unit rotations, one for each frame, which read back nearly the same when they
+/// are written.
 pub(crate) fn kitti(bytes: &[u8]) -> u64 {
     let options = ReadOptions {
         source_rate: FrameRate::new(10, 1).ok(),
         ..options()
     };
-    let loaded = match read_kitti("fuzz", bytes, &options) {
+    let read = read_kitti("fuzz", bytes, &options);
+    let (clip, out, of) = match written(bytes, read, &kitti::FORMAT) {
+        Ok(found) => found,
+        Err(refused) => return refused,
+    };
+    let again = read_kitti("fuzz", &*out, &options).expect("our own");
+    are_alike(&again.clips[0], &clip);
+    let rotations = |clip: &Motion| keyed(clip).expect("one list of times").rotations;
+    for (found, wanted) in rotations(&again.clips[0]).into_iter().zip(rotations(&clip)) {
+        let off = 1.0 - found.as_dquat().dot(wanted.as_dquat()).abs();
+        assert!(off < 1e-6, "{wanted} {off:e}");
+    }
+    of
+}
+
+/// The parser of EuRoC's trajectories: what it takes is written again, at the nearest nanoseconds.
+pub(crate) fn euroc(bytes: &[u8]) -> u64 {
+    let read = read_euroc("fuzz", bytes, &options());
+    let loaded = match read {
         Ok(loaded) => loaded,
         Err(error) => {
             place_is_inside(bytes, &error);
+            assert!(!error.message.is_empty());
             let hint: String = error.message.chars().rev().take(12).collect();
             return signature((error.code, hint));
         }
     };
-    let track = loaded.clips[0].set.track(0);
-    assert_eq!(track.times.len(), track.keys.len());
-    for key in track.keys {
-        assert!((key.as_dquat().length() - 1.0).abs() < 1e-6, "{key}");
+    let clip = &loaded.clips[0];
+    let samples = keyed(clip).expect("one list of times");
+    let mut out = Vec::new();
+    let sampled = [samples.of(clip, clip.rate, &[])];
+    let written = euroc::FORMAT.write_clips(&sampled, &MotionOptions::default(), &mut out);
+    // Text may have more digits than nanoseconds.
+    let Ok(_) = written else {
+        return signature("times in one nanosecond");
+    };
+    let again = read_euroc("fuzz", &*out, &ReadOptions::default()).expect("our own");
+    let found = keyed(&again.clips[0]).expect("one list of times");
+    assert_eq!(found.rotations, samples.rotations);
+    assert_eq!(found.translations.len(), samples.translations.len());
+    let codes: Vec<_> = loaded.warnings.iter().map(|own| own.code).collect();
+    signature((codes, samples.times.len().min(5)))
+}
+
+/// The reader of logs: unit rotations at increasing times.
+pub(crate) fn mcap(bytes: &[u8]) -> u64 {
+    let loaded = match read_mcap("fuzz", bytes, &options()) {
+        Ok(loaded) => loaded,
+        Err(error) => {
+            assert!(!error.message.is_empty());
+            return signature(error.code);
+        }
+    };
+    let clip = &loaded.clips[0];
+    for track in clip.set.tracks() {
+        assert!(track.times.windows(2).all(|pair| pair[0] < pair[1]));
+        for key in track.keys {
+            assert!((key.as_dquat().length() - 1.0).abs() < 1e-6, "{key}");
+        }
     }
     let codes: Vec<_> = loaded.warnings.iter().map(|own| own.code).collect();
-    signature((codes, track.keys.len().min(5)))
+    let refused: Vec<_> = loaded.refused.iter().map(|own| own.code).collect();
+    signature((codes, refused, clip.set.track_count().min(5)))
 }
 
 /// The trajectory parser: what it takes reads back bit for bit when it is written, with signs that

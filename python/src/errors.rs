@@ -101,7 +101,7 @@ pub(crate) fn input_at(message: &str, code: Code, pointer: String) -> PyErr {
 /// A message of the program's with the keywords of Python in the place of options: `--map time=NAME` is
 /// `map="time=NAME"`.
 pub(crate) fn in_python(message: &str) -> String {
-    const WORDS: [(&str, &str); 9] = [
+    const WORDS: [(&str, &str); 8] = [
         (
             "--time-unit s, ms, us or ns",
             r#"time_unit="s", "ms", "us" or "ns""#,
@@ -119,10 +119,6 @@ pub(crate) fn in_python(message: &str) -> String {
             r#"duplicates="first" or "last""#,
         ),
         ("--linear NAME, in Python linear=[NAME]", "linear=[NAME]"),
-        (
-            "--source-fps, their rate (in Python source_fps)",
-            "source_fps, their rate",
-        ),
         (
             "use -m bessel-overhauser",
             r#"use method="bessel-overhauser""#,

@@ -9,6 +9,7 @@ use pyo3::types::{PyString, PyTuple};
 use tumble_formats::adjust::{UpAxis, adjust_all, set_offsets};
 use tumble_formats::format::TimeUnit;
 use tumble_formats::keys::Duplicates;
+use tumble_formats::kitti::open_frame_times;
 use tumble_formats::npz::body_offsets;
 use tumble_formats::{Format, Limits, Loaded, ReadOptions};
 
@@ -152,15 +153,15 @@ impl File {
     }
 }
 
-/// Reads a motion file of any format: glTF and GLB, BVH, FBX, NPZ and NPY, Parquet, Arrow, CSV, TUM,
-/// `.dat`. What is remarkable about it becomes an `InputWarning`; what is wrong, an `InputError`
+/// Reads a motion file of any format: glTF and GLB, BVH, FBX, NPZ and NPY, Parquet, Arrow, CSV, TUM, EuRoC,
+/// KITTI, `.dat`. What is remarkable about it becomes an `InputWarning`; what is wrong, an `InputError`
 /// with the place.
 ///
-/// `load(path, *, format=None, source_fps=None, map=None, time_unit=None, duplicates=None,
+/// `load(path, *, format=None, source_fps=None, source_times=None, map=None, time_unit=None, duplicates=None,
 /// raw_times=False, bridge_gaps=False, keyframes=False, offsets=None, body_model=None, scale=None, up=None)`
 ///
 /// `format`: of the file, instead of by its first bytes and its name. `source_fps`: the rate of
-/// keys of files without times. `map`: which array or column is what, where names do not
+/// keys of files without times; `source_times`: a file of them, seconds a line, for KITTI. `map`: which array or column is what, where names do not
 /// tell: "rotations=keys:wxyz,time=t". `time_unit`: of times that are whole numbers, "s", "ms", "us"
 /// or "ns". A map has entries NAME=SOURCE, separated by commas: NAME is `rotations`, `translations` or
 /// `time` of arrays, a known column or a track's name of tables; SOURCE is an array, a column, a part of a list
@@ -183,7 +184,7 @@ impl File {
 /// tumble.MissingFileError: missing.glb: error[E001]: ...
 #[pyfunction]
 #[pyo3(signature = (
-    path, *, format=None, source_fps=None, map=None, time_unit=None, duplicates=None,
+    path, *, format=None, source_fps=None, source_times=None, map=None, time_unit=None, duplicates=None,
     raw_times=false, bridge_gaps=false, keyframes=false, offsets=None, body_model=None, scale=None, up=None
 ))]
 #[allow(clippy::too_many_arguments, reason = "keywords")]
@@ -192,6 +193,7 @@ pub(crate) fn load(
     path: PathBuf,
     format: Option<&str>,
     source_fps: Option<&Bound<'_, PyAny>>,
+    source_times: Option<PathBuf>,
     map: Option<String>,
     time_unit: Option<&Bound<'_, PyAny>>,
     duplicates: Option<&Bound<'_, PyAny>>,
@@ -203,6 +205,15 @@ pub(crate) fn load(
     scale: Option<&Bound<'_, PyAny>>,
     up: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<File> {
+    if source_fps.is_some() && source_times.is_some() {
+        return Err(input(
+            "source_fps and source_times both say when the keys are; give one",
+        ));
+    }
+    let frame_times = source_times.map(|file| open_frame_times(&file, Limits::default()));
+    let frame_times = frame_times
+        .transpose()
+        .map_err(|diagnostic| of_diagnostic(&diagnostic))?;
     let options = ReadOptions {
         limits: Limits::default(),
         pipes: false,
@@ -220,6 +231,7 @@ pub(crate) fn load(
             )?,
         },
         source_rate: source_fps.map(frame_rate).transpose()?,
+        frame_times: frame_times.map(Arc::new),
         map,
         time_unit: time_unit
             .map(|unit| {

@@ -10,9 +10,10 @@ use tumble::{Encoding, Engine, Error, FrameRate, Frames, Layout, Quantity, Stop}
 use tumble_formats::Diagnostic;
 use tumble_formats::diagnostic::Code;
 use tumble_formats::format::{
-    Document, Format, MotionOptions, ResultShape, WriteError, WriteResults,
+    Document, Format, FormatOption, MotionOptions, ResultShape, WriteError, WriteResults,
 };
 use tumble_formats::keyed::keyed;
+use tumble_formats::kitti::write_frame_times;
 use tumble_formats::motion::{Motion, Sampled};
 use tumble_formats::npy::ComponentOrder;
 use tumble_formats::output::Output;
@@ -33,7 +34,7 @@ const CHUNK: usize = 1 << 20;
 /// Writes clips to a file, whole or not at all; its format is that of the name's ending.
 ///
 /// `save(path, clips, *, fps=None, at=None, format=None, sequence=None, linear=(), order=None,
-/// layout="track", overwrite=True, engine=None, …)`
+/// layout="track", times_out=None, quantize=False, meshopt=False, overwrite=True, engine=None, …)`
 ///
 /// `clips`: a `Clip`, the `File` of `load`, or a list of clips. With `fps` or `at` they are sampled
 /// as `Engine.evaluate` does, the other options being as there; a clip of a glTF or NPZ file goes
@@ -44,7 +45,9 @@ const CHUNK: usize = 1 << 20;
 /// `tumble` writes.
 ///
 /// `sequence`: of BVH's angles, such as "ZXY". `linear`: arrays of an NPZ file with a number for
-/// each frame that are to be interpolated linearly instead of being left out. `engine`: which
+/// each frame that are to be interpolated linearly instead of being left out. `times_out`: where the times of
+/// the poses go, seconds a line, for KITTI, which has none. `quantize`: glTF's rotations have 16 bits a
+/// component, within 6e-5 rad. `meshopt`: a new glTF is compressed by EXT_meshopt_compression. `engine`: which
 /// evaluates, else one that all calls share.
 ///
 /// `write` is another name of it.
@@ -58,8 +61,8 @@ const CHUNK: usize = 1 << 20;
 #[pyfunction]
 #[pyo3(signature = (
     path, clips, /, *, format=None, sequence=None, linear=vec![], order=None, layout="track",
-    overwrite=true, engine=None, **options
-), text_signature = "(file, clips, /, *, fps=None, at=None, times=None, start=None, end=None, method=None, path=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, format=None, sequence=None, linear=(), order=None, layout='track', overwrite=True, engine=None)")]
+    times_out=None, quantize=false, meshopt=false, overwrite=true, engine=None, **options
+), text_signature = "(file, clips, /, *, fps=None, at=None, times=None, start=None, end=None, method=None, path=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, format=None, sequence=None, linear=(), order=None, layout='track', times_out=None, quantize=False, meshopt=False, overwrite=True, engine=None)")]
 #[allow(clippy::too_many_arguments, reason = "keywords")]
 pub(crate) fn save(
     py: Python<'_>,
@@ -70,6 +73,9 @@ pub(crate) fn save(
     linear: Vec<String>,
     order: Option<&str>,
     layout: &str,
+    times_out: Option<PathBuf>,
+    quantize: bool,
+    meshopt: bool,
     overwrite: bool,
     engine: Option<&Bound<'_, crate::engine::Engine>>,
     options: Option<&Bound<'_, PyDict>>,
@@ -91,8 +97,22 @@ pub(crate) fn save(
         Order::Xyzw => ComponentOrder::Xyzw,
         Order::Wxyz => ComponentOrder::Wxyz,
     });
+    let format = format_named(name)?;
+    if times_out.is_some() && !format.takes(FormatOption::TimesApart) {
+        return Err(input(format!(
+            "times_out is for kitti, which has no times; {} has them, or is of frames: leave it out",
+            format.name
+        )));
+    }
+    if (quantize || meshopt) && !format.takes(FormatOption::Quantize) {
+        let option = if quantize { "quantize" } else { "meshopt" };
+        return Err(input(format!(
+            "{option} is for glTF, and says nothing to {}; leave it out",
+            format.name
+        )));
+    }
     let job = Save {
-        format: format_named(name)?,
+        format,
         motion: MotionOptions {
             name: path.display().to_string(),
             format: name.to_lowercase(),
@@ -100,6 +120,9 @@ pub(crate) fn save(
             linear,
             order,
             box_length: clips.first().and_then(Clip::box_length),
+            times_apart: times_out.is_some(),
+            quantize,
+            meshopt,
         },
         layout: layout_named(layout)?,
         engine: match engine {
@@ -116,13 +139,25 @@ pub(crate) fn save(
         let inputs: Vec<PathBuf> = sources.collect();
         let create = || Output::create(&job.path, overwrite, &inputs);
         let out = create().map_err(|error| of_output(&error))?;
+        let times = times_out.map(|path| {
+            let mut others = inputs.clone();
+            others.push(job.path.clone());
+            Output::create(&path, overwrite, &others).map_err(|error| of_output(&error))
+        });
+        let times = times.transpose()?;
         let stop = Stop::of_this_work();
         let mut out = Stoppable { out, stop };
-        let warnings = job.write(&mut out)?;
+        let mut of_times = Vec::new();
+        let warnings = job.write(&mut out, &mut of_times)?;
         if out.stop.is_stopped() {
             return Err(of_engine(&Error::Stopped(tumble::Stopped)));
         }
         out.out.commit().map_err(|error| of_output(&error))?;
+        if let Some(mut times) = times {
+            let written = times.write_all(&of_times);
+            written.map_err(|error| of_write(&error.into()))?;
+            times.commit().map_err(|error| of_output(&error))?;
+        }
         Ok(warnings)
     })?;
     warnings
@@ -181,9 +216,10 @@ impl<W: Write> Write for Stoppable<W> {
 }
 
 impl Save {
-    fn write(&self, out: &mut dyn Write) -> PyResult<Vec<Diagnostic>> {
+    /// `times` gets the times of the samples, where they go into a file of their own.
+    fn write(&self, out: &mut dyn Write, times: &mut Vec<u8>) -> PyResult<Vec<Diagnostic>> {
         let Some(samples) = &self.request.samples else {
-            return self.keys(out);
+            return self.keys(out, times);
         };
         let motions: Vec<&Motion> = self.clips.iter().map(|clip| &*clip.motion).collect();
         if let Some(document) = self.document() {
@@ -196,7 +232,7 @@ impl Save {
             return self.baked(&motions, &*document, rate, out);
         }
         if self.format.takes_motion(&motions) {
-            return self.sampled(&motions, samples, out);
+            return self.sampled(&motions, samples, out, times);
         }
         let written = match (&*motions, &self.format.write) {
             ([motion], Some(write)) => self.rotations(motion, samples, write, out),
@@ -243,7 +279,7 @@ impl Save {
     }
 
     /// Keys at their own times.
-    fn keys(&self, out: &mut dyn Write) -> PyResult<Vec<Diagnostic>> {
+    fn keys(&self, out: &mut dyn Write, times: &mut Vec<u8>) -> PyResult<Vec<Diagnostic>> {
         if !self.format.writes_clips() {
             return Err(input(format!(
                 "{} holds samples, not keys; give `fps` or `at`",
@@ -266,8 +302,21 @@ impl Save {
                 keys.of(&clip.motion, rate, &[])
             })
             .collect();
-        let written = self.format.write_clips(&sampled, &self.motion, out);
+        let written = self.write_clips(&sampled, out, times);
         written.map_err(|error| of_write(&error))
+    }
+
+    fn write_clips(
+        &self,
+        sampled: &[Sampled<'_>],
+        out: &mut dyn Write,
+        times: &mut Vec<u8>,
+    ) -> Result<Vec<Diagnostic>, WriteError> {
+        let warnings = self.format.write_clips(sampled, &self.motion, out)?;
+        if let ([sampled], true) = (sampled, self.motion.times_apart) {
+            write_frame_times(sampled, times)?;
+        }
+        Ok(warnings)
     }
 
     /// The clips' own file with other keys.
@@ -294,6 +343,7 @@ impl Save {
         clips: &[&Motion],
         samples: &Wanted,
         out: &mut dyn Write,
+        times: &mut Vec<u8>,
     ) -> PyResult<Vec<Diagnostic>> {
         let frames = clips.iter().map(|clip| Ok(samples.resolved(&clip.set)?.0));
         let frames: Vec<Frames> = frames.collect::<PyResult<_>>()?;
@@ -302,7 +352,7 @@ impl Save {
             _ => None,
         };
         self.written(clips, &frames, rate, |sampled| {
-            self.format.write_clips(sampled, &self.motion, out)
+            self.write_clips(sampled, out, times)
         })
     }
 

@@ -322,3 +322,35 @@ def test_the_script_is_the_program():
     script = pathlib.Path(sys.executable).with_name("tumble")
     done = subprocess.run([script, "--version"], capture_output=True, text=True, timeout=60)
     assert done.stdout == f"tumble {tumble.__version__}\n"
+
+
+def test_trajectories_have_their_times_apart(tmp_path, rng):
+    times = np.cumsum(rng.uniform(0.05, 0.2, 20))
+    clip = tumble.Clip(times, unit(rng, 20))
+    path, apart = tmp_path / "path.kitti", tmp_path / "times.txt"
+    with pytest.raises(tumble.InputError, match="times_out"):
+        tumble.save(path, clip)
+    tumble.save(path, clip, times_out=apart)
+    found = tumble.load(path, source_times=apart).clip
+    assert np.allclose(np.loadtxt(apart), times, atol=1e-9)
+    assert np.allclose(np.abs((found.keys(0) * clip.keys(0)).sum(-1)), 1, atol=1e-6)
+    with pytest.raises(tumble.InputError, match="both say when"):
+        tumble.load(path, source_times=apart, source_fps=10)
+    with pytest.raises(tumble.InputError, match="times_out is for kitti"):
+        tumble.save(tmp_path / "path.tum", clip, times_out=apart)
+    tumble.save(tmp_path / "path.euroc", clip)
+    assert tumble.load(tmp_path / "path.euroc").clip.key_count == 20
+
+
+def test_a_small_gltf_is_near(tmp_path, rng):
+    clip = tumble.Clip(np.arange(200) / 30, unit(rng, 200))
+    sizes = []
+    for options in [{}, {"quantize": True}, {"quantize": True, "meshopt": True}]:
+        path = tmp_path / "clip.glb"
+        tumble.save(path, clip, **options)
+        sizes.append(path.stat().st_size)
+        dots = np.abs((tumble.load(path).clip.keys(0) * clip.keys(0)).sum(-1))
+        assert np.all(dots > 1 - 1e-6)
+    assert sizes[1] < sizes[0] and sizes[2] < sizes[0]
+    with pytest.raises(tumble.InputError, match="quantize is for glTF"):
+        tumble.save(tmp_path / "clip.bvh", clip, quantize=True)

@@ -19,7 +19,7 @@ pub(crate) struct Given {
 /// Options that decide over no byte of a result: which inputs and outputs there are, what may be
 /// read and replaced, who computes, and what is said. Times may come from standard input, so that
 /// who reads them says what they are.
-const SILENT: [&str; 17] = [
+const SILENT: [&str; 18] = [
     "allow_inexact",
     "device",
     "explain_route",
@@ -37,10 +37,11 @@ const SILENT: [&str; 17] = [
     "shard",
     "shard_bytes",
     "times",
+    "times_out",
 ];
 
-/// The option whose value is a file: what that holds decides, not what it is called.
-const FILE: &str = "offsets";
+/// Options whose value is a file: what that holds decides, not what it is called.
+const FILES: [&str; 3] = ["body_model", "offsets", "source_times"];
 
 impl Given {
     /// Whether the command line names the option, rather than its default.
@@ -53,7 +54,7 @@ impl Given {
     pub(crate) fn options(&self) -> String {
         let deciding = self.values.iter();
         let deciding = deciding.filter(|(name, _)| !SILENT.contains(&name.as_str()));
-        let shown = deciding.map(|(name, values)| match name == FILE {
+        let shown = deciding.map(|(name, values)| match FILES.contains(&name.as_str()) {
             true => {
                 let content = values.iter().map(|file| content(file));
                 format!("{name}={}", content.collect::<Vec<_>>().join(","))
@@ -64,8 +65,11 @@ impl Given {
     }
 }
 
-/// The hash of a file; nothing where it cannot be read again, as standard input cannot.
+/// The hash of a file; nothing where it cannot be read again, as standard input cannot. A folder's name.
 fn content(file: &str) -> String {
+    if Path::new(file).is_dir() {
+        return file.to_owned();
+    }
     let file = InputFile::new(Path::new(file));
     file.sha256().unwrap_or_default().to_owned()
 }

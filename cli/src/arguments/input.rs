@@ -143,18 +143,19 @@ impl Inputs {
     }
 
     /// How files are read.
-    pub(crate) fn options(&self) -> ReadOptions {
+    pub(crate) fn options(&self) -> Result<ReadOptions, Failure> {
         let limits = Limits {
             file: self.max_size,
             memory: self.max_memory,
             ..Limits::default()
         };
-        self.reading.options(limits, self.pipes)
+        let options = self.reading.options(limits, self.pipes);
+        options.map_err(|fault| Failure::input(&fault, ""))
     }
 
     /// As [`Inputs::load_quietly`], without a word of how far it is.
     pub(crate) fn read(&self, path: &Path) -> Result<Loaded, Failure> {
-        let options = self.options();
+        let options = self.options()?;
         let refuse = |diagnostic: Diagnostic| {
             let hint = match diagnostic.code {
                 Code::FileTooLong => " (--max-size)",

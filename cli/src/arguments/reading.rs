@@ -1,7 +1,7 @@
 //! Arguments that say how motion files are read, and what becomes of their clips.
 
 use std::path::{Path, PathBuf};
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
@@ -9,6 +9,7 @@ use tumble::FrameRate;
 use tumble_formats::adjust::{UpAxis, adjust_all, set_offsets};
 use tumble_formats::format::{FormatOption, TimeUnit};
 use tumble_formats::keys::Duplicates;
+use tumble_formats::kitti::open_frame_times;
 use tumble_formats::motion::Motion;
 use tumble_formats::npz::body_offsets;
 use tumble_formats::{Code, Diagnostic, FORMATS, Format, Limits, Loaded, ReadOptions};
@@ -35,6 +36,9 @@ pub(crate) struct Reading {
     /// The rate of the keys of files without times: where they say one, this overrules it
     #[arg(long, value_name = "FPS")]
     source_fps: Option<FrameRate>,
+    /// The times of the keys of files without times, for KITTI: a file of seconds, a line for each pose
+    #[arg(long, value_name = "FILE", conflicts_with = "source_fps")]
+    source_times: Option<PathBuf>,
     /// Which array or column is what, where names do not tell: rotations=keys:wxyz,time=t
     #[arg(long, value_name = "MAP")]
     map: Option<String>,
@@ -139,6 +143,7 @@ impl Reading {
     pub(crate) fn changes_keys(&self) -> bool {
         self.duplicates.is_some()
             || self.source_fps.is_some()
+            || self.source_times.is_some()
             || self.map.is_some()
             || self.time_unit.is_some()
             || self.bridge_gaps
@@ -155,6 +160,7 @@ impl Reading {
             raw_times,
             duplicates,
             source_fps,
+            source_times,
             map,
             time_unit,
             bridge_gaps,
@@ -172,6 +178,7 @@ impl Reading {
             || animation.is_some()
             || duplicates.is_some()
             || source_fps.is_some()
+            || source_times.is_some()
             || map.is_some()
             || time_unit.is_some()
             || offsets.is_some()
@@ -180,8 +187,10 @@ impl Reading {
             || up.is_some()
     }
 
-    pub(crate) fn options(&self, limits: Limits, pipes: bool) -> ReadOptions {
-        ReadOptions {
+    pub(crate) fn options(&self, limits: Limits, pipes: bool) -> Result<ReadOptions, Diagnostic> {
+        let frame_times = self.source_times.as_deref();
+        let frame_times = frame_times.map(|file| open_frame_times(file, limits));
+        Ok(ReadOptions {
             limits,
             pipes,
             raw_times: self.raw_times,
@@ -192,6 +201,7 @@ impl Reading {
                 Some(DuplicatesArgument::Both) => Duplicates::Both,
             },
             source_rate: self.source_fps,
+            frame_times: frame_times.transpose()?.map(Arc::new),
             map: self.map.clone(),
             time_unit: self.time_unit.map(|unit| match unit {
                 TimeUnitArgument::S => TimeUnit::Seconds,
@@ -201,7 +211,7 @@ impl Reading {
             }),
             bridge_gaps: self.bridge_gaps,
             keyframes: self.keyframes || self.names_method.get().is_some(),
-        }
+        })
     }
 
     /// Refuses what says nothing to any of the inputs' formats.
@@ -220,6 +230,11 @@ impl Reading {
                 "source-fps",
                 self.source_fps.is_some(),
                 FormatOption::SourceRate,
+            ),
+            (
+                "source-times",
+                self.source_times.is_some(),
+                FormatOption::TimesApart,
             ),
             ("map", self.map.is_some(), FormatOption::Map),
             (

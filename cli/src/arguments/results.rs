@@ -21,6 +21,8 @@ use crate::messages::exit::{Failure, SOME_INPUTS, for_all};
 use crate::messages::progress::busy;
 use crate::messages::words;
 
+const ONE_INPUT: &str = "--times-out is of one input, whose result is one file";
+
 #[derive(Debug, Args)]
 pub(crate) struct Results {
     #[arg(short, long = "out", value_name = "OUT", help = output::out_help())]
@@ -35,6 +37,9 @@ pub(crate) struct Results {
     /// The format of the results [default: by the name of the output, else npy]
     #[arg(long, visible_alias = "to", value_parser = output::format())]
     format: Option<&'static Format>,
+    /// KITTI, which has no times: also write those of the poses, seconds a line, into this file; of one input
+    #[arg(long, value_name = "FILE")]
+    times_out: Option<PathBuf>,
 }
 
 impl Results {
@@ -59,6 +64,9 @@ impl Results {
 
     /// The directory of results, for those who evaluate shards of them.
     pub(crate) fn folder(&self) -> Result<&Path, Failure> {
+        if self.times_out.is_some() {
+            return Err(Failure::usage(ONE_INPUT));
+        }
         match self.out.as_deref() {
             Some(out) if !is_standard(out) => Ok(out),
             _ => Err(Failure::usage(
@@ -85,7 +93,7 @@ impl Results {
     /// Where each input's result goes. Everything that can be refused is refused here, before any
     /// work.
     pub(crate) fn plan(&self, inputs: &Gathered) -> Result<Plan, Failure> {
-        output::plan(
+        let mut plan = output::plan(
             inputs,
             Wish {
                 out: self.out.as_deref(),
@@ -93,7 +101,23 @@ impl Results {
                 overwrite: self.overwrite,
                 resume: self.resume,
             },
-        )
+        )?;
+        if let Some(file) = &self.times_out {
+            let (1, None, Some(target)) = (plan.targets.len(), &plan.manifest, plan.targets.pop())
+            else {
+                return Err(Failure::usage(ONE_INPUT));
+            };
+            let format = target.format();
+            if !format.takes(FormatOption::TimesApart) {
+                return Err(Failure::usage(format!(
+                    "--times-out is for kitti, which has no times; {} has them, or is of frames: leave it out",
+                    format.name
+                )));
+            }
+            let place = Place::new(file, self.overwrite, &inputs.paths())?;
+            plan.targets.push(target.with_times(place)?);
+        }
+        Ok(plan)
     }
 
     /// Makes the results of all inputs. `options` are all that decides over a result besides its

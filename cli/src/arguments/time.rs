@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 use tumble::{FrameRate, Frames, TrackSet};
 use tumble_formats::motion::Motion;
 use tumble_formats::{Format, ReadOptions};
@@ -10,7 +10,7 @@ use tumble_formats::{Format, ReadOptions};
 use crate::arguments::input;
 use crate::arguments::tolerance::not_negative;
 use crate::batch::digest;
-use crate::messages::exit::Failure;
+use crate::messages::exit::{ALL_INPUTS, Failure};
 use crate::messages::words;
 
 /// Broadcast rates are n × 1000/1001; written as decimals they drift by a frame in
@@ -64,8 +64,47 @@ pub(crate) struct KeyTimes {
     /// Seconds, increasing, counted from a whole second.
     times: Vec<f64>,
     from: i64,
-    /// Seconds between neighbouring keys of a clip beyond which it is not sampled in between.
+    /// Seconds between neighbouring keys of a clip beyond which it is not interpolated in between.
     max_gap: Option<f64>,
+    in_gaps: InGaps,
+}
+
+/// What becomes of times between two keys that are too far apart.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum InGaps {
+    /// leave them out
+    LeaveOut,
+    /// refuse the input
+    Refuse,
+    /// stay at the key before
+    Hold,
+}
+
+/// The samples of one clip.
+pub(crate) struct ClipFrames {
+    /// When it is evaluated.
+    pub(crate) frames: Frames,
+    /// When the results are said to be, where that is another time: a key is held there.
+    pub(crate) held: Option<Frames>,
+    /// How many of them were in gaps, and were left out or held.
+    pub(crate) in_gaps: usize,
+}
+
+impl From<Frames> for ClipFrames {
+    fn from(frames: Frames) -> Self {
+        Self {
+            frames,
+            held: None,
+            in_gaps: 0,
+        }
+    }
+}
+
+impl ClipFrames {
+    /// When the results are said to be.
+    pub(crate) fn said(&self) -> &Frames {
+        self.held.as_ref().unwrap_or(&self.frames)
+    }
 }
 
 /// `--at`, `--max-gap`: the times of another file.
@@ -74,12 +113,23 @@ pub(crate) struct AtKeys {
     /// Evaluate at the key times of another motion file instead
     #[arg(long, value_name = "FILE", conflicts_with_all = ["fps", "times", "start", "end", "from_zero"])]
     at: Option<PathBuf>,
-    /// Leave out times between two keys that are more than so many seconds apart
+    /// Do not interpolate between two keys that are more than so many seconds apart
     #[arg(long, value_name = "SECONDS", requires = "at", value_parser = not_negative)]
     max_gap: Option<f64>,
+    /// What becomes of times there
+    #[arg(long, value_enum, requires = "max_gap", default_value = "leave-out")]
+    in_gaps: InGaps,
 }
 
 impl AtKeys {
+    /// What becomes of times in gaps.
+    pub(crate) fn done_in_gaps(&self) -> &'static str {
+        match self.in_gaps {
+            InGaps::Hold => "held",
+            InGaps::LeaveOut | InGaps::Refuse => "left out",
+        }
+    }
+
     /// The times of the file; nothing where none is named.
     pub(crate) fn samples(&self) -> Result<Option<Samples>, Failure> {
         let Some(path) = &self.at else {
@@ -95,6 +145,7 @@ impl AtKeys {
             times: clip.key_times(),
             from: clip.time_offset,
             max_gap: self.max_gap,
+            in_gaps: self.in_gaps,
         })))
     }
 }
@@ -138,46 +189,79 @@ impl Samples {
                 times,
                 from,
                 max_gap,
+                in_gaps,
             }) => {
                 let numbers = times.iter().map(|time| time.to_le_bytes());
                 let bytes: Vec<u8> = numbers.flatten().chain(from.to_le_bytes()).collect();
                 let gap = max_gap.unwrap_or(f64::INFINITY);
-                digest::of_bytes([&*bytes, &gap.to_le_bytes()])
+                digest::of_bytes([&*bytes, &gap.to_le_bytes(), &[*in_gaps as u8]])
             }
             Self::Rate { .. } => String::new(),
         }
     }
 
-    /// The samples for one clip; says when they pass its keys, and how many are left out.
-    pub(crate) fn of_clip(&self, clip: &Motion, name: &str) -> Frames {
+    /// The samples for one clip; says when they pass its keys, and how many are in gaps.
+    ///
+    /// # Errors
+    /// When one is in a gap, and such are refused.
+    pub(crate) fn of_clip(&self, clip: &Motion, name: &str) -> Result<ClipFrames, Failure> {
         let Self::Keys(keys) = self else {
-            return self.of(&clip.set, name);
+            return Ok(self.of(&clip.set, name).into());
         };
         // Each clip counts from whole seconds of its own.
         let shift = (keys.from - clip.time_offset) as f64;
-        let mut times: Vec<f64> = keys.times.iter().map(|time| time + shift).collect();
-        if let Some(most) = keys.max_gap {
-            let known = clip.key_times();
-            let is_in_gap = |time: f64| {
-                let next = known.partition_point(|&key| key < time);
-                let before = next.checked_sub(1).map(|before| known[before]);
-                let gap = known.get(next).filter(|&&key| key != time).zip(before);
-                gap.is_some_and(|(next, before)| next - before > most)
+        let times: Vec<f64> = keys.times.iter().map(|time| time + shift).collect();
+        let known = clip.key_times();
+        // The key before a gap.
+        let held = |time: f64| {
+            let next = known.partition_point(|&key| key < time);
+            let before = known[next.checked_sub(1)?];
+            let after = *known.get(next).filter(|&&key| key != time)?;
+            (after - before > keys.max_gap?).then_some(before)
+        };
+        let held: Vec<Option<f64>> = times.iter().map(|&time| held(time)).collect();
+        let in_gaps = held.iter().flatten().count();
+        let mut samples = ClipFrames {
+            in_gaps,
+            ..Frames::at(times.clone()).into()
+        };
+        if let Some(first) = held.iter().position(Option::is_some) {
+            let all = words::count(times.len(), "time");
+            let found = format!(
+                "{name}: {in_gaps} of {all} lie between keys that are more than {} s apart",
+                keys.max_gap.unwrap_or_default()
+            );
+            let each = times.iter().zip(&held);
+            let done = match keys.in_gaps {
+                InGaps::Refuse => {
+                    let time = times[first];
+                    let from = match clip.time_offset {
+                        0 => String::new(),
+                        second => format!(" (from second {second} on)"),
+                    };
+                    let message = format!(
+                        "{found}, the first at {time} s{from}; --in-gaps leave-out or hold goes on"
+                    );
+                    return Err(Failure::new(ALL_INPUTS, message));
+                }
+                InGaps::LeaveOut => {
+                    let outside = each.filter(|(_, held)| held.is_none());
+                    samples.frames = Frames::at(outside.map(|(&time, _)| time).collect());
+                    "left out"
+                }
+                InGaps::Hold => {
+                    let evaluated = each.map(|(&time, held)| held.unwrap_or(time));
+                    let evaluated = Frames::at(evaluated.collect());
+                    samples.held = Some(std::mem::replace(&mut samples.frames, evaluated));
+                    "held at the key before"
+                }
             };
-            let count = times.len();
-            times.retain(|&time| !is_in_gap(time));
-            let left_out = count - times.len();
-            if left_out > 0 {
-                words::warning(&format!(
-                    "{name}: {left_out} of {} lie between keys that are more than {most} s apart; they are left out",
-                    words::count(count, "time")
-                ));
-            }
+            words::warning(&format!("{found}; they are {done}"));
         }
         if let [first, .., last] = times[..] {
             warn_beyond(first, last, &clip.set, name);
         }
-        Frames::at(times)
+        Ok(samples)
     }
 
     /// The samples for one set; says when they pass its keys.

@@ -13,6 +13,8 @@ use tumble_formats::Diagnostic;
 use tumble_formats::format::{
     Format, MotionOptions, ResultShape, ResultWriter, WriteError, WriteResults,
 };
+use tumble_formats::kitti::write_frame_times;
+use tumble_formats::motion::Sampled;
 
 use crate::arguments::gather::Gathered;
 use crate::arguments::input;
@@ -31,6 +33,8 @@ pub(crate) struct Target {
     format: &'static Format,
     /// Below the directory of results; empty for a result in no such directory.
     name: String,
+    /// Where the times go, for a format that has none.
+    times: Option<Place>,
 }
 
 /// One target for each input, and the manifest of the directory that they are in.
@@ -163,7 +167,16 @@ impl Target {
             place,
             format,
             name,
+            times: None,
         }
+    }
+
+    /// The same, with a file for the times of what is written.
+    pub(crate) fn with_times(self, place: Place) -> Result<Self, Failure> {
+        place.refuse_same(self.path())?;
+        place.try_out()?;
+        let times = Some(place);
+        Ok(Self { times, ..self })
     }
 
     /// The format of the result.
@@ -187,6 +200,7 @@ impl Target {
         MotionOptions {
             name: self.to_string(),
             format: ending.to_string_lossy().to_lowercase(),
+            times_apart: self.times.is_some(),
             ..MotionOptions::default()
         }
     }
@@ -259,6 +273,15 @@ impl Target {
             words::note(&warning.to_string());
         }
         self.prepare(|out| out.write_all(&bytes))
+    }
+
+    /// Writes the times of what was written as a motion file, where they go into a file of their own.
+    pub(crate) fn write_times(&self, sampled: &[Sampled<'_>]) -> Result<(), Failure> {
+        let (Some(place), [sampled]) = (&self.times, sampled) else {
+            return Ok(());
+        };
+        let written = place.prepare(None, |out| write_frame_times(sampled, out))?;
+        written.commit()
     }
 
     /// Writes one result that is in memory.

@@ -218,7 +218,10 @@ fn write(
         }
         None => {
             let clips: Vec<Sampled<'_>> = sampled.collect();
-            target.write_motion(|out| target.format().write_clips(&clips, &options, out))
+            let written =
+                target.write_motion(|out| target.format().write_clips(&clips, &options, out))?;
+            target.write_times(&clips)?;
+            Ok(written)
         }
     }
 }

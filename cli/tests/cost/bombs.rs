@@ -317,7 +317,7 @@ fn every_reader_of_binary_files_asks_for_its_memory() {
     let fixtures = Path::new(env!("CARGO_MANIFEST_DIR")).join("../formats/tests/fixtures");
     let mut told = String::new();
     for format in FORMATS {
-        let text = ["dat", "bvh", "csv", "tum"].contains(&format.name);
+        let text = ["dat", "bvh", "csv", "tum", "euroc"].contains(&format.name);
         let folder = fixtures.join(format.name);
         // An array alone says nothing without a map, poses without a rate.
         if ["npy", "kitti"].contains(&format.name) {

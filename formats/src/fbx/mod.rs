@@ -4,6 +4,7 @@
 //! say together. Each animation stack becomes a clip, each node a track: keys that follow its curves within
 //! [a bound](follow), or those at the file's key times alone ([`ReadOptions::keyframes`]).
 
+mod direct;
 mod follow;
 mod times;
 
@@ -16,12 +17,13 @@ use glam::{DQuat, DVec3, DVec4, Quat, Vec3};
 use rayon::prelude::*;
 use tumble::{FrameRate, TrackError};
 use ufbx::{
-    AllocatorOpts, CoordinateAxis, ErrorType, FileFormat, InheritModeHandling, LoadOpts, SceneRoot,
-    Transform,
+    AllocatorOpts, AnimValue, CoordinateAxis, ErrorType, FileFormat, InheritModeHandling, LoadOpts,
+    Node, SceneRoot, Transform,
 };
 
 use crate::budget::{Budget, OverBudget};
 use crate::diagnostic::{Code, Diagnostic, Place};
+use crate::fbx::direct::Direct;
 use crate::fbx::follow::{Follow, Keys, Kind, Stop, Value};
 use crate::fbx::times::{NodeTimes, Takes, Times};
 use crate::feature::Feature;
@@ -458,7 +460,14 @@ impl Reader<'_> {
         let times = moved.map_or([&none; 3], |moved| {
             [&moved.translation, &moved.rotation, &moved.scale]
         });
-        let lists = times.map(|times| times.within(takes.span));
+        let evaluator = Evaluator::of(self, stack, node, takes);
+        let mut lists = times.map(|times| times.within(takes.span));
+        // Curves that never change need no look behind their first key.
+        for (list, channel) in lists.iter_mut().zip(CHANNELS) {
+            if evaluator.is_still(channel.0) {
+                list.truncate(1);
+            }
+        }
         let mut keys: [Option<Keys>; 3] = [None, None, None];
         let mut is_whole = true;
         for channel in 0..3 {
@@ -470,7 +479,7 @@ impl Reader<'_> {
                 .filter(|&other| lists[other] == lists[channel])
                 .collect();
             let jump = group.iter().any(|&channel| times[channel].jump);
-            let found = self.follow(stack, node, takes.layers, (&lists[channel], jump), &group)?;
+            let found = self.follow(&evaluator, (&lists[channel], jump), &group)?;
             for (channel, (found, follows)) in group.into_iter().zip(found) {
                 keys[channel] = Some(found);
                 is_whole &= follows;
@@ -491,45 +500,15 @@ impl Reader<'_> {
     /// The keys of some channels of a node that have keys at the same times.
     fn follow(
         &self,
-        stack: usize,
-        node: usize,
-        layers: usize,
+        evaluator: &Evaluator<'_>,
         (times, jump): (&[f64], bool),
         group: &[usize],
     ) -> Result<Vec<(Keys, bool)>, Diagnostic> {
+        let stack = evaluator.stack;
         let memory = |error: OverBudget| self.refuse(stack, Code::Memory, error.to_string());
         let _borrowed = self.budget.borrow(times.len(), STOP).map_err(memory)?;
-        let (anim, of_node) = (&self.scene.anim_stacks[stack].anim, &self.scene.nodes[node]);
-        let fault = Cell::new(None);
-        let cost = 1 + layers as i64 / 8;
-        let evaluate = |time: f64, flags: u32| {
-            if self.evaluations.fetch_sub(cost, Ordering::Relaxed) < 0 {
-                fault.set(Some(Fault::Work));
-                return None;
-            }
-            let found = ufbx::evaluate_transform_flags(anim, of_node, time, EXPLICIT | flags);
-            let is_finite = CHANNELS
-                .iter()
-                .all(|channel| (channel.2)(&found).is_finite());
-            if !is_finite {
-                fault.set(Some(Fault::NotFinite { time }));
-            }
-            is_finite.then_some(found)
-        };
-        let refuse = || {
-            match fault.get() {
-            Some(Fault::NotFinite { time }) => self.refuse(
-                stack,
-                Code::NotFinite,
-                format!("`{}` is nowhere at {time} s: a number is not finite", &*of_node.element.name),
-            ),
-            _ => self.refuse(
-                stack,
-                Code::FbxWork,
-                "following the curves takes more work than a file of this length gets; is it damaged?",
-            ),
-        }
-        };
+        let evaluate = |time: f64, flags: u32| evaluator.at(time, flags);
+        let refuse = || evaluator.refusal();
         let all = group
             .iter()
             .fold(0, |all, &channel| all | CHANNELS[channel].0);
@@ -672,6 +651,113 @@ impl Reader<'_> {
         clip.channels.push(channels);
         clip.set_origin(track, origin);
         Ok(rest)
+    }
+}
+
+/// What gives the transforms of a node.
+struct Evaluator<'a> {
+    reader: &'a Reader<'a>,
+    stack: usize,
+    node: &'a Node,
+    direct: Option<Direct<'a>>,
+    /// What an evaluation counts.
+    cost: i64,
+    /// Evaluations that the reader has granted already.
+    left: Cell<i64>,
+    fault: Cell<Option<Fault>>,
+}
+
+/// How many evaluations are granted at once: the count is shared by all threads.
+const GRANTED: i64 = 1024;
+
+impl<'a> Evaluator<'a> {
+    fn of(reader: &'a Reader<'a>, stack: usize, node: usize, takes: &Takes) -> Self {
+        let scene = reader.scene;
+        let layers = &scene.anim_stacks[stack].layers;
+        let value = |place: usize| -> &'a AnimValue { &layers[0].anim_props[place].anim_value };
+        let mut own = Self {
+            reader,
+            stack,
+            node: &scene.nodes[node],
+            direct: None,
+            cost: 1 + takes.layers as i64 / 8,
+            left: Cell::new(0),
+            fault: Cell::new(None),
+        };
+        let direct = takes.properties.get(&node);
+        let direct = direct.and_then(|properties| Direct::of(own.node, properties, value));
+        own.direct = direct.filter(|direct| {
+            let exact = |time| own.exact(time, TRANSLATION | ROTATION | SCALE);
+            direct.is(exact, takes.span)
+        });
+        own
+    }
+
+    /// What `ufbx` gives.
+    fn exact(&self, time: f64, flags: u32) -> Transform {
+        let anim = &self.reader.scene.anim_stacks[self.stack].anim;
+        ufbx::evaluate_transform_flags(anim, self.node, time, EXPLICIT | flags)
+    }
+
+    /// Nothing where the work is too much or a number is not finite, which the [refusal](Self::refusal) tells.
+    fn at(&self, time: f64, flags: u32) -> Option<Transform> {
+        if self.left.get() == 0 {
+            let granted = GRANTED * self.cost;
+            if self
+                .reader
+                .evaluations
+                .fetch_sub(granted, Ordering::Relaxed)
+                < 0
+            {
+                self.fault.set(Some(Fault::Work));
+                return None;
+            }
+            self.left.set(GRANTED);
+        }
+        self.left.set(self.left.get() - 1);
+        let found = match &self.direct {
+            Some(direct) => direct.at(time, flags),
+            None => self.exact(time, flags),
+        };
+        let is_finite = CHANNELS
+            .iter()
+            .all(|channel| (channel.2)(&found).is_finite());
+        if !is_finite {
+            self.fault.set(Some(Fault::NotFinite { time }));
+        }
+        is_finite.then_some(found)
+    }
+
+    /// Whether the channels of these flags never change.
+    fn is_still(&self, flags: u32) -> bool {
+        let direct = self.direct.as_ref();
+        direct.is_some_and(|direct| direct.is_still(flags))
+    }
+
+    fn refusal(&self) -> Diagnostic {
+        match self.fault.get() {
+            Some(Fault::NotFinite { time }) => self.reader.refuse(
+                self.stack,
+                Code::NotFinite,
+                format!(
+                    "`{}` is nowhere at {time} s: a number is not finite",
+                    &*self.node.element.name
+                ),
+            ),
+            _ => self.reader.refuse(
+                self.stack,
+                Code::FbxWork,
+                "following the curves takes more work than a file of this length gets; is it damaged?",
+            ),
+        }
+    }
+}
+
+impl Drop for Evaluator<'_> {
+    /// Gives back what was granted and not used.
+    fn drop(&mut self) {
+        let left = self.left.get() * self.cost;
+        self.reader.evaluations.fetch_add(left, Ordering::Relaxed);
     }
 }
 

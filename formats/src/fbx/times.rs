@@ -7,6 +7,7 @@ use ufbx::{
 };
 
 use crate::budget::{Budget, OverBudget};
+use crate::fbx::direct::is_still;
 
 /// Times closer than this are one, seconds: FBX counts in ticks of 2.2e-11 s.
 pub(super) const SAME: f64 = 1e-9;
@@ -43,6 +44,16 @@ impl NodeTimes {
     }
 }
 
+/// Which of the first layer's properties move a node.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Properties {
+    pub(super) translation: Option<usize>,
+    pub(super) rotation: Option<usize>,
+    pub(super) scale: Option<usize>,
+    /// Nothing else moves it: no other property, no other layer, and no scale that a node above keeps.
+    pub(super) are_plain: bool,
+}
+
 /// The curves of an animation stack.
 #[derive(Debug, Default)]
 pub(super) struct Takes {
@@ -50,6 +61,7 @@ pub(super) struct Takes {
     pub(super) span: [f64; 2],
     /// By the index of the node.
     pub(super) nodes: HashMap<usize, NodeTimes>,
+    pub(super) properties: HashMap<usize, Properties>,
     /// Keys that lie outside the span.
     pub(super) outside: usize,
     /// Names of properties with curves that are no transforms.
@@ -90,9 +102,9 @@ impl Takes {
             ..Self::default()
         };
         let mut others = HashSet::new();
-        for layer in &stack.layers {
+        for (index, layer) in stack.layers.iter().enumerate() {
             let weight = takes.weight(layer, budget)?;
-            for property in &layer.anim_props {
+            for (place, property) in layer.anim_props.iter().enumerate() {
                 let curves = || property.anim_value.curves.iter().flatten();
                 let part = part_of(&property.prop_name);
                 let is_node = property.element.type_ == ElementType::Node;
@@ -111,6 +123,20 @@ impl Takes {
                 }
                 times.append(&weight, budget)?;
                 let node = property.element.typed_id as usize;
+                let properties = takes.properties.entry(node).or_insert(Properties {
+                    are_plain: true,
+                    ..Properties::default()
+                });
+                let known = match &*property.prop_name {
+                    "Lcl Translation" => Some(&mut properties.translation),
+                    "Lcl Rotation" => Some(&mut properties.rotation),
+                    "Lcl Scaling" => Some(&mut properties.scale),
+                    _ => None,
+                };
+                match known {
+                    Some(known) if index == 0 && known.is_none() => *known = Some(place),
+                    _ => properties.are_plain = false,
+                }
                 let moved = takes.nodes.entry(node).or_default();
                 match part {
                     Part::Translation => moved.translation.append(&times, budget)?,
@@ -120,7 +146,7 @@ impl Takes {
             }
         }
         for node in &scene.nodes {
-            takes.carry(node, budget)?;
+            takes.carry(node, stack, budget)?;
         }
         Ok(takes)
     }
@@ -141,7 +167,7 @@ impl Takes {
     }
 
     /// What moves a node by way of its pivots, and of scales that nodes above it have.
-    fn carry(&mut self, node: &Node, budget: &Budget) -> Result<(), OverBudget> {
+    fn carry(&mut self, node: &Node, stack: &AnimStack, budget: &Budget) -> Result<(), OverBudget> {
         let index = node.element.typed_id as usize;
         let pivot = |name| {
             let found = ufbx::find_prop(&node.element.props, name);
@@ -172,15 +198,26 @@ impl Takes {
             return Ok(());
         }
         let mut scales = Times::default();
+        let mut is_scaled = false;
         let mut next = parent;
         while let Some(above) = next {
             let helper = above.scale_helper.as_deref().into_iter();
             for carrier in helper.chain([above]) {
-                if let Some(moved) = self.nodes.get(&(carrier.element.typed_id as usize)) {
+                let carrier = carrier.element.typed_id as usize;
+                if let Some(moved) = self.nodes.get(&carrier) {
                     scales.append(&moved.scale, budget)?;
+                }
+                if let Some(properties) = self.properties.get(&carrier) {
+                    let value = |place: usize| &stack.layers[0].anim_props[place].anim_value;
+                    let scale = properties.scale.map(value);
+                    is_scaled |=
+                        !properties.are_plain || scale.is_some_and(|scale| !is_still(scale));
                 }
             }
             next = above.parent.as_deref();
+        }
+        if is_scaled {
+            self.properties.entry(index).or_default().are_plain = false;
         }
         if !scales.list.is_empty() {
             let moved = self.nodes.entry(index).or_default();
@@ -229,8 +266,17 @@ impl Times {
         if keys.len() < 2 {
             return Ok(0);
         }
-        budget.take(keys.len(), size_of::<f64>())?;
-        self.list.extend(keys.iter().map(|key| key.time));
+        // Curves of one property mostly have keys at the same times.
+        let is_known = self.list.len() == keys.len()
+            && self
+                .list
+                .iter()
+                .zip(keys)
+                .all(|(time, key)| *time == key.time);
+        if !is_known {
+            budget.take(keys.len(), size_of::<f64>())?;
+            self.list.extend(keys.iter().map(|key| key.time));
+        }
         self.jump |= keys.windows(2).any(|pair| {
             let holds = |key: &ufbx::Keyframe| {
                 matches!(

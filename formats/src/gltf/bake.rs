@@ -105,7 +105,7 @@ impl Document for Gltf {
     fn write(
         &self,
         clips: &[(usize, Sampled<'_>)],
-        _: &MotionOptions,
+        options: &MotionOptions,
         path: &FilePath,
         out: &mut dyn Write,
     ) -> Result<Vec<Diagnostic>, WriteError> {
@@ -148,7 +148,8 @@ impl Document for Gltf {
                 });
             }
             if !read.sampled.is_empty() || cuts {
-                let mut baking = Baking::new(&json, *place, read, sampled, &edits)?;
+                let mut baking =
+                    Baking::new(&json, *place, read, (sampled, options.quantize), &edits)?;
                 baking.bake(&mut edits)?;
                 data.append(&mut edits, &baking.bytes);
             }

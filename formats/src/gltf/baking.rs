@@ -13,13 +13,28 @@ use crate::gltf::channel::Path;
 use crate::gltf::edits::Edits;
 use crate::gltf::json::{Json, Members};
 use crate::gltf::own_keys::OwnKeys;
+use crate::gltf::quantized::quantized;
 use crate::gltf::schema::{Animation, Channel};
-use crate::motion::Sampled;
+use crate::gltf::write_new::{FLOAT, SHORT};
+use crate::motion::{self, Sampled};
 
 /// Numbers as a file has them.
 fn bytes_of(numbers: &[f32]) -> Vec<u8> {
     let each = numbers.iter().flat_map(|number| number.to_le_bytes());
     each.collect()
+}
+
+/// Rotations in f32 as those of 16 bits a component.
+fn shorts_of(bytes: &[u8]) -> Vec<u8> {
+    let numbers = bytes.as_chunks::<4>().0.iter();
+    let numbers: Vec<f32> = numbers.map(|&own| f32::from_le_bytes(own)).collect();
+    let each = numbers
+        .as_chunks::<4>()
+        .0
+        .iter()
+        .copied()
+        .flat_map(quantized);
+    each.flat_map(i16::to_le_bytes).collect()
 }
 
 /// One animation on its way into the file.
@@ -36,6 +51,8 @@ pub(super) struct Baking<'a> {
     samplers_array: &'a RawValue,
     /// The clip was cut: all its channels get other keys.
     is_cut: bool,
+    /// Rotations have 16 bits a component.
+    quantize: bool,
     /// The buffer view that the bytes will be.
     view: usize,
     pub(super) bytes: Vec<u8>,
@@ -62,7 +79,7 @@ impl<'a> Baking<'a> {
         json: &'a Json<'a>,
         place: usize,
         read: &'a Read,
-        sampled: &'a Sampled<'a>,
+        (sampled, quantize): (&'a Sampled<'a>, bool),
         edits: &Edits<'_>,
     ) -> Result<Self, WriteError> {
         let pointer = format!("/animations/{place}");
@@ -108,6 +125,7 @@ impl<'a> Baking<'a> {
             samplers: animation.samplers,
             samplers_array,
             is_cut,
+            quantize,
             view: edits.count("bufferViews"),
             bytes: Vec::new(),
         })
@@ -139,6 +157,10 @@ impl<'a> Baking<'a> {
             };
             let values = own.map_or_else(|| self.values(channel), |own| bytes_of(&own.values));
             let count = values.len() / (4 * channel.path.width());
+            let is_short = self.quantize
+                && channel.path == Path::Rotation
+                && interpolation != motion::Sampler::Cubic.name();
+            let values = if is_short { shorts_of(&values) } else { values };
             let made = made.entry(channel.sampler).or_default();
             let same = made.iter().find(|made| {
                 self.bytes[made.values.clone()] == values
@@ -154,7 +176,9 @@ impl<'a> Baking<'a> {
                     } else {
                         "VEC3"
                     };
-                    let accessor = self.accessor(start, count, kind, "");
+                    let shorts = (SHORT, ",\"normalized\":true");
+                    let (component, more) = if is_short { shorts } else { (FLOAT, "") };
+                    let accessor = self.accessor(start, (count, component, kind), more);
                     let output = edits.append_to("accessors", accessor);
                     let is_free = made.is_empty()
                         && !self.kept.contains(&channel.sampler)
@@ -203,7 +227,7 @@ impl<'a> Baking<'a> {
         let range = format!(",\"min\":[{first:?}],\"max\":[{last:?}]");
         let start = self.bytes.len();
         self.bytes.extend(bytes_of(&times));
-        let accessor = self.accessor(start, times.len(), "SCALAR", &range);
+        let accessor = self.accessor(start, (times.len(), FLOAT, "SCALAR"), &range);
         let input = edits.append_to("accessors", accessor);
         known.insert(bits, input);
         Ok(input)
@@ -253,9 +277,14 @@ impl<'a> Baking<'a> {
         Ok(interpolation == "LINEAR" || members.get("interpolation").is_some())
     }
 
-    fn accessor(&self, offset: usize, count: usize, kind: &str, more: &str) -> String {
+    fn accessor(
+        &self,
+        offset: usize,
+        (count, component, kind): (usize, u32, &str),
+        more: &str,
+    ) -> String {
         format!(
-            "{{\"bufferView\":{},\"byteOffset\":{offset},\"componentType\":5126,\
+            "{{\"bufferView\":{},\"byteOffset\":{offset},\"componentType\":{component},\
              \"count\":{count},\"type\":\"{kind}\"{more}}}",
             self.view
         )

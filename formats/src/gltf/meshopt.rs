@@ -1,5 +1,5 @@
 //! Meshopt's attribute streams, versions 0 and 1, as the appendices of `KHR_meshopt_compression`
-//! specify them; `EXT_meshopt_compression` has version 0.
+//! specify them; `EXT_meshopt_compression` has version 0, which is what is written.
 //!
 //! A stream is a header byte, blocks of up to 256 elements, and a tail that holds the element before
 //! the first. An element has `stride` bytes. A block stores its elements' first bytes, then their
@@ -185,6 +185,64 @@ pub(crate) fn decode_attributes(
         Filter::Exponential => output.as_chunks_mut().0.iter_mut().for_each(exponential),
     }
     Ok(output)
+}
+
+/// Elements of `stride` bytes each as a stream of version 0. Each group of 16 differences takes the width in
+/// which it is shortest.
+pub(crate) fn encode_attributes(bytes: &[u8], stride: usize) -> Vec<u8> {
+    let block = (BLOCK_BYTES / stride / GROUP * GROUP).min(BLOCK);
+    let none = vec![0; stride];
+    let first = bytes.get(..stride).unwrap_or(&none);
+    let mut before = first.to_vec();
+    let mut stream = vec![0xa0];
+    for elements in bytes.chunks(block * stride) {
+        for byte in 0..stride {
+            let mut list = Vec::with_capacity(BLOCK);
+            for element in elements.chunks_exact(stride) {
+                let difference = element[byte].wrapping_sub(before[byte]);
+                let sign = if difference & 0x80 == 0 { 0 } else { 0xff };
+                list.push((difference << 1) ^ sign);
+                before[byte] = element[byte];
+            }
+            encode_list(list, &mut stream);
+        }
+    }
+    stream.resize(stream.len() + 32usize.saturating_sub(stride), 0);
+    stream.extend_from_slice(first);
+    stream
+}
+
+/// Encodes the differences of one byte of all elements of a block.
+fn encode_list(mut list: Vec<u8>, stream: &mut Vec<u8>) {
+    const WIDTHS: [usize; 4] = [0, 2, 4, 8];
+    list.resize(list.len().next_multiple_of(GROUP), 0);
+    let groups = list.as_chunks::<GROUP>().0;
+    let header = stream.len();
+    stream.resize(header + groups.len().div_ceil(4), 0);
+    for (place, group) in groups.iter().enumerate() {
+        // Those that do not fit take a byte each behind the others; in no bits there is nothing but zeros.
+        let length = |width: usize| match width {
+            0 if group.iter().any(|&own| own != 0) => usize::MAX,
+            0 => 0,
+            8 => GROUP,
+            _ => 2 * width + group.iter().filter(|&&own| own >= (1 << width) - 1).count(),
+        };
+        let shortest = (0..WIDTHS.len()).min_by_key(|&index| length(WIDTHS[index]));
+        let index = shortest.unwrap_or(3);
+        stream[header + place / 4] |= (index as u8) << (2 * (place % 4));
+        match WIDTHS[index] {
+            0 => {}
+            8 => stream.extend_from_slice(group),
+            width => {
+                let all_set = (1u8 << width) - 1;
+                for packed in group.chunks_exact(8 / width) {
+                    let bits = packed.iter().map(|&own| own.min(all_set));
+                    stream.push(bits.fold(0, |bits, own| bits << width | own));
+                }
+                stream.extend(group.iter().filter(|&&own| own >= all_set));
+            }
+        }
+    }
 }
 
 /// The fewest bytes that so many elements can take between the header and the tail: two bits a

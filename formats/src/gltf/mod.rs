@@ -20,6 +20,7 @@ pub mod meshes;
 mod meshopt;
 mod nodes;
 mod own_keys;
+pub(crate) mod quantized;
 mod reader;
 mod schema;
 pub mod skins;
@@ -73,6 +74,7 @@ pub static FORMAT: Format = Format {
         FormatOption::RawTimes,
         FormatOption::Duplicates,
         FormatOption::OwnKeys,
+        FormatOption::Quantize,
     ],
 };
 

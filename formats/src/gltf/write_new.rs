@@ -19,12 +19,14 @@ use crate::format::{MotionOptions, WriteError};
 use crate::gltf::own_keys::OwnKeys;
 use crate::gltf::write_new::binary::{Binary, Data};
 use crate::gltf::write_new::json::{
-    Animation, Asset, Buffer, Channel, Root, Sampler, Scene, Skin, Target,
+    Animation, Asset, Buffer, Channel, MESHOPT, Root, Sampler, Scene, Skin, Target,
 };
 use crate::gltf::write_new::rig::{Nodes, UniqueNames};
 use crate::gltf::write_new::samples::{Property, Samples};
-use crate::motion::Sampled;
+use crate::motion::{self, Sampled};
 use crate::warnings::Warnings;
+
+pub(super) use crate::gltf::write_new::json::{FLOAT, SHORT};
 
 /// Bytes of a GLB beside its JSON and its binary data: a header of 12, and 8 for each of the two.
 const HEADERS: u64 = 28;
@@ -63,7 +65,7 @@ pub fn write_new(
     let mut names = UniqueNames::default();
     let mut animations = Vec::new();
     for (place, (part, clip)) in parts.into_iter().zip(clips).enumerate() {
-        let mut animation = animation(&mut binary, part);
+        let mut animation = animation(&mut binary, part, options.quantize);
         let name = clip.clip.name.clone();
         animation.name = name.map(|name| names.unique(name, place));
         let notes = clip.notes.iter();
@@ -72,7 +74,24 @@ pub fn write_new(
             .collect();
         animations.push(animation);
     }
+    let accessors = |binary: &mut Binary<'_>| std::mem::take(&mut binary.accessors);
+    let (bytes, buffers, extensions): (_, Vec<Buffer>, &[&str]) = match options.meshopt {
+        true => {
+            let (bytes, buffers) = binary.compress();
+            (Some(bytes), buffers.into(), &[MESHOPT])
+        }
+        false => {
+            let whole = Buffer {
+                uri: None,
+                byte_length: binary.length(),
+                extensions: None,
+            };
+            (None, vec![whole], &[])
+        }
+    };
     let root = Root {
+        extensions_used: extensions,
+        extensions_required: extensions,
         asset: Asset {
             version: "2.0",
             generator: concat!("Tumble ", env!("CARGO_PKG_VERSION")),
@@ -82,21 +101,23 @@ pub fn write_new(
         nodes: nodes.list,
         skins,
         animations,
-        accessors: std::mem::take(&mut binary.accessors),
-        buffers: [Buffer {
-            uri: None,
-            byte_length: binary.length(),
-        }],
+        accessors: accessors(&mut binary),
+        buffers,
         buffer_views: binary.views.clone(),
     };
     let json = serde_json::to_vec(&root).map_err(io::Error::from)?;
-    let length = glb_length(json.len() as u64, binary.length())
+    let chunk = Chunk {
+        length: root.buffers[0].byte_length,
+        compressed: bytes,
+        binary,
+    };
+    let length = glb_length(json.len() as u64, chunk.length)
         .map_err(|why| Diagnostic::new(&options.name, Code::GlbTooLong, why))?;
     let mut out = BufWriter::new(out);
     if options.format.eq_ignore_ascii_case("gltf") {
-        write_text(root, &binary, &mut out)?;
+        write_text(root, &chunk, &mut out)?;
     } else {
-        write_glb(json, &binary, length, &mut out)?;
+        write_glb(json, &chunk, length, &mut out)?;
     }
     out.flush()?;
     Ok(moved_starts(clips, options))
@@ -192,10 +213,28 @@ fn parts<'a>(
     Ok(parts)
 }
 
-/// Writes JSON whose only buffer is a data URI.
-fn write_text(mut root: Root, binary: &Binary<'_>, out: &mut impl Write) -> io::Result<()> {
+/// The binary data of a file.
+struct Chunk<'a> {
+    /// Bytes of all.
+    length: u64,
+    /// All of it, where it is compressed.
+    compressed: Option<Vec<u8>>,
+    binary: Binary<'a>,
+}
+
+impl Chunk<'_> {
+    fn write(&self, out: &mut impl Write) -> io::Result<()> {
+        match &self.compressed {
+            Some(bytes) => out.write_all(bytes),
+            None => self.binary.write(out),
+        }
+    }
+}
+
+/// Writes JSON whose first buffer is a data URI.
+fn write_text(mut root: Root, chunk: &Chunk<'_>, out: &mut impl Write) -> io::Result<()> {
     let mut bytes = Vec::new();
-    binary.write(&mut bytes)?;
+    chunk.write(&mut bytes)?;
     let encoded = STANDARD.encode(bytes);
     root.buffers[0].uri = Some(format!("data:application/octet-stream;base64,{encoded}"));
     serde_json::to_writer(out, &root).map_err(io::Error::from)
@@ -204,7 +243,7 @@ fn write_text(mut root: Root, binary: &Binary<'_>, out: &mut impl Write) -> io::
 /// Writes a GLB of `length` bytes. JSON is padded with blanks to a multiple of 4 bytes.
 fn write_glb(
     mut json: Vec<u8>,
-    binary: &Binary<'_>,
+    chunk: &Chunk<'_>,
     length: u32,
     out: &mut impl Write,
 ) -> io::Result<()> {
@@ -213,8 +252,8 @@ fn write_glb(
     // Both are parts of `length`.
     write_words(out, [json.len() as u32, JSON])?;
     out.write_all(&json)?;
-    write_words(out, [binary.length() as u32, BIN])?;
-    binary.write(out)
+    write_words(out, [chunk.length as u32, BIN])?;
+    chunk.write(out)
 }
 
 const GLTF: u32 = u32::from_le_bytes(*b"glTF");
@@ -275,11 +314,11 @@ fn f32_times(samples: Samples<'_>, seconds: &[f64]) -> Result<Vec<f32>, (Code, S
 }
 
 /// The animation of a clip, without name.
-fn animation<'a>(binary: &mut Binary<'a>, part: Part<'a>) -> Animation {
+fn animation<'a>(binary: &mut Binary<'a>, part: Part<'a>, quantize: bool) -> Animation {
     let samples = part.samples;
     binary.begin_view();
     if let Some(channels) = part.keys.filter(|channels| !channels.is_empty()) {
-        return keyed_animation(binary, channels, &part.nodes);
+        return keyed_animation(binary, channels, &part.nodes, quantize);
     }
     let input = binary.push(Data::Times(part.times));
     let mut channels = Vec::new();
@@ -298,7 +337,10 @@ fn animation<'a>(binary: &mut Binary<'a>, part: Part<'a>) -> Animation {
     for (sampler, (track, property, interpolation)) in channels.into_iter().enumerate() {
         animation.samplers.push(Sampler {
             input,
-            output: binary.push(Data::Channel(samples, track, property)),
+            output: binary.push(match quantize {
+                true => Data::Channel(samples, track, property).quantized(),
+                false => Data::Channel(samples, track, property),
+            }),
             interpolation,
         });
         let target = Target {
@@ -315,6 +357,7 @@ fn keyed_animation(
     binary: &mut Binary<'_>,
     channels: Vec<KeyedChannel>,
     nodes: &[usize],
+    quantize: bool,
 ) -> Animation {
     let mut animation = Animation::default();
     let mut inputs: HashMap<Vec<u32>, usize> = HashMap::new();
@@ -323,9 +366,14 @@ fn keyed_animation(
         let input = *inputs
             .entry(bits)
             .or_insert_with(|| binary.push(Data::Times(own.times)));
+        let values = Data::Keys(own.property, own.keys.values);
+        let values = match quantize && own.keys.sampler != motion::Sampler::Cubic {
+            true => values.quantized(),
+            false => values,
+        };
         animation.samplers.push(Sampler {
             input,
-            output: binary.push(Data::Keys(own.property, own.keys.values)),
+            output: binary.push(values),
             interpolation: own.keys.sampler.name(),
         });
         let target = Target {

@@ -49,6 +49,35 @@ impl Plan {
         Ok(())
     }
 
+    /// Says where a file's length, in seconds, contradicts its rate: a rate that is twice or half of what the motion
+    /// was recorded at. Lengths are counted with the last frame and without, and a part may have been cut off.
+    pub(crate) fn compare_length(&mut self, archive: &Archive, name: &str) {
+        const LEAST_FACTOR: f64 = 1.5;
+        let Some(rate) = self.rate else {
+            return;
+        };
+        // What is no length says nothing.
+        let numbers = archive
+            .find(name)
+            .and_then(|own| read_numbers(archive, own).ok());
+        let Some(&[seconds]) = numbers.as_deref() else {
+            return;
+        };
+        let by_length = self.frames as f64 / seconds;
+        let factor = by_length / rate.per_second();
+        let is_alike = factor < LEAST_FACTOR && factor > 1.0 / LEAST_FACTOR;
+        if self.frames < 8 || !by_length.is_finite() || by_length <= 0.0 || is_alike {
+            return;
+        }
+        self.two_rates.get_or_insert_with(|| {
+            format!(
+                "the file says {rate} frames a second, and `{name}` that {} frames last {seconds} s, which is \
+                 {by_length:.3} a second; the first is taken, --source-fps says another",
+                self.frames
+            )
+        });
+    }
+
     /// The times of all frames, in seconds; the plan's rate becomes that on whose frames they lie.
     ///
     /// # Errors

@@ -50,6 +50,9 @@ const ROOTS: [&str; 2] = ["trans", "transl"];
 /// Where such files say their rate.
 const RATES: [&str; 4] = ["mocap_framerate", "mocap_frame_rate", "framerate", "fps"];
 
+/// Where files of AMASS say how long they last, in seconds.
+const LENGTH: &str = "mocap_time_length";
+
 /// Names and parents of joints.
 struct Skeleton {
     names: Vec<String>,
@@ -210,6 +213,7 @@ pub(crate) fn plan(archive: &Archive, warnings: &mut Warnings) -> Result<Option<
         plan.add(archive, root)?;
     }
     plan.read_rate(archive, &RATES)?;
+    plan.compare_length(archive, LENGTH);
     Ok(Some(plan))
 }
 

@@ -10,12 +10,13 @@ mod keys;
 
 use std::f64::consts::PI;
 
-use glam::DVec3;
+use glam::{DVec3, Quat};
 use tumble::reduce::{ReduceError, ReducedCurve};
 use tumble::reference::angle_between;
 use tumble::{Channel, Engine, Error, Frames, TrackError};
 
-use crate::motion::Motion;
+use crate::gltf::quantized::read_back;
+use crate::motion::{Motion, Sampler};
 use crate::sample::{ChannelMethods, Samples};
 use crate::world::{HierarchyError, WorldPose, parents_first, world};
 
@@ -34,13 +35,16 @@ pub struct ReduceOptions {
     /// All joints have keys at the same times, as most formats hold them; else each channel at times of
     /// its own, as glTF does.
     pub together: bool,
+    /// Rotations will have 16 bits a component ([`MotionOptions::quantize`](crate::format::MotionOptions::quantize)):
+    /// errors are those of what is read of them.
+    pub quantize: bool,
 }
 
 /// A reduced clip, and how far it is from the samples.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub struct Reduced {
-    /// The clip with few keys.
+    /// The clip with few keys, in f32.
     pub clip: Motion,
     /// Keys of all channels before and after.
     pub keys: [usize; 2],
@@ -84,7 +88,7 @@ pub enum ReduceMotionError {
     /// A bound is less than what f32 holds.
     #[error(
         "even all samples as keys are {found:.3e} {unit} away, and the bound is {bound:.3e}; keys are \
-         f32: give a larger one"
+         {kept}: give a larger one"
     )]
     TooSmall {
         /// The largest that was found.
@@ -93,6 +97,8 @@ pub enum ReduceMotionError {
         bound: f64,
         /// `rad`, or `of the file's unit of length`.
         unit: &'static str,
+        /// What rotations are kept in: `f32`, or `of 16 bits`.
+        kept: &'static str,
     },
 }
 
@@ -215,6 +221,12 @@ impl<'a> Reduction<'a> {
     /// How far a clip is from the samples, as `eval` evaluates it.
     fn measure(&self, reduced: &Motion) -> Result<Measured, ReduceMotionError> {
         let frames = Frames::at(self.times.clone());
+        let quantized = self
+            .options
+            .quantize
+            .then(|| quantized(reduced))
+            .transpose()?;
+        let reduced = quantized.as_ref().unwrap_or(reduced);
         let samples = ChannelMethods::AUTHORED.sample(self.engine, reduced, &frames)?;
         let poses = poses(reduced, &samples)?;
         let joints = self.parents.len();
@@ -292,19 +304,53 @@ impl Measured {
     fn too_small(&self, reduction: &Reduction<'_>) -> ReduceMotionError {
         let largest = |kind: usize| self.joints.iter().map(|own| own[kind]).fold(0.0, f64::max);
         let bound = reduction.options.angle;
+        let kept = if reduction.options.quantize {
+            "of 16 bits"
+        } else {
+            "f32"
+        };
         match largest(0) > bound {
             true => ReduceMotionError::TooSmall {
                 found: largest(0),
                 bound,
                 unit: "rad",
+                kept,
             },
             false => ReduceMotionError::TooSmall {
                 found: largest(1),
                 bound: reduction.distance,
                 unit: "of the file's unit of length",
+                kept,
             },
         }
     }
+}
+
+/// A clip as it is read when its rotations were written with 16 bits a component.
+fn quantized(clip: &Motion) -> Result<Motion, TrackError> {
+    let mut short = clip.without_tracks();
+    for (index, track) in clip.set.tracks().enumerate() {
+        let keys: Vec<Quat> = match clip.channels.get(index).map(|own| own.rotation) {
+            // A node's rest pose is f32, and tangents may be longer than 16 bits take.
+            Some(None | Some(Sampler::Cubic)) => track.keys.to_vec(),
+            _ => track.keys.iter().map(|&key| read_back(key)).collect(),
+        };
+        short
+            .set
+            .push(clip.set.track_name(index), track.times, &keys)?;
+        if !track.tangents.is_empty() {
+            short.set.set_tangents(index, track.tangents)?;
+        }
+        if let Some(own) = clip.set.vector_keys(Channel::Translation, index) {
+            let (times, keys, tangents) = (own.times, own.keys, own.tangents);
+            short.set.set_translations(index, times, keys, tangents)?;
+        }
+        if let Some(own) = clip.set.vector_keys(Channel::Scale, index) {
+            let (times, keys, tangents) = (own.times, own.keys, own.tangents);
+            short.set.set_scales(index, times, keys, tangents)?;
+        }
+    }
+    Ok(short)
 }
 
 /// Poses in the world, or relative to the parents where those cannot be told.

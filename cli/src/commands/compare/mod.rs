@@ -112,7 +112,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
             (Report::Trajectory(Box::new(found)), rest)
         }
         true => {
-            let found = arrays::compare(paths, &arguments.inputs.options())?;
+            let found = arrays::compare(paths, &arguments.inputs.options()?)?;
             (Report::Array(found), Ok(()))
         }
         false => {

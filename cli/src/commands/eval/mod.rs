@@ -138,6 +138,9 @@ pub(crate) struct Told {
     /// Of the first and the last frame, seconds; nothing where there are none.
     first_time: Option<f64>,
     last_time: Option<f64>,
+    /// Times between keys that are too far apart, which were left out or held; nothing without `--max-gap`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    in_gaps: Option<usize>,
     /// What was written of each rotation.
     what: &'static str,
     /// The components of a quaternion as they are written; nothing where none are, or where the
@@ -191,6 +194,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
                 file,
                 loaded,
                 started: Instant::now(),
+                in_gaps: 0,
             };
             job.run(target, done, &mut told)
         },
@@ -243,6 +247,8 @@ struct Job<'a> {
     file: &'a InputFile,
     loaded: &'a Loaded,
     started: Instant,
+    /// Times in gaps of the clips that are being evaluated.
+    in_gaps: usize,
 }
 
 impl Job<'_> {
@@ -424,9 +430,17 @@ impl Job<'_> {
     ) -> (Evaluated, Told) {
         let elapsed = self.started.elapsed();
         let told = format!(
-            "{name}: {} × {}, {method}, on {} in {} → {target}",
+            "{name}: {} × {}{}, {method}, on {} in {} → {target}",
             words::count(tracks, "track"),
             words::count(frames, "frame"),
+            match self.in_gaps {
+                0 => String::new(),
+                count => format!(
+                    " ({} in gaps {})",
+                    count,
+                    self.arguments.at_keys.done_in_gaps()
+                ),
+            },
             self.device.label,
             words::duration(elapsed),
         );
@@ -437,6 +451,7 @@ impl Job<'_> {
             tracks,
             frames,
             first_time: span.map(|span| span.0),
+            in_gaps: self.arguments.given.has("max_gap").then_some(self.in_gaps),
             last_time: span.map(|span| span.1),
             what: self.arguments.what.name(),
             order: order.map(ComponentOrder::name),

@@ -7,7 +7,7 @@ use tumble_formats::format::{FormatOption, MotionOptions, WriteError};
 use tumble_formats::motion::{Motion, Sampled};
 use tumble_formats::{Diagnostic, sample};
 
-use crate::arguments::time::Samples;
+use crate::arguments::time::{ClipFrames, Samples};
 use crate::batch::output::Target;
 use crate::batch::room;
 use crate::batch::run::Evaluated;
@@ -43,11 +43,11 @@ impl Job<'_> {
         clips: &[&Motion],
         target: &Target,
     ) -> Result<(Evaluated, Told), Failure> {
-        let frames = |clip: &Motion| Ok(self.samples.of_clip(clip, name));
-        let times: Vec<Frames> = clips
+        let times: Vec<ClipFrames> = clips
             .iter()
-            .map(|clip| frames(clip))
+            .map(|clip| self.samples.of_clip(clip, name))
             .collect::<Result<_, _>>()?;
+        self.in_gaps = times.iter().map(|own| own.in_gaps).sum();
         let rate = match self.samples {
             Samples::Rate { rate, .. } => Some(*rate),
             Samples::Times(_) | Samples::Keys(_) => None,
@@ -82,8 +82,11 @@ impl Job<'_> {
                  write another format"
             )));
         };
-        let at = |clip: &&Motion| document.times(clip.place, rate).map(Frames::at);
-        let times: Result<Vec<Frames>, _> = clips.iter().map(at).collect();
+        let at = |clip: &&Motion| {
+            let times = document.times(clip.place, rate);
+            times.map(|times| Frames::at(times).into())
+        };
+        let times: Result<Vec<ClipFrames>, _> = clips.iter().map(at).collect();
         let times = times.map_err(|diagnostic| Failure::input(&diagnostic, ""))?;
         let options = self.options(target);
         let places: Vec<usize> = clips.iter().map(|clip| clip.place).collect();
@@ -112,19 +115,26 @@ impl Job<'_> {
         &mut self,
         name: &str,
         clips: &[&Motion],
-        frames: &[Frames],
+        frames: &[ClipFrames],
         rate: Option<FrameRate>,
         target: &Target,
         write: impl FnOnce(&[Sampled<'_>], &mut Vec<u8>) -> Result<Vec<Diagnostic>, WriteError>,
     ) -> Result<(Evaluated, Told), Failure> {
         let mut all: Vec<sample::Samples> = Vec::new();
-        for (clip, frames) in clips.iter().zip(frames) {
+        for (clip, samples) in clips.iter().zip(frames) {
+            let frames = &samples.frames;
             let boxes = target.format().takes(FormatOption::BoxLength);
             self.check_scale(name, clip, boxes)?;
             // Rotations, translations, scales, and what they are written as.
             room::in_memory(name, &clip.set, frames, 6)?;
             self.explain(name, clip, frames, Layout::FrameMajor)?;
-            all.push(self.sample(name, clip, frames)?);
+            let mut found = self.sample(name, clip, frames)?;
+            if let Some(held) = &samples.held {
+                let said = held.resolve(clip.set.track_count(), clip.set.time_span());
+                let said = said.map_err(|error| Failure::evaluating(name, &error.into()))?;
+                found.times = said.times(0).collect();
+            }
+            all.push(found);
         }
         let method = self.arguments.method.to_string();
         let notes = self.notes(name)?;
@@ -132,6 +142,7 @@ impl Job<'_> {
             .map(|(clip, samples)| samples.of(clip, rate, &notes))
             .collect();
         let written = target.write_motion(|out| write(&sampled, out))?;
+        target.write_times(&sampled)?;
         let tracks = clips.iter().map(|clip| clip.set.track_count()).max();
         let samples = all.iter().map(|samples| samples.times.len()).sum();
         let times = || all.iter().flat_map(|samples| &samples.times).copied();

@@ -28,8 +28,16 @@ impl Job<'_> {
         target: &Target,
     ) -> Result<(Evaluated, Told), Failure> {
         let (arguments, set) = (self.arguments, &clip.set);
-        let frames = self.samples.of_clip(clip, name);
-        let timeline = frames
+        let samples = self.samples.of_clip(clip, name)?;
+        self.in_gaps = samples.in_gaps;
+        if samples.held.is_some() && arguments.what.quantity() != Quantity::Rotation {
+            return Err(Failure::usage(format!(
+                "{name}: what is held does not turn; leave times in gaps out (--in-gaps leave-out)"
+            )));
+        }
+        let frames = &samples.frames;
+        let timeline = samples
+            .said()
             .resolve(set.track_count(), set.time_span())
             .map_err(|error| Failure::evaluating(name, &error.into()))?;
         let encoding = arguments.what.encoding(arguments.encoding);
@@ -55,7 +63,7 @@ impl Job<'_> {
             encoding,
             notes: &notes,
         };
-        self.explain(name, clip, &frames, result.layout)?;
+        self.explain(name, clip, frames, result.layout)?;
         let (method, with) = self.methods();
         let methods = ChannelMethods {
             method,
@@ -65,17 +73,17 @@ impl Job<'_> {
         let told = (size.0, size.1, span(&timeline));
         let Some(method) = methods.method_of(clip) else {
             // Tracks of different samplers are evaluated apart, and put together in memory.
-            room::in_memory(name, set, &frames, 2)?;
+            room::in_memory(name, set, frames, 2)?;
             let found = self
                 .device
                 .choose(size.0 * size.1)
                 .and_then(|()| {
                     let layout = result.layout;
                     let work = |engine: &Engine| match arguments.what.quantity() {
-                        Quantity::Rotation => methods.rotations(engine, clip, &frames, layout),
+                        Quantity::Rotation => methods.rotations(engine, clip, frames, layout),
                         // Velocities are rows of four numbers too.
                         _ => {
-                            let rates = methods.rates(engine, clip, &frames, layout)?;
+                            let rates = methods.rates(engine, clip, frames, layout)?;
                             Ok(rates.into_iter().map(Quat::from_vec4).collect())
                         }
                     };
@@ -89,7 +97,7 @@ impl Job<'_> {
         let interpolation = with(method);
         let written = target.write_rotations(&result, |sink| {
             self.device
-                .stream(set, interpolation, &frames, result.layout, sink)
+                .stream(set, interpolation, frames, result.layout, sink)
         })?;
         Ok(self.evaluated(name, told, method.name, written, target, order))
     }
@@ -105,8 +113,11 @@ impl Job<'_> {
         target: &Target,
     ) -> Result<(Evaluated, Told), Failure> {
         let set = &clip.set;
-        let frames = &self.samples.of_clip(clip, name);
-        let timeline = frames
+        let samples = self.samples.of_clip(clip, name)?;
+        self.in_gaps = samples.in_gaps;
+        let frames = &samples.frames;
+        let timeline = samples
+            .said()
             .resolve(set.track_count(), set.time_span())
             .map_err(|error| Failure::evaluating(name, &error.into()))?;
         // The rotations, and twice what becomes of them.

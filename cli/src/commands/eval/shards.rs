@@ -196,6 +196,7 @@ impl Evaluator {
                 file,
                 loaded,
                 started: Instant::now(),
+                in_gaps: 0,
             };
             job.run(target, done, told)
         });

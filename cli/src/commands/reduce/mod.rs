@@ -14,7 +14,7 @@ use tumble_formats::format::{FormatOption, MotionOptions};
 use tumble_formats::keyed::keyed;
 use tumble_formats::motion::{Motion, Sampled, Sampler};
 use tumble_formats::reduce::{ReduceMotionError, ReduceOptions, Reduced, reduce};
-use tumble_formats::{Feature, Loaded};
+use tumble_formats::{Feature, Format, Loaded};
 
 use crate::arguments::given::Given;
 use crate::arguments::input::{self, Inputs};
@@ -63,6 +63,12 @@ pub(crate) struct Arguments {
     /// The curve that joins the keys
     #[arg(long, value_name = "CURVE", default_value = "linear")]
     curve: CurveArgument,
+    /// glTF: rotations of 16 bits a component instead of f32. The errors are those of what is read of them
+    #[arg(long)]
+    quantize: bool,
+    /// glTF: a new file, compressed by meshopt; players need EXT_meshopt_compression
+    #[arg(long)]
+    meshopt: bool,
     /// Sample at this rate first [default: the keys are the samples]
     #[arg(long, value_name = "FPS")]
     fps: Option<FrameRate>,
@@ -150,6 +156,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
             "glTF has no bessel-overhauser; choose --curve linear or cubic, or write .npz",
         ));
     }
+    arguments.check_quantized(format)?;
     let engine =
         Engine::new(Device::Cpu).map_err(|error| Failure::evaluating("the CPU", &error))?;
     let options = format!("reduce {}", arguments.given.options());
@@ -178,6 +185,27 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
 }
 
 impl Arguments {
+    /// Refuses what takes no keys of few bits.
+    fn check_quantized(&self, format: Option<&Format>) -> Result<(), Failure> {
+        let option = match (self.quantize, self.meshopt) {
+            (true, _) => "quantize",
+            (_, true) => "meshopt",
+            _ => return Ok(()),
+        };
+        if let Some(format) = format.filter(|format| !format.takes(FormatOption::Quantize)) {
+            let name = format.name;
+            return Err(Failure::usage(format!(
+                "--{option} is for glTF, and says nothing to {name}; leave it out"
+            )));
+        }
+        if self.quantize && matches!(self.curve, CurveArgument::Cubic) {
+            return Err(Failure::usage(
+                "--quantize is for keys that arcs join: tangents are longer than 16 bits take; leave out --curve cubic",
+            ));
+        }
+        Ok(())
+    }
+
     /// Reduces clips and writes them into one file.
     fn make(
         &self,
@@ -262,6 +290,7 @@ impl Arguments {
             distance: self.distance,
             shell: self.shell,
             together,
+            quantize: self.quantize,
         };
         reduce(&clip, engine, &options).map_err(failed)
     }
@@ -306,9 +335,13 @@ impl Arguments {
         let options = MotionOptions {
             sequence: self.sequence,
             box_length: loaded.box_length,
+            quantize: self.quantize,
+            meshopt: self.meshopt,
             ..target.motion_options()
         };
         let otherwise = match has_own_keys {
+            // A file that is kept keeps the bytes of its old keys too.
+            true if self.meshopt => Some("compression makes"),
             true => self.inputs.tracks.is_given().then_some("some tracks make"),
             false => Some("keys at uneven times make"),
         };
@@ -317,14 +350,16 @@ impl Arguments {
             let message = format!("{target}: {} holds results, not keys", format.name);
             return Err(Failure::usage(message));
         }
-        target.write_motion(|out| match document {
+        let written = target.write_motion(|out| match document {
             Some(document) => {
                 let places = clips.iter().map(|clip| clip.place);
                 let clips: Vec<_> = places.zip(sampled.iter().cloned()).collect();
                 document.write(&clips, &options, target.path(), out)
             }
             None => format.write_clips(&sampled, &options, out),
-        })
+        })?;
+        target.write_times(&sampled)?;
+        Ok(written)
     }
 }
 

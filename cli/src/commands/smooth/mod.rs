@@ -355,5 +355,7 @@ fn write(
         );
         return Err(Failure::usage(message));
     }
-    target.write_motion(|out| format.write_clips(&sampled, &options, out))
+    let written = target.write_motion(|out| format.write_clips(&sampled, &options, out))?;
+    target.write_times(&sampled)?;
+    Ok(written)
 }

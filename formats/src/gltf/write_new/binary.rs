@@ -2,7 +2,12 @@
 
 use std::io::{self, Write};
 
-use crate::gltf::write_new::json::{Accessor, BufferView, FLOAT};
+use crate::gltf::meshopt::encode_attributes;
+use crate::gltf::quantized::quantized;
+use crate::gltf::write_new::json::{
+    Accessor, Buffer, BufferExtensions, BufferView, FLOAT, Fallback, MeshoptView, SHORT,
+    ViewExtensions,
+};
 use crate::gltf::write_new::samples::{Property, Samples};
 
 /// What an accessor gives.
@@ -15,6 +20,8 @@ pub(super) enum Data<'a> {
     Channel(Samples<'a>, usize, Property),
     /// The keys of a channel.
     Keys(Property, Vec<f32>),
+    /// Rotations of 16 bits a component.
+    Quantized(Vec<i16>),
 }
 
 impl Data<'_> {
@@ -27,6 +34,22 @@ impl Data<'_> {
             Self::Channel(samples, _, _) => ("VEC3", 12, samples.len()),
             Self::Keys(Property::Rotation, numbers) => ("VEC4", 16, numbers.len() / 4),
             Self::Keys(_, numbers) => ("VEC3", 12, numbers.len() / 3),
+            Self::Quantized(numbers) => ("VEC4", 8, numbers.len() / 4),
+        }
+    }
+
+    /// The same, its rotations in 16 bits if it has some that may be.
+    pub(super) fn quantized(self) -> Self {
+        match self {
+            Self::Channel(samples, track, Property::Rotation) => {
+                let rotations = samples.rotations(track);
+                Self::Quantized(rotations.flat_map(quantized).collect())
+            }
+            Self::Keys(Property::Rotation, numbers) => {
+                let keys = numbers.as_chunks::<4>().0.iter();
+                Self::Quantized(keys.copied().flat_map(quantized).collect())
+            }
+            other => other,
         }
     }
 
@@ -40,6 +63,10 @@ impl Data<'_> {
                 Property::Scale => bytes_of(samples.scales(*track)),
             },
             Self::Keys(_, numbers) => bytes_of(numbers.iter().map(|&number| [number])),
+            Self::Quantized(numbers) => {
+                let each = numbers.iter().flat_map(|number| number.to_le_bytes());
+                each.collect()
+            }
         }
     }
 }
@@ -53,8 +80,8 @@ fn bytes_of<const N: usize>(values: impl Iterator<Item = [f32; N]>) -> Vec<u8> {
     bytes
 }
 
-/// All binary data, in the order of its accessors. Every value is of f32, so everything is aligned
-/// to 4 bytes.
+/// All binary data, in the order of its accessors. Every value is of f32 or four of 16 bits, so everything is
+/// aligned to 4 bytes.
 #[derive(Default)]
 pub(super) struct Binary<'a> {
     data: Vec<Data<'a>>,
@@ -75,6 +102,7 @@ impl<'a> Binary<'a> {
             buffer: 0,
             byte_offset: self.length(),
             byte_length: 0,
+            extensions: None,
         });
     }
 
@@ -95,7 +123,11 @@ impl<'a> Binary<'a> {
         self.accessors.push(Accessor {
             buffer_view,
             byte_offset: view.byte_length,
-            component_type: FLOAT,
+            component_type: match data {
+                Data::Quantized(_) => SHORT,
+                _ => FLOAT,
+            },
+            normalized: matches!(data, Data::Quantized(_)),
             count,
             shape,
             min,
@@ -104,6 +136,60 @@ impl<'a> Binary<'a> {
         view.byte_length += bytes * count as u64;
         self.data.push(data);
         self.accessors.len() - 1
+    }
+
+    /// Everything compressed by meshopt: a view for all data of one length of elements, which the accessors then
+    /// lie in. Gives the bytes, and the buffers: that of the bytes, and that which stands for what they decode to.
+    pub(super) fn compress(&mut self) -> (Vec<u8>, [Buffer; 2]) {
+        let mut strides: Vec<u64> = self.data.iter().map(|data| data.shape().1).collect();
+        strides.sort_unstable();
+        strides.dedup();
+        let (mut views, mut compressed, mut length) = (Vec::new(), Vec::new(), 0);
+        for (view, &stride) in strides.iter().enumerate() {
+            let mut bytes = Vec::new();
+            for (data, accessor) in self.data.iter().zip(&mut self.accessors) {
+                if data.shape().1 == stride {
+                    accessor.buffer_view = view;
+                    accessor.byte_offset = bytes.len() as u64;
+                    bytes.extend(data.bytes());
+                }
+            }
+            let stream = encode_attributes(&bytes, stride as usize);
+            views.push(BufferView {
+                buffer: 1,
+                byte_offset: length,
+                byte_length: bytes.len() as u64,
+                extensions: Some(ViewExtensions {
+                    meshopt: MeshoptView {
+                        buffer: 0,
+                        byte_offset: compressed.len() as u64,
+                        byte_length: stream.len() as u64,
+                        byte_stride: stride,
+                        mode: "ATTRIBUTES",
+                        count: bytes.len() as u64 / stride,
+                    },
+                }),
+            });
+            length += bytes.len() as u64;
+            compressed.extend(stream);
+            compressed.resize(compressed.len().next_multiple_of(4), 0);
+        }
+        self.views = views;
+        let buffers = [
+            Buffer {
+                uri: None,
+                byte_length: compressed.len() as u64,
+                extensions: None,
+            },
+            Buffer {
+                uri: None,
+                byte_length: length,
+                extensions: Some(BufferExtensions {
+                    meshopt: Fallback { fallback: true },
+                }),
+            },
+        ];
+        (compressed, buffers)
     }
 
     /// Writes all, a channel at a time.

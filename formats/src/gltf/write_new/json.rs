@@ -9,6 +9,10 @@ use serde_json::{Map, Value};
 #[serde(rename_all = "camelCase")]
 pub(super) struct Root {
     pub(super) asset: Asset,
+    #[serde(skip_serializing_if = "<[_]>::is_empty")]
+    pub(super) extensions_used: &'static [&'static str],
+    #[serde(skip_serializing_if = "<[_]>::is_empty")]
+    pub(super) extensions_required: &'static [&'static str],
     pub(super) scene: usize,
     pub(super) scenes: [Scene; 1],
     pub(super) nodes: Vec<Node>,
@@ -17,7 +21,7 @@ pub(super) struct Root {
     pub(super) animations: Vec<Animation>,
     pub(super) accessors: Vec<Accessor>,
     pub(super) buffer_views: Vec<BufferView>,
-    pub(super) buffers: [Buffer; 1],
+    pub(super) buffers: Vec<Buffer>,
 }
 
 #[derive(Serialize)]
@@ -104,8 +108,12 @@ pub(super) struct Sampler {
     pub(super) interpolation: &'static str,
 }
 
-/// The component type of f32.
-pub(super) const FLOAT: u32 = 5126;
+/// The component types of f32 and i16.
+pub(in crate::gltf) const FLOAT: u32 = 5126;
+pub(in crate::gltf) const SHORT: u32 = 5122;
+
+/// The extension of compressed views.
+pub(super) const MESHOPT: &str = "EXT_meshopt_compression";
 
 /// `min` and `max` are f32 written with all the digits of f64: readers that take them for f64 then
 /// find them equal to the data.
@@ -115,6 +123,8 @@ pub(super) struct Accessor {
     pub(super) buffer_view: usize,
     pub(super) byte_offset: u64,
     pub(super) component_type: u32,
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub(super) normalized: bool,
     pub(super) count: usize,
     #[serde(rename = "type")]
     pub(super) shape: &'static str,
@@ -130,6 +140,26 @@ pub(super) struct BufferView {
     pub(super) buffer: usize,
     pub(super) byte_offset: u64,
     pub(super) byte_length: u64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) extensions: Option<ViewExtensions>,
+}
+
+#[derive(Serialize, Clone)]
+pub(super) struct ViewExtensions {
+    #[serde(rename = "EXT_meshopt_compression")]
+    pub(super) meshopt: MeshoptView,
+}
+
+/// Where a view's bytes are, compressed.
+#[derive(Serialize, Clone)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct MeshoptView {
+    pub(super) buffer: usize,
+    pub(super) byte_offset: u64,
+    pub(super) byte_length: u64,
+    pub(super) byte_stride: u64,
+    pub(super) mode: &'static str,
+    pub(super) count: u64,
 }
 
 #[derive(Serialize)]
@@ -138,4 +168,18 @@ pub(super) struct Buffer {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) uri: Option<String>,
     pub(super) byte_length: u64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) extensions: Option<BufferExtensions>,
+}
+
+#[derive(Serialize)]
+pub(super) struct BufferExtensions {
+    #[serde(rename = "EXT_meshopt_compression")]
+    pub(super) meshopt: Fallback,
+}
+
+/// The buffer stands for what is decoded, and holds nothing.
+#[derive(Serialize)]
+pub(super) struct Fallback {
+    pub(super) fallback: bool,
 }

@@ -1,0 +1,188 @@
+//! Trajectories as the EuRoC MAV data sets have them: CSV of `timestamp x y z qw qx qy qz`, times in whole
+//! nanoseconds, w first, under a heading that says so. Files of ground truth have velocities and biases behind
+//! each pose.
+
+use std::fmt::Write as _;
+use std::io::{BufRead, Write};
+use std::path::Path;
+
+use crate::csv::read::open_csv;
+use crate::decimal::Decimal;
+use crate::diagnostic::Diagnostic;
+use crate::feature::Feature;
+use crate::format::{
+    Format, FormatOption, Loaded, MotionOptions, ReadOptions, TimeUnit, WriteError,
+};
+use crate::motion::Sampled;
+use crate::source::Source;
+use crate::tum::{PoseLine, Trajectory, read_lines};
+
+/// A path of one body.
+pub static FORMAT: Format = Format {
+    name: "euroc",
+    summary: "a trajectory, CSV of nanoseconds, `x y z` and `qw qx qy qz`",
+    extensions: &[],
+    probe: |start| {
+        let line = start
+            .split(|&byte| byte == b'\n')
+            .next()
+            .unwrap_or_default();
+        // Its columns are in this order in every file of the data sets.
+        let columns: [&[u8]; 5] = [b"timestamp", b"p_RS_R_x", b"q_RS_w", b"q_RS_x", b"q_RS_z"];
+        let mut rest = line;
+        line.starts_with(b"#")
+            && columns.iter().all(|word| {
+                let found = rest.windows(word.len()).position(|part| part == *word);
+                rest = found.map_or(&[], |at| &rest[at..]);
+                found.is_some()
+            })
+    },
+    read: open_euroc,
+    write: None,
+    write_motion: Some(write_motion),
+    features: &[Feature::Translations, Feature::UnevenTimes, Feature::Start],
+    options: &[
+        FormatOption::RawTimes,
+        FormatOption::Duplicates,
+        FormatOption::TimeUnit,
+        FormatOption::Map,
+    ],
+};
+
+const LINE: PoseLine = PoseLine {
+    numbers: "timestamp,x,y,z,qw,qx,qy,qz",
+    is_w_first: true,
+    unit: Some(TimeUnit::Nanoseconds),
+};
+
+/// The first line of a file.
+const HEADING: &str = "#timestamp [ns],p_RS_R_x [m],p_RS_R_y [m],p_RS_R_z [m],\
+                       q_RS_w [],q_RS_x [],q_RS_y [],q_RS_z []\n";
+
+fn open_euroc(path: &Path, options: &ReadOptions) -> Result<Loaded, Diagnostic> {
+    // Who says what the columns are reads a table.
+    if options.map.is_some() {
+        return open_csv(path, options);
+    }
+    let mut source = Source::open(path, options.pipes)?;
+    let name = source.name.clone();
+    let loaded = read_euroc(&name, &mut source.reader, options)?;
+    source.check_unchanged()?;
+    Ok(loaded)
+}
+
+/// Reads poses; `name` is what messages call the input. The one track is named `body`. Times are nanoseconds
+/// unless the options say otherwise, and count from the whole second at or before the first, which is the
+/// clip's [`time_offset`](crate::motion::Motion::time_offset).
+///
+/// # Errors
+/// The first fault that refuses the input.
+pub fn read_euroc(
+    name: &str,
+    reader: impl BufRead,
+    options: &ReadOptions,
+) -> Result<Loaded, Diagnostic> {
+    read_lines(name, reader, options, &LINE)
+}
+
+/// Writes one clip of one track. Times are rounded to nanoseconds; the other numbers have the fewest digits that
+/// read back as the same f32, about an origin where there is one.
+fn write_motion(
+    clips: &[Sampled<'_>],
+    options: &MotionOptions,
+    out: &mut dyn Write,
+) -> Result<Vec<Diagnostic>, WriteError> {
+    let path = Trajectory::of(clips, options)?;
+    let mut text = HEADING.to_owned();
+    let mut last = None;
+    for (sample, &time) in path.sampled.times.iter().enumerate() {
+        let exact = Decimal::of(path.sampled.clip.time_offset, time);
+        let exact = exact.ok_or_else(|| path.out_of_range(sample))?;
+        let nanoseconds = exact.nanoseconds();
+        if last == Some(nanoseconds) {
+            let message = format!(
+                "two poses at {nanoseconds} ns, in which EuRoC has times; write another format"
+            );
+            return Err(path.refuse(message));
+        }
+        last = Some(nanoseconds);
+        let (rotation, position) = path.pose(sample)?;
+        let [x, y, z] = position;
+        let [qx, qy, qz, qw] = rotation.to_array();
+        // Memory takes everything.
+        let _ = writeln!(text, "{nanoseconds},{x},{y},{z},{qw},{qx},{qy},{qz}");
+        out.write_all(text.as_bytes())?;
+        text.clear();
+    }
+    out.write_all(text.as_bytes())?;
+    Ok(Vec::new())
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::{Quat, Vec3};
+    use tumble::Channel;
+
+    use super::*;
+    use crate::diagnostic::Code;
+    use crate::keyed::keyed;
+
+    const TEXT: &str = "#timestamp, p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_w [], q_RS_x [], q_RS_y [], q_RS_z [], v_RS_R_x [m s^-1]\n\
+        1403636580838555648,4.688319,-1.786938,0.783338,0.8,-0.6,0,0,-0.027876\n\
+        1403636580843555328,4.688177,-1.78677,0.78735,0,0,0.6,0.8,-0.028\n";
+
+    fn read(text: &str) -> Loaded {
+        let loaded = read_euroc("t", text.as_bytes(), &ReadOptions::default());
+        loaded.unwrap_or_else(|error| panic!("{error}"))
+    }
+
+    #[test]
+    fn poses_are_read_and_come_back_word_for_word() {
+        let loaded = read(TEXT);
+        let clip = &loaded.clips[0];
+        assert_eq!(loaded.warnings[0].code, Code::FurtherNumbers);
+        assert_eq!(clip.time_offset, 1_403_636_580);
+        assert_eq!(clip.set.track(0).times, [0.838_555_648, 0.843_555_328]);
+        assert_eq!(
+            clip.set.track(0).keys,
+            [
+                Quat::from_xyzw(-0.6, 0.0, 0.0, 0.8),
+                Quat::from_xyzw(0.0, 0.6, 0.8, 0.0)
+            ]
+        );
+        let moved = clip.set.vector_keys(Channel::Translation, 0).unwrap().keys;
+        assert_eq!(moved[1], Vec3::new(4.688_177, -1.786_77, 0.787_35));
+        let samples = keyed(clip).unwrap();
+        let mut out = Vec::new();
+        let sampled = [samples.of(clip, clip.rate, &[])];
+        let written = FORMAT.write_clips(&sampled, &MotionOptions::default(), &mut out);
+        assert_eq!(written.unwrap(), []);
+        // The sign of the second quaternion continues that of the first.
+        let expected = HEADING.to_owned()
+            + "1403636580838555648,4.688319,-1.786938,0.783338,0.8,-0.6,0,0\n\
+               1403636580843555328,4.688177,-1.78677,0.78735,0,0,0.6,0.8\n";
+        assert_eq!(String::from_utf8(out).unwrap(), expected);
+        assert_eq!(
+            Format::detect(Path::new("data.csv"), TEXT.as_bytes()).name,
+            "euroc"
+        );
+    }
+
+    #[test]
+    fn times_are_whole_nanoseconds_that_differ() {
+        let clip = &read(TEXT).clips[0];
+        let mut samples = keyed(clip).unwrap();
+        let mut write = |times: [f64; 2]| {
+            samples.times = times.to_vec();
+            let mut out = Vec::new();
+            let sampled = [samples.of(clip, None, &[])];
+            let written = FORMAT.write_clips(&sampled, &MotionOptions::default(), &mut out);
+            written.map(|_| String::from_utf8(out).unwrap())
+        };
+        let text = write([1.0 / 3.0, 2.0 / 3.0]).unwrap();
+        let times: Vec<&str> = text.lines().skip(1).map(|line| &line[..19]).collect();
+        assert_eq!(times, ["1403636580333333333", "1403636580666666667"]);
+        let refused = write([0.5, 0.500_000_000_3]);
+        assert!(matches!(refused, Err(WriteError::Refused(fault)) if fault.code == Code::TumWrite));
+    }
+}

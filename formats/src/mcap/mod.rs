@@ -1,0 +1,443 @@
+//! Trajectories in MCAP, the logs of ROS 2: topics of poses, odometry and paths, and transforms between frames.
+//!
+//! The file is read from its beginning to its end, records and chunks as they come, so that one that was cut
+//! (a robot that lost power) gives all that it holds. The crate `mcap` does not serve here: it asks for no
+//! budget before it unpacks a chunk, and brings decompressors of its own beside those that Parquet takes.
+
+mod cdr;
+mod records;
+
+use std::collections::HashMap;
+use std::path::Path;
+
+use glam::{DQuat, DVec3};
+use tumble::{TrackError, TrackSet};
+
+use crate::budget::{Budget, OverBudget};
+use crate::decimal::Decimal;
+use crate::diagnostic::{Code, Diagnostic, Place};
+use crate::feature::Feature;
+use crate::format::{Format, FormatOption, Loaded, ReadOptions};
+use crate::grid::restore;
+use crate::keys::{Origin, select};
+use crate::mcap::cdr::{Cdr, Stamp};
+use crate::mcap::records::{Channel, MAGIC, Record, Records};
+use crate::motion::{Joint, Motion, Transform};
+use crate::names::untaken;
+use crate::rate::Precision;
+use crate::source::Source;
+use crate::warnings::Warnings;
+
+/// Poses in a log.
+pub static FORMAT: Format = Format {
+    name: "mcap",
+    summary: "logs of ROS 2: poses, odometry, paths and transforms",
+    extensions: &[],
+    probe: |start| start.starts_with(MAGIC),
+    read: open_mcap,
+    write: None,
+    write_motion: None,
+    features: &[
+        Feature::TrackNames,
+        Feature::Translations,
+        Feature::OwnTimes,
+        Feature::UnevenTimes,
+        Feature::Start,
+    ],
+    options: &[FormatOption::RawTimes, FormatOption::Duplicates],
+};
+
+/// Bytes of a pose on its way: as it was read, sorted, and as keys.
+const POSE: usize = 2 * size_of::<Pose>() + 64;
+
+/// Bytes of a track beside its keys.
+const TRACK: usize = 400;
+
+/// Digits behind the point of a stamp.
+const NANOSECONDS: u32 = 9;
+
+/// Reads a file; `-` is standard input.
+///
+/// # Errors
+/// The first fault that refuses the file; those of single tracks are in [`Loaded::refused`].
+pub fn open_mcap(path: &Path, options: &ReadOptions) -> Result<Loaded, Diagnostic> {
+    let source = Source::open(path, options.pipes)?;
+    let name = source.name.clone();
+    let bytes = source.into_bytes(options.limits.file)?;
+    read_mcap(&name, &bytes, options)
+}
+
+/// Reads the bytes of a file; `name` is what messages call it. One clip: a track for each topic of poses, by the
+/// topic's name, and one for each pair of frames, `parent/child`. Poses are at the stamps of their headers; times
+/// count from the whole second at or before the first.
+///
+/// # Errors
+/// As [`open_mcap`].
+pub fn read_mcap(name: &str, bytes: &[u8], options: &ReadOptions) -> Result<Loaded, Diagnostic> {
+    let budget = Budget::of(bytes.len(), options.limits);
+    let mut log = Log {
+        name,
+        budget: &budget,
+        tracks: Vec::new(),
+        places: HashMap::new(),
+        others: Vec::new(),
+        refused: Vec::new(),
+        warnings: Warnings::new(name),
+    };
+    let mut records = Records::new(name, bytes, &budget)?;
+    while let Some(record) = records.next(&mut log.warnings)? {
+        let Record {
+            channel,
+            log_time,
+            data,
+            offset,
+        } = record;
+        log.message(channel, log_time, data, offset)?;
+    }
+    log.into_loaded(options)
+}
+
+/// What a message of a known type holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    PoseStamped,
+    PoseWithCovarianceStamped,
+    Odometry,
+    TransformStamped,
+    TransformList,
+    Path,
+}
+
+impl Kind {
+    /// By the name of a type, with `msg/` in it or without.
+    fn of(schema: &str) -> Option<Self> {
+        let (package, rest) = schema.split_once('/')?;
+        let name = rest.strip_prefix("msg/").unwrap_or(rest);
+        Some(match (package, name) {
+            ("geometry_msgs", "PoseStamped") => Self::PoseStamped,
+            ("geometry_msgs", "PoseWithCovarianceStamped") => Self::PoseWithCovarianceStamped,
+            ("geometry_msgs", "TransformStamped") => Self::TransformStamped,
+            ("nav_msgs", "Odometry") => Self::Odometry,
+            ("nav_msgs", "Path") => Self::Path,
+            ("tf2_msgs", "TFMessage") => Self::TransformList,
+            _ => return None,
+        })
+    }
+}
+
+/// Where a body is at a time.
+#[derive(Debug, Clone, Copy)]
+struct Pose {
+    /// Nanoseconds.
+    time: i64,
+    position: DVec3,
+    rotation: DQuat,
+    /// Where its message begins in the file, or in its chunk.
+    offset: u64,
+}
+
+/// The poses of one body.
+struct Track {
+    name: String,
+    poses: Vec<Pose>,
+}
+
+/// A log that is being read.
+struct Log<'a> {
+    name: &'a str,
+    budget: &'a Budget,
+    tracks: Vec<Track>,
+    /// The track of a topic, or of two frames.
+    places: HashMap<[String; 2], usize>,
+    /// Topics with messages of other types.
+    others: Vec<String>,
+    /// Topics that are refused.
+    refused: Vec<(String, Diagnostic)>,
+    warnings: Warnings,
+}
+
+impl Log<'_> {
+    fn over(&self, error: &OverBudget) -> Diagnostic {
+        Diagnostic::new(self.name, Code::Memory, error.to_string())
+    }
+
+    /// Takes the poses of a message; what cannot be read of one refuses its topic.
+    fn message(
+        &mut self,
+        channel: &Channel,
+        log_time: u64,
+        data: &[u8],
+        offset: u64,
+    ) -> Result<(), Diagnostic> {
+        if self
+            .refused
+            .iter()
+            .any(|(topic, _)| *topic == channel.topic)
+        {
+            return Ok(());
+        }
+        let kind = Kind::of(&channel.schema).filter(|_| channel.encoding == "cdr");
+        let Some(kind) = kind else {
+            if !self.others.contains(&channel.topic) {
+                self.budget
+                    .take(channel.topic.len() + 64, 1)
+                    .map_err(|error| self.over(&error))?;
+                self.others.push(channel.topic.clone());
+            }
+            return Ok(());
+        };
+        let mut found = Vec::new();
+        let read = self.poses(kind, channel, (log_time, offset), data, &mut found);
+        match read {
+            Ok(()) => {}
+            Err(Fault::Memory(error)) => return Err(self.over(&error)),
+            Err(Fault::Message(reason)) => {
+                let message = format!(
+                    "a message of `{}` ({}) {reason}",
+                    channel.topic, channel.schema
+                );
+                let mut fault = Diagnostic::new(self.name, Code::McapMessage, message);
+                fault.place = Some(Place::Inside(format!("{} at byte {offset}", channel.topic)));
+                self.refused.push((channel.topic.clone(), fault));
+                return Ok(());
+            }
+        }
+        // A path is said anew as a whole.
+        if kind == Kind::Path {
+            let track = self.track([channel.topic.clone(), String::new()])?;
+            self.tracks[track].poses.clear();
+        }
+        for (key, pose) in found {
+            let track = self.track(key)?;
+            self.tracks[track].poses.push(pose);
+        }
+        Ok(())
+    }
+
+    /// The place of a track, which is made if it is new.
+    fn track(&mut self, key: [String; 2]) -> Result<usize, Diagnostic> {
+        if let Some(&place) = self.places.get(&key) {
+            return Ok(place);
+        }
+        let length = TRACK + 4 * (key[0].len() + key[1].len());
+        self.budget
+            .take(length, 1)
+            .map_err(|error| self.over(&error))?;
+        let name = match &key {
+            [topic, none] if none.is_empty() => topic.clone(),
+            [parent, child] => format!("{parent}/{child}"),
+        };
+        self.tracks.push(Track {
+            name,
+            poses: Vec::new(),
+        });
+        self.places.insert(key, self.tracks.len() - 1);
+        Ok(self.tracks.len() - 1)
+    }
+
+    /// The poses of a message, each with the key of its track.
+    fn poses(
+        &self,
+        kind: Kind,
+        channel: &Channel,
+        (log_time, offset): (u64, u64),
+        data: &[u8],
+        found: &mut Vec<([String; 2], Pose)>,
+    ) -> Result<(), Fault> {
+        let mut cdr = Cdr::new(data)?;
+        let topic = || [channel.topic.clone(), String::new()];
+        // Who fills in no stamp leaves 0, and the log then says when the message came.
+        let time = |stamp: Stamp| match stamp.nanoseconds() {
+            0 => i64::try_from(log_time).unwrap_or(i64::MAX),
+            time => time,
+        };
+        let take = || self.budget.take(1, POSE).map_err(Fault::Memory);
+        match kind {
+            Kind::PoseStamped | Kind::PoseWithCovarianceStamped | Kind::Odometry => {
+                let (stamp, _) = cdr.header()?;
+                if kind == Kind::Odometry {
+                    cdr.text()?;
+                }
+                let (position, rotation) = cdr.pose()?;
+                take()?;
+                let time = time(stamp);
+                found.push((
+                    topic(),
+                    Pose {
+                        time,
+                        position,
+                        rotation,
+                        offset,
+                    },
+                ));
+            }
+            Kind::TransformStamped | Kind::TransformList => {
+                let count = match kind {
+                    Kind::TransformList => cdr.count()?,
+                    _ => 1,
+                };
+                for _ in 0..count {
+                    let (stamp, parent) = cdr.header()?;
+                    let child = cdr.text()?;
+                    let (position, rotation) = cdr.pose()?;
+                    take()?;
+                    let key = [parent, child].map(|frame| frame.trim_start_matches('/').to_owned());
+                    let time = time(stamp);
+                    found.push((
+                        key,
+                        Pose {
+                            time,
+                            position,
+                            rotation,
+                            offset,
+                        },
+                    ));
+                }
+            }
+            Kind::Path => {
+                cdr.header()?;
+                for _ in 0..cdr.count()? {
+                    let (stamp, _) = cdr.header()?;
+                    let (position, rotation) = cdr.pose()?;
+                    take()?;
+                    // All poses of a path would come when its message did.
+                    let time = stamp.nanoseconds();
+                    found.push((
+                        topic(),
+                        Pose {
+                            time,
+                            position,
+                            rotation,
+                            offset,
+                        },
+                    ));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn into_loaded(mut self, options: &ReadOptions) -> Result<Loaded, Diagnostic> {
+        let mut refused: Vec<Diagnostic> = self.refused.drain(..).map(|(_, fault)| fault).collect();
+        self.tracks.retain(|track| !track.poses.is_empty());
+        if !self.others.is_empty() {
+            let names: Vec<String> = self.others.iter().map(|name| format!("`{name}`")).collect();
+            self.warnings.warn(Code::McapOthers, || {
+                (
+                    None,
+                    format!("topics of other types are left out: {}", names.join(", ")),
+                )
+            });
+        }
+        let first = self
+            .tracks
+            .iter()
+            .flat_map(|track| &track.poses)
+            .map(|pose| pose.time)
+            .min();
+        let Some(first) = first else {
+            let message = "no poses; PoseStamped, Odometry, TFMessage and Path in CDR are read";
+            let none = || Diagnostic::new(self.name, Code::McapEmpty, message);
+            return Err(if refused.is_empty() {
+                none()
+            } else {
+                refused.remove(0)
+            });
+        };
+        let offset = first.div_euclid(1_000_000_000);
+        let mut taken = std::collections::HashSet::new();
+        let mut clip = Motion {
+            set: TrackSet::new(),
+            time_offset: offset,
+            ..Motion::default()
+        };
+        let mut all: Vec<(String, Vec<f64>, Vec<DVec3>, Vec<glam::Quat>)> = Vec::new();
+        for mut track in self.tracks {
+            // Messages may overtake each other.
+            track.poses.sort_by_key(|pose| pose.time);
+            let place = |key: usize| {
+                let offset = track.poses[key].offset;
+                Place::Inside(format!("{} at byte {offset}", track.name))
+            };
+            let origin = Origin {
+                file: self.name,
+                place: &place,
+                duplicates: options.duplicates,
+            };
+            let of_track = (|| {
+                let mut keys = origin.unit(
+                    track.poses.iter().map(|pose| pose.rotation),
+                    &mut self.warnings,
+                )?;
+                let mut positions: Vec<DVec3> =
+                    track.poses.iter().map(|pose| pose.position).collect();
+                if let Some(key) = positions.iter().position(|at| !at.as_vec3().is_finite()) {
+                    let message = format!("the position {} is no finite f32", positions[key]);
+                    let mut fault = Diagnostic::new(self.name, Code::NotFinite, message);
+                    fault.place = Some(place(key));
+                    return Err(fault);
+                }
+                let seconds = |pose: &Pose| {
+                    Decimal::whole(pose.time, -9).map_or(f64::NAN, |time| time.since(offset))
+                };
+                let mut times: Vec<f64> = track.poses.iter().map(seconds).collect();
+                let equal = |i: usize, j: usize| keys[i] == keys[j] && positions[i] == positions[j];
+                let kept = origin.increasing(&mut times, equal, &mut self.warnings)?;
+                select(&mut times, kept.as_deref());
+                select(&mut positions, kept.as_deref());
+                select(&mut keys, kept.as_deref());
+                Ok((
+                    untaken(track.name.clone(), all.len(), &mut taken),
+                    times,
+                    positions,
+                    keys,
+                ))
+            })();
+            match of_track {
+                Ok(track) => all.push(track),
+                Err(fault) => refused.push(fault),
+            }
+        }
+        if all.is_empty() && !refused.is_empty() {
+            return Err(refused.remove(0));
+        }
+        if !options.raw_times {
+            let mut lists: Vec<Vec<f64>> = all
+                .iter_mut()
+                .map(|track| std::mem::take(&mut track.1))
+                .collect();
+            clip.rate = restore(&mut lists, Precision::Decimals(NANOSECONDS));
+            for (track, times) in all.iter_mut().zip(lists) {
+                track.1 = times;
+            }
+        }
+        let refuse =
+            |error: TrackError| Diagnostic::new(self.name, Code::McapMessage, error.to_string());
+        for (place, (name, times, positions, keys)) in all.into_iter().enumerate() {
+            clip.set.push(&name, &times, &keys).map_err(refuse)?;
+            clip.skeleton.push(Joint {
+                parent: None,
+                rest: Transform::default(),
+            });
+            clip.set_positions(place, &times, &positions)
+                .map_err(refuse)?;
+        }
+        Ok(Loaded {
+            refused,
+            ..Loaded::of(clip, self.warnings.into_list())
+        })
+    }
+}
+
+/// Why a message cannot be read.
+enum Fault {
+    Memory(OverBudget),
+    /// What about it, behind its name.
+    Message(String),
+}
+
+impl From<String> for Fault {
+    fn from(reason: String) -> Self {
+        Self::Message(reason)
+    }
+}

@@ -1,0 +1,313 @@
+//! The records of an MCAP file: messages, and what says how they are read.
+
+use std::collections::HashMap;
+use std::io::Read;
+
+use crate::budget::{Borrowed, Budget, OverBudget};
+use crate::diagnostic::{Code, Diagnostic, Place};
+use crate::warnings::Warnings;
+
+/// How a file begins and ends.
+pub(super) const MAGIC: &[u8] = b"\x89MCAP0\r\n";
+
+/// The kinds of records that matter.
+const SCHEMA: u8 = 3;
+const CHANNEL: u8 = 4;
+const MESSAGE: u8 = 5;
+const CHUNK: u8 = 6;
+const DATA_END: u8 = 15;
+
+/// What the messages of a topic are.
+#[derive(Debug, Clone)]
+pub(super) struct Channel {
+    pub(super) topic: String,
+    /// How they are encoded.
+    pub(super) encoding: String,
+    /// The name of their type.
+    pub(super) schema: String,
+}
+
+/// A message.
+pub(super) struct Record<'a> {
+    pub(super) channel: &'a Channel,
+    /// When it was logged, nanoseconds.
+    pub(super) log_time: u64,
+    pub(super) data: &'a [u8],
+    /// Where it, or its chunk, begins in the file.
+    pub(super) offset: u64,
+}
+
+/// A file whose records are read one after another.
+pub(super) struct Records<'a> {
+    name: &'a str,
+    budget: &'a Budget,
+    bytes: &'a [u8],
+    at: usize,
+    schemas: HashMap<u16, String>,
+    channels: HashMap<u16, Channel>,
+    /// The records of the chunk that is being read, where it is in the file, and how far it is read.
+    chunk: Vec<u8>,
+    chunk_offset: u64,
+    chunk_at: usize,
+    /// The memory of the chunk.
+    borrowed: Option<Borrowed<'a>>,
+}
+
+/// Fields of a record.
+struct Fields<'a>(&'a [u8]);
+
+impl<'a> Fields<'a> {
+    fn take(&mut self, count: usize) -> Option<&'a [u8]> {
+        let (taken, rest) = self.0.split_at_checked(count)?;
+        self.0 = rest;
+        Some(taken)
+    }
+
+    fn number<const N: usize>(&mut self) -> Option<[u8; N]> {
+        let (taken, rest) = self.0.split_first_chunk()?;
+        self.0 = rest;
+        Some(*taken)
+    }
+
+    fn u16(&mut self) -> Option<u16> {
+        self.number().map(u16::from_le_bytes)
+    }
+
+    fn u32(&mut self) -> Option<u32> {
+        self.number().map(u32::from_le_bytes)
+    }
+
+    fn u64(&mut self) -> Option<u64> {
+        self.number().map(u64::from_le_bytes)
+    }
+
+    fn text(&mut self) -> Option<&'a str> {
+        let length = self.u32()? as usize;
+        std::str::from_utf8(self.take(length)?).ok()
+    }
+}
+
+/// The next record: its kind, its content, and its length with both.
+fn record(bytes: &[u8]) -> Option<(u8, &[u8], usize)> {
+    let mut fields = Fields(bytes);
+    let [kind] = fields.number()?;
+    let length = usize::try_from(fields.u64()?).ok()?;
+    Some((kind, fields.take(length)?, length + 9))
+}
+
+impl<'a> Records<'a> {
+    pub(super) fn new(
+        name: &'a str,
+        bytes: &'a [u8],
+        budget: &'a Budget,
+    ) -> Result<Self, Diagnostic> {
+        if bytes.is_empty() {
+            return Err(Diagnostic::new(name, Code::Empty, "the file is empty"));
+        }
+        if !bytes.starts_with(MAGIC) {
+            let message = "the file does not begin as MCAP does; is it a bag of ROS 1, or SQLite? convert it first";
+            return Err(Diagnostic::new(name, Code::McapDamaged, message));
+        }
+        Ok(Self {
+            name,
+            budget,
+            bytes,
+            at: MAGIC.len(),
+            schemas: HashMap::new(),
+            channels: HashMap::new(),
+            chunk: Vec::new(),
+            chunk_offset: 0,
+            chunk_at: 0,
+            borrowed: None,
+        })
+    }
+
+    fn damaged(&self, offset: u64, message: String) -> Diagnostic {
+        let mut fault = Diagnostic::new(self.name, Code::McapDamaged, message);
+        fault.place = Some(Place::Inside(format!("byte {offset}")));
+        fault
+    }
+
+    /// The next message; nothing at the end, which a cut file has too, and is told.
+    ///
+    /// # Errors
+    /// When the file is damaged, or says that it has more than fits into memory.
+    pub(super) fn next(
+        &mut self,
+        warnings: &mut Warnings,
+    ) -> Result<Option<Record<'_>>, Diagnostic> {
+        loop {
+            let in_chunk = self.chunk_at < self.chunk.len();
+            let offset = if in_chunk {
+                self.chunk_offset
+            } else {
+                self.at as u64
+            };
+            let (bytes, at) = match in_chunk {
+                true => (&self.chunk[..], self.chunk_at),
+                false => (self.bytes, self.at),
+            };
+            if at >= bytes.len() || !in_chunk && &bytes[at..] == MAGIC {
+                return Ok(None);
+            }
+            let Some((kind, content, length)) = record(&bytes[at..]) else {
+                if in_chunk {
+                    return Err(
+                        self.damaged(offset, "a record runs over the end of its chunk".to_owned())
+                    );
+                }
+                warnings.warn(Code::McapCut, || {
+                    let place = Place::Inside(format!("byte {offset}"));
+                    (
+                        Some(place),
+                        "the file ends within a record; what is before it is read",
+                    )
+                });
+                self.at = self.bytes.len();
+                return Ok(None);
+            };
+            match in_chunk {
+                true => self.chunk_at += length,
+                false => self.at += length,
+            }
+            let broken = |what: &str| {
+                format!("a record of a {what} is too short, or its texts are no UTF-8")
+            };
+            match kind {
+                SCHEMA => {
+                    let mut fields = Fields(content);
+                    let found = fields.u16().zip(fields.text());
+                    let found = found.map(|(id, name)| (id, name.to_owned()));
+                    let (id, name) = found.ok_or_else(|| self.damaged(offset, broken("schema")))?;
+                    self.keep(name.len())?;
+                    self.schemas.insert(id, name);
+                }
+                CHANNEL => {
+                    let mut fields = Fields(content);
+                    let found = (|| {
+                        let (id, schema) = (fields.u16()?, fields.u16()?);
+                        Some((
+                            id,
+                            schema,
+                            fields.text()?.to_owned(),
+                            fields.text()?.to_owned(),
+                        ))
+                    })();
+                    let (id, schema, topic, encoding) =
+                        found.ok_or_else(|| self.damaged(offset, broken("channel")))?;
+                    self.keep(topic.len() + encoding.len())?;
+                    let schema = self.schemas.get(&schema).cloned().unwrap_or_default();
+                    let channel = Channel {
+                        topic,
+                        encoding,
+                        schema,
+                    };
+                    self.channels.insert(id, channel);
+                }
+                MESSAGE => {
+                    let mut fields = Fields(content);
+                    let head = (|| {
+                        let (id, _, log_time, _) =
+                            (fields.u16()?, fields.u32()?, fields.u64()?, fields.u64()?);
+                        Some((id, log_time))
+                    })();
+                    let Some((id, log_time)) = head else {
+                        return Err(self.damaged(offset, broken("message")));
+                    };
+                    if !self.channels.contains_key(&id) {
+                        return Err(self.damaged(
+                            offset,
+                            format!("a message of channel {id}, which is not there"),
+                        ));
+                    }
+                    // The loop goes on from here no more: what is given is looked up again.
+                    let bytes = if in_chunk {
+                        &self.chunk[..]
+                    } else {
+                        self.bytes
+                    };
+                    let data = &bytes[at + 9 + 22..at + length];
+                    return Ok(Some(Record {
+                        channel: &self.channels[&id],
+                        log_time,
+                        data,
+                        offset,
+                    }));
+                }
+                CHUNK if in_chunk => {
+                    return Err(self.damaged(offset, "a chunk within a chunk".to_owned()));
+                }
+                CHUNK => {
+                    let content = &self.bytes[at + 9..at + length];
+                    (self.chunk, self.borrowed) = (Vec::new(), None);
+                    let (chunk, borrowed) = self.unpacked(content, offset)?;
+                    (self.chunk, self.chunk_offset, self.chunk_at) = (chunk, offset, 0);
+                    self.borrowed = Some(borrowed);
+                }
+                // An index and a summary follow, which say the channels again.
+                DATA_END if !in_chunk => self.at = self.bytes.len(),
+                _ => {}
+            }
+        }
+    }
+
+    /// Takes the memory of an entry with texts of so many bytes.
+    fn keep(&self, length: usize) -> Result<(), Diagnostic> {
+        let taken = self.budget.take(length + 200, 1);
+        taken.map_err(|error| Diagnostic::new(self.name, Code::Memory, error.to_string()))
+    }
+
+    /// The records of a chunk.
+    fn unpacked(&self, content: &[u8], offset: u64) -> Result<(Vec<u8>, Borrowed<'a>), Diagnostic> {
+        let mut fields = Fields(content);
+        let head = (|| {
+            let (_, _, size, sum) = (fields.u64()?, fields.u64()?, fields.u64()?, fields.u32()?);
+            let compression = fields.text()?;
+            let length = usize::try_from(fields.u64()?).ok()?;
+            Some((size, sum, compression, fields.take(length)?))
+        })();
+        let Some((size, sum, compression, packed)) = head else {
+            return Err(self.damaged(offset, "a chunk is too short for what it says".to_owned()));
+        };
+        let size = usize::try_from(size).unwrap_or(usize::MAX);
+        let over = |error: OverBudget| Diagnostic::new(self.name, Code::Memory, error.to_string());
+        let borrowed = self.budget.borrow(size, 1).map_err(over)?;
+        let unpacked = match compression {
+            "" => Ok(packed.to_vec()),
+            "zstd" => {
+                let unpacked = zstd::bulk::decompress(packed, size);
+                unpacked.map_err(|error| error.to_string())
+            }
+            "lz4" => {
+                let mut unpacked = Vec::new();
+                let decoder = lz4_flex::frame::FrameDecoder::new(packed);
+                let read = decoder.take(size as u64 + 1).read_to_end(&mut unpacked);
+                read.map(|_| unpacked).map_err(|error| error.to_string())
+            }
+            other => {
+                let message = format!("a chunk is compressed by `{other}`; zstd and lz4 are read");
+                return Err(self.damaged(offset, message));
+            }
+        };
+        let unpacked = unpacked.map_err(|reason| {
+            self.damaged(offset, format!("a chunk cannot be unpacked: {reason}"))
+        })?;
+        if unpacked.len() != size {
+            let message = format!(
+                "a chunk has {} bytes, and says that it has {size}",
+                unpacked.len()
+            );
+            return Err(self.damaged(offset, message));
+        }
+        let mut crc = flate2::Crc::new();
+        crc.update(&unpacked);
+        if sum != 0 && crc.sum() != sum {
+            let message = format!(
+                "the checksum of a chunk is {:#010x}, and it says {sum:#010x}",
+                crc.sum()
+            );
+            return Err(self.damaged(offset, message));
+        }
+        Ok((unpacked, borrowed))
+    }
+}
