@@ -7,6 +7,7 @@ use std::io::{self, BufRead, Write};
 use std::path::Path;
 
 use glam::{DMat3, DQuat, DVec3};
+use tumble::FrameRate;
 
 use crate::decimal::Decimal;
 use crate::diagnostic::{Code, Diagnostic};
@@ -184,6 +185,9 @@ fn read_rows<R: BufRead>(lines: &Lines<R>, line: &str) -> Result<[[f64; 4]; 3], 
     Ok(rows)
 }
 
+/// How far a time may be from its frame, in frames.
+const OFF_FRAME: f64 = 0.01;
+
 /// Decimals of a matrix' numbers: read back, they are the same rotation in f32.
 const DECIMALS: usize = 12;
 
@@ -197,7 +201,13 @@ fn write_motion(
     let path = Trajectory::of(clips, options)?;
     let mut warnings = Vec::new();
     if !options.times_apart {
-        let Some(rate) = path.sampled.rate else {
+        let times = path.sampled.times;
+        let is_frame = |rate: FrameRate, (frame, &time): (usize, &f64)| {
+            ((time - times[0]) * rate.per_second() - frame as f64).abs() < OFF_FRAME
+        };
+        let are_frames =
+            |&rate: &FrameRate| times.iter().enumerate().all(|own| is_frame(rate, own));
+        let Some(rate) = path.sampled.rate.filter(are_frames) else {
             let message = "its times are no frames of a rate, and KITTI has no times; give --times-out, a file of them";
             return Err(path.refuse(message.to_owned()));
         };

@@ -7,7 +7,6 @@ use ufbx::{
 };
 
 use crate::budget::{Budget, OverBudget};
-use crate::fbx::direct::is_still;
 
 /// Times closer than this are one, seconds: FBX counts in ticks of 2.2e-11 s.
 pub(super) const SAME: f64 = 1e-9;
@@ -50,7 +49,7 @@ pub(super) struct Properties {
     pub(super) translation: Option<usize>,
     pub(super) rotation: Option<usize>,
     pub(super) scale: Option<usize>,
-    /// Nothing else moves it: no other property, no other layer, and no scale that a node above keeps.
+    /// Nothing else moves it: no other property, and no other layer.
     pub(super) are_plain: bool,
 }
 
@@ -146,7 +145,7 @@ impl Takes {
             }
         }
         for node in &scene.nodes {
-            takes.carry(node, stack, budget)?;
+            takes.carry(node, budget)?;
         }
         Ok(takes)
     }
@@ -167,7 +166,7 @@ impl Takes {
     }
 
     /// What moves a node by way of its pivots, and of scales that nodes above it have.
-    fn carry(&mut self, node: &Node, stack: &AnimStack, budget: &Budget) -> Result<(), OverBudget> {
+    fn carry(&mut self, node: &Node, budget: &Budget) -> Result<(), OverBudget> {
         let index = node.element.typed_id as usize;
         let pivot = |name| {
             let found = ufbx::find_prop(&node.element.props, name);
@@ -198,26 +197,15 @@ impl Takes {
             return Ok(());
         }
         let mut scales = Times::default();
-        let mut is_scaled = false;
         let mut next = parent;
         while let Some(above) = next {
             let helper = above.scale_helper.as_deref().into_iter();
             for carrier in helper.chain([above]) {
-                let carrier = carrier.element.typed_id as usize;
-                if let Some(moved) = self.nodes.get(&carrier) {
+                if let Some(moved) = self.nodes.get(&(carrier.element.typed_id as usize)) {
                     scales.append(&moved.scale, budget)?;
-                }
-                if let Some(properties) = self.properties.get(&carrier) {
-                    let value = |place: usize| &stack.layers[0].anim_props[place].anim_value;
-                    let scale = properties.scale.map(value);
-                    is_scaled |=
-                        !properties.are_plain || scale.is_some_and(|scale| !is_still(scale));
                 }
             }
             next = above.parent.as_deref();
-        }
-        if is_scaled {
-            self.properties.entry(index).or_default().are_plain = false;
         }
         if !scales.list.is_empty() {
             let moved = self.nodes.entry(index).or_default();
