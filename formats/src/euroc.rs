@@ -38,6 +38,10 @@ pub static FORMAT: Format = Format {
             })
     },
     read: open_euroc,
+    read_bytes: |name, bytes, options| match options.map {
+        Some(_) => (crate::csv::FORMAT.read_bytes)(name, bytes, options),
+        None => read_euroc(name, &bytes[..], options),
+    },
     write: None,
     write_motion: Some(write_motion),
     features: &[Feature::Translations, Feature::UnevenTimes, Feature::Start],

@@ -35,6 +35,7 @@ pub static FORMAT: Format = Format {
     extensions: &[],
     probe: |start| start.starts_with(MAGIC),
     read: open_mcap,
+    read_bytes: |name, bytes, options| read_mcap(name, &bytes, options),
     write: None,
     write_motion: None,
     features: &[
