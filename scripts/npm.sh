@@ -48,4 +48,14 @@ cargo build --quiet -p tumble-cli --bin tumble
 TUMBLE=$(realpath "$target/debug/tumble") node --test --test-concurrency=1 --test-reporter=spec npm/tests/
 mkdir -p "$target/npm"
 archives=$(realpath "$target/npm")
-(cd npm/package && npm pack --silent --pack-destination "$archives")
+archive=$archives/$(cd npm/package && npm pack --silent --pack-destination "$archives")
+
+# The archive as npm installs it, and its types.
+user=$target/npm/user
+mkdir -p "$user"
+printf '{ "private": true, "type": "module" }\n' >"$user/package.json"
+npm install --silent --no-audit --no-fund --prefix "$user" "$archive" typescript@5.9
+cp npm/tests/types.mts "$user"
+cd "$user"
+npx tsc --noEmit --strict --target es2022 --module nodenext --lib es2022,dom types.mts
+node --input-type=module -e 'import { load } from "tumble"; console.log(`installed: tumble ${(await load()).version}`)'

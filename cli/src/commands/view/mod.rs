@@ -125,7 +125,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
             match document.as_ref().map(|own| own.carried_mesh(&one.clip)) {
                 Some(Ok(mesh)) => one.mesh = mesh.filter(|mesh| is_small(mesh, &one.name)),
                 Some(Err(fault)) => {
-                    words::note(&format!("{fault}; bones are shown without meshes"))
+                    words::note(&format!("{fault}; bones are shown without meshes"));
                 }
                 None => {}
             }
