@@ -295,6 +295,7 @@ codes! {
     TwoRates = "W304", "two rates that differ", "A file says its rate twice, or a rate and times or a length of another; `--source-fps` overrules rates.";
     Nanoseconds = "W305", "times that are nanoseconds", "Seconds since 1970 have ten digits, nanoseconds nineteen, as ORB-SLAM writes them: `--time-unit ns` says it without this warning.";
     Bridged = "W401", "keys that are missing", "Cells are blank or NaN, and `--bridge-gaps` asks for the track to be interpolated from its other keys there.";
+    ColumnsLeftOut = "W402", "columns that are left out", "Their names are none of those that keys have, or a list has more numbers than `--map` takes. `--map` gives columns the names of keys.";
     FurtherNumbers = "W501", "further numbers behind a pose", "A line of a trajectory is a time, a position and a quaternion; what follows, such as a covariance or velocities, is not read.";
     FbxBeside = "W701", "what is not motion", "Meshes, skins, materials and the like are not read from FBX; nodes, and what moves them, are.";
     FbxProperties = "W702", "curves of other properties", "They move what is no transform, such as blend shapes, visibility or a lens.";

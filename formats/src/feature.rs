@@ -67,9 +67,10 @@ impl Feature {
 
     /// What tables of many clips hold.
     #[cfg(feature = "parquet")]
-    pub(crate) const OF_TABLES: [Self; 8] = [
+    pub(crate) const OF_TABLES: [Self; 9] = [
         Self::TrackNames,
         Self::ClipName,
+        Self::Skeleton,
         Self::Translations,
         Self::Scales,
         Self::World,
@@ -114,7 +115,7 @@ impl Feature {
                 (has_names, "the names of the tracks")
             }
             Self::ClipName => (clip.name.is_some(), "the name of the clip"),
-            Self::Skeleton => (joints().any(|it| it.parent.is_some()), "the skeleton"),
+            Self::Skeleton => (clip.hangs_together(), "the skeleton"),
             Self::RestRotations => (
                 joints().any(|it| it.rest.rotation != Quat::IDENTITY),
                 "the rotations in which joints rest",

@@ -12,6 +12,7 @@ pub mod arrow;
 pub mod beneath;
 pub mod budget;
 pub mod bvh;
+pub mod compare;
 pub mod csv;
 pub mod dat;
 mod decimal;

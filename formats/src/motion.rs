@@ -58,6 +58,13 @@ impl Motion {
         }
     }
 
+    /// Whether a joint hangs on another, or rests elsewhere than at 0.
+    #[must_use]
+    pub fn hangs_together(&self) -> bool {
+        let moves = |joint: &Joint| joint.parent.is_some() || joint.rest.translation != Vec3::ZERO;
+        self.skeleton.iter().any(moves)
+    }
+
     /// What a track's translations are to be moved by.
     #[must_use]
     pub fn origin(&self, track: usize) -> DVec3 {

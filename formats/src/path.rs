@@ -27,13 +27,13 @@ pub enum Pace {
 
 /// The points of one path.
 #[derive(Debug, Clone, Default)]
-struct Points {
-    /// Empty if the file has none.
-    times: Vec<f64>,
-    points: Vec<DVec3>,
-    ups: Vec<Option<Vec3>>,
-    /// The lines of the points in text.
-    lines: Vec<u64>,
+pub struct PathPoints {
+    /// Seconds, increasing; empty if there are none.
+    pub times: Vec<f64>,
+    /// The points, one for each time.
+    pub points: Vec<DVec3>,
+    /// Upward directions, one for each point; empty if there are none.
+    pub ups: Vec<Option<Vec3>>,
 }
 
 /// Reads the paths of a file, a track each, named `name`; `-` is standard input. All have one
@@ -96,6 +96,19 @@ pub fn read_paths(
         true => of_array(file, bytes)?,
         false => vec![of_text(file, bytes)?],
     };
+    paths_of(file, name, paths, pace)
+}
+
+/// Paths of points, a track each; otherwise as [`open_paths`].
+///
+/// # Errors
+/// When a path has neither times nor a pace, or the set refuses its points.
+pub fn paths_of(
+    file: &str,
+    name: &str,
+    paths: Vec<PathPoints>,
+    pace: Option<Pace>,
+) -> Result<Motion, Diagnostic> {
     let mut set = TrackSet::new();
     let several = paths.len() > 1;
     let origin = origin_of(paths.iter().flat_map(|path| path.points.iter().copied()));
@@ -124,7 +137,7 @@ pub fn read_paths(
 /// Columns by their names, of which those of `t` and of the ups may be missing.
 const NAMES: [&str; 7] = ["t", "x", "y", "z", "ux", "uy", "uz"];
 
-fn of_text(file: &str, bytes: &[u8]) -> Result<Points, Diagnostic> {
+fn of_text(file: &str, bytes: &[u8]) -> Result<PathPoints, Diagnostic> {
     let refuse = |line: u64, code, message: String| {
         let mut fault = Diagnostic::new(file, code, message);
         fault.place = Some(Place::Text { line, column: 1 });
@@ -166,7 +179,7 @@ fn of_text(file: &str, bytes: &[u8]) -> Result<Points, Diagnostic> {
         );
         return Err(refuse(1, Code::Path, message));
     }
-    let mut path = Points::default();
+    let mut path = PathPoints::default();
     while next(&mut record)? {
         let line = record.position().map_or(0, ::csv::Position::line);
         if record.len() != names.len() {
@@ -217,7 +230,6 @@ fn of_text(file: &str, bytes: &[u8]) -> Result<Points, Diagnostic> {
             return Err(refuse(line, Code::Path, message));
         }
         path.ups.push(up);
-        path.lines.push(line);
     }
     if path.points.is_empty() {
         return Err(refuse(
@@ -229,7 +241,7 @@ fn of_text(file: &str, bytes: &[u8]) -> Result<Points, Diagnostic> {
     Ok(path)
 }
 
-fn of_array(file: &str, bytes: &[u8]) -> Result<Vec<Points>, Diagnostic> {
+fn of_array(file: &str, bytes: &[u8]) -> Result<Vec<PathPoints>, Diagnostic> {
     let refuse = |code, message: String| Diagnostic::new(file, code, message);
     let array = npy::read_numbers(file, bytes, |shape| match shape {
         [_, _, 3] => Ok(()),
@@ -244,7 +256,7 @@ fn of_array(file: &str, bytes: &[u8]) -> Result<Vec<Points>, Diagnostic> {
             "there is no point in the array".to_owned(),
         ));
     }
-    let of_track = |(track, own): (usize, &[f64])| -> Result<Points, Diagnostic> {
+    let of_track = |(track, own): (usize, &[f64])| -> Result<PathPoints, Diagnostic> {
         let points = own
             .as_chunks::<3>()
             .0
@@ -256,9 +268,9 @@ fn of_array(file: &str, bytes: &[u8]) -> Result<Vec<Points>, Diagnostic> {
                 let message = "a coordinate is not a finite f32".to_owned();
                 Err(refuse(Code::NotFinite, message).inside(format!("[{track}, {point}]")))
             }
-            None => Ok(Points {
+            None => Ok(PathPoints {
                 points,
-                ..Points::default()
+                ..PathPoints::default()
             }),
         }
     };
@@ -270,7 +282,7 @@ fn of_array(file: &str, bytes: &[u8]) -> Result<Vec<Points>, Diagnostic> {
         .collect()
 }
 
-impl Points {
+impl PathPoints {
     /// Gives points without times the times at which a body passes them. Of points that repeat the
     /// one before, that one stays.
     fn give_times(&mut self, file: &str, pace: Option<Pace>) -> Result<(), Diagnostic> {

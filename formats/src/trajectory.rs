@@ -29,6 +29,23 @@ pub enum Align {
     Sim3,
 }
 
+impl Align {
+    /// All of them.
+    pub const ALL: [Self; 5] = [Self::None, Self::Position, Self::Yaw, Self::Se3, Self::Sim3];
+
+    /// The name by which programs call it.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::None => "none",
+            Self::Position => "position",
+            Self::Yaw => "yaw",
+            Self::Se3 => "se3",
+            Self::Sim3 => "sim3",
+        }
+    }
+}
+
 /// What lays an estimate over its reference: `scale`, then `rotation`, then `translation`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Alignment {
@@ -47,6 +64,28 @@ pub enum Step {
     Seconds(f64),
     /// Along the estimate.
     Metres(f64),
+}
+
+/// A text is no step.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("not a step over 0, such as 1s or 0.5m")]
+pub struct StepError;
+
+/// `1s` or `0.5m`.
+impl std::str::FromStr for Step {
+    type Err = StepError;
+
+    fn from_str(text: &str) -> Result<Self, StepError> {
+        let unit = text.chars().last().map_or(0, char::len_utf8);
+        let (number, unit) = text.split_at(text.len() - unit);
+        let number = number.trim().parse::<f64>().map_err(|_| StepError)?;
+        let is_length = number.is_finite() && number > 0.0;
+        match unit {
+            "s" if is_length => Ok(Self::Seconds(number)),
+            "m" if is_length => Ok(Self::Metres(number)),
+            _ => Err(StepError),
+        }
+    }
 }
 
 /// The errors of some poses, or of the steps between some.
@@ -298,6 +337,15 @@ impl Statistics {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn steps_are_of_seconds_or_metres() {
+        assert_eq!("1s".parse(), Ok(Step::Seconds(1.0)));
+        assert_eq!("0.5 m".parse(), Ok(Step::Metres(0.5)));
+        for bad in ["", "s", "1", "0m", "-1s", "infs", "1km", "1\u{e4}"] {
+            assert_eq!(bad.parse::<Step>(), Err(StepError), "{bad}");
+        }
+    }
 
     fn pose(x: f64, y: f64, z: f64, rotation: DQuat) -> Pose {
         Pose {

@@ -342,19 +342,21 @@ impl Clip {
     /// >>> clip.evaluate(at=[0.0, 2.0], method="slerp")[0]
     /// array([[0., 0., 0., 1.],
     ///        [1., 0., 0., 0.]], dtype=float32)
-    #[pyo3(signature = (*, out=None, order="xyzw", layout="track", as_rotation=false, **options), text_signature = "($self, *, fps=None, at=None, times=None, start=None, end=None, method=None, path=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, out=None, order='xyzw', layout='track', as_rotation=False)")]
+    #[pyo3(signature = (*, out=None, order="xyzw", layout="track", as_rotation=false, dtype=None, **options), text_signature = "($self, *, fps=None, at=None, times=None, start=None, end=None, method=None, path=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, out=None, order='xyzw', layout='track', as_rotation=False, dtype='float32')")]
+    #[allow(clippy::too_many_arguments, reason = "keywords")]
     fn evaluate<'py>(
         slf: &Bound<'py, Self>,
         out: Option<&Bound<'py, PyAny>>,
         order: &str,
         layout: &str,
         as_rotation: bool,
+        dtype: Option<&Bound<'py, PyAny>>,
         options: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let engine = default_engine(slf.py())?;
         engine
             .get()
-            .evaluate(slf, out, order, layout, as_rotation, options)
+            .evaluate(slf, out, order, layout, as_rotation, dtype, options)
     }
 
     /// Draws the components of a track over time, its keys as dots, with matplotlib; gives its axes.
@@ -427,7 +429,7 @@ fn vectors(py: Python<'_>, of: impl Iterator<Item = Vec3>) -> PyResult<Bound<'_,
 
 impl Clip {
     /// A track's place, of its place or name.
-    fn track(&self, track: &Bound<'_, PyAny>) -> PyResult<usize> {
+    pub(crate) fn track(&self, track: &Bound<'_, PyAny>) -> PyResult<usize> {
         let set = &self.motion.set;
         let tracks = set.track_count();
         if let Ok(name) = track.cast::<PyString>() {

@@ -16,9 +16,12 @@ use crate::arrays::Order;
 use crate::clip::Clip;
 use crate::errors::{device, guarded, input, of_engine};
 use crate::evaluate::Result;
-use crate::options::{Request, request_arrays};
+use crate::follow;
+use crate::options::{Request, request_arrays, samples_of};
+use crate::output::quaternions_of;
 use crate::poses;
 use crate::run::{interruptible, stoppable};
+use crate::samples;
 use crate::stream::Chunks;
 use crate::verify::Verification;
 
@@ -178,7 +181,7 @@ impl Engine {
     /// float32, (tracks, frames, 4), unit quaternions.
     ///
     /// `evaluate(clip, *, fps=None, at=None, out=None, order="xyzw", layout="track",
-    /// as_rotation=False, …)`
+    /// as_rotation=False, dtype="float32", …)`
     ///
     /// Which samples: `fps`, a rate ("30000/1001" is exact, 29.97 is not it), with `start` and
     /// `end`, seconds, else from the first key to the last; or `at` (or `times`), seconds, in any
@@ -186,9 +189,10 @@ impl Engine {
     /// single time gives a result without the axis of frames; lists of different lengths give a
     /// list of arrays.
     ///
-    /// `out`: a C-contiguous float32 array of the result's shape, which is filled and returned.
+    /// `out`: a C-contiguous array of the result's type and shape, which is filled and returned.
     /// `order`: "xyzw" or "wxyz", of the result. `layout`: "frame" gives (frames, tracks, 4).
-    /// `as_rotation`: a `Rotation` of SciPy's for each track.
+    /// `as_rotation`: a `Rotation` of SciPy's for each track. `dtype`: "float16" has half the size, within
+    /// 2.5e-4 of each component; "int16", to be divided by 32767, within 1.6e-5.
     ///
     /// Other options: `method` ("authored": as a file says of each channel, bessel-overhauser where
     /// it says nothing; see `tumble.methods()`), `path` ("shortest", "as-authored"), `ends`
@@ -201,7 +205,8 @@ impl Engine {
     /// >>> out = np.empty((1, 25, 4), np.float32)
     /// >>> tumble.Engine().evaluate(clip, fps=24, method="slerp", out=out) is out
     /// True
-    #[pyo3(signature = (clip, *, out=None, order="xyzw", layout="track", as_rotation=false, **options), text_signature = "($self, clip, *, fps=None, at=None, times=None, start=None, end=None, method=None, path=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, out=None, order='xyzw', layout='track', as_rotation=False)")]
+    #[pyo3(signature = (clip, *, out=None, order="xyzw", layout="track", as_rotation=false, dtype=None, **options), text_signature = "($self, clip, *, fps=None, at=None, times=None, start=None, end=None, method=None, path=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, out=None, order='xyzw', layout='track', as_rotation=False, dtype='float32')")]
+    #[allow(clippy::too_many_arguments, reason = "keywords")]
     pub(crate) fn evaluate<'py>(
         &self,
         clip: &Bound<'py, Clip>,
@@ -209,9 +214,11 @@ impl Engine {
         order: &str,
         layout: &str,
         as_rotation: bool,
+        dtype: Option<&Bound<'py, PyAny>>,
         options: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let result = Result {
+            encoding: dtype.map_or(Ok(Encoding::F32), quaternions_of)?,
             order: Order::named(order)?,
             layout: layout_named(layout)?,
             as_rotation,
@@ -275,8 +282,8 @@ impl Engine {
         self.result(clip, &result, out, options)
     }
 
-    /// The rotations as matrices for column vectors: float32, (tracks, frames, 3, 3). Other
-    /// keywords are those of `evaluate`.
+    /// The rotations as matrices for column vectors: float32, (tracks, frames, 3, 3), or with `columns=4`
+    /// (tracks, frames, 3, 4), the last column, the translation, 0. Other keywords are those of `evaluate`.
     ///
     /// >>> import tumble
     /// >>> clip = tumble.Clip([0.0, 2.0], [[0, 0, 0, 1], [0, 0, 1, 0]])
@@ -284,16 +291,46 @@ impl Engine {
     /// array([[-1.,  0.,  0.],
     ///        [ 0., -1.,  0.],
     ///        [ 0.,  0.,  1.]], dtype=float32)
-    #[pyo3(signature = (clip, *, out=None, layout="track", **options), text_signature = "($self, clip, *, fps=None, at=None, times=None, start=None, end=None, method=None, path=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, out=None, layout='track')")]
+    #[pyo3(signature = (clip, *, columns=3, out=None, layout="track", **options), text_signature = "($self, clip, *, fps=None, at=None, times=None, start=None, end=None, method=None, path=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, columns=3, out=None, layout='track')")]
     fn matrices<'py>(
         &self,
         clip: &Bound<'py, Clip>,
+        columns: u32,
         out: Option<&Bound<'py, PyAny>>,
         layout: &str,
         options: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let result = Result {
-            encoding: Encoding::Matrix3x3(MatrixOrder::RowMajor),
+            encoding: match columns {
+                3 => Encoding::Matrix3x3(MatrixOrder::RowMajor),
+                4 => Encoding::Matrix3x4(MatrixOrder::RowMajor),
+                _ => return Err(input(format!("columns: there are 3 or 4, not {columns}"))),
+            },
+            layout: layout_named(layout)?,
+            ..Result::default()
+        };
+        self.result(clip, &result, out, options)
+    }
+
+    /// The rotations as axes and angles: float32, (tracks, frames, 4), x y z of the axis, a unit vector, and
+    /// the angle, 0 to 360 degrees, or radians. Other keywords are those of `evaluate`.
+    ///
+    /// >>> import tumble
+    /// >>> clip = tumble.Clip([0.0, 2.0], [[0, 0, 0, 1], [0, 0, 1, 0]])
+    /// >>> tumble.Engine().axis_angle(clip, at=1.0, method="slerp").round(3)
+    /// array([[ 0.,  0.,  1., 90.]], dtype=float32)
+    #[pyo3(signature = (clip, *, degrees=true, out=None, layout="track", **options), text_signature = "($self, clip, *, fps=None, at=None, times=None, start=None, end=None, method=None, path=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, degrees=True, out=None, layout='track')")]
+    fn axis_angle<'py>(
+        &self,
+        clip: &Bound<'py, Clip>,
+        degrees: bool,
+        out: Option<&Bound<'py, PyAny>>,
+        layout: &str,
+        options: Option<&Bound<'py, PyDict>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let result = Result {
+            encoding: Encoding::AxisAngle,
+            radians: !degrees,
             layout: layout_named(layout)?,
             ..Result::default()
         };
@@ -371,6 +408,235 @@ impl Engine {
         options: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Bound<'py, PyTuple>> {
         poses::in_world(self, clip, layout_named(layout)?, options)
+    }
+
+    /// Samples without their noise: an array of their shape, float32.
+    ///
+    /// `smooth(samples, *, kernel="gaussian:2", low_pass=None, fps=None, passes=1, ends="keep",
+    /// layout="track", order="xyzw", out=None)`
+    ///
+    /// `samples`: evenly spaced rotations (frames, 4) or (tracks, frames, 4), or vectors with 3 components; with
+    /// `layout="frame"` (frames, tracks, …). Kernels act on the steps from sample to sample, so that what
+    /// stands still keeps its bits and even motion stays. `kernel`: "linear", "cubic", "box:S" and "tent:S" (S
+    /// samples to either side), "gaussian:S" (standard deviation) or "savitzky-golay:RADIUS:ORDER".
+    /// `low_pass`, Hz, with `fps`, the rate of the samples, is the bell that halves the power of motion at that
+    /// frequency. `ends`: "keep", "parabolic" (of "cubic") or "loop" (the last repeats the first).
+    ///
+    /// >>> import numpy as np, tumble
+    /// >>> noise = np.random.default_rng(1).normal(size=(100, 3))
+    /// >>> tumble.Engine("cpu").smooth(noise, kernel="gaussian:3").std() < 0.5 * noise.std()
+    /// np.True_
+    #[pyo3(signature = (
+        samples, *, kernel=None, low_pass=None, fps=None, passes=1, ends="keep", layout="track", order="xyzw", out=None
+    ), text_signature = "($self, samples, *, kernel=None, low_pass=None, fps=None, passes=1, ends='keep', layout='track', order='xyzw', out=None)")]
+    #[allow(clippy::too_many_arguments, reason = "keywords")]
+    fn smooth<'py>(
+        &self,
+        samples: &Bound<'py, PyAny>,
+        kernel: Option<&str>,
+        low_pass: Option<f64>,
+        fps: Option<&Bound<'py, PyAny>>,
+        passes: u32,
+        ends: &str,
+        layout: &str,
+        order: &str,
+        out: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let options = samples::Smooth {
+            kernel,
+            low_pass,
+            fps,
+            passes,
+            ends,
+        };
+        let form = (layout_named(layout)?, Order::named(order)?);
+        samples::smooth(self, samples, &options, form, out)
+    }
+
+    /// Layers of rotations blended into one: the weighted sum of each rotation, normalised, every layer with
+    /// the sign that is nearer to the first one's. Weights need not add up to 1.
+    ///
+    /// `blend(layers, weights=None, *, order="xyzw", out=None)`
+    ///
+    /// `layers`: a list of arrays (…, 4) of one shape, which is that of the result; `weights`: a number for each,
+    /// by default 1.
+    ///
+    /// >>> import tumble
+    /// >>> tumble.Engine("cpu").blend([[[0, 0, 0, 1]], [[0, 0, 1, 0]]], [3, 3]).round(4)
+    /// array([[0.    , 0.    , 0.7071, 0.7071]], dtype=float32)
+    #[pyo3(signature = (layers, weights=None, *, order="xyzw", out=None))]
+    fn blend<'py>(
+        &self,
+        layers: &Bound<'py, PyAny>,
+        weights: Option<&Bound<'py, PyAny>>,
+        order: &str,
+        out: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let weights = samples::weights(weights)?;
+        samples::blend(self, layers, weights, Order::named(order)?, out)
+    }
+
+    /// Slerp, the shorter way, from every rotation of the first array (…, 4) to that of the second, by a `weight`
+    /// from 0 to 1.
+    ///
+    /// >>> import tumble
+    /// >>> tumble.Engine("cpu").mix([0, 0, 0, 1], [0, 0, 1, 0], 0.5).round(4)
+    /// array([0.    , 0.    , 0.7071, 0.7071], dtype=float32)
+    #[pyo3(signature = (first, second, weight, *, order="xyzw", out=None))]
+    fn mix<'py>(
+        &self,
+        first: &Bound<'py, PyAny>,
+        second: &Bound<'py, PyAny>,
+        weight: f32,
+        order: &str,
+        out: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        samples::mix(self, [first, second], weight, Order::named(order)?, out)
+    }
+
+    /// A layer of rotations added to a base: `base · (reference⁻¹ layer)^weight`.
+    ///
+    /// `add(base, layer, *, reference=None, weight=1.0, layout="track", order="xyzw", out=None)`
+    ///
+    /// `base` and `layer`: (frames, 4), (tracks, frames, 4), or as `layout` says. `reference`: a rotation for each
+    /// track, (tracks, 4), or one, (4,); without it, the layer itself is what is added. `weight`: 0 to 1.
+    ///
+    /// >>> import tumble
+    /// >>> half = 0.5 ** 0.5
+    /// >>> tumble.Engine("cpu").add([[0, 0, half, half]], [[0, 0, 1, 0]], weight=0.5).round(4) + 0.0
+    /// array([[0., 0., 1., 0.]], dtype=float32)
+    #[pyo3(signature = (base, layer, *, reference=None, weight=1.0, layout="track", order="xyzw", out=None))]
+    #[allow(clippy::too_many_arguments, reason = "keywords")]
+    fn add<'py>(
+        &self,
+        base: &Bound<'py, PyAny>,
+        layer: &Bound<'py, PyAny>,
+        reference: Option<&Bound<'py, PyAny>>,
+        weight: f32,
+        layout: &str,
+        order: &str,
+        out: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let form = (layout_named(layout)?, Order::named(order)?);
+        samples::add(self, [base, layer], reference, weight, form, out)
+    }
+
+    /// The matrices of a skeleton's joints in the model, from its roots down: `M = M_parent T R S`, and `M B`
+    /// with inverse bind matrices `B`, as vertices are skinned with. float32, (tracks, frames, 3, 4), for column
+    /// vectors, the last column the translation; a view.
+    ///
+    /// `local_to_model(rotations, parents, offsets=None, *, translations=None, scales=None, inverse_bind=None,
+    /// layout="track", order="xyzw")`
+    ///
+    /// `rotations`: (tracks, frames, 4), or of one pose (tracks, 4). `parents`: for each track the one that it
+    /// hangs on, None or -1 for a root. `offsets`: (tracks, 3). `translations` take their place: like the
+    /// rotations with 3 components, or a list with (frames, 3) or None for each track. `scales`: likewise.
+    /// `inverse_bind`: (tracks, 3, 4) or (tracks, 4, 4).
+    ///
+    /// >>> import tumble
+    /// >>> half = 0.5 ** 0.5
+    /// >>> pose = [[0, 0, half, half], [0, 0, 0, 1]]
+    /// >>> tumble.Engine("cpu").local_to_model(pose, [None, 0], [[0, 0, 0], [2, 0, 0]])[1].round(3) + 0.0
+    /// array([[ 0., -1.,  0.,  0.],
+    ///        [ 1.,  0.,  0.,  2.],
+    ///        [ 0.,  0.,  1.,  0.]], dtype=float32)
+    #[pyo3(signature = (
+        rotations, parents, offsets=None, *, translations=None, scales=None, inverse_bind=None, layout="track",
+        order="xyzw"
+    ))]
+    #[allow(clippy::too_many_arguments, reason = "keywords")]
+    fn local_to_model<'py>(
+        &self,
+        rotations: &Bound<'py, PyAny>,
+        parents: Vec<Option<i64>>,
+        offsets: Option<&Bound<'py, PyAny>>,
+        translations: Option<&Bound<'py, PyAny>>,
+        scales: Option<&Bound<'py, PyAny>>,
+        inverse_bind: Option<&Bound<'py, PyAny>>,
+        layout: &str,
+        order: &str,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let walk = samples::Walk {
+            rotations,
+            parents,
+            offsets,
+            translations,
+            scales,
+            inverse_bind,
+        };
+        walk.local_to_model(self, (layout_named(layout)?, Order::named(order)?))
+    }
+
+    /// Bodies on paths: the position of each at every sample, and the rotation from its axes to the world's.
+    ///
+    /// `follow(times, points, *, fps=None, at=None, start=None, end=None, duration=None, rate=None, ups=None,
+    /// method="bessel-overhauser", ends="parabolic", ahead=None, look_at=None, frame="minimal",
+    /// up=(0, 1, 0), twist="spread", speed="keys", forward="z", upward="y", layout="track", order="xyzw")`
+    ///
+    /// `points`: (points, 3), (tracks, points, 3), or a list with an array for each track; `times`: seconds
+    /// of the points, or None with `duration`, seconds, or `rate`, the way covered in a second. `ups`: upward
+    /// directions at the points, like them. `method`: the curve through the points. `ahead`: the body faces
+    /// the point this far ahead instead of along the path; `look_at`: a point or a track's index that it
+    /// faces. `frame`: how it is turned about its direction, "minimal", "fixed" or "frenet", with `up` at the
+    /// start or everywhere. `twist`: whether the turn that a closed path (`ends="loop"`) leaves over is spread
+    /// ("spread") or stays ("free"). `speed`: "keys", "constant", or the parts of the time over which it grows
+    /// and falls. `forward` and `upward`: axes of the body, such as "-x".
+    ///
+    /// Gives positions (tracks, frames, 3), float32 (float64 far from 0), and rotations (tracks, frames, 4).
+    ///
+    /// >>> import tumble
+    /// >>> positions, rotations = tumble.Engine("cpu").follow(
+    /// ...     [0.0, 1.0, 3.0], [[0, 0, 0], [4, 0, 1], [8, 1, 0]], fps=1)
+    /// >>> positions[1], rotations.shape
+    /// (array([4., 0., 1.], dtype=float32), (4, 4))
+    #[pyo3(signature = (
+        times, points, *, fps=None, at=None, start=None, end=None, duration=None, rate=None, ups=None,
+        method="bessel-overhauser", ends=None, ahead=None, look_at=None, frame=None,
+        up=[0.0, 1.0, 0.0], twist=None, speed=None, forward="z", upward="y", layout="track", order="xyzw"
+    ), text_signature = "($self, times, points, *, fps=None, at=None, start=None, end=None, duration=None, rate=None, ups=None, method='bessel-overhauser', ends='parabolic', ahead=None, look_at=None, frame='minimal', up=(0.0, 1.0, 0.0), twist='spread', speed='keys', forward='z', upward='y', layout='track', order='xyzw')")]
+    #[allow(clippy::too_many_arguments, reason = "keywords")]
+    fn follow<'py>(
+        &self,
+        times: Option<&Bound<'py, PyAny>>,
+        points: &Bound<'py, PyAny>,
+        fps: Option<&Bound<'py, PyAny>>,
+        at: Option<Bound<'py, PyAny>>,
+        start: Option<f64>,
+        end: Option<f64>,
+        duration: Option<f64>,
+        rate: Option<f64>,
+        ups: Option<&Bound<'py, PyAny>>,
+        method: &str,
+        ends: Option<&Bound<'py, PyAny>>,
+        ahead: Option<f64>,
+        look_at: Option<&Bound<'py, PyAny>>,
+        frame: Option<&Bound<'py, PyAny>>,
+        up: [f64; 3],
+        twist: Option<&Bound<'py, PyAny>>,
+        speed: Option<&Bound<'py, PyAny>>,
+        forward: &str,
+        upward: &str,
+        layout: &str,
+        order: &str,
+    ) -> PyResult<Bound<'py, PyTuple>> {
+        let options = follow::Options {
+            duration,
+            rate,
+            ups,
+            method,
+            ends,
+            ahead,
+            look_at,
+            frame,
+            up,
+            twist,
+            speed,
+            forward,
+            upward,
+        };
+        let samples = samples_of(fps, at, start, end)?;
+        let form = (layout_named(layout)?, Order::named(order)?);
+        follow::follow(self, (times, points), &options, samples, form)
     }
 
     /// The rotations in pieces of about `chunk` rotations, for results larger than memory: an

@@ -101,7 +101,7 @@ pub(crate) fn input_at(message: &str, code: Code, pointer: String) -> PyErr {
 /// A message of the program's with the keywords of Python in the place of options: `--map time=NAME` is
 /// `map="time=NAME"`.
 pub(crate) fn in_python(message: &str) -> String {
-    const WORDS: [(&str, &str); 8] = [
+    const WORDS: [(&str, &str); 12] = [
         (
             "--time-unit s, ms, us or ns",
             r#"time_unit="s", "ms", "us" or "ns""#,
@@ -125,6 +125,10 @@ pub(crate) fn in_python(message: &str) -> String {
         ),
         ("`tumble eval --fps`", "`fps`"),
         ("--animation", "its name or place"),
+        ("; --tracks chooses some", ""),
+        ("`--by exact`", r#"`by="exact"`"#),
+        ("`--by edges`", r#"`by="edges"`"#),
+        ("--weld DISTANCE", "weld=DISTANCE"),
     ];
     const FLAGS: [&str; 4] = ["bridge_gaps", "keyframes", "overwrite", "raw_times"];
     let message = WORDS
@@ -177,6 +181,14 @@ pub(crate) fn of_diagnostic(diagnostic: &Diagnostic) -> PyErr {
 pub(crate) fn warn(py: Python<'_>, diagnostic: &Diagnostic) -> PyResult<()> {
     let message = in_python(&diagnostic.to_string());
     let warning = Class::Warning.error(&message, &diagnostic.into());
+    py.import("warnings")?
+        .call_method1("warn", (warning.value(py),))?;
+    Ok(())
+}
+
+/// What is remarkable about arguments.
+pub(crate) fn warn_of(py: Python<'_>, message: &str) -> PyResult<()> {
+    let warning = Class::Warning.error(message, &Found::default());
     py.import("warnings")?
         .call_method1("warn", (warning.value(py),))?;
     Ok(())

@@ -8,7 +8,9 @@ use pyo3::intern;
 use pyo3::prelude::*;
 use pyo3::types::{PyList, PySlice};
 use tumble::method::{C2, SLERP};
-use tumble::{Encoding, Engine, Frames, Interpolation, Layout, Method, Quantity, TrackSet};
+use tumble::{
+    ComponentType, Encoding, Engine, Frames, Interpolation, Layout, Method, Quantity, TrackSet,
+};
 use tumble_cli::host;
 use tumble_formats::Diagnostic;
 use tumble_formats::motion::Motion;
@@ -17,7 +19,7 @@ use tumble_formats::sample::ChannelMethods;
 use crate::arrays::Order;
 use crate::errors::{guarded, input, of_engine, warn};
 use crate::options::{Request, Samples};
-use crate::output::{array, filled};
+use crate::output::{array_of, filled_bytes};
 use crate::run::{Job, check_signals, interruptible};
 
 /// What is made of a clip, and how it lies in memory.
@@ -30,7 +32,7 @@ pub(crate) struct Result {
     pub(crate) as_rotation: bool,
     /// Rates are those of the rotations in the world, along the skeleton, not those in the parents' frames.
     pub(crate) in_world: bool,
-    /// Euler angles in radians instead of degrees.
+    /// Angles in radians instead of degrees.
     pub(crate) radians: bool,
     /// The only track has no axis.
     pub(crate) is_one_track: bool,
@@ -95,10 +97,11 @@ impl Result {
         inputs: &[&Bound<'py, PyAny>],
     ) -> PyResult<Bound<'py, PyAny>> {
         let samples = request.samples()?;
-        if self.as_rotation && (self.order != Order::Xyzw || out.is_some()) {
+        let has_form = self.order != Order::Xyzw || self.encoding != Encoding::F32;
+        if self.as_rotation && (has_form || out.is_some()) {
             return Err(input(
                 "as_rotation: SciPy's rotations have memory and an order of their own; leave out \
-                 `order` and `out`",
+                 `order`, `dtype` and `out`",
             ));
         }
         let tracks = clip.set.track_count();
@@ -128,9 +131,9 @@ impl Result {
         };
         shape.extend(axes.into_iter().filter(|axis| !axis.1).map(|axis| axis.0));
         shape.extend_from_slice(self.encoding.shape());
-        let array = array(py, &shape, out, inputs)?;
+        let array = array_of(py, self.encoding.component_type(), &shape, out, inputs)?;
         let engine = engine(tracks * count)?;
-        filled(&array, |numbers| {
+        filled_bytes(&array, |bytes| {
             guarded(|| {
                 let work = Work {
                     engine: &engine,
@@ -140,9 +143,9 @@ impl Result {
                     frames: &frames,
                     count,
                 };
-                self.fill(work, numbers)?;
+                self.fill(work, bytes)?;
                 if along_skeleton {
-                    self.along_skeleton(work, numbers)?;
+                    self.along_skeleton(work, bytemuck::cast_slice_mut(bytes))?;
                 }
                 Ok(())
             })
@@ -151,12 +154,12 @@ impl Result {
             warn(py, &diagnostic)?;
         }
         match self.as_rotation {
-            true => self.rotation(array.as_any(), self.is_one_track),
-            false => Ok(array.into_any()),
+            true => self.rotation(&array, self.is_one_track),
+            false => Ok(array),
         }
     }
 
-    fn fill(&self, work: Work<'_>, numbers: &mut [f32]) -> PyResult<()> {
+    fn fill(&self, work: Work<'_>, bytes: &mut [u8]) -> PyResult<()> {
         let Work {
             engine,
             clip,
@@ -176,27 +179,30 @@ impl Result {
             encoding: self.encoding,
         };
         let tracks = clip.set.track_count();
-        let own = self.encoding.components().len();
+        let size = self.encoding.bytes();
         for (method, group) in groups(clip, request.method) {
             let Some(group) = group else {
                 let job = Job {
                     interpolation: with(method),
                     ..job
                 };
-                job.write(bytemuck::cast_slice_mut(numbers))?;
+                job.write(bytes)?;
                 continue;
             };
             // Tracks of other methods lie between these.
             let set = clip.set.select(group.iter().copied()).map_err(of_tracks)?;
             let frames = samples.frames(&clip.set, Some(&group))?;
-            let mut found = vec![0.0_f32; group.len() * count * own];
+            // As the results in NumPy's memory are aligned.
+            let mut found = vec![0_u32; (group.len() * count * size).div_ceil(4)];
+            let found: &mut [u8] = bytemuck::cast_slice_mut(&mut found);
+            let found = &mut found[..group.len() * count * size];
             let job = Job {
                 set: &set,
                 frames: &frames,
                 interpolation: with(method),
                 ..job
             };
-            job.write(bytemuck::cast_slice_mut(&mut found))?;
+            job.write(found)?;
             for (place, &track) in group.iter().enumerate() {
                 for sample in 0..count {
                     let from = self.layout.index(place, sample, group.len(), count);
@@ -204,12 +210,12 @@ impl Result {
                     let (Some(from), Some(to)) = (from, to) else {
                         continue;
                     };
-                    let (from, to) = (from * own, to * own);
-                    numbers[to..to + own].copy_from_slice(&found[from..from + own]);
+                    let (from, to) = (from * size, to * size);
+                    bytes[to..to + size].copy_from_slice(&found[from..from + size]);
                 }
             }
         }
-        self.finish(numbers);
+        self.finish(bytes);
         Ok(())
     }
 
@@ -224,7 +230,7 @@ impl Result {
                 ..*self
             };
             let mut found = vec![0.0; tracks * count * encoding.components().len()];
-            other.fill(work, &mut found)?;
+            other.fill(work, bytemuck::cast_slice_mut(&mut found))?;
             Ok(found)
         };
         let rotations = other(Quantity::Rotation, Encoding::F32)?;
@@ -278,16 +284,31 @@ impl Result {
     }
 
     /// What the engine does not do: the other order of components, and radians.
-    fn finish(&self, numbers: &mut [f32]) {
+    fn finish(&self, bytes: &mut [u8]) {
         if self.order == Order::Wxyz {
-            for quaternion in numbers.as_chunks_mut().0 {
-                *quaternion = self.order.of_xyzw(*quaternion);
+            match self.encoding.component_type() {
+                ComponentType::F32 => self.reorder::<f32>(bytes),
+                ComponentType::F16 | ComponentType::Snorm16 => self.reorder::<u16>(bytes),
             }
         }
-        if self.radians {
-            for angle in numbers {
-                *angle = f64::from(*angle).to_radians() as f32;
-            }
+        if !self.radians {
+            return;
+        }
+        let numbers: &mut [f32] = bytemuck::cast_slice_mut(bytes);
+        // Of an axis and an angle the last is the angle.
+        let (first, step) = match self.encoding {
+            Encoding::AxisAngle => (3, 4),
+            _ => (0, 1),
+        };
+        for angle in numbers.iter_mut().skip(first).step_by(step) {
+            *angle = f64::from(*angle).to_radians() as f32;
+        }
+    }
+
+    fn reorder<T: bytemuck::Pod>(&self, bytes: &mut [u8]) {
+        let numbers: &mut [T] = bytemuck::cast_slice_mut(bytes);
+        for quaternion in numbers.as_chunks_mut().0 {
+            *quaternion = self.order.of_xyzw(*quaternion);
         }
     }
 
@@ -301,19 +322,19 @@ impl Result {
         lists: &[Vec<f64>],
     ) -> PyResult<Bound<'py, PyAny>> {
         let count: usize = lists.iter().map(Vec::len).sum();
-        let own: usize = self.encoding.shape().iter().product();
+        let size = self.encoding.bytes();
         let shape = [&[count], self.encoding.shape()].concat();
-        let array = array(py, &shape, None, &[])?;
+        let array = array_of(py, self.encoding.component_type(), &shape, None, &[])?;
         let engine = engine(count)?;
-        filled(&array, |numbers| {
+        filled_bytes(&array, |bytes| {
             guarded(|| {
-                let mut numbers = numbers;
+                let mut bytes = bytes;
                 for (track, list) in lists.iter().enumerate() {
                     if track % 256 == 255 {
                         check_signals()?;
                     }
-                    let (numbers_of_track, rest) = numbers.split_at_mut(list.len() * own);
-                    numbers = rest;
+                    let (of_track, rest) = bytes.split_at_mut(list.len() * size);
+                    bytes = rest;
                     let one = track_of(clip, track)?;
                     let samples = Samples::Shared {
                         times: list.as_slice().into(),
@@ -328,7 +349,7 @@ impl Result {
                         frames: &frames,
                         count: list.len(),
                     };
-                    self.fill(work, numbers_of_track)?;
+                    self.fill(work, of_track)?;
                 }
                 Ok(())
             })

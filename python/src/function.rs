@@ -2,6 +2,7 @@
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use tumble::Encoding;
 
 use crate::arrays::Order;
 use crate::build::clip_of;
@@ -9,11 +10,12 @@ use crate::engine::{default_engine, layout_named};
 use crate::errors::guarded;
 use crate::evaluate::Result;
 use crate::options::{Request, request_arrays};
+use crate::output::quaternions_of;
 
 /// Interpolates keys: `Clip(times, keys, order=order)`, evaluated by a shared engine.
 ///
 /// `evaluate(times, keys, *, fps=None, at=None, order="xyzw", out=None, layout="track",
-/// as_rotation=False, …)`
+/// as_rotation=False, dtype="float32", …)`
 ///
 /// `times` and `keys` are as those of `Clip`; `order` is that of the keys and of the result. Keys
 /// (keys, 4) of one track give (frames, 4), (tracks, keys, 4) give (tracks, frames, 4). `fps`, `at`
@@ -26,7 +28,7 @@ use crate::options::{Request, request_arrays};
 /// array([[1.    , 0.    , 0.    , 0.    ],
 ///        [0.7071, 0.    , 0.    , 0.7071]], dtype=float32)
 #[pyfunction]
-#[pyo3(signature = (times, keys, *, out=None, order="xyzw", layout="track", as_rotation=false, **options), text_signature = "(times, keys, *, fps=None, at=None, start=None, end=None, method=None, path=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, out=None, order='xyzw', layout='track', as_rotation=False)")]
+#[pyo3(signature = (times, keys, *, out=None, order="xyzw", layout="track", as_rotation=false, dtype=None, **options), text_signature = "(times, keys, *, fps=None, at=None, start=None, end=None, method=None, path=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, out=None, order='xyzw', layout='track', as_rotation=False, dtype='float32')")]
 #[allow(clippy::too_many_arguments, reason = "keywords")]
 pub(crate) fn evaluate<'py>(
     times: &Bound<'py, PyAny>,
@@ -35,6 +37,7 @@ pub(crate) fn evaluate<'py>(
     order: &str,
     layout: &str,
     as_rotation: bool,
+    dtype: Option<&Bound<'py, PyAny>>,
     options: Option<&Bound<'py, PyDict>>,
 ) -> PyResult<Bound<'py, PyAny>> {
     guarded(|| {
@@ -43,6 +46,7 @@ pub(crate) fn evaluate<'py>(
         let order = Order::named(order)?;
         let (motion, is_one_track) = clip_of(times, keys, order, None)?;
         let result = Result {
+            encoding: dtype.map_or(Ok(Encoding::F32), quaternions_of)?,
             // Rotations of SciPy's have an order of their own.
             order: if as_rotation { Order::Xyzw } else { order },
             layout: layout_named(layout)?,

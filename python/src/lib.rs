@@ -9,10 +9,13 @@
 mod arrays;
 mod build;
 mod clip;
+mod compare;
+mod crowd;
 mod engine;
 mod errors;
 mod evaluate;
 mod file;
+mod follow;
 mod function;
 mod motions;
 mod options;
@@ -20,7 +23,10 @@ mod output;
 mod pickle;
 mod poses;
 mod program;
+mod reduce;
+mod route;
 mod run;
+mod samples;
 mod save;
 mod shards;
 mod stream;
@@ -33,6 +39,13 @@ use pyo3::pymodule;
 mod _tumble {
     #[pymodule_export]
     use crate::clip::Clip;
+    #[pymodule_export]
+    use crate::compare::{
+        ArrayDifference, ChannelDifference, ClipDifference, PathErrors, PathStatistics, Spread,
+        compare, path_errors,
+    };
+    #[pymodule_export]
+    use crate::crowd::Crowd;
     #[pymodule_export]
     use crate::engine::Engine;
     #[pymodule_export]
@@ -47,6 +60,10 @@ mod _tumble {
     use crate::pickle::clip_of_state;
     #[pymodule_export]
     use crate::program::{devices, load_drivers, methods, page, panic, run, set_probe};
+    #[pymodule_export]
+    use crate::reduce::{Reduction, reduce};
+    #[pymodule_export]
+    use crate::route::{Route, Surface, Walk, walk};
     #[pymodule_export]
     use crate::save::save;
     #[pymodule_export]

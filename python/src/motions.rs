@@ -8,7 +8,7 @@ use numpy::{
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use tumble::{
-    Channel, CrowdError, CrowdLibrary, Error, Interpolation, MotionStates, MotionTables,
+    Channel, CrowdError, CrowdLibrary, Error, Interpolation, Method, MotionStates, MotionTables,
     MotionWords, Quantity, Skeleton,
 };
 use tumble_formats::motion::Motion;
@@ -40,8 +40,44 @@ pub(crate) struct Motions {
     cells: Py<PyArray2<f32>>,
 }
 
-fn of_crowd(error: CrowdError) -> PyErr {
-    of_engine(&Error::Crowd(error))
+pub(crate) fn of_crowd(error: CrowdError) -> PyErr {
+    match error {
+        CrowdError::NoInverseBind => {
+            input("the crowd has no inverse bind matrices; give `inverse_bind`")
+        }
+        error => of_engine(&Error::Crowd(error)),
+    }
+}
+
+/// Adds a clip to a library.
+pub(crate) fn push(
+    library: &mut CrowdLibrary,
+    index: usize,
+    clip: &Clip,
+    method: Option<Method>,
+) -> PyResult<()> {
+    let named = |error: &str| input(format!("{}: {error}", shown(index, clip)));
+    let motion = &clip.motion;
+    let methods = ChannelMethods {
+        method,
+        with: &Interpolation::from,
+    };
+    let (Some(of_rotations), Some(of_vectors)) =
+        (methods.method_of(motion), methods.vector_method_of(motion))
+    else {
+        return Err(named(
+            "its tracks have several methods; name one as `method`",
+        ));
+    };
+    let interpolation = Interpolation {
+        quantity: Quantity::Rotation,
+        ..Interpolation::from(of_rotations)
+    };
+    let pushed = library.push(&motion.set, interpolation, of_vectors);
+    pushed.map(drop).map_err(|error| match error {
+        CrowdError::Stopped(_) => of_crowd(error),
+        error => named(&error.to_string()),
+    })
 }
 
 #[pymethods]
@@ -71,31 +107,10 @@ impl Motions {
                 };
                 let made = CrowdLibrary::with_ticks(&skeleton, ticks);
                 let mut library = made.map_err(of_crowd)?;
-                for (place, clip) in clips.iter().enumerate() {
-                    let named = |error: &str| input(format!("{}: {error}", shown(place, clip)));
-                    let motion = &clip.motion;
-                    check(motion).map_err(named)?;
-                    let methods = ChannelMethods {
-                        method,
-                        with: &Interpolation::from,
-                    };
-                    let (Some(of_rotations), Some(of_vectors)) =
-                        (methods.method_of(motion), methods.vector_method_of(motion))
-                    else {
-                        return Err(named(
-                            "its tracks have several methods; name one as `method`",
-                        ));
-                    };
-                    let interpolation = Interpolation {
-                        quantity: Quantity::Rotation,
-                        ..Interpolation::from(of_rotations)
-                    };
-                    library
-                        .push(&motion.set, interpolation, of_vectors)
-                        .map_err(|error| match error {
-                            CrowdError::Stopped(_) => of_crowd(error),
-                            error => named(&error.to_string()),
-                        })?;
+                for (index, clip) in clips.iter().enumerate() {
+                    check(&clip.motion)
+                        .map_err(|error| input(format!("{}: {error}", shown(index, clip))))?;
+                    push(&mut library, index, clip, method)?;
                 }
                 Ok(library.into_tables())
             })

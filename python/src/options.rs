@@ -120,9 +120,7 @@ impl Request {
 
     /// The samples, of which there must be some.
     pub(crate) fn samples(&self) -> PyResult<&Samples> {
-        self.samples
-            .as_ref()
-            .ok_or_else(|| input("give `fps`, frames per second, or `at`, times in seconds"))
+        self.samples.as_ref().ok_or_else(none_asked_for)
     }
 
     /// What is asked of a method.
@@ -190,6 +188,28 @@ impl Samples {
     }
 }
 
+/// Which samples some keywords mean, of which there must be some.
+pub(crate) fn samples_of(
+    fps: Option<&Bound<'_, PyAny>>,
+    at: Option<Bound<'_, PyAny>>,
+    start: Option<f64>,
+    end: Option<f64>,
+) -> PyResult<Samples> {
+    let finite = |name: &str, number: Option<f64>| match number {
+        Some(number) if !number.is_finite() => {
+            Err(input(format!("{name}: {number} is not finite")))
+        }
+        number => Ok(number),
+    };
+    let rate = fps.map(frame_rate).transpose()?;
+    let found = samples(rate, at, finite("start", start)?, finite("end", end)?)?;
+    found.ok_or_else(none_asked_for)
+}
+
+fn none_asked_for() -> PyErr {
+    input("give `fps`, frames per second, or `at`, times in seconds")
+}
+
 fn samples(
     rate: Option<FrameRate>,
     times: Option<Bound<'_, PyAny>>,
@@ -248,7 +268,7 @@ fn wrap(value: &Bound<'_, PyAny>, what: &str) -> PyResult<WrapMode> {
 }
 
 /// A name, or a pair of angular velocities.
-fn ends(value: &Bound<'_, PyAny>) -> PyResult<Ends> {
+pub(crate) fn ends(value: &Bound<'_, PyAny>) -> PyResult<Ends> {
     let still = Ends::Clamped {
         start: DVec3::ZERO,
         end: DVec3::ZERO,

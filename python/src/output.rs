@@ -1,16 +1,42 @@
-//! What goes out: float32 in NumPy's own memory.
+//! What goes out: numbers in NumPy's own memory.
 
-use numpy::{PyArrayDyn, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods};
+use numpy::{PyArrayDescr, PyArrayDescrMethods, PyArrayDyn, PyArrayMethods};
+use numpy::{PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::exceptions::PyTypeError;
 use pyo3::intern;
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyDict, PyTuple};
+use tumble::{ComponentType, Encoding};
 
 use crate::arrays::{is_aligned, numpy};
 use crate::errors::input;
 
-/// An array for a result of that shape: a fresh one, or `out`, if it is exactly what is needed and
+/// The type of NumPy's that a component is stored as.
+pub(crate) fn type_name(component: ComponentType) -> &'static str {
+    match component {
+        ComponentType::F32 => "float32",
+        ComponentType::F16 => "float16",
+        ComponentType::Snorm16 => "int16",
+    }
+}
+
+/// The representation of rotations for a type of NumPy's.
+pub(crate) fn quaternions_of(dtype: &Bound<'_, PyAny>) -> PyResult<Encoding> {
+    let kind = PyArrayDescr::new(dtype.py(), dtype.clone())?;
+    let name = kind.str()?.to_string();
+    let all = [Encoding::F32, Encoding::F16, Encoding::Snorm16];
+    let found = all
+        .into_iter()
+        .find(|it| type_name(it.component_type()) == name);
+    found.ok_or_else(|| {
+        input(format!(
+            "dtype: there are no rotations in {name}; there are float32, float16, and int16, to be divided by 32767"
+        ))
+    })
+}
+
+/// An array of float32 for a result of that shape: a fresh one, or `out`, if it is exactly what is needed and
 /// none of `inputs` lies in its memory.
 pub(crate) fn array<'py>(
     py: Python<'py>,
@@ -18,22 +44,38 @@ pub(crate) fn array<'py>(
     out: Option<&Bound<'py, PyAny>>,
     inputs: &[&Bound<'py, PyAny>],
 ) -> PyResult<Bound<'py, PyArrayDyn<f32>>> {
+    let array = array_of(py, ComponentType::F32, shape, out, inputs)?;
+    Ok(array.cast_into()?)
+}
+
+/// As [`array`], of any type of components.
+pub(crate) fn array_of<'py>(
+    py: Python<'py>,
+    component: ComponentType,
+    shape: &[usize],
+    out: Option<&Bound<'py, PyAny>>,
+    inputs: &[&Bound<'py, PyAny>],
+) -> PyResult<Bound<'py, PyAny>> {
+    let name = type_name(component);
     let Some(out) = out else {
-        return fresh(py, shape);
+        return match component {
+            ComponentType::F32 => Ok(fresh(py, shape)?.into_any()),
+            _ => numpy(py)?.call_method1(intern!(py, "empty"), (PyTuple::new(py, shape)?, name)),
+        };
     };
-    let Ok(given) = out.cast::<PyUntypedArray>() else {
+    let Ok(array) = out.cast::<PyUntypedArray>() else {
         let kind = out.get_type().name()?;
         return Err(PyTypeError::new_err(format!(
-            "out: a {kind}; give an array of NumPy's, such as np.empty({}, np.float32)",
+            "out: a {kind}; give an array of NumPy's, such as np.empty({}, np.{name})",
             shown(shape)
         )));
     };
-    let Ok(array) = out.cast::<PyArrayDyn<f32>>() else {
+    if !array.dtype().is_equiv_to(&PyArrayDescr::new(py, name)?) {
         return Err(input(format!(
-            "out: its type is {}; results are float32 in the machine's byte order",
-            given.dtype()
+            "out: its type is {}; results are {name} in the machine's byte order",
+            array.dtype()
         )));
-    };
+    }
     if array.shape() != shape {
         return Err(input(format!(
             "out: its shape is {}; the result's is {}",
@@ -47,8 +89,11 @@ pub(crate) fn array<'py>(
              array, or a transposed one, cannot be written to",
         ));
     }
-    if !is_aligned(array.data() as usize, &[], 4) {
-        return Err(input("out: its memory is not aligned to 4 bytes"));
+    let (start, bytes) = (address(out)?, component.bytes());
+    if !is_aligned(start, &[], bytes) {
+        return Err(input(format!(
+            "out: its memory is not aligned to {bytes} bytes"
+        )));
     }
     for &other in inputs {
         let shares = numpy(py)?.call_method1(intern!(py, "shares_memory"), (out, other));
@@ -59,7 +104,16 @@ pub(crate) fn array<'py>(
             ));
         }
     }
-    Ok(array.clone())
+    Ok(out.clone())
+}
+
+/// Where the numbers of an array start.
+fn address(array: &Bound<'_, PyAny>) -> PyResult<usize> {
+    if let Ok(array) = array.cast::<PyArrayDyn<f32>>() {
+        return Ok(array.data() as usize);
+    }
+    let interface = array.getattr(intern!(array.py(), "__array_interface__"))?;
+    interface.get_item("data")?.get_item(0)?.extract()
 }
 
 fn fresh<'py>(py: Python<'py>, shape: &[usize]) -> PyResult<Bound<'py, PyArrayDyn<f32>>> {
@@ -91,11 +145,32 @@ pub(crate) fn filled(
     array: &Bound<'_, PyArrayDyn<f32>>,
     work: impl FnOnce(&mut [f32]) -> PyResult<()> + Send,
 ) -> PyResult<()> {
-    let refused = |error: numpy::BorrowError| match error {
-        numpy::BorrowError::NotWriteable => input("out: it is read-only"),
-        _ => input("out: another call writes to this memory at this moment"),
-    };
     let mut memory = array.try_readwrite().map_err(refused)?;
     let numbers = memory.as_slice_mut()?;
     array.py().detach(|| work(numbers))
+}
+
+fn refused(error: numpy::BorrowError) -> PyErr {
+    match error {
+        numpy::BorrowError::NotWriteable => input("out: it is read-only"),
+        _ => input("out: another call writes to this memory at this moment"),
+    }
+}
+
+/// As [`filled`], for an array of any type of components.
+pub(crate) fn filled_bytes(
+    array: &Bound<'_, PyAny>,
+    work: impl FnOnce(&mut [u8]) -> PyResult<()> + Send,
+) -> PyResult<()> {
+    if let Ok(array) = array.cast::<PyArrayDyn<f32>>() {
+        return filled(array, |numbers| work(bytemuck::cast_slice_mut(numbers)));
+    }
+    // Components of 16 bits, whatever they mean.
+    let numbers = array.call_method1(intern!(array.py(), "view"), ("uint16",))?;
+    let numbers = numbers.cast_into::<PyArrayDyn<u16>>()?;
+    let mut memory = numbers.try_readwrite().map_err(refused)?;
+    let numbers = memory.as_slice_mut()?;
+    array
+        .py()
+        .detach(|| work(bytemuck::cast_slice_mut(numbers)))
 }

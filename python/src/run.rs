@@ -96,6 +96,21 @@ pub(crate) fn stoppable<T: Send>(work: impl FnOnce() -> PyResult<T> + Send) -> P
     })
 }
 
+/// Values from which on work on arrays is worth a thread that Ctrl-C can stop.
+const MANY: usize = 1 << 16;
+
+/// Does work on so many values without the GIL; where these are many, Ctrl-C ends it.
+pub(crate) fn work<T: Send + 'static>(
+    py: Python<'_>,
+    values: usize,
+    work: impl FnOnce() -> PyResult<T> + Send + 'static,
+) -> PyResult<T> {
+    match values < MANY {
+        true => py.detach(|| guarded(work)),
+        false => interruptible(py, work),
+    }
+}
+
 impl Job<'_> {
     /// Writes all of it to `output`.
     pub(crate) fn write(&self, output: &mut [u8]) -> PyResult<()> {

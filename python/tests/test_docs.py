@@ -48,7 +48,10 @@ def test_examples_in_docstrings(name, monkeypatch, tmp_path):
 def test_everything_public_is_documented_with_an_example():
     for name in tumble.__all__:
         assert inspect.getdoc(getattr(tumble, name)), name
-    exempt = {"tumble.Chunk", "tumble.Chunks", "tumble.Verification"}
+    results = ["ArrayDifference", "ChannelDifference", "ClipDifference", "PathErrors"]
+    results += ["PathStatistics", "Reduction", "Route", "Spread", "Walk"]
+    results += ["Chunk", "Chunks", "Verification"]
+    exempt = {f"tumble.{name}" for name in results}
     for name, value in ALL.items():
         is_callable = inspect.isclass(value) or callable(value)
         if is_callable and name not in exempt:
@@ -117,6 +120,20 @@ for chunk in engine.stream(clip, fps=24, chunk=1000):
 for one in tumble.load("walk.glb", source_fps=30):
     tumble.save("walk.npz", one, fps=60, sequence="ZXY")
 try:
+    halves = engine.evaluate(clip, fps=24, dtype=np.float16)
+    found = engine.smooth(engine.blend([found, found], [1, 2]), low_pass=6, fps=24)
+    found = engine.add(engine.mix(found, found, 0.5), found, reference=[0, 0, 0, 1])
+    found = engine.local_to_model(found, [None, 0], np.zeros((2, 3)), scales=[None, found])
+    positions, found = engine.follow(None, [[0, 0, 0], [1, 0, 0]], duration=1, fps=24, ends="natural")
+    angle: float = tumble.compare(clip, tumble.reduce(clip, curve="cubic").clip).rotation.largest
+    differing: int = tumble.compare(found, found).differing
+    scale: float = tumble.path_errors(clip, clip, align="sim3", rpe="1s").scale
+    crowd = tumble.Crowd([clip], 100, parents=[None, None])
+    crowd.set(np.arange(100), 0, time=np.linspace(0, 1, 100), wrap="mirror")
+    found = crowd.evaluate("rotations")
+    surface = tumble.Surface(np.zeros((3, 3)), [[0, 1, 2]])
+    ways = [way for way in surface.routes([[0, 0, 0]], [[1, 0, 0]], by="edges") if way is not None]
+    walks: list[tumble.Walk | None] = tumble.walk(ways, speed=1, radius=0.25)
     tumble.load("walk.glb")["Run"].view(fps=30).save("run.html")
 except tumble.InputError as error:
     print(error.code, error.line, error.pointer)

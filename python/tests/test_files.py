@@ -354,3 +354,49 @@ def test_a_small_gltf_is_near(tmp_path, rng):
     assert sizes[1] < sizes[0] and sizes[2] < sizes[0]
     with pytest.raises(tumble.InputError, match="quantize is for glTF"):
         tumble.save(tmp_path / "clip.bvh", clip, quantize=True)
+
+
+@pytest.mark.parametrize("name", ["walk.parquet", "walk.arrow", "walk.npz", "walk.glb"])
+def test_parents_and_offsets_come_back(tmp_path, rng, name, recwarn):
+    keys = unit(rng, 3, 5)
+    offsets = np.float32([[0, 1, 0], [0.1, -0.4, 0], [0, -0.4, 0]])
+    clip = tumble.Clip(np.arange(5) / 30, keys, names=["hip", "knee", "foot"], parents=[None, 0, 1], offsets=offsets)
+    tumble.save(tmp_path / name, clip)
+    again = tumble.load(tmp_path / name).clip
+    assert (again.names, again.parents) == (clip.names, clip.parents)
+    assert np.array_equal(again.offsets, offsets)
+    # The rows of a table may come in another order.
+    assert not [warning for warning in recwarn if issubclass(warning.category, tumble.InputWarning)]
+    tumble.save(tmp_path / f"baked-{name}", clip, fps=60)
+    assert tumble.load(tmp_path / f"baked-{name}").clip.parents == clip.parents
+
+
+def test_csv_says_what_it_has_no_room_for(tmp_path, rng):
+    clip = tumble.Clip([0.0, 1.0], unit(rng, 2, 2), parents=[None, 0], offsets=np.ones((2, 3)))
+    with pytest.warns(tumble.InputWarning, match="CSV has no room for it, left out: the skeleton"):
+        tumble.save(tmp_path / "walk.csv", clip)
+    assert tumble.load(tmp_path / "walk.csv").clip.parents is None
+
+
+def test_clips_of_a_table_keep_skeletons_of_their_own(tmp_path, rng):
+    clips = [
+        tumble.Clip([0.0, 1.0], unit(rng, 2, 2), name=name, names=["a", "b"], parents=parents, offsets=np.ones((2, 3)))
+        for name, parents in [("one", [None, 0]), ("other", [1, None])]
+    ]
+    tumble.save(tmp_path / "two.parquet", clips)
+    assert [clip.parents for clip in tumble.load(tmp_path / "two.parquet")] == [[None, 0], [1, None]]
+
+
+def test_columns_that_are_left_out_are_said(tmp_path):
+    (tmp_path / "a.csv").write_text("time,x,y,z,w,note\n0,0,0,0,1,a\n1,0,0,0,1,b\n", encoding="utf-8")
+    with pytest.warns(tumble.InputWarning, match="left out, .*: `note`; map names what is"):
+        tumble.load(tmp_path / "a.csv")
+    pa = pytest.importorskip("pyarrow")
+    parquet = pytest.importorskip("pyarrow.parquet")
+    states = [[0.0, 1.0, 2.0, 0.0, 0.0, 0.0, 1.0, 9.0]] * 2
+    table = pa.table({"timestamp": [0.0, 1.0], "state": states, "reward": [0.0, 0.0], "index": [0, 1]})
+    parquet.write_table(table, tmp_path / "a.parquet")
+    with pytest.warns(tumble.InputWarning, match=r": `reward`, `state\[0:3\]`, `state\[7:8\]`; map"):
+        tumble.load(tmp_path / "a.parquet", map="hand=state[3:7]")
+    with pytest.warns(tumble.InputWarning, match=r": `reward`, `state\[7:8\]`; map"):
+        tumble.load(tmp_path / "a.parquet", map="hand=state[3:7],hand.translation=state[0:3]")

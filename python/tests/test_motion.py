@@ -5,6 +5,8 @@ from __future__ import annotations
 import importlib.util
 import multiprocessing
 import pickle
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -247,3 +249,11 @@ def test_the_example_gives_the_bits_of_every_machine():
     seconds, bits = steps.run(steps.invented(clips=20), steps=3, environments=256)
     assert seconds > 0
     assert bits == "7aafc96c4c49c8ba12a89bd337d66bba94f459afd9729e80d1b84921093d423d"
+
+
+def test_the_way_of_a_trainer_gives_the_same_bits_everywhere(tmp_path):
+    command = [sys.executable, str(ROOT / "python/examples/training.py")]
+    command += ["--files", "20", "--steps", "5", "--environments", "256"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.endswith("all have the same bits\n") and "the same bits: True" in done.stdout

@@ -151,7 +151,15 @@ INTERRUPTED = {
     "verify": "engine.verify(clip, fps=60, method='c2')",
     "save": "tumble.save(path, clip, fps=600, method='c2')",
     "save keys": "tumble.save(path, clip)",
+    "720 000 keys at constant speed": "engine.evaluate(long, fps=1, speed='constant')",
+    "c2 of 720 000 keys at constant speed": "engine.evaluate(long, fps=1, method='c2', speed='constant')",
+    "smooth": "engine.smooth(keys, kernel='box:3', passes=5000)",
+    "reduce": "tumble.reduce(clip, tolerance=0.01)",
+    "compare": "tumble.compare(clip, moved, world=True)",
+    "follow": "engine.follow(clip.times(0), keys[..., :3], fps=60, speed='constant')",
     "a stream": "list(engine.stream(clip, fps=600, method='c2', layout='frame'))",
+    # Last: a way that is being found is found in the background.
+    "routes": "surface.routes(np.zeros((99, 3)), np.full((99, 3), [9, 0, 9]))",
 }
 
 
@@ -167,6 +175,12 @@ keys[..., :3] = np.random.default_rng(1).normal(size=(24, 30_000, 3)) * 0.3
 keys /= np.linalg.norm(keys, axis=-1, keepdims=True)
 clip = tumble.Clip(np.arange(30_000) / 30, keys, parents=[None, *range(23)],
                    offsets=np.ones((24, 3)))
+moved = tumble.Clip(clip.times(0) + 1e-4, keys, parents=clip.parents, offsets=clip.offsets)
+long = tumble.Clip(np.arange(720_000) / 30, keys.reshape(-1, 4))
+line, index = np.linspace(0, 9, 300), np.arange(90_000).reshape(300, 300)
+x, z = np.meshgrid(line, line, indexing="ij")
+corners = [index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]]
+surface = tumble.Surface(np.stack([x, np.sin(3 * x) * np.cos(2 * z), z], -1).reshape(-1, 3), np.stack(corners, axis=-1).reshape(-1, 4))
 engine = tumble.Engine("cpu")
 path = {str(tmp_path / "out.bvh")!r}
 sent = 0.0

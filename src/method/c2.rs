@@ -12,6 +12,7 @@ use crate::method::ends::End;
 use crate::method::interpolation::Interpolation;
 use crate::method::{Continuity, Cost, Curves, Given, Keys, Method, Smooth, USUAL};
 use crate::reference;
+use crate::threads::stop;
 use crate::tracks::set::Track;
 use crate::tracks::signs::Signs;
 
@@ -95,6 +96,8 @@ fn velocities(
         let (first_solved, solved) = solve(track, signs, from..to, interpolation);
         keys.map(move |key| solved[(key as isize - first_solved) as usize].to_array())
     };
+    // Whoever prepares looks again when this is done.
+    let windows = windows.take_while(|_| !stop::is_stopped());
     windows.flat_map(in_window).collect()
 }
 
@@ -112,6 +115,9 @@ fn jumps(track: Track, signs: Signs<'_>, interpolation: &Interpolation) -> Vec<u
         .into_iter()
         .map(DVec3::from_array)
         .collect();
+    if velocities.len() <= last {
+        return Vec::new(); // the work was stopped
+    }
     let is_closed = matches!(interpolation.ends, Ends::Loop);
     let mut before = Step::new(track, signs, if is_closed { last - 1 } else { 0 });
     let mut jumps = Vec::new();

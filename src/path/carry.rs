@@ -15,6 +15,7 @@ use crate::math::quaternion::{Quaternion, sine_cosine};
 use crate::path::lanes::{self, Rolled, Rolling, Row, find_directions};
 use crate::path::route::{Route, Stretch};
 use crate::simd::dispatch::in_lanes;
+use crate::threads::stop;
 
 /// The integrand of ψ is the polynomial through so many Chebyshev nodes of a piece.
 pub(crate) const NODES: usize = 11;
@@ -97,6 +98,11 @@ impl Uncarried {
         let mut pieces: Vec<Unturned> = Vec::with_capacity(stretches.len());
         let mut done = 0;
         while done < waiting.len() {
+            if stop::is_stopped() {
+                // Whoever prepares paths looks again when this is done.
+                (pieces, counts) = (Vec::new(), vec![0; stretches.len()]);
+                break;
+            }
             let some = done..waiting.len().min(done + MOST);
             done = some.end;
             block.find(stretches, &waiting[some.clone()]);

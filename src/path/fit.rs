@@ -14,6 +14,7 @@ use crate::prepare::prepared::Prepared;
 use crate::shader::{POWERS, PolynomialSegment};
 use crate::simd::dispatch::{InLanes, in_lanes};
 use crate::simd::lanes::{Doubles, Lanes, canonical};
+use crate::threads::stop;
 use crate::time::spans::Source;
 
 /// How often a span is cut in two: what then does not fit is shorter than the resolution of time,
@@ -66,7 +67,8 @@ pub(crate) fn fit(prepared: &mut Prepared, spans: &[Span], sampler: &mut Sampler
     let mut block: Vec<Waiting> = Vec::with_capacity(MOST);
     let mut own_spans: Vec<Span> = Vec::with_capacity(MOST);
     let mut lanes = Box::new(FittedLanes::zeroed());
-    while !waiting.is_empty() {
+    // Whoever prepares paths looks again when this is done.
+    while !waiting.is_empty() && !stop::is_stopped() {
         block.clear();
         block.extend(waiting.drain(waiting.len().saturating_sub(MOST)..));
         own_spans.clear();

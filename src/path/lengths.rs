@@ -2,6 +2,7 @@
 
 use crate::math::quadrature::{gauss, integral};
 use crate::path::polynomial::Polynomial;
+use crate::threads::stop;
 
 /// Lengths along the intervals of a path.
 #[derive(Debug, Clone, Default)]
@@ -32,6 +33,12 @@ impl Lengths {
             let mut places: Vec<f64> = even.chain(stops.iter().copied()).collect();
             places.sort_by(f64::total_cmp);
             let mut marks = vec![(0.0, total)];
+            if stop::is_stopped() {
+                // Whoever prepares paths looks again when this is done.
+                marks.push((1.0, total));
+                own.marks.push(marks);
+                continue;
+            }
             let mut from = 0.0;
             for to in places {
                 if to > from {

@@ -4,6 +4,7 @@ use glam::{DQuat, DVec3};
 
 use crate::curve::options::Ends;
 use crate::method::vector_method::VectorMethod;
+use crate::threads::stop::Stopped;
 
 /// How the bodies of a set follow their paths, which are the tracks' translations.
 ///
@@ -252,6 +253,9 @@ pub enum FollowError {
         /// The last part.
         end: f64,
     },
+    /// The work was stopped ([`Stop`](crate::Stop)).
+    #[error(transparent)]
+    Stopped(#[from] Stopped),
     /// Forward and upward must be different axes.
     #[error("a body's forward and upward axes are two different ones of x, y, z, -x, -y, -z")]
     Axes,

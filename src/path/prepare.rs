@@ -19,6 +19,7 @@ use crate::path::sample::{Kind, Sampler, Span};
 use crate::prepare::clip_data::ClipData;
 use crate::prepare::prepared::Prepared;
 use crate::prepare::vectors;
+use crate::threads::stop;
 use crate::time::spans::{NONE, Source};
 use crate::tracks::set::TrackSet;
 use crate::tracks::vectors::{Channel, VectorTrack};
@@ -54,7 +55,12 @@ impl PreparedPaths {
             quantity: Quantity::Velocity(Axes::Parent),
             ..rotations
         };
-        let prepared = |tracks| prepared(set, tracks, follow, [&positions, &rotations]);
+        let stop = stop::current();
+        let prepared = |tracks| {
+            stop::during(stop.clone(), || {
+                prepared(set, tracks, follow, [&positions, &rotations])
+            })
+        };
         let batches: Vec<_> = batches(set).into_par_iter().map(prepared).collect();
         // Of several errors that of the first track counts.
         let batches = batches.into_iter().collect::<Result<Vec<_>, _>>()?;
@@ -115,6 +121,7 @@ fn body_on(
         return Err(FollowError::UpsUnused { track });
     }
     let route = Route::new(path, follow);
+    stop::check()?;
     // The body that others look at looks along its own path.
     let direction = match follow.direction {
         Direction::Track(target) if target == track => Direction::Tangent,
@@ -131,6 +138,7 @@ fn body_on(
         _ => None,
     };
     let stretches = stretches(&route, direction, target.as_ref());
+    stop::check()?;
     Ok(Frames::new(route, stretches, follow))
 }
 
@@ -145,11 +153,13 @@ fn prepared(
     for track in tracks.clone() {
         let path = path_of(set, track, follow)?;
         paths.push(body_on(path, set, track, follow)?);
+        stop::check()?;
         points.push(path);
     }
     let minimal = (paths.iter()).filter(|_| follow.frame == Frame::Minimal);
     let carried = minimal.flat_map(|own| own.stretches.iter().map(|stretch| (&own.route, stretch)));
     let uncarried = Uncarried::new(&carried.collect::<Vec<_>>());
+    stop::check()?;
     let (mut first_stretch, mut spans, mut warnings) = (0, Vec::new(), Vec::new());
     for (place, (path, own)) in points.iter().zip(&mut paths).enumerate() {
         let (track, count) = (tracks.start + place, own.stretches.len());
@@ -172,7 +182,9 @@ fn prepared(
     };
     let [mut positions, mut rotations] = interpolations.map(Prepared::new);
     adding.add(&mut positions, Kind::Vector);
+    stop::check()?;
     adding.add(&mut rotations, Kind::Rotation);
+    stop::check()?;
     Ok(([positions, rotations], warnings))
 }
 

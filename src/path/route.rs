@@ -8,6 +8,7 @@ use crate::method::vector_curve::Curves;
 use crate::path::lengths::Lengths;
 use crate::path::options::{Direction, Follow, Frame, PathSpeed, Twist};
 use crate::path::polynomial::Polynomial;
+use crate::threads::stop;
 use crate::tracks::vectors::VectorTrack;
 
 /// The curves of a path, and when a body is where on them.
@@ -248,6 +249,10 @@ pub(crate) fn stretches(
     let mut all: Vec<Stretch> = Vec::with_capacity(route.curves.len());
     let mut cuts: Vec<f64> = Vec::new();
     for interval in 0..route.curves.len() {
+        if stop::is_stopped() {
+            // Whoever prepares paths looks again when this is done.
+            return Vec::new();
+        }
         let slope = &route.slopes[interval];
         // Where the direction is that of a polynomial, this without its zeros.
         let divided = match direction {

@@ -3,9 +3,9 @@
 use crate::engine::Engine;
 use crate::error::Error;
 use crate::output::rotations::{Layout, Rotations, Vectors};
-use crate::path::options::{Follow, FollowWarning};
+use crate::path::options::{Follow, FollowError, FollowWarning};
 use crate::path::prepare::PreparedPaths;
-use crate::threads::on_threads;
+use crate::threads::{on_threads, stop};
 use crate::time::frames::Frames;
 use crate::tracks::set::TrackSet;
 
@@ -50,7 +50,13 @@ impl Engine {
         layout: Layout,
     ) -> Result<Followed, Error> {
         let group_bytes = self.backend.group_bytes();
-        let prepared = on_threads(|| PreparedPaths::new(set, follow, group_bytes))??;
+        let stop = stop::current();
+        let prepare = || PreparedPaths::new(set, follow, group_bytes);
+        let prepared = on_threads(|| stop::during(stop, prepare))?;
+        let prepared = prepared.map_err(|error| match error {
+            FollowError::Stopped(stopped) => Error::Stopped(stopped),
+            error => Error::Follow(error),
+        })?;
         Ok(Followed {
             positions: self.samples_of(prepared.positions, frames, layout)?,
             rotations: self.samples_of(prepared.rotations, frames, layout)?,

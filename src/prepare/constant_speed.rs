@@ -85,6 +85,9 @@ fn retime_track(
         {
             prepared.constants[beyond.at_end as usize] = round_quat(curve.value_at(1.0));
         }
+        if stop::is_stopped() {
+            return;
+        }
         if from < to {
             fitting.take_curve(prepared, curve, from, key);
         }

@@ -8,6 +8,7 @@ use crate::fit::double::fit::{FitBlock, Tier, tier};
 use crate::fit::double::intervals::Intervals;
 use crate::fit::double::shape::Shape;
 use crate::prepare::prepared::{Place, Prepared};
+use crate::threads::stop;
 use crate::time::spans::{NONE, Source};
 
 /// Fits curves in blocks, whose memory is kept.
@@ -100,7 +101,9 @@ impl Fitting {
         }
         let segments = &mut prepared.segments.polynomials;
         self.cutter.cut(self.shape, self.quantity, segments);
-        prepared.put_subcurves(&self.cutter);
+        if !stop::is_stopped() {
+            prepared.put_subcurves(&self.cutter);
+        }
         self.cutter.curves.clear();
         self.cutter.subcurves.clear();
     }

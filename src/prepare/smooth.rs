@@ -20,6 +20,7 @@ use crate::prepare::fitting::Fitting;
 use crate::prepare::prepared::Prepared;
 use crate::shader::PolynomialSegment;
 use crate::simd::dispatch::in_lanes;
+use crate::threads::stop;
 use crate::time::frame_clock::{FrameClock, FrameStart};
 use crate::time::frame_rate::FrameRate;
 use crate::time::spans::{NONE, Source};
@@ -112,7 +113,8 @@ impl SmoothPreparation {
             _ => Vec::new(),
         };
         let mut from = intervals.start;
-        while from < intervals.end {
+        // Whoever prepares looks again when this is done.
+        while from < intervals.end && !stop::is_stopped() {
             if self.intervals.count + context >= LANES {
                 self.flush(prepared);
             }

@@ -70,6 +70,17 @@ pub enum SmoothingError {
         /// The order.
         order: usize,
     },
+    /// Samples hold nothing at the frequency.
+    #[error(
+        "a low-pass at {hz} Hz leaves samples at {rate} Hz as they are, which hold nothing faster than {} Hz; give a lower frequency above 0",
+        0.5 * rate
+    )]
+    Frequency {
+        /// The frequency, Hz.
+        hz: f64,
+        /// Samples a second.
+        rate: f64,
+    },
     /// Too many passes.
     #[error("{passes} passes are too many; give at most {MOST_PASSES}, or a wider kernel")]
     Passes {
@@ -146,6 +157,21 @@ impl Smoothing {
 }
 
 impl SmoothingKernel {
+    /// The bell that halves the power of motion at a frequency in samples at some rate, both in Hz: its
+    /// spectrum, exp(-(2π f σ)²/2), is 1/√2 there and ¼ at twice the frequency.
+    ///
+    /// # Errors
+    /// When the frequency is not between 0 and half the rate, or the bell is too wide.
+    pub fn low_pass(hz: f64, rate: f64) -> Result<Self, SmoothingError> {
+        if !(hz > 0.0 && hz < 0.5 * rate && rate.is_finite()) {
+            return Err(SmoothingError::Frequency { hz, rate });
+        }
+        let deviation = rate * std::f64::consts::LN_2.sqrt() / (std::f64::consts::TAU * hz);
+        let kernel = Self::Gaussian(deviation);
+        Smoothing::new(kernel).check()?;
+        Ok(kernel)
+    }
+
     /// The weights of a sample and of each neighbour on one side.
     pub(crate) fn weights(self) -> Result<Vec<f64>, SmoothingError> {
         let checked = |width: f64| match width > 0.0 && width <= MOST_RADIUS as f64 / 4.0 {

@@ -86,7 +86,11 @@ fn read_table(
         .iter()
         .map(|field| field.name().clone())
         .collect();
-    let plan = Plan::of(name, &names, options)?;
+    let mut plan = Plan::of(name, &names, options)?;
+    let notes = schema.metadata().iter();
+    plan.notes = notes
+        .map(|(key, value)| (key.clone(), value.clone()))
+        .collect();
     let types = plan
         .wanted
         .iter()

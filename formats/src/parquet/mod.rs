@@ -126,7 +126,12 @@ fn read_table(
     let loaded = ArrowReaderMetadata::load(&bytes, own).map_err(|error| damaged(&error))?;
     let fields = loaded.schema().fields();
     let names: Vec<String> = fields.iter().map(|field| field.name().clone()).collect();
-    let plan = Plan::of(name, &names, options)?;
+    let mut plan = Plan::of(name, &names, options)?;
+    let notes = loaded.metadata().file_metadata().key_value_metadata();
+    let notes = notes.into_iter().flatten();
+    plan.notes = notes
+        .filter_map(|note| Some((note.key.clone(), note.value.clone()?)))
+        .collect();
     let mut roots: Vec<usize> = plan.wanted.iter().map(|wanted| wanted.index).collect();
     roots.sort_unstable();
     roots.dedup();

@@ -16,6 +16,8 @@ use crate::table::columns::Table;
 use crate::table::groups::{labels, numbered, share_out};
 use crate::table::keys::Keys;
 use crate::table::plan::{Parts, Plan, Rows};
+#[cfg(feature = "parquet")]
+use crate::table::skeleton;
 use crate::table::times::{Times, times};
 use crate::warnings::Warnings;
 
@@ -37,6 +39,14 @@ pub(crate) fn clips(
     }
     table.check_nulls(options.bridge_gaps)?;
     let mut warnings = Warnings::new(&table.file);
+    if let Some(columns) = plan.left_out(table) {
+        warnings.warn(Code::ColumnsLeftOut, || {
+            let message = format!(
+                "left out, because nothing says that they are keys: {columns}; --map names what is"
+            );
+            (None, message)
+        });
+    }
     let times = times(table, plan, options)?;
     let mut loaded = Loaded::default();
     let groups = match plan.clip {
@@ -69,7 +79,12 @@ pub(crate) fn clips(
             options,
         };
         match clip.read(plan, name, &mut warnings) {
-            Ok(motion) => loaded.clips.push(Motion { place, ..motion }),
+            Ok(mut motion) => {
+                #[cfg(feature = "parquet")]
+                skeleton::hang(&mut motion, place, &plan.notes);
+                motion.place = place;
+                loaded.clips.push(motion);
+            }
             Err(refusal) if alone => return Err(refusal),
             Err(refusal) => loaded.refused.push(refusal),
         }

@@ -79,6 +79,14 @@ impl Table {
         Diagnostic::new(&self.file, code, message)
     }
 
+    /// How many numbers the list of the first row has, of a column of lists.
+    pub(crate) fn list_length(&self, column: usize) -> Option<usize> {
+        match &self.columns.get(column)?.values {
+            Values::Lists { ends, .. } => ends.first().copied(),
+            _ => None,
+        }
+    }
+
     /// Where a cell is.
     pub(crate) fn place(&self, column: usize, row: usize) -> Place {
         let column = &self.columns[column];

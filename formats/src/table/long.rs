@@ -14,6 +14,7 @@ use crate::names::distinct_names;
 use crate::npy::ComponentOrder;
 use crate::poses::{Poses, TRANSFORM, WORLD};
 use crate::table::rows::{Batch, Component, Head, Sink, invalid, names};
+use crate::table::skeleton;
 
 /// Begins a table of a result's rotations.
 pub(crate) fn write_rotations<'a, S: Sink + 'a>(
@@ -243,11 +244,13 @@ fn notes(clips: &[Sampled<'_>]) -> Vec<(String, String)> {
     let mut notes: Vec<(String, String)> = Vec::new();
     for (place, sampled) in clips.iter().enumerate() {
         let rate = sampled.rate.map(|rate| ("rate", rate.to_string()));
+        let skeleton = skeleton::note_of(sampled);
         let own = sampled
             .notes
             .iter()
             .map(|(key, value)| (*key, value.clone()))
-            .chain(rate);
+            .chain(rate)
+            .chain(skeleton);
         for (key, value) in own {
             match notes.iter().find(|(known, _)| known == key) {
                 None => notes.push((key.to_owned(), value)),

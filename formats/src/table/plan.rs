@@ -8,12 +8,16 @@ use crate::format::ReadOptions;
 use crate::map::{Entry, Map};
 use crate::npy::ComponentOrder;
 use crate::rotation_form::RotationForm;
+use crate::table::columns::Table;
 
 /// Columns that tell the tracks of long tables apart.
 const TRACK: [&str; 3] = ["track", "joint", "body"];
 
 /// Columns that tell clips apart.
 const CLIP: [&str; 3] = ["clip", "clip_id", "motion_id"];
+
+/// Columns that count rows.
+const COUNTED: [&str; 3] = ["frame", "frame_index", "index"];
 
 /// What a column has to hold.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -47,6 +51,11 @@ pub(crate) struct Plan {
     /// What tells clips apart, and what goes before its values in their names.
     pub(crate) clip: Option<(usize, &'static str)>,
     pub(crate) rows: Rows,
+    /// The names of the columns that are not read.
+    pub(crate) left_out: Vec<String>,
+    /// What the file says of itself beside its rows.
+    #[cfg(feature = "parquet")]
+    pub(crate) notes: Vec<(String, String)>,
 }
 
 /// What a row is.
@@ -229,6 +238,55 @@ impl Names<'_> {
 }
 
 impl Plan {
+    /// What is not read: columns, and parts of the lists of others.
+    pub(crate) fn left_out(&self, table: &Table) -> Option<String> {
+        let mut all: Vec<String> = self
+            .left_out
+            .iter()
+            .map(|name| format!("`{name}`"))
+            .collect();
+        for (column, wanted) in self.wanted.iter().enumerate() {
+            let Some(length) = table.list_length(column) else {
+                continue;
+            };
+            let mut is_read = vec![false; length];
+            for cell in self.cells().filter(|cell| cell.column == column) {
+                if let Some(known) = cell.place.and_then(|place| is_read.get_mut(place)) {
+                    *known = true;
+                }
+            }
+            let mut first = 0;
+            for run in is_read.chunk_by(|a, b| a == b) {
+                let end = first + run.len();
+                if !run[0] {
+                    all.push(format!("`{}[{first}:{end}]`", wanted.name));
+                }
+                first = end;
+            }
+        }
+        /// More names than anybody reads.
+        const MOST: usize = 12;
+        let count = all.len();
+        all.truncate(MOST);
+        let more = match count - all.len() {
+            0 => String::new(),
+            more => format!(" and {more} more"),
+        };
+        (count > 0).then(|| format!("{}{more}", all.join(", ")))
+    }
+
+    /// Where the numbers of all tracks are.
+    fn cells(&self) -> impl Iterator<Item = &Cell> {
+        let parts: Vec<&Parts> = match &self.rows {
+            Rows::Keys { parts, .. } => vec![parts],
+            Rows::Times { tracks, .. } => tracks.iter().map(|(_, parts)| parts).collect(),
+        };
+        parts.into_iter().flat_map(|parts| {
+            let vectors = parts.translation.iter().chain(&parts.scale).flatten();
+            parts.rotation.all().iter().chain(vectors)
+        })
+    }
+
     /// The plan for a file with columns of these names.
     ///
     /// # Errors
@@ -272,12 +330,21 @@ impl Plan {
         } else {
             wide_rows(&mut names)?
         };
+        let is_read = |index: usize| names.wanted.iter().any(|wanted| wanted.index == index);
+        // Beside times, frames say nothing more.
+        let is_known = |name: &str| COUNTED.contains(&name);
+        let left_out = (own.iter().enumerate())
+            .filter(|(index, name)| !is_read(*index) && !is_known(name))
+            .map(|(_, name)| name.clone());
         Ok(Self {
+            left_out: left_out.collect(),
             wanted: names.wanted,
             time,
             is_frames,
             clip,
             rows,
+            #[cfg(feature = "parquet")]
+            notes: Vec::new(),
         })
     }
 }

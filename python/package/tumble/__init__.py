@@ -30,17 +30,32 @@ from tumble._errors import (
 )
 from tumble._motion import MotionLibrary, MotionState
 from tumble._tumble import (
+    ArrayDifference,
+    ChannelDifference,
     Chunk,
     Chunks,
     Clip,
+    ClipDifference,
+    Crowd,
     Engine,
     File,
+    PathErrors,
+    PathStatistics,
+    Reduction,
+    Route,
+    Spread,
+    Surface,
     Verification,
+    Walk,
+    compare,
     devices,
     evaluate,
     load,
     methods,
+    path_errors,
+    reduce,
     save,
+    walk,
 )
 
 read = load
@@ -49,9 +64,13 @@ write = save
 __version__: str = _tumble.__version__
 
 __all__ = [
+    "ArrayDifference",
+    "ChannelDifference",
     "Chunk",
     "Chunks",
     "Clip",
+    "ClipDifference",
+    "Crowd",
     "DeviceError",
     "Engine",
     "Error",
@@ -62,13 +81,24 @@ __all__ = [
     "MotionLibrary",
     "MotionState",
     "OutputError",
+    "PathErrors",
+    "PathStatistics",
+    "Reduction",
+    "Route",
+    "Spread",
+    "Surface",
     "Verification",
+    "Walk",
+    "compare",
     "devices",
     "evaluate",
     "load",
     "methods",
+    "path_errors",
     "read",
+    "reduce",
     "save",
+    "walk",
     "write",
 ]
 

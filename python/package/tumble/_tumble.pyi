@@ -4,23 +4,35 @@ from fractions import Fraction
 from typing import Any, Literal, Protocol, TypeAlias, final, overload
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike, DTypeLike, NDArray
 from typing_extensions import Buffer
 
 from tumble._notebook import View
 
 __all__ = [
+    "ArrayDifference",
+    "ChannelDifference",
     "Chunk",
     "Chunks",
     "Clip",
+    "ClipDifference",
+    "Crowd",
     "Engine",
     "File",
     "Motions",
+    "PathErrors",
+    "PathStatistics",
     "Plan",
+    "Reduction",
+    "Route",
+    "Spread",
+    "Surface",
     "Verification",
+    "Walk",
     "Worker",
     "__version__",
     "clip_of_state",
+    "compare",
     "devices",
     "evaluate",
     "file_of_state",
@@ -32,9 +44,12 @@ __all__ = [
     "methods",
     "page",
     "panic",
+    "path_errors",
+    "reduce",
     "run",
     "save",
     "set_probe",
+    "walk",
 ]
 __version__: str
 
@@ -57,6 +72,7 @@ _Layout: TypeAlias = Literal["track", "frame"]
 _Axes: TypeAlias = Literal["body", "parent", "world"]
 _Wrap: TypeAlias = Literal["hold", "loop", "mirror", "extrapolate"]
 _Single: TypeAlias = NDArray[np.float32]
+_Double: TypeAlias = NDArray[np.float64]
 # Double where positions count from an origin.
 _Places: TypeAlias = NDArray[np.float32] | NDArray[np.float64]
 
@@ -83,6 +99,20 @@ _Ends: TypeAlias = (
     Literal["parabolic", "natural", "clamped", "secant", "loop", "frozen"] | ArrayLike
 )
 _Speed: TypeAlias = Literal["as-keyed", "constant"]
+_VectorMethod: TypeAlias = Literal[
+    "step",
+    "linear",
+    "catmull-rom",
+    "bessel-overhauser",
+    "gltf-cubic",
+    "c2",
+    "b-spline",
+]
+_SmoothingEnds: TypeAlias = Literal["keep", "parabolic", "loop"]
+_Up: TypeAlias = tuple[float, float, float] | Sequence[float] | NDArray[Any]
+_Values: TypeAlias = Literal["model", "skinning", "local", "rotations"]
+_Align: TypeAlias = Literal["none", "position", "yaw", "se3", "sim3"]
+_Curve: TypeAlias = Literal["linear", "bessel-overhauser", "cubic"]
 
 @final
 class Clip:
@@ -149,6 +179,7 @@ class Clip:
         order: _Order = "xyzw",
         layout: _Layout = "track",
         as_rotation: Literal[False] = False,
+        dtype: Literal["float32"] = "float32",
         fps: _Rate | None = None,
         at: _Arrays | None = None,
         times: _Arrays | None = None,
@@ -168,10 +199,35 @@ class Clip:
     def evaluate(
         self,
         *,
+        out: NDArray[Any] | None = None,
+        order: _Order = "xyzw",
+        layout: _Layout = "track",
+        as_rotation: Literal[False] = False,
+        dtype: DTypeLike,
+        fps: _Rate | None = None,
+        at: _Arrays | None = None,
+        times: _Arrays | None = None,
+        start: float | None = None,
+        end: float | None = None,
+        method: _Method | None = None,
+        path: _Way | None = None,
+        ends: _Ends | None = None,
+        speed: _Speed | None = None,
+        before: _Wrap | None = None,
+        after: _Wrap | None = None,
+        tension: float | None = None,
+        continuity: float | None = None,
+        bias: float | None = None,
+    ) -> NDArray[Any]: ...
+    @overload
+    def evaluate(
+        self,
+        *,
         out: None = None,
         order: Literal["xyzw"] = "xyzw",
         layout: _Layout = "track",
         as_rotation: Literal[True],
+        dtype: Literal["float32"] = "float32",
         fps: _Rate | None = None,
         at: _Arrays | None = None,
         times: _Arrays | None = None,
@@ -237,6 +293,7 @@ class Engine:
         order: _Order = "xyzw",
         layout: _Layout = "track",
         as_rotation: Literal[False] = False,
+        dtype: Literal["float32"] = "float32",
         fps: _Rate | None = None,
         at: _Arrays | None = None,
         times: _Arrays | None = None,
@@ -257,10 +314,36 @@ class Engine:
         self,
         clip: Clip,
         *,
+        out: NDArray[Any] | None = None,
+        order: _Order = "xyzw",
+        layout: _Layout = "track",
+        as_rotation: Literal[False] = False,
+        dtype: DTypeLike,
+        fps: _Rate | None = None,
+        at: _Arrays | None = None,
+        times: _Arrays | None = None,
+        start: float | None = None,
+        end: float | None = None,
+        method: _Method | None = None,
+        path: _Way | None = None,
+        ends: _Ends | None = None,
+        speed: _Speed | None = None,
+        before: _Wrap | None = None,
+        after: _Wrap | None = None,
+        tension: float | None = None,
+        continuity: float | None = None,
+        bias: float | None = None,
+    ) -> NDArray[Any]: ...
+    @overload
+    def evaluate(
+        self,
+        clip: Clip,
+        *,
         out: None = None,
         order: Literal["xyzw"] = "xyzw",
         layout: _Layout = "track",
         as_rotation: Literal[True],
+        dtype: Literal["float32"] = "float32",
         fps: _Rate | None = None,
         at: _Arrays | None = None,
         times: _Arrays | None = None,
@@ -324,6 +407,29 @@ class Engine:
         self,
         clip: Clip,
         *,
+        columns: Literal[3, 4] = 3,
+        out: _Single | None = None,
+        layout: _Layout = "track",
+        fps: _Rate | None = None,
+        at: _Arrays | None = None,
+        times: _Arrays | None = None,
+        start: float | None = None,
+        end: float | None = None,
+        method: _Method | None = None,
+        path: _Way | None = None,
+        ends: _Ends | None = None,
+        speed: _Speed | None = None,
+        before: _Wrap | None = None,
+        after: _Wrap | None = None,
+        tension: float | None = None,
+        continuity: float | None = None,
+        bias: float | None = None,
+    ) -> _Single: ...
+    def axis_angle(
+        self,
+        clip: Clip,
+        *,
+        degrees: bool = True,
         out: _Single | None = None,
         layout: _Layout = "track",
         fps: _Rate | None = None,
@@ -403,6 +509,84 @@ class Engine:
         tension: float | None = None,
         continuity: float | None = None,
         bias: float | None = None,
+    ) -> tuple[_Places, _Single]: ...
+    def smooth(
+        self,
+        samples: _Keys,
+        *,
+        kernel: str | None = None,
+        low_pass: float | None = None,
+        fps: _Rate | None = None,
+        passes: int = 1,
+        ends: _SmoothingEnds = "keep",
+        layout: _Layout = "track",
+        order: _Order = "xyzw",
+        out: _Single | None = None,
+    ) -> _Single: ...
+    def blend(
+        self,
+        layers: Sequence[_Keys] | NDArray[Any],
+        weights: ArrayLike | None = None,
+        *,
+        order: _Order = "xyzw",
+        out: _Single | None = None,
+    ) -> _Single: ...
+    def mix(
+        self,
+        first: _Keys,
+        second: _Keys,
+        weight: float,
+        *,
+        order: _Order = "xyzw",
+        out: _Single | None = None,
+    ) -> _Single: ...
+    def add(
+        self,
+        base: _Keys,
+        layer: _Keys,
+        *,
+        reference: _Keys | None = None,
+        weight: float = 1.0,
+        layout: _Layout = "track",
+        order: _Order = "xyzw",
+        out: _Single | None = None,
+    ) -> _Single: ...
+    def local_to_model(
+        self,
+        rotations: _Keys,
+        parents: Sequence[int | None],
+        offsets: ArrayLike | None = None,
+        *,
+        translations: _Arrays | Sequence[_Array | None] | None = None,
+        scales: _Arrays | Sequence[_Array | None] | None = None,
+        inverse_bind: ArrayLike | None = None,
+        layout: _Layout = "track",
+        order: _Order = "xyzw",
+    ) -> _Single: ...
+    def follow(
+        self,
+        times: _Arrays | None,
+        points: _Arrays,
+        *,
+        fps: _Rate | None = None,
+        at: _Arrays | None = None,
+        start: float | None = None,
+        end: float | None = None,
+        duration: float | None = None,
+        rate: float | None = None,
+        ups: _Arrays | None = None,
+        method: _VectorMethod = "bessel-overhauser",
+        ends: _Ends = "parabolic",
+        ahead: float | None = None,
+        look_at: int | ArrayLike | None = None,
+        frame: Literal["minimal", "fixed", "frenet"] = "minimal",
+        up: _Up = (0.0, 1.0, 0.0),
+        twist: Literal["spread", "free"] = "spread",
+        speed: Literal["keys", "constant"] | tuple[float, float] = "keys",
+        forward: str = "z",
+        upward: str = "y",
+        layout: _Layout = "track",
+        order: _Order = "xyzw",
     ) -> tuple[_Places, _Single]: ...
     def stream(
         self,
@@ -531,6 +715,7 @@ def evaluate(
     order: _Order = "xyzw",
     layout: _Layout = "track",
     as_rotation: Literal[False] = False,
+    dtype: Literal["float32"] = "float32",
     fps: _Rate | None = None,
     at: _Arrays | None = None,
     start: float | None = None,
@@ -550,10 +735,35 @@ def evaluate(
     times: _Arrays,
     keys: _Keys,
     *,
+    out: NDArray[Any] | None = None,
+    order: _Order = "xyzw",
+    layout: _Layout = "track",
+    as_rotation: Literal[False] = False,
+    dtype: DTypeLike,
+    fps: _Rate | None = None,
+    at: _Arrays | None = None,
+    start: float | None = None,
+    end: float | None = None,
+    method: _Method | None = None,
+    path: _Way | None = None,
+    ends: _Ends | None = None,
+    speed: _Speed | None = None,
+    before: _Wrap | None = None,
+    after: _Wrap | None = None,
+    tension: float | None = None,
+    continuity: float | None = None,
+    bias: float | None = None,
+) -> NDArray[Any]: ...
+@overload
+def evaluate(
+    times: _Arrays,
+    keys: _Keys,
+    *,
     out: None = None,
     order: _Order = "xyzw",
     layout: _Layout = "track",
     as_rotation: Literal[True],
+    dtype: Literal["float32"] = "float32",
     fps: _Rate | None = None,
     at: _Arrays | None = None,
     start: float | None = None,
@@ -695,3 +905,281 @@ class Worker:
 def inputs_of(line: Sequence[str]) -> list[str]: ...
 def kernels_sha256() -> str: ...
 def merge(folder: str) -> tuple[int, str]: ...
+
+@final
+class Spread:
+    @property
+    def mean(self) -> float: ...
+    @property
+    def rms(self) -> float: ...
+    @property
+    def largest(self) -> float: ...
+
+@final
+class ArrayDifference:
+    @property
+    def numbers(self) -> int: ...
+    @property
+    def differing(self) -> int: ...
+    @property
+    def difference(self) -> Spread: ...
+    @property
+    def largest_at(self) -> list[int]: ...
+    @property
+    def rotation(self) -> Spread | None: ...
+    @property
+    def largest_rotation_at(self) -> list[int] | None: ...
+
+@final
+class ChannelDifference:
+    @property
+    def mean(self) -> float: ...
+    @property
+    def rms(self) -> float: ...
+    @property
+    def largest(self) -> float: ...
+    @property
+    def track(self) -> str: ...
+    @property
+    def time(self) -> float: ...
+
+@final
+class ClipDifference:
+    @property
+    def tracks(self) -> int: ...
+    @property
+    def missing(self) -> tuple[list[str], list[str]]: ...
+    @property
+    def samples(self) -> int: ...
+    @property
+    def span(self) -> tuple[float, float]: ...
+    @property
+    def identical(self) -> int: ...
+    @property
+    def rotation(self) -> ChannelDifference: ...
+    @property
+    def translation(self) -> ChannelDifference | None: ...
+    @property
+    def scale(self) -> ChannelDifference | None: ...
+
+@final
+class PathStatistics:
+    @property
+    def rmse(self) -> float: ...
+    @property
+    def mean(self) -> float: ...
+    @property
+    def median(self) -> float: ...
+    @property
+    def std(self) -> float: ...
+    @property
+    def min(self) -> float: ...
+    @property
+    def max(self) -> float: ...
+
+@final
+class PathErrors:
+    @property
+    def poses(self) -> int: ...
+    @property
+    def outside(self) -> int: ...
+    @property
+    def in_gaps(self) -> int: ...
+    @property
+    def span(self) -> tuple[float, float]: ...
+    @property
+    def scale(self) -> float: ...
+    @property
+    def rotation(self) -> list[float]: ...
+    @property
+    def translation(self) -> list[float]: ...
+    @property
+    def ape_translation(self) -> PathStatistics: ...
+    @property
+    def ape_rotation(self) -> PathStatistics: ...
+    @property
+    def rpe_translation(self) -> PathStatistics | None: ...
+    @property
+    def rpe_rotation(self) -> PathStatistics | None: ...
+    @property
+    def rpe_count(self) -> int: ...
+
+@overload
+def compare(
+    first: Clip,
+    second: Clip,
+    *,
+    fps: _Rate | None = None,
+    at: _Array | None = None,
+    start: float | None = None,
+    end: float | None = None,
+    world: bool = False,
+    engine: Engine | None = None,
+) -> ClipDifference: ...
+@overload
+def compare(
+    first: _Array,
+    second: _Array,
+    *,
+    fps: None = None,
+    at: None = None,
+    start: None = None,
+    end: None = None,
+    world: Literal[False] = False,
+    engine: None = None,
+) -> ArrayDifference: ...
+def path_errors(
+    reference: Clip,
+    estimate: Clip,
+    *,
+    align: _Align = "none",
+    rpe: str | None = None,
+    max_gap: float | None = None,
+    track: int | str | None = None,
+    engine: Engine | None = None,
+) -> PathErrors: ...
+
+@final
+class Reduction:
+    @property
+    def clip(self) -> Clip: ...
+    @property
+    def keys_before(self) -> int: ...
+    @property
+    def keys_after(self) -> int: ...
+    @property
+    def times(self) -> _Double: ...
+    @property
+    def angles(self) -> _Double: ...
+    @property
+    def distances(self) -> _Double: ...
+    @property
+    def bounds(self) -> tuple[float, float]: ...
+
+def reduce(
+    clip: Clip,
+    *,
+    tolerance: float = 0.1,
+    distance: float | None = None,
+    shell: float = 0.0,
+    curve: _Curve = "linear",
+    together: bool = False,
+    fps: _Rate | None = None,
+    engine: Engine | None = None,
+) -> Reduction: ...
+
+@final
+class Crowd:
+    def __new__(
+        cls,
+        clips: Sequence[Clip],
+        instances: int,
+        *,
+        layers: int = 1,
+        method: _Method = "slerp",
+        parents: Sequence[int | None] | None = None,
+        offsets: ArrayLike | None = None,
+        masks: Sequence[Sequence[float]] | None = None,
+        inverse_bind: ArrayLike | None = None,
+        references: dict[int, tuple[int, float]] | None = None,
+        ticks_per_second: int = 705600,
+        engine: Engine | None = None,
+    ) -> Crowd: ...
+    @property
+    def instances(self) -> int: ...
+    @property
+    def joints(self) -> int: ...
+    @property
+    def layers(self) -> int: ...
+    def set(
+        self,
+        instances: ArrayLike,
+        clip: ArrayLike,
+        *,
+        layer: int = 0,
+        time: ArrayLike = 0.0,
+        speed: ArrayLike = 1.0,
+        wrap: Literal["hold", "loop", "mirror"] = "loop",
+        weight: ArrayLike = 1.0,
+        additive: bool = False,
+        mask: int | None = None,
+    ) -> None: ...
+    def advance(self, seconds: float) -> None: ...
+    @overload
+    def evaluate(
+        self,
+        values: _Values = "model",
+        *,
+        dtype: Literal["float32"] = "float32",
+        out: _Single | None = None,
+    ) -> _Single: ...
+    @overload
+    def evaluate(
+        self,
+        values: _Values = "model",
+        *,
+        dtype: DTypeLike,
+        out: NDArray[Any] | None = None,
+    ) -> NDArray[Any]: ...
+    def times(self, layer: int = 0) -> _Double: ...
+
+@final
+class Surface:
+    def __new__(
+        cls, vertices: ArrayLike, faces: ArrayLike, *, weld: float = 0.0
+    ) -> Surface: ...
+    @classmethod
+    def net(cls, points: ArrayLike) -> Surface: ...
+    def route(
+        self,
+        start: ArrayLike,
+        goal: ArrayLike,
+        *,
+        by: str | None = None,
+        avoid: Surface | None = None,
+        clearance: float = 0.0,
+        finest: float | None = None,
+        max_slope: float | None = None,
+        up: _Up = (0.0, 1.0, 0.0),
+    ) -> Route: ...
+    def routes(
+        self,
+        starts: ArrayLike,
+        goals: ArrayLike,
+        *,
+        by: str | None = None,
+        avoid: Surface | None = None,
+        clearance: float = 0.0,
+        finest: float | None = None,
+        max_slope: float | None = None,
+        up: _Up = (0.0, 1.0, 0.0),
+    ) -> list[Route | None]: ...
+
+@final
+class Route:
+    @property
+    def points(self) -> _Double: ...
+    @property
+    def normals(self) -> _Double | None: ...
+    @property
+    def length(self) -> float: ...
+    @property
+    def off(self) -> tuple[float, float]: ...
+
+@final
+class Walk:
+    @property
+    def times(self) -> _Double: ...
+    @property
+    def points(self) -> _Double: ...
+    @property
+    def normals(self) -> _Double | None: ...
+
+def walk(
+    routes: Sequence[Route],
+    *,
+    speed: ArrayLike,
+    radius: ArrayLike,
+    start: ArrayLike = 0.0,
+    movers: Sequence[tuple[ArrayLike, ArrayLike, float]] = (),
+) -> list[Walk | None]: ...

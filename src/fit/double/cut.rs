@@ -8,6 +8,7 @@ use crate::fit::double::fit::{FitBlock, Tier};
 use crate::fit::double::intervals::LANES;
 use crate::fit::double::shape::Shape;
 use crate::shader::PolynomialSegment;
+use crate::threads::stop;
 
 /// Cuts curves; its memory is kept for the next ones.
 #[derive(Default)]
@@ -85,7 +86,8 @@ impl Cutter {
         segments: &mut Vec<PolynomialSegment>,
     ) {
         let mut done = 0;
-        while done < self.waiting.len() {
+        // Whoever prepares looks again when this is done.
+        while done < self.waiting.len() && !stop::is_stopped() {
             let new = || Box::new(FitBlock::new(shape, quantity, Tier::Piece));
             let block = self.block.get_or_insert_with(new);
             block.clear();

@@ -1,24 +1,24 @@
 //! `tumble compare`: how far two motions, or two results, are apart.
 
-mod arrays;
-mod clips;
-mod tally;
-mod trajectory;
+mod text;
 
 use std::path::Path;
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 use serde::Serialize;
 use tumble::{Device, Engine, FrameRate, Frames};
-use tumble_formats::Format;
+use tumble_formats::compare::{
+    ArrayDifference, ClipDifference, ClipPair, CompareError, PathDifference, PathMeasure,
+};
 use tumble_formats::motion::Motion;
-use tumble_formats::trajectory::Step;
+use tumble_formats::npz::open_numbers;
+use tumble_formats::trajectory::{Align, Step};
+use tumble_formats::{Diagnostic, Format};
 
 use crate::arguments::input::{self, Inputs, clip_name};
 use crate::arguments::time::{check_range, finite_seconds};
 use crate::arguments::tolerance::{degrees, not_negative};
-use crate::commands::compare::clips::Comparison;
-use crate::commands::compare::trajectory::{AlignArgument, Measure};
+use crate::batch::room;
 use crate::messages::exit::{ALL_INPUTS, DIFFERENCE, Failure};
 use crate::messages::words;
 
@@ -71,7 +71,7 @@ pub(crate) struct Arguments {
     #[arg(long, help_heading = TRAJECTORIES)]
     ape: bool,
     /// Relative errors: over steps of so many seconds, or so many units of length along the second
-    #[arg(long, value_name = "1s|1m", value_parser = trajectory::step, help_heading = TRAJECTORIES)]
+    #[arg(long, value_name = "1s|1m", value_parser = step, help_heading = TRAJECTORIES)]
     rpe: Option<Step>,
     /// Leave out poses between two of the second that are more than so many seconds apart
     #[arg(long, value_name = "SECONDS", value_parser = not_negative, help_heading = TRAJECTORIES)]
@@ -81,6 +81,44 @@ pub(crate) struct Arguments {
     json: bool,
 }
 
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum AlignArgument {
+    /// as they are
+    None,
+    /// move the second
+    Position,
+    /// move it, and turn it about z
+    Yaw,
+    /// move and turn it
+    Se3,
+    /// move, turn and scale it
+    Sim3,
+}
+
+impl AlignArgument {
+    fn align(self) -> Align {
+        match self {
+            Self::None => Align::None,
+            Self::Position => Align::Position,
+            Self::Yaw => Align::Yaw,
+            Self::Se3 => Align::Se3,
+            Self::Sim3 => Align::Sim3,
+        }
+    }
+}
+
+fn step(text: &str) -> Result<Step, String> {
+    text.parse::<Step>().map_err(|error| error.to_string())
+}
+
+/// A motion that cannot be compared is the input's fault.
+fn refused(error: CompareError) -> Failure {
+    match error {
+        CompareError::Evaluating { input, error } => Failure::evaluating(&input, &error),
+        error => Failure::new(ALL_INPUTS, error.to_string()),
+    }
+}
+
 /// The heading of what is about paths in help.
 const TRAJECTORIES: &str = "Trajectories";
 
@@ -88,9 +126,9 @@ const TRAJECTORIES: &str = "Trajectories";
 #[derive(Serialize)]
 #[serde(rename_all = "lowercase")]
 enum Report {
-    Clips(Vec<clips::Compared>),
-    Array(arrays::Compared),
-    Trajectory(Box<trajectory::Compared>),
+    Clips(Vec<ClipDifference>),
+    Array(ArrayDifference),
+    Trajectory(Box<PathDifference>),
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
@@ -112,7 +150,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
             (Report::Trajectory(Box::new(found)), rest)
         }
         true => {
-            let found = arrays::compare(paths, &arguments.inputs.options()?)?;
+            let found = arguments.arrays(paths)?;
             (Report::Array(found), Ok(()))
         }
         false => {
@@ -122,11 +160,11 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     };
     match (&report, arguments.json) {
         (report, true) => words::json(report)?,
-        (Report::Array(found), false) => words::listing(&found.told())?,
-        (Report::Trajectory(found), false) => words::listing(&found.lines())?,
+        (Report::Array(found), false) => words::listing(&text::of_arrays(found))?,
+        (Report::Trajectory(found), false) => words::listing(&text::of_paths(found))?,
         (Report::Clips(found), false) => {
-            let told: String = found.iter().map(clips::Compared::told).collect();
-            words::listing(&told)?;
+            let lines: String = found.iter().map(text::of_clips).collect();
+            words::listing(&lines)?;
         }
     }
     arguments.judge(&report).and(rest)
@@ -142,7 +180,7 @@ impl Arguments {
     fn trajectory(
         &self,
         paths: [&Path; 2],
-    ) -> Result<(trajectory::Compared, Result<(), Failure>), Failure> {
+    ) -> Result<(PathDifference, Result<(), Failure>), Failure> {
         if self.fps.is_some() || self.world {
             let message = "trajectories are compared in the world at the poses of the first; leave out --fps and --world";
             return Err(Failure::usage(message));
@@ -172,9 +210,9 @@ impl Arguments {
         ];
         let engine =
             Engine::new(Device::Cpu).map_err(|error| Failure::evaluating(&names[0], &error))?;
-        let measure = Measure {
-            align: self.align.unwrap_or(AlignArgument::None),
-            absolute: self.ape || self.rpe.is_none(),
+        let measure = PathMeasure {
+            align: self.align.map(AlignArgument::align).unwrap_or_default(),
+            is_absolute: self.ape || self.rpe.is_none(),
             step: self.rpe,
             max_gap: self.max_gap,
         };
@@ -182,8 +220,20 @@ impl Arguments {
             (&*names[0], &first.clip, tracks[0]),
             (&*names[1], &second.clip, tracks[1]),
         ];
-        let found = trajectory::compare(&engine, clips, &measure)?;
+        let found = PathDifference::of(&engine, clips, &measure).map_err(refused)?;
         Ok((found, first.rest.and(second.rest)))
+    }
+
+    /// The arrays of two NPY files.
+    fn arrays(&self, paths: [&Path; 2]) -> Result<ArrayDifference, Failure> {
+        let options = self.inputs.options()?;
+        let read = |path| {
+            open_numbers(path, &options).map_err(|error: Diagnostic| Failure::input(&error, ""))
+        };
+        let arrays = [read(paths[0])?, read(paths[1])?];
+        let names = paths.map(input::name);
+        let found = ArrayDifference::of([&names[0], &names[1]], arrays.each_ref());
+        found.map_err(refused)
     }
 
     /// Whether both are arrays whose meaning nobody needs to know.
@@ -207,7 +257,7 @@ impl Arguments {
     fn clips(
         &self,
         paths: [&Path; 2],
-    ) -> Result<(Vec<clips::Compared>, Result<(), Failure>), Failure> {
+    ) -> Result<(Vec<ClipDifference>, Result<(), Failure>), Failure> {
         let loaded = [self.inputs.load(paths[0])?, self.inputs.load(paths[1])?];
         let rest = (paths.iter().zip(&loaded))
             .try_for_each(|(path, loaded)| input::whole(&input::name(path), loaded));
@@ -226,15 +276,6 @@ impl Arguments {
         }
         let engine = Engine::new(Device::Cpu)
             .map_err(|error| Failure::evaluating(&input::name(paths[0]), &error))?;
-        let frames = |start: f64, end: f64| {
-            let (start, end) = (self.start.unwrap_or(start), self.end.unwrap_or(end));
-            self.fps.map(|rate| Frames::rate(rate).between(start, end))
-        };
-        let comparison = Comparison {
-            engine: &engine,
-            frames: &frames,
-            in_world: self.world,
-        };
         let mut found = Vec::new();
         for (place, first) in loaded[0].clips.iter().enumerate() {
             // Of the same name, else at the same place.
@@ -252,9 +293,34 @@ impl Arguments {
                 false => tracks.select(clip, name),
             };
             let own = [select(first, &names[0])?, select(second, &names[1])?];
-            found.push(comparison.compare([(&names[0], &own[0]), (&names[1], &own[1])])?);
+            let pair = ClipPair {
+                inputs: [&names[0], &names[1]],
+                clips: [&own[0], &own[1]],
+            };
+            found.push(self.differences(&engine, pair)?);
         }
         Ok((found, rest))
+    }
+
+    /// The differences of two clips at the frames that are asked for.
+    fn differences(&self, engine: &Engine, pair: ClipPair<'_>) -> Result<ClipDifference, Failure> {
+        let common = pair.common_times().map_err(refused)?;
+        if let Some(warning) = &common.warning {
+            words::warning(warning);
+        }
+        let (start, end) = (
+            self.start.unwrap_or(common.start),
+            self.end.unwrap_or(common.end),
+        );
+        let frames = match self.fps {
+            Some(rate) => Frames::rate(rate).between(start, end),
+            None => pair.keys(&common),
+        };
+        for (name, clip) in pair.inputs.into_iter().zip(pair.clips) {
+            room::in_memory(name, &clip.set, &frames, 7)?;
+        }
+        let found = pair.differences(engine, &frames, self.world);
+        found.map_err(refused)
     }
 
     /// Fails where a difference is over its bound.

@@ -10,7 +10,7 @@ use std::time::Instant;
 use clap::{Args, ValueEnum};
 use tumble::{
     Engine, Error, EulerSequence, FrameRate, Frames, Layout, Rotations, Smoothing, SmoothingEnds,
-    SmoothingKernel, Vectors,
+    SmoothingError, SmoothingKernel, Vectors,
 };
 use tumble_formats::format::{Document, MotionOptions, ResultShape};
 use tumble_formats::motion::{Motion, Sampled};
@@ -97,8 +97,7 @@ fn frequency(text: &str) -> Result<f64, String> {
     }
 }
 
-/// The smoothing of samples at those times: with a low-pass the bell whose spectrum, exp(-(2π f σ)²/2),
-/// is 1/√2 at its frequency.
+/// The smoothing of samples at those times.
 fn smoothing_at(
     times: &[f64],
     smoothing: &Smoothing,
@@ -108,22 +107,15 @@ fn smoothing_at(
         return Ok(*smoothing);
     };
     let rate = (times.len() - 1) as f64 / (last - first);
-    if hz >= rate / 2.0 {
-        return Err(format!(
-            "--low-pass {hz}: the samples come at {rate} Hz and hold nothing faster than {} Hz; give a \
-             lower frequency",
-            rate / 2.0
-        ));
-    }
-    let deviation = rate * std::f64::consts::LN_2.sqrt() / (std::f64::consts::TAU * hz);
-    let kernel = SmoothingKernel::Gaussian(deviation);
-    let smoothing = Smoothing {
+    let kernel = SmoothingKernel::low_pass(hz, rate);
+    let kernel = kernel.map_err(|error| match error {
+        SmoothingError::Frequency { .. } => format!("--low-pass {hz}: {error}"),
+        error => format!("--low-pass {hz}: {error}; give a higher frequency"),
+    })?;
+    Ok(Smoothing {
         kernel,
         ..*smoothing
-    };
-    let checked = smoothing.check();
-    checked.map_err(|error| format!("--low-pass {hz}: {error}; give a higher frequency"))?;
-    Ok(smoothing)
+    })
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {

@@ -2,35 +2,38 @@
 
 use serde::Serialize;
 
-/// What many differences come to.
+/// Differences while they are counted.
 #[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Tally {
+pub(super) struct Tally {
     count: u64,
     sum: f64,
     squares: f64,
     largest: f64,
     /// Which of them the largest is, in the order in which they were counted.
-    pub(crate) place: u64,
+    pub(super) largest_at: u64,
 }
 
-/// The same in words that JSON takes.
-#[derive(Debug, Clone, Copy, Serialize)]
-pub(crate) struct Spread {
-    pub(crate) mean: f64,
-    pub(crate) rms: f64,
-    pub(crate) largest: f64,
+/// What many differences come to.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Spread {
+    /// The mean.
+    pub mean: f64,
+    /// The root of the mean square.
+    pub rms: f64,
+    /// The largest.
+    pub largest: f64,
 }
 
 impl Tally {
     /// Counts one difference, 0 or more. What is no number is further than every number.
-    pub(crate) fn add(&mut self, difference: f64) {
+    pub(super) fn add(&mut self, difference: f64) {
         let difference = match difference.is_nan() {
             true => f64::INFINITY,
             false => difference,
         };
         if difference > self.largest {
             self.largest = difference;
-            self.place = self.count;
+            self.largest_at = self.count;
         }
         self.count += 1;
         self.sum += difference;
@@ -38,7 +41,7 @@ impl Tally {
     }
 
     /// Each of them times a number, such as degrees of a radian.
-    pub(crate) fn times(self, factor: f64) -> Spread {
+    pub(super) fn times(self, factor: f64) -> Spread {
         let count = self.count.max(1) as f64;
         Spread {
             mean: self.sum / count * factor,
@@ -60,11 +63,14 @@ mod tests {
         }
         let spread = tally.times(10.0);
         assert_eq!(
-            (spread.mean, spread.largest, spread.rms, tally.place),
+            (spread.mean, spread.largest, spread.rms, tally.largest_at),
             (16.0, 30.0, 20.0, 1)
         );
         tally.add(f64::NAN);
-        assert_eq!((tally.times(1.0).largest, tally.place), (f64::INFINITY, 5));
+        assert_eq!(
+            (tally.times(1.0).largest, tally.largest_at),
+            (f64::INFINITY, 5)
+        );
         assert_eq!(Tally::default().times(1.0).mean, 0.0);
     }
 }

@@ -1,0 +1,134 @@
+//! What `tumble compare` says.
+
+use tumble_formats::compare::{
+    AlignmentSummary, ArrayDifference, ChannelDifference, ClipDifference, PathDifference,
+    PathStatistics, Spread,
+};
+use tumble_formats::printable::printable;
+
+use crate::messages::words;
+
+/// Lines that say how far two clips are apart.
+pub(super) fn of_clips(difference: &ClipDifference) -> String {
+    let mut text = format!(
+        "{} and {}: {} × {} from {} to {} s\n",
+        difference.inputs[0],
+        difference.inputs[1],
+        words::count(difference.tracks, "track"),
+        words::count(difference.samples, "sample"),
+        difference.span[0],
+        difference.span[1]
+    );
+    let mut line = |what: &str, unit: &str, found: &ChannelDifference| {
+        let Spread { mean, rms, largest } = found.spread;
+        let place = match largest > 0.0 {
+            true => format!(" at {}, {:.4} s", printable(&found.track), found.time),
+            false => String::new(),
+        };
+        text += &format!(
+            "  {what:<12} mean {mean:.3e}{unit}, rms {rms:.3e}{unit}, largest \
+                 {largest:.3e}{unit}{place}\n"
+        );
+    };
+    line("rotation", "°", &difference.rotation);
+    for (what, found) in [
+        ("translation", &difference.translation),
+        ("scale", &difference.scale),
+    ] {
+        if let Some(found) = found {
+            line(what, "", found);
+        }
+    }
+    text += &format!(
+        "  {} of {} rotations are the same, bit for bit\n",
+        difference.identical,
+        difference.tracks * difference.samples
+    );
+    for (side, missing) in difference.missing.iter().enumerate() {
+        if !missing.is_empty() {
+            text += &format!(
+                "  only in {}: {}\n",
+                difference.inputs[side],
+                printable(&missing.join(", "))
+            );
+        }
+    }
+    text
+}
+
+/// Lines that say how far two arrays are apart.
+pub(super) fn of_arrays(found: &ArrayDifference) -> String {
+    let mut text = format!(
+        "array of shape {:?}: {} of {} numbers differ\n  difference   mean {:.3e}, rms {:.3e}, \
+             largest {:.3e} at {:?}\n",
+        found.shape,
+        found.differing,
+        found.numbers,
+        found.difference.mean,
+        found.difference.rms,
+        found.difference.largest,
+        found.largest_at
+    );
+    if let (Some(angles), Some(at)) = (&found.rotation, &found.largest_rotation_at) {
+        text += &format!(
+            "  angle        mean {:.3e}°, rms {:.3e}°, largest {:.3e}° at {at:?}\n",
+            angles.mean, angles.rms, angles.largest
+        );
+    }
+    text
+}
+
+/// Lines that say how far two paths are apart.
+pub(super) fn of_paths(found: &PathDifference) -> String {
+    let [first, second] = found.inputs.each_ref().map(|name| printable(name));
+    let mut text = format!(
+        "{first} and {second}: {} from {} to {} s",
+        words::count(found.poses, "pose"),
+        found.span[0],
+        found.span[1]
+    );
+    for (count, why) in [
+        (found.outside, "outside the times of the second"),
+        (found.in_gaps, "in its gaps"),
+    ] {
+        if count > 0 {
+            text += &format!(", {count} {why}");
+        }
+    }
+    let AlignmentSummary {
+        by,
+        scale,
+        degrees,
+        translation: [x, y, z],
+        ..
+    } = &found.alignment;
+    if *by != "none" {
+        text += &format!(
+            "\n  aligned      by {by}: scale {scale:.6}, turned {degrees:.4}°, moved {x:.6} {y:.6} {z:.6}"
+        );
+    }
+    for (what, found) in [("absolute", &found.ape), ("relative", &found.rpe)] {
+        let Some(found) = found else { continue };
+        for (of, unit, numbers) in [
+            ("translation", "", &found.translation),
+            ("rotation", "°", &found.rotation),
+        ] {
+            let PathStatistics {
+                rmse,
+                mean,
+                median,
+                std,
+                min,
+                max,
+                ..
+            } = numbers;
+            text += &format!(
+                "\n  {what:<8} {of:<11} rmse {rmse:.6}{unit}, mean {mean:.6}{unit}, median {median:.6}{unit}, \
+                     std {std:.6}{unit}, min {min:.6}{unit}, max {max:.6}{unit} ({})",
+                found.count
+            );
+        }
+    }
+    text.push('\n');
+    text
+}

@@ -1,0 +1,140 @@
+//! Which joint hangs on which, beside the rows of a table: as JSON in the metadata of Parquet and Arrow.
+
+use glam::DVec3;
+use serde::{Deserialize, Serialize};
+
+use crate::motion::{Joint, Motion, Sampled, Transform};
+use crate::names::distinct_names;
+
+/// The key of the metadata; that of one clip of several may have its number behind it, `skeleton.1`.
+pub(crate) const KEY: &str = "skeleton";
+
+/// The skeleton of a clip, by the names of its tracks in the table.
+#[derive(Debug, PartialEq, Serialize, Deserialize)]
+struct Hierarchy {
+    tracks: Vec<String>,
+    /// For each track the index of the one that it hangs on; none for a root.
+    parents: Vec<Option<usize>>,
+    /// Where each rests in its parent's frame.
+    offsets: Vec<[f64; 3]>,
+}
+
+/// What the metadata says of a clip's skeleton; nothing where no joint hangs on another, and all rest at 0.
+pub(crate) fn note_of(sampled: &Sampled<'_>) -> Option<(&'static str, String)> {
+    let clip = sampled.clip;
+    if !clip.hangs_together() {
+        return None;
+    }
+    let joints = || clip.skeleton.iter().enumerate();
+    let offset = |(track, joint): (usize, &Joint)| {
+        (clip.origin(track) + joint.rest.translation.as_dvec3()).to_array()
+    };
+    let hierarchy = Hierarchy {
+        tracks: distinct_names(&clip.set),
+        parents: joints().map(|(_, joint)| joint.parent).collect(),
+        offsets: joints().map(offset).collect(),
+    };
+    // Text and finite numbers: there is nothing that JSON has not.
+    let text = serde_json::to_string(&hierarchy).ok()?;
+    Some((KEY, text))
+}
+
+/// Gives the clip at a place of a table the skeleton that the metadata says, if it is of these tracks.
+pub(crate) fn hang(motion: &mut Motion, index: usize, notes: &[(String, String)]) {
+    let find = |key: &str| notes.iter().find(|(known, _)| known == key);
+    let note = find(&format!("{KEY}.{index}")).or_else(|| find(KEY));
+    // What others call a skeleton is none of this form.
+    let hierarchy = note.and_then(|(_, text)| serde_json::from_str::<Hierarchy>(text).ok());
+    let Some(Hierarchy {
+        tracks,
+        parents,
+        offsets,
+    }) = hierarchy
+    else {
+        return;
+    };
+    let count = tracks.len();
+    let set = &motion.set;
+    if parents.len() != count || offsets.len() != count || set.track_count() != count {
+        return;
+    }
+    let by_name = |name: &String| (0..count).find(|&track| set.track_name(track) == *name);
+    // Rows of a table may bring its tracks in another order.
+    let Some(places) = tracks.iter().map(by_name).collect::<Option<Vec<usize>>>() else {
+        return;
+    };
+    let mut skeleton: Vec<Option<Joint>> = vec![None; count];
+    for ((&track, parent), offset) in places.iter().zip(parents).zip(offsets) {
+        let parent = match parent.map(|parent| places.get(parent).copied()) {
+            None => None,
+            Some(Some(parent)) if parent != track => Some(parent),
+            Some(_) => return,
+        };
+        let offset = DVec3::from_array(offset) - motion.origin(track);
+        if !offset.as_vec3().is_finite() {
+            return;
+        }
+        skeleton[track] = Some(Joint {
+            parent,
+            rest: Transform {
+                translation: offset.as_vec3(),
+                ..Transform::default()
+            },
+        });
+    }
+    if let Some(skeleton) = skeleton.into_iter().collect::<Option<Vec<Joint>>>() {
+        motion.skeleton = skeleton;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::{Quat, Vec3};
+
+    fn clip(names: [&str; 2]) -> Motion {
+        let mut motion = Motion::default();
+        for name in names {
+            motion.set.push(name, &[0.0], &[Quat::IDENTITY]).unwrap();
+        }
+        motion
+    }
+
+    fn joint(parent: Option<usize>, translation: Vec3) -> Joint {
+        let rest = Transform {
+            translation,
+            ..Transform::default()
+        };
+        Joint { parent, rest }
+    }
+
+    #[test]
+    fn a_skeleton_is_found_again_whatever_the_order_of_its_tracks() {
+        let mut written = clip(["hip", "knee"]);
+        written.skeleton = vec![
+            joint(None, Vec3::Y),
+            joint(Some(0), Vec3::new(0.1, -0.4, 0.0)),
+        ];
+        let samples = crate::keyed::keyed(&written).unwrap();
+        let (key, text) = note_of(&samples.of(&written, None, &[])).unwrap();
+        let notes = [(key.to_owned(), text)];
+        let mut read = clip(["knee", "hip"]);
+        hang(&mut read, 0, &notes);
+        let expected = [
+            joint(Some(1), Vec3::new(0.1, -0.4, 0.0)),
+            joint(None, Vec3::Y),
+        ];
+        assert_eq!(read.skeleton, expected);
+        for text in [
+            "a man",
+            r#"{"tracks":["hip","foot"],"parents":[null,0],"offsets":[[0,0,0],[0,0,0]]}"#,
+            r#"{"tracks":["hip","knee"],"parents":[null,9],"offsets":[[0,0,0],[0,0,0]]}"#,
+            r#"{"tracks":["hip","hip"],"parents":[null,0],"offsets":[[0,0,0],[0,0,0]]}"#,
+            r#"{"tracks":["hip","knee"],"parents":[null,1],"offsets":[[0,0,0],[0,0,0]]}"#,
+        ] {
+            let mut read = clip(["hip", "knee"]);
+            hang(&mut read, 0, &[(KEY.to_owned(), text.to_owned())]);
+            assert_eq!(read.skeleton, [], "{text}");
+        }
+    }
+}

@@ -1,0 +1,215 @@
+"""The whole way of a trainer of humanoids, with the guide alone: 1 000 files like those of AMASS, a library of
+them, the workers of a DataLoader, and 4 096 environments that step 1 000 times with velocities; then the same
+steps on one thread and on a Vulkan device, whose bits are to be the same. Beside them NumPy, and torch and roma
+where they are installed.
+
+    python training.py [--files 1000] [--steps 1000] [--environments 4096]
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import multiprocessing
+import pathlib
+import tempfile
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+import tumble
+
+STEP = 1 / 60
+PARENTS = [None, 0, 0, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 9, 9, 12, 13, 14, 16, 17, 18, 19]
+OFFSETS = np.random.default_rng(3).normal(scale=0.1, size=(len(PARENTS), 3))
+SAMPLED = ("rotations", "positions", "velocities", "angular_velocities")
+
+
+def write_files(folder: pathlib.Path, files: int) -> None:
+    """Swinging bodies of 22 joints, 60 to 600 frames at 30 Hz."""
+    rng = np.random.default_rng(1)
+    for index in range(files):
+        frames = int(rng.integers(60, 600))
+        poses = np.cumsum(0.02 * rng.normal(size=(frames, 3 * len(PARENTS))), axis=0)
+        trans = np.cumsum(0.01 * rng.normal(size=(frames, 3)), axis=0)
+        np.savez(folder / f"{index:04}.npz", poses=poses, trans=trans, mocap_framerate=np.float64(30))
+
+
+def run(library: tumble.MotionLibrary, steps: int, environments: int) -> tuple[float, str]:
+    """Seconds a step, and a sum of all bits."""
+    rng = np.random.default_rng(2)
+    ids = rng.integers(0, len(library), environments)
+    times = library.sample_times(ids, rng)
+    state = library.sample(ids, times, arrays=SAMPLED)
+    bits, spent = hashlib.sha256(), 0.0
+    for _ in range(steps):
+        times += STEP
+        over = times > library.lengths[ids]
+        ids[over] = rng.integers(0, len(library), int(over.sum()))
+        times[over] = 0.0
+        started = time.perf_counter()
+        library.sample(ids, times, out=state)
+        spent += time.perf_counter() - started
+        for name in SAMPLED:
+            bits.update(getattr(state, name).data)
+    return spent / steps, bits.hexdigest()
+
+
+class Windows:
+    """What a DataLoader takes: windows of 64 frames of clips."""
+
+    def __init__(self, library: tumble.MotionLibrary) -> None:
+        self.library = library
+
+    def __len__(self) -> int:
+        return len(self.library)
+
+    def __getitem__(self, index: int) -> np.ndarray[Any, Any]:
+        times = np.minimum(np.arange(64) / 30, self.library.lengths[index])
+        found = self.library.sample(np.full(64, index), times, arrays=["rotations"]).rotations
+        assert found is not None
+        return found
+
+
+WINDOWS: Windows | None = None
+
+
+def window(index: int) -> np.ndarray[Any, Any]:
+    assert WINDOWS is not None
+    return WINDOWS[index]
+
+
+def load_in_workers(library: tumble.MotionLibrary) -> tuple[str, float, str]:
+    """All windows by two forked workers: by whom, seconds, and the sum of their bits."""
+    global WINDOWS
+    windows = WINDOWS = Windows(library)
+    bits = hashlib.sha256()
+    started = time.perf_counter()
+    try:
+        from torch.utils.data import DataLoader
+    except ImportError:
+        with multiprocessing.get_context("fork").Pool(2) as pool:
+            for one in pool.imap(window, range(len(windows)), chunksize=16):
+                bits.update(one.data)
+        return "multiprocessing.Pool", time.perf_counter() - started, bits.hexdigest()
+    loader = DataLoader(windows, batch_size=16, num_workers=2, multiprocessing_context="fork")
+    for batch in loader:
+        bits.update(batch.numpy().data)
+    return "torch's DataLoader", time.perf_counter() - started, bits.hexdigest()
+
+
+def shortest(work: Callable[[], Any], runs: int = 10) -> float:
+    best = float("inf")
+    for _ in range(runs):
+        started = time.perf_counter()
+        work()
+        best = min(best, time.perf_counter() - started)
+    return best
+
+
+def others(clips: list[tumble.Clip], ids: Any, times: Any) -> dict[str, float]:
+    """Seconds of rotations alone, as training projects find them: gathered, then slerped."""
+    counts = np.array([len(clip.times(0)) for clip in clips])
+    flat = np.concatenate(
+        [np.stack([clip.keys(joint) for joint in range(len(clip))], axis=1) for clip in clips]
+    )
+    starts = np.cumsum(counts) - counts
+    place = np.minimum((times * 30).astype(int), counts[ids] - 2)
+    t = (times * 30 - place).astype(np.float32)[:, None, None]
+
+    def by_numpy() -> Any:
+        a, b = flat[starts[ids] + place], flat[starts[ids] + place + 1]
+        cosine = (a * b).sum(axis=-1, keepdims=True)
+        b, cosine = np.where(cosine < 0, -b, b), np.abs(cosine)
+        half = np.arccos(np.clip(cosine, -1, 1))
+        sine = np.sin(half)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            found = (np.sin((1 - t) * half) * a + np.sin(t * half) * b) / sine
+        return np.where(sine < 1e-3, a * (1 - t) + b * t, found)
+
+    found = {"NumPy": shortest(by_numpy)}
+    try:
+        import roma
+        import torch
+    except ImportError:
+        return found
+    keys, first = torch.from_numpy(flat), torch.from_numpy(starts[ids] + place)
+    steps = torch.from_numpy(t[:, 0, 0])
+
+    def by_torch() -> Any:
+        a, b, s = keys[first], keys[first + 1], steps[:, None, None]
+        cosine = (a * b).sum(-1, keepdim=True)
+        b, half = torch.where(cosine < 0, -b, b), torch.acos(cosine.abs().clamp(max=1))
+        sine = torch.sin(half)
+        found = (torch.sin((1 - s) * half) * a + torch.sin(s * half) * b) / sine
+        return torch.where(sine < 1e-3, a * (1 - s) + b * s, found)
+
+    def by_roma() -> Any:
+        a, b = keys[first], keys[first + 1]
+        return roma.unitquat_slerp_fast(a, b, steps[:, None].expand(a.shape[:2]), shortest_arc=True)
+
+    return {**found, "torch": shortest(by_torch), "roma": shortest(by_roma)}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--files", type=int, default=1000)
+    parser.add_argument("--steps", type=int, default=1000)
+    parser.add_argument("--environments", type=int, default=4096)
+    options = parser.parse_args()
+    with tempfile.TemporaryDirectory() as place:
+        folder = pathlib.Path(place)
+        write_files(folder, options.files)
+        started = time.perf_counter()
+        skeleton = (PARENTS, OFFSETS)
+        library = tumble.MotionLibrary.load(folder / "*.npz", skeleton=skeleton)
+        print(f"{library} of {options.files} files in {time.perf_counter() - started:.2f} s")
+        library.save(folder / "motions.npz")
+        library = tumble.MotionLibrary.open(folder / "motions.npz")
+
+        by, seconds, bits = load_in_workers(library)
+        alone = hashlib.sha256()
+        for index in range(len(library)):
+            alone.update(window(index).data)
+        same = bits == alone.hexdigest()
+        print(f"{len(library)} windows by two forked workers ({by}): {seconds:.2f} s, the same bits: {same}")
+
+        clips = [tumble.load(path).clip for path in sorted(folder.glob("[0-9]*.npz"))]
+        rng = np.random.default_rng(4)
+        ids = rng.integers(0, len(library), options.environments)
+        times = library.sample_times(ids, rng)
+        state = library.sample(ids, times, arrays=["rotations"])
+        every = library.sample(ids, times)
+        figures = others(clips, ids, times)
+        figures["tumble, rotations"] = shortest(lambda: library.sample(ids, times, out=state))
+        figures["tumble, all five arrays"] = shortest(lambda: library.sample(ids, times, out=every))
+        for name, seconds in figures.items():
+            print(f"  {name:24} {1e3 * seconds:8.2f} ms for {options.environments} environments")
+
+        devices = {"one thread": tumble.Engine("cpu", threads=1), "two threads": tumble.Engine("cpu", threads=2)}
+        try:
+            devices["Vulkan"] = tumble.Engine("vulkan")
+        except tumble.DeviceError as error:
+            print(f"  no Vulkan device: {error}")
+        sums = set()
+        for name, engine in devices.items():
+            opened = tumble.MotionLibrary.open(folder / "motions.npz", engine=engine)
+            seconds, bits = run(opened, options.steps, options.environments)
+            sums.add(bits)
+            print(
+                f"  {options.steps} steps, {name} ({engine.device}): {1e3 * seconds:.2f} ms a step, sha256 {bits[:16]}…"
+            )
+        crowds = set()
+        for engine in devices.values():
+            # The same clips as a crowd, which a Vulkan device evaluates itself.
+            crowd = tumble.Crowd(clips, options.environments, parents=PARENTS, offsets=OFFSETS, engine=engine)
+            crowd.set(np.arange(options.environments), ids, time=times, wrap="hold")
+            crowds.add(hashlib.sha256(crowd.evaluate().data).hexdigest())
+        assert len(sums) == len(crowds) == 1 and same, "the bits differ"
+        print("all have the same bits")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,471 @@
+//! `tumble.compare` and `tumble.path_errors`: how far two motions, arrays or paths are apart.
+
+use std::sync::Arc;
+
+use pyo3::prelude::*;
+use tumble::Frames;
+use tumble_formats::compare::{self as differences, ClipPair, CompareError, PathMeasure};
+use tumble_formats::motion::Motion;
+use tumble_formats::npz;
+use tumble_formats::trajectory::Align;
+
+use crate::arrays::{Numbers, doubles};
+use crate::clip::Clip;
+use crate::engine::{Engine, default_engine};
+use crate::errors::{in_python, input, of_engine, warn_of};
+use crate::options::{Samples, samples_of};
+use crate::run::interruptible;
+
+/// What many differences come to.
+#[pyclass(frozen, get_all, module = "tumble")]
+#[derive(Debug, Clone)]
+pub(crate) struct Spread {
+    /// The mean.
+    mean: f64,
+    /// The root of the mean square.
+    rms: f64,
+    /// The largest.
+    largest: f64,
+}
+
+impl From<differences::Spread> for Spread {
+    fn from(of: differences::Spread) -> Self {
+        Self {
+            mean: of.mean,
+            rms: of.rms,
+            largest: of.largest,
+        }
+    }
+}
+
+#[pymethods]
+impl Spread {
+    fn __repr__(&self) -> String {
+        let Self { mean, rms, largest } = self;
+        format!("Spread(mean {mean:.3e}, rms {rms:.3e}, largest {largest:.3e})")
+    }
+}
+
+/// How far two arrays of one shape are apart.
+#[pyclass(frozen, get_all, module = "tumble")]
+pub(crate) struct ArrayDifference {
+    /// How many numbers there are.
+    numbers: usize,
+    /// How many of them differ.
+    differing: usize,
+    /// The differences of numbers.
+    difference: Spread,
+    /// The indices of the largest.
+    largest_at: Vec<usize>,
+    /// Angles in degrees, where four numbers each are a rotation; else None.
+    rotation: Option<Spread>,
+    /// The indices of the rotation of the largest angle; else None.
+    largest_rotation_at: Option<Vec<usize>>,
+}
+
+#[pymethods]
+impl ArrayDifference {
+    fn __repr__(&self) -> String {
+        let Self {
+            numbers, differing, ..
+        } = self;
+        format!("ArrayDifference({differing} of {numbers} numbers differ)")
+    }
+}
+
+/// The differences of a channel of two clips.
+#[pyclass(frozen, get_all, module = "tumble")]
+#[derive(Debug, Clone)]
+pub(crate) struct ChannelDifference {
+    /// The mean.
+    mean: f64,
+    /// The root of the mean square.
+    rms: f64,
+    /// The largest.
+    largest: f64,
+    /// The name of the track with the largest.
+    track: String,
+    /// When it is, seconds.
+    time: f64,
+}
+
+impl From<differences::ChannelDifference> for ChannelDifference {
+    fn from(of: differences::ChannelDifference) -> Self {
+        Self {
+            mean: of.spread.mean,
+            rms: of.spread.rms,
+            largest: of.spread.largest,
+            track: of.track,
+            time: of.time,
+        }
+    }
+}
+
+#[pymethods]
+impl ChannelDifference {
+    fn __repr__(&self) -> String {
+        let Self {
+            mean,
+            rms,
+            largest,
+            track,
+            time,
+        } = self;
+        format!(
+            "ChannelDifference(mean {mean:.3e}, rms {rms:.3e}, largest {largest:.3e} at {track:?}, {time:.4} s)"
+        )
+    }
+}
+
+/// How far two clips are apart.
+#[pyclass(frozen, get_all, module = "tumble")]
+pub(crate) struct ClipDifference {
+    /// How many tracks both have.
+    tracks: usize,
+    /// The names of those that one alone has: of the first clip, and of the second.
+    missing: (Vec<String>, Vec<String>),
+    /// Samples of each track.
+    samples: usize,
+    /// First and last time, seconds.
+    span: (f64, f64),
+    /// Rotations whose bits are the same.
+    identical: u64,
+    /// Degrees.
+    rotation: ChannelDifference,
+    /// Lengths; None where neither clip moves.
+    translation: Option<ChannelDifference>,
+    /// Lengths of the differences of scales; None where neither clip scales.
+    scale: Option<ChannelDifference>,
+}
+
+#[pymethods]
+impl ClipDifference {
+    fn __repr__(&self) -> String {
+        format!(
+            "ClipDifference({} tracks, {} samples, largest angle {:.3e}°)",
+            self.tracks, self.samples, self.rotation.largest
+        )
+    }
+}
+
+/// What errors of one kind come to, by the names of `evo`.
+#[pyclass(frozen, get_all, module = "tumble")]
+#[derive(Debug, Clone)]
+pub(crate) struct PathStatistics {
+    /// The root of the mean square.
+    rmse: f64,
+    /// The mean.
+    mean: f64,
+    /// The median.
+    median: f64,
+    /// The deviation from the mean.
+    std: f64,
+    /// The smallest.
+    min: f64,
+    /// The largest.
+    max: f64,
+}
+
+impl From<differences::PathStatistics> for PathStatistics {
+    fn from(of: differences::PathStatistics) -> Self {
+        Self {
+            rmse: of.rmse,
+            mean: of.mean,
+            median: of.median,
+            std: of.std,
+            min: of.min,
+            max: of.max,
+        }
+    }
+}
+
+#[pymethods]
+impl PathStatistics {
+    fn __repr__(&self) -> String {
+        format!(
+            "PathStatistics(rmse {:.6}, mean {:.6}, max {:.6})",
+            self.rmse, self.mean, self.max
+        )
+    }
+}
+
+/// How far an estimated path is from its reference.
+#[pyclass(frozen, get_all, module = "tumble")]
+pub(crate) struct PathErrors {
+    /// Poses of the reference that have one of the estimate.
+    poses: usize,
+    /// Poses of the reference before or after the estimate.
+    outside: usize,
+    /// Poses of the reference in gaps of the estimate.
+    in_gaps: usize,
+    /// First and last time, seconds.
+    span: (f64, f64),
+    /// What lays the estimate over the reference: first the scale,
+    scale: f64,
+    /// then the rotation, x y z w,
+    rotation: [f64; 4],
+    /// then the translation.
+    translation: [f64; 3],
+    /// Absolute errors of the positions, lengths.
+    ape_translation: PathStatistics,
+    /// Absolute errors of the rotations, degrees.
+    ape_rotation: PathStatistics,
+    /// Relative errors of the positions, lengths; None where they were not asked for.
+    rpe_translation: Option<PathStatistics>,
+    /// Relative errors of the rotations, degrees; None where they were not asked for.
+    rpe_rotation: Option<PathStatistics>,
+    /// How many steps the relative errors are of.
+    rpe_count: usize,
+}
+
+#[pymethods]
+impl PathErrors {
+    fn __repr__(&self) -> String {
+        format!(
+            "PathErrors({} poses, rmse {:.6}, {:.6}°)",
+            self.poses, self.ape_translation.rmse, self.ape_rotation.rmse
+        )
+    }
+}
+
+fn of_compare(error: CompareError) -> PyErr {
+    match error {
+        CompareError::Evaluating { error, .. } => of_engine(&error),
+        error => input(in_python(&error.to_string())),
+    }
+}
+
+/// Compares two clips, or two arrays: the largest and the mean difference, and where it is.
+///
+/// `compare(first, second, *, fps=None, at=None, start=None, end=None, world=False, engine=None)`
+///
+/// Clips are sampled as their files say, at every key of both and halfway between neighbouring keys, or
+/// at `fps` (from `start` to `end`) or the seconds of `at`; their tracks belong together by their names,
+/// or by their order where the names differ. `world` compares joints in the world instead of
+/// relative to their parents. Gives a `ClipDifference`, whose `rotation` is in degrees.
+///
+/// Arrays of one shape are compared number by number, and by angles where they hold rotations: an
+/// `ArrayDifference`.
+///
+/// >>> import tumble
+/// >>> one = tumble.Clip([0.0, 2.0], [[0, 0, 0, 1], [0, 0, 1, 0]])
+/// >>> other = tumble.Clip([0.0, 1.0, 2.0], [[0, 0, 0, 1], [0, 0, 0.6, 0.8], [0, 0, 1, 0]])
+/// >>> found = tumble.compare(one, other)
+/// >>> round(found.rotation.largest, 3), found.rotation.time
+/// (16.26, 1.0)
+/// >>> tumble.compare([1.0, 2.0], [1.0, 2.5]).difference.largest
+/// 0.5
+#[pyfunction]
+#[pyo3(signature = (first, second, *, fps=None, at=None, start=None, end=None, world=false, engine=None))]
+#[allow(clippy::too_many_arguments, reason = "keywords")]
+pub(crate) fn compare<'py>(
+    py: Python<'py>,
+    first: &Bound<'py, PyAny>,
+    second: &Bound<'py, PyAny>,
+    fps: Option<&Bound<'py, PyAny>>,
+    at: Option<Bound<'py, PyAny>>,
+    start: Option<f64>,
+    end: Option<f64>,
+    world: bool,
+    engine: Option<&Bound<'py, Engine>>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let clips = (first.cast::<Clip>(), second.cast::<Clip>());
+    let has_times = fps.is_some() || at.is_some() || start.is_some() || end.is_some();
+    let (Ok(one), Ok(other)) = clips else {
+        if first.is_instance_of::<Clip>() || second.is_instance_of::<Clip>() {
+            return Err(input("give two clips, or two arrays"));
+        }
+        if has_times || world {
+            return Err(input(
+                "arrays are compared number by number; leave out times and `world`",
+            ));
+        }
+        let found = of_arrays([first, second])?;
+        return Ok(Bound::new(py, found)?.into_any());
+    };
+    let samples = match has_times {
+        true => Some(samples_of(fps, at, start, end)?),
+        false => None,
+    };
+    let clips = [one, other].map(|clip| Arc::clone(&clip.get().motion));
+    let engine = engine_of(py, engine)?;
+    let (found, warning) = interruptible(py, move || of_clips(&engine, clips, samples, world))?;
+    if let Some(warning) = warning {
+        warn_of(py, &warning)?;
+    }
+    Ok(Bound::new(py, found)?.into_any())
+}
+
+fn engine_of(py: Python<'_>, engine: Option<&Bound<'_, Engine>>) -> PyResult<tumble::Engine> {
+    match engine {
+        Some(engine) => engine.get().engine(1),
+        None => default_engine(py)?.get().engine(1),
+    }
+}
+
+fn of_arrays(arrays: [&Bound<'_, PyAny>; 2]) -> PyResult<ArrayDifference> {
+    let read = |value: &Bound<'_, PyAny>, name: &str| {
+        let Numbers { shape, values } = doubles(value, name)?;
+        Ok::<_, PyErr>(npz::Numbers { shape, values })
+    };
+    let [first, second] = [read(arrays[0], "first")?, read(arrays[1], "second")?];
+    let found = differences::ArrayDifference::of(["first", "second"], [&first, &second]);
+    let found = found.map_err(of_compare)?;
+    Ok(ArrayDifference {
+        numbers: found.numbers,
+        differing: found.differing,
+        difference: found.difference.into(),
+        largest_at: found.largest_at,
+        rotation: found.rotation.map(Spread::from),
+        largest_rotation_at: found.largest_rotation_at,
+    })
+}
+
+fn of_clips(
+    engine: &tumble::Engine,
+    clips: [Arc<Motion>; 2],
+    samples: Option<Samples>,
+    world: bool,
+) -> PyResult<(ClipDifference, Option<String>)> {
+    let pair = ClipPair {
+        inputs: ["the first clip", "the second clip"],
+        clips: [&clips[0], &clips[1]],
+    };
+    let common = pair.common_times().map_err(of_compare)?;
+    let mut warning = common.warning.clone();
+    let frames = match samples {
+        None => pair.keys(&common),
+        Some(Samples::Rate(rate, start, end)) => {
+            Frames::rate(rate).between(start.unwrap_or(common.start), end.unwrap_or(common.end))
+        }
+        Some(Samples::Shared { times, .. }) => {
+            // The times are known, whatever the clips have.
+            warning = None;
+            Frames::at(times.to_vec())
+        }
+        Some(_) => {
+            return Err(input(
+                "at: clips are compared at the same times in all tracks",
+            ));
+        }
+    };
+    let found = pair.differences(engine, &frames, world);
+    let found = found.map_err(of_compare)?;
+    let [first, second] = found.missing;
+    let [start, end] = found.span;
+    let difference = ClipDifference {
+        tracks: found.tracks,
+        missing: (first, second),
+        samples: found.samples,
+        span: (start, end),
+        identical: found.identical,
+        rotation: found.rotation.into(),
+        translation: found.translation.map(ChannelDifference::from),
+        scale: found.scale.map(ChannelDifference::from),
+    };
+    Ok((difference, warning))
+}
+
+/// The errors of an estimated path beside its reference, as benchmarks of odometry and SLAM say them;
+/// the numbers are those of `evo`.
+///
+/// `path_errors(reference, estimate, *, align="none", rpe=None, max_gap=None, track=None, engine=None)`
+///
+/// Both are clips of one track, or `track` names one of each. The estimate is interpolated by lines and
+/// arcs at the times of the reference's poses, and laid over it by `align`: "position" moves it, "yaw"
+/// turns it about z too, "se3" about any axis, "sim3" scales it too. Absolute errors are those of each
+/// pose; `rpe` asks for those over steps too, of so many seconds or units of length: "1s", "0.5m".
+/// `max_gap`: seconds between two keys of the estimate, beyond which it is not interpolated.
+///
+/// >>> import numpy as np, tumble
+/// >>> path = np.random.default_rng(1).normal(size=(9, 3))
+/// >>> keys = np.tile([0, 0, 0, 1], (9, 1))
+/// >>> one = tumble.Clip(np.arange(9), keys, translations=[path])
+/// >>> other = tumble.Clip(np.arange(9), keys, translations=[2 * path + 1])
+/// >>> found = tumble.path_errors(one, other, align="sim3")
+/// >>> round(found.scale, 6), found.ape_translation.max < 1e-6
+/// (0.5, True)
+#[pyfunction]
+#[pyo3(signature = (reference, estimate, *, align="none", rpe=None, max_gap=None, track=None, engine=None))]
+#[allow(clippy::too_many_arguments, reason = "keywords")]
+pub(crate) fn path_errors(
+    py: Python<'_>,
+    reference: &Bound<'_, Clip>,
+    estimate: &Bound<'_, Clip>,
+    align: &str,
+    rpe: Option<&str>,
+    max_gap: Option<f64>,
+    track: Option<&Bound<'_, PyAny>>,
+    engine: Option<&Bound<'_, Engine>>,
+) -> PyResult<PathErrors> {
+    let known = Align::ALL.iter().find(|known| known.name() == align);
+    let Some(&align) = known else {
+        let names = Align::ALL.map(Align::name).join(", ");
+        return Err(input(format!(
+            "align: there is no `{align}`; there are {names}"
+        )));
+    };
+    if let Some(gap) = max_gap.filter(|gap| gap.is_nan() || *gap < 0.0) {
+        return Err(input(format!("max_gap: {gap} is no number of seconds")));
+    }
+    let step = rpe.map(|text| {
+        let step = text.parse();
+        step.map_err(|error| input(format!("rpe: `{text}` is {error}")))
+    });
+    let measure = PathMeasure {
+        align,
+        is_absolute: true,
+        step: step.transpose()?,
+        max_gap,
+    };
+    let one_of = |clip: &Bound<'_, Clip>, name: &str| {
+        let clip = clip.get();
+        let index = match (track, clip.motion.set.track_count()) {
+            (Some(track), _) => clip.track(track)?,
+            (None, 1) => 0,
+            (None, count) => {
+                return Err(input(format!(
+                    "{name}: has {count} tracks; a path is one, name it as `track`"
+                )));
+            }
+        };
+        Ok((Arc::clone(&clip.motion), index))
+    };
+    let (first, first_track) = one_of(reference, "reference")?;
+    let (second, second_track) = one_of(estimate, "estimate")?;
+    let engine = engine_of(py, engine)?;
+    let found = interruptible(py, move || {
+        let clips = [
+            ("the reference", &*first, first_track),
+            ("the estimate", &*second, second_track),
+        ];
+        let found = differences::PathDifference::of(&engine, clips, &measure);
+        found.map_err(of_compare)
+    })?;
+    let Some(absolute) = found.ape else {
+        return Err(input("there is no pose to compare"));
+    };
+    let [start, end] = found.span;
+    let rpe_count = found.rpe.as_ref().map_or(0, |errors| errors.count);
+    let (rpe_translation, rpe_rotation) = match found.rpe {
+        Some(errors) => (
+            Some(errors.translation.into()),
+            Some(errors.rotation.into()),
+        ),
+        None => (None, None),
+    };
+    Ok(PathErrors {
+        poses: found.poses,
+        outside: found.outside,
+        in_gaps: found.in_gaps,
+        span: (start, end),
+        scale: found.alignment.scale,
+        rotation: found.alignment.rotation,
+        translation: found.alignment.translation,
+        ape_translation: absolute.translation.into(),
+        ape_rotation: absolute.rotation.into(),
+        rpe_translation,
+        rpe_rotation,
+        rpe_count,
+    })
+}

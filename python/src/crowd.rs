@@ -1,0 +1,376 @@
+//! `tumble.Crowd`: many instances of a skeleton, each of which plays clips at its own time.
+
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use glam::Vec3;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use tumble::{ComponentType, CrowdLayer, CrowdLibrary, CrowdValues, Skeleton, WrapMode};
+
+use crate::arrays::{Numbers, doubles};
+use crate::clip::Clip;
+use crate::engine::{Engine, default_engine};
+use crate::errors::{guarded, input};
+use crate::motions::{of_crowd, push};
+use crate::options::{method_named, one_of};
+use crate::output::{array_of, filled_bytes, quaternions_of};
+use crate::run::stoppable;
+use crate::samples::matrices;
+
+/// Ticks of a second, unless others are asked for.
+const TICKS: u32 = 705_600;
+
+/// Joints of an evaluation from which on Ctrl-C is looked for.
+const MANY: usize = 1 << 20;
+
+/// Many instances of a skeleton, each of which plays clips at its own time and speed: poses for skinning.
+///
+/// `Crowd(clips, instances, *, layers=1, method="slerp", parents=None, offsets=None, masks=None,
+/// inverse_bind=None, references=None, ticks_per_second=705600, engine=None)`
+///
+/// `clips`: of one skeleton, that of the first unless `parents` and `offsets` say it. `layers`: of an
+/// instance, 1 to 4, each laid over the ones below. `masks`: lists of a weight from 0 to 1 for each joint,
+/// which a layer's weight is multiplied with. `inverse_bind`: (joints, 3, 4) or (joints, 4, 4), for the
+/// values "skinning". `references`: {clip: (other clip, seconds)}, the pose that additive layers of a clip
+/// differ from, instead of its own at its start.
+///
+/// All instances follow one clock, which counts whole ticks: a clip in a loop gives the same bits in the
+/// first second and a day later, on the CPU and every Vulkan device. At the start all play the first clip
+/// and stand still.
+///
+/// >>> import numpy as np, tumble
+/// >>> half = 0.5 ** 0.5
+/// >>> door = tumble.Clip([0.0, 2.0], [[[0, 0, 0, 1], [0, 0, half, half]]],
+/// ...                    parents=[None], offsets=[[1, 0, 0]])
+/// >>> crowd = tumble.Crowd([door], 3)
+/// >>> crowd.set([0, 1, 2], 0, time=[0.0, 0.5, 1.0], wrap="hold")
+/// >>> crowd.advance(1.0)
+/// >>> crowd.evaluate("rotations")[2, 0].round(4)
+/// array([0.    , 0.    , 0.7071, 0.7071], dtype=float32)
+/// >>> crowd.evaluate().shape
+/// (3, 1, 3, 4)
+#[pyclass(frozen, module = "tumble")]
+pub(crate) struct Crowd {
+    crowd: Mutex<tumble::Crowd>,
+    instances: usize,
+    joints: usize,
+    layers: usize,
+    clips: usize,
+}
+
+/// Numbers for each of some instances: one for all, or a list.
+fn each(value: &Bound<'_, PyAny>, name: &str, count: usize) -> PyResult<Vec<f64>> {
+    let Numbers { shape, values } = doubles(value, name)?;
+    match (&*shape, &*values) {
+        ([], &[one]) => Ok(vec![one; count]),
+        (&[length], _) if length == count => Ok(values),
+        _ => Err(input(format!(
+            "{name}: the shape is {shape:?}; give one for all, or ({count},)"
+        ))),
+    }
+}
+
+/// Whole numbers from 0 for each of some instances.
+fn indices(value: &Bound<'_, PyAny>, name: &str, count: usize) -> PyResult<Vec<usize>> {
+    let whole = |number: f64| match number >= 0.0 && number.fract() == 0.0 && number < 1e15 {
+        true => Ok(number as usize),
+        false => Err(input(format!("{name}: {number} is no index"))),
+    };
+    each(value, name, count)?.into_iter().map(whole).collect()
+}
+
+fn values_named(name: &str) -> PyResult<CrowdValues> {
+    Ok(match name {
+        "model" => CrowdValues::Model,
+        "skinning" => CrowdValues::Skinning,
+        "local" => CrowdValues::Local,
+        "rotations" => CrowdValues::Rotations,
+        _ => {
+            return Err(input(format!(
+                "values: there are no `{name}`; there are model, skinning, local, rotations"
+            )));
+        }
+    })
+}
+
+impl Crowd {
+    fn lock(&self) -> MutexGuard<'_, tumble::Crowd> {
+        self.crowd.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+#[pymethods]
+impl Crowd {
+    #[new]
+    #[pyo3(signature = (
+        clips, instances, *, layers=1, method="slerp", parents=None, offsets=None, masks=None,
+        inverse_bind=None, references=None, ticks_per_second=TICKS, engine=None
+    ), text_signature = "(clips, instances, *, layers=1, method='slerp', parents=None, offsets=None, masks=None, inverse_bind=None, references=None, ticks_per_second=705600, engine=None)")]
+    #[allow(clippy::too_many_arguments, reason = "keywords")]
+    fn new(
+        py: Python<'_>,
+        clips: Vec<Clip>,
+        instances: usize,
+        layers: usize,
+        method: &str,
+        parents: Option<Vec<Option<i64>>>,
+        offsets: Option<&Bound<'_, PyAny>>,
+        masks: Option<Vec<Vec<f32>>>,
+        inverse_bind: Option<&Bound<'_, PyAny>>,
+        references: Option<&Bound<'_, PyDict>>,
+        ticks_per_second: u32,
+        engine: Option<&Bound<'_, Engine>>,
+    ) -> PyResult<Self> {
+        let Some(first) = clips.first() else {
+            return Err(input("clips: there is none"));
+        };
+        let method = method_named(method)?;
+        let joints = first.motion.set.track_count();
+        let skeleton = match parents {
+            Some(parents) => crate::samples::skeleton(&parents, offsets, joints)?,
+            None if offsets.is_some() => return Err(input("offsets: give `parents` too")),
+            None if first.motion.skeleton.is_empty() => {
+                return Err(input(
+                    "clips[0]: it says not how its tracks hang together; give `parents` and `offsets`",
+                ));
+            }
+            None => {
+                let all = first.motion.skeleton.iter();
+                let parents = all.clone().map(|joint| joint.parent).collect();
+                let offsets: Vec<Vec3> = all.map(|joint| joint.rest.translation).collect();
+                let skeleton = Skeleton::new(parents, offsets);
+                skeleton.map_err(|error| input(format!("clips[0]: {error}")))?
+            }
+        };
+        let inverse_bind = inverse_bind.map(|value| matrices(value, joints));
+        let inverse_bind = inverse_bind.transpose()?;
+        let mut poses: Vec<(usize, usize, f64)> = Vec::new();
+        for (clip, reference) in references.into_iter().flatten() {
+            let (from, seconds): (usize, f64) = reference.extract()?;
+            poses.push((clip.extract()?, from, seconds));
+        }
+        let engine = match engine {
+            Some(engine) => engine.get().engine(1)?,
+            None => default_engine(py)?.get().engine(1)?,
+        };
+        let count = clips.len();
+        let crowd = py.detach(|| {
+            stoppable(|| {
+                let made = CrowdLibrary::with_ticks(&skeleton, ticks_per_second);
+                let mut library = made.map_err(of_crowd)?;
+                for (index, clip) in clips.iter().enumerate() {
+                    push(&mut library, index, clip, method)?;
+                }
+                for (index, mask) in masks.iter().flatten().enumerate() {
+                    library
+                        .push_mask(mask)
+                        .map_err(|error| input(format!("masks[{index}]: {error}")))?;
+                }
+                if let Some(matrices) = &inverse_bind {
+                    let set = library.set_inverse_bind(matrices);
+                    set.map_err(|error| input(format!("inverse_bind: {error}")))?;
+                }
+                for (clip, from, seconds) in poses {
+                    let tick = (seconds * f64::from(ticks_per_second)).round();
+                    let set = library.set_reference(clip, from, tick as u32);
+                    set.map_err(|error| input(format!("references: {error}")))?;
+                }
+                engine.crowd(&library, instances, layers).map_err(of_crowd)
+            })
+        })?;
+        Ok(Self {
+            crowd: Mutex::new(crowd),
+            instances,
+            joints,
+            layers,
+            clips: count,
+        })
+    }
+
+    /// Sets what instances play from now on.
+    ///
+    /// `set(instances, clip, *, layer=0, time=0.0, speed=1.0, wrap="loop", weight=1.0, additive=False,
+    /// mask=None)`
+    ///
+    /// `instances`: their indices, (n,), or one. `clip`, `time` (seconds of the clip), `speed` and `weight`
+    /// are one for all of them or (n,). `wrap`: "hold", "loop" or "mirror", outside of the clip. `weight`:
+    /// how much of the layer is laid over those below, 0 to 1. `additive`: the clip's difference from its
+    /// reference is added to those below. `mask`: the index of one, or None.
+    ///
+    /// >>> import tumble
+    /// >>> door = tumble.Clip([0.0, 2.0], [[[0, 0, 0, 1], [0, 0, 1, 0]]], parents=[None])
+    /// >>> tumble.Crowd([door], 100).set(range(100), 0, speed=0.5)
+    #[pyo3(signature = (
+        instances, clip, *, layer=0, time=None, speed=None, wrap=None, weight=None, additive=false, mask=None
+    ), text_signature = "($self, instances, clip, *, layer=0, time=0.0, speed=1.0, wrap='loop', weight=1.0, additive=False, mask=None)")]
+    #[allow(clippy::too_many_arguments, reason = "keywords")]
+    fn set(
+        &self,
+        py: Python<'_>,
+        instances: &Bound<'_, PyAny>,
+        clip: &Bound<'_, PyAny>,
+        layer: usize,
+        time: Option<&Bound<'_, PyAny>>,
+        speed: Option<&Bound<'_, PyAny>>,
+        wrap: Option<&Bound<'_, PyAny>>,
+        weight: Option<&Bound<'_, PyAny>>,
+        additive: bool,
+        mask: Option<usize>,
+    ) -> PyResult<()> {
+        let count = match &*doubles(instances, "instances")?.shape {
+            [] => 1,
+            [count] => *count,
+            shape => {
+                return Err(input(format!(
+                    "instances: the shape is {shape:?}; give indices, (n,)"
+                )));
+            }
+        };
+        let numbers = |value: Option<&Bound<'_, PyAny>>, name: &str, rest: f64| match value {
+            Some(value) => each(value, name, count),
+            None => Ok(vec![rest; count]),
+        };
+        let instances = indices(instances, "instances", count)?;
+        let clips = indices(clip, "clip", count)?;
+        let times = numbers(time, "time", 0.0)?;
+        let speeds = numbers(speed, "speed", 1.0)?;
+        let weights = numbers(weight, "weight", 1.0)?;
+        let modes = [
+            ("hold", WrapMode::Hold),
+            ("loop", WrapMode::Loop),
+            ("mirror", WrapMode::Mirror),
+        ];
+        let wrap = wrap.map(|name| one_of(name, "wrap", &modes)).transpose()?;
+        py.detach(|| {
+            guarded(|| {
+                let mut crowd = self.lock();
+                let mut changes = Vec::with_capacity(count);
+                for (index, &instance) in instances.iter().enumerate() {
+                    let plays = CrowdLayer {
+                        clip: clips[index],
+                        time: crowd.ticks_of(times[index]).map_err(of_crowd)?,
+                        speed: speeds[index] as f32,
+                        wrap: wrap.unwrap_or(WrapMode::Loop),
+                        weight: weights[index] as f32,
+                        additive,
+                        mask,
+                    };
+                    changes.push((instance, layer, plays));
+                }
+                crowd.set_all(&changes).map_err(of_crowd)
+            })
+        })
+    }
+
+    /// Moves the clock on, by the ticks nearest to some seconds.
+    ///
+    /// >>> import tumble
+    /// >>> door = tumble.Clip([0.0, 2.0], [[[0, 0, 0, 1], [0, 0, 1, 0]]], parents=[None])
+    /// >>> tumble.Crowd([door], 100).advance(1 / 60)
+    fn advance(&self, py: Python<'_>, seconds: f64) -> PyResult<()> {
+        py.detach(|| guarded(|| self.lock().advance(seconds).map_err(of_crowd)))
+    }
+
+    /// The poses of all instances at the clock's time: (instances, joints, 3, 4), for column vectors, the
+    /// last column the translation; or of "rotations" (instances, joints, 4), x y z w.
+    ///
+    /// `evaluate(values="model", *, dtype="float32", out=None)`
+    ///
+    /// `values`: "model", "skinning" (times the inverse bind matrices), "local" (in the parents' frames), or
+    /// "rotations" (in the parents' frames). `dtype`: "float32" or "float16".
+    ///
+    /// >>> import tumble
+    /// >>> door = tumble.Clip([0.0, 2.0], [[[0, 0, 0, 1], [0, 0, 1, 0]]], parents=[None])
+    /// >>> tumble.Crowd([door], 100).evaluate("local", dtype="float16").shape
+    /// (100, 1, 3, 4)
+    #[pyo3(signature = (values="model", *, dtype=None, out=None), text_signature = "($self, values='model', *, dtype='float32', out=None)")]
+    fn evaluate<'py>(
+        &self,
+        py: Python<'py>,
+        values: &str,
+        dtype: Option<&Bound<'py, PyAny>>,
+        out: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let values = values_named(values)?;
+        let component = match dtype {
+            None => ComponentType::F32,
+            Some(dtype) => quaternions_of(dtype)?.component_type(),
+        };
+        let is_half = match component {
+            ComponentType::F32 => false,
+            ComponentType::F16 => true,
+            ComponentType::Snorm16 => {
+                return Err(input("dtype: crowds give float32 or float16"));
+            }
+        };
+        let shape: &[usize] = match values {
+            CrowdValues::Rotations => &[self.instances, self.joints, 4],
+            _ => &[self.instances, self.joints, 3, 4],
+        };
+        let array = array_of(py, component, shape, out, &[])?;
+        let is_long = self.instances * self.joints >= MANY;
+        filled_bytes(&array, |bytes| {
+            let work = || {
+                let mut crowd = self.lock();
+                let evaluated = match is_half {
+                    false => crowd.evaluate_into(values, bytemuck::cast_slice_mut(bytes)),
+                    true => crowd.evaluate_half_into(values, bytemuck::cast_slice_mut(bytes)),
+                };
+                evaluated.map_err(of_crowd)
+            };
+            match is_long {
+                true => stoppable(work),
+                false => guarded(work),
+            }
+        })?;
+        Ok(array)
+    }
+
+    /// The second of its clip at which each instance stands in a layer, (instances,), float64.
+    ///
+    /// >>> import tumble
+    /// >>> door = tumble.Clip([0.0, 2.0], [[[0, 0, 0, 1], [0, 0, 1, 0]]], parents=[None])
+    /// >>> crowd = tumble.Crowd([door], 2)
+    /// >>> crowd.set([0, 1], 0, time=[0.0, 1.75])
+    /// >>> crowd.advance(0.5)
+    /// >>> crowd.times()
+    /// array([0.5 , 0.25])
+    #[pyo3(signature = (layer=0))]
+    fn times<'py>(&self, py: Python<'py>, layer: usize) -> PyResult<Bound<'py, PyAny>> {
+        let found = py.detach(|| {
+            let crowd = self.lock();
+            let second = f64::from(crowd.library().ticks_per_second());
+            let times = (0..self.instances).map(|instance| {
+                let tick = crowd.tick(instance, layer).map_err(of_crowd)?;
+                Ok(f64::from(tick) / second)
+            });
+            times.collect::<PyResult<Vec<f64>>>()
+        })?;
+        Ok(numpy::PyArray1::from_vec(py, found).into_any())
+    }
+
+    /// Number of instances.
+    #[getter]
+    fn instances(&self) -> usize {
+        self.instances
+    }
+
+    /// Joints of the skeleton.
+    #[getter]
+    fn joints(&self) -> usize {
+        self.joints
+    }
+
+    /// Layers of an instance.
+    #[getter]
+    fn layers(&self) -> usize {
+        self.layers
+    }
+
+    fn __repr__(&self) -> String {
+        format!(
+            "Crowd({} clips, {} instances, {} joints)",
+            self.clips, self.instances, self.joints
+        )
+    }
+}

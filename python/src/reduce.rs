@@ -1,0 +1,171 @@
+//! `tumble.reduce`: motion with few keys.
+
+use std::sync::Arc;
+
+use numpy::PyArray1;
+use pyo3::prelude::*;
+use tumble::Frames;
+use tumble::reduce::ReducedCurve;
+use tumble_formats::motion::Sampler;
+use tumble_formats::reduce::{ReduceMotionError, ReduceOptions, Reduced, reduce as reduced};
+
+use crate::clip::Clip;
+use crate::engine::{Engine, default_engine};
+use crate::errors::{input, of_engine};
+use crate::options::{frame_rate, one_of};
+use crate::run::interruptible;
+
+/// A clip with few keys, and how far it is from its samples.
+#[pyclass(frozen, module = "tumble")]
+pub(crate) struct Reduction {
+    found: Reduced,
+    clip: Clip,
+}
+
+#[pymethods]
+impl Reduction {
+    /// The clip with few keys.
+    #[getter]
+    fn clip(&self) -> Clip {
+        self.clip.clone()
+    }
+
+    /// Keys of all channels before.
+    #[getter]
+    fn keys_before(&self) -> usize {
+        self.found.keys[0]
+    }
+
+    /// Keys of all channels that are left.
+    #[getter]
+    fn keys_after(&self) -> usize {
+        self.found.keys[1]
+    }
+
+    /// The times of the samples, seconds, (samples,).
+    #[getter]
+    fn times<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_slice(py, &self.found.times)
+    }
+
+    /// The largest angle of all joints at each sample, degrees, (samples,).
+    #[getter]
+    fn angles<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        let angles = self.found.errors.iter().map(|error| error[0].to_degrees());
+        PyArray1::from_iter(py, angles)
+    }
+
+    /// The largest distance of all joints at each sample, (samples,).
+    #[getter]
+    fn distances<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_iter(py, self.found.errors.iter().map(|error| error[1]))
+    }
+
+    /// The bounds that hold: an angle in degrees, and a distance.
+    #[getter]
+    fn bounds(&self) -> (f64, f64) {
+        let [angle, distance] = self.found.bounds;
+        (angle.to_degrees(), distance)
+    }
+
+    fn __repr__(&self) -> String {
+        format!(
+            "Reduction({} of {} keys)",
+            self.found.keys[1], self.found.keys[0]
+        )
+    }
+}
+
+/// Takes keys out of a clip: the fewest whose curves stay near all samples.
+///
+/// `reduce(clip, *, tolerance=0.1, distance=None, shell=0.0, curve="linear", together=False, fps=None,
+/// engine=None)`
+///
+/// The keys are the samples, or the frames of `fps`. At each of them every joint stays within the angle
+/// of `tolerance`, degrees, and the distance `distance` (None: what the angle amounts to at the end of the
+/// longest chain of joints): in the world where the clip has a skeleton, else each track for itself. That it
+/// does is found by evaluating the keys that stay. `shell`: points so far from each joint stay within the
+/// distance too. `curve`: "linear" (arcs and straight lines), "bessel-overhauser", or "cubic", glTF's.
+/// `together`: all tracks keep keys at the same times, as most formats but glTF hold them.
+///
+/// >>> import numpy as np, tumble
+/// >>> half = np.linspace(0.0, 0.5, 101)
+/// >>> keys = np.stack([np.sin(half), 0 * half, 0 * half, np.cos(half)], axis=-1)
+/// >>> found = tumble.reduce(tumble.Clip(np.arange(101) / 30, keys), tolerance=0.01)
+/// >>> found.keys_before, found.keys_after, found.angles.max() < 0.01
+/// (101, 2, np.True_)
+#[pyfunction]
+#[pyo3(signature = (
+    clip, *, tolerance=0.1, distance=None, shell=0.0, curve=None, together=false, fps=None, engine=None
+), text_signature = "(clip, *, tolerance=0.1, distance=None, shell=0.0, curve='linear', together=False, fps=None, engine=None)")]
+#[allow(clippy::too_many_arguments, reason = "keywords")]
+pub(crate) fn reduce(
+    py: Python<'_>,
+    clip: &Bound<'_, Clip>,
+    tolerance: f64,
+    distance: Option<f64>,
+    shell: f64,
+    curve: Option<&Bound<'_, PyAny>>,
+    together: bool,
+    fps: Option<&Bound<'_, PyAny>>,
+    engine: Option<&Bound<'_, Engine>>,
+) -> PyResult<Reduction> {
+    let curves = [
+        ("linear", ReducedCurve::Linear),
+        ("bessel-overhauser", ReducedCurve::BesselOverhauser),
+        ("cubic", ReducedCurve::GltfCubic),
+    ];
+    let curve = curve
+        .map(|name| one_of(name, "curve", &curves))
+        .transpose()?;
+    let rate = fps.map(frame_rate).transpose()?;
+    let motion = Arc::clone(&clip.get().motion);
+    if rate.is_none()
+        && motion
+            .channels
+            .iter()
+            .any(|channels| channels.has(Sampler::Cubic))
+    {
+        return Err(input(
+            "its keys are joined by cubics with tangents, so they are not its samples; give `fps`",
+        ));
+    }
+    let options = ReduceOptions {
+        curve: curve.unwrap_or(ReducedCurve::Linear),
+        angle: tolerance.to_radians(),
+        distance,
+        shell,
+        together: together || motion.is_world,
+        quantize: false,
+    };
+    let engine = match engine {
+        Some(engine) => engine.get().engine(1)?,
+        None => default_engine(py)?.get().engine(1)?,
+    };
+    let found = interruptible(py, move || {
+        let sampled = match rate {
+            Some(rate) => {
+                let sampled = motion.sampled(&engine, &Frames::rate(rate));
+                Some(sampled.map_err(|error| of_engine(&error))?)
+            }
+            None => None,
+        };
+        let motion = sampled.as_ref().unwrap_or(&motion);
+        reduced(motion, &engine, &options).map_err(|error| match error {
+            ReduceMotionError::Evaluating(error) => of_engine(&error),
+            ReduceMotionError::Steps { joint, name } => input(format!(
+                "together: joint {joint} (`{name}`) holds each key until the next one, so that its keys \
+                 stay at their own times; leave it out"
+            )),
+            error => input(error.to_string()),
+        })
+    })?;
+    let reduced_clip = Clip {
+        motion: Arc::new(found.clip.clone()),
+        source: None,
+    };
+    Ok(Reduction {
+        clip: reduced_clip,
+        found,
+    })
+}

@@ -1,0 +1,531 @@
+//! Arrays of samples to others: smoothed, blended, mixed, added, and walked down a skeleton.
+
+use glam::{Affine3A, Mat3, Quat, Vec3};
+use numpy::{PyArray1, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods};
+use pyo3::exceptions::PyTypeError;
+use pyo3::intern;
+use pyo3::prelude::*;
+use tumble::{
+    Layout, Rotations, Samples, SamplesError, Skeleton, Smoothing, SmoothingEnds, SmoothingError,
+    SmoothingKernel, Transforms, Vectors,
+};
+use tumble_formats::diagnostic::Code;
+
+use crate::arrays::{Numbers, Order, doubles, parts, quaternions};
+use crate::engine::Engine;
+use crate::errors::{input, input_at, of_engine};
+use crate::output::{array, filled};
+use crate::run::work;
+
+/// What the axes of samples are, without that of their components.
+#[derive(Debug, Clone, Copy)]
+struct Axes {
+    tracks: usize,
+    samples: usize,
+}
+
+impl Axes {
+    /// Of (samples,) or, in that layout, (tracks, samples).
+    fn of(shape: &[usize], layout: Layout, name: &str) -> PyResult<Self> {
+        Ok(match (shape, layout) {
+            (&[], _) => Self {
+                tracks: 1,
+                samples: 1,
+            },
+            (&[samples], _) => Self { tracks: 1, samples },
+            (&[tracks, samples], Layout::TrackMajor) | (&[samples, tracks], Layout::FrameMajor) => {
+                Self { tracks, samples }
+            }
+            _ => {
+                return Err(input(format!(
+                    "{name}: the shape is {shape:?} and the components; give (frames, …) or \
+                     (tracks, frames, …)"
+                )));
+            }
+        })
+    }
+}
+
+/// Values that are no samples.
+fn of_samples(name: &str, error: &SamplesError) -> PyErr {
+    match error {
+        SamplesError::OutOfRange { index, .. } => input_at(
+            &format!("{name}: {error}"),
+            Code::Norm,
+            format!("{name}[{index}]"),
+        ),
+        _ => input(format!("{name}: {error}")),
+    }
+}
+
+fn rotations(values: &[Quat], tracks: usize, layout: Layout, name: &str) -> PyResult<Rotations> {
+    Rotations::of(values, tracks, layout).map_err(|error| of_samples(name, &error))
+}
+
+/// Rotations of any shape, as one track.
+fn row(value: &Bound<'_, PyAny>, order: Order, name: &str) -> PyResult<(Vec<usize>, Rotations)> {
+    let Numbers { shape, values } = quaternions(value, order, name)?;
+    Ok((shape, rotations(&values, 1, Layout::TrackMajor, name)?))
+}
+
+/// The result as an array of that shape, with the components behind it.
+fn written<'py>(
+    py: Python<'py>,
+    shape: &[usize],
+    found: &Rotations,
+    order: Order,
+    out: Option<&Bound<'py, PyAny>>,
+    inputs: &[&Bound<'py, PyAny>],
+) -> PyResult<Bound<'py, PyAny>> {
+    let array = array(py, &[shape, &[4]].concat(), out, inputs)?;
+    filled(&array, |numbers| {
+        let to = numbers.as_chunks_mut().0.iter_mut();
+        for (to, from) in to.zip(found.as_arrays()) {
+            *to = order.of_xyzw(*from);
+        }
+        Ok(())
+    })?;
+    Ok(array.into_any())
+}
+
+/// How samples are smoothed.
+pub(crate) struct Smooth<'a> {
+    pub(crate) kernel: Option<&'a str>,
+    pub(crate) low_pass: Option<f64>,
+    pub(crate) fps: Option<&'a Bound<'a, PyAny>>,
+    pub(crate) passes: u32,
+    pub(crate) ends: &'a str,
+}
+
+impl Smooth<'_> {
+    fn smoothing(&self) -> PyResult<Smoothing> {
+        let of_kernel = |name: &str, error: &SmoothingError| input(format!("{name}: {error}"));
+        let kernel = match (self.low_pass, self.kernel) {
+            (Some(_), Some(_)) => {
+                return Err(input(
+                    "`kernel` and `low_pass` exclude each other; give one of them",
+                ));
+            }
+            (Some(hz), None) => {
+                let Some(fps) = self.fps else {
+                    return Err(input("low_pass: give `fps` too, the rate of the samples"));
+                };
+                let rate = crate::options::frame_rate(fps)?;
+                SmoothingKernel::low_pass(hz, rate.per_second())
+                    .map_err(|error| of_kernel("low_pass", &error))?
+            }
+            (None, _) if self.fps.is_some() => {
+                return Err(input(
+                    "fps: kernels count samples; it goes with `low_pass`, in Hz",
+                ));
+            }
+            (None, kernel) => kernel
+                .unwrap_or("gaussian:2")
+                .parse()
+                .map_err(|error| of_kernel("kernel", &error))?,
+        };
+        let ends = match self.ends {
+            "keep" => SmoothingEnds::Keep,
+            "parabolic" => SmoothingEnds::Parabolic,
+            "loop" => SmoothingEnds::Loop,
+            name => {
+                return Err(input(format!(
+                    "ends: there is no `{name}`; there are keep, parabolic, loop"
+                )));
+            }
+        };
+        let smoothing = Smoothing {
+            kernel,
+            ends,
+            passes: self.passes,
+        };
+        let checked = smoothing.check();
+        checked.map_err(|error| input(error.to_string()))?;
+        Ok(smoothing)
+    }
+}
+
+/// Smooths rotations (…, 4), or vectors (…, 3).
+pub(crate) fn smooth<'py>(
+    engine: &Engine,
+    samples: &Bound<'py, PyAny>,
+    options: &Smooth<'_>,
+    (layout, order): (Layout, Order),
+    out: Option<&Bound<'py, PyAny>>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let py = samples.py();
+    let smoothing = options.smoothing()?;
+    let passes = smoothing.passes as usize;
+    if are_vectors(samples)? {
+        let (shape, values) = vectors(samples, "samples")?;
+        let axes = Axes::of(&shape, layout, "samples")?;
+        let count = values.len();
+        let engine = engine.engine(count)?;
+        let found = work(py, count.saturating_mul(passes), move || {
+            let before = Vectors::of(&values, axes.tracks, layout);
+            let before = before.map_err(|error| of_samples("samples", &error))?;
+            let found = engine.smooth_vectors(&before, &smoothing);
+            found.map_err(|error| of_engine(&error))
+        })?;
+        let array = array(py, &[&shape[..], &[3]].concat(), out, &[samples])?;
+        filled(&array, |numbers| {
+            let to = numbers.as_chunks_mut().0.iter_mut();
+            for (to, &[x, y, z, _]) in to.zip(found.as_arrays()) {
+                *to = [x, y, z];
+            }
+            Ok(())
+        })?;
+        return Ok(array.into_any());
+    }
+    let Numbers { shape, values } = quaternions(samples, order, "samples")?;
+    let axes = Axes::of(&shape, layout, "samples")?;
+    let count = values.len();
+    let engine = engine.engine(count)?;
+    let found = work(py, count.saturating_mul(passes), move || {
+        let before = rotations(&values, axes.tracks, layout, "samples")?;
+        let found = engine.smooth(&before, &smoothing);
+        found.map_err(|error| of_engine(&error))
+    })?;
+    written(py, &shape, &found, order, out, &[samples])
+}
+
+/// Whether the last axis has three components.
+fn are_vectors(value: &Bound<'_, PyAny>) -> PyResult<bool> {
+    if let Ok(array) = value.cast::<PyUntypedArray>() {
+        return Ok(array.shape().last() == Some(&3));
+    }
+    if value.hasattr(intern!(value.py(), "as_quat"))? {
+        return Ok(false);
+    }
+    Ok(doubles(value, "samples")?.shape.last() == Some(&3))
+}
+
+/// Vectors of any shape, without the axis of their components.
+fn vectors(value: &Bound<'_, PyAny>, name: &str) -> PyResult<(Vec<usize>, Vec<Vec3>)> {
+    let Numbers { mut shape, values } = doubles(value, name)?;
+    if shape.pop() != Some(3) {
+        return Err(input(format!(
+            "{name}: the last axis has the 3 components of a vector"
+        )));
+    }
+    let vectors = values.as_chunks::<3>().0.iter();
+    let vectors = vectors.map(|of| Vec3::from_array(of.map(|number| number as f32)));
+    Ok((shape, vectors.collect()))
+}
+
+/// The weighted sum of layers, normalised.
+pub(crate) fn blend<'py>(
+    engine: &Engine,
+    layers: &Bound<'py, PyAny>,
+    weights: Option<Vec<f32>>,
+    order: Order,
+    out: Option<&Bound<'py, PyAny>>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let py = layers.py();
+    let mut all = Vec::new();
+    let mut inputs = Vec::new();
+    let mut first: Option<Vec<usize>> = None;
+    for (index, layer) in layers.try_iter()?.enumerate() {
+        let (layer, name) = (layer?, format!("layers[{index}]"));
+        let (shape, rotations) = row(&layer, order, &name)?;
+        check_shape(
+            &name,
+            &shape,
+            first.get_or_insert_with(|| shape.clone()),
+            "layers[0]",
+        )?;
+        all.push(rotations);
+        inputs.push(layer);
+    }
+    let weights = weights.unwrap_or_else(|| vec![1.0; all.len()]);
+    if weights.len() != all.len() {
+        return Err(input(format!(
+            "weights: there are {} for {} layers",
+            weights.len(),
+            all.len()
+        )));
+    }
+    let shape = first.unwrap_or_default();
+    let count: usize = shape.iter().product();
+    let engine = engine.engine(count)?;
+    let found = work(py, count.saturating_mul(all.len()), move || {
+        let layers: Vec<(&Rotations, f32)> = all.iter().zip(weights).collect();
+        engine.blend(&layers).map_err(|error| of_engine(&error))
+    })?;
+    let inputs: Vec<_> = inputs.iter().collect();
+    written(py, &shape, &found, order, out, &inputs)
+}
+
+fn check_shape(name: &str, shape: &[usize], first: &[usize], of: &str) -> PyResult<()> {
+    match shape == first {
+        true => Ok(()),
+        false => Err(input(format!(
+            "{name}: its shape is {:?}, that of {of} {:?}; they are to be the same",
+            [shape, &[4]].concat(),
+            [first, &[4]].concat()
+        ))),
+    }
+}
+
+/// Slerp from each rotation to that of the other.
+pub(crate) fn mix<'py>(
+    engine: &Engine,
+    [first, second]: [&Bound<'py, PyAny>; 2],
+    weight: f32,
+    order: Order,
+    out: Option<&Bound<'py, PyAny>>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let py = first.py();
+    let (shape, from) = row(first, order, "first")?;
+    let (other, to) = row(second, order, "second")?;
+    check_shape("second", &other, &shape, "first")?;
+    let count = from.as_arrays().len();
+    let engine = engine.engine(count)?;
+    let found = work(py, count, move || {
+        let found = engine.mix(&from, &to, weight);
+        found.map_err(|error| of_engine(&error))
+    })?;
+    written(py, &shape, &found, order, out, &[first, second])
+}
+
+/// `base · (reference⁻¹ layer)^weight`.
+pub(crate) fn add<'py>(
+    engine: &Engine,
+    [base, layer]: [&Bound<'py, PyAny>; 2],
+    reference: Option<&Bound<'py, PyAny>>,
+    weight: f32,
+    (layout, order): (Layout, Order),
+    out: Option<&Bound<'py, PyAny>>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let py = base.py();
+    let Numbers { shape, values } = quaternions(base, order, "base")?;
+    let Axes { tracks, .. } = Axes::of(&shape, layout, "base")?;
+    let Numbers {
+        shape: other,
+        values: layers,
+    } = quaternions(layer, order, "layer")?;
+    check_shape("layer", &other, &shape, "base")?;
+    let reference = match reference {
+        None => vec![Quat::IDENTITY; tracks],
+        Some(value) => match quaternions(value, order, "reference")? {
+            Numbers { shape, values } if shape.is_empty() => vec![values[0]; tracks],
+            Numbers { shape, values } if *shape == [tracks] => values,
+            Numbers { shape, .. } => {
+                return Err(input(format!(
+                    "reference: its shape is {:?}; give ({tracks}, 4), a rotation for each track",
+                    [&shape[..], &[4]].concat()
+                )));
+            }
+        },
+    };
+    // A reference that is none is refused as other rotations are.
+    rotations(&reference, 1, layout, "reference")?;
+    let count = values.len();
+    let engine = engine.engine(count)?;
+    let found = work(py, count, move || {
+        let base = rotations(&values, tracks, layout, "base")?;
+        let layer = rotations(&layers, tracks, layout, "layer")?;
+        let found = engine.add(&base, &layer, &reference, weight);
+        found.map_err(|error| of_engine(&error))
+    })?;
+    written(py, &shape, &found, order, out, &[base, layer])
+}
+
+/// What a skeleton and its poses are, as they come in.
+pub(crate) struct Walk<'a, 'py> {
+    pub(crate) rotations: &'a Bound<'py, PyAny>,
+    pub(crate) parents: Vec<Option<i64>>,
+    pub(crate) offsets: Option<&'a Bound<'py, PyAny>>,
+    pub(crate) translations: Option<&'a Bound<'py, PyAny>>,
+    pub(crate) scales: Option<&'a Bound<'py, PyAny>>,
+    pub(crate) inverse_bind: Option<&'a Bound<'py, PyAny>>,
+}
+
+impl<'py> Walk<'_, 'py> {
+    /// The matrices of all joints in the model, 3 × 4.
+    pub(crate) fn local_to_model(
+        self,
+        engine: &Engine,
+        (layout, order): (Layout, Order),
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let py = self.rotations.py();
+        let Numbers { shape, values } = quaternions(self.rotations, order, "rotations")?;
+        // One pose is (tracks,).
+        let is_one = shape.len() == 1;
+        let axes = match (&*shape, layout) {
+            (&[tracks], _) => Axes { tracks, samples: 1 },
+            _ => Axes::of(&shape, layout, "rotations")?,
+        };
+        let Axes { tracks, samples } = axes;
+        let rotations = rotations(&values, tracks, layout, "rotations")?;
+        let (translations, has_translation) = channel(
+            self.translations,
+            "translations",
+            (&shape, axes),
+            layout,
+            Vec3::ZERO,
+        )?;
+        let (scales, _) = channel(self.scales, "scales", (&shape, axes), layout, Vec3::ONE)?;
+        let skeleton = skeleton(&self.parents, self.offsets, tracks)?;
+        let inverse_bind = self.inverse_bind.map(|value| matrices(value, tracks));
+        let inverse_bind = inverse_bind.transpose()?;
+        let engine = engine.engine(tracks * samples)?;
+        let local = Transforms {
+            translations,
+            rotations,
+            scales,
+            has_translation,
+        };
+        let found = work(py, tracks * samples, move || {
+            let found = engine.local_to_model(&local, &skeleton, inverse_bind.as_deref());
+            found.map_err(|error| of_engine(&error))
+        })?;
+        let numbers: &[f32] = found.as_arrays().as_flattened().as_flattened();
+        let flat = PyArray1::from_slice(py, numbers);
+        if is_one {
+            return Ok(flat.reshape([tracks, 3, 4])?.into_any());
+        }
+        let array = flat.reshape([samples, tracks, 3, 4])?;
+        match layout {
+            Layout::FrameMajor => Ok(array.into_any()),
+            Layout::TrackMajor => array.call_method1(intern!(py, "swapaxes"), (0, 1)),
+        }
+    }
+}
+
+/// The translations or the scales of all joints, and which of them have any.
+fn channel(
+    value: Option<&Bound<'_, PyAny>>,
+    name: &str,
+    (shape, axes): (&[usize], Axes),
+    layout: Layout,
+    rest: Vec3,
+) -> PyResult<(Vectors, Vec<bool>)> {
+    let Axes { tracks, samples } = axes;
+    let made = |values: &[Vec3]| {
+        Vectors::of(values, tracks, layout).map_err(|error| of_samples(name, &error))
+    };
+    let count = tracks * samples;
+    let Some(value) = value else {
+        return Ok((made(&vec![rest; count])?, vec![false; tracks]));
+    };
+    let lists = parts(value).filter(|parts| parts.iter().any(Bound::is_none));
+    let Some(lists) = lists else {
+        let (other, values) = vectors(value, name)?;
+        if other != shape {
+            return Err(input(format!(
+                "{name}: the shape is {:?}, that of the rotations {:?}; all axes but the last are the same",
+                [&other[..], &[3]].concat(),
+                [shape, &[4]].concat()
+            )));
+        }
+        return Ok((made(&values)?, vec![true; tracks]));
+    };
+    if lists.len() != tracks {
+        return Err(input(format!(
+            "{name}: a list of {} for {tracks} tracks; give an array or None for each",
+            lists.len()
+        )));
+    }
+    let mut all = vec![rest; count];
+    let mut has = vec![false; tracks];
+    for (track, part) in lists.iter().enumerate().filter(|(_, part)| !part.is_none()) {
+        let (other, values) = vectors(part, &format!("{name}[{track}]"))?;
+        if values.len() != samples {
+            return Err(input(format!(
+                "{name}[{track}]: the shape is {:?}; give ({samples}, 3)",
+                [&other[..], &[3]].concat()
+            )));
+        }
+        has[track] = true;
+        for (sample, value) in values.into_iter().enumerate() {
+            if let Some(index) = layout.index(track, sample, tracks, samples) {
+                all[index] = value;
+            }
+        }
+    }
+    Ok((made(&all)?, has))
+}
+
+/// A skeleton of parents and offsets.
+pub(crate) fn skeleton(
+    parents: &[Option<i64>],
+    offsets: Option<&Bound<'_, PyAny>>,
+    tracks: usize,
+) -> PyResult<Skeleton> {
+    if parents.len() != tracks {
+        return Err(input(format!(
+            "parents: there are {} for {tracks} tracks",
+            parents.len()
+        )));
+    }
+    let offsets = match offsets {
+        None => vec![Vec3::ZERO; tracks],
+        Some(value) => match vectors(value, "offsets")? {
+            (shape, offsets) if *shape == [tracks] => offsets,
+            (shape, _) => {
+                return Err(input(format!(
+                    "offsets: the shape is {:?}; give ({tracks}, 3)",
+                    [&shape[..], &[3]].concat()
+                )));
+            }
+        },
+    };
+    let parents = parents.iter().map(|parent| match parent {
+        None | Some(-1) => None,
+        // What is no track is refused as one.
+        Some(parent) => Some(usize::try_from(*parent).unwrap_or(usize::MAX)),
+    });
+    let skeleton = Skeleton::new(parents.collect(), offsets);
+    skeleton.map_err(|error| input(format!("parents: {error}")))
+}
+
+/// Affine matrices, (tracks, 3, 4) or (tracks, 4, 4).
+pub(crate) fn matrices(value: &Bound<'_, PyAny>, tracks: usize) -> PyResult<Vec<Affine3A>> {
+    let Numbers { shape, values } = doubles(value, "inverse_bind")?;
+    let rows = match *shape {
+        [count, rows @ (3 | 4), 4] if count == tracks => rows,
+        _ => {
+            return Err(input(format!(
+                "inverse_bind: the shape is {shape:?}; give ({tracks}, 3, 4) or ({tracks}, 4, 4)"
+            )));
+        }
+    };
+    let matrix = |numbers: &[f64]| {
+        let number = |row: usize, column: usize| numbers[4 * row + column] as f32;
+        let column = |column: usize| Vec3::from_array([0, 1, 2].map(|row| number(row, column)));
+        let turn_and_scale = Mat3::from_cols(column(0), column(1), column(2));
+        Affine3A::from_mat3_translation(turn_and_scale, column(3))
+    };
+    Ok(values.chunks_exact(4 * rows).map(matrix).collect())
+}
+
+/// Samples as an array of NumPy's: (tracks, frames, components), or as the layout has it.
+pub(crate) fn of_values<'py, T, const N: usize>(
+    py: Python<'py>,
+    found: &Samples<T>,
+    order: impl Fn([f32; 4]) -> [f32; N],
+) -> PyResult<Bound<'py, PyAny>> {
+    let numbers = found.as_arrays().iter().flat_map(|&of| order(of));
+    let numbers: Vec<f32> = numbers.collect();
+    let (tracks, samples) = (found.tracks(), found.samples());
+    let flat = PyArray1::from_vec(py, numbers);
+    let shape = match found.layout() {
+        Layout::TrackMajor => [tracks, samples, N],
+        Layout::FrameMajor => [samples, tracks, N],
+    };
+    Ok(flat.reshape(shape)?.into_any())
+}
+
+/// The weights of layers.
+pub(crate) fn weights(value: Option<&Bound<'_, PyAny>>) -> PyResult<Option<Vec<f32>>> {
+    let Some(value) = value else { return Ok(None) };
+    match doubles(value, "weights")? {
+        Numbers { shape, values } if shape.len() == 1 => Ok(Some(
+            values.into_iter().map(|weight| weight as f32).collect(),
+        )),
+        _ => Err(PyTypeError::new_err(
+            "weights: give a list of numbers, one for each layer",
+        )),
+    }
+}
