@@ -3,6 +3,7 @@
 # its bits beside Node's. The archive that npm installs comes to lie in target/npm.
 #
 #   scripts/npm.sh            builds and tests
+#   TUMBLE=PROGRAM scripts/npm.sh   compares with that program
 #   scripts/npm.sh --page     also puts the module into the program, for the pages of `tumble view`
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -44,8 +45,13 @@ printf 'the module: %s bytes, %s by gzip -9\n' "$(stat -c %s "$built")" "$(gzip 
 cp "$built" npm/package/tumble.wasm
 cp LICENSE-* npm/package
 
-cargo build --quiet -p tumble-cli --bin tumble
-TUMBLE=$(realpath "$target/debug/tumble") node --test --test-concurrency=1 --test-reporter=spec npm/tests/
+# The program that it is compared with, where none is named.
+if [ -z "${TUMBLE:-}" ]; then
+    cargo build --quiet -p tumble-cli --bin tumble
+    TUMBLE=$(realpath "$target/debug/tumble")
+fi
+export TUMBLE
+node --test --test-concurrency=1 --test-reporter=spec npm/tests/
 mkdir -p "$target/npm"
 archives=$(realpath "$target/npm")
 archive=$archives/$(cd npm/package && npm pack --silent --pack-destination "$archives")
