@@ -17,7 +17,7 @@ pub fn is_guarded() -> bool {
 
 /// What `work` gives, or its panic. Nothing that it has touched may be used after that.
 #[cfg_attr(
-    not(feature = "parquet"),
+    not(any(feature = "parquet", test)),
     expect(dead_code, reason = "the tables' decoders alone assert")
 )]
 pub(crate) fn guarded<T>(work: impl FnOnce() -> T) -> thread::Result<T> {

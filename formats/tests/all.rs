@@ -19,9 +19,12 @@ mod gltf_times;
 mod gltf_values;
 mod kept;
 mod maps;
+#[cfg(feature = "mcap")]
 mod mcap;
 mod npz;
 mod origins;
+// The guide has all formats.
+#[cfg(all(feature = "fbx", feature = "mcap", feature = "parquet"))]
 mod readme;
 mod reduce;
 mod round_trip;
