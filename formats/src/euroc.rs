@@ -1,4 +1,4 @@
-//! Trajectories as the EuRoC MAV data sets have them: CSV of `timestamp x y z qw qx qy qz`, times in whole
+//! Trajectories as the `EuRoC` MAV data sets have them: CSV of `timestamp x y z qw qx qy qz`, times in whole
 //! nanoseconds, w first, under a heading that says so. Files of ground truth have velocities and biases behind
 //! each pose.
 

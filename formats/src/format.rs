@@ -13,6 +13,7 @@ use crate::diagnostic::Diagnostic;
 #[cfg(feature = "fbx")]
 use crate::fbx;
 use crate::feature::{self, Feature};
+pub use crate::gltf::quantized::Quantization;
 use crate::gltf::skins::CarriedMesh;
 use crate::keys::Duplicates;
 use crate::kitti::FrameTimes;
@@ -310,9 +311,10 @@ pub struct MotionOptions {
     /// The times are written into a file of their own ([`write_frame_times`](crate::kitti::write_frame_times)),
     /// for formats that have none (KITTI).
     pub times_apart: bool,
-    /// Rotations have 16 bits a component instead of f32 (glTF); those of cubics with tangents stay f32.
-    pub quantize: bool,
-    /// Animations are compressed by `EXT_meshopt_compression` (glTF).
+    /// Rotations have few bits instead of f32 (glTF); those of cubics with tangents stay f32. A filter needs
+    /// [`meshopt`](Self::meshopt).
+    pub quantize: Option<Quantization>,
+    /// A new file is compressed by `EXT_meshopt_compression` (glTF).
     pub meshopt: bool,
 }
 

@@ -310,12 +310,13 @@ fn of_distinct(times: &[f64], precision: Precision) -> Option<Found> {
     let exact = Precision::F64.rounding(first.abs().max(last.abs()));
     // Times may have been added up, key by key.
     let added = |keys: usize| exact * (2.0 + keys as f64 / 8.0);
-    let even = |(key, &time): (usize, &f64)| {
-        let count = ((time - first) / step).round();
-        (time - first - count * step).abs() <= added(key) + count * exact / 8.0
-    };
     let count = ((last - first) / step).round();
+    // A step between two late times is off by more than the mean of all.
     let mean = (last - first) / count;
+    let even = |(key, &time): (usize, &f64)| {
+        let count = ((time - first) / mean).round();
+        (time - first - count * mean).abs() <= added(key) + count * exact / 8.0
+    };
     let as_written = times
         .iter()
         .enumerate()

@@ -5,9 +5,9 @@ use std::path::Path;
 use glam::{DVec3, Quat, Vec3};
 use tumble::reduce::ReducedCurve;
 use tumble::{Channel, Device, Engine, Frames, Interpolation};
-use tumble_formats::format::MotionOptions;
+use tumble_formats::format::{MotionOptions, Quantization};
 use tumble_formats::motion::{Channels, Joint, Motion, Sampled, Sampler, Transform};
-use tumble_formats::reduce::{ReduceMotionError, ReduceOptions, Reduced, reduce};
+use tumble_formats::reduce::{ReduceMotionError, ReduceOptions, Reduced, all_in_few_bits, reduce};
 use tumble_formats::sample::ChannelMethods;
 use tumble_formats::world::{WorldPose, world};
 use tumble_formats::{Format, ReadOptions};
@@ -23,7 +23,7 @@ fn options(curve: ReducedCurve) -> ReduceOptions {
         distance: None,
         shell: 0.0,
         together: false,
-        quantize: false,
+        quantize: None,
     }
 }
 
@@ -206,7 +206,8 @@ fn rotations_of_16_bits_stay_within_the_bounds() {
     clip.skeleton[3].rest.rotation = clip.set.track(3).keys[0];
     let folder = tempfile::tempdir().unwrap();
     let (mut files, mut sizes) = (Vec::new(), Vec::new());
-    for (quantize, meshopt) in [(false, false), (true, false), (true, true)] {
+    let (plain, packed) = (Quantization::Components, Quantization::Filtered(32767));
+    for (quantize, meshopt) in [(None, false), (Some(plain), false), (Some(packed), true)] {
         let options = ReduceOptions {
             quantize,
             ..options(ReducedCurve::Linear)
@@ -226,7 +227,9 @@ fn rotations_of_16_bits_stay_within_the_bounds() {
         let glb = Format::named("glb").unwrap();
         glb.write_clips(&[sampled], &motion, &mut bytes).unwrap();
         sizes.push(bytes.len());
-        let file = folder.path().join(format!("{quantize}{meshopt}.glb"));
+        let file = folder
+            .path()
+            .join(format!("{}{meshopt}.glb", quantize.is_some()));
         std::fs::write(&file, &bytes).unwrap();
         let loaded = glb.open(&file, &ReadOptions::default()).unwrap();
         assert_eq!(loaded.warnings, []);
@@ -250,7 +253,7 @@ fn rotations_of_16_bits_stay_within_the_bounds() {
                 .map(|(a, b)| (*a - *b).length().min((*a + *b).length()))
                 .fold(0.0, f32::max)
         };
-        assert_eq!(off(0) > 1e-6, quantize, "{:e}", off(0));
+        assert_eq!(off(0) > 1e-6, quantize.is_some(), "{:e}", off(0));
         assert_eq!(again.set.track(3).keys, reduced.clip.set.track(3).keys);
         files.push(file);
     }
@@ -259,10 +262,25 @@ fn rotations_of_16_bits_stay_within_the_bounds() {
     for report in validate(&files).into_iter().flatten() {
         assert_eq!(report.errors, [] as [String; 0]);
     }
+    // All samples of fewer bits are within the bounds too.
+    let options_of = options(ReducedCurve::Linear);
+    let (all, bits) = all_in_few_bits(&clip, &engine, &options_of)
+        .unwrap()
+        .unwrap();
+    assert!(
+        matches!(bits, Quantization::Filtered(256..=16_384)),
+        "{bits:?}"
+    );
+    assert!(
+        all.errors
+            .iter()
+            .all(|own| own[0] <= TENTH && own[1] <= all.bounds[1])
+    );
+    assert_eq!(all.clip.set.track(0).times.len(), 90);
     // Half a step of 16 bits is more than this.
     let fine = ReduceOptions {
         angle: 1e-5,
-        quantize: true,
+        quantize: Some(plain),
         ..options(ReducedCurve::Linear)
     };
     let refused = reduce(&clip, &engine, &fine).unwrap_err().to_string();

@@ -10,7 +10,8 @@ use tumble::{Encoding, Engine, Error, FrameRate, Frames, Layout, Quantity, Stop}
 use tumble_formats::Diagnostic;
 use tumble_formats::diagnostic::Code;
 use tumble_formats::format::{
-    Document, Format, FormatOption, MotionOptions, ResultShape, WriteError, WriteResults,
+    Document, Format, FormatOption, MotionOptions, Quantization, ResultShape, WriteError,
+    WriteResults,
 };
 use tumble_formats::keyed::keyed;
 use tumble_formats::kitti::write_frame_times;
@@ -121,7 +122,10 @@ pub(crate) fn save(
             order,
             box_length: clips.first().and_then(Clip::box_length),
             times_apart: times_out.is_some(),
-            quantize,
+            quantize: quantize.then_some(match meshopt {
+                true => Quantization::Filtered(32767),
+                false => Quantization::Components,
+            }),
             meshopt,
         },
         layout: layout_named(layout)?,

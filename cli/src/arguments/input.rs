@@ -4,6 +4,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use tumble_formats::format::FormatOption;
 use tumble_formats::motion::Motion;
 use tumble_formats::printable::{printable, printable_path};
 use tumble_formats::times::open_times;
@@ -99,6 +100,12 @@ impl Inputs {
         let formats = || gathered.paths().into_iter().map(format);
         self.reading.check(formats).map_err(Failure::usage)?;
         Ok(gathered)
+    }
+
+    /// Whether the keys of an input are as many as it takes to follow its curves.
+    pub(crate) fn follows_curves(&self, path: &Path) -> bool {
+        let format = self.reading.from.unwrap_or_else(|| Format::detected(path));
+        format.takes(FormatOption::Keyframes) && !self.reading.takes_keyframes()
     }
 
     /// The longest input that is read, bytes.

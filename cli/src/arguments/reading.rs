@@ -134,6 +134,11 @@ impl Reading {
         self.names_method.get_or_init(|| ());
     }
 
+    /// Whether the keys are those of the file alone.
+    pub(crate) fn takes_keyframes(&self) -> bool {
+        self.keyframes || self.names_method.get().is_some()
+    }
+
     /// Whether one animation was asked for.
     pub(crate) fn chooses(&self) -> bool {
         self.animation.is_some()
@@ -210,7 +215,7 @@ impl Reading {
                 TimeUnitArgument::Ns => TimeUnit::Nanoseconds,
             }),
             bridge_gaps: self.bridge_gaps,
-            keyframes: self.keyframes || self.names_method.get().is_some(),
+            keyframes: self.takes_keyframes(),
         })
     }
 

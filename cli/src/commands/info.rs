@@ -104,8 +104,12 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
             if place > 0 {
                 summary.warnings.clear();
             }
+            // Keys that follow a file's curves are none that a method is asked to join.
+            let follows = arguments.inputs.follows_curves(path);
             let smoothest = Interpolation::from(C2);
-            let of_curves = curve_warning(&name, &clip.set, &smoothest);
+            let of_curves = (!follows)
+                .then(|| curve_warning(&name, &clip.set, &smoothest))
+                .flatten();
             summary
                 .warnings
                 .extend(of_curves.map(|warning| warning.to_string()));

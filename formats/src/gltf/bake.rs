@@ -148,8 +148,13 @@ impl Document for Gltf {
                 });
             }
             if !read.sampled.is_empty() || cuts {
-                let mut baking =
-                    Baking::new(&json, *place, read, (sampled, options.quantize), &edits)?;
+                let mut baking = Baking::new(
+                    &json,
+                    *place,
+                    read,
+                    (sampled, options.quantize.is_some()),
+                    &edits,
+                )?;
                 baking.bake(&mut edits)?;
                 data.append(&mut edits, &baking.bytes);
             }

@@ -373,7 +373,7 @@ fn apply(before: [u8; 4], difference: [u8; 4], mode: u8) -> [u8; 4] {
 /// fourth input is `one`, but its two lowest bits, which say which component is left out: the
 /// largest, which is positive. Nothing is rounded before the root where `one` has up to 12 bits,
 /// and the order of operations is meshoptimizer's, so that the results are the same.
-fn quaternion(element: &mut [u8; 8]) {
+pub(super) fn quaternion(element: &mut [u8; 8]) {
     let input: [i16; 4] =
         array::from_fn(|i| i16::from_le_bytes([element[2 * i], element[2 * i + 1]]));
     let [x, y, z, one] = [input[0], input[1], input[2], input[3] | 3].map(f32::from);

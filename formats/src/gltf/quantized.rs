@@ -1,7 +1,11 @@
-//! Rotations of 16 bits a component, as accessors of normalised `SHORT` have them.
+//! Rotations of few bits: 16 a component, as accessors of normalised `SHORT` have them, or fewer of three
+//! components, from which meshopt's filter QUATERNION decodes such.
+
+use std::array;
 
 use glam::{DQuat, Quat};
 
+use crate::gltf::meshopt::quaternion;
 use crate::quaternion::unit;
 
 /// What 1 is.
@@ -12,10 +16,59 @@ pub(crate) fn quantized(rotation: [f32; 4]) -> [i16; 4] {
     rotation.map(|component| (component * ONE).round_ties_even() as i16) // saturates
 }
 
-/// What is read of a rotation that was written so.
-pub(crate) fn read_back(rotation: Quat) -> Quat {
-    let components = quantized(rotation.to_array()).map(|own| f64::from(own) / f64::from(ONE));
-    unit(DQuat::from_array(components))
+/// How the rotations of a file are kept.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Quantization {
+    /// 16 bits for each of four components.
+    Components,
+    /// The three smaller components alone, by meshopt's filter QUATERNION, in steps of which so many are the root of
+    /// 1/2: 7 to 32767, one less than a multiple of 4. Of a quaternion and its negative it keeps the one whose
+    /// largest component is positive.
+    Filtered(u16),
+}
+
+impl Quantization {
+    /// What is read of a rotation that was written so.
+    pub(crate) fn read_back(self, rotation: Quat) -> Quat {
+        let components = match self {
+            Self::Components => quantized(rotation.to_array()),
+            Self::Filtered(steps) => {
+                let mut element = filtered(rotation.to_array(), steps);
+                quaternion(&mut element);
+                array::from_fn(|i| i16::from_le_bytes([element[2 * i], element[2 * i + 1]]))
+            }
+        };
+        unit(DQuat::from_array(
+            components.map(|own| f64::from(own) / f64::from(ONE)),
+        ))
+    }
+}
+
+/// What meshopt's filter makes a rotation of: see [`quaternion`].
+pub(crate) fn filtered(rotation: [f32; 4], steps: u16) -> [u8; 8] {
+    let steps = steps.min(i16::MAX as u16) | 3;
+    let one = f32::from(steps);
+    let largest = (1..4).fold(0, |most, i| {
+        match rotation[i].abs() > rotation[most].abs() {
+            true => i,
+            false => most,
+        }
+    });
+    let sign = if rotation[largest] < 0.0 { -1.0 } else { 1.0 };
+    let short = |place: usize| {
+        let component = rotation[(largest + place) % 4] * std::f32::consts::SQRT_2 * sign;
+        (component.clamp(-1.0, 1.0) * one).round_ties_even() as i16
+    };
+    // What is left out is said in the two lowest bits.
+    let last = (steps & !3) as i16 | largest as i16;
+    let mut element = [0; 8];
+    for (bytes, own) in element
+        .chunks_exact_mut(2)
+        .zip([short(1), short(2), short(3), last])
+    {
+        bytes.copy_from_slice(&own.to_le_bytes());
+    }
+    element
 }
 
 #[cfg(test)]
@@ -27,10 +80,25 @@ mod tests {
         for step in 0..2000u16 {
             let axis = glam::Vec3::new(1.0, f32::from(step % 37) - 18.0, f32::from(step % 11));
             let q = Quat::from_axis_angle(axis.normalize(), f32::from(step) * 0.01);
-            let off = 2.0 * (read_back(q).as_dquat() - q.as_dquat()).length();
+            let off =
+                2.0 * (Quantization::Components.read_back(q).as_dquat() - q.as_dquat()).length();
             assert!(off < 4.0 * 0.5 / 32767.0 * 1.01, "{q} {off:e}");
         }
+        for steps in [31, 511, 1447, 2047, 32767] {
+            for step in 0..500u16 {
+                let axis =
+                    glam::Vec3::new(f32::from(step % 7) - 3.0, 1.0, f32::from(step % 5) - 2.0);
+                let q = Quat::from_axis_angle(axis.normalize(), f32::from(step) * 0.03);
+                let found = Quantization::Filtered(steps).read_back(q).as_dquat();
+                let q = q.as_dquat();
+                let off = 2.0 * (found - q).length().min((found + q).length());
+                // Half a step in each of three components, and what that makes of the largest.
+                let most = 2.0 * 2.0 * 0.5 / f64::from(steps) + 1e-4;
+                assert!(off < most, "{steps} {q} {off:e}");
+            }
+        }
         assert_eq!(quantized([0.0, -1.0, 1.0, 0.5]), [0, -32767, 32767, 16384]);
+        let read_back = |q| Quantization::Components.read_back(q);
         assert_eq!(read_back(Quat::IDENTITY), Quat::IDENTITY);
     }
 }

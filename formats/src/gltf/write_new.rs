@@ -15,7 +15,7 @@ use base64::engine::general_purpose::STANDARD;
 use serde_json::Value;
 
 use crate::diagnostic::{Code, Diagnostic};
-use crate::format::{MotionOptions, WriteError};
+use crate::format::{MotionOptions, Quantization, WriteError};
 use crate::gltf::own_keys::OwnKeys;
 use crate::gltf::write_new::binary::{Binary, Data};
 use crate::gltf::write_new::json::{
@@ -65,7 +65,12 @@ pub fn write_new(
     let mut names = UniqueNames::default();
     let mut animations = Vec::new();
     for (place, (part, clip)) in parts.into_iter().zip(clips).enumerate() {
-        let mut animation = animation(&mut binary, part, options.quantize);
+        // Only a compressed view has a filter.
+        let quantize = options.quantize.map(|own| match own {
+            Quantization::Filtered(_) if !options.meshopt => Quantization::Components,
+            own => own,
+        });
+        let mut animation = animation(&mut binary, part, quantize);
         let name = clip.clip.name.clone();
         animation.name = name.map(|name| names.unique(name, place));
         let notes = clip.notes.iter();
@@ -314,7 +319,11 @@ fn f32_times(samples: Samples<'_>, seconds: &[f64]) -> Result<Vec<f32>, (Code, S
 }
 
 /// The animation of a clip, without name.
-fn animation<'a>(binary: &mut Binary<'a>, part: Part<'a>, quantize: bool) -> Animation {
+fn animation<'a>(
+    binary: &mut Binary<'a>,
+    part: Part<'a>,
+    quantize: Option<Quantization>,
+) -> Animation {
     let samples = part.samples;
     binary.begin_view();
     if let Some(channels) = part.keys.filter(|channels| !channels.is_empty()) {
@@ -337,10 +346,13 @@ fn animation<'a>(binary: &mut Binary<'a>, part: Part<'a>, quantize: bool) -> Ani
     for (sampler, (track, property, interpolation)) in channels.into_iter().enumerate() {
         animation.samplers.push(Sampler {
             input,
-            output: binary.push(match quantize {
-                true => Data::Channel(samples, track, property).quantized(),
-                false => Data::Channel(samples, track, property),
-            }),
+            output: {
+                let data = Data::Channel(samples, track, property);
+                binary.push(match quantize {
+                    Some(quantization) => data.quantized(quantization),
+                    None => data,
+                })
+            },
             interpolation,
         });
         let target = Target {
@@ -357,7 +369,7 @@ fn keyed_animation(
     binary: &mut Binary<'_>,
     channels: Vec<KeyedChannel>,
     nodes: &[usize],
-    quantize: bool,
+    quantize: Option<Quantization>,
 ) -> Animation {
     let mut animation = Animation::default();
     let mut inputs: HashMap<Vec<u32>, usize> = HashMap::new();
@@ -367,9 +379,9 @@ fn keyed_animation(
             .entry(bits)
             .or_insert_with(|| binary.push(Data::Times(own.times)));
         let values = Data::Keys(own.property, own.keys.values);
-        let values = match quantize && own.keys.sampler != motion::Sampler::Cubic {
-            true => values.quantized(),
-            false => values,
+        let values = match quantize.filter(|_| own.keys.sampler != motion::Sampler::Cubic) {
+            Some(quantization) => values.quantized(quantization),
+            None => values,
         };
         animation.samplers.push(Sampler {
             input,

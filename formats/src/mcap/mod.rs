@@ -10,7 +10,7 @@ mod records;
 use std::collections::HashMap;
 use std::path::Path;
 
-use glam::{DQuat, DVec3};
+use glam::{DQuat, DVec3, Quat};
 use tumble::{TrackError, TrackSet};
 
 use crate::budget::{Budget, OverBudget};
@@ -136,6 +136,9 @@ struct Pose {
     /// Where its message begins in the file, or in its chunk.
     offset: u64,
 }
+
+/// A track's name, times, positions and rotations.
+type Keys = (String, Vec<f64>, Vec<DVec3>, Vec<Quat>);
 
 /// The poses of one body.
 struct Track {
@@ -352,7 +355,7 @@ impl Log<'_> {
             time_offset: offset,
             ..Motion::default()
         };
-        let mut all: Vec<(String, Vec<f64>, Vec<DVec3>, Vec<glam::Quat>)> = Vec::new();
+        let mut all: Vec<Keys> = Vec::new();
         for mut track in self.tracks {
             // Messages may overtake each other.
             track.poses.sort_by_key(|pose| pose.time);

@@ -185,3 +185,15 @@ fn whole_seconds_show_no_rate() {
     );
     assert_eq!(lists, [times]);
 }
+
+/// A tenth has no exact step: between two late times it is off by their rounding, and many such steps by a frame.
+#[test]
+fn tenths_in_one_decimal_are_at_ten_a_second_however_many() {
+    for count in [2u32, 150, 199, 200, 1999, 36_000] {
+        let times = (0..count).map(|frame| f64::from(frame) / 10.0);
+        let (times, precision) = kept(times, "1 decimals");
+        let found = of(&Written::Times(&[times], precision));
+        assert_eq!(shown(found), "10", "{count}");
+        assert_eq!(found.unwrap().phase, 0.0);
+    }
+}

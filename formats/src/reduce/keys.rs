@@ -51,6 +51,56 @@ impl Reduction<'_> {
         Ok(reduced)
     }
 
+    /// The clip with a key for each sample, of channels that move; of vectors with no more digits than the bound of
+    /// distances needs.
+    pub(super) fn all(&self) -> Result<Motion, ReduceMotionError> {
+        let joints = self.parents.len();
+        let mut all = Motion {
+            channels: (0..joints).map(|joint| self.new_sampler(joint)).collect(),
+            ..self.clip.without_tracks()
+        };
+        let every: Vec<usize> = (0..self.times.len()).collect();
+        let is_step = |sampler: Option<Sampler>| sampler == Some(Sampler::Step);
+        for joint in 0..joints {
+            let samples = self.local(joint);
+            let mut keys = steps(&samples);
+            if keys.places.len() > 1 && !is_step(self.sampler(joint).rotation) {
+                (keys.places, keys.keys) = (every.clone(), samples);
+            }
+            if self.order.first() == Some(&joint) {
+                lengthen(&mut keys, self.times.len().saturating_sub(1));
+            }
+            self.push(&mut all, joint, &keys)?;
+            for channel in CHANNELS {
+                if self.clip.set.vector_keys(channel, joint).is_none() {
+                    continue;
+                }
+                let samples = match channel {
+                    Channel::Translation => &self.samples.translations,
+                    Channel::Scale => &self.samples.scales,
+                };
+                let samples = self.of_joint(samples, joint);
+                // A step of a power of two is exact, and leaves zeros at the end of f32.
+                let step = libm::log2(self.distance / 64.0).floor().clamp(-60.0, 60.0);
+                let step = match channel {
+                    Channel::Translation if self.distance > 0.0 => libm::exp2(step),
+                    _ => 0.0,
+                };
+                let rounded = |v: &Vec3| match step > 0.0 {
+                    true => (v.as_dvec3() / step).round() * step,
+                    false => v.as_dvec3(),
+                };
+                let samples: Vec<DVec3> = samples.iter().map(rounded).collect();
+                let mut keys = steps(&samples);
+                if keys.places.len() > 1 && !is_step(self.sampler(joint).of(channel)) {
+                    (keys.places, keys.keys) = (every.clone(), samples);
+                }
+                self.push_vectors(&mut all, joint, channel, &keys)?;
+            }
+        }
+        Ok(all)
+    }
+
     /// The keys of each joint's rotations, each joint after its parent.
     fn rotations(
         &self,

@@ -15,7 +15,7 @@ use tumble::reduce::{ReduceError, ReducedCurve};
 use tumble::reference::angle_between;
 use tumble::{Channel, Engine, Error, Frames, TrackError};
 
-use crate::gltf::quantized::read_back;
+use crate::format::Quantization;
 use crate::motion::{Motion, Sampler};
 use crate::sample::{ChannelMethods, Samples};
 use crate::world::{HierarchyError, WorldPose, parents_first, world};
@@ -35,9 +35,9 @@ pub struct ReduceOptions {
     /// All joints have keys at the same times, as most formats hold them; else each channel at times of
     /// its own, as glTF does.
     pub together: bool,
-    /// Rotations will have 16 bits a component ([`MotionOptions::quantize`](crate::format::MotionOptions::quantize)):
+    /// Rotations will have few bits ([`MotionOptions::quantize`](crate::format::MotionOptions::quantize)):
     /// errors are those of what is read of them.
-    pub quantize: bool,
+    pub quantize: Option<Quantization>,
 }
 
 /// A reduced clip, and how far it is from the samples.
@@ -139,6 +139,56 @@ pub fn reduce(
     }
 }
 
+/// All samples as keys, in steps as coarse as the bounds allow: where many keys are needed these are smaller, once
+/// meshopt has compressed them, than fewer keys at times of their own. Nothing where 16 bits are too few.
+///
+/// # Errors
+/// As [`reduce`].
+pub fn all_in_few_bits(
+    clip: &Motion,
+    engine: &Engine,
+    options: &ReduceOptions,
+) -> Result<Option<(Reduced, Quantization)>, ReduceMotionError> {
+    let attempt = |place: u32| -> Result<Option<(Reduced, Quantization)>, ReduceMotionError> {
+        let quantization = filtered(place);
+        let options = ReduceOptions {
+            quantize: Some(quantization),
+            ..*options
+        };
+        let reduction = Reduction::new(clip, engine, &options)?;
+        let all = reduction.all()?;
+        let found = reduction.measure(&all)?;
+        let joints = clip.set.track_count();
+        let mut tolerances = Tolerances {
+            angles: vec![0.0; joints],
+            distances: vec![0.0; joints],
+        };
+        let is_beyond = reduction.tighten(&found, &mut tolerances);
+        Ok((!is_beyond).then(|| (found.into_reduced(&reduction, all), quantization)))
+    };
+    let Some(mut best) = attempt(FINEST)? else {
+        return Ok(None);
+    };
+    let (mut low, mut high) = (0, FINEST);
+    while low < high {
+        let middle = u32::midpoint(low, high);
+        match attempt(middle)? {
+            Some(found) => (best, high) = (found, middle),
+            None => low = middle + 1,
+        }
+    }
+    Ok(Some(best))
+}
+
+/// The finest steps; those of 0 are 10 degrees apart.
+const FINEST: u32 = 40;
+
+/// Each is finer than the one before by the fourth root of 2.
+fn filtered(place: u32) -> Quantization {
+    let steps = libm::exp2(5.0 + f64::from(place) / 4.0);
+    Quantization::Filtered((steps as u16).min(0x7fff) | 3)
+}
+
 /// How far the curve of each joint may be from what it is to be.
 struct Tolerances {
     angles: Vec<f64>,
@@ -221,11 +271,8 @@ impl<'a> Reduction<'a> {
     /// How far a clip is from the samples, as `eval` evaluates it.
     fn measure(&self, reduced: &Motion) -> Result<Measured, ReduceMotionError> {
         let frames = Frames::at(self.times.clone());
-        let quantized = self
-            .options
-            .quantize
-            .then(|| quantized(reduced))
-            .transpose()?;
+        let quantized = self.options.quantize.map(|own| quantized(reduced, own));
+        let quantized = quantized.transpose()?;
         let reduced = quantized.as_ref().unwrap_or(reduced);
         let samples = ChannelMethods::AUTHORED.sample(self.engine, reduced, &frames)?;
         let poses = poses(reduced, &samples)?;
@@ -304,10 +351,9 @@ impl Measured {
     fn too_small(&self, reduction: &Reduction<'_>) -> ReduceMotionError {
         let largest = |kind: usize| self.joints.iter().map(|own| own[kind]).fold(0.0, f64::max);
         let bound = reduction.options.angle;
-        let kept = if reduction.options.quantize {
-            "of 16 bits"
-        } else {
-            "f32"
+        let kept = match reduction.options.quantize {
+            Some(_) => "of 16 bits",
+            None => "f32",
         };
         match largest(0) > bound {
             true => ReduceMotionError::TooSmall {
@@ -326,14 +372,17 @@ impl Measured {
     }
 }
 
-/// A clip as it is read when its rotations were written with 16 bits a component.
-fn quantized(clip: &Motion) -> Result<Motion, TrackError> {
+/// A clip as it is read when its rotations were written with few bits.
+fn quantized(clip: &Motion, quantization: Quantization) -> Result<Motion, TrackError> {
     let mut short = clip.without_tracks();
     for (index, track) in clip.set.tracks().enumerate() {
         let keys: Vec<Quat> = match clip.channels.get(index).map(|own| own.rotation) {
             // A node's rest pose is f32, and tangents may be longer than 16 bits take.
             Some(None | Some(Sampler::Cubic)) => track.keys.to_vec(),
-            _ => track.keys.iter().map(|&key| read_back(key)).collect(),
+            _ => {
+                let keys = track.keys.iter();
+                keys.map(|&key| quantization.read_back(key)).collect()
+            }
         };
         short
             .set

@@ -10,10 +10,10 @@ use clap::{Args, ValueEnum};
 use serde::Serialize;
 use tumble::reduce::ReducedCurve;
 use tumble::{Device, Engine, EulerSequence, FrameRate, Frames};
-use tumble_formats::format::{FormatOption, MotionOptions};
+use tumble_formats::format::{FormatOption, MotionOptions, Quantization};
 use tumble_formats::keyed::keyed;
 use tumble_formats::motion::{Motion, Sampled, Sampler};
-use tumble_formats::reduce::{ReduceMotionError, ReduceOptions, Reduced, reduce};
+use tumble_formats::reduce::{ReduceMotionError, ReduceOptions, Reduced, all_in_few_bits, reduce};
 use tumble_formats::{Feature, Format, Loaded};
 
 use crate::arguments::given::Given;
@@ -66,7 +66,8 @@ pub(crate) struct Arguments {
     /// glTF: rotations of 16 bits a component instead of f32. The errors are those of what is read of them
     #[arg(long)]
     quantize: bool,
-    /// glTF: a new file, compressed by meshopt; players need EXT_meshopt_compression
+    /// glTF: a new file, compressed by meshopt; players need EXT_meshopt_compression. With --quantize all samples
+    /// are keys, of as few bits as the bounds allow, where that is smaller
     #[arg(long)]
     meshopt: bool,
     /// Sample at this rate first [default: the keys are the samples]
@@ -226,10 +227,13 @@ impl Arguments {
             let together = clip.is_world || !target.format().takes(FormatOption::OwnKeys);
             all.push(self.reduced(engine, (name, clip), together)?);
         }
+        let all = self.smaller(engine, &names, all)?;
+        let quantize = all.first().and_then(|own| own.1);
+        let all: Vec<Reduced> = all.into_iter().map(|own| own.0).collect();
         if let (Some(place), [reduced]) = (plot, &*all) {
             picture::draw(&input::file_name(path), reduced, place)?;
         }
-        let written = self.write(engine, (name, clips), &all, loaded, target)?;
+        let written = self.write(engine, (name, clips), (&all, quantize), loaded, target)?;
         let mut told = Vec::new();
         let mut lines = Vec::new();
         for (reduced, input) in all.iter().zip(names) {
@@ -260,7 +264,7 @@ impl Arguments {
         engine: &Engine,
         (name, clip): (&str, &Motion),
         together: bool,
-    ) -> Result<Reduced, Failure> {
+    ) -> Result<(Reduced, Option<(Reduced, Quantization)>), Failure> {
         let clip = self.inputs.tracks.select_with_ancestors(clip, name)?;
         let failed = |error: ReduceMotionError| match error {
             ReduceMotionError::Evaluating(error) => Failure::evaluating(name, &error),
@@ -290,9 +294,69 @@ impl Arguments {
             distance: self.distance,
             shell: self.shell,
             together,
-            quantize: self.quantize,
+            quantize: self.quantize.then_some(match self.meshopt {
+                true => Quantization::Filtered(32767),
+                false => Quantization::Components,
+            }),
         };
-        reduce(&clip, engine, &options).map_err(failed)
+        let few = reduce(&clip, engine, &options).map_err(failed)?;
+        let is_packed = self.quantize && self.meshopt;
+        let all = is_packed.then(|| all_in_few_bits(&clip, engine, &options));
+        let all = all.transpose().map_err(failed)?.flatten();
+        Ok((few, all))
+    }
+
+    /// Writes clips as new files with few keys and with all of few bits; gives those of which the file is smaller.
+    fn smaller(
+        &self,
+        engine: &Engine,
+        names: &[String],
+        reduced: Vec<(Reduced, Option<(Reduced, Quantization)>)>,
+    ) -> Result<Vec<(Reduced, Option<Quantization>)>, Failure> {
+        let sixteen = self.quantize.then_some(match self.meshopt {
+            true => Quantization::Filtered(32767),
+            false => Quantization::Components,
+        });
+        let format = Format::named("glb");
+        let size = |reduced: &Reduced, quantize| -> Result<usize, Failure> {
+            let ends = reduced.clip.ends(engine);
+            let ends = ends.map_err(|error| Failure::evaluating(&names[0], &error))?;
+            let options = MotionOptions {
+                quantize,
+                meshopt: true,
+                ..MotionOptions::default()
+            };
+            let sampled = [Sampled {
+                of_own_keys: true,
+                ..ends.of(&reduced.clip, None, &[])
+            }];
+            let mut bytes = Vec::new();
+            // What cannot be written is told when it is.
+            let written = format.map(|format| format.write_clips(&sampled, &options, &mut bytes));
+            Ok(written
+                .and_then(Result::ok)
+                .map_or(usize::MAX, |_| bytes.len()))
+        };
+        // One file has one quantization.
+        let mut each = reduced.iter().map(|(_, all)| all.as_ref().map(|all| all.1));
+        let first = each.next().flatten();
+        let same = first.filter(|&first| each.all(|own| own == Some(first)));
+        let (mut few, mut all) = (0usize, 0usize);
+        for (own, other) in &reduced {
+            few = few.saturating_add(size(own, sixteen)?);
+            all = match other {
+                Some((other, _)) => all.saturating_add(size(other, same)?),
+                None => usize::MAX,
+            };
+        }
+        let takes_all = same.filter(|_| all < few);
+        let own = reduced
+            .into_iter()
+            .map(|(own, other)| match (takes_all, other) {
+                (Some(bits), Some((other, _))) => (other, Some(bits)),
+                _ => (own, sixteen),
+            });
+        Ok(own.collect())
     }
 
     /// Writes reduced clips: into the input's own file where that is of the same format, else into a
@@ -301,7 +365,7 @@ impl Arguments {
         &self,
         engine: &Engine,
         (name, clips): (&str, &[&Motion]),
-        reduced: &[Reduced],
+        (reduced, quantize): (&[Reduced], Option<Quantization>),
         loaded: &Loaded,
         target: &Target,
     ) -> Result<Written, Failure> {
@@ -335,7 +399,7 @@ impl Arguments {
         let options = MotionOptions {
             sequence: self.sequence,
             box_length: loaded.box_length,
-            quantize: self.quantize,
+            quantize,
             meshopt: self.meshopt,
             ..target.motion_options()
         };

@@ -3,7 +3,7 @@
 use std::io::{self, Write};
 
 use crate::gltf::meshopt::encode_attributes;
-use crate::gltf::quantized::quantized;
+use crate::gltf::quantized::{Quantization, filtered, quantized};
 use crate::gltf::write_new::json::{
     Accessor, Buffer, BufferExtensions, BufferView, FLOAT, Fallback, MeshoptView, SHORT,
     ViewExtensions,
@@ -22,6 +22,8 @@ pub(super) enum Data<'a> {
     Keys(Property, Vec<f32>),
     /// Rotations of 16 bits a component.
     Quantized(Vec<i16>),
+    /// Rotations from which meshopt's filter decodes such.
+    Filtered(Vec<[u8; 8]>),
 }
 
 impl Data<'_> {
@@ -35,19 +37,22 @@ impl Data<'_> {
             Self::Keys(Property::Rotation, numbers) => ("VEC4", 16, numbers.len() / 4),
             Self::Keys(_, numbers) => ("VEC3", 12, numbers.len() / 3),
             Self::Quantized(numbers) => ("VEC4", 8, numbers.len() / 4),
+            Self::Filtered(elements) => ("VEC4", 8, elements.len()),
         }
     }
 
-    /// The same, its rotations in 16 bits if it has some that may be.
-    pub(super) fn quantized(self) -> Self {
-        match self {
-            Self::Channel(samples, track, Property::Rotation) => {
-                let rotations = samples.rotations(track);
-                Self::Quantized(rotations.flat_map(quantized).collect())
+    /// The same, its rotations in few bits if it has some.
+    pub(super) fn quantized(self, quantization: Quantization) -> Self {
+        let of = |rotations: &mut dyn Iterator<Item = [f32; 4]>| match quantization {
+            Quantization::Components => Self::Quantized(rotations.flat_map(quantized).collect()),
+            Quantization::Filtered(steps) => {
+                Self::Filtered(rotations.map(|own| filtered(own, steps)).collect())
             }
+        };
+        match self {
+            Self::Channel(samples, track, Property::Rotation) => of(&mut samples.rotations(track)),
             Self::Keys(Property::Rotation, numbers) => {
-                let keys = numbers.as_chunks::<4>().0.iter();
-                Self::Quantized(keys.copied().flat_map(quantized).collect())
+                of(&mut numbers.as_chunks::<4>().0.iter().copied())
             }
             other => other,
         }
@@ -67,6 +72,7 @@ impl Data<'_> {
                 let each = numbers.iter().flat_map(|number| number.to_le_bytes());
                 each.collect()
             }
+            Self::Filtered(elements) => elements.concat(),
         }
     }
 }
@@ -124,10 +130,10 @@ impl<'a> Binary<'a> {
             buffer_view,
             byte_offset: view.byte_length,
             component_type: match data {
-                Data::Quantized(_) => SHORT,
+                Data::Quantized(_) | Data::Filtered(_) => SHORT,
                 _ => FLOAT,
             },
-            normalized: matches!(data, Data::Quantized(_)),
+            normalized: matches!(data, Data::Quantized(_) | Data::Filtered(_)),
             count,
             shape,
             min,
@@ -138,17 +144,18 @@ impl<'a> Binary<'a> {
         self.accessors.len() - 1
     }
 
-    /// Everything compressed by meshopt: a view for all data of one length of elements, which the accessors then
+    /// Everything compressed by meshopt: a view for all data of one length of elements and one filter, which the accessors then
     /// lie in. Gives the bytes, and the buffers: that of the bytes, and that which stands for what they decode to.
     pub(super) fn compress(&mut self) -> (Vec<u8>, [Buffer; 2]) {
-        let mut strides: Vec<u64> = self.data.iter().map(|data| data.shape().1).collect();
-        strides.sort_unstable();
-        strides.dedup();
+        let kind = |data: &Data<'_>| (data.shape().1, matches!(data, Data::Filtered(_)));
+        let mut kinds: Vec<(u64, bool)> = self.data.iter().map(kind).collect();
+        kinds.sort_unstable();
+        kinds.dedup();
         let (mut views, mut compressed, mut length) = (Vec::new(), Vec::new(), 0);
-        for (view, &stride) in strides.iter().enumerate() {
+        for (view, &(stride, is_filtered)) in kinds.iter().enumerate() {
             let mut bytes = Vec::new();
             for (data, accessor) in self.data.iter().zip(&mut self.accessors) {
-                if data.shape().1 == stride {
+                if kind(data) == (stride, is_filtered) {
                     accessor.buffer_view = view;
                     accessor.byte_offset = bytes.len() as u64;
                     bytes.extend(data.bytes());
@@ -166,6 +173,7 @@ impl<'a> Binary<'a> {
                         byte_length: stream.len() as u64,
                         byte_stride: stride,
                         mode: "ATTRIBUTES",
+                        filter: is_filtered.then_some("QUATERNION"),
                         count: bytes.len() as u64 / stride,
                     },
                 }),

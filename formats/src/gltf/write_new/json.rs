@@ -159,6 +159,8 @@ pub(super) struct MeshoptView {
     pub(super) byte_length: u64,
     pub(super) byte_stride: u64,
     pub(super) mode: &'static str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) filter: Option<&'static str>,
     pub(super) count: u64,
 }
 
