@@ -149,7 +149,7 @@ pub(crate) fn kitti(bytes: &[u8]) -> u64 {
     of
 }
 
-/// The parser of EuRoC's trajectories: what it takes is written again, at the nearest nanoseconds.
+/// The parser of `EuRoC`'s trajectories: what it takes is written again, at the nearest nanoseconds.
 pub(crate) fn euroc(bytes: &[u8]) -> u64 {
     let read = read_euroc("fuzz", bytes, &options());
     let loaded = match read {

@@ -136,7 +136,7 @@ pub(crate) fn reduce(
         distance,
         shell,
         together: together || motion.is_world,
-        quantize: false,
+        quantize: None,
     };
     let engine = match engine {
         Some(engine) => engine.get().engine(1)?,

@@ -66,7 +66,7 @@ pub(crate) struct Arguments {
     /// glTF: rotations of 16 bits a component instead of f32. The errors are those of what is read of them
     #[arg(long)]
     quantize: bool,
-    /// glTF: a new file, compressed by meshopt; players need EXT_meshopt_compression. With --quantize all samples
+    /// glTF: a new file, compressed by meshopt; players need `EXT_meshopt_compression`. With --quantize all samples
     /// are keys, of as few bits as the bounds allow, where that is smaller
     #[arg(long)]
     meshopt: bool,
