@@ -153,7 +153,7 @@ impl File {
     }
 }
 
-/// Reads a motion file of any format: glTF and GLB, BVH, FBX, NPZ and NPY, Parquet, Arrow, CSV, TUM, EuRoC,
+/// Reads a motion file of any format: glTF and GLB, BVH, FBX, NPZ and NPY, Parquet, Arrow, CSV, TUM, `EuRoC`,
 /// KITTI, `.dat`. What is remarkable about it becomes an `InputWarning`; what is wrong, an `InputError`
 /// with the place.
 ///

@@ -48,7 +48,7 @@ const CHUNK: usize = 1 << 20;
 /// `sequence`: of BVH's angles, such as "ZXY". `linear`: arrays of an NPZ file with a number for
 /// each frame that are to be interpolated linearly instead of being left out. `times_out`: where the times of
 /// the poses go, seconds a line, for KITTI, which has none. `quantize`: glTF's rotations have 16 bits a
-/// component, within 6e-5 rad. `meshopt`: a new glTF is compressed by EXT_meshopt_compression. `engine`: which
+/// component, within 6e-5 rad. `meshopt`: a new glTF is compressed by `EXT_meshopt_compression`. `engine`: which
 /// evaluates, else one that all calls share.
 ///
 /// `write` is another name of it.
