@@ -1,4 +1,4 @@
-//! Trajectories of TUM, EuRoC, KITTI and MCAP through the program: out of each into every other, and times that
+//! Trajectories of TUM, `EuRoC`, KITTI and MCAP through the program: out of each into every other, and times that
 //! lie in gaps.
 
 use std::fs;

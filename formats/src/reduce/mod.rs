@@ -181,12 +181,11 @@ pub fn all_in_few_bits(
 }
 
 /// The finest steps; those of 0 are 10 degrees apart.
-const FINEST: u32 = 40;
+const FINEST: u32 = 10;
 
-/// Each is finer than the one before by the fourth root of 2.
+/// Each is of a bit more than the one before, from 6 on.
 fn filtered(place: u32) -> Quantization {
-    let steps = libm::exp2(5.0 + f64::from(place) / 4.0);
-    Quantization::Filtered((steps as u16).min(0x7fff) | 3)
+    Quantization::Filtered((1 << (5 + place.min(FINEST))) - 1)
 }
 
 /// How far the curve of each joint may be from what it is to be.
