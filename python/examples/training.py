@@ -202,10 +202,11 @@ def main() -> None:
                 f"  {options.steps} steps, {name} ({engine.device}): {1e3 * seconds:.2f} ms a step, sha256 {bits[:16]}…"
             )
         crowds = set()
+        some = clips[:200]  # as many as the buffers of small devices hold
         for engine in devices.values():
             # The same clips as a crowd, which a Vulkan device evaluates itself.
-            crowd = tumble.Crowd(clips, options.environments, parents=PARENTS, offsets=OFFSETS, engine=engine)
-            crowd.set(np.arange(options.environments), ids, time=times, wrap="hold")
+            crowd = tumble.Crowd(some, options.environments, parents=PARENTS, offsets=OFFSETS, engine=engine)
+            crowd.set(np.arange(options.environments), ids % len(some), time=times, wrap="hold")
             crowds.add(hashlib.sha256(crowd.evaluate().data).hexdigest())
         assert len(sums) == len(crowds) == 1 and same, "the bits differ"
         print("all have the same bits")
