@@ -22,7 +22,12 @@ if cargo clippy --version >/dev/null 2>&1; then
     # No other call compiles the tests that run on demand.
     cargo clippy --workspace --test load --quiet -- -D warnings
 fi
-RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --document-private-items --quiet
+# What users see, with links that lead somewhere; then what authors see.
+export RUSTDOCFLAGS="-D warnings"
+rm -rf target/doc
+cargo doc --workspace --no-deps --quiet
+python3 scripts/doc-links.py target/doc
+cargo doc --workspace --no-deps --document-private-items --quiet
 
 # The engine without Vulkan, as an application builds it that wants the CPU alone.
 CARGO_TARGET_DIR=target/without_vulkan cargo run --quiet --manifest-path tests/without_vulkan/Cargo.toml

@@ -1,8 +1,8 @@
 //! FBX, as programs of Autodesk, Blender and Mixamo write it, binary or text.
 //!
 //! The file is read by `ufbx`, which also evaluates what a node's layers, curves, pivots and rotation orders
-//! say together. Each animation stack becomes a clip, each node a track: keys that follow its curves within
-//! [a bound](follow), or those at the file's key times alone ([`ReadOptions::keyframes`]).
+//! say together. Each animation stack becomes a clip, each node a track: keys that follow its curves within a
+//! millionth (radians; else parts of the largest number), or those at the file's key times alone ([`ReadOptions::keyframes`]).
 
 mod direct;
 mod follow;
