@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use crate::fit::double::curve::Curve;
+use crate::fit::double::curve::{Curve, INDISTINCT};
 use crate::fit::motion::arc_length::Pace;
 use crate::math::canonical::round_quat;
 use crate::math::quaternion::length;
@@ -11,6 +11,9 @@ use crate::prepare::fitting::Fitting;
 use crate::prepare::prepared::Prepared;
 use crate::threads::stop;
 use crate::time::spans::{NONE, Part, Source};
+
+/// A smaller angle than this, radians, shows in no result in f32.
+const VISIBLE: f64 = 1e-8;
 
 /// An interval that waits until all of its track is there.
 pub(crate) struct Waiting {
@@ -44,13 +47,12 @@ fn retime_track(
         if stop::is_stopped() {
             return None; // whoever prepares looks again when this is done
         }
-        let mut curve = own.curve.take()?;
+        let curve = own.curve.take()?;
         let pace = Pace::new(&curve);
         let length = pace.total();
-        curve.pace = Some(Arc::new(pace));
-        (length > 0.0 && length.is_finite()).then_some((own.key, curve, length))
+        (length > 0.0 && length.is_finite()).then_some((own.key, curve, pace))
     };
-    let paced: Vec<(u32, Curve, f64)> = intervals.iter_mut().filter_map(paced).collect();
+    let paced: Vec<(u32, Curve, Pace)> = intervals.iter_mut().filter_map(paced).collect();
     if paced.is_empty() {
         // The track does not move at all.
         let Part { before, beyond, .. } = &prepared.parts[part];
@@ -66,19 +68,37 @@ fn retime_track(
         prepared.push_span(start, Source::Constant(held), NONE);
         return;
     }
-    let total: f64 = paced.iter().map(|&(_, _, length)| length).sum();
+    let total: f64 = paced.iter().map(|(_, _, pace)| pace.total()).sum();
     let (end, count) = (prepared.parts[part].end, paced.len());
     let seconds = end - start;
+    // The first time of f64 at which the track has got so far, in seconds from its start: before it, the
+    // curve would be followed beyond its end.
+    let reached = |exact: f64| {
+        let time = start + exact;
+        let is_before = (exact - (time - start)) * (total / seconds) > VISIBLE;
+        if is_before { time.next_up() } else { time }
+    };
     let mut done = 0.0;
-    for (i, (key, mut curve, length)) in paced.into_iter().enumerate() {
-        let from = start + seconds * (done / total);
-        done += length;
+    for (i, (key, mut curve, mut pace)) in paced.into_iter().enumerate() {
+        let exact_from = seconds * (done / total);
+        done += pace.total();
         let is_last = i + 1 == count;
-        let to = if is_last {
-            end
-        } else {
-            start + seconds * (done / total)
+        let exact_to = match is_last {
+            true => seconds,
+            false => seconds * (done / total),
         };
+        let from = reached(exact_from);
+        let to = if is_last { end } else { reached(exact_to) };
+        let missed = [(from, exact_from, 0.0), (to, exact_to, 1.0)];
+        let ends = missed.map(|(time, exact, fraction)| {
+            let missed = ((time - start) - exact) / (exact_to - exact_from);
+            match missed.abs() > INDISTINCT {
+                true => fraction + missed,
+                false => fraction,
+            }
+        });
+        pace.set_ends(ends);
+        curve.pace = Some(Arc::new(pace));
         curve.rate = 1.0 / (to - from);
         if let (true, Some(beyond)) = (is_last, &prepared.parts[part].beyond)
             && beyond.at_end != NONE
@@ -89,6 +109,8 @@ fn retime_track(
             return;
         }
         if from < to {
+            // Where no f64 is the key's time, no sample is the key.
+            let key = if ends[0] == 0.0 { key } else { NONE };
             fitting.take_curve(prepared, curve, from, key);
         }
     }

@@ -16,10 +16,16 @@ const SLOW: f64 = 1e-4;
 /// seven digits.
 const NEXT_TO_REST: f64 = 1e-5;
 
+/// How far outside its interval a curve is followed at most, in parts of the interval.
+const FARTHEST_OUTSIDE: f64 = 0.25;
+
 /// How far a curve has turned at each eighth of its parameter, radians.
 #[derive(Debug)]
 pub(crate) struct Pace {
     lengths: [f64; PARTS + 1],
+    /// The fractions of the length at which the curve is when its interval starts and ends: 0 and 1, but
+    /// far from the time 0, where the exact start and end lie between two times of f64.
+    ends: [f64; 2],
 }
 
 impl Pace {
@@ -29,7 +35,15 @@ impl Pace {
             let [from, to] = [part, part + 1].map(|part| part as f64 / PARTS as f64);
             lengths[part + 1] = lengths[part] + turned(curve, from, to);
         }
-        Self { lengths }
+        Self {
+            lengths,
+            ends: [0.0, 1.0],
+        }
+    }
+
+    /// Lets the interval start and end where the curve has turned by these fractions of its length.
+    pub(crate) fn set_ends(&mut self, ends: [f64; 2]) {
+        self.ends = ends;
     }
 
     /// How far the whole curve turns, radians.
@@ -37,10 +51,11 @@ impl Pace {
         self.lengths[PARTS]
     }
 
-    /// The curve's own parameter where it has turned by the fraction `part` of its length, with the
-    /// first two derivatives by `part`.
-    pub(crate) fn parameter(&self, curve: &Curve, part: f64) -> Dual {
-        let mut u = self.place(curve, part * self.total());
+    /// The curve's own parameter at `t`, which runs from 0 to 1 over the interval, with the first two
+    /// derivatives by `t`.
+    pub(crate) fn parameter(&self, curve: &Curve, t: f64) -> Dual {
+        let [from, to] = self.ends;
+        let mut u = self.place(curve, (from + (to - from) * t) * self.total());
         let (mut velocity, mut acceleration) = rates(curve, u);
         if length(velocity) < SLOW * self.total() {
             // A curve at rest has no direction; it has one a little way into the interval.
@@ -48,7 +63,7 @@ impl Pace {
             (velocity, acceleration) = rates(curve, u);
         }
         let speed = length(velocity).max(1e-12);
-        let first = self.total() / speed;
+        let first = (to - from) * self.total() / speed;
         let along: f64 = velocity.iter().zip(acceleration).map(|(v, a)| v * a).sum();
         // |ω| u' is constant, so its derivative is 0.
         Dual::new(u, first, -along * (first / speed) * (first / speed))
@@ -66,6 +81,11 @@ impl Pace {
             return from;
         }
         let mut u = from + (high - low) * (rest / whole).clamp(0.0, 1.0);
+        if rest < 0.0 {
+            low -= FARTHEST_OUTSIDE;
+        } else if rest > whole {
+            high += FARTHEST_OUTSIDE;
+        }
         let mut excess = turned(curve, from, u) - rest;
         for _ in 0..40 {
             if excess > 0.0 {
