@@ -333,7 +333,10 @@ fn arbitrary_times_have_the_same_bits() {
             }
         });
         for (round, (method, expected)) in METHODS.into_iter().zip(&expected).enumerate() {
-            for vulkan in in_turn(&engines, round + place) {
+            if !is_turn(round, place, 2) {
+                continue;
+            }
+            for vulkan in in_turn(&engines, (round + place) / 2) {
                 for (frames, expected) in requests.iter().zip(expected) {
                     let found = vulkan.evaluate(&set, method, frames).unwrap();
                     let what = format!("{method}, {memory:?} bytes");
@@ -1114,10 +1117,13 @@ fn few_samples_of_a_kept_clip_have_the_same_bits() {
         let clips: Vec<_> = in_turn(&engines, round)
             .map(|engine| (engine, engine.upload(&set, interpolation).unwrap()))
             .collect();
-        for frames in &requests {
+        for (request, frames) in requests.iter().enumerate() {
             let samples = kept.evaluate(frames).unwrap().as_quats().len();
             assert!(samples < set.key_count(), "few samples");
-            for encoding in Encoding::KINDS {
+            for (place, encoding) in Encoding::KINDS.into_iter().enumerate() {
+                if !is_turn(round + request, place, 2) {
+                    continue;
+                }
                 let layout = Layout::TrackMajor;
                 let expected = kept.evaluate_encoded(frames, layout, encoding).unwrap();
                 for (engine, clip) in &clips {

@@ -50,10 +50,12 @@ fn every_device_encodes_like_the_host() {
                         let found = clip.evaluate_encoded(frames, layout, encoding).unwrap();
                         let what = format!("{device:?}, {method}, {layout:?}, {encoding:?}");
                         assert!(found == expected, "{what}");
-                        let mut own = vec![0xff; expected.len()];
-                        clip.evaluate_encoded_into(frames, layout, encoding, &mut own)
-                            .unwrap();
-                        assert!(own == expected, "{what}");
+                        if is_turn(round, place, 2 * WAYS.len()) {
+                            let mut into = vec![0xff; expected.len()];
+                            clip.evaluate_encoded_into(frames, layout, encoding, &mut into)
+                                .unwrap();
+                            assert!(into == expected, "{what}");
+                        }
                     }
                 }
             }
