@@ -99,7 +99,7 @@ pub fn to_bytes(clip: &Motion) -> Vec<u8> {
     for (index, track) in set.tracks().enumerate() {
         let vectors = |channel| set.vector_keys(channel, index);
         let joint = clip.skeleton.get(index);
-        let own = Written {
+        let written = Written {
             track,
             shares_times: index > 0 && track.times == before,
             translations: vectors(Channel::Translation),
@@ -108,8 +108,10 @@ pub fn to_bytes(clip: &Motion) -> Vec<u8> {
             rest: joint.map(|joint| joint.rest),
         };
         before = track.times;
-        header.tracks.push(own.header(joint, clip.channel(index)));
-        own.write(&mut numbers);
+        header
+            .tracks
+            .push(written.header(joint, clip.channel(index)));
+        written.write(&mut numbers);
     }
     let header = serde_json::to_vec(&header).expect("names are strings and numbers are whole");
     let mut bytes = Vec::with_capacity(4 + header.len() + numbers.len());
@@ -132,7 +134,7 @@ struct Written<'a> {
 impl Written<'_> {
     fn header(&self, joint: Option<&Joint>, channels: Channels) -> TrackHeader {
         let has_tangents =
-            |keys: Option<VectorKeys<'_>>| keys.is_some_and(|own| !own.tangents.is_empty());
+            |keys: Option<VectorKeys<'_>>| keys.is_some_and(|vectors| !vectors.tangents.is_empty());
         TrackHeader {
             name: self.track.name.unwrap_or_default().to_owned(),
             keys: self.track.keys.len(),
@@ -140,9 +142,9 @@ impl Written<'_> {
             velocities: !self.track.velocities.is_empty(),
             tcb: !self.track.tcb.is_empty(),
             tangents: !self.track.tangents.is_empty(),
-            translations: self.translations.map_or(0, |own| own.keys.len()),
+            translations: self.translations.map_or(0, |vectors| vectors.keys.len()),
             translation_tangents: has_tangents(self.translations),
-            scales: self.scales.map_or(0, |own| own.keys.len()),
+            scales: self.scales.map_or(0, |vectors| vectors.keys.len()),
             scale_tangents: has_tangents(self.scales),
             parent: joint.and_then(|joint| joint.parent),
             rotation_sampler: channels.rotation,
@@ -168,7 +170,7 @@ impl Written<'_> {
         doubles(velocities.iter().flat_map(DVec3::to_array), out);
         let tcb = tcb
             .iter()
-            .flat_map(|own| [own.tension, own.continuity, own.bias]);
+            .flat_map(|tcb| [tcb.tension, tcb.continuity, tcb.bias]);
         doubles(tcb, out);
         singles(keys.iter().flat_map(Quat::to_array), out);
         singles(tangents.as_flattened().iter().flat_map(Quat::to_array), out);
@@ -226,30 +228,30 @@ pub fn from_bytes(bytes: &[u8]) -> Result<Motion, PackedError> {
         track: 0,
     };
     let mut times = Vec::new();
-    for (index, own) in header.tracks.into_iter().enumerate() {
+    for (index, track) in header.tracks.into_iter().enumerate() {
         numbers.track = index;
-        if own.shares_times && index == 0 {
+        if track.shares_times && index == 0 {
             return Err(PackedError::NothingShared);
         }
-        if !own.shares_times {
-            times = numbers.doubles(own.keys, "key times")?;
+        if !track.shares_times {
+            times = numbers.doubles(track.keys, "key times")?;
         }
-        numbers.read_track(&own, &times, &mut clip)?;
+        numbers.read_track(&track, &times, &mut clip)?;
         if header.has_skeleton {
-            let rest = match own.rest {
+            let rest = match track.rest {
                 true => numbers.rest()?,
                 false => Transform::default(),
             };
             clip.skeleton.push(Joint {
-                parent: own.parent,
+                parent: track.parent,
                 rest,
             });
         }
         if header.has_channels {
             clip.channels.push(Channels {
-                rotation: own.rotation_sampler,
-                translation: own.translation_sampler,
-                scale: own.scale_sampler,
+                rotation: track.rotation_sampler,
+                translation: track.translation_sampler,
+                scale: track.scale_sampler,
             });
         }
     }
@@ -279,9 +281,9 @@ impl Numbers<'_> {
             .checked_mul(components)
             .and_then(|numbers| numbers.checked_mul(BYTES))
             .ok_or_else(short)?;
-        let (own, rest) = self.bytes.split_at_checked(length).ok_or_else(short)?;
+        let (taken, rest) = self.bytes.split_at_checked(length).ok_or_else(short)?;
         self.bytes = rest;
-        let (numbers, _) = own.as_chunks();
+        let (numbers, _) = taken.as_chunks();
         Ok(numbers.iter().map(|&bytes| number(bytes)).collect())
     }
 
@@ -307,47 +309,47 @@ impl Numbers<'_> {
     /// The numbers of a track up to its rest, and the track.
     fn read_track(
         &mut self,
-        own: &TrackHeader,
+        header: &TrackHeader,
         times: &[f64],
         clip: &mut Motion,
     ) -> Result<(), PackedError> {
         let index = self.track;
-        let keyed = |has: bool| if has { own.keys } else { 0 };
-        let velocities = self.triples(keyed(own.velocities), "angular velocities")?;
-        let tcb = self.triples(keyed(own.tcb), "tension, continuity and bias")?;
-        let keys = self.quats(own.keys, "keys")?;
-        let tangents = self.quats(keyed(own.tangents).saturating_mul(2), "tangents")?;
+        let keyed = |has: bool| if has { header.keys } else { 0 };
+        let velocities = self.triples(keyed(header.velocities), "angular velocities")?;
+        let tcb = self.triples(keyed(header.tcb), "tension, continuity and bias")?;
+        let keys = self.quats(header.keys, "keys")?;
+        let tangents = self.quats(keyed(header.tangents).saturating_mul(2), "tangents")?;
         let set = &mut clip.set;
-        set.push(&*own.name, times, &keys)?;
-        if own.velocities {
+        set.push(&*header.name, times, &keys)?;
+        if header.velocities {
             set.set_velocities(index, &velocities)?;
         }
-        if own.tcb {
-            let tcb = tcb.iter().map(|own| Tcb {
-                tension: own.x,
-                continuity: own.y,
-                bias: own.z,
+        if header.tcb {
+            let tcb = tcb.iter().map(|numbers| Tcb {
+                tension: numbers.x,
+                continuity: numbers.y,
+                bias: numbers.z,
             });
             set.set_tcb(index, &tcb.collect::<Vec<_>>())?;
         }
-        if own.tangents {
+        if header.tangents {
             set.set_tangents(index, tangents.as_chunks().0)?;
         }
-        if own.translations > 0 {
-            let times = self.doubles(own.translations, "times of translations")?;
-            let keys = self.vectors(own.translations, "translations")?;
-            let tangents = self.tangents(own.translations, own.translation_tangents)?;
+        if header.translations > 0 {
+            let times = self.doubles(header.translations, "times of translations")?;
+            let keys = self.vectors(header.translations, "translations")?;
+            let tangents = self.tangents(header.translations, header.translation_tangents)?;
             let tangents = tangents.as_chunks().0;
             clip.set.set_translations(index, &times, &keys, tangents)?;
         }
-        if own.scales > 0 {
-            let times = self.doubles(own.scales, "times of scales")?;
-            let keys = self.vectors(own.scales, "scales")?;
-            let tangents = self.tangents(own.scales, own.scale_tangents)?;
+        if header.scales > 0 {
+            let times = self.doubles(header.scales, "times of scales")?;
+            let keys = self.vectors(header.scales, "scales")?;
+            let tangents = self.tangents(header.scales, header.scale_tangents)?;
             let tangents = tangents.as_chunks().0;
             clip.set.set_scales(index, &times, &keys, tangents)?;
         }
-        if own.origin {
+        if header.origin {
             let origin = self.triples(1, "origin")?;
             clip.set_origin(index, origin[0]);
         }
@@ -425,7 +427,8 @@ mod tests {
         let all = |clip: &Motion| {
             let tracks = 0..clip.set.track_count();
             let channels = [Channel::Translation, Channel::Scale];
-            let vectors = tracks.map(|track| channels.map(|own| clip.set.vector_keys(own, track)));
+            let vectors =
+                tracks.map(|track| channels.map(|channel| clip.set.vector_keys(channel, track)));
             let tracks: Vec<Track<'_>> = clip.set.tracks().collect();
             let beside = Motion {
                 set: TrackSet::new(),

@@ -69,10 +69,13 @@ fn samples_have_the_engine_s_bits_in_both_orders() {
                         "track" => track * 4 + sample,
                         _ => sample * 3 + track,
                     };
-                    let own = Quat::from_slice(&found[4 * at..]);
+                    let rotation = Quat::from_slice(&found[4 * at..]);
                     let right = right.get(track, sample).unwrap();
                     // Signs continue along a track, as in files.
-                    assert!(own == right || own == -right, "{method} {layout} {at}");
+                    assert!(
+                        rotation == right || rotation == -right,
+                        "{method} {layout} {at}"
+                    );
                 }
             }
         }
