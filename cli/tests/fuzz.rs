@@ -289,8 +289,8 @@ fn mcap() {
         corpus
             .clone()
             .into_iter()
-            .filter(|own| own.starts_with(b"\x89MCAP0\r\n"))
-            .map(|own| unpacked(&own)),
+            .filter(|file| file.starts_with(b"\x89MCAP0\r\n"))
+            .map(|file| unpacked(&file)),
     );
     fuzz_motion("mcap", targets::motion::mcap, corpus, &words);
 }
@@ -299,8 +299,10 @@ fn mcap() {
 fn unpacked(log: &[u8]) -> Vec<u8> {
     let mut at = 8;
     while let Some(&kind) = log.get(at) {
-        let length = log.get(at + 1..at + 9).and_then(|own| own.first_chunk());
-        let Some(length) = length.map(|own| u64::from_le_bytes(*own) as usize) else {
+        let length = log
+            .get(at + 1..at + 9)
+            .and_then(|bytes| bytes.first_chunk());
+        let Some(length) = length.map(|bytes| u64::from_le_bytes(*bytes) as usize) else {
             break;
         };
         if kind == 6 && log.get(at + 37..at + 41) == Some(&[0; 4]) {

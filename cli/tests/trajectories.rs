@@ -52,7 +52,7 @@ fn every_trajectory_becomes_every_other() {
     ];
     let mut pairs = second.iter().zip(expected);
     assert!(
-        pairs.all(|(own, expected)| (own - expected).abs() < 1e-7),
+        pairs.all(|(found, expected)| (found - expected).abs() < 1e-7),
         "{kitti}"
     );
     let times = fs::read_to_string(at.join("times.txt")).unwrap();

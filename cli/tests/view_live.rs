@@ -69,10 +69,10 @@ fn assert_same_bits(page: &mut Page, place: &Path, line: &[&str]) {
     assert_eq!(found.len(), expected.len() * 4);
     for (track, rotations) in expected.chunks(times.len()).enumerate() {
         for (sample, rotation) in rotations.iter().enumerate() {
-            let own = &found[(sample * tracks + track) * 4..][..4];
-            let own = own.iter().map(|number| number.as_f64().unwrap() as f32);
+            let live = &found[(sample * tracks + track) * 4..][..4];
+            let live = live.iter().map(|number| number.as_f64().unwrap() as f32);
             assert!(
-                own.eq(rotation.to_array()),
+                live.eq(rotation.to_array()),
                 "{line:?}, track {track}, sample {sample}: {rotation}"
             );
         }

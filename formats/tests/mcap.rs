@@ -25,7 +25,7 @@ fn topics_and_pairs_of_frames_are_tracks() {
     for name in ["good.mcap", "lz4.mcap"] {
         let loaded = read(name);
         assert_eq!(loaded.refused, []);
-        let codes: Vec<Code> = loaded.warnings.iter().map(|own| own.code).collect();
+        let codes: Vec<Code> = loaded.warnings.iter().map(|warning| warning.code).collect();
         assert_eq!(codes, [Code::McapOthers]);
         assert!(loaded.warnings[0].message.ends_with("`/log`"));
         let clip = &loaded.clips[0];
@@ -51,7 +51,7 @@ fn topics_and_pairs_of_frames_are_tracks() {
             let expected = (0..6u8).map(|i| first + 0.1 * f64::from(i));
             let mut pairs = times.iter().zip(expected);
             assert!(
-                pairs.all(|(own, expected)| (own - expected).abs() < 1e-9),
+                pairs.all(|(found, expected)| (found - expected).abs() < 1e-9),
                 "{name} {times:?}"
             );
             assert_eq!(keys, positions, "{name}");
@@ -90,7 +90,12 @@ fn a_topic_that_is_broken_is_refused_alone() {
         matches!(&refused.place, Some(Place::Inside(place)) if place.starts_with("/twice at byte "))
     );
     let loaded = read("cut.mcap");
-    assert!(loaded.warnings.iter().any(|own| own.code == Code::McapCut));
+    assert!(
+        loaded
+            .warnings
+            .iter()
+            .any(|warning| warning.code == Code::McapCut)
+    );
     assert!(loaded.clips[0].set.track(0).keys.len() < 6);
 }
 

@@ -240,7 +240,11 @@ fn rotations_of_16_bits_stay_within_the_bounds() {
         assert!(found[0] <= TENTH + 1e-7, "{found:?}");
         assert!(found[1] <= reduced.bounds[1] * (1.0 + 1e-6), "{found:?}");
         // What is told is what is read.
-        let told = reduced.errors.iter().map(|own| own[0]).fold(0.0, f64::max);
+        let told = reduced
+            .errors
+            .iter()
+            .map(|pair| pair[0])
+            .fold(0.0, f64::max);
         assert!((told - found[0]).abs() < 2e-7, "{told:e} {found:?}");
         let off = |track: usize| {
             let pairs = again
@@ -274,7 +278,7 @@ fn rotations_of_16_bits_stay_within_the_bounds() {
     assert!(
         all.errors
             .iter()
-            .all(|own| own[0] <= TENTH && own[1] <= all.bounds[1])
+            .all(|pair| pair[0] <= TENTH && pair[1] <= all.bounds[1])
     );
     assert_eq!(all.clip.set.track(0).times.len(), 90);
     // Half a step of 16 bits is more than this.

@@ -91,10 +91,10 @@ pub(crate) fn bvh(bytes: &[u8]) -> u64 {
     let again = read_bvh("fuzz", &*out, &ReadOptions::default()).expect("our own");
     are_alike(&again.clips[0], &clip);
     let rotations = |clip: &Motion| keyed(clip).expect("one list of times").rotations;
-    for (found, wanted) in rotations(&again.clips[0]).into_iter().zip(rotations(&clip)) {
-        let [found, wanted] = [found, wanted].map(|q: Quat| q.as_dquat().normalize());
-        let off = 2.0 * (found * wanted.conjugate()).xyz().length();
-        assert!(off < 1e-6, "{wanted} {off:e}");
+    for (found, expected) in rotations(&again.clips[0]).into_iter().zip(rotations(&clip)) {
+        let [found, expected] = [found, expected].map(|q: Quat| q.as_dquat().normalize());
+        let off = 2.0 * (found * expected.conjugate()).xyz().length();
+        assert!(off < 1e-6, "{expected} {off:e}");
     }
     of
 }
@@ -142,9 +142,9 @@ pub(crate) fn kitti(bytes: &[u8]) -> u64 {
     let again = read_kitti("fuzz", &*out, &options).expect("our own");
     are_alike(&again.clips[0], &clip);
     let rotations = |clip: &Motion| keyed(clip).expect("one list of times").rotations;
-    for (found, wanted) in rotations(&again.clips[0]).into_iter().zip(rotations(&clip)) {
-        let off = 1.0 - found.as_dquat().dot(wanted.as_dquat()).abs();
-        assert!(off < 1e-6, "{wanted} {off:e}");
+    for (found, expected) in rotations(&again.clips[0]).into_iter().zip(rotations(&clip)) {
+        let off = 1.0 - found.as_dquat().dot(expected.as_dquat()).abs();
+        assert!(off < 1e-6, "{expected} {off:e}");
     }
     of
 }
@@ -174,7 +174,7 @@ pub(crate) fn euroc(bytes: &[u8]) -> u64 {
     let found = keyed(&again.clips[0]).expect("one list of times");
     assert_eq!(found.rotations, samples.rotations);
     assert_eq!(found.translations.len(), samples.translations.len());
-    let codes: Vec<_> = loaded.warnings.iter().map(|own| own.code).collect();
+    let codes: Vec<_> = loaded.warnings.iter().map(|warning| warning.code).collect();
     signature((codes, samples.times.len().min(5)))
 }
 
@@ -194,8 +194,8 @@ pub(crate) fn mcap(bytes: &[u8]) -> u64 {
             assert!((key.as_dquat().length() - 1.0).abs() < 1e-6, "{key}");
         }
     }
-    let codes: Vec<_> = loaded.warnings.iter().map(|own| own.code).collect();
-    let refused: Vec<_> = loaded.refused.iter().map(|own| own.code).collect();
+    let codes: Vec<_> = loaded.warnings.iter().map(|warning| warning.code).collect();
+    let refused: Vec<_> = loaded.refused.iter().map(|warning| warning.code).collect();
     signature((codes, refused, clip.set.track_count().min(5)))
 }
 

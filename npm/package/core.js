@@ -96,17 +96,17 @@ function packedTrack(track, index, before) {
     parts.push(tangents);
   }
   for (const [name, tangentsName] of [["translations", "translationTangents"], ["scales", "scaleTangents"]]) {
-    const own = track[name];
-    if (own === undefined) continue;
-    const at = numbers(own.times, Float64Array, 1, what(`times of ${name}`));
-    const values = numbers(own.values, Float32Array, 3, what(name));
+    const vectors = track[name];
+    if (vectors === undefined) continue;
+    const at = numbers(vectors.times, Float64Array, 1, what(`times of ${name}`));
+    const values = numbers(vectors.values, Float32Array, 3, what(name));
     if (values.length !== at.length * 3) {
       throw new TumbleError(`${what("")}${values.length / 3} ${name} at ${at.length} times`);
     }
     header[name] = at.length;
     parts.push(at, values);
-    if (own.tangents !== undefined) {
-      const tangents = numbers(own.tangents, Float32Array, 6, what(`tangents of ${name}`));
+    if (vectors.tangents !== undefined) {
+      const tangents = numbers(vectors.tangents, Float32Array, 6, what(`tangents of ${name}`));
       if (tangents.length !== at.length * 6) throw new TumbleError(`${what(`tangents of ${name}`)}: two vectors a key are expected`);
       header[tangentsName] = true;
       parts.push(tangents);
@@ -131,20 +131,20 @@ function packed(tracks, { name = null, isWorld = false } = {}) {
   if (!Array.isArray(tracks)) throw new TumbleError("tracks are no array");
   let before = null;
   const made = tracks.map((track, index) => {
-    const own = packedTrack(track, index, before);
-    before = own.times;
-    return own;
+    const packed = packedTrack(track, index, before);
+    before = packed.times;
+    return packed;
   });
   const isSkeleton = tracks.some((track) => track.parent !== undefined || track.rest !== undefined || track.translations !== undefined);
   const hasChannels = tracks.some((track) => track.interpolation !== undefined);
-  for (const own of made) {
+  for (const packed of made) {
     if (isSkeleton) continue;
-    own.header.rest = false;
-    own.parts.pop();
+    packed.header.rest = false;
+    packed.parts.pop();
   }
-  const header = { name, isWorld, hasSkeleton: isSkeleton, hasChannels, tracks: made.map((own) => own.header) };
+  const header = { name, isWorld, hasSkeleton: isSkeleton, hasChannels, tracks: made.map((packed) => packed.header) };
   const json = text.encode(JSON.stringify(header));
-  const parts = made.flatMap((own) => own.parts);
+  const parts = made.flatMap((packed) => packed.parts);
   const bytes = new Uint8Array(4 + json.length + parts.reduce((sum, part) => sum + part.byteLength, 0));
   new DataView(bytes.buffer).setUint32(0, json.length, true);
   bytes.set(json, 4);

@@ -107,7 +107,7 @@ test("arrays make the clip that a file makes", () => {
     assert.deepEqual([same.name, same.names, same.start, same.end], ["same", clip.names, clip.start, clip.end]);
     assert.deepEqual(same.parents, clip.parents);
     for (const method of ["slerp", "c2"]) {
-      const [one, other] = [clip, same].map((own) => own.sample({ fps: 60 }, { method }));
+      const [one, other] = [clip, same].map((each) => each.sample({ fps: 60 }, { method }));
       assert.equal(differs(one.rotations, other.rotations), -1, `${file} ${method}`);
       if (one.translations && clip.parents[0] === null) {
         const first = (pose) => pose.translations.slice(0, 3 * pose.samples);

@@ -414,9 +414,9 @@ def test_reduced_clips_stay_within_their_bounds(rng, engine, tmp_path):
     assert len({tuple(together.clip.times(track)) for track in range(3)}) == 1
     tumble.save(tmp_path / "clip.glb", clip)
     line = ["reduce", "clip.glb", "--tolerance", "0.5deg", "-o", "small.glb", "--json"]
-    told = json.loads(program(*line, cwd=tmp_path))[0]
-    assert (told["keys_before"], told["keys_after"]) == (found.keys_before, found.keys_after)
-    assert abs(told["angle"]["largest"] - found.angles.max()) < 1e-9
+    said = json.loads(program(*line, cwd=tmp_path))[0]
+    assert (said["keys_before"], said["keys_after"]) == (found.keys_before, found.keys_after)
+    assert abs(said["angle"]["largest"] - found.angles.max()) < 1e-9
     smaller = tumble.reduce(clip, tolerance=0.5, curve="bessel-overhauser", fps=30)
     assert smaller.times.shape == (61,)
     with pytest.raises(tumble.InputError, match="curve: there is no `round`"):
@@ -437,10 +437,10 @@ def test_clips_are_compared_as_the_program_does(rng, tmp_path):
     assert found.translation is None and found.identical == 0
     for name, clip in [("a.glb", first), ("b.glb", second)]:
         tumble.save(tmp_path / name, clip)
-    told = json.loads(program("compare", "a.glb", "b.glb", "--json", cwd=tmp_path))["clips"][0]
+    said = json.loads(program("compare", "a.glb", "b.glb", "--json", cwd=tmp_path))["clips"][0]
     again = tumble.compare(tumble.load(tmp_path / "a.glb").clip, tumble.load(tmp_path / "b.glb").clip)
-    assert told["rotation"]["largest"] == again.rotation.largest
-    assert told["rotation"]["time"] == again.rotation.time and told["samples"] == again.samples
+    assert said["rotation"]["largest"] == again.rotation.largest
+    assert said["rotation"]["time"] == again.rotation.time and said["samples"] == again.samples
     same = tumble.compare(first, first, fps=60, start=0.5)
     assert same.identical == same.tracks * same.samples == 2 * 91
     longer = tumble.Clip(TIMES * 2, keys, names=names)
@@ -478,15 +478,15 @@ def test_path_errors_are_those_of_the_program(rng, tmp_path):
     for name, where, q in [("truth.tum", path, keys), ("estimate.tum", moved, rotated)]:
         np.savetxt(tmp_path / name, np.c_[times, where, q], fmt="%.9f")
     line = ["compare", "truth.tum", "estimate.tum", "--align", "sim3", "--ape", "--rpe", "1s", "--json"]
-    told = json.loads(program(*line, cwd=tmp_path))["trajectory"]
+    said = json.loads(program(*line, cwd=tmp_path))["trajectory"]
     clips = [tumble.load(tmp_path / name).clip for name in ("truth.tum", "estimate.tum")]
     found = tumble.path_errors(*clips, align="sim3", rpe="1s")
-    assert found.poses == told["poses"] == 60 and found.rpe_count == told["rpe"]["count"]
-    assert found.scale == told["alignment"]["scale"] and abs(found.scale - 1 / 1.5) < 0.01
+    assert found.poses == said["poses"] == 60 and found.rpe_count == said["rpe"]["count"]
+    assert found.scale == said["alignment"]["scale"] and abs(found.scale - 1 / 1.5) < 0.01
     for name, errors in [("ape", (found.ape_translation, found.ape_rotation)), ("rpe", (found.rpe_translation, found.rpe_rotation))]:
         for kind, numbers in zip(["translation", "rotation"], errors):
             for field in ["rmse", "mean", "median", "std", "min", "max"]:
-                assert getattr(numbers, field) == told[name][kind][field]
+                assert getattr(numbers, field) == said[name][kind][field]
     assert tumble.path_errors(*clips).rpe_rotation is None
     for options, message in [
         (dict(align="se4"), "align: there is no `se4`; there are none, position"),
@@ -581,13 +581,13 @@ def test_every_device_gives_the_same_bits(rng, walks):
         pytest.skip("no Vulkan device")
     found = []
     for engine in [tumble.Engine("cpu"), tumble.Engine("vulkan")]:
-        own = np.random.default_rng(3)
-        a, b = unit(own, 5, 300), unit(own, 5, 300)
+        generator = np.random.default_rng(3)
+        a, b = unit(generator, 5, 300), unit(generator, 5, 300)
         crowd = tumble.Crowd(walks, 64, engine=engine)
-        crowd.set(range(64), own.integers(0, 2, 64), time=own.uniform(0, 1, 64))
+        crowd.set(range(64), generator.integers(0, 2, 64), time=generator.uniform(0, 1, 64))
         found.append([
             engine.smooth(a), engine.mix(a, b, 0.3), engine.blend([a, b], [1, 2]), engine.add(a, b, weight=0.5),
-            engine.local_to_model(a, [None, 0, 1, 2, 3]), *engine.follow(np.arange(9), own.normal(size=(9, 3)), fps=30),
+            engine.local_to_model(a, [None, 0, 1, 2, 3]), *engine.follow(np.arange(9), generator.normal(size=(9, 3)), fps=30),
             crowd.evaluate(), crowd.evaluate("rotations"),
         ])
     for one, other in zip(*found):

@@ -27,7 +27,7 @@ fn bytes_of(numbers: &[f32]) -> Vec<u8> {
 /// Rotations in f32 as those of 16 bits a component.
 fn shorts_of(bytes: &[u8]) -> Vec<u8> {
     let numbers = bytes.as_chunks::<4>().0.iter();
-    let numbers: Vec<f32> = numbers.map(|&own| f32::from_le_bytes(own)).collect();
+    let numbers: Vec<f32> = numbers.map(|&bytes| f32::from_le_bytes(bytes)).collect();
     let each = numbers
         .as_chunks::<4>()
         .0

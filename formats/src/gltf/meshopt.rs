@@ -222,10 +222,16 @@ fn encode_list(mut list: Vec<u8>, stream: &mut Vec<u8>) {
     for (place, group) in groups.iter().enumerate() {
         // Those that do not fit take a byte each behind the others; in no bits there is nothing but zeros.
         let length = |width: usize| match width {
-            0 if group.iter().any(|&own| own != 0) => usize::MAX,
+            0 if group.iter().any(|&byte| byte != 0) => usize::MAX,
             0 => 0,
             8 => GROUP,
-            _ => 2 * width + group.iter().filter(|&&own| own >= (1 << width) - 1).count(),
+            _ => {
+                2 * width
+                    + group
+                        .iter()
+                        .filter(|&&byte| byte >= (1 << width) - 1)
+                        .count()
+            }
         };
         let shortest = (0..WIDTHS.len()).min_by_key(|&index| length(WIDTHS[index]));
         let index = shortest.unwrap_or(3);
@@ -236,10 +242,10 @@ fn encode_list(mut list: Vec<u8>, stream: &mut Vec<u8>) {
             width => {
                 let all_set = (1u8 << width) - 1;
                 for packed in group.chunks_exact(8 / width) {
-                    let bits = packed.iter().map(|&own| own.min(all_set));
-                    stream.push(bits.fold(0, |bits, own| bits << width | own));
+                    let bits = packed.iter().map(|&byte| byte.min(all_set));
+                    stream.push(bits.fold(0, |bits, byte| bits << width | byte));
                 }
-                stream.extend(group.iter().filter(|&&own| own >= all_set));
+                stream.extend(group.iter().filter(|&&byte| byte >= all_set));
             }
         }
     }

@@ -39,7 +39,7 @@ impl Quantization {
             }
         };
         unit(DQuat::from_array(
-            components.map(|own| f64::from(own) / f64::from(ONE)),
+            components.map(|component| f64::from(component) / f64::from(ONE)),
         ))
     }
 }
@@ -62,11 +62,11 @@ pub(crate) fn filtered(rotation: [f32; 4], steps: u16) -> [u8; 8] {
     // What is left out is said in the two lowest bits.
     let last = (steps & !3) as i16 | largest as i16;
     let mut element = [0; 8];
-    for (bytes, own) in element
+    for (bytes, component) in element
         .chunks_exact_mut(2)
         .zip([short(1), short(2), short(3), last])
     {
-        bytes.copy_from_slice(&own.to_le_bytes());
+        bytes.copy_from_slice(&component.to_le_bytes());
     }
     element
 }

@@ -124,8 +124,8 @@ impl Making<'_> {
             None => Vec::new(),
             Some(accessor) => {
                 let from = format!("{pointer}/inverseBindMatrices");
-                let own = self.reader.accessor(accessor, &from)?;
-                self.reader.numbers(accessor, &own, 16, &from)?
+                let matrices = self.reader.accessor(accessor, &from)?;
+                self.reader.numbers(accessor, &matrices, 16, &from)?
             }
         };
         let inverses: Vec<&[f64]> = inverses.chunks_exact(16).collect();
@@ -161,14 +161,14 @@ impl Making<'_> {
     fn carrier(&self, node: usize) -> Result<Option<Bone>, Diagnostic> {
         let mut to_joint = DMat4::IDENTITY;
         let mut next = Some(node);
-        while let Some(own) = next {
-            if let Some(&track) = self.tracks.get(self.nodes.name(own)) {
+        while let Some(node) = next {
+            if let Some(&track) = self.tracks.get(self.nodes.name(node)) {
                 let to_joint = to_joint.as_mat4().to_cols_array();
                 return Ok(Some(Bone { track, to_joint }));
             }
-            let entry: Node = self.reader.json.entry("nodes", own, "/nodes")?;
+            let entry: Node = self.reader.json.entry("nodes", node, "/nodes")?;
             to_joint = place_in_parent(&entry) * to_joint;
-            next = self.nodes.parent(own);
+            next = self.nodes.parent(node);
         }
         Ok(None)
     }
@@ -181,9 +181,9 @@ impl Making<'_> {
         has_skin: bool,
     ) -> Result<(), Diagnostic> {
         let json = self.reader.json;
-        let mut own = Triangles::default();
-        add(self.reader, primitive, pointer, DMat4::IDENTITY, &mut own)?;
-        let count = own.positions.len();
+        let mut added = Triangles::default();
+        add(self.reader, primitive, pointer, DMat4::IDENTITY, &mut added)?;
+        let count = added.positions.len();
         self.reader.take(count, VERTEX, pointer)?;
         let attributes = &primitive.attributes;
         let (bones_of, weights) = match (has_skin, attributes.joints, attributes.weights) {
@@ -218,10 +218,13 @@ impl Making<'_> {
             let message = "the file has more than 4294967295 vertices; simplify it";
             return Err(json.refuse(pointer, Code::IndexRange, message));
         }
-        let corners = own.triangles.iter();
+        let corners = added.triangles.iter();
         let moved = corners.map(|three| three.map(|corner| corner + first as u32));
         self.mesh.triangles.extend(moved);
-        let places = own.positions.iter().map(|place| place.as_vec3().to_array());
+        let places = added
+            .positions
+            .iter()
+            .map(|place| place.as_vec3().to_array());
         self.mesh.positions.extend(places);
         let bones_of = bones_of.as_chunks().0.iter();
         let numbers =

@@ -59,7 +59,7 @@ impl Plan {
         // What is no length says nothing.
         let numbers = archive
             .find(name)
-            .and_then(|own| read_numbers(archive, own).ok());
+            .and_then(|name| read_numbers(archive, name).ok());
         let Some(&[seconds]) = numbers.as_deref() else {
             return;
         };

@@ -270,7 +270,7 @@ impl<'a> Reduction<'a> {
     /// How far a clip is from the samples, as `eval` evaluates it.
     fn measure(&self, reduced: &Motion) -> Result<Measured, ReduceMotionError> {
         let frames = Frames::at(self.times.clone());
-        let quantized = self.options.quantize.map(|own| quantized(reduced, own));
+        let quantized = self.options.quantize.map(|bits| quantized(reduced, bits));
         let quantized = quantized.transpose()?;
         let reduced = quantized.as_ref().unwrap_or(reduced);
         let samples = ChannelMethods::AUTHORED.sample(self.engine, reduced, &frames)?;
@@ -375,7 +375,7 @@ impl Measured {
 fn quantized(clip: &Motion, quantization: Quantization) -> Result<Motion, TrackError> {
     let mut short = clip.without_tracks();
     for (index, track) in clip.set.tracks().enumerate() {
-        let keys: Vec<Quat> = match clip.channels.get(index).map(|own| own.rotation) {
+        let keys: Vec<Quat> = match clip.channels.get(index).map(|channels| channels.rotation) {
             // A node's rest pose is f32, and tangents may be longer than 16 bits take.
             Some(None | Some(Sampler::Cubic)) => track.keys.to_vec(),
             _ => {
@@ -389,12 +389,12 @@ fn quantized(clip: &Motion, quantization: Quantization) -> Result<Motion, TrackE
         if !track.tangents.is_empty() {
             short.set.set_tangents(index, track.tangents)?;
         }
-        if let Some(own) = clip.set.vector_keys(Channel::Translation, index) {
-            let (times, keys, tangents) = (own.times, own.keys, own.tangents);
+        if let Some(vectors) = clip.set.vector_keys(Channel::Translation, index) {
+            let (times, keys, tangents) = (vectors.times, vectors.keys, vectors.tangents);
             short.set.set_translations(index, times, keys, tangents)?;
         }
-        if let Some(own) = clip.set.vector_keys(Channel::Scale, index) {
-            let (times, keys, tangents) = (own.times, own.keys, own.tangents);
+        if let Some(vectors) = clip.set.vector_keys(Channel::Scale, index) {
+            let (times, keys, tangents) = (vectors.times, vectors.keys, vectors.tangents);
             short.set.set_scales(index, times, keys, tangents)?;
         }
     }

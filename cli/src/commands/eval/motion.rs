@@ -47,7 +47,7 @@ impl Job<'_> {
             .iter()
             .map(|clip| self.samples.of_clip(clip, name))
             .collect::<Result<_, _>>()?;
-        self.in_gaps = times.iter().map(|own| own.in_gaps).sum();
+        self.in_gaps = times.iter().map(|of_clip| of_clip.in_gaps).sum();
         let rate = match self.samples {
             Samples::Rate { rate, .. } => Some(*rate),
             Samples::Times(_) | Samples::Keys(_) => None,

@@ -228,8 +228,8 @@ impl Arguments {
             all.push(self.reduced(engine, (name, clip), together)?);
         }
         let all = self.smaller(engine, &names, all)?;
-        let quantize = all.first().and_then(|own| own.1);
-        let all: Vec<Reduced> = all.into_iter().map(|own| own.0).collect();
+        let quantize = all.first().and_then(|pair| pair.1);
+        let all: Vec<Reduced> = all.into_iter().map(|pair| pair.0).collect();
         if let (Some(place), [reduced]) = (plot, &*all) {
             picture::draw(&input::file_name(path), reduced, place)?;
         }
@@ -340,23 +340,23 @@ impl Arguments {
         // One file has one quantization.
         let mut each = reduced.iter().map(|(_, all)| all.as_ref().map(|all| all.1));
         let first = each.next().flatten();
-        let same = first.filter(|&first| each.all(|own| own == Some(first)));
+        let same = first.filter(|&first| each.all(|bits| bits == Some(first)));
         let (mut few, mut all) = (0usize, 0usize);
-        for (own, other) in &reduced {
-            few = few.saturating_add(size(own, sixteen)?);
+        for (few_keys, other) in &reduced {
+            few = few.saturating_add(size(few_keys, sixteen)?);
             all = match other {
                 Some((other, _)) => all.saturating_add(size(other, same)?),
                 None => usize::MAX,
             };
         }
         let takes_all = same.filter(|_| all < few);
-        let own = reduced
+        let chosen = reduced
             .into_iter()
-            .map(|(own, other)| match (takes_all, other) {
+            .map(|(few_keys, other)| match (takes_all, other) {
                 (Some(bits), Some((other, _))) => (other, Some(bits)),
-                _ => (own, sixteen),
+                _ => (few_keys, sixteen),
             });
-        Ok(own.collect())
+        Ok(chosen.collect())
     }
 
     /// Writes reduced clips: into the input's own file where that is of the same format, else into a
@@ -389,8 +389,8 @@ impl Arguments {
         // Formats of frames take the keys where every frame has one.
         let has_times = format.holds(Feature::UnevenTimes);
         let rate = |clip: &Motion| clip.rate.filter(|_| !has_times);
-        let own = reduced.iter().zip(&samples);
-        let sampled: Vec<Sampled<'_>> = own
+        let both = reduced.iter().zip(&samples);
+        let sampled: Vec<Sampled<'_>> = both
             .map(|(reduced, samples)| Sampled {
                 of_own_keys: has_own_keys,
                 ..samples.of(&reduced.clip, rate(&reduced.clip), &notes)

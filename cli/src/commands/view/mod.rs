@@ -122,7 +122,10 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
                 words::note(&format!("{}: nothing moves; it is left out", one.name));
                 continue;
             }
-            match document.as_ref().map(|own| own.carried_mesh(&one.clip)) {
+            match document
+                .as_ref()
+                .map(|document| document.carried_mesh(&one.clip))
+            {
                 Some(Ok(mesh)) => one.mesh = mesh.filter(|mesh| is_small(mesh, &one.name)),
                 Some(Err(fault)) => {
                     words::note(&format!("{fault}; bones are shown without meshes"));

@@ -45,9 +45,11 @@ impl Data<'_> {
     pub(super) fn quantized(self, quantization: Quantization) -> Self {
         let of = |rotations: &mut dyn Iterator<Item = [f32; 4]>| match quantization {
             Quantization::Components => Self::Quantized(rotations.flat_map(quantized).collect()),
-            Quantization::Filtered(steps) => {
-                Self::Filtered(rotations.map(|own| filtered(own, steps)).collect())
-            }
+            Quantization::Filtered(steps) => Self::Filtered(
+                rotations
+                    .map(|rotation| filtered(rotation, steps))
+                    .collect(),
+            ),
         };
         match self {
             Self::Channel(samples, track, Property::Rotation) => of(&mut samples.rotations(track)),
