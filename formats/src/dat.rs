@@ -53,11 +53,9 @@ pub static FORMAT: Format = Format {
 /// # Errors
 /// The first fault that refuses the file.
 pub fn open_dat(path: &Path, options: &ReadOptions) -> Result<Loaded, Diagnostic> {
-    let mut source = Source::open(path, options.pipes)?;
-    let name = source.name.clone();
-    let loaded = read_dat(&name, &mut source.reader, options)?;
-    source.check_unchanged()?;
-    Ok(loaded)
+    Source::read_by(path, options.pipes, |name, reader| {
+        read_dat(name, reader, options)
+    })
 }
 
 /// Reads keyframes; `name` is what messages call the input.

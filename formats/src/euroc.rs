@@ -68,11 +68,9 @@ fn open_euroc(path: &Path, options: &ReadOptions) -> Result<Loaded, Diagnostic> 
     if options.map.is_some() {
         return open_csv(path, options);
     }
-    let mut source = Source::open(path, options.pipes)?;
-    let name = source.name.clone();
-    let loaded = read_euroc(&name, &mut source.reader, options)?;
-    source.check_unchanged()?;
-    Ok(loaded)
+    Source::read_by(path, options.pipes, |name, reader| {
+        read_euroc(name, reader, options)
+    })
 }
 
 /// Reads poses; `name` is what messages call the input. The one track is named `body`. Times are nanoseconds

@@ -52,11 +52,9 @@ pub struct FrameTimes {
 /// # Errors
 /// The first fault that refuses the file.
 pub fn open_frame_times(path: &Path, limits: Limits) -> Result<FrameTimes, Diagnostic> {
-    let mut source = Source::open(path, true)?;
-    let name = source.name.clone();
-    let times = read_frame_times(&name, &mut source.reader, limits)?;
-    source.check_unchanged()?;
-    Ok(times)
+    Source::read_by(path, true, |name, reader| {
+        read_frame_times(name, reader, limits)
+    })
 }
 
 /// Reads the times of frames; `name` is what messages call the input.
@@ -95,11 +93,9 @@ pub fn read_frame_times(
 }
 
 fn open_kitti(path: &Path, options: &ReadOptions) -> Result<Loaded, Diagnostic> {
-    let mut source = Source::open(path, options.pipes)?;
-    let name = source.name.clone();
-    let loaded = read_kitti(&name, &mut source.reader, options)?;
-    source.check_unchanged()?;
-    Ok(loaded)
+    Source::read_by(path, options.pipes, |name, reader| {
+        read_kitti(name, reader, options)
+    })
 }
 
 /// Reads poses, one a frame of the rate that the options say or at the times that they name; the one track is
@@ -206,7 +202,7 @@ fn write_motion(
             ((time - times[0]) * rate.per_second() - frame as f64).abs() < OFF_FRAME
         };
         let are_frames =
-            |&rate: &FrameRate| times.iter().enumerate().all(|own| is_frame(rate, own));
+            |&rate: &FrameRate| times.iter().enumerate().all(|frame| is_frame(rate, frame));
         let Some(rate) = path.sampled.rate.filter(are_frames) else {
             let message = "its times are no frames of a rate, and KITTI has no times; give --times-out, a file of them";
             return Err(path.refuse(message.to_owned()));
@@ -333,15 +329,15 @@ mod tests {
         };
         let (text, warnings) = write(clip, &apart).unwrap();
         assert_eq!(warnings, []);
-        let (matrices, own) = text.split_at(text.find("1305").unwrap());
+        let (matrices, seconds) = text.split_at(text.find("1305").unwrap());
         assert_eq!(
-            own,
+            seconds,
             "1305031098.665900000\n1305031098.700000000\n1305031099.250000000\n"
         );
-        let again = &read(matrices, own).unwrap().clips[0];
+        let again = &read(matrices, seconds).unwrap().clips[0];
         assert_eq!(again.set.track(0).times, clip.set.track(0).times);
         assert_eq!(again.set.track(0).keys, clip.set.track(0).keys);
-        // Without a file of times such poses cannot be told.
+        // Without a file of times such poses cannot be read.
         let refused = write(clip, &MotionOptions::default());
         assert!(matches!(refused, Err(WriteError::Refused(fault)) if fault.code == Code::TumWrite));
         let code = |poses: &str, times: &str| read(poses, times).unwrap_err().code;

@@ -44,6 +44,19 @@ impl Source {
         Self::of_file(file, name.clone()).map_err(unreadable)
     }
 
+    /// Opens a file, has it read by a function that gets its name for messages, and refuses it if it was
+    /// written to meanwhile.
+    pub(super) fn read_by<T>(
+        path: &Path,
+        pipes: bool,
+        read: impl FnOnce(&str, &mut BufReader<Box<dyn Read>>) -> Result<T, Diagnostic>,
+    ) -> Result<T, Diagnostic> {
+        let mut source = Self::open(path, pipes)?;
+        let found = read(&source.name, &mut source.reader)?;
+        source.check_unchanged()?;
+        Ok(found)
+    }
+
     /// A file that a file in `folder` names; see [`open_beneath`].
     pub(super) fn open_beneath(folder: &Path, named: &Path) -> Result<Self, Diagnostic> {
         let name = folder.join(named).display().to_string();

@@ -14,11 +14,7 @@ use crate::text::number;
 /// # Errors
 /// The first fault that refuses the file.
 pub fn open_times(path: &Path) -> Result<Vec<f64>, Diagnostic> {
-    let mut source = Source::open(path, true)?;
-    let name = source.name.clone();
-    let times = read_times(&name, &mut source.reader)?;
-    source.check_unchanged()?;
-    Ok(times)
+    Source::read_by(path, true, |name, reader| read_times(name, reader))
 }
 
 /// Reads times; `name` is what messages call the input.

@@ -73,11 +73,9 @@ pub static FORMAT: Format = Format {
 /// # Errors
 /// The first fault that refuses the file.
 pub fn open_tum(path: &Path, options: &ReadOptions) -> Result<Loaded, Diagnostic> {
-    let mut source = Source::open(path, options.pipes)?;
-    let name = source.name.clone();
-    let loaded = read_tum(&name, &mut source.reader, options)?;
-    source.check_unchanged()?;
-    Ok(loaded)
+    Source::read_by(path, options.pipes, |name, reader| {
+        read_tum(name, reader, options)
+    })
 }
 
 /// Reads poses; `name` is what messages call the input. The one track is named `body`. Times count

@@ -52,11 +52,9 @@ pub static FORMAT: Format = Format {
 /// # Errors
 /// The first fault that refuses the file.
 pub fn open_bvh(path: &Path, options: &ReadOptions) -> Result<Loaded, Diagnostic> {
-    let mut source = Source::open(path, options.pipes)?;
-    let name = source.name.clone();
-    let loaded = read_bvh(&name, &mut source.reader, options)?;
-    source.check_unchanged()?;
-    Ok(loaded)
+    Source::read_by(path, options.pipes, |name, reader| {
+        read_bvh(name, reader, options)
+    })
 }
 
 /// Reads a clip; `name` is what messages call the input. Translations have the file's units, times
