@@ -43,12 +43,12 @@ fn a_walk_gets_few_keys_and_compares() {
             "--curve",
             curve,
         ];
-        let told = succeed(
+        let said = succeed(
             place,
             &[&line[..], &["--json", "--plot", "errors.svg"]].concat(),
         );
-        assert!(told.words.contains("363 → "), "{}", told.words);
-        let json: Value = serde_json::from_slice(&told.out).unwrap();
+        assert!(said.words.contains("363 → "), "{}", said.words);
+        let json: Value = serde_json::from_slice(&said.out).unwrap();
         let clip = &json[0];
         assert_eq!(
             (clip["keys_before"].as_u64(), clip["samples"].as_u64()),
@@ -82,11 +82,11 @@ fn a_gltf_keeps_all_but_its_keys() {
     let folder = sample_folder();
     let place = folder.path();
     let fox = fox.to_str().unwrap();
-    let told = succeed(place, &["reduce", fox, "-o", "fox.glb", "--curve", "cubic"]);
+    let said = succeed(place, &["reduce", fox, "-o", "fox.glb", "--curve", "cubic"]);
     assert!(
-        told.words.contains("Survey: ") && told.words.contains("Run: "),
+        said.words.contains("Survey: ") && said.words.contains("Run: "),
         "{}",
-        told.words
+        said.words
     );
     let json = |file: &Path| -> Value {
         let bytes = fs::read(file).unwrap();
@@ -103,14 +103,15 @@ fn a_gltf_keeps_all_but_its_keys() {
         ("short.glb", &["--quantize"][..]),
         ("packed.glb", &["--quantize", "--meshopt"]),
     ] {
-        let told = succeed(place, &[&["reduce", fox, "-o", name][..], more].concat());
-        let is_new = told
+        let said = succeed(place, &[&["reduce", fox, "-o", name][..], more].concat());
+        let is_new = said
             .words
             .contains("compression makes a new file; stays behind: meshes");
-        assert_eq!(is_new, name == "packed.glb", "{}", told.words);
+        assert_eq!(is_new, name == "packed.glb", "{}", said.words);
         let found = json(&place.join(name));
         let accessors = found["accessors"].as_array().unwrap();
-        let is_short = |own: &&Value| own["componentType"] == 5122 && own["normalized"] == true;
+        let is_short =
+            |accessor: &&Value| accessor["componentType"] == 5122 && accessor["normalized"] == true;
         assert!(accessors.iter().filter(is_short).count() > 20, "{found}");
         assert_eq!(before["meshes"] == found["meshes"], !is_new);
         succeed(place, &[&["compare", fox, name][..], &bounds].concat());
@@ -149,8 +150,8 @@ fn a_chain_goes_back_into_dat() {
         "--curve",
         "bessel-overhauser",
     ];
-    let told = succeed(place, &line);
-    assert!(told.words.contains("402 → "), "{}", told.words);
+    let said = succeed(place, &line);
+    assert!(said.words.contains("402 → "), "{}", said.words);
     let text = fs::read_to_string(place.join("few.dat")).unwrap();
     assert!(text.lines().count() < 60, "{text}");
     succeed(
@@ -260,12 +261,12 @@ fn convert_keeps_cubics_and_times_of_channels() {
     );
     succeed(place, &["convert", "cubic.glb", "-o", "again.glb"]);
     let bits = ["--tolerance", "0", "--distance", "0"];
-    let told = succeed(
+    let said = succeed(
         place,
         &[&["compare", "cubic.glb", "again.glb"][..], &bits].concat(),
     );
     assert!(
-        String::from_utf8(told.out)
+        String::from_utf8(said.out)
             .unwrap()
             .contains("largest 0.000e0°")
     );

@@ -66,7 +66,7 @@ fn every_trajectory_becomes_every_other() {
         let largest = found["ape"][of]["max"].as_f64().unwrap();
         assert!(largest < 1e-5, "{of}: {largest}");
     }
-    // Sampled at a rate, poses need no file of times, and the rate is told.
+    // Sampled at a rate, poses need no file of times, and the rate is reported.
     let sampled = line(at, "eval path.tum --fps 20 -o path.kitti");
     assert!(
         sampled
@@ -153,28 +153,28 @@ fn times_in_gaps_are_left_out_held_or_refused() {
         lines.map(words).collect()
     };
     let eval = "eval path.tum -m slerp --at times.tum --max-gap 0.2";
-    let told = line(at, &format!("{eval} -o left.tum --json"));
-    let found: Value = serde_json::from_slice(&told.out).unwrap();
+    let said = line(at, &format!("{eval} -o left.tum --json"));
+    let found: Value = serde_json::from_slice(&said.out).unwrap();
     assert_eq!(
         (&found[0]["in_gaps"], &found[0]["frames"]),
         (&2.into(), &3.into())
     );
     assert!(
-        told.words.contains("3 frames (2 in gaps left out)"),
+        said.words.contains("3 frames (2 in gaps left out)"),
         "{}",
-        told.words
+        said.words
     );
     assert_eq!(positions("left.tum").len(), 3);
-    let told = line(at, &format!("{eval} --in-gaps hold -o held.tum --json"));
-    let found: Value = serde_json::from_slice(&told.out).unwrap();
+    let said = line(at, &format!("{eval} --in-gaps hold -o held.tum --json"));
+    let found: Value = serde_json::from_slice(&said.out).unwrap();
     assert_eq!(
         (&found[0]["in_gaps"], &found[0]["frames"]),
         (&2.into(), &5.into())
     );
     assert!(
-        told.words.contains("5 frames (2 in gaps held)"),
+        said.words.contains("5 frames (2 in gaps held)"),
         "{}",
-        told.words
+        said.words
     );
     let held = positions("held.tum");
     assert_eq!(

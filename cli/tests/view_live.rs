@@ -142,8 +142,8 @@ fn pictures_between_frames_are_evaluated_at_their_own_times() {
         return;
     };
     let times = ["0.1234", "1.77", "5.01"];
-    fs::write(place.path().join("own.txt"), times.join("\n")).unwrap();
-    let (_, expected) = evaluated(place.path(), &[&data, "-m", "c2", "--times", "own.txt"]);
+    fs::write(place.path().join("between.txt"), times.join("\n")).unwrap();
+    let (_, expected) = evaluated(place.path(), &[&data, "-m", "c2", "--times", "between.txt"]);
     let shown =
         |page: &mut Page, time: &str| page.value(&format!("tumble.seek({time}), tumble.shown(0)"));
     let before = shown(&mut page, times[0]);

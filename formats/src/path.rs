@@ -256,8 +256,8 @@ fn of_array(file: &str, bytes: &[u8]) -> Result<Vec<PathPoints>, Diagnostic> {
             "there is no point in the array".to_owned(),
         ));
     }
-    let of_track = |(track, own): (usize, &[f64])| -> Result<PathPoints, Diagnostic> {
-        let points = own
+    let of_track = |(track, numbers): (usize, &[f64])| -> Result<PathPoints, Diagnostic> {
+        let points = numbers
             .as_chunks::<3>()
             .0
             .iter()

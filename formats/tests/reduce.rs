@@ -76,17 +76,20 @@ fn check(clip: &Motion, reduced: &Reduced, options: &ReduceOptions) -> [f64; 2] 
         found[1] <= distance * (1.0 + 1e-6),
         "{found:?} over {distance}"
     );
-    let told = [0, 1].map(|kind| {
+    let reported = [0, 1].map(|kind| {
         reduced
             .errors
             .iter()
             .map(|own| own[kind])
             .fold(0.0, f64::max)
     });
-    assert!((told[0] - found[0]).abs() < 2e-7, "{told:?} {found:?}");
     assert!(
-        (told[1] - found[1]).abs() <= 1e-6 * (1.0 + found[1]),
-        "{told:?} {found:?}"
+        (reported[0] - found[0]).abs() < 2e-7,
+        "{reported:?} {found:?}"
+    );
+    assert!(
+        (reported[1] - found[1]).abs() <= 1e-6 * (1.0 + found[1]),
+        "{reported:?} {found:?}"
     );
     assert_eq!(reduced.keys, [clip.key_count(), reduced.clip.key_count()]);
     assert_eq!(reduced.clip.set.time_span(), clip.set.time_span());
@@ -239,13 +242,13 @@ fn rotations_of_16_bits_stay_within_the_bounds() {
         let found = apart(&clip, again, 0.0);
         assert!(found[0] <= TENTH + 1e-7, "{found:?}");
         assert!(found[1] <= reduced.bounds[1] * (1.0 + 1e-6), "{found:?}");
-        // What is told is what is read.
-        let told = reduced
+        // What is reported is what is read.
+        let reported = reduced
             .errors
             .iter()
             .map(|pair| pair[0])
             .fold(0.0, f64::max);
-        assert!((told - found[0]).abs() < 2e-7, "{told:e} {found:?}");
+        assert!((reported - found[0]).abs() < 2e-7, "{reported:e} {found:?}");
         let off = |track: usize| {
             let pairs = again
                 .set

@@ -188,7 +188,7 @@ pub(crate) fn follow<'py>(
     engine: &Engine,
     (key_times, path): (Option<&Bound<'py, PyAny>>, &Bound<'py, PyAny>),
     options: &Options<'_, 'py>,
-    wanted: Times,
+    moments: Times,
     (layout, order): (Layout, Order),
 ) -> PyResult<Bound<'py, PyTuple>> {
     let py = path.py();
@@ -250,8 +250,8 @@ pub(crate) fn follow<'py>(
     })?;
     let origin = made.origin(0);
     let follow = options.follow(origin)?;
-    let is_one_time = matches!(wanted, Times::Shared { is_one: true, .. });
-    let (frames, count) = wanted.resolved(&made.set)?;
+    let is_one_time = matches!(moments, Times::Shared { is_one: true, .. });
+    let (frames, count) = moments.resolved(&made.set)?;
     let engine = engine.engine(tracks * count)?;
     let found = interruptible(py, move || {
         let found = engine.follow(&made.set, &follow, &frames, layout);

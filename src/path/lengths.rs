@@ -23,12 +23,12 @@ impl Lengths {
     /// The lengths of curves with these slopes, which vanish at these parameters: their speed has a
     /// corner there.
     pub(crate) fn new<'a>(slopes: Vec<Polynomial>, stops: impl Iterator<Item = &'a [f64]>) -> Self {
-        let mut own = Self {
+        let mut lengths = Self {
             marks: Vec::with_capacity(slopes.len()),
             slopes,
         };
         let mut total = 0.0;
-        for (slope, stops) in own.slopes.iter().zip(stops) {
+        for (slope, stops) in lengths.slopes.iter().zip(stops) {
             let even = (1..=PARTS).map(|part| part as f64 / PARTS as f64);
             let mut places: Vec<f64> = even.chain(stops.iter().copied()).collect();
             places.sort_by(f64::total_cmp);
@@ -36,7 +36,7 @@ impl Lengths {
             if stop::is_stopped() {
                 // Whoever prepares paths looks again when this is done.
                 marks.push((1.0, total));
-                own.marks.push(marks);
+                lengths.marks.push(marks);
                 continue;
             }
             let mut from = 0.0;
@@ -47,9 +47,9 @@ impl Lengths {
                     from = to;
                 }
             }
-            own.marks.push(marks);
+            lengths.marks.push(marks);
         }
-        own
+        lengths
     }
 
     /// Whether there are no intervals, or their lengths are not known yet.

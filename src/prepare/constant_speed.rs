@@ -43,14 +43,14 @@ fn retime_track(
     fitting: &mut Fitting,
 ) {
     let (start, first_key) = (intervals[0].start, intervals[0].key);
-    let paced = |own: &mut Waiting| {
+    let paced = |interval: &mut Waiting| {
         if stop::is_stopped() {
             return None; // whoever prepares looks again when this is done
         }
-        let curve = own.curve.take()?;
+        let curve = interval.curve.take()?;
         let pace = Pace::new(&curve);
         let length = pace.total();
-        (length > 0.0 && length.is_finite()).then_some((own.key, curve, pace))
+        (length > 0.0 && length.is_finite()).then_some((interval.key, curve, pace))
     };
     let paced: Vec<(u32, Curve, Pace)> = intervals.iter_mut().filter_map(paced).collect();
     if paced.is_empty() {

@@ -87,9 +87,9 @@ fn indices(mut index: u64, shape: &[usize]) -> Vec<usize> {
         .rev()
         .map(|&length| {
             let length = length.max(1) as u64;
-            let own = (index % length) as usize;
+            let along_axis = (index % length) as usize;
             index /= length;
-            own
+            along_axis
         })
         .collect();
     found.reverse();

@@ -675,7 +675,7 @@ impl<'a> Evaluator<'a> {
         let scene = reader.scene;
         let layers = &scene.anim_stacks[stack].layers;
         let value = |place: usize| -> &'a AnimValue { &layers[0].anim_props[place].anim_value };
-        let mut own = Self {
+        let mut evaluator = Self {
             reader,
             stack,
             node: &scene.nodes[node],
@@ -685,12 +685,12 @@ impl<'a> Evaluator<'a> {
             fault: Cell::new(None),
         };
         let direct = takes.properties.get(&node);
-        let direct = direct.and_then(|properties| Direct::of(own.node, properties, value));
-        own.direct = direct.filter(|direct| {
-            let exact = |time| own.exact(time, TRANSLATION | ROTATION | SCALE);
+        let direct = direct.and_then(|properties| Direct::of(evaluator.node, properties, value));
+        evaluator.direct = direct.filter(|direct| {
+            let exact = |time| evaluator.exact(time, TRANSLATION | ROTATION | SCALE);
             direct.is(exact, takes.span)
         });
-        own
+        evaluator
     }
 
     /// What `ufbx` gives.

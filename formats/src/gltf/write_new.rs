@@ -66,9 +66,9 @@ pub fn write_new(
     let mut animations = Vec::new();
     for (place, (part, clip)) in parts.into_iter().zip(clips).enumerate() {
         // Only a compressed view has a filter.
-        let quantize = options.quantize.map(|own| match own {
+        let quantize = options.quantize.map(|bits| match bits {
             Quantization::Filtered(_) if !options.meshopt => Quantization::Components,
-            own => own,
+            bits => bits,
         });
         let mut animation = animation(&mut binary, part, quantize);
         let name = clip.clip.name.clone();
@@ -373,24 +373,24 @@ fn keyed_animation(
 ) -> Animation {
     let mut animation = Animation::default();
     let mut inputs: HashMap<Vec<u32>, usize> = HashMap::new();
-    for (sampler, own) in channels.into_iter().enumerate() {
-        let bits = own.times.iter().map(|time| time.to_bits()).collect();
+    for (sampler, channel) in channels.into_iter().enumerate() {
+        let bits = channel.times.iter().map(|time| time.to_bits()).collect();
         let input = *inputs
             .entry(bits)
-            .or_insert_with(|| binary.push(Data::Times(own.times)));
-        let values = Data::Keys(own.property, own.keys.values);
-        let values = match quantize.filter(|_| own.keys.sampler != motion::Sampler::Cubic) {
+            .or_insert_with(|| binary.push(Data::Times(channel.times)));
+        let values = Data::Keys(channel.property, channel.keys.values);
+        let values = match quantize.filter(|_| channel.keys.sampler != motion::Sampler::Cubic) {
             Some(quantization) => values.quantized(quantization),
             None => values,
         };
         animation.samplers.push(Sampler {
             input,
             output: binary.push(values),
-            interpolation: own.keys.sampler.name(),
+            interpolation: channel.keys.sampler.name(),
         });
         let target = Target {
-            node: nodes[own.track],
-            path: own.property.path().name(),
+            node: nodes[channel.track],
+            path: channel.property.path().name(),
         };
         animation.channels.push(Channel { sampler, target });
     }

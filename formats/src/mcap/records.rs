@@ -128,7 +128,7 @@ impl<'a> Records<'a> {
         fault
     }
 
-    /// The next message; nothing at the end, which a cut file has too, and is told.
+    /// The next message; nothing at the end, which a cut file has too, with a warning.
     ///
     /// # Errors
     /// When the file is damaged, or says that it has more than fits into memory.

@@ -245,7 +245,7 @@ impl Plan {
             .iter()
             .map(|name| format!("`{name}`"))
             .collect();
-        for (column, wanted) in self.wanted.iter().enumerate() {
+        for (column, named) in self.wanted.iter().enumerate() {
             let Some(length) = table.list_length(column) else {
                 continue;
             };
@@ -259,7 +259,7 @@ impl Plan {
             for run in is_read.chunk_by(|a, b| a == b) {
                 let end = first + run.len();
                 if !run[0] {
-                    all.push(format!("`{}[{first}:{end}]`", wanted.name));
+                    all.push(format!("`{}[{first}:{end}]`", named.name));
                 }
                 first = end;
             }

@@ -292,10 +292,10 @@ impl Arguments {
                 true => tracks.select_with_ancestors(clip, name),
                 false => tracks.select(clip, name),
             };
-            let own = [select(first, &names[0])?, select(second, &names[1])?];
+            let selected = [select(first, &names[0])?, select(second, &names[1])?];
             let pair = ClipPair {
                 inputs: [&names[0], &names[1]],
-                clips: [&own[0], &own[1]],
+                clips: [&selected[0], &selected[1]],
             };
             found.push(self.differences(&engine, pair)?);
         }
