@@ -12,8 +12,8 @@ use std::error::Error;
 use ash::vk;
 use glam::Quat;
 use tumble::{
-    Clip, Device, Encoding, Engine, EngineOptions, Frames, Layout, TrackSet, VulkanBuffer,
-    VulkanHandles, ash, glam, method,
+    Clip, Device, Engine, EngineOptions, Frames, Layout, TrackSet, VulkanBuffer, VulkanHandles,
+    ash, glam, method,
 };
 
 const TRACKS: u64 = 60;
@@ -228,7 +228,11 @@ fn pose(clip: &Clip, time: f64, buffer: vk::Buffer) -> Result<(), tumble::Error>
     let frames = Frames::at(vec![time]);
     // SAFETY: the buffer is the device's, has memory and these usages, and nothing else uses it until
     // this returns: `draw` waits for its fence.
-    unsafe { clip.evaluate_to_buffer(&frames, Layout::FrameMajor, Encoding::F32, place) }
+    unsafe {
+        clip.request(&frames)
+            .layout(Layout::FrameMajor)
+            .to_buffer(place)
+    }
 }
 
 fn main() -> Result<(), Box<dyn Error>> {

@@ -15,7 +15,7 @@ fn main(
     }
     let item = item_at(dispatch.first_item + index);
     let stride = dispatch.stride;
-    var output = item.output;
+    var output = item.output + dispatch.first_output;
     if (item.count & IS_CONSTANT) != 0u {
         let constant = constant_at(item.source);
         let count = item.count & ~IS_CONSTANT;

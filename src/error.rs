@@ -107,6 +107,11 @@ pub enum Error {
         "this engine evaluates on the CPU and has no Vulkan device to which the buffer could belong; make one of the buffer's device with Engine::from_vulkan"
     )]
     BufferOnCpu,
+    /// A buffer is given to an engine that opened its device itself.
+    #[error(
+        "the engine opened its device itself, so no buffer of an application's can be on it; make the engine of the buffer's device with Engine::from_vulkan"
+    )]
+    BufferOfOther,
     /// The environment's `TUMBLE_VECTOR_WIDTH` names no vector width.
     #[error("TUMBLE_VECTOR_WIDTH: {0}")]
     VectorWidth(#[from] UnknownWidth),

@@ -50,7 +50,7 @@
 //!   in [`Layout::FrameMajor`]; give the times in increasing order.
 //! * **Your own Vulkan device**: [`Engine::from_vulkan`] takes a renderer's device and a queue,
 //!   [`Crowd::record`] records a crowd's poses into its command buffers, and
-//!   [`Clip::evaluate_to_buffer`] leaves the poses in the renderer's buffer. `examples/own_device.rs`
+//!   [`Request::target`] and [`Request::to_buffer`] leave a clip's in the renderer's buffer. `examples/own_device.rs`
 //!   is a whole program, with two queue families, buffers that are kept, and the warm-up.
 //! * **Bodies that travel**: [`Engine::follow`] moves them along paths, [`Engine::smooth`] takes the
 //!   noise from samples.
@@ -104,6 +104,7 @@ mod pose;
 mod prepare;
 pub mod reduce;
 pub mod reference;
+mod request;
 mod shader;
 mod simd;
 mod smooth;
@@ -126,6 +127,8 @@ pub use crate::curve::options::{
 pub use crate::device::{Device, VulkanDevice};
 pub use crate::engine::Engine;
 pub use crate::error::Error;
+#[cfg(feature = "vulkan")]
+pub use crate::gpu::clip_target::ClipTarget;
 #[cfg(feature = "vulkan")]
 pub use crate::gpu::crowd_target::CrowdTarget;
 #[cfg(feature = "prove")]
@@ -162,6 +165,7 @@ pub use crate::pose::local_to_model::ModelMatrices;
 pub use crate::pose::poses::WorldPoses;
 pub use crate::pose::skeleton::Skeleton;
 pub use crate::pose::transforms::Transforms;
+pub use crate::request::Request;
 pub use crate::shader::{Form, kernels};
 pub use crate::simd::dispatch::{UnknownWidth, VectorWidth};
 pub use crate::smooth::kernel::{Smoothing, SmoothingEnds, SmoothingError, SmoothingKernel};

@@ -328,6 +328,15 @@ impl Window {
         encoding: Encoding,
         output: &[u8],
     ) -> Result<(), Error> {
+        self.check_within(tracks, samples)?;
+        match (output.len(), self.len().saturating_mul(encoding.bytes())) {
+            (given, needed) if given == needed => Ok(()),
+            (given, needed) => Err(Error::OutputBytes { given, needed }),
+        }
+    }
+
+    /// Refuses a window that a result of so many tracks and samples has not.
+    pub(crate) fn check_within(&self, tracks: usize, samples: usize) -> Result<(), Error> {
         let lies_in = |part: &Range<usize>, whole| part.start <= part.end && part.end <= whole;
         if !lies_in(&self.tracks, tracks) || !lies_in(&self.samples, samples) {
             return Err(Error::NoSuchPart {
@@ -335,10 +344,7 @@ impl Window {
                 whole: (tracks, samples),
             });
         }
-        match (output.len(), self.len().saturating_mul(encoding.bytes())) {
-            (given, needed) if given == needed => Ok(()),
-            (given, needed) => Err(Error::OutputBytes { given, needed }),
-        }
+        Ok(())
     }
 }
 

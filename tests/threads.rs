@@ -305,12 +305,9 @@ fn to_own_buffers() {
         size,
     };
     buffers.par_iter().for_each(|&(buffer, _)| {
-        let (frames, encoding) = (Frames::fps(40), Encoding::F32);
-        let buffer = whole(buffer);
+        let frames = Frames::fps(40);
         // SAFETY: each buffer is the device's, has memory, and is this task's alone.
-        let done =
-            unsafe { clip.evaluate_to_buffer(&frames, Layout::TrackMajor, encoding, buffer) };
-        done.unwrap();
+        unsafe { clip.request(&frames).to_buffer(whole(buffer)) }.unwrap();
     });
     for (_, memory) in &buffers {
         let expected: &[u8] = bytemuck::cast_slice(expected.as_quats());

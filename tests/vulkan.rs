@@ -265,7 +265,12 @@ fn assert_stays_in_own_buffer(mapping: Mapping) {
             };
             let write = |stretch| {
                 // SAFETY: the buffer is as it must be, and nobody else uses it.
-                unsafe { clip.evaluate_to_buffer(frames, Layout::FrameMajor, encoding, stretch) }
+                unsafe {
+                    clip.request(frames)
+                        .layout(Layout::FrameMajor)
+                        .encoding(encoding)
+                        .to_buffer(stretch)
+                }
             };
             write(stretch(offset, size)).unwrap();
             let found = application.bytes(memory, offset + size);
@@ -296,8 +301,7 @@ fn assert_stays_in_own_buffer(mapping: Mapping) {
         size: u64::MAX,
     };
     // SAFETY: the CPU refuses.
-    let result =
-        unsafe { clip.evaluate_to_buffer(&frames, Layout::FrameMajor, Encoding::F32, nowhere) };
+    let result = unsafe { clip.request(&frames).to_buffer(nowhere) };
     assert!(result.is_err());
 }
 

@@ -1,6 +1,6 @@
 //! Evaluating: a set in one go, or a clip that stays on a device.
 
-use tumble::{Clip, Encoding, Frames, Timeline, TrackSet};
+use tumble::{Clip, Frames, Timeline, TrackSet};
 
 use crate::arguments::{Out, list_mut};
 use crate::engine::TumbleEngine;
@@ -199,13 +199,9 @@ pub unsafe extern "C" fn tumble_clip_evaluate_to_buffer(
         let frames = unsafe { TumbleSamples::read(samples)? };
         let layout = self::layout(layout)?;
         let buffer = buffer_range(clip.is_on_own_device, buffer, offset, size)?;
-        let encoding = Encoding::F32;
+        let request = clip.own.request(&frames).layout(layout);
         // SAFETY: as the caller promises.
-        unsafe {
-            let own = &clip.own;
-            own.evaluate_to_buffer(&frames, layout, encoding, buffer)?;
-        }
-        Ok(())
+        Ok(unsafe { request.to_buffer(buffer) }?)
     })
 }
 

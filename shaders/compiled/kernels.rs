@@ -338,7 +338,8 @@ pub(crate) struct Dispatch {
     pub(crate) stride: u32,
 /// What the store needs beside the rotation: the order of a matrix, the axes of angles.
     pub(crate) detail: u32,
-/// Where the first listed sample is stored; the others follow.
+/// Where the first listed sample is stored; the others follow. For items, what is added to their
+/// `output`.
     pub(crate) first_output: u32,
 /// Invocations before the first listed sample, which do nothing: so neighbours begin to store
 /// where a line of memory begins. `first_item` and `first_output` count them too.
@@ -364,27 +365,30 @@ pub(crate) struct Grid {
     pub(crate) samples: u32,
 /// How many rows.
     pub(crate) rows: u32,
-/// Where the first position of the first row is stored; track by track that is a multiple of
-/// `BLOCK_SAMPLES`.
+/// Frame by frame, where the first position of the first row is stored; track by track the first
+/// position, a multiple of `BLOCK_SAMPLES`.
     pub(crate) first_output: u32,
 /// The block of the first positions of the first row.
     pub(crate) first_block: u32,
+/// Track by track, how far behind its position a sample is stored.
+    pub(crate) shift: u32,
 }
 const _: () = {
-    assert!(size_of::<Grid>() == 24);
+    assert!(size_of::<Grid>() == 28);
     assert!(std::mem::offset_of!(Grid, detail) == 0);
     assert!(std::mem::offset_of!(Grid, stride) == 4);
     assert!(std::mem::offset_of!(Grid, samples) == 8);
     assert!(std::mem::offset_of!(Grid, rows) == 12);
     assert!(std::mem::offset_of!(Grid, first_output) == 16);
     assert!(std::mem::offset_of!(Grid, first_block) == 20);
+    assert!(std::mem::offset_of!(Grid, shift) == 24);
 };
 #[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub(crate) struct Item {
 /// The segment's index; the constant's, when `count` carries `IS_CONSTANT`.
     pub(crate) source: u32,
-/// Where the first sample is stored. In the blocks of a grid, the first sample's position.
+/// Where the first sample is stored, counted from where the dispatch's first is. In the blocks of a grid, the first sample's position.
     pub(crate) output: u32,
 /// Number of samples, with the bit `IS_CONSTANT` if they are a constant. Where an invocation
 /// evaluates an item they are at most `ITEM_SAMPLES`; in a grid there are as many as there are,
@@ -772,22 +776,22 @@ impl Kernel {
 }
 pub(crate) static KERNELS: [KernelCode; 98] = [
     KernelCode { kernel: Kernel::SelfTest, storage: ("self_test", 1920), texels: None, bindings: 2, segments: None },
-    KernelCode { kernel: Kernel::ArcFramesAxisAngle, storage: ("arc_frames_axis_angle", 2857), texels: Some(("arc_frames_axis_angle_texels", 2983)), bindings: 4, segments: Some((Form::Arc, List::Frames, Store::AxisAngle)) },
-    KernelCode { kernel: Kernel::ArcFramesEuler, storage: ("arc_frames_euler", 3405), texels: Some(("arc_frames_euler_texels", 3523)), bindings: 4, segments: Some((Form::Arc, List::Frames, Store::Euler)) },
-    KernelCode { kernel: Kernel::ArcFramesF16, storage: ("arc_frames_f16", 2096), texels: Some(("arc_frames_f16_texels", 2214)), bindings: 4, segments: Some((Form::Arc, List::Frames, Store::F16)) },
-    KernelCode { kernel: Kernel::ArcFramesF32, storage: ("arc_frames_f32", 1840), texels: Some(("arc_frames_f32_texels", 2071)), bindings: 4, segments: Some((Form::Arc, List::Frames, Store::F32)) },
-    KernelCode { kernel: Kernel::ArcFramesMatrix3x3, storage: ("arc_frames_matrix3x3", 2435), texels: Some(("arc_frames_matrix3x3_texels", 2553)), bindings: 4, segments: Some((Form::Arc, List::Frames, Store::Matrix3x3)) },
-    KernelCode { kernel: Kernel::ArcFramesMatrix3x4, storage: ("arc_frames_matrix3x4", 2518), texels: Some(("arc_frames_matrix3x4_texels", 2636)), bindings: 4, segments: Some((Form::Arc, List::Frames, Store::Matrix3x4)) },
-    KernelCode { kernel: Kernel::ArcFramesSnorm16, storage: ("arc_frames_snorm16", 1977), texels: Some(("arc_frames_snorm16_texels", 2095)), bindings: 4, segments: Some((Form::Arc, List::Frames, Store::Snorm16)) },
-    KernelCode { kernel: Kernel::ArcFramesVector, storage: ("arc_frames_vector", 1904), texels: Some(("arc_frames_vector_texels", 2022)), bindings: 4, segments: Some((Form::Arc, List::Frames, Store::Vector)) },
-    KernelCode { kernel: Kernel::ArcTimesAxisAngle, storage: ("arc_times_axis_angle", 2922), texels: Some(("arc_times_axis_angle_texels", 3083)), bindings: 5, segments: Some((Form::Arc, List::Times, Store::AxisAngle)) },
-    KernelCode { kernel: Kernel::ArcTimesEuler, storage: ("arc_times_euler", 3466), texels: Some(("arc_times_euler_texels", 3619)), bindings: 5, segments: Some((Form::Arc, List::Times, Store::Euler)) },
-    KernelCode { kernel: Kernel::ArcTimesF16, storage: ("arc_times_f16", 2161), texels: Some(("arc_times_f16_texels", 2314)), bindings: 5, segments: Some((Form::Arc, List::Times, Store::F16)) },
-    KernelCode { kernel: Kernel::ArcTimesF32, storage: ("arc_times_f32", 1905), texels: Some(("arc_times_f32_texels", 2171)), bindings: 5, segments: Some((Form::Arc, List::Times, Store::F32)) },
-    KernelCode { kernel: Kernel::ArcTimesMatrix3x3, storage: ("arc_times_matrix3x3", 2496), texels: Some(("arc_times_matrix3x3_texels", 2653)), bindings: 5, segments: Some((Form::Arc, List::Times, Store::Matrix3x3)) },
-    KernelCode { kernel: Kernel::ArcTimesMatrix3x4, storage: ("arc_times_matrix3x4", 2579), texels: Some(("arc_times_matrix3x4_texels", 2732)), bindings: 5, segments: Some((Form::Arc, List::Times, Store::Matrix3x4)) },
-    KernelCode { kernel: Kernel::ArcTimesSnorm16, storage: ("arc_times_snorm16", 2042), texels: Some(("arc_times_snorm16_texels", 2195)), bindings: 5, segments: Some((Form::Arc, List::Times, Store::Snorm16)) },
-    KernelCode { kernel: Kernel::ArcTimesVector, storage: ("arc_times_vector", 1965), texels: Some(("arc_times_vector_texels", 2122)), bindings: 5, segments: Some((Form::Arc, List::Times, Store::Vector)) },
+    KernelCode { kernel: Kernel::ArcFramesAxisAngle, storage: ("arc_frames_axis_angle", 2875), texels: Some(("arc_frames_axis_angle_texels", 3001)), bindings: 4, segments: Some((Form::Arc, List::Frames, Store::AxisAngle)) },
+    KernelCode { kernel: Kernel::ArcFramesEuler, storage: ("arc_frames_euler", 3419), texels: Some(("arc_frames_euler_texels", 3537)), bindings: 4, segments: Some((Form::Arc, List::Frames, Store::Euler)) },
+    KernelCode { kernel: Kernel::ArcFramesF16, storage: ("arc_frames_f16", 2114), texels: Some(("arc_frames_f16_texels", 2232)), bindings: 4, segments: Some((Form::Arc, List::Frames, Store::F16)) },
+    KernelCode { kernel: Kernel::ArcFramesF32, storage: ("arc_frames_f32", 1858), texels: Some(("arc_frames_f32_texels", 2089)), bindings: 4, segments: Some((Form::Arc, List::Frames, Store::F32)) },
+    KernelCode { kernel: Kernel::ArcFramesMatrix3x3, storage: ("arc_frames_matrix3x3", 2453), texels: Some(("arc_frames_matrix3x3_texels", 2571)), bindings: 4, segments: Some((Form::Arc, List::Frames, Store::Matrix3x3)) },
+    KernelCode { kernel: Kernel::ArcFramesMatrix3x4, storage: ("arc_frames_matrix3x4", 2532), texels: Some(("arc_frames_matrix3x4_texels", 2650)), bindings: 4, segments: Some((Form::Arc, List::Frames, Store::Matrix3x4)) },
+    KernelCode { kernel: Kernel::ArcFramesSnorm16, storage: ("arc_frames_snorm16", 1995), texels: Some(("arc_frames_snorm16_texels", 2113)), bindings: 4, segments: Some((Form::Arc, List::Frames, Store::Snorm16)) },
+    KernelCode { kernel: Kernel::ArcFramesVector, storage: ("arc_frames_vector", 1922), texels: Some(("arc_frames_vector_texels", 2040)), bindings: 4, segments: Some((Form::Arc, List::Frames, Store::Vector)) },
+    KernelCode { kernel: Kernel::ArcTimesAxisAngle, storage: ("arc_times_axis_angle", 2940), texels: Some(("arc_times_axis_angle_texels", 3097)), bindings: 5, segments: Some((Form::Arc, List::Times, Store::AxisAngle)) },
+    KernelCode { kernel: Kernel::ArcTimesEuler, storage: ("arc_times_euler", 3480), texels: Some(("arc_times_euler_texels", 3633)), bindings: 5, segments: Some((Form::Arc, List::Times, Store::Euler)) },
+    KernelCode { kernel: Kernel::ArcTimesF16, storage: ("arc_times_f16", 2179), texels: Some(("arc_times_f16_texels", 2328)), bindings: 5, segments: Some((Form::Arc, List::Times, Store::F16)) },
+    KernelCode { kernel: Kernel::ArcTimesF32, storage: ("arc_times_f32", 1923), texels: Some(("arc_times_f32_texels", 2185)), bindings: 5, segments: Some((Form::Arc, List::Times, Store::F32)) },
+    KernelCode { kernel: Kernel::ArcTimesMatrix3x3, storage: ("arc_times_matrix3x3", 2514), texels: Some(("arc_times_matrix3x3_texels", 2667)), bindings: 5, segments: Some((Form::Arc, List::Times, Store::Matrix3x3)) },
+    KernelCode { kernel: Kernel::ArcTimesMatrix3x4, storage: ("arc_times_matrix3x4", 2593), texels: Some(("arc_times_matrix3x4_texels", 2746)), bindings: 5, segments: Some((Form::Arc, List::Times, Store::Matrix3x4)) },
+    KernelCode { kernel: Kernel::ArcTimesSnorm16, storage: ("arc_times_snorm16", 2060), texels: Some(("arc_times_snorm16_texels", 2209)), bindings: 5, segments: Some((Form::Arc, List::Times, Store::Snorm16)) },
+    KernelCode { kernel: Kernel::ArcTimesVector, storage: ("arc_times_vector", 1983), texels: Some(("arc_times_vector_texels", 2136)), bindings: 5, segments: Some((Form::Arc, List::Times, Store::Vector)) },
     KernelCode { kernel: Kernel::ArcSamplesAxisAngle, storage: ("arc_samples_axis_angle", 2554), texels: Some(("arc_samples_axis_angle_texels", 2605)), bindings: 4, segments: Some((Form::Arc, List::Samples, Store::AxisAngle)) },
     KernelCode { kernel: Kernel::ArcSamplesEuler, storage: ("arc_samples_euler", 3102), texels: Some(("arc_samples_euler_texels", 3145)), bindings: 4, segments: Some((Form::Arc, List::Samples, Store::Euler)) },
     KernelCode { kernel: Kernel::ArcSamplesF16, storage: ("arc_samples_f16", 1797), texels: Some(("arc_samples_f16_texels", 1840)), bindings: 4, segments: Some((Form::Arc, List::Samples, Store::F16)) },
@@ -796,38 +800,38 @@ pub(crate) static KERNELS: [KernelCode; 98] = [
     KernelCode { kernel: Kernel::ArcSamplesMatrix3x4, storage: ("arc_samples_matrix3x4", 2215), texels: Some(("arc_samples_matrix3x4_texels", 2258)), bindings: 4, segments: Some((Form::Arc, List::Samples, Store::Matrix3x4)) },
     KernelCode { kernel: Kernel::ArcSamplesSnorm16, storage: ("arc_samples_snorm16", 1678), texels: Some(("arc_samples_snorm16_texels", 1721)), bindings: 4, segments: Some((Form::Arc, List::Samples, Store::Snorm16)) },
     KernelCode { kernel: Kernel::ArcSamplesVector, storage: ("arc_samples_vector", 1605), texels: Some(("arc_samples_vector_texels", 1648)), bindings: 4, segments: Some((Form::Arc, List::Samples, Store::Vector)) },
-    KernelCode { kernel: Kernel::ArcFramesCoalescedAxisAngle, storage: ("arc_frames_coalesced_axis_angle", 3807), texels: None, bindings: 5, segments: Some((Form::Arc, List::FramesCoalesced, Store::AxisAngle)) },
-    KernelCode { kernel: Kernel::ArcFramesCoalescedEuler, storage: ("arc_frames_coalesced_euler", 4343), texels: None, bindings: 5, segments: Some((Form::Arc, List::FramesCoalesced, Store::Euler)) },
-    KernelCode { kernel: Kernel::ArcFramesCoalescedF16, storage: ("arc_frames_coalesced_f16", 3050), texels: None, bindings: 5, segments: Some((Form::Arc, List::FramesCoalesced, Store::F16)) },
-    KernelCode { kernel: Kernel::ArcFramesCoalescedF32, storage: ("arc_frames_coalesced_f32", 2790), texels: None, bindings: 5, segments: Some((Form::Arc, List::FramesCoalesced, Store::F32)) },
-    KernelCode { kernel: Kernel::ArcFramesCoalescedMatrix3x3, storage: ("arc_frames_coalesced_matrix3x3", 3381), texels: None, bindings: 5, segments: Some((Form::Arc, List::FramesCoalesced, Store::Matrix3x3)) },
-    KernelCode { kernel: Kernel::ArcFramesCoalescedMatrix3x4, storage: ("arc_frames_coalesced_matrix3x4", 3456), texels: None, bindings: 5, segments: Some((Form::Arc, List::FramesCoalesced, Store::Matrix3x4)) },
-    KernelCode { kernel: Kernel::ArcFramesCoalescedSnorm16, storage: ("arc_frames_coalesced_snorm16", 2931), texels: None, bindings: 5, segments: Some((Form::Arc, List::FramesCoalesced, Store::Snorm16)) },
-    KernelCode { kernel: Kernel::ArcFramesCoalescedVector, storage: ("arc_frames_coalesced_vector", 2850), texels: None, bindings: 5, segments: Some((Form::Arc, List::FramesCoalesced, Store::Vector)) },
-    KernelCode { kernel: Kernel::ArcTimesCoalescedAxisAngle, storage: ("arc_times_coalesced_axis_angle", 3872), texels: None, bindings: 6, segments: Some((Form::Arc, List::TimesCoalesced, Store::AxisAngle)) },
-    KernelCode { kernel: Kernel::ArcTimesCoalescedEuler, storage: ("arc_times_coalesced_euler", 4404), texels: None, bindings: 6, segments: Some((Form::Arc, List::TimesCoalesced, Store::Euler)) },
-    KernelCode { kernel: Kernel::ArcTimesCoalescedF16, storage: ("arc_times_coalesced_f16", 3115), texels: None, bindings: 6, segments: Some((Form::Arc, List::TimesCoalesced, Store::F16)) },
-    KernelCode { kernel: Kernel::ArcTimesCoalescedF32, storage: ("arc_times_coalesced_f32", 2855), texels: None, bindings: 6, segments: Some((Form::Arc, List::TimesCoalesced, Store::F32)) },
-    KernelCode { kernel: Kernel::ArcTimesCoalescedMatrix3x3, storage: ("arc_times_coalesced_matrix3x3", 3442), texels: None, bindings: 6, segments: Some((Form::Arc, List::TimesCoalesced, Store::Matrix3x3)) },
-    KernelCode { kernel: Kernel::ArcTimesCoalescedMatrix3x4, storage: ("arc_times_coalesced_matrix3x4", 3517), texels: None, bindings: 6, segments: Some((Form::Arc, List::TimesCoalesced, Store::Matrix3x4)) },
-    KernelCode { kernel: Kernel::ArcTimesCoalescedSnorm16, storage: ("arc_times_coalesced_snorm16", 2996), texels: None, bindings: 6, segments: Some((Form::Arc, List::TimesCoalesced, Store::Snorm16)) },
-    KernelCode { kernel: Kernel::ArcTimesCoalescedVector, storage: ("arc_times_coalesced_vector", 2911), texels: None, bindings: 6, segments: Some((Form::Arc, List::TimesCoalesced, Store::Vector)) },
-    KernelCode { kernel: Kernel::PolynomialFramesAxisAngle, storage: ("polynomial_frames_axis_angle", 2539), texels: Some(("polynomial_frames_axis_angle_texels", 2832)), bindings: 4, segments: Some((Form::Polynomial, List::Frames, Store::AxisAngle)) },
-    KernelCode { kernel: Kernel::PolynomialFramesEuler, storage: ("polynomial_frames_euler", 3087), texels: Some(("polynomial_frames_euler_texels", 3368)), bindings: 4, segments: Some((Form::Polynomial, List::Frames, Store::Euler)) },
-    KernelCode { kernel: Kernel::PolynomialFramesF16, storage: ("polynomial_frames_f16", 1774), texels: Some(("polynomial_frames_f16_texels", 2059)), bindings: 4, segments: Some((Form::Polynomial, List::Frames, Store::F16)) },
-    KernelCode { kernel: Kernel::PolynomialFramesF32, storage: ("polynomial_frames_f32", 1518), texels: Some(("polynomial_frames_f32_texels", 1916)), bindings: 4, segments: Some((Form::Polynomial, List::Frames, Store::F32)) },
-    KernelCode { kernel: Kernel::PolynomialFramesMatrix3x3, storage: ("polynomial_frames_matrix3x3", 2117), texels: Some(("polynomial_frames_matrix3x3_texels", 2394)), bindings: 4, segments: Some((Form::Polynomial, List::Frames, Store::Matrix3x3)) },
-    KernelCode { kernel: Kernel::PolynomialFramesMatrix3x4, storage: ("polynomial_frames_matrix3x4", 2196), texels: Some(("polynomial_frames_matrix3x4_texels", 2465)), bindings: 4, segments: Some((Form::Polynomial, List::Frames, Store::Matrix3x4)) },
-    KernelCode { kernel: Kernel::PolynomialFramesSnorm16, storage: ("polynomial_frames_snorm16", 1655), texels: Some(("polynomial_frames_snorm16_texels", 1940)), bindings: 4, segments: Some((Form::Polynomial, List::Frames, Store::Snorm16)) },
-    KernelCode { kernel: Kernel::PolynomialFramesVector, storage: ("polynomial_frames_vector", 1582), texels: Some(("polynomial_frames_vector_texels", 1867)), bindings: 4, segments: Some((Form::Polynomial, List::Frames, Store::Vector)) },
-    KernelCode { kernel: Kernel::PolynomialTimesAxisAngle, storage: ("polynomial_times_axis_angle", 2604), texels: Some(("polynomial_times_axis_angle_texels", 2928)), bindings: 5, segments: Some((Form::Polynomial, List::Times, Store::AxisAngle)) },
-    KernelCode { kernel: Kernel::PolynomialTimesEuler, storage: ("polynomial_times_euler", 3148), texels: Some(("polynomial_times_euler_texels", 3464)), bindings: 5, segments: Some((Form::Polynomial, List::Times, Store::Euler)) },
-    KernelCode { kernel: Kernel::PolynomialTimesF16, storage: ("polynomial_times_f16", 1839), texels: Some(("polynomial_times_f16_texels", 2155)), bindings: 5, segments: Some((Form::Polynomial, List::Times, Store::F16)) },
-    KernelCode { kernel: Kernel::PolynomialTimesF32, storage: ("polynomial_times_f32", 1583), texels: Some(("polynomial_times_f32_texels", 2012)), bindings: 5, segments: Some((Form::Polynomial, List::Times, Store::F32)) },
-    KernelCode { kernel: Kernel::PolynomialTimesMatrix3x3, storage: ("polynomial_times_matrix3x3", 2178), texels: Some(("polynomial_times_matrix3x3_texels", 2490)), bindings: 5, segments: Some((Form::Polynomial, List::Times, Store::Matrix3x3)) },
-    KernelCode { kernel: Kernel::PolynomialTimesMatrix3x4, storage: ("polynomial_times_matrix3x4", 2257), texels: Some(("polynomial_times_matrix3x4_texels", 2561)), bindings: 5, segments: Some((Form::Polynomial, List::Times, Store::Matrix3x4)) },
-    KernelCode { kernel: Kernel::PolynomialTimesSnorm16, storage: ("polynomial_times_snorm16", 1720), texels: Some(("polynomial_times_snorm16_texels", 2036)), bindings: 5, segments: Some((Form::Polynomial, List::Times, Store::Snorm16)) },
-    KernelCode { kernel: Kernel::PolynomialTimesVector, storage: ("polynomial_times_vector", 1643), texels: Some(("polynomial_times_vector_texels", 1963)), bindings: 5, segments: Some((Form::Polynomial, List::Times, Store::Vector)) },
+    KernelCode { kernel: Kernel::ArcFramesCoalescedAxisAngle, storage: ("arc_frames_coalesced_axis_angle", 3831), texels: None, bindings: 5, segments: Some((Form::Arc, List::FramesCoalesced, Store::AxisAngle)) },
+    KernelCode { kernel: Kernel::ArcFramesCoalescedEuler, storage: ("arc_frames_coalesced_euler", 4367), texels: None, bindings: 5, segments: Some((Form::Arc, List::FramesCoalesced, Store::Euler)) },
+    KernelCode { kernel: Kernel::ArcFramesCoalescedF16, storage: ("arc_frames_coalesced_f16", 3074), texels: None, bindings: 5, segments: Some((Form::Arc, List::FramesCoalesced, Store::F16)) },
+    KernelCode { kernel: Kernel::ArcFramesCoalescedF32, storage: ("arc_frames_coalesced_f32", 2814), texels: None, bindings: 5, segments: Some((Form::Arc, List::FramesCoalesced, Store::F32)) },
+    KernelCode { kernel: Kernel::ArcFramesCoalescedMatrix3x3, storage: ("arc_frames_coalesced_matrix3x3", 3401), texels: None, bindings: 5, segments: Some((Form::Arc, List::FramesCoalesced, Store::Matrix3x3)) },
+    KernelCode { kernel: Kernel::ArcFramesCoalescedMatrix3x4, storage: ("arc_frames_coalesced_matrix3x4", 3480), texels: None, bindings: 5, segments: Some((Form::Arc, List::FramesCoalesced, Store::Matrix3x4)) },
+    KernelCode { kernel: Kernel::ArcFramesCoalescedSnorm16, storage: ("arc_frames_coalesced_snorm16", 2955), texels: None, bindings: 5, segments: Some((Form::Arc, List::FramesCoalesced, Store::Snorm16)) },
+    KernelCode { kernel: Kernel::ArcFramesCoalescedVector, storage: ("arc_frames_coalesced_vector", 2874), texels: None, bindings: 5, segments: Some((Form::Arc, List::FramesCoalesced, Store::Vector)) },
+    KernelCode { kernel: Kernel::ArcTimesCoalescedAxisAngle, storage: ("arc_times_coalesced_axis_angle", 3896), texels: None, bindings: 6, segments: Some((Form::Arc, List::TimesCoalesced, Store::AxisAngle)) },
+    KernelCode { kernel: Kernel::ArcTimesCoalescedEuler, storage: ("arc_times_coalesced_euler", 4428), texels: None, bindings: 6, segments: Some((Form::Arc, List::TimesCoalesced, Store::Euler)) },
+    KernelCode { kernel: Kernel::ArcTimesCoalescedF16, storage: ("arc_times_coalesced_f16", 3139), texels: None, bindings: 6, segments: Some((Form::Arc, List::TimesCoalesced, Store::F16)) },
+    KernelCode { kernel: Kernel::ArcTimesCoalescedF32, storage: ("arc_times_coalesced_f32", 2879), texels: None, bindings: 6, segments: Some((Form::Arc, List::TimesCoalesced, Store::F32)) },
+    KernelCode { kernel: Kernel::ArcTimesCoalescedMatrix3x3, storage: ("arc_times_coalesced_matrix3x3", 3462), texels: None, bindings: 6, segments: Some((Form::Arc, List::TimesCoalesced, Store::Matrix3x3)) },
+    KernelCode { kernel: Kernel::ArcTimesCoalescedMatrix3x4, storage: ("arc_times_coalesced_matrix3x4", 3541), texels: None, bindings: 6, segments: Some((Form::Arc, List::TimesCoalesced, Store::Matrix3x4)) },
+    KernelCode { kernel: Kernel::ArcTimesCoalescedSnorm16, storage: ("arc_times_coalesced_snorm16", 3020), texels: None, bindings: 6, segments: Some((Form::Arc, List::TimesCoalesced, Store::Snorm16)) },
+    KernelCode { kernel: Kernel::ArcTimesCoalescedVector, storage: ("arc_times_coalesced_vector", 2935), texels: None, bindings: 6, segments: Some((Form::Arc, List::TimesCoalesced, Store::Vector)) },
+    KernelCode { kernel: Kernel::PolynomialFramesAxisAngle, storage: ("polynomial_frames_axis_angle", 2557), texels: Some(("polynomial_frames_axis_angle_texels", 2846)), bindings: 4, segments: Some((Form::Polynomial, List::Frames, Store::AxisAngle)) },
+    KernelCode { kernel: Kernel::PolynomialFramesEuler, storage: ("polynomial_frames_euler", 3101), texels: Some(("polynomial_frames_euler_texels", 3382)), bindings: 4, segments: Some((Form::Polynomial, List::Frames, Store::Euler)) },
+    KernelCode { kernel: Kernel::PolynomialFramesF16, storage: ("polynomial_frames_f16", 1792), texels: Some(("polynomial_frames_f16_texels", 2073)), bindings: 4, segments: Some((Form::Polynomial, List::Frames, Store::F16)) },
+    KernelCode { kernel: Kernel::PolynomialFramesF32, storage: ("polynomial_frames_f32", 1536), texels: Some(("polynomial_frames_f32_texels", 1930)), bindings: 4, segments: Some((Form::Polynomial, List::Frames, Store::F32)) },
+    KernelCode { kernel: Kernel::PolynomialFramesMatrix3x3, storage: ("polynomial_frames_matrix3x3", 2135), texels: Some(("polynomial_frames_matrix3x3_texels", 2408)), bindings: 4, segments: Some((Form::Polynomial, List::Frames, Store::Matrix3x3)) },
+    KernelCode { kernel: Kernel::PolynomialFramesMatrix3x4, storage: ("polynomial_frames_matrix3x4", 2210), texels: Some(("polynomial_frames_matrix3x4_texels", 2479)), bindings: 4, segments: Some((Form::Polynomial, List::Frames, Store::Matrix3x4)) },
+    KernelCode { kernel: Kernel::PolynomialFramesSnorm16, storage: ("polynomial_frames_snorm16", 1673), texels: Some(("polynomial_frames_snorm16_texels", 1954)), bindings: 4, segments: Some((Form::Polynomial, List::Frames, Store::Snorm16)) },
+    KernelCode { kernel: Kernel::PolynomialFramesVector, storage: ("polynomial_frames_vector", 1600), texels: Some(("polynomial_frames_vector_texels", 1881)), bindings: 4, segments: Some((Form::Polynomial, List::Frames, Store::Vector)) },
+    KernelCode { kernel: Kernel::PolynomialTimesAxisAngle, storage: ("polynomial_times_axis_angle", 2622), texels: Some(("polynomial_times_axis_angle_texels", 2942)), bindings: 5, segments: Some((Form::Polynomial, List::Times, Store::AxisAngle)) },
+    KernelCode { kernel: Kernel::PolynomialTimesEuler, storage: ("polynomial_times_euler", 3162), texels: Some(("polynomial_times_euler_texels", 3478)), bindings: 5, segments: Some((Form::Polynomial, List::Times, Store::Euler)) },
+    KernelCode { kernel: Kernel::PolynomialTimesF16, storage: ("polynomial_times_f16", 1857), texels: Some(("polynomial_times_f16_texels", 2169)), bindings: 5, segments: Some((Form::Polynomial, List::Times, Store::F16)) },
+    KernelCode { kernel: Kernel::PolynomialTimesF32, storage: ("polynomial_times_f32", 1601), texels: Some(("polynomial_times_f32_texels", 2026)), bindings: 5, segments: Some((Form::Polynomial, List::Times, Store::F32)) },
+    KernelCode { kernel: Kernel::PolynomialTimesMatrix3x3, storage: ("polynomial_times_matrix3x3", 2196), texels: Some(("polynomial_times_matrix3x3_texels", 2504)), bindings: 5, segments: Some((Form::Polynomial, List::Times, Store::Matrix3x3)) },
+    KernelCode { kernel: Kernel::PolynomialTimesMatrix3x4, storage: ("polynomial_times_matrix3x4", 2271), texels: Some(("polynomial_times_matrix3x4_texels", 2575)), bindings: 5, segments: Some((Form::Polynomial, List::Times, Store::Matrix3x4)) },
+    KernelCode { kernel: Kernel::PolynomialTimesSnorm16, storage: ("polynomial_times_snorm16", 1738), texels: Some(("polynomial_times_snorm16_texels", 2050)), bindings: 5, segments: Some((Form::Polynomial, List::Times, Store::Snorm16)) },
+    KernelCode { kernel: Kernel::PolynomialTimesVector, storage: ("polynomial_times_vector", 1661), texels: Some(("polynomial_times_vector_texels", 1977)), bindings: 5, segments: Some((Form::Polynomial, List::Times, Store::Vector)) },
     KernelCode { kernel: Kernel::PolynomialSamplesAxisAngle, storage: ("polynomial_samples_axis_angle", 2236), texels: Some(("polynomial_samples_axis_angle_texels", 2450)), bindings: 4, segments: Some((Form::Polynomial, List::Samples, Store::AxisAngle)) },
     KernelCode { kernel: Kernel::PolynomialSamplesEuler, storage: ("polynomial_samples_euler", 2784), texels: Some(("polynomial_samples_euler_texels", 2986)), bindings: 4, segments: Some((Form::Polynomial, List::Samples, Store::Euler)) },
     KernelCode { kernel: Kernel::PolynomialSamplesF16, storage: ("polynomial_samples_f16", 1475), texels: Some(("polynomial_samples_f16_texels", 1681)), bindings: 4, segments: Some((Form::Polynomial, List::Samples, Store::F16)) },
@@ -836,22 +840,22 @@ pub(crate) static KERNELS: [KernelCode; 98] = [
     KernelCode { kernel: Kernel::PolynomialSamplesMatrix3x4, storage: ("polynomial_samples_matrix3x4", 1893), texels: Some(("polynomial_samples_matrix3x4_texels", 2083)), bindings: 4, segments: Some((Form::Polynomial, List::Samples, Store::Matrix3x4)) },
     KernelCode { kernel: Kernel::PolynomialSamplesSnorm16, storage: ("polynomial_samples_snorm16", 1356), texels: Some(("polynomial_samples_snorm16_texels", 1562)), bindings: 4, segments: Some((Form::Polynomial, List::Samples, Store::Snorm16)) },
     KernelCode { kernel: Kernel::PolynomialSamplesVector, storage: ("polynomial_samples_vector", 1283), texels: Some(("polynomial_samples_vector_texels", 1485)), bindings: 4, segments: Some((Form::Polynomial, List::Samples, Store::Vector)) },
-    KernelCode { kernel: Kernel::PolynomialFramesCoalescedAxisAngle, storage: ("polynomial_frames_coalesced_axis_angle", 3489), texels: None, bindings: 5, segments: Some((Form::Polynomial, List::FramesCoalesced, Store::AxisAngle)) },
-    KernelCode { kernel: Kernel::PolynomialFramesCoalescedEuler, storage: ("polynomial_frames_coalesced_euler", 4025), texels: None, bindings: 5, segments: Some((Form::Polynomial, List::FramesCoalesced, Store::Euler)) },
-    KernelCode { kernel: Kernel::PolynomialFramesCoalescedF16, storage: ("polynomial_frames_coalesced_f16", 2728), texels: None, bindings: 5, segments: Some((Form::Polynomial, List::FramesCoalesced, Store::F16)) },
-    KernelCode { kernel: Kernel::PolynomialFramesCoalescedF32, storage: ("polynomial_frames_coalesced_f32", 2468), texels: None, bindings: 5, segments: Some((Form::Polynomial, List::FramesCoalesced, Store::F32)) },
-    KernelCode { kernel: Kernel::PolynomialFramesCoalescedMatrix3x3, storage: ("polynomial_frames_coalesced_matrix3x3", 3063), texels: None, bindings: 5, segments: Some((Form::Polynomial, List::FramesCoalesced, Store::Matrix3x3)) },
-    KernelCode { kernel: Kernel::PolynomialFramesCoalescedMatrix3x4, storage: ("polynomial_frames_coalesced_matrix3x4", 3134), texels: None, bindings: 5, segments: Some((Form::Polynomial, List::FramesCoalesced, Store::Matrix3x4)) },
-    KernelCode { kernel: Kernel::PolynomialFramesCoalescedSnorm16, storage: ("polynomial_frames_coalesced_snorm16", 2609), texels: None, bindings: 5, segments: Some((Form::Polynomial, List::FramesCoalesced, Store::Snorm16)) },
-    KernelCode { kernel: Kernel::PolynomialFramesCoalescedVector, storage: ("polynomial_frames_coalesced_vector", 2528), texels: None, bindings: 5, segments: Some((Form::Polynomial, List::FramesCoalesced, Store::Vector)) },
-    KernelCode { kernel: Kernel::PolynomialTimesCoalescedAxisAngle, storage: ("polynomial_times_coalesced_axis_angle", 3554), texels: None, bindings: 6, segments: Some((Form::Polynomial, List::TimesCoalesced, Store::AxisAngle)) },
-    KernelCode { kernel: Kernel::PolynomialTimesCoalescedEuler, storage: ("polynomial_times_coalesced_euler", 4086), texels: None, bindings: 6, segments: Some((Form::Polynomial, List::TimesCoalesced, Store::Euler)) },
-    KernelCode { kernel: Kernel::PolynomialTimesCoalescedF16, storage: ("polynomial_times_coalesced_f16", 2793), texels: None, bindings: 6, segments: Some((Form::Polynomial, List::TimesCoalesced, Store::F16)) },
-    KernelCode { kernel: Kernel::PolynomialTimesCoalescedF32, storage: ("polynomial_times_coalesced_f32", 2533), texels: None, bindings: 6, segments: Some((Form::Polynomial, List::TimesCoalesced, Store::F32)) },
-    KernelCode { kernel: Kernel::PolynomialTimesCoalescedMatrix3x3, storage: ("polynomial_times_coalesced_matrix3x3", 3124), texels: None, bindings: 6, segments: Some((Form::Polynomial, List::TimesCoalesced, Store::Matrix3x3)) },
-    KernelCode { kernel: Kernel::PolynomialTimesCoalescedMatrix3x4, storage: ("polynomial_times_coalesced_matrix3x4", 3195), texels: None, bindings: 6, segments: Some((Form::Polynomial, List::TimesCoalesced, Store::Matrix3x4)) },
-    KernelCode { kernel: Kernel::PolynomialTimesCoalescedSnorm16, storage: ("polynomial_times_coalesced_snorm16", 2674), texels: None, bindings: 6, segments: Some((Form::Polynomial, List::TimesCoalesced, Store::Snorm16)) },
-    KernelCode { kernel: Kernel::PolynomialTimesCoalescedVector, storage: ("polynomial_times_coalesced_vector", 2589), texels: None, bindings: 6, segments: Some((Form::Polynomial, List::TimesCoalesced, Store::Vector)) },
+    KernelCode { kernel: Kernel::PolynomialFramesCoalescedAxisAngle, storage: ("polynomial_frames_coalesced_axis_angle", 3513), texels: None, bindings: 5, segments: Some((Form::Polynomial, List::FramesCoalesced, Store::AxisAngle)) },
+    KernelCode { kernel: Kernel::PolynomialFramesCoalescedEuler, storage: ("polynomial_frames_coalesced_euler", 4049), texels: None, bindings: 5, segments: Some((Form::Polynomial, List::FramesCoalesced, Store::Euler)) },
+    KernelCode { kernel: Kernel::PolynomialFramesCoalescedF16, storage: ("polynomial_frames_coalesced_f16", 2752), texels: None, bindings: 5, segments: Some((Form::Polynomial, List::FramesCoalesced, Store::F16)) },
+    KernelCode { kernel: Kernel::PolynomialFramesCoalescedF32, storage: ("polynomial_frames_coalesced_f32", 2492), texels: None, bindings: 5, segments: Some((Form::Polynomial, List::FramesCoalesced, Store::F32)) },
+    KernelCode { kernel: Kernel::PolynomialFramesCoalescedMatrix3x3, storage: ("polynomial_frames_coalesced_matrix3x3", 3083), texels: None, bindings: 5, segments: Some((Form::Polynomial, List::FramesCoalesced, Store::Matrix3x3)) },
+    KernelCode { kernel: Kernel::PolynomialFramesCoalescedMatrix3x4, storage: ("polynomial_frames_coalesced_matrix3x4", 3158), texels: None, bindings: 5, segments: Some((Form::Polynomial, List::FramesCoalesced, Store::Matrix3x4)) },
+    KernelCode { kernel: Kernel::PolynomialFramesCoalescedSnorm16, storage: ("polynomial_frames_coalesced_snorm16", 2633), texels: None, bindings: 5, segments: Some((Form::Polynomial, List::FramesCoalesced, Store::Snorm16)) },
+    KernelCode { kernel: Kernel::PolynomialFramesCoalescedVector, storage: ("polynomial_frames_coalesced_vector", 2552), texels: None, bindings: 5, segments: Some((Form::Polynomial, List::FramesCoalesced, Store::Vector)) },
+    KernelCode { kernel: Kernel::PolynomialTimesCoalescedAxisAngle, storage: ("polynomial_times_coalesced_axis_angle", 3578), texels: None, bindings: 6, segments: Some((Form::Polynomial, List::TimesCoalesced, Store::AxisAngle)) },
+    KernelCode { kernel: Kernel::PolynomialTimesCoalescedEuler, storage: ("polynomial_times_coalesced_euler", 4110), texels: None, bindings: 6, segments: Some((Form::Polynomial, List::TimesCoalesced, Store::Euler)) },
+    KernelCode { kernel: Kernel::PolynomialTimesCoalescedF16, storage: ("polynomial_times_coalesced_f16", 2817), texels: None, bindings: 6, segments: Some((Form::Polynomial, List::TimesCoalesced, Store::F16)) },
+    KernelCode { kernel: Kernel::PolynomialTimesCoalescedF32, storage: ("polynomial_times_coalesced_f32", 2557), texels: None, bindings: 6, segments: Some((Form::Polynomial, List::TimesCoalesced, Store::F32)) },
+    KernelCode { kernel: Kernel::PolynomialTimesCoalescedMatrix3x3, storage: ("polynomial_times_coalesced_matrix3x3", 3144), texels: None, bindings: 6, segments: Some((Form::Polynomial, List::TimesCoalesced, Store::Matrix3x3)) },
+    KernelCode { kernel: Kernel::PolynomialTimesCoalescedMatrix3x4, storage: ("polynomial_times_coalesced_matrix3x4", 3219), texels: None, bindings: 6, segments: Some((Form::Polynomial, List::TimesCoalesced, Store::Matrix3x4)) },
+    KernelCode { kernel: Kernel::PolynomialTimesCoalescedSnorm16, storage: ("polynomial_times_coalesced_snorm16", 2698), texels: None, bindings: 6, segments: Some((Form::Polynomial, List::TimesCoalesced, Store::Snorm16)) },
+    KernelCode { kernel: Kernel::PolynomialTimesCoalescedVector, storage: ("polynomial_times_coalesced_vector", 2613), texels: None, bindings: 6, segments: Some((Form::Polynomial, List::TimesCoalesced, Store::Vector)) },
     KernelCode { kernel: Kernel::FromKeysArcs, storage: ("from_keys_arcs", 2361), texels: Some(("from_keys_arcs_texels", 2514)), bindings: 3, segments: None },
     KernelCode { kernel: Kernel::FromKeysTwoKeys, storage: ("from_keys_two_keys", 3121), texels: Some(("from_keys_two_keys_texels", 3274)), bindings: 3, segments: None },
     KernelCode { kernel: Kernel::FromKeysCubics, storage: ("from_keys_cubics", 5760), texels: Some(("from_keys_cubics_texels", 5904)), bindings: 4, segments: None },

@@ -10,7 +10,8 @@ struct Dispatch {
     stride: u32,
     /// What the store needs beside the rotation: the order of a matrix, the axes of angles.
     detail: u32,
-    /// Where the first listed sample is stored; the others follow.
+    /// Where the first listed sample is stored; the others follow. For items, what is added to their
+    /// `output`.
     first_output: u32,
     /// Invocations before the first listed sample, which do nothing: so neighbours begin to store
     /// where a line of memory begins. `first_item` and `first_output` count them too.

@@ -2,8 +2,8 @@
 // those are.
 
 /// The arguments of one dispatch over a grid of samples. Track by track (`stride` is 1), the
-/// samples of all tracks are one row, and a sample's position is the place where it is stored.
-/// Frame by frame each track is a row, and a position is a sample's number.
+/// samples of all tracks are one row, and a sample's position is the place where it is stored, less
+/// `shift`. Frame by frame each track is a row, and a position is a sample's number.
 struct Grid {
     /// What the store needs beside the rotation: the order of a matrix, the axes of angles.
     detail: u32,
@@ -13,11 +13,13 @@ struct Grid {
     samples: u32,
     /// How many rows.
     rows: u32,
-    /// Where the first position of the first row is stored; track by track that is a multiple of
-    /// `BLOCK_SAMPLES`.
+    /// Frame by frame, where the first position of the first row is stored; track by track the first
+    /// position, a multiple of `BLOCK_SAMPLES`.
     first_output: u32,
     /// The block of the first positions of the first row.
     first_block: u32,
+    /// Track by track, how far behind its position a sample is stored.
+    shift: u32,
 }
 
 /// Which items the samples of 32 neighbouring positions belong to.
@@ -84,8 +86,9 @@ fn corner_of(group: vec3u, groups: vec3u, lane: u32) -> Corner {
 fn cell_of(corner: Corner, turn: u32) -> Cell {
     if dispatch.stride == 1u {
         let index = corner.first + turn * LINE;
-        let place = dispatch.first_output + index;
-        return Cell(place, place, corner.block, index < dispatch.samples);
+        let position = dispatch.first_output + index;
+        let place = position + dispatch.shift;
+        return Cell(place, position, corner.block, index < dispatch.samples);
     }
     let sample = corner.first + turn;
     let row = sample * dispatch.stride + dispatch.first_output;

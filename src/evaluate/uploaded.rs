@@ -7,6 +7,7 @@ use crate::cpu::engine::CpuEngine;
 use crate::evaluate::pieces::{Pieces, segment_bytes};
 use crate::gpu::engine::{ClipBuffers, Job, VulkanEngine, lock};
 use crate::gpu::error::{EvaluateError, VulkanError};
+use crate::gpu::kept_lists::ListCache;
 use crate::gpu::recovery::Opened;
 use crate::gpu::turns::Turns;
 use crate::memory::{OutOfMemory, refuse_more_than_there_is};
@@ -27,6 +28,8 @@ pub(crate) struct Uploaded {
     /// Uploaded again after the device was lost.
     buffers: Mutex<Option<Arc<ClipBuffers>>>,
     uploading: Turns<()>,
+    /// What a device reads of samples that were asked for before.
+    lists: ListCache,
     /// The set, where its segments would take more memory than the engine may use, with how much that is: then
     /// nothing is prepared before it is evaluated.
     in_pieces: Option<(TrackSet, usize)>,
@@ -60,6 +63,7 @@ impl Uploaded {
             data,
             buffers: Mutex::new(buffers),
             uploading: Turns::default(),
+            lists: ListCache::default(),
             in_pieces: None,
         })
     }
@@ -80,6 +84,7 @@ impl Uploaded {
             data: ClipData::unprepared(set, interpolation)?,
             buffers: Mutex::default(),
             uploading: Turns::default(),
+            lists: ListCache::default(),
             in_pieces: Some((set.clone(), limit)),
         })
     }
@@ -184,14 +189,21 @@ impl Uploaded {
             return Err(OutOfMemory::new::<u8>(SEGMENTS, needed).into());
         }
         opened.attempt_smaller(|engine| {
-            let (clip, buffers) = (&self.data, &*self.buffers_on(engine)?);
+            let (clip, buffers) = (&self.data, &self.buffers_on(engine)?);
             let job = Job {
                 clip,
                 buffers,
                 timeline,
                 encoding,
+                lists: &self.lists,
             };
-            work(engine, job)
+            let done = work(engine, job);
+            if let Err(EvaluateError::Vulkan(error)) = &done
+                && error.is_out_of_memory()
+            {
+                self.lists.forget();
+            }
+            done
         })
     }
 

@@ -32,6 +32,15 @@ pub(crate) mod physical {
     }
 }
 
+pub(crate) mod kept_lists {
+    #[derive(Default)]
+    pub(crate) struct ListCache;
+
+    impl ListCache {
+        pub(crate) fn forget(&self) {}
+    }
+}
+
 pub(crate) mod engine {
     use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -40,6 +49,7 @@ pub(crate) mod engine {
     use crate::from_keys::dispatches::KeyJob;
     use crate::gpu::Never;
     use crate::gpu::error::{EvaluateError, VulkanError};
+    use crate::gpu::kept_lists::ListCache;
     use crate::gpu::options::Timings;
     use crate::gpu::reports::{KernelCheck, NegativeControl};
     use crate::output::encoding::Encoding;
@@ -59,9 +69,10 @@ pub(crate) mod engine {
 
     pub(crate) struct Job<'a> {
         pub(crate) clip: &'a ClipData,
-        pub(crate) buffers: &'a ClipBuffers,
+        pub(crate) buffers: &'a Arc<ClipBuffers>,
         pub(crate) timeline: &'a Timeline,
         pub(crate) encoding: Encoding,
+        pub(crate) lists: &'a ListCache,
     }
 
     pub(crate) struct VulkanEngine {

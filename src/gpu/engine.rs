@@ -11,15 +11,16 @@ use crate::gpu::device::{Lane, LogicalDevice};
 use crate::gpu::error::{EvaluateError, VulkanError};
 use crate::gpu::from_keys::KeyUploads;
 use crate::gpu::in_flight::{InFlight, Target, copy};
+use crate::gpu::kept_lists::ListCache;
 use crate::gpu::kernel_check::passes::{Pass, Passes};
 use crate::gpu::kernel_check::{self, KernelCheck};
 use crate::gpu::memory_types::KernelReads;
 use crate::gpu::options::{EngineOptions, Timings, Transfer};
 use crate::gpu::pipeline::{Exactness, Pipeline};
-use crate::gpu::submission::{Access, Submission};
+use crate::gpu::submission::{Access, Binding, Submission};
 use crate::gpu::turns::Turns;
 use crate::gpu::upload::writable;
-use crate::gpu::work_list::WorkLists;
+use crate::gpu::work_list::{GroupItems, WorkLists};
 use crate::output::buffer::OutputBuffer;
 use crate::output::encoding::Encoding;
 use crate::output::rotations::{Layout, Storage};
@@ -81,12 +82,34 @@ pub(crate) struct ClipBuffers {
 #[derive(Clone, Copy)]
 pub(crate) struct Job<'a> {
     pub(crate) clip: &'a ClipData,
-    pub(crate) buffers: &'a ClipBuffers,
+    pub(crate) buffers: &'a Arc<ClipBuffers>,
     pub(crate) timeline: &'a Timeline,
     pub(crate) encoding: Encoding,
+    /// The lists that the clip keeps on the device.
+    pub(crate) lists: &'a ListCache,
 }
 
 impl Job<'_> {
+    /// The kernel that evaluates what is listed.
+    pub(crate) fn kernel(&self, list: List) -> Kernel {
+        let form = self.clip.interpolation.form();
+        Kernel::over_segments(form, list, self.encoding.row().store)
+    }
+
+    /// What it binds for a group.
+    pub(crate) fn bindings(
+        &self,
+        group: &GroupItems,
+        listed: &[Binding],
+        result: Binding,
+    ) -> Vec<Binding> {
+        let (segments, constants) = &self.buffers.groups[group.group];
+        let mut all = vec![Binding::whole(segments), Binding::whole(constants)];
+        all.extend(listed);
+        all.push(result);
+        all
+    }
+
     /// All of the result.
     pub(crate) fn whole(&self, layout: Layout) -> Window {
         Window::whole(self.clip.track_count(), self.timeline.len(), layout)

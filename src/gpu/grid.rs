@@ -16,19 +16,16 @@ pub(crate) struct GridRows {
     stride: u32,
     /// Samples of each track.
     samples: u32,
-    /// Added to every place in the output.
-    shift: u32,
 }
 
 impl GridRows {
     /// `None` for a window that items suit better: frame by frame, with fewer tracks than a line of
     /// memory has rotations.
-    pub(crate) fn new(window: &Window, shift: u32) -> Option<Self> {
+    pub(crate) fn new(window: &Window) -> Option<Self> {
         let stride = window.stride() as u32;
         (stride == 1 || stride >= LINE).then_some(Self {
             stride,
             samples: window.samples.len() as u32,
-            shift,
         })
     }
 
@@ -36,10 +33,7 @@ impl GridRows {
     pub(crate) fn cell(self, place: u32) -> (u32, u32) {
         match self.stride {
             1 => (0, place),
-            stride => {
-                let place = place - self.shift;
-                (place % stride, place / stride)
-            }
+            stride => (place % stride, place / stride),
         }
     }
 
@@ -74,7 +68,7 @@ impl GridRows {
                 let first = first - first % BLOCK_SAMPLES;
                 (1, end - first, first)
             }
-            _ => (row - first_row + 1, self.samples, self.shift + first_row),
+            _ => (row - first_row + 1, self.samples, first_row),
         };
         Some(GroupGrid {
             all: self,
@@ -86,6 +80,7 @@ impl GridRows {
                 rows,
                 first_output,
                 first_block,
+                shift: 0,
             },
         })
     }
@@ -217,7 +212,7 @@ mod tests {
                     stride => sample * stride + track,
                 };
                 let mut item = Item::zeroed();
-                (item.output, item.count) = (output + rows.shift, count);
+                (item.output, item.count) = (output, count);
                 let flags = [0, IS_CONSTANT, MAY_BE_TINY];
                 item.count |= flags[random.usize(..3)];
                 chunks[usize::from(track > 4)].items.push(item);
@@ -232,9 +227,9 @@ mod tests {
     #[test]
     fn blocks_tell_the_item_of_every_sample() {
         for layout in [Layout::TrackMajor, Layout::FrameMajor] {
-            for (tracks, samples, shift) in [(9, 300, 0), (8, 1, 3), (40, 65, 7), (11, 32, 40)] {
+            for (tracks, samples) in [(9, 300), (8, 1), (40, 65), (11, 32)] {
                 let window = Window::whole(tracks as usize, samples as usize, layout);
-                let rows = GridRows::new(&window, shift).unwrap();
+                let rows = GridRows::new(&window).unwrap();
                 let list = listed(rows, tracks);
                 let grid = rows.of_group(&list, 0).unwrap();
                 let mut blocks = vec![Block::zeroed(); grid.blocks() as usize];
@@ -273,7 +268,7 @@ mod tests {
     #[test]
     fn items_in_another_order_have_no_grid() {
         let window = Window::whole(9, 300, Layout::TrackMajor);
-        let rows = GridRows::new(&window, 0).unwrap();
+        let rows = GridRows::new(&window).unwrap();
         let mut list = listed(rows, 9);
         list.chunks.reverse();
         assert!(rows.of_group(&list, 0).is_none());
@@ -282,6 +277,6 @@ mod tests {
         list.chunks[0].items[1].output = overlap - 1;
         assert!(rows.of_group(&list, 0).is_none());
         let few = Window::whole(7, 300, Layout::FrameMajor);
-        assert!(GridRows::new(&few, 0).is_none());
+        assert!(GridRows::new(&few).is_none());
     }
 }

@@ -129,12 +129,7 @@ impl VulkanEngine {
         let mut result = work.try_for_each(|work| {
             stop::check().map_err(SetError::from)?;
             if next == in_flight.len() {
-                in_flight.push(InFlight {
-                    results: ReadBack::new(&self.device)?,
-                    uploads: U::default(),
-                    done: None,
-                    compiled: false,
-                });
+                in_flight.push(InFlight::new(&self.device)?);
             }
             let own = &mut in_flight[next];
             next = (next + 1) % self.in_flight_count;
@@ -164,6 +159,17 @@ impl VulkanEngine {
         }
         *lock(&self.timings) += stopwatch.timings;
         result
+    }
+}
+
+impl<U: Default> InFlight<U> {
+    pub(crate) fn new(device: &Arc<LogicalDevice>) -> Result<Self, VulkanError> {
+        Ok(Self {
+            results: ReadBack::new(device)?,
+            uploads: U::default(),
+            done: None,
+            compiled: false,
+        })
     }
 }
 

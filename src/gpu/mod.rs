@@ -8,6 +8,7 @@ pub(crate) mod buffer;
 pub(crate) mod cache;
 #[cfg(test)]
 pub(crate) mod cards;
+pub(crate) mod clip_target;
 pub(crate) mod crowd;
 pub(crate) mod crowd_target;
 pub(crate) mod descriptors;
@@ -22,6 +23,7 @@ pub(crate) mod handles;
 pub(crate) mod imported_memory;
 pub(crate) mod in_flight;
 pub(crate) mod instance;
+pub(crate) mod kept_lists;
 pub(crate) mod kernel_check;
 pub(crate) mod memory_types;
 pub(crate) mod options;

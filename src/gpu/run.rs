@@ -3,15 +3,17 @@
 
 use std::sync::atomic::Ordering;
 
-use crate::gpu::engine::{Job, VulkanEngine};
-use crate::gpu::error::EvaluateError;
-use crate::gpu::in_flight::{Finish, InFlight, Target};
-use crate::gpu::submission::{Access, Binding};
+use crate::gpu::engine::{Job, VulkanEngine, lock};
+use crate::gpu::error::{EvaluateError, VulkanError};
+use crate::gpu::handles::VulkanBuffer;
+use crate::gpu::in_flight::{Finish, InFlight, Stopwatch, Target};
+use crate::gpu::kept_lists::KeptLists;
+use crate::gpu::submission::{Access, Binding, Submission};
 use crate::gpu::upload::Upload;
-use crate::gpu::work_list::WorkLists;
+use crate::gpu::work_list::{GroupItems, Work, WorkLists};
 use crate::output::encoding::Encoding;
 use crate::output::window::Window;
-use crate::shader::{Dispatch, Grid, Kernel, LINE, WORKGROUP};
+use crate::shader::{Dispatch, Grid, LINE, List, WORKGROUP};
 use crate::threads::on_threads;
 
 /// Bytes of the lines in which a card's memory is written, at most.
@@ -27,7 +29,32 @@ fn aligned_before(start: u64, rotation: u64, alignment: u64) -> Option<u64> {
     Some(aligned)
 }
 
+/// What comes with one dispatch over segments.
+#[derive(Clone, Copy)]
+pub(crate) enum Arguments {
+    /// Of a grid, whose neighbouring invocations take neighbouring samples.
+    Grid(Grid),
+    /// Of items, or of listed samples.
+    Listed(Dispatch),
+}
+
+impl Arguments {
+    pub(crate) fn bytes(&self) -> &[u8] {
+        match self {
+            Self::Grid(grid) => bytemuck::bytes_of(grid),
+            Self::Listed(dispatch) => bytemuck::bytes_of(dispatch),
+        }
+    }
+}
+
 impl VulkanEngine {
+    /// Values of a window, of this encoding: `self.window()` counts rotations of 16 bytes; of larger ones
+    /// a window holds fewer.
+    pub(crate) fn window_of(&self, encoding: Encoding) -> usize {
+        let each = encoding.bytes().div_ceil(Encoding::F32.bytes());
+        (self.window() / each).max(1)
+    }
+
     /// Evaluates a window of a result, cut into smaller windows that suit the device.
     pub(crate) fn run(
         &self,
@@ -35,16 +62,21 @@ impl VulkanEngine {
         window: &Window,
         mut target: Target<'_>,
     ) -> Result<(), EvaluateError> {
-        // `self.window()` counts rotations of 16 bytes; of larger ones a window holds fewer.
-        let each = job.encoding.bytes().div_ceil(Encoding::F32.bytes());
-        let most = || (self.window() / each).max(1);
+        let kept = job.lists.lists(self, job, window)?;
+        let kept = kept.as_deref();
+        if let (Some(kept), Target::External(buffer)) = (kept, &target)
+            && self.runs_at_once(job, window)
+        {
+            return self.run_kept(job, kept, buffer);
+        }
+        let most = || self.window_of(job.encoding);
         // Each is cut again when its turn comes: windows may have been halved since.
         let windows = window.cut(most()).flat_map(|window| window.within(most()));
         self.fly(
             &self.in_flight,
             &mut target,
             windows,
-            |own, target, window| self.start(own, job, &window, target),
+            |own, target, window| self.start(own, job, kept, &window, target),
         )
     }
 
@@ -52,26 +84,19 @@ impl VulkanEngine {
         &self,
         own: &mut InFlight<WorkLists>,
         job: Job<'_>,
+        kept: Option<&KeptLists>,
         window: &Window,
         target: &Target<'_>,
     ) -> Result<(), EvaluateError> {
         let (clip, encoding) = (job.clip, job.encoding);
         let rotation = encoding.bytes();
         let bytes = window.start * rotation..(window.start + window.len()) * rotation;
-        let info = &self.device.physical.info;
         let place = target.place();
         let start = place.map_or(0, |(_, first)| first + bytes.start as u64);
         let rotation = rotation as u64;
-        let least = info.min_storage_buffer_offset_alignment.max(1);
-        let lines = self.maps_samples.then_some(least.max(LINE_BYTES));
-        let aligned = (lines.into_iter().chain([least]))
-            .find_map(|alignment| aligned_before(start, rotation, alignment))
-            .unwrap_or(0);
+        let aligned = self.binding_before(start, rotation);
         let shift = (start - aligned) / rotation;
         let size = (window.len() as u64 + shift) * rotation;
-        let lists = &mut own.uploads;
-        let list = || lists.list(self, clip, job.timeline, window, shift as u32);
-        let work = on_threads(list)??;
 
         let staged = !self.device.placing.in_place;
         let buffer = match place {
@@ -80,69 +105,41 @@ impl VulkanEngine {
         };
         let rotations = Binding::range(buffer, aligned, size);
         let kernels = &mut own.results.kernels;
-        kernels.begin(work.groups.len() as u32)?;
-        let uploads = lists.uploads(work.list);
-        Upload::record(uploads.iter().copied(), kernels);
-        let listed: Vec<Binding> = uploads.into_iter().filter_map(Upload::binding).collect();
-        let form = clip.interpolation.form();
-        let (store, detail) = (encoding.row().store, encoding.row().detail);
-        let pipeline = self.pipeline(Kernel::over_segments(form, work.list, store))?;
-        own.compiled = pipeline.has_run.swap(true, Ordering::Relaxed);
-        let mut first_item = 0_u32;
-        for group in work.groups {
-            let item_count = group.items;
-            if item_count == 0 {
-                continue;
+        let (listed, fresh);
+        let work = match kept.and_then(|kept| kept.of(window)) {
+            Some(kept) => {
+                kernels.begin(kept.work.groups.len() as u32)?;
+                listed = kept.bindings();
+                &kept.work
             }
-            let (segments, constants) = &job.buffers.groups[group.group];
-            let mut bindings = vec![Binding::whole(segments), Binding::whole(constants)];
-            bindings.extend(&listed);
-            bindings.push(rotations);
-            let (grid, dispatch);
-            let (arguments, groups) = match group.grid {
-                Some(of_group) => {
-                    grid = Grid {
-                        detail,
-                        ..of_group.arguments
-                    };
-                    let most = info.max_compute_work_group_count[0];
-                    (bytemuck::bytes_of(&grid), of_group.workgroups(most))
-                }
-                None => {
-                    // Only samples have a first output.
-                    let idle = match self.maps_samples {
-                        true => group.first_output % LINE,
-                        false => 0,
-                    };
-                    dispatch = Dispatch {
-                        first_item: first_item.wrapping_sub(idle),
-                        item_count,
-                        stride: window.stride() as u32,
-                        detail,
-                        first_output: group.first_output - idle,
-                        idle,
-                    };
-                    let groups = self.workgroups(item_count + idle);
-                    (bytemuck::bytes_of(&dispatch), groups)
-                }
-            };
-            kernels.dispatch(&pipeline, &bindings, arguments, groups)?;
-            first_item += item_count;
+            None => {
+                let lists = &mut own.uploads;
+                let list = || lists.list(self, clip, job.timeline, window);
+                fresh = on_threads(list)??;
+                kernels.begin(fresh.groups.len() as u32)?;
+                let uploads = lists.uploads(fresh.list);
+                Upload::record(uploads.iter().copied(), kernels);
+                listed = uploads.into_iter().filter_map(Upload::binding).collect();
+                &fresh
+            }
+        };
+        let pipeline = self.pipeline(job.kernel(work.list))?;
+        own.compiled = pipeline.has_run.swap(true, Ordering::Relaxed);
+        let stride = window.stride() as u32;
+        for group in work.dispatched() {
+            let bindings = job.bindings(group, &listed, rotations);
+            let like = [stride, encoding.row().detail, shift as u32];
+            let (arguments, groups) = self.dispatch_of(work, group, like);
+            kernels.dispatch(&pipeline, &bindings, arguments.bytes(), groups)?;
         }
-        let mut patches = work.patches;
+        let mut patches = Vec::new();
         if let Target::External(range) = target {
             let commands = kernels.commands();
-            commands.barrier(Access::Kernel, Access::Copy);
-            let mut value_bytes = vec![0; encoding.bytes()];
-            for (place, value) in patches.drain(..) {
-                encoding.encode_all(&[value], &mut value_bytes);
-                let offset = start + place as u64 * rotation;
-                commands.update(range.buffer, offset, &value_bytes);
-            }
+            work.patch(commands, range.buffer, start, encoding);
             commands.barrier(Access::Kernel, Access::Any);
-            commands.barrier(Access::Copy, Access::Any);
             kernels.submit()?;
         } else {
+            patches.clone_from(&work.patches);
             own.results.submit(place.is_none().then_some(size))?;
         }
         own.done = Some(Finish {
@@ -151,6 +148,124 @@ impl VulkanEngine {
             patches,
         });
         Ok(())
+    }
+
+    /// Where a binding begins that has a value at `start`: where a line of memory does on cards, and whole
+    /// values before it.
+    pub(crate) fn binding_before(&self, start: u64, rotation: u64) -> u64 {
+        let info = &self.device.physical.info;
+        let least = info.min_storage_buffer_offset_alignment.max(1);
+        let lines = self.maps_samples.then_some(least.max(LINE_BYTES));
+        (lines.into_iter().chain([least]))
+            .find_map(|alignment| aligned_before(start, rotation, alignment))
+            .unwrap_or(0)
+    }
+
+    /// The dispatch of a group of a window: with the stride of its samples, what the store needs beside a
+    /// rotation, and how many values behind the beginning of the binding the window's result begins.
+    pub(crate) fn dispatch_of(
+        &self,
+        work: &Work,
+        group: &GroupItems,
+        [stride, detail, shift]: [u32; 3],
+    ) -> (Arguments, [u32; 3]) {
+        let most = self.device.physical.info.max_compute_work_group_count[0];
+        if let Some(of_group) = group.grid {
+            let mut grid = Grid {
+                detail,
+                ..of_group.arguments
+            };
+            match grid.stride {
+                1 => grid.shift = shift,
+                _ => grid.first_output += shift,
+            }
+            return (Arguments::Grid(grid), of_group.workgroups(most));
+        }
+        let first_output = group.first_output + shift;
+        // Only samples lie one after another.
+        let idle = match self.maps_samples && work.list == List::Samples {
+            true => first_output % LINE,
+            false => 0,
+        };
+        let dispatch = Dispatch {
+            first_item: group.first_item.wrapping_sub(idle),
+            item_count: group.items,
+            stride,
+            detail,
+            first_output: first_output - idle,
+            idle,
+        };
+        let groups = self.workgroups(group.items + idle);
+        (Arguments::Listed(dispatch), groups)
+    }
+
+    /// Whether all windows of a result can go to the device at once: into one binding, and on a card, which
+    /// is done with them long before anybody notices.
+    fn runs_at_once(&self, job: Job<'_>, whole: &Window) -> bool {
+        let bytes = (whole.len() * job.encoding.bytes()) as u64 + LINE_BYTES;
+        let range = self.device.physical.info.max_storage_buffer_range;
+        self.maps_samples && bytes <= range.min(u64::from(u32::MAX))
+    }
+
+    /// Evaluates all windows of a result whose lists are kept into an application's buffer, in one
+    /// submission.
+    fn run_kept(
+        &self,
+        job: Job<'_>,
+        kept: &KeptLists,
+        target: &VulkanBuffer,
+    ) -> Result<(), EvaluateError> {
+        let mut in_flight = self.in_flight.take();
+        if in_flight.is_empty() {
+            in_flight.push(InFlight::new(&self.device)?);
+        }
+        let kernels = &mut in_flight[0].results.kernels;
+        let done = self.submit_kept(kernels, job, kept, target);
+        let spent = done.and_then(|()| kernels.wait());
+        if spent.is_err() {
+            in_flight.clear(); // a fence or a recording may be half way
+        }
+        if let Some(spent) = spent? {
+            let mut stopwatch = Stopwatch::default();
+            stopwatch.ran(spent, false);
+            *lock(&self.timings) += stopwatch.timings;
+        }
+        Ok(())
+    }
+
+    fn submit_kept(
+        &self,
+        kernels: &mut Submission,
+        job: Job<'_>,
+        kept: &KeptLists,
+        target: &VulkanBuffer,
+    ) -> Result<(), VulkanError> {
+        let sets = kept.windows.iter().map(|own| own.work.groups.len());
+        kernels.begin(sets.sum::<usize>() as u32)?;
+        let encoding = job.encoding;
+        let rotation = encoding.bytes() as u64;
+        let aligned = self.binding_before(target.offset, rotation);
+        let shift = (target.offset - aligned) / rotation;
+        let end = (kept.windows.last()).map_or(0, |own| own.window.start + own.window.len());
+        let range = Binding::range(target.buffer, aligned, (end as u64 + shift) * rotation);
+        for own in &kept.windows {
+            let pipeline = self.pipeline(job.kernel(own.work.list))?;
+            let listed = own.bindings();
+            for group in own.work.dispatched() {
+                let bindings = job.bindings(group, &listed, range);
+                let shift = shift as u32 + own.window.start as u32;
+                let like = [own.window.stride() as u32, encoding.row().detail, shift];
+                let (arguments, groups) = self.dispatch_of(&own.work, group, like);
+                kernels.dispatch(&pipeline, &bindings, arguments.bytes(), groups)?;
+            }
+        }
+        let commands = kernels.commands();
+        for own in &kept.windows {
+            let start = target.offset + own.window.start as u64 * rotation;
+            own.work.patch(commands, target.buffer, start, encoding);
+        }
+        commands.barrier(Access::Kernel, Access::Any);
+        kernels.submit()
     }
 
     /// Enough workgroups for `items`, within the limit along x.

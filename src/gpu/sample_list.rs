@@ -99,20 +99,17 @@ impl<'a> SampleList<'a> {
         row + (first as usize).clamp(samples.start, samples.end) - samples.start
     }
 
-    /// Writes the list, on the engine's threads; `shift` is added to every place in the output.
-    pub(crate) fn write(
-        &self,
-        mut list: &mut [ListedSample],
-        shift: u32,
-    ) -> Result<Work, FramesError> {
+    /// Writes the list, on the engine's threads.
+    pub(crate) fn write(&self, mut list: &mut [ListedSample]) -> Result<Work, FramesError> {
         let mut chunks = Vec::new();
         let mut groups = Vec::new();
         for (i, own) in self.groups.iter().enumerate() {
             let end = (self.groups.get(i + 1)).map_or(self.window.len(), |next| next.first);
             groups.push(GroupItems {
                 group: own.group,
+                first_item: own.first as u32,
                 items: (end - own.first) as u32,
-                first_output: own.first as u32 + shift,
+                first_output: own.first as u32,
                 grid: None,
             });
             let each = parts_per_chunk(self.window);

@@ -62,6 +62,24 @@ impl Upload {
         }
     }
 
+    /// Whether the device reads a copy.
+    pub(crate) fn is_copied(&self) -> bool {
+        self.copied.is_some()
+    }
+
+    /// Frees what was written for the device to copy, when it has copied it: no more is written here.
+    pub(crate) fn forget_written(&mut self) {
+        if self.is_copied() {
+            self.written = None;
+        }
+    }
+
+    /// Bytes of the memory that kernels read.
+    pub(crate) fn bytes(&self) -> u64 {
+        let read = self.copied.as_ref().or(self.written.as_ref());
+        read.map_or(0, |buffer| buffer.size)
+    }
+
     /// What kernels bind; nothing before there was room for anything.
     pub(crate) fn binding(&self) -> Option<Binding> {
         let own = self.copied.as_ref().or(self.written.as_ref());

@@ -1,5 +1,6 @@
 //! The work list of one window of the output: items, each some consecutive samples of one segment.
 
+use ash::vk;
 use bytemuck::Zeroable as _;
 use rayon::prelude::*;
 
@@ -9,7 +10,9 @@ use crate::gpu::grid::{GridRows, GroupGrid, write_blocks};
 use crate::gpu::in_flight::copy;
 use crate::gpu::memory_types::KernelReads;
 use crate::gpu::sample_list::SampleList;
+use crate::gpu::submission::{Access, Commands};
 use crate::gpu::upload::Upload;
+use crate::output::encoding::Encoding;
 use crate::output::window::Window;
 use crate::prepare::clip_data::ClipData;
 use crate::prepare::prepared::Prepared;
@@ -29,9 +32,43 @@ pub(crate) struct Work {
     pub(crate) patches: Vec<Patch>,
 }
 
+impl Work {
+    /// The groups that the device has anything to do for.
+    pub(crate) fn dispatched(&self) -> impl Iterator<Item = &GroupItems> {
+        self.groups.iter().filter(|group| group.items > 0)
+    }
+
+    /// Records what the host computed, behind the kernels, into a window that begins at `start` of a buffer.
+    pub(crate) fn patch(
+        &self,
+        commands: Commands<'_>,
+        buffer: vk::Buffer,
+        start: u64,
+        encoding: Encoding,
+    ) {
+        if self.patches.is_empty() {
+            return;
+        }
+        commands.barrier(Access::Kernel, Access::Copy);
+        let bytes = encoding.bytes();
+        let mut encoded = [0; MOST_VALUE_BYTES];
+        for &(place, value) in &self.patches {
+            encoding.encode_all(&[value], &mut encoded[..bytes]);
+            let offset = start + (place * bytes) as u64;
+            commands.update(buffer, offset, &encoded[..bytes]);
+        }
+        commands.barrier(Access::Copy, Access::Any);
+    }
+}
+
+/// Bytes of a stored value, at most: those of a 3 × 4 matrix.
+const MOST_VALUE_BYTES: usize = 48;
+
 /// How much the device has to do for one group of a clip.
 pub(crate) struct GroupItems {
     pub(crate) group: usize,
+    /// Where they begin in the list.
+    pub(crate) first_item: u32,
     /// How many items, or samples of a sample list.
     pub(crate) items: u32,
     /// Where the first sample of a sample list is stored.
@@ -79,33 +116,32 @@ pub(crate) struct WorkLists {
 }
 
 impl WorkLists {
-    /// Writes the work list of a window into its buffers, one group after another; `shift`
-    /// is added to every place in the output. Where the engine maps samples, neighbouring
-    /// invocations take neighbouring samples if that can be. Called on one of the engine's threads.
+    /// Writes the work list of a window into its buffers, one group after another. Where the engine
+    /// maps samples, neighbouring invocations take neighbouring samples if that can be. Called on one of
+    /// the engine's threads.
     pub(crate) fn list(
         &mut self,
         engine: &VulkanEngine,
         clip: &ClipData,
         timeline: &Timeline,
         window: &Window,
-        shift: u32,
     ) -> Result<Work, EvaluateError> {
         let (device, often) = (&engine.device, KernelReads::Often);
         if let Some(list) = SampleList::new(clip, timeline, window) {
             let bytes = window.len() * size_of::<ListedSample>();
             let place = self.items.room(device, "tumble items", often, bytes)?;
-            return Ok(list.write(bytemuck::cast_slice_mut(place), shift)?);
+            return Ok(list.write(bytemuck::cast_slice_mut(place))?);
         }
-        let mut rows = GridRows::new(window, shift).filter(|_| engine.maps_samples);
+        let mut rows = GridRows::new(window).filter(|_| engine.maps_samples);
         let (mut lists, mut grids) = (Vec::new(), Vec::new());
         if let Some(rows) = rows {
-            lists = work(clip, timeline, window, shift, Cut::Whole, &mut self.spare)?;
+            lists = work(clip, timeline, window, Cut::Whole, &mut self.spare)?;
             grids = rows.of_groups(&lists).unwrap_or_default();
         }
         if grids.is_empty() {
             rows = None;
             self.take_back(lists);
-            lists = work(clip, timeline, window, shift, Cut::Short, &mut self.spare)?;
+            lists = work(clip, timeline, window, Cut::Short, &mut self.spare)?;
         }
 
         let chunks = lists.iter().flat_map(|list| &list.chunks);
@@ -130,11 +166,18 @@ impl WorkLists {
         }
 
         let is_timed = matches!(timeline.ticks, Ticks::Times { .. });
-        let groups = lists.iter().enumerate().map(|(place, list)| GroupItems {
-            group: list.group,
-            items: list.item_count() as u32,
-            first_output: 0,
-            grid: grids.get(place).copied(),
+        let mut first_item = 0;
+        let groups = lists.iter().enumerate().map(|(place, list)| {
+            let items = list.item_count() as u32;
+            let group = GroupItems {
+                group: list.group,
+                first_item,
+                items,
+                first_output: 0,
+                grid: grids.get(place).copied(),
+            };
+            first_item += items;
+            group
         });
         Ok(Work {
             list: match (rows.is_some(), is_timed) {
@@ -158,6 +201,19 @@ impl WorkLists {
             self.spare.push(chunk);
         }
         patches
+    }
+
+    /// Frees what only the next list would use.
+    pub(crate) fn forget_spare(&mut self) {
+        self.spare = Vec::new();
+        self.listed_blocks = Vec::new();
+    }
+
+    /// Frees what was written for the device to copy, when it has copied it.
+    pub(crate) fn forget_written(&mut self) {
+        for upload in [&mut self.items, &mut self.distances, &mut self.blocks] {
+            upload.forget_written();
+        }
     }
 
     /// What kernels read of a list, in the order of their bindings.
@@ -199,14 +255,12 @@ pub(crate) enum Cut {
     Whole,
 }
 
-/// The work lists of a window: one for each group that has any of its tracks. `shift` is added to
-/// every place in the output. `spare` are emptied chunks to use again: fresh memory would cost
+/// The work lists of a window: one for each group that has any of its tracks. `spare` are emptied chunks to use again: fresh memory would cost
 /// more than listing.
 pub(crate) fn work(
     clip: &ClipData,
     timeline: &Timeline,
     window: &Window,
-    shift: u32,
     cut: Cut,
     spare: &mut Vec<WorkChunk>,
 ) -> Result<Vec<GroupWork>, FramesError> {
@@ -220,7 +274,6 @@ pub(crate) fn work(
                 parts,
                 timeline,
                 window,
-                shift,
                 cut,
                 track: 0,
                 chunk: spare.pop().unwrap_or_default(),
@@ -247,7 +300,6 @@ struct PartsList<'a> {
     parts: &'a [Part],
     timeline: &'a Timeline,
     window: &'a Window,
-    shift: u32,
     cut: Cut,
     /// The track whose runs are met.
     track: usize,
@@ -321,7 +373,7 @@ impl Emit for PartsList<'_> {
         while done < run.count {
             let count = most.min(run.count - done);
             chunk.items.push(Item {
-                output: window.place(track, run.sample + done) as u32 + self.shift,
+                output: window.place(track, run.sample + done) as u32,
                 count: count as u32 | flags,
                 first: whole.first.wrapping_add(done as i32),
                 ..whole

@@ -16,7 +16,7 @@ use crate::output::encoding::Encoding;
 use crate::output::rotations::Layout;
 use crate::time::frames::Frames;
 use crate::verify::golden::GoldenError;
-use crate::verify::renderer::{Renderer, record};
+use crate::verify::renderer::{Renderer, record, record_clip};
 use crate::verify::sets::{Random, crowd_layer, crowd_library, shared_set};
 
 /// Seconds of the keys of the cases: 26 keys, 0.8 s apart.
@@ -62,6 +62,8 @@ pub struct FigureCase {
     pub seconds: f64,
     /// Seconds of later calls by the host's clock.
     pub host_seconds: f64,
+    /// Seconds in which the host recorded a later call into commands; none where it was not recorded.
+    pub record_seconds: Option<f64>,
     /// Bytes of the result in a second.
     pub rate: f64,
     /// `fill` or `download`: the limit.
@@ -230,10 +232,19 @@ impl Bench {
             first_call: first_call.as_secs_f64(),
             seconds,
             host_seconds: on_host,
+            record_seconds: None,
             rate,
             limit,
             share: if of > 0.0 { rate / of } else { 0.0 },
         });
+    }
+
+    /// How long the last case took to record, each time; the first does not count.
+    fn recorded_in(&mut self, mut times: Vec<Duration>) {
+        times.remove(0);
+        if let Some(case) = self.figures.cases.last_mut() {
+            case.record_seconds = Some(median(times));
+        }
     }
 
     /// One clip, kept on the device, whose result stays there.
@@ -256,19 +267,27 @@ impl Bench {
         let buffer = self.device_buffer(bytes)?;
         let started = Instant::now();
         let clip = self.renderer.engine.upload(&set, method)?;
-        let renderer = &self.renderer;
-        let mut first_call = None;
+        let target = Renderer::clip_target(&clip, &frames, (layout, encoding), (&buffer, 0))?;
+        let application = &mut self.renderer.application;
+        let (mut first_call, mut recording) = (None, Vec::new());
         let (_, runs) = measured(|| {
-            let call = Instant::now();
-            Renderer::to_buffer(&clip, &frames, (layout, encoding), (&buffer, 0))?;
-            let on_host = call.elapsed();
+            let commands = application.recorded(true, |commands| {
+                let call = Instant::now();
+                let recorded = record_clip(&target, commands, 0);
+                recording.push(call.elapsed());
+                recorded
+            })?;
+            let ran = application.timed(commands)?;
             first_call.get_or_insert_with(|| started.elapsed());
-            Ok(taken(&renderer.engine, on_host))
+            Ok(ran)
         })?;
+        application.forget_commands();
+        drop(target);
         let name = format!("{tracks} tracks × {samples} frames, {method}, {encoding}, {layout:?}");
         let values = (tracks * samples) as u64;
         let first_call = first_call.unwrap_or_default();
         self.add((case, name), (values, bytes), first_call, &runs, "fill");
+        self.recorded_in(recording);
         Ok(())
     }
 
@@ -348,14 +367,18 @@ impl Bench {
                 crowd.set(instance, 0, crowd_layer(&mut random, &library))?;
             }
             let target = Renderer::target(&crowd, output, &buffer)?;
-            let mut runs = Vec::new();
+            let (mut runs, mut recording) = (Vec::new(), Vec::new());
             let mut first_call = None;
             for _ in 0..8 {
                 crowd.advance_ticks(11_760)?;
                 let call = Instant::now();
                 let application = &self.renderer.application;
-                let commands =
-                    application.recorded(true, |commands| record(&mut crowd, &target, commands))?;
+                let commands = application.recorded(true, |commands| {
+                    let call = Instant::now();
+                    let recorded = record(&mut crowd, &target, commands);
+                    recording.push(call.elapsed());
+                    recorded
+                })?;
                 let ran = self.renderer.application.timed(commands);
                 let ran = ran.map_err(Error::from)?;
                 if first_call.is_none() {
@@ -373,6 +396,7 @@ impl Bench {
             let name = format!("{instances} instances × {JOINTS} joints, {values:?}");
             let first_call = first_call.unwrap_or_default();
             self.add(("crowd", name), (joints, size), first_call, &runs, "fill");
+            self.recorded_in(recording);
         }
         Ok(())
     }

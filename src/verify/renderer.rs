@@ -12,6 +12,7 @@ use crate::device::{Device, VulkanDevice};
 use crate::engine::Engine;
 use crate::error::Error;
 use crate::gpu::application::{Application, ApplicationBuffer, ApplicationMemory, Taken};
+use crate::gpu::clip_target::ClipTarget;
 use crate::gpu::crowd_target::CrowdTarget;
 use crate::gpu::options::{EngineOptions, ReadBack, Transfer};
 use crate::method::{self, Method};
@@ -84,8 +85,23 @@ impl Renderer {
         (buffer, offset): (&ApplicationBuffer, u64),
     ) -> Result<(), Error> {
         let range = buffer.range(offset, buffer.size - offset);
+        let request = clip.request(frames).layout(layout).encoding(encoding);
         // SAFETY: the buffer is of the same application, made for both uses, and nobody uses it now.
-        unsafe { clip.evaluate_to_buffer(frames, layout, encoding, range) }
+        unsafe { request.to_buffer(range) }
+    }
+
+    /// Makes ready what it takes to record a clip's samples into a buffer, from `offset` on.
+    pub(crate) fn clip_target(
+        clip: &Clip,
+        frames: &Frames,
+        (layout, encoding): (Layout, Encoding),
+        (buffer, offset): (&ApplicationBuffer, u64),
+    ) -> Result<ClipTarget, Error> {
+        let range = buffer.range(offset, buffer.size - offset);
+        let request = clip.request(frames).layout(layout).encoding(encoding);
+        // SAFETY: the buffer is of the same application, made for both uses, and outlives the target, which is
+        // made after it.
+        unsafe { request.target(range) }
     }
 
     pub(crate) fn target(
@@ -128,6 +144,17 @@ impl Renderer {
         self.application.run(&[commands])?;
         Ok(through.bytes(size)?)
     }
+}
+
+/// Records a clip's samples, to `offset` bytes behind the beginning of the target's range.
+pub(crate) fn record_clip(
+    target: &ClipTarget,
+    commands: ash::vk::CommandBuffer,
+    offset: u64,
+) -> Result<(), Error> {
+    // SAFETY: the commands are in recording and of the same device; callers here wait for them before the
+    // target goes.
+    Ok(unsafe { target.record(commands, offset) }?)
 }
 
 /// Records an evaluation of a crowd.
@@ -185,7 +212,8 @@ pub fn renderer(
 }
 
 /// Every encoding in both layouts, of arcs and polynomials, at frames and at explicit times, behind bytes that
-/// stay as they are.
+/// stay as they are: by the engine's submission, twice, and recorded into the application's commands, which run
+/// twice.
 fn buffer_to_buffer(
     renderer: &mut Renderer,
     cpu: &Engine,
@@ -227,18 +255,31 @@ fn buffer_to_buffer(
                     let each = encoding.bytes();
                     let offset = offset_rotations * each;
                     let expected = expected_clip.evaluate_encoded(frames, layout, encoding)?;
-                    Renderer::to_buffer(
-                        &clip,
-                        frames,
-                        (layout, encoding),
-                        (&buffer, offset as u64),
-                    )?;
-                    let found = renderer.bytes(&buffer, &host, offset + expected.len())?;
-                    let (before, found) = found.split_at(offset);
-                    check.values += (expected.len() / each) as u64;
-                    check.differing += differences(found, &expected, each).0;
-                    check.differing += before.iter().filter(|&&byte| byte != 0xff).count() as u64;
-                    renderer.fill(&buffer)?;
+                    let like = (layout, encoding);
+                    // A range that begins where no line does, and a record to a place further on in it.
+                    let further = 3 * each;
+                    let range = (&buffer, (offset - further) as u64);
+                    let target = Renderer::clip_target(&clip, frames, like, range)?;
+                    let recorded = renderer.application.recorded(false, |commands| {
+                        record_clip(&target, commands, further as u64)
+                    })?;
+                    // What is listed anew, what was kept from then on, and what was recorded.
+                    for way in 0..4 {
+                        match way {
+                            0 | 1 => {
+                                Renderer::to_buffer(&clip, frames, like, (&buffer, offset as u64))?;
+                            }
+                            _ => drop(renderer.application.run(&[recorded]).map_err(Error::from)?),
+                        }
+                        let found = renderer.bytes(&buffer, &host, offset + expected.len())?;
+                        let (before, found) = found.split_at(offset);
+                        check.values += (expected.len() / each) as u64;
+                        check.differing += differences(found, &expected, each).0;
+                        check.differing +=
+                            before.iter().filter(|&&byte| byte != 0xff).count() as u64;
+                        renderer.fill(&buffer)?;
+                    }
+                    drop(target);
                     renderer.application.forget_commands();
                 }
             }

@@ -324,7 +324,7 @@ fn of_clip(set: &TrackSet, frames: &Frames, method: Method, layout: Layout, cut:
             };
             window.len()
         ];
-        list.write(&mut samples, 0).unwrap();
+        list.write(&mut samples).unwrap();
         globals.push(("samples", cells(bytemuck::cast_slice(&samples))));
         let dispatch = dispatch_of(samples.len(), 1);
         globals.push(("dispatch", cells(bytemuck::bytes_of(&dispatch))));
@@ -337,13 +337,13 @@ fn of_clip(set: &TrackSet, frames: &Frames, method: Method, layout: Layout, cut:
             rotations,
         };
     }
-    let lists = work(&clip, &timeline, &window, 0, cut, &mut Vec::new()).unwrap();
+    let lists = work(&clip, &timeline, &window, cut, &mut Vec::new()).unwrap();
     let count: usize = lists.iter().map(GroupWork::item_count).sum();
     let chunks = lists.iter().flat_map(|list| &list.chunks);
     let distances: usize = chunks.map(|chunk| chunk.distances.len()).sum();
     let mut items: Vec<Item> = vec![bytemuck::Zeroable::zeroed(); count + 1];
     let mut distances = vec![0.0; distances];
-    let rows = GridRows::new(&window, 0).filter(|_| cut == Cut::Whole);
+    let rows = GridRows::new(&window).filter(|_| cut == Cut::Whole);
     write(&lists, rows, &mut items[..count], &mut distances);
     globals.push(("items", cells(bytemuck::cast_slice(&items))));
     let listed = if is_timed { "times" } else { "frames" };

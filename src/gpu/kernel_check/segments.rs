@@ -363,6 +363,7 @@ impl<S: Segment> Scene<S> {
             rows: 1,
             first_output: BLOCK_SAMPLES,
             first_block: 1,
+            shift: 0,
         };
         let tiles = SAMPLES.div_ceil(WORKGROUP * SAMPLES_EACH);
         self.grid(&blocks, grid, [2, tiles.div_ceil(2), 1], is_listed)
@@ -392,6 +393,7 @@ impl<S: Segment> Scene<S> {
             rows: ROWS,
             first_output: FIRST,
             first_block: 0,
+            shift: 0,
         };
         // A row may begin at any place of a line.
         let tiles = (LINE - 1 + ROWS).div_ceil(LINE);

@@ -247,7 +247,7 @@ fn speed(proof: &Proof, text: &mut String) {
     for case in &figures.cases {
         let _ = writeln!(
             text,
-            "  {:9}  {:width$}  first {:>8}  then {:>8}  {:>10}  {:>4.0} % of {}",
+            "  {:9}  {:width$}  first {:>8}  then {:>8}  {:>10}  {:>4.0} % of {}{}",
             case.case,
             case.name,
             time(case.first_call),
@@ -257,7 +257,9 @@ fn speed(proof: &Proof, text: &mut String) {
             match case.limit {
                 "download" => "the bus",
                 _ => "filling",
-            }
+            },
+            case.record_seconds
+                .map_or_else(String::new, |own| format!(", recorded in {}", time(own)))
         );
     }
 }

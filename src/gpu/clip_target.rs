@@ -1,0 +1,150 @@
+//! A clip's samples on their way into an application's buffer: everything that recording needs, made once.
+
+use std::sync::Arc;
+
+use ash::vk;
+
+use crate::gpu::descriptors::DescriptorPool;
+use crate::gpu::engine::{ClipBuffers, Job, VulkanEngine};
+use crate::gpu::error::{EvaluateError, VulkanError};
+use crate::gpu::handles::VulkanBuffer;
+use crate::gpu::kept_lists::KeptLists;
+use crate::gpu::pipeline::Pipeline;
+use crate::gpu::submission::{Access, Binding, Commands};
+use crate::output::encoding::Encoding;
+use crate::output::window::Window;
+
+/// Samples of a clip that are recorded into an application's commands, and the buffer that they go to
+/// ([`Request::target`](crate::request::Request::target)). What kernels read of the samples lies on the
+/// device: recording neither lists nor allocates anything.
+pub struct ClipTarget {
+    engine: Arc<VulkanEngine>,
+    lists: KeptLists,
+    pipelines: Vec<Arc<Pipeline>>,
+    /// Of each window and group that has work, its descriptor set.
+    sets: Vec<vk::DescriptorSet>,
+    encoding: Encoding,
+    buffer: VulkanBuffer,
+    /// Where the buffer is bound from.
+    bound: u64,
+    /// Bytes of the result.
+    bytes: u64,
+    // What the sets are made of and lead to. Whoever records promises that no work that uses it is in
+    // flight when the target is dropped.
+    _pool: DescriptorPool,
+    _segments: Arc<ClipBuffers>,
+}
+
+impl ClipTarget {
+    pub(crate) fn new(
+        engine: &Arc<VulkanEngine>,
+        job: Job<'_>,
+        whole: &Window,
+        buffer: VulkanBuffer,
+    ) -> Result<Self, EvaluateError> {
+        let each = job.encoding.bytes() as u64;
+        let bound = engine.binding_before(buffer.offset, each);
+        let range = buffer.offset + buffer.size - bound;
+        (engine.device.physical).check_range("the buffer", range)?;
+        let lists = KeptLists::new(engine, job, whole)?;
+        let mut pool = DescriptorPool::new(&engine.device);
+        let sets = lists
+            .windows
+            .iter()
+            .map(|own| own.work.dispatched().count());
+        pool.make_room(sets.sum::<usize>() as u32)?;
+        let (mut pipelines, mut sets) = (Vec::new(), Vec::new());
+        let result = Binding::range(buffer.buffer, bound, range);
+        for own in &lists.windows {
+            let pipeline = engine.pipeline(job.kernel(own.work.list))?;
+            let listed = own.bindings();
+            for group in own.work.dispatched() {
+                sets.push(pool.set(&pipeline, &job.bindings(group, &listed, result))?);
+            }
+            pipelines.push(pipeline);
+        }
+        Ok(Self {
+            engine: Arc::clone(engine),
+            lists,
+            pipelines,
+            sets,
+            encoding: job.encoding,
+            buffer,
+            bound,
+            bytes: whole.len() as u64 * each,
+            _pool: pool,
+            _segments: Arc::clone(job.buffers),
+        })
+    }
+
+    /// Bytes of the result.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        self.bytes
+    }
+
+    /// Records an evaluation into the application's command buffer, to `offset` bytes behind the beginning
+    /// of the target's range. Nothing is waited for and nothing allocated: a dispatch for each two million
+    /// values, and some bytes for each value that the host computed, if there are any. What is recorded
+    /// waits for all that was recorded before it, and all that comes behind it sees the result; it may be
+    /// submitted as often as is wanted.
+    ///
+    /// # Errors
+    /// When the result does not fit there, or `offset` is no multiple of the bytes of a value; then nothing is
+    /// recorded.
+    ///
+    /// # Safety
+    /// The command buffer must be of the engine's device, in recording, outside of a render pass, and of a
+    /// family that computes. The target must live until the work has ended, and the clip's engine as long.
+    pub unsafe fn record(
+        &self,
+        commands: vk::CommandBuffer,
+        offset: u64,
+    ) -> Result<(), VulkanError> {
+        let each = self.encoding.bytes() as u64;
+        let fits = offset
+            .checked_add(self.bytes)
+            .is_some_and(|end| end <= self.buffer.size);
+        if !fits || !offset.is_multiple_of(each) {
+            return Err(VulkanError::OwnBuffer {
+                offset: self.buffer.offset.saturating_add(offset),
+                size: self.buffer.size.saturating_sub(offset),
+                rotation: each,
+                needed: self.bytes,
+            });
+        }
+        // SAFETY: promised by the caller.
+        let commands = unsafe { Commands::new(&self.engine.device, commands) };
+        commands.barrier(Access::Any, Access::Kernel);
+        let start = self.buffer.offset + offset;
+        let shift = ((start - self.bound) / each) as u32;
+        let mut sets = self.sets.iter();
+        for (own, pipeline) in self.lists.windows.iter().zip(&self.pipelines) {
+            let behind = shift + own.window.start as u32;
+            let like = [
+                own.window.stride() as u32,
+                self.encoding.row().detail,
+                behind,
+            ];
+            for (group, &set) in own.work.dispatched().zip(&mut sets) {
+                let (arguments, groups) = self.engine.dispatch_of(&own.work, group, like);
+                commands.dispatch(pipeline, set, arguments.bytes(), groups);
+            }
+        }
+        for own in &self.lists.windows {
+            let start = start + own.window.start as u64 * each;
+            (own.work).patch(commands, self.buffer.buffer, start, self.encoding);
+        }
+        commands.barrier(Access::Kernel, Access::Any);
+        Ok(())
+    }
+}
+
+impl std::fmt::Debug for ClipTarget {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("ClipTarget")
+            .field("encoding", &self.encoding)
+            .field("bytes", &self.bytes)
+            .finish_non_exhaustive()
+    }
+}

@@ -1,0 +1,161 @@
+//! Lists that stay on the device: what a kernel reads of a result's samples depends on the clip, the
+//! samples and the layout alone, so whoever asks for the same ones again needs none of it anew.
+
+use std::sync::{Arc, Mutex};
+
+use crate::gpu::device::{Lane, LogicalDevice};
+use crate::gpu::engine::{Job, VulkanEngine, lock};
+use crate::gpu::error::EvaluateError;
+use crate::gpu::submission::{Binding, Submission};
+use crate::gpu::upload::Upload;
+use crate::gpu::work_list::{Work, WorkLists};
+use crate::output::window::Window;
+use crate::threads::on_threads;
+use crate::time::frames::{Ticks, Timeline};
+
+/// The lists of a result, window by window, in the memory of a device.
+pub(crate) struct KeptLists {
+    device: Arc<LogicalDevice>,
+    /// In the order in which they lie in the result.
+    pub(crate) windows: Vec<KeptWindow>,
+}
+
+/// The lists of one window.
+pub(crate) struct KeptWindow {
+    pub(crate) window: Window,
+    pub(crate) work: Work,
+    lists: WorkLists,
+}
+
+impl KeptWindow {
+    /// What kernels bind of the lists, in their order.
+    pub(crate) fn bindings(&self) -> Vec<Binding> {
+        let uploads = self.lists.uploads(self.work.list).into_iter();
+        uploads.filter_map(Upload::binding).collect()
+    }
+}
+
+impl KeptLists {
+    /// Lists all of a result, and brings the lists to the device.
+    pub(crate) fn new(
+        engine: &VulkanEngine,
+        job: Job<'_>,
+        whole: &Window,
+    ) -> Result<Self, EvaluateError> {
+        let mut windows = Vec::new();
+        for window in whole.cut(engine.window_of(job.encoding)) {
+            let mut lists = WorkLists::default();
+            let list = || lists.list(engine, job.clip, job.timeline, &window);
+            let work = on_threads(list)??;
+            lists.forget_spare();
+            windows.push(KeptWindow {
+                window,
+                work,
+                lists,
+            });
+        }
+        let device = &engine.device;
+        let uploads = || {
+            windows
+                .iter()
+                .flat_map(|own| own.lists.uploads(own.work.list))
+        };
+        if uploads().any(Upload::is_copied) {
+            let mut submission = Submission::new(device, Lane::Kernels)?;
+            submission.begin(0)?;
+            Upload::record(uploads(), &mut submission);
+            submission.submit()?;
+            submission.wait()?;
+        }
+        for window in &mut windows {
+            window.lists.forget_written();
+        }
+        Ok(Self {
+            device: Arc::clone(device),
+            windows,
+        })
+    }
+
+    /// The lists of a window of the result, where the result was cut as it is now.
+    pub(crate) fn of(&self, window: &Window) -> Option<&KeptWindow> {
+        let start = |own: &KeptWindow| own.window.start;
+        let place = self
+            .windows
+            .partition_point(|own| start(own) < window.start);
+        self.windows.get(place).filter(|own| own.window == *window)
+    }
+
+    /// Bytes of the device's memory.
+    fn bytes(&self) -> u64 {
+        let windows = self.windows.iter();
+        let uploads = windows.flat_map(|own| own.lists.uploads(own.work.list));
+        uploads.map(Upload::bytes).sum()
+    }
+}
+
+/// More bytes of lists than this are not kept.
+const MOST_BYTES: u64 = 256 << 20;
+
+/// Results of which a clip keeps the lists.
+const MOST_KEPT: usize = 2;
+
+/// The lists that a clip keeps, of frames at a rate: from the second time on that the same ones are asked for,
+/// so that whoever never asks twice pays for none.
+#[derive(Default)]
+pub(crate) struct ListCache(Mutex<Kept>);
+
+#[derive(Default)]
+struct Kept {
+    /// What was asked for last.
+    last: Option<(Timeline, Window)>,
+    /// The latest first.
+    lists: Vec<(Timeline, Window, Arc<KeptLists>)>,
+}
+
+impl ListCache {
+    /// The lists of a result, if they are kept or shall be from now on.
+    pub(crate) fn lists(
+        &self,
+        engine: &VulkanEngine,
+        job: Job<'_>,
+        whole: &Window,
+    ) -> Result<Option<Arc<KeptLists>>, EvaluateError> {
+        let is_rate = matches!(job.timeline.ticks, Ticks::Frames { .. });
+        if !is_rate || engine.clip_bytes.is_some() {
+            return Ok(None);
+        }
+        {
+            let mut kept = lock(&self.0);
+            // Those of a device that was lost are of no use.
+            (kept.lists).retain(|(.., lists)| Arc::ptr_eq(&lists.device, &engine.device));
+            let same = |(timeline, window, _): &(Timeline, Window, Arc<KeptLists>)| {
+                timeline == job.timeline && window == whole
+            };
+            if let Some(place) = kept.lists.iter().position(same) {
+                kept.lists[..=place].rotate_right(1);
+                return Ok(Some(Arc::clone(&kept.lists[0].2)));
+            }
+            let now = (job.timeline.clone(), whole.clone());
+            if kept.last.replace(now.clone()) != Some(now) {
+                return Ok(None);
+            }
+        }
+        // Nothing is locked while they are made. Of several callers who make the same, the last one's stay.
+        let made = match KeptLists::new(engine, job, whole) {
+            Err(EvaluateError::Vulkan(error)) if error.is_out_of_memory() => return Ok(None),
+            made => Arc::new(made?),
+        };
+        if made.bytes() <= MOST_BYTES {
+            let mut kept = lock(&self.0);
+            kept.lists.truncate(MOST_KEPT - 1);
+            let own = (job.timeline.clone(), whole.clone(), Arc::clone(&made));
+            kept.lists.insert(0, own);
+        }
+        Ok(Some(made))
+    }
+
+    /// Lets go of all, where memory is short.
+    pub(crate) fn forget(&self) {
+        *lock(&self.0) = Kept::default();
+    }
+}

@@ -1,0 +1,118 @@
+//! A request: which samples of a clip, how they are stored, and where they go.
+
+use std::ops::Range;
+
+use bytemuck::Pod;
+
+use crate::clip::Clip;
+use crate::error::Error;
+use crate::output::encoding::Encoding;
+use crate::output::rotations::Layout;
+use crate::output::window::Window;
+use crate::time::frames::{Frames, Timeline};
+
+/// What is asked of a clip beside the plain [`Clip::evaluate`]: a layout, an encoding, some of the tracks,
+/// some of the samples, and a place for the result.
+///
+/// ```
+/// use tumble::{Device, Encoding, Engine, Frames, Layout, TrackSet, method};
+/// use glam::Quat;
+///
+/// let mut set = TrackSet::new();
+/// let keys = [0.0, 0.7, 2.0].map(Quat::from_rotation_z);
+/// set.push("elbow", &[0.0, 0.5, 1.0], &keys)?;
+/// set.push("wrist", &[0.0, 0.5, 1.0], &keys)?;
+/// let clip = Engine::new(Device::Cpu)?.upload(&set, method::SLERP)?;
+///
+/// // The second half of a second at 60 frames a second, of the wrist alone, as bits of f16.
+/// let frames = Frames::fps(60);
+/// let request = clip.request(&frames).encoding(Encoding::F16).tracks(1..2).samples(30..61);
+/// let mut halves = vec![[0_u16; 4]; 31];
+/// request.into(&mut halves)?;
+/// # assert_eq!(halves[0][3], 0x3b84);
+/// # Ok::<(), tumble::Error>(())
+/// ```
+#[derive(Debug, Clone)]
+#[must_use = "a request does nothing until it is told where its result goes"]
+pub struct Request<'a> {
+    pub(crate) clip: &'a Clip,
+    frames: &'a Frames,
+    layout: Layout,
+    pub(crate) encoding: Encoding,
+    tracks: Option<Range<usize>>,
+    samples: Option<Range<usize>>,
+}
+
+impl Clip {
+    /// A request for the samples that `frames` means: of all tracks, track by track, as rotations of four
+    /// f32, until it is told otherwise.
+    pub fn request<'a>(&'a self, frames: &'a Frames) -> Request<'a> {
+        Request {
+            clip: self,
+            frames,
+            layout: Layout::TrackMajor,
+            encoding: Encoding::F32,
+            tracks: None,
+            samples: None,
+        }
+    }
+}
+
+impl Request<'_> {
+    /// The order of the result: `[track][sample]`, unless it is told otherwise.
+    pub fn layout(mut self, layout: Layout) -> Self {
+        self.layout = layout;
+        self
+    }
+
+    /// How each value is stored.
+    pub fn encoding(mut self, encoding: Encoding) -> Self {
+        self.encoding = encoding;
+        self
+    }
+
+    /// Only these tracks, from 0: the result has no others.
+    pub fn tracks(mut self, tracks: Range<usize>) -> Self {
+        self.tracks = Some(tracks);
+        self
+    }
+
+    /// Only these of the samples that the frames mean, from 0: the result has no others.
+    pub fn samples(mut self, samples: Range<usize>) -> Self {
+        self.samples = Some(samples);
+        self
+    }
+
+    /// Values of the result, and bytes of each.
+    ///
+    /// # Errors
+    /// When the frames do not fit the clip, there are no such tracks or samples, or the encoding is for
+    /// rotations and the clip has none.
+    pub fn size(&self) -> Result<(usize, usize), Error> {
+        let (_, window) = self.window()?;
+        Ok((window.len(), self.encoding.bytes()))
+    }
+
+    /// Evaluates into the caller's memory, of whatever type: its bytes are those of
+    /// [`Encoding::encode`], in the order of the layout.
+    ///
+    /// # Errors
+    /// As [`Request::size`]; also when `output` has not exactly the bytes of the result, or the device fails.
+    pub fn into<T: Pod>(&self, output: &mut [T]) -> Result<(), Error> {
+        let (timeline, window) = self.window()?;
+        let output = bytemuck::cast_slice_mut(output);
+        (self.clip).encode_window_into(&timeline, &window, self.encoding, output)
+    }
+
+    /// The samples that are meant, and which part of them the result is.
+    pub(crate) fn window(&self) -> Result<(Timeline, Window), Error> {
+        self.encoding.check(self.clip.quantity())?;
+        let timeline = self.clip.timeline(self.frames)?;
+        let (tracks, samples) = (self.clip.track_count(), timeline.len());
+        let part = |asked: &Option<Range<usize>>, all| asked.clone().unwrap_or(0..all);
+        let (own_tracks, own_samples) = (part(&self.tracks, tracks), part(&self.samples, samples));
+        let window = Window::of(own_tracks, own_samples, self.layout);
+        window.check_within(tracks, samples)?;
+        Ok((timeline, window))
+    }
+}
