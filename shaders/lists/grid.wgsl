@@ -33,7 +33,7 @@ struct Block {
 const WORKGROUP: u32 = 64;
 
 // Samples of an invocation.
-const SAMPLES_EACH: u32 = 4;
+const SAMPLES_EACH: u32 = 8;
 
 // Set in a `source` or a `count`: it is a constant that is stored as it is, not a segment.
 const IS_CONSTANT: u32 = 0x80000000;
@@ -56,7 +56,7 @@ struct Corner {
     first: u32,
     // Frame by frame, the distance from the beginning of the first row's line.
     column: u32,
-    // The block of all of them; frame by frame, that of the row in which `column` would be 0.
+    // The block of the first; frame by frame that of all, in the row in which `column` would be 0.
     block: u32,
 }
 
@@ -88,7 +88,8 @@ fn cell_of(corner: Corner, turn: u32) -> Cell {
         let index = corner.first + turn * LINE;
         let position = dispatch.first_output + index;
         let place = position + dispatch.shift;
-        return Cell(place, position, corner.block, index < dispatch.samples);
+        let block = corner.block + turn * LINE / BLOCK_SAMPLES;
+        return Cell(place, position, block, index < dispatch.samples);
     }
     let sample = corner.first + turn;
     let row = sample * dispatch.stride + dispatch.first_output;

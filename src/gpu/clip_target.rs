@@ -46,7 +46,10 @@ impl ClipTarget {
         let bound = engine.binding_before(buffer.offset, each);
         let range = buffer.offset + buffer.size - bound;
         (engine.device.physical).check_range("the buffer", range)?;
-        let lists = KeptLists::new(engine, job, whole)?;
+        let most = engine
+            .at_once()
+            .unwrap_or_else(|| engine.window_of(job.encoding));
+        let lists = KeptLists::new(engine, job, whole, most)?;
         let mut pool = DescriptorPool::new(&engine.device);
         let sets = lists
             .windows

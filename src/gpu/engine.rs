@@ -364,7 +364,8 @@ impl VulkanEngine {
     }
 
     /// Evaluates in f32 into memory of the engine's choice: the device's own, mapped, where
-    /// it writes in place and one allocation can hold the result.
+    /// it writes in place and one allocation can hold the result; from the second time on that the same is
+    /// asked for, memory that a card's copies go to.
     pub(crate) fn evaluate(
         &self,
         job: Job<'_>,
@@ -375,8 +376,19 @@ impl VulkanEngine {
         let whole = job.whole(layout);
         let bytes = (whole.len() * encoding.bytes()) as u64;
         let fits = bytes <= self.device.physical.info.max_memory_allocation_size;
-        let buffer = match self.device.placing.in_place && fits {
-            true => match self.output_buffer(bytes) {
+        let in_place = self.device.placing.in_place;
+        // Memory that a card copies into is dear to make: only for what is asked for again.
+        let pays = in_place
+            || job
+                .lists
+                .lists(self, job, &whole, self.window_of(encoding))?
+                .is_some();
+        let residence = match in_place {
+            true => Residence::InPlace,
+            false => Residence::Readback,
+        };
+        let buffer = match fits && pays {
+            true => match self.output_buffer(bytes, residence) {
                 // Window by window the result may still be made.
                 Err(error) if error.is_out_of_memory() => None,
                 // The host changes some rotations (`patches`). Where it must show that, it would show
@@ -391,7 +403,11 @@ impl VulkanEngine {
             self.evaluate_into(job, &whole, bytemuck::cast_slice_mut(&mut quats))?;
             return Ok(Box::new(quats));
         };
-        self.run(job, &whole, Target::Buffer(&mut buffer))?;
+        let target = match in_place {
+            true => Target::Buffer(&mut buffer),
+            false => Target::Staged(&mut buffer),
+        };
+        self.run(job, &whole, target)?;
         Ok(Box::new(MappedQuats {
             buffer: Some(buffer),
             count: whole.len(),
@@ -412,14 +428,14 @@ impl VulkanEngine {
     }
 
     /// A buffer that was given back, when one fits closely, else a new one.
-    fn output_buffer(&self, bytes: u64) -> Result<Buffer, VulkanError> {
+    fn output_buffer(&self, bytes: u64, residence: Residence) -> Result<Buffer, VulkanError> {
         let mut free = lock(&self.free);
         let fits = |buffer: &Buffer| (bytes..=bytes.max(1 << 16) * 2).contains(&buffer.size);
         if let Some(i) = free.iter().position(fits) {
             return Ok(free.swap_remove(i));
         }
         drop(free);
-        Buffer::new(&self.device, "tumble rotations", bytes, Residence::InPlace)
+        Buffer::new(&self.device, "tumble rotations", bytes, residence)
     }
 }
 

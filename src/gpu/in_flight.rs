@@ -76,6 +76,8 @@ impl Stopwatch {
 pub(crate) enum Target<'a> {
     /// Straight into a mapped buffer.
     Buffer(&'a mut Buffer),
+    /// Through the device's own memory into a buffer of the host's.
+    Staged(&'a mut Buffer),
     /// Straight into the caller's memory, which is imported.
     ImportedMemory(ImportedMemory<'a>),
     /// Through a window's own buffer into the caller's memory.
@@ -106,7 +108,7 @@ impl<'a> Target<'a> {
             Self::Buffer(buffer) => Some((buffer.raw, 0)),
             Self::ImportedMemory(memory) => Some((memory.buffer.raw, memory.start as u64)),
             Self::External(range) => Some((range.buffer, range.offset)),
-            Self::Slice(_) => None,
+            Self::Slice(_) | Self::Staged(_) => None,
         }
     }
 }
@@ -188,7 +190,7 @@ impl<U> InFlight<U> {
         };
         let copying = Instant::now();
         let output: &mut [u8] = match target {
-            Target::Buffer(buffer) => buffer.bytes_mut(done.output),
+            Target::Buffer(buffer) | Target::Staged(buffer) => buffer.bytes_mut(done.output),
             Target::ImportedMemory(memory) => memory.bytes_mut(done.output),
             Target::External(_) => &mut [],
             Target::Slice(slice) => {

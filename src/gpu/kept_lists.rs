@@ -36,14 +36,15 @@ impl KeptWindow {
 }
 
 impl KeptLists {
-    /// Lists all of a result, and brings the lists to the device.
+    /// Lists all of a result, in windows of at most so many values, and brings the lists to the device.
     pub(crate) fn new(
         engine: &VulkanEngine,
         job: Job<'_>,
         whole: &Window,
+        most: usize,
     ) -> Result<Self, EvaluateError> {
         let mut windows = Vec::new();
-        for window in whole.cut(engine.window_of(job.encoding)) {
+        for window in whole.cut(most) {
             let mut lists = WorkLists::default();
             let list = || lists.list(engine, job.clip, job.timeline, &window);
             let work = on_threads(list)??;
@@ -107,49 +108,49 @@ pub(crate) struct ListCache(Mutex<Kept>);
 #[derive(Default)]
 struct Kept {
     /// What was asked for last.
-    last: Option<(Timeline, Window)>,
+    last: Option<Asked>,
     /// The latest first.
-    lists: Vec<(Timeline, Window, Arc<KeptLists>)>,
+    lists: Vec<(Asked, Arc<KeptLists>)>,
 }
 
+/// The samples, what of them is the result, and the values of its windows.
+type Asked = (Timeline, Window, usize);
+
 impl ListCache {
-    /// The lists of a result, if they are kept or shall be from now on.
+    /// The lists of a result in windows of so many values, if they are kept or shall be from now on.
     pub(crate) fn lists(
         &self,
         engine: &VulkanEngine,
         job: Job<'_>,
         whole: &Window,
+        most: usize,
     ) -> Result<Option<Arc<KeptLists>>, EvaluateError> {
         let is_rate = matches!(job.timeline.ticks, Ticks::Frames { .. });
         if !is_rate || engine.clip_bytes.is_some() {
             return Ok(None);
         }
+        let asked = (job.timeline.clone(), whole.clone(), most);
         {
             let mut kept = lock(&self.0);
             // Those of a device that was lost are of no use.
-            (kept.lists).retain(|(.., lists)| Arc::ptr_eq(&lists.device, &engine.device));
-            let same = |(timeline, window, _): &(Timeline, Window, Arc<KeptLists>)| {
-                timeline == job.timeline && window == whole
-            };
-            if let Some(place) = kept.lists.iter().position(same) {
+            (kept.lists).retain(|(_, lists)| Arc::ptr_eq(&lists.device, &engine.device));
+            if let Some(place) = kept.lists.iter().position(|(own, _)| *own == asked) {
                 kept.lists[..=place].rotate_right(1);
-                return Ok(Some(Arc::clone(&kept.lists[0].2)));
+                return Ok(Some(Arc::clone(&kept.lists[0].1)));
             }
-            let now = (job.timeline.clone(), whole.clone());
-            if kept.last.replace(now.clone()) != Some(now) {
+            if kept.last.replace(asked.clone()).as_ref() != Some(&asked) {
                 return Ok(None);
             }
         }
         // Nothing is locked while they are made. Of several callers who make the same, the last one's stay.
-        let made = match KeptLists::new(engine, job, whole) {
+        let made = match KeptLists::new(engine, job, whole, most) {
             Err(EvaluateError::Vulkan(error)) if error.is_out_of_memory() => return Ok(None),
             made => Arc::new(made?),
         };
         if made.bytes() <= MOST_BYTES {
             let mut kept = lock(&self.0);
             kept.lists.truncate(MOST_KEPT - 1);
-            let own = (job.timeline.clone(), whole.clone(), Arc::clone(&made));
-            kept.lists.insert(0, own);
+            kept.lists.insert(0, (asked, Arc::clone(&made)));
         }
         Ok(Some(made))
     }

@@ -50,35 +50,61 @@ impl ReadBack {
         if !staged {
             return grow(device, &mut self.output, size, Residence::InPlace);
         }
+        self.copy_apart(device)?;
+        grow(device, &mut self.host, size, Residence::Readback)?;
+        grow(device, &mut self.output, size, Residence::Results)
+    }
+
+    /// The same for results that are copied to a buffer which is not one of these.
+    pub(crate) fn room_apart(
+        &mut self,
+        device: &Arc<LogicalDevice>,
+        size: u64,
+    ) -> Result<&Buffer, VulkanError> {
+        self.copy_apart(device)?;
+        grow(device, &mut self.output, size, Residence::Results)
+    }
+
+    fn copy_apart(&mut self, device: &Arc<LogicalDevice>) -> Result<(), VulkanError> {
         if self.apart.is_none() && device.copies_apart {
             self.apart = Some(CopyApart {
                 submission: Submission::new(device, Lane::Copies)?,
                 done: Semaphore::new(device)?,
             });
         }
-        grow(device, &mut self.host, size, Residence::Readback)?;
-        grow(device, &mut self.output, size, Residence::Results)
+        Ok(())
     }
 
     /// Submits the recorded kernels, and what brings the first `size` bytes of the results to the host;
     /// with `None` they were written into other memory, where the host sees them.
     pub(crate) fn submit(&mut self, size: Option<u64>) -> Result<(), VulkanError> {
+        self.submit_to(size, None)
+    }
+
+    /// As [`ReadBack::submit`]; the results go to another buffer that the host sees, from an offset on, if one
+    /// is named.
+    pub(crate) fn submit_to(
+        &mut self,
+        size: Option<u64>,
+        place: Option<(&Buffer, u64)>,
+    ) -> Result<(), VulkanError> {
         let kernels = &mut self.kernels;
-        let (Some(size), Some(output), Some(host)) = (size, &self.output, &self.host) else {
+        let place = place.or(self.host.as_ref().map(|host| (host, 0)));
+        let (Some(size), Some(output), Some(place)) = (size, &self.output, place) else {
             (kernels.commands()).barrier(Access::Kernel, Access::Host);
             return kernels.submit();
         };
         let size = size.max(4); // no copy may be of nothing, and no buffer is shorter
         let Some(CopyApart { submission, done }) = &mut self.apart else {
             (kernels.commands()).barrier(Access::Kernel, Access::Copy);
-            (kernels.commands()).copy(output, host, size);
+            (kernels.commands()).copy_to(output, place, size);
             (kernels.commands()).barrier(Access::Copy, Access::Host);
             return kernels.submit();
         };
         // The semaphore orders the copy and makes the kernels' writes visible to it: there is no
         // barrier in between, and none that the next kernels would wait for.
         submission.begin(0)?;
-        (submission.commands()).copy(output, host, size);
+        (submission.commands()).copy_to(output, place, size);
         (submission.commands()).barrier(Access::Copy, Access::Host);
         let point = done.advance();
         kernels.submit_between(None, Some(point))?;

@@ -13,7 +13,7 @@ use crate::gpu::upload::Upload;
 use crate::gpu::work_list::{GroupItems, Work, WorkLists};
 use crate::output::encoding::Encoding;
 use crate::output::window::Window;
-use crate::shader::{Dispatch, Grid, LINE, List, WORKGROUP};
+use crate::shader::{Dispatch, Grid, Item, LINE, List, WORKGROUP};
 use crate::threads::on_threads;
 
 /// Bytes of the lines in which a card's memory is written, at most.
@@ -62,14 +62,19 @@ impl VulkanEngine {
         window: &Window,
         mut target: Target<'_>,
     ) -> Result<(), EvaluateError> {
-        let kept = job.lists.lists(self, job, window)?;
-        let kept = kept.as_deref();
-        if let (Some(kept), Target::External(buffer)) = (kept, &target)
-            && self.runs_at_once(job, window)
-        {
-            return self.run_kept(job, kept, buffer);
-        }
         let most = || self.window_of(job.encoding);
+        let at_once = self.at_once();
+        if let (Some(most), Target::External(buffer)) = (at_once, &target)
+            && self.binds_at_once(job, window)
+            && let Some(kept) = job.lists.lists(self, job, window, most)?
+        {
+            return self.run_kept(job, &kept, buffer);
+        }
+        let kept = match target {
+            Target::External(_) => None,
+            _ => job.lists.lists(self, job, window, most())?,
+        };
+        let kept = kept.as_deref();
         // Each is cut again when its turn comes: windows may have been halved since.
         let windows = window.cut(most()).flat_map(|window| window.within(most()));
         self.fly(
@@ -101,6 +106,9 @@ impl VulkanEngine {
         let staged = !self.device.placing.in_place;
         let buffer = match place {
             Some((buffer, _)) => buffer,
+            None if matches!(target, Target::Staged(_)) => {
+                (own.results.room_apart(&self.device, size)?).raw
+            }
             None => (own.results.room(&self.device, size, staged)?).raw,
         };
         let rotations = Binding::range(buffer, aligned, size);
@@ -140,7 +148,12 @@ impl VulkanEngine {
             kernels.submit()?;
         } else {
             patches.clone_from(&work.patches);
-            own.results.submit(place.is_none().then_some(size))?;
+            let apart = match target {
+                Target::Staged(buffer) => Some((&**buffer, bytes.start as u64)),
+                _ => None,
+            };
+            own.results
+                .submit_to(place.is_none().then_some(size), apart)?;
         }
         own.done = Some(Finish {
             output: bytes,
@@ -199,12 +212,21 @@ impl VulkanEngine {
         (Arguments::Listed(dispatch), groups)
     }
 
-    /// Whether all windows of a result can go to the device at once: into one binding, and on a card, which
-    /// is done with them long before anybody notices.
-    fn runs_at_once(&self, job: Job<'_>, whole: &Window) -> bool {
+    /// Values of a window where results stay on a card, which is done with them long before anybody
+    /// notices; `None` on devices that take their time.
+    pub(crate) fn at_once(&self) -> Option<usize> {
+        const AT_ONCE: usize = 1 << 24;
+        let info = &self.device.physical.info;
+        let largest = (info.max_storage_buffer_range).min(info.max_memory_allocation_size);
+        let listed = largest / size_of::<Item>() as u64 / 2;
+        (self.maps_samples).then(|| AT_ONCE.min(usize::try_from(listed).unwrap_or(AT_ONCE)))
+    }
+
+    /// Whether a result goes into one binding.
+    fn binds_at_once(&self, job: Job<'_>, whole: &Window) -> bool {
         let bytes = (whole.len() * job.encoding.bytes()) as u64 + LINE_BYTES;
         let range = self.device.physical.info.max_storage_buffer_range;
-        self.maps_samples && bytes <= range.min(u64::from(u32::MAX))
+        bytes <= range.min(u64::from(u32::MAX))
     }
 
     /// Evaluates all windows of a result whose lists are kept into an application's buffer, in one

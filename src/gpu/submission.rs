@@ -313,6 +313,14 @@ impl<'a> Commands<'a> {
         unsafe { (self.device).cmd_copy_buffer(self.raw, from.raw, to.raw, &region) };
     }
 
+    /// Records a copy of the first `size` bytes of a buffer to a place in another.
+    pub(crate) fn copy_to(self, from: &Buffer, (to, offset): (&Buffer, u64), size: u64) {
+        let size = size.min(to.size - offset);
+        let region = [vk::BufferCopy::default().dst_offset(offset).size(size)];
+        // SAFETY: as in `dispatch`; both ranges lie within their buffers.
+        unsafe { (self.device).cmd_copy_buffer(self.raw, from.raw, to.raw, &region) };
+    }
+
     /// Records that the first bytes of a buffer, a multiple of 4, are filled with a word.
     #[cfg(feature = "prove")]
     pub(crate) fn fill(self, to: &Buffer, bytes: u64, word: u32) {

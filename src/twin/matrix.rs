@@ -1,4 +1,4 @@
-//! Twin of `shaders/math/matrix.wgsl`, `shaders/stores/matrix.wgsl`, `shaders/stores/matrix3x3.wgsl`
+//! Twin of `shaders/math/matrix.wgsl`, `shaders/stores/matrix3x3.wgsl`
 //! and `shaders/stores/matrix3x4.wgsl`: the same names, the same order.
 
 use crate::math::canonical::canonical;

@@ -42,15 +42,18 @@ fn invocation(random: &mut Random, trial: &mut Trial) -> Invocation {
     if random.once_in(2) {
         // Track by track: the line's first index of all, and where that is stored.
         let first = (tile * WORKGROUP + line * LINE) * SAMPLES_EACH;
-        let place = BLOCK_SAMPLES * random.below(2);
-        let samples = first + random.below(40);
-        let first_output = place.wrapping_sub(first);
-        trial.global("dispatch", [0, 1, samples, 1, first_output, first_block]);
+        let (position, shift) = (BLOCK_SAMPLES * random.below(2), random.below(5));
+        let samples = first + random.below(LINE * SAMPLES_EACH + 8);
+        let first_output = position.wrapping_sub(first);
+        trial.global(
+            "dispatch",
+            [0, 1, samples, 1, first_output, first_block, shift],
+        );
         let cell = |turn: u32| {
             let own = turn * LINE + within;
             Cell {
-                place: place + own,
-                position: place + own,
+                place: position + own + shift,
+                position: position + own,
                 block: first_block + (first + own) / BLOCK_SAMPLES,
                 is_inside: first + own < samples,
             }
@@ -66,11 +69,11 @@ fn invocation(random: &mut Random, trial: &mut Trial) -> Invocation {
     let (stride, first_row) = (LINE + random.below(3), random.below(12));
     let first = (group[2] * (WORKGROUP / LINE) + line) * SAMPLES_EACH;
     let rows = (tile * LINE + within + random.below(4)).saturating_sub(first_row % LINE);
-    let samples = first + random.below(6);
+    let samples = first + random.below(SAMPLES_EACH + 2);
     let first_output = first_row.wrapping_sub(first * stride);
     trial.global(
         "dispatch",
-        [0, stride, samples, rows, first_output, first_block],
+        [0, stride, samples, rows, first_output, first_block, 0],
     );
     let before = first / BLOCK_SAMPLES * rows + first_block;
     let cell = |turn: u32| {
@@ -200,6 +203,15 @@ pub(super) fn coalesced() -> Vec<Twin> {
             let (first, starts) = blocks[block as usize];
             let begun = (0..=position % BLOCK_SAMPLES).filter(|bit| (starts >> bit) & 1 == 1);
             trial.expect(first.wrapping_add(begun.count() as u32));
+        }),
+        with_globals(KERNEL, "has", |random, trial| {
+            let (output, count, position) = (random.below(40), random.below(40), random.below(90));
+            let bits = [0, IS_CONSTANT, MAY_BE_TINY, IS_CONSTANT | MAY_BE_TINY];
+            let bits = bits[random.below(4) as usize];
+            trial.argument((random.word(), output, count | bits));
+            trial.argument((random.word(), random.word(), random.word()));
+            trial.argument(position);
+            trial.expect((output..output + count).contains(&position));
         }),
         with_globals(KERNEL, "block_at", |random, trial| {
             let all: [u32; 6] = std::array::from_fn(|_| random.word());

@@ -219,6 +219,8 @@ impl<S: Segment> Scene<S> {
     fn runs(mut self, random: &mut Random, is_listed: bool, is_one: bool) -> Trial {
         const ITEMS: usize = 101;
         const BEFORE: usize = 2;
+        /// Where the first value of the result is stored.
+        const FIRST: usize = 5;
         let stride = if is_one { 1 } else { 3 };
         let mut next = vec![0; stride];
         for i in 0..ITEMS + BEFORE {
@@ -229,7 +231,7 @@ impl<S: Segment> Scene<S> {
                 random,
                 is_listed,
                 output as u32,
-                (0..count).map(|j| output + j * stride),
+                (0..count).map(|j| output + j * stride + FIRST),
             );
             next[track] += count;
         }
@@ -242,7 +244,7 @@ impl<S: Segment> Scene<S> {
             item_count: ITEMS as u32,
             stride: stride as u32,
             detail: self.detail(),
-            first_output: 0,
+            first_output: FIRST as u32,
             idle: 0,
         };
         let mut listed = vec![bytes(&self.items)];
@@ -349,7 +351,10 @@ impl<S: Segment> Scene<S> {
     fn track_by_track(mut self, random: &mut Random, is_listed: bool) -> Trial {
         const SAMPLES: u32 = 709;
         let ends = [BLOCK_SAMPLES, BLOCK_SAMPLES + SAMPLES];
-        self.row(random, is_listed, ends, |position| position as usize);
+        const SHIFT: u32 = 3;
+        self.row(random, is_listed, ends, |position| {
+            (position + SHIFT) as usize
+        });
         // Another dispatch has the first block.
         let other = Block {
             first: 0,
@@ -363,7 +368,7 @@ impl<S: Segment> Scene<S> {
             rows: 1,
             first_output: BLOCK_SAMPLES,
             first_block: 1,
-            shift: 0,
+            shift: SHIFT,
         };
         let tiles = SAMPLES.div_ceil(WORKGROUP * SAMPLES_EACH);
         self.grid(&blocks, grid, [2, tiles.div_ceil(2), 1], is_listed)
