@@ -2,7 +2,8 @@
 // memory. An invocation takes a few samples in turn, and looks for an item, and loads its constants, only
 // where the one before has ended; neighbours of one item read its constants from one address.
 // It is joined with a form (`Segment`, `evaluate`), with the functions that read buffers
-// (`segment_at`, `constant_at`, `item_at`, `block_at`), a `distance_from_middle` and a `store`.
+// (`segment_at`, `constant_at`, `item_at`, `block_at`), a `distance_from_middle`, and a `finish`, which
+// stores what an invocation made of a sample.
 
 @compute @workgroup_size(WORKGROUP)
 fn main(
@@ -16,26 +17,25 @@ fn main(
     var segment: Segment;
     for (var turn = 0u; turn < SAMPLES_EACH; turn++) {
         let cell = cell_of(corner, turn);
-        if cell.is_inside {
-            if !has(item, cell.position) {
-                item = item_at(item_of(cell));
-                segment = segment_of(item);
-            }
-            // Samples that no item has are the host's, or another dispatch's.
-            if has(item, cell.position) {
-                var rotation: vec4f;
-                if (item.count & IS_CONSTANT) != 0u {
-                    rotation = constant_at(item.source);
-                } else {
-                    let distance = distance_from_middle(item.first, cell.position - item.output);
-                    rotation = evaluate(segment, distance * item.scale + item.offset);
-                    if (item.count & MAY_BE_TINY) != 0u {
-                        rotation = canonical(rotation);
-                    }
+        if cell.is_inside & !has(item, cell.position) {
+            item = item_at(item_of(cell));
+            segment = segment_of(item);
+        }
+        // Samples that no item has are the host's, or another dispatch's.
+        let is_stored = cell.is_inside & has(item, cell.position);
+        var rotation: vec4f;
+        if is_stored {
+            if (item.count & IS_CONSTANT) != 0u {
+                rotation = constant_at(item.source);
+            } else {
+                let distance = distance_from_middle(item.first, cell.position - item.output);
+                rotation = evaluate(segment, distance * item.scale + item.offset);
+                if (item.count & MAY_BE_TINY) != 0u {
+                    rotation = canonical(rotation);
                 }
-                store(cell.place, rotation);
             }
         }
+        finish(lane, cell.place, rotation, is_stored);
     }
 }
 

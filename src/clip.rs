@@ -141,22 +141,6 @@ impl Clip {
         self.encode_window_into(&timeline, &whole, encoding, &mut output)?;
         Ok(output)
     }
-
-    /// As [`Clip::evaluate_encoded`], into the caller's memory.
-    ///
-    /// # Errors
-    /// Also when `output` has not exactly the bytes of the result.
-    pub fn evaluate_encoded_into(
-        &self,
-        frames: &Frames,
-        layout: Layout,
-        encoding: Encoding,
-        output: &mut [u8],
-    ) -> Result<(), Error> {
-        let timeline = self.timeline(frames)?;
-        let whole = Window::whole(self.track_count(), timeline.len(), layout);
-        self.encode_window_into(&timeline, &whole, encoding, output)
-    }
 }
 
 impl std::fmt::Debug for Clip {

@@ -38,8 +38,8 @@
 //! # Where to go on
 //!
 //! * **Results larger than memory**: [`Engine::stream`] and [`Clip::stream`] give a chunk at a time
-//!   while the next one is evaluated; [`Clip::evaluate_part_into`] evaluates some samples of some
-//!   tracks into memory of your own. [`OutputBuffer`] is memory that is quick to fill.
+//!   while the next one is evaluated; [`Clip::request`] asks for some samples of some
+//!   tracks, into memory of your own. [`OutputBuffer`] is memory that is quick to fill.
 //! * **Skeletons**: [`Engine::transforms`] evaluates translations, rotations and scales, and
 //!   [`Engine::local_to_model`] makes matrices in the model of them along a [`Skeleton`], for skinning
 //!   with inverse bind matrices. [`Engine::world`] does so for rotations on fixed offsets.

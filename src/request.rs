@@ -28,7 +28,7 @@ use crate::time::frames::{Frames, Timeline};
 /// let frames = Frames::fps(60);
 /// let request = clip.request(&frames).encoding(Encoding::F16).tracks(1..2).samples(30..61);
 /// let mut halves = vec![[0_u16; 4]; 31];
-/// request.into(&mut halves)?;
+/// request.evaluate_into(&mut halves)?;
 /// # assert_eq!(halves[0][3], 0x3b84);
 /// # Ok::<(), tumble::Error>(())
 /// ```
@@ -98,7 +98,7 @@ impl Request<'_> {
     ///
     /// # Errors
     /// As [`Request::size`]; also when `output` has not exactly the bytes of the result, or the device fails.
-    pub fn into<T: Pod>(&self, output: &mut [T]) -> Result<(), Error> {
+    pub fn evaluate_into<T: Pod>(&self, output: &mut [T]) -> Result<(), Error> {
         let (timeline, window) = self.window()?;
         let output = bytemuck::cast_slice_mut(output);
         (self.clip).encode_window_into(&timeline, &window, self.encoding, output)

@@ -218,7 +218,7 @@ impl Engine {
     }
 
     /// All tracks of a set, encoded, in the given layout, into the caller's memory: what
-    /// [`Engine::upload`] and [`Clip::evaluate_encoded_into`] give, but only what the samples need is
+    /// [`Engine::upload`] and [`Clip::request`] give, but only what the samples need is
     /// prepared. Memory that is aligned to 16 bytes is filled without a copy.
     ///
     /// # Errors
@@ -294,28 +294,6 @@ impl Engine {
         let clip = self.upload_wanted(set, interpolation, wanted)?;
         let whole = Window::whole(tracks.len(), timeline.len(), layout);
         clip.encode_window_into(&timeline, &whole, encoding, output)
-    }
-}
-
-impl Clip {
-    /// Some samples of some tracks, encoded, `[track][sample]` or `[sample][track]`, into the
-    /// caller's memory. The bytes are those of [`Clip::evaluate_encoded`].
-    ///
-    /// # Errors
-    /// As there; also when there are no such tracks or samples, or `output` has not exactly the
-    /// bytes of the result.
-    pub fn evaluate_part_into(
-        &self,
-        frames: &Frames,
-        layout: Layout,
-        (tracks, samples): (Range<usize>, Range<usize>),
-        encoding: Encoding,
-        output: &mut [u8],
-    ) -> Result<(), Error> {
-        encoding.check(self.quantity())?;
-        let timeline = self.timeline(frames)?;
-        let part = Window::of(tracks, samples, layout);
-        self.encode_window_into(&timeline, &part, encoding, output)
     }
 }
 

@@ -141,11 +141,9 @@ fn runs_of_every_length_have_the_bits_of_single_samples() {
             // So few samples are evaluated one by one.
             for (track, row) in expected.chunks_mut(9871).enumerate() {
                 for (pair, own) in row.chunks_mut(2).enumerate() {
-                    let part = (track..track + 1, 2 * pair..2 * pair + own.len());
-                    let (layout, encoding) = (Layout::TrackMajor, Encoding::F32);
-                    let own = bytemuck::cast_slice_mut(own);
-                    clip.evaluate_part_into(&frames, layout, part, encoding, own)
-                        .unwrap();
+                    let samples = 2 * pair..2 * pair + own.len();
+                    let request = clip.request(&frames).tracks(track..track + 1);
+                    request.samples(samples).evaluate_into(own).unwrap();
                 }
             }
             for engine in &widths {

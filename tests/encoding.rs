@@ -52,8 +52,8 @@ fn every_device_encodes_like_the_host() {
                         assert!(found == expected, "{what}");
                         if is_turn(round, place, 2 * WAYS.len()) {
                             let mut into = vec![0xff; expected.len()];
-                            clip.evaluate_encoded_into(frames, layout, encoding, &mut into)
-                                .unwrap();
+                            let request = clip.request(frames).layout(layout);
+                            request.encoding(encoding).evaluate_into(&mut into).unwrap();
                             assert!(into == expected, "{what}");
                         }
                     }
@@ -68,8 +68,7 @@ fn memory_of_another_size_is_refused() {
     let engine = Engine::new(Device::Cpu).unwrap();
     let clip = engine.upload(&hostile_set(1, 2), method::SLERP).unwrap();
     let frames = Frames::at(vec![0.0, 1.0]);
-    let result =
-        clip.evaluate_encoded_into(&frames, Layout::TrackMajor, Encoding::F16, &mut [0; 33]);
+    let result = (clip.request(&frames).encoding(Encoding::F16)).evaluate_into(&mut [0_u8; 33]);
     let expected = "the output has 33 bytes; the result has 32";
     assert!(matches!(&result, Err(Error::OutputBytes { .. })));
     assert_eq!(result.unwrap_err().to_string(), expected);

@@ -420,13 +420,10 @@ fn evaluate(any: &mut Any, engine: &Engine, set: &TrackSet) {
     let _ = clip.rates(&frames, layout).is_ok();
     let _ = clip.evaluate_into(&frames, layout, &mut output[..]).is_ok();
     let _ = clip.evaluate_encoded(&frames, layout, encoding).is_ok();
-    let _ = clip
-        .evaluate_encoded_into(&frames, layout, encoding, &mut bytes)
-        .is_ok();
-    let part = (any.range(tracks), any.range(3));
-    let _ = clip
-        .evaluate_part_into(&frames, layout, part, encoding, &mut bytes)
-        .is_ok();
+    let request = clip.request(&frames).layout(layout).encoding(encoding);
+    let _ = request.evaluate_into(&mut bytes).is_ok();
+    let request = request.tracks(any.range(tracks)).samples(any.range(3));
+    let _ = request.evaluate_into(&mut bytes).is_ok();
 }
 
 /// Whole poses and smoothing.

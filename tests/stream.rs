@@ -175,9 +175,9 @@ fn parts_are_those_of_the_whole() {
                     let whole = clip.evaluate_encoded(frames, layout, encoding).unwrap();
                     let (tracks, part) = (1..4, 7..samples / 2);
                     let mut found = vec![0; tracks.len() * part.len() * encoding.bytes()];
-                    let place = (tracks.clone(), part.clone());
-                    clip.evaluate_part_into(frames, layout, place, encoding, &mut found)
-                        .unwrap();
+                    let request = clip.request(frames).layout(layout).encoding(encoding);
+                    let request = request.tracks(tracks.clone()).samples(part.clone());
+                    request.evaluate_into(&mut found).unwrap();
                     for (own, t) in tracks.clone().enumerate() {
                         for (sample, s) in part.clone().enumerate() {
                             let size = encoding.bytes();
@@ -223,8 +223,11 @@ fn parts_that_a_result_has_not_are_refused() {
         "{error}"
     );
     let of_clip = |tracks, samples, output: &mut [u8]| {
-        let (layout, encoding) = (Layout::FrameMajor, Encoding::F32);
-        clip.evaluate_part_into(&frames, layout, (tracks, samples), encoding, output)
+        let request = clip.request(&frames).layout(Layout::FrameMajor);
+        request
+            .tracks(tracks)
+            .samples(samples)
+            .evaluate_into(output)
     };
     for (tracks, samples) in [(0..4, 0..2), (0..1, 1..9), (backwards, 0..8)] {
         let error = of_clip(tracks, samples, &mut bytes).unwrap_err();

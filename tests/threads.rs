@@ -150,11 +150,12 @@ fn calls(engine: &Engine) -> Vec<Call> {
                 .unwrap())
         }),
         Box::new(move |rate| {
-            let part = (3..tracks, 5..samples(rate));
-            let mut output = vec![0; part.0.len() * part.1.len() * 16];
-            let (rate, encoding) = (frames(rate), Encoding::F32);
-            clip.evaluate_part_into(&rate, frame_major, part, encoding, &mut output)
-                .unwrap();
+            let frames = frames(rate);
+            let request = clip.request(&frames).layout(frame_major);
+            let request = request.tracks(3..tracks).samples(5..samples(rate));
+            let (count, each) = request.size().unwrap();
+            let mut output = vec![0; count * each];
+            request.evaluate_into(&mut output).unwrap();
             sum(&output)
         }),
         Box::new(move |rate| {

@@ -335,8 +335,8 @@ fn the_callers_memory_gets_the_result_and_nothing_else() {
                 let is_next = |(own, _): &(usize, _)| is_turn(round + place, *own, WAYS.len());
                 for (_, clip) in clips.iter().enumerate().filter(is_next) {
                     assert_between(&0xa5, beside, &expected, |output| {
-                        clip.evaluate_encoded_into(&frames, layout, encoding, output)
-                            .unwrap();
+                        let request = clip.request(&frames).layout(layout);
+                        request.encoding(encoding).evaluate_into(output).unwrap();
                     });
                 }
             }

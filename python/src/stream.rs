@@ -198,9 +198,9 @@ impl Group {
         bytes: &mut [u8],
     ) -> PyResult<()> {
         let part = |tracks, bytes: &mut [u8]| {
-            let part = (tracks, samples.clone());
-            self.clip
-                .evaluate_part_into(&self.frames, layout, part, Encoding::F32, bytes)
+            let request = self.clip.request(&self.frames).layout(layout);
+            (request.tracks(tracks).samples(samples.clone()))
+                .evaluate_into(bytes)
                 .map_err(|error| of_engine(&error))
         };
         let Some(all) = &self.tracks else {

@@ -191,6 +191,8 @@ impl Module {
             // Loops here end: their bounds are data that the host wrote.
             force_loop_bounding: false,
             flags: spv::WriterFlags::empty(),
+            // What a workgroup shares is written before it is read.
+            zero_initialize_workgroup_memory: spv::ZeroInitializeWorkgroupMemoryMode::None,
             ..spv::Options::default()
         };
         let words = spv::write_vec(parsed, &info, &options, None)

@@ -9,7 +9,7 @@ use naga::{
     VectorSize,
 };
 
-use crate::table::{FORMS, LISTS, stores};
+use crate::table::{FORMS, LISTS, Store, stores};
 
 /// Everything that the kernels declare, once each. Two declarations of one name that differ are
 /// an error.
@@ -18,6 +18,9 @@ pub(crate) struct Declared {
     constants: BTreeMap<String, String>,
     structs: BTreeMap<String, Layout>,
 }
+
+/// The constant that each store has of its own.
+const PARTS: &str = "PARTS";
 
 /// A struct as it lies in a buffer.
 struct Layout {
@@ -35,6 +38,9 @@ impl Declared {
             else {
                 continue;
             };
+            if name == PARTS {
+                continue;
+            }
             let value = match literal {
                 Literal::F32(value) => format!("f32 = {value:?}"),
                 Literal::U32(value) => format!("u32 = {value}"),
@@ -229,7 +235,7 @@ pub(crate) fn kernels(all: &[Compiled]) -> String {
         ),
         (
             "What a kernel stores a rotation as.",
-            ("Store", stores().iter().map(|store| store.0).collect()),
+            ("Store", stores().iter().map(|store| store.name).collect()),
         ),
     ] {
         let (name, variants) = names;
@@ -252,7 +258,7 @@ pub(crate) fn kernels(all: &[Compiled]) -> String {
     let mut over_segments = BTreeMap::new();
     for (form, _) in FORMS {
         for (list, _, _) in LISTS {
-            for (store, _) in stores() {
+            for Store { name: store, .. } in stores() {
                 let name = format!("{form}_{list}_{store}");
                 let [form, list, store] = [form, list, store].map(variant);
                 let choice = format!("(Form::{form}, List::{list}, Store::{store})");

@@ -111,9 +111,18 @@ fn is_for_cards(list: &str) -> bool {
     list.ends_with("_coalesced")
 }
 
-/// What a rotation is stored as: the name of each file of `shaders/stores` that has a function
-/// `store`, and the files that its line `// Needs: FILE, FILE.` names.
-pub(crate) fn stores() -> Vec<(&'static str, Vec<&'static str>)> {
+/// What a rotation is stored as.
+#[derive(PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct Store {
+    /// The name of a file of `shaders/stores` that has a function `store`.
+    pub(crate) name: &'static str,
+    /// The files that its line `// Needs: FILE, FILE.` names.
+    needed: Vec<&'static str>,
+    /// Whether a value has several parts, which neighbours store together.
+    has_parts: bool,
+}
+
+pub(crate) fn stores() -> Vec<Store> {
     let mut stores = Vec::new();
     let folder = Path::new(ROOT).join("shaders/stores");
     for entry in fs::read_dir(folder).expect("the stores lie there") {
@@ -131,7 +140,11 @@ pub(crate) fn stores() -> Vec<(&'static str, Vec<&'static str>)> {
             let needed = needed.map_or_else(Vec::new, |files| {
                 files.trim_end_matches('.').split(", ").collect()
             });
-            stores.push((&*name.leak(), needed));
+            stores.push(Store {
+                name: name.leak(),
+                needed,
+                has_parts: text.contains("\nfn parts("),
+            });
         }
     }
     stores.sort_unstable();
@@ -260,13 +273,20 @@ pub(crate) fn kernels() -> Vec<Kernel> {
     }];
     for (form, formula) in FORMS {
         for (list, entry, listed) in LISTS {
-            for (store, needed) in stores() {
+            for store in stores() {
+                let needed = store.needed.clone();
                 let mut files = vec!["math/canonical"];
                 files.extend([formula, entry].concat());
                 files.extend(needed);
-                files.push(format!("stores/{store}").leak());
+                files.push(format!("stores/{}", store.name).leak());
+                if is_for_cards(list) {
+                    files.push(match store.has_parts {
+                        true => "coalesced/together",
+                        false => "coalesced/alone",
+                    });
+                }
                 kernels.push(Kernel {
-                    name: format!("{form}_{list}_{store}"),
+                    name: format!("{form}_{list}_{}", store.name),
                     files,
                     reads: CLIP.iter().chain(listed).collect(),
                     has_texels: !is_for_cards(list),

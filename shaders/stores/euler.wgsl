@@ -5,6 +5,8 @@
 
 alias Stored = f32;
 
+const PARTS: u32 = 3;
+
 // Bits of `dispatch.detail`; the lower six name the three axes, two bits each.
 const SYMMETRIC: u32 = 0x40; // the first axis comes twice, as in ZXZ
 const NEGATIVE: u32 = 0x80; // the axes are an odd permutation of x y z
@@ -57,9 +59,14 @@ fn euler(rotation: vec4f, detail: u32) -> vec3f {
     );
 }
 
-fn store(place: u32, rotation: vec4f) {
+fn parts(rotation: vec4f) -> array<Stored, PARTS> {
     let angles = canonical(vec4f(euler(rotation, dispatch.detail), 0.0));
-    rotations[place * 3u] = angles.x;
-    rotations[place * 3u + 1u] = angles.y;
-    rotations[place * 3u + 2u] = angles.z;
+    return array<Stored, PARTS>(angles.x, angles.y, angles.z);
+}
+
+fn store(place: u32, rotation: vec4f) {
+    var all = parts(rotation);
+    for (var part = 0u; part < PARTS; part++) {
+        rotations[place * PARTS + part] = all[part];
+    }
 }

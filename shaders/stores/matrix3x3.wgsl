@@ -4,16 +4,21 @@
 
 alias Stored = f32;
 
-fn store_row(place: u32, row: vec3f) {
-    let settled = canonical(vec4f(row, 0.0));
-    rotations[place] = settled.x;
-    rotations[place + 1u] = settled.y;
-    rotations[place + 2u] = settled.z;
+const PARTS: u32 = 9;
+
+fn parts(rotation: vec4f) -> array<Stored, PARTS> {
+    let rows = matrix_rows(rotation, dispatch.detail);
+    let first = canonical(vec4f(rows.first, 0.0));
+    let second = canonical(vec4f(rows.second, 0.0));
+    let third = canonical(vec4f(rows.third, 0.0));
+    return array<Stored, PARTS>(
+        first.x, first.y, first.z, second.x, second.y, second.z, third.x, third.y, third.z,
+    );
 }
 
 fn store(place: u32, rotation: vec4f) {
-    let rows = matrix_rows(rotation, dispatch.detail);
-    store_row(place * 9u, rows.first);
-    store_row(place * 9u + 3u, rows.second);
-    store_row(place * 9u + 6u, rows.third);
+    var all = parts(rotation);
+    for (var part = 0u; part < PARTS; part++) {
+        rotations[place * PARTS + part] = all[part];
+    }
 }

@@ -4,7 +4,9 @@
 
 alias Stored = vec4f;
 
-fn store(place: u32, rotation: vec4f) {
+const PARTS: u32 = 3;
+
+fn parts(rotation: vec4f) -> array<Stored, PARTS> {
     let detail = dispatch.detail;
     let rows = matrix_rows(rotation, detail);
     let first = canonical(vec4f(rows.first, 0.0));
@@ -12,8 +14,16 @@ fn store(place: u32, rotation: vec4f) {
     let third = canonical(vec4f(rows.third, 0.0));
     // Row by row each row ends in a 0; column by column the fourth column is 0.
     let by_columns = detail == 1u;
-    let at = place * 3u;
-    rotations[at] = select(first, vec4f(first.xyz, second.x), by_columns);
-    rotations[at + 1u] = select(second, vec4f(second.yz, third.xy), by_columns);
-    rotations[at + 2u] = select(third, vec4f(third.z, 0.0, 0.0, 0.0), by_columns);
+    return array<Stored, PARTS>(
+        select(first, vec4f(first.xyz, second.x), by_columns),
+        select(second, vec4f(second.yz, third.xy), by_columns),
+        select(third, vec4f(third.z, 0.0, 0.0, 0.0), by_columns),
+    );
+}
+
+fn store(place: u32, rotation: vec4f) {
+    var all = parts(rotation);
+    for (var part = 0u; part < PARTS; part++) {
+        rotations[place * PARTS + part] = all[part];
+    }
 }

@@ -2,8 +2,15 @@
 
 alias Stored = f32;
 
+const PARTS: u32 = 3;
+
+fn parts(rotation: vec4f) -> array<Stored, PARTS> {
+    return array<Stored, PARTS>(rotation.x, rotation.y, rotation.z);
+}
+
 fn store(place: u32, rotation: vec4f) {
-    rotations[place * 3u] = rotation.x;
-    rotations[place * 3u + 1u] = rotation.y;
-    rotations[place * 3u + 2u] = rotation.z;
+    var all = parts(rotation);
+    for (var part = 0u; part < PARTS; part++) {
+        rotations[place * PARTS + part] = all[part];
+    }
 }

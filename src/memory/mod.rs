@@ -7,7 +7,7 @@ const LARGE: u128 = 1 << 30;
 /// There is not the memory that a result needs.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "no memory for {what}: {bytes} bytes; ask for less at once, as `stream` and `evaluate_part_into` do"
+    "no memory for {what}: {bytes} bytes; ask for less at once, as `stream` and `Clip::request` do"
 )]
 #[non_exhaustive]
 pub struct OutOfMemory {

@@ -179,6 +179,8 @@ impl Frame<'_> {
                 body: self.block(body),
                 continuing: self.block(continuing),
             },
+            // An invocation runs alone: what others of its workgroup would leave, trials fill in.
+            Statement::ControlBarrier(_) => return,
             Statement::Break => Step::Break,
             Statement::Return { value } => Step::Return {
                 from: value.map_or(0, |value| self.place(value)),

@@ -1,8 +1,8 @@
 //! The functions that read and store elements of buffers.
 
-use crate::math::canonical::canonical;
 use crate::output::encoding::{Encoding, MatrixOrder};
 use crate::output::euler::EulerSequence;
+use crate::shader::{LINE, WORKGROUP};
 
 use super::trial::{Trial, Twin, UNTOUCHED, with_globals};
 use crate::gpu::kernel_check::StoredKey;
@@ -44,12 +44,9 @@ fn store(kernel: &'static str, kind: &'static str) -> Twin {
         trial.argument((place, rotation));
         trial.global("dispatch", [0, 0, 0, encoding.row().detail, 0u32]);
         trial.output("rotations");
-        let mut bytes = vec![0; encoding.bytes()];
-        encoding.encode(&[rotation], &mut bytes).unwrap();
-        let words: Vec<u32> = bytemuck::pod_collect_to_vec(&bytes);
         let cells: Vec<u64> = match kind {
-            "f32_wide" => bytemuck::pod_collect_to_vec(&bytes),
-            _ => words.into_iter().map(u64::from).collect(),
+            "f32_wide" => bytemuck::pod_collect_to_vec(bytemuck::bytes_of(&rotation)),
+            _ => words(encoding, rotation),
         };
         trial.expect(vec![UNTOUCHED; place as usize * cells.len()]);
         trial.expect(cells);
@@ -86,18 +83,86 @@ pub(super) fn stores() -> Vec<Twin> {
         store("arc_frames_euler", "euler"),
         store("arc_frames_vector", "vector"),
     ];
+    for (kernel, kind) in [
+        ("arc_frames_matrix3x3", "matrix3x3"),
+        ("arc_frames_matrix3x4", "matrix3x4"),
+        ("arc_frames_euler", "euler"),
+        ("arc_frames_vector", "vector"),
+    ] {
+        all.push(with_globals(kernel, "parts", move |random, trial| {
+            let (encoding, rotation) = (encoding(kind, random), random.rotation());
+            trial.argument(rotation);
+            trial.global("dispatch", [0, 0, 0, encoding.row().detail, 0u32]);
+            trial.expect(words(encoding, rotation));
+        }));
+    }
+    for (kernel, kind, size) in [
+        ("arc_frames_coalesced_matrix3x3", "matrix3x3", 1),
+        ("arc_frames_coalesced_matrix3x4", "matrix3x4", 4),
+        ("arc_frames_coalesced_euler", "euler", 1),
+    ] {
+        all.push(together(kernel, kind, size));
+    }
     all.push(with_globals(
-        "arc_frames_matrix3x3",
-        "store_row",
+        "arc_frames_coalesced_f32",
+        "finish",
         |random, trial| {
-            let row: [f32; 3] = random.vector();
-            trial.argument((1u32, row));
+            let (place, is_stored) = (random.below(3), random.once_in(2));
+            let rotation = random.rotation();
+            trial.argument((random.below(WORKGROUP), place, rotation, is_stored));
             trial.output("rotations");
-            trial.expect(UNTOUCHED);
-            trial.expect(row.map(canonical));
+            trial.expect(vec![UNTOUCHED; 4 * place as usize]);
+            match is_stored {
+                true => trial.expect(rotation),
+                false => trial.expect([UNTOUCHED; 4]),
+            }
         },
     ));
     all
+}
+
+/// The words of an encoded rotation.
+fn words(encoding: Encoding, rotation: [f32; 4]) -> Vec<u64> {
+    let mut bytes = vec![0; encoding.bytes()];
+    encoding.encode(&[rotation], &mut bytes).unwrap();
+    let words: Vec<u32> = bytemuck::pod_collect_to_vec(&bytes);
+    words.into_iter().map(u64::from).collect()
+}
+
+/// The parts, of so many words each, that an invocation stores of what its neighbours have put together.
+fn together(kernel: &'static str, kind: &'static str, size: usize) -> Twin {
+    with_globals(kernel, "finish", move |random, trial| {
+        let encoding = encoding(kind, random);
+        let (lane, rotation) = (random.below(WORKGROUP), random.rotation());
+        let (within, line) = (lane % LINE, 2 * LINE);
+        let is_stored = random.once_in(2);
+        trial.argument((lane, line + within, rotation, is_stored));
+        trial.global("dispatch", [encoding.row().detail, 0, 0, 0, 0, 0, 0u32]);
+        let words = words(encoding, rotation);
+        let parts = words.len() / size;
+        let mut there: Vec<u64> = (0..WORKGROUP).map(|_| random.below(2).into()).collect();
+        let mut tile: Vec<u64> = (0..WORKGROUP as usize * words.len())
+            .map(|_| random.word().into())
+            .collect();
+        trial.global("is_there", there.clone());
+        trial.global("tile", tile.clone());
+        there[lane as usize] = is_stored.into();
+        if is_stored {
+            tile[lane as usize * words.len()..][..words.len()].copy_from_slice(&words);
+        }
+        trial.output("rotations");
+        trial.expect(vec![UNTOUCHED; line as usize * words.len()]);
+        for part in 0..LINE as usize * parts {
+            let other = (lane - within) as usize + part / parts;
+            let is_own = part % LINE as usize == within as usize && there[other] != 0;
+            match is_own {
+                true => trial.expect(
+                    tile[(lane - within) as usize * words.len() + part * size..][..size].to_vec(),
+                ),
+                false => trial.expect(vec![UNTOUCHED; size]),
+            }
+        }
+    })
 }
 
 pub(super) fn readers() -> Vec<Twin> {

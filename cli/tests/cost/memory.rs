@@ -4,9 +4,7 @@
 use std::io::{BufReader, Read};
 
 use glam::Quat;
-use tumble::{
-    Chunk, Device, Encoding, Engine, EngineOptions, Error, Frames, Layout, TrackSet, method,
-};
+use tumble::{Chunk, Device, Engine, EngineOptions, Error, Frames, Layout, TrackSet, method};
 use tumble_formats::Loaded;
 use tumble_formats::ReadOptions;
 use tumble_formats::dat::read_dat;
@@ -144,9 +142,8 @@ fn clips_and_streams_keep_to_the_memory_of_the_engine() {
         let mut rotations = vec![Quat::IDENTITY; tracks as usize * 100];
         let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut rotations);
         let ((), evaluating) = peak_of(|| {
-            let part = (0..tracks as usize, 200..300);
-            clip.evaluate_part_into(&frames, layout, part, Encoding::F32, bytes)
-                .unwrap();
+            let request = clip.request(&frames).layout(layout);
+            request.samples(200..300).evaluate_into(bytes).unwrap();
         });
         drop(clip);
         let (count, streaming) = peak_of(|| {
