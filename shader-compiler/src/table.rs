@@ -246,14 +246,40 @@ const CROWD_JOINTS: [(&str, &[&str], &[&str]); 4] = [
 ];
 
 /// Other kernels over a crowd.
-const CROWD: [(&str, &[&str]); 4] = [
+const CROWD: [(&str, &[&str]); 5] = [
     (
         "times",
-        &["crowd/entry", "lists/frame_distance", "crowd/times"],
+        &[
+            "crowd/entry",
+            "lists/frame_distance",
+            "crowd/times",
+            "crowd",
+        ],
     ),
-    ("walk", &["math/canonical", "crowd/affine", "crowd/walk"]),
-    ("skin", &["math/canonical", "crowd/affine", "crowd/skin"]),
-    ("half", &["math/half", "crowd/half"]),
+    (
+        "walk",
+        &[
+            "math/canonical",
+            "crowd/affine",
+            "crowd/link",
+            "crowd/walk",
+            "crowd",
+        ],
+    ),
+    (
+        "walk_all",
+        &[
+            "math/canonical",
+            "crowd/affine",
+            "crowd/link",
+            "crowd/walk_all",
+        ],
+    ),
+    (
+        "skin",
+        &["math/canonical", "crowd/affine", "crowd/skin", "crowd"],
+    ),
+    ("half", &["math/half", "crowd/half", "crowd"]),
 ];
 
 /// The files of the self-test.
@@ -324,7 +350,7 @@ pub(crate) fn kernels() -> Vec<Kernel> {
     for (name, shared, own) in CROWD_JOINTS {
         kernels.push(Kernel {
             name: format!("crowd_{name}"),
-            files: [shared, own, &["stores/f32", "crowd"]].concat(),
+            files: [&["crowd/dispatch"], shared, own, &["stores/f32", "crowd"]].concat(),
             reads: CROWD_READS.iter().collect(),
             has_texels: true,
         });
@@ -332,7 +358,7 @@ pub(crate) fn kernels() -> Vec<Kernel> {
     for (name, own) in CROWD {
         kernels.push(Kernel {
             name: format!("crowd_{name}"),
-            files: [own, &["crowd"]].concat(),
+            files: [&["crowd/dispatch"], own].concat(),
             reads: Vec::new(),
             has_texels: false,
         });

@@ -87,6 +87,7 @@ pub(crate) const LONGEST_STEP: f32 = 0.0034;
 pub(crate) const LONGEST_TANGENT_PART: f32 = 0.01;
 pub(crate) const LONGEST_TURN_SQUARE: f32 = 2.4674;
 pub(crate) const MAY_BE_TINY: u32 = 1073741824;
+pub(crate) const MOST_WALKED: u32 = 128;
 pub(crate) const NEGATIVE: u32 = 128;
 pub(crate) const ON_KEY: u32 = 2147483648;
 pub(crate) const PI: f32 = 3.1415927;
@@ -230,17 +231,18 @@ const _: () = {
 #[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub(crate) struct CrowdDispatch {
-/// The number of invocations with work.
+/// The number of invocations with work; of instances, where a workgroup takes one.
     pub(crate) count: u32,
 /// The first instance of the window that is evaluated.
     pub(crate) first_instance: u32,
-/// Joints of the skeleton; when it is walked, joints of the level.
+/// Joints of the skeleton; when a level is walked, joints of the level.
     pub(crate) joints: u32,
-/// Layers of an instance.
+/// Layers of an instance; when all levels are walked, how many there are.
     pub(crate) layers: u32,
 /// The most time bases of a clip.
     pub(crate) bases: u32,
-/// The first link of the level.
+/// The first link of the level; when all levels are walked, the first of the links that say where each
+/// begins and ends.
     pub(crate) first_link: u32,
 /// The clock, ticks: the lower 32 bits.
     pub(crate) clock_low: u32,
@@ -663,6 +665,7 @@ pub(crate) enum Kernel {
     CrowdPlainLocals,
     CrowdTimes,
     CrowdWalk,
+    CrowdWalkAll,
     CrowdSkin,
     CrowdHalf,
 }
@@ -774,7 +777,7 @@ impl Kernel {
         }
     }
 }
-pub(crate) static KERNELS: [KernelCode; 98] = [
+pub(crate) static KERNELS: [KernelCode; 99] = [
     KernelCode { kernel: Kernel::SelfTest, storage: ("self_test", 1920), texels: None, bindings: 2, segments: None },
     KernelCode { kernel: Kernel::ArcFramesAxisAngle, storage: ("arc_frames_axis_angle", 2875), texels: Some(("arc_frames_axis_angle_texels", 3001)), bindings: 4, segments: Some((Form::Arc, List::Frames, Store::AxisAngle)) },
     KernelCode { kernel: Kernel::ArcFramesEuler, storage: ("arc_frames_euler", 3536), texels: Some(("arc_frames_euler_texels", 3654)), bindings: 4, segments: Some((Form::Arc, List::Frames, Store::Euler)) },
@@ -871,6 +874,7 @@ pub(crate) static KERNELS: [KernelCode; 98] = [
     KernelCode { kernel: Kernel::CrowdPlainLocals, storage: ("crowd_plain_locals", 2978), texels: Some(("crowd_plain_locals_texels", 3070)), bindings: 5, segments: None },
     KernelCode { kernel: Kernel::CrowdTimes, storage: ("crowd_times", 2589), texels: None, bindings: 5, segments: None },
     KernelCode { kernel: Kernel::CrowdWalk, storage: ("crowd_walk", 940), texels: None, bindings: 2, segments: None },
+    KernelCode { kernel: Kernel::CrowdWalkAll, storage: ("crowd_walk_all", 1264), texels: None, bindings: 2, segments: None },
     KernelCode { kernel: Kernel::CrowdSkin, storage: ("crowd_skin", 767), texels: None, bindings: 2, segments: None },
     KernelCode { kernel: Kernel::CrowdHalf, storage: ("crowd_half", 777), texels: None, bindings: 2, segments: None },
 ];

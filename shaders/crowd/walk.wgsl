@@ -1,15 +1,6 @@
 // Walks a level of the skeleton: matrices in their parents' frames become matrices in the model.
 // Twin: src/twin/crowd_matrices.rs.
 
-/// A joint and its parent.
-struct CrowdLink {
-    joint: u32,
-    parent: u32,
-}
-
-@group(0) @binding(0) var<storage, read> links: array<CrowdLink>;
-@group(0) @binding(1) var<storage, read_write> matrices: array<vec4f>;
-
 // `place` is a joint of the level, of an instance; `dispatch.layers` is the number of joints of the
 // skeleton.
 fn crowd_work(place: u32) {

@@ -15,7 +15,7 @@ use crate::gpu::crowd::{CrowdTables, DeviceCrowd};
 use crate::gpu::crowd_target::CrowdReader;
 use crate::memory::zeroed;
 use crate::output::crowd::{CrowdOutput, CrowdValues};
-use crate::shader::{CrowdDispatch, CrowdEntry};
+use crate::shader::{CrowdDispatch, CrowdEntry, CrowdLink};
 use crate::threads::OutOfThreads;
 use crate::twin::crowd_layers::Layers;
 use crate::twin::crowd_matrices::to_any_half;
@@ -93,6 +93,12 @@ impl Crowd {
         };
         let (engine, library) = (opened.engine(), &self.library);
         let own = &library.tables;
+        // Behind the links, where each level begins and ends.
+        let mut links = library.links.clone();
+        links.extend(library.levels.windows(2).map(|level| CrowdLink {
+            joint: level[0],
+            parent: level[1],
+        }));
         let tables = CrowdTables {
             instances: self.instances() as u32,
             levels: library.levels.clone(),
@@ -103,7 +109,7 @@ impl Crowd {
             spans: engine.crowd_table("tumble crowd spans", &own.spans)?,
             channels: engine.crowd_table("tumble crowd channels", &own.channels)?,
             cells: engine.crowd_table("tumble crowd cells", &self.cells)?,
-            links: engine.crowd_table("tumble crowd links", &library.links)?,
+            links: engine.crowd_table("tumble crowd links", &links)?,
             bind: engine.crowd_table("tumble crowd inverse bind", &library.bind)?,
         };
         Ok(Some(Arc::new(DeviceCrowd::new(engine, tables)?)))

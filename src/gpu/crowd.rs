@@ -10,7 +10,7 @@ use crate::gpu::error::VulkanError;
 use crate::gpu::physical::DeviceKind;
 use crate::gpu::submission::Binding;
 use crate::output::crowd::{CrowdOutput, CrowdValues};
-use crate::shader::{CrowdDispatch, CrowdEntry, CrowdPlace, Kernel};
+use crate::shader::{CrowdDispatch, CrowdEntry, CrowdPlace, Kernel, MOST_WALKED};
 
 /// The fewest instances of a window: so many that windows start at multiples of 256 bytes.
 const LEAST_WINDOW: u64 = 32;
@@ -121,8 +121,14 @@ impl DeviceCrowd {
             (_, false) => Kernel::CrowdLocals,
         };
         let mut kernels = vec![Kernel::CrowdTimes, joints];
+        // Software devices run a workgroup's invocations one after another, and stop at each barrier.
+        let fits = self.tables.arguments.joints <= MOST_WALKED;
+        let walk = match self.engine.maps_samples && fits {
+            true => Kernel::CrowdWalkAll,
+            false => Kernel::CrowdWalk,
+        };
         let walks = matches!(output.values, Model | Skinning);
-        kernels.extend(walks.then_some(Kernel::CrowdWalk));
+        kernels.extend(walks.then_some(walk));
         kernels.extend((output.values == Skinning).then_some(Kernel::CrowdSkin));
         kernels.extend(output.is_half.then_some(Kernel::CrowdHalf));
         kernels
@@ -142,7 +148,7 @@ impl DeviceCrowd {
                 let [clips, bases, spans] = [&own.clips, &own.bases, &own.spans].map(whole);
                 vec![entries, clips, bases, spans, places]
             }
-            Kernel::CrowdWalk => vec![whole(&own.links), values],
+            Kernel::CrowdWalk | Kernel::CrowdWalkAll => vec![whole(&own.links), values],
             Kernel::CrowdSkin => vec![whole(&own.bind), values],
             Kernel::CrowdHalf => vec![values, output],
             _ => {

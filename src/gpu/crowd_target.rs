@@ -151,6 +151,19 @@ impl CrowdTarget {
                 Kernel::CrowdTimes => instances * arguments.layers * arguments.bases,
                 Kernel::CrowdSkin => 3 * joints,
                 Kernel::CrowdHalf => joints * self.output.vectors() as u32,
+                Kernel::CrowdWalkAll => {
+                    let levels = self.crowd.tables.levels.len() - 1;
+                    let own = CrowdDispatch {
+                        count: instances,
+                        layers: levels as u32,
+                        first_link: self.crowd.tables.levels[levels],
+                        ..arguments
+                    };
+                    let groups = self.crowd.engine.workgroups(instances * WORKGROUP);
+                    commands.dispatch(pipeline, set, bytemuck::bytes_of(&own), groups);
+                    commands.barrier(Access::Kernel, Access::Kernel);
+                    continue;
+                }
                 Kernel::CrowdWalk => {
                     for level in self.crowd.tables.levels.windows(2) {
                         let own = CrowdDispatch {

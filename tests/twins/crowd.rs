@@ -579,6 +579,51 @@ pub(super) fn matrices() -> Vec<Twin> {
             all[at(joint)] = affine_product(&all[at(parent)], &all[at(joint)]);
             trial.expect(all);
         }),
+        with_globals("crowd_walk_all", "main", |random, trial| {
+            const JOINTS: u32 = 30;
+            // An invocation alone: it copies rows, walks the links that are its own, and stores its rows; what
+            // others would copy lies there before.
+            let all: Vec<[f32; 4]> = (0..2 * 3 * JOINTS).map(|_| random.vector()).collect();
+            let mut memory: Vec<[f32; 4]> = (0..384).map(|_| random.vector()).collect();
+            let (instance, lane) = (random.below(3), random.below(70) % 64);
+            let links: Vec<[u32; 2]> = (1..JOINTS)
+                .map(|joint| [joint, random.below(joint)])
+                .collect();
+            let bounds = [[0, 20], [20, JOINTS - 1]];
+            trial.argument([0, instance, 0]);
+            trial.argument([1u32, 3, 1]);
+            trial.argument(lane);
+            let dispatch = Dispatch {
+                count: 2,
+                joints: JOINTS,
+                layers: 2,
+                first_link: JOINTS - 1,
+                ..Dispatch::default()
+            };
+            dispatch.put(trial);
+            trial.global("links", [&links[..], &bounds].concat());
+            trial.global("rows", memory.clone());
+            trial.global("matrices", all.clone());
+            trial.output("matrices");
+            let mut after = all;
+            if instance < 2 {
+                let first = (instance * 3 * JOINTS) as usize;
+                let own = (lane..3 * JOINTS).step_by(64).map(|row| row as usize);
+                own.clone().for_each(|row| memory[row] = after[first + row]);
+                for [from, to] in bounds {
+                    for link in (from + lane..to).step_by(64) {
+                        let [joint, parent] = links[link as usize].map(|joint| 3 * joint as usize);
+                        let at = |memory: &[[f32; 4]], at: usize| {
+                            [memory[at], memory[at + 1], memory[at + 2]]
+                        };
+                        let product = affine_product(&at(&memory, parent), &at(&memory, joint));
+                        memory[joint..joint + 3].copy_from_slice(&product);
+                    }
+                }
+                own.for_each(|row| after[first + row] = memory[row]);
+            }
+            trial.expect(after);
+        }),
         with_globals("crowd_skin", "crowd_work", |random, trial| {
             const JOINTS: u32 = 2;
             let mut all: Vec<Rows> = (0..2 * JOINTS).map(|_| rows(random)).collect();

@@ -29,6 +29,7 @@ pub(super) fn trials(kernel: Kernel) -> Vec<Trial> {
     match kernel {
         Kernel::CrowdTimes => vec![times(random)],
         Kernel::CrowdWalk => vec![walk(random)],
+        Kernel::CrowdWalkAll => vec![walk_all(random)],
         Kernel::CrowdSkin => vec![skin(random)],
         Kernel::CrowdHalf => vec![half(random)],
         Kernel::CrowdPlainRotations => vec![joints(random, 1, true, false)],
@@ -279,6 +280,38 @@ fn walk(random: &mut Random) -> Trial {
         }
     }
     let trial = Trial::new([bytes(&links)], &dispatch, groups(count, true));
+    over(trial, &before, &after)
+}
+
+/// The links of a skeleton, level by level: each a joint and its parent.
+const LEVELS: [&[[u32; 2]]; 3] = [&[[1, 0], [2, 0]], &[[6, 1]], &[[3, 2], [5, 6], [4, 6]]];
+
+fn walk_all(random: &mut Random) -> Trial {
+    const POSES: usize = 19;
+    let before: Vec<_> = (0..POSES * JOINTS as usize).map(|_| rows(random)).collect();
+    let link = |[joint, parent]: [u32; 2]| CrowdLink { joint, parent };
+    let mut links: Vec<_> = LEVELS.concat().into_iter().map(link).collect();
+    let mut first = 0;
+    let first_link = links.len() as u32;
+    for level in LEVELS {
+        links.push(link([first, first + level.len() as u32]));
+        first += level.len() as u32;
+    }
+    let dispatch = CrowdDispatch {
+        count: POSES as u32,
+        joints: JOINTS,
+        layers: LEVELS.len() as u32,
+        first_link,
+        ..CrowdDispatch::zeroed()
+    };
+    let mut after = before.clone();
+    for pose in after.chunks_mut(JOINTS as usize) {
+        for [joint, parent] in LEVELS.concat() {
+            pose[joint as usize] = affine_product(&pose[parent as usize], &pose[joint as usize]);
+        }
+    }
+    // A workgroup takes a pose, and one of them has none.
+    let trial = Trial::new([bytes(&links)], &dispatch, [4, 5, 1]);
     over(trial, &before, &after)
 }
 

@@ -112,6 +112,7 @@ fn trials(kernel: Kernel) -> Vec<Trial> {
         | Kernel::CrowdPlainLocals
         | Kernel::CrowdTimes
         | Kernel::CrowdWalk
+        | Kernel::CrowdWalkAll
         | Kernel::CrowdSkin
         | Kernel::CrowdHalf => crowd::trials(kernel),
         _ => segments::trials(kernel),
