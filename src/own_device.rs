@@ -9,7 +9,6 @@ use crate::gpu::clip_target::ClipTarget;
 use crate::gpu::engine::{Job, VulkanEngine};
 use crate::gpu::error::VulkanError;
 use crate::gpu::handles::{VulkanBuffer, VulkanHandles};
-use crate::gpu::in_flight::Target;
 use crate::gpu::options::EngineOptions;
 use crate::gpu::recovery::Opened;
 use crate::output::window::Window;
@@ -54,9 +53,7 @@ impl Request<'_> {
         let (opened, timeline, window) = self.for_buffer(buffer)?;
         let uploaded = &self.clip.uploaded;
         let timeline = uploaded.folded(&timeline)?;
-        let to_buffer = |engine: &VulkanEngine, job: Job<'_>| {
-            engine.run(job, &window, Target::External(buffer))
-        };
+        let to_buffer = |engine: &VulkanEngine, job: Job<'_>| engine.run_into(job, &window, buffer);
         Ok(uploaded.on_device(opened, &timeline, self.encoding, to_buffer)?)
     }
 

@@ -378,11 +378,8 @@ impl VulkanEngine {
         let fits = bytes <= self.device.physical.info.max_memory_allocation_size;
         let in_place = self.device.placing.in_place;
         // Memory that a card copies into is dear to make: only for what is asked for again.
-        let pays = in_place
-            || job
-                .lists
-                .lists(self, job, &whole, self.window_of(encoding))?
-                .is_some();
+        let kept = self.kept(job, &whole)?;
+        let pays = in_place || kept.is_some();
         let residence = match in_place {
             true => Residence::InPlace,
             false => Residence::Readback,
@@ -400,14 +397,16 @@ impl VulkanEngine {
         };
         let Some(mut buffer) = buffer else {
             let mut quats = OutputBuffer::new(whole.len())?;
-            self.evaluate_into(job, &whole, bytemuck::cast_slice_mut(&mut quats))?;
+            let output = bytemuck::cast_slice_mut(&mut quats);
+            let target = Target::of(&self.device, self.imports, output, encoding.bytes());
+            self.run(job, &whole, target, kept.as_deref())?;
             return Ok(Box::new(quats));
         };
         let target = match in_place {
             true => Target::Buffer(&mut buffer),
             false => Target::Staged(&mut buffer),
         };
-        self.run(job, &whole, target)?;
+        self.run(job, &whole, target, kept.as_deref())?;
         Ok(Box::new(MappedQuats {
             buffer: Some(buffer),
             count: whole.len(),
@@ -423,8 +422,9 @@ impl VulkanEngine {
         output: &mut [u8],
     ) -> Result<(), EvaluateError> {
         let each = job.encoding.bytes();
+        let kept = self.kept(job, window)?;
         let target = Target::of(&self.device, self.imports, output, each);
-        self.run(job, window, target)
+        self.run(job, window, target, kept.as_deref())
     }
 
     /// A buffer that was given back, when one fits closely, else a new one.

@@ -109,6 +109,8 @@ pub(crate) struct ListCache(Mutex<Kept>);
 struct Kept {
     /// What was asked for last.
     last: Option<Asked>,
+    /// What was asked for again, and whose lists are too long to keep.
+    too_long: Option<Asked>,
     /// The latest first.
     lists: Vec<(Asked, Arc<KeptLists>)>,
 }
@@ -138,21 +140,25 @@ impl ListCache {
                 kept.lists[..=place].rotate_right(1);
                 return Ok(Some(Arc::clone(&kept.lists[0].1)));
             }
-            if kept.last.replace(asked.clone()).as_ref() != Some(&asked) {
+            let is_new = kept.last.replace(asked.clone()).as_ref() != Some(&asked);
+            if is_new || kept.too_long.as_ref() == Some(&asked) {
                 return Ok(None);
             }
         }
         // Nothing is locked while they are made. Of several callers who make the same, the last one's stay.
         let made = match KeptLists::new(engine, job, whole, most) {
-            Err(EvaluateError::Vulkan(error)) if error.is_out_of_memory() => return Ok(None),
-            made => Arc::new(made?),
+            Err(EvaluateError::Vulkan(error)) if error.is_out_of_memory() => None,
+            made => Some(Arc::new(made?)).filter(|made| made.bytes() <= MOST_BYTES),
         };
-        if made.bytes() <= MOST_BYTES {
-            let mut kept = lock(&self.0);
-            kept.lists.truncate(MOST_KEPT - 1);
-            kept.lists.insert(0, (asked, Arc::clone(&made)));
+        let mut kept = lock(&self.0);
+        match &made {
+            Some(made) => {
+                kept.lists.truncate(MOST_KEPT - 1);
+                kept.lists.insert(0, (asked, Arc::clone(made)));
+            }
+            None => kept.too_long = Some(asked),
         }
-        Ok(Some(made))
+        Ok(made)
     }
 
     /// Lets go of all, where memory is short.

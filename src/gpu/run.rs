@@ -1,6 +1,7 @@
 //! The walk over a result's windows. Two are in flight: the host lists the work of one while the
 //! device evaluates the other; three where a second queue brings back the one before.
 
+use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
 use crate::gpu::engine::{Job, VulkanEngine, lock};
@@ -55,26 +56,40 @@ impl VulkanEngine {
         (self.window() / each).max(1)
     }
 
+    /// Evaluates a window of a result into an application's buffer.
+    pub(crate) fn run_into(
+        &self,
+        job: Job<'_>,
+        window: &Window,
+        buffer: VulkanBuffer,
+    ) -> Result<(), EvaluateError> {
+        if let Some(most) = self.at_once()
+            && self.binds_at_once(job, window)
+            && let Some(kept) = job.lists.lists(self, job, window, most)?
+        {
+            return self.run_kept(job, &kept, &buffer);
+        }
+        self.run(job, window, Target::External(buffer), None)
+    }
+
+    /// The lists of a result that the host reads, where it was asked for before.
+    pub(crate) fn kept(
+        &self,
+        job: Job<'_>,
+        window: &Window,
+    ) -> Result<Option<Arc<KeptLists>>, EvaluateError> {
+        (job.lists).lists(self, job, window, self.window_of(job.encoding))
+    }
+
     /// Evaluates a window of a result, cut into smaller windows that suit the device.
     pub(crate) fn run(
         &self,
         job: Job<'_>,
         window: &Window,
         mut target: Target<'_>,
+        kept: Option<&KeptLists>,
     ) -> Result<(), EvaluateError> {
         let most = || self.window_of(job.encoding);
-        let at_once = self.at_once();
-        if let (Some(most), Target::External(buffer)) = (at_once, &target)
-            && self.binds_at_once(job, window)
-            && let Some(kept) = job.lists.lists(self, job, window, most)?
-        {
-            return self.run_kept(job, &kept, buffer);
-        }
-        let kept = match target {
-            Target::External(_) => None,
-            _ => job.lists.lists(self, job, window, most())?,
-        };
-        let kept = kept.as_deref();
         // Each is cut again when its turn comes: windows may have been halved since.
         let windows = window.cut(most()).flat_map(|window| window.within(most()));
         self.fly(

@@ -12,7 +12,6 @@ use crate::gpu::buffer::{Buffer, Residence};
 use crate::gpu::engine::VulkanEngine;
 use crate::gpu::error::VulkanError;
 use crate::gpu::handles::VulkanBuffer;
-use crate::gpu::in_flight::Target;
 pub use crate::gpu::write_rates::WriteRates;
 use crate::output::encoding::Encoding;
 use crate::output::rotations::Layout;
@@ -126,7 +125,7 @@ impl Resident<'_> {
                     offset: 0,
                     size: bytes,
                 };
-                engine.run(job, &job.whole(layout), Target::External(target))
+                engine.run_into(job, &job.whole(layout), target)
             })?;
         let on_host = started.elapsed();
         let on_device = self.clip.engine().take_timings().on_device;
