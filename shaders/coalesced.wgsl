@@ -15,11 +15,13 @@ fn main(
     // It has no samples.
     var item: Item;
     var segment: Segment;
+    var row = 0u;
     for (var turn = 0u; turn < SAMPLES_EACH; turn++) {
         let cell = cell_of(corner, turn);
-        if cell.is_inside & !has(item, cell.position) {
+        if cell.is_inside & ((cell.row != row) | !has(item, cell.position)) {
             item = item_at(item_of(cell));
             segment = segment_of(item);
+            row = cell.row;
         }
         // Samples that no item has are the host's, or another dispatch's.
         let is_stored = cell.is_inside & has(item, cell.position);

@@ -87,7 +87,7 @@ fn every_float_operation_of_every_shader_is_decorated_once() {
         let least = match name {
             "crowd_half" => 1,
             "crowd_times" => 3,
-            "crowd_skin" | "crowd_walk" => 6,
+            "crowd_skin" | "crowd_walk" | "crowd_walk_all" => 6,
             _ => 11,
         };
         assert!(

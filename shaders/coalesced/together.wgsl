@@ -15,9 +15,10 @@ fn finish(lane: u32, place: u32, rotation: vec4f, is_stored: bool) {
     let within = lane & (LINE - 1u);
     let first = (place - within) * PARTS;
     for (var part = within; part < LINE * PARTS; part += LINE) {
-        let other = lane - within + part / PARTS;
+        let value = part / PARTS;
+        let other = lane - within + value;
         if is_there[other] != 0u {
-            rotations[first + part] = tile[other][part % PARTS];
+            rotations[first + part] = tile[other][part - value * PARTS];
         }
     }
     workgroupBarrier();

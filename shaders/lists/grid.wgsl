@@ -62,6 +62,8 @@ struct Corner {
 
 struct Cell {
     place: u32,
+    // The row, and the position in it.
+    row: u32,
     position: u32,
     block: u32,
     is_inside: bool,
@@ -89,7 +91,7 @@ fn cell_of(corner: Corner, turn: u32) -> Cell {
         let position = dispatch.first_output + index;
         let place = position + dispatch.shift;
         let block = corner.block + turn * LINE / BLOCK_SAMPLES;
-        return Cell(place, position, block, index < dispatch.samples);
+        return Cell(place, 0u, position, block, index < dispatch.samples);
     }
     let sample = corner.first + turn;
     let row = sample * dispatch.stride + dispatch.first_output;
@@ -97,5 +99,5 @@ fn cell_of(corner: Corner, turn: u32) -> Cell {
     // What lies before the row wraps to a large number.
     let track = place - row;
     let is_inside = (sample < dispatch.samples) & (track < dispatch.rows);
-    return Cell(place, sample, corner.block + track, is_inside);
+    return Cell(place, track, sample, corner.block + track, is_inside);
 }

@@ -15,6 +15,7 @@ use crate::gpu::kernel_check::random::Random;
 /// The sample that an invocation takes in one of its turns.
 struct Cell {
     place: u32,
+    row: u32,
     position: u32,
     block: u32,
     is_inside: bool,
@@ -53,6 +54,7 @@ fn invocation(random: &mut Random, trial: &mut Trial) -> Invocation {
             let own = turn * LINE + within;
             Cell {
                 place: position + own + shift,
+                row: 0,
                 position: position + own,
                 block: first_block + (first + own) / BLOCK_SAMPLES,
                 is_inside: first + own < samples,
@@ -84,6 +86,7 @@ fn invocation(random: &mut Random, trial: &mut Trial) -> Invocation {
         let block = sample / BLOCK_SAMPLES * rows + first_block;
         Cell {
             place,
+            row: track,
             position: sample,
             block: block.wrapping_add(track),
             is_inside: sample < samples && track < rows,
@@ -193,12 +196,12 @@ pub(super) fn coalesced() -> Vec<Twin> {
             let turn = random.below(SAMPLES_EACH);
             trial.argument((own.corner, turn));
             let own = &own.turns[turn as usize];
-            trial.expect((own.place, own.position, own.block, own.is_inside));
+            trial.expect((own.place, own.row, own.position, own.block, own.is_inside));
         }),
         with_globals(KERNEL, "item_of", |random, trial| {
             let blocks: [(u32, u32); 3] = std::array::from_fn(|_| (random.word(), random.word()));
             let (position, block) = (random.word(), random.below(3));
-            trial.argument((random.word(), position, block, true));
+            trial.argument((random.word(), random.word(), position, block, true));
             trial.global("blocks", blocks);
             let (first, starts) = blocks[block as usize];
             let begun = (0..=position % BLOCK_SAMPLES).filter(|bit| (starts >> bit) & 1 == 1);

@@ -200,23 +200,23 @@ fn global(program: &Program, name: &str) -> usize {
     place.unwrap_or_else(|| panic!("no global {name}"))
 }
 
-/// The first stores of all lanes go together, then the second ones.
+/// Of each turn of a loop the first stores of all lanes go together, then the second ones.
 fn stores_of(wave: &[Vec<Touch>], line: u64) -> Lines {
-    let stores = |lane: &Vec<Touch>| -> Vec<Range<u64>> {
-        let own = lane.iter().filter(|touch| touch.is_store);
-        own.map(Touch::bytes).collect()
-    };
-    let lanes: Vec<_> = wave.iter().map(stores).collect();
-    let mut lines = Lines::default();
-    for step in 0.. {
-        let ranges: Vec<_> = lanes
-            .iter()
-            .filter_map(|lane| lane.get(step).cloned())
-            .collect();
-        if ranges.is_empty() {
-            return lines;
+    let mut together = BTreeMap::<(usize, usize), Vec<Range<u64>>>::new();
+    for lane in wave {
+        let (mut turn, mut stores) = (0, 0);
+        for touch in lane.iter().filter(|touch| touch.is_store) {
+            stores = if touch.turn == turn { stores + 1 } else { 0 };
+            turn = touch.turn;
+            together
+                .entry((turn, stores))
+                .or_default()
+                .push(touch.bytes());
         }
-        lines.add(store(&ranges, line));
+    }
+    let mut lines = Lines::default();
+    for ranges in together.values() {
+        lines.add(store(ranges, line));
     }
     lines
 }

@@ -118,6 +118,8 @@ pub(super) struct Machine<'a> {
     pub(super) globals: Vec<Vec<u64>>,
     /// What was read and written of global variables, where that is asked for.
     pub(super) touches: Option<Vec<Touch>>,
+    /// Turns of loops so far.
+    turns: usize,
     /// Whether anything was read or written outside the memory, or beyond the end of an array.
     is_outside: bool,
 }
@@ -127,6 +129,8 @@ pub(super) struct Touch {
     pub(super) global: usize,
     cells: Range<usize>,
     pub(super) is_store: bool,
+    /// Turns of loops before it: invocations that run together take them together.
+    pub(super) turn: usize,
 }
 
 impl Touch {
@@ -158,6 +162,7 @@ impl<'a> Machine<'a> {
             stack: Vec::new(),
             globals: vec![Vec::new(); program.globals.len()],
             touches: None,
+            turns: 0,
             is_outside: false,
         }
     }
@@ -166,7 +171,7 @@ impl<'a> Machine<'a> {
     pub(super) fn call(&mut self, function: usize, arguments: &[u64]) -> Option<&[u64]> {
         self.stack.clear();
         self.stack.extend_from_slice(arguments);
-        self.is_outside = false;
+        (self.is_outside, self.turns) = (false, 0);
         let places: Vec<Place> = (0..arguments.len()).collect();
         let first = self.enter(function, 0, &places, arguments.len());
         let count = self.program.functions[function].result;
@@ -207,6 +212,7 @@ impl<'a> Machine<'a> {
                 global,
                 cells: cells.clone(),
                 is_store,
+                turn: self.turns,
             });
         }
     }
@@ -343,6 +349,7 @@ impl<'a> Machine<'a> {
                         end => return end,
                     }
                     self.run(continuing, base, top);
+                    self.turns += 1;
                 },
                 Step::Break => return End::Break,
                 Step::Return { from } => return End::Return(base + from),
