@@ -18,7 +18,7 @@ fn main(
     var row = 0u;
     for (var turn = 0u; turn < SAMPLES_EACH; turn++) {
         let cell = cell_of(corner, turn);
-        if cell.is_inside & ((cell.row != row) | !has(item, cell.position)) {
+        if cell.is_inside & !((cell.row == row) & has(item, cell.position)) {
             item = item_at(item_of(cell));
             segment = segment_of(item);
             row = cell.row;
