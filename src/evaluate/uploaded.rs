@@ -184,7 +184,7 @@ impl Uploaded {
             return Err(OutOfMemory::new::<u8>(SEGMENTS, needed).into());
         }
         opened.attempt_smaller(|engine| {
-            let (clip, buffers) = (&self.data, &*self.buffers_on(engine)?);
+            let (clip, buffers) = (&self.data, &self.buffers_on(engine)?);
             let job = Job {
                 clip,
                 buffers,

@@ -59,7 +59,7 @@ pub(crate) mod engine {
 
     pub(crate) struct Job<'a> {
         pub(crate) clip: &'a ClipData,
-        pub(crate) buffers: &'a ClipBuffers,
+        pub(crate) buffers: &'a Arc<ClipBuffers>,
         pub(crate) timeline: &'a Timeline,
         pub(crate) encoding: Encoding,
     }

@@ -81,7 +81,7 @@ pub(crate) struct ClipBuffers {
 #[derive(Clone, Copy)]
 pub(crate) struct Job<'a> {
     pub(crate) clip: &'a ClipData,
-    pub(crate) buffers: &'a ClipBuffers,
+    pub(crate) buffers: &'a Arc<ClipBuffers>,
     pub(crate) timeline: &'a Timeline,
     pub(crate) encoding: Encoding,
 }

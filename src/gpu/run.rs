@@ -1,11 +1,13 @@
 //! The walk over a result's windows. Two are in flight: the host lists the work of one while the
 //! device evaluates the other; three where a second queue brings back the one before.
 
+use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
+use crate::gpu::device::Lane;
 use crate::gpu::engine::{Job, VulkanEngine};
 use crate::gpu::error::EvaluateError;
-use crate::gpu::in_flight::{Finish, InFlight, Target};
+use crate::gpu::in_flight::{Finish, InFlight, Kept, Target};
 use crate::gpu::submission::{Access, Binding};
 use crate::gpu::upload::Upload;
 use crate::gpu::work_list::WorkLists;
@@ -129,26 +131,44 @@ impl VulkanEngine {
             kernels.dispatch(&pipeline, &bindings, arguments, groups)?;
             first_item += item_count;
         }
-        let mut patches = work.patches;
-        if let Target::External(range) = target {
+        let external = match target {
+            Target::External(range) => Some(range.buffer),
+            Target::Exported(result) => Some(result.buffer.raw),
+            _ => None,
+        };
+        if let Some(external) = external {
             let commands = kernels.commands();
             commands.barrier(Access::Kernel, Access::Copy);
             let mut value_bytes = vec![0; encoding.bytes()];
-            for (place, value) in patches.drain(..) {
+            for (place, value) in work.patches {
                 encoding.encode_all(&[value], &mut value_bytes);
                 let offset = start + place as u64 * rotation;
-                commands.update(range.buffer, offset, &value_bytes);
+                commands.update(external, offset, &value_bytes);
             }
             commands.barrier(Access::Kernel, Access::Any);
             commands.barrier(Access::Copy, Access::Any);
-            kernels.submit()?;
-        } else {
-            own.results.submit(place.is_none().then_some(size))?;
+            let Target::Exported(result) = target else {
+                kernels.submit()?;
+                own.done = None;
+                return Ok(());
+            };
+            let written = Binding::range(external, start, window.len() as u64 * rotation);
+            commands.release(written, self.device.family(Lane::Kernels));
+            own.kept = Some(Kept {
+                _segments: Arc::clone(job.buffers),
+                _pipeline: pipeline,
+            });
+            let point = result.next_point();
+            kernels.submit_between(None, point)?;
+            result.has_submitted(point);
+            own.done = None; // nothing is left for the host to do
+            return Ok(());
         }
+        own.results.submit(place.is_none().then_some(size))?;
         own.done = Some(Finish {
             output: bytes,
             encoding,
-            patches,
+            patches: work.patches,
         });
         Ok(())
     }
