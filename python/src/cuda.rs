@@ -382,8 +382,20 @@ impl Mapping {
         let code = unsafe { (functions.map)(&raw mut address, memory, &raw const range) };
         cuda.checked("cuExternalMemoryGetMappedBuffer", code)?;
         self.address = Some(address);
+        // Without the semaphore the host waits, and the result is the same.
+        self.semaphore = self.import_semaphore().unwrap_or_default();
+        if self.semaphore.is_none() {
+            self.result.wait()?;
+        }
+        Ok(())
+    }
+
+    /// What says that the result is written, and the value that says it; none where the device exports none.
+    #[cfg(unix)]
+    fn import_semaphore(&self) -> Result<Option<(Semaphore, u64)>, CudaError> {
+        use std::os::fd::{AsRawFd, IntoRawFd};
         let Some((file, value)) = self.result.timeline_file()? else {
-            return Ok(());
+            return Ok(None);
         };
         let handle = SemaphoreHandle {
             kind: TIMELINE_FILE,
@@ -395,11 +407,18 @@ impl Mapping {
         };
         let mut semaphore = null_mut();
         // SAFETY: the file is that of a timeline semaphore of the same device.
-        let code = unsafe { (functions.import_semaphore)(&raw mut semaphore, &raw const handle) };
-        cuda.checked("cuImportExternalSemaphore", code)?;
+        let code = unsafe {
+            let import = self.cuda.functions.import_semaphore;
+            import(&raw mut semaphore, &raw const handle)
+        };
+        self.cuda.checked("cuImportExternalSemaphore", code)?;
         let _ = file.into_raw_fd(); // the driver's from now on
-        self.semaphore = Some((semaphore, value));
-        Ok(())
+        Ok(Some((semaphore, value)))
+    }
+
+    /// Whether streams wait for the result; else the host has waited.
+    pub(crate) fn is_ordered_by_streams(&self) -> bool {
+        self.semaphore.is_some()
     }
 
     /// Where the first number is, for somebody whose work comes after [`Mapping::order`].

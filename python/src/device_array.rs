@@ -87,6 +87,16 @@ impl DeviceArray {
         numpy(py)?.call_method1("dtype", (type_name(self.component),))
     }
 
+    /// Who waits for the card to write it: the "stream" that takes it, or the "host", which has done so, where the
+    /// Vulkan device exports no semaphore or CUDA takes none.
+    #[getter]
+    fn waited_by(&self) -> &'static str {
+        match self.mapping.is_ordered_by_streams() {
+            true => "stream",
+            false => "host",
+        }
+    }
+
     /// The array as a capsule of DLPack's. `stream`: the stream that will use it, which waits for the engine: None or
     /// 1, the default one, 2, that of each thread, a pointer, or -1, to wait for nothing. With `max_version` of (1, 0)
     /// or more the capsule has a version. `dl_device`: (1, 0) copies to the host. `copy=True` is refused on the card.

@@ -102,7 +102,8 @@ def compared(host_of):
 
 @step("numpy()")
 def _():
-    return compared(lambda array: array.numpy())
+    waited_by = on_card(REQUESTS[0]).waited_by
+    return f"waited by the {waited_by}; " + compared(lambda array: array.numpy())
 
 
 @step("numpy.from_dlpack(device='cpu')")
