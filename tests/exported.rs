@@ -10,7 +10,7 @@ use tumble::{
 
 use crate::support::{dense_set, hostile_set, vulkan_devices};
 
-/// What lies in the memory. SwiftShader's file is the memory; lavapipe's begins with a header, whose
+/// What lies in the memory. Some drivers' file is the memory; lavapipe's begins with a header, whose
 /// second word says where the memory starts.
 fn bytes(result: &ExportedResult) -> Vec<u8> {
     let file = File::from(result.memory_file().unwrap());

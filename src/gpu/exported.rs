@@ -145,23 +145,27 @@ impl ExportedResult {
     }
 
     /// Bytes of the result, from the start of the memory.
+    #[must_use]
     pub fn bytes(&self) -> u64 {
         self.bytes
     }
 
     /// Bytes of the memory, which belongs to one buffer alone (a dedicated allocation): what an importer has to be
     /// told.
+    #[must_use]
     pub fn memory_bytes(&self) -> u64 {
         self.exported.buffer.memory().1
     }
 
     /// The device's UUID, by which another interface finds it, as in
     /// [`DeviceInfo::uuid`](crate::gpu::reports::DeviceInfo::uuid).
+    #[must_use]
     pub fn device_uuid(&self) -> &str {
         &self.device().physical.info.uuid
     }
 
     /// The device's name.
+    #[must_use]
     pub fn device_name(&self) -> &str {
         &self.device().physical.info.name
     }
