@@ -4,6 +4,10 @@
 //!
 //! `unsafe`: functions of a C library.
 #![allow(unsafe_code)]
+#![cfg_attr(
+    not(unix),
+    allow(dead_code, reason = "memory leaves Vulkan as a file on Unix alone")
+)]
 
 use std::ffi::{CStr, c_char, c_int, c_uint, c_void};
 use std::fmt;

@@ -12,7 +12,7 @@ typedef void (*function)(void);
 typedef function (*get_proc)(void *, const char *);
 typedef int (*create)(void *, const void *, const void *, void *);
 
-enum { OPAQUE_FILE = 1, EXPORTABLE = 1, EXPORT_SEMAPHORE = 1000077000 };
+enum { OPAQUE_FILE = 1, EXPORTABLE = 1, EXPORT_SEMAPHORE = 1000077000, LOST = -4 };
 static const char extension[] = "VK_KHR_external_semaphore_fd";
 
 static get_proc real_instance, real_device;
@@ -88,6 +88,21 @@ static int create_semaphore(void *device, const struct chained *info, const void
     return ((create)found)(device, &plain, allocator, semaphore);
 }
 
+/* A device that is lost (STUB_VULKAN_LOST) before a result is waited for. */
+static int wait_for(void *device, const void *info, uint64_t timeout) {
+    if (getenv("STUB_VULKAN_LOST"))
+        return LOST;
+    function found = real_device(device, "vkWaitSemaphores");
+    return ((int (*)(void *, const void *, uint64_t))found)(device, info, timeout);
+}
+
+static int counter(void *device, uint64_t semaphore, uint64_t *value) {
+    if (getenv("STUB_VULKAN_LOST"))
+        return LOST;
+    function found = real_device(device, "vkGetSemaphoreCounterValue");
+    return ((int (*)(void *, uint64_t, uint64_t *))found)(device, semaphore, value);
+}
+
 static int semaphore_file(void *device, const void *info, int *file) {
     (void)device, (void)info;
     *file = memfd_create("semaphore", MFD_CLOEXEC);
@@ -106,6 +121,10 @@ static function device_function(void *object, const char *name) {
         return (function)semaphore_file;
     if (!strcmp(name, "vkCreateSemaphore"))
         return (function)create_semaphore;
+    if (!strcmp(name, "vkWaitSemaphores"))
+        return (function)wait_for;
+    if (!strcmp(name, "vkGetSemaphoreCounterValue"))
+        return (function)counter;
     return real_device(object, name);
 }
 

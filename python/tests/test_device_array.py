@@ -170,6 +170,20 @@ for engine in all:
     assert np.array_equal(array.numpy(), expected)
     del array
     assert (alive(), files()) == (0, opened)
+
+    # Of a device that is lost nothing is read, and nothing that a stream may wait for in vain is waited for.
+    array = evaluate(engine)
+    array.numpy()
+    os.environ["STUB_VULKAN_LOST"] = "1"
+    refused(array.numpy, "vkWaitSemaphores failed: ERROR_DEVICE_LOST")
+    refused(array.__dlpack__, "vkGetSemaphoreCounterValue failed: ERROR_DEVICE_LOST")
+    refused(lambda: array.__cuda_array_interface__, "ERROR_DEVICE_LOST")
+    before = alive()
+    del array
+    assert alive() == before
+    del os.environ["STUB_VULKAN_LOST"]
+    assert np.array_equal(evaluate(engine).numpy(), expected)
+    assert alive() == before
     del os.environ["STUB_CUDA_UUIDS"]
 """
     run(script, driver("failing", semaphores=True))

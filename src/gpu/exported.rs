@@ -5,7 +5,9 @@ use std::sync::{Arc, Mutex};
 
 use ash::vk;
 
-use crate::gpu::buffer::{Buffer, FILE};
+use crate::gpu::buffer::Buffer;
+#[cfg(unix)]
+use crate::gpu::buffer::FILE;
 use crate::gpu::device::LogicalDevice;
 use crate::gpu::engine::lock;
 use crate::gpu::error::{Named, VulkanError};
