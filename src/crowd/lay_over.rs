@@ -223,7 +223,7 @@ mod tests {
     impl Case {
         fn rotation(&mut self) -> [f32; 4] {
             let random = std::array::from_fn(|_| self.random.f32() - 0.5);
-            let whole = std::array::from_fn(|_| self.random.i8(-1..=1) as f32);
+            let whole = std::array::from_fn(|_| f32::from(self.random.i8(-1..=1)));
             let q: [f32; 4] = if self.random.bool() { random } else { whole };
             if dot(q, q) < 1e-3 {
                 return UNMOVED;

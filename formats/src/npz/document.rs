@@ -271,7 +271,8 @@ impl Document for NpzDocument {
         let members = self.archive.members.iter().enumerate();
         let others = members.filter(|&(place, member)| {
             let is_known = self.plan.constants.contains(&place)
-                || self.plan.is_own && own::CONSTANTS.contains(&&*member.name);
+                || self.plan.is_own && own::CONSTANTS.contains(&&*member.name)
+                || self.plan.is_note(member);
             !is_key(place) && !is_time(place) && self.plan.rate_member != Some(place) && !is_known
         });
         others.map(|(_, member)| member.name.clone()).collect()

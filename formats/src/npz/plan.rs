@@ -218,9 +218,6 @@ impl Plan {
     pub(crate) fn not_read(&self, archive: &Archive, options: &ReadOptions) -> Vec<usize> {
         let is_read = |place: usize, member: &Member| {
             let header = member.header.as_ref();
-            // What made our own samples stands beside them, a text each.
-            let is_note =
-                self.is_own && header.is_ok_and(|it| it.shape.is_empty() && it.element.is_text());
             let is_shape = self.is_body && options.has_body_model;
             self.parts.iter().any(|part| part.member == place)
                 || self.times.is_some_and(|list| list.member == place)
@@ -229,12 +226,18 @@ impl Plan {
                 || self.constants.contains(&place)
                 || self.is_own && CONSTANTS.contains(&&*member.name)
                 || is_shape && SHAPE.contains(&&*member.name)
-                || is_note
+                || self.is_note(member)
                 || header.is_ok_and(|it| it.element == Element::Object)
         };
         let members = archive.members.iter().enumerate();
         let others = members.filter(|&(place, member)| !is_read(place, member));
         others.map(|(place, _)| place).collect()
+    }
+
+    /// Whether a member says what made our own samples: a text beside them.
+    pub(crate) fn is_note(&self, member: &Member) -> bool {
+        let header = member.header.as_ref();
+        self.is_own && header.is_ok_and(|it| it.shape.is_empty() && it.element.is_text())
     }
 
     /// Warns of them, and of pickled objects, which are not looked into.
