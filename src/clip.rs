@@ -1,11 +1,26 @@
 //! A clip: a set prepared for one method, on a device, ready for any frames.
 
+#[cfg(feature = "vulkan")]
+use std::sync::Arc;
+
 use glam::{Quat, Vec4};
 
 use crate::curve::options::Quantity;
 use crate::engine::{Engine, check_rows, in_quats};
 use crate::error::Error;
+#[cfg(feature = "vulkan")]
+use crate::evaluate::uploaded::Backend;
 use crate::evaluate::uploaded::Uploaded;
+#[cfg(feature = "vulkan")]
+use crate::gpu::engine::{Job, VulkanEngine};
+#[cfg(feature = "vulkan")]
+use crate::gpu::error::EvaluateError;
+#[cfg(feature = "vulkan")]
+use crate::gpu::exported::{Exported, ExportedResult};
+#[cfg(feature = "vulkan")]
+use crate::gpu::in_flight::Target;
+#[cfg(feature = "vulkan")]
+use crate::memory::OutOfMemory;
 use crate::memory::zeroed;
 use crate::output::encoding::Encoding;
 use crate::output::rotations::{Layout, Rotations, Samples, Vectors};
@@ -140,6 +155,47 @@ impl Clip {
         let mut output = zeroed(bytes, "a result")?;
         self.encode_window_into(&timeline, &whole, encoding, &mut output)?;
         Ok(output)
+    }
+
+    /// Evaluates into memory of the engine's device that others on the same card, such as CUDA, import. Where they
+    /// can wait for the device, this returns while it still writes.
+    ///
+    /// # Errors
+    /// When the engine is the CPU, the device exports no memory, the frames do not fit the clip, the encoding is for
+    /// rotations and the clip has none, or the device fails.
+    #[cfg(feature = "vulkan")]
+    pub fn evaluate_exported(
+        &self,
+        frames: &Frames,
+        layout: Layout,
+        encoding: Encoding,
+    ) -> Result<ExportedResult, Error> {
+        let Backend::Vulkan(opened) = &*self.engine().backend else {
+            return Err(Error::ExportOnCpu);
+        };
+        encoding.check(self.quantity())?;
+        let timeline = self.timeline(frames)?;
+        let timeline = self.uploaded.folded(&timeline)?;
+        let values = (self.track_count() as u64).saturating_mul(timeline.len() as u64);
+        let bytes = values.saturating_mul(encoding.bytes() as u64);
+        let needed = usize::try_from(bytes).unwrap_or(usize::MAX);
+        let export = |engine: &VulkanEngine, job: Job<'_>| {
+            // Smaller windows would not make room for it.
+            let exported = match Exported::new(&engine.device, bytes) {
+                Err(error) if error.is_out_of_memory() && engine.give_back() => {
+                    Exported::new(&engine.device, bytes)
+                }
+                made => made,
+            };
+            let exported = Arc::new(exported.map_err(|error| match error.is_out_of_memory() {
+                true => OutOfMemory::new::<u8>("a result in the device's memory", needed).into(),
+                false => EvaluateError::from(error),
+            })?);
+            let target = Target::Exported(Arc::clone(&exported));
+            engine.run(job, &job.whole(layout), target, None)?;
+            Ok(ExportedResult::new(exported, bytes))
+        };
+        Ok((self.uploaded).on_device(opened, &timeline, encoding, export)?)
     }
 }
 

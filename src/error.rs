@@ -107,6 +107,11 @@ pub enum Error {
         "this engine evaluates on the CPU and has no Vulkan device to which the buffer could belong; make one of the buffer's device with Engine::from_vulkan"
     )]
     BufferOnCpu,
+    /// Results of the CPU lie in no device's memory.
+    #[error(
+        "this engine evaluates on the CPU, whose results lie in the host's memory; open a Vulkan device to have them in a device's"
+    )]
+    ExportOnCpu,
     /// A buffer is given to an engine that opened its device itself.
     #[error(
         "the engine opened its device itself, so no buffer of an application's can be on it; make the engine of the buffer's device with Engine::from_vulkan"

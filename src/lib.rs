@@ -137,6 +137,8 @@ pub use crate::gpu::details::{
 };
 pub use crate::gpu::error::VulkanError;
 #[cfg(feature = "vulkan")]
+pub use crate::gpu::exported::ExportedResult;
+#[cfg(feature = "vulkan")]
 pub use crate::gpu::handles::{QueueLock, VulkanBuffer, VulkanHandles, VulkanQueue};
 pub use crate::gpu::options::{
     EngineOptions, Mapping, ReadBack, Reads, Timings, Transfer, Uploads,

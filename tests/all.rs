@@ -11,6 +11,8 @@ mod c2;
 mod crowd;
 mod encoding;
 mod examples;
+#[cfg(target_os = "linux")]
+mod exported;
 mod external_vectors;
 mod extremes;
 mod few_samples;

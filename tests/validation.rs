@@ -11,6 +11,8 @@ use crate::layer::Layer;
 #[test]
 fn no_layer_has_anything_to_say_of_the_library() {
     let mut tests = vec!["crowd::own_device::", "poses::", "every_way_of_copying"];
+    #[cfg(target_os = "linux")]
+    tests.push("exported_memory_lives");
     if std::env::var_os("VALIDATE_ALL").is_some() {
         tests.extend(["crowd::", "vulkan::", "encoding::", "transforms::"]);
         tests.extend(["bit_identity::", "outside::", "stream::"]);

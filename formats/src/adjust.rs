@@ -183,8 +183,9 @@ pub fn set_offsets(clip: &mut Motion, numbers: &[f64]) -> Result<(), OffsetsErro
         clip.no_world = None;
     }
     for (track, &offset) in offsets.iter().enumerate() {
-        let origin = clip.origin(track);
-        clip.skeleton[track].rest.translation = (DVec3::from_array(offset) - origin).as_vec3();
+        let parent = clip.skeleton[track].parent;
+        let rest = clip.resting_at(track, parent, DVec3::from_array(offset));
+        clip.skeleton[track].rest.translation = rest;
     }
     Ok(())
 }

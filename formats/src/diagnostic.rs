@@ -294,6 +294,7 @@ codes! {
     ObjectsBeside = "W303", "pickled Python objects beside the keys", "They are not looked into. Where the file is written again, they are copied as they are if they are no lists of frames.";
     TwoRates = "W304", "two rates that differ", "A file says its rate twice, or a rate and times or a length of another; `--source-fps` overrules rates.";
     Nanoseconds = "W305", "times that are nanoseconds", "Seconds since 1970 have ten digits, nanoseconds nineteen, as ORB-SLAM writes them: `--time-unit ns` says it without this warning.";
+    ArraysNotRead = "W306", "arrays that are not read", "They are no part of a motion as far as their names tell; `--map` says what arrays are. The shape of a body (`betas`, `gender`) is used where `--body-model` brings its model. A result in the file's own layout keeps what is the same in all frames.";
     Bridged = "W401", "keys that are missing", "Cells are blank or NaN, and `--bridge-gaps` asks for the track to be interpolated from its other keys there.";
     ColumnsLeftOut = "W402", "columns that are left out", "Their names are none of those that keys have, or a list has more numbers than `--map` takes. `--map` gives columns the names of keys.";
     FurtherNumbers = "W501", "further numbers behind a pose", "A line of a trajectory is a time, a position and a quaternion; what follows, such as a covariance or velocities, is not read.";

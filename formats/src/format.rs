@@ -169,6 +169,9 @@ pub struct ReadOptions {
     /// Of a file whose curves are of another kind than a clip's (FBX) the keys at its key times alone, and as
     /// many more as its turns take; else as many as it takes to follow the curves.
     pub keyframes: bool,
+    /// A model of the body is going to say where joints are
+    /// ([`body_offsets`](crate::npz::body_offsets)): the shape in the file is not left out.
+    pub has_body_model: bool,
 }
 
 /// The unit of times that are whole numbers.

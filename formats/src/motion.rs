@@ -5,7 +5,7 @@ use tumble::{Channel, FrameRate, TrackError, TrackSet};
 
 use crate::bvh::BvhJoint;
 use crate::decimal::Decimal;
-use crate::origin::{coordinate, relative};
+use crate::origin::{coordinate, origin_of, relative};
 
 /// One clip of a file.
 ///
@@ -79,6 +79,21 @@ impl Motion {
         let tracks = self.set.track_count().max(track + 1);
         self.origins.resize(tracks, DVec3::ZERO);
         self.origins[track] = origin;
+    }
+
+    /// Where a track that hangs on none rests, about an [origin](Self::origins) where it needs one; keys of
+    /// translation have theirs already. Others rest near their parents, and have none but that of their keys.
+    pub(crate) fn resting_at(
+        &mut self,
+        track: usize,
+        parent: Option<usize>,
+        position: DVec3,
+    ) -> Vec3 {
+        let moves = self.set.vector_keys(Channel::Translation, track).is_some();
+        if parent.is_none() && !moves {
+            self.set_origin(track, origin_of([position].into_iter()));
+        }
+        (position - self.origin(track)).as_vec3()
     }
 
     /// Gives a track translation keys without tangents, about an [origin](Self::origins) where they

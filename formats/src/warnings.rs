@@ -2,6 +2,19 @@
 
 use crate::diagnostic::{Code, Diagnostic, Place};
 
+/// Names of what is left out, for a message; `None` where nothing is.
+pub(crate) fn listed(mut names: Vec<String>) -> Option<String> {
+    /// More names than anybody reads.
+    const MOST: usize = 12;
+    let count = names.len();
+    names.truncate(MOST);
+    let more = match count - names.len() {
+        0 => String::new(),
+        more => format!(" and {more} more"),
+    };
+    (count > 0).then(|| format!("{}{more}", names.join(", ")))
+}
+
 /// Collects what is remarkable about an input: the first of each code keeps its place and words,
 /// the others are counted.
 #[derive(Debug, Clone, Default)]

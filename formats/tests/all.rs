@@ -18,6 +18,7 @@ mod gltf_new;
 mod gltf_times;
 mod gltf_values;
 mod kept;
+mod left_out;
 mod maps;
 #[cfg(feature = "mcap")]
 mod mcap;

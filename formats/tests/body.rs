@@ -18,7 +18,11 @@ fn folder() -> PathBuf {
 fn motion(gender: &str) -> Motion {
     let path = folder().join(gender).with_extension("npz");
     let bytes = std::fs::read(path).unwrap();
-    let mut loaded = read_npz(gender, bytes, &ReadOptions::default()).unwrap();
+    let options = ReadOptions {
+        has_body_model: true,
+        ..ReadOptions::default()
+    };
+    let mut loaded = read_npz(gender, bytes, &options).unwrap();
     assert_eq!(loaded.warnings, []);
     loaded.clips.remove(0)
 }

@@ -180,3 +180,42 @@ fn paths_of_a_map_keep_their_shape() {
     let expected = DVec3::new(0.785, 0.706_825_181, 0.0);
     assert!((step - expected).length() < 1e-7, "{step}");
 }
+
+/// Catches a root without keys of translation, whose place f32 alone would move by up to a quarter of a metre.
+#[test]
+fn a_root_that_rests_on_a_map_comes_back() {
+    let text = format!(
+        "HIERARCHY\nROOT hips\n{{\nOFFSET {} {} {}\nCHANNELS 3 Zrotation Xrotation Yrotation\nJOINT knee\n{{\n\
+         OFFSET 0 0.5 0\nCHANNELS 0\n}}\n}}\nMOTION\nFrames: 2\nFrame Time: 0.1\n1 2 3\n4 5 6\n",
+        UTM.x, UTM.y, UTM.z
+    );
+    let folder = tempfile::tempdir().unwrap();
+    let read = |name: &str, bytes: &[u8]| {
+        let file = folder.path().join(name);
+        std::fs::write(&file, bytes).unwrap();
+        let loaded = Format::open_detected(&file, &ReadOptions::default()).unwrap();
+        loaded.clips.into_iter().next().unwrap()
+    };
+    let root = |clip: &Motion| clip.origin(0) + clip.skeleton[0].rest.translation.as_dvec3();
+    let clip = read("a.bvh", text.as_bytes());
+    for name in ["bvh", "npz"] {
+        let format = FORMATS
+            .into_iter()
+            .find(|format| format.name == name)
+            .unwrap();
+        let samples = keyed(&clip).unwrap();
+        let sampled = [samples.of(&clip, clip.rate, &[])];
+        let mut bytes = Vec::new();
+        let options = MotionOptions::default();
+        format.write_clips(&sampled, &options, &mut bytes).unwrap();
+        let again = read(&format!("b.{name}"), &bytes);
+        for clip in [&clip, &again] {
+            assert!(
+                (root(clip) - UTM).abs().max_element() < 1e-5,
+                "{name}: {}",
+                root(clip)
+            );
+            assert_eq!(clip.origin(1), DVec3::ZERO);
+        }
+    }
+}

@@ -342,7 +342,7 @@ impl Clip {
     /// >>> clip.evaluate(at=[0.0, 2.0], method="slerp")[0]
     /// array([[0., 0., 0., 1.],
     ///        [1., 0., 0., 0.]], dtype=float32)
-    #[pyo3(signature = (*, out=None, order="xyzw", layout="track", as_rotation=false, dtype=None, **options), text_signature = "($self, *, fps=None, at=None, times=None, start=None, end=None, method=None, path=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, out=None, order='xyzw', layout='track', as_rotation=False, dtype='float32')")]
+    #[pyo3(signature = (*, out=None, order="xyzw", layout="track", as_rotation=false, dtype=None, device_array=false, **options), text_signature = "($self, *, fps=None, at=None, times=None, start=None, end=None, method=None, path=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, out=None, order='xyzw', layout='track', as_rotation=False, dtype='float32', device_array=False)")]
     #[allow(clippy::too_many_arguments, reason = "keywords")]
     fn evaluate<'py>(
         slf: &Bound<'py, Self>,
@@ -351,12 +351,21 @@ impl Clip {
         layout: &str,
         as_rotation: bool,
         dtype: Option<&Bound<'py, PyAny>>,
+        device_array: bool,
         options: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let engine = default_engine(slf.py())?;
-        engine
-            .get()
-            .evaluate(slf, out, order, layout, as_rotation, dtype, options)
+        let engine = engine.get();
+        engine.evaluate(
+            slf,
+            out,
+            order,
+            layout,
+            as_rotation,
+            dtype,
+            device_array,
+            options,
+        )
     }
 
     /// Draws the components of a track over time, its keys as dots, with matplotlib; gives its axes.

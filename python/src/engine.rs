@@ -26,7 +26,7 @@ use crate::stream::Chunks;
 use crate::verify::Verification;
 
 /// Fewer rotations than this the CPU evaluates before another device is open.
-const FEW: usize = 1 << 20;
+pub(crate) const FEW: usize = 1 << 20;
 
 /// Evaluates clips on one device, which stays open.
 ///
@@ -181,7 +181,7 @@ impl Engine {
     /// float32, (tracks, frames, 4), unit quaternions.
     ///
     /// `evaluate(clip, *, fps=None, at=None, out=None, order="xyzw", layout="track",
-    /// as_rotation=False, dtype="float32", …)`
+    /// as_rotation=False, dtype="float32", device_array=False, …)`
     ///
     /// Which samples: `fps`, a rate ("30000/1001" is exact, 29.97 is not it), with `start` and
     /// `end`, seconds, else from the first key to the last; or `at` (or `times`), seconds, in any
@@ -194,6 +194,9 @@ impl Engine {
     /// `as_rotation`: a `Rotation` of SciPy's for each track. `dtype`: "float16" has half the size, within
     /// 2.5e-4 of each component; "int16", to be divided by 32767, within 1.6e-5.
     ///
+    /// `device_array`: the result stays on the NVIDIA card that makes it, as a `DeviceArray` that torch, CuPy and JAX
+    /// take without a copy. Where that cannot be, it is a `DeviceError`.
+    ///
     /// Other options: `method` ("authored": as a file says of each channel, bessel-overhauser where
     /// it says nothing; see `tumble.methods()`), `path` ("shortest", "as-authored"), `ends`
     /// ("parabolic", "natural", "clamped", "secant", "loop", "frozen", or angular velocities (2, 3),
@@ -205,7 +208,7 @@ impl Engine {
     /// >>> out = np.empty((1, 25, 4), np.float32)
     /// >>> tumble.Engine().evaluate(clip, fps=24, method="slerp", out=out) is out
     /// True
-    #[pyo3(signature = (clip, *, out=None, order="xyzw", layout="track", as_rotation=false, dtype=None, **options), text_signature = "($self, clip, *, fps=None, at=None, times=None, start=None, end=None, method=None, path=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, out=None, order='xyzw', layout='track', as_rotation=False, dtype='float32')")]
+    #[pyo3(signature = (clip, *, out=None, order="xyzw", layout="track", as_rotation=false, dtype=None, device_array=false, **options), text_signature = "($self, clip, *, fps=None, at=None, times=None, start=None, end=None, method=None, path=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, out=None, order='xyzw', layout='track', as_rotation=False, dtype='float32', device_array=False)")]
     #[allow(clippy::too_many_arguments, reason = "keywords")]
     pub(crate) fn evaluate<'py>(
         &self,
@@ -215,6 +218,7 @@ impl Engine {
         layout: &str,
         as_rotation: bool,
         dtype: Option<&Bound<'py, PyAny>>,
+        device_array: bool,
         options: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let result = Result {
@@ -222,6 +226,7 @@ impl Engine {
             order: Order::named(order)?,
             layout: layout_named(layout)?,
             as_rotation,
+            on_card: device_array,
             ..Result::default()
         };
         self.result(clip, &result, out, options)
@@ -236,13 +241,14 @@ impl Engine {
     /// >>> clip = tumble.Clip([0.0, 2.0], [[0, 0, 0, 1], [0, 0, 1, 0]])
     /// >>> tumble.Engine().velocity(clip, at=[1.0], method="slerp").round(4)
     /// array([[[0.    , 0.    , 1.5708]]], dtype=float32)
-    #[pyo3(signature = (clip, *, axes="body", out=None, layout="track", **options), text_signature = "($self, clip, *, fps=None, at=None, times=None, start=None, end=None, method=None, path=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, axes='body', out=None, layout='track')")]
+    #[pyo3(signature = (clip, *, axes="body", out=None, layout="track", device_array=false, **options), text_signature = "($self, clip, *, fps=None, at=None, times=None, start=None, end=None, method=None, path=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, axes='body', out=None, layout='track', device_array=False)")]
     fn velocity<'py>(
         &self,
         clip: &Bound<'py, Clip>,
         axes: &str,
         out: Option<&Bound<'py, PyAny>>,
         layout: &str,
+        device_array: bool,
         options: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let (axes, in_world) = axes_named(axes)?;
@@ -251,6 +257,7 @@ impl Engine {
             in_world,
             encoding: Encoding::Vector,
             layout: layout_named(layout)?,
+            on_card: device_array,
             ..Result::default()
         };
         self.result(clip, &result, out, options)
@@ -262,13 +269,14 @@ impl Engine {
     /// >>> clip = tumble.Clip([0.0, 2.0], [[0, 0, 0, 1], [0, 0, 1, 0]])
     /// >>> tumble.Engine().acceleration(clip, at=[1.0], method="slerp").shape
     /// (1, 1, 3)
-    #[pyo3(signature = (clip, *, axes="body", out=None, layout="track", **options), text_signature = "($self, clip, *, fps=None, at=None, times=None, start=None, end=None, method=None, path=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, axes='body', out=None, layout='track')")]
+    #[pyo3(signature = (clip, *, axes="body", out=None, layout="track", device_array=false, **options), text_signature = "($self, clip, *, fps=None, at=None, times=None, start=None, end=None, method=None, path=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, axes='body', out=None, layout='track', device_array=False)")]
     fn acceleration<'py>(
         &self,
         clip: &Bound<'py, Clip>,
         axes: &str,
         out: Option<&Bound<'py, PyAny>>,
         layout: &str,
+        device_array: bool,
         options: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let (axes, in_world) = axes_named(axes)?;
@@ -277,6 +285,7 @@ impl Engine {
             in_world,
             encoding: Encoding::Vector,
             layout: layout_named(layout)?,
+            on_card: device_array,
             ..Result::default()
         };
         self.result(clip, &result, out, options)
@@ -291,13 +300,14 @@ impl Engine {
     /// array([[-1.,  0.,  0.],
     ///        [ 0., -1.,  0.],
     ///        [ 0.,  0.,  1.]], dtype=float32)
-    #[pyo3(signature = (clip, *, columns=3, out=None, layout="track", **options), text_signature = "($self, clip, *, fps=None, at=None, times=None, start=None, end=None, method=None, path=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, columns=3, out=None, layout='track')")]
+    #[pyo3(signature = (clip, *, columns=3, out=None, layout="track", device_array=false, **options), text_signature = "($self, clip, *, fps=None, at=None, times=None, start=None, end=None, method=None, path=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, columns=3, out=None, layout='track', device_array=False)")]
     fn matrices<'py>(
         &self,
         clip: &Bound<'py, Clip>,
         columns: u32,
         out: Option<&Bound<'py, PyAny>>,
         layout: &str,
+        device_array: bool,
         options: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let result = Result {
@@ -307,6 +317,7 @@ impl Engine {
                 _ => return Err(input(format!("columns: there are 3 or 4, not {columns}"))),
             },
             layout: layout_named(layout)?,
+            on_card: device_array,
             ..Result::default()
         };
         self.result(clip, &result, out, options)

@@ -228,7 +228,7 @@ pub(crate) fn of_track(error: &TrackError) -> PyErr {
 pub(crate) fn of_engine(error: &Error) -> PyErr {
     let message = error.to_string();
     match error {
-        Error::Vulkan(_) | Error::Threads(_) => device(&message),
+        Error::Vulkan(_) | Error::Threads(_) | Error::ExportOnCpu => device(&message),
         Error::Stopped(_) => PyKeyboardInterrupt::new_err(message),
         Error::Frames(FramesError::TimeNotFinite { index, .. }) => {
             input_at(&message, Code::NotFinite, format!("at[{index}]"))

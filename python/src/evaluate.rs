@@ -17,7 +17,9 @@ use tumble_formats::motion::Motion;
 use tumble_formats::sample::ChannelMethods;
 
 use crate::arrays::Order;
-use crate::errors::{guarded, input, of_engine, warn};
+use crate::device_array::DeviceArray;
+use crate::engine::FEW;
+use crate::errors::{device, guarded, input, of_engine, warn};
 use crate::options::{Request, Samples};
 use crate::output::{array_of, filled_bytes};
 use crate::run::{Job, check_signals, interruptible};
@@ -30,6 +32,8 @@ pub(crate) struct Result {
     pub(crate) layout: Layout,
     pub(crate) order: Order,
     pub(crate) as_rotation: bool,
+    /// The result stays on the card that makes it.
+    pub(crate) on_card: bool,
     /// Rates are those of the rotations in the world, along the skeleton, not those in the parents' frames.
     pub(crate) in_world: bool,
     /// Angles in radians instead of degrees.
@@ -47,6 +51,7 @@ impl Default for Result {
             layout: Layout::TrackMajor,
             order: Order::Xyzw,
             as_rotation: false,
+            on_card: false,
             in_world: false,
             radians: false,
             is_one_track: false,
@@ -106,6 +111,9 @@ impl Result {
         }
         let tracks = clip.set.track_count();
         let along_skeleton = self.in_world && !clip.is_world && !clip.skeleton.is_empty();
+        if self.on_card {
+            self.check_on_card(samples, out.is_some(), along_skeleton)?;
+        }
         if along_skeleton && matches!(samples, Samples::Each { .. } | Samples::Ragged(_)) {
             return Err(input(
                 "axes=\"world\": what a joint does in the world follows from its parents at the same times; \
@@ -131,6 +139,22 @@ impl Result {
         };
         shape.extend(axes.into_iter().filter(|axis| !axis.1).map(|axis| axis.0));
         shape.extend_from_slice(self.encoding.shape());
+        if self.on_card {
+            let engine = engine((tracks * count).max(FEW))?;
+            let work = Work {
+                engine: &engine,
+                clip,
+                request,
+                samples,
+                frames: &frames,
+                count,
+            };
+            let array = self.card_array(py, work, shape)?;
+            for diagnostic in curve_warnings(py, clip, request, self.quantity, count)? {
+                warn(py, &diagnostic)?;
+            }
+            return Ok(array.into_any());
+        }
         let array = array_of(py, self.encoding.component_type(), &shape, out, inputs)?;
         let engine = engine(tracks * count)?;
         filled_bytes(&array, |bytes| {
@@ -157,6 +181,69 @@ impl Result {
             true => self.rotation(&array, self.is_one_track),
             false => Ok(array),
         }
+    }
+
+    /// Refuses what is done on the host after the engine, or needs the host's memory.
+    fn check_on_card(
+        &self,
+        samples: &Samples,
+        has_out: bool,
+        along_skeleton: bool,
+    ) -> PyResult<()> {
+        let refused = match samples {
+            Samples::Ragged(_) => {
+                "lists of times of different lengths give a list of arrays of NumPy's"
+            }
+            _ if has_out => "`out` is memory of the host's; leave it out",
+            _ if self.as_rotation => {
+                "rotations of SciPy's are on the host; leave out `as_rotation`"
+            }
+            _ if self.order != Order::Xyzw => {
+                "what is on the card is x y z w; reorder it there, as q[..., [3, 0, 1, 2]]"
+            }
+            _ if along_skeleton => {
+                "what joints do in the world is added up on the host; take the axes of the body or its parent"
+            }
+            _ => return Ok(()),
+        };
+        Err(input(format!("device_array: {refused}")))
+    }
+
+    /// Evaluates a clip into memory of the device, which stays there.
+    fn card_array<'py>(
+        &self,
+        py: Python<'py>,
+        work: Work<'_>,
+        shape: Vec<usize>,
+    ) -> PyResult<Bound<'py, DeviceArray>> {
+        if work.engine.device_info().is_none() {
+            return Err(device(
+                "device_array: this engine evaluates on the CPU, whose results are arrays of NumPy's; open a Vulkan \
+                 device that is an NVIDIA card, such as tumble.Engine(\"vulkan\") or one of tumble.devices(), or \
+                 leave out `device_array`",
+            ));
+        }
+        let Some(method) = uniform(work.clip, work.request) else {
+            return Err(input(
+                "device_array: the file has other methods for some tracks than for others, and such results are put \
+                 together on the host; name one `method` for all",
+            ));
+        };
+        let array = py.detach(|| {
+            guarded(|| {
+                let job = Job {
+                    engine: work.engine,
+                    set: &work.clip.set,
+                    interpolation: work.request.with(self.quantity)(method),
+                    frames: work.frames,
+                    samples: work.count,
+                    layout: self.layout,
+                    encoding: self.encoding,
+                };
+                DeviceArray::new(job.export()?, shape, self.encoding.component_type())
+            })
+        })?;
+        Bound::new(py, array)
     }
 
     fn fill(&self, work: Work<'_>, bytes: &mut [u8]) -> PyResult<()> {

@@ -246,6 +246,7 @@ pub(crate) fn load(
             .transpose()?,
         bridge_gaps,
         keyframes,
+        has_body_model: body_model.is_some(),
     };
     let format = format.map(format_named).transpose()?;
     let up = up

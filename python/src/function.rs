@@ -15,7 +15,7 @@ use crate::output::quaternions_of;
 /// Interpolates keys: `Clip(times, keys, order=order)`, evaluated by a shared engine.
 ///
 /// `evaluate(times, keys, *, fps=None, at=None, order="xyzw", out=None, layout="track",
-/// as_rotation=False, dtype="float32", …)`
+/// as_rotation=False, dtype="float32", device_array=False, …)`
 ///
 /// `times` and `keys` are as those of `Clip`; `order` is that of the keys and of the result. Keys
 /// (keys, 4) of one track give (frames, 4), (tracks, keys, 4) give (tracks, frames, 4). `fps`, `at`
@@ -28,7 +28,7 @@ use crate::output::quaternions_of;
 /// array([[1.    , 0.    , 0.    , 0.    ],
 ///        [0.7071, 0.    , 0.    , 0.7071]], dtype=float32)
 #[pyfunction]
-#[pyo3(signature = (times, keys, *, out=None, order="xyzw", layout="track", as_rotation=false, dtype=None, **options), text_signature = "(times, keys, *, fps=None, at=None, start=None, end=None, method=None, path=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, out=None, order='xyzw', layout='track', as_rotation=False, dtype='float32')")]
+#[pyo3(signature = (times, keys, *, out=None, order="xyzw", layout="track", as_rotation=false, dtype=None, device_array=false, **options), text_signature = "(times, keys, *, fps=None, at=None, start=None, end=None, method=None, path=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, out=None, order='xyzw', layout='track', as_rotation=False, dtype='float32', device_array=False)")]
 #[allow(clippy::too_many_arguments, reason = "keywords")]
 pub(crate) fn evaluate<'py>(
     times: &Bound<'py, PyAny>,
@@ -38,6 +38,7 @@ pub(crate) fn evaluate<'py>(
     layout: &str,
     as_rotation: bool,
     dtype: Option<&Bound<'py, PyAny>>,
+    device_array: bool,
     options: Option<&Bound<'py, PyDict>>,
 ) -> PyResult<Bound<'py, PyAny>> {
     guarded(|| {
@@ -51,6 +52,7 @@ pub(crate) fn evaluate<'py>(
             order: if as_rotation { Order::Xyzw } else { order },
             layout: layout_named(layout)?,
             as_rotation,
+            on_card: device_array,
             is_one_track,
             ..Result::default()
         };

@@ -2,15 +2,17 @@
 //!
 //! Arguments become values of the engine's (`arrays`, `build`, `options`), results are written by
 //! the engine into NumPy's memory (`evaluate`, `output`, `run`), and what went wrong becomes an
-//! exception (`errors`). The interpreter's lock is released while the engine works.
-
-#![forbid(unsafe_code)]
+//! exception (`errors`). The interpreter's lock is released while the engine works. Results that stay on a card
+//! (`device_array`) are handed on by CUDA's driver (`cuda`) and DLPack (`dlpack`), the only ones with `unsafe`.
 
 mod arrays;
 mod build;
 mod clip;
 mod compare;
 mod crowd;
+mod cuda;
+mod device_array;
+mod dlpack;
 mod engine;
 mod errors;
 mod evaluate;
@@ -46,6 +48,8 @@ mod _tumble {
     };
     #[pymodule_export]
     use crate::crowd::Crowd;
+    #[pymodule_export]
+    use crate::device_array::DeviceArray;
     #[pymodule_export]
     use crate::engine::Engine;
     #[pymodule_export]

@@ -6,7 +6,9 @@ use std::time::Duration;
 
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
-use tumble::{Encoding, Engine, Frames, Interpolation, Layout, Speed, Stop, TrackSet};
+use tumble::{
+    Encoding, Engine, ExportedResult, Frames, Interpolation, Layout, Speed, Stop, TrackSet,
+};
 
 use crate::errors::{guarded, of_engine};
 
@@ -130,6 +132,21 @@ impl Job<'_> {
             output,
         );
         evaluated.map_err(|error| of_engine(&error))
+    }
+
+    /// Evaluates all of it into memory of the engine's device, where it stays.
+    pub(crate) fn export(&self) -> PyResult<ExportedResult> {
+        match self.nanoseconds() < SHORT {
+            true => self.exported(),
+            false => stoppable(|| self.exported()),
+        }
+    }
+
+    fn exported(&self) -> PyResult<ExportedResult> {
+        let clip = self.engine.upload(self.set, self.interpolation);
+        let exported =
+            clip.and_then(|clip| clip.evaluate_exported(self.frames, self.layout, self.encoding));
+        exported.map_err(|error| of_engine(&error))
     }
 
     /// Some tracks.

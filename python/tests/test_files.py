@@ -261,6 +261,15 @@ def test_warnings_are_warnings(tmp_path):
             tumble.load(path)
 
 
+def test_arrays_that_are_not_read_are_named(tmp_path, rng):
+    path = tmp_path / "walk.npz"
+    walk = {"poses": rng.normal(size=(3, 72)), "mocap_framerate": np.array(30.0)}
+    np.savez(path, **walk, dmpls=np.zeros((3, 8)), betas=np.zeros(10))
+    with pytest.warns(tumble.InputWarning, match="not read: `dmpls`, `betas`") as caught:
+        tumble.load(path)
+    assert [warning.message.code for warning in caught] == ["W306"]
+
+
 def test_outputs_that_cannot_be_written(tmp_path, rng):
     clip = tumble.Clip([0.0, 1.0], unit(rng, 2))
     with pytest.raises(tumble.OutputError) as caught:

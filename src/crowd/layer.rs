@@ -139,6 +139,20 @@ impl CrowdLayer {
     }
 }
 
+impl CrowdEntry {
+    /// Whether a mask says which joints take part.
+    pub(crate) fn has_mask(&self) -> bool {
+        (self.speed_and_modes >> 24) & 0x1f != 0
+    }
+
+    /// Whether nothing of the layers below is left: all joints have the clip's rotations, bit for bit.
+    pub(crate) fn hides_what_is_below(&self) -> bool {
+        let is_whole = (self.clip_and_weight >> 16) as f32 * WEIGHT_UNIT == 1.0;
+        let is_additive = self.speed_and_modes >> 31 != 0;
+        is_whole && !is_additive && !self.has_mask()
+    }
+}
+
 /// The tick of a clip at which an entry stands.
 pub(crate) fn tick(entry: &CrowdEntry, clips: &[CrowdClip], clock: u64) -> u32 {
     let clip = &clips[(entry.clip_and_weight & 0xffff) as usize];

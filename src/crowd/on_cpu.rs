@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use crate::cpu::engine::CpuEngine;
 use crate::crowd::clip_tables::ClipTables;
-use crate::crowd::lay_over::lay_over;
+use crate::crowd::lay_over::{MOST_LANES, lay_over};
 use crate::crowd::library::CrowdLibrary;
 use crate::output::crowd::{CrowdOutput, CrowdValues};
 use crate::shader::{
@@ -95,11 +95,13 @@ impl InLanes for Task<'_, '_> {
         };
         let (found, layered) = self.rotations.split_at_mut(scene.library.joints());
         for (instance, output) in self.output.chunks_exact_mut(scene.vectors()).enumerate() {
-            if scene.values == CrowdValues::Rotations {
-                rotations::<L>(&context, tables, instance, layered, output);
+            let is_all = scene.values == CrowdValues::Rotations;
+            // One call: its many instructions are compiled where it stands.
+            let into = if is_all { &mut *output } else { &mut *found };
+            rotations::<L>(&context, tables, instance, layered, into);
+            if is_all {
                 continue;
             }
-            rotations::<L>(&context, tables, instance, layered, found);
             let (matrices, _) = output.as_chunks_mut::<3>();
             let instance = instance as u32;
             for ((joint, &rotation), matrix) in (0..).zip(&*found).zip(&mut *matrices) {
@@ -140,8 +142,13 @@ fn rotations<L: Lanes>(
     output: &mut [[f32; 4]],
 ) {
     let first = instance * context.layers as usize;
-    of_layer::<L>(context, tables, first, output);
-    for layer in first + 1..first + context.layers as usize {
+    let mut layers = first + 1..first + context.layers as usize;
+    // What lies below a layer that hides it is not seen.
+    let hides = |layer: &usize| context.entries[*layer].hides_what_is_below();
+    let lowest = layers.clone().rfind(hides).unwrap_or(first);
+    layers.start = lowest + 1;
+    of_layer::<L>(context, tables, lowest, output);
+    for layer in layers {
         if context.entries[layer].clip_and_weight >> 16 != 0 {
             of_layer::<L>(context, tables, layer, layered);
             lay_over::<L>(context, layer, layered, output);
@@ -216,6 +223,3 @@ pub(super) fn arcs<L: Lanes>(
         output[whole..].copy_from_slice(&found.as_ref()[..rest]);
     }
 }
-
-/// Lanes of the widest vectors.
-const MOST_LANES: usize = 16;

@@ -75,6 +75,10 @@ impl Residence {
 const HOST_ALLOCATION: vk::ExternalMemoryHandleTypeFlags =
     vk::ExternalMemoryHandleTypeFlags::HOST_ALLOCATION_EXT;
 
+/// The handle type of exported memory: a file of the driver's own.
+pub(crate) const FILE: vk::ExternalMemoryHandleTypeFlags =
+    vk::ExternalMemoryHandleTypeFlags::OPAQUE_FD;
+
 fn usage(is_texels: bool) -> vk::BufferUsageFlags {
     let usage = vk::BufferUsageFlags::STORAGE_BUFFER
         | vk::BufferUsageFlags::TRANSFER_SRC
@@ -87,17 +91,31 @@ fn usage(is_texels: bool) -> vk::BufferUsageFlags {
 
 /// Whether a device can import such memory for a buffer.
 pub(crate) fn may_be_imported(physical: &PhysicalDevice, is_texels: bool) -> bool {
+    let features = external_features(physical, is_texels, HOST_ALLOCATION);
+    features.contains(vk::ExternalMemoryFeatureFlags::IMPORTABLE)
+}
+
+/// Whether a device can export the memory of a buffer of results as a file.
+pub(crate) fn may_be_exported(physical: &PhysicalDevice) -> bool {
+    let features = external_features(physical, false, FILE);
+    features.contains(vk::ExternalMemoryFeatureFlags::EXPORTABLE)
+}
+
+fn external_features(
+    physical: &PhysicalDevice,
+    is_texels: bool,
+    handle_type: vk::ExternalMemoryHandleTypeFlags,
+) -> vk::ExternalMemoryFeatureFlags {
     let info = vk::PhysicalDeviceExternalBufferInfo::default()
         .usage(usage(is_texels))
-        .handle_type(HOST_ALLOCATION);
+        .handle_type(handle_type);
     let mut found = vk::ExternalBufferProperties::default();
     let instance = &physical.instance.raw;
     // SAFETY: Vulkan 1.1, and a device of the instance.
     unsafe {
         instance.get_physical_device_external_buffer_properties(physical.raw, &info, &mut found);
     }
-    let features = found.external_memory_properties.external_memory_features;
-    features.contains(vk::ExternalMemoryFeatureFlags::IMPORTABLE)
+    found.external_memory_properties.external_memory_features
 }
 
 /// A storage buffer. One that the host touches stays mapped for as long as it lives.
@@ -214,6 +232,43 @@ impl Buffer {
         };
         buffer.bind(memory, is_texels, "tumble imported").ok()?;
         Some(buffer)
+    }
+
+    /// A buffer of `size` bytes at least, for results, whose memory may be exported and is no other buffer's.
+    pub(crate) fn exportable(
+        device: &Arc<LogicalDevice>,
+        name: &str,
+        size: u64,
+    ) -> Result<Self, VulkanError> {
+        let size = size.max(LEAST).next_multiple_of(16);
+        let (mut buffer, needs) = Self::without_memory(device, size, false, None, Some(FILE))?;
+        let (required, preferred) = Residence::Results.properties();
+        let physical = &device.physical;
+        let memory_type = physical.memory_type(needs.memory_type_bits, required, preferred);
+        let wanted = required.as_raw();
+        let memory_type = memory_type.ok_or(VulkanError::NoMemoryType { wanted })?;
+        let mut export = vk::ExportMemoryAllocateInfo::default().handle_types(FILE);
+        let mut alone = vk::MemoryDedicatedAllocateInfo::default().buffer(buffer.raw);
+        let info = vk::MemoryAllocateInfo::default()
+            .allocation_size(needs.size)
+            .memory_type_index(memory_type)
+            .push_next(&mut export)
+            .push_next(&mut alone);
+        // SAFETY: the size and the type are those that the buffer needs, and it may be exported.
+        let memory =
+            unsafe { device.raw.allocate_memory(&info, None) }.named("vkAllocateMemory")?;
+        let memory = Share {
+            memory,
+            size: needs.size,
+            ..Share::default()
+        };
+        buffer.bind(memory, false, name)?;
+        Ok(buffer)
+    }
+
+    /// Its memory, and how much that is, bytes.
+    pub(crate) fn memory(&self) -> (vk::DeviceMemory, u64) {
+        (self.memory.memory, self.memory.size)
     }
 
     /// A buffer that has no memory yet, and what memory it needs.

@@ -7,9 +7,10 @@ use std::time::Duration;
 
 use ash::{ext, khr, vk};
 
-use crate::gpu::buffer::may_be_imported;
+use crate::gpu::buffer::{may_be_exported, may_be_imported};
 use crate::gpu::engine::lock;
 use crate::gpu::error::{Named, VulkanError};
+use crate::gpu::exported::timelines_may_be_exported;
 use crate::gpu::handles::{QueueLock, VulkanQueue};
 use crate::gpu::memory_types::{Placing, direct};
 use crate::gpu::options::{EngineOptions, ReadBack};
@@ -65,6 +66,10 @@ pub(crate) struct LogicalDevice {
     names: Option<ext::debug_utils::Device>,
     /// The extension that imports the caller's memory, where it is used.
     pub(crate) borrows: Option<ext::external_memory_host::Device>,
+    /// The extension that exports memory, where results can be exported.
+    pub(crate) exports: Option<khr::external_memory_fd::Device>,
+    /// The extension that exports semaphores, where timelines can be exported.
+    pub(crate) exports_timelines: Option<khr::external_semaphore_fd::Device>,
     /// Whether it was opened here, and may be opened again here.
     pub(crate) owned: bool,
     pub(crate) shared: SharedMemory,
@@ -105,11 +110,18 @@ impl LogicalDevice {
             && physical.lent_alignment.is_some()
             && may_be_imported(&physical, reads_texels);
         let copies_apart = copies != Copies::Together;
+        let exports = physical.memory_files && may_be_exported(&physical);
+        let exports_timelines = exports
+            && physical.semaphore_files
+            && physical.has_timelines
+            && timelines_may_be_exported(&physical);
         let timelines = copies_apart && physical.timelines_extension;
         let controls = physical.float_controls_extension;
         let extensions = [
             (controls, khr::shader_float_controls::NAME),
             (borrows, ext::external_memory_host::NAME),
+            (exports, khr::external_memory_fd::NAME),
+            (exports_timelines, khr::external_semaphore_fd::NAME),
             (timelines, khr::timeline_semaphore::NAME),
             (physical.portability_subset, khr::portability_subset::NAME),
         ];
@@ -122,7 +134,7 @@ impl LogicalDevice {
             .enabled_features(&features)
             .queue_create_infos(&queues)
             .enabled_extension_names(&extensions);
-        if copies_apart {
+        if copies_apart || exports_timelines {
             info = info.push_next(&mut timelines);
         }
         let instance = &physical.instance.raw;
@@ -137,8 +149,12 @@ impl LogicalDevice {
         });
         let first = queue(own, 0);
         let borrows = borrows.then(|| ext::external_memory_host::Device::new(instance, &raw));
+        let exports = exports.then(|| khr::external_memory_fd::Device::new(instance, &raw));
+        let exports_timelines =
+            exports_timelines.then(|| khr::external_semaphore_fd::Device::new(instance, &raw));
         let mut device = Self::borrowed(physical, raw, first, copy_queue, None, options);
         (device.owned, device.borrows) = (true, borrows);
+        (device.exports, device.exports_timelines) = (exports, exports_timelines);
         device.copies_apart = copies_apart;
         Ok(Arc::new(device))
     }
@@ -183,6 +199,8 @@ impl LogicalDevice {
             physical,
             names,
             borrows: None,
+            exports: None,
+            exports_timelines: None,
             owned: false,
             shared: SharedMemory::default(),
             hung: AtomicBool::new(false),

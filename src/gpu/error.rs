@@ -156,6 +156,16 @@ pub enum VulkanError {
         /// Bytes of the result.
         needed: u64,
     },
+    /// The device cannot export the memory of its results.
+    #[error(
+        "{device} cannot hand the memory of results to others: {lacks}; evaluate into the host's memory instead"
+    )]
+    NoExport {
+        /// The device's name.
+        device: String,
+        /// What it has not.
+        lacks: &'static str,
+    },
     /// One track alone exceeds the device's limits.
     #[error(
         "{what} needs {bytes} bytes, over the device's limit of {limit}; use the CPU for this set"

@@ -11,11 +11,13 @@ use rayon::prelude::*;
 
 use crate::gpu::buffer::Buffer;
 use crate::gpu::device::LogicalDevice;
-use crate::gpu::engine::{VulkanEngine, lock};
+use crate::gpu::engine::{ClipBuffers, VulkanEngine, lock};
 use crate::gpu::error::{EvaluateError, VulkanError};
+use crate::gpu::exported::Exported;
 use crate::gpu::handles::VulkanBuffer;
 use crate::gpu::imported_memory::ImportedMemory;
 use crate::gpu::options::Timings;
+use crate::gpu::pipeline::Pipeline;
 use crate::gpu::read_back::ReadBack;
 use crate::gpu::submission::Spent;
 use crate::gpu::turns::Turns;
@@ -33,6 +35,14 @@ pub(crate) struct InFlight<U> {
     /// Whether the kernel had run before: some drivers compile at the first dispatch, which then
     /// does not count as slow.
     pub(crate) compiled: bool,
+    /// What work that goes on after its call uses, until it has ended.
+    pub(crate) kept: Option<Kept>,
+}
+
+/// What work on an exported result uses besides its uploads and the result, which waits for the work itself.
+pub(crate) struct Kept {
+    pub(crate) _segments: Arc<ClipBuffers>,
+    pub(crate) _pipeline: Arc<Pipeline>,
 }
 
 /// What is left to do when a piece of work has been computed.
@@ -84,6 +94,8 @@ pub(crate) enum Target<'a> {
     Slice(&'a mut [u8]),
     /// Into a buffer that the application made on this device.
     External(VulkanBuffer),
+    /// Into memory that others import.
+    Exported(Arc<Exported>),
 }
 
 impl<'a> Target<'a> {
@@ -108,8 +120,14 @@ impl<'a> Target<'a> {
             Self::Buffer(buffer) => Some((buffer.raw, 0)),
             Self::ImportedMemory(memory) => Some((memory.buffer.raw, memory.start as u64)),
             Self::External(range) => Some((range.buffer, range.offset)),
+            Self::Exported(result) => Some((result.buffer.raw, 0)),
             Self::Slice(_) | Self::Staged(_) => None,
         }
+    }
+
+    /// Whether whoever uses the result waits by itself for the device to end.
+    fn is_waited_for_elsewhere(&self) -> bool {
+        matches!(self, Self::Exported(result) if result.has_timeline())
     }
 }
 
@@ -117,7 +135,8 @@ impl VulkanEngine {
     /// Starts pieces of work one after another, and finishes all that is in flight, also after an
     /// error: work that was submitted uses the caller's buffers. Where a piece takes long, windows are
     /// halved before `work` is asked for more. Of several callers each waits for its turn, so that the
-    /// memory in flight is that of one; nothing is locked meanwhile.
+    /// memory in flight is that of one; nothing is locked meanwhile. Work on a result that others wait for
+    /// goes on after the call: whoever uses the same buffers next waits for it.
     pub(crate) fn fly<U: Default, W>(
         &self,
         kept: &Turns<Vec<InFlight<U>>>,
@@ -127,7 +146,18 @@ impl VulkanEngine {
     ) -> Result<(), EvaluateError> {
         let mut in_flight = kept.take();
         let mut stopwatch = Stopwatch::default();
-        let mut next = 0;
+        let mut ended = in_flight.iter_mut().filter(|own| own.kept.is_some());
+        let finished = ended.try_for_each(|own| match own.results.is_done()? {
+            true => own.finish(target, &mut stopwatch),
+            false => Ok(()),
+        });
+        if let Err(error) = finished {
+            in_flight.clear(); // as below
+            return Err(error.into());
+        }
+        let is_free = |own: &InFlight<U>| own.kept.is_none();
+        let beside = in_flight.len() % self.in_flight_count;
+        let mut next = in_flight.iter().position(is_free).unwrap_or(beside);
         let mut result = work.try_for_each(|work| {
             stop::check().map_err(SetError::from)?;
             if next == in_flight.len() {
@@ -145,7 +175,8 @@ impl VulkanEngine {
             started
         });
         let count = in_flight.len();
-        for i in 0..count {
+        let goes_on = result.is_ok() && target.is_waited_for_elsewhere();
+        for i in (0..count).filter(|_| !goes_on) {
             let oldest = &mut in_flight[(next + i) % count];
             let finished = oldest.finish(target, &mut stopwatch);
             result = result.and(finished.map_err(EvaluateError::from));
@@ -171,6 +202,7 @@ impl<U: Default> InFlight<U> {
             uploads: U::default(),
             done: None,
             compiled: false,
+            kept: None,
         })
     }
 }
@@ -182,9 +214,16 @@ impl<U> InFlight<U> {
         target: &mut Target<'_>,
         stopwatch: &mut Stopwatch,
     ) -> Result<(), VulkanError> {
-        if let Some(spent) = self.results.wait()? {
+        if let Some(mut spent) = self.results.wait()? {
+            if self.kept.is_some() {
+                // It may have ended long ago.
+                spent.submitted = (spent.finished)
+                    .checked_sub(spent.on_device)
+                    .unwrap_or(spent.finished);
+            }
             stopwatch.ran(spent, self.compiled);
         }
+        self.kept = None;
         let Some(done) = self.done.take() else {
             return Ok(());
         };
@@ -192,7 +231,7 @@ impl<U> InFlight<U> {
         let output: &mut [u8] = match target {
             Target::Buffer(buffer) | Target::Staged(buffer) => buffer.bytes_mut(done.output),
             Target::ImportedMemory(memory) => memory.bytes_mut(done.output),
-            Target::External(_) => &mut [],
+            Target::External(_) | Target::Exported(_) => &mut [],
             Target::Slice(slice) => {
                 let output = &mut slice[done.output];
                 copy(output, self.results.bytes(0..output.len())?);

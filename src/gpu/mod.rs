@@ -17,6 +17,7 @@ pub(crate) mod details;
 pub(crate) mod device;
 pub(crate) mod engine;
 pub(crate) mod error;
+pub(crate) mod exported;
 pub(crate) mod from_keys;
 pub(crate) mod grid;
 pub(crate) mod handles;

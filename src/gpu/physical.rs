@@ -49,6 +49,9 @@ pub(crate) struct PhysicalDevice {
     pub(crate) pipeline_cache: (u32, u32, [u8; 16]),
     /// Shaders may have integers of 64 bits.
     pub(crate) has_int64: bool,
+    /// Memory and semaphores can be exported as files (`VK_KHR_external_memory_fd`, `VK_KHR_external_semaphore_fd`).
+    pub(crate) memory_files: bool,
+    pub(crate) semaphore_files: bool,
     /// The alignment of imported memory, bytes; `None` where memory cannot be imported.
     pub(crate) lent_alignment: Option<u64>,
     pub(crate) info: DeviceInfo,
@@ -191,6 +194,8 @@ impl PhysicalDevice {
             non_coherent_atom: limits.non_coherent_atom_size.max(1),
             storage_buffers: limits.max_per_stage_descriptor_storage_buffers,
             portability_subset: has(khr::portability_subset::NAME),
+            memory_files: cfg!(unix) && has(khr::external_memory_fd::NAME),
+            semaphore_files: cfg!(unix) && core_1_2 && has(khr::external_semaphore_fd::NAME),
             pipeline_cache: (
                 properties.vendor_id,
                 properties.device_id,

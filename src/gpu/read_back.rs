@@ -140,31 +140,53 @@ impl ReadBack {
 
 /// A timeline semaphore, whose device has that feature: what one queue has reached, for another that
 /// waits.
-struct Semaphore {
+pub(crate) struct Semaphore {
     device: Arc<LogicalDevice>,
-    raw: vk::Semaphore,
+    pub(crate) raw: vk::Semaphore,
     /// The value of the point that was given last.
     last: u64,
+    /// Whether others than this device may wait for it.
+    is_exported: bool,
 }
 
 impl Semaphore {
     fn new(device: &Arc<LogicalDevice>) -> Result<Self, VulkanError> {
+        Self::made(device, "tumble kernels done", None)
+    }
+
+    /// One that may be exported as a file, of a device that can.
+    pub(crate) fn exportable(device: &Arc<LogicalDevice>) -> Result<Self, VulkanError> {
+        let file = vk::ExternalSemaphoreHandleTypeFlags::OPAQUE_FD;
+        Self::made(device, "tumble result done", Some(file))
+    }
+
+    fn made(
+        device: &Arc<LogicalDevice>,
+        name: &str,
+        exported: Option<vk::ExternalSemaphoreHandleTypeFlags>,
+    ) -> Result<Self, VulkanError> {
         let mut kind =
             vk::SemaphoreTypeCreateInfo::default().semaphore_type(vk::SemaphoreType::TIMELINE);
-        let info = vk::SemaphoreCreateInfo::default().push_next(&mut kind);
+        let mut export =
+            vk::ExportSemaphoreCreateInfo::default().handle_types(exported.unwrap_or_default());
+        let mut info = vk::SemaphoreCreateInfo::default().push_next(&mut kind);
+        if exported.is_some() {
+            info = info.push_next(&mut export);
+        }
         // SAFETY: the device is alive, with the feature; what is made is destroyed in `drop`.
         let raw = unsafe { device.raw.create_semaphore(&info, None) }.named("vkCreateSemaphore")?;
-        device.name(raw, "tumble kernels done");
+        device.name(raw, name);
         Ok(Self {
             device: Arc::clone(device),
             raw,
             last: 0,
+            is_exported: exported.is_some(),
         })
     }
 
     /// The next point, later than all that were given before. One that is never reached, because
     /// its submission failed, does no harm.
-    fn advance(&mut self) -> Point {
+    pub(crate) fn advance(&mut self) -> Point {
         self.last += 1;
         (self.raw, self.last)
     }
@@ -175,7 +197,9 @@ impl Drop for Semaphore {
         if self.device.may_destroy() {
             // Fences say that copies have ended. But Mesa's drivers that make timelines of plain
             // semaphores let go of them a moment after they signal the fence.
-            self.device.settle();
+            if !self.is_exported {
+                self.device.settle(); // timelines that can be exported are no such
+            }
             // SAFETY: created from this device; whoever submits with it waits for that before.
             unsafe { self.device.raw.destroy_semaphore(self.raw, None) };
         }

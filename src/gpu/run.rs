@@ -4,10 +4,11 @@
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
+use crate::gpu::device::Lane;
 use crate::gpu::engine::{Job, VulkanEngine, lock};
 use crate::gpu::error::{EvaluateError, VulkanError};
 use crate::gpu::handles::VulkanBuffer;
-use crate::gpu::in_flight::{Finish, InFlight, Stopwatch, Target};
+use crate::gpu::in_flight::{Finish, InFlight, Kept, Stopwatch, Target};
 use crate::gpu::kept_lists::KeptLists;
 use crate::gpu::submission::{Access, Binding, Submission};
 use crate::gpu::upload::Upload;
@@ -155,25 +156,42 @@ impl VulkanEngine {
             let (arguments, groups) = self.dispatch_of(work, group, like);
             kernels.dispatch(&pipeline, &bindings, arguments.bytes(), groups)?;
         }
-        let mut patches = Vec::new();
-        if let Target::External(range) = target {
+        let external = match target {
+            Target::External(range) => Some(range.buffer),
+            Target::Exported(result) => Some(result.buffer.raw),
+            _ => None,
+        };
+        if let Some(external) = external {
             let commands = kernels.commands();
-            work.patch(commands, range.buffer, start, encoding);
+            work.patch(commands, external, start, encoding);
             commands.barrier(Access::Kernel, Access::Any);
-            kernels.submit()?;
-        } else {
-            patches.clone_from(&work.patches);
-            let apart = match target {
-                Target::Staged(buffer) => Some((&**buffer, bytes.start as u64)),
-                _ => None,
+            let Target::Exported(result) = target else {
+                kernels.submit()?;
+                own.done = None;
+                return Ok(());
             };
-            own.results
-                .submit_to(place.is_none().then_some(size), apart)?;
+            let written = Binding::range(external, start, window.len() as u64 * rotation);
+            commands.release(written, self.device.family(Lane::Kernels));
+            own.kept = Some(Kept {
+                _segments: Arc::clone(job.buffers),
+                _pipeline: pipeline,
+            });
+            let point = result.next_point();
+            kernels.submit_between(None, point)?;
+            result.has_submitted(point);
+            own.done = None; // nothing is left for the host to do
+            return Ok(());
         }
+        let apart = match target {
+            Target::Staged(buffer) => Some((&**buffer, bytes.start as u64)),
+            _ => None,
+        };
+        let size = place.is_none().then_some(size);
+        own.results.submit_to(size, apart)?;
         own.done = Some(Finish {
             output: bytes,
             encoding,
-            patches,
+            patches: work.patches.clone(),
         });
         Ok(())
     }

@@ -335,6 +335,23 @@ impl<'a> Commands<'a> {
         unsafe { self.device.cmd_update_buffer(self.raw, to, offset, bytes) };
     }
 
+    /// Records that a range, which kernels and copies of a queue family have written, is handed to users outside
+    /// of this Vulkan.
+    pub(crate) fn release(self, range: Binding, family: u32) {
+        use vk::{AccessFlags as A, PipelineStageFlags as S};
+        let memory = [vk::BufferMemoryBarrier::default()
+            .src_access_mask(A::SHADER_WRITE | A::TRANSFER_WRITE)
+            .src_queue_family_index(family)
+            .dst_queue_family_index(vk::QUEUE_FAMILY_EXTERNAL)
+            .buffer(range.buffer)
+            .offset(range.offset)
+            .size(range.size)];
+        let (from, to) = (S::COMPUTE_SHADER | S::TRANSFER, S::BOTTOM_OF_PIPE);
+        let none = vk::DependencyFlags::empty();
+        // SAFETY: as in `dispatch`; the range lies within the buffer.
+        unsafe { (self.device).cmd_pipeline_barrier(self.raw, from, to, none, &[], &memory, &[]) };
+    }
+
     /// Records a barrier: what `from` wrote before it is visible to `to` after it.
     pub(crate) fn barrier(self, from: Access, to: Access) {
         let (source_stage, source_access) = from.scope(true);

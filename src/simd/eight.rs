@@ -5,7 +5,6 @@ use std::arch::x86_64::*;
 use bytemuck::{Pod, Zeroable};
 
 use crate::math::operators::operators;
-use crate::shader::TINY_BITS;
 use crate::simd::doubles::doubles;
 use crate::simd::lanes::{Lanes, Number};
 
@@ -90,12 +89,29 @@ impl Number for Eight {
     }
 
     #[inline(always)]
-    fn canonical(self) -> Self {
-        let tiny = Self::all(f32::from_bits(TINY_BITS));
-        let magnitude = self.magnitude();
+    fn zero_below(self, limit: f32) -> Self {
+        let (magnitude, limit) = (self.magnitude(), Self::all(limit));
         Self(avx2! {
-            let whole = _mm256_cmp_ps::<_CMP_NLT_UQ>(magnitude.0, tiny.0);
+            let whole = _mm256_cmp_ps::<_CMP_NLT_UQ>(magnitude.0, limit.0);
             _mm256_and_ps(self.0, whole)
+        })
+    }
+
+    #[inline(always)]
+    fn sign(self) -> Self {
+        let (one, minus_one) = (Self::all(1.0), Self::all(-1.0));
+        Self(avx2! {
+            let below = _mm256_cmp_ps::<_CMP_LT_OQ>(self.0, _mm256_setzero_ps());
+            _mm256_blendv_ps(one.0, minus_one.0, below)
+        })
+    }
+
+    #[inline(always)]
+    fn guess(self, seed: u32, shift: u32) -> Self {
+        Self(avx2! {
+            let bits = _mm256_castps_si256(self.0);
+            let shifted = _mm256_srlv_epi32(bits, _mm256_set1_epi32(shift as i32));
+            _mm256_castsi256_ps(_mm256_sub_epi32(_mm256_set1_epi32(seed as i32), shifted))
         })
     }
 }
@@ -216,11 +232,11 @@ impl Lanes for Eight {
     }
 
     #[inline(always)]
-    fn sign(self) -> Self {
-        let (one, minus_one) = (Self::all(1.0), Self::all(-1.0));
+    fn where_equal(self, value: f32, then: Self, otherwise: Self) -> Self {
+        let value = Self::all(value);
         Self(avx2! {
-            let below = _mm256_cmp_ps::<_CMP_LT_OQ>(self.0, _mm256_setzero_ps());
-            _mm256_blendv_ps(one.0, minus_one.0, below)
+            let is_equal = _mm256_cmp_ps::<_CMP_EQ_OQ>(self.0, value.0);
+            _mm256_blendv_ps(otherwise.0, then.0, is_equal)
         })
     }
 

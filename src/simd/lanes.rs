@@ -6,7 +6,6 @@ use std::slice;
 use bytemuck::Pod;
 use glam::{Mat4, Vec4, Vec4Swizzles as _};
 
-use crate::math::canonical;
 use crate::math::quaternion::{Arithmetic, Real};
 use crate::shader::{PolynomialSegment, TINY_BITS};
 use crate::simd::doubles::{Four, pair};
@@ -17,8 +16,21 @@ pub(crate) trait Number: Arithmetic + Neg<Output = Self> {
     /// The same for every sample.
     fn all(value: f32) -> Self;
 
+    /// Magnitudes below a positive limit become +0.
+    fn zero_below(self, limit: f32) -> Self;
+
     /// Magnitudes below 2^-64 become +0: twin of `shaders/math/canonical.wgsl`.
-    fn canonical(self) -> Self;
+    #[inline(always)]
+    fn canonical(self) -> Self {
+        self.zero_below(f32::from_bits(TINY_BITS))
+    }
+
+    /// -1 where a number is less than 0, else 1.
+    fn sign(self) -> Self;
+
+    /// The number whose bits are `seed` less the bits of this one, shifted to the right: the first guess of a
+    /// reciprocal or of a root.
+    fn guess(self, seed: u32, shift: u32) -> Self;
 }
 
 impl Number for f32 {
@@ -28,8 +40,23 @@ impl Number for f32 {
     }
 
     #[inline(always)]
-    fn canonical(self) -> Self {
-        canonical::canonical(self)
+    fn zero_below(self, limit: f32) -> Self {
+        let magnitude = self.to_bits() & 0x7fff_ffff;
+        if magnitude < limit.to_bits() {
+            0.0
+        } else {
+            self
+        }
+    }
+
+    #[inline(always)]
+    fn sign(self) -> Self {
+        if self < 0.0 { -1.0 } else { 1.0 }
+    }
+
+    #[inline(always)]
+    fn guess(self, seed: u32, shift: u32) -> Self {
+        Self::from_bits(seed.wrapping_sub(self.to_bits() >> shift))
     }
 }
 
@@ -147,10 +174,10 @@ pub(crate) trait Lanes: Number + Pod {
     /// [`fence`](super::dispatch::fence).
     fn store_past_caches(self, block: &mut Self::Block);
 
-    /// -1 where a number is less than 0, else 1.
-    fn sign(self) -> Self;
-
     fn magnitude(self) -> Self;
+
+    /// `then` where a number is `value`, else `otherwise`.
+    fn where_equal(self, value: f32, then: Self, otherwise: Self) -> Self;
 
     /// The larger of two numbers; `other` if either is NaN.
     fn larger(self, other: Self) -> Self;
@@ -194,9 +221,21 @@ impl Number for Vec4 {
     }
 
     #[inline(always)]
-    fn canonical(self) -> Self {
-        let tiny = self.abs().cmplt(Self::splat(f32::from_bits(TINY_BITS)));
-        Self::select(tiny, Self::ZERO, self)
+    fn zero_below(self, limit: f32) -> Self {
+        let small = self.abs().cmplt(Self::splat(limit));
+        Self::select(small, Self::ZERO, self)
+    }
+
+    #[inline(always)]
+    fn sign(self) -> Self {
+        Self::select(self.cmplt(Self::ZERO), Self::NEG_ONE, Self::ONE)
+    }
+
+    #[inline(always)]
+    fn guess(self, seed: u32, shift: u32) -> Self {
+        let of = |number: f32| number.guess(seed, shift);
+        let [x, y, z, w] = self.to_array();
+        Self::new(of(x), of(y), of(z), of(w))
     }
 }
 
@@ -273,13 +312,13 @@ impl Lanes for Vec4 {
     }
 
     #[inline(always)]
-    fn sign(self) -> Self {
-        Self::select(self.cmplt(Self::ZERO), Self::NEG_ONE, Self::ONE)
+    fn magnitude(self) -> Self {
+        self.abs()
     }
 
     #[inline(always)]
-    fn magnitude(self) -> Self {
-        self.abs()
+    fn where_equal(self, value: f32, then: Self, otherwise: Self) -> Self {
+        Self::select(self.cmpeq(Self::splat(value)), then, otherwise)
     }
 
     #[inline(always)]
@@ -333,6 +372,16 @@ mod tests {
             let mut stored = vec![9.0; L::COUNT];
             loaded[c].store(&mut stored);
             assert_eq!(bits(&stored), bits(&columns[c]));
+            let guess = loaded[c].guess(0x5f37_59df, 1);
+            guess.store(&mut stored);
+            let guesses: Vec<f32> = columns[c].iter().map(|v| v.guess(0x5f37_59df, 1)).collect();
+            assert_eq!(bits(&stored), bits(&guesses));
+            let (one, two) = (L::all(1.0), L::all(2.0));
+            loaded[c].where_equal(10.0, one, two).store(&mut stored);
+            let chosen = columns[c]
+                .iter()
+                .map(|&v| if v == 10.0 { 1.0 } else { 2.0 });
+            assert!(stored.iter().copied().eq(chosen));
             loaded[c].sign().store(&mut stored);
             let signs = columns[c].iter().map(|&v| if v < 0.0 { -1.0 } else { 1.0 });
             assert!(stored.iter().copied().eq(signs));

@@ -11,3 +11,4 @@ pub(crate) mod lanes;
 pub(crate) mod line;
 #[cfg(wide_vectors)]
 pub(crate) mod sixteen;
+pub(crate) mod together;

@@ -5,7 +5,7 @@ use std::arch::x86_64::*;
 use bytemuck::{Pod, Zeroable};
 
 use crate::math::operators::operators;
-use crate::shader::{PolynomialSegment, TINY_BITS};
+use crate::shader::PolynomialSegment;
 use crate::simd::doubles::doubles;
 use crate::simd::eight::{Eight, alike_at_any_width};
 use crate::simd::lanes::{Lanes, Number};
@@ -40,11 +40,29 @@ impl Number for Sixteen {
     }
 
     #[inline(always)]
-    fn canonical(self) -> Self {
-        let tiny = Self::all(f32::from_bits(TINY_BITS));
+    fn zero_below(self, limit: f32) -> Self {
+        let limit = Self::all(limit);
         Self(avx512! {
-            let whole = _mm512_cmp_ps_mask::<_CMP_NLT_UQ>(_mm512_abs_ps(self.0), tiny.0);
+            let whole = _mm512_cmp_ps_mask::<_CMP_NLT_UQ>(_mm512_abs_ps(self.0), limit.0);
             _mm512_maskz_mov_ps(whole, self.0)
+        })
+    }
+
+    #[inline(always)]
+    fn sign(self) -> Self {
+        let (one, minus_one) = (Self::all(1.0), Self::all(-1.0));
+        Self(avx512! {
+            let below = _mm512_cmp_ps_mask::<_CMP_LT_OQ>(self.0, _mm512_setzero_ps());
+            _mm512_mask_blend_ps(below, one.0, minus_one.0)
+        })
+    }
+
+    #[inline(always)]
+    fn guess(self, seed: u32, shift: u32) -> Self {
+        Self(avx512! {
+            let bits = _mm512_castps_si512(self.0);
+            let shifted = _mm512_srlv_epi32(bits, _mm512_set1_epi32(shift as i32));
+            _mm512_castsi512_ps(_mm512_sub_epi32(_mm512_set1_epi32(seed as i32), shifted))
         })
     }
 }
@@ -212,11 +230,11 @@ impl Lanes for Sixteen {
     }
 
     #[inline(always)]
-    fn sign(self) -> Self {
-        let (one, minus_one) = (Self::all(1.0), Self::all(-1.0));
+    fn where_equal(self, value: f32, then: Self, otherwise: Self) -> Self {
+        let value = Self::all(value);
         Self(avx512! {
-            let below = _mm512_cmp_ps_mask::<_CMP_LT_OQ>(self.0, _mm512_setzero_ps());
-            _mm512_mask_blend_ps(below, one.0, minus_one.0)
+            let is_equal = _mm512_cmp_ps_mask::<_CMP_EQ_OQ>(self.0, value.0);
+            _mm512_mask_blend_ps(is_equal, otherwise.0, then.0)
         })
     }
 

@@ -1,14 +1,11 @@
 //! Twin of `shaders/math/arc_tangent.wgsl`: the same names, the same order.
 
 use crate::shader::*;
+use crate::simd::lanes::Number;
 
 #[inline(always)]
-pub(crate) fn flushed(x: f32) -> f32 {
-    if x.to_bits() & 0x7fff_ffff < FLUSHED_BITS {
-        0.0
-    } else {
-        x
-    }
+pub(crate) fn flushed<N: Number>(x: N) -> N {
+    x.zero_below(f32::from_bits(FLUSHED_BITS))
 }
 
 #[inline(always)]
@@ -17,27 +14,48 @@ pub(super) fn magnitude(x: f32) -> f32 {
 }
 
 #[inline(always)]
-pub(super) fn reciprocal(x: f32) -> f32 {
-    let seed = f32::from_bits(RECIPROCAL_SEED.wrapping_sub(x.to_bits()));
-    let first = seed * (2.0 - x * seed);
-    let second = first * (2.0 - x * first);
-    let third = second * (2.0 - x * second);
-    third * (2.0 - x * third)
+pub(super) fn reciprocal<N: Number>(x: N) -> N {
+    let seed = x.guess(RECIPROCAL_SEED, 0);
+    let first = seed * (N::all(2.0) - x * seed);
+    let second = first * (N::all(2.0) - x * first);
+    let third = second * (N::all(2.0) - x * second);
+    third * (N::all(2.0) - x * third)
 }
 
 #[inline(always)]
-pub(crate) fn reciprocal_root(x: f32) -> f32 {
-    let seed = f32::from_bits(ROOT_SEED.wrapping_sub(x.to_bits() >> 1));
-    let half = 0.5 * x;
-    let first = seed * (1.5 - half * seed * seed);
-    let second = first * (1.5 - half * first * first);
-    second * (1.5 - half * second * second)
+pub(crate) fn reciprocal_root<N: Number>(x: N) -> N {
+    let seed = x.guess(ROOT_SEED, 1);
+    let half = N::all(0.5) * x;
+    let first = seed * (N::all(1.5) - half * seed * seed);
+    let second = first * (N::all(1.5) - half * first * first);
+    second * (N::all(1.5) - half * second * second)
 }
 
 #[inline(always)]
-pub(crate) fn root(x: f32) -> f32 {
-    let near = x * reciprocal_root(x);
-    near + (x - near * near) * (0.5 * reciprocal_root(x))
+pub(crate) fn root<N: Number>(x: N) -> N {
+    let inverse = reciprocal_root(x);
+    root_by(x, inverse)
+}
+
+/// The root of a number of which the reciprocal root is known.
+#[inline(always)]
+pub(crate) fn root_by<N: Number>(x: N, inverse: N) -> N {
+    let near = x * inverse;
+    near + (x - near * near) * (N::all(0.5) * inverse)
+}
+
+/// The arc tangent of `small / large`, for 0 <= small <= large and large > 0.
+#[inline(always)]
+pub(crate) fn flat_arc_tangent<N: Number>(small: N, large: N) -> N {
+    let inverse = reciprocal(large);
+    let near = small * inverse;
+    let t = near + (small - near * large) * inverse;
+    let z = t * t;
+    let upper = (N::all(ARC_8) * z + N::all(ARC_7)) * z + N::all(ARC_6);
+    let high = (upper * z + N::all(ARC_5)) * z + N::all(ARC_4);
+    let lower = (high * z + N::all(ARC_3)) * z + N::all(ARC_2);
+    let tail = (lower * z + N::all(ARC_1)) * z + N::all(ARC_0);
+    tail * (z * t) + t
 }
 
 #[inline(always)]
@@ -48,13 +66,7 @@ pub(crate) fn arc_tangent(y: f32, x: f32) -> f32 {
     let large = if steep { up } else { along };
     let small = if steep { along } else { up };
     let divisor = if large == 0.0 { 1.0 } else { large };
-    let inverse = reciprocal(divisor);
-    let near = small * inverse;
-    let t = near + (small - near * divisor) * inverse;
-    let z = t * t;
-    let high = (((ARC_8 * z + ARC_7) * z + ARC_6) * z + ARC_5) * z + ARC_4;
-    let tail = (((high * z + ARC_3) * z + ARC_2) * z + ARC_1) * z + ARC_0;
-    let flat = tail * (z * t) + t;
+    let flat = flat_arc_tangent(small, divisor);
     let acute = if steep {
         (HALF_PI - flat) + HALF_PI_LOW
     } else {

@@ -2,6 +2,7 @@
 //! and `dot4` are [`product`](crate::math::quaternion::product) and [`dot`].
 
 use crate::math::quaternion::{cross3, dot, sum};
+use crate::simd::lanes::Number;
 use crate::twin::arc_tangent::{arc_tangent, flushed, reciprocal_root, root};
 use crate::twin::sine_cosine::sine_cosine;
 
@@ -15,39 +16,47 @@ pub(crate) fn rotated(q: [f32; 4], v: [f32; 3]) -> [f32; 3] {
 }
 
 #[inline(always)]
-pub(crate) fn normalised(q: [f32; 4]) -> [f32; 4] {
+pub(crate) fn normalised<N: Number>(q: [N; 4]) -> [N; 4] {
     let scale = reciprocal_root(dot(q, q));
-    q.map(|c| c * scale)
+    // Written out: closures are not always inlined.
+    [q[0] * scale, q[1] * scale, q[2] * scale, q[3] * scale]
 }
 
 /// The sum of two rotations, and what leads from the first to the nearer sign of the second.
 #[inline(always)]
-pub(crate) fn chord(a: [f32; 4], b: [f32; 4]) -> ([f32; 4], [f32; 4]) {
-    let near = if dot(a, b) < 0.0 { b.map(|c| -c) } else { b };
-    let sum: [f32; 4] = std::array::from_fn(|c| a[c] + near[c]);
-    (sum, std::array::from_fn(|c| flushed(near[c] - a[c])))
-}
-
-/// 0 for 0.
-#[inline(always)]
-pub(crate) fn inverse_root(square: f32) -> f32 {
-    if square == 0.0 {
-        0.0
-    } else {
-        reciprocal_root(square)
-    }
+pub(crate) fn chord<N: Number>(a: [N; 4], b: [N; 4]) -> ([N; 4], [N; 4]) {
+    let sign = dot(a, b).sign();
+    let near = [b[0] * sign, b[1] * sign, b[2] * sign, b[3] * sign];
+    let sum = [
+        a[0] + near[0],
+        a[1] + near[1],
+        a[2] + near[2],
+        a[3] + near[3],
+    ];
+    let difference = [
+        flushed(near[0] - a[0]),
+        flushed(near[1] - a[1]),
+        flushed(near[2] - a[2]),
+        flushed(near[3] - a[3]),
+    ];
+    (sum, difference)
 }
 
 /// The rotation at an angle from the middle of a chord, whose sine and cosine are `turn`, with the inverse
 /// lengths of the sum and of the difference.
 #[inline(always)]
-pub(crate) fn along(
-    sum: [f32; 4],
-    difference: [f32; 4],
-    (to_unit, inverse): (f32, f32),
-    turn: (f32, f32),
-) -> [f32; 4] {
-    std::array::from_fn(|c| sum[c] * to_unit * turn.1 + difference[c] * inverse * turn.0)
+pub(crate) fn along<N: Number>(
+    sum: [N; 4],
+    difference: [N; 4],
+    (to_unit, inverse): (N, N),
+    turn: (N, N),
+) -> [N; 4] {
+    [
+        sum[0] * to_unit * turn.1 + difference[0] * inverse * turn.0,
+        sum[1] * to_unit * turn.1 + difference[1] * inverse * turn.0,
+        sum[2] * to_unit * turn.1 + difference[2] * inverse * turn.0,
+        sum[3] * to_unit * turn.1 + difference[3] * inverse * turn.0,
+    ]
 }
 
 /// The function of the shader, whose parts are functions of their own for blocks of rotations
@@ -59,8 +68,12 @@ pub(crate) fn slerp(a: [f32; 4], b: [f32; 4], t: f32) -> [f32; 4] {
     let whole = dot(sum, sum);
     let half = arc_tangent(root(square), root(whole));
     let turn = sine_cosine((t + t - 1.0) * half);
-    let scales = (reciprocal_root(whole), inverse_root(square));
-    along(sum, difference, scales, turn)
+    let inverse = if square == 0.0 {
+        0.0
+    } else {
+        reciprocal_root(square)
+    };
+    along(sum, difference, (reciprocal_root(whole), inverse), turn)
 }
 
 #[inline(always)]

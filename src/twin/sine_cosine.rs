@@ -5,9 +5,9 @@ use crate::simd::lanes::Number;
 
 /// Sine and cosine for |angle| <= pi/2.
 #[inline(always)]
-pub(crate) fn sine_cosine(angle: f32) -> (f32, f32) {
+pub(crate) fn sine_cosine<N: Number>(angle: N) -> (N, N) {
     let (sine, cosine_minus_one) = sine_cosm1(angle, angle * angle);
-    (sine, cosine_minus_one + 1.0)
+    (sine, cosine_minus_one + N::all(1.0))
 }
 
 /// `x sin(a)/a` and `cos(a) - 1` for an angle |a| <= pi/2 that is given by its square `z`. With

@@ -216,6 +216,7 @@ impl Reading {
             }),
             bridge_gaps: self.bridge_gaps,
             keyframes: self.takes_keyframes(),
+            has_body_model: self.body_model.is_some(),
         })
     }
 

@@ -7,7 +7,7 @@ use clap::Args;
 use tumble::EulerSequence;
 use tumble_formats::format::{Document, FormatOption};
 use tumble_formats::motion::Motion;
-use tumble_formats::{Feature, Format, Loaded};
+use tumble_formats::{Code, Diagnostic, Feature, Format, Loaded};
 
 use crate::arguments::gather::Gathered;
 use crate::arguments::input::{
@@ -196,6 +196,14 @@ pub(crate) fn kept<'a>(
 ) -> Option<&'a dyn Document> {
     let document = loaded.document.as_deref()?;
     if !document.writes(target.format()) {
+        let is_known = |warning: &Diagnostic| warning.code == Code::ArraysNotRead;
+        let beside = document.beside();
+        if !beside.is_empty() && !loaded.warnings.iter().any(is_known) {
+            let (all, format) = (beside.join(", "), target.format().name);
+            words::note(&format!(
+                "{name}: {format} has no room for it, left out: {all}"
+            ));
+        }
         return None;
     }
     let adjusted = loaded.is_adjusted.then_some("other units or axes make");

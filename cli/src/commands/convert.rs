@@ -125,15 +125,6 @@ impl Arguments {
     ) -> Result<Evaluated, Failure> {
         let started = Instant::now();
         let document = kept(name, loaded, target, self.makes_new(target));
-        if let Some(document) = &loaded.document
-            && !document.writes(target.format())
-            && !document.beside().is_empty()
-        {
-            let (all, format) = (document.beside().join(", "), target.format().name);
-            words::note(&format!(
-                "{name}: {format} has no room for it, left out: {all}"
-            ));
-        }
         let parts = clips.iter().map(|&clip| self.part(name, clip));
         let parts: Vec<Cow<'_, Motion>> = parts.collect::<Result<_, Failure>>()?;
         let is_whole = (self.start, self.end) == (None, None);

@@ -190,6 +190,7 @@ fallible! {
     vkCreateBuffer(device, info, allocator, out) creates;
     vkCreateBufferView(device, info, allocator, out) creates;
     vkGetMemoryHostPointerPropertiesEXT(device, kind, pointer, out) asks;
+    vkGetMemoryFdKHR(device, info, out) asks;
     vkBindBufferMemory(device, buffer, memory, offset) asks;
     vkMapMemory(device, memory, offset, size, flags, out) asks;
     vkCreateCommandPool(device, info, allocator, out) creates;

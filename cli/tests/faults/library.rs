@@ -9,8 +9,8 @@ use crate::support::{dense_set, first_difference, hostile_set};
 use glam::{Quat, Vec3};
 use rayon::prelude::*;
 use tumble::{
-    CrowdError, CrowdLibrary, CrowdValues, Device, Engine, EngineOptions, Error, Frames, Layout,
-    ReadBack, Skeleton, TrackSet, Transfer, Uploads, VectorMethod, VulkanError, method,
+    CrowdError, CrowdLibrary, CrowdValues, Device, Encoding, Engine, EngineOptions, Error, Frames,
+    Layout, ReadBack, Skeleton, TrackSet, Transfer, Uploads, VectorMethod, VulkanError, method,
 };
 
 /// What the program never does: validation, results that are staged, poses put together.
@@ -86,6 +86,12 @@ fn library_work() {
         let frames = Frames::fps(30).between(0.0, 5.0);
         let poses = clip.evaluate_as(&frames, Layout::FrameMajor)?;
         engine.blend(&[(&poses, 0.5), (&poses, 1.0)])?;
+        #[cfg(target_os = "linux")]
+        {
+            let exported = clip.evaluate_exported(&frames, Layout::FrameMajor, Encoding::F32)?;
+            exported.wait()?;
+            exported.memory_file()?;
+        }
         // By segments, and straight from keys.
         for frames in [frames, Frames::at(vec![0.3, 0.7])] {
             let found = engine.evaluate(&set, method::SLERP, &frames)?;

@@ -213,16 +213,9 @@ fn moved(
 /// The node that a channel moves, and what of it; `None` if it moves something else.
 fn target(reader: &Reader<'_>, channel: &Channel, pointer: &str) -> Option<(usize, Path)> {
     let target = &channel.target;
-    if target.path == "pointer" {
-        let pointer = target.extensions.pointer.as_ref()?;
-        let mut parts = pointer.pointer.strip_prefix("/nodes/")?.split('/');
-        let node = parts.next()?.parse().ok()?;
-        let path = Path::named(parts.next()?)?;
-        return parts.next().is_none().then_some((node, path));
-    }
-    let node = target.node?;
-    let path = Path::named(&target.path);
-    if path.is_none() && target.path != "weights" {
+    let moved = target.moves();
+    let is_known = ["pointer", "weights"].contains(&&*target.path);
+    if target.node.is_some() && !is_known && Path::named(&target.path).is_none() {
         reader.warn(Code::TargetPath, &format!("{pointer}/target/path"), || {
             format!(
                 "`{}` is not known; the channel is kept as it is",
@@ -230,7 +223,7 @@ fn target(reader: &Reader<'_>, channel: &Channel, pointer: &str) -> Option<(usiz
             )
         });
     }
-    path.map(|path| (node, path))
+    moved
 }
 
 /// The times of channels, by the accessor that they are in.

@@ -17,6 +17,7 @@ use crate::gltf::edits::Edits;
 use crate::gltf::gather;
 use crate::gltf::json::{Json, Members};
 use crate::gltf::reader::Reader;
+use crate::gltf::schema::{Animation, Channel};
 use crate::gltf::skins::{self, CarriedMesh};
 use crate::gltf::uri;
 use crate::motion::{Motion, Sampled};
@@ -95,7 +96,23 @@ impl Document for Gltf {
             "extensionsUsed",
         ];
         let has = |list: &&str| !json.optional::<&RawValue>(list).is_empty();
-        lists.into_iter().filter(has).map(str::to_owned).collect()
+        let lists = lists.into_iter().filter(has).map(str::to_owned);
+        let animations: Vec<Animation<'_>> = json.optional("animations");
+        let channels = animations.iter().flat_map(|animation| &animation.channels);
+        let mut others: Vec<String> = channels
+            .filter_map(|channel| {
+                let channel: Channel = serde_json::from_str(channel.get()).ok()?;
+                channel
+                    .target
+                    .moves()
+                    .is_none()
+                    .then_some(channel.target.path)
+            })
+            .map(|path| format!("channels of `{path}`"))
+            .collect();
+        others.sort();
+        others.dedup();
+        lists.chain(others).collect()
     }
 
     fn carried_mesh(&self, clip: &Motion) -> Result<Option<CarriedMesh>, Diagnostic> {

@@ -5,6 +5,7 @@ use std::borrow::Cow;
 use serde::Deserialize;
 use serde_json::value::RawValue;
 
+use crate::gltf::channel::Path;
 use crate::gltf::json::Members;
 use crate::gltf::whole;
 
@@ -141,6 +142,20 @@ pub(super) struct Target {
     pub(super) path: String,
     #[serde(default)]
     pub(super) extensions: TargetExtensions,
+}
+
+impl Target {
+    /// The node that is moved, and what of it; `None` if something else is.
+    pub(super) fn moves(&self) -> Option<(usize, Path)> {
+        if self.path == "pointer" {
+            let pointer = self.extensions.pointer.as_ref()?;
+            let mut parts = pointer.pointer.strip_prefix("/nodes/")?.split('/');
+            let node = parts.next()?.parse().ok()?;
+            let path = Path::named(parts.next()?)?;
+            return parts.next().is_none().then_some((node, path));
+        }
+        Some((self.node?, Path::named(&self.path)?))
+    }
 }
 
 #[derive(Deserialize, Default)]

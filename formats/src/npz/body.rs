@@ -10,6 +10,9 @@ use crate::npz::plan::read_numbers;
 use crate::source::Source;
 use crate::text::lines::Limits;
 
+/// The arrays of a motion that say its body's shape.
+pub(crate) const SHAPE: [&str; 2] = ["betas", "gender"];
+
 /// What a motion's file says of the shape; nothing of what it does not say in numbers and text.
 pub(crate) fn shape_of(archive: &Archive) -> Result<Shape, Diagnostic> {
     let mut shape = Shape::default();

@@ -128,17 +128,17 @@ pub(crate) fn read(
         motion.set_origin(track, origin);
     }
     if !plan.parents.is_empty() || !plan.rest.is_empty() {
-        let joint = |track| {
+        for track in 0..plan.tracks {
+            let parent = plan.parents.get(track).copied().flatten();
             let rest = plan.rest.get(track).map(|&(rest, position)| Transform {
-                translation: (position - motion.origin(track)).as_vec3(),
+                translation: motion.resting_at(track, parent, position),
                 ..rest
             });
-            Joint {
-                parent: plan.parents.get(track).copied().flatten(),
+            motion.skeleton.push(Joint {
+                parent,
                 rest: rest.unwrap_or_default(),
-            }
-        };
-        motion.skeleton = (0..plan.tracks).map(joint).collect();
+            });
+        }
     }
     Ok(motion)
 }

@@ -12,7 +12,7 @@ use crate::format::{Document, Format, MotionOptions, WriteError};
 use crate::motion::{Motion, Sampled};
 use crate::npz::archive::{Archive, Member};
 use crate::npz::array::{Array, AsStored};
-use crate::npz::header::{Element, Header};
+use crate::npz::header::Element;
 use crate::npz::plan::{Part, Plan, Values};
 use crate::npz::write::{Members, check, keys, note_name, notes, times};
 use crate::npz::{FORMAT, linear, own, smpl};
@@ -57,20 +57,6 @@ impl NpzDocument {
             archive,
             plan,
             span,
-        }
-    }
-
-    /// Warns of pickled objects, which are not looked into.
-    pub(super) fn warn_of_objects(&self, warnings: &mut Warnings) {
-        for member in &self.archive.members {
-            let is_object = |header: &Header| header.element == Element::Object;
-            if member.header.as_ref().is_ok_and(is_object) {
-                let message = format!(
-                    "`{}` holds pickled objects, which are not read",
-                    member.name
-                );
-                warnings.warn(Code::ObjectsBeside, || (None, message));
-            }
         }
     }
 
@@ -285,7 +271,8 @@ impl Document for NpzDocument {
         let members = self.archive.members.iter().enumerate();
         let others = members.filter(|&(place, member)| {
             let is_known = self.plan.constants.contains(&place)
-                || self.plan.is_own && own::CONSTANTS.contains(&&*member.name);
+                || self.plan.is_own && own::CONSTANTS.contains(&&*member.name)
+                || self.plan.is_note(member);
             !is_key(place) && !is_time(place) && self.plan.rate_member != Some(place) && !is_known
         });
         others.map(|(_, member)| member.name.clone()).collect()

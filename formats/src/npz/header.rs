@@ -61,6 +61,10 @@ impl Element {
     pub(crate) fn is_float(&self) -> bool {
         matches!(self, Self::F16 | Self::F32 | Self::F64)
     }
+
+    pub(crate) fn is_text(&self) -> bool {
+        matches!(self, Self::Unicode(_) | Self::Bytes(_))
+    }
 }
 
 impl fmt::Display for Element {

@@ -84,6 +84,7 @@ pub fn read_npz(file: &str, bytes: Vec<u8>, options: &ReadOptions) -> Result<Loa
     if let Some(map) = map(file, options)? {
         let mut plan = mapped::plan(&archive, &map)?;
         let clip = clip::read(&archive, &mut plan, options, &mut warnings)?;
+        plan.warn_of_others(&archive, options, &mut warnings);
         return Ok(Loaded::of(clip, warnings.into_list()));
     }
     let plan = match own::plan(&archive)? {
@@ -102,8 +103,8 @@ pub fn read_npz(file: &str, bytes: Vec<u8>, options: &ReadOptions) -> Result<Loa
         Diagnostic::new(file, Code::UnknownArrays, message)
     })?;
     let clip = clip::read(&archive, &mut plan, options, &mut warnings)?;
+    plan.warn_of_others(&archive, options, &mut warnings);
     let document = NpzDocument::new(archive, plan, &clip);
-    document.warn_of_objects(&mut warnings);
     Ok(Loaded {
         document: Some(Arc::new(document)),
         ..Loaded::of(clip, warnings.into_list())

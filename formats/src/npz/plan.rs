@@ -8,12 +8,16 @@ use tumble::{FrameRate, Layout};
 
 use crate::bvh::BvhJoint;
 use crate::diagnostic::{Code, Diagnostic};
+use crate::format::ReadOptions;
 use crate::motion::{Channels, Transform};
 use crate::npy::ComponentOrder;
-use crate::npz::archive::Archive;
+use crate::npz::archive::{Archive, Member};
 use crate::npz::array::Strides;
-use crate::npz::header::shape_text;
+use crate::npz::body::SHAPE;
+use crate::npz::header::{Element, Header, shape_text};
+use crate::npz::own::CONSTANTS;
 use crate::rotation_form::RotationForm;
+use crate::warnings::{Warnings, listed};
 
 /// One clip, as arrays.
 #[derive(Debug, Clone, Default)]
@@ -39,6 +43,8 @@ pub(crate) struct Plan {
     pub(crate) two_rates: Option<String>,
     /// The times of all frames, those that are left out of the clip too.
     pub(crate) all_times: Vec<f64>,
+    /// Members that say again what others say, or that the rate is compared with.
+    pub(crate) compared: Vec<usize>,
     /// Members that hold the same for all frames, whatever their shape looks like.
     pub(crate) constants: Vec<usize>,
     pub(crate) is_world: bool,
@@ -208,6 +214,63 @@ pub(crate) fn check_float(archive: &Archive, member: usize) -> Result<(), Diagno
 }
 
 impl Plan {
+    /// The members of which nothing is read, but for pickled objects, which have a warning of their own.
+    pub(crate) fn not_read(&self, archive: &Archive, options: &ReadOptions) -> Vec<usize> {
+        let is_read = |place: usize, member: &Member| {
+            let header = member.header.as_ref();
+            let is_shape = self.is_body && options.has_body_model;
+            self.parts.iter().any(|part| part.member == place)
+                || self.times.is_some_and(|list| list.member == place)
+                || self.rate_member == Some(place)
+                || self.compared.contains(&place)
+                || self.constants.contains(&place)
+                || self.is_own && CONSTANTS.contains(&&*member.name)
+                || is_shape && SHAPE.contains(&&*member.name)
+                || self.is_note(member)
+                || header.is_ok_and(|it| it.element == Element::Object)
+        };
+        let members = archive.members.iter().enumerate();
+        let others = members.filter(|&(place, member)| !is_read(place, member));
+        others.map(|(place, _)| place).collect()
+    }
+
+    /// Whether a member says what made our own samples: a text beside them.
+    pub(crate) fn is_note(&self, member: &Member) -> bool {
+        let header = member.header.as_ref();
+        self.is_own && header.is_ok_and(|it| it.shape.is_empty() && it.element.is_text())
+    }
+
+    /// Warns of them, and of pickled objects, which are not looked into.
+    pub(crate) fn warn_of_others(
+        &self,
+        archive: &Archive,
+        options: &ReadOptions,
+        warnings: &mut Warnings,
+    ) {
+        let name = |place: usize| &*archive.members[place].name;
+        let others = self.not_read(archive, options);
+        let quoted = others.iter().map(|&place| format!("`{}`", name(place)));
+        if let Some(names) = listed(quoted.collect()) {
+            let has_shape = others.iter().any(|&place| SHAPE.contains(&name(place)));
+            let hint = match self.is_body && has_shape {
+                true => "; --body-model brings the model that the shape is of",
+                false => "",
+            };
+            let message = format!("not read: {names}; --map says what arrays are{hint}");
+            warnings.warn(Code::ArraysNotRead, || (None, message));
+        }
+        for member in &archive.members {
+            let is_object = |header: &Header| header.element == Element::Object;
+            if member.header.as_ref().is_ok_and(is_object) {
+                let message = format!(
+                    "`{}` holds pickled objects, which are not read",
+                    member.name
+                );
+                warnings.warn(Code::ObjectsBeside, || (None, message));
+            }
+        }
+    }
+
     /// Adds the keys of an array that has as many tracks and frames as the others.
     pub(crate) fn add(
         &mut self,

@@ -24,6 +24,7 @@ impl Plan {
             .filter_map(|&name| Some((name, archive.find(name)?)))
         {
             let numbers = read_numbers(archive, member)?;
+            self.compared.push(member);
             let rate = match *numbers {
                 [number] => {
                     let found = of(&Written::Number(number)).map(|found| found.grid);
@@ -57,9 +58,9 @@ impl Plan {
             return;
         };
         // What is no length says nothing.
-        let numbers = archive
-            .find(name)
-            .and_then(|name| read_numbers(archive, name).ok());
+        let member = archive.find(name);
+        self.compared.extend(member);
+        let numbers = member.and_then(|member| read_numbers(archive, member).ok());
         let Some(&[seconds]) = numbers.as_deref() else {
             return;
         };

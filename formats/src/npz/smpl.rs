@@ -212,6 +212,10 @@ pub(crate) fn plan(archive: &Archive, warnings: &mut Warnings) -> Result<Option<
     {
         plan.add(archive, root)?;
     }
+    if archive.find("poses").is_some() {
+        let again = PIECES.iter().filter_map(|(name, _)| archive.find(name));
+        plan.compared.extend(again);
+    }
     plan.read_rate(archive, &RATES)?;
     plan.compare_length(archive, LENGTH);
     Ok(Some(plan))

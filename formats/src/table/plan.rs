@@ -9,6 +9,7 @@ use crate::map::{Entry, Map};
 use crate::npy::ComponentOrder;
 use crate::rotation_form::RotationForm;
 use crate::table::columns::Table;
+use crate::warnings::listed;
 
 /// Columns that tell the tracks of long tables apart.
 const TRACK: [&str; 3] = ["track", "joint", "body"];
@@ -264,15 +265,7 @@ impl Plan {
                 first = end;
             }
         }
-        /// More names than anybody reads.
-        const MOST: usize = 12;
-        let count = all.len();
-        all.truncate(MOST);
-        let more = match count - all.len() {
-            0 => String::new(),
-            more => format!(" and {more} more"),
-        };
-        (count > 0).then(|| format!("{}{more}", all.join(", ")))
+        listed(all)
     }
 
     /// Where the numbers of all tracks are.

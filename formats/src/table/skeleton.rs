@@ -54,11 +54,10 @@ pub(crate) fn hang(motion: &mut Motion, index: usize, notes: &[(String, String)]
         return;
     };
     let count = tracks.len();
-    let set = &motion.set;
-    if parents.len() != count || offsets.len() != count || set.track_count() != count {
+    if parents.len() != count || offsets.len() != count || motion.set.track_count() != count {
         return;
     }
-    let by_name = |name: &String| (0..count).find(|&track| set.track_name(track) == *name);
+    let by_name = |name: &String| (0..count).find(|&track| motion.set.track_name(track) == *name);
     // Rows of a table may bring its tracks in another order.
     let Some(places) = tracks.iter().map(by_name).collect::<Option<Vec<usize>>>() else {
         return;
@@ -70,14 +69,14 @@ pub(crate) fn hang(motion: &mut Motion, index: usize, notes: &[(String, String)]
             Some(Some(parent)) if parent != track => Some(parent),
             Some(_) => return,
         };
-        let offset = DVec3::from_array(offset) - motion.origin(track);
-        if !offset.as_vec3().is_finite() {
+        let offset = motion.resting_at(track, parent, DVec3::from_array(offset));
+        if !offset.is_finite() {
             return;
         }
         skeleton[track] = Some(Joint {
             parent,
             rest: Transform {
-                translation: offset.as_vec3(),
+                translation: offset,
                 ..Transform::default()
             },
         });

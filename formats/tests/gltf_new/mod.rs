@@ -164,7 +164,7 @@ fn numbers(json: &Value, binary: &[u8], accessor: &Value) -> Vec<f32> {
         "MAT4" => 16,
         other => panic!("{other}"),
     };
-    let [view_start, start] = [view, accessor].map(|of| place(&of["byteOffset"]));
+    let [view_start, start] = [view, accessor].map(|of| of.get("byteOffset").map_or(0, place));
     let length = 4 * width * place(&accessor["count"]);
     assert_eq!((view_start % 4, start % 4), (0, 0));
     assert!(start + length <= place(&view["byteLength"]));
@@ -192,7 +192,7 @@ fn channels<'a>(json: &'a Value, binary: &[u8], animation: usize) -> Vec<Channel
         Channel {
             node: place(&channel["target"]["node"]),
             path: channel["target"]["path"].as_str().unwrap(),
-            interpolation: sampler["interpolation"].as_str().unwrap(),
+            interpolation: sampler["interpolation"].as_str().unwrap_or("LINEAR"),
             times: numbers(json, binary, &sampler["input"]),
             values: numbers(json, binary, &sampler["output"]),
         }

@@ -17,6 +17,7 @@ __all__ = [
     "Clip",
     "ClipDifference",
     "Crowd",
+    "DeviceArray",
     "Engine",
     "File",
     "Motions",
@@ -180,6 +181,7 @@ class Clip:
         layout: _Layout = "track",
         as_rotation: Literal[False] = False,
         dtype: Literal["float32"] = "float32",
+        device_array: Literal[False] = False,
         fps: _Rate | None = None,
         at: _Arrays | None = None,
         times: _Arrays | None = None,
@@ -204,6 +206,7 @@ class Clip:
         layout: _Layout = "track",
         as_rotation: Literal[False] = False,
         dtype: DTypeLike,
+        device_array: Literal[False] = False,
         fps: _Rate | None = None,
         at: _Arrays | None = None,
         times: _Arrays | None = None,
@@ -228,6 +231,7 @@ class Clip:
         layout: _Layout = "track",
         as_rotation: Literal[True],
         dtype: Literal["float32"] = "float32",
+        device_array: Literal[False] = False,
         fps: _Rate | None = None,
         at: _Arrays | None = None,
         times: _Arrays | None = None,
@@ -243,6 +247,31 @@ class Clip:
         continuity: float | None = None,
         bias: float | None = None,
     ) -> Any: ...
+    @overload
+    def evaluate(
+        self,
+        *,
+        out: None = None,
+        order: Literal["xyzw"] = "xyzw",
+        layout: _Layout = "track",
+        as_rotation: Literal[False] = False,
+        dtype: DTypeLike = "float32",
+        device_array: Literal[True],
+        fps: _Rate | None = None,
+        at: _Arrays | None = None,
+        times: _Arrays | None = None,
+        start: float | None = None,
+        end: float | None = None,
+        method: _Method | None = None,
+        path: _Way | None = None,
+        ends: _Ends | None = None,
+        speed: _Speed | None = None,
+        before: _Wrap | None = None,
+        after: _Wrap | None = None,
+        tension: float | None = None,
+        continuity: float | None = None,
+        bias: float | None = None,
+    ) -> DeviceArray: ...
     def plot(
         self,
         track: int | str | None = None,
@@ -294,6 +323,7 @@ class Engine:
         layout: _Layout = "track",
         as_rotation: Literal[False] = False,
         dtype: Literal["float32"] = "float32",
+        device_array: Literal[False] = False,
         fps: _Rate | None = None,
         at: _Arrays | None = None,
         times: _Arrays | None = None,
@@ -319,6 +349,7 @@ class Engine:
         layout: _Layout = "track",
         as_rotation: Literal[False] = False,
         dtype: DTypeLike,
+        device_array: Literal[False] = False,
         fps: _Rate | None = None,
         at: _Arrays | None = None,
         times: _Arrays | None = None,
@@ -344,6 +375,7 @@ class Engine:
         layout: _Layout = "track",
         as_rotation: Literal[True],
         dtype: Literal["float32"] = "float32",
+        device_array: Literal[False] = False,
         fps: _Rate | None = None,
         at: _Arrays | None = None,
         times: _Arrays | None = None,
@@ -359,6 +391,33 @@ class Engine:
         continuity: float | None = None,
         bias: float | None = None,
     ) -> Any: ...
+    @overload
+    def evaluate(
+        self,
+        clip: Clip,
+        *,
+        out: None = None,
+        order: Literal["xyzw"] = "xyzw",
+        layout: _Layout = "track",
+        as_rotation: Literal[False] = False,
+        dtype: DTypeLike = "float32",
+        device_array: Literal[True],
+        fps: _Rate | None = None,
+        at: _Arrays | None = None,
+        times: _Arrays | None = None,
+        start: float | None = None,
+        end: float | None = None,
+        method: _Method | None = None,
+        path: _Way | None = None,
+        ends: _Ends | None = None,
+        speed: _Speed | None = None,
+        before: _Wrap | None = None,
+        after: _Wrap | None = None,
+        tension: float | None = None,
+        continuity: float | None = None,
+        bias: float | None = None,
+    ) -> DeviceArray: ...
+    @overload
     def velocity(
         self,
         clip: Clip,
@@ -366,6 +425,7 @@ class Engine:
         axes: _Axes = "body",
         out: _Single | None = None,
         layout: _Layout = "track",
+        device_array: Literal[False] = False,
         fps: _Rate | None = None,
         at: _Arrays | None = None,
         times: _Arrays | None = None,
@@ -381,6 +441,31 @@ class Engine:
         continuity: float | None = None,
         bias: float | None = None,
     ) -> _Single: ...
+    @overload
+    def velocity(
+        self,
+        clip: Clip,
+        *,
+        axes: _Axes = "body",
+        out: None = None,
+        layout: _Layout = "track",
+        device_array: Literal[True],
+        fps: _Rate | None = None,
+        at: _Arrays | None = None,
+        times: _Arrays | None = None,
+        start: float | None = None,
+        end: float | None = None,
+        method: _Method | None = None,
+        path: _Way | None = None,
+        ends: _Ends | None = None,
+        speed: _Speed | None = None,
+        before: _Wrap | None = None,
+        after: _Wrap | None = None,
+        tension: float | None = None,
+        continuity: float | None = None,
+        bias: float | None = None,
+    ) -> DeviceArray: ...
+    @overload
     def acceleration(
         self,
         clip: Clip,
@@ -388,6 +473,7 @@ class Engine:
         axes: _Axes = "body",
         out: _Single | None = None,
         layout: _Layout = "track",
+        device_array: Literal[False] = False,
         fps: _Rate | None = None,
         at: _Arrays | None = None,
         times: _Arrays | None = None,
@@ -403,6 +489,31 @@ class Engine:
         continuity: float | None = None,
         bias: float | None = None,
     ) -> _Single: ...
+    @overload
+    def acceleration(
+        self,
+        clip: Clip,
+        *,
+        axes: _Axes = "body",
+        out: None = None,
+        layout: _Layout = "track",
+        device_array: Literal[True],
+        fps: _Rate | None = None,
+        at: _Arrays | None = None,
+        times: _Arrays | None = None,
+        start: float | None = None,
+        end: float | None = None,
+        method: _Method | None = None,
+        path: _Way | None = None,
+        ends: _Ends | None = None,
+        speed: _Speed | None = None,
+        before: _Wrap | None = None,
+        after: _Wrap | None = None,
+        tension: float | None = None,
+        continuity: float | None = None,
+        bias: float | None = None,
+    ) -> DeviceArray: ...
+    @overload
     def matrices(
         self,
         clip: Clip,
@@ -410,6 +521,7 @@ class Engine:
         columns: Literal[3, 4] = 3,
         out: _Single | None = None,
         layout: _Layout = "track",
+        device_array: Literal[False] = False,
         fps: _Rate | None = None,
         at: _Arrays | None = None,
         times: _Arrays | None = None,
@@ -425,6 +537,30 @@ class Engine:
         continuity: float | None = None,
         bias: float | None = None,
     ) -> _Single: ...
+    @overload
+    def matrices(
+        self,
+        clip: Clip,
+        *,
+        columns: Literal[3, 4] = 3,
+        out: None = None,
+        layout: _Layout = "track",
+        device_array: Literal[True],
+        fps: _Rate | None = None,
+        at: _Arrays | None = None,
+        times: _Arrays | None = None,
+        start: float | None = None,
+        end: float | None = None,
+        method: _Method | None = None,
+        path: _Way | None = None,
+        ends: _Ends | None = None,
+        speed: _Speed | None = None,
+        before: _Wrap | None = None,
+        after: _Wrap | None = None,
+        tension: float | None = None,
+        continuity: float | None = None,
+        bias: float | None = None,
+    ) -> DeviceArray: ...
     def axis_angle(
         self,
         clip: Clip,
@@ -716,6 +852,7 @@ def evaluate(
     layout: _Layout = "track",
     as_rotation: Literal[False] = False,
     dtype: Literal["float32"] = "float32",
+    device_array: Literal[False] = False,
     fps: _Rate | None = None,
     at: _Arrays | None = None,
     start: float | None = None,
@@ -740,6 +877,7 @@ def evaluate(
     layout: _Layout = "track",
     as_rotation: Literal[False] = False,
     dtype: DTypeLike,
+    device_array: Literal[False] = False,
     fps: _Rate | None = None,
     at: _Arrays | None = None,
     start: float | None = None,
@@ -764,6 +902,7 @@ def evaluate(
     layout: _Layout = "track",
     as_rotation: Literal[True],
     dtype: Literal["float32"] = "float32",
+    device_array: Literal[False] = False,
     fps: _Rate | None = None,
     at: _Arrays | None = None,
     start: float | None = None,
@@ -778,6 +917,31 @@ def evaluate(
     continuity: float | None = None,
     bias: float | None = None,
 ) -> Any: ...
+@overload
+def evaluate(
+    times: _Arrays,
+    keys: _Keys,
+    *,
+    out: None = None,
+    order: Literal["xyzw"] = "xyzw",
+    layout: _Layout = "track",
+    as_rotation: Literal[False] = False,
+    dtype: DTypeLike = "float32",
+    device_array: Literal[True],
+    fps: _Rate | None = None,
+    at: _Arrays | None = None,
+    start: float | None = None,
+    end: float | None = None,
+    method: _Method | None = None,
+    path: _Way | None = None,
+    ends: _Ends | None = None,
+    speed: _Speed | None = None,
+    before: _Wrap | None = None,
+    after: _Wrap | None = None,
+    tension: float | None = None,
+    continuity: float | None = None,
+    bias: float | None = None,
+) -> DeviceArray: ...
 def load(
     path: _Path,
     *,
@@ -1067,6 +1231,28 @@ def reduce(
     fps: _Rate | None = None,
     engine: Engine | None = None,
 ) -> Reduction: ...
+
+@final
+class DeviceArray:
+    @property
+    def shape(self) -> tuple[int, ...]: ...
+    @property
+    def dtype(self) -> np.dtype[Any]: ...
+    @property
+    def waited_by(self) -> Literal["stream", "host"]: ...
+    @property
+    def __cuda_array_interface__(self) -> dict[str, Any]: ...
+    def __dlpack__(
+        self,
+        *,
+        stream: int | None = None,
+        max_version: tuple[int, int] | None = None,
+        dl_device: tuple[int, int] | None = None,
+        copy: bool | None = None,
+    ) -> Any: ...
+    def __dlpack_device__(self) -> tuple[int, int]: ...
+    def __len__(self) -> int: ...
+    def numpy(self) -> NDArray[Any]: ...
 
 @final
 class Crowd:

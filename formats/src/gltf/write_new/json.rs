@@ -40,9 +40,12 @@ pub(super) struct Scene {
 #[derive(Serialize)]
 pub(super) struct Node {
     pub(super) name: String,
-    /// Whole numbers, or those of f32.
+    /// Whole numbers, or those of f32. What glTF has by default is left out.
+    #[serde(skip_serializing_if = "is_zero")]
     pub(super) translation: [f64; 3],
+    #[serde(skip_serializing_if = "is_identity")]
     pub(super) rotation: [f32; 4],
+    #[serde(skip_serializing_if = "is_one")]
     pub(super) scale: [f32; 3],
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub(super) children: Vec<usize>,
@@ -105,7 +108,28 @@ pub(super) struct Target {
 pub(super) struct Sampler {
     pub(super) input: usize,
     pub(super) output: usize,
+    #[serde(skip_serializing_if = "is_linear")]
     pub(super) interpolation: &'static str,
+}
+
+fn is_zero(translation: &[f64; 3]) -> bool {
+    translation.map(f64::to_bits) == [0; 3]
+}
+
+fn is_identity(rotation: &[f32; 4]) -> bool {
+    rotation.map(f32::to_bits) == [0.0f32, 0.0, 0.0, 1.0].map(f32::to_bits)
+}
+
+fn is_one(scale: &[f32; 3]) -> bool {
+    *scale == [1.0; 3]
+}
+
+fn is_linear(interpolation: &&'static str) -> bool {
+    *interpolation == "LINEAR"
+}
+
+fn is_start(byte_offset: &u64) -> bool {
+    *byte_offset == 0
 }
 
 /// The component types of f32 and i16.
@@ -121,6 +145,7 @@ pub(super) const MESHOPT: &str = "EXT_meshopt_compression";
 #[serde(rename_all = "camelCase")]
 pub(super) struct Accessor {
     pub(super) buffer_view: usize,
+    #[serde(skip_serializing_if = "is_start")]
     pub(super) byte_offset: u64,
     pub(super) component_type: u32,
     #[serde(skip_serializing_if = "std::ops::Not::not")]
@@ -138,6 +163,7 @@ pub(super) struct Accessor {
 #[serde(rename_all = "camelCase")]
 pub(super) struct BufferView {
     pub(super) buffer: usize,
+    #[serde(skip_serializing_if = "is_start")]
     pub(super) byte_offset: u64,
     pub(super) byte_length: u64,
     #[serde(skip_serializing_if = "Option::is_none")]

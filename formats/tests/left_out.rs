@@ -1,0 +1,101 @@
+//! What is in a file and no part of its motion is said, by name, whatever the format.
+
+use std::path::Path;
+
+use tumble_formats::{Code, Format, Loaded, ReadOptions};
+
+fn read(fixture: &str, options: &ReadOptions) -> Loaded {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("tests/fixtures")
+        .join(fixture);
+    Format::open_detected(&path, options).unwrap()
+}
+
+/// The warnings of a code.
+fn said(loaded: &Loaded, code: Code) -> Vec<String> {
+    let all = loaded.warnings.iter().filter(|own| own.code == code);
+    all.map(|own| own.message.clone()).collect()
+}
+
+/// Catches a reader that passes over something without a word, or names something else.
+#[test]
+fn what_is_no_part_of_the_motion_is_named() {
+    let cases = [
+        (
+            "npz/arrays_beside.npz",
+            Code::ArraysNotRead,
+            "not read: `betas`, `dmpls`, `gender`; ",
+        ),
+        (
+            "npz/objects_beside.npz",
+            Code::ObjectsBeside,
+            "`labels` holds pickled objects",
+        ),
+        (
+            "csv/left_out.csv",
+            Code::ColumnsLeftOut,
+            "`note`, `temperature`",
+        ),
+        (
+            "tum/further_numbers.tum",
+            Code::FurtherNumbers,
+            "2 numbers behind",
+        ),
+        (
+            "euroc/velocities.euroc",
+            Code::FurtherNumbers,
+            "1 numbers behind",
+        ),
+        (
+            "bvh/frames_fewer.bvh",
+            Code::BvhMoreRows,
+            "a row behind the last of 2 frames",
+        ),
+        #[cfg(feature = "fbx")]
+        ("fbx/properties.fbx", Code::FbxProperties, "`Visibility`"),
+        #[cfg(feature = "mcap")]
+        ("mcap/good.mcap", Code::McapOthers, "`/log`"),
+    ];
+    for (fixture, code, words) in cases {
+        let said = said(&read(fixture, &ReadOptions::default()), code);
+        assert_eq!(said.len(), 1, "{fixture}: {said:?}");
+        assert!(said[0].contains(words), "{fixture}: {said:?}");
+    }
+}
+
+/// Catches a warning of what another option uses, and of what our own files say.
+#[test]
+fn what_is_used_is_not_named() {
+    let loaded = read(
+        "npz/arrays_beside.npz",
+        &ReadOptions {
+            has_body_model: true,
+            ..ReadOptions::default()
+        },
+    );
+    let said_of_it = said(&loaded, Code::ArraysNotRead);
+    assert_eq!(said_of_it.len(), 1, "{said_of_it:?}");
+    assert!(
+        said_of_it[0].contains("not read: `dmpls`; "),
+        "{said_of_it:?}"
+    );
+    for fixture in [
+        "npz/smpl.npz",
+        "npz/pieces.npz",
+        "npz/own.npz",
+        "npz/bodies.npz",
+    ] {
+        let said = said(&read(fixture, &ReadOptions::default()), Code::ArraysNotRead);
+        assert!(said.is_empty(), "{fixture}: {said:?}");
+    }
+    let map = "pelvis=poses[0:3]:rotvec,fps=mocap_framerate";
+    let mapped = ReadOptions {
+        map: Some(map.to_owned()),
+        ..ReadOptions::default()
+    };
+    let said = said(&read("npz/arrays_beside.npz", &mapped), Code::ArraysNotRead);
+    assert!(
+        said[0].contains("not read: `trans`, `betas`, `dmpls`, `gender`; "),
+        "{said:?}"
+    );
+}

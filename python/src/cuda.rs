@@ -1,0 +1,543 @@
+//! CUDA's driver, as far as results on a card need it. Its library is opened when the first such result is asked
+//! for; memory and semaphores come as files that the Vulkan driver exports, and the devices of both are the same
+//! where their UUIDs are.
+//!
+//! `unsafe`: functions of a C library.
+#![allow(unsafe_code)]
+#![cfg_attr(
+    not(unix),
+    allow(dead_code, reason = "memory leaves Vulkan as a file on Unix alone")
+)]
+
+use std::ffi::{CStr, c_char, c_int, c_uint, c_void};
+use std::fmt;
+use std::ptr::null_mut;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, OnceLock, PoisonError};
+
+use libloading::Library;
+use tumble::{ExportedResult, VulkanError};
+
+/// The driver's library.
+const LIBRARY: &str = match cfg!(windows) {
+    true => "nvcuda.dll",
+    false => "libcuda.so.1",
+};
+
+/// Why a result cannot be had by CUDA.
+#[derive(Debug)]
+pub(crate) enum CudaError {
+    /// There is no driver.
+    NoLibrary(String),
+    /// The driver is older than timeline semaphores (CUDA 11.2).
+    NoFunction(&'static str),
+    /// A call failed.
+    Call {
+        call: &'static str,
+        code: c_int,
+        name: String,
+    },
+    /// CUDA sees no device that is the Vulkan device.
+    NoDevice {
+        device: String,
+        uuid: String,
+        seen: Vec<String>,
+    },
+    /// The memory is not exported as CUDA imports it.
+    #[cfg(not(unix))]
+    NoFiles,
+    /// The Vulkan device failed.
+    Vulkan(VulkanError),
+}
+
+impl fmt::Display for CudaError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NoLibrary(reason) => write!(
+                f,
+                "no CUDA driver: {reason}; arrays on a card need NVIDIA's driver ({LIBRARY})"
+            ),
+            Self::NoFunction(name) => write!(
+                f,
+                "the CUDA driver has no function {name}; arrays on a card need one of CUDA 11.2 or newer"
+            ),
+            Self::Call { call, code, name } => write!(f, "{call} failed: {name} ({code})"),
+            Self::NoDevice { device, uuid, seen } => {
+                write!(f, "CUDA has no device that is {device} (UUID {uuid}); ")?;
+                match &seen[..] {
+                    [] => write!(f, "it sees none"),
+                    seen => write!(f, "it sees {}", seen.join(", ")),
+                }?;
+                write!(
+                    f,
+                    ": open a Vulkan device that is one of them (tumble.devices()), or make it visible \
+                     (CUDA_VISIBLE_DEVICES)"
+                )
+            }
+            #[cfg(not(unix))]
+            Self::NoFiles => write!(f, "arrays on a card are made on Linux alone"),
+            Self::Vulkan(error) => error.fmt(f),
+        }
+    }
+}
+
+impl From<VulkanError> for CudaError {
+    fn from(error: VulkanError) -> Self {
+        Self::Vulkan(error)
+    }
+}
+
+type Device = c_int;
+type Context = *mut c_void;
+type Memory = *mut c_void;
+type Semaphore = *mut c_void;
+type Stream = *mut c_void;
+type Address = u64;
+
+/// `CUexternalMemoryHandleType`, and `CUexternalSemaphoreHandleType` for timelines of Vulkan's.
+const OPAQUE_FILE: c_int = 1;
+const TIMELINE_FILE: c_int = 9;
+
+/// The memory belongs to one buffer alone.
+const DEDICATED: c_uint = 1;
+
+/// `CUDA_EXTERNAL_MEMORY_HANDLE_DESC`.
+#[repr(C)]
+#[derive(Default)]
+struct MemoryHandle {
+    kind: c_int,
+    file: File,
+    size: u64,
+    flags: c_uint,
+    reserved: [c_uint; 16],
+}
+
+/// The union of the handles: a file, or two pointers.
+#[repr(C, align(8))]
+#[derive(Default)]
+struct File {
+    number: c_int,
+    unused: [c_uint; 3],
+}
+
+/// `CUDA_EXTERNAL_MEMORY_BUFFER_DESC`.
+#[repr(C)]
+#[derive(Default)]
+struct BufferRange {
+    offset: u64,
+    size: u64,
+    flags: c_uint,
+    reserved: [c_uint; 16],
+}
+
+/// `CUDA_EXTERNAL_SEMAPHORE_HANDLE_DESC`.
+#[repr(C)]
+#[derive(Default)]
+struct SemaphoreHandle {
+    kind: c_int,
+    file: File,
+    flags: c_uint,
+    reserved: [c_uint; 16],
+}
+
+/// `CUDA_EXTERNAL_SEMAPHORE_WAIT_PARAMS`.
+#[repr(C)]
+#[derive(Default)]
+struct Wait {
+    value: u64,
+    /// Of semaphores of other kinds.
+    others: [u64; 3],
+    other: [c_uint; 10],
+    flags: c_uint,
+    reserved: [c_uint; 16],
+}
+
+const _: () = {
+    assert!(size_of::<MemoryHandle>() == 104);
+    assert!(size_of::<BufferRange>() == 88);
+    assert!(size_of::<SemaphoreHandle>() == 96);
+    assert!(size_of::<Wait>() == 144);
+};
+
+/// The functions of the driver, by the names that its library has for them.
+macro_rules! functions {
+    ($($field:ident: $name:literal ($($argument:ty),*);)*) => {
+        struct Functions {
+            $($field: unsafe extern "system" fn($($argument),*) -> c_int,)*
+        }
+
+        impl Functions {
+            fn of(library: &Library) -> Result<Self, CudaError> {
+                Ok(Self {$(
+                    $field: {
+                        // SAFETY: so the driver's header (cuda.h) declares the function of this name.
+                        let found = unsafe { library.get(concat!($name, "\0").as_bytes()) };
+                        *found.map_err(|_| CudaError::NoFunction($name))?
+                    },
+                )*})
+            }
+        }
+    };
+}
+
+functions! {
+    init: "cuInit" (c_uint);
+    error_name: "cuGetErrorName" (c_int, *mut *const c_char);
+    device_count: "cuDeviceGetCount" (*mut c_int);
+    device: "cuDeviceGet" (*mut Device, c_int);
+    device_uuid: "cuDeviceGetUuid" (*mut [u8; 16], Device);
+    retain: "cuDevicePrimaryCtxRetain" (*mut Context, Device);
+    push: "cuCtxPushCurrent_v2" (Context);
+    pop: "cuCtxPopCurrent_v2" (*mut Context);
+    synchronize: "cuCtxSynchronize" ();
+    import_memory: "cuImportExternalMemory" (*mut Memory, *const MemoryHandle);
+    map: "cuExternalMemoryGetMappedBuffer" (*mut Address, Memory, *const BufferRange);
+    destroy_memory: "cuDestroyExternalMemory" (Memory);
+    import_semaphore: "cuImportExternalSemaphore" (*mut Semaphore, *const SemaphoreHandle);
+    wait: "cuWaitExternalSemaphoresAsync" (*const Semaphore, *const Wait, c_uint, Stream);
+    destroy_semaphore: "cuDestroyExternalSemaphore" (Semaphore);
+    free: "cuMemFree_v2" (Address);
+    copy_to_host: "cuMemcpyDtoH_v2" (*mut c_void, Address, usize);
+}
+
+/// The driver.
+pub(crate) struct Cuda {
+    functions: Functions,
+    /// The contexts that all users of a device share (the primary ones), of the devices that were used. They stay, as
+    /// those of CUDA's runtime do: making one takes a tenth of a second.
+    contexts: Mutex<Vec<(Device, Context)>>,
+    /// Keeps the functions where they are.
+    _library: Library,
+}
+
+// SAFETY: the driver's functions may be called by any thread, and a context is no thread's own.
+unsafe impl Send for Cuda {}
+// SAFETY: as above; the list is locked.
+unsafe impl Sync for Cuda {}
+
+impl Cuda {
+    /// The driver of this machine, opened at the first call.
+    fn of_this_machine() -> Result<&'static Self, CudaError> {
+        static CUDA: OnceLock<Cuda> = OnceLock::new();
+        if let Some(cuda) = CUDA.get() {
+            return Ok(cuda);
+        }
+        // SAFETY: loading a library runs its initialisers; that is what is asked for.
+        let library = unsafe { Library::new(LIBRARY) }
+            .map_err(|error| CudaError::NoLibrary(error.to_string()))?;
+        let cuda = Self {
+            functions: Functions::of(&library)?,
+            contexts: Mutex::default(),
+            _library: library,
+        };
+        Ok(CUDA.get_or_init(|| cuda))
+    }
+
+    /// The context of a device.
+    fn context(&self, device: Device) -> Result<Context, CudaError> {
+        let mut contexts = self.contexts.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, context)) = contexts.iter().find(|(of, _)| *of == device) {
+            return Ok(*context);
+        }
+        let mut context = null_mut();
+        // SAFETY: a device of CUDA's, and a pointer to a context.
+        let code = unsafe { (self.functions.retain)(&raw mut context, device) };
+        self.checked("cuDevicePrimaryCtxRetain", code)?;
+        contexts.push((device, context));
+        Ok(context)
+    }
+
+    /// Keeps the name of the call that failed.
+    fn checked(&self, call: &'static str, code: c_int) -> Result<(), CudaError> {
+        if code == 0 {
+            return Ok(());
+        }
+        let mut name = std::ptr::null();
+        // SAFETY: the function sets the pointer to a string that stays, or leaves it null.
+        let named = unsafe { (self.functions.error_name)(code, &raw mut name) } == 0;
+        let name = match named && !name.is_null() {
+            // SAFETY: a string of the driver's that stays.
+            true => unsafe { CStr::from_ptr(name) }
+                .to_string_lossy()
+                .into_owned(),
+            false => "an unknown error".to_owned(),
+        };
+        Err(CudaError::Call { call, code, name })
+    }
+
+    /// The device with that UUID and its place among those that CUDA sees.
+    fn device(&self, result: &ExportedResult) -> Result<(Device, c_int), CudaError> {
+        let functions = &self.functions;
+        // SAFETY: plain arguments, and pointers to what they are declared as, here and below.
+        self.checked("cuInit", unsafe { (functions.init)(0) })?;
+        let mut count = 0;
+        // SAFETY: as above.
+        let code = unsafe { (functions.device_count)(&raw mut count) };
+        self.checked("cuDeviceGetCount", code)?;
+        let mut seen = Vec::new();
+        for ordinal in 0..count {
+            let (mut device, mut uuid) = (0, [0; 16]);
+            // SAFETY: as above.
+            let code = unsafe { (functions.device)(&raw mut device, ordinal) };
+            self.checked("cuDeviceGet", code)?;
+            // SAFETY: as above, and a device that the driver has named.
+            let code = unsafe { (functions.device_uuid)(&raw mut uuid, device) };
+            self.checked("cuDeviceGetUuid", code)?;
+            let uuid = spelt(uuid);
+            if uuid == result.device_uuid() {
+                return Ok((device, ordinal));
+            }
+            seen.push(uuid);
+        }
+        Err(CudaError::NoDevice {
+            device: result.device_name().to_owned(),
+            uuid: result.device_uuid().to_owned(),
+            seen,
+        })
+    }
+}
+
+/// As RFC 9562 writes it.
+fn spelt(uuid: [u8; 16]) -> String {
+    let digits: String = uuid.iter().map(|byte| format!("{byte:02x}")).collect();
+    let parts = [0..8, 8..12, 12..16, 16..20, 20..32];
+    parts.map(|part| &digits[part]).join("-")
+}
+
+/// A result of a Vulkan device in the memory that CUDA sees. What CUDA made of it is given back when this is
+/// dropped, and then the memory.
+pub(crate) struct Mapping {
+    cuda: &'static Cuda,
+    result: ExportedResult,
+    /// The place of the device among those that CUDA sees.
+    pub(crate) ordinal: c_int,
+    context: Context,
+    memory: Option<Memory>,
+    address: Option<Address>,
+    /// The semaphore, and the value that says that the result is written.
+    semaphore: Option<(Semaphore, u64)>,
+    /// Whether somebody was told where the memory is, whose work may still use it.
+    is_known: AtomicBool,
+    /// The process that it is of: CUDA cannot be used in one that was forked from it.
+    process: u32,
+}
+
+// SAFETY: the driver's functions may be called by any thread, and its handles are no thread's own; the context is
+// made a thread's for the length of a call.
+unsafe impl Send for Mapping {}
+// SAFETY: as above; nothing but atomic numbers changes behind a shared reference.
+unsafe impl Sync for Mapping {}
+
+impl Mapping {
+    /// Imports the memory of a result, and the semaphore that says when it is written.
+    pub(crate) fn new(result: ExportedResult) -> Result<Self, CudaError> {
+        let cuda = Cuda::of_this_machine()?;
+        let (device, ordinal) = cuda.device(&result)?;
+        let context = cuda.context(device)?;
+        let mut mapping = Self {
+            cuda,
+            result,
+            ordinal,
+            context,
+            memory: None,
+            address: None,
+            semaphore: None,
+            is_known: AtomicBool::new(false),
+            process: std::process::id(),
+        };
+        // Whatever was made until one step fails is given back as it is dropped.
+        in_context(cuda, context, || mapping.import())?;
+        Ok(mapping)
+    }
+
+    #[cfg(not(unix))]
+    fn import(&mut self) -> Result<(), CudaError> {
+        Err(CudaError::NoFiles)
+    }
+
+    #[cfg(unix)]
+    fn import(&mut self) -> Result<(), CudaError> {
+        use std::os::fd::{AsRawFd, IntoRawFd};
+        let (cuda, functions) = (self.cuda, &self.cuda.functions);
+        let file = self.result.memory_file()?;
+        let size = self.result.memory_bytes();
+        let handle = MemoryHandle {
+            kind: OPAQUE_FILE,
+            file: File {
+                number: file.as_raw_fd(),
+                ..File::default()
+            },
+            size,
+            flags: DEDICATED,
+            ..MemoryHandle::default()
+        };
+        let mut memory = null_mut();
+        // SAFETY: the file is that of a dedicated allocation of this size on the device of the current context.
+        let code = unsafe { (functions.import_memory)(&raw mut memory, &raw const handle) };
+        cuda.checked("cuImportExternalMemory", code)?;
+        let _ = file.into_raw_fd(); // the driver's from now on
+        self.memory = Some(memory);
+        let range = BufferRange {
+            size,
+            ..BufferRange::default()
+        };
+        let mut address = 0;
+        // SAFETY: memory that was imported just now, and a range within it.
+        let code = unsafe { (functions.map)(&raw mut address, memory, &raw const range) };
+        cuda.checked("cuExternalMemoryGetMappedBuffer", code)?;
+        self.address = Some(address);
+        // Without the semaphore the host waits, and the result is the same.
+        self.semaphore = self.import_semaphore().unwrap_or_default();
+        if self.semaphore.is_none() {
+            self.result.wait()?;
+        }
+        Ok(())
+    }
+
+    /// What says that the result is written, and the value that says it; none where the device exports none.
+    #[cfg(unix)]
+    fn import_semaphore(&self) -> Result<Option<(Semaphore, u64)>, CudaError> {
+        use std::os::fd::{AsRawFd, IntoRawFd};
+        let Some((file, value)) = self.result.timeline_file()? else {
+            return Ok(None);
+        };
+        let handle = SemaphoreHandle {
+            kind: TIMELINE_FILE,
+            file: File {
+                number: file.as_raw_fd(),
+                ..File::default()
+            },
+            ..SemaphoreHandle::default()
+        };
+        let mut semaphore = null_mut();
+        // SAFETY: the file is that of a timeline semaphore of the same device.
+        let code = unsafe {
+            let import = self.cuda.functions.import_semaphore;
+            import(&raw mut semaphore, &raw const handle)
+        };
+        self.cuda.checked("cuImportExternalSemaphore", code)?;
+        let _ = file.into_raw_fd(); // the driver's from now on
+        Ok(Some((semaphore, value)))
+    }
+
+    /// Whether streams wait for the result; else the host has waited.
+    pub(crate) fn is_ordered_by_streams(&self) -> bool {
+        self.semaphore.is_some()
+    }
+
+    /// Where the first number is, for somebody whose work comes after [`Mapping::order`].
+    pub(crate) fn address(&self) -> Address {
+        self.is_known.store(true, Ordering::Relaxed);
+        self.address.unwrap_or(0)
+    }
+
+    fn check_process(&self) -> Result<(), CudaError> {
+        match self.process == std::process::id() {
+            true => Ok(()),
+            false => Err(CudaError::Vulkan(VulkanError::Forked)),
+        }
+    }
+
+    /// Lets a stream wait until the result is written: 1 is the default one of all threads, 2 that of each thread,
+    /// others are pointers. The host does not wait.
+    pub(crate) fn order(&self, stream: usize) -> Result<(), CudaError> {
+        self.check_process()?;
+        self.result.is_written()?; // not, if the device was lost
+        let Some((semaphore, value)) = self.semaphore else {
+            return Ok(());
+        };
+        let wait = Wait {
+            value,
+            ..Wait::default()
+        };
+        let stream = std::ptr::without_provenance_mut(stream);
+        in_context(self.cuda, self.context, || {
+            // SAFETY: one semaphore and what it is waited for, and a stream that the caller names.
+            let code = unsafe {
+                let wait_for = self.cuda.functions.wait;
+                wait_for(&raw const semaphore, &raw const wait, 1, stream)
+            };
+            self.cuda.checked("cuWaitExternalSemaphoresAsync", code)
+        })
+    }
+
+    /// Copies the result to the host, when it is written.
+    pub(crate) fn copy_to_host(&self, bytes: &mut [u8]) -> Result<(), CudaError> {
+        self.check_process()?;
+        self.result.wait()?;
+        self.order(DEFAULT_STREAM)?; // on which the copy is
+        let Some(address) = self.address else {
+            return Ok(());
+        };
+        let size = bytes.len().min(self.result.bytes() as usize);
+        in_context(self.cuda, self.context, || {
+            // SAFETY: both have at least so many bytes.
+            let code = unsafe {
+                let copy = self.cuda.functions.copy_to_host;
+                copy(bytes.as_mut_ptr().cast(), address, size)
+            };
+            self.cuda.checked("cuMemcpyDtoH", code)
+        })
+    }
+
+    /// Gives back what CUDA made, when nothing uses it any more.
+    fn give_back(&mut self) -> Result<(), CudaError> {
+        let (cuda, functions) = (self.cuda, &self.cuda.functions);
+        if let Some(address) = self.address.take() {
+            if *self.is_known.get_mut() {
+                // Whoever imported it may have let go of it while their work was still queued.
+                // SAFETY: the context is the current one.
+                cuda.checked("cuCtxSynchronize", unsafe { (functions.synchronize)() })?;
+            }
+            // SAFETY: mapped by `import`, once, and nothing uses it.
+            cuda.checked("cuMemFree", unsafe { (functions.free)(address) })?;
+        }
+        if let Some((semaphore, _)) = self.semaphore.take() {
+            // SAFETY: imported by `import`, and nothing waits for it.
+            let code = unsafe { (functions.destroy_semaphore)(semaphore) };
+            cuda.checked("cuDestroyExternalSemaphore", code)?;
+        }
+        if let Some(memory) = self.memory.take() {
+            // SAFETY: imported by `import`, and nothing of it is mapped any more.
+            let code = unsafe { (functions.destroy_memory)(memory) };
+            cuda.checked("cuDestroyExternalMemory", code)?;
+        }
+        Ok(())
+    }
+}
+
+/// The default stream that all threads share.
+pub(crate) const DEFAULT_STREAM: usize = 1;
+
+/// Does work while a context is the thread's current one.
+fn in_context<T>(
+    cuda: &Cuda,
+    context: Context,
+    work: impl FnOnce() -> Result<T, CudaError>,
+) -> Result<T, CudaError> {
+    // SAFETY: a context that stays.
+    cuda.checked("cuCtxPushCurrent", unsafe {
+        (cuda.functions.push)(context)
+    })?;
+    let done = work();
+    let mut popped = null_mut();
+    // SAFETY: the context that was pushed is on top, for work pops what it pushes.
+    let code = unsafe { (cuda.functions.pop)(&raw mut popped) };
+    let popped = cuda.checked("cuCtxPopCurrent", code);
+    let done = done?;
+    popped.map(|()| done)
+}
+
+impl Drop for Mapping {
+    fn drop(&mut self) {
+        if self.check_process().is_err() {
+            return; // the driver is not there
+        }
+        // Streams wait for what a lost device was to write, and would be waited for in vain: then all of it stays.
+        if self.result.wait().is_err() {
+            return;
+        }
+        // After an error of the driver's nothing more of it can be given back.
+        let _ = in_context(self.cuda, self.context, || self.give_back());
+    }
+}

@@ -1,0 +1,202 @@
+//! DLPack, the exchange of arrays between libraries: a capsule with a description of the memory, which its consumer
+//! takes over by renaming it.
+//!
+//! `unsafe`: structs of a C interface, which the other side deletes through a pointer.
+#![allow(unsafe_code)]
+
+use std::ffi::{CStr, c_void};
+use std::ptr::null_mut;
+use std::sync::Arc;
+
+use pyo3::ffi;
+use pyo3::prelude::*;
+use tumble::ComponentType;
+
+use crate::cuda::Mapping;
+
+/// `kDLCPU` and `kDLCUDA`.
+pub(crate) const CPU: i32 = 1;
+pub(crate) const CUDA: i32 = 2;
+
+/// The version of the newer form.
+const VERSION: Version = Version { major: 1, minor: 0 };
+
+/// `DLDevice`.
+#[repr(C)]
+struct Device {
+    kind: i32,
+    ordinal: i32,
+}
+
+/// `DLDataType`.
+#[repr(C)]
+struct DataType {
+    code: u8,
+    bits: u8,
+    lanes: u16,
+}
+
+impl DataType {
+    fn of(component: ComponentType) -> Self {
+        let (code, bits) = match component {
+            ComponentType::F32 => (2, 32),
+            ComponentType::F16 => (2, 16),
+            ComponentType::Snorm16 => (0, 16),
+        };
+        Self {
+            code,
+            bits,
+            lanes: 1,
+        }
+    }
+}
+
+/// `DLTensor`.
+#[repr(C)]
+struct Tensor {
+    data: *mut c_void,
+    device: Device,
+    axes: i32,
+    kind: DataType,
+    shape: *mut i64,
+    strides: *mut i64,
+    offset: u64,
+}
+
+/// `DLPackVersion`.
+#[repr(C)]
+struct Version {
+    major: u32,
+    minor: u32,
+}
+
+/// What the pointers of a tensor point to.
+struct Kept {
+    shape: Box<[i64]>,
+    strides: Box<[i64]>,
+    _mapping: Arc<Mapping>,
+}
+
+/// `DLManagedTensor`, and behind it what is ours.
+#[repr(C)]
+struct Managed {
+    tensor: Tensor,
+    context: *mut c_void,
+    delete: Option<unsafe extern "C" fn(*mut Managed)>,
+    kept: Kept,
+}
+
+/// `DLManagedTensorVersioned`, and behind it what is ours.
+#[repr(C)]
+struct ManagedVersioned {
+    version: Version,
+    context: *mut c_void,
+    delete: Option<unsafe extern "C" fn(*mut ManagedVersioned)>,
+    flags: u64,
+    tensor: Tensor,
+    kept: Kept,
+}
+
+const _: () = {
+    assert!(size_of::<Tensor>() == 48);
+    assert!(std::mem::offset_of!(Managed, kept) == 64);
+    assert!(std::mem::offset_of!(ManagedVersioned, tensor) == 32);
+};
+
+/// Deletes what a capsule or its consumer has.
+///
+/// # Safety
+/// The pointer is that of a box of this type, which nobody uses any more.
+unsafe extern "C" fn delete<T>(managed: *mut T) {
+    if !managed.is_null() {
+        // SAFETY: promised by the caller.
+        drop(unsafe { Box::from_raw(managed) });
+    }
+}
+
+/// The names of a capsule that nobody has consumed.
+const NAME: &CStr = c"dltensor";
+const NAME_VERSIONED: &CStr = c"dltensor_versioned";
+
+/// The destructor of a capsule. A consumer has renamed it, and deletes the tensor itself.
+///
+/// # Safety
+/// Called by Python with a capsule that `capsule` made.
+unsafe extern "C" fn destroy(capsule: *mut ffi::PyObject) {
+    // SAFETY: promised by the caller; a pointer under one of the names is to a box of that name's type.
+    unsafe {
+        if ffi::PyCapsule_IsValid(capsule, NAME.as_ptr()) == 1 {
+            delete::<Managed>(ffi::PyCapsule_GetPointer(capsule, NAME.as_ptr()).cast());
+        } else if ffi::PyCapsule_IsValid(capsule, NAME_VERSIONED.as_ptr()) == 1 {
+            let managed = ffi::PyCapsule_GetPointer(capsule, NAME_VERSIONED.as_ptr());
+            delete::<ManagedVersioned>(managed.cast());
+        }
+    }
+}
+
+/// A capsule of an array on a card, in C order, in the form with a version or the older one. The memory lives for as
+/// long as the capsule or its consumer has it.
+pub(crate) fn capsule<'py>(
+    py: Python<'py>,
+    mapping: &Arc<Mapping>,
+    shape: &[usize],
+    component: ComponentType,
+    is_versioned: bool,
+) -> PyResult<Bound<'py, PyAny>> {
+    let mut strides = vec![1; shape.len()];
+    for axis in (1..shape.len()).rev() {
+        strides[axis - 1] = strides[axis] * shape[axis].max(1) as i64;
+    }
+    let mut kept = Kept {
+        shape: shape.iter().map(|&length| length as i64).collect(),
+        strides: strides.into_boxed_slice(),
+        _mapping: Arc::clone(mapping),
+    };
+    let tensor = Tensor {
+        data: std::ptr::with_exposed_provenance_mut(mapping.address() as usize),
+        device: Device {
+            kind: CUDA,
+            ordinal: mapping.ordinal,
+        },
+        axes: shape.len() as i32,
+        kind: DataType::of(component),
+        shape: kept.shape.as_mut_ptr(),
+        strides: kept.strides.as_mut_ptr(),
+        offset: 0,
+    };
+    let (managed, name): (*mut c_void, _) = match is_versioned {
+        true => {
+            let managed = Box::new(ManagedVersioned {
+                version: VERSION,
+                context: null_mut(),
+                delete: Some(delete),
+                flags: 0,
+                tensor,
+                kept,
+            });
+            (Box::into_raw(managed).cast(), NAME_VERSIONED)
+        }
+        false => {
+            let managed = Box::new(Managed {
+                tensor,
+                context: null_mut(),
+                delete: Some(delete),
+                kept,
+            });
+            (Box::into_raw(managed).cast(), NAME)
+        }
+    };
+    // SAFETY: the pointer is not null, the name stays, and the destructor is that of what the pointer is to.
+    let capsule = unsafe { ffi::PyCapsule_New(managed, name.as_ptr(), Some(destroy)) };
+    if capsule.is_null() {
+        // SAFETY: the box was made just now, and is nobody's.
+        unsafe {
+            match is_versioned {
+                true => delete::<ManagedVersioned>(managed.cast()),
+                false => delete::<Managed>(managed.cast()),
+            }
+        }
+    }
+    // SAFETY: a new reference, or null with an exception set.
+    unsafe { Bound::from_owned_ptr_or_err(py, capsule) }
+}

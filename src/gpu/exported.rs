@@ -1,0 +1,258 @@
+//! Results in a device's memory that others import: CUDA, or another Vulkan device, without a copy.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex};
+
+use ash::vk;
+
+use crate::gpu::buffer::Buffer;
+#[cfg(unix)]
+use crate::gpu::buffer::FILE;
+use crate::gpu::device::LogicalDevice;
+use crate::gpu::engine::lock;
+use crate::gpu::error::{Named, VulkanError};
+use crate::gpu::physical::PhysicalDevice;
+use crate::gpu::read_back::Semaphore;
+use crate::gpu::submission::Point;
+
+/// The handle type of exported semaphores: a file of the driver's own.
+const SEMAPHORE_FILE: vk::ExternalSemaphoreHandleTypeFlags =
+    vk::ExternalSemaphoreHandleTypeFlags::OPAQUE_FD;
+
+/// How long a result is waited for: no window takes longer than a fence is waited for.
+const TIMEOUT_SECONDS: u64 = 60;
+
+/// Whether a device can export timeline semaphores as files.
+pub(crate) fn timelines_may_be_exported(physical: &PhysicalDevice) -> bool {
+    let mut kind =
+        vk::SemaphoreTypeCreateInfo::default().semaphore_type(vk::SemaphoreType::TIMELINE);
+    let info = vk::PhysicalDeviceExternalSemaphoreInfo::default()
+        .handle_type(SEMAPHORE_FILE)
+        .push_next(&mut kind);
+    let mut found = vk::ExternalSemaphoreProperties::default();
+    let instance = &physical.instance.raw;
+    // SAFETY: Vulkan 1.2, which knows the structure that is chained, and a device of the instance.
+    unsafe {
+        instance.get_physical_device_external_semaphore_properties(physical.raw, &info, &mut found);
+    }
+    let features = found.external_semaphore_features;
+    features.contains(vk::ExternalSemaphoreFeatureFlags::EXPORTABLE)
+}
+
+/// The memory of a result, and what the device reaches when it has written it.
+pub(crate) struct Exported {
+    // It goes first: nobody waits for it any more when the buffer is freed.
+    done: Option<Mutex<Semaphore>>,
+    /// The value that the last submitted work reaches.
+    submitted: AtomicU64,
+    pub(crate) buffer: Buffer,
+}
+
+impl Exported {
+    pub(crate) fn new(device: &Arc<LogicalDevice>, bytes: u64) -> Result<Self, VulkanError> {
+        if device.exports.is_none() {
+            let lacks = match (device.owned, device.physical.memory_files) {
+                (false, _) => "it is an application's own, whose buffers are that application's",
+                (true, false) => "it lacks the extension VK_KHR_external_memory_fd",
+                (true, true) => "it exports no memory of storage buffers (OPAQUE_FD)",
+            };
+            let device = device.physical.info.name.clone();
+            return Err(VulkanError::NoExport { device, lacks });
+        }
+        let exports_timelines = device.exports_timelines.is_some();
+        let done = exports_timelines.then(|| Semaphore::exportable(device));
+        Ok(Self {
+            done: done.transpose()?.map(Mutex::new),
+            submitted: AtomicU64::new(0),
+            buffer: Buffer::exportable(device, "tumble exported", bytes)?,
+        })
+    }
+
+    /// Whether others can wait for the device to write it.
+    pub(crate) fn has_timeline(&self) -> bool {
+        self.done.is_some()
+    }
+
+    /// The point that the next submission reaches.
+    pub(crate) fn next_point(&self) -> Option<Point> {
+        self.done.as_ref().map(|done| lock(done).advance())
+    }
+
+    /// Says that the work which reaches a point was submitted.
+    pub(crate) fn has_submitted(&self, point: Option<Point>) {
+        if let Some((_, value)) = point {
+            self.submitted.store(value, Ordering::Release);
+        }
+    }
+
+    /// The point at which all of it is written.
+    fn last_point(&self) -> Option<Point> {
+        let done = lock(self.done.as_ref()?);
+        Some((done.raw, self.submitted.load(Ordering::Acquire)))
+    }
+
+    /// Waits until all of it is written.
+    fn wait(&self) -> Result<(), VulkanError> {
+        let device = &self.buffer.device;
+        device.check_process()?;
+        let Some((semaphore, value)) = self.last_point() else {
+            return Ok(());
+        };
+        let (semaphores, values) = ([semaphore], [value]);
+        let info = vk::SemaphoreWaitInfo::default()
+            .semaphores(&semaphores)
+            .values(&values);
+        // A device that has hung is not waited for again.
+        let seconds = TIMEOUT_SECONDS * u64::from(device.may_destroy());
+        // SAFETY: a timeline semaphore of this device, which has Vulkan 1.2.
+        match unsafe { device.raw.wait_semaphores(&info, seconds * 1_000_000_000) } {
+            Err(vk::Result::TIMEOUT) => {
+                device.mark_hung();
+                Err(VulkanError::Timeout {
+                    seconds: TIMEOUT_SECONDS,
+                })
+            }
+            waited => waited.named("vkWaitSemaphores"),
+        }
+    }
+}
+
+impl Drop for Exported {
+    fn drop(&mut self) {
+        // Nobody else waits for the work before the memory is freed. That of a lost device has ended; after
+        // another error it may not have.
+        if let Err(error) = self.wait()
+            && !error.is_lost()
+        {
+            self.buffer.device.mark_hung();
+        }
+    }
+}
+
+/// A result in the memory of the device that evaluated it. Others on the same card, such as CUDA, import that
+/// memory as a file and use it without a copy; the memory lives for as long as this or an import of it does.
+///
+/// Where [`ExportedResult::timeline_file`] gives a semaphore, the device may still be writing: an importer lets its
+/// queue or stream wait for the semaphore, or the host waits ([`ExportedResult::wait`]). Where there is none, all is
+/// written.
+#[derive(Clone)]
+pub struct ExportedResult {
+    exported: Arc<Exported>,
+    bytes: u64,
+}
+
+impl ExportedResult {
+    pub(crate) fn new(exported: Arc<Exported>, bytes: u64) -> Self {
+        Self { exported, bytes }
+    }
+
+    /// Bytes of the result, from the start of the memory.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        self.bytes
+    }
+
+    /// Bytes of the memory, which belongs to one buffer alone (a dedicated allocation): what an importer has to be
+    /// told.
+    #[must_use]
+    pub fn memory_bytes(&self) -> u64 {
+        self.exported.buffer.memory().1
+    }
+
+    /// The device's UUID, by which another interface finds it, as in
+    /// [`DeviceInfo::uuid`](crate::gpu::reports::DeviceInfo::uuid).
+    #[must_use]
+    pub fn device_uuid(&self) -> &str {
+        &self.device().physical.info.uuid
+    }
+
+    /// The device's name.
+    #[must_use]
+    pub fn device_name(&self) -> &str {
+        &self.device().physical.info.name
+    }
+
+    fn device(&self) -> &LogicalDevice {
+        &self.exported.buffer.device
+    }
+
+    /// A new file of the memory (`VK_EXTERNAL_MEMORY_HANDLE_TYPE_OPAQUE_FD_BIT`), for one import.
+    ///
+    /// # Errors
+    /// When the device refuses, or the process was forked from that which opened the device.
+    #[cfg(unix)]
+    pub fn memory_file(&self) -> Result<std::os::fd::OwnedFd, VulkanError> {
+        let device = self.device();
+        device.check_process()?;
+        let Some(exports) = &device.exports else {
+            return Err(VulkanError::NoExport {
+                device: self.device_name().to_owned(),
+                lacks: "it lacks the extension VK_KHR_external_memory_fd",
+            });
+        };
+        let info = vk::MemoryGetFdInfoKHR::default()
+            .memory(self.exported.buffer.memory().0)
+            .handle_type(FILE);
+        // SAFETY: memory of this device, allocated to be exported so.
+        let file = unsafe { exports.get_memory_fd(&info) }.named("vkGetMemoryFdKHR")?;
+        // SAFETY: the file was made just now, for the caller, who closes it.
+        Ok(unsafe { std::os::fd::FromRawFd::from_raw_fd(file) })
+    }
+
+    /// A new file of the timeline semaphore (`VK_EXTERNAL_SEMAPHORE_HANDLE_TYPE_OPAQUE_FD_BIT`), for one import, and
+    /// the value that it reaches when the result is written; `None` where the device exports none, and has written
+    /// the result already.
+    ///
+    /// # Errors
+    /// As [`ExportedResult::memory_file`].
+    #[cfg(unix)]
+    pub fn timeline_file(&self) -> Result<Option<(std::os::fd::OwnedFd, u64)>, VulkanError> {
+        let device = self.device();
+        device.check_process()?;
+        let (Some(exports), Some((semaphore, value))) =
+            (&device.exports_timelines, self.exported.last_point())
+        else {
+            return Ok(None);
+        };
+        let info = vk::SemaphoreGetFdInfoKHR::default()
+            .semaphore(semaphore)
+            .handle_type(SEMAPHORE_FILE);
+        // SAFETY: a semaphore of this device, made to be exported so.
+        let file = unsafe { exports.get_semaphore_fd(&info) }.named("vkGetSemaphoreFdKHR")?;
+        // SAFETY: the file was made just now, for the caller, who closes it.
+        let file = unsafe { std::os::fd::FromRawFd::from_raw_fd(file) };
+        Ok(Some((file, value)))
+    }
+
+    /// Whether the device has written all of it, as far as a look tells.
+    ///
+    /// # Errors
+    /// When the device was lost, or the process was forked from that which opened it.
+    pub fn is_written(&self) -> Result<bool, VulkanError> {
+        let device = self.device();
+        device.check_process()?;
+        let Some((semaphore, value)) = self.exported.last_point() else {
+            return Ok(true);
+        };
+        // SAFETY: a timeline semaphore of this device, which has Vulkan 1.2.
+        let reached = unsafe { device.raw.get_semaphore_counter_value(semaphore) };
+        Ok(reached.named("vkGetSemaphoreCounterValue")? >= value)
+    }
+
+    /// Waits until the device has written all of it.
+    ///
+    /// # Errors
+    /// When the device was lost or did not finish in time, or the process was forked from that which opened it.
+    pub fn wait(&self) -> Result<(), VulkanError> {
+        self.exported.wait()
+    }
+}
+
+impl std::fmt::Debug for ExportedResult {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("ExportedResult")
+            .field("device", &self.device_name())
+            .field("bytes", &self.bytes)
+            .finish_non_exhaustive()
+    }
+}

@@ -1,0 +1,90 @@
+//! Several vectors that are worked on together. A long chain of operations waits for each of its results; here
+//! those of the other vectors follow each in the program, so that a processor need not look far ahead for them.
+
+use std::ops::{Add, Mul, Neg, Sub};
+
+use crate::simd::lanes::{Lanes, Number};
+
+/// Vectors side by side: every operation is one of each.
+#[derive(Clone, Copy)]
+pub(crate) struct Together<L, const VECTORS: usize>(pub(crate) [L; VECTORS]);
+
+/// Functions of which each vector is given to the one of the same name. Written out, without closures: their
+/// bodies would not be compiled for the vector width.
+macro_rules! of_each {
+    ($($of:ident $name:ident($($other:ident),*; $($value:ident: $type:ty),*);)+) => {
+        $(of_each!(@$of $name, ($($other),*), ($($value: $type),*));)+
+    };
+    (@function $name:ident, ($($other:ident),*), ($($value:ident: $type:ty),*)) => {
+        #[inline(always)]
+        fn $name(mut self $(, $value: $type)*) -> Self {
+            for v in 0..VECTORS {
+                self.0[v] = self.0[v].$name($($value),*);
+            }
+            self
+        }
+    };
+    (@operator $name:ident, ($other:ident), ()) => {
+        #[inline(always)]
+        fn $name(mut self, $other: Self) -> Self {
+            for v in 0..VECTORS {
+                self.0[v] = self.0[v].$name($other.0[v]);
+            }
+            self
+        }
+    };
+}
+
+impl<L: Lanes, const VECTORS: usize> Add for Together<L, VECTORS> {
+    type Output = Self;
+    of_each! { operator add(other;); }
+}
+
+impl<L: Lanes, const VECTORS: usize> Sub for Together<L, VECTORS> {
+    type Output = Self;
+    of_each! { operator sub(other;); }
+}
+
+impl<L: Lanes, const VECTORS: usize> Mul for Together<L, VECTORS> {
+    type Output = Self;
+    of_each! { operator mul(other;); }
+}
+
+impl<L: Lanes, const VECTORS: usize> Neg for Together<L, VECTORS> {
+    type Output = Self;
+    of_each! { function neg(;); }
+}
+
+impl<L: Lanes, const VECTORS: usize> Number for Together<L, VECTORS> {
+    #[inline(always)]
+    fn all(value: f32) -> Self {
+        Self([L::all(value); VECTORS])
+    }
+
+    of_each! {
+        function zero_below(; limit: f32);
+        function sign(;);
+        function guess(; seed: u32, shift: u32);
+    }
+}
+
+impl<L: Lanes, const VECTORS: usize> Together<L, VECTORS> {
+    /// `then` where a number is `value`, else `otherwise`.
+    #[inline(always)]
+    pub(crate) fn where_equal(self, value: f32, then: Self, mut otherwise: Self) -> Self {
+        for v in 0..VECTORS {
+            otherwise.0[v] = self.0[v].where_equal(value, then.0[v], otherwise.0[v]);
+        }
+        otherwise
+    }
+
+    /// Whether any number is at least `limit`.
+    #[inline(always)]
+    pub(crate) fn any_at_least(self, limit: f32) -> bool {
+        let mut most = self.0[0];
+        for v in 1..VECTORS {
+            most = most.larger(self.0[v]);
+        }
+        (-most).any_at_most(-limit)
+    }
+}

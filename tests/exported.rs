@@ -1,0 +1,115 @@
+//! Results in memory that a device exports: the bits of the CPU, whoever drops what first.
+
+use std::fs::File;
+use std::os::unix::fs::FileExt;
+
+use tumble::{
+    Device, Encoding, Engine, EngineOptions, Error, ExportedResult, Frames, Layout, VulkanError,
+    method,
+};
+
+use crate::support::{dense_set, hostile_set, vulkan_devices};
+
+/// What lies in the memory. Some drivers' file is the memory; lavapipe's begins with a header, whose
+/// second word says where the memory starts.
+fn bytes(result: &ExportedResult) -> Vec<u8> {
+    let file = File::from(result.memory_file().unwrap());
+    let mut word = [0; 8];
+    file.read_exact_at(&mut word, 8).unwrap();
+    let spare = file.metadata().unwrap().len() - result.memory_bytes();
+    let start = Some(u64::from_ne_bytes(word)).filter(|&start| start <= spare);
+    let start = start.unwrap_or(0);
+    let mut found = vec![0; usize::try_from(result.bytes()).unwrap()];
+    file.read_exact_at(&mut found, start).unwrap();
+    found
+}
+
+#[test]
+fn exported_results_have_the_bits_of_the_cpu() {
+    let cpu = Engine::new(Device::Cpu).unwrap();
+    let set = hostile_set(12, 9);
+    let many = Frames::fps(10_000).between(0.0, 25.0); // several windows
+    let mut exported = 0;
+    for device in vulkan_devices() {
+        let engine = Engine::new(device).unwrap();
+        for (frames, layout, encoding) in [
+            (Frames::fps(25), Layout::TrackMajor, Encoding::F32),
+            (Frames::fps(25), Layout::FrameMajor, Encoding::F16),
+            (many.clone(), Layout::TrackMajor, Encoding::F32),
+        ] {
+            let expected = cpu.upload(&set, method::BESSEL_OVERHAUSER).unwrap();
+            let expected = expected
+                .evaluate_encoded(&frames, layout, encoding)
+                .unwrap();
+            let clip = engine.upload(&set, method::BESSEL_OVERHAUSER).unwrap();
+            let found = match clip.evaluate_exported(&frames, layout, encoding) {
+                Err(Error::Vulkan(VulkanError::NoExport { .. })) => continue, // none of its memory can be
+                found => found.unwrap(),
+            };
+            exported += 1;
+            drop(clip); // while the device may still write
+            assert_eq!(found.bytes(), expected.len() as u64);
+            assert!(found.memory_bytes() >= found.bytes());
+            found.wait().unwrap();
+            assert!(found.is_written().unwrap());
+            let name = found.device_name();
+            assert!(
+                bytes(&found) == expected,
+                "{name}, {layout:?}, {encoding:?}"
+            );
+        }
+    }
+    assert!(exported > 0, "no device of this machine exports memory");
+}
+
+/// The memory outlives its clip, its engine and all handles of ours, and what is dropped at once was waited for.
+#[test]
+fn exported_memory_lives_as_long_as_somebody_has_it() {
+    let cpu = Engine::new(Device::Cpu).unwrap();
+    let (set, frames) = dense_set(8, 20_000, 0.1);
+    let expected = cpu.upload(&set, method::SLERP).unwrap();
+    let expected = expected.evaluate_encoded(&frames, Layout::TrackMajor, Encoding::F32);
+    let expected = expected.unwrap();
+    for device in vulkan_devices() {
+        let engine = Engine::new(device).unwrap();
+        let clip = engine.upload(&set, method::SLERP).unwrap();
+        let export = || clip.evaluate_exported(&frames, Layout::TrackMajor, Encoding::F32);
+        let Ok(first) = export() else { continue };
+        for _ in 0..8 {
+            drop(export().unwrap());
+        }
+        let last = export().unwrap();
+        let other = last.clone();
+        drop((clip, engine, last));
+        for result in [first, other] {
+            result.wait().unwrap();
+            assert!(bytes(&result) == expected);
+        }
+    }
+}
+
+#[test]
+fn what_cannot_be_exported_is_said() {
+    let set = hostile_set(3, 2);
+    let cpu = Engine::new(Device::Cpu).unwrap();
+    let clip = cpu.upload(&set, method::SLERP).unwrap();
+    let export =
+        |frames: &Frames, encoding| clip.evaluate_exported(frames, Layout::TrackMajor, encoding);
+    let found = export(&Frames::fps(10), Encoding::F32).unwrap_err();
+    assert!(matches!(found, Error::ExportOnCpu), "{found}");
+    for device in vulkan_devices() {
+        let options = EngineOptions::default();
+        let engine = Engine::with_options(device, &options).unwrap();
+        let clip = engine.upload(&set, method::SLERP).unwrap();
+        let layout = Layout::TrackMajor;
+        let found = clip.evaluate_exported(&Frames::at(vec![f64::NAN]), layout, Encoding::F32);
+        assert!(matches!(found, Err(Error::Frames(_))), "{found:?}");
+        if let Err(found) = clip.evaluate_exported(&Frames::fps(10), layout, Encoding::F32) {
+            let said = found.to_string();
+            assert!(
+                said.contains("cannot hand the memory of results to others"),
+                "{said}"
+            );
+        }
+    }
+}
