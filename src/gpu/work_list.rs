@@ -51,18 +51,26 @@ impl Work {
         }
         commands.barrier(Access::Kernel, Access::Copy);
         let bytes = encoding.bytes();
-        let mut encoded = [0; MOST_VALUE_BYTES];
-        for &(place, value) in &self.patches {
-            encoding.encode_all(&[value], &mut encoded[..bytes]);
-            let offset = start + (place * bytes) as u64;
-            commands.update(buffer, offset, &encoded[..bytes]);
+        let mut encoded = [0; PATCHED_BYTES];
+        // Neighbours go together.
+        let are_neighbours = |one: &Patch, next: &Patch| next.0 == one.0 + 1;
+        let most = PATCHED_BYTES / bytes;
+        let rows = self.patches.chunk_by(are_neighbours);
+        for patches in rows.flat_map(|row| row.chunks(most)) {
+            let own = &mut encoded[..patches.len() * bytes];
+            for ((_, value), into) in patches.iter().zip(own.chunks_exact_mut(bytes)) {
+                encoding.encode_all(&[*value], into);
+            }
+            let offset = start + (patches[0].0 * bytes) as u64;
+            commands.update(buffer, offset, own);
         }
         commands.barrier(Access::Copy, Access::Any);
     }
 }
 
-/// Bytes of a stored value, at most: those of a 3 × 4 matrix.
-const MOST_VALUE_BYTES: usize = 48;
+/// Bytes that are patched by one command, at most; it is a whole number of values of any encoding, and Vulkan allows
+/// 65 536.
+const PATCHED_BYTES: usize = 48 * 48;
 
 /// How much the device has to do for one group of a clip.
 pub(crate) struct GroupItems {

@@ -153,16 +153,27 @@ fn entry<S: Segment>(kernel: &'static str, is_listed: bool) -> Twin {
         let blocks: Vec<(u32, u32)> = (0..=last).map(|_| block()).collect();
         let places = turns.iter().map(|cell| cell.place as usize + 1).max();
         let mut stored = vec![None; places.unwrap_or(0)];
+        // The row of the item that was looked for last, and its place.
+        let mut last: Option<(u32, usize)> = None;
         for cell in turns.iter().filter(|cell| cell.is_inside) {
-            let (first, starts) = blocks[cell.block as usize];
-            let within = cell.position % BLOCK_SAMPLES;
-            let begun = (0..=within).filter(|bit| (starts >> bit) & 1 == 1);
-            let item = first as usize + begun.count();
-            let (source, output, count, first, scale, offset) = items[item];
-            let j = cell.position.wrapping_sub(output);
-            if j >= count & !(IS_CONSTANT | MAY_BE_TINY) {
+            let has = |item: usize| {
+                let (_, output, count, ..) = items[item];
+                cell.position.wrapping_sub(output) < count & !(IS_CONSTANT | MAY_BE_TINY)
+            };
+            let (_, item) = *(last.insert(match last {
+                Some((row, item)) if row == cell.row && has(item) => (row, item),
+                _ => {
+                    let (first, starts) = blocks[cell.block as usize];
+                    let within = cell.position % BLOCK_SAMPLES;
+                    let begun = (0..=within).filter(|bit| (starts >> bit) & 1 == 1);
+                    (cell.row, first as usize + begun.count())
+                }
+            }));
+            if !has(item) {
                 continue;
             }
+            let (source, output, count, first, scale, offset) = items[item];
+            let j = cell.position.wrapping_sub(output);
             let source = source as usize;
             let distance = match is_listed {
                 true => listed[first as usize + j as usize],
