@@ -154,7 +154,7 @@ fn calls(engine: &Engine) -> Vec<Call> {
             let request = clip.request(&frames).layout(frame_major);
             let request = request.tracks(3..tracks).samples(5..samples(rate));
             let (count, each) = request.size().unwrap();
-            let mut output = vec![0; count * each];
+            let mut output = vec![0_u8; count * each];
             request.evaluate_into(&mut output).unwrap();
             sum(&output)
         }),

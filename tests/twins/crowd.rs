@@ -580,21 +580,22 @@ pub(super) fn matrices() -> Vec<Twin> {
             trial.expect(all);
         }),
         with_globals("crowd_walk_all", "main", |random, trial| {
-            const JOINTS: u32 = 30;
+            const JOINTS: u32 = 100;
             // An invocation alone: it copies rows, walks the links that are its own, and stores its rows; what
             // others would copy lies there before.
-            let all: Vec<[f32; 4]> = (0..2 * 3 * JOINTS).map(|_| random.vector()).collect();
+            let all: Vec<[f32; 4]> = (0..3 * 3 * JOINTS).map(|_| random.vector()).collect();
             let mut memory: Vec<[f32; 4]> = (0..384).map(|_| random.vector()).collect();
-            let (instance, lane) = (random.below(3), random.below(70) % 64);
+            let (group, lane) = ([random.below(2), random.below(2)], random.below(80) % 64);
+            let instance = 2 * group[1] + group[0];
             let links: Vec<[u32; 2]> = (1..JOINTS)
                 .map(|joint| [joint, random.below(joint)])
                 .collect();
-            let bounds = [[0, 20], [20, JOINTS - 1]];
-            trial.argument([0, instance, 0]);
-            trial.argument([1u32, 3, 1]);
+            let bounds = [[0, 80], [80, JOINTS - 1]];
+            trial.argument([group[0], group[1], 0]);
+            trial.argument([2u32, 2, 1]);
             trial.argument(lane);
             let dispatch = Dispatch {
-                count: 2,
+                count: 3,
                 joints: JOINTS,
                 layers: 2,
                 first_link: JOINTS - 1,
@@ -606,7 +607,7 @@ pub(super) fn matrices() -> Vec<Twin> {
             trial.global("matrices", all.clone());
             trial.output("matrices");
             let mut after = all;
-            if instance < 2 {
+            if instance < 3 {
                 let first = (instance * 3 * JOINTS) as usize;
                 let own = (lane..3 * JOINTS).step_by(64).map(|row| row as usize);
                 own.clone().for_each(|row| memory[row] = after[first + row]);
