@@ -209,7 +209,7 @@ impl<U: Default> InFlight<U> {
 
 impl<U> InFlight<U> {
     /// Waits for the work, if there is any, and does what is left to do then.
-    fn finish(
+    pub(crate) fn finish(
         &mut self,
         target: &mut Target<'_>,
         stopwatch: &mut Stopwatch,

@@ -274,18 +274,19 @@ impl VulkanEngine {
         if in_flight.is_empty() {
             in_flight.push(InFlight::new(&self.device)?);
         }
-        let kernels = &mut in_flight[0].results.kernels;
-        let done = self.submit_kept(kernels, job, kept, target);
-        let spent = done.and_then(|()| kernels.wait());
-        if spent.is_err() {
+        let (own, mut stopwatch) = (&mut in_flight[0], Stopwatch::default());
+        // Work on a result that is exported may still go on.
+        let mut finish = |own: &mut InFlight<WorkLists>| {
+            own.finish(&mut Target::External(*target), &mut stopwatch)
+        };
+        let result = finish(own)
+            .and_then(|()| self.submit_kept(&mut own.results.kernels, job, kept, target))
+            .and_then(|()| finish(own));
+        if result.is_err() {
             in_flight.clear(); // a fence or a recording may be half way
         }
-        if let Some(spent) = spent? {
-            let mut stopwatch = Stopwatch::default();
-            stopwatch.ran(spent, false);
-            *lock(&self.timings) += stopwatch.timings;
-        }
-        Ok(())
+        *lock(&self.timings) += stopwatch.timings;
+        Ok(result?)
     }
 
     fn submit_kept(

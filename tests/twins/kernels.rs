@@ -114,8 +114,9 @@ fn runs<S: Segment>(is_listed: bool) -> Twin {
     with_globals(kernel, "main", move |random, trial| {
         let scene = Scene::<S>::new(random, trial);
         let (output, stride, count) = (random.below(2), 1 + random.below(3), 1 + random.below(4));
+        let first_output = random.below(3);
         trial.samples(count);
-        scene.dispatch(trial, stride, 0, 0);
+        scene.dispatch(trial, stride, first_output, 0);
         let affine = Affine {
             scale: random.number() * 0.25,
             offset: random.parameter(),
@@ -146,7 +147,7 @@ fn runs<S: Segment>(is_listed: bool) -> Twin {
             }
             _ => frames::<Vec4, S>(segment, affine, first as f32, count as usize, &mut found),
         }
-        trial.expect(vec![[UNTOUCHED; 4]; output as usize]);
+        trial.expect(vec![[UNTOUCHED; 4]; (first_output + output) as usize]);
         for rotation in &found[..count as usize - 1] {
             trial.expect(*rotation);
             trial.expect(vec![[UNTOUCHED; 4]; stride as usize - 1]);

@@ -203,6 +203,9 @@ fallible! {
     vkResetFences(device, count, fences) asks;
     vkGetFenceStatus(device, fence) asks;
     vkWaitForFences(device, count, fences, all, timeout) wait;
+    vkWaitSemaphores(device, info, timeout) wait;
+    vkGetSemaphoreFdKHR(device, info, out) asks;
+    vkGetSemaphoreCounterValue(device, semaphore, out) asks;
     vkQueueWaitIdle(queue) wait;
     vkDeviceWaitIdle(device) wait;
     vkQueueSubmit(queue, count, infos, fence) asks;
