@@ -33,7 +33,7 @@ use crate::time::frames::{Frames, Timeline};
 /// # Ok::<(), tumble::Error>(())
 /// ```
 #[derive(Debug, Clone)]
-#[must_use = "a request does nothing until it is told where its result goes"]
+#[must_use = "a request does nothing until its result is sent somewhere"]
 pub struct Request<'a> {
     pub(crate) clip: &'a Clip,
     frames: &'a Frames,
@@ -45,7 +45,7 @@ pub struct Request<'a> {
 
 impl Clip {
     /// A request for the samples that `frames` means: of all tracks, track by track, as rotations of four
-    /// f32, until it is told otherwise.
+    /// f32, unless it says otherwise.
     pub fn request<'a>(&'a self, frames: &'a Frames) -> Request<'a> {
         Request {
             clip: self,
@@ -59,7 +59,7 @@ impl Clip {
 }
 
 impl Request<'_> {
-    /// The order of the result: `[track][sample]`, unless it is told otherwise.
+    /// The order of the result: `[track][sample]`, unless another is asked for.
     pub fn layout(mut self, layout: Layout) -> Self {
         self.layout = layout;
         self

@@ -13,8 +13,11 @@ fn read(fixture: &str, options: &ReadOptions) -> Loaded {
 
 /// The warnings of a code.
 fn said(loaded: &Loaded, code: Code) -> Vec<String> {
-    let all = loaded.warnings.iter().filter(|own| own.code == code);
-    all.map(|own| own.message.clone()).collect()
+    let all = loaded
+        .warnings
+        .iter()
+        .filter(|warning| warning.code == code);
+    all.map(|warning| warning.message.clone()).collect()
 }
 
 /// Catches a reader that passes over something without a word, or names something else.

@@ -54,14 +54,14 @@ impl ClipTarget {
         let sets = lists
             .windows
             .iter()
-            .map(|own| own.work.dispatched().count());
+            .map(|kept| kept.work.dispatched().count());
         pool.make_room(sets.sum::<usize>() as u32)?;
         let (mut pipelines, mut sets) = (Vec::new(), Vec::new());
         let result = Binding::range(buffer.buffer, bound, range);
-        for own in &lists.windows {
-            let pipeline = engine.pipeline(job.kernel(own.work.list))?;
-            let listed = own.bindings();
-            for group in own.work.dispatched() {
+        for kept in &lists.windows {
+            let pipeline = engine.pipeline(job.kernel(kept.work.list))?;
+            let listed = kept.bindings();
+            for group in kept.work.dispatched() {
                 sets.push(pool.set(&pipeline, &job.bindings(group, &listed, result))?);
             }
             pipelines.push(pipeline);
@@ -122,21 +122,21 @@ impl ClipTarget {
         let start = self.buffer.offset + offset;
         let shift = ((start - self.bound) / each) as u32;
         let mut sets = self.sets.iter();
-        for (own, pipeline) in self.lists.windows.iter().zip(&self.pipelines) {
-            let behind = shift + own.window.start as u32;
+        for (kept, pipeline) in self.lists.windows.iter().zip(&self.pipelines) {
+            let behind = shift + kept.window.start as u32;
             let like = [
-                own.window.stride() as u32,
+                kept.window.stride() as u32,
                 self.encoding.row().detail,
                 behind,
             ];
-            for (group, &set) in own.work.dispatched().zip(&mut sets) {
-                let (arguments, groups) = self.engine.dispatch_of(&own.work, group, like);
+            for (group, &set) in kept.work.dispatched().zip(&mut sets) {
+                let (arguments, groups) = self.engine.dispatch_of(&kept.work, group, like);
                 commands.dispatch(pipeline, set, arguments.bytes(), groups);
             }
         }
-        for own in &self.lists.windows {
-            let start = start + own.window.start as u64 * each;
-            (own.work).patch(commands, self.buffer.buffer, start, self.encoding);
+        for kept in &self.lists.windows {
+            let start = start + kept.window.start as u64 * each;
+            (kept.work).patch(commands, self.buffer.buffer, start, self.encoding);
         }
         commands.barrier(Access::Kernel, Access::Any);
         Ok(())

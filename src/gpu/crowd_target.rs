@@ -153,14 +153,14 @@ impl CrowdTarget {
                 Kernel::CrowdHalf => joints * self.output.vectors() as u32,
                 Kernel::CrowdWalkAll => {
                     let levels = self.crowd.tables.levels.len() - 1;
-                    let own = CrowdDispatch {
+                    let walk = CrowdDispatch {
                         count: instances,
                         layers: levels as u32,
                         first_link: self.crowd.tables.levels[levels],
                         ..arguments
                     };
                     let groups = self.crowd.engine.workgroups(instances * WORKGROUP);
-                    commands.dispatch(pipeline, set, bytemuck::bytes_of(&own), groups);
+                    commands.dispatch(pipeline, set, bytemuck::bytes_of(&walk), groups);
                     commands.barrier(Access::Kernel, Access::Kernel);
                     continue;
                 }

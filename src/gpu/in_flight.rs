@@ -146,16 +146,16 @@ impl VulkanEngine {
     ) -> Result<(), EvaluateError> {
         let mut in_flight = kept.take();
         let mut stopwatch = Stopwatch::default();
-        let mut ended = in_flight.iter_mut().filter(|own| own.kept.is_some());
-        let finished = ended.try_for_each(|own| match own.results.is_done()? {
-            true => own.finish(target, &mut stopwatch),
+        let mut ended = in_flight.iter_mut().filter(|flight| flight.kept.is_some());
+        let finished = ended.try_for_each(|flight| match flight.results.is_done()? {
+            true => flight.finish(target, &mut stopwatch),
             false => Ok(()),
         });
         if let Err(error) = finished {
             in_flight.clear(); // as below
             return Err(error.into());
         }
-        let is_free = |own: &InFlight<U>| own.kept.is_none();
+        let is_free = |flight: &InFlight<U>| flight.kept.is_none();
         let beside = in_flight.len() % self.in_flight_count;
         let mut next = in_flight.iter().position(is_free).unwrap_or(beside);
         let mut result = work.try_for_each(|work| {

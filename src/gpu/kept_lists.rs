@@ -59,7 +59,7 @@ impl KeptLists {
         let uploads = || {
             windows
                 .iter()
-                .flat_map(|own| own.lists.uploads(own.work.list))
+                .flat_map(|kept| kept.lists.uploads(kept.work.list))
         };
         if uploads().any(Upload::is_copied) {
             let mut submission = Submission::new(device, Lane::Kernels)?;
@@ -79,17 +79,19 @@ impl KeptLists {
 
     /// The lists of a window of the result, where the result was cut as it is now.
     pub(crate) fn of(&self, window: &Window) -> Option<&KeptWindow> {
-        let start = |own: &KeptWindow| own.window.start;
+        let start = |kept: &KeptWindow| kept.window.start;
         let place = self
             .windows
-            .partition_point(|own| start(own) < window.start);
-        self.windows.get(place).filter(|own| own.window == *window)
+            .partition_point(|kept| start(kept) < window.start);
+        self.windows
+            .get(place)
+            .filter(|kept| kept.window == *window)
     }
 
     /// Bytes of the device's memory.
     fn bytes(&self) -> u64 {
         let windows = self.windows.iter();
-        let uploads = windows.flat_map(|own| own.lists.uploads(own.work.list));
+        let uploads = windows.flat_map(|kept| kept.lists.uploads(kept.work.list));
         uploads.map(Upload::bytes).sum()
     }
 }
@@ -136,7 +138,7 @@ impl ListCache {
             let mut kept = lock(&self.0);
             // Those of a device that was lost are of no use.
             (kept.lists).retain(|(_, lists)| Arc::ptr_eq(&lists.device, &engine.device));
-            if let Some(place) = kept.lists.iter().position(|(own, _)| *own == asked) {
+            if let Some(place) = kept.lists.iter().position(|(known, _)| *known == asked) {
                 kept.lists[..=place].rotate_right(1);
                 return Ok(Some(Arc::clone(&kept.lists[0].1)));
             }

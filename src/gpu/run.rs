@@ -97,13 +97,13 @@ impl VulkanEngine {
             &self.in_flight,
             &mut target,
             windows,
-            |own, target, window| self.start(own, job, kept, &window, target),
+            |flight, target, window| self.start(flight, job, kept, &window, target),
         )
     }
 
     fn start(
         &self,
-        own: &mut InFlight<WorkLists>,
+        flight: &mut InFlight<WorkLists>,
         job: Job<'_>,
         kept: Option<&KeptLists>,
         window: &Window,
@@ -123,12 +123,12 @@ impl VulkanEngine {
         let buffer = match place {
             Some((buffer, _)) => buffer,
             None if matches!(target, Target::Staged(_)) => {
-                (own.results.room_apart(&self.device, size)?).raw
+                (flight.results.room_apart(&self.device, size)?).raw
             }
-            None => (own.results.room(&self.device, size, staged)?).raw,
+            None => (flight.results.room(&self.device, size, staged)?).raw,
         };
         let rotations = Binding::range(buffer, aligned, size);
-        let kernels = &mut own.results.kernels;
+        let kernels = &mut flight.results.kernels;
         let (listed, fresh);
         let work = match kept.and_then(|kept| kept.of(window)) {
             Some(kept) => {
@@ -137,7 +137,7 @@ impl VulkanEngine {
                 &kept.work
             }
             None => {
-                let lists = &mut own.uploads;
+                let lists = &mut flight.uploads;
                 let list = || lists.list(self, clip, job.timeline, window);
                 fresh = on_threads(list)??;
                 kernels.begin(fresh.groups.len() as u32)?;
@@ -148,7 +148,7 @@ impl VulkanEngine {
             }
         };
         let pipeline = self.pipeline(job.kernel(work.list))?;
-        own.compiled = pipeline.has_run.swap(true, Ordering::Relaxed);
+        flight.compiled = pipeline.has_run.swap(true, Ordering::Relaxed);
         let stride = window.stride() as u32;
         for group in work.dispatched() {
             let bindings = job.bindings(group, &listed, rotations);
@@ -167,19 +167,19 @@ impl VulkanEngine {
             commands.barrier(Access::Kernel, Access::Any);
             let Target::Exported(result) = target else {
                 kernels.submit()?;
-                own.done = None;
+                flight.done = None;
                 return Ok(());
             };
             let written = Binding::range(external, start, window.len() as u64 * rotation);
             commands.release(written, self.device.family(Lane::Kernels));
-            own.kept = Some(Kept {
+            flight.kept = Some(Kept {
                 _segments: Arc::clone(job.buffers),
                 _pipeline: pipeline,
             });
             let point = result.next_point();
             kernels.submit_between(None, point)?;
             result.has_submitted(point);
-            own.done = None; // nothing is left for the host to do
+            flight.done = None; // nothing is left for the host to do
             return Ok(());
         }
         let apart = match target {
@@ -187,8 +187,8 @@ impl VulkanEngine {
             _ => None,
         };
         let size = place.is_none().then_some(size);
-        own.results.submit_to(size, apart)?;
-        own.done = Some(Finish {
+        flight.results.submit_to(size, apart)?;
+        flight.done = Some(Finish {
             output: bytes,
             encoding,
             patches: work.patches.clone(),
@@ -274,14 +274,14 @@ impl VulkanEngine {
         if in_flight.is_empty() {
             in_flight.push(InFlight::new(&self.device)?);
         }
-        let (own, mut stopwatch) = (&mut in_flight[0], Stopwatch::default());
+        let (flight, mut stopwatch) = (&mut in_flight[0], Stopwatch::default());
         // Work on a result that is exported may still go on.
-        let mut finish = |own: &mut InFlight<WorkLists>| {
-            own.finish(&mut Target::External(*target), &mut stopwatch)
+        let mut finish = |flight: &mut InFlight<WorkLists>| {
+            flight.finish(&mut Target::External(*target), &mut stopwatch)
         };
-        let result = finish(own)
-            .and_then(|()| self.submit_kept(&mut own.results.kernels, job, kept, target))
-            .and_then(|()| finish(own));
+        let result = finish(flight)
+            .and_then(|()| self.submit_kept(&mut flight.results.kernels, job, kept, target))
+            .and_then(|()| finish(flight));
         if result.is_err() {
             in_flight.clear(); // a fence or a recording may be half way
         }
@@ -296,29 +296,29 @@ impl VulkanEngine {
         kept: &KeptLists,
         target: &VulkanBuffer,
     ) -> Result<(), VulkanError> {
-        let sets = kept.windows.iter().map(|own| own.work.groups.len());
+        let sets = kept.windows.iter().map(|part| part.work.groups.len());
         kernels.begin(sets.sum::<usize>() as u32)?;
         let encoding = job.encoding;
         let rotation = encoding.bytes() as u64;
         let aligned = self.binding_before(target.offset, rotation);
         let shift = (target.offset - aligned) / rotation;
-        let end = (kept.windows.last()).map_or(0, |own| own.window.start + own.window.len());
+        let end = (kept.windows.last()).map_or(0, |part| part.window.start + part.window.len());
         let range = Binding::range(target.buffer, aligned, (end as u64 + shift) * rotation);
-        for own in &kept.windows {
-            let pipeline = self.pipeline(job.kernel(own.work.list))?;
-            let listed = own.bindings();
-            for group in own.work.dispatched() {
+        for part in &kept.windows {
+            let pipeline = self.pipeline(job.kernel(part.work.list))?;
+            let listed = part.bindings();
+            for group in part.work.dispatched() {
                 let bindings = job.bindings(group, &listed, range);
-                let shift = shift as u32 + own.window.start as u32;
-                let like = [own.window.stride() as u32, encoding.row().detail, shift];
-                let (arguments, groups) = self.dispatch_of(&own.work, group, like);
+                let shift = shift as u32 + part.window.start as u32;
+                let like = [part.window.stride() as u32, encoding.row().detail, shift];
+                let (arguments, groups) = self.dispatch_of(&part.work, group, like);
                 kernels.dispatch(&pipeline, &bindings, arguments.bytes(), groups)?;
             }
         }
         let commands = kernels.commands();
-        for own in &kept.windows {
-            let start = target.offset + own.window.start as u64 * rotation;
-            own.work.patch(commands, target.buffer, start, encoding);
+        for part in &kept.windows {
+            let start = target.offset + part.window.start as u64 * rotation;
+            part.work.patch(commands, target.buffer, start, encoding);
         }
         commands.barrier(Access::Kernel, Access::Any);
         kernels.submit()

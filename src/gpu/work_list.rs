@@ -57,12 +57,12 @@ impl Work {
         let most = PATCHED_BYTES / bytes;
         let rows = self.patches.chunk_by(are_neighbours);
         for patches in rows.flat_map(|row| row.chunks(most)) {
-            let own = &mut encoded[..patches.len() * bytes];
-            for ((_, value), into) in patches.iter().zip(own.chunks_exact_mut(bytes)) {
+            let values = &mut encoded[..patches.len() * bytes];
+            for ((_, value), into) in patches.iter().zip(values.chunks_exact_mut(bytes)) {
                 encoding.encode_all(&[*value], into);
             }
             let offset = start + (patches[0].0 * bytes) as u64;
-            commands.update(buffer, offset, own);
+            commands.update(buffer, offset, values);
         }
         commands.barrier(Access::Copy, Access::Any);
     }

@@ -609,8 +609,10 @@ pub(super) fn matrices() -> Vec<Twin> {
             let mut after = all;
             if instance < 3 {
                 let first = (instance * 3 * JOINTS) as usize;
-                let own = (lane..3 * JOINTS).step_by(64).map(|row| row as usize);
-                own.clone().for_each(|row| memory[row] = after[first + row]);
+                let copied = (lane..3 * JOINTS).step_by(64).map(|row| row as usize);
+                copied
+                    .clone()
+                    .for_each(|row| memory[row] = after[first + row]);
                 for [from, to] in bounds {
                     for link in (from + lane..to).step_by(64) {
                         let [joint, parent] = links[link as usize].map(|joint| 3 * joint as usize);
@@ -621,7 +623,7 @@ pub(super) fn matrices() -> Vec<Twin> {
                         memory[joint..joint + 3].copy_from_slice(&product);
                     }
                 }
-                own.for_each(|row| after[first + row] = memory[row]);
+                copied.for_each(|row| after[first + row] = memory[row]);
             }
             trial.expect(after);
         }),

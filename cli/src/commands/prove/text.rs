@@ -259,7 +259,10 @@ fn speed(proof: &Proof, text: &mut String) {
                 _ => "filling",
             },
             case.record_seconds
-                .map_or_else(String::new, |own| format!(", recorded in {}", time(own)))
+                .map_or_else(String::new, |seconds| format!(
+                    ", recorded in {}",
+                    time(seconds)
+                ))
         );
     }
 }
