@@ -27,14 +27,14 @@ fn main(
         // Where the level begins, and where it ends.
         let bounds = links[dispatch.first_link + level];
         for (var link = bounds.joint + lane; link < bounds.parent; link += CROWD_WORKGROUP) {
-            let above = links[link].parent * 3u;
-            let own = links[link].joint * 3u;
-            let first = rows[own];
-            let second = rows[own + 1u];
-            let third = rows[own + 2u];
-            rows[own] = row_product(rows[above], first, second, third);
-            rows[own + 1u] = row_product(rows[above + 1u], first, second, third);
-            rows[own + 2u] = row_product(rows[above + 2u], first, second, third);
+            let parent = links[link].parent * 3u;
+            let joint = links[link].joint * 3u;
+            let first = rows[joint];
+            let second = rows[joint + 1u];
+            let third = rows[joint + 2u];
+            rows[joint] = row_product(rows[parent], first, second, third);
+            rows[joint + 1u] = row_product(rows[parent + 1u], first, second, third);
+            rows[joint + 2u] = row_product(rows[parent + 2u], first, second, third);
         }
         workgroupBarrier();
     }
