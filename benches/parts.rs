@@ -8,8 +8,8 @@ use divan::Bencher;
 use divan::counter::ItemsCount;
 use glam::Quat;
 use tumble::{
-    CrowdLayer, CrowdLibrary, CrowdValues, Device, Encoding, Engine, EngineOptions, Frames, Layout,
-    METHODS, Skeleton, TrackSet, VectorMethod, method,
+    CrowdLayer, CrowdLibrary, CrowdValues, Device, Encoding, Engine, EngineOptions, Layout,
+    METHODS, SampleTimes, Skeleton, TrackSet, VectorMethod, method,
 };
 
 fn main() {
@@ -25,8 +25,8 @@ fn set(step: f32) -> TrackSet {
     let times: Vec<f64> = (0..KEYS).map(|i| i as f64 + 0.3 * (i % 3) as f64).collect();
     for track in 0..TRACKS {
         let key = |i: usize| {
-            let turn = step * (i as f32 + (i as f32 + track as f32).sin());
-            Quat::from_rotation_y(turn) * Quat::from_rotation_x(0.4 * turn.cos())
+            let angle = step * (i as f32 + (i as f32 + track as f32).sin());
+            Quat::from_rotation_y(angle) * Quat::from_rotation_x(0.4 * angle.cos())
         };
         let keys: Vec<Quat> = (0..KEYS).map(key).collect();
         set.push("", &times, &keys).expect("unit keys in order");
@@ -64,7 +64,7 @@ fn prepare_small_angle(bencher: Bencher<'_, '_>) {
 fn evaluate(bencher: Bencher<'_, '_>, method: &str) {
     let method = tumble::Method::named(method).expect("in the list");
     let clip = one_thread().upload(&set(1.0), method).expect("good keys");
-    let frames = Frames::fps(40);
+    let frames = SampleTimes::fps(40);
     let rotations = TRACKS * clip.timeline(&frames).expect("frames").len();
     let mut output = vec![Quat::IDENTITY; rotations];
     bencher
@@ -86,7 +86,7 @@ fn encode(bencher: Bencher<'_, '_>, encoding: Encoding) {
         });
 }
 
-/// A frame of a crowd, each character at its own time in a clip of arcs, per joint.
+/// A frame of a crowd, each character at a different time in a clip of arcs, per joint.
 #[divan::bench(args = [CrowdValues::Rotations, CrowdValues::Model])]
 fn crowd(bencher: Bencher<'_, '_>, values: CrowdValues) {
     frame_of_crowd(bencher, values, 1, false);

@@ -1,9 +1,9 @@
-//! A crowd on an application's own Vulkan device: `crowd [CHARACTERS] [PICTURE.svg]`.
+//! A crowd on an application's Vulkan device: `crowd [CHARACTERS] [PICTURE.svg]`.
 //!
 //! A renderer has its device, its queue and its command buffers. The crowd records the poses of every
 //! frame into these: a few bytes for each character that does something new, and nothing for the others.
 //! The matrices stay in the renderer's buffer. Two frames are in flight. At the end the bits are
-//! compared with the CPU's, the characters are drawn as a picture, and the times are told.
+//! compared with the CPU's, the characters are drawn as a picture, and the times are printed.
 #![allow(clippy::disallowed_methods)] // poses to look at
 #![allow(unsafe_code)] // Vulkan's handles are the application's to promise; an allocator that counts
 
@@ -74,8 +74,8 @@ fn clip(number: usize, joints: usize) -> Result<TrackSet, Box<dyn Error>> {
     for joint in 0..joints {
         let keys: Vec<Quat> = (0..KEYS)
             .map(|key| {
-                let turn = std::f32::consts::TAU * key as f32 / (KEYS - 1) as f32;
-                let phase = turn + joint as f32 * 0.37 + number as f32;
+                let angle = std::f32::consts::TAU * key as f32 / (KEYS - 1) as f32;
+                let phase = angle + joint as f32 * 0.37 + number as f32;
                 let size = 0.05 + 0.03 * number as f32;
                 let swing = Quat::from_rotation_x(size * phase.sin());
                 swing * Quat::from_rotation_z(size * phase.cos())
@@ -160,8 +160,9 @@ impl Renderer {
             let all = instance.enumerate_physical_devices()?;
             let physical_device = *all.first().ok_or("there is no Vulkan device")?;
             let families = instance.get_physical_device_queue_family_properties(physical_device);
-            let computes =
-                |own: &vk::QueueFamilyProperties| own.queue_flags.contains(vk::QueueFlags::COMPUTE);
+            let computes = |family: &vk::QueueFamilyProperties| {
+                family.queue_flags.contains(vk::QueueFlags::COMPUTE)
+            };
             let family = families
                 .iter()
                 .position(computes)
@@ -229,7 +230,7 @@ impl Renderer {
             let types = self
                 .instance
                 .get_physical_device_memory_properties(self.physical_device);
-            // The card's own memory, where the host sees it: the other is across the bus.
+            // The card's memory, where the host sees it: the other is across the bus.
             let local = required | vk::MemoryPropertyFlags::DEVICE_LOCAL;
             let with = |required| {
                 (0..types.memory_type_count).find(|&index| {
@@ -268,7 +269,7 @@ struct Slot {
 }
 
 /// What was found on the device.
-struct Found {
+struct DeviceRun {
     name: String,
     /// The result of the last frame.
     values: Vec<[f32; 4]>,
@@ -282,7 +283,7 @@ fn on_device(
     library: &CrowdLibrary,
     characters: usize,
     values: CrowdValues,
-) -> Result<Found, Box<dyn Error>> {
+) -> Result<DeviceRun, Box<dyn Error>> {
     let renderer = Renderer::new()?;
     let device = &renderer.device;
     let engine = renderer.engine()?;
@@ -314,13 +315,13 @@ fn on_device(
     }
     // Kernels are compiled here, while a level loads.
     let target = |slot: &Slot| -> Result<CrowdTarget, tumble::CrowdError> {
-        let place = VulkanBuffer {
+        let range = VulkanBuffer {
             buffer: slot.buffer,
             offset: 0,
             size,
         };
         // SAFETY: the buffer is the device's, has memory and this usage, and outlives the target.
-        unsafe { crowd.target(values, place) }
+        unsafe { crowd.target(values, range) }
     };
     let targets: Vec<CrowdTarget> = slots.iter().map(target).collect::<Result<_, _>>()?;
 
@@ -328,7 +329,7 @@ fn on_device(
     let began = Instant::now();
     for frame in 0..FRAMES {
         let (slot, target) = (&slots[frame % IN_FLIGHT], &targets[frame % IN_FLIGHT]);
-        // SAFETY: the slot's own work has ended before its commands are recorded anew; frames are
+        // SAFETY: the slot's work has ended before its commands are recorded anew; frames are
         // submitted in the order in which they are recorded, to the engine's queue, by this thread.
         unsafe {
             device.wait_for_fences(&[slot.fence], true, u64::MAX)?;
@@ -344,8 +345,8 @@ fn on_device(
             allocations += ALLOCATIONS.get() - before;
             // Here a renderer draws from `slot.buffer`.
             device.end_command_buffer(slot.commands)?;
-            let own = [slot.commands];
-            let submit = [vk::SubmitInfo::default().command_buffers(&own)];
+            let recorded = [slot.commands];
+            let submit = [vk::SubmitInfo::default().command_buffers(&recorded)];
             device.queue_submit(renderer.queue, &submit, slot.fence)?;
         }
     }
@@ -355,7 +356,7 @@ fn on_device(
     let found = renderer.read(slots[(FRAMES - 1) % IN_FLIGHT].memory, rows)?;
     let name = engine.device_name().to_owned();
     drop((targets, crowd, engine));
-    // SAFETY: the engine is gone, and nothing is in flight.
+    // SAFETY: the engine is dropped, and nothing is in flight.
     unsafe {
         for slot in slots {
             device.destroy_fence(slot.fence, None);
@@ -366,7 +367,7 @@ fn on_device(
         device.destroy_device(None);
         renderer.instance.destroy_instance(None);
     }
-    Ok(Found {
+    Ok(DeviceRun {
         name,
         values: found,
         host: host / (FRAMES - 1) as u32,
@@ -411,11 +412,11 @@ fn picture(skeleton: &Skeleton, matrices: &[[f32; 4]]) -> Result<String, std::fm
         COLUMNS as f32 * CELL,
         rows as f32 * CELL * 2.0,
     )?;
-    for (place, own) in shown.iter().enumerate() {
-        let middle = ((place % COLUMNS) as f32 + 0.5) * CELL;
-        let floor = ((place / COLUMNS) as f32 + 1.1) * CELL * 2.0 - CELL;
+    for (i, pose) in shown.iter().enumerate() {
+        let middle = ((i % COLUMNS) as f32 + 0.5) * CELL;
+        let floor = ((i / COLUMNS) as f32 + 1.1) * CELL * 2.0 - CELL;
         let at = |joint: usize| {
-            let [x, y, _] = own[joint];
+            let [x, y, _] = pose[joint];
             (middle + x[3] * CELL * 0.6, floor - y[3] * CELL * 0.9)
         };
         for joint in 1..joints {
@@ -438,7 +439,9 @@ fn picture(skeleton: &Skeleton, matrices: &[[f32; 4]]) -> Result<String, std::fm
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = std::env::args().skip(1);
-    let characters = arguments.next().map_or(Ok(1000), |given| given.parse())?;
+    let characters = arguments
+        .next()
+        .map_or(Ok(1000), |argument| argument.parse())?;
     let library = library()?;
     let joints = library.joints();
     println!("{characters} characters of {joints} joints, {CLIPS} clips, slerp; a frame takes");

@@ -3,17 +3,17 @@
 //!
 //! `cargo run --release --example same_bits`
 
-use tumble::{Device, Engine, Frames, METHODS};
-use tumble_formats::generate::{Generate, Steps};
+use tumble::{Device, Engine, METHODS, SampleTimes};
+use tumble_formats::generate::{Generate, KeySpacing};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let set = Generate {
         boxes: 1000,
-        steps: Steps::Random,
+        spacing: KeySpacing::Random,
         ..Generate::default()
     }
     .track_set()?;
-    let frames = Frames::fps(60);
+    let frames = SampleTimes::fps(60);
     let cpu = Engine::new(Device::Cpu)?;
     for device in Device::list()? {
         let vulkan = Engine::new(device)?;

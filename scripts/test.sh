@@ -123,12 +123,27 @@ fi
 
 # Three seconds for each fuzz target, a quarter for motion files; ten minutes each are FUZZ_SECONDS=600.
 export FUZZ_SECONDS=${FUZZ_SECONDS:-3}
-# The Python package waits for processes that it starts more than it computes: it is tested meanwhile.
-said=target/python.log
-./scripts/python.sh --color=yes >"$said" 2>&1 &
-python=$!
+# The Python package waits for processes that it starts more than it computes, and other tests for their last
+# one: two rows of tests beside the engine's keep both cores busy.
+beside=()
+start_beside() { # a file for what it says, a command
+    local said=$1
+    shift
+    "$@" >"$said" 2>&1 &
+    beside+=("$!:$said")
+}
+others() {
+    local failed=0
+    cargo test --workspace --no-fail-fast --test cost --test fuzz --test options || failed=$?
+    cargo test --workspace --no-fail-fast --doc || failed=$?
+    return $failed
+}
+start_beside target/others.log others
+start_beside target/python.log ./scripts/python.sh --color=yes
 failed=0
-cargo test --workspace --no-fail-fast || failed=$?
-wait "$python" || failed=$?
-cat "$said"
+cargo test --workspace --no-fail-fast --lib --bins --test all || failed=$?
+for one in "${beside[@]}"; do
+    wait "${one%%:*}" || failed=$?
+    cat "${one#*:}"
+done
 exit "$failed"

@@ -16,8 +16,8 @@ fn main(
     var item: Item;
     var segment: Segment;
     var row = 0u;
-    for (var turn = 0u; turn < SAMPLES_EACH; turn++) {
-        let cell = cell_of(corner, turn);
+    for (var iteration = 0u; iteration < SAMPLES_EACH; iteration++) {
+        let cell = cell_of(corner, iteration);
         if cell.is_inside & !((cell.row == row) & has(item, cell.position)) {
             item = item_at(item_of(cell));
             segment = segment_of(item);
@@ -37,7 +37,7 @@ fn main(
                 }
             }
         }
-        finish(lane, cell.place, rotation, is_stored);
+        finish(lane, cell.output, rotation, is_stored);
     }
 }
 

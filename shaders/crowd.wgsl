@@ -6,8 +6,8 @@ fn main(
     @builtin(global_invocation_id) invocation: vec3u,
     @builtin(num_workgroups) groups: vec3u,
 ) {
-    let place = invocation.y * (groups.x * CROWD_WORKGROUP) + invocation.x;
-    if place < dispatch.count {
-        crowd_work(place);
+    let index = invocation.y * (groups.x * CROWD_WORKGROUP) + invocation.x;
+    if index < dispatch.count {
+        crowd_work(index);
     }
 }

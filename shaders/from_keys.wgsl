@@ -37,7 +37,7 @@ const IS_KEY: u32 = 0x80000000;
 
 // Set in a key's x: sign continuation over the track turns the key's sign. The bit is free, for
 // it makes a float at least 2, and no component of a rotation is that large.
-const SIGN_TURNED: u32 = 0x40000000;
+const SIGN_NEGATED: u32 = 0x40000000;
 
 var<immediate> rows: RowShape;
 
@@ -45,11 +45,11 @@ var<immediate> rows: RowShape;
 fn main(@builtin(global_invocation_id) invocation: vec3u) {
     let row = invocation.y * rows.each;
     // What lies before the row wraps to a large number.
-    let own_sample = invocation.x - ((row * rows.samples) & rows.line);
-    if own_sample >= rows.samples {
+    let sample_index = invocation.x - ((row * rows.samples) & rows.line);
+    if sample_index >= rows.samples {
         return;
     }
-    let sample = sample_at(own_sample);
+    let sample = sample_at(sample_index);
     let is_key = (sample.key & IS_KEY) != 0u;
     let first = sample.key & ~IS_KEY;
     // A sample that is a key has that key as its neighbour: the last key has no next one.
@@ -60,26 +60,26 @@ fn main(@builtin(global_invocation_id) invocation: vec3u) {
     let keys = rows.keys;
     let samples = rows.samples;
     var key = row * keys + first;
-    var place = row * samples + own_sample;
+    var output_index = row * samples + sample_index;
     for (var j = 0u; j < count; j++) {
         let stored = key_at(key);
-        let own = canonical(rotation_between(key, continued(stored), key + next, all_rows));
-        store(place, select(own, as_given(stored), is_key));
+        let interpolated = canonical(rotation_between(key, continued(stored), key + next, all_rows));
+        store(output_index, select(interpolated, as_stored(stored), is_key));
         key += keys;
-        place += samples;
+        output_index += samples;
     }
 }
 
-// A key with the sign that it was given.
-fn as_given(stored: vec4u) -> vec4f {
-    return bitcast<vec4f>(vec4u(stored.x & ~SIGN_TURNED, stored.yzw));
+// A key with its stored sign.
+fn as_stored(stored: vec4u) -> vec4f {
+    return bitcast<vec4f>(vec4u(stored.x & ~SIGN_NEGATED, stored.yzw));
 }
 
 // A key with the sign that continues the keys before it.
 fn continued(stored: vec4u) -> vec4f {
-    let turned = stored.x & SIGN_TURNED;
-    let sign = turned << 1u;
-    return bitcast<vec4f>(stored ^ vec4u(turned | sign, vec3u(sign)));
+    let negation = stored.x & SIGN_NEGATED;
+    let sign = negation << 1u;
+    return bitcast<vec4f>(stored ^ vec4u(negation | sign, vec3u(sign)));
 }
 
 fn continued_key_at(key: u32) -> vec4f {

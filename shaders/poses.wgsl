@@ -18,8 +18,8 @@ fn main(
     @builtin(global_invocation_id) invocation: vec3u,
     @builtin(num_workgroups) groups: vec3u,
 ) {
-    let place = invocation.y * (groups.x * POSE_WORKGROUP) + invocation.x;
-    if place < dispatch.count {
-        pose(place);
+    let index = invocation.y * (groups.x * POSE_WORKGROUP) + invocation.x;
+    if index < dispatch.count {
+        pose(index);
     }
 }

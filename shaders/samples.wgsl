@@ -26,6 +26,6 @@ fn main(
     // both ways, and each way would need a store of its own.
     let constant = constant_at(select(0u, source, is_constant));
     let segment = segment_at(select(source, 0u, is_constant));
-    let own = canonical(evaluate(segment, sample.parameter));
-    store(dispatch.first_output + index, select(own, constant, is_constant));
+    let value = canonical(evaluate(segment, sample.parameter));
+    store(dispatch.first_output + index, select(value, constant, is_constant));
 }

@@ -38,7 +38,7 @@ fn main(@builtin(global_invocation_id) invocation: vec3u) {
     let b = probe.b;
     let c = probe.c;
     let low = probe.n & 0xfff;
-    let turn = sine_cosine(c);
+    let sines = sine_cosine(c);
     var reply: Reply;
     // A fused multiply-add would not round the product.
     reply.contraction = a * b + c;
@@ -48,8 +48,8 @@ fn main(@builtin(global_invocation_id) invocation: vec3u) {
     reply.association = (a * b) * c;
     reply.conversion = f32(probe.n - low) + f32(low);
     reply.cancellation = (a * c + b) - a * c;
-    reply.sine = turn.x;
-    reply.cosine = turn.y;
+    reply.sine = sines.x;
+    reply.cosine = sines.y;
     reply.root = root(a * a + c * c);
     reply.arc_tangent = arc_tangent(a, c);
     replies[index] = reply;

@@ -6,10 +6,10 @@ use std::sync::Arc;
 use glam::{Quat, Vec4};
 
 use crate::curve::options::Quantity;
-use crate::engine::{Engine, check_rows, in_quats};
+use crate::engine::{Engine, check_encoding, check_rows, in_quats};
 use crate::error::Error;
 #[cfg(feature = "vulkan")]
-use crate::evaluate::uploaded::Backend;
+use crate::evaluate::backend::Backend;
 use crate::evaluate::uploaded::Uploaded;
 #[cfg(feature = "vulkan")]
 use crate::gpu::engine::{Job, VulkanEngine};
@@ -24,9 +24,11 @@ use crate::memory::OutOfMemory;
 use crate::memory::zeroed;
 use crate::output::encoding::Encoding;
 use crate::output::rotations::{Layout, Rotations, Samples, Vectors};
-use crate::output::row::Row;
+use crate::output::value::OutputValue;
 use crate::output::window::Window;
-use crate::time::frames::{Frames, FramesError, Timeline};
+use crate::request::{Request, check_window};
+use crate::stream::{Chunk, run};
+use crate::time::frames::{SampleTimes, SampleTimesError, Timeline};
 
 /// A set prepared for one method, on its engine's device; evaluate it as often as
 /// needed, at any frames.
@@ -54,7 +56,7 @@ impl Clip {
     ///
     /// # Errors
     /// When they do not fit it.
-    pub fn timeline(&self, frames: &Frames) -> Result<Timeline, FramesError> {
+    pub fn timeline(&self, frames: &SampleTimes) -> Result<Timeline, SampleTimesError> {
         frames.resolve(self.track_count(), self.uploaded.data.time_span)
     }
 
@@ -63,7 +65,7 @@ impl Clip {
     /// # Errors
     /// When the frames do not fit the clip, the clip is of velocities or accelerations, there is not
     /// the memory for the result, or the device fails.
-    pub fn evaluate(&self, frames: &Frames) -> Result<Rotations, Error> {
+    pub fn evaluate(&self, frames: &SampleTimes) -> Result<Rotations, Error> {
         self.evaluate_as(frames, Layout::TrackMajor)
     }
 
@@ -71,7 +73,7 @@ impl Clip {
     ///
     /// # Errors
     /// As [`Clip::evaluate`].
-    pub fn evaluate_as(&self, frames: &Frames, layout: Layout) -> Result<Rotations, Error> {
+    pub fn evaluate_as(&self, frames: &SampleTimes, layout: Layout) -> Result<Rotations, Error> {
         check_rows::<Quat>(self.quantity())?;
         self.samples(frames, layout)
     }
@@ -81,7 +83,7 @@ impl Clip {
     ///
     /// # Errors
     /// As [`Clip::evaluate`]; also when the clip is of rotations.
-    pub fn rates(&self, frames: &Frames, layout: Layout) -> Result<Vectors, Error> {
+    pub fn rates(&self, frames: &SampleTimes, layout: Layout) -> Result<Vectors, Error> {
         check_rows::<Vec4>(self.quantity())?;
         self.samples(frames, layout)
     }
@@ -91,7 +93,11 @@ impl Clip {
     }
 
     /// The stored values, whatever they are.
-    pub(crate) fn samples<T>(&self, frames: &Frames, layout: Layout) -> Result<Samples<T>, Error> {
+    pub(crate) fn samples<T>(
+        &self,
+        frames: &SampleTimes,
+        layout: Layout,
+    ) -> Result<Samples<T>, Error> {
         let timeline = self.timeline(frames)?;
         let storage = (self.uploaded).evaluate(&timeline, layout)?;
         let (tracks, samples) = (self.track_count(), timeline.len());
@@ -99,14 +105,14 @@ impl Clip {
     }
 
     /// As [`Clip::evaluate_as`], or as [`Clip::rates`], into the caller's memory, of which
-    /// [`Engine::evaluate_into`] tells more.
+    /// [`Engine::evaluate_into`] says more.
     ///
     /// # Errors
     /// As [`Clip::evaluate`]; also when `output` is not exactly as long as the result, or of another
     /// type.
-    pub fn evaluate_into<R: Row>(
+    pub fn evaluate_into<R: OutputValue>(
         &self,
-        frames: &Frames,
+        frames: &SampleTimes,
         layout: Layout,
         output: &mut [R],
     ) -> Result<(), Error> {
@@ -128,8 +134,14 @@ impl Clip {
         encoding: Encoding,
         output: &mut [u8],
     ) -> Result<(), Error> {
-        encoding.check(self.quantity())?;
-        window.check(self.track_count(), timeline.len(), encoding, output)?;
+        check_encoding(encoding, self.quantity())?;
+        check_window(
+            &window,
+            self.track_count(),
+            timeline.len(),
+            encoding,
+            output,
+        )?;
         if output.is_empty() {
             return Ok(());
         }
@@ -145,7 +157,7 @@ impl Clip {
     /// has none, or the device fails.
     pub fn evaluate_encoded(
         &self,
-        frames: &Frames,
+        frames: &SampleTimes,
         layout: Layout,
         encoding: Encoding,
     ) -> Result<Vec<u8>, Error> {
@@ -166,14 +178,14 @@ impl Clip {
     #[cfg(feature = "vulkan")]
     pub fn evaluate_exported(
         &self,
-        frames: &Frames,
+        frames: &SampleTimes,
         layout: Layout,
         encoding: Encoding,
     ) -> Result<ExportedResult, Error> {
         let Backend::Vulkan(opened) = &*self.engine().backend else {
             return Err(Error::ExportOnCpu);
         };
-        encoding.check(self.quantity())?;
+        check_encoding(encoding, self.quantity())?;
         let timeline = self.timeline(frames)?;
         let timeline = self.uploaded.folded(&timeline)?;
         let values = (self.track_count() as u64).saturating_mul(timeline.len() as u64);
@@ -197,6 +209,51 @@ impl Clip {
         };
         Ok((self.uploaded).on_device(opened, &timeline, encoding, export)?)
     }
+
+    /// A request for the samples that `frames` means: of all tracks, track by track, as rotations of four
+    /// f32, unless it says otherwise.
+    pub fn request<'a>(&'a self, frames: &'a SampleTimes) -> Request<'a> {
+        Request::new(self, frames)
+    }
+
+    /// Evaluates in chunks of about `chunk` rotations (at least one row of the layout
+    /// is best); `sink` uses one while others are evaluated. The rotations are those
+    /// of [`Clip::evaluate_as`]; memory is that of three chunks.
+    ///
+    /// ```
+    /// # use glam::{Quat, Vec4};
+    /// # use tumble::{Device, Engine, Error, SampleTimes, Layout, TrackSet, method};
+    /// # let mut set = TrackSet::new();
+    /// # set.push("", &[0.0, 1.0], &[Quat::IDENTITY, Quat::from_rotation_x(1.0)]).unwrap();
+    /// # let clip = Engine::new(Device::Cpu)?.upload(&set, method::SLERP)?;
+    /// let mut largest: f32 = 0.0;
+    /// clip.stream(&SampleTimes::fps(60), Layout::FrameMajor, 1 << 20, |chunk| {
+    ///     largest = chunk.rows.iter().map(|[x, ..]| *x).fold(largest, f32::max);
+    ///     Ok::<(), Error>(())
+    /// })?;
+    /// # assert_eq!(largest, (0.5f32).sin());
+    /// # Ok::<(), Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// The first error of `sink`; or when the frames do not fit the clip, or the
+    /// device fails.
+    pub fn stream<E: From<Error>>(
+        &self,
+        frames: &SampleTimes,
+        layout: Layout,
+        chunk: usize,
+        sink: impl FnMut(Chunk<'_>) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let timeline = self.timeline(frames).map_err(Error::from)?;
+        let whole = Window::whole(self.track_count(), timeline.len(), layout);
+        let timeline = self.uploaded.folded(&timeline).map_err(Error::from)?;
+        let fill = |window: &Window, output: &mut [Quat]| {
+            let bytes = bytemuck::cast_slice_mut(output);
+            Ok((self.uploaded).evaluate_into(&timeline, window, Encoding::F32, bytes)?)
+        };
+        run(whole.cut(chunk), self.quantity(), fill, sink)
+    }
 }
 
 impl std::fmt::Debug for Clip {
@@ -206,15 +263,5 @@ impl std::fmt::Debug for Clip {
             .field("method", &self.uploaded.data.interpolation.method)
             .field("tracks", &self.track_count())
             .finish_non_exhaustive()
-    }
-}
-
-impl Encoding {
-    /// Refuses what cannot be stored in this way.
-    pub(crate) fn check(self, quantity: Quantity) -> Result<(), Error> {
-        match self.row().takes_vectors || quantity == Quantity::Rotation {
-            true => Ok(()),
-            false => Err(Error::EncodesRotations { encoding: self }),
-        }
     }
 }

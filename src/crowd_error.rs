@@ -9,15 +9,15 @@ use crate::threads::stop::Stopped;
 use crate::time::wrap::WrapMode;
 
 /// The most clips of a library.
-pub(crate) const MOST_CLIPS: usize = 1 << 16;
+pub(crate) const MAX_CLIPS: usize = 1 << 16;
 /// The most masks of a library, beside the one that lets everything through.
-pub(crate) const MOST_MASKS: usize = 31;
+pub(crate) const MAX_MASKS: usize = 31;
 /// The most instances of a crowd.
-pub(crate) const MOST_INSTANCES: usize = 1_000_000;
+pub(crate) const MAX_INSTANCES: usize = 1_000_000;
 /// The most layers of an instance.
-pub(crate) const MOST_LAYERS: usize = 4;
+pub(crate) const MAX_LAYERS: usize = 4;
 /// The longest clip, ticks.
-pub(crate) const MOST_TICKS: u32 = (1 << 31) - (1 << 18);
+pub(crate) const MAX_TICKS: u32 = (1 << 31) - (1 << 18);
 /// Speeds stay below this magnitude.
 pub(crate) const FASTEST: f32 = 128.0;
 /// Where a buffer's range may start: Vulkan allows every device to ask for as much.
@@ -29,11 +29,11 @@ pub(crate) const OFFSET_STEP: u64 = 256;
 pub enum CrowdError {
     /// A clip of other joints than the library's skeleton.
     #[error(
-        "the clip has {given} tracks, the skeleton has {joints} joints; give one track for each"
+        "the clip has {tracks} tracks, the skeleton has {joints} joints; give one track for each"
     )]
     Tracks {
         /// Tracks of the set.
-        given: usize,
+        tracks: usize,
         /// Joints of the skeleton.
         joints: usize,
     },
@@ -44,10 +44,10 @@ pub enum CrowdError {
     #[error("the library has no clips; push one")]
     NoClips,
     /// More clips than entries can name.
-    #[error("the library is full: there can be {} clips", MOST_CLIPS)]
+    #[error("the library is full: there can be {} clips", MAX_CLIPS)]
     TooManyClips,
     /// More masks than entries can name.
-    #[error("the library is full: there can be {} masks", MOST_MASKS)]
+    #[error("the library is full: there can be {} masks", MAX_MASKS)]
     TooManyMasks,
     /// The library is larger than indices of 32 bits can tell.
     #[error(
@@ -55,13 +55,13 @@ pub enum CrowdError {
     )]
     TooLarge,
     /// Ticks of no length.
-    #[error("{given} ticks a second; give 1 to {}", MOST_TICKS)]
+    #[error("{ticks_per_second} ticks a second; give 1 to {}", MAX_TICKS)]
     TicksPerSecond {
-        /// What was given.
-        given: u32,
+        /// The ticks that were asked for.
+        ticks_per_second: u32,
     },
     /// A clip that is too long for its ticks.
-    #[error("the clip takes {seconds} s; at {ticks_per_second} ticks a second there can be {} s", f64::from(MOST_TICKS) / f64::from(*ticks_per_second))]
+    #[error("the clip takes {seconds} s; at {ticks_per_second} ticks a second there can be {} s", f64::from(MAX_TICKS) / f64::from(*ticks_per_second))]
     TooLong {
         /// How long it is.
         seconds: f64,
@@ -85,12 +85,12 @@ pub enum CrowdError {
     #[error(transparent)]
     Interpolation(#[from] InterpolationError),
     /// A mask or a set of matrices is not of the skeleton's joints.
-    #[error("{given} {what} were given for {joints} joints; give one for each")]
+    #[error("{count} {subject} were given for {joints} joints; give one for each")]
     Joints {
-        /// What was given.
-        what: &'static str,
+        /// What was given: weights or matrices.
+        subject: &'static str,
         /// How many.
-        given: usize,
+        count: usize,
         /// Joints of the skeleton.
         joints: usize,
     },
@@ -112,24 +112,24 @@ pub enum CrowdError {
     #[error("the library has no inverse bind matrices; set_inverse_bind gives it some")]
     NoInverseBind,
     /// Too many instances, or none.
-    #[error("{given} instances; there can be 1 to {}", MOST_INSTANCES)]
+    #[error("{requested} instances; there can be 1 to {}", MAX_INSTANCES)]
     Instances {
-        /// What was asked for.
-        given: usize,
+        /// Instances that were asked for.
+        requested: usize,
     },
     /// Too many layers, or none.
-    #[error("{given} layers; an instance has 1 to {}", MOST_LAYERS)]
+    #[error("{requested} layers; an instance has 1 to {}", MAX_LAYERS)]
     Layers {
-        /// What was asked for.
-        given: usize,
+        /// Layers that were asked for.
+        requested: usize,
     },
     /// Something that is not there.
-    #[error("there is no {what} {given}; there are {count}")]
+    #[error("there is no {subject} {index}; there are {count}")]
     Missing {
         /// An instance, a layer, a clip or a mask.
-        what: &'static str,
-        /// What was asked for.
-        given: usize,
+        subject: &'static str,
+        /// The number that was asked for, from 0.
+        index: usize,
         /// How many there are.
         count: usize,
     },
@@ -170,10 +170,10 @@ pub enum CrowdError {
         seconds: f64,
     },
     /// The output given is not as large as the result.
-    #[error("the output has {given} values; the result has {needed}")]
+    #[error("the output has {length} values; the result has {needed}")]
     OutputLength {
-        /// What it holds.
-        given: usize,
+        /// Values that it has room for.
+        length: usize,
         /// Values of the result.
         needed: usize,
     },

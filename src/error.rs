@@ -14,7 +14,7 @@ use crate::simd::dispatch::UnknownWidth;
 use crate::smooth::kernel::SmoothingError;
 use crate::threads::OutOfThreads;
 use crate::threads::stop::Stopped;
-use crate::time::frames::FramesError;
+use crate::time::frames::SampleTimesError;
 use crate::tracks::error::TrackError;
 
 /// Why an evaluation failed.
@@ -23,7 +23,7 @@ use crate::tracks::error::TrackError;
 pub enum Error {
     /// The samples asked for do not fit the set.
     #[error(transparent)]
-    Frames(#[from] FramesError),
+    SampleTimes(#[from] SampleTimesError),
     /// A track cannot be interpolated as asked.
     #[error(transparent)]
     Interpolation(#[from] InterpolationError),
@@ -40,26 +40,26 @@ pub enum Error {
     #[error(transparent)]
     Crowd(#[from] CrowdError),
     /// The output given is not as large as the result.
-    #[error("the output has room for {given} rotations; the result has {needed}")]
+    #[error("the output has room for {length} rotations; the result has {needed}")]
     OutputLength {
-        /// Rotations that it holds.
-        given: usize,
+        /// Rotations that it has room for.
+        length: usize,
         /// Rotations of the result.
         needed: usize,
     },
     /// Rotations that are to be compared with a result are not as many as it has.
-    #[error("{given} rotations are to be compared; the result has {needed}")]
+    #[error("{length} rotations are to be compared; the result has {needed}")]
     ComparedLength {
-        /// Rotations that were given.
-        given: usize,
+        /// Rotations to compare.
+        length: usize,
         /// Rotations of the result: one for each sample of each track.
         needed: usize,
     },
     /// The memory given for an encoded result is not as large as it.
-    #[error("the output has {given} bytes; the result has {needed}")]
+    #[error("the output has {length} bytes; the result has {needed}")]
     OutputBytes {
-        /// Bytes that it holds.
-        given: usize,
+        /// Bytes that it has room for.
+        length: usize,
         /// Bytes of the result.
         needed: usize,
     },
@@ -121,12 +121,14 @@ pub enum Error {
     #[error("TUMBLE_VECTOR_WIDTH: {0}")]
     VectorWidth(#[from] UnknownWidth),
     /// That many worker threads cannot be asked for.
-    #[error("{given} worker threads were asked for; give 1 to {most}, or none for the shared ones")]
+    #[error(
+        "{requested} worker threads were asked for; give 1 to {max}, or none for the shared ones"
+    )]
     ThreadCount {
-        /// What was given.
-        given: usize,
+        /// Threads that were asked for.
+        requested: usize,
         /// The most that can be asked for.
-        most: usize,
+        max: usize,
     },
     /// The system refused worker threads.
     #[error(transparent)]
@@ -139,7 +141,7 @@ pub enum Error {
 impl From<SetError> for Error {
     fn from(error: SetError) -> Self {
         match error {
-            SetError::Frames(error) => Self::Frames(error),
+            SetError::Frames(error) => Self::SampleTimes(error),
             SetError::Interpolation(error) => Self::Interpolation(error),
             SetError::OutOfMemory(error) => Self::OutOfMemory(error),
             SetError::Threads(error) => Self::Threads(error),

@@ -4,7 +4,7 @@
 //! Keyframe tracks go in, the rotation of every track at every frame comes out:
 //!
 //! ```
-//! use tumble::{Device, Engine, Frames, TrackSet, method};
+//! use tumble::{Device, Engine, SampleTimes, TrackSet, method};
 //! use glam::Quat;
 //!
 //! // 1. What was loaded: tracks of unit quaternions with key times in seconds.
@@ -17,18 +17,18 @@
 //!
 //! // 3. A clip stays on the device; evaluate it as often as needed.
 //! let clip = engine.upload(&set, method::BESSEL_OVERHAUSER)?;
-//! let rotations = clip.evaluate(&Frames::fps(60))?;
+//! let rotations = clip.evaluate(&SampleTimes::fps(60))?;
 //! assert_eq!(rotations.get(0, 30), Some(keys[1]));
 //!
 //! // 4. Another device gives the same bits.
-//! let on_cpu = Engine::new(Device::Cpu)?.evaluate(&set, method::BESSEL_OVERHAUSER, &Frames::fps(60))?;
+//! let on_cpu = Engine::new(Device::Cpu)?.evaluate(&set, method::BESSEL_OVERHAUSER, &SampleTimes::fps(60))?;
 //! assert_eq!(on_cpu.as_quats(), rotations.as_quats());
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
 //! # The path of the data
 //!
-//! A [`TrackSet`] holds what was loaded. [`Frames`] says which samples to evaluate,
+//! A [`TrackSet`] holds what was loaded. [`SampleTimes`] says which samples to evaluate,
 //! at an exact [`FrameRate`] or at any times. A [`Method`] says how the rotation
 //! between keys follows from the keys. An [`Engine`] is one device; it prepares a
 //! set into a [`Clip`] and evaluates it into [`Rotations`]. [`mod@reference`] is
@@ -46,11 +46,11 @@
 //!   [`Engine::blend`], [`Engine::mix`] and [`Engine::add`] put layers of poses together.
 //! * **Crowds**: a [`CrowdLibrary`] holds the clips of a skeleton, and a [`Crowd`] plays them: many
 //!   instances, each at its own time, with layers, into matrices for skinning. Without a skeleton, many
-//!   characters at their own times in one [`Clip`] are one call with [`Frames::at`], a sample for each,
+//!   characters at their own times in one [`Clip`] are one call with [`SampleTimes::at`], a sample for each,
 //!   in [`Layout::FrameMajor`]; give the times in increasing order.
 //! * **Your own Vulkan device**: [`Engine::from_vulkan`] takes a renderer's device and a queue,
 //!   [`Crowd::record`] records a crowd's poses into its command buffers, and
-//!   [`Request::target`] and [`Request::to_buffer`] leave a clip's in the renderer's buffer. `examples/own_device.rs`
+//!   [`Request::target`] and [`Request::to_buffer`] leave a clip's in the renderer's buffer. `examples/application_device.rs`
 //!   is a whole program, with two queue families, buffers that are kept, and the warm-up.
 //! * **Bodies that travel**: [`Engine::follow`] moves them along paths, [`Engine::smooth`] takes the
 //!   noise from samples.
@@ -76,7 +76,6 @@
 // What only Vulkan uses lies beside what the CPU does too.
 #![cfg_attr(not(feature = "vulkan"), allow(dead_code, unused_imports))]
 
-mod auto;
 mod clip;
 mod cpu;
 mod crowd;
@@ -97,8 +96,6 @@ mod math;
 mod memory;
 pub mod method;
 mod output;
-#[cfg(feature = "vulkan")]
-mod own_device;
 mod path;
 mod pose;
 mod prepare;
@@ -122,7 +119,7 @@ pub use crate::crowd::player::Crowd;
 pub use crate::crowd::states::{MotionStates, MotionTables, MotionWords};
 pub use crate::crowd_error::CrowdError;
 pub use crate::curve::options::{
-    Axes, Ends, InterpolationError, InterpolationWarning, Path, Quantity, Speed,
+    Axes, Ends, InterpolationError, InterpolationWarning, KeySigns, Quantity, Speed,
 };
 pub use crate::device::{Device, VulkanDevice};
 pub use crate::engine::Engine;
@@ -130,11 +127,9 @@ pub use crate::error::Error;
 #[cfg(feature = "vulkan")]
 pub use crate::gpu::clip_target::ClipTarget;
 #[cfg(feature = "vulkan")]
-pub use crate::gpu::crowd_target::CrowdTarget;
+pub use crate::gpu::crowd::CrowdTarget;
 #[cfg(feature = "prove")]
-pub use crate::gpu::details::{
-    DeviceDetails, EngineChoices, FloatControlsReport, Limits, MemoryHeap, MemoryType, QueueFamily,
-};
+pub use crate::gpu::engine::choices::EngineChoices;
 pub use crate::gpu::error::VulkanError;
 #[cfg(feature = "vulkan")]
 pub use crate::gpu::exported::ExportedResult;
@@ -142,6 +137,10 @@ pub use crate::gpu::exported::ExportedResult;
 pub use crate::gpu::handles::{QueueLock, VulkanBuffer, VulkanHandles, VulkanQueue};
 pub use crate::gpu::options::{
     EngineOptions, Mapping, ReadBack, Reads, Timings, Transfer, Uploads,
+};
+#[cfg(feature = "prove")]
+pub use crate::gpu::physical::details::{
+    DeviceDetails, FloatControlsReport, Limits, MemoryHeap, MemoryType, QueueFamily,
 };
 pub use crate::gpu::reports::{
     DeviceInfo, DeviceKind, KernelCheck, NegativeControl, SelfTestReport,
@@ -157,11 +156,12 @@ pub use crate::output::encoding::{Encoding, EncodingLength, EncodingOptions, Mat
 pub use crate::output::euler::{EulerSequence, UnknownSequence};
 pub use crate::output::pose_error::{PoseError, SkeletonError};
 pub use crate::output::rotations::{Layout, Rotations, Samples, SamplesError, Vectors};
-pub use crate::output::row::Row;
 pub use crate::output::signs::{continue_signs, signs_differ, signs_jump};
+pub use crate::output::value::OutputValue;
 pub use crate::path::options::{
-    BodyAxis, Direction, Follow, FollowError, FollowWarning, Frame, PathSpeed, Twist,
+    BodyAxis, Direction, Follow, FollowError, FollowWarning, PathFrame, Twist,
 };
+pub use crate::path::speed::PathSpeed;
 pub use crate::pose::follow::Followed;
 pub use crate::pose::local_to_model::ModelMatrices;
 pub use crate::pose::poses::WorldPoses;
@@ -175,15 +175,15 @@ pub use crate::stream::Chunk;
 pub use crate::threads::stop::{Stop, Stopped};
 pub use crate::threads::{OutOfThreads, on_threads};
 pub use crate::time::frame_rate::FrameRate;
-pub use crate::time::frames::{Frames, FramesError, MAX_FRAMES, Timeline};
+pub use crate::time::frames::{MAX_FRAMES, SampleTimes, SampleTimesError, Timeline};
 pub use crate::time::time_base::TimeBase;
 pub use crate::time::wrap::WrapMode;
 pub use crate::tracks::check::{NORM_TOLERANCE, UNIT_TOLERANCE};
 pub use crate::tracks::error::TrackError;
-pub use crate::tracks::key_data::Tcb;
 pub use crate::tracks::rotation::Rotation;
+pub use crate::tracks::set::key_data::Tcb;
+pub use crate::tracks::set::vectors::{Channel, VectorKeys};
 pub use crate::tracks::set::{Track, TrackSet};
-pub use crate::tracks::vectors::{Channel, VectorKeys};
 
 #[cfg(feature = "vulkan")]
 pub use ash;

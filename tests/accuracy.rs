@@ -1,12 +1,12 @@
 //! How far the engine is from the textbook, in radians, with stated bounds: slerp
 //! 6e-7 (largest) and 1e-7 (rms), cubic methods 1e-6 and 1e-7, norms 4e-7.
 
-use crate::support::{Random, give_key_data, hostile_set, is_turn};
+use crate::support::{Random, give_key_data, hostile_set, is_due};
 use glam::{DQuat, Quat};
-use tumble::reference::{Curve, angle_between};
+use tumble::reference::{ReferenceCurve, angle_between};
 use tumble::{
-    Clip, Device, Ends, Engine, Form, FrameRate, Frames, Interpolation, METHODS, Path, Rotations,
-    Track, TrackSet,
+    Clip, Device, Ends, Engine, Form, FrameRate, Interpolation, KeySigns, METHODS, Rotations,
+    SampleTimes, Track, TrackSet,
 };
 
 /// Largest and rms error in radians, largest | |q| - 1 |.
@@ -22,7 +22,7 @@ fn clip(set: &TrackSet, interpolation: Interpolation) -> Clip {
     engine.upload(set, interpolation).unwrap()
 }
 
-fn errors(set: &TrackSet, interpolation: Interpolation, frames: &Frames) -> Errors {
+fn errors(set: &TrackSet, interpolation: Interpolation, frames: &SampleTimes) -> Errors {
     let clip = clip(set, interpolation);
     let timeline = clip.timeline(frames).unwrap();
     let rotations = clip.evaluate(frames).unwrap();
@@ -30,7 +30,7 @@ fn errors(set: &TrackSet, interpolation: Interpolation, frames: &Frames) -> Erro
     let mut undefined = 0;
     let method = interpolation.method;
     for (t, track) in set.tracks().enumerate() {
-        let curve = Curve::of(&interpolation, track);
+        let curve = ReferenceCurve::of(&interpolation, track);
         for s in 0..rotations.samples() {
             let found = rotations.get(t, s).unwrap().as_dquat();
             let time = timeline.time(t, s).unwrap();
@@ -62,7 +62,7 @@ fn errors(set: &TrackSet, interpolation: Interpolation, frames: &Frames) -> Erro
 /// Whether there is a curve to compare with: not where the last bit of a key moves it by
 /// a thousandth of a radian, as between opposite control rotations.
 fn is_defined(interpolation: &Interpolation, track: Track, time: f64) -> bool {
-    let own = Curve::of(interpolation, track).rotation(time);
+    let plain = ReferenceCurve::of(interpolation, track).rotation(time);
     (0..track.keys.len()).all(|key| {
         let mut keys = track.keys.to_vec();
         let largest = keys[key]
@@ -74,20 +74,28 @@ fn is_defined(interpolation: &Interpolation, track: Track, time: f64) -> bool {
         keys[key] += nudge;
         let mut nudged: Track<'_> = track;
         nudged.keys = &keys;
-        angle_between(own, Curve::of(interpolation, nudged).rotation(time)) < 1e-3
+        angle_between(
+            plain,
+            ReferenceCurve::of(interpolation, nudged).rotation(time),
+        ) < 1e-3
     })
 }
 
-fn assert_within_bounds(set: &TrackSet, interpolation: Interpolation, frames: &Frames, what: &str) {
+fn assert_within_bounds(
+    set: &TrackSet,
+    interpolation: Interpolation,
+    frames: &SampleTimes,
+    label: &str,
+) {
     let (largest, rms) = match interpolation.method.form {
         Form::Arc => (6e-7, 1e-7),
         _ => (1e-6, 1e-7),
     };
     let errors = errors(set, interpolation, frames);
-    println!("{}, {what}: {errors:?}", interpolation.method);
+    println!("{}, {label}: {errors:?}", interpolation.method);
     assert!(
         errors.largest <= largest && errors.rms <= rms && errors.norm <= 4e-7,
-        "{interpolation:?}, {what}: {errors:?}"
+        "{interpolation:?}, {label}: {errors:?}"
     );
 }
 
@@ -108,8 +116,9 @@ fn smooth_set(seed: u64, start: f64, step: f64) -> TrackSet {
             times.push(time);
             keys.push(rotation.as_quat());
             time += 0.8 * random.between(0.5, 1.5);
-            let turn = DQuat::from_axis_angle(random.direction(), random.between(0.0, step));
-            rotation = (rotation * turn).normalize();
+            let rotation_step =
+                DQuat::from_axis_angle(random.direction(), random.between(0.0, step));
+            rotation = (rotation * rotation_step).normalize();
         }
         set.push("", &times, &keys).unwrap();
     }
@@ -122,7 +131,7 @@ fn every_method_is_within_its_bounds_for_steps_up_to_half_a_turn() {
     let set = smooth_set(1, 0.0, std::f64::consts::PI);
     for method in METHODS {
         for fps in RATES {
-            assert_within_bounds(&set, method.into(), &Frames::rate(rate(fps)), fps);
+            assert_within_bounds(&set, method.into(), &SampleTimes::rate(rate(fps)), fps);
         }
     }
 }
@@ -140,9 +149,9 @@ fn every_method_is_within_its_bounds_for_keys_near_each_other() {
         }
         give_key_data(&mut even, seed);
         for method in METHODS {
-            let frames = Frames::rate(rate("999"));
+            let frames = SampleTimes::rate(rate("999"));
             assert_within_bounds(&even, method.into(), &frames, "near and even");
-            assert_within_bounds(&uneven, method.into(), &Frames::fps(60), "near");
+            assert_within_bounds(&uneven, method.into(), &SampleTimes::fps(60), "near");
         }
     }
 }
@@ -158,11 +167,11 @@ fn slerp_is_within_its_bounds_the_long_way_too() {
         set.push("", track.times, &keys).unwrap();
     }
     let interpolation = Interpolation {
-        path: Path::AsAuthored,
+        signs: KeySigns::AsAuthored,
         ..tumble::method::SLERP.into()
     };
     for fps in RATES {
-        let frames = Frames::rate(rate(fps));
+        let frames = SampleTimes::rate(rate(fps));
         assert_within_bounds(&set, interpolation, &frames, "the long way");
     }
 }
@@ -173,8 +182,8 @@ fn accuracy_does_not_decay_by_hour_24() {
     let set = smooth_set(2, 86_400.0, 1.6);
     for (i, method) in METHODS.into_iter().enumerate() {
         let rates = RATES.into_iter().enumerate();
-        for (_, fps) in rates.filter(|(j, _)| is_turn(i, *j, 2)) {
-            assert_within_bounds(&set, method.into(), &Frames::rate(rate(fps)), "24 h");
+        for (_, fps) in rates.filter(|(j, _)| is_due(i, *j, 2)) {
+            assert_within_bounds(&set, method.into(), &SampleTimes::rate(rate(fps)), "24 h");
         }
     }
 }
@@ -185,16 +194,16 @@ fn accuracy_does_not_decay_along_a_day() {
     let mut random = Random(6);
     let mut set = TrackSet::new();
     // A key a second at the end, where it is sampled, and every ten before.
-    let far = (0..8600).map(|i| 10.0 * f64::from(i));
-    let times: Vec<f64> = far.chain((86_000..=86_400).map(f64::from)).collect();
+    let sparse = (0..8600).map(|i| 10.0 * f64::from(i));
+    let times: Vec<f64> = sparse.chain((86_000..=86_400).map(f64::from)).collect();
     let keys: Vec<Quat> = times.iter().map(|_| random.rotation().as_quat()).collect();
     set.push("", &times, &keys).unwrap();
     for (i, method) in METHODS.into_iter().enumerate() {
         for (j, fps) in RATES.into_iter().enumerate() {
-            if !is_turn(i, j, RATES.len()) {
+            if !is_due(i, j, RATES.len()) {
                 continue;
             }
-            let frames = Frames::rate(rate(fps)).between(86_390.0, 86_400.0);
+            let frames = SampleTimes::rate(rate(fps)).between(86_390.0, 86_400.0);
             assert_within_bounds(
                 &set,
                 method.into(),
@@ -211,7 +220,7 @@ fn hostile_keys_are_within_the_bounds() {
     for seed in 0..4 {
         let set = hostile_set(seed, 64);
         for method in METHODS {
-            let frames = Frames::fps(60).between(-1.0, 40.0);
+            let frames = SampleTimes::fps(60).between(-1.0, 40.0);
             assert_within_bounds(&set, method.into(), &frames, "hostile keys");
         }
     }
@@ -224,7 +233,7 @@ fn arbitrary_times_are_within_the_bounds() {
     let times = (0..2000)
         .map(|_| 1e5 + random.between(-1.0, 25.0))
         .collect();
-    let frames = Frames::at(times);
+    let frames = SampleTimes::at(times);
     for method in METHODS {
         assert_within_bounds(&set, method.into(), &frames, "arbitrary times");
     }
@@ -255,13 +264,13 @@ fn every_option_is_within_the_bounds() {
                 ends,
                 ..method.into()
             };
-            assert_within_bounds(&set, interpolation, &Frames::fps(60), "ends");
+            assert_within_bounds(&set, interpolation, &SampleTimes::fps(60), "ends");
         }
         let interpolation = Interpolation {
-            path: Path::AsAuthored,
+            signs: KeySigns::AsAuthored,
             ..method.into()
         };
-        assert_within_bounds(&set, interpolation, &Frames::fps(60), "as authored");
+        assert_within_bounds(&set, interpolation, &SampleTimes::fps(60), "as authored");
     }
     let mut closed = TrackSet::new();
     for track in set.tracks() {
@@ -274,7 +283,7 @@ fn every_option_is_within_the_bounds() {
             ends: Ends::Loop,
             ..method.into()
         };
-        assert_within_bounds(&closed, interpolation, &Frames::fps(60), "loop");
+        assert_within_bounds(&closed, interpolation, &SampleTimes::fps(60), "loop");
     }
 }
 
@@ -303,9 +312,9 @@ fn keys_are_reproduced_exactly() {
                         ..method.into()
                     },
                 );
-                let frames = clip.evaluate(&Frames::fps(25)).unwrap();
+                let frames = clip.evaluate(&SampleTimes::fps(25)).unwrap();
                 let times = clip
-                    .evaluate(&Frames::at(set.track(0).times.to_vec()))
+                    .evaluate(&SampleTimes::at(set.track(0).times.to_vec()))
                     .unwrap();
                 for (t, track) in set.tracks().enumerate() {
                     for (k, &key) in track.keys.iter().enumerate() {
@@ -327,7 +336,9 @@ fn end_values_are_held_outside_the_keys() {
     set.push("single", &[2.5], &keys[1..2]).unwrap();
     for method in METHODS {
         let clip = clip(&set, method.into());
-        let frames = clip.evaluate(&Frames::fps(10).between(0.0, 9.0)).unwrap();
+        let frames = clip
+            .evaluate(&SampleTimes::fps(10).between(0.0, 9.0))
+            .unwrap();
         let held = |a, b| bits(frames.get(0, a).unwrap()) == bits(frames.get(0, b).unwrap());
         assert!(held(0, 9) && held(40, 90) && !held(9, 25), "{method}");
         for s in 0..frames.samples() {
@@ -346,13 +357,13 @@ fn times_of_frames_are_within_rounding_of_frames() {
     let set = smooth_set(11, 0.0, 2.0);
     for method in METHODS {
         let clip = clip(&set, method.into());
-        let frames = Frames::fps(60);
+        let frames = SampleTimes::fps(60);
         let timeline = clip.timeline(&frames).unwrap();
         let times = (0..timeline.len())
             .map(|s| timeline.time(0, s).unwrap())
             .collect();
         let by_frame: Rotations = clip.evaluate(&frames).unwrap();
-        let by_time = clip.evaluate(&Frames::at(times)).unwrap();
+        let by_time = clip.evaluate(&SampleTimes::at(times)).unwrap();
         for (a, b) in by_frame.as_quats().iter().zip(by_time.as_quats()) {
             assert!(
                 angle_between(a.as_dquat(), b.as_dquat()) < 2e-6,
@@ -384,10 +395,10 @@ fn keys_next_to_nothing_apart_give_unit_quaternions() {
                         ..method.into()
                     };
                     let clip = clip(&set, interpolation);
-                    let found = clip.evaluate(&Frames::at(samples.clone())).unwrap();
+                    let found = clip.evaluate(&SampleTimes::at(samples.clone())).unwrap();
                     for q in found.as_quats() {
-                        let what = format!("{method}, {ends:?}, {times:?}, {keys:?}: {q}");
-                        assert!((q.length() - 1.0).abs() < 1e-5, "{what}");
+                        let label = format!("{method}, {ends:?}, {times:?}, {keys:?}: {q}");
+                        assert!((q.length() - 1.0).abs() < 1e-5, "{label}");
                     }
                 }
             }

@@ -2,14 +2,14 @@
 //! frames, however the work is cut.
 
 use crate::support::{
-    Random, WAYS, first_difference, give_key_data, hostile_set, in_turn, is_turn, stage,
-    vulkan_devices, vulkan_engines,
+    KERNEL_OPTIONS, Random, first_difference, give_key_data, hostile_set, is_due, round_robin,
+    stage, vulkan_devices, vulkan_engines,
 };
 use glam::{DQuat, DVec3, Quat};
-use tumble::reference::{Curve, angle_between};
+use tumble::reference::{ReferenceCurve, angle_between};
 use tumble::{
-    Device, Encoding, Ends, Engine, EngineOptions, Frames, Interpolation, Layout, METHODS, Path,
-    Rotations, TrackSet, Transfer, VectorWidth, WrapMode, method,
+    Device, Encoding, Ends, Engine, EngineOptions, Interpolation, KeySigns, Layout, METHODS,
+    Rotations, SampleTimes, TrackSet, Transfer, VectorWidth, WrapMode, method,
 };
 
 const ENDS: [Ends; 5] = [
@@ -44,11 +44,11 @@ fn widths(streaming_stores: Option<bool>) -> Vec<Engine> {
     VectorWidth::available().into_iter().map(of_width).collect()
 }
 
-fn assert_same_bits(expected: &[Quat], found: &[Quat], what: &str) {
-    if let Some(place) = first_difference(expected, found) {
+fn assert_same_bits(expected: &[Quat], found: &[Quat], label: &str) {
+    if let Some(index) = first_difference(expected, found) {
         panic!(
-            "{what}: rotation {place} is {} on the CPU, {}",
-            expected[place], found[place]
+            "{label}: rotation {index} is {} on the CPU, {}",
+            expected[index], found[index]
         );
     }
 }
@@ -69,18 +69,18 @@ fn twenty_million_hostile_rotations_have_the_same_bits() {
     for seed in 0.. {
         let set = hostile_set(seed, 256);
         let rate = random.pick(&["24", "25", "30000/1001", "60", "120", "1000/3"]);
-        let frames = Frames::rate(rate.parse().unwrap()).between(-1.0, 20.0);
-        for (place, method) in METHODS.into_iter().enumerate() {
+        let frames = SampleTimes::rate(rate.parse().unwrap()).between(-1.0, 20.0);
+        for (i, method) in METHODS.into_iter().enumerate() {
             let interpolation = Interpolation {
                 ends: random.pick(&ENDS),
                 ..Interpolation::from(method)
             };
             let expected = cpu.evaluate(&set, interpolation, &frames).unwrap();
-            for vulkan in in_turn(&engines, seed as usize + place) {
+            for vulkan in round_robin(&engines, seed as usize + i) {
                 let found = vulkan.evaluate(&set, interpolation, &frames).unwrap();
                 let name = vulkan.device_name();
-                let what = format!("{name}, {interpolation:?}, {rate} fps, seed {seed}");
-                assert_same_bits(expected.as_quats(), found.as_quats(), &what);
+                let label = format!("{name}, {interpolation:?}, {rate} fps, seed {seed}");
+                assert_same_bits(expected.as_quats(), found.as_quats(), &label);
             }
             compared += expected.as_quats().len();
         }
@@ -95,7 +95,7 @@ fn twenty_million_hostile_rotations_have_the_same_bits() {
 #[test]
 fn every_vector_width_and_thread_count_gives_the_same_bits() {
     let set = hostile_set(77, 300);
-    let frames = Frames::fps(60).between(-1.0, 30.0);
+    let frames = SampleTimes::fps(60).between(-1.0, 30.0);
     for method in METHODS {
         let expected = cpu().evaluate(&set, method, &frames).unwrap();
         for width in VectorWidth::available() {
@@ -105,8 +105,8 @@ fn every_vector_width_and_thread_count_gives_the_same_bits() {
                     options.threads = Some(threads);
                 });
                 let found = engine.evaluate(&set, method, &frames).unwrap();
-                let what = format!("{method}, {width:?}, {threads} threads");
-                assert_same_bits(expected.as_quats(), found.as_quats(), &what);
+                let label = format!("{method}, {width:?}, {threads} threads");
+                assert_same_bits(expected.as_quats(), found.as_quats(), &label);
             }
         }
     }
@@ -136,21 +136,24 @@ fn runs_of_every_length_have_the_bits_of_single_samples() {
     let widths = [false, true].map(|streams| widths(Some(streams))).concat();
     for method in [method::SLERP, method::BESSEL_OVERHAUSER] {
         let clip = cpu().upload(&set, method).unwrap();
-        for frames in [Frames::fps(1), Frames::at(listed.clone())] {
+        for frames in [SampleTimes::fps(1), SampleTimes::at(listed.clone())] {
             let mut expected = vec![Quat::IDENTITY; 2 * 9871];
             // So few samples are evaluated one by one.
             for (track, row) in expected.chunks_mut(9871).enumerate() {
-                for (pair, own) in row.chunks_mut(2).enumerate() {
-                    let samples = 2 * pair..2 * pair + own.len();
+                for (pair, pair_samples) in row.chunks_mut(2).enumerate() {
+                    let samples = 2 * pair..2 * pair + pair_samples.len();
                     let request = clip.request(&frames).tracks(track..track + 1);
-                    request.samples(samples).evaluate_into(own).unwrap();
+                    request
+                        .samples(samples)
+                        .evaluate_into(pair_samples)
+                        .unwrap();
                 }
             }
             for engine in &widths {
                 let clip = engine.upload(&set, method).unwrap();
                 let found = clip.evaluate(&frames).unwrap();
-                let what = format!("{method}, {engine:?}");
-                assert_same_bits(&expected, found.as_quats(), &what);
+                let label = format!("{method}, {engine:?}");
+                assert_same_bits(&expected, found.as_quats(), &label);
             }
         }
     }
@@ -161,33 +164,33 @@ fn runs_of_every_length_have_the_bits_of_single_samples() {
 #[test]
 fn every_memory_budget_transfer_and_layout_gives_the_same_bits() {
     let set = hostile_set(5, 30);
-    let frames = Frames::fps(25).between(-1.0, 20.0);
+    let frames = SampleTimes::fps(25).between(-1.0, 20.0);
     let budgets = [None, Some(1), Some(10_000), Some(200_000), Some(5_000_000)];
     let expected = METHODS.map(|method| cpu().evaluate(&set, method, &frames).unwrap());
     let transfers = [Transfer::InPlace, Transfer::Staged];
-    let ways = transfers.map(|transfer| WAYS.map(|way| (transfer, way)));
-    for (way, (transfer, (reads, mapping))) in ways.concat().into_iter().enumerate() {
+    let variants = transfers.map(|transfer| KERNEL_OPTIONS.map(|kernel| (transfer, kernel)));
+    for (variant, (transfer, (reads, mapping))) in variants.concat().into_iter().enumerate() {
         for (budget, memory) in budgets.into_iter().enumerate() {
             // Opening a device takes longer than what is asked of it.
-            if !is_turn(way, budget, 2) {
+            if !is_due(variant, budget, 2) {
                 continue;
             }
             for device in vulkan_devices() {
                 let engine = engine(&device, |options| {
                     options.transfer = transfer;
                     if transfer == Transfer::Staged {
-                        stage(options, way + budget);
+                        stage(options, variant + budget);
                     }
                     (options.reads, options.mapping) = (reads, mapping);
                     options.memory = memory;
                 });
                 for (i, (method, expected)) in METHODS.iter().zip(&expected).enumerate() {
-                    if !is_turn(way + budget / 2, i, WAYS.len()) {
+                    if !is_due(variant + budget / 2, i, KERNEL_OPTIONS.len()) {
                         continue;
                     }
-                    let what = format!("{method}, {transfer:?}, {mapping:?}, {memory:?} bytes");
+                    let label = format!("{method}, {transfer:?}, {mapping:?}, {memory:?} bytes");
                     let found = engine.evaluate(&set, *method, &frames).unwrap();
-                    assert_same_bits(expected.as_quats(), found.as_quats(), &what);
+                    assert_same_bits(expected.as_quats(), found.as_quats(), &label);
                     let layout = Layout::FrameMajor;
                     let transposed = engine.evaluate_as(&set, *method, &frames, layout).unwrap();
                     assert_transposed(expected, &transposed);
@@ -202,7 +205,7 @@ fn every_memory_budget_transfer_and_layout_gives_the_same_bits() {
 #[test]
 fn long_results_have_the_bits_of_short_ones() {
     let set = hostile_set(7, 1800);
-    let frames = Frames::fps(60).between(-1.0, 20.0);
+    let frames = SampleTimes::fps(60).between(-1.0, 20.0);
     let ordinary = engine(&Device::Cpu, |options| {
         options.streaming_stores = Some(false);
     });
@@ -242,10 +245,10 @@ fn streaming_stores_have_the_bits_of_others() {
             let clip = streaming.upload(&set, interpolation).unwrap();
             let times = (0..700).map(|k| f64::from(k * 617 % 700) * 0.04 - 2.0);
             for frames in [
-                Frames::fps(60).between(0.0, 16.0),
-                Frames::fps(24).between(3.01, 17.0),
-                Frames::fps(40).between(-3.0, 20.0),
-                Frames::at(times.collect()),
+                SampleTimes::fps(60).between(0.0, 16.0),
+                SampleTimes::fps(24).between(3.01, 17.0),
+                SampleTimes::fps(40).between(-3.0, 20.0),
+                SampleTimes::at(times.collect()),
             ] {
                 let expected = ordinary.evaluate(&set, interpolation, &frames).unwrap();
                 let count = expected.as_quats().len();
@@ -262,11 +265,11 @@ fn streaming_stores_have_the_bits_of_others() {
                             false => clip.evaluate_into(&frames, layout, found),
                         }
                         .unwrap();
-                        let what =
+                        let label =
                             format!("{method}, {after:?}, {streaming:?}, shifted by {shift}");
-                        assert_same_bits(expected.as_quats(), found, &what);
+                        assert_same_bits(expected.as_quats(), found, &label);
                         let mut beside = before.iter().chain(&*behind);
-                        assert!(beside.all(|q| q.to_array() == [9.0; 4]), "{what}");
+                        assert!(beside.all(|q| q.to_array() == [9.0; 4]), "{label}");
                     }
                 }
             }
@@ -277,7 +280,7 @@ fn streaming_stores_have_the_bits_of_others() {
 #[test]
 fn layouts_are_transposes_of_each_other() {
     let set = hostile_set(9, 40);
-    let frames = Frames::fps(25).between(-1.0, 20.0);
+    let frames = SampleTimes::fps(25).between(-1.0, 20.0);
     for method in METHODS {
         let rows = cpu().evaluate(&set, method, &frames).unwrap();
         let columns = cpu()
@@ -310,7 +313,11 @@ fn arbitrary_times_have_the_same_bits() {
     let mut sorted = times.clone();
     sorted.sort_by(f64::total_cmp);
     let each: Vec<f64> = (0..200 * 50).map(|_| random.between(-3.0, 40.0)).collect();
-    let requests = [Frames::at(times), Frames::at(sorted), Frames::at_each(each)];
+    let requests = [
+        SampleTimes::at(times),
+        SampleTimes::at(sorted),
+        SampleTimes::at_each(each),
+    ];
     let of_method = |method| {
         let found = requests
             .each_ref()
@@ -322,7 +329,7 @@ fn arbitrary_times_have_the_same_bits() {
         (None, Transfer::Automatic),
         (Some(100_000), Transfer::Staged),
     ];
-    for (place, (memory, transfer)) in settings.into_iter().enumerate() {
+    for (case, (memory, transfer)) in settings.into_iter().enumerate() {
         let engines = vulkan_engines(|options| {
             options.memory = memory;
             options.transfer = transfer;
@@ -331,14 +338,14 @@ fn arbitrary_times_have_the_same_bits() {
             }
         });
         for (round, (method, expected)) in METHODS.into_iter().zip(&expected).enumerate() {
-            if !is_turn(round, place, 2) {
+            if !is_due(round, case, 2) {
                 continue;
             }
-            for vulkan in in_turn(&engines, (round + place) / 2) {
+            for vulkan in round_robin(&engines, (round + case) / 2) {
                 for (frames, expected) in requests.iter().zip(expected) {
                     let found = vulkan.evaluate(&set, method, frames).unwrap();
-                    let what = format!("{method}, {memory:?} bytes");
-                    assert_same_bits(expected.as_quats(), found.as_quats(), &what);
+                    let label = format!("{method}, {memory:?} bytes");
+                    assert_same_bits(expected.as_quats(), found.as_quats(), &label);
                 }
             }
         }
@@ -357,15 +364,15 @@ fn the_path_as_authored_has_the_same_bits() {
             .collect();
         set.push("", &times, &keys).unwrap();
     }
-    let frames = Frames::fps(60);
+    let frames = SampleTimes::fps(60);
     let engines = vulkan_engines(|_| {});
     for (round, method) in METHODS.into_iter().enumerate() {
         let interpolation = Interpolation {
-            path: Path::AsAuthored,
+            signs: KeySigns::AsAuthored,
             ..Interpolation::from(method)
         };
         let expected = cpu().evaluate(&set, interpolation, &frames).unwrap();
-        for vulkan in in_turn(&engines, round + 1) {
+        for vulkan in round_robin(&engines, round + 1) {
             let found = vulkan.evaluate(&set, interpolation, &frames).unwrap();
             assert_same_bits(expected.as_quats(), found.as_quats(), method.name);
         }
@@ -384,7 +391,7 @@ fn closed_loops_have_the_same_bits() {
             .collect();
         set.push("", &times, &keys).unwrap();
     }
-    let frames = Frames::fps(120);
+    let frames = SampleTimes::fps(120);
     let engines = vulkan_engines(|_| {});
     for (round, method) in METHODS.into_iter().enumerate() {
         let interpolation = Interpolation {
@@ -392,7 +399,7 @@ fn closed_loops_have_the_same_bits() {
             ..Interpolation::from(method)
         };
         let expected = cpu().evaluate(&set, interpolation, &frames).unwrap();
-        for vulkan in in_turn(&engines, round + 2) {
+        for vulkan in round_robin(&engines, round + 2) {
             let found = vulkan.evaluate(&set, interpolation, &frames).unwrap();
             assert_same_bits(expected.as_quats(), found.as_quats(), method.name);
         }
@@ -413,13 +420,13 @@ fn stretches_of_a_long_track_have_the_bits_of_the_whole() {
         let clip = cpu().upload(&set, method).unwrap();
         let from = -500.0;
         let whole = clip
-            .evaluate(&Frames::fps(10).between(from, 4500.0))
+            .evaluate(&SampleTimes::fps(10).between(from, 4500.0))
             .unwrap();
         for _ in 0..40 {
             let first = random.next() as usize % 49_000;
             let last = first + random.next() as usize % 900;
             let time = |frame: usize| from + frame as f64 / 10.0;
-            let frames = Frames::fps(10).between(time(first), time(last));
+            let frames = SampleTimes::fps(10).between(time(first), time(last));
             let found = clip.evaluate(&frames).unwrap();
             let expected = &whole.as_quats()[first..=last];
             // A frame is counted from another start here, so only keys are the same
@@ -440,7 +447,7 @@ fn reused_buffers_hold_nothing_of_older_results() {
         let clip = vulkan.upload(&set, method::BESSEL_OVERHAUSER).unwrap();
         let reference = cpu().upload(&set, method::BESSEL_OVERHAUSER).unwrap();
         for end in [30.0, 3.0, 20.0, 0.0, 29.0, 1.0] {
-            let frames = Frames::fps(30).between(0.0, end);
+            let frames = SampleTimes::fps(30).between(0.0, end);
             let expected = reference.evaluate(&frames).unwrap();
             let found = clip.evaluate(&frames).unwrap();
             assert_same_bits(
@@ -448,10 +455,10 @@ fn reused_buffers_hold_nothing_of_older_results() {
                 found.as_quats(),
                 &format!("to {end} s"),
             );
-            let mut own = vec![Quat::NAN; expected.as_quats().len()];
-            clip.evaluate_into(&frames, Layout::TrackMajor, &mut own)
+            let mut samples = vec![Quat::NAN; expected.as_quats().len()];
+            clip.evaluate_into(&frames, Layout::TrackMajor, &mut samples)
                 .unwrap();
-            assert_same_bits(expected.as_quats(), &own, &format!("to {end} s"));
+            assert_same_bits(expected.as_quats(), &samples, &format!("to {end} s"));
         }
     }
 }
@@ -460,7 +467,7 @@ fn reused_buffers_hold_nothing_of_older_results() {
 #[test]
 fn several_threads_share_an_engine() {
     let set = hostile_set(31, 32);
-    let frames = Frames::fps(60).between(0.0, 10.0);
+    let frames = SampleTimes::fps(60).between(0.0, 10.0);
     for vulkan in vulkan_engines(|_| {}) {
         let clip = vulkan.upload(&set, method::CATMULL_ROM).unwrap();
         let expected = cpu().evaluate(&set, method::CATMULL_ROM, &frames).unwrap();
@@ -479,14 +486,14 @@ fn several_threads_share_an_engine() {
 
 #[test]
 fn nothing_to_evaluate_is_no_error() {
-    let frames = Frames::fps(25);
+    let frames = SampleTimes::fps(25);
     for engine in vulkan_engines(|_| {}).into_iter().chain([cpu()]) {
         for method in METHODS {
             let empty = engine.evaluate(&TrackSet::new(), method, &frames).unwrap();
             assert_eq!((empty.tracks(), empty.as_quats().len()), (0, 0));
             let set = hostile_set(1, 3);
             let none = engine
-                .evaluate(&set, method, &Frames::at(Vec::new()))
+                .evaluate(&set, method, &SampleTimes::at(Vec::new()))
                 .unwrap();
             assert_eq!((none.tracks(), none.samples()), (3, 0));
         }
@@ -523,16 +530,16 @@ fn assert_everywhere(
     expected: &Rotations,
     set: &TrackSet,
     interpolation: Interpolation,
-    frames: &Frames,
+    frames: &SampleTimes,
 ) {
     for engine in engines {
         let found = engine.evaluate(set, interpolation, frames).unwrap();
-        let what = format!("{interpolation:?}, {frames:?}, {}", engine.device_name());
-        assert_same_bits(expected.as_quats(), found.as_quats(), &what);
+        let label = format!("{interpolation:?}, {frames:?}, {}", engine.device_name());
+        assert_same_bits(expected.as_quats(), found.as_quats(), &label);
     }
 }
 
-/// Fewer samples than keys take another way on the CPU, arcs by no segments, cubics by
+/// Fewer samples than keys take another route on the CPU, arcs by no segments, cubics by
 /// fewer: the same bits, at every width, for frames and for times, wherever they begin
 /// and end.
 #[test]
@@ -568,25 +575,25 @@ fn few_samples_of_many_keys_have_the_same_bits() {
     let scattered = any(50, start - 1.0, end + 1.0);
     let of_each = any(40 * 7, start - 1.0, start + 4.0);
     let requests = [
-        Frames::fps(25).between(start, start + 3.0),
-        Frames::fps(25).between(start + 1.0, start + 2.5),
-        Frames::rate("1/31".parse().unwrap()),
-        Frames::at(scattered),
-        Frames::at(set.track(8).times.iter().copied().step_by(9).collect()),
-        Frames::at_each(of_each),
+        SampleTimes::fps(25).between(start, start + 3.0),
+        SampleTimes::fps(25).between(start + 1.0, start + 2.5),
+        SampleTimes::rate("1/31".parse().unwrap()),
+        SampleTimes::at(scattered),
+        SampleTimes::at(set.track(8).times.iter().copied().step_by(9).collect()),
+        SampleTimes::at_each(of_each),
     ];
     let engines = everywhere();
-    let paths = [Path::Shortest, Path::AsAuthored];
+    let paths = [KeySigns::Shortest, KeySigns::AsAuthored];
     let pairs = METHODS.into_iter().enumerate();
     let pairs = pairs.flat_map(|(m, method)| [0, 1].map(|p| (m + p, method, paths[p])));
     for (round, method, path) in pairs {
         let interpolation = Interpolation {
-            path,
+            signs: path,
             ..method.into()
         };
         let clip = cpu().upload(&set, interpolation).unwrap();
-        for (place, frames) in requests.iter().enumerate() {
-            if !is_turn(round, place, 2) {
+        for (request, frames) in requests.iter().enumerate() {
+            if !is_due(round, request, 2) {
                 continue;
             }
             let expected = clip.evaluate(frames).unwrap();
@@ -643,12 +650,12 @@ fn few_samples_of_keys_near_each_other_have_the_same_bits() {
     let mut any =
         |count: usize| -> Vec<f64> { (0..count).map(|_| random.between(-4.0, 9.0)).collect() };
     let requests = [
-        Frames::fps(25).between(-1.0, 2.0),
-        Frames::fps(120).between(-1.0, -0.5),
-        Frames::rate("1/31".parse().unwrap()).between(0.0, 2000.0),
-        Frames::at(any(90)),
-        Frames::at(set.track(9).times.iter().copied().step_by(9).collect()),
-        Frames::at_each(any(48 * 7)),
+        SampleTimes::fps(25).between(-1.0, 2.0),
+        SampleTimes::fps(120).between(-1.0, -0.5),
+        SampleTimes::rate("1/31".parse().unwrap()).between(0.0, 2000.0),
+        SampleTimes::at(any(90)),
+        SampleTimes::at(set.track(9).times.iter().copied().step_by(9).collect()),
+        SampleTimes::at_each(any(48 * 7)),
     ];
     let spin = DVec3::new(0.3, -2.0, 1.0);
     let clamped = Ends::Clamped {
@@ -679,8 +686,8 @@ fn few_samples_of_keys_near_each_other_have_the_same_bits() {
     }
 }
 
-/// Curves that turn little, moderately and far are made in different ways, those of many
-/// tracks side by side: a track's bits are its own, whatever lies beside it.
+/// Curves that turn little, moderately and far are fitted by different routes, those of many
+/// tracks side by side: a track's bits do not depend on its neighbours.
 #[test]
 fn tracks_have_the_same_bits_whatever_is_beside_them() {
     let mut random = Random(84);
@@ -694,9 +701,9 @@ fn tracks_have_the_same_bits_whatever_is_beside_them() {
         for _ in 0..count {
             times.push(time);
             keys.push(key.as_quat() * random.pick(&[1.0, 1.0, -1.0]));
-            let far = random.pick(&[longest, longest, longest, 2.5]);
-            let turn = random.between(0.01, far);
-            key = (key * DQuat::from_axis_angle(random.direction(), turn)).normalize();
+            let largest = random.pick(&[longest, longest, longest, 2.5]);
+            let angle = random.between(0.01, largest);
+            key = (key * DQuat::from_axis_angle(random.direction(), angle)).normalize();
             time += random.between(0.02, 0.4);
         }
         tracks.push((times, keys));
@@ -713,17 +720,17 @@ fn tracks_have_the_same_bits_whatever_is_beside_them() {
         let last = keys.len() - 1;
         keys[last] = keys[0];
     }
-    let frames = Frames::fps(240).between(-1.0, 4.0);
+    let frames = SampleTimes::fps(240).between(-1.0, 4.0);
     let ends = [Ends::Parabolic, Ends::Natural, Ends::Loop, Ends::Frozen];
     let outside = [WrapMode::Hold, WrapMode::Extrapolate];
     for (method, path) in [
-        (method::CATMULL_ROM, Path::Shortest),
-        (method::BESSEL_OVERHAUSER, Path::Shortest),
-        (method::BESSEL_OVERHAUSER, Path::AsAuthored),
+        (method::CATMULL_ROM, KeySigns::Shortest),
+        (method::BESSEL_OVERHAUSER, KeySigns::Shortest),
+        (method::BESSEL_OVERHAUSER, KeySigns::AsAuthored),
     ] {
         for (ends, after) in ends.into_iter().flat_map(|end| outside.map(|o| (end, o))) {
             let interpolation = Interpolation {
-                path,
+                signs: path,
                 ends,
                 after,
                 ..method.into()
@@ -759,21 +766,21 @@ fn few_samples_of_a_long_track_of_near_keys_have_the_same_bits() {
         let times: Vec<f64> = (0..count).map(uneven).collect();
         let mut set = TrackSet::new();
         set.push("", &times, &keys).unwrap();
-        for (place, method) in [method::CATMULL_ROM, method::BESSEL_OVERHAUSER]
+        for (case, method) in [method::CATMULL_ROM, method::BESSEL_OVERHAUSER]
             .into_iter()
             .enumerate()
         {
             let clip = cpu().upload(&set, method).unwrap();
             let requests = [
-                Frames::fps(53),
-                Frames::fps(60).between(100.0, 400.0),
-                Frames::at(times.iter().map(|time| time + 0.001).step_by(13).collect()),
+                SampleTimes::fps(53),
+                SampleTimes::fps(60).between(100.0, 400.0),
+                SampleTimes::at(times.iter().map(|time| time + 0.001).step_by(13).collect()),
             ];
             for (round, frames) in requests.iter().enumerate() {
                 let expected = clip.evaluate(frames).unwrap();
                 assert!(expected.as_quats().len() < set.key_count(), "few samples");
                 assert_everywhere(&engines, &expected, &set, method.into(), frames);
-                for engine in in_turn(&small, round + place) {
+                for engine in round_robin(&small, round + case) {
                     let found = engine.evaluate(&set, method, frames).unwrap();
                     assert_same_bits(expected.as_quats(), found.as_quats(), method.name);
                 }
@@ -801,21 +808,21 @@ fn few_samples_of_a_long_track_have_the_same_bits() {
     let of_memory = |memory| vulkan_engines(|options| options.memory = memory);
     let engines: Vec<Engine> = memory.flat_map(of_memory).collect();
     let requests = [
-        Frames::fps(7),
-        Frames::fps(15).between(100.0, 900.0),
-        Frames::rate("1/1000".parse().unwrap()),
-        Frames::at(times.iter().copied().step_by(13).collect()),
+        SampleTimes::fps(7),
+        SampleTimes::fps(15).between(100.0, 900.0),
+        SampleTimes::rate("1/1000".parse().unwrap()),
+        SampleTimes::at(times.iter().copied().step_by(13).collect()),
     ];
     for (round, frames) in requests.iter().enumerate() {
         let expected = clip.evaluate(frames).unwrap();
         let found = cpu().evaluate(&set, slerp, frames).unwrap();
-        let what = format!("{frames:?}").chars().take(60).collect::<String>();
-        assert_same_bits(expected.as_quats(), found.as_quats(), &what);
+        let label = format!("{frames:?}").chars().take(60).collect::<String>();
+        assert_same_bits(expected.as_quats(), found.as_quats(), &label);
         // A device with little memory gets the track in stretches, and those with many
         // samples in pieces.
-        for engine in in_turn(&engines, round) {
+        for engine in round_robin(&engines, round) {
             let found = engine.evaluate(&set, slerp, frames).unwrap();
-            assert_same_bits(expected.as_quats(), found.as_quats(), &what);
+            assert_same_bits(expected.as_quats(), found.as_quats(), &label);
         }
     }
 }
@@ -839,9 +846,9 @@ fn long_tracks_in_stretches_have_the_same_bits() {
     set.push("", &times, &keys).unwrap();
     let (start, end) = set.time_span().unwrap();
     let requests = [
-        Frames::fps(30),
-        Frames::fps(2).between(start - 3.0, end + 3.0),
-        Frames::fps(24).between(start + 50.0, start + 300.0),
+        SampleTimes::fps(30),
+        SampleTimes::fps(2).between(start - 3.0, end + 3.0),
+        SampleTimes::fps(24).between(start + 50.0, start + 300.0),
     ];
     let small = vulkan_engines(|options| options.memory = Some(2 << 20));
     let methods = METHODS.into_iter().zip(ENDS.into_iter().cycle());
@@ -851,12 +858,12 @@ fn long_tracks_in_stretches_have_the_same_bits() {
             ..method.into()
         };
         let clip = cpu().upload(&set, interpolation).unwrap();
-        for (turn, frames) in requests.iter().enumerate() {
+        for (request, frames) in requests.iter().enumerate() {
             let expected = clip.evaluate(frames).unwrap();
             let found = cpu().evaluate(&set, interpolation, frames).unwrap();
             assert_same_bits(expected.as_quats(), found.as_quats(), method.name);
             // A device that has not the memory for the whole track.
-            for engine in in_turn(&small, round + turn) {
+            for engine in round_robin(&small, round + request) {
                 let found = engine.evaluate(&set, interpolation, frames).unwrap();
                 assert_same_bits(expected.as_quats(), found.as_quats(), method.name);
             }
@@ -866,7 +873,7 @@ fn long_tracks_in_stretches_have_the_same_bits() {
     let mut set = TrackSet::new();
     set.push("", &times, &keys).unwrap();
     let as_authored = Interpolation {
-        path: Path::AsAuthored,
+        signs: KeySigns::AsAuthored,
         ..method::CATMULL_ROM.into()
     };
     let refused = cpu().evaluate(&set, as_authored, &requests[0]);
@@ -874,7 +881,7 @@ fn long_tracks_in_stretches_have_the_same_bits() {
     assert!(words.contains("keys 8999 and 9000"), "{words}");
 }
 
-/// Frames in a gap of more than 2^32 cannot be counted: every way says which key it is
+/// Frames in a gap of more than 2^32 cannot be counted: every route reports which key it is
 /// behind, also in a piece of a long track, and behind intervals that were cut.
 #[test]
 fn a_gap_too_long_is_named_by_its_key() {
@@ -889,7 +896,7 @@ fn a_gap_too_long_is_named_by_its_key() {
     set.push("", &[0.0, 1.0, 2.0], &keys[..3]).unwrap();
     set.push("", &times, &keys).unwrap();
     let start = times[9000] + 1.5;
-    let frames = Frames::fps(1).between(start, start + 3.0);
+    let frames = SampleTimes::fps(1).between(start, start + 3.0);
     for engine in vulkan_devices()
         .into_iter()
         .map(Engine::new)
@@ -922,7 +929,7 @@ fn frames_far_from_their_segments_middle_have_the_same_bits() {
     let limit = (3e7 - 16_777_216.0) / 60.0; // of the first segment
     let engines = vulkan_engines(|_| {});
     for start in [10.0, limit - 3.0, 1e6 - limit - 3.0, 5e5] {
-        let frames = Frames::fps(60).between(start, start + 6.0);
+        let frames = SampleTimes::fps(60).between(start, start + 6.0);
         for method in [method::SLERP, method::BESSEL_OVERHAUSER] {
             let expected = cpu().evaluate(&set, method, &frames).unwrap();
             for width in VectorWidth::available() {
@@ -938,7 +945,7 @@ fn frames_far_from_their_segments_middle_have_the_same_bits() {
     }
 }
 
-/// Tracks of two keys alone take a way of their own on the CPU, and have polynomials that
+/// Tracks of two keys alone have their own route on the CPU, and have polynomials that
 /// nobody fitted: the same bits as by segments, at every width, and near the reference.
 #[test]
 fn crowds_of_two_keys_have_the_same_bits() {
@@ -947,37 +954,37 @@ fn crowds_of_two_keys_have_the_same_bits() {
     for track in 0..200 {
         let first = random.rotation();
         let step = [0.0, 1e-7, 1e-3, 0.4, 1.5, 3.0, 3.1, std::f64::consts::PI][track % 8];
-        let turn = DQuat::from_axis_angle(random.direction(), step);
-        // Opposite keys would have no way between them as authored.
+        let rotation = DQuat::from_axis_angle(random.direction(), step);
+        // Between opposite keys no arc is defined as authored.
         let sign = if track % 3 == 0 && step > 0.1 {
             -1.0
         } else {
             1.0
         };
-        let keys = [first.as_quat(), (first * turn).as_quat() * sign];
+        let keys = [first.as_quat(), (first * rotation).as_quat() * sign];
         let start = random.between(-1.0, 1.0);
         let times = [start, start + random.pick(&[1e-5, 0.04, 1.0, 500.0])];
         let count = if track % 11 == 0 { 1 } else { 2 };
         set.push("", &times[..count], &keys[..count]).unwrap();
     }
-    let own_times = (0..set.track_count()).map(|track| {
+    let track_times = (0..set.track_count()).map(|track| {
         let track = set.track(track);
         let (first, last) = (track.times[0], track.times[track.times.len() - 1]);
         first + random.between(-0.1, 1.1) * (last - first)
     });
     let requests = [
-        Frames::at_each(own_times.collect()),
-        Frames::at(vec![0.3]),
-        Frames::rate("1/1000".parse().unwrap()),
-        Frames::fps(1).between(0.0, 0.0),
+        SampleTimes::at_each(track_times.collect()),
+        SampleTimes::at(vec![0.3]),
+        SampleTimes::rate("1/1000".parse().unwrap()),
+        SampleTimes::fps(1).between(0.0, 0.0),
     ];
     let engines = everywhere();
     for (method, path) in METHODS
         .into_iter()
-        .flat_map(|method| [Path::Shortest, Path::AsAuthored].map(|path| (method, path)))
+        .flat_map(|method| [KeySigns::Shortest, KeySigns::AsAuthored].map(|path| (method, path)))
     {
         let interpolation = Interpolation {
-            path,
+            signs: path,
             ..method.into()
         };
         for frames in &requests {
@@ -988,7 +995,7 @@ fn crowds_of_two_keys_have_the_same_bits() {
             assert_everywhere(&engines, &expected, &set, interpolation, frames);
             // At half a turn exactly either way round is as short.
             for track in (0..set.track_count()).filter(|track| track % 8 != 7) {
-                let curve = Curve::of(&interpolation, set.track(track));
+                let curve = ReferenceCurve::of(&interpolation, set.track(track));
                 let reference = curve.rotation(timeline.time(track, 0).unwrap());
                 let found = expected.get(track, 0).unwrap().as_dquat();
                 let error = angle_between(found, reference);
@@ -1017,9 +1024,9 @@ fn few_times_of_each_track_have_the_bits_of_many() {
         let step = [0.05, 1.0, 3.0][track % 3];
         let start = random.between(-3.0, 3.0);
         let (times, keys) = near_keys(&mut random, count, start, step);
-        let place = |random: &mut Random| times[random.next() as usize % count];
-        let on_key = place(&mut random);
-        let between = place(&mut random) + random.between(0.0, 0.01);
+        let some_key = |random: &mut Random| times[random.next() as usize % count];
+        let on_key = some_key(&mut random);
+        let between = some_key(&mut random) + random.between(0.0, 0.01);
         let anywhere = random.between(-4.0, 4.0);
         asked.push(match track % 4 {
             0 => vec![on_key, between, anywhere],
@@ -1043,14 +1050,14 @@ fn few_times_of_each_track_have_the_bits_of_many() {
                 let of = |times: &Vec<f64>| times[..count].repeat(copies);
                 asked.iter().flat_map(of).collect()
             };
-            let many = many.evaluate(&Frames::at_each(some(4))).unwrap();
+            let many = many.evaluate(&SampleTimes::at_each(some(4))).unwrap();
             let of_track = |row: &[Quat]| row[..count].to_vec();
             let rows = many.as_quats().chunks(4 * count);
             let expected: Vec<Quat> = rows.flat_map(of_track).collect();
             let others = others.iter().filter(|_| count == 2);
-            let frames = Frames::at_each(some(1));
-            for (place, engine) in engines.iter().chain(others).enumerate() {
-                if !is_turn(round + count, place, WAYS.len()) {
+            let frames = SampleTimes::at_each(some(1));
+            for (i, engine) in engines.iter().chain(others).enumerate() {
+                if !is_due(round + count, i, KERNEL_OPTIONS.len()) {
                     continue;
                 }
                 let clip = engine.upload(&set, method).unwrap();
@@ -1068,7 +1075,7 @@ fn few_times_of_each_track_have_the_bits_of_many() {
     }
 }
 
-/// Where a kept clip has no more samples than spans, a device is told each by itself: the
+/// Where a kept clip has no more samples than spans, a device gets a list of single samples: the
 /// CPU's bits, in many windows and groups, between keys, on them and outside, of curves that
 /// the host evaluates, beside gaps of more frames than f32 counts, as any encoding.
 #[test]
@@ -1086,9 +1093,9 @@ fn few_samples_of_a_kept_clip_have_the_same_bits() {
     set.push("", &times, &keys).unwrap();
     let times: Vec<f64> = (0..90).map(|_| random.between(-1.0, 9.0)).collect();
     let requests = [
-        Frames::fps(25).between(-1.0, 6.0),
-        Frames::fps(125).between(1.0, 4.0),
-        Frames::at(times),
+        SampleTimes::fps(25).between(-1.0, 6.0),
+        SampleTimes::fps(125).between(1.0, 4.0),
+        SampleTimes::at(times),
     ];
     let mut engines = Vec::new();
     for change in [
@@ -1112,14 +1119,14 @@ fn few_samples_of_a_kept_clip_have_the_same_bits() {
             ..method.into()
         };
         let kept = cpu().upload(&set, interpolation).unwrap();
-        let clips: Vec<_> = in_turn(&engines, round)
+        let clips: Vec<_> = round_robin(&engines, round)
             .map(|engine| (engine, engine.upload(&set, interpolation).unwrap()))
             .collect();
         for (request, frames) in requests.iter().enumerate() {
             let samples = kept.evaluate(frames).unwrap().as_quats().len();
             assert!(samples < set.key_count(), "few samples");
-            for (place, encoding) in Encoding::KINDS.into_iter().enumerate() {
-                if !is_turn(round + request, place, 2) {
+            for (kind, encoding) in Encoding::KINDS.into_iter().enumerate() {
+                if !is_due(round + request, kind, 2) {
                     continue;
                 }
                 let layout = Layout::TrackMajor;
@@ -1127,8 +1134,8 @@ fn few_samples_of_a_kept_clip_have_the_same_bits() {
                 for (engine, clip) in &clips {
                     let found = clip.evaluate_encoded(frames, layout, encoding).unwrap();
                     let device = engine.device_name();
-                    let what = format!("{method}, {outside:?}, {frames:?}, {device}");
-                    assert!(expected == found, "{encoding:?}, {what}");
+                    let label = format!("{method}, {outside:?}, {frames:?}, {device}");
+                    assert!(expected == found, "{encoding:?}, {label}");
                 }
             }
         }
@@ -1136,21 +1143,21 @@ fn few_samples_of_a_kept_clip_have_the_same_bits() {
 }
 
 /// Far more keys than samples go to a device piece by piece, and only those intervals that
-/// hold a sample: the same bits, and errors that name the set's own tracks.
+/// hold a sample: the same bits, and errors that name the tracks of the whole set.
 #[test]
 fn dense_sets_go_piece_by_piece() {
     let mut random = Random(80);
     let (tracks, count) = (1000, 2000);
     let times: Vec<f64> = (0..count).map(|key| f64::from(key) / 120.0).collect();
-    let few: Vec<DQuat> = (0..97).map(|_| random.rotation()).collect();
+    let pool: Vec<DQuat> = (0..97).map(|_| random.rotation()).collect();
     let mut keys = Vec::new();
     for track in 0..tracks {
         let base = random.rotation();
-        let turn = |key: i32| few[(key / 64) as usize % 97].slerp(few[track % 97], 0.5);
-        keys.extend((0..count).map(|key| (base * turn(key)).as_quat()));
+        let rotation = |key: i32| pool[(key / 64) as usize % 97].slerp(pool[track % 97], 0.5);
+        keys.extend((0..count).map(|key| (base * rotation(key)).as_quat()));
     }
     let set = TrackSet::with_shared_times(&times, &keys).unwrap();
-    let frames = Frames::fps(7).between(1.0 / 240.0, 16.0);
+    let frames = SampleTimes::fps(7).between(1.0 / 240.0, 16.0);
     let mut engines = vulkan_engines(|_| {});
     engines.extend(vulkan_engines(|options| options.memory = Some(2 << 20)));
     for (round, method) in [method::SLERP, method::BESSEL_OVERHAUSER]
@@ -1161,11 +1168,11 @@ fn dense_sets_go_piece_by_piece() {
         let expected = expected.evaluate(&frames).unwrap();
         let on_cpu = cpu().evaluate(&set, method, &frames).unwrap();
         assert_same_bits(expected.as_quats(), on_cpu.as_quats(), method.name);
-        for engine in in_turn(&engines, round) {
+        for engine in round_robin(&engines, round) {
             let found = engine.evaluate(&set, method, &frames).unwrap();
             assert_same_bits(expected.as_quats(), found.as_quats(), method.name);
         }
-        for engine in in_turn(&engines, round + 1) {
+        for engine in round_robin(&engines, round + 1) {
             let layout = Layout::FrameMajor;
             let columns = engine.evaluate_as(&set, method, &frames, layout).unwrap();
             assert_transposed(&expected, &columns);
@@ -1174,10 +1181,10 @@ fn dense_sets_go_piece_by_piece() {
     keys[990 * count as usize + 5] = -keys[990 * count as usize + 4];
     let set = TrackSet::with_shared_times(&times, &keys).unwrap();
     let as_authored = Interpolation {
-        path: Path::AsAuthored,
+        signs: KeySigns::AsAuthored,
         ..method::BESSEL_OVERHAUSER.into()
     };
-    for engine in in_turn(&engines, 2).chain([&cpu()]) {
+    for engine in round_robin(&engines, 2).chain([&cpu()]) {
         let refused = engine.evaluate(&set, as_authored, &frames);
         let words = refused.unwrap_err().to_string();
         assert!(words.contains("track 990: keys 4 and 5"), "{words}");

@@ -2,8 +2,8 @@
 
 use glam::{DQuat, DVec3, Quat, Vec4};
 use tumble::{
-    Axes, Device, Ends, Engine, Frames, Interpolation, InterpolationWarning, Layout, Path,
-    Quantity, TrackSet, method, reference::Curve,
+    Axes, Device, Ends, Engine, Interpolation, InterpolationWarning, KeySigns, Layout, Quantity,
+    SampleTimes, TrackSet, method, reference::ReferenceCurve,
 };
 
 use crate::support::{Random, hostile_set};
@@ -49,7 +49,7 @@ fn accelerations(set: &TrackSet, interpolation: Interpolation) -> Vec<[DVec3; 2]
         .flat_map(|&time| [time.next_down(), time])
         .collect();
     let found = engine
-        .rates(set, of, &Frames::at(asked), Layout::TrackMajor)
+        .rates(set, of, &SampleTimes::at(asked), Layout::TrackMajor)
         .unwrap();
     let vector = |v: &Vec4| v.truncate().as_dvec3();
     let all: Vec<DVec3> = found.as_slice().iter().map(vector).collect();
@@ -96,7 +96,7 @@ fn a_short_interval_between_long_ones_is_as_scipy_has_it() {
         assert!((side - expected).length() < 2e-5, "{side}");
     }
     let engine = Engine::new(Device::Cpu).unwrap();
-    let at = Frames::at(vec![0.5, 1.5]);
+    let at = SampleTimes::at(vec![0.5, 1.5]);
     let found = engine.evaluate(&set, method::C2, &at).unwrap();
     let expected = [
         DQuat::from_xyzw(0.106_921_98, -0.405_388_18, -0.070_785_59, 0.905_106_36),
@@ -149,7 +149,7 @@ fn keys_at_which_the_acceleration_jumps_are_named() {
     }
     let set = one(&times(&mut random, 24, 10.0), &rotations);
     let interpolation = Interpolation {
-        path: Path::AsAuthored,
+        signs: KeySigns::AsAuthored,
         ..method::C2.into()
     };
     let found = interpolation.warnings(&set);
@@ -169,7 +169,7 @@ fn keys_at_which_the_acceleration_jumps_are_named() {
     // The shortest way round is an easy curve, and other methods have nothing to say.
     assert_eq!(Interpolation::from(method::C2).warnings(&set), []);
     let other = Interpolation {
-        path: Path::AsAuthored,
+        signs: KeySigns::AsAuthored,
         ..method::BESSEL_OVERHAUSER.into()
     };
     assert_eq!(other.warnings(&set), []);
@@ -191,7 +191,7 @@ fn engine_and_reference_take_one_solution_of_hostile_keys() {
             of_tracks[track] = count;
         }
         for (index, track) in set.tracks().enumerate() {
-            let curve = Curve::of(&interpolation, track);
+            let curve = ReferenceCurve::of(&interpolation, track);
             let mut jumps = 0;
             for key in 1..track.times.len().saturating_sub(1) {
                 let steps = [key - 1, key].map(|i| track.times[i + 1] - track.times[i]);
@@ -203,9 +203,9 @@ fn engine_and_reference_take_one_solution_of_hostile_keys() {
                 let speeds = at_keys.map(DVec3::length);
                 let fastest = speeds.into_iter().fold(0.0, f64::max);
                 // Differences follow a few turns in an interval, not thousands.
-                let turned =
+                let largest_angle =
                     (speeds[0].max(speeds[1]) * steps[0]).max(speeds[1].max(speeds[2]) * steps[1]);
-                if turned > 20.0 {
+                if largest_angle > 20.0 {
                     continue;
                 }
                 seen += 1;
@@ -239,7 +239,7 @@ fn long_steps_cost_other_keys_nothing() {
     }
     let even: Vec<f64> = (0..3000).map(f64::from).collect();
     let interpolation = Interpolation {
-        path: Path::AsAuthored,
+        signs: KeySigns::AsAuthored,
         ..method::C2.into()
     };
     let found = interpolation.warnings(&one(&even, &rotations));

@@ -1,10 +1,10 @@
 //! Results in other forms: the same bits from every device, namely those that the f32
 //! result gives.
 
-use crate::support::{WAYS, hostile_set, is_turn, vulkan_engines};
+use crate::support::{KERNEL_OPTIONS, hostile_set, is_due, vulkan_engines};
 use glam::Quat;
 use tumble::{
-    Axes, Device, Encoding, Engine, Error, Frames, Interpolation, Layout, Quantity, method,
+    Axes, Device, Encoding, Engine, Error, Interpolation, Layout, Quantity, SampleTimes, method,
 };
 
 #[test]
@@ -12,14 +12,21 @@ fn every_device_encodes_like_the_host() {
     let mut set = hostile_set(12, 24);
     // Turns so small that squares of them, or what rounding takes from the squares, are subnormal.
     for tiny in 40..72 {
-        let turn = Quat::from_xyzw(-(0.7 * 0.5f32.powi(tiny)), 0.0, 0.0, 1.0);
-        let turns = [turn, turn * turn, turn.conjugate()];
-        set.push("", &[0.0, 5.0, 20.0], &turns).unwrap();
+        let tiny_rotation = Quat::from_xyzw(-(0.7 * 0.5f32.powi(tiny)), 0.0, 0.0, 1.0);
+        let tiny_rotations = [
+            tiny_rotation,
+            tiny_rotation * tiny_rotation,
+            tiny_rotation.conjugate(),
+        ];
+        set.push("", &[0.0, 5.0, 20.0], &tiny_rotations).unwrap();
     }
     let explicit = (0..500)
         .map(|i| 0.013 * f64::from((i * 29) % 500))
         .collect();
-    let requests = [Frames::fps(25).between(-1.0, 25.0), Frames::at(explicit)];
+    let requests = [
+        SampleTimes::fps(25).between(-1.0, 25.0),
+        SampleTimes::at(explicit),
+    ];
     let cpu = Engine::new(Device::Cpu).unwrap();
     let engines: Vec<Engine> = [None, Some(500_000)]
         .into_iter()
@@ -42,19 +49,19 @@ fn every_device_encodes_like_the_host() {
                     let mut expected = vec![0; quats.len() * encoding.bytes()];
                     encoding.encode(quats, &mut expected).unwrap();
                     round += 1;
-                    for (place, (engine, clip)) in engines.iter().zip(&clips).enumerate() {
-                        if !is_turn(round, place, WAYS.len()) {
+                    for (i, (engine, clip)) in engines.iter().zip(&clips).enumerate() {
+                        if !is_due(round, i, KERNEL_OPTIONS.len()) {
                             continue;
                         }
                         let device = engine.device_name();
                         let found = clip.evaluate_encoded(frames, layout, encoding).unwrap();
-                        let what = format!("{device:?}, {method}, {layout:?}, {encoding:?}");
-                        assert!(found == expected, "{what}");
-                        if is_turn(round, place, 2 * WAYS.len()) {
+                        let label = format!("{device:?}, {method}, {layout:?}, {encoding:?}");
+                        assert!(found == expected, "{label}");
+                        if is_due(round, i, 2 * KERNEL_OPTIONS.len()) {
                             let mut into = vec![0xff; expected.len()];
                             let request = clip.request(frames).layout(layout);
                             request.encoding(encoding).evaluate_into(&mut into).unwrap();
-                            assert!(into == expected, "{what}");
+                            assert!(into == expected, "{label}");
                         }
                     }
                 }
@@ -67,7 +74,7 @@ fn every_device_encodes_like_the_host() {
 fn memory_of_another_size_is_refused() {
     let engine = Engine::new(Device::Cpu).unwrap();
     let clip = engine.upload(&hostile_set(1, 2), method::SLERP).unwrap();
-    let frames = Frames::at(vec![0.0, 1.0]);
+    let frames = SampleTimes::at(vec![0.0, 1.0]);
     let result = (clip.request(&frames).encoding(Encoding::F16)).evaluate_into(&mut [0_u8; 33]);
     let expected = "the output has 33 bytes; the result has 32";
     assert!(matches!(&result, Err(Error::OutputBytes { .. })));
@@ -84,7 +91,7 @@ fn velocities_are_not_stored_as_rotations() {
     };
     let set = hostile_set(1, 8);
     let clip = engine.upload(&set, velocity).unwrap();
-    let frames = Frames::at(vec![0.0, 0.5, 1.0]);
+    let frames = SampleTimes::at(vec![0.0, 0.5, 1.0]);
     let whole = clip.rates(&frames, Layout::TrackMajor).unwrap();
     for encoding in Encoding::KINDS {
         let found = clip.evaluate_encoded(&frames, Layout::TrackMajor, encoding);

@@ -8,8 +8,8 @@ use crate::support::vulkan_devices;
 /// A program that was built beside this one.
 fn program(name: &str) -> PathBuf {
     let tests = std::env::current_exe().unwrap();
-    let place = tests.parent().unwrap().parent().unwrap().join("examples");
-    place.join(format!("{name}{}", std::env::consts::EXE_SUFFIX))
+    let folder = tests.parent().unwrap().parent().unwrap().join("examples");
+    folder.join(format!("{name}{}", std::env::consts::EXE_SUFFIX))
 }
 
 #[test]
@@ -25,8 +25,8 @@ fn every_example_runs_and_says_what_it_found() {
             "crowd" if !has_vulkan => continue, // in CI its absence has failed already
             "crowd" => (&["300", drawn], " 0 differ from the CPU's, 0 allocations"),
             "into_memory" => (&["8", "3", "5"], "0."),
-            "own_device" if !has_vulkan => continue, // in CI its absence has failed already
-            "own_device" => (&[], "7200 rotations on"),
+            "application_device" if !has_vulkan => continue, // in CI its absence has failed already
+            "application_device" => (&[], "7200 rotations on"),
             "same_bits" => (&[], ""),
             _ => panic!("{name}: say here what it prints"),
         };

@@ -4,8 +4,8 @@ use std::fs::File;
 use std::os::unix::fs::FileExt;
 
 use tumble::{
-    Device, Encoding, Engine, EngineOptions, Error, ExportedResult, Frames, Layout, VulkanError,
-    method,
+    Device, Encoding, Engine, EngineOptions, Error, ExportedResult, Layout, SampleTimes,
+    VulkanError, method,
 };
 
 use crate::support::{dense_set, hostile_set, vulkan_devices};
@@ -28,13 +28,13 @@ fn bytes(result: &ExportedResult) -> Vec<u8> {
 fn exported_results_have_the_bits_of_the_cpu() {
     let cpu = Engine::new(Device::Cpu).unwrap();
     let set = hostile_set(12, 9);
-    let many = Frames::fps(10_000).between(0.0, 25.0); // several windows
+    let many = SampleTimes::fps(10_000).between(0.0, 25.0); // several windows
     let mut exported = 0;
     for device in vulkan_devices() {
         let engine = Engine::new(device).unwrap();
         for (frames, layout, encoding) in [
-            (Frames::fps(25), Layout::TrackMajor, Encoding::F32),
-            (Frames::fps(25), Layout::FrameMajor, Encoding::F16),
+            (SampleTimes::fps(25), Layout::TrackMajor, Encoding::F32),
+            (SampleTimes::fps(25), Layout::FrameMajor, Encoding::F16),
             (many.clone(), Layout::TrackMajor, Encoding::F32),
         ] {
             let expected = cpu.upload(&set, method::BESSEL_OVERHAUSER).unwrap();
@@ -93,18 +93,19 @@ fn what_cannot_be_exported_is_said() {
     let set = hostile_set(3, 2);
     let cpu = Engine::new(Device::Cpu).unwrap();
     let clip = cpu.upload(&set, method::SLERP).unwrap();
-    let export =
-        |frames: &Frames, encoding| clip.evaluate_exported(frames, Layout::TrackMajor, encoding);
-    let found = export(&Frames::fps(10), Encoding::F32).unwrap_err();
+    let export = |frames: &SampleTimes, encoding| {
+        clip.evaluate_exported(frames, Layout::TrackMajor, encoding)
+    };
+    let found = export(&SampleTimes::fps(10), Encoding::F32).unwrap_err();
     assert!(matches!(found, Error::ExportOnCpu), "{found}");
     for device in vulkan_devices() {
         let options = EngineOptions::default();
         let engine = Engine::with_options(device, &options).unwrap();
         let clip = engine.upload(&set, method::SLERP).unwrap();
         let layout = Layout::TrackMajor;
-        let found = clip.evaluate_exported(&Frames::at(vec![f64::NAN]), layout, Encoding::F32);
-        assert!(matches!(found, Err(Error::Frames(_))), "{found:?}");
-        if let Err(found) = clip.evaluate_exported(&Frames::fps(10), layout, Encoding::F32) {
+        let found = clip.evaluate_exported(&SampleTimes::at(vec![f64::NAN]), layout, Encoding::F32);
+        assert!(matches!(found, Err(Error::SampleTimes(_))), "{found:?}");
+        if let Err(found) = clip.evaluate_exported(&SampleTimes::fps(10), layout, Encoding::F32) {
             let said = found.to_string();
             assert!(
                 said.contains("cannot hand the memory of results to others"),

@@ -3,8 +3,10 @@
 #![allow(clippy::approx_constant)] // theirs have fewer digits
 
 use glam::{DQuat, DVec3, Quat};
-use tumble::reference::{Curve, angle_between, nlerp, slerp, squad};
-use tumble::{Device, Ends, Engine, Frames, Interpolation, Method, Path, TrackSet, method};
+use tumble::reference::{ReferenceCurve, angle_between, nlerp, slerp, squad};
+use tumble::{
+    Device, Ends, Engine, Interpolation, KeySigns, Method, SampleTimes, TrackSet, method,
+};
 
 fn q(wxyz: [f64; 4]) -> DQuat {
     DQuat::from_xyzw(wxyz[1], wxyz[2], wxyz[3], wxyz[0])
@@ -21,17 +23,17 @@ fn assert_near(found: DQuat, expected: [f64; 4], tolerance: f64) {
 }
 
 /// The engine's slerp over keys in f32, at any times.
-fn engine_slerp(path: Path, times: &[f64], keys: &[DQuat], at: &[f64]) -> Vec<DQuat> {
+fn engine_slerp(path: KeySigns, times: &[f64], keys: &[DQuat], at: &[f64]) -> Vec<DQuat> {
     let mut set = TrackSet::new();
     let keys: Vec<Quat> = keys.iter().map(|key| key.as_quat()).collect();
     set.push("", times, &keys).unwrap();
     let interpolation = Interpolation {
-        path,
+        signs: path,
         ..method::SLERP.into()
     };
     let engine = Engine::new(Device::Cpu).unwrap();
     let rotations = engine
-        .evaluate(&set, interpolation, &Frames::at(at.to_vec()))
+        .evaluate(&set, interpolation, &SampleTimes::at(at.to_vec()))
         .unwrap();
     rotations.as_quats().iter().map(|q| q.as_dquat()).collect()
 }
@@ -47,7 +49,7 @@ fn magnum_slerp_and_lerp() {
         [0.990445, 0.119127, 0.049134, 0.049134],
         1e-5,
     );
-    let engine = engine_slerp(Path::Shortest, &[0.0, 1.0], &[a, b], &[0.35]);
+    let engine = engine_slerp(KeySigns::Shortest, &[0.0, 1.0], &[a, b], &[0.35]);
     assert_near(engine[0], expected, 1e-5);
 }
 
@@ -66,12 +68,12 @@ fn magnum_long_and_short_path() {
     assert_near(nlerp(a, -b, 0.25), [0.964667, 0.0, 0.0, -0.26347], 1e-5);
     let times = [0.0, 1.0];
     assert_near(
-        engine_slerp(Path::AsAuthored, &times, &[a, b], &[0.25])[0],
+        engine_slerp(KeySigns::AsAuthored, &times, &[a, b], &[0.25])[0],
         long,
         1e-5,
     );
     assert_near(
-        engine_slerp(Path::Shortest, &times, &[a, b], &[0.25])[0],
+        engine_slerp(KeySigns::Shortest, &times, &[a, b], &[0.25])[0],
         short,
         1e-5,
     );
@@ -97,7 +99,7 @@ fn magnum_shortest_path_patching() {
     let between: Vec<f64> = (0..8).map(|i| f64::from(i) + 0.5).collect();
     let short = [247.5, 292.5, 337.5, 22.5, 67.5, 112.5, 157.5, 202.5];
     let raw = [247.5, 292.5, 337.5, 202.5, 67.5, -67.5, -202.5, -337.5];
-    for (path, expected) in [(Path::Shortest, short), (Path::AsAuthored, raw)] {
+    for (path, expected) in [(KeySigns::Shortest, short), (KeySigns::AsAuthored, raw)] {
         let found = engine_slerp(path, &times, &keys, &between);
         for (rotation, degrees) in found.into_iter().zip(expected) {
             let off = angle_between(rotation, about([0.0, 0.0, 1.0], degrees));
@@ -150,7 +152,7 @@ fn cgmath_nearly_opposite_keys() {
         -1.5113232620933559e-05,
     ];
     assert_near(slerp(a, -b, 0.5), expected, 2e-6);
-    let engine = engine_slerp(Path::Shortest, &[0.0, 1.0], &[a, b], &[0.5]);
+    let engine = engine_slerp(KeySigns::Shortest, &[0.0, 1.0], &[a, b], &[0.5]);
     assert_near(engine[0], expected, 2e-6);
 }
 
@@ -160,13 +162,13 @@ fn cgmath_nearly_opposite_keys() {
 fn pairs_that_broke_others_give_unit_rotations() {
     let a = q([-0.999254525, -0.011218898, -0.0367633253, -0.00361495349]);
     let b = q([-0.999251783, -0.0114078531, -0.0367971063, -0.00342923636]);
-    let found = engine_slerp(Path::Shortest, &[0.0, 1.0], &[a, b], &[0.691265166])[0];
+    let found = engine_slerp(KeySigns::Shortest, &[0.0, 1.0], &[a, b], &[0.691265166])[0];
     assert!((found.length() - 1.0).abs() < 4e-7);
     assert!((slerp(a, b, 0.691265166).length() - 1.0).abs() < 1e-15);
 
     let a = q([0.19, 0.76, 0.39, 0.51]).normalize();
     let b = q([-0.17, -0.72, -0.45, -0.49]).normalize();
-    let found = engine_slerp(Path::Shortest, &[0.0, 1.0], &[a, b], &[0.5])[0];
+    let found = engine_slerp(KeySigns::Shortest, &[0.0, 1.0], &[a, b], &[0.5])[0];
     assert!((found.length() - 1.0).abs() < 4e-7);
     for end in [a, b] {
         assert!(angle_between(found, end).to_degrees() < 6.0);
@@ -181,7 +183,7 @@ fn box_animated_turns_as_its_signs_say() {
         q([-1.0, 0.0, 0.0, 0.0]),
         q([4.4896593387466766e-11, 1.0, 0.0, 0.0]),
     ];
-    for path in [Path::Shortest, Path::AsAuthored] {
+    for path in [KeySigns::Shortest, KeySigns::AsAuthored] {
         let found = engine_slerp(path, &[1.25, 2.5], &keys, &[1.875])[0];
         let half = std::f64::consts::FRAC_1_SQRT_2;
         assert_near(found, [-half, half, 0.0, 0.0], 1e-6);
@@ -202,7 +204,7 @@ fn animated_triangle_keeps_turning() {
     .map(q);
     let times: Vec<f64> = (0..5).map(|i| f64::from(i) / 4.0).collect();
     let at: Vec<f64> = (0..=16).map(|i| f64::from(i) / 16.0).collect();
-    let found = engine_slerp(Path::Shortest, &times, &keys, &at);
+    let found = engine_slerp(KeySigns::Shortest, &times, &keys, &at);
     for (i, rotation) in (0..).zip(found) {
         let off = angle_between(rotation, about([0.0, 0.0, 1.0], 22.5 * f64::from(i)));
         assert!(off < 1e-6, "sample {i}: {off:e}");
@@ -215,7 +217,7 @@ fn gltf_linear_yaw_is_linear() {
     let keys = [90.0, 0.0, -90.0, 0.0, 90.0].map(|yaw| about([0.0, 1.0, 0.0], yaw));
     let times: Vec<f64> = (0..5).map(f64::from).collect();
     for (at, yaw) in [(0.25, 67.5), (1.5, -45.0), (2.75, -22.5), (3.9, 81.0)] {
-        let found = engine_slerp(Path::Shortest, &times, &keys, &[at])[0];
+        let found = engine_slerp(KeySigns::Shortest, &times, &keys, &[at])[0];
         assert!(angle_between(found, about([0.0, 1.0, 0.0], yaw)) < 1e-6);
     }
 }
@@ -233,7 +235,7 @@ fn scipy_geometric_slerp() {
         (1.0, [0.0, 1.0, 0.0, 0.0]),
     ] {
         assert_near(slerp(start, end, t), expected, 1e-15);
-        let engine = engine_slerp(Path::Shortest, &[0.0, 1.0], &[start, end], &[t]);
+        let engine = engine_slerp(KeySigns::Shortest, &[0.0, 1.0], &[start, end], &[t]);
         assert_near(engine[0], expected, 1.2e-7);
     }
 }
@@ -248,9 +250,9 @@ fn drake_angular_velocity_across_a_sign_flip() {
         .map(|angle| DQuat::from_axis_angle(axis, angle).as_quat())
         .to_vec();
     let times = [0.0, 1.6, 2.32];
-    let curve = Curve::new(
+    let curve = ReferenceCurve::new(
         tumble::method::SLERP.reference,
-        Path::Shortest,
+        KeySigns::Shortest,
         Ends::default(),
         &times,
         &keys,
@@ -263,7 +265,7 @@ fn drake_angular_velocity_across_a_sign_flip() {
 /// One track's rotations at any times.
 fn evaluate(set: &TrackSet, interpolation: impl Into<Interpolation>, at: &[f64]) -> Vec<DQuat> {
     let engine = Engine::new(Device::Cpu).unwrap();
-    let rotations = engine.evaluate(set, interpolation, &Frames::at(at.to_vec()));
+    let rotations = engine.evaluate(set, interpolation, &SampleTimes::at(at.to_vec()));
     let rotations = rotations.unwrap();
     rotations.as_quats().iter().map(|q| q.as_dquat()).collect()
 }
@@ -302,7 +304,7 @@ fn magnum_gltf_cubic_spline() {
     }
     // As authored: their dot product is negative.
     let raw = Interpolation {
-        path: Path::AsAuthored,
+        signs: KeySigns::AsAuthored,
         ..method::NLERP.into()
     };
     let found = evaluate(&set, raw, &[0.35, 0.8]);
@@ -376,7 +378,13 @@ fn scipy_rotation_spline_of_two_keys_is_slerp() {
     }
 }
 
-fn curve(method: Method, times: &[f64], keys: &[DQuat]) -> Curve {
+fn curve(method: Method, times: &[f64], keys: &[DQuat]) -> ReferenceCurve {
     let keys: Vec<Quat> = keys.iter().map(|key| key.as_quat()).collect();
-    Curve::new(method.reference, Path::Shortest, method.ends, times, &keys)
+    ReferenceCurve::new(
+        method.reference,
+        KeySigns::Shortest,
+        method.ends,
+        times,
+        &keys,
+    )
 }

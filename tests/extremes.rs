@@ -7,10 +7,10 @@ use std::ops::Range;
 use glam::{Affine3A, DVec3, Quat, Vec3};
 use proptest::prelude::*;
 use tumble::{
-    Axes, Channel, Direction, Encoding, Ends, Engine, Error, EulerSequence, Follow, Frame,
-    FrameRate, Frames, Interpolation, Layout, METHODS, OutputBuffer, Path, PathSpeed, Quantity,
-    Rotations, Skeleton, Smoothing, SmoothingEnds, SmoothingKernel, Speed, Tcb, TrackSet, Twist,
-    VectorMethod, Vectors, WrapMode,
+    Axes, Channel, Direction, Encoding, Ends, Engine, Error, EulerSequence, Follow, FrameRate,
+    Interpolation, KeySigns, Layout, METHODS, OutputBuffer, PathFrame, PathSpeed, Quantity,
+    Rotations, SampleTimes, Skeleton, Smoothing, SmoothingEnds, SmoothingKernel, Speed, Tcb,
+    TrackSet, Twist, VectorMethod, Vectors, WrapMode,
 };
 
 use crate::support::{Random, vulkan_devices};
@@ -53,9 +53,9 @@ const COUNTS: [usize; 9] = [
 ];
 
 /// Values of all kinds, tame ones more often: else nothing is ever evaluated.
-struct Any(Random);
+struct Generator(Random);
 
-impl Any {
+impl Generator {
     fn number(&mut self) -> f64 {
         match self.0.next() % 3 {
             0 => self.0.pick(&NUMBERS),
@@ -89,8 +89,8 @@ impl Any {
         }
     }
 
-    fn times(&mut self, most: u64) -> Vec<f64> {
-        let count = self.0.next() % (most + 1);
+    fn times(&mut self, limit: u64) -> Vec<f64> {
+        let count = self.0.next() % (limit + 1);
         let mut times: Vec<f64> = (0..count).map(|_| self.0.between(-2.0, 2.0)).collect();
         if self.wild(4) {
             times.iter_mut().for_each(|time| *time = self.number());
@@ -202,7 +202,7 @@ impl Any {
                 WrapMode::Mirror,
                 WrapMode::Extrapolate,
             ];
-            interpolation.path = self.0.pick(&[Path::Shortest, Path::AsAuthored]);
+            interpolation.signs = self.0.pick(&[KeySigns::Shortest, KeySigns::AsAuthored]);
             interpolation.ends = self.ends();
             interpolation.tcb = self.tcb();
             interpolation.speed = self.0.pick(&[Speed::AsKeyed, Speed::Constant]);
@@ -219,21 +219,21 @@ impl Any {
         interpolation
     }
 
-    fn frames(&mut self) -> Frames {
-        let few = Frames::fps(self.0.pick(&[1, 2, 7]));
+    fn frames(&mut self) -> SampleTimes {
+        let sparse = SampleTimes::fps(self.0.pick(&[1, 2, 7]));
         match self.0.next() % 8 {
-            0 => Frames::fps(self.0.pick(&[0, 60, 4_000_000_000, u32::MAX])),
-            1 => Frames::at(self.times(8)),
-            2 => Frames::at_each(self.times(8)),
-            3 => few.between(self.number(), self.number()),
-            4 => few.spanning((self.number(), self.number())),
-            5 => Frames::at(self.times(3)).between(self.number(), self.number()),
+            0 => SampleTimes::fps(self.0.pick(&[0, 60, 4_000_000_000, u32::MAX])),
+            1 => SampleTimes::at(self.times(8)),
+            2 => SampleTimes::at_each(self.times(8)),
+            3 => sparse.between(self.number(), self.number()),
+            4 => sparse.spanning((self.number(), self.number())),
+            5 => SampleTimes::at(self.times(3)).between(self.number(), self.number()),
             6 => {
                 let parts = [0, 1, 2, 1001, u64::MAX - 1, u64::MAX];
                 let rate = FrameRate::new(self.0.pick(&parts), self.0.pick(&parts));
-                rate.map_or(few, Frames::rate)
+                rate.map_or(sparse, SampleTimes::rate)
             }
-            _ => few,
+            _ => sparse,
         }
     }
 
@@ -257,8 +257,8 @@ impl Any {
 
     fn skeleton(&mut self) -> Skeleton {
         let joints = self.0.next() as usize % 5;
-        let parent = |any: &mut Self, joint: usize| match any.0.next() % 8 {
-            0 => Some(any.count()),
+        let parent = |generate: &mut Self, joint: usize| match generate.0.next() % 8 {
+            0 => Some(generate.count()),
             1 => Some(joint),
             2 => None,
             _ => joint.checked_sub(1),
@@ -281,7 +281,9 @@ impl Any {
                 2 => Direction::Track(self.index(set)),
                 _ => Direction::Tangent,
             },
-            frame: self.0.pick(&[Frame::Minimal, Frame::Fixed, Frame::Frenet]),
+            frame: self
+                .0
+                .pick(&[PathFrame::Minimal, PathFrame::Fixed, PathFrame::Frenet]),
             up: self.vector(),
             twist: self.0.pick(&[Twist::Spread, Twist::Free]),
             speed: match self.0.next() % 3 {
@@ -320,8 +322,8 @@ impl Any {
 }
 
 /// What a set tells about itself.
-fn ask(any: &mut Any, set: &TrackSet) {
-    let index = any.count();
+fn ask(generate: &mut Generator, set: &TrackSet) {
+    let index = generate.count();
     let _ = (
         set.get(index).is_some(),
         set.track_name(index),
@@ -330,81 +332,91 @@ fn ask(any: &mut Any, set: &TrackSet) {
     for channel in [Channel::Translation, Channel::Scale] {
         let _ = set.vector_keys(channel, index).is_some();
     }
-    let list: Vec<usize> = (0..any.0.next() % 3).map(|_| any.index(set)).collect();
+    let list: Vec<usize> = (0..generate.0.next() % 3)
+        .map(|_| generate.index(set))
+        .collect();
     let selected = set.select(list.iter().copied());
     assert_eq!(
         selected.is_ok(),
         list.iter().all(|&track| track < set.track_count())
     );
-    let shared: Vec<Quat> = (0..any.0.next() % 7).map(|_| any.quat()).collect();
-    let times = any.times(3);
+    let shared: Vec<Quat> = (0..generate.0.next() % 7)
+        .map(|_| generate.quat())
+        .collect();
+    let times = generate.times(3);
     let _ = TrackSet::with_shared_times(&times, &shared).is_ok();
     let _ = TrackSet::from_shared_times(times, shared).is_ok();
 }
 
 /// Evaluates a set in every way that there is.
-fn evaluate(any: &mut Any, engine: &Engine, set: &TrackSet) {
-    let (interpolation, frames) = (any.interpolation(), any.frames());
-    let layout = any.layout();
-    let (tracks, few) = (set.track_count(), 1 << 12);
+fn evaluate(generate: &mut Generator, engine: &Engine, set: &TrackSet) {
+    let (interpolation, frames) = (generate.interpolation(), generate.frames());
+    let layout = generate.layout();
+    let (tracks, limit) = (set.track_count(), 1 << 12);
     let resolved = frames.resolve(tracks, set.time_span());
     let count = resolved
         .as_ref()
         .map_or(0, |timeline| tracks.saturating_mul(timeline.len()));
     if let Ok(timeline) = &resolved {
-        let _ = timeline.time(any.count(), any.count());
-        let _ = timeline.times(any.count()).len();
+        let _ = timeline.time(generate.count(), generate.count());
+        let _ = timeline.times(generate.count()).len();
     }
     let _ = frames
-        .resolve(any.count(), Some((any.number(), any.number())))
+        .resolve(
+            generate.count(),
+            Some((generate.number(), generate.number())),
+        )
         .is_ok();
     let _ = engine
         .explain_route(set, interpolation, &frames, layout)
         .is_ok();
     // What is large and still fits is evaluated elsewhere, in time; what does not fit is refused here.
-    if (few..1 << 32).contains(&count) {
+    if (limit..1 << 32).contains(&count) {
         return;
     }
     if let Ok(result) = engine.evaluate_as(set, interpolation, &frames, layout) {
         assert_eq!(result.as_quats().len(), count);
-        let (track, sample) = (any.count(), any.count());
+        let (track, sample) = (generate.count(), generate.count());
         let is_there = track < tracks && sample < result.samples();
         assert_eq!(result.get(track, sample).is_some(), is_there);
     } else {
         let _ = engine.evaluate(set, interpolation, &frames).is_err();
     }
     let _ = engine.rates(set, interpolation, &frames, layout).is_ok();
-    let room = if any.wild(4) {
-        any.0.next() as usize % 9
+    let room = if generate.wild(4) {
+        generate.0.next() as usize % 9
     } else {
-        count.min(few)
+        count.min(limit)
     };
     let mut output = OutputBuffer::new(room).unwrap();
     let _ = engine
         .evaluate_into(set, interpolation, &frames, layout, &mut output[..])
         .is_ok();
     let kinds = Encoding::KINDS;
-    let encoding = kinds[any.0.next() as usize % kinds.len()];
+    let encoding = kinds[generate.0.next() as usize % kinds.len()];
     let mut bytes = vec![0; room.saturating_mul(encoding.bytes())];
-    let range = any.range(tracks);
+    let range = generate.range(tracks);
     let _ = engine
         .evaluate_tracks_into(set, interpolation, &frames, range, encoding, &mut bytes)
         .is_ok();
-    let method = any.0.pick(&VectorMethod::ALL);
+    let method = generate.0.pick(&VectorMethod::ALL);
     let transforms = engine.transforms(set, interpolation, method, &frames, layout);
     if let Ok(transforms) = &transforms {
-        let skeleton = any.skeleton();
+        let skeleton = generate.skeleton();
         let bind = [Affine3A::IDENTITY; 3];
         let bind = [None, Some(&bind[..]), Some(&bind[..1])];
-        let bind = any.0.pick(&bind);
+        let bind = generate.0.pick(&bind);
         if let Ok(model) = engine.local_to_model(transforms, &skeleton, bind) {
-            let _ = (model.get(any.count(), 0), model.position(0, any.count()));
+            let _ = (
+                model.get(generate.count(), 0),
+                model.position(0, generate.count()),
+            );
         }
     }
-    let follow = any.follow(set);
+    let follow = generate.follow(set);
     let _ = engine.follow(set, &follow, &frames, layout).is_ok();
-    let chunk = any.count();
-    if count < few {
+    let chunk = generate.count();
+    if count < limit {
         let streamed: Result<(), Error> =
             engine.stream(set, interpolation, &frames, layout, chunk, |chunk| {
                 let _ = (chunk.rotations().is_some(), chunk.rates().is_some());
@@ -422,53 +434,62 @@ fn evaluate(any: &mut Any, engine: &Engine, set: &TrackSet) {
     let _ = clip.evaluate_encoded(&frames, layout, encoding).is_ok();
     let request = clip.request(&frames).layout(layout).encoding(encoding);
     let _ = request.evaluate_into(&mut bytes).is_ok();
-    let request = request.tracks(any.range(tracks)).samples(any.range(3));
+    let request = request
+        .tracks(generate.range(tracks))
+        .samples(generate.range(3));
     let _ = request.evaluate_into(&mut bytes).is_ok();
 }
 
 /// Whole poses and smoothing.
-fn combine(any: &mut Any, engine: &Engine) {
-    let (a, b) = (any.rotations(), any.rotations());
-    let weights = [any.number() as f32, any.number() as f32];
+fn combine(generate: &mut Generator, engine: &Engine) {
+    let (a, b) = (generate.rotations(), generate.rotations());
+    let weights = [generate.number() as f32, generate.number() as f32];
     let _ = engine.mix(&a, &b, weights[0]).is_ok();
     let _ = engine.blend(&[(&a, weights[0]), (&b, weights[1])]).is_ok();
     let _ = engine.blend(&[]).is_ok();
-    let reference: Vec<Quat> = (0..any.0.next() % 4).map(|_| any.quat()).collect();
+    let reference: Vec<Quat> = (0..generate.0.next() % 4)
+        .map(|_| generate.quat())
+        .collect();
     let _ = engine.add(&a, &b, &reference, weights[1]).is_ok();
-    let skeleton = any.skeleton();
+    let skeleton = generate.skeleton();
     if let Ok(world) = engine.world(&a, &skeleton) {
         let _ = (
-            world.position(any.count(), 0),
-            world.rotation(0, any.count()),
+            world.position(generate.count(), 0),
+            world.rotation(0, generate.count()),
         );
     }
-    let smoothing = any.smoothing();
+    let smoothing = generate.smoothing();
     let _ = smoothing.check().is_ok();
     let _ = engine.smooth(&a, &smoothing).is_ok();
-    let points: Vec<Vec3> = (0..6).map(|_| any.small()).collect();
-    if let Ok(vectors) = Vectors::of(&points, any.0.pick(&[1, 2, 3, 4]), any.layout()) {
+    let points: Vec<Vec3> = (0..6).map(|_| generate.small()).collect();
+    if let Ok(vectors) = Vectors::of(&points, generate.0.pick(&[1, 2, 3, 4]), generate.layout()) {
         let _ = engine.smooth_vectors(&vectors, &smoothing).is_ok();
-        let _ = vectors.get(any.count(), any.count()).is_none();
+        let _ = vectors.get(generate.count(), generate.count()).is_none();
     }
 }
 
 /// What takes numbers alone.
-fn small_things(any: &mut Any) {
-    let layout = any.layout();
-    let _ = layout.index(any.count(), any.count(), any.count(), any.count());
+fn small_things(generate: &mut Generator) {
+    let layout = generate.layout();
+    let _ = layout.index(
+        generate.count(),
+        generate.count(),
+        generate.count(),
+        generate.count(),
+    );
     for kind in Encoding::KINDS {
-        let rows: Vec<[f32; 4]> = (0..3).map(|_| any.quat().to_array()).collect();
-        let mut bytes = vec![0; kind.bytes() * 3 + usize::from(any.wild(3))];
+        let rows: Vec<[f32; 4]> = (0..3).map(|_| generate.quat().to_array()).collect();
+        let mut bytes = vec![0; kind.bytes() * 3 + usize::from(generate.wild(3))];
         let _ = kind.encode(&rows, &mut bytes).is_ok();
         let _ = kind.decode(&bytes[..kind.bytes().min(bytes.len())]).is_ok();
         let _ = kind.decode(&[]).is_err();
     }
-    let count = any.count();
+    let count = generate.count();
     if count > 1 << 32 {
         assert!(OutputBuffer::new(count).is_err());
-        assert!(Skeleton::chain(count, any.number()).is_err());
+        assert!(Skeleton::chain(count, generate.number()).is_err());
     }
-    let text = any.0.pick(&[
+    let text = generate.0.pick(&[
         "", "xyz", "XYX", "xxx", "\u{fc}yz", "abcdefgh", "-9e999/0", "1/0", "30/1",
     ]);
     let _ = (
@@ -476,7 +497,7 @@ fn small_things(any: &mut Any) {
         text.parse::<FrameRate>().is_ok(),
     );
     let parts = [1, 1 << 40, u64::MAX];
-    if let Ok(rate) = FrameRate::new(any.0.pick(&parts), any.0.pick(&parts)) {
+    if let Ok(rate) = FrameRate::new(generate.0.pick(&parts), generate.0.pick(&parts)) {
         let _ = (rate.time_of(u64::MAX), rate.per_second());
     }
     let _ = tumble::Method::named(text).is_none();
@@ -491,13 +512,13 @@ proptest! {
 
     #[test]
     fn nothing_panics_on_the_cpu(seed in any::<u64>()) {
-        let mut any = Any(Random(seed));
+        let mut generate = Generator(Random(seed));
         let engine = Engine::new(tumble::Device::Cpu).unwrap();
-        let set = any.set();
-        ask(&mut any, &set);
-        evaluate(&mut any, &engine, &set);
-        combine(&mut any, &engine);
-        small_things(&mut any);
+        let set = generate.set();
+        ask(&mut generate, &set);
+        evaluate(&mut generate, &engine, &set);
+        combine(&mut generate, &engine);
+        small_things(&mut generate);
     }
 }
 
@@ -507,10 +528,10 @@ fn nothing_panics_on_a_device() {
     for device in vulkan_devices().into_iter().take(1) {
         let engine = Engine::new(device).unwrap();
         for seed in 0..40 {
-            let mut any = Any(Random(seed));
-            let set = any.set();
-            evaluate(&mut any, &engine, &set);
-            combine(&mut any, &engine);
+            let mut generate = Generator(Random(seed));
+            let set = generate.set();
+            evaluate(&mut generate, &engine, &set);
+            combine(&mut generate, &engine);
         }
     }
 }

@@ -1,5 +1,5 @@
 //! The golden hashes (`tumble::verify::golden`) on the CPU at every vector width and on every Vulkan
-//! device, whichever way its kernels read.
+//! device, however its kernels read.
 //!
 //! `UPDATE_GOLDEN=1 cargo test golden` records them anew, `UPDATE_GOLDEN=new` only those of cases that
 //! are not there yet; a change of a hash is a change of the engine's promise and belongs into the
@@ -8,7 +8,7 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use crate::support::{in_turn, vulkan_engines};
+use crate::support::{round_robin, vulkan_engines};
 use tumble::verify::golden::Golden;
 use tumble::{Device, Engine, EngineOptions, VectorWidth};
 
@@ -55,8 +55,8 @@ fn results_have_the_recorded_hashes() {
     for case in 0..golden.count() {
         let name = golden.name(case);
         let recorded = Golden::recorded(name);
-        // A method has six cases: of the next one each is read in the next way.
-        for engine in widths.iter().chain(in_turn(&vulkan, case + case / 6)) {
+        // A method has six cases: each is read by the next of `KERNEL_OPTIONS`.
+        for engine in widths.iter().chain(round_robin(&vulkan, case + case / 6)) {
             let found = golden.evaluate(case, engine).unwrap();
             assert!(found.bytes > 0, "{name}");
             compared += 1;

@@ -2,13 +2,13 @@
 //! reference's and with the same bits on every device.
 
 use crate::support::{
-    Random, first_difference, give_key_data, hostile_set, in_turn, vulkan_engines,
+    Random, first_difference, give_key_data, hostile_set, round_robin, vulkan_engines,
 };
 use glam::{DQuat, DVec3, Quat};
-use tumble::reference::Curve;
+use tumble::reference::ReferenceCurve;
 use tumble::{
-    Axes, Device, Ends, Engine, Error, Frames, Interpolation, Layout, METHODS, Quantity, Track,
-    TrackSet, method,
+    Axes, Device, Ends, Engine, Error, Interpolation, Layout, METHODS, Quantity, SampleTimes,
+    Track, TrackSet, method,
 };
 
 const QUANTITIES: [Quantity; 4] = [
@@ -28,8 +28,9 @@ fn set(seed: u64, step: f64) -> TrackSet {
             times.push(time);
             keys.push(rotation.as_quat());
             time += random.between(0.3, 1.3);
-            let turn = DQuat::from_axis_angle(random.direction(), random.between(0.0, step));
-            rotation = (rotation * turn).normalize();
+            let rotation_step =
+                DQuat::from_axis_angle(random.direction(), random.between(0.0, step));
+            rotation = (rotation * rotation_step).normalize();
         }
         set.push("", &times, &keys).unwrap();
     }
@@ -37,7 +38,7 @@ fn set(seed: u64, step: f64) -> TrackSet {
     set
 }
 
-fn expected(curve: &Curve, quantity: Quantity, time: f64) -> DVec3 {
+fn expected(curve: &ReferenceCurve, quantity: Quantity, time: f64) -> DVec3 {
     let (body, axes) = match quantity {
         Quantity::Velocity(axes) => (curve.velocity(time), axes),
         Quantity::Acceleration(axes) => (curve.acceleration(time), axes),
@@ -50,7 +51,7 @@ fn expected(curve: &Curve, quantity: Quantity, time: f64) -> DVec3 {
 }
 
 /// The largest error, in parts of the largest value within the same key interval.
-fn largest_error(set: &TrackSet, interpolation: Interpolation, frames: &Frames) -> f64 {
+fn largest_error(set: &TrackSet, interpolation: Interpolation, frames: &SampleTimes) -> f64 {
     let engine = Engine::new(Device::Cpu).unwrap();
     let clip = engine.upload(set, interpolation).unwrap();
     let timeline = clip.timeline(frames).unwrap();
@@ -58,7 +59,7 @@ fn largest_error(set: &TrackSet, interpolation: Interpolation, frames: &Frames) 
     assert!(found.as_slice().iter().all(|vector| vector.w == 0.0));
     let mut largest = 0.0f64;
     for (t, track) in set.tracks().enumerate() {
-        let curve = Curve::of(&interpolation, track);
+        let curve = ReferenceCurve::of(&interpolation, track);
         let mut scales = vec![None; track.times.len() + 1];
         for s in 0..found.samples() {
             let time = timeline.time(t, s).unwrap();
@@ -76,7 +77,7 @@ fn largest_error(set: &TrackSet, interpolation: Interpolation, frames: &Frames) 
 
 /// The largest value in the interval before key `i`; before the first key and behind the last one
 /// nothing moves.
-fn scale(curve: &Curve, track: Track, quantity: Quantity, i: usize) -> f64 {
+fn scale(curve: &ReferenceCurve, track: Track, quantity: Quantity, i: usize) -> f64 {
     let Some((from, to)) = i
         .checked_sub(1)
         .map(|i| track.times[i])
@@ -96,7 +97,7 @@ fn velocities_and_accelerations_are_those_of_the_reference() {
     let set = set(1, 2.0);
     let mut random = Random(4);
     let times = (0..400).map(|_| random.between(-1.0, 16.0)).collect();
-    for frames in [Frames::fps(30), Frames::at(times)] {
+    for frames in [SampleTimes::fps(30), SampleTimes::at(times)] {
         for method in METHODS {
             for quantity in QUANTITIES {
                 let interpolation = Interpolation {
@@ -126,7 +127,7 @@ fn ends_move_as_they_are_told() {
                 ends,
                 ..method.into()
             };
-            let error = largest_error(&set, interpolation, &Frames::fps(24));
+            let error = largest_error(&set, interpolation, &SampleTimes::fps(24));
             assert!(error < 2e-6, "{method}, {ends:?}: {error:e}");
         }
     }
@@ -138,7 +139,7 @@ fn the_same_bits_on_every_device() {
     let engines = vulkan_engines(|_| {});
     for seed in 0..2 {
         let set = hostile_set(seed, 48);
-        let frames = Frames::fps(30).between(-1.0, 20.0);
+        let frames = SampleTimes::fps(30).between(-1.0, 20.0);
         for (i, method) in METHODS.into_iter().enumerate() {
             for (j, quantity) in QUANTITIES.into_iter().enumerate() {
                 let interpolation = Interpolation {
@@ -149,7 +150,7 @@ fn the_same_bits_on_every_device() {
                 let expected = cpu.rates(&set, interpolation, &frames, layout).unwrap();
                 let expected: &[Quat] = bytemuck::cast_slice(expected.as_slice());
                 assert!(expected.iter().all(|q| q.is_finite()));
-                for vulkan in in_turn(&engines, seed as usize + i + j) {
+                for vulkan in round_robin(&engines, seed as usize + i + j) {
                     let found = vulkan.rates(&set, interpolation, &frames, layout).unwrap();
                     let found: &[Quat] = bytemuck::cast_slice(found.as_slice());
                     let difference = first_difference(expected, found);
@@ -172,8 +173,8 @@ fn a_door_turns_until_its_last_key() {
         quantity: Quantity::Velocity(Axes::Parent),
         ..method::SLERP.into()
     };
-    let frames = Frames::fps(2).between(-1.0, 3.0);
-    let times = Frames::at((-2..=6).map(|i| f64::from(i) * 0.5).collect());
+    let frames = SampleTimes::fps(2).between(-1.0, 3.0);
+    let times = SampleTimes::at((-2..=6).map(|i| f64::from(i) * 0.5).collect());
     for frames in [frames, times] {
         let layout = Layout::TrackMajor;
         let found = engine.rates(&set, velocity, &frames, layout).unwrap();

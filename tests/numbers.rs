@@ -5,17 +5,17 @@ use glam::{Affine3A, DQuat, DVec3, Quat, Vec3};
 use tumble::reduce::{ReducedCurve, reduce_rotations, reduce_vectors};
 use tumble::{
     Crowd, CrowdError, CrowdLayer, CrowdLibrary, CrowdValues, Device, Direction, Ends, Engine,
-    Error, Follow, Frames, Interpolation, Layout, METHODS, PathSpeed, PoseError, Skeleton,
+    Error, Follow, Interpolation, Layout, METHODS, PathSpeed, PoseError, SampleTimes, Skeleton,
     Smoothing, SmoothingKernel, Tcb, TrackSet, VectorMethod, method,
 };
 
-type Found = Result<Vec<f64>, Box<dyn std::error::Error>>;
+type Computed = Result<Vec<f64>, Box<dyn std::error::Error>>;
 
 /// A number of an interface: its name, the word that its error must have, and what is made with it.
 struct Number {
     name: &'static str,
     word: &'static str,
-    try_with: fn(f64) -> Found,
+    try_with: fn(f64) -> Computed,
 }
 
 const TIMES: [f64; 5] = [0.0, 0.4, 0.5, 1.7, 2.0];
@@ -44,24 +44,24 @@ fn numbers(quats: &[Quat]) -> Vec<f64> {
         .collect()
 }
 
-/// Evaluates at a rate, few samples from keys, explicit times and as a clip: every route checks.
-fn evaluated(set: &TrackSet, interpolation: Interpolation) -> Found {
+/// Evaluates at a rate, sparse samples from keys, explicit times and as a clip: every route checks.
+fn evaluated(set: &TrackSet, interpolation: Interpolation) -> Computed {
     let engine = cpu();
     let mut all = Vec::new();
     for frames in [
-        Frames::fps(30),
-        Frames::fps(1),
-        Frames::at(vec![0.45, 0.1, 1.9]),
+        SampleTimes::fps(30),
+        SampleTimes::fps(1),
+        SampleTimes::at(vec![0.45, 0.1, 1.9]),
     ] {
         let found = engine.evaluate(set, interpolation, &frames)?;
         all.extend(numbers(found.as_quats()));
     }
     let clip = engine.upload(set, interpolation)?;
-    all.extend(numbers(clip.evaluate(&Frames::fps(30))?.as_quats()));
+    all.extend(numbers(clip.evaluate(&SampleTimes::fps(30))?.as_quats()));
     Ok(all)
 }
 
-fn with_tcb(tcb: Tcb) -> Found {
+fn with_tcb(tcb: Tcb) -> Computed {
     let mut all = Vec::new();
     for method in METHODS {
         let interpolation = Interpolation {
@@ -73,7 +73,7 @@ fn with_tcb(tcb: Tcb) -> Found {
     Ok(all)
 }
 
-fn with_ends(start: DVec3, end: DVec3) -> Found {
+fn with_ends(start: DVec3, end: DVec3) -> Computed {
     let mut all = Vec::new();
     for method in METHODS {
         let interpolation = Interpolation {
@@ -88,19 +88,19 @@ fn with_ends(start: DVec3, end: DVec3) -> Found {
 fn with_set(
     method: tumble::Method,
     change: impl Fn(&mut TrackSet) -> Result<(), tumble::TrackError>,
-) -> Found {
+) -> Computed {
     let mut set = set();
     change(&mut set)?;
     evaluated(&set, method.into())
 }
 
-fn vectors(set: &TrackSet, method: VectorMethod) -> Found {
+fn vectors(set: &TrackSet, method: VectorMethod) -> Computed {
     let found = cpu().vectors(
         set,
         tumble::Channel::Translation,
         method,
         method::SLERP,
-        &Frames::fps(20),
+        &SampleTimes::fps(20),
         Layout::TrackMajor,
     )?;
     Ok(found
@@ -111,7 +111,7 @@ fn vectors(set: &TrackSet, method: VectorMethod) -> Found {
         .collect())
 }
 
-fn with_translations(key: f32, tangent: f32) -> Found {
+fn with_translations(key: f32, tangent: f32) -> Computed {
     let mut set = set();
     let keys = [Vec3::ZERO, Vec3::ONE, Vec3::new(0.0, key, 0.0)];
     let tangents = [[Vec3::ZERO; 2], [Vec3::splat(tangent); 2], [Vec3::ZERO; 2]];
@@ -123,30 +123,34 @@ fn with_translations(key: f32, tangent: f32) -> Found {
     Ok(all)
 }
 
-fn followed(follow: &Follow) -> Found {
+fn followed(follow: &Follow) -> Computed {
     let mut set = TrackSet::new();
     let road = [[0.0, 0.0, 0.0], [4.0, 0.0, 1.0], [8.0, 1.0, 0.0]];
     set.push_path("car", &[0.0, 1.0, 3.0], &road, &[])?;
-    let found = cpu().follow(&set, follow, &Frames::fps(10), Layout::TrackMajor)?;
-    let places = found
+    let found = cpu().follow(&set, follow, &SampleTimes::fps(10), Layout::TrackMajor)?;
+    let positions = found
         .positions
         .as_slice()
         .iter()
         .flat_map(glam::Vec4::to_array);
-    let mut all: Vec<f64> = places.map(f64::from).collect();
+    let mut all: Vec<f64> = positions.map(f64::from).collect();
     all.extend(numbers(found.rotations.as_quats()));
     Ok(all)
 }
 
-fn smoothed(kernel: SmoothingKernel) -> Found {
+fn smoothed(kernel: SmoothingKernel) -> Computed {
     let engine = cpu();
-    let samples = engine.evaluate(&set(), method::SLERP, &Frames::fps(30))?;
+    let samples = engine.evaluate(&set(), method::SLERP, &SampleTimes::fps(30))?;
     let found = engine.smooth(&samples, &Smoothing::new(kernel))?;
     Ok(numbers(found.as_quats()))
 }
 
 fn layers() -> [tumble::Rotations; 2] {
-    let of = |method: tumble::Method| cpu().evaluate(&set(), method, &Frames::fps(9)).unwrap();
+    let of = |method: tumble::Method| {
+        cpu()
+            .evaluate(&set(), method, &SampleTimes::fps(9))
+            .unwrap()
+    };
     [of(method::SLERP), of(method::STEP)]
 }
 
@@ -157,7 +161,7 @@ fn crowd() -> Result<(Crowd, CrowdLibrary), CrowdError> {
     Ok((cpu().crowd(&library, 2, 2)?, library))
 }
 
-fn crowded(layer: usize, plays: CrowdLayer) -> Found {
+fn crowded(layer: usize, plays: CrowdLayer) -> Computed {
     let (mut crowd, _) = crowd()?;
     crowd.set(1, layer, plays)?;
     crowd.advance(0.3)?;
@@ -267,7 +271,7 @@ const NUMBERS: &[Number] = &[
         name: "Frames::at",
         word: "time",
         try_with: |value| {
-            let found = cpu().evaluate(&set(), method::C2, &Frames::at(vec![0.1, value]))?;
+            let found = cpu().evaluate(&set(), method::C2, &SampleTimes::at(vec![0.1, value]))?;
             Ok(numbers(found.as_quats()))
         },
     },
@@ -357,7 +361,7 @@ const NUMBERS: &[Number] = &[
     },
     Number {
         name: "Skeleton::new",
-        word: "hangs at",
+        word: "the offset of track",
         try_with: |value| {
             Skeleton::new(vec![None], vec![Vec3::new(value as f32, 0.0, 0.0)])?;
             Ok(Vec::new())
@@ -365,7 +369,7 @@ const NUMBERS: &[Number] = &[
     },
     Number {
         name: "Skeleton::chain",
-        word: "hangs at",
+        word: "the offset of track",
         try_with: |value| {
             Skeleton::chain(3, value)?;
             Ok(Vec::new())
@@ -474,10 +478,10 @@ fn no_number_gives_a_result_that_is_none() {
         let large = [1e6, 1e9, -1e12, 1e30, 1e38, -3e38, 1e300, -f64::MAX];
         for value in tiny.into_iter().chain(large).chain([0.3, -1.0]) {
             let Ok(found) = try_with(value) else { continue };
-            if let Some(place) = found.iter().position(|number| !number.is_finite()) {
+            if let Some(index) = found.iter().position(|number| !number.is_finite()) {
                 wrong.push(format!(
-                    "{name}: {value:e} gives {} at {place}",
-                    found[place]
+                    "{name}: {value:e} gives {} at {index}",
+                    found[index]
                 ));
             }
         }
@@ -498,13 +502,13 @@ fn errors_name_the_option_and_the_value() {
     let error = interpolation.check().unwrap_err();
     assert_eq!(
         error.to_string(),
-        "the bias NaN cannot be met; give a number between -1e6 and 1e6, mostly within -1 and 1"
+        "the bias NaN is out of range; give a number between -1e6 and 1e6, mostly within -1 and 1"
     );
     // An empty set is no reason to accept it.
     let empty = TrackSet::new();
     assert!(
         cpu()
-            .evaluate(&empty, interpolation, &Frames::at(vec![0.0]))
+            .evaluate(&empty, interpolation, &SampleTimes::at(vec![0.0]))
             .is_err()
     );
     let [a, b] = layers();
@@ -537,7 +541,7 @@ fn a_crowd_fails_as_an_engine_does() {
     let Err(Error::Crowd(error)) = make() else {
         panic!("no instances");
     };
-    assert_eq!(error, CrowdError::Instances { given: 0 });
+    assert_eq!(error, CrowdError::Instances { requested: 0 });
 }
 
 /// A mix at its ends is its inputs, bit for bit, and so is a layer of a crowd at weight 1.

@@ -4,10 +4,10 @@
 
 use glam::{DQuat, DVec3, Quat};
 use tumble::reference::angle_between;
-use tumble::{Device, Engine, Frames, Interpolation, METHODS, Method, Path, TrackSet};
+use tumble::{Device, Engine, Interpolation, KeySigns, METHODS, Method, SampleTimes, TrackSet};
 use tumble_formats::ReadOptions;
 use tumble_formats::dat::open_dat;
-use tumble_formats::generate::{Generate, Steps};
+use tumble_formats::generate::{Generate, KeySpacing};
 
 const FRAME_RATE: f64 = 25.0;
 
@@ -94,7 +94,7 @@ fn original_frames(method: Method, times: &[f64], keys: &[DQuat]) -> Vec<Option<
     frames
 }
 
-fn assert_matches_the_original(set: &TrackSet, what: &str) {
+fn assert_matches_the_original(set: &TrackSet, label: &str) {
     let engine = Engine::new(Device::Cpu).unwrap();
     for method in METHODS
         .into_iter()
@@ -102,11 +102,11 @@ fn assert_matches_the_original(set: &TrackSet, what: &str) {
     {
         // The original takes keys as they are.
         let interpolation = Interpolation {
-            path: Path::AsAuthored,
+            signs: KeySigns::AsAuthored,
             ..method.into()
         };
         let rotations = engine
-            .evaluate(set, interpolation, &Frames::fps(25))
+            .evaluate(set, interpolation, &SampleTimes::fps(25))
             .unwrap();
         let (mut compared, mut worst) = (0, 0.0f64);
         for (t, track) in set.tracks().enumerate() {
@@ -123,10 +123,10 @@ fn assert_matches_the_original(set: &TrackSet, what: &str) {
                 compared += 1;
             }
         }
-        println!("{what}, {method}: {compared} frames, at most {worst:e} rad apart");
+        println!("{label}, {method}: {compared} frames, at most {worst:e} rad apart");
         assert!(
             compared > 400 && worst <= 2e-6,
-            "{what}, {method}: {worst:e} rad"
+            "{label}, {method}: {worst:e} rad"
         );
     }
 }
@@ -150,7 +150,7 @@ fn generated_pendulums_match_the_original_program() {
 fn uneven_pendulums_match_the_original_program() {
     let generate = Generate {
         seconds: 10.0,
-        steps: Steps::Random,
+        spacing: KeySpacing::Random,
         ..Generate::default()
     };
     let smooth = generate.track_set().unwrap();
@@ -174,7 +174,7 @@ fn uneven_pendulums_match_the_original_program() {
 }
 
 /// `ORIGINAL_DATA=file.dat cargo test --test all original:: -- --nocapture` compares on a
-/// file of one's own, such as the original program's.
+/// file of the user's, such as the original program's.
 #[test]
 fn files_of_ones_own_match_the_original_program() {
     let Some(path) = std::env::var_os("ORIGINAL_DATA") else {

@@ -1,10 +1,10 @@
 //! Before the first key and behind the last: held, again, back and forth, or on.
 
-use crate::support::{Random, first_difference, give_key_data, in_turn, vulkan_engines};
+use crate::support::{Random, first_difference, give_key_data, round_robin, vulkan_engines};
 use glam::{DQuat, DVec3, Quat};
-use tumble::reference::{Curve, angle_between};
+use tumble::reference::{ReferenceCurve, angle_between};
 use tumble::{
-    Axes, Device, Engine, Frames, Interpolation, Layout, METHODS, Quantity, Track, TrackSet,
+    Axes, Device, Engine, Interpolation, Layout, METHODS, Quantity, SampleTimes, Track, TrackSet,
     WrapMode, method,
 };
 
@@ -30,8 +30,8 @@ fn set(seed: u64, keys: usize) -> TrackSet {
             } else {
                 random.between(0.2, 0.9)
             };
-            let turn = DQuat::from_axis_angle(random.direction(), random.between(0.0, 1.5));
-            rotation = (rotation * turn).normalize();
+            let step = DQuat::from_axis_angle(random.direction(), random.between(0.0, 1.5));
+            rotation = (rotation * step).normalize();
         }
         set.push("", &times, &quats).unwrap();
     }
@@ -40,7 +40,7 @@ fn set(seed: u64, keys: usize) -> TrackSet {
 }
 
 /// What the words say, by the reference.
-fn expected(curve: &Curve, track: Track, sides: [WrapMode; 2], time: f64) -> DQuat {
+fn expected(curve: &ReferenceCurve, track: Track, sides: [WrapMode; 2], time: f64) -> DQuat {
     let (first, last) = (track.times[0], track.times[track.times.len() - 1]);
     let length = last - first;
     let side = if time < first { sides[0] } else { sides[1] };
@@ -52,13 +52,13 @@ fn expected(curve: &Curve, track: Track, sides: [WrapMode; 2], time: f64) -> DQu
         WrapMode::Hold => curve.rotation(time),
         WrapMode::Loop => curve.rotation(first + (time - first).rem_euclid(length)),
         WrapMode::Mirror => {
-            let place = (time - first).rem_euclid(2.0 * length);
+            let offset = (time - first).rem_euclid(2.0 * length);
             curve.rotation(
                 first
-                    + if place > length {
-                        2.0 * length - place
+                    + if offset > length {
+                        2.0 * length - offset
                     } else {
-                        place
+                        offset
                     },
             )
         }
@@ -85,14 +85,14 @@ fn outside_is_what_the_words_say() {
                     ..method.into()
                 };
                 for frames in [
-                    Frames::fps(24).between(-12.0, 14.0),
-                    Frames::at(times.clone()),
+                    SampleTimes::fps(24).between(-12.0, 14.0),
+                    SampleTimes::at(times.clone()),
                 ] {
                     let clip = engine.upload(&set, interpolation).unwrap();
                     let timeline = clip.timeline(&frames).unwrap();
                     let found = clip.evaluate(&frames).unwrap();
                     for (t, track) in set.tracks().enumerate() {
-                        let curve = Curve::of(&interpolation, track);
+                        let curve = ReferenceCurve::of(&interpolation, track);
                         let steps = method == method::STEP;
                         for s in 0..found.samples() {
                             let time = timeline.time(t, s).unwrap();
@@ -123,8 +123,8 @@ fn near_a_seam(track: Track, time: f64) -> bool {
         [time - key, time + key - 2.0 * first]
             .iter()
             .any(|distance| {
-                let place = distance.rem_euclid(length);
-                place < 1e-9 || length - place < 1e-9
+                let offset = distance.rem_euclid(length);
+                offset < 1e-9 || length - offset < 1e-9
             })
     })
 }
@@ -143,7 +143,10 @@ fn the_same_bits_on_every_device_however_it_is_cut() {
     let of_memory = |memory| vulkan_engines(|options| options.memory = memory);
     let engines: Vec<Engine> = memory.flat_map(of_memory).collect();
     let mut round = 0;
-    for frames in [Frames::fps(12).between(-130.0, 200.0), Frames::at(explicit)] {
+    for frames in [
+        SampleTimes::fps(12).between(-130.0, 200.0),
+        SampleTimes::at(explicit),
+    ] {
         for method in [method::SLERP, method::BESSEL_OVERHAUSER, method::B_SPLINE] {
             for [before, after] in [
                 [WrapMode::Loop, WrapMode::Mirror],
@@ -164,17 +167,17 @@ fn the_same_bits_on_every_device_however_it_is_cut() {
                     Ok::<(), tumble::Error>(())
                 })
                 .unwrap();
-                let what = format!("{method}, {before:?} {after:?}");
+                let label = format!("{method}, {before:?} {after:?}");
                 assert_eq!(
                     first_difference(expected.as_quats(), &streamed),
                     None,
-                    "{what}"
+                    "{label}"
                 );
                 // Each kind of frames has twelve cases.
-                for engine in in_turn(&engines, round + round / 12) {
+                for engine in round_robin(&engines, round + round / 12) {
                     let found = engine.evaluate(&long, interpolation, &frames).unwrap();
                     let difference = first_difference(expected.as_quats(), found.as_quats());
-                    assert_eq!(difference, None, "{what}, {}", engine.device_name());
+                    assert_eq!(difference, None, "{label}, {}", engine.device_name());
                 }
                 round += 1;
             }
@@ -200,19 +203,19 @@ fn two_keys_go_on_turning() {
             quantity,
             ..method::C2.into()
         };
-        let frames = Frames::at(at.to_vec());
+        let frames = SampleTimes::at(at.to_vec());
         let mut found = [[0.0; 4]; 3];
         let layout = Layout::TrackMajor;
         engine
             .evaluate_into(&set, interpolation, &frames, layout, &mut found)
             .unwrap();
         for (q, time) in found.map(Quat::from_array).into_iter().zip(at) {
-            let turn = end.to_scaled_axis() / 10.0;
+            let velocity = end.to_scaled_axis() / 10.0;
             let off = match quantity {
                 Quantity::Rotation => {
-                    angle_between(q.as_dquat(), DQuat::from_scaled_axis(turn * time))
+                    angle_between(q.as_dquat(), DQuat::from_scaled_axis(velocity * time))
                 }
-                _ => (DVec3::new(q.x.into(), q.y.into(), q.z.into()) - turn).length(),
+                _ => (DVec3::new(q.x.into(), q.y.into(), q.z.into()) - velocity).length(),
             };
             assert!(off < 3e-7, "{quantity:?} at {time}: {off:e}");
         }
@@ -223,7 +226,7 @@ fn two_keys_go_on_turning() {
         ..method::C2.into()
     };
     let refused = engine
-        .rates(&set, mirrored, &Frames::fps(1), Layout::TrackMajor)
+        .rates(&set, mirrored, &SampleTimes::fps(1), Layout::TrackMajor)
         .unwrap_err();
     assert_eq!(
         refused.to_string(),
@@ -235,8 +238,8 @@ fn two_keys_go_on_turning() {
 #[test]
 fn times_beyond_counting_give_rotations() {
     let set = set(3, 6);
-    let far = [1e16, 1e39, 1e300, f64::MAX];
-    let times: Vec<f64> = far.iter().flat_map(|&time| [time, -time]).collect();
+    let distant = [1e16, 1e39, 1e300, f64::MAX];
+    let times: Vec<f64> = distant.iter().flat_map(|&time| [time, -time]).collect();
     let engine = Engine::new(Device::Cpu).unwrap();
     for method in METHODS {
         for outside in ALL {
@@ -245,7 +248,7 @@ fn times_beyond_counting_give_rotations() {
                 after: outside,
                 ..method.into()
             };
-            let frames = Frames::at(times.clone());
+            let frames = SampleTimes::at(times.clone());
             let rotations = engine.evaluate(&set, interpolation, &frames).unwrap();
             for q in rotations.as_quats() {
                 let norm = q.as_dquat().length();
@@ -261,21 +264,21 @@ fn times_beyond_counting_give_rotations() {
 fn wild_turns_as_authored_give_rotations() {
     let mut set = TrackSet::new();
     let still = Quat::IDENTITY;
-    let turned = Quat::from_xyzw(-0.002_937_95, -0.003_484_545, -0.000_204_973, -0.999_989_6);
+    let opposite = Quat::from_xyzw(-0.002_937_95, -0.003_484_545, -0.000_204_973, -0.999_989_6);
     let times: Vec<f64> = [3.6]
         .into_iter()
         .chain((0..7).map(|i| 5.7 + f64::from(i) * 1e-9))
         .collect();
-    let keys = [still, turned, still, still, still, still, still, still];
+    let keys = [still, opposite, still, still, still, still, still, still];
     set.push("", &times, &keys).unwrap();
     let engine = Engine::new(Device::Cpu).unwrap();
     for method in METHODS {
         let interpolation = Interpolation {
-            path: method.path.unwrap_or(tumble::Path::AsAuthored),
+            signs: method.path.unwrap_or(tumble::KeySigns::AsAuthored),
             ..method.into()
         };
         let rotations = engine
-            .evaluate(&set, interpolation, &Frames::fps(100))
+            .evaluate(&set, interpolation, &SampleTimes::fps(100))
             .unwrap();
         for q in rotations.as_quats() {
             let norm = q.as_dquat().length();

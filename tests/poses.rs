@@ -5,8 +5,8 @@ use crate::support::{Random, hostile_set, vulkan_devices};
 use glam::{DQuat, DVec3, Quat, Vec3};
 use tumble::reference::{angle_between, slerp};
 use tumble::{
-    Device, Engine, EngineOptions, Error, Frames, Layout, PoseError, Rotations, Skeleton, TrackSet,
-    WorldPoses, method,
+    Device, Engine, EngineOptions, Error, Layout, PoseError, Rotations, SampleTimes, Skeleton,
+    TrackSet, WorldPoses, method,
 };
 
 fn engines() -> Vec<Engine> {
@@ -23,7 +23,7 @@ fn engines() -> Vec<Engine> {
 
 fn layers(layout: Layout) -> Vec<Rotations> {
     let engine = Engine::new(Device::Cpu).unwrap();
-    let frames = Frames::fps(30).between(0.0, 5.0);
+    let frames = SampleTimes::fps(30).between(0.0, 5.0);
     (0..3)
         .map(|seed| {
             let set = hostile_set(seed, 64);
@@ -40,19 +40,19 @@ fn bits(values: &[Quat]) -> Vec<[u32; 4]> {
         .collect()
 }
 
-fn exact(layer: &Rotations, place: usize) -> DQuat {
-    layer.as_quats()[place].as_dquat().normalize()
+fn exact(layer: &Rotations, index: usize) -> DQuat {
+    layer.as_quats()[index].as_dquat().normalize()
 }
 
 /// The same bits from all, and what the first gives.
-fn agreed(what: &str, of: impl Fn(&Engine) -> Rotations) -> Rotations {
+fn agreed(label: &str, of: impl Fn(&Engine) -> Rotations) -> Rotations {
     let engines = engines();
     let first = of(&engines[0]);
     for engine in &engines[1..] {
         let found = of(engine);
         assert!(
             bits(first.as_quats()) == bits(found.as_quats()),
-            "{what} on {}",
+            "{label} on {}",
             engine.device_name()
         );
     }
@@ -65,20 +65,20 @@ fn a_blend_is_the_normalised_sum() {
     let weights = [0.5, 0.3, 0.4];
     let pairs: Vec<_> = layers.iter().zip(weights).collect();
     let found = agreed("blend", |engine| engine.blend(&pairs).unwrap());
-    for place in 0..found.as_quats().len() {
-        let first = exact(&layers[0], place);
+    for i in 0..found.as_quats().len() {
+        let first = exact(&layers[0], i);
         let mut sum = DQuat::from_xyzw(0.0, 0.0, 0.0, 0.0);
         for (layer, weight) in &pairs {
-            let own = exact(layer, place);
-            let sign = if own.dot(first) < 0.0 { -1.0 } else { 1.0 };
-            sum += own * (sign * f64::from(*weight));
+            let rotation = exact(layer, i);
+            let sign = if rotation.dot(first) < 0.0 { -1.0 } else { 1.0 };
+            sum += rotation * (sign * f64::from(*weight));
         }
-        let off = angle_between(found.as_quats()[place].as_dquat(), sum.normalize());
+        let off = angle_between(found.as_quats()[i].as_dquat(), sum.normalize());
         // A sign at a right angle is rounding's to choose.
         let doubtful = pairs
             .iter()
-            .any(|(layer, _)| exact(layer, place).dot(first).abs() < 1e-6);
-        assert!(off < 2e-6 || doubtful, "{place}: {off:e}");
+            .any(|(layer, _)| exact(layer, i).dot(first).abs() < 1e-6);
+        assert!(off < 2e-6 || doubtful, "{i}: {off:e}");
     }
 }
 
@@ -88,15 +88,15 @@ fn a_mix_is_slerp() {
     for weight in [0.0, 0.25, 0.7, 1.0] {
         let mix = |engine: &Engine| engine.mix(&layers[0], &layers[1], weight).unwrap();
         let found = agreed("mix", mix);
-        for place in 0..found.as_quats().len() {
-            let (a, b) = (exact(&layers[0], place), exact(&layers[1], place));
+        for i in 0..found.as_quats().len() {
+            let (a, b) = (exact(&layers[0], i), exact(&layers[1], i));
             if a.dot(b).abs() < 1e-6 {
                 continue; // either way
             }
             let near = if a.dot(b) < 0.0 { -b } else { b };
             let expected = slerp(a, near, f64::from(weight));
-            let off = angle_between(found.as_quats()[place].as_dquat(), expected);
-            assert!(off < 2e-6, "{place}, {weight}: {off:e}");
+            let off = angle_between(found.as_quats()[i].as_dquat(), expected);
+            assert!(off < 2e-6, "{i}, {weight}: {off:e}");
         }
     }
 }
@@ -117,12 +117,16 @@ fn an_added_layer_turns_the_base_on() {
             for (track, reference) in reference.iter().enumerate() {
                 for sample in 0..found.samples() {
                     let get = |layer: &Rotations| layer.get(track, sample).unwrap().as_dquat();
-                    let turn = reference.as_dquat().normalize().inverse() * get(&layers[1]);
-                    if turn.w.abs() < 1e-6 {
+                    let difference = reference.as_dquat().normalize().inverse() * get(&layers[1]);
+                    if difference.w.abs() < 1e-6 {
                         continue; // half a turn, either way
                     }
-                    let turn = if turn.w < 0.0 { -turn } else { turn };
-                    let part = slerp(DQuat::IDENTITY, turn, f64::from(weight));
+                    let difference = if difference.w < 0.0 {
+                        -difference
+                    } else {
+                        difference
+                    };
+                    let part = slerp(DQuat::IDENTITY, difference, f64::from(weight));
                     let off = angle_between(get(&found), get(&layers[0]) * part);
                     assert!(off < 3e-6, "{track}, {sample}: {off:e}");
                 }
@@ -149,8 +153,8 @@ fn worlds_follow_their_parents() {
     }
     let mut parents = vec![None; tracks];
     for i in 1..tracks {
-        let far = (random.next() as usize) % i;
-        parents[order[i]] = (i % 20 != 0).then_some(order[far]);
+        let ancestor = (random.next() as usize) % i;
+        parents[order[i]] = (i % 20 != 0).then_some(order[ancestor]);
     }
     let offsets: Vec<Vec3> = (0..tracks)
         .map(|_| (random.direction() * random.between(0.0, 3.0)).as_vec3())
@@ -171,13 +175,13 @@ fn worlds_follow_their_parents() {
         for sample in 0..local.samples() {
             let mut world = vec![(DQuat::IDENTITY, DVec3::ZERO); tracks];
             for &track in &order {
-                let own = local.get(track, sample).unwrap().as_dquat();
+                let local_rotation = local.get(track, sample).unwrap().as_dquat();
                 let hung = offsets[track].as_dvec3();
                 world[track] = match parents[track] {
-                    None => (own, hung),
+                    None => (local_rotation, hung),
                     Some(parent) => {
                         let (above, at): (DQuat, DVec3) = world[parent];
-                        ((above * own).normalize(), at + above * hung)
+                        ((above * local_rotation).normalize(), at + above * hung)
                     }
                 };
                 let rotation = found.rotation(track, sample).unwrap().as_dquat();
@@ -195,8 +199,8 @@ fn what_does_not_fit_is_refused() {
     let engine = Engine::new(Device::Cpu).unwrap();
     let all = layers(Layout::TrackMajor);
     let set = hostile_set(1, 3);
-    let few = engine
-        .evaluate(&set, method::SLERP, &Frames::fps(2))
+    let short = engine
+        .evaluate(&set, method::SLERP, &SampleTimes::fps(2))
         .unwrap();
     let refused = |result: Result<Rotations, Error>| match result {
         Err(Error::Pose(error)) => error,
@@ -204,34 +208,34 @@ fn what_does_not_fit_is_refused() {
     };
     assert_eq!(refused(engine.blend(&[])), PoseError::NoLayer);
     assert!(matches!(
-        refused(engine.blend(&[(&few, f32::NAN)])),
+        refused(engine.blend(&[(&short, f32::NAN)])),
         PoseError::WeightNotFinite { layer: 0, .. }
     ));
     assert!(matches!(
-        refused(engine.mix(&few, &all[0], 0.5)),
+        refused(engine.mix(&short, &all[0], 0.5)),
         PoseError::Shape { layer: 1, .. }
     ));
     assert_eq!(
-        refused(engine.mix(&few, &few, 1.5)),
+        refused(engine.mix(&short, &short, 1.5)),
         PoseError::WeightOutOfRange { weight: 1.5 }
     );
     assert_eq!(
-        refused(engine.add(&few, &few, &[], 0.5)),
+        refused(engine.add(&short, &short, &[], 0.5)),
         PoseError::References {
-            given: 0,
+            references: 0,
             tracks: 3
         }
     );
-    let world = engine.world(&few, &Skeleton::chain(2, 1.0).unwrap());
+    let world = engine.world(&short, &Skeleton::chain(2, 1.0).unwrap());
     assert!(matches!(
         world,
         Err(Error::Pose(PoseError::Skeleton {
-            given: 2,
+            skeleton_tracks: 2,
             tracks: 3
         }))
     ));
     let nothing = engine
-        .evaluate(&TrackSet::new(), method::SLERP, &Frames::fps(2))
+        .evaluate(&TrackSet::new(), method::SLERP, &SampleTimes::fps(2))
         .unwrap();
     let world = engine
         .world(&nothing, &Skeleton::chain(0, 1.0).unwrap())

@@ -6,7 +6,7 @@ use proptest::prelude::*;
 use tumble::reduce::{
     ReduceError, ReducedCurve, reduce_rotations, reduce_together, reduce_vectors,
 };
-use tumble::{Channel, Device, Engine, Frames, Layout, TrackSet, VectorMethod, method};
+use tumble::{Channel, Device, Engine, Layout, SampleTimes, TrackSet, VectorMethod, method};
 
 use crate::support::Random;
 
@@ -16,7 +16,7 @@ const CURVES: [ReducedCurve; 3] = [
     ReducedCurve::GltfCubic,
 ];
 
-/// What an evaluation in f32 may add, radians; of places as a part of their size.
+/// What an evaluation in f32 may add, radians; of positions relative to their size.
 const ROUNDING: f64 = 1e-6;
 
 fn angle(a: DQuat, b: DQuat) -> f64 {
@@ -32,28 +32,28 @@ fn motion(seed: u64, count: usize) -> (Vec<f64>, Vec<DQuat>, Vec<DVec3>) {
     let corner = random.between(0.0, 2.0);
     let noise = random.pick(&[0.0, 1e-4, 1e-2]);
     let mut times = Vec::new();
-    let mut turns = Vec::new();
-    let mut places = Vec::new();
+    let mut rotations = Vec::new();
+    let mut positions = Vec::new();
     let mut time = random.between(-2.0, 2.0);
     let start = time;
     for _ in 0..count {
         let t = (time - start).min(corner) + 0.3 * (time - start - corner).max(0.0).powi(2);
         let wave = |a: f64, b: f64| (a * t).sin() + (b * t * 1.7).cos();
         let shake = random.direction() * noise;
-        turns.push(
+        rotations.push(
             DQuat::from_scaled_axis(axis * wave(speeds[0], speeds[1]) * 2.0)
                 * DQuat::from_rotation_x(wave(speeds[2], speeds[3]))
                 * DQuat::from_scaled_axis(shake),
         );
-        places.push(DVec3::new(wave(speeds[4], 1.0), t, wave(speeds[5], speeds[0])) + shake);
+        positions.push(DVec3::new(wave(speeds[4], 1.0), t, wave(speeds[5], speeds[0])) + shake);
         times.push(time);
         time += random.pick(&[0.01, 0.02, 0.05]);
     }
-    (times, turns, places)
+    (times, rotations, positions)
 }
 
-fn pick<T: Copy>(all: &[T], places: &[usize]) -> Vec<T> {
-    places.iter().map(|&place| all[place]).collect()
+fn pick<T: Copy>(all: &[T], indices: &[usize]) -> Vec<T> {
+    indices.iter().map(|&i| all[i]).collect()
 }
 
 proptest! {
@@ -62,19 +62,19 @@ proptest! {
     #[test]
     fn every_sample_is_near(seed in any::<u64>(), count in 2usize..200, power in -4f64..-0.5) {
         let tolerance = 10f64.powf(power);
-        let (times, turns, places) = motion(seed, count);
+        let (times, samples, positions) = motion(seed, count);
         let engine = Engine::new(Device::Cpu).unwrap();
-        let frames = Frames::at(times.clone());
+        let frames = SampleTimes::at(times.clone());
         for curve in CURVES {
-            let found = reduce_rotations(&times, &turns, tolerance, curve).unwrap();
+            let found = reduce_rotations(&times, &samples, tolerance, curve).unwrap();
             prop_assert!(found.error <= tolerance, "{curve:?}: {} over {tolerance}", found.error);
-            prop_assert!(found.places.is_sorted_by(|a, b| a < b));
-            let last = *found.places.last().unwrap();
-            prop_assert!(found.places[0] == 0 && (last == count - 1 || found.places.len() == 1));
+            prop_assert!(found.indices.is_sorted_by(|a, b| a < b));
+            let last = *found.indices.last().unwrap();
+            prop_assert!(found.indices[0] == 0 && (last == count - 1 || found.indices.len() == 1));
             let keys: Vec<Quat> = found.keys.iter().map(|key| key.as_quat()).collect();
-            let own = pick(&times, &found.places);
+            let key_times = pick(&times, &found.indices);
             let mut set = TrackSet::new();
-            set.push("", &own, &keys).unwrap();
+            set.push("", &key_times, &keys).unwrap();
             let how = match curve {
                 ReducedCurve::Linear => method::SLERP,
                 ReducedCurve::BesselOverhauser => method::BESSEL_OVERHAUSER,
@@ -85,18 +85,18 @@ proptest! {
                 set.set_tangents(0, &tangents.collect::<Vec<_>>()).unwrap();
             }
             let evaluated = engine.evaluate(&set, how, &frames).unwrap();
-            for (sample, (found, wanted)) in evaluated.as_quats().iter().zip(&turns).enumerate() {
-                let apart = angle(found.as_dquat(), *wanted);
+            for (sample, (found, expected)) in evaluated.as_quats().iter().zip(&samples).enumerate() {
+                let apart = angle(found.as_dquat(), *expected);
                 prop_assert!(apart <= tolerance + ROUNDING, "{curve:?} {sample}: {apart}");
             }
 
-            let found = reduce_vectors(&times, &places, tolerance, curve).unwrap();
+            let found = reduce_vectors(&times, &positions, tolerance, curve).unwrap();
             prop_assert!(found.error <= tolerance, "{curve:?}: {} over {tolerance}", found.error);
             let keys: Vec<Vec3> = found.keys.iter().map(|key| key.as_vec3()).collect();
             let tangents = found.tangents.iter().map(|pair| pair.map(DVec3::as_vec3));
             let tangents: Vec<[Vec3; 2]> = tangents.collect();
-            let own = pick(&times, &found.places);
-            set.set_translations(0, &own, &keys, &tangents).unwrap();
+            let key_times = pick(&times, &found.indices);
+            set.set_translations(0, &key_times, &keys, &tangents).unwrap();
             let how = match curve {
                 ReducedCurve::Linear => VectorMethod::Linear,
                 ReducedCurve::BesselOverhauser => VectorMethod::BesselOverhauser,
@@ -106,9 +106,9 @@ proptest! {
             let evaluated = engine
                 .vectors(&set, channel, how, method::SLERP, &frames, layout)
                 .unwrap();
-            for (sample, (found, wanted)) in evaluated.as_slice().iter().zip(&places).enumerate() {
-                let apart = found.truncate().as_dvec3().distance(*wanted);
-                let rounding = ROUNDING * (1.0 + wanted.length());
+            for (sample, (found, expected)) in evaluated.as_slice().iter().zip(&positions).enumerate() {
+                let apart = found.truncate().as_dvec3().distance(*expected);
+                let rounding = ROUNDING * (1.0 + expected.length());
                 prop_assert!(apart <= tolerance + rounding, "{curve:?} {sample}: {apart}");
             }
         }
@@ -117,22 +117,22 @@ proptest! {
     #[test]
     fn together_each_channel_has_its_own_tolerance(seed in any::<u64>(), power in -3f64..-1.0) {
         let tolerance = 10f64.powf(power);
-        let (times, turns, places) = motion(seed, 120);
+        let (times, samples, positions) = motion(seed, 120);
         let (_, others, _) = motion(seed ^ 1, 120);
         for curve in CURVES {
-            let rotations = [(turns.clone(), tolerance), (others.clone(), 3.0 * tolerance)];
-            let vectors = [(places.clone(), 2.0 * tolerance)];
+            let rotations = [(samples.clone(), tolerance), (others.clone(), 3.0 * tolerance)];
+            let vectors = [(positions.clone(), 2.0 * tolerance)];
             let all = reduce_together(&times, &rotations, &vectors, curve).unwrap();
             let bounds = [tolerance, 3.0 * tolerance];
             for (found, bound) in all.rotations.iter().zip(bounds) {
                 prop_assert!(found.error <= bound, "{curve:?}: {} over {bound}", found.error);
-                prop_assert_eq!(&found.places, &all.vectors[0].places);
+                prop_assert_eq!(&found.indices, &all.vectors[0].indices);
             }
             prop_assert!(all.vectors[0].error <= 2.0 * tolerance, "{curve:?}");
             // A channel that is together with none has the keys that it has alone.
-            let single = [(turns.clone(), tolerance)];
+            let single = [(samples.clone(), tolerance)];
             let single = reduce_together(&times, &single, &[], curve).unwrap();
-            let alone = reduce_rotations(&times, &turns, tolerance, curve).unwrap();
+            let alone = reduce_rotations(&times, &samples, tolerance, curve).unwrap();
             prop_assert_eq!(&single.rotations[0], &alone, "{:?}", curve);
         }
     }
@@ -159,7 +159,7 @@ fn what_needs_few_keys_gets_few() {
         (&even, ReducedCurve::BesselOverhauser, &[0, 200]),
     ] {
         let found = reduce_rotations(&times, samples, 1e-6, curve).unwrap();
-        assert_eq!(found.places, keys, "{curve:?}");
+        assert_eq!(found.indices, keys, "{curve:?}");
     }
     // A cubic is one cubic.
     let cubic: Vec<DVec3> = times
@@ -167,7 +167,7 @@ fn what_needs_few_keys_gets_few() {
         .map(|&t| DVec3::new(t * t * t, t * t - t, 1.0 - 2.0 * t))
         .collect();
     let found = reduce_vectors(&times, &cubic, 1e-5, ReducedCurve::GltfCubic).unwrap();
-    assert_eq!(found.places, [0, 200]);
+    assert_eq!(found.indices, [0, 200]);
     let leaving = found.tangents[0][1];
     assert!(
         leaving.distance(DVec3::new(0.0, -1.0, -2.0)) < 1e-3,
@@ -175,7 +175,10 @@ fn what_needs_few_keys_gets_few() {
     );
     // What stands still has no tangents.
     let found = reduce_rotations(&times, &still, 1e-6, ReducedCurve::GltfCubic).unwrap();
-    assert_eq!(found.tangents[0].map(|own| own.to_array()), [[0.0; 4]; 2]);
+    assert_eq!(
+        found.tangents[0].map(|tangent| tangent.to_array()),
+        [[0.0; 4]; 2]
+    );
     // Either sign of a quaternion is the same rotation.
     let signs: Vec<DQuat> = even
         .iter()
@@ -184,7 +187,7 @@ fn what_needs_few_keys_gets_few() {
         .collect();
     let found = reduce_rotations(&times, &signs, 1e-6, ReducedCurve::GltfCubic).unwrap();
     let plain = reduce_rotations(&times, &even, 1e-6, ReducedCurve::GltfCubic).unwrap();
-    assert_eq!(found.places, plain.places);
+    assert_eq!(found.indices, plain.indices);
 }
 
 /// A curve through 26 keys, sampled densely, needs about so many keys of the same curve again.
@@ -204,7 +207,7 @@ fn samples_of_a_curve_need_few_of_its_keys() {
     set.push("", &times, &keys).unwrap();
     let engine = Engine::new(Device::Cpu).unwrap();
     let dense = engine
-        .evaluate(&set, method::BESSEL_OVERHAUSER, &Frames::fps(100))
+        .evaluate(&set, method::BESSEL_OVERHAUSER, &SampleTimes::fps(100))
         .unwrap();
     let samples: Vec<DQuat> = dense.as_quats().iter().map(|q| q.as_dquat()).collect();
     let times: Vec<f64> = (0..samples.len()).map(|i| i as f64 * 0.01).collect();
@@ -213,10 +216,10 @@ fn samples_of_a_curve_need_few_of_its_keys() {
         let found = reduce_rotations(&times, &samples, tolerance, curve).unwrap();
         println!(
             "{curve:?}: {} of {} keys",
-            found.places.len(),
+            found.indices.len(),
             samples.len()
         );
-        found.places.len()
+        found.indices.len()
     };
     let [linear, bessel, cubic] = CURVES.map(count);
     assert!(
@@ -227,19 +230,19 @@ fn samples_of_a_curve_need_few_of_its_keys() {
 
 #[test]
 fn what_cannot_be_reduced_is_refused() {
-    let (times, turns, places) = motion(1, 20);
+    let (times, rotations, positions) = motion(1, 20);
     let curve = ReducedCurve::Linear;
-    let refused = |times: &[f64], turns: &[DQuat], tolerance| {
-        reduce_rotations(times, turns, tolerance, curve).unwrap_err()
+    let refused = |times: &[f64], rotations: &[DQuat], tolerance| {
+        reduce_rotations(times, rotations, tolerance, curve).unwrap_err()
     };
     let lengths = ReduceError::Lengths {
         samples: 20,
         times: 19,
     };
-    assert_eq!(refused(&times[1..], &turns, 0.1), lengths);
+    assert_eq!(refused(&times[1..], &rotations, 0.1), lengths);
     for tolerance in [-1.0, f64::INFINITY] {
         assert_eq!(
-            refused(&times, &turns, tolerance),
+            refused(&times, &rotations, tolerance),
             ReduceError::Tolerance { tolerance }
         );
     }
@@ -247,30 +250,30 @@ fn what_cannot_be_reduced_is_refused() {
     wrong[7] = wrong[6];
     let time = wrong[7];
     assert_eq!(
-        refused(&wrong, &turns, 0.1),
-        ReduceError::Time { place: 7, time }
+        refused(&wrong, &rotations, 0.1),
+        ReduceError::Time { index: 7, time }
     );
-    let mut wrong = places.clone();
+    let mut wrong = positions.clone();
     wrong[3].y = f64::NAN;
     let found = reduce_vectors(&times, &wrong, 0.1, curve).unwrap_err();
-    assert_eq!(found, ReduceError::Sample { place: 3 });
-    let mut wrong = turns.clone();
+    assert_eq!(found, ReduceError::Sample { index: 3 });
+    let mut wrong = rotations.clone();
     wrong[5] = DQuat::from_xyzw(0.0, 0.0, 0.0, 0.0);
     assert_eq!(
         refused(&times, &wrong, 0.1),
-        ReduceError::Sample { place: 5 }
+        ReduceError::Sample { index: 5 }
     );
     for curve in CURVES {
         assert!(
             reduce_rotations(&[], &[], 0.1, curve)
                 .unwrap()
-                .places
+                .indices
                 .is_empty()
         );
         assert_eq!(
             reduce_vectors(&[0.0], &[DVec3::X], 0.0, curve)
                 .unwrap()
-                .places,
+                .indices,
             [0]
         );
     }

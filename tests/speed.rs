@@ -1,10 +1,10 @@
-//! Curves at constant angular speed: the way stays the same, and is measured out evenly.
+//! Curves at constant angular speed: the path stays the same, at even steps of its length.
 
-use crate::support::{Random, first_difference, hostile_set, is_turn, vulkan_devices};
+use crate::support::{Random, first_difference, hostile_set, is_due, vulkan_devices};
 use glam::{DQuat, Quat};
-use tumble::reference::{Curve, angle_between};
+use tumble::reference::{ReferenceCurve, angle_between};
 use tumble::{
-    Axes, Device, Ends, Engine, Frames, Interpolation, METHODS, Quantity, Speed, TrackSet,
+    Axes, Device, Ends, Engine, Interpolation, METHODS, Quantity, SampleTimes, Speed, TrackSet,
     WrapMode, method,
 };
 
@@ -16,8 +16,8 @@ fn set() -> TrackSet {
         let (mut times, mut keys) = (vec![0.3], vec![rotation.as_quat()]);
         for i in 1..9 {
             times.push(times[i - 1] + random.between(0.2, 1.5));
-            let turn = DQuat::from_axis_angle(random.direction(), random.between(0.2, 1.6));
-            rotation = (rotation * turn).normalize();
+            let step = DQuat::from_axis_angle(random.direction(), random.between(0.2, 1.6));
+            rotation = (rotation * step).normalize();
             keys.push(rotation.as_quat());
         }
         keys[4] = keys[3]; // a rest
@@ -39,7 +39,7 @@ fn constant(method: tumble::Method) -> Interpolation {
 fn rotations_are_where_the_reference_is() {
     let engine = Engine::new(Device::Cpu).unwrap();
     let set = set();
-    let frames = Frames::fps(30);
+    let frames = SampleTimes::fps(30);
     for method in METHODS {
         let interpolation = constant(method);
         let clip = engine.upload(&set, interpolation).unwrap();
@@ -47,7 +47,7 @@ fn rotations_are_where_the_reference_is() {
         let found = clip.evaluate(&frames).unwrap();
         let mut worst = 0.0f64;
         for (t, track) in set.tracks().enumerate() {
-            let curve = Curve::of(&interpolation, track);
+            let curve = ReferenceCurve::of(&interpolation, track);
             for s in 0..found.samples() {
                 let expected = curve.rotation(timeline.time(t, s).unwrap());
                 let off = angle_between(found.get(t, s).unwrap().as_dquat(), expected);
@@ -75,7 +75,7 @@ fn every_step_is_as_long() {
     // Curves without corners, which a step cuts.
     for method in [method::BESSEL_OVERHAUSER, method::C2, method::SQUAD] {
         let found = engine
-            .evaluate(&set, constant(method), &Frames::fps(500))
+            .evaluate(&set, constant(method), &SampleTimes::fps(500))
             .unwrap();
         let quats = found.as_quats();
         let steps: Vec<f64> = quats
@@ -100,7 +100,7 @@ fn every_step_is_as_long() {
 fn velocities_have_one_length_and_go_on() {
     let engine = Engine::new(Device::Cpu).unwrap();
     let set = set();
-    let frames = Frames::fps(20).between(-1.0, 12.0);
+    let frames = SampleTimes::fps(20).between(-1.0, 12.0);
     for quantity in [
         Quantity::Velocity(Axes::Body),
         Quantity::Acceleration(Axes::Parent),
@@ -115,7 +115,7 @@ fn velocities_have_one_length_and_go_on() {
             let layout = tumble::Layout::TrackMajor;
             let found = engine.rates(&set, interpolation, &frames, layout).unwrap();
             for (t, track) in set.tracks().enumerate() {
-                let curve = Curve::of(&interpolation, track);
+                let curve = ReferenceCurve::of(&interpolation, track);
                 let (first, last) = (track.times[0], track.times[track.times.len() - 1]);
                 let speed = curve.velocity(0.5 * (first + last)).length();
                 let bend = |i: i32| {
@@ -161,17 +161,17 @@ fn the_same_bits_on_every_device() {
     let devices = vulkan_devices().into_iter().map(Engine::new);
     let devices: Vec<Engine> = devices.collect::<Result<_, _>>().unwrap();
     let set = hostile_set(3, 6);
-    let frames = Frames::fps(30).between(-1.0, 30.0);
+    let frames = SampleTimes::fps(30).between(-1.0, 30.0);
     for (round, method) in METHODS.into_iter().enumerate() {
         let interpolation = constant(method);
         let expected = cpu.evaluate(&set, interpolation, &frames).unwrap();
-        for (place, q) in expected.as_quats().iter().enumerate() {
+        for (index, q) in expected.as_quats().iter().enumerate() {
             let norm = q.as_dquat().length();
-            assert!((norm - 1.0).abs() < 1e-6, "{method}, {place}: {q}");
+            assert!((norm - 1.0).abs() < 1e-6, "{method}, {index}: {q}");
         }
         // What takes long is to prepare the curves, again for each.
-        for (place, vulkan) in devices.iter().enumerate() {
-            if !is_turn(round, place, devices.len()) {
+        for (i, vulkan) in devices.iter().enumerate() {
+            if !is_due(round, i, devices.len()) {
                 continue;
             }
             let found = vulkan.evaluate(&set, interpolation, &frames).unwrap();

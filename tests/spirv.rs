@@ -126,7 +126,7 @@ fn vectors_times_scalars_become_products_of_vectors() {
     );
     let count = |module: &[u32], opcode| {
         let all = instructions(module);
-        all.iter().filter(|(own, _)| *own == opcode).count()
+        all.iter().filter(|(code, _)| *code == opcode).count()
     };
     let (times_scalar, multiply, construct) = (142, 133, 80);
     let found = count(&module, times_scalar);
@@ -262,7 +262,7 @@ fn textures_of_one_dimension_become_texel_buffers() {
     validate("texels", "vulkan1.1", &passed);
     // Dimension and whether it is an array; capabilities; what a fetch says of levels.
     let all = instructions(&passed);
-    let of = |wanted: u16| all.iter().filter(move |(opcode, _)| *opcode == wanted);
+    let of = |requested: u16| all.iter().filter(move |(opcode, _)| *opcode == requested);
     let mut dimensions: Vec<u32> = of(25).map(|(_, operands)| operands[2]).collect();
     dimensions.sort_unstable();
     assert_eq!(dimensions, [1, 5]);
@@ -321,11 +321,11 @@ proptest! {
 
     /// A damaged shader is refused or stays a list of whole instructions.
     #[test]
-    fn damaged_shaders_never_panic(place in 0usize..2000, value in any::<u32>()) {
+    fn damaged_shaders_never_panic(offset in 0usize..2000, value in any::<u32>()) {
         for (_, code) in tumble::kernels() {
             let mut module = words(code);
-            let place = place % module.len();
-            module[place] = value;
+            let offset = offset % module.len();
+            module[offset] = value;
             let _ = no_contraction(&module);
             let _ = float_controls(&module, ALL_CONTROLS);
             let _ = texel_buffers(&module);

@@ -1,10 +1,10 @@
 //! Results in chunks: the same bits as in one piece, in order, and nothing left out.
 
-use crate::support::{Random, first_difference, hostile_set, is_turn, vulkan_devices};
+use crate::support::{Random, first_difference, hostile_set, is_due, vulkan_devices};
 use glam::{DQuat, Quat};
 use tumble::{
-    Device, Encoding, Engine, EngineOptions, Error, Frames, Interpolation, Layout, METHODS, Speed,
-    WrapMode, method,
+    Device, Encoding, Engine, EngineOptions, Error, Interpolation, Layout, METHODS, SampleTimes,
+    Speed, WrapMode, method,
 };
 
 fn devices() -> Vec<Device> {
@@ -36,7 +36,10 @@ impl Collected {
 fn chunks_are_the_whole_in_order() {
     let set = hostile_set(5, 24);
     let explicit = (0..700).map(|i| 0.01 * f64::from((i * 37) % 700)).collect();
-    let requests = [Frames::fps(60).between(-1.0, 20.0), Frames::at(explicit)];
+    let requests = [
+        SampleTimes::fps(60).between(-1.0, 20.0),
+        SampleTimes::at(explicit),
+    ];
     let mut round = 0;
     for device in devices() {
         let engine = Engine::new(device).unwrap();
@@ -48,8 +51,8 @@ fn chunks_are_the_whole_in_order() {
                     let whole = clip.evaluate_as(frames, layout).unwrap();
                     round += 1;
                     let limits = [100, 5000, 1000, usize::MAX].into_iter().enumerate();
-                    for (_, limit) in limits.filter(|(place, _)| is_turn(round, *place, 2)) {
-                        let what = format!("{method}, {layout:?}, {limit}");
+                    for (_, limit) in limits.filter(|(i, _)| is_due(round, *i, 2)) {
+                        let label = format!("{method}, {layout:?}, {limit}");
                         let mut of_clip = Collected::default();
                         clip.stream(frames, layout, limit, |chunk| {
                             of_clip.take(&chunk);
@@ -64,10 +67,10 @@ fn chunks_are_the_whole_in_order() {
                             })
                             .unwrap();
                         for found in [of_clip, of_set] {
-                            assert!(found.largest <= limit, "{what}");
-                            assert!(found.chunks > 1 || limit == usize::MAX, "{what}");
+                            assert!(found.largest <= limit, "{label}");
+                            assert!(found.chunks > 1 || limit == usize::MAX, "{label}");
                             let difference = first_difference(whole.as_quats(), &found.rotations);
-                            assert_eq!(difference, None, "{what}");
+                            assert_eq!(difference, None, "{label}");
                         }
                     }
                 }
@@ -94,8 +97,8 @@ fn a_sink_that_fails_ends_the_stream() {
     let set = hostile_set(6, 16);
     for device in devices() {
         let engine = Engine::new(device).unwrap();
-        let mut taken = 0;
-        let frames = Frames::fps(120).between(0.0, 10.0);
+        let mut chunks = 0;
+        let frames = SampleTimes::fps(120).between(0.0, 10.0);
         let result = engine.stream(
             &set,
             method::SLERP,
@@ -103,8 +106,8 @@ fn a_sink_that_fails_ends_the_stream() {
             Layout::TrackMajor,
             1500,
             |_| {
-                taken += 1;
-                if taken == 3 {
+                chunks += 1;
+                if chunks == 3 {
                     Err(Stop::Enough)
                 } else {
                     Ok(())
@@ -112,14 +115,14 @@ fn a_sink_that_fails_ends_the_stream() {
             },
         );
         assert!(matches!(result, Err(Stop::Enough)));
-        assert_eq!(taken, 3);
+        assert_eq!(chunks, 3);
     }
 }
 
 #[test]
 fn what_cannot_be_evaluated_is_an_error_before_any_chunk() {
     let engine = Engine::new(Device::Cpu).unwrap();
-    let frames = Frames::at(vec![0.0, f64::NAN]);
+    let frames = SampleTimes::at(vec![0.0, f64::NAN]);
     let result = engine.stream(
         &hostile_set(7, 4),
         method::SLERP,
@@ -128,7 +131,7 @@ fn what_cannot_be_evaluated_is_an_error_before_any_chunk() {
         10,
         |_| Err(Stop::Enough),
     );
-    assert!(matches!(result, Err(Stop::Engine(Error::Frames(_)))));
+    assert!(matches!(result, Err(Stop::Engine(Error::SampleTimes(_)))));
 }
 
 #[test]
@@ -138,7 +141,11 @@ fn parts_are_those_of_the_whole() {
         .map(|i| 0.04 * f64::from((i * 37) % 450))
         .collect();
     let shared = each[..300].to_vec();
-    let requests = [Frames::fps(40), Frames::at(shared), Frames::at_each(each)];
+    let requests = [
+        SampleTimes::fps(40),
+        SampleTimes::at(shared),
+        SampleTimes::at_each(each),
+    ];
     let sequence = tumble::EulerSequence::XYZ;
     for device in devices() {
         let engine = Engine::new(device).unwrap();
@@ -164,9 +171,16 @@ fn parts_are_those_of_the_whole() {
                         let mut store = vec![Quat::IDENTITY; tracks.len() * track / 16 + 2];
                         let store: &mut [u8] = bytemuck::cast_slice_mut(&mut store);
                         let part = &mut store[shift..shift + tracks.len() * track];
-                        let own = tracks.clone();
+                        let range = tracks.clone();
                         engine
-                            .evaluate_tracks_into(&set, interpolation, frames, own, encoding, part)
+                            .evaluate_tracks_into(
+                                &set,
+                                interpolation,
+                                frames,
+                                range,
+                                encoding,
+                                part,
+                            )
                             .unwrap();
                         assert!(*part == whole[tracks.start * track..tracks.end * track]);
                     }
@@ -178,12 +192,14 @@ fn parts_are_those_of_the_whole() {
                     let request = clip.request(frames).layout(layout).encoding(encoding);
                     let request = request.tracks(tracks.clone()).samples(part.clone());
                     request.evaluate_into(&mut found).unwrap();
-                    for (own, t) in tracks.clone().enumerate() {
+                    for (part_track, t) in tracks.clone().enumerate() {
                         for (sample, s) in part.clone().enumerate() {
                             let size = encoding.bytes();
                             let from = layout.index(t, s, 5, samples).unwrap() * size;
-                            let to =
-                                layout.index(own, sample, tracks.len(), part.len()).unwrap() * size;
+                            let to = layout
+                                .index(part_track, sample, tracks.len(), part.len())
+                                .unwrap()
+                                * size;
                             assert_eq!(found[to..to + size], whole[from..from + size]);
                         }
                     }
@@ -198,7 +214,7 @@ fn parts_that_a_result_has_not_are_refused() {
     let set = hostile_set(4, 3);
     let engine = Engine::new(Device::Cpu).unwrap();
     let clip = engine.upload(&set, method::SLERP).unwrap();
-    let frames = Frames::at(vec![0.0; 8]);
+    let frames = SampleTimes::at(vec![0.0; 8]);
     let mut bytes = vec![0; 8 * 16];
     let of_tracks = |tracks, encoding, output: &mut [u8]| {
         engine.evaluate_tracks_into(&set, method::SLERP, &frames, tracks, encoding, output)
@@ -216,7 +232,7 @@ fn parts_that_a_result_has_not_are_refused() {
         matches!(
             error,
             Error::OutputBytes {
-                given: 127,
+                length: 127,
                 needed: 128
             }
         ),
@@ -237,7 +253,7 @@ fn parts_that_a_result_has_not_are_refused() {
     assert!(of_clip(3..3, 0..8, &mut []).is_ok());
 }
 
-/// Sets whose segments take more than the engine may use, in every way in which samples are asked for. Catches a
+/// Sets whose segments take more than the engine may use, by every call that asks for samples. Catches a
 /// piece that lacks an interval, or whose numbers depend on where it was cut.
 #[test]
 fn what_takes_too_much_memory_is_made_piece_by_piece_with_the_same_bits() {
@@ -258,12 +274,12 @@ fn what_takes_too_much_memory_is_made_piece_by_piece_with_the_same_bits() {
     let (tracks, unlimited) = (set.track_count(), Engine::new(Device::Cpu).unwrap());
     let mut times: Vec<f64> = (0..24).map(|i| 0.15 * f64::from((i * 7) % 24)).collect();
     let each = (0..tracks * 12).map(|i| 0.01 * ((i * 31) % 349) as f64);
-    let each = Frames::at_each(each.collect());
-    let unordered = Frames::at(times.clone());
+    let each = SampleTimes::at_each(each.collect());
+    let unordered = SampleTimes::at(times.clone());
     times.sort_by(f64::total_cmp);
     let requests = [
-        Frames::fps(13).between(-1.0, 4.5),
-        Frames::at(times),
+        SampleTimes::fps(13).between(-1.0, 4.5),
+        SampleTimes::at(times),
         unordered,
         each,
     ];
@@ -284,7 +300,7 @@ fn what_takes_too_much_memory_is_made_piece_by_piece_with_the_same_bits() {
         ),
         interpolation(method::SLERP, WrapMode::Hold, Speed::Constant),
     ];
-    for (way, device) in devices().into_iter().enumerate() {
+    for (device_index, device) in devices().into_iter().enumerate() {
         let mut options = EngineOptions::default();
         options.memory = Some(50_000);
         let engine = Engine::with_options(device, &options).unwrap();
@@ -292,31 +308,32 @@ fn what_takes_too_much_memory_is_made_piece_by_piece_with_the_same_bits() {
             let whole = unlimited.upload(&set, interpolation).unwrap();
             let clip = engine.upload(&set, interpolation).unwrap();
             for (request, frames) in requests.iter().enumerate() {
-                if !is_turn(way + round, request, requests.len()) {
+                if !is_due(device_index + round, request, requests.len()) {
                     continue;
                 }
-                let what = format!("{interpolation:?}, request {request}, {engine:?}");
+                let label = format!("{interpolation:?}, request {request}, {engine:?}");
                 for layout in [Layout::TrackMajor, Layout::FrameMajor] {
                     let expected = whole.evaluate_as(frames, layout).unwrap();
                     let expected = expected.as_quats();
-                    let same = |found: &[Quat], way: &str| {
+                    let same = |found: &[Quat], strategy: &str| {
                         let difference = first_difference(expected, found);
-                        assert_eq!(difference, None, "{way}, {layout:?}, {what}");
+                        assert_eq!(difference, None, "{strategy}, {layout:?}, {label}");
                     };
                     same(clip.evaluate_as(frames, layout).unwrap().as_quats(), "clip");
                     let found = engine.evaluate_as(&set, interpolation, frames, layout);
                     same(found.unwrap().as_quats(), "set");
                     let mut streamed = Collected::default();
-                    let taken = engine.stream(&set, interpolation, frames, layout, 300, |chunk| {
-                        streamed.take(&chunk);
-                        Ok::<(), Error>(())
-                    });
-                    taken.unwrap();
+                    let outcome =
+                        engine.stream(&set, interpolation, frames, layout, 300, |chunk| {
+                            streamed.take(&chunk);
+                            Ok::<(), Error>(())
+                        });
+                    outcome.unwrap();
                     same(&streamed.rotations, "stream");
                     let (encoding, samples) = (Encoding::F16, clip.timeline(frames).unwrap().len());
                     let expected = whole.evaluate_encoded(frames, layout, encoding).unwrap();
                     let found = clip.evaluate_encoded(frames, layout, encoding).unwrap();
-                    assert!(found == expected, "encoded, {layout:?}, {what}");
+                    assert!(found == expected, "encoded, {layout:?}, {label}");
                     if layout == Layout::TrackMajor {
                         let mut part = vec![0; 7 * samples * encoding.bytes()];
                         let start = (tracks - 7) * samples * encoding.bytes();
@@ -331,7 +348,7 @@ fn what_takes_too_much_memory_is_made_piece_by_piece_with_the_same_bits() {
                                 &mut part,
                             )
                             .unwrap();
-                        assert!(part == expected[start..], "tracks, {what}");
+                        assert!(part == expected[start..], "tracks, {label}");
                     }
                 }
             }
@@ -349,11 +366,11 @@ fn what_cannot_be_interpolated_is_refused_before_it_is_made_piece_by_piece() {
     let opposite = [Quat::IDENTITY, -Quat::IDENTITY];
     set.push("", &[0.0, 1.0], &opposite).unwrap();
     let mut interpolation = Interpolation::from(method::SLERP);
-    interpolation.path = tumble::Path::AsAuthored;
+    interpolation.signs = tumble::KeySigns::AsAuthored;
     let error = engine.upload(&set, interpolation).unwrap_err();
     assert!(matches!(error, Error::Interpolation(_)), "{error}");
     let sink = |_: tumble::Chunk<'_>| -> Result<(), Error> { panic!("no chunk comes") };
-    let (frames, layout) = (Frames::fps(5), Layout::FrameMajor);
+    let (frames, layout) = (SampleTimes::fps(5), Layout::FrameMajor);
     let error = engine.stream(&set, interpolation, &frames, layout, 10, sink);
     assert!(matches!(error, Err(Error::Interpolation(_))));
 }

@@ -1,4 +1,4 @@
-//! The reference against the textbook: what must hold of these curves whatever the
+//! The reference against the textbook: what is true of these curves whatever the
 //! keys. The engine is measured against the reference in `accuracy.rs`.
 
 use std::f64::consts::TAU;
@@ -7,10 +7,10 @@ use crate::support::Random;
 use glam::{DQuat, DVec3, Quat};
 use proptest::prelude::*;
 use tumble::reference::{
-    Curve, angle_between, slerp, slerp_from_end, slerp_from_end_left, slerp_from_start,
+    ReferenceCurve, angle_between, slerp, slerp_from_end, slerp_from_end_left, slerp_from_start,
     slerp_from_start_left,
 };
-use tumble::{Continuity, Ends, Keys, METHODS, Method, Path, method};
+use tumble::{Continuity, Ends, KeySigns, Keys, METHODS, Method, method};
 
 /// Every method but those that are made to jump.
 fn moving() -> impl Iterator<Item = Method> {
@@ -19,12 +19,12 @@ fn moving() -> impl Iterator<Item = Method> {
 
 /// Methods that follow from the keys alone, also at the ends.
 fn free() -> impl Iterator<Item = Method> {
-    let given = [method::HERMITE, method::GLTF_CUBIC];
-    moving().filter(move |method| !given.contains(method))
+    let with_tangents = [method::HERMITE, method::GLTF_CUBIC];
+    moving().filter(move |method| !with_tangents.contains(method))
 }
 
-fn curve(method: Method, ends: Ends, times: &[f64], keys: &[Quat]) -> Curve {
-    Curve::new(method.reference, Path::Shortest, ends, times, keys)
+fn curve(method: Method, ends: Ends, times: &[f64], keys: &[Quat]) -> ReferenceCurve {
+    ReferenceCurve::new(method.reference, KeySigns::Shortest, ends, times, keys)
 }
 
 /// `count` keys, each up to `step` radians from the one before.
@@ -32,8 +32,9 @@ fn random_keys(random: &mut Random, count: usize, step: f64) -> Vec<Quat> {
     let mut rotation = random.rotation();
     (0..count)
         .map(|_| {
-            let turn = DQuat::from_axis_angle(random.direction(), random.between(0.0, step));
-            rotation = (rotation * turn).normalize();
+            let rotation_step =
+                DQuat::from_axis_angle(random.direction(), random.between(0.0, step));
+            rotation = (rotation * rotation_step).normalize();
             rotation.as_quat()
         })
         .collect()
@@ -145,8 +146,9 @@ fn velocity_is_the_derivative_of_the_rotation() {
                 continue;
             }
             let (before, after) = (curve.rotation(time - h), curve.rotation(time + h));
-            let turn = before.inverse() * after;
-            let numeric = DVec3::new(turn.x, turn.y, turn.z) * turn.w.signum() / h;
+            let difference = before.inverse() * after;
+            let numeric =
+                DVec3::new(difference.x, difference.y, difference.z) * difference.w.signum() / h;
             let exact = curve.velocity(time);
             assert!(
                 (numeric - exact).length() < 1e-6,
@@ -157,14 +159,14 @@ fn velocity_is_the_derivative_of_the_rotation() {
 }
 
 /// The velocities on both sides of each inner key.
-fn velocity_jumps(curve: &Curve, segments: usize) -> f64 {
+fn velocity_jumps(curve: &ReferenceCurve, segments: usize) -> f64 {
     (1..segments)
         .map(|i| (curve.segment_velocity(i, 0.0) - curve.segment_velocity(i - 1, 1.0)).length())
         .fold(0.0, f64::max)
 }
 
 /// The same for angular accelerations.
-fn acceleration_jumps(curve: &Curve, segments: usize) -> f64 {
+fn acceleration_jumps(curve: &ReferenceCurve, segments: usize) -> f64 {
     (1..segments)
         .map(|i| {
             let before = curve.segment_acceleration(i - 1, 1.0);
@@ -195,9 +197,9 @@ fn continuity_is_what_is_promised() {
                 (true, false) => Continuity::C1,
                 _ => Continuity::C0,
             };
-            let what = format!("{method}: {velocity:e} {acceleration:e}");
-            assert_eq!(found, promised, "{what}");
-            assert!(found >= Continuity::C1 || velocity > 0.01, "{what}");
+            let label = format!("{method}: {velocity:e} {acceleration:e}");
+            assert_eq!(found, promised, "{label}");
+            assert!(found >= Continuity::C1 || velocity > 0.01, "{label}");
         }
     }
 }
@@ -249,16 +251,16 @@ fn turning_all_keys_turns_every_sample() {
     let mut random = Random(7);
     let keys = random_keys(&mut random, 8, 2.0);
     let times = uneven_times(&mut random, 8);
-    let turn = Quat::from_xyzw(1.0, 0.0, 0.0, 0.0);
-    let exact = turn.as_dquat();
+    let factor = Quat::from_xyzw(1.0, 0.0, 0.0, 0.0);
+    let exact = factor.as_dquat();
     for method in moving() {
-        let own = curve(method, Ends::Parabolic, &times, &keys);
-        let left: Vec<Quat> = keys.iter().map(|&key| turn * key).collect();
-        let right: Vec<Quat> = keys.iter().map(|&key| key * turn).collect();
+        let plain = curve(method, Ends::Parabolic, &times, &keys);
+        let left: Vec<Quat> = keys.iter().map(|&key| factor * key).collect();
+        let right: Vec<Quat> = keys.iter().map(|&key| key * factor).collect();
         let left = curve(method, Ends::Parabolic, &times, &left);
         let right = curve(method, Ends::Parabolic, &times, &right);
         for time in samples(&times) {
-            let rotation = own.rotation(time);
+            let rotation = plain.rotation(time);
             assert!(
                 angle_between(left.rotation(time), exact * rotation) < 1e-13,
                 "{method:?}"

@@ -1,6 +1,6 @@
 //! Whoever calls from whatever thread: nothing hangs, and no thread that is refused ends the program.
 //! What may hang runs in a process of its own, which is ended after a while.
-#![allow(unsafe_code)] // the buffers of an application's own device
+#![allow(unsafe_code)] // the buffers of an application's device
 
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::process::{Child, Command, Stdio};
@@ -11,8 +11,8 @@ use glam::{DQuat, Quat, Vec3};
 use rayon::prelude::*;
 use tumble::{
     Axes, CrowdLayer, CrowdLibrary, CrowdValues, Device, Encoding, Engine, EngineOptions, Error,
-    Follow, Frames, Interpolation, Layout, Mapping, OutputBuffer, Quantity, Skeleton, Smoothing,
-    SmoothingKernel, TrackSet, VectorMethod, VulkanBuffer, method,
+    Follow, Interpolation, Layout, Mapping, OutputBuffer, Quantity, SampleTimes, Skeleton,
+    Smoothing, SmoothingKernel, TrackSet, VectorMethod, VulkanBuffer, method,
 };
 
 use crate::application::Application;
@@ -78,8 +78,8 @@ fn keys() -> TrackSet {
         let mut rotation = random.rotation();
         let mut keys = Vec::new();
         for _ in &times {
-            let turn = DQuat::from_axis_angle(random.direction(), random.between(0.0, 0.8));
-            rotation = (rotation * turn).normalize();
+            let step = DQuat::from_axis_angle(random.direction(), random.between(0.0, 0.8));
+            rotation = (rotation * step).normalize();
             keys.push(rotation.as_quat());
         }
         set.push("", &times, &keys).unwrap();
@@ -114,7 +114,7 @@ fn calls(engine: &Engine) -> Vec<Call> {
     let paths: &'static TrackSet = Box::leak(Box::new(paths()));
     let clip: &'static _ = Box::leak(Box::new(engine.upload(set, method::SLERP).unwrap()));
     let engine: &'static Engine = Box::leak(Box::new(engine.clone()));
-    let frames = |rate: u32| Frames::fps(rate);
+    let frames = |rate: u32| SampleTimes::fps(rate);
     let tracks = set.track_count();
     let samples = move |rate: u32| clip.timeline(&frames(rate)).unwrap().len();
     let chain: &'static _ = Box::leak(Box::new(Skeleton::chain(tracks, 0.5).unwrap()));
@@ -184,8 +184,8 @@ fn calls(engine: &Engine) -> Vec<Call> {
         }),
         // Straight from keys.
         Box::new(move |rate| {
-            let few = Frames::at((0..20).map(|i| f64::from(i * rate) * 0.005).collect());
-            let found = engine.evaluate(set, method::CATMULL_ROM, &few);
+            let sparse = SampleTimes::at((0..20).map(|i| f64::from(i * rate) * 0.005).collect());
+            let found = engine.evaluate(set, method::CATMULL_ROM, &sparse);
             sum(found.unwrap().as_quats())
         }),
         Box::new(move |rate| {
@@ -225,10 +225,10 @@ fn calls(engine: &Engine) -> Vec<Call> {
             sum(engine.world(&added, chain).unwrap().as_slice())
         }),
         Box::new(move |rate| {
-            let mut own = engine.crowd(&library, 100, 1).unwrap();
-            own.submit(CrowdValues::Local).unwrap();
-            let mut output = vec![[0.0; 4]; own.output_len(CrowdValues::Local)];
-            own.wait_into(&mut output).unwrap();
+            let mut crowd = engine.crowd(&library, 100, 1).unwrap();
+            crowd.submit(CrowdValues::Local).unwrap();
+            let mut output = vec![[0.0; 4]; crowd.output_len(CrowdValues::Local)];
+            crowd.wait_into(&mut output).unwrap();
             sum(&output)
                 ^ sum(engine
                     .upload(set, method::C2)
@@ -253,9 +253,9 @@ fn calls(engine: &Engine) -> Vec<Call> {
 #[ignore = "part of tasks_of_a_callers_own_pool_may_call_everything_at_once"]
 fn four_hundred_tasks() {
     let cpu = Engine::new(Device::Cpu).unwrap();
-    let mut own = EngineOptions::default();
-    own.threads = Some(2);
-    let mut engines = vec![Engine::with_options(Device::Cpu, &own).unwrap()];
+    let mut options = EngineOptions::default();
+    options.threads = Some(2);
+    let mut engines = vec![Engine::with_options(Device::Cpu, &options).unwrap()];
     engines.extend(
         vulkan_devices()
             .into_iter()
@@ -285,11 +285,11 @@ fn four_hundred_tasks() {
         })
         .unwrap();
     }
-    to_own_buffers();
+    to_application_buffers();
 }
 
-/// Into buffers of an application's own, one for each task.
-fn to_own_buffers() {
+/// Into an application's buffers, one for each task.
+fn to_application_buffers() {
     if vulkan_devices().is_empty() {
         return;
     }
@@ -297,7 +297,7 @@ fn to_own_buffers() {
     let engine = application.engine(Mapping::Automatic);
     let set = keys();
     let clip = engine.upload(&set, method::SLERP).unwrap();
-    let expected = clip.evaluate(&Frames::fps(40)).unwrap();
+    let expected = clip.evaluate(&SampleTimes::fps(40)).unwrap();
     let size = size_of_val(expected.as_quats()) as u64;
     let buffers: Vec<_> = (0..60).map(|_| application.buffer(size)).collect();
     let whole = |buffer| VulkanBuffer {
@@ -306,7 +306,7 @@ fn to_own_buffers() {
         size,
     };
     buffers.par_iter().for_each(|&(buffer, _)| {
-        let frames = Frames::fps(40);
+        let frames = SampleTimes::fps(40);
         // SAFETY: each buffer is the device's, has memory, and is this task's alone.
         unsafe { clip.request(&frames).to_buffer(whole(buffer)) }.unwrap();
     });
@@ -329,12 +329,12 @@ fn to_own_buffers() {
 #[cfg(target_os = "linux")]
 #[test]
 fn threads_that_the_system_refuses_are_an_error() {
-    let own = child("refused_threads");
+    let child_command = child("refused_threads");
     let mut command = Command::new("sh");
     command
         .args(["-c", "ulimit -v 2000000; exec \"$0\" \"$@\""])
-        .arg(own.get_program())
-        .args(own.get_args())
+        .arg(child_command.get_program())
+        .args(child_command.get_args())
         .env("RAYON_NUM_THREADS", "1000");
     runs(command).unwrap();
 }
@@ -348,11 +348,11 @@ fn refused_threads() {
     let one = set.select([1]).unwrap();
     assert!(
         engine
-            .evaluate(&one, method::SLERP, &Frames::fps(10))
+            .evaluate(&one, method::SLERP, &SampleTimes::fps(10))
             .is_ok()
     );
     for _ in 0..2 {
-        let refused = engine.evaluate(&set, method::SLERP, &Frames::fps(60));
+        let refused = engine.evaluate(&set, method::SLERP, &SampleTimes::fps(60));
         let Err(Error::Threads(refused)) = refused else {
             panic!("a thousand threads");
         };
@@ -373,7 +373,7 @@ fn refused_threads() {
     };
     assert!(
         engine
-            .evaluate(&set, method::SLERP, &Frames::fps(60))
+            .evaluate(&set, method::SLERP, &SampleTimes::fps(60))
             .is_ok()
     );
     options.threads = Some(1000);

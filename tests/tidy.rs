@@ -17,7 +17,7 @@ fn files(directory: &str, extension: &str) -> Vec<PathBuf> {
             let path = entry.unwrap().path();
             if path.is_dir() {
                 pending.push(path);
-            } else if path.extension().is_some_and(|own| own == extension) {
+            } else if path.extension().is_some_and(|name| name == extension) {
                 found.push(path);
             }
         }
@@ -45,11 +45,12 @@ fn unsafe_code_stays_in_its_homes() {
         let relative = path.strip_prefix(root()).unwrap();
         let home = relative.starts_with("src/gpu")
             || relative.starts_with("src/simd")
-            || relative.ends_with("src/own_device.rs")
+            || relative.ends_with("src/engine/application_device.rs")
+            || relative.ends_with("src/request/application_device.rs")
             // C interfaces: CUDA's driver, and the exchange of arrays.
             || relative.ends_with("python/src/cuda.rs")
             || relative.ends_with("python/src/dlpack.rs")
-            || relative.ends_with("src/crowd/own_device.rs")
+            || relative.ends_with("src/crowd/player/application_device.rs")
             || relative.ends_with("src/verify/renderer.rs");
         let blocks = read(&path)
             .lines()
@@ -80,11 +81,11 @@ fn no_multiply_add_is_fused_and_unsafe_code_has_its_reason() {
             if line.trim_start().starts_with("//") {
                 continue;
             }
-            let place = format!("{}:{}", path.display(), i + 1);
+            let location = format!("{}:{}", path.display(), i + 1);
             // A fused one rounds once where the kernels round twice.
             assert!(
                 !line.contains("mul_add") && !line.contains("fmadd"),
-                "{place}"
+                "{location}"
             );
             if line.contains("unsafe {") || line.contains("unsafe impl") {
                 unsafe_lines += 1;
@@ -92,7 +93,7 @@ fn no_multiply_add_is_fused_and_unsafe_code_has_its_reason() {
                 let has_reason = before.iter().any(|line| line.contains("SAFETY: "));
                 assert!(
                     has_reason,
-                    "{place}: say why it is sound, after `// SAFETY: `"
+                    "{location}: say why it is sound, after `// SAFETY: `"
                 );
             }
         }
@@ -144,7 +145,7 @@ const DIFFERS_BY_SYSTEM: [&str; 36] = [
 
 /// Where no result depends on it.
 const SEEN_ALONE: [&str; 5] = [
-    "src/auto.rs", // a probe to time
+    "src/engine/auto.rs", // a probe to time
     "cli/src/commands/bench",
     "cli/src/commands/travel.rs", // bodies for pictures
     "cli/src/commands/plot",
@@ -286,18 +287,22 @@ const LAYERS: [&str; 25] = [
 
 const FACE: &str = "face";
 
+/// Folders of the face: types whose methods fill several files.
+const FACE_FOLDERS: [&str; 2] = ["engine", "request"];
+
 /// The layer of a file or of a module, by the first part of its path within `src/`.
 fn layer(first: &str) -> &str {
     let name = first.strip_suffix(".rs").unwrap_or(first);
-    match root().join("src").join(name).is_dir() {
+    let is_folder = root().join("src").join(name).is_dir();
+    match is_folder && !FACE_FOLDERS.contains(&name) {
         true => name,
         false => FACE,
     }
 }
 
 /// Why `line` of a file of the layer `own` may not stand there.
-fn refused(own: &str, line: &str) -> Option<String> {
-    let place = |layer: &str| {
+fn refused(layer_name: &str, line: &str) -> Option<String> {
+    let rank = |layer: &str| {
         let found = LAYERS.iter().position(|name| *name == layer);
         found.unwrap_or_else(|| panic!("the table of layers has no `{layer}`"))
     };
@@ -305,7 +310,8 @@ fn refused(own: &str, line: &str) -> Option<String> {
     code.split("crate::").skip(1).find_map(|path| {
         let first: &str = path.split([':', ',', ';', ' ', '}']).next().unwrap();
         let other = layer(first);
-        (place(other) > place(own)).then(|| format!("{own} uses {other}, which lies above it"))
+        (rank(other) > rank(layer_name))
+            .then(|| format!("{layer_name} uses {other}, which lies above it"))
     })
 }
 
@@ -319,7 +325,7 @@ fn imports_go_down_the_layers() {
         if relative == Path::new("lib.rs") {
             continue;
         }
-        let own = layer(relative.iter().next().unwrap().to_str().unwrap());
+        let home = layer(relative.iter().next().unwrap().to_str().unwrap());
         let text = read(&path);
         if path.ends_with("tests.rs") {
             continue;
@@ -331,7 +337,7 @@ fn imports_go_down_the_layers() {
             .unwrap();
         for (number, line) in code.lines().enumerate() {
             checked += usize::from(line.contains("crate::"));
-            if let Some(why) = refused(own, line) {
+            if let Some(why) = refused(home, line) {
                 panic!("{}:{}: {why}: {line}", path.display(), number + 1);
             }
         }
@@ -489,4 +495,432 @@ fn packages_have_all_that_they_include() {
         }
     }
     assert!(found >= 4, "only {found} files are included");
+}
+
+/// A word or a mark of a source text, and its line.
+struct Token<'a> {
+    text: &'a str,
+    line: usize,
+}
+
+/// Where the literal ends that starts with a quotation mark at `start`; `hashes` of a raw one.
+fn after_string(text: &str, start: usize, hashes: Option<usize>) -> usize {
+    let body = &text[start + 1..];
+    let length = match hashes {
+        Some(count) => {
+            let end = format!("\"{}", "#".repeat(count));
+            body.find(&end).map(|at| at + end.len())
+        }
+        None => {
+            let mut is_escaped = false;
+            let end = body.bytes().position(|byte| {
+                let is_end = byte == b'"' && !is_escaped;
+                is_escaped = byte == b'\\' && !is_escaped;
+                is_end
+            });
+            end.map(|at| at + 1)
+        }
+    };
+    length.map_or(text.len(), |length| start + 1 + length)
+}
+
+/// Where the comment ends that starts at `start`: such comments lie within each other.
+fn after_block_comment(text: &str, start: usize) -> usize {
+    let (mut at, mut depth) = (start + 2, 1);
+    while depth > 0 && at < text.len() {
+        let rest = &text.as_bytes()[at..];
+        let (step, change) = match rest {
+            [b'/', b'*', ..] => (2, 1),
+            [b'*', b'/', ..] => (2, -1),
+            _ => (1, 0),
+        };
+        at += step;
+        depth += change;
+    }
+    at.min(text.len())
+}
+
+/// Where the character, or the lifetime, ends whose quotation mark is at `start`.
+fn after_quote(text: &str, start: usize) -> usize {
+    let body = &text[start + 1..];
+    if let Some(escaped) = body.strip_prefix('\\') {
+        let skipped = escaped.chars().next().map_or(0, char::len_utf8);
+        let end = escaped[skipped..].find('\'');
+        return end.map_or(text.len(), |at| start + 2 + skipped + at + 1);
+    }
+    let first = body.chars().next().map_or(0, char::len_utf8);
+    match body[first..].starts_with('\'') {
+        true => start + 1 + first + 1,
+        false => start + 1 + length_of_word(body),
+    }
+}
+
+fn length_of_word(text: &str) -> usize {
+    let is_part = |letter: char| letter.is_alphanumeric() || letter == '_';
+    text.find(|letter| !is_part(letter)).unwrap_or(text.len())
+}
+
+/// The words and marks of a Rust source, without its comments and literals.
+fn tokens(text: &str) -> Vec<Token<'_>> {
+    let (mut all, mut at, mut line) = (Vec::new(), 0, 1);
+    while let Some(first) = text[at..].chars().next() {
+        let (start, rest) = (at, &text[at..]);
+        let mut token = None;
+        if rest.starts_with("//") {
+            at += rest.find('\n').unwrap_or(rest.len());
+        } else if rest.starts_with("/*") {
+            at = after_block_comment(text, at);
+        } else if first == '"' {
+            at = after_string(text, at, None);
+        } else if first == '\'' {
+            at = after_quote(text, at);
+        } else if first.is_ascii_digit() {
+            at += length_of_word(rest);
+        } else if first.is_alphabetic() || first == '_' {
+            let word = &rest[..length_of_word(rest)];
+            let behind = &rest[word.len()..];
+            let hashes = behind.len() - behind.trim_start_matches('#').len();
+            let is_raw = ["r", "br", "cr"].contains(&word);
+            at += word.len();
+            if is_raw && behind[hashes..].starts_with('"') {
+                at = after_string(text, at + hashes, Some(hashes));
+            } else if ["b", "c"].contains(&word) && behind.starts_with('"') {
+                at = after_string(text, at, None);
+            } else if word == "b" && behind.starts_with('\'') {
+                at = after_quote(text, at);
+            } else if word == "r" && hashes == 1 {
+                at += 1; // a raw identifier follows
+            } else {
+                token = Some(word);
+            }
+        } else {
+            at += first.len_utf8();
+            token = (!first.is_whitespace()).then(|| &rest[..first.len_utf8()]);
+        }
+        all.extend(token.map(|text| Token { text, line }));
+        line += text[start..at].matches('\n').count();
+    }
+    all
+}
+
+/// The words of an identifier, in lower case: `own_keys`, `OwnKeys` and `OWN_KEYS` have the same.
+fn words(identifier: &str) -> Vec<String> {
+    let mut all = Vec::new();
+    for part in identifier.split('_').filter(|part| !part.is_empty()) {
+        let is_camel = part.contains(char::is_lowercase);
+        for (i, letter) in part.char_indices() {
+            if i == 0 || is_camel && letter.is_uppercase() {
+                all.push(String::new());
+            }
+            let word: &mut String = all.last_mut().unwrap();
+            word.extend(letter.to_lowercase());
+        }
+    }
+    all
+}
+
+/// Words that named many things each (`docs/words.md`): a name says which one it is.
+const RETIRED: [&str; 35] = [
+    "own", "place", "places", "given", "wanted", "what", "told", "way", "ways", "turn", "turns",
+    "turned", "hold", "holds", "far", "fate", "fates", "beyond", "party", "parties", "wish",
+    "wishes", "manner", "manners", "fly", "bring", "brought", "gone", "few", "studio", "studios",
+    "usual", "taken", "most", "look",
+];
+
+/// Phrases in which a retired word is the field's or ordinary English, and why.
+const ALLOWED: [(&str, &str); 9] = [
+    ("at_most", "a bound"),
+    ("half_turn", "an angle"),
+    ("half_turns", "rotations by this angle"),
+    ("in_place", "without a copy, as in Rust's standard library"),
+    ("look_at", "of a camera, as in glam and OpenGL"),
+    ("most_common", "what statistics call the mode"),
+    ("quarter_turn", "an angle"),
+    ("too_few", "below a minimum"),
+    ("wrap_hold", "the wrap mode, in the shaders' constants"),
+];
+
+/// Whole identifiers, as they stand.
+const ALLOWED_WHOLE: [(&str, &str); 1] = [(
+    "Hold",
+    "the wrap mode that keeps the last key, as animation tools call it",
+)];
+
+/// The retired word in an identifier.
+fn retired_word(identifier: &str) -> Option<&'static str> {
+    if ALLOWED_WHOLE.iter().any(|(whole, _)| *whole == identifier) {
+        return None;
+    }
+    let mut all = format!("_{}_", words(identifier).join("_"));
+    for (phrase, _) in ALLOWED {
+        all = all.replace(&format!("_{phrase}_"), "_");
+    }
+    let found = all
+        .split('_')
+        .find_map(|word| RETIRED.iter().find(|retired| **retired == word));
+    found.copied()
+}
+
+/// The identifiers that have a retired word, with their lines. Names of tests are sentences, and may.
+fn retired_identifiers(text: &str) -> Vec<(usize, &str)> {
+    let tokens = tokens(text);
+    let (mut found, mut is_test) = (Vec::new(), false);
+    for (i, token) in tokens.iter().enumerate() {
+        let before = |count: usize| i.checked_sub(count).map_or("", |i| tokens[i].text);
+        is_test |= token.text == "test" && before(1) == "[" && before(2) == "#";
+        let is_name_of_test = is_test && before(1) == "fn";
+        if is_name_of_test {
+            is_test = false;
+        } else if retired_word(token.text).is_some() {
+            found.push((token.line, token.text));
+        }
+    }
+    found
+}
+
+/// Every folder with Rust sources.
+const SOURCES: [&str; 13] = [
+    "src",
+    "tests",
+    "examples",
+    "benches",
+    "fuzz",
+    "shaders",
+    "formats",
+    "routes",
+    "cli",
+    "python",
+    "capi",
+    "npm",
+    "shader-compiler",
+];
+
+/// How often folders may still use retired words. The numbers only fall; a folder without one has none.
+const UNFINISHED: [(&str, usize); 0] = [];
+
+#[test]
+fn retired_words_do_not_come_back() {
+    let mut counts = UNFINISHED.map(|_| 0);
+    let (mut wrong, mut identifiers) = (Vec::new(), 0);
+    for path in SOURCES.iter().flat_map(|folder| files(folder, "rs")) {
+        let relative = path.strip_prefix(root()).unwrap();
+        if relative.iter().any(|part| part == "target") {
+            continue;
+        }
+        let text = read(&path);
+        identifiers += tokens(&text).len();
+        let unfinished = UNFINISHED
+            .iter()
+            .position(|(folder, _)| relative.starts_with(folder));
+        let found = retired_identifiers(&text);
+        if let Some(i) = unfinished {
+            counts[i] += found.len();
+            continue;
+        }
+        let named = |(line, name)| format!("{}:{line}: {name}", relative.display());
+        wrong.extend(found.into_iter().map(named));
+    }
+    for ((folder, limit), count) in UNFINISHED.iter().zip(counts) {
+        if count > *limit {
+            wrong.push(format!("{folder}: {count} retired words, {limit} at most"));
+        }
+    }
+    assert!(
+        wrong.is_empty(),
+        "{} names have a word that says too little (docs/words.md):\n{}",
+        wrong.len(),
+        wrong.join("\n")
+    );
+    assert!(
+        identifiers > 1_000_000,
+        "only {identifiers} words were read"
+    );
+}
+
+/// The test of the words can fail.
+#[test]
+fn a_retired_word_is_found() {
+    let text = r##"
+        // own place
+        fn follow<'own>(own_times: &OwnKeys) -> usize {
+            let said = ("what", 'w', r#"a "turn" of its own"#, b"told", '\'', "\"given");
+            /* far /* few */ beyond */ at_most(Transfer::InPlace, WrapMode::Hold)
+                + MOST_BYTES + r#place + in_turn(HALF_TURN) + owner.placement.lookup()
+        }
+        #[test]
+        #[ignore]
+        fn what_is_told_is_taken() {}
+        fn what() {}
+    "##;
+    let expected = [
+        (3, "own_times"),
+        (3, "OwnKeys"),
+        (6, "MOST_BYTES"),
+        (6, "place"),
+        (6, "in_turn"),
+        (11, "what"),
+    ];
+    assert_eq!(retired_identifiers(text), expected);
+}
+
+/// The type that the inherent `impl` at a token is of; none for those of traits and for types (`impl Iterator`).
+fn type_of_impl<'a>(tokens: &[Token<'a>], at: usize) -> Option<&'a str> {
+    let before = at.checked_sub(1).map_or(";", |i| tokens[i].text);
+    if tokens[at].text != "impl" || ![";", "{", "}", "]", "unsafe"].contains(&before) {
+        return None;
+    }
+    let (mut depth, mut name) = (0, None);
+    for pair in tokens[at..].windows(2) {
+        let (before, text) = (pair[0].text, pair[1].text);
+        match text {
+            "<" => depth += 1,
+            ">" if before != "-" => depth -= 1,
+            "for" | "$" if depth == 0 => return None,
+            "{" | "where" if depth == 0 => return name,
+            _ if depth == 0 && text.starts_with(char::is_alphabetic) => name = Some(text),
+            _ => {}
+        }
+    }
+    None
+}
+
+/// The inherent `impl`s of a package that stand neither in the file of their type nor in one of its child modules:
+/// file, line and type.
+fn away_from_home(files: &[(String, String)]) -> Vec<(&str, usize, &str)> {
+    let lexed = files
+        .iter()
+        .map(|(path, text)| (path.as_str(), tokens(text)));
+    let lexed: Vec<(&str, Vec<Token>)> = lexed.collect();
+    let mut homes = Vec::new();
+    for (path, tokens) in &lexed {
+        let defined = tokens
+            .windows(2)
+            .filter(|pair| ["struct", "enum", "union", "type"].contains(&pair[0].text));
+        let folder = ["/mod.rs", "/lib.rs", ".rs"]
+            .iter()
+            .find_map(|end| path.strip_suffix(end));
+        homes.extend(defined.map(|pair| (pair[1].text, *path, folder.unwrap_or(path))));
+    }
+    let mut away = Vec::new();
+    for (path, tokens) in &lexed {
+        for at in 0..tokens.len() {
+            let Some(name) = type_of_impl(tokens, at) else {
+                continue;
+            };
+            let is_home = homes.iter().any(|(of, file, folder)| {
+                let is_child = Path::new(path).starts_with(folder);
+                *of == name && (file == path || is_child)
+            });
+            if !is_home {
+                away.push((*path, tokens[at].line, name));
+            }
+        }
+    }
+    away
+}
+
+/// Files with methods of types that live elsewhere, and why.
+const AWAY: [(&str, &[&str], &str); 10] = [
+    (
+        "src/crowd/layer.rs",
+        &["CrowdEntry"],
+        "the type is generated in shaders/compiled/kernels.rs",
+    ),
+    ("src/crowd/player/mod.rs", &["Engine"], ABOVE_THE_ENGINE),
+    ("src/pose/follow.rs", &["Engine"], ABOVE_THE_ENGINE),
+    ("src/pose/local_to_model.rs", &["Engine"], ABOVE_THE_ENGINE),
+    ("src/pose/poses.rs", &["Engine"], ABOVE_THE_ENGINE),
+    ("src/pose/smooth.rs", &["Engine"], ABOVE_THE_ENGINE),
+    ("src/pose/transforms.rs", &["Engine"], ABOVE_THE_ENGINE),
+    (
+        "src/verify/resident.rs",
+        &["Clip", "Engine"],
+        ABOVE_THE_ENGINE,
+    ),
+    (
+        "src/method/interpolation.rs",
+        &["ReferenceCurve"],
+        "the reference knows neither methods nor their options",
+    ),
+    (
+        "src/shader/mod.rs",
+        &["Kernel"],
+        "the type is generated in shaders/compiled/kernels.rs",
+    ),
+];
+
+const ABOVE_THE_ENGINE: &str = "a layer above the engine's face, which does not know it";
+
+/// So many of a folder may still be away; the numbers only fall.
+const AWAY_UNFINISHED: [(&str, usize); 0] = [];
+
+/// A reader finds all that a type does in one file and in the folder of its name.
+#[test]
+fn an_impl_stands_at_home() {
+    let packages = SOURCES.iter().filter_map(|package| match *package {
+        "src" => Some("src".to_owned()),
+        "tests" | "examples" | "benches" | "shaders" => None,
+        package => Some(format!("{package}/src")),
+    });
+    let (mut wrong, mut counts, mut is_used) =
+        (Vec::new(), AWAY_UNFINISHED.map(|_| 0), [false; AWAY.len()]);
+    let mut read_files = 0;
+    for package in packages {
+        let texts = files(&package, "rs").into_iter().map(|path| {
+            let relative = path.strip_prefix(root()).unwrap();
+            (relative.to_str().unwrap().replace('\\', "/"), read(&path))
+        });
+        let texts: Vec<(String, String)> = texts.collect();
+        read_files += texts.len();
+        for (path, line, name) in away_from_home(&texts) {
+            let is_in = |folder: &str| Path::new(path).starts_with(folder);
+            let is_listed =
+                |(file, of, _): &(&str, &[&str], &str)| *file == path && of.contains(&name);
+            if let Some(i) = AWAY_UNFINISHED.iter().position(|(folder, _)| is_in(folder)) {
+                counts[i] += 1;
+            } else if let Some(i) = AWAY.iter().position(is_listed) {
+                is_used[i] = true;
+            } else {
+                wrong.push(format!("{path}:{line}: {name}"));
+            }
+        }
+    }
+    for ((file, of, _), is_used) in AWAY.iter().zip(is_used) {
+        if !is_used {
+            wrong.push(format!("{file}: {of:?} is listed, and at home: remove it"));
+        }
+    }
+    for ((folder, limit), count) in AWAY_UNFINISHED.iter().zip(counts) {
+        if count > *limit {
+            wrong.push(format!("{folder}: {count}, {limit} at most"));
+        }
+    }
+    assert!(
+        wrong.is_empty(),
+        "{} `impl`s stand neither in the file of their type nor in a child module of it:\n{}",
+        wrong.len(),
+        wrong.join("\n")
+    );
+    assert!(read_files > 500, "only {read_files} files were read");
+}
+
+/// The test of the homes can fail.
+#[test]
+fn an_impl_away_from_home_is_found() {
+    let files = [
+        (
+            "src/engine.rs",
+            "pub struct Engine; impl Engine {} fn all() -> impl Iterator<Item = u8> {}",
+        ),
+        ("src/engine/run.rs", "impl super::Engine {}"),
+        (
+            "src/clip.rs",
+            "\nimpl Engine {} impl Drop for Engine {} impl<T: Fn() -> u8> Lane<T> where T: Copy {}",
+        ),
+        ("src/time/mod.rs", "pub(crate) struct Lane<T>(T);"),
+        ("src/time/runs.rs", "impl<T> Lane<T> {}"),
+    ];
+    let files = files.map(|(path, text)| (path.to_owned(), text.to_owned()));
+    let expected = [("src/clip.rs", 2, "Engine"), ("src/clip.rs", 2, "Lane")];
+    assert_eq!(away_from_home(&files), expected);
 }

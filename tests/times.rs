@@ -2,11 +2,11 @@
 
 use glam::{DQuat, DVec3, Quat};
 use proptest::prelude::*;
-use tumble::reference::{Curve, angle_between};
+use tumble::reference::{ReferenceCurve, angle_between};
 use tumble::verify::verify;
 use tumble::{
-    Device, Engine, FrameRate, Frames, Interpolation, Layout, METHODS, Method, Speed, TrackSet,
-    WrapMode, method,
+    Device, Engine, FrameRate, Interpolation, Layout, METHODS, Method, SampleTimes, Speed,
+    TrackSet, WrapMode, method,
 };
 
 use crate::support::{Random, first_difference, vulkan_engines};
@@ -53,7 +53,7 @@ fn any_set(random: &mut Random) -> TrackSet {
     set
 }
 
-fn any_frames(random: &mut Random, set: &TrackSet) -> Frames {
+fn any_frames(random: &mut Random, set: &TrackSet) -> SampleTimes {
     let (first, last) = set.time_span().unwrap();
     let near = |random: &mut Random| first + (last - first) * random.between(-3.0, 4.0);
     if random.next().is_multiple_of(3) {
@@ -61,13 +61,13 @@ fn any_frames(random: &mut Random, set: &TrackSet) -> Frames {
             0 => any_time(random),
             _ => near(random),
         };
-        return Frames::at((0..60).map(|_| any()).collect());
+        return SampleTimes::at((0..60).map(|_| any()).collect());
     }
     let start = match random.next() % 2 {
         0 => any_time(random),
         _ => near(random),
     };
-    // From few frames for each track to few for each key.
+    // From a handful of frames a track to a handful a key.
     let frames = [1u32, 24, 30, 1000, 1_000_000];
     let rate = match random.next() % 3 {
         0 => FrameRate::new(u64::from(random.pick(&frames)), 1001).unwrap(),
@@ -80,7 +80,7 @@ fn any_frames(random: &mut Random, set: &TrackSet) -> Frames {
         }
     };
     let count = random.pick(&[1.0, 2.0, 30.0, 300.0]);
-    Frames::rate(rate).between(start, start + count / rate.per_second())
+    SampleTimes::rate(rate).between(start, start + count / rate.per_second())
 }
 
 /// Every sample of a poisoned output is a rotation, or the call is an error.
@@ -106,24 +106,24 @@ fn check_written(seed: u64, engines: &[Engine]) {
                     .upload(&set, interpolation)
                     .and_then(|clip| clip.evaluate_into(&frames, layout, &mut output)),
             };
-            let what = format!(
+            let label = format!(
                 "seed {seed}, {interpolation:?}, {frames:?}, clip {keeps}, {}",
                 engine.device_name()
             );
             if let Err(error) = done {
                 // Not every method can close a loop or has a path for each pair of keys.
                 let error = error.to_string();
-                assert!(!error.contains("bug"), "{what}: {error}");
+                assert!(!error.contains("bug"), "{label}: {error}");
                 continue;
             }
             for (sample, q) in output.iter().enumerate() {
                 let norm = Quat::from_array(*q).as_dquat().length();
                 assert!(
                     (norm - 1.0).abs() < 1e-5,
-                    "{what}: sample {sample} is {q:?}"
+                    "{label}: sample {sample} is {q:?}"
                 );
             }
-            all.push((what, output));
+            all.push((label, output));
         }
     }
     for pair in all.windows(2) {
@@ -161,8 +161,8 @@ fn fast_keys(count: usize) -> Vec<Quat> {
     let mut random = Random(11);
     let mut rotation = DQuat::IDENTITY;
     let keys = (0..count).map(|_| {
-        let turn = DQuat::from_axis_angle(random.direction(), 50.0 / 64.0);
-        rotation = (rotation * turn).normalize();
+        let step = DQuat::from_axis_angle(random.direction(), 50.0 / 64.0);
+        rotation = (rotation * step).normalize();
         rotation.as_quat()
     });
     keys.collect()
@@ -177,12 +177,12 @@ const UNIT: f64 = (1 << 20) as f64;
 fn accuracy_is_the_same_at_every_time() {
     let engine = Engine::new(Device::Cpu).unwrap();
     let keys = fast_keys(40);
-    let places: Vec<f64> = (0..40).map(|key| f64::from(key) / 64.0).collect();
+    let key_times: Vec<f64> = (0..40).map(|key| f64::from(key) / 64.0).collect();
     let rates = ["60", "1000", "24000/1001", "64"].map(|rate| rate.parse::<FrameRate>().unwrap());
     for base in [
         0.0, 1.0, -1000.0, 86_400.0, 3e6, 1e9, 1.7e9, -1.7e9, 1e10, 1e11, 1e12,
     ] {
-        let times: Vec<f64> = places.iter().map(|place| base + place).collect();
+        let times: Vec<f64> = key_times.iter().map(|key_time| base + key_time).collect();
         let mut set = TrackSet::new();
         set.push("", &times, &keys).unwrap();
         for (r, rate) in rates.into_iter().enumerate() {
@@ -201,25 +201,25 @@ fn accuracy_is_the_same_at_every_time() {
                 };
                 // From before the keys until behind them.
                 let start = base - 0.75 + 1.0 / 4096.0;
-                let sampled = Frames::rate(rate).between(start, start + 2.0);
+                let sampled = SampleTimes::rate(rate).between(start, start + 2.0);
                 let found = engine.evaluate(&set, interpolation, &sampled).unwrap();
                 let mut track = set.track(0);
-                track.times = &places;
-                let curve = Curve::of(&method.into(), track);
+                track.times = &key_times;
+                let curve = ReferenceCurve::of(&method.into(), track);
                 let unit = |seconds: f64| (seconds * UNIT) as i128 * frames;
-                let length = unit(places[39]);
+                let length = unit(key_times[39]);
                 for (k, q) in (0..).zip(found.as_quats()) {
-                    let place = unit(start - base) + k * seconds * (1 << 20);
-                    let place = match after {
-                        WrapMode::Loop => place.rem_euclid(length),
+                    let position = unit(start - base) + k * seconds * (1 << 20);
+                    let wrapped = match after {
+                        WrapMode::Loop => position.rem_euclid(length),
                         WrapMode::Mirror => {
-                            let place = place.rem_euclid(2 * length);
-                            place.min(2 * length - place)
+                            let unfolded = position.rem_euclid(2 * length);
+                            unfolded.min(2 * length - unfolded)
                         }
-                        _ => place.clamp(0, length),
+                        _ => position.clamp(0, length),
                     };
-                    let place = place as f64 / UNIT / frames as f64;
-                    let off = angle_between(q.as_dquat(), curve.rotation(place));
+                    let seconds_in = wrapped as f64 / UNIT / frames as f64;
+                    let off = angle_between(q.as_dquat(), curve.rotation(seconds_in));
                     assert!(
                         off < 1.1e-6,
                         "{method} at {base} s, {rate} fps, frame {k}, {after:?}: {off:e}"
@@ -228,7 +228,7 @@ fn accuracy_is_the_same_at_every_time() {
                 let explicit: Vec<f64> = (0..500).map(|k| base + f64::from(k) / 1024.0).collect();
                 if base.abs() < 1e12 {
                     let found = engine
-                        .evaluate(&set, interpolation, &Frames::at(explicit.clone()))
+                        .evaluate(&set, interpolation, &SampleTimes::at(explicit.clone()))
                         .unwrap();
                     for (time, q) in explicit.iter().zip(found.as_quats()) {
                         let off = angle_between(q.as_dquat(), curve.rotation(time - base));
@@ -271,8 +271,8 @@ fn curves_of_raw_unix_times_are_as_accurate_as_at_zero() {
                 speed,
                 ..method.into()
             };
-            let curve = Curve::of(&interpolation, track);
-            let found = engine.evaluate(&set, interpolation, &Frames::at(samples.clone()));
+            let curve = ReferenceCurve::of(&interpolation, track);
+            let found = engine.evaluate(&set, interpolation, &SampleTimes::at(samples.clone()));
             let each = if speed == Speed::Constant { 7 } else { 1 };
             let found = found.unwrap();
             for (time, q) in samples.iter().zip(found.as_quats()).step_by(each) {
@@ -291,12 +291,12 @@ fn curves_of_raw_unix_times_are_as_accurate_as_at_zero() {
 fn repeated_motion_is_as_accurate_far_out() {
     let engine = Engine::new(Device::Cpu).unwrap();
     let keys = fast_keys(40);
-    let places: Vec<f64> = (0..40).map(|key| f64::from(key) / 64.0).collect();
+    let times: Vec<f64> = (0..40).map(|key| f64::from(key) / 64.0).collect();
     let mut set = TrackSet::new();
-    set.push("", &places, &keys).unwrap();
-    let curve = Curve::of(&method::BESSEL_OVERHAUSER.into(), set.track(0));
+    set.push("", &times, &keys).unwrap();
+    let curve = ReferenceCurve::of(&method::BESSEL_OVERHAUSER.into(), set.track(0));
     let unit = |seconds: f64| (seconds * UNIT) as i128 * 1001;
-    let length = unit(places[39]);
+    let length = unit(times[39]);
     for mode in [WrapMode::Loop, WrapMode::Mirror] {
         let interpolation = Interpolation {
             before: mode,
@@ -304,25 +304,26 @@ fn repeated_motion_is_as_accurate_far_out() {
             ..method::BESSEL_OVERHAUSER.into()
         };
         for start in [10.0, 1e6 + 0.5, 1.7e9, -1.7e9, 1e12, -1e12] {
-            let frames = Frames::rate(FrameRate::new(1001, 2).unwrap()).between(start, start + 1.0);
+            let frames =
+                SampleTimes::rate(FrameRate::new(1001, 2).unwrap()).between(start, start + 1.0);
             let found = engine.evaluate(&set, interpolation, &frames).unwrap();
             let mut compared = 0;
             for (k, q) in (0i128..).zip(found.as_quats()) {
-                let place = unit(start) + k * 2 * (1 << 20);
-                let seam = place.rem_euclid(length);
+                let position = unit(start) + k * 2 * (1 << 20);
+                let seam = position.rem_euclid(length);
                 if mode == WrapMode::Loop
                     && seam.min(length - seam) < unit(1e-9).max(1002)
                     && seam != 0
                 {
                     continue; // it jumps there
                 }
-                let twice = place.rem_euclid(2 * length);
-                let place = if mode == WrapMode::Loop {
+                let twice = position.rem_euclid(2 * length);
+                let wrapped = if mode == WrapMode::Loop {
                     seam
                 } else {
                     twice.min(2 * length - twice)
                 };
-                let expected = curve.rotation(place as f64 / UNIT / 1001.0);
+                let expected = curve.rotation(wrapped as f64 / UNIT / 1001.0);
                 let off = angle_between(q.as_dquat(), expected);
                 assert!(off < 1.1e-6, "{mode:?} from {start} s, frame {k}: {off:e}");
                 compared += 1;
@@ -336,21 +337,21 @@ fn repeated_motion_is_as_accurate_far_out() {
 #[test]
 fn frames_at_keys_of_unix_time_show_the_keys() {
     let engine = Engine::new(Device::Cpu).unwrap();
-    let turned = |key: u32| Quat::from_rotation_z(0.01 * f64::from(key) as f32);
+    let rotation_at = |key: u32| Quat::from_rotation_z(0.01 * f64::from(key) as f32);
     let times: Vec<f64> = (0..200)
         .map(|key| 1.7e9 + 0.3 + f64::from(key) * 0.01)
         .collect();
-    let keys: Vec<Quat> = (0..200).map(turned).collect();
+    let keys: Vec<Quat> = (0..200).map(rotation_at).collect();
     let set = TrackSet::with_shared_times(&times, &keys).unwrap();
     let found = engine
-        .evaluate(&set, method::STEP, &Frames::fps(100))
+        .evaluate(&set, method::STEP, &SampleTimes::fps(100))
         .unwrap();
     assert_eq!(found.as_quats(), keys);
     // Behind a key by more than its rounding is not the key: 1.2 µs are 6e-5 rad here.
     let times: Vec<f64> = (0..200)
         .map(|key| 1.7e9 + 0.01 * f64::from(key) + 1.2e-6)
         .collect();
-    let frames = Frames::fps(1000).between(1.7e9, 1.7e9 + 1.9);
+    let frames = SampleTimes::fps(1000).between(1.7e9, 1.7e9 + 1.9);
     let verified = |keys: &[Quat], method: Method| {
         let set = TrackSet::with_shared_times(&times, keys).unwrap();
         let found = verify(&engine, &set, method.into(), &frames).unwrap();
@@ -361,7 +362,7 @@ fn frames_at_keys_of_unix_time_show_the_keys() {
             found.worst
         );
     };
-    let slow: Vec<Quat> = (0..200).map(turned).collect();
+    let slow: Vec<Quat> = (0..200).map(rotation_at).collect();
     METHODS
         .into_iter()
         .for_each(|method| verified(&slow, method));
@@ -390,7 +391,7 @@ fn far_extrapolation_is_finite() {
                 ..method::BESSEL_OVERHAUSER.into()
             };
             for start in [1.7e9, -4e16, 4e16, 1e18, -1e18] {
-                let frames = Frames::fps(1000).between(start, start + 2.0);
+                let frames = SampleTimes::fps(1000).between(start, start + 2.0);
                 let mut output = vec![POISON; frames.resolve(1, None).unwrap().len()];
                 engine
                     .evaluate_into(

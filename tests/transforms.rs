@@ -1,11 +1,11 @@
 //! Translations and scales beside rotations: what the textbook says, with the same bits on
 //! every device.
 
-use crate::support::{Random, WAYS, is_turn, vulkan_engines};
+use crate::support::{KERNEL_OPTIONS, Random, is_due, vulkan_engines};
 use glam::{DVec3, Quat, Vec3};
 use tumble::reference::VectorCurve;
 use tumble::{
-    Device, Ends, Engine, Frames, Interpolation, Layout, TrackError, TrackSet, Transforms,
+    Device, Ends, Engine, Interpolation, Layout, SampleTimes, TrackError, TrackSet, Transforms,
     VectorMethod, WrapMode, method,
 };
 
@@ -20,12 +20,12 @@ const ENDS: [Ends; 5] = [
     },
 ];
 
-struct Given {
+struct Case {
     set: TrackSet,
     curves: Vec<Option<VectorCurve>>,
 }
 
-fn given(seed: u64) -> Given {
+fn case(seed: u64) -> Case {
     let mut random = Random(seed);
     let mut set = TrackSet::new();
     let mut curves = Vec::new();
@@ -62,7 +62,7 @@ fn given(seed: u64) -> Given {
                 .collect(),
         }));
     }
-    Given { set, curves }
+    Case { set, curves }
 }
 
 fn bits(found: &Transforms) -> Vec<u32> {
@@ -83,7 +83,7 @@ fn bits(found: &Transforms) -> Vec<u32> {
 #[test]
 fn translations_are_the_textbook_s() {
     let engine = Engine::new(Device::Cpu).unwrap();
-    let Given { set, curves } = given(1);
+    let Case { set, curves } = case(1);
     for vectors in VectorMethod::ALL {
         for ends in ENDS {
             let interpolation = Interpolation {
@@ -91,8 +91,8 @@ fn translations_are_the_textbook_s() {
                 ..method::SLERP.into()
             };
             for frames in [
-                Frames::fps(24),
-                Frames::at((0..200).map(|i| 0.05 * f64::from(i)).collect()),
+                SampleTimes::fps(24),
+                SampleTimes::at((0..200).map(|i| 0.05 * f64::from(i)).collect()),
             ] {
                 let layout = Layout::TrackMajor;
                 let found = engine.transforms(&set, interpolation, vectors, &frames, layout);
@@ -100,10 +100,10 @@ fn translations_are_the_textbook_s() {
                 let timeline = frames.resolve(24, set.time_span()).unwrap();
                 for (track, curve) in curves.iter().enumerate() {
                     for sample in 0..timeline.len() {
-                        let own = found.translations.get(track, sample).unwrap();
+                        let translation = found.translations.get(track, sample).unwrap();
                         assert_eq!(found.scales.get(track, sample), Some(Vec3::ONE));
                         let Some(curve) = curve else {
-                            assert_eq!(own, Vec3::ZERO);
+                            assert_eq!(translation, Vec3::ZERO);
                             continue;
                         };
                         let curve = VectorCurve {
@@ -116,7 +116,7 @@ fn translations_are_the_textbook_s() {
                         if curve.times.iter().any(|key| (key - time).abs() < 1e-9) {
                             continue;
                         }
-                        let off = (own.as_dvec3() - curve.value(time)).length();
+                        let off = (translation.as_dvec3() - curve.value(time)).length();
                         assert!(
                             off < 3e-5,
                             "{vectors}, {ends:?}, track {track} at {time}: {off:e}"
@@ -131,7 +131,7 @@ fn translations_are_the_textbook_s() {
 #[test]
 fn the_same_bits_on_every_device() {
     let cpu = Engine::new(Device::Cpu).unwrap();
-    let Given { set, .. } = given(2);
+    let Case { set, .. } = case(2);
     let sides = [
         WrapMode::Hold,
         WrapMode::Loop,
@@ -142,7 +142,7 @@ fn the_same_bits_on_every_device() {
         .into_iter()
         .flat_map(|memory| vulkan_engines(|options| options.memory = memory))
         .collect();
-    let frames = Frames::fps(12).between(-5.0, 20.0);
+    let frames = SampleTimes::fps(12).between(-5.0, 20.0);
     for (i, vectors) in VectorMethod::ALL.into_iter().enumerate() {
         for (j, (before, after)) in sides.into_iter().zip(sides.into_iter().rev()).enumerate() {
             let interpolation = Interpolation {
@@ -156,8 +156,8 @@ fn the_same_bits_on_every_device() {
                     bits(&found.unwrap())
                 };
                 let expected = of(&cpu);
-                for (place, vulkan) in engines.iter().enumerate() {
-                    if !is_turn(i + j, place, WAYS.len()) {
+                for (k, vulkan) in engines.iter().enumerate() {
+                    if !is_due(i + j, k, KERNEL_OPTIONS.len()) {
                         continue;
                     }
                     assert!(of(vulkan) == expected, "{vectors}, {before:?}, {after:?}");
@@ -180,7 +180,7 @@ fn a_lift_goes_on_rising() {
         after: WrapMode::Extrapolate,
         ..method::SLERP.into()
     };
-    let frames = Frames::fps(1).between(-2.0, 3.0);
+    let frames = SampleTimes::fps(1).between(-2.0, 3.0);
     let linear = VectorMethod::Linear;
     let found = engine
         .transforms(&set, rising, linear, &frames, Layout::TrackMajor)
@@ -225,7 +225,7 @@ fn vectors_that_are_none_are_refused() {
     let error = set
         .set_translations(0, &[0.0], &[Vec3::ONE], &tangents)
         .unwrap_err();
-    assert!(matches!(error, TrackError::DataLength { given: 2, .. }));
+    assert!(matches!(error, TrackError::DataLength { values: 2, .. }));
     assert_eq!("linear".parse(), Ok(VectorMethod::Linear));
     assert!("slerp".parse::<VectorMethod>().is_err());
 }

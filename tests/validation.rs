@@ -10,7 +10,11 @@ use crate::layer::Layer;
 /// test with a layer of its own (`vulkan::the_validation_layer_has_nothing_to_say`).
 #[test]
 fn no_layer_has_anything_to_say_of_the_library() {
-    let mut tests = vec!["crowd::own_device::", "poses::", "every_way_of_copying"];
+    let mut tests = vec![
+        "crowd::application_device::",
+        "poses::",
+        "every_way_of_copying",
+    ];
     #[cfg(target_os = "linux")]
     tests.push("exported_memory_lives");
     if std::env::var_os("VALIDATE_ALL").is_some() {

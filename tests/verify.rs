@@ -2,9 +2,9 @@
 
 use glam::Quat;
 use tumble::method::SLERP;
-use tumble::reference::{Curve, angle_between};
+use tumble::reference::{ReferenceCurve, angle_between};
 use tumble::verify::{Agreement, Verdict, compare, error_bound, verify};
-use tumble::{Device, Engine, Form, Frames, METHODS, TrackSet};
+use tumble::{Device, Engine, Form, METHODS, SampleTimes, TrackSet};
 
 fn set() -> TrackSet {
     let mut set = TrackSet::new();
@@ -20,7 +20,7 @@ fn set() -> TrackSet {
 fn the_cpu_is_within_its_bounds_and_says_that_no_device_took_part() {
     let engine = Engine::new(Device::Cpu).unwrap();
     for method in METHODS {
-        let found = verify(&engine, &set(), method.into(), &Frames::fps(60)).unwrap();
+        let found = verify(&engine, &set(), method.into(), &SampleTimes::fps(60)).unwrap();
         assert_eq!(found.verdict(), Verdict::ReferenceOnly, "{found:?}");
         assert!(!found.passes(), "no device took part");
         assert_eq!((found.device.as_deref(), found.rotations), (None, 2 * 151));
@@ -31,8 +31,8 @@ fn the_cpu_is_within_its_bounds_and_says_that_no_device_took_part() {
 #[test]
 fn what_compared_nothing_has_not_passed() {
     let engine = Engine::new(Device::Cpu).unwrap();
-    let none = Frames::at(Vec::new());
-    for (set, frames) in [(set(), none), (TrackSet::new(), Frames::fps(25))] {
+    let none = SampleTimes::at(Vec::new());
+    for (set, frames) in [(set(), none), (TrackSet::new(), SampleTimes::fps(25))] {
         let found = verify(&engine, &set, METHODS[0].into(), &frames).unwrap();
         assert_eq!((found.rotations, found.verdict()), (0, Verdict::Nothing));
         assert!(!found.passes());
@@ -43,7 +43,7 @@ fn what_compared_nothing_has_not_passed() {
 /// Somebody's results: the engine's bits, the other sign of one, glam's slerp, a wrong one, NaN and none.
 #[test]
 fn results_of_others_are_told_apart() {
-    let (set, frames) = (set(), Frames::fps(60));
+    let (set, frames) = (set(), SampleTimes::fps(60));
     let engine = Engine::new(Device::Cpu).unwrap();
     let same = engine.evaluate(&set, SLERP, &frames).unwrap();
     let found = |theirs: &[Quat]| compare(&set, SLERP.into(), &frames, theirs).unwrap();
@@ -76,7 +76,13 @@ fn results_of_others_are_told_apart() {
     let long = with(7, same.as_quats()[7] * 1.001);
     assert_eq!(long.agreement(), Agreement::OutsideBounds, "{long}");
 
-    let none = compare(&set, SLERP.into(), &Frames::at(Vec::new()), &[[0f32; 4]; 0]).unwrap();
+    let none = compare(
+        &set,
+        SLERP.into(),
+        &SampleTimes::at(Vec::new()),
+        &[[0f32; 4]; 0],
+    )
+    .unwrap();
     assert_eq!((none.agreement(), none.rotations), (Agreement::Nothing, 0));
     let error = compare(&set, SLERP.into(), &frames, &same.as_quats()[1..]).unwrap_err();
     assert!(error.to_string().contains("301"), "{error}");
@@ -105,7 +111,7 @@ fn half_turns_there_and_back_are_within_their_bounds() {
             // Between two inner half turns squad's controls are opposite to each other: it has no arc.
             let is_meant = |name: &str| keys.len() == 3 || name.starts_with("shoemake");
             for method in METHODS.into_iter().filter(|method| is_meant(method.name)) {
-                let found = verify(&engine, &set, method.into(), &Frames::fps(25)).unwrap();
+                let found = verify(&engine, &set, method.into(), &SampleTimes::fps(25)).unwrap();
                 assert_eq!(
                     found.verdict(),
                     Verdict::ReferenceOnly,
@@ -126,7 +132,7 @@ fn samples_on_keys_are_within_their_bounds() {
     set.push("", &times, &angles.map(Quat::from_rotation_x))
         .unwrap();
     for method in METHODS {
-        let found = verify(&engine, &set, method.into(), &Frames::fps(25)).unwrap();
+        let found = verify(&engine, &set, method.into(), &SampleTimes::fps(25)).unwrap();
         assert_eq!(found.verdict(), Verdict::ReferenceOnly, "{found:?}");
     }
 }
@@ -150,8 +156,8 @@ fn a_long_track_is_within_its_bounds_in_all_its_parts() {
     let frames: Vec<f64> = (0..30_000).map(|k| f64::from(k) * 0.517).collect();
     for method in METHODS {
         let found = engine.upload(&set, method).unwrap();
-        let found = found.evaluate(&Frames::at(frames.clone())).unwrap();
-        let curve = Curve::of(&method.into(), set.track(0));
+        let found = found.evaluate(&SampleTimes::at(frames.clone())).unwrap();
+        let curve = ReferenceCurve::of(&method.into(), set.track(0));
         let errors = (frames.iter().zip(found.as_quats()))
             .map(|(&time, found)| angle_between(curve.rotation(time), found.as_dquat()));
         let error = errors.fold(0.0, f64::max);

@@ -1,15 +1,16 @@
 //! Vulkan's side of the bargain: devices, self-tests, validation, handles.
 
 use crate::support::{
-    WAYS, dense_set, first_difference, hostile_set, is_turn, stage, vulkan_devices, vulkan_engines,
+    KERNEL_OPTIONS, dense_set, first_difference, hostile_set, is_due, stage, vulkan_devices,
+    vulkan_engines,
 };
 use std::collections::BTreeMap;
 
 use bytemuck::Pod;
 use glam::Quat;
 use tumble::{
-    Device, Encoding, Engine, EngineOptions, Frames, Layout, METHODS, Mapping, Reads, Skeleton,
-    TrackSet, Transfer, VulkanBuffer, VulkanError, method,
+    Device, Encoding, Engine, EngineOptions, Layout, METHODS, Mapping, Reads, SampleTimes,
+    Skeleton, TrackSet, Transfer, VulkanBuffer, VulkanError, method,
 };
 
 #[test]
@@ -75,9 +76,14 @@ fn the_comparison_finds_a_driver_that_is_left_free() {
     for device in vulkan_devices() {
         let engine = Engine::new(device.clone()).unwrap();
         let control = engine.negative_control().unwrap().unwrap();
-        assert!(control.holds(), "{}: {control:?}", device.name());
+        assert!(control.is_conclusive(), "{}: {control:?}", device.name());
         assert_eq!(control.expressions.len(), 10);
-        assert!(control.expressions.iter().all(|own| own.total == 1003));
+        assert!(
+            control
+                .expressions
+                .iter()
+                .all(|expression| expression.total == 1003)
+        );
         if control.must_differ {
             must_differ += 1;
             let sum = &control.expressions[1];
@@ -85,10 +91,10 @@ fn the_comparison_finds_a_driver_that_is_left_free() {
             assert!(sum.differing > 100, "{control:?}");
             // One that is known to differ, and does not, has proved nothing.
             let mut blind = control.clone();
-            for own in &mut blind.expressions {
-                own.differing = 0;
+            for expression in &mut blind.expressions {
+                expression.differing = 0;
             }
-            assert!(!blind.holds());
+            assert!(!blind.is_conclusive());
         }
     }
     assert!(
@@ -115,17 +121,17 @@ fn the_validation_layer_has_nothing_to_say() {
     let set = hostile_set(2, 64);
     let reference = [glam::Quat::IDENTITY; 64];
     let requests = [
-        Frames::fps(60).between(0.0, 20.0),
-        Frames::at(vec![0.5, 0.25, 7.0]),
+        SampleTimes::fps(60).between(0.0, 20.0),
+        SampleTimes::at(vec![0.5, 0.25, 7.0]),
     ];
     for device in devices {
         let transfers = [Transfer::InPlace, Transfer::Staged];
-        let ways = transfers.map(|transfer| WAYS.map(|way| (transfer, way)));
-        for (way, (transfer, (reads, mapping))) in ways.concat().into_iter().enumerate() {
+        let variants = transfers.map(|transfer| KERNEL_OPTIONS.map(|kernel| (transfer, kernel)));
+        for (variant, (transfer, (reads, mapping))) in variants.concat().into_iter().enumerate() {
             let mut options = EngineOptions::default();
             options.transfer = transfer;
             if transfer == Transfer::Staged {
-                stage(&mut options, way);
+                stage(&mut options, variant);
             }
             (options.reads, options.mapping) = (reads, mapping);
             options.memory = Some(1_000_000);
@@ -133,13 +139,13 @@ fn the_validation_layer_has_nothing_to_say() {
             // Constants alone, and both forms.
             let methods = [method::STEP, method::SLERP, method::C2];
             for (round, method) in methods.into_iter().enumerate() {
-                if !is_turn(round, way / 3 + way, WAYS.len()) {
+                if !is_due(round, variant / 3 + variant, KERNEL_OPTIONS.len()) {
                     continue;
                 }
                 let clip = engine.upload(&set, method).unwrap();
                 for frames in &requests {
                     let layouts = [Layout::TrackMajor, Layout::FrameMajor].into_iter();
-                    for (turn, layout) in layouts.enumerate() {
+                    for (layout_index, layout) in layouts.enumerate() {
                         let poses = clip.evaluate_as(frames, layout).unwrap();
                         engine.blend(&[(&poses, 0.5), (&poses, 1.0)]).unwrap();
                         engine.mix(&poses, &poses, 0.5).unwrap();
@@ -149,7 +155,7 @@ fn the_validation_layer_has_nothing_to_say() {
                             .unwrap();
                         let encodings = Encoding::KINDS.into_iter().enumerate();
                         for (_, encoding) in
-                            encodings.filter(|(e, _)| is_turn(way / 3 + turn, *e, 2))
+                            encodings.filter(|(e, _)| is_due(variant / 3 + layout_index, *e, 2))
                         {
                             clip.evaluate_encoded(frames, layout, encoding).unwrap();
                         }
@@ -173,12 +179,12 @@ fn every_way_of_copying_gives_the_same_bits() {
     let cpu = Engine::new(Device::Cpu).unwrap();
     let set = hostile_set(6, 40);
     let (dense, dense_frames) = dense_set(40, 300, 0.1);
-    let frames = Frames::fps(60).between(0.0, 9.0);
+    let frames = SampleTimes::fps(60).between(0.0, 9.0);
     for device in vulkan_devices() {
-        for (turn, (reads, mapping)) in WAYS.into_iter().enumerate() {
+        for (round, (reads, mapping)) in KERNEL_OPTIONS.into_iter().enumerate() {
             for memory in [None, Some(100_000)] {
                 let mut options = EngineOptions::default();
-                stage(&mut options, turn);
+                stage(&mut options, round);
                 (options.reads, options.mapping) = (reads, mapping);
                 options.memory = memory;
                 let engine = Engine::with_options(device.clone(), &options).unwrap();
@@ -209,7 +215,7 @@ fn an_applications_own_device_gives_the_same_bits() {
     let application = crate::application::Application::new();
     let engine = application.engine(Mapping::Automatic);
     let set = hostile_set(4, 32);
-    let frames = Frames::fps(30).between(0.0, 20.0);
+    let frames = SampleTimes::fps(30).between(0.0, 20.0);
     for method in METHODS {
         let found = engine.evaluate(&set, method, &frames).unwrap();
         let cpu = Engine::new(Device::Cpu).unwrap();
@@ -229,25 +235,25 @@ fn results_stay_in_an_applications_own_buffer() {
         return;
     }
     for mapping in [Mapping::Runs, Mapping::Samples] {
-        assert_stays_in_own_buffer(mapping);
+        assert_stays_in_application_buffer(mapping);
     }
 }
 
 #[allow(unsafe_code)] // the buffer is the application's
-fn assert_stays_in_own_buffer(mapping: Mapping) {
+fn assert_stays_in_application_buffer(mapping: Mapping) {
     let application = crate::application::Application::new();
     let engine = application.engine(mapping);
     // With intervals so wild that the host computes their samples.
     let mut set = hostile_set(4, 32);
-    let turn = |angle| glam::Quat::from_rotation_x(angle);
-    let keys = [0.0, 3.0, 0.5, 2.5, 1.0].map(turn);
+    let about_x = |angle| glam::Quat::from_rotation_x(angle);
+    let keys = [0.0, 3.0, 0.5, 2.5, 1.0].map(about_x);
     set.push("wild", &[0.0, 0.001, 2.0, 2.001, 5.0], &keys)
         .unwrap();
-    let frames = Frames::fps(30).between(0.0, 20.0);
-    let few = Frames::at(vec![0.3, 7.0]);
+    let frames = SampleTimes::fps(30).between(0.0, 20.0);
+    let sparse = SampleTimes::at(vec![0.3, 7.0]);
     for method in METHODS {
         let clip = engine.upload(&set, method).unwrap();
-        let requests = [&frames, &few].into_iter();
+        let requests = [&frames, &sparse].into_iter();
         let requests =
             requests.flat_map(|frames| Encoding::KINDS.map(|encoding| (frames, encoding)));
         for (frames, encoding) in requests {
@@ -306,23 +312,23 @@ fn assert_stays_in_own_buffer(mapping: Mapping) {
 }
 
 /// Catches a store beside the caller's memory, which software devices write where it is, and
-/// what is left out there: at any place in its pages, in windows, mended, in every encoding.
+/// what is left out there: at any offset in its pages, in windows, repaired by the host, in every encoding.
 #[test]
 fn the_callers_memory_gets_the_result_and_nothing_else() {
     let cpu = Engine::new(Device::Cpu).unwrap();
     let set = hostile_set(5, 256);
-    let frames = Frames::fps(60).between(0.0, 9.0);
+    let frames = SampleTimes::fps(60).between(0.0, 9.0);
     let engines = vulkan_engines(|_| {});
-    for (turn, method) in [method::SLERP, method::C2].into_iter().enumerate() {
+    for (index, method) in [method::SLERP, method::C2].into_iter().enumerate() {
         let expected_of = cpu.upload(&set, method).unwrap();
         let upload = |engine: &Engine| engine.upload(&set, method).unwrap();
         let clips: Vec<_> = engines.iter().map(upload).collect();
-        let layout = [Layout::TrackMajor, Layout::FrameMajor][turn];
+        let layout = [Layout::TrackMajor, Layout::FrameMajor][index];
         let expected = expected_of.evaluate_as(&frames, layout).unwrap();
         assert!(expected.as_quats().len() > 1 << 16, "too few to lend");
         for (clip, beside) in clips
             .iter()
-            .zip([1, 3, 256 + turn].into_iter().cycle().skip(turn))
+            .zip([1, 3, 256 + index].into_iter().cycle().skip(index))
         {
             assert_between(&SENTINEL, beside, expected.as_quats(), |output| {
                 clip.evaluate_into(&frames, layout, output).unwrap();
@@ -330,9 +336,11 @@ fn the_callers_memory_gets_the_result_and_nothing_else() {
         }
         for (round, encoding) in Encoding::KINDS.into_iter().enumerate() {
             let expected = (expected_of.evaluate_encoded(&frames, layout, encoding)).unwrap();
-            let places = [encoding.bytes(), 16, 4099].into_iter().enumerate();
-            for (place, beside) in places {
-                let is_next = |(own, _): &(usize, _)| is_turn(round + place, *own, WAYS.len());
+            let shifts = [encoding.bytes(), 16, 4099].into_iter().enumerate();
+            for (shift, beside) in shifts {
+                let is_next = |(clip_index, _): &(usize, _)| {
+                    is_due(round + shift, *clip_index, KERNEL_OPTIONS.len())
+                };
                 for (_, clip) in clips.iter().enumerate().filter(is_next) {
                     assert_between(&0xa5, beside, &expected, |output| {
                         let request = clip.request(&frames).layout(layout);
@@ -348,14 +356,14 @@ fn the_callers_memory_gets_the_result_and_nothing_else() {
 #[test]
 fn the_callers_keys_are_read_where_they_are() {
     let cpu = Engine::new(Device::Cpu).unwrap();
-    let of_two = |turned: f64| {
-        let (pairs, _) = dense_set(1, 140_000, turned);
+    let of_two = |negated: f64| {
+        let (pairs, _) = dense_set(1, 140_000, negated);
         let mut set = TrackSet::new();
         for keys in pairs.track(0).keys.chunks(2) {
             set.push("", &[0.0, 1.0], keys).unwrap();
         }
         let times: Vec<f64> = (0..70_000).map(|t| f64::from(t % 1000) * 0.00101).collect();
-        (set, Frames::at_each(times))
+        (set, SampleTimes::at_each(times))
     };
     let apart = || {
         let (together, frames) = dense_set(70, 1100, 0.0);
@@ -369,7 +377,7 @@ fn the_callers_keys_are_read_where_they_are() {
     };
     let cases = [
         ("many", dense_set(70, 1100, 0.0)),
-        ("many, at times of their own", apart()),
+        ("many, each with its times", apart()),
         ("many, some turned", dense_set(70, 1100, 1e-4)),
         ("long", dense_set(1, 90_000, 0.0)),
         ("long, some turned", dense_set(1, 90_000, 1e-4)),
@@ -377,20 +385,20 @@ fn the_callers_keys_are_read_where_they_are() {
         ("pairs, some turned", of_two(0.01)),
     ];
     for engine in vulkan_engines(|_| {}) {
-        let (set, nothing) = (&cases[0].1.0, Frames::at(Vec::new()));
+        let (set, nothing) = (&cases[0].1.0, SampleTimes::at(Vec::new()));
         let found = engine.evaluate(set, method::SLERP, &nothing).unwrap();
         assert!(found.as_quats().is_empty());
-        for (what, (set, frames)) in &cases {
+        for (label, (set, frames)) in &cases {
             for method in [method::SLERP, method::CATMULL_ROM] {
                 let layout = Layout::TrackMajor;
                 let expected = cpu.evaluate(set, method, frames).unwrap();
                 assert!(
                     expected.as_quats().len() > 1 << 16,
-                    "{what}: too few to lend"
+                    "{label}: too few to lend"
                 );
                 assert_between(&SENTINEL, 5, expected.as_quats(), |output| {
                     let done = engine.evaluate_into(set, method, frames, layout, output);
-                    done.unwrap_or_else(|error| panic!("{what}, {method}: {error}"));
+                    done.unwrap_or_else(|error| panic!("{label}, {method}: {error}"));
                 });
             }
         }
@@ -458,7 +466,7 @@ fn an_application_and_an_engine_share_a_queue_by_its_lock() {
     let application = Application::new();
     let engine = application.engine(Mapping::Automatic);
     let set = hostile_set(3, 40);
-    let frames = Frames::fps(60).between(0.0, 5.0);
+    let frames = SampleTimes::fps(60).between(0.0, 5.0);
     let expected = Engine::new(Device::Cpu)
         .unwrap()
         .evaluate(&set, method::C2, &frames);

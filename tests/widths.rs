@@ -8,8 +8,8 @@ use std::process::Command;
 use glam::{DVec3, Quat, Vec3};
 use sha2::{Digest, Sha256};
 use tumble::{
-    Device, Direction, Engine, Follow, Frame, Frames, Layout, METHODS, PathSpeed, TrackSet,
-    VectorWidth,
+    Device, Direction, Engine, Follow, Layout, METHODS, PathFrame, PathSpeed, SampleTimes,
+    TrackSet, VectorWidth,
 };
 
 /// Steps from a hundredth of a degree to half a turn, evenly and unevenly.
@@ -23,8 +23,8 @@ fn rotations() -> TrackSet {
             .collect();
         let key = |i: u8| {
             let i = f32::from(i);
-            let turn = step * (i + i.sin());
-            Quat::from_rotation_y(turn) * Quat::from_rotation_x(0.3 * turn.cos())
+            let angle = step * (i + i.sin());
+            Quat::from_rotation_y(angle) * Quat::from_rotation_x(0.3 * angle.cos())
         };
         let mut keys: Vec<Quat> = (0..23).map(key).collect();
         if track == 13 {
@@ -41,13 +41,13 @@ fn rotations() -> TrackSet {
 pub(crate) fn paths() -> TrackSet {
     let mut set = TrackSet::new();
     for track in 0..23u8 {
-        let far = f32::from(track % 5);
+        let scale = f32::from(track % 5);
         let point = |i: u8| {
-            let t = f32::from(i) * (0.3 + 0.1 * far);
+            let t = f32::from(i) * (0.3 + 0.1 * scale);
             match track {
                 7 => Vec3::ONE,
                 8 => Vec3::X * f32::from(i % 2),
-                _ => Vec3::new((3.0 * t).sin() * far, t, (t * t).cos()),
+                _ => Vec3::new((3.0 * t).sin() * scale, t, (t * t).cos()),
             }
         };
         let points: Vec<Vec3> = (0..2 + track).map(point).collect();
@@ -70,35 +70,35 @@ fn hashes() -> String {
     let set = rotations();
     for method in METHODS {
         let clip = engine.upload(&set, method).unwrap();
-        let found = clip.evaluate(&Frames::fps(997)).unwrap();
+        let found = clip.evaluate(&SampleTimes::fps(997)).unwrap();
         add(&method.name, &[bytemuck::cast_slice(found.as_quats())]);
     }
     let set = paths();
-    let own = Follow::default();
+    let base = Follow::default();
     let axes = ["x", "-z"].map(|axis| axis.parse().unwrap());
-    let (speed, frame) = (PathSpeed::Constant, Frame::Fixed);
+    let (speed, frame) = (PathSpeed::Constant, PathFrame::Fixed);
     let direction = Direction::Point(DVec3::new(0.0, 2.0, 9.0));
     for follow in [
-        own.clone(),
+        base.clone(),
         Follow {
             axes,
-            ..own.clone()
+            ..base.clone()
         },
         Follow {
             speed,
-            ..own.clone()
+            ..base.clone()
         },
         Follow {
             frame,
             direction,
-            ..own.clone()
+            ..base.clone()
         },
         Follow {
-            frame: Frame::Frenet,
-            ..own
+            frame: PathFrame::Frenet,
+            ..base
         },
     ] {
-        let frames = Frames::fps(997).between(-0.1, 12.1);
+        let frames = SampleTimes::fps(997).between(-0.1, 12.1);
         let found = engine.follow(&set, &follow, &frames, Layout::TrackMajor);
         let found = found.unwrap();
         let positions = bytemuck::cast_slice(found.positions.as_slice());

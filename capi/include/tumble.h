@@ -63,7 +63,7 @@ enum TumbleResult
    */
   TUMBLE_RESULT_OUT_OF_RANGE = 5,
   /*
-   Keys, times, samples or a file are refused; the message names the place.
+   Keys, times, samples or a file are refused; the message says where.
    */
   TUMBLE_RESULT_INVALID_INPUT = 6,
   /*
@@ -317,7 +317,7 @@ typedef uint32_t TumbleSampling;
 #endif // __cplusplus
 
 /*
- What is left of every joint of every instance, in the order `[instance][joint]`.
+ What is written for every joint of every instance, in the order `[instance][joint]`.
  */
 enum TumbleCrowdValues
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -378,7 +378,7 @@ typedef struct TumbleCrowdTarget TumbleCrowdTarget;
 typedef struct TumbleEngine TumbleEngine;
 
 /*
- What was read from a motion file: clips, and what is remarkable about it.
+ A motion file that was read: its clips, and messages about them.
  */
 typedef struct TumbleFile TumbleFile;
 
@@ -659,13 +659,13 @@ TumbleResult tumble_engine_open(const char *device,
                                 struct TumbleEngine **engine);
 
 /*
- The name of the device, "CPU" for the CPU: UTF-8, valid until the engine is freed; null for what
- is no engine.
+ The name of the device, "CPU" for the CPU: UTF-8, valid until the engine is freed; null for an
+ invalid handle.
  */
 const char *tumble_engine_device_name(const struct TumbleEngine *engine);
 
 /*
- Gives an engine back; clips that were uploaded to it keep its device. Null is allowed.
+ Frees an engine; clips that were uploaded to it keep its device open. Null is allowed.
  */
 TumbleResult tumble_engine_free(struct TumbleEngine *engine);
 
@@ -708,12 +708,12 @@ TumbleResult tumble_set_with_shared_times(const double *times,
                                           struct TumbleSet **set);
 
 /*
- The number of tracks; 0 for what is no set.
+ The number of tracks; 0 for an invalid handle.
  */
 size_t tumble_set_track_count(const struct TumbleSet *set);
 
 /*
- The number of keys of all tracks together; 0 for what is no set.
+ The number of keys of all tracks together; 0 for an invalid handle.
  */
 size_t tumble_set_key_count(const struct TumbleSet *set);
 
@@ -753,7 +753,7 @@ TumbleResult tumble_set_track_name(const struct TumbleSet *set,
 TumbleResult tumble_set_time_span(const struct TumbleSet *set, double *first, double *last);
 
 /*
- Gives a set back; clips that were made of it stay. Null is allowed.
+ Frees a set; clips that were made of it stay. Null is allowed.
  */
 TumbleResult tumble_set_free(struct TumbleSet *set);
 
@@ -767,7 +767,7 @@ TumbleResult tumble_set_free(struct TumbleSet *set);
 TumbleResult tumble_file_load(const char *path, struct TumbleFile **file);
 
 /*
- The number of clips that could be read; 0 for what is no file.
+ The number of clips that could be read; 0 for an invalid handle.
  */
 size_t tumble_file_clip_count(const struct TumbleFile *file);
 
@@ -809,7 +809,7 @@ TumbleResult tumble_file_clip_time_offset(const struct TumbleFile *file,
                                           int64_t *seconds);
 
 /*
- What was taken off the translations of a track of a clip, so that f32 holds what is left of positions
+ What was subtracted from the translations of a track of a clip, so that f32 has the digits of positions
  such as those of maps: add it to what is made of them, in doubles. Mostly 0, 0, 0.
 
  # Safety
@@ -821,8 +821,8 @@ TumbleResult tumble_file_clip_origin(const struct TumbleFile *file,
                                      double *origin);
 
 /*
- How many messages there are about the file: warnings, and why clips could not be read; 0 for what
- is no file.
+ How many messages there are about the file: warnings, and why clips could not be read; 0 for an
+ invalid handle.
  */
 size_t tumble_file_message_count(const struct TumbleFile *file);
 
@@ -832,7 +832,7 @@ size_t tumble_file_message_count(const struct TumbleFile *file);
 const char *tumble_file_message(const struct TumbleFile *file, size_t index);
 
 /*
- Gives a file back; sets that were made of it stay. Null is allowed.
+ Frees a file; sets that were made of it stay. Null is allowed.
  */
 TumbleResult tumble_file_free(struct TumbleFile *file);
 
@@ -927,7 +927,7 @@ TumbleResult tumble_clip_evaluate_to_buffer(const struct TumbleClip *clip,
                                             uint64_t size);
 
 /*
- Gives a clip back. Null is allowed.
+ Frees a clip. Null is allowed.
  */
 TumbleResult tumble_clip_free(struct TumbleClip *clip);
 
@@ -980,7 +980,7 @@ TumbleResult tumble_engine_from_vulkan(const struct TumbleVulkan *vulkan,
                                        struct TumbleEngine **engine);
 
 /*
- An empty library for a skeleton of arrays. `parents` has the place of each joint's parent, -1 for a
+ An empty library for a skeleton of arrays. `parents` has the index of each joint's parent, -1 for a
  root; parents may come after their children. `offsets` has three numbers for each joint: where it
  hangs in its parent's frame while a clip has no translations for it; null: nowhere but at the parent.
  `ticks_per_second`: the unit of all times, 0 for 705 600, which allows clips of 50 minutes.
@@ -1047,17 +1047,17 @@ TumbleResult tumble_crowd_library_set_reference(struct TumbleCrowdLibrary *libra
                                                 uint32_t tick);
 
 /*
- The number of joints; 0 for what is no library.
+ The number of joints; 0 for an invalid handle.
  */
 size_t tumble_crowd_library_joint_count(const struct TumbleCrowdLibrary *library);
 
 /*
- The number of clips; 0 for what is no library.
+ The number of clips; 0 for an invalid handle.
  */
 size_t tumble_crowd_library_clip_count(const struct TumbleCrowdLibrary *library);
 
 /*
- Ticks of a second; 0 for what is no library.
+ Ticks of a second; 0 for an invalid handle.
  */
 uint32_t tumble_crowd_library_ticks_per_second(const struct TumbleCrowdLibrary *library);
 
@@ -1075,7 +1075,7 @@ uint32_t tumble_crowd_library_clip_ticks(const struct TumbleCrowdLibrary *librar
 const char *tumble_crowd_library_joint_name(const struct TumbleCrowdLibrary *library, size_t joint);
 
 /*
- The place of each joint's parent, -1 for a root: `joint_count` numbers, exactly as many as there are
+ The index of each joint's parent, -1 for a root: `joint_count` numbers, exactly as many as there are
  joints.
 
  # Safety
@@ -1086,7 +1086,7 @@ TumbleResult tumble_crowd_library_parents(const struct TumbleCrowdLibrary *libra
                                           size_t joint_count);
 
 /*
- Gives a library back; crowds that were made of it stay. Null is allowed.
+ Frees a library; crowds that were made of it stay. Null is allowed.
  */
 TumbleResult tumble_crowd_library_free(struct TumbleCrowdLibrary *library);
 
@@ -1185,7 +1185,7 @@ TumbleResult tumble_crowd_set_clock(struct TumbleCrowd *crowd, uint64_t ticks);
 TumbleResult tumble_crowd_clock(const struct TumbleCrowd *crowd, uint64_t *ticks);
 
 /*
- Gives a crowd back, which waits for what was submitted; its targets stay. Null is allowed.
+ Frees a crowd, after waiting for what was submitted; its targets stay. Null is allowed.
  */
 TumbleResult tumble_crowd_free(struct TumbleCrowd *crowd);
 
@@ -1289,7 +1289,7 @@ TumbleResult tumble_crowd_target_new(const struct TumbleCrowd *crowd,
 
  The command buffer is of the engine's device and of the family of its queue, in recording, outside of
  a render pass. What is recorded is submitted once, to the engine's queue, in the order of the calls;
- a frame that is thrown away is told by `tumble_crowd_forget_recorded`. The library submits to that
+ after a frame that is thrown away, call `tumble_crowd_forget_recorded`. The library submits to that
  queue by itself only in `tumble_upload`, `tumble_evaluate`, `tumble_clip_evaluate`,
  `tumble_clip_evaluate_to_buffer`, `tumble_crowd_new`, `tumble_crowd_evaluate` and `tumble_crowd_submit` (and their `half` forms): the
  application keeps these calls and its own submissions from one another.
@@ -1302,13 +1302,13 @@ TumbleResult tumble_crowd_record(struct TumbleCrowd *crowd,
                                  void *commands);
 
 /*
- Takes back that anything was recorded: the next evaluation tells the device all that instances play.
+ Forgets what was recorded: the next evaluation sends the device all that instances play.
  For an application that threw a recorded frame away.
  */
 TumbleResult tumble_crowd_forget_recorded(struct TumbleCrowd *crowd);
 
 /*
- Gives a target back, after all work that was recorded with it has ended. Null is allowed.
+ Frees a target, after all work that was recorded with it has ended. Null is allowed.
 
  # Safety
  No such work is in flight.

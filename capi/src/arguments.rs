@@ -6,20 +6,20 @@ use tumble::ash::vk::Handle;
 
 use crate::result::{Failure, TumbleResult};
 
-fn check<T>(pointer: *const T, what: &str) -> Result<(), Failure> {
+fn check<T>(pointer: *const T, name: &str) -> Result<(), Failure> {
     if pointer.is_null() {
-        let message = format!("`{what}` is null");
+        let message = format!("`{name}` is null");
         return Err(Failure::new(TumbleResult::InvalidPointer, message));
     }
     if !pointer.is_aligned() {
-        let message = format!("`{what}` is not aligned to {} bytes", align_of::<T>());
+        let message = format!("`{name}` is not aligned to {} bytes", align_of::<T>());
         return Err(Failure::new(TumbleResult::InvalidPointer, message));
     }
     Ok(())
 }
 
-/// How many numbers `count` times `each` are; an error where no memory holds so many.
-pub(crate) fn product<T>(count: usize, each: usize, what: &str) -> Result<usize, Failure> {
+/// The product of `count` and `each`; an error where no memory can have so many numbers.
+pub(crate) fn product<T>(count: usize, each: usize, name: &str) -> Result<usize, Failure> {
     let bytes = count
         .checked_mul(each)
         .and_then(|all| all.checked_mul(size_of::<T>()))
@@ -27,7 +27,7 @@ pub(crate) fn product<T>(count: usize, each: usize, what: &str) -> Result<usize,
     match bytes {
         Some(_) => Ok(count * each),
         None => Err(Failure::argument(format!(
-            "`{what}` would have {count} × {each} numbers, which no memory holds"
+            "`{name}` would have {count} × {each} numbers, which no memory holds"
         ))),
     }
 }
@@ -40,13 +40,13 @@ pub(crate) fn product<T>(count: usize, each: usize, what: &str) -> Result<usize,
 pub(crate) unsafe fn list<'a, T: Copy>(
     pointer: *const T,
     count: usize,
-    what: &str,
+    name: &str,
 ) -> Result<&'a [T], Failure> {
-    product::<T>(count, 1, what)?;
+    product::<T>(count, 1, name)?;
     if count == 0 {
         return Ok(&[]);
     }
-    check(pointer, what)?;
+    check(pointer, name)?;
     // SAFETY: not null, aligned, of a size that can be; the rest is the caller's promise.
     Ok(unsafe { std::slice::from_raw_parts(pointer, count) })
 }
@@ -65,27 +65,27 @@ impl Number for i32 {}
 pub(crate) unsafe fn list_mut<'a, T: Number>(
     pointer: *mut T,
     count: usize,
-    what: &str,
+    name: &str,
 ) -> Result<&'a mut [T], Failure> {
-    product::<T>(count, 1, what)?;
+    product::<T>(count, 1, name)?;
     if count == 0 {
         return Ok(&mut []);
     }
-    check(pointer, what)?;
+    check(pointer, name)?;
     // SAFETY: as in `list`; every pattern of bits is a number.
     Ok(unsafe { std::slice::from_raw_parts_mut(pointer, count) })
 }
 
 /// A handle of Vulkan's that is not null.
-pub(crate) fn vulkan<T: Handle>(pointer: *mut c_void, what: &str) -> Result<T, Failure> {
+pub(crate) fn vulkan<T: Handle>(pointer: *mut c_void, name: &str) -> Result<T, Failure> {
     if pointer.is_null() {
-        let message = format!("`{what}` is null");
+        let message = format!("`{name}` is null");
         return Err(Failure::new(TumbleResult::InvalidPointer, message));
     }
     Ok(T::from_raw(pointer.expose_provenance() as u64))
 }
 
-/// A structure of the caller's that begins with its own size; `None` where the pointer is null.
+/// A structure of the caller's that begins with its size; `None` where the pointer is null.
 ///
 /// # Safety
 /// The pointer is null, unaligned, or that of a structure whose first member is its size in bytes,
@@ -93,17 +93,17 @@ pub(crate) fn vulkan<T: Handle>(pointer: *mut c_void, what: &str) -> Result<T, F
 pub(crate) unsafe fn sized<T: Copy>(
     pointer: *const T,
     size: impl FnOnce(*const T) -> *const usize,
-    what: &str,
+    name: &str,
 ) -> Result<Option<T>, Failure> {
     if pointer.is_null() {
         return Ok(None);
     }
-    check(pointer, what)?;
+    check(pointer, name)?;
     // SAFETY: aligned and not null; the first member is there in every version of the structure.
     let size = unsafe { size(pointer).read() };
     if size != size_of::<T>() {
         return Err(Failure::argument(format!(
-            "`{what}->size` is {size}, and this version's structure has {} bytes; set it to \
+            "`{name}->size` is {size}, and this version's structure has {} bytes; set it to \
              `sizeof`, with the header of the library's version",
             size_of::<T>()
         )));
@@ -119,12 +119,12 @@ pub(crate) unsafe fn sized<T: Copy>(
 pub(crate) unsafe fn needed<T: Copy>(
     pointer: *const T,
     size: impl FnOnce(*const T) -> *const usize,
-    what: &str,
+    name: &str,
 ) -> Result<T, Failure> {
     // SAFETY: the caller's promise.
-    let found = unsafe { sized(pointer, size, what)? };
+    let found = unsafe { sized(pointer, size, name)? };
     found.ok_or_else(|| {
-        let message = format!("`{what}` is null");
+        let message = format!("`{name}` is null");
         Failure::new(TumbleResult::InvalidPointer, message)
     })
 }
@@ -135,7 +135,7 @@ pub(crate) unsafe fn needed<T: Copy>(
 /// The pointer is null, or that of bytes which end with a zero and stay as they are during the call.
 pub(crate) unsafe fn text<'a>(
     pointer: *const c_char,
-    what: &str,
+    name: &str,
 ) -> Result<Option<&'a str>, Failure> {
     if pointer.is_null() {
         return Ok(None);
@@ -144,27 +144,28 @@ pub(crate) unsafe fn text<'a>(
     let text = unsafe { CStr::from_ptr(pointer) };
     let text = text.to_str();
     text.map(Some)
-        .map_err(|_| Failure::argument(format!("`{what}` is not UTF-8")))
+        .map_err(|_| Failure::argument(format!("`{name}` is not UTF-8")))
 }
 
-/// Where a value goes.
+/// The destination of a value.
 pub(crate) struct Out<T> {
-    /// Null where the value is not wanted.
+    /// Null where the caller does not ask for the value.
     pointer: *mut T,
 }
 
 impl<T> Out<T> {
     /// Checked before the work, so that nothing is done that could not be given.
-    pub(crate) fn new(pointer: *mut T, what: &str) -> Result<Self, Failure> {
-        check(pointer, what)?;
+    pub(crate) fn new(pointer: *mut T, name: &str) -> Result<Self, Failure> {
+        check(pointer, name)?;
         Ok(Self { pointer })
     }
 
-    /// As [`Out::new`]; null where the value is not wanted.
-    pub(crate) fn optional(pointer: *mut T, what: &str) -> Result<Self, Failure> {
-        match pointer.is_null() {
-            true => Ok(Self { pointer }),
-            false => Self::new(pointer, what),
+    /// As [`Out::new`]; null where the caller does not ask for the value.
+    pub(crate) fn optional(pointer: *mut T, name: &str) -> Result<Self, Failure> {
+        if pointer.is_null() {
+            Ok(Self { pointer })
+        } else {
+            Self::new(pointer, name)
         }
     }
 
@@ -181,17 +182,17 @@ impl<T> Out<T> {
 }
 
 /// What a constant of C's stands for.
-pub(crate) fn constant<T: Copy>(value: u32, known: &[(u32, T)], what: &str) -> Result<T, Failure> {
-    let found = known.iter().find(|&&(own, _)| own == value);
+pub(crate) fn constant<T: Copy>(value: u32, known: &[(u32, T)], name: &str) -> Result<T, Failure> {
+    let found = known.iter().find(|&&(code, _)| code == value);
     found.map(|&(_, value)| value).ok_or_else(|| {
         let last = known.len() - 1;
         Failure::argument(format!(
-            "`{what}` is {value}; its constants are 0 to {last}"
+            "`{name}` is {value}; its constants are 0 to {last}"
         ))
     })
 }
 
 /// What 0 and 1 stand for.
-pub(crate) fn flag(value: u32, what: &str) -> Result<bool, Failure> {
-    constant(value, &[(0, false), (1, true)], what)
+pub(crate) fn flag(value: u32, name: &str) -> Result<bool, Failure> {
+    constant(value, &[(0, false), (1, true)], name)
 }

@@ -1,6 +1,6 @@
 //! Evaluating: a set in one go, or a clip that stays on a device.
 
-use tumble::{Clip, Frames, Timeline, TrackSet};
+use tumble::{Clip, SampleTimes, Timeline, TrackSet};
 
 use crate::arguments::{Out, list_mut};
 use crate::engine::TumbleEngine;
@@ -13,9 +13,9 @@ use crate::vulkan::buffer_range;
 
 /// A set prepared for one method, on an engine's device. Any number of threads may use it at once.
 pub struct TumbleClip {
-    own: Clip,
+    inner: Clip,
     /// Whether its engine is on the application's own Vulkan device.
-    is_on_own_device: bool,
+    is_on_application_device: bool,
 }
 
 impl Object for TumbleClip {
@@ -35,7 +35,7 @@ fn check_size(tracks: usize, timeline: &Timeline, floats: usize) -> Result<(), F
     Err(Failure::new(TumbleResult::WrongSize, message))
 }
 
-fn timeline(set: &TrackSet, frames: &Frames) -> Result<Timeline, Failure> {
+fn timeline(set: &TrackSet, frames: &SampleTimes) -> Result<Timeline, Failure> {
     Ok(frames.resolve(set.track_count(), set.time_span())?)
 }
 
@@ -92,7 +92,7 @@ pub unsafe extern "C" fn tumble_evaluate(
         // SAFETY: as the caller promises.
         let output = unsafe { list_mut(output, output_count, "output")? };
         let (rows, _) = output.as_chunks_mut::<4>();
-        let (engine, how) = (&engine.own, interpolation);
+        let (engine, how) = (&engine.inner, interpolation);
         Ok(engine.evaluate_into(&set, how, &frames, layout, rows)?)
     })
 }
@@ -113,12 +113,12 @@ pub unsafe extern "C" fn tumble_upload(
         let (engine, set) = (handle::get(engine)?, handle::get(set)?);
         // SAFETY: as the caller promises.
         let interpolation = unsafe { TumbleInterpolation::read(interpolation)? };
-        let own = engine.own.upload(&set.read(), interpolation)?;
+        let inner = engine.inner.upload(&set.read(), interpolation)?;
         // SAFETY: as the caller promises.
         unsafe {
             out.set(handle::give(TumbleClip {
-                own,
-                is_on_own_device: engine.is_on_own_device,
+                inner,
+                is_on_application_device: engine.is_on_application_device,
             }));
         }
         Ok(())
@@ -140,7 +140,7 @@ pub unsafe extern "C" fn tumble_clip_sample_count(
         let clip = handle::get(clip)?;
         // SAFETY: as the caller promises.
         let frames = unsafe { TumbleSamples::read(samples)? };
-        let timeline = clip.own.timeline(&frames)?;
+        let timeline = clip.inner.timeline(&frames)?;
         // SAFETY: as the caller promises.
         unsafe { out.set(timeline.len()) };
         Ok(())
@@ -164,12 +164,12 @@ pub unsafe extern "C" fn tumble_clip_evaluate(
         // SAFETY: as the caller promises.
         let frames = unsafe { TumbleSamples::read(samples)? };
         let layout = self::layout(layout)?;
-        let timeline = clip.own.timeline(&frames)?;
-        check_size(clip.own.track_count(), &timeline, output_count)?;
+        let timeline = clip.inner.timeline(&frames)?;
+        check_size(clip.inner.track_count(), &timeline, output_count)?;
         // SAFETY: as the caller promises.
         let output = unsafe { list_mut(output, output_count, "output")? };
         let (rows, _) = output.as_chunks_mut::<4>();
-        Ok(clip.own.evaluate_into(&frames, layout, rows)?)
+        Ok(clip.inner.evaluate_into(&frames, layout, rows)?)
     })
 }
 
@@ -198,14 +198,14 @@ pub unsafe extern "C" fn tumble_clip_evaluate_to_buffer(
         // SAFETY: as the caller promises.
         let frames = unsafe { TumbleSamples::read(samples)? };
         let layout = self::layout(layout)?;
-        let buffer = buffer_range(clip.is_on_own_device, buffer, offset, size)?;
-        let request = clip.own.request(&frames).layout(layout);
+        let buffer = buffer_range(clip.is_on_application_device, buffer, offset, size)?;
+        let request = clip.inner.request(&frames).layout(layout);
         // SAFETY: as the caller promises.
         Ok(unsafe { request.to_buffer(buffer) }?)
     })
 }
 
-/// Gives a clip back. Null is allowed.
+/// Frees a clip. Null is allowed.
 #[unsafe(no_mangle)]
 pub extern "C" fn tumble_clip_free(clip: *mut TumbleClip) -> TumbleResult {
     code(|| handle::free(clip))

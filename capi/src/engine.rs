@@ -10,19 +10,19 @@ use crate::result::{Failure, TumbleResult, code, guarded};
 
 /// One device, open. Any number of threads may use it at once.
 pub struct TumbleEngine {
-    pub(crate) own: Engine,
+    pub(crate) inner: Engine,
     /// Whether the Vulkan device is the application's.
-    pub(crate) is_on_own_device: bool,
+    pub(crate) is_on_application_device: bool,
     name: CString,
 }
 
 impl TumbleEngine {
-    pub(crate) fn new(own: Engine, is_on_own_device: bool) -> Self {
-        let name = own.device_name().replace('\0', "");
+    pub(crate) fn new(inner: Engine, is_on_application_device: bool) -> Self {
+        let name = inner.device_name().replace('\0', "");
         let name = CString::new(name).unwrap_or_default();
         Self {
-            own,
-            is_on_own_device,
+            inner,
+            is_on_application_device,
             name,
         }
     }
@@ -68,9 +68,9 @@ pub unsafe extern "C" fn tumble_engine_open(
             let options = TumbleEngineOptions::read(options)?;
             (text(device, "device")?, options)
         };
-        let own = open(device.unwrap_or("auto"), &options)?;
+        let opened = open(device.unwrap_or("auto"), &options)?;
         // SAFETY: as the caller promises.
-        unsafe { out.set(handle::give(TumbleEngine::new(own, false))) };
+        unsafe { out.set(handle::give(TumbleEngine::new(opened, false))) };
         Ok(())
     })
 }
@@ -82,19 +82,19 @@ impl TumbleEngineOptions {
     /// The pointer is null or that of such a structure.
     pub(crate) unsafe fn read(pointer: *const Self) -> Result<EngineOptions, Failure> {
         // SAFETY: as the caller promises.
-        let given = unsafe {
-            let size = |own: *const Self| (&raw const (*own).size).cast();
+        let options = unsafe {
+            let size = |pointer: *const Self| (&raw const (*pointer).size).cast();
             sized(pointer, size, "options")?
         };
-        given.map_or_else(|| Ok(EngineOptions::default()), engine_options)
+        options.map_or_else(|| Ok(EngineOptions::default()), engine_options)
     }
 }
 
-fn engine_options(given: TumbleEngineOptions) -> Result<EngineOptions, Failure> {
+fn engine_options(structure: TumbleEngineOptions) -> Result<EngineOptions, Failure> {
     let mut options = EngineOptions::default();
-    options.memory = (given.memory > 0).then_some(given.memory);
-    options.threads = (given.threads > 0).then_some(given.threads as usize);
-    options.allow_inexact = flag(given.allow_inexact, "options->allow_inexact")?;
+    options.memory = (structure.memory > 0).then_some(structure.memory);
+    options.threads = (structure.threads > 0).then_some(structure.threads as usize);
+    options.allow_inexact = flag(structure.allow_inexact, "options->allow_inexact")?;
     Ok(options)
 }
 
@@ -141,8 +141,8 @@ fn first_exact(options: &EngineOptions) -> Result<Engine, Failure> {
 fn named(name: &str) -> Result<Device, Failure> {
     let devices = Device::list()?;
     let index = name.parse().ok();
-    let wanted = name.to_lowercase();
-    let is_it = |device: &&Device| device.name().to_lowercase().contains(&wanted);
+    let lowercase = name.to_lowercase();
+    let is_it = |device: &&Device| device.name().to_lowercase().contains(&lowercase);
     let found = match index {
         Some(index) => devices.get::<usize>(index),
         None if name.is_empty() => None,
@@ -152,24 +152,25 @@ fn named(name: &str) -> Result<Device, Failure> {
         let names: Vec<&str> = devices.iter().map(Device::name).collect();
         let message = format!(
             "there is no device `{name}`; there are auto, cpu, vulkan and {}",
-            match names.is_empty() {
-                true => "no Vulkan devices".to_owned(),
-                false => names.join(", "),
+            if names.is_empty() {
+                "no Vulkan devices".to_owned()
+            } else {
+                names.join(", ")
             }
         );
         Failure::new(TumbleResult::Device, message)
     })
 }
 
-/// The name of the device, "CPU" for the CPU: UTF-8, valid until the engine is freed; null for what
-/// is no engine.
+/// The name of the device, "CPU" for the CPU: UTF-8, valid until the engine is freed; null for an
+/// invalid handle.
 #[unsafe(no_mangle)]
 pub extern "C" fn tumble_engine_device_name(engine: *const TumbleEngine) -> *const c_char {
     let name = guarded(|| Ok(handle::get(engine)?.name.as_ptr()));
     name.unwrap_or(std::ptr::null())
 }
 
-/// Gives an engine back; clips that were uploaded to it keep its device. Null is allowed.
+/// Frees an engine; clips that were uploaded to it keep its device open. Null is allowed.
 #[unsafe(no_mangle)]
 pub extern "C" fn tumble_engine_free(engine: *mut TumbleEngine) -> TumbleResult {
     code(|| handle::free(engine))

@@ -12,13 +12,13 @@ use crate::handle::{self, Object};
 use crate::result::{Failure, TumbleResult, code, guarded};
 use crate::set::TumbleSet;
 
-/// What was read from a motion file: clips, and what is remarkable about it.
+/// A motion file that was read: its clips, and messages about them.
 pub struct TumbleFile {
     pub(crate) clips: Vec<Clip>,
     messages: Vec<CString>,
 }
 
-/// A clip, and what is told about it as text.
+/// A clip, with its names as text for C.
 pub(crate) struct Clip {
     pub(crate) motion: Motion,
     name: CString,
@@ -69,7 +69,9 @@ pub unsafe extern "C" fn tumble_file_load(
         });
         let clips = clips.collect();
         let messages = loaded.refused.iter().chain(&loaded.warnings);
-        let messages = messages.map(|told| c_text(&told.to_string())).collect();
+        let messages = messages
+            .map(|diagnostic| c_text(&diagnostic.to_string()))
+            .collect();
         // SAFETY: as the caller promises.
         unsafe { out.set(handle::give(TumbleFile { clips, messages })) };
         Ok(())
@@ -88,7 +90,7 @@ fn system_path(path: &CStr) -> Result<&OsStr, Failure> {
     text.map_err(|_| Failure::argument("`path` is not UTF-8"))
 }
 
-/// The number of clips that could be read; 0 for what is no file.
+/// The number of clips that could be read; 0 for an invalid handle.
 #[unsafe(no_mangle)]
 pub extern "C" fn tumble_file_clip_count(file: *const TumbleFile) -> usize {
     guarded(|| Ok(handle::get(file)?.clips.len())).unwrap_or(0)
@@ -125,9 +127,9 @@ pub unsafe extern "C" fn tumble_file_clip_set(
 ) -> TumbleResult {
     code(|| {
         let out = Out::new(set, "set")?;
-        let own = handle::get(file)?.clip(clip)?.motion.set.clone();
+        let tracks = handle::get(file)?.clip(clip)?.motion.set.clone();
         // SAFETY: as the caller promises.
-        unsafe { out.set(handle::give(TumbleSet::new(own))) };
+        unsafe { out.set(handle::give(TumbleSet::new(tracks))) };
         Ok(())
     })
 }
@@ -173,7 +175,7 @@ pub unsafe extern "C" fn tumble_file_clip_time_offset(
     })
 }
 
-/// What was taken off the translations of a track of a clip, so that f32 holds what is left of positions
+/// What was subtracted from the translations of a track of a clip, so that f32 has the digits of positions
 /// such as those of maps: add it to what is made of them, in doubles. Mostly 0, 0, 0.
 ///
 /// # Safety
@@ -200,8 +202,8 @@ pub unsafe extern "C" fn tumble_file_clip_origin(
     })
 }
 
-/// How many messages there are about the file: warnings, and why clips could not be read; 0 for what
-/// is no file.
+/// How many messages there are about the file: warnings, and why clips could not be read; 0 for an
+/// invalid handle.
 #[unsafe(no_mangle)]
 pub extern "C" fn tumble_file_message_count(file: *const TumbleFile) -> usize {
     guarded(|| Ok(handle::get(file)?.messages.len())).unwrap_or(0)
@@ -222,7 +224,7 @@ pub extern "C" fn tumble_file_message(file: *const TumbleFile, index: usize) -> 
     message.unwrap_or(std::ptr::null())
 }
 
-/// Gives a file back; sets that were made of it stay. Null is allowed.
+/// Frees a file; sets that were made of it stay. Null is allowed.
 #[unsafe(no_mangle)]
 pub extern "C" fn tumble_file_free(file: *mut TumbleFile) -> TumbleResult {
     code(|| handle::free(file))

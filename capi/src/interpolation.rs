@@ -5,7 +5,7 @@ use std::sync::LazyLock;
 
 use glam::DVec3;
 use tumble::{
-    Axes, Ends, Interpolation, METHODS, Method, Path, Quantity, Speed, Tcb, WrapMode, method,
+    Axes, Ends, Interpolation, KeySigns, METHODS, Method, Quantity, Speed, Tcb, WrapMode, method,
 };
 
 use crate::arguments::{constant, sized, text};
@@ -141,30 +141,30 @@ impl TumbleInterpolation {
         other: impl FnOnce() -> Result<Method, Failure>,
     ) -> Result<Interpolation, Failure> {
         // SAFETY: as the caller promises.
-        let given = unsafe {
-            let size = |own: *const Self| (&raw const (*own).size).cast();
+        let structure = unsafe {
+            let size = |pointer: *const Self| (&raw const (*pointer).size).cast();
             sized(pointer, size, "interpolation")?
         };
-        let Some(given) = given else {
+        let Some(structure) = structure else {
             return Ok(other()?.into());
         };
         // SAFETY: as the caller promises.
-        let name = unsafe { text(given.method, "interpolation->method")? };
+        let name = unsafe { text(structure.method, "interpolation->method")? };
         let method = match name {
             None => method::BESSEL_OVERHAUSER,
             Some(name) => name
                 .parse::<Method>()
                 .map_err(|error| Failure::argument(error.to_string()))?,
         };
-        given.with(method)
+        structure.with(method)
     }
 
     fn with(&self, method: Method) -> Result<Interpolation, Failure> {
         let body = Axes::Body;
         let parent = Axes::Parent;
         let paths = [
-            (TumblePath::Shortest as u32, Path::Shortest),
-            (TumblePath::AsAuthored as u32, Path::AsAuthored),
+            (TumblePath::Shortest as u32, KeySigns::Shortest),
+            (TumblePath::AsAuthored as u32, KeySigns::AsAuthored),
         ];
         let path = constant(self.path, &paths, "interpolation->path")?;
         let clamped = Ends::Clamped {
@@ -205,7 +205,7 @@ impl TumbleInterpolation {
         ];
         Ok(Interpolation {
             method,
-            path: method.path.unwrap_or(path),
+            signs: method.path.unwrap_or(path),
             ends: constant(self.ends, &ends, "interpolation->ends")?,
             tcb: Tcb {
                 tension: self.tension,

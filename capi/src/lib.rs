@@ -1,6 +1,6 @@
 //! Tumble for C and C++: the interface that `include/tumble.h` declares.
 //!
-//! Handles are places in a table of this library and are never dereferenced, so that one that was
+//! Handles are indices into a table of this library and are never dereferenced, so that one that was
 //! freed, or is of another kind, is an error (`handle`). Every function that can fail gives a
 //! [`TumbleResult`](result::TumbleResult), with words for it in [`result::tumble_last_error`]; a
 //! panic, which is a mistake of ours, ends in the code `INTERNAL` and not in the caller.

@@ -25,7 +25,7 @@ pub enum TumbleResult {
     WrongSize = 4,
     /// There is nothing at that index.
     OutOfRange = 5,
-    /// Keys, times, samples or a file are refused; the message names the place.
+    /// Keys, times, samples or a file are refused; the message says where.
     InvalidInput = 6,
     /// There is not the memory.
     OutOfMemory = 7,
@@ -61,7 +61,7 @@ impl Failure {
 impl From<Error> for Failure {
     fn from(error: Error) -> Self {
         let code = match &error {
-            Error::Vulkan(VulkanError::OwnBuffer { .. }) => TumbleResult::WrongSize,
+            Error::Vulkan(VulkanError::BufferRange { .. }) => TumbleResult::WrongSize,
             Error::Vulkan(VulkanError::QueueFamily { .. } | VulkanError::SameQueue) => {
                 TumbleResult::InvalidArgument
             }
@@ -149,11 +149,11 @@ impl From<CrowdError> for Failure {
 fn crowd_words(error: &CrowdError) -> String {
     match error {
         CrowdError::Missing {
-            what: "mask",
-            given,
+            subject: "mask",
+            index,
             count,
         } => {
-            let mask = given.saturating_add(1);
+            let mask = index.saturating_add(1);
             format!("there is no mask {mask}; there are {count}, which count from 1")
         }
         CrowdError::Change { change, reason } => format!("change {change}: {}", crowd_words(reason)),
@@ -182,8 +182,8 @@ fn crowd_words(error: &CrowdError) -> String {
     }
 }
 
-impl From<tumble::FramesError> for Failure {
-    fn from(error: tumble::FramesError) -> Self {
+impl From<tumble::SampleTimesError> for Failure {
+    fn from(error: tumble::SampleTimesError) -> Self {
         Self::new(TumbleResult::InvalidInput, error.to_string())
     }
 }
@@ -230,10 +230,10 @@ pub(crate) fn code(work: impl FnOnce() -> Result<(), Failure>) -> TumbleResult {
 
 fn of_panic(panic: &(dyn Any + Send)) -> Failure {
     let text = panic.downcast_ref::<String>().map(String::as_str);
-    let what = text.or_else(|| panic.downcast_ref::<&str>().copied());
+    let reason = text.or_else(|| panic.downcast_ref::<&str>().copied());
     let message = format!(
         "internal error: {}; this is a mistake in tumble {}: please report it with the call",
-        what.unwrap_or("no reason given"),
+        reason.unwrap_or("no reason given"),
         env!("CARGO_PKG_VERSION"),
     );
     Failure::new(TumbleResult::Internal, message)

@@ -1,6 +1,6 @@
 //! Which samples are evaluated, and where they lie in memory.
 
-use tumble::{FrameRate, Frames, Layout};
+use tumble::{FrameRate, Layout, SampleTimes};
 
 use crate::arguments::{constant, list, needed};
 use crate::result::Failure;
@@ -57,15 +57,15 @@ impl TumbleSamples {
     ///
     /// # Safety
     /// The pointer is null or that of such a structure, whose `times` has `time_count` numbers.
-    pub(crate) unsafe fn read(pointer: *const Self) -> Result<Frames, Failure> {
+    pub(crate) unsafe fn read(pointer: *const Self) -> Result<SampleTimes, Failure> {
         // SAFETY: as the caller promises.
-        let given = unsafe {
-            let size = |own: *const Self| (&raw const (*own).size).cast();
+        let structure = unsafe {
+            let size = |pointer: *const Self| (&raw const (*pointer).size).cast();
             needed(pointer, size, "samples")?
         };
-        let rate = || FrameRate::new(given.rate_frames, given.rate_seconds.max(1));
+        let rate = || FrameRate::new(structure.rate_frames, structure.rate_seconds.max(1));
         // SAFETY: as the caller promises.
-        let times = || unsafe { list(given.times, given.time_count, "samples->times") };
+        let times = || unsafe { list(structure.times, structure.time_count, "samples->times") };
         let samplings = [
             TumbleSampling::Keys,
             TumbleSampling::Range,
@@ -74,11 +74,13 @@ impl TumbleSamples {
         ];
         let samplings = samplings.map(|sampling| (sampling as u32, sampling));
         Ok(
-            match constant(given.sampling, &samplings, "samples->sampling")? {
-                TumbleSampling::Keys => Frames::rate(rate()?),
-                TumbleSampling::Range => Frames::rate(rate()?).between(given.start, given.end),
-                TumbleSampling::Times => Frames::at(times()?.to_vec()),
-                TumbleSampling::TimesOfTracks => Frames::at_each(times()?.to_vec()),
+            match constant(structure.sampling, &samplings, "samples->sampling")? {
+                TumbleSampling::Keys => SampleTimes::rate(rate()?),
+                TumbleSampling::Range => {
+                    SampleTimes::rate(rate()?).between(structure.start, structure.end)
+                }
+                TumbleSampling::Times => SampleTimes::at(times()?.to_vec()),
+                TumbleSampling::TimesOfTracks => SampleTimes::at_each(times()?.to_vec()),
             },
         )
     }

@@ -13,7 +13,7 @@ use crate::result::{Failure, TumbleResult, code, guarded};
 /// Tracks of keys. Any number of threads may read a set at once.
 #[derive(Default)]
 pub struct TumbleSet {
-    pub(crate) own: RwLock<TrackSet>,
+    pub(crate) inner: RwLock<TrackSet>,
 }
 
 impl Object for TumbleSet {
@@ -21,15 +21,15 @@ impl Object for TumbleSet {
 }
 
 impl TumbleSet {
-    pub(crate) fn new(own: TrackSet) -> Self {
+    pub(crate) fn new(tracks: TrackSet) -> Self {
         Self {
-            own: RwLock::new(own),
+            inner: RwLock::new(tracks),
         }
     }
 
     /// The set: a track is pushed as a whole or not at all, after panics too.
     pub(crate) fn read(&self) -> RwLockReadGuard<'_, TrackSet> {
-        self.own.read().unwrap_or_else(PoisonError::into_inner)
+        self.inner.read().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -76,8 +76,8 @@ pub unsafe extern "C" fn tumble_set_push(
             )
         };
         let (keys, _) = keys.as_chunks::<4>();
-        let mut own = set.own.write().unwrap_or_else(PoisonError::into_inner);
-        Ok(own.push(name, times, keys)?)
+        let mut tracks = set.inner.write().unwrap_or_else(PoisonError::into_inner);
+        Ok(tracks.push(name, times, keys)?)
     })
 }
 
@@ -107,20 +107,20 @@ pub unsafe extern "C" fn tumble_set_with_shared_times(
             )
         };
         let (keys, _) = keys.as_chunks::<4>();
-        let own = TrackSet::with_shared_times(times, keys)?;
+        let tracks = TrackSet::with_shared_times(times, keys)?;
         // SAFETY: as the caller promises.
-        unsafe { out.set(handle::give(TumbleSet::new(own))) };
+        unsafe { out.set(handle::give(TumbleSet::new(tracks))) };
         Ok(())
     })
 }
 
-/// The number of tracks; 0 for what is no set.
+/// The number of tracks; 0 for an invalid handle.
 #[unsafe(no_mangle)]
 pub extern "C" fn tumble_set_track_count(set: *const TumbleSet) -> usize {
     guarded(|| Ok(handle::get(set)?.read().track_count())).unwrap_or(0)
 }
 
-/// The number of keys of all tracks together; 0 for what is no set.
+/// The number of keys of all tracks together; 0 for an invalid handle.
 #[unsafe(no_mangle)]
 pub extern "C" fn tumble_set_key_count(set: *const TumbleSet) -> usize {
     guarded(|| Ok(handle::get(set)?.read().key_count())).unwrap_or(0)
@@ -238,7 +238,7 @@ pub unsafe extern "C" fn tumble_set_time_span(
     })
 }
 
-/// Gives a set back; clips that were made of it stay. Null is allowed.
+/// Frees a set; clips that were made of it stay. Null is allowed.
 #[unsafe(no_mangle)]
 pub extern "C" fn tumble_set_free(set: *mut TumbleSet) -> TumbleResult {
     code(|| handle::free(set))

@@ -24,9 +24,10 @@ unsafe fn give(
 ) -> Result<(), Failure> {
     let set = handle::get(set)?;
     let numbers = product::<f32>(key_count, 3, "keys")?;
-    let of_tangents = match tangents.is_null() {
-        true => 0,
-        false => product::<f32>(key_count, 6, "tangents")?,
+    let of_tangents = if tangents.is_null() {
+        0
+    } else {
+        product::<f32>(key_count, 6, "tangents")?
     };
     // SAFETY: as the caller promises.
     let (times, keys, tangents) = unsafe {
@@ -40,8 +41,8 @@ unsafe fn give(
     let (tangents, _) = tangents.as_chunks::<3>();
     let (tangents, _) = tangents.as_chunks::<2>();
     let tangents: Vec<[Vec3; 2]> = tangents.iter().map(|both| both.map(Vec3::from)).collect();
-    let mut own = set.own.write().unwrap_or_else(PoisonError::into_inner);
-    Ok(to(&mut own, track, times, keys, &tangents)?)
+    let mut tracks = set.inner.write().unwrap_or_else(PoisonError::into_inner);
+    Ok(to(&mut tracks, track, times, keys, &tangents)?)
 }
 
 /// Gives a track translations, in place of those that it had. `times` are seconds, strictly increasing,

@@ -1,4 +1,4 @@
-//! What C may do wrong, and what it is told then.
+//! Wrong uses from C, and the errors that they get.
 
 mod crowd;
 mod crowd_files;
@@ -8,7 +8,7 @@ mod crowd_states;
 use std::ffi::{CStr, c_char};
 use std::ptr::{dangling, dangling_mut, null, null_mut};
 
-use tumble::{Device, Engine, Frames, TrackSet, method};
+use tumble::{Device, Engine, SampleTimes, TrackSet, method};
 
 use crate::clip::*;
 use crate::engine::*;
@@ -36,7 +36,7 @@ fn fails(result: TumbleResult, code: TumbleResult, says: &str) {
 
 fn cpu() -> *mut TumbleEngine {
     let mut engine = null_mut();
-    // SAFETY: text, null and a place for the handle.
+    // SAFETY: text, null and room for the handle.
     let opened = unsafe { tumble_engine_open(c"cpu".as_ptr(), null(), &raw mut engine) };
     assert_eq!(opened, TumbleResult::Ok, "{}", words());
     engine
@@ -56,7 +56,7 @@ fn push(set: *mut TumbleSet, times: *const f64, keys: *const f32, count: usize) 
 
 fn one_track() -> *mut TumbleSet {
     let mut set = null_mut();
-    // SAFETY: a place for the handle.
+    // SAFETY: room for the handle.
     assert_eq!(unsafe { tumble_set_new(&raw mut set) }, TumbleResult::Ok);
     let pushed = push(set, TIMES.as_ptr(), KEYS.as_ptr().cast(), 3);
     assert_eq!(pushed, TumbleResult::Ok, "{}", words());
@@ -109,10 +109,10 @@ fn evaluate(
 #[test]
 fn zeros_are_the_engines_defaults() {
     let (engine, set) = (cpu(), one_track());
-    let mut own = TrackSet::new();
-    own.push("joint", &TIMES, &KEYS).unwrap();
+    let mut tracks = TrackSet::new();
+    tracks.push("joint", &TIMES, &KEYS).unwrap();
     let expected = Engine::new(Device::Cpu).unwrap();
-    let expected = expected.evaluate(&own, method::BESSEL_OVERHAUSER, &Frames::fps(60));
+    let expected = expected.evaluate(&tracks, method::BESSEL_OVERHAUSER, &SampleTimes::fps(60));
     let expected = expected.unwrap();
     let expected: Vec<u32> = (expected.as_quats().iter())
         .flat_map(|rotation| rotation.to_array().map(f32::to_bits))
@@ -153,7 +153,7 @@ fn a_handle_that_was_freed_or_is_another_is_refused() {
     assert_eq!(tumble_engine_free(null_mut()), TumbleResult::Ok);
     // A clip keeps what it needs.
     let (set, mut clip) = (one_track(), null_mut());
-    // SAFETY: handles, and a place for one.
+    // SAFETY: handles, and room for one.
     let uploaded = unsafe { tumble_upload(engine, set, null(), &raw mut clip) };
     assert_eq!(uploaded, TumbleResult::Ok, "{}", words());
     assert_eq!(tumble_engine_free(engine), TumbleResult::Ok);
@@ -221,7 +221,7 @@ fn results_are_as_large_as_their_memory() {
     let (engine, set) = (cpu(), one_track());
     let (how, samples) = (defaults(), at_60_fps());
     let mut count = 0;
-    // SAFETY: a structure, and a place for the number.
+    // SAFETY: a structure, and room for the number.
     let counted = unsafe { tumble_set_sample_count(set, &raw const samples, &raw mut count) };
     assert_eq!((counted, count), (TumbleResult::Ok, 121), "{}", words());
     let mut output = vec![7.0; 4 * count + 1];
@@ -244,12 +244,12 @@ fn results_are_as_large_as_their_memory() {
         )
     };
     fails(done, TumbleResult::InvalidPointer, "`output` is null");
-    let far = TumbleSamples {
+    let out_of_range = TumbleSamples {
         sampling: TumbleSampling::Range as u32,
         end: 1e30,
         ..samples
     };
-    let done = evaluate(engine, set, &how, &far, &mut output);
+    let done = evaluate(engine, set, &how, &out_of_range, &mut output);
     fails(done, TumbleResult::InvalidInput, "at most");
 }
 
@@ -319,18 +319,18 @@ fn constants_names_and_versions_are_checked() {
     let version = env!("CARGO_PKG_VERSION").split('.');
     let version: Vec<u32> = version.map(|part| part.parse().unwrap()).collect();
     assert_eq!(tumble_version(), TUMBLE_VERSION);
-    let told = [
+    let reported = [
         TUMBLE_VERSION_MAJOR,
         TUMBLE_VERSION_MINOR,
         TUMBLE_VERSION_PATCH,
     ];
-    assert_eq!(version, told);
+    assert_eq!(version, reported);
 }
 
 #[test]
 fn devices_files_and_methods_are_found_or_named() {
     let mut engine = null_mut();
-    // SAFETY: text, null and a place for the handle.
+    // SAFETY: text, null and room for the handle.
     let opened = unsafe { tumble_engine_open(c"no such".as_ptr(), null(), &raw mut engine) };
     assert_eq!(opened, TumbleResult::Device, "{}", words());
     let options = TumbleEngineOptions {
@@ -348,7 +348,7 @@ fn devices_files_and_methods_are_found_or_named() {
         "100000 worker threads",
     );
     let mut file = null_mut();
-    // SAFETY: text, and a place for the handle.
+    // SAFETY: text, and room for the handle.
     let loaded = unsafe { tumble_file_load(c"no such.glb".as_ptr(), &raw mut file) };
     fails(loaded, TumbleResult::InvalidInput, "no such.glb");
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../data/pendulum.dat\0");
@@ -362,23 +362,23 @@ fn devices_files_and_methods_are_found_or_named() {
     assert_eq!(method, c"bessel-overhauser");
     assert!(tumble_file_track_method(file, 0, 4).is_null());
     let mut set = null_mut();
-    // SAFETY: a place for the handle.
+    // SAFETY: room for the handle.
     let done = unsafe { tumble_file_clip_set(file, 0, &raw mut set) };
     assert_eq!((done, tumble_set_track_count(set)), (TumbleResult::Ok, 4));
     let (mut times, mut keys, mut count) = (null(), null(), 0);
-    // SAFETY: places for them.
+    // SAFETY: room for them.
     let done = unsafe { tumble_set_track(set, 3, &raw mut times, &raw mut keys, &raw mut count) };
     assert_eq!(done, TumbleResult::Ok);
     // SAFETY: keys of a set that is not freed yet.
     let keys = unsafe { std::slice::from_raw_parts(keys.cast::<[f32; 4]>(), count) };
-    let own = handle::get(set).unwrap();
-    assert_eq!(keys[1], own.read().track(3).keys[1].to_array());
-    // SAFETY: places for them, dangling ones where there is no such track.
+    let object = handle::get(set).unwrap();
+    assert_eq!(keys[1], object.read().track(3).keys[1].to_array());
+    // SAFETY: room for them, dangling ones where there is no such track.
     let done = unsafe { tumble_set_track(set, 4, dangling_mut(), dangling_mut(), dangling_mut()) };
     fails(done, TumbleResult::OutOfRange, "no track 4");
     let mut name = [1 as c_char; 5];
     let mut length = 0;
-    // SAFETY: memory of that size, and a place for the number.
+    // SAFETY: memory of that size, and room for the number.
     let mut named = |size| unsafe {
         let done = tumble_set_track_name(set, 3, name.as_mut_ptr(), size, &raw mut length);
         (done, length)
@@ -403,7 +403,7 @@ fn a_map_s_origin_is_reported() {
     .unwrap();
     let path = std::ffi::CString::new(file.to_str().unwrap()).unwrap();
     let mut file = null_mut();
-    // SAFETY: text, and a place for the handle.
+    // SAFETY: text, and room for the handle.
     let loaded = unsafe { tumble_file_load(path.as_ptr(), &raw mut file) };
     assert_eq!(loaded, TumbleResult::Ok, "{}", words());
     let mut origin = [1.0; 3];

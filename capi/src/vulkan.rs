@@ -106,21 +106,25 @@ impl TumbleVulkan {
         let physical_device = vulkan(self.physical_device, "vulkan->physical_device")?;
         let device = vulkan(self.device, "vulkan->device")?;
         let queue = vulkan(self.queue, "vulkan->queue")?;
-        let copy_queue = match self.copy_queue.is_null() {
-            true => None,
-            false => Some(VulkanQueue {
+        let copy_queue = if self.copy_queue.is_null() {
+            None
+        } else {
+            Some(VulkanQueue {
                 queue: vulkan(self.copy_queue, "vulkan->copy_queue")?,
                 family: self.copy_queue_family,
-            }),
+            })
         };
         let shader_float_controls =
             flag(self.shader_float_controls, "vulkan->shader_float_controls")?;
         let shader_int64 = flag(self.shader_int64, "vulkan->shader_int64")?;
         if self.api_version < vk::API_VERSION_1_1 {
-            let given = self.api_version;
-            let (major, minor) = (vk::api_version_major(given), vk::api_version_minor(given));
+            let version = self.api_version;
+            let (major, minor) = (
+                vk::api_version_major(version),
+                vk::api_version_minor(version),
+            );
             return Err(refused(format!(
-                "`vulkan->api_version` is {given}, Vulkan {major}.{minor}; the instance must be made for 1.1 or newer"
+                "`vulkan->api_version` is {version}, Vulkan {major}.{minor}; the instance must be made for 1.1 or newer"
             )));
         }
         // SAFETY: pointers to functions have one size; the caller promises which function it is.
@@ -193,9 +197,11 @@ impl TumbleVulkan {
                 "`vulkan->queue_family` is {family}; the device has {} families",
                 families.len()
             ))),
-            Some(own) if !own.queue_flags.contains(vk::QueueFlags::COMPUTE) => Err(refused(
-                format!("`vulkan->queue_family` is {family}, whose queues cannot compute"),
-            )),
+            Some(properties) if !properties.queue_flags.contains(vk::QueueFlags::COMPUTE) => {
+                Err(refused(format!(
+                    "`vulkan->queue_family` is {family}, whose queues cannot compute"
+                )))
+            }
             Some(_) => match families.get(self.copy_queue_family as usize) {
                 None if !self.copy_queue.is_null() => Err(refused(format!(
                     "`vulkan->copy_queue_family` is {}; the device has {} families",
@@ -210,12 +216,12 @@ impl TumbleVulkan {
 
 /// A range of an application's buffer, for what an engine on its own device left there.
 pub(crate) fn buffer_range(
-    is_on_own_device: bool,
+    is_on_application_device: bool,
     buffer: u64,
     offset: u64,
     size: u64,
 ) -> Result<VulkanBuffer, Failure> {
-    if !is_on_own_device {
+    if !is_on_application_device {
         let message = "the engine is not on the application's device; make it with \
                        tumble_engine_from_vulkan";
         return Err(Failure::argument(message));
@@ -251,15 +257,15 @@ pub unsafe extern "C" fn tumble_engine_from_vulkan(
     code(|| {
         let out = Out::new(engine, "engine")?;
         // SAFETY: as the caller promises.
-        let (own, options) = unsafe {
-            let size = |own: *const TumbleVulkan| (&raw const (*own).size).cast();
+        let (structure, options) = unsafe {
+            let size = |pointer: *const TumbleVulkan| (&raw const (*pointer).size).cast();
             let vulkan = needed(vulkan, size, "vulkan")?;
             (vulkan, TumbleEngineOptions::read(options)?)
         };
         // SAFETY: as the caller promises.
-        let own = unsafe { Engine::from_vulkan(own.handles()?, &options)? };
+        let opened = unsafe { Engine::from_vulkan(structure.handles()?, &options)? };
         // SAFETY: as the caller promises.
-        unsafe { out.set(handle::give(TumbleEngine::new(own, true))) };
+        unsafe { out.set(handle::give(TumbleEngine::new(opened, true))) };
         Ok(())
     })
 }

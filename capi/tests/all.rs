@@ -5,9 +5,9 @@
 
 #[path = "../../tests/support/application.rs"]
 mod application;
+mod application_device;
 #[path = "../../tests/support/layer.rs"]
 mod layer;
-mod own_device;
 #[path = "../../tests/support/mod.rs"]
 mod support;
 
@@ -15,10 +15,10 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use glam::Quat;
-use tumble::{Device, Engine, Frames, Layout, TrackSet, method};
+use tumble::{Device, Engine, Layout, SampleTimes, TrackSet, method};
 use tumble_formats::{Format, ReadOptions};
 
-fn own(path: &str) -> PathBuf {
+fn package_path(path: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join(path)
 }
 
@@ -26,7 +26,7 @@ fn own(path: &str) -> PathBuf {
 #[test]
 fn the_header_is_what_the_sources_say() {
     let mut builder = cbindgen::Builder::new()
-        .with_config(cbindgen::Config::from_file(own("cbindgen.toml")).unwrap());
+        .with_config(cbindgen::Config::from_file(package_path("cbindgen.toml")).unwrap());
     let sources = [
         "version",
         "result",
@@ -46,18 +46,18 @@ fn the_header_is_what_the_sources_say() {
         "crowd/target",
     ];
     for source in sources {
-        builder = builder.with_src(own(&format!("src/{source}.rs")));
+        builder = builder.with_src(package_path(&format!("src/{source}.rs")));
     }
     let mut header = Vec::new();
     builder.generate().unwrap().write(&mut header);
     let header = String::from_utf8(header).unwrap();
     let functions = header.matches("tumble_").count();
     assert!(functions > 20, "{functions} functions: {header}");
-    let place = own("include/tumble.h");
+    let path = package_path("include/tumble.h");
     if std::env::var_os("UPDATE_HEADER").is_some() {
-        std::fs::write(&place, &header).unwrap();
+        std::fs::write(&path, &header).unwrap();
     }
-    let found = std::fs::read_to_string(&place).unwrap_or_default();
+    let found = std::fs::read_to_string(&path).unwrap_or_default();
     assert!(
         found == header,
         "capi/include/tumble.h is not current: UPDATE_HEADER=1 cargo test -p tumble-capi"
@@ -77,7 +77,7 @@ fn compiler(name: &str) -> Option<Command> {
     is_there.then(|| {
         let mut command = Command::new(name);
         command.args(["-O1", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-I"]);
-        command.arg(own("include"));
+        command.arg(package_path("include"));
         command
     })
 }
@@ -108,10 +108,10 @@ fn expected() -> String {
     ];
     let mut set = TrackSet::new();
     set.push("elbow", &[0.0, 0.5, 1.25], &keys).unwrap();
-    let elbow = engine.evaluate(&set, method::SLERP, &Frames::fps(60));
+    let elbow = engine.evaluate(&set, method::SLERP, &SampleTimes::fps(60));
     let elbow = elbow.unwrap();
     let loaded = Format::open_detected(&pendulum(), &ReadOptions::default()).unwrap();
-    let frames = Frames::at(vec![0.0, 7.3, 1.0 / 3.0]);
+    let frames = SampleTimes::at(vec![0.0, 7.3, 1.0 / 3.0]);
     let (set, layout) = (&loaded.clips[0].set, Layout::FrameMajor);
     let file = engine.evaluate_as(set, method::BESSEL_OVERHAUSER, &frames, layout);
     let file = file.unwrap();
@@ -127,7 +127,7 @@ fn expected() -> String {
 }
 
 fn pendulum() -> PathBuf {
-    own("../data/pendulum.dat")
+    package_path("../data/pendulum.dat")
 }
 
 /// Engines are written in C++.
@@ -146,7 +146,7 @@ fn programs(example: &str) -> Vec<(PathBuf, &'static [&'static str])> {
             };
             let kind = if is_static { "static" } else { "shared" };
             let program = out.join(format!("{example}-{name}-{kind}"));
-            let source = own(&format!("examples/{example}.c"));
+            let source = package_path(&format!("examples/{example}.c"));
             command
                 .args(language)
                 .arg(source)
@@ -169,9 +169,10 @@ fn programs(example: &str) -> Vec<(PathBuf, &'static [&'static str])> {
 
 /// The CPU, and for shared libraries a Vulkan device where there is one.
 fn devices(is_static: bool) -> &'static [&'static str] {
-    match is_static || support::vulkan_devices().is_empty() {
-        true => &["cpu"],
-        false => &["cpu", "vulkan"],
+    if is_static || support::vulkan_devices().is_empty() {
+        &["cpu"]
+    } else {
+        &["cpu", "vulkan"]
     }
 }
 
@@ -204,7 +205,7 @@ fn crowds_in_c_have_the_same_bytes_on_the_cpu_and_a_device() {
     for (program, devices) in programs("crowd") {
         for device in devices {
             let said = succeed(Command::new(&program).arg(device).arg(&chain));
-            let lines = |what: &str| said.lines().filter(|line| line.starts_with(what)).count();
+            let lines = |prefix: &str| said.lines().filter(|line| line.starts_with(prefix)).count();
             assert!(
                 said.contains("figures: 3000 instances of 13 joints, 3 clips\n"),
                 "{said}"
@@ -241,7 +242,7 @@ fn the_header_is_c_plus_plus_too() {
     let Some(mut command) = compiler("c++") else {
         return;
     };
-    let header = own("include/tumble.h");
+    let header = package_path("include/tumble.h");
     let check = command.args(["-std=c++11", "-fsyntax-only", "-x", "c++"]);
     succeed(check.arg(header));
 }

@@ -21,7 +21,7 @@ use crate::messages::{signals, words};
 pub struct Refused {
     /// In words for people.
     pub message: String,
-    /// What was asked for is at fault, rather than a device or the system.
+    /// Whether the request is at fault, rather than a device or the system.
     pub is_usage: bool,
     /// The program's exit code.
     pub code: u8,
@@ -41,11 +41,11 @@ impl From<Failure> for Refused {
 #[must_use]
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     words::explain_panics();
-    let given: Vec<OsString> = arguments.into_iter().collect();
-    let arguments = match Arguments::try_parse_from(&given) {
+    let raw: Vec<OsString> = arguments.into_iter().collect();
+    let arguments = match Arguments::try_parse_from(&raw) {
         Ok(arguments) => arguments,
         Err(error) => {
-            words::usage(&error, &given);
+            words::usage(&error, &raw);
             return error.exit_code() as u8;
         }
     };
@@ -56,12 +56,12 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     match outcome {
         Ok(Ok(())) => exit::DONE,
         Ok(Err(failure)) => failure.report(),
-        Err(_) => exit::BUG, // the hook has told about it
+        Err(_) => exit::BUG, // the hook has reported it
     }
 }
 
-/// Says which command, instead of this process's executable, loads the Vulkan drivers in a process
-/// of its own: see [`load_drivers`]. What is said first counts.
+/// Sets the command that loads the Vulkan drivers in a child process, instead of this executable: see
+/// [`load_drivers`]. Only the first call counts.
 pub fn set_probe(command: Vec<OsString>) {
     probe::set_command(command);
 }
@@ -69,8 +69,8 @@ pub fn set_probe(command: Vec<OsString>) {
 /// Loads the Vulkan drivers. A driver may end the process that loads it, so that a child process
 /// does this before anything else opens a device, and says on standard output that it came through.
 pub fn load_drivers() {
-    let _ = Device::list(); // what goes wrong here goes wrong again where it is told about
-    let _ = words::listing(&format!("{}\n", probe::LOADED)); // whoever asked may have gone away
+    let _ = Device::list(); // errors occur again where they are reported
+    let _ = words::listing(&format!("{}\n", probe::LOADED)); // the parent may have ended
 }
 
 /// The names of all Vulkan devices, in the order of their indices.
@@ -85,7 +85,7 @@ pub fn devices() -> Result<Vec<Device>, Refused> {
     })
 }
 
-/// Opens the device of that name, as `--device` takes it: `first`, `cpu`, `vulkan`, an index, a name
+/// Opens the device of that name, as in `--device`: `first`, `cpu`, `vulkan`, an index, a name
 /// or part of it; `auto` is the CPU here, see [`auto`].
 ///
 /// # Errors

@@ -14,7 +14,7 @@ mod commands;
 pub mod host;
 mod messages;
 pub mod shards;
-mod together;
+mod threads;
 
 use std::process::ExitCode;
 
@@ -49,7 +49,7 @@ Exit codes:
   3 some inputs failed             8 a difference was found, or nothing proved
   4 all inputs failed              129 to 131, 141, 143 by a signal";
 
-/// What the command line says.
+/// The command line.
 #[derive(Debug, Parser)]
 #[command(name = "tumble", version, about = ABOUT, after_help = EXAMPLES)]
 #[command(max_term_width = 100)]

@@ -1,4 +1,4 @@
-//! The program `tumble`; what it does is in the library beside it.
+//! The program `tumble`; the code is in the library beside it.
 
 use std::process::ExitCode;
 

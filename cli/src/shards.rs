@@ -1,9 +1,9 @@
 //! A library evaluated in shards, for front ends that spread them over machines: what `tumble eval
 //! --shard` and `tumble merge` do, part by part.
 //!
-//! A command line, that of `tumble eval`, says what is asked for; its inputs and its output are said
-//! apart, since workers may see them under other names. A [`Plan`] cuts the library, a [`Worker`]
-//! keeps a device open and evaluates shards, and [`merge`] makes one manifest of what they leave.
+//! The options are those of a command line of `tumble eval`; inputs and output are passed separately,
+//! since workers may see them under other names. A [`LibraryPlan`] cuts the library, a [`Worker`] keeps
+//! a device open and evaluates shards, and [`merge`] makes one manifest of their records.
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -12,15 +12,15 @@ use clap::Parser;
 use serde::Serialize;
 use tumble_formats::Format;
 
-use crate::arguments::gather::{Found, Gathered};
+use crate::arguments::gather::{FoundInput, GatheredInputs};
 use crate::batch::folder;
 use crate::batch::manifest;
-use crate::batch::shards::plan::Plan as OwnPlan;
-use crate::batch::shards::record::Header;
+use crate::batch::shards::plan::ShardPlan;
+use crate::batch::shards::record::ShardHeader;
 use crate::batch::shards::run::Shard;
-use crate::batch::shards::{merge as merging, record::Refusal};
-use crate::commands::eval::shards::{Evaluator, Request, size};
-use crate::commands::eval::{Arguments, Told};
+use crate::batch::shards::{merge as merging, record::RefusedInput};
+use crate::commands::eval::shards::{EvaluationRequest, Evaluator, size};
+use crate::commands::eval::{Arguments, EvaluationReport};
 use crate::host::Refused;
 use crate::messages::exit::{Failure, USAGE};
 use crate::messages::words;
@@ -28,14 +28,14 @@ use crate::messages::words;
 /// A command line.
 #[derive(Debug, Parser)]
 #[command(name = "eval", disable_help_flag = true)]
-struct Line {
+struct EvalCommandLine {
     #[command(flatten)]
     eval: Arguments,
 }
 
 fn parse(line: &[OsString]) -> Result<Arguments, Refused> {
     let name = OsString::from("eval");
-    let parsed = Line::try_parse_from(std::iter::once(&name).chain(line));
+    let parsed = EvalCommandLine::try_parse_from(std::iter::once(&name).chain(line));
     let parsed = parsed.map_err(|error| Refused {
         message: error.to_string(),
         is_usage: true,
@@ -49,7 +49,7 @@ fn parse(line: &[OsString]) -> Result<Arguments, Refused> {
 /// # Errors
 /// When the command line is wrong.
 pub fn inputs(line: &[OsString]) -> Result<Vec<PathBuf>, Refused> {
-    Ok(parse(line)?.inputs.given().to_vec())
+    Ok(parse(line)?.inputs.named_paths().to_vec())
 }
 
 /// Of every kernel: machines that agree in it and in the version write the same bytes.
@@ -59,15 +59,15 @@ pub fn kernels_sha256() -> &'static str {
 }
 
 /// A library, cut into shards.
-pub struct Plan {
-    own: OwnPlan,
+pub struct LibraryPlan {
+    shard_plan: ShardPlan,
     arguments: Arguments,
 }
 
-impl Plan {
-    /// Cuts what lies below a directory, matches a pattern or is one file; or `listed`, the names
-    /// below `library` and their sizes, of which those of readable formats are taken. `into`: what
-    /// becomes of the results, where that is not `files`.
+impl LibraryPlan {
+    /// Cuts the files below a directory, those that match a pattern, or one file; or `listed`, names
+    /// below `library` with their sizes, if their formats can be read. `into`: the kind of output, where
+    /// that is not `files`.
     ///
     /// # Errors
     /// When the command line is wrong, or results of two inputs would be one.
@@ -81,11 +81,11 @@ impl Plan {
     ) -> Result<Self, Refused> {
         let arguments = parse(line)?;
         let shard_bytes = words::parse_bytes(shard_bytes).map_err(Failure::usage)?;
-        let mut request = Request::new(&arguments)?;
+        let mut request = EvaluationRequest::new(&arguments)?;
         if into != "files" {
             request.options += &format!(" into={into}");
         }
-        let (inputs, sizes): (Vec<Found>, Vec<u64>) = match listed {
+        let (inputs, sizes): (Vec<FoundInput>, Vec<u64>) = match listed {
             Some(listed) => {
                 let of_formats = listed
                     .into_iter()
@@ -93,12 +93,12 @@ impl Plan {
                 let found = of_formats.map(|(name, size)| {
                     let path = PathBuf::from(format!("{}/{name}", library.display()));
                     let below = PathBuf::from(name);
-                    (Found::named(path, below), size)
+                    (FoundInput::named(path, below), size)
                 });
                 found.unzip()
             }
             None => {
-                let found = Gathered::new(&[library.to_owned()], None)?.files;
+                let found = GatheredInputs::new(&[library.to_owned()], None)?.files;
                 let found = folder::without_results(found, folder)?;
                 let sizes = found.iter().map(size).collect();
                 (found, sizes)
@@ -109,18 +109,21 @@ impl Plan {
             let message = format!("{library}: has no file of a format that can be read");
             return Err(Failure::usage(message).into());
         }
-        let own = request.plan(&arguments, inputs, &sizes, folder, shard_bytes)?;
-        folder::refuse_shared_names(&own.inputs, own.format)?;
-        Ok(Self { own, arguments })
+        let shard_plan = request.plan(&arguments, inputs, &sizes, folder, shard_bytes)?;
+        folder::refuse_shared_names(&shard_plan.inputs, shard_plan.format)?;
+        Ok(Self {
+            shard_plan,
+            arguments,
+        })
     }
 
-    /// Says in the directory of results what its shards are of, and refuses what is a stranger's.
+    /// Records the plan in the directory of results, and refuses to replace other files.
     ///
     /// # Errors
     /// When the directory has other shards, or files under the names of results.
     pub fn claim(&self, folder: &Path) -> Result<(), Refused> {
         let results = &self.arguments.results;
-        self.own
+        self.shard_plan
             .claim(folder, results.is_resumed(), results.overwrites())?;
         Ok(())
     }
@@ -128,33 +131,33 @@ impl Plan {
     /// Which plan it is: the same for the same list, sizes, options and version.
     #[must_use]
     pub fn id(&self) -> &str {
-        &self.own.stated.plan
+        &self.shard_plan.recorded.plan
     }
 
-    /// All that decides over results besides their inputs, as manifests have it.
+    /// Everything that determines results besides their inputs, as in manifests.
     #[must_use]
     pub fn options(&self) -> &str {
-        &self.own.stated.options
+        &self.shard_plan.recorded.options
     }
 
     /// How many shards there are.
     #[must_use]
     pub fn shards(&self) -> usize {
-        self.own.cuts.len()
+        self.shard_plan.cuts.len()
     }
 
     /// How many inputs there are.
     #[must_use]
     pub fn inputs(&self) -> usize {
-        self.own.inputs.len()
+        self.shard_plan.inputs.len()
     }
 
-    /// The inputs of a shard, from 1: where they are, and where they lie below the library; nothing
-    /// where there is no such shard.
+    /// The inputs of a shard, from 1: their paths, and their paths below the library; `None` where there
+    /// is no such shard.
     #[must_use]
     pub fn inputs_of(&self, shard: usize) -> Option<Vec<(PathBuf, PathBuf)>> {
-        let own = self.own.cuts.get(shard.checked_sub(1)?)?;
-        let found = self.own.inputs[own.clone()].iter();
+        let range = self.shard_plan.cuts.get(shard.checked_sub(1)?)?;
+        let found = self.shard_plan.inputs[range.clone()].iter();
         Some(
             found
                 .map(|found| (found.path.clone(), found.below.clone()))
@@ -162,13 +165,13 @@ impl Plan {
         )
     }
 
-    /// What the results of a shard are called below the directory of results; an input whose result can
-    /// have no name there fails.
+    /// The names of the results of a shard below the directory of results; an input whose result cannot
+    /// have a name there fails.
     #[must_use]
     pub fn names_of(&self, shard: usize) -> Option<Vec<String>> {
-        let own = self.own.cuts.get(shard.checked_sub(1)?)?;
+        let range = self.shard_plan.cuts.get(shard.checked_sub(1)?)?;
         Some(
-            self.own.names[own.clone()]
+            self.shard_plan.names[range.clone()]
                 .iter()
                 .flatten()
                 .cloned()
@@ -179,34 +182,34 @@ impl Plan {
 
 /// One shard, or some of its inputs.
 #[derive(Debug, Clone)]
-pub struct Task {
+pub struct ShardTask {
     /// From 1.
     pub shard: usize,
     /// How many shards there are.
     pub of: usize,
-    /// [`Plan::id`].
+    /// [`LibraryPlan::id`].
     pub plan: String,
-    /// Where the inputs are, and where they lie below the library.
+    /// The paths of the inputs, and their paths below the library.
     pub inputs: Vec<(PathBuf, PathBuf)>,
-    /// Whether it writes the shard's file, rather than give it to the caller.
+    /// Whether the shard's file is written, rather than returned.
     pub record: bool,
 }
 
-/// What became of a task.
+/// The outcome of a task.
 #[derive(Debug, Clone, Serialize)]
-pub struct Outcome {
+pub struct ShardOutcome {
     made: usize,
     skipped: usize,
     /// Rotations that were evaluated.
     rotations: u64,
     device: String,
-    failed: Vec<Refusal>,
-    /// The shard's file, where the caller is to write it.
+    failed: Vec<RefusedInput>,
+    /// The text of the shard's file, if the caller writes it.
     #[serde(skip_serializing_if = "Option::is_none")]
     record: Option<String>,
 }
 
-impl Outcome {
+impl ShardOutcome {
     /// The outcome as JSON.
     #[must_use]
     pub fn to_json(&self) -> String {
@@ -235,52 +238,52 @@ impl Worker {
         })
     }
 
-    /// How its device is called.
+    /// The name of its device.
     #[must_use]
     pub fn device(&self) -> &str {
         &self.evaluator.device.label
     }
 
-    /// All that decides over results besides their inputs, as manifests have it.
+    /// Everything that determines results besides their inputs, as in manifests.
     #[must_use]
     pub fn options(&self) -> &str {
         &self.evaluator.request.options
     }
 
-    /// Evaluates a task's inputs into a directory whose plan is claimed, or that is the caller's own.
+    /// Evaluates a task's inputs into a directory whose plan is claimed, or that only the caller uses.
     ///
     /// # Errors
     /// When the device fails or results cannot be written. Inputs that are refused are no error.
-    pub fn run(&mut self, task: &Task, folder: &Path) -> Result<Outcome, Refused> {
-        let found: Vec<Found> = (task.inputs.iter())
-            .map(|(path, below)| Found::named(path.clone(), below.clone()))
+    pub fn run(&mut self, task: &ShardTask, folder: &Path) -> Result<ShardOutcome, Refused> {
+        let found: Vec<FoundInput> = (task.inputs.iter())
+            .map(|(path, below)| FoundInput::named(path.clone(), below.clone()))
             .collect();
         let format = folder::format(folder, self.arguments.results.format())?;
         let names = folder::names(&found, folder, format);
-        let header = Header {
+        let header = ShardHeader {
             shard: task.shard,
             of: task.of,
             plan: task.plan.clone(),
             inputs: found.len(),
-            ..Header::default()
+            ..ShardHeader::default()
         };
-        let own: Vec<&str> = names.iter().flatten().map(|name| &**name).collect();
+        let valid_names: Vec<&str> = names.iter().flatten().map(|name| &**name).collect();
         let resume = self.arguments.results.is_resumed();
-        let mut shard = Shard::new(folder, header, &own, resume);
+        let mut shard = Shard::new(folder, header, &valid_names, resume);
         shard.quiet = true;
         let paths = found.into_iter().map(|found| found.path);
         let jobs = shard.jobs(paths, &names, format);
-        let mut told = Vec::new();
+        let mut reports = Vec::new();
         self.evaluator
-            .evaluate(&self.arguments, &jobs, &mut shard, &mut told)?;
+            .evaluate(&self.arguments, &jobs, &mut shard, &mut reports)?;
         let record = match task.record {
             true => shard.finish().map(|()| None),
             false => shard.finish_elsewhere().map(Some),
         }?;
-        Ok(Outcome {
+        Ok(ShardOutcome {
             made: shard.made,
             skipped: shard.skipped,
-            rotations: told.iter().map(Told::rotations).sum(),
+            rotations: reports.iter().map(EvaluationReport::rotations).sum(),
             device: self.evaluator.device.label.clone(),
             failed: shard.header.failed,
             record,
@@ -294,15 +297,15 @@ fn json(value: &impl Serialize) -> String {
 
 /// What merging came to.
 #[derive(Debug, Clone, Serialize)]
-pub struct Merged {
+pub struct MergeReport {
     results: usize,
     shards: usize,
     inputs: usize,
-    failed: Vec<Refusal>,
+    failed: Vec<RefusedInput>,
 }
 
-impl Merged {
-    /// It as JSON.
+impl MergeReport {
+    /// The report as JSON.
     #[must_use]
     pub fn to_json(&self) -> String {
         json(self)
@@ -313,9 +316,9 @@ impl Merged {
 ///
 /// # Errors
 /// When shards are missing, or the manifest cannot be written.
-pub fn merge(folder: &Path) -> Result<Merged, Refused> {
+pub fn merge(folder: &Path) -> Result<MergeReport, Refused> {
     let merged = merging::merge(folder)?;
-    Ok(Merged {
+    Ok(MergeReport {
         results: merged.results,
         shards: merged.shards,
         inputs: merged.inputs,

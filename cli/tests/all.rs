@@ -39,6 +39,8 @@ mod view_skeletons;
 mod application;
 #[path = "support/browser.rs"]
 mod browser;
+#[path = "../../formats/tests/cases.rs"]
+mod cases;
 #[path = "../../tests/support/layer.rs"]
 mod layer;
 #[path = "support/program.rs"]

@@ -5,7 +5,7 @@ use std::fs;
 use crate::program::{command, finish, pendulum, run, sample_folder, succeed};
 use crate::support::vulkan_devices;
 use glam::Quat;
-use tumble::{Device, Encoding, Engine, Frames, Layout, TrackSet, method};
+use tumble::{Device, Encoding, Engine, Layout, SampleTimes, TrackSet, method};
 
 fn set() -> TrackSet {
     let (times, keys) = pendulum();
@@ -13,7 +13,7 @@ fn set() -> TrackSet {
 }
 
 /// What the library gives for the file that [`sample_folder`] has.
-fn expected(frames: &Frames, layout: Layout) -> Vec<Quat> {
+fn expected(frames: &SampleTimes, layout: Layout) -> Vec<Quat> {
     let engine = Engine::new(Device::Cpu).unwrap();
     engine
         .evaluate_as(&set(), method::BESSEL_OVERHAUSER, frames, layout)
@@ -34,12 +34,12 @@ fn read_npy(bytes_of_file: &[u8]) -> (Vec<u64>, Vec<u32>) {
 
 #[test]
 fn npy_holds_the_library_s_bits_in_every_layout_and_order() {
-    let place = sample_folder();
+    let folder = sample_folder();
     for (layout_flag, layout, shape) in [
         ("track", Layout::TrackMajor, vec![2, 51, 4]),
         ("frame", Layout::FrameMajor, vec![51, 2, 4]),
     ] {
-        let quats = expected(&Frames::fps(25), layout);
+        let quats = expected(&SampleTimes::fps(25), layout);
         for order in ["xyzw", "wxyz"] {
             let line = [
                 "eval",
@@ -52,14 +52,14 @@ fn npy_holds_the_library_s_bits_in_every_layout_and_order() {
                 "--order",
                 order,
             ];
-            let run = succeed(place.path(), &line);
+            let run = succeed(folder.path(), &line);
             assert!(
                 run.words
                     .contains("2 tracks × 51 frames, bessel-overhauser, on "),
                 "{}",
                 run.words
             );
-            let found = read_npy(&fs::read(place.path().join("out.npy")).unwrap());
+            let found = read_npy(&fs::read(folder.path().join("out.npy")).unwrap());
             let components = quats.iter().flat_map(|q| match order {
                 "xyzw" => [q.x, q.y, q.z, q.w],
                 _ => [q.w, q.x, q.y, q.z],
@@ -75,19 +75,19 @@ fn npy_holds_the_library_s_bits_in_every_layout_and_order() {
 
 #[test]
 fn csv_holds_the_library_s_bits() {
-    let place = sample_folder();
+    let folder = sample_folder();
     succeed(
-        place.path(),
+        folder.path(),
         &["eval", "a.dat", "-o", "out.csv", "--fps", "10"],
     );
-    let text = fs::read_to_string(place.path().join("out.csv")).unwrap();
+    let text = fs::read_to_string(folder.path().join("out.csv")).unwrap();
     let mut lines = text.lines();
     let header: Vec<&str> = lines.next().unwrap().split(',').collect();
     assert_eq!(
         header[..6],
         ["frame", "time", "box1.w", "box1.x", "box1.y", "box1.z"]
     );
-    let quats = expected(&Frames::fps(10), Layout::FrameMajor);
+    let quats = expected(&SampleTimes::fps(10), Layout::FrameMajor);
     let components = quats.iter().flat_map(|q| [q.w, q.x, q.y, q.z]);
     let found = lines.clone().flat_map(|line| {
         line.split(',')
@@ -102,8 +102,8 @@ fn csv_holds_the_library_s_bits() {
 
 #[test]
 fn half_size_results_are_what_the_library_encodes() {
-    let place = sample_folder();
-    let quats = expected(&Frames::fps(25), Layout::TrackMajor);
+    let folder = sample_folder();
+    let quats = expected(&SampleTimes::fps(25), Layout::TrackMajor);
     let rotations: Vec<[f32; 4]> = quats.iter().map(Quat::to_array).collect();
     for (name, encoding) in [("f16", Encoding::F16), ("snorm16", Encoding::Snorm16)] {
         let line = [
@@ -115,26 +115,26 @@ fn half_size_results_are_what_the_library_encodes() {
             "--encoding",
             name,
         ];
-        succeed(place.path(), &line);
-        let file = fs::read(place.path().join("out.npy")).unwrap();
+        succeed(folder.path(), &line);
+        let file = fs::read(folder.path().join("out.npy")).unwrap();
         let mut bytes = vec![0; rotations.len() * encoding.bytes()];
         encoding.encode(&rotations, &mut bytes).unwrap();
         assert!(file.ends_with(&bytes), "{name}");
         assert!(file.len() - bytes.len() <= 128, "{name}: a header, no more");
     }
     let line = ["eval", "a.dat", "-o", "out.csv", "--encoding", "f16"];
-    let refused = run(place.path(), &line);
+    let refused = run(folder.path(), &line);
     assert_eq!(refused.code, 2, "{}", refused.words);
 }
 
 #[test]
 fn standard_input_and_output_carry_data() {
-    let place = sample_folder();
-    let quats = expected(&Frames::fps(25), Layout::TrackMajor);
+    let folder = sample_folder();
+    let quats = expected(&SampleTimes::fps(25), Layout::TrackMajor);
     let components = || bits(quats.iter().flat_map(Quat::to_array));
     for line in [&["eval", "-", "-o", "-"][..], &["eval", "-"]] {
-        let output = command(place.path(), line)
-            .stdin(fs::File::open(place.path().join("a.dat")).unwrap())
+        let output = command(folder.path(), line)
+            .stdin(fs::File::open(folder.path().join("a.dat")).unwrap())
             .output()
             .unwrap();
         let run = finish(output);
@@ -142,7 +142,7 @@ fn standard_input_and_output_carry_data() {
         assert_eq!(read_npy(&run.out), (vec![2, 51, 4], components()));
     }
     let run = succeed(
-        place.path(),
+        folder.path(),
         &["eval", "a.dat", "-o", "-", "--format", "csv"],
     );
     assert!(run.out.starts_with(b"frame,time,box1.w,"));
@@ -150,15 +150,15 @@ fn standard_input_and_output_carry_data() {
 
 #[test]
 fn explicit_times_are_evaluated() {
-    let place = sample_folder();
+    let folder = sample_folder();
     let times = vec![0.0, 1.75, 0.3, 0.3];
-    fs::write(place.path().join("times.txt"), "0\n1.75\n0.3\n0.3\n").unwrap();
+    fs::write(folder.path().join("times.txt"), "0\n1.75\n0.3\n0.3\n").unwrap();
     succeed(
-        place.path(),
+        folder.path(),
         &["eval", "a.dat", "--times", "times.txt", "-o", "out.npy"],
     );
-    let found = read_npy(&fs::read(place.path().join("out.npy")).unwrap());
-    let quats = expected(&Frames::at(times), Layout::TrackMajor);
+    let found = read_npy(&fs::read(folder.path().join("out.npy")).unwrap());
+    let quats = expected(&SampleTimes::at(times), Layout::TrackMajor);
     assert_eq!(
         found,
         (vec![2, 4, 4], bits(quats.iter().flat_map(Quat::to_array)))
@@ -167,7 +167,7 @@ fn explicit_times_are_evaluated() {
 
 #[test]
 fn every_device_writes_the_cpu_s_file() {
-    let place = sample_folder();
+    let folder = sample_folder();
     for method in tumble::METHODS {
         let line = [
             "eval",
@@ -180,8 +180,8 @@ fn every_device_writes_the_cpu_s_file() {
             "--device",
             "cpu",
         ];
-        assert!(succeed(place.path(), &line).words.contains("on CPU in"));
-        let expected = fs::read(place.path().join("cpu.npy")).unwrap();
+        assert!(succeed(folder.path(), &line).words.contains("on CPU in"));
+        let expected = fs::read(folder.path().join("cpu.npy")).unwrap();
         for (index, device) in vulkan_devices().iter().enumerate() {
             for by in [index.to_string(), device.name().to_uppercase()] {
                 let line = [
@@ -195,14 +195,14 @@ fn every_device_writes_the_cpu_s_file() {
                     "--device",
                     &by,
                 ];
-                let run = succeed(place.path(), &line);
+                let run = succeed(folder.path(), &line);
                 assert!(
                     run.words.contains(&format!("on {} in", device.name())),
                     "{}",
                     run.words
                 );
                 assert!(
-                    fs::read(place.path().join("vk.npy")).unwrap() == expected,
+                    fs::read(folder.path().join("vk.npy")).unwrap() == expected,
                     "{method}"
                 );
             }
@@ -213,7 +213,7 @@ fn every_device_writes_the_cpu_s_file() {
 /// Every output, as NPY and as CSV: its shape, and that it says what it holds.
 #[test]
 fn outputs_have_their_shapes_and_names() {
-    let place = sample_folder();
+    let folder = sample_folder();
     for (output, shape, first) in [
         ("quaternion", vec![2, 3, 4], "box1.w"),
         ("axis-angle", vec![2, 3, 4], "box1.x"),
@@ -237,8 +237,8 @@ fn outputs_have_their_shapes_and_names() {
                 "-o",
                 out,
             ];
-            succeed(place.path(), &line);
-            fs::read(place.path().join(out)).unwrap()
+            succeed(folder.path(), &line);
+            fs::read(folder.path().join(out)).unwrap()
         };
         let (found, numbers) = read_npy(&of("out.npy"));
         assert_eq!(found, shape, "{output}");
@@ -248,14 +248,14 @@ fn outputs_have_their_shapes_and_names() {
         // The last frame of the first track: the same bits in both.
         let each = numbers.len() / 6;
         let start = if shape[0] == 3 { 4 * each } else { 2 * each };
-        let mut own = numbers[start..start + each].to_vec();
+        let mut expected = numbers[start..start + each].to_vec();
         if output == "quaternion" {
-            own.rotate_right(1);
+            expected.rotate_right(1);
         }
         let written = lines[3][2..2 + each]
             .iter()
             .map(|number| number.parse().unwrap());
-        assert_eq!(bits(written), own, "{output}");
+        assert_eq!(bits(written), expected, "{output}");
     }
     // Both boxes hang from the world: neither moves the other.
     let line = [
@@ -268,8 +268,8 @@ fn outputs_have_their_shapes_and_names() {
         "-o",
         "apart.npy",
     ];
-    succeed(place.path(), &line);
-    let (_, apart) = read_npy(&fs::read(place.path().join("apart.npy")).unwrap());
+    succeed(folder.path(), &line);
+    let (_, apart) = read_npy(&fs::read(folder.path().join("apart.npy")).unwrap());
     assert!(apart.chunks(7).all(|pose| pose[..3] == [0, 0, 0]));
     let parents = |list: &str| {
         let line = [
@@ -282,10 +282,10 @@ fn outputs_have_their_shapes_and_names() {
             "-o",
             "no.npy",
         ];
-        run(place.path(), &line).words
+        run(folder.path(), &line).words
     };
     assert!(parents("-1").contains("1 entries for 2 tracks"));
-    assert!(parents("1,0").contains("hangs from itself"));
+    assert!(parents("1,0").contains("is its own ancestor"));
     assert!(parents("-2,0").contains("-2 is no track"));
     for (wrong, says) in [
         (
@@ -302,8 +302,8 @@ fn outputs_have_their_shapes_and_names() {
         ),
     ] {
         let line = [&["eval", "a.dat", "-o", "no.npy"][..], &wrong].concat();
-        let refused = run(place.path(), &line);
+        let refused = run(folder.path(), &line);
         assert!(refused.words.contains(says), "{}", refused.words);
-        assert!(!place.path().join("no.npy").exists());
+        assert!(!folder.path().join("no.npy").exists());
     }
 }

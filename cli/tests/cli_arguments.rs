@@ -24,7 +24,7 @@ const ARGUMENTS: &str = "
 0 | eval a.dat -o o.npy --fps 30000/1001         | 2 tracks × 60 frames
 2 | eval a.dat -o o.npy --start 2 --end 1        | before it starts at 2 s
 2 | eval a.dat -o o.npy --start 5                | before it starts
-2 | eval a.dat -o o.npy --start nan              | `nan` is no time
+2 | eval a.dat -o o.npy --start nan              | invalid time `nan`
 0 | eval a.dat -o o.npy --start -1 --end 1       | keys lie from 0 to 2 s
 4 | eval a.dat -o o.npy --times none.txt         | none.txt
 2 | eval a.dat -o o.npy --times t.txt --fps 9    | cannot be used with
@@ -53,7 +53,7 @@ const ARGUMENTS: &str = "
 2 | eval - --files-from - -o out                 | standard input cannot be both
 2 | eval a.dat -o o.npy --resume                 | for a directory of results
 4 | check none.jsonl                             | none.jsonl
-4 | check a.dat                                  | is no manifest
+4 | check a.dat                                  | is not a manifest
 2 | eval a.dat -o o.npy --device vulcan          | vulkan
 7 | eval a.dat -o /proc/o.npy                    | /proc/o.npy
 7 | eval a.dat -o /proc/self/o.npy --overwrite   | cannot be written
@@ -62,7 +62,7 @@ const ARGUMENTS: &str = "
 2 | eval a.dat b.dat -o o.npy                    | need a directory
 2 | eval a.dat b.dat -o old.npy                  | need a directory
 4 | eval a.dat folder/a.dat -o out               | would both be
-0 | eval a.dat a.dat -o o.npy                    | given twice
+0 | eval a.dat a.dat -o o.npy                    | named twice
 0 | eval a.dat b.dat -o out                      | b.npy
 3 | eval a.dat none.dat -o out                   | 1 of 2 inputs failed
 4 | eval bad.dat none.dat -o out                 | all 2 inputs failed
@@ -89,19 +89,19 @@ fn each_argument_gets_its_exit_code_and_message() {
         };
         let code: i32 = code.parse().unwrap();
         let line: Vec<&str> = line.split_whitespace().collect();
-        let place = sample_folder();
-        let run = run(place.path(), &line);
+        let folder = sample_folder();
+        let run = run(folder.path(), &line);
         if run.code != code || !run.words.contains(fragment) {
             wrong.push(format!(
                 "{line:?}: {code}, `{fragment}`; but {}: {}",
                 run.code, run.words
             ));
         }
-        let old = fs::read(place.path().join("old.npy")).unwrap();
+        let old = fs::read(folder.path().join("old.npy")).unwrap();
         if old != b"old" && !line.contains(&"--overwrite") {
             wrong.push(format!("{line:?} changed old.npy"));
         }
-        if code != 0 && place.path().join("o.npy").exists() {
+        if code != 0 && folder.path().join("o.npy").exists() {
             wrong.push(format!("{line:?} left an output"));
         }
     }
@@ -110,28 +110,28 @@ fn each_argument_gets_its_exit_code_and_message() {
 
 #[test]
 fn a_link_to_the_input_is_not_overwritten() {
-    let place = sample_folder();
-    let input = fs::read(place.path().join("a.dat")).unwrap();
+    let folder = sample_folder();
+    let input = fs::read(folder.path().join("a.dat")).unwrap();
     #[cfg(unix)]
-    std::os::unix::fs::symlink("a.dat", place.path().join("link.npy")).unwrap();
+    std::os::unix::fs::symlink("a.dat", folder.path().join("link.npy")).unwrap();
     #[cfg(unix)]
     assert_eq!(
         run(
-            place.path(),
+            folder.path(),
             &["eval", "a.dat", "-o", "link.npy", "--overwrite"]
         )
         .code,
         2
     );
-    fs::hard_link(place.path().join("a.dat"), place.path().join("hard.npy")).unwrap();
+    fs::hard_link(folder.path().join("a.dat"), folder.path().join("hard.npy")).unwrap();
     run(
-        place.path(),
+        folder.path(),
         &["eval", "a.dat", "-o", "hard.npy", "--overwrite"],
     );
-    assert_eq!(fs::read(place.path().join("a.dat")).unwrap(), input);
+    assert_eq!(fs::read(folder.path().join("a.dat")).unwrap(), input);
     fs::copy(
-        place.path().join("a.dat"),
-        place.path().join("folder/c.npy"),
+        folder.path().join("a.dat"),
+        folder.path().join("folder/c.npy"),
     )
     .unwrap();
     let line = [
@@ -143,17 +143,17 @@ fn a_link_to_the_input_is_not_overwritten() {
         "--overwrite",
     ];
     // One input's failure: the other result is made.
-    assert_eq!(run(place.path(), &line).code, 3);
-    assert!(place.path().join("folder/b.npy").exists());
-    assert_eq!(fs::read(place.path().join("folder/c.npy")).unwrap(), input);
+    assert_eq!(run(folder.path(), &line).code, 3);
+    assert!(folder.path().join("folder/b.npy").exists());
+    assert_eq!(fs::read(folder.path().join("folder/c.npy")).unwrap(), input);
 }
 
 #[test]
 fn without_vulkan_the_cpu_stands_in_unless_vulkan_was_demanded() {
-    let place = sample_folder();
+    let folder = sample_folder();
     let without = |line: &[&str]| {
         finish(
-            no_vulkan(&mut command(place.path(), line))
+            no_vulkan(&mut command(folder.path(), line))
                 .output()
                 .unwrap(),
         )
@@ -163,7 +163,7 @@ fn without_vulkan_the_cpu_stands_in_unless_vulkan_was_demanded() {
         let run = without(&["eval", "a.dat", "-o", "out.npy", "--device", device]);
         assert_eq!(run.code, 5, "{device}: {}", run.words);
         assert!(run.words.contains("no Vulkan device"), "{}", run.words);
-        assert!(!place.path().join("out.npy").exists());
+        assert!(!folder.path().join("out.npy").exists());
     }
     assert!(started.elapsed().as_secs() < 10);
     let run = without(&["eval", "a.dat", "-o", "out.npy", "--device", "first"]);
@@ -193,17 +193,17 @@ fn an_unknown_device_is_answered_with_those_there_are() {
     let Some(device) = vulkan_devices().into_iter().next() else {
         return;
     };
-    let place = sample_folder();
+    let folder = sample_folder();
     for name in ["llvmpip3", "99"] {
         let run = run(
-            place.path(),
+            folder.path(),
             &["eval", "a.dat", "-o", "out.npy", "--device", name],
         );
         assert_eq!(run.code, 2, "{}", run.words);
         assert!(run.words.contains(device.name()), "{}", run.words);
     }
     let run = run(
-        place.path(),
+        folder.path(),
         &["eval", "a.dat", "-o", "out.npy", "--device", "vulcan"],
     );
     assert!(

@@ -8,14 +8,14 @@ use crate::program::{command, finish, is_writing, run, sample_folder, with_signa
 #[cfg(unix)]
 #[test]
 fn a_closed_pipe_ends_quietly_and_a_full_disk_does_not() {
-    let place = sample_folder();
+    let folder = sample_folder();
     let big = ["eval", "a.dat", "--fps", "100000", "-o", "-"];
     for (line, code) in [
         (&big[..], 141),
         (&["methods"], 0),
         (&["completions", "bash"], 0),
     ] {
-        let mut child = command(place.path(), line)
+        let mut child = command(folder.path(), line)
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
             .spawn()
@@ -27,7 +27,7 @@ fn a_closed_pipe_ends_quietly_and_a_full_disk_does_not() {
     if cfg!(target_os = "linux") {
         for line in [&big[..], &["methods"]] {
             let full = fs::File::options().write(true).open("/dev/full").unwrap();
-            let run = finish(command(place.path(), line).stdout(full).output().unwrap());
+            let run = finish(command(folder.path(), line).stdout(full).output().unwrap());
             assert_eq!(run.code, 7, "{line:?}: {}", run.words);
             assert!(run.words.contains("cannot be written"), "{}", run.words);
         }
@@ -38,8 +38,8 @@ fn a_closed_pipe_ends_quietly_and_a_full_disk_does_not() {
 #[cfg(unix)]
 #[test]
 fn an_output_that_is_no_file_is_refused() {
-    let place = sample_folder();
-    let pipe = place.path().join("pipe.npy");
+    let folder = sample_folder();
+    let pipe = folder.path().join("pipe.npy");
     assert!(
         Command::new("mkfifo")
             .arg(&pipe)
@@ -48,7 +48,7 @@ fn an_output_that_is_no_file_is_refused() {
             .success()
     );
     let run = run(
-        place.path(),
+        folder.path(),
         &["eval", "a.dat", "-o", "pipe.npy", "--overwrite"],
     );
     assert_eq!(run.code, 2, "{}", run.words);
@@ -59,17 +59,17 @@ fn an_output_that_is_no_file_is_refused() {
 #[test]
 fn signals_stop_the_program_and_leave_no_file() {
     for (signal, code) in [("INT", 130), ("TERM", 143)] {
-        let place = sample_folder();
-        fs::create_dir(place.path().join("out")).unwrap();
+        let folder = sample_folder();
+        fs::create_dir(folder.path().join("out")).unwrap();
         // Some seconds of text.
         let line = ["eval", "a.dat", "--fps", "1000000", "-o", "out/o.csv"];
         let mut child = with_signals(env!("CARGO_BIN_EXE_tumble"))
-            .current_dir(place.path())
+            .current_dir(folder.path())
             .args(line)
             .stdin(Stdio::null())
             .spawn()
             .unwrap();
-        let out = place.path().join("out");
+        let out = folder.path().join("out");
         while !is_writing(&child, &out) {
             assert!(
                 child.try_wait().unwrap().is_none(),
@@ -97,14 +97,14 @@ fn signals_stop_the_program_and_leave_no_file() {
 #[cfg(target_os = "linux")]
 #[test]
 fn a_file_that_cannot_grow_leaves_the_old_one_intact() {
-    let place = sample_folder();
+    let folder = sample_folder();
     let program = env!("CARGO_BIN_EXE_tumble");
     let line = format!(
         "ulimit -f 100; exec '{program}' eval a.dat --fps 100000 -o old.npy --overwrite --device cpu"
     );
     let mut shell = Command::new("sh");
-    shell.current_dir(place.path()).args(["-c", &line]);
-    let before = names(place.path());
+    shell.current_dir(folder.path()).args(["-c", &line]);
+    let before = names(folder.path());
     let run = finish(shell.output().unwrap());
     assert_eq!(run.code, 7, "{}", run.words);
     assert!(
@@ -113,8 +113,8 @@ fn a_file_that_cannot_grow_leaves_the_old_one_intact() {
         "{}",
         run.words
     );
-    assert_eq!(fs::read(place.path().join("old.npy")).unwrap(), b"old");
-    assert_eq!(names(place.path()), before);
+    assert_eq!(fs::read(folder.path().join("old.npy")).unwrap(), b"old");
+    assert_eq!(names(folder.path()), before);
 }
 
 #[cfg(unix)]
@@ -133,16 +133,16 @@ fn names(folder: &std::path::Path) -> Vec<String> {
 fn a_read_only_directory_is_refused_before_any_work() {
     use std::os::unix::fs::PermissionsExt;
 
-    let place = sample_folder();
-    let folder = place.path().join("folder");
+    let temporary = sample_folder();
+    let folder = temporary.path().join("folder");
     fs::set_permissions(&folder, fs::Permissions::from_mode(0o555)).unwrap();
-    // Whoever may do everything has to be told otherwise.
+    // Root may write everywhere: the program runs as another user.
     let is_root = fs::write(folder.join("try"), "").is_ok();
     let line = ["eval", "a.dat", "-o", "folder/o.npy", "--device", "cpu"];
-    let mut command = command(place.path(), &line);
+    let mut command = command(temporary.path(), &line);
     if is_root {
-        std::os::unix::fs::chown(place.path(), Some(65_534), None).unwrap();
-        fs::set_permissions(place.path(), fs::Permissions::from_mode(0o755)).unwrap();
+        std::os::unix::fs::chown(temporary.path(), Some(65_534), None).unwrap();
+        fs::set_permissions(temporary.path(), fs::Permissions::from_mode(0o755)).unwrap();
         std::os::unix::process::CommandExt::uid(&mut command, 65_534);
     }
     let run = finish(command.output().unwrap());
@@ -163,9 +163,9 @@ fn a_read_only_directory_is_refused_before_any_work() {
 fn pipes_standard_input_and_files_that_change() {
     use std::io::Write;
 
-    let place = sample_folder();
-    let text = fs::read(place.path().join("a.dat")).unwrap();
-    let pipe = place.path().join("pipe.dat");
+    let folder = sample_folder();
+    let text = fs::read(folder.path().join("a.dat")).unwrap();
+    let pipe = folder.path().join("pipe.dat");
     assert!(
         Command::new("mkfifo")
             .arg(&pipe)
@@ -173,7 +173,7 @@ fn pipes_standard_input_and_files_that_change() {
             .unwrap()
             .success()
     );
-    let refused = run(place.path(), &["eval", "pipe.dat", "-o", "o.npy"]);
+    let refused = run(folder.path(), &["eval", "pipe.dat", "-o", "o.npy"]);
     assert_eq!(refused.code, 4);
     assert!(
         refused.words.contains("is a named pipe"),
@@ -184,16 +184,16 @@ fn pipes_standard_input_and_files_that_change() {
     let line = [
         "eval", "pipe.dat", "--pipes", "-o", "o.npy", "--device", "cpu",
     ];
-    let child = command(place.path(), &line)
+    let child = command(folder.path(), &line)
         .stderr(Stdio::piped())
         .spawn()
         .unwrap();
     fs::write(&pipe, &text).unwrap();
     let read = finish(child.wait_with_output().unwrap());
     assert_eq!(read.code, 0, "{}", read.words);
-    let expected = fs::read(place.path().join("o.npy")).unwrap();
+    let expected = fs::read(folder.path().join("o.npy")).unwrap();
 
-    let mut child = command(place.path(), &["eval", "-", "-o", "-", "--device", "cpu"])
+    let mut child = command(folder.path(), &["eval", "-", "-o", "-", "--device", "cpu"])
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
@@ -204,12 +204,12 @@ fn pipes_standard_input_and_files_that_change() {
     assert_eq!((run.code, run.out == expected), (0, true), "{}", run.words);
 
     // Large enough that it is still being read when it grows.
-    let grown = place.path().join("grown.dat");
+    let grown = folder.path().join("grown.dat");
     let mut file = fs::File::create(&grown).unwrap();
     file.write_all(b"# 1 1\n").unwrap();
     let rows: String = (0..400_000).map(|i| format!("{i} 1 0 0 0\n")).collect();
     file.write_all(rows.as_bytes()).unwrap();
-    let child = command(place.path(), &["info", "grown.dat"])
+    let child = command(folder.path(), &["info", "grown.dat"])
         .stderr(Stdio::piped())
         .stdout(Stdio::null())
         .spawn()
@@ -229,26 +229,26 @@ fn pipes_standard_input_and_files_that_change() {
 fn what_is_no_readable_file_is_refused_with_the_systems_reason() {
     use std::os::unix::fs::{PermissionsExt, symlink};
 
-    let place = sample_folder();
-    let at = place.path();
-    symlink(at.join("loop2.dat"), at.join("loop1.dat")).unwrap();
-    symlink(at.join("loop1.dat"), at.join("loop2.dat")).unwrap();
-    let _listener = std::os::unix::net::UnixListener::bind(at.join("socket.dat")).unwrap();
+    let temporary = sample_folder();
+    let folder = temporary.path();
+    symlink(folder.join("loop2.dat"), folder.join("loop1.dat")).unwrap();
+    symlink(folder.join("loop1.dat"), folder.join("loop2.dat")).unwrap();
+    let _listener = std::os::unix::net::UnixListener::bind(folder.join("socket.dat")).unwrap();
     // More than 64 MiB of one line.
     let mut long = b"# 1 1\n0 1 0 0 0".to_vec();
     long.resize(65 << 20, b' ');
-    fs::write(at.join("long.dat"), long).unwrap();
-    fs::copy(at.join("a.dat"), at.join("secret.dat")).unwrap();
-    fs::set_permissions(at.join("secret.dat"), fs::Permissions::from_mode(0o000)).unwrap();
-    let is_root = fs::read(at.join("secret.dat")).is_ok();
-    fs::set_permissions(at, fs::Permissions::from_mode(0o777)).unwrap();
+    fs::write(folder.join("long.dat"), long).unwrap();
+    fs::copy(folder.join("a.dat"), folder.join("secret.dat")).unwrap();
+    fs::set_permissions(folder.join("secret.dat"), fs::Permissions::from_mode(0o000)).unwrap();
+    let is_root = fs::read(folder.join("secret.dat")).is_ok();
+    fs::set_permissions(folder, fs::Permissions::from_mode(0o777)).unwrap();
     for (name, code, words) in [
         ("loop1.dat", "E001", "symbolic links"),
         ("socket.dat", "E002", "is a socket"),
         ("long.dat", "E007", "longer than 67108864 bytes"),
         ("secret.dat", "E001", "Permission denied"),
     ] {
-        let mut command = command(at, &["eval", name, "-o", "o.npy", "--device", "cpu"]);
+        let mut command = command(folder, &["eval", name, "-o", "o.npy", "--device", "cpu"]);
         if is_root {
             std::os::unix::process::CommandExt::uid(&mut command, 65_534);
         }
@@ -260,6 +260,6 @@ fn what_is_no_readable_file_is_refused_with_the_systems_reason() {
             "{}",
             run.words
         );
-        assert!(!at.join("o.npy").exists());
+        assert!(!folder.join("o.npy").exists());
     }
 }

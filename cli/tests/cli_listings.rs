@@ -1,4 +1,4 @@
-//! What the program tells of files, devices and methods, and what it measures: as text and as JSON.
+//! Listings of files, devices and methods, and benchmarks: as text and as JSON.
 
 use std::fs;
 
@@ -7,8 +7,8 @@ use crate::support::vulkan_devices;
 
 #[test]
 fn verify_passes_on_good_data_and_says_what_it_compared() {
-    let place = sample_folder();
-    let run = succeed(place.path(), &["verify", "a.dat", "b.dat", "--json"]);
+    let folder = sample_folder();
+    let run = succeed(folder.path(), &["verify", "a.dat", "b.dat", "--json"]);
     let lines: serde_json::Value = serde_json::from_slice(&run.out).unwrap();
     assert_eq!(lines.as_array().unwrap().len(), 2 * tumble::METHODS.len());
     for line in lines.as_array().unwrap() {
@@ -19,7 +19,7 @@ fn verify_passes_on_good_data_and_says_what_it_compared() {
         );
         assert_eq!(line["rotations"], 102);
     }
-    let table = String::from_utf8(succeed(place.path(), &["verify", "a.dat"]).out).unwrap();
+    let table = String::from_utf8(succeed(folder.path(), &["verify", "a.dat"]).out).unwrap();
     for method in tumble::METHODS {
         assert!(table.contains(method.name), "{table}");
     }
@@ -31,8 +31,8 @@ fn verify_passes_on_good_data_and_says_what_it_compared() {
 
 #[test]
 fn devices_and_info_speak_json() {
-    let place = sample_folder();
-    let run = succeed(place.path(), &["devices", "--json"]);
+    let folder = sample_folder();
+    let run = succeed(folder.path(), &["devices", "--json"]);
     let listing: serde_json::Value = serde_json::from_slice(&run.out).unwrap();
     let found = listing["devices"].as_array().unwrap();
     for (entry, device) in found.iter().zip(&vulkan_devices()) {
@@ -44,7 +44,7 @@ fn devices_and_info_speak_json() {
     }
     assert_eq!(found.len(), vulkan_devices().len());
 
-    let run = succeed(place.path(), &["info", "a.dat", "--json"]);
+    let run = succeed(folder.path(), &["info", "a.dat", "--json"]);
     let info: serde_json::Value = serde_json::from_slice(&run.out).unwrap();
     let expected = [
         ("tracks", 2.0),
@@ -65,7 +65,7 @@ fn devices_and_info_speak_json() {
 
 #[test]
 fn generate_is_deterministic_and_can_be_read_back() {
-    let place = sample_folder();
+    let folder = sample_folder();
     let line = [
         "generate",
         "--boxes",
@@ -78,8 +78,11 @@ fn generate_is_deterministic_and_can_be_read_back() {
         "-o",
     ];
     let write = |name: &str, seed: &str| {
-        succeed(place.path(), &[&line[..], &[name, "--seed", seed]].concat());
-        fs::read(place.path().join(name)).unwrap()
+        succeed(
+            folder.path(),
+            &[&line[..], &[name, "--seed", seed]].concat(),
+        );
+        fs::read(folder.path().join(name)).unwrap()
     };
     let first = write("g1.dat", "5");
     assert!(
@@ -90,8 +93,8 @@ fn generate_is_deterministic_and_can_be_read_back() {
         first != write("g3.dat", "6"),
         "another seed gave the same file"
     );
-    assert!(first == succeed(place.path(), &[&line[..], &["-", "--seed", "5"]].concat()).out);
-    let info = succeed(place.path(), &["info", "g1.dat", "--json"]).out;
+    assert!(first == succeed(folder.path(), &[&line[..], &["-", "--seed", "5"]].concat()).out);
+    let info = succeed(folder.path(), &["info", "g1.dat", "--json"]).out;
     let info: serde_json::Value = serde_json::from_slice(&info).unwrap();
     assert_eq!(
         (&info[0]["tracks"], &info[0]["keys"]),
@@ -103,8 +106,8 @@ fn generate_is_deterministic_and_can_be_read_back() {
 
 #[test]
 fn listings_say_what_there_is() {
-    let place = sample_folder();
-    let methods = String::from_utf8(succeed(place.path(), &["methods"]).out).unwrap();
+    let folder = sample_folder();
+    let methods = String::from_utf8(succeed(folder.path(), &["methods"]).out).unwrap();
     for method in tumble::METHODS {
         assert!(
             methods.contains(method.name) && methods.contains(method.summary),
@@ -112,7 +115,8 @@ fn listings_say_what_there_is() {
         );
     }
     for shell in ["bash", "zsh", "fish", "powershell", "elvish"] {
-        let script = String::from_utf8(succeed(place.path(), &["completions", shell]).out).unwrap();
+        let script =
+            String::from_utf8(succeed(folder.path(), &["completions", shell]).out).unwrap();
         // clap completes values only for these.
         let values = ["bash", "zsh", "fish"].contains(&shell);
         assert!(script.contains("method"), "{shell} does not complete flags");
@@ -121,24 +125,24 @@ fn listings_say_what_there_is() {
             "{shell} does not complete methods"
         );
     }
-    let version = String::from_utf8(succeed(place.path(), &["--version"]).out).unwrap();
+    let version = String::from_utf8(succeed(folder.path(), &["--version"]).out).unwrap();
     assert_eq!(
         version.trim(),
         format!("tumble {}", env!("CARGO_PKG_VERSION"))
     );
     for line in [&["--help"][..], &["eval", "--help"], &["verify", "--help"]] {
-        let help = String::from_utf8(succeed(place.path(), line).out).unwrap();
+        let help = String::from_utf8(succeed(folder.path(), line).out).unwrap();
         assert!(help.contains("Examples:"), "{help}");
     }
 }
 
 #[test]
 fn bench_reads_and_resamples_clips_of_every_format() {
-    let place = sample_folder();
+    let folder = sample_folder();
     let line = "bench files --json --rounds 1 --shrink 1500";
     let line: Vec<&str> = line.split(' ').collect();
     let report: serde_json::Value =
-        serde_json::from_slice(&succeed(place.path(), &line).out).unwrap();
+        serde_json::from_slice(&succeed(folder.path(), &line).out).unwrap();
     let sections = report["sections"].as_array().unwrap();
     let formats: Vec<&str> = (sections.iter())
         .map(|section| section["method"].as_str().unwrap())
@@ -163,20 +167,20 @@ fn bench_reads_and_resamples_clips_of_every_format() {
     }
 }
 
-/// That everything is measured and told; not how fast it is.
+/// Everything is measured and reported; speed is not tested.
 #[test]
 fn bench_measures_every_workload_in_one_run() {
-    let place = sample_folder();
+    let folder = sample_folder();
     let workloads = ["sparse", "dense", "small", "crowd", "long"];
     let mut line = vec!["bench", "--json", "--rounds", "2", "--shrink", "2000"];
     line.extend(workloads);
     let report: serde_json::Value =
-        serde_json::from_slice(&succeed(place.path(), &line).out).unwrap();
+        serde_json::from_slice(&succeed(folder.path(), &line).out).unwrap();
     let devices = report["devices"].as_array().unwrap();
     assert!(!devices.is_empty() || std::env::var_os("CI").is_none());
     for device in devices {
-        for told in ["driver", "uuid"] {
-            assert!(!device[told].as_str().unwrap().is_empty(), "{device}");
+        for field in ["driver", "uuid"] {
+            assert!(!device[field].as_str().unwrap().is_empty(), "{device}");
         }
         for chosen in ["mapping", "transfer", "read_back", "uploads"] {
             assert!(device["choices"][chosen].is_string(), "{device}");

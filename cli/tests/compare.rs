@@ -4,8 +4,8 @@ use serde_json::Value;
 
 use crate::program::{run, sample_folder, succeed};
 
-fn json(place: &std::path::Path, line: &[&str]) -> (i32, Value) {
-    let run = run(place, line);
+fn json(folder: &std::path::Path, line: &[&str]) -> (i32, Value) {
+    let run = run(folder, line);
     let value = serde_json::from_slice(&run.out);
     (
         run.code,
@@ -15,34 +15,34 @@ fn json(place: &std::path::Path, line: &[&str]) -> (i32, Value) {
 
 #[test]
 fn a_motion_and_what_was_made_of_it() {
-    let folder = sample_folder();
-    let place = folder.path();
+    let temporary = sample_folder();
+    let folder = temporary.path();
     // The same keys, two tracks; the second file has one key turned by 0.2 radians about z.
     let half = 0.1f64;
-    let turned = format!("{} 0 0 {}", half.cos(), half.sin());
-    let text = std::fs::read_to_string(place.join("a.dat")).unwrap();
+    let rotation = format!("{} 0 0 {}", half.cos(), half.sin());
+    let text = std::fs::read_to_string(folder.join("a.dat")).unwrap();
     let lines: Vec<String> = text
         .lines()
         .map(|line| match line.strip_prefix("0  ") {
-            // The first key of the first track is no turn at all.
-            Some(rest) => format!("0  {turned}  {}", rest.split("  ").nth(1).unwrap()),
+            // The first key of the first track is the identity.
+            Some(rest) => format!("0  {rotation}  {}", rest.split("  ").nth(1).unwrap()),
             None => line.to_owned(),
         })
         .collect();
-    std::fs::write(place.join("turned.dat"), lines.join("\n") + "\n").unwrap();
+    std::fs::write(folder.join("turned.dat"), lines.join("\n") + "\n").unwrap();
 
-    let same = succeed(place, &["compare", "a.dat", "b.dat", "--tolerance", "0"]);
-    let told = String::from_utf8(same.out).unwrap();
+    let same = succeed(folder, &["compare", "a.dat", "b.dat", "--tolerance", "0"]);
+    let report = String::from_utf8(same.out).unwrap();
     assert!(
-        told.contains("2 tracks × 9 samples from 0 to 2 s"),
-        "{told}"
+        report.contains("2 tracks × 9 samples from 0 to 2 s"),
+        "{report}"
     );
     assert!(
-        told.contains("18 of 18 rotations are the same, bit for bit"),
-        "{told}"
+        report.contains("18 of 18 rotations are the same, bit for bit"),
+        "{report}"
     );
 
-    let (code, found) = json(place, &["compare", "a.dat", "turned.dat", "--json"]);
+    let (code, found) = json(folder, &["compare", "a.dat", "turned.dat", "--json"]);
     let clip = &found["clips"][0];
     let degrees = 0.2f64.to_degrees();
     let largest = clip["rotation"]["largest"].as_f64().unwrap();
@@ -57,7 +57,7 @@ fn a_motion_and_what_was_made_of_it() {
 
     for (tolerance, code) in [("12deg", 0), ("11deg", 8), ("0.21rad", 0), ("0.19rad", 8)] {
         let line = ["compare", "a.dat", "turned.dat", "--tolerance", tolerance];
-        let run = run(place, &line);
+        let run = run(folder, &line);
         assert_eq!(run.code, code, "{tolerance}: {}", run.words);
         assert_eq!(
             run.words.contains("they differ: angle of"),
@@ -75,19 +75,19 @@ fn a_motion_and_what_was_made_of_it() {
         "--tolerance",
         "0",
     ];
-    succeed(place, &second);
+    succeed(folder, &second);
     // At other samples the largest is another one: half a frame from the key it is less.
     let fps = ["--fps", "4", "--start", "0.25", "--json"];
     let line = [&["compare", "a.dat", "turned.dat"][..], &fps].concat();
-    let (_, found) = json(place, &line);
+    let (_, found) = json(folder, &line);
     let less = found["clips"][0]["rotation"]["largest"].as_f64().unwrap();
     assert!(less > 0.0 && less < largest, "{less}");
 }
 
 #[test]
 fn results_number_by_number() {
-    let folder = sample_folder();
-    let place = folder.path();
+    let temporary = sample_folder();
+    let folder = temporary.path();
     for (name, more) in [
         ("one.npy", &["-m", "slerp"][..]),
         ("same.npy", &["-m", "slerp", "--device", "cpu"]),
@@ -96,27 +96,27 @@ fn results_number_by_number() {
         ("speed.npy", &["-m", "slerp", "--output", "velocity"]),
         ("speed2.npy", &["-m", "c2", "--output", "velocity"]),
     ] {
-        succeed(place, &[&["eval", "a.dat", "-o", name][..], more].concat());
+        succeed(folder, &[&["eval", "a.dat", "-o", name][..], more].concat());
     }
     succeed(
-        place,
+        folder,
         &["compare", "one.npy", "same.npy", "--tolerance", "0"],
     );
-    let (code, found) = json(place, &["compare", "one.npy", "half.npy", "--json"]);
+    let (code, found) = json(folder, &["compare", "one.npy", "half.npy", "--json"]);
     let array = &found["array"];
     let angle = array["rotation"]["largest"].as_f64().unwrap();
     assert!(code == 0 && angle > 0.0 && angle < 0.2, "{angle}");
     assert_eq!(array["shape"], serde_json::json!([2, 51, 4]));
     assert_eq!(array["largest_rotation_at"].as_array().unwrap().len(), 2);
-    let beyond = run(
-        place,
+    let exceeded = run(
+        folder,
         &["compare", "one.npy", "half.npy", "--tolerance", "1e-6"],
     );
-    assert_eq!(beyond.code, 8, "{}", beyond.words);
-    let (code, found) = json(place, &["compare", "speed.npy", "speed2.npy", "--json"]);
+    assert_eq!(exceeded.code, 8, "{}", exceeded.words);
+    let (code, found) = json(folder, &["compare", "speed.npy", "speed2.npy", "--json"]);
     assert!(code == 0 && found["array"]["rotation"].is_null());
     assert!(found["array"]["difference"]["largest"].as_f64().unwrap() > 0.1);
-    let shapes = run(place, &["compare", "one.npy", "frames.npy"]);
+    let shapes = run(folder, &["compare", "one.npy", "frames.npy"]);
     assert_eq!(shapes.code, 4);
     assert!(
         shapes.words.contains("has the shape [2, 51, 4] and"),
@@ -127,10 +127,10 @@ fn results_number_by_number() {
 
 #[test]
 fn what_cannot_be_compared_is_refused() {
-    let folder = sample_folder();
-    let place = folder.path();
-    std::fs::write(place.join("late.dat"), "# 1 1\n9 1 0 0 0\n10 1 0 0 0\n").unwrap();
-    std::fs::write(place.join("part.dat"), "# 1 1\n0 1 0 0 0\n1 0 1 0 0\n").unwrap();
+    let temporary = sample_folder();
+    let folder = temporary.path();
+    std::fs::write(folder.join("late.dat"), "# 1 1\n9 1 0 0 0\n10 1 0 0 0\n").unwrap();
+    std::fs::write(folder.join("part.dat"), "# 1 1\n0 1 0 0 0\n1 0 1 0 0\n").unwrap();
     for (line, code, says) in [
         (
             &["compare", "a.dat"][..],
@@ -147,7 +147,7 @@ fn what_cannot_be_compared_is_refused() {
         (
             &["compare", "a.dat", "b.dat", "--tolerance", "-1"],
             2,
-            "no finite number from 0",
+            "expected a finite number of 0 or more",
         ),
         (
             &["compare", "a.dat", "b.dat", "--start", "1"],
@@ -160,37 +160,40 @@ fn what_cannot_be_compared_is_refused() {
             "1 track of one alone",
         ),
     ] {
-        let run = run(place, line);
+        let run = run(folder, line);
         assert_eq!(run.code, code, "{line:?}: {}", run.words);
         assert!(run.words.contains(says), "{line:?}: {}", run.words);
     }
-    // Without a bound the tracks and times of both are compared, and the rest is told.
-    let told = succeed(place, &["compare", "a.dat", "part.dat"]);
+    // Without a tolerance, the tracks and times common to both are compared, and the others are listed.
+    let compared = succeed(folder, &["compare", "a.dat", "part.dat"]);
     assert!(
-        told.words.contains("compared from 0 to 1 s"),
+        compared.words.contains("compared from 0 to 1 s"),
         "{}",
-        told.words
+        compared.words
     );
-    let told = String::from_utf8(told.out).unwrap();
-    assert!(told.contains("only in a.dat: box2"), "{told}");
+    let report = String::from_utf8(compared.out).unwrap();
+    assert!(report.contains("only in a.dat: box2"), "{report}");
 }
 
 /// A chain goes into another format and back, and a part of it into `.dat`, without a bit of
 /// difference; what `.dat` has no room for is named.
 #[test]
 fn keys_come_back_as_dat() {
-    let folder = sample_folder();
-    let place = folder.path();
-    succeed(place, &["convert", "a.dat", "-o", "a.npz"]);
-    succeed(place, &["convert", "a.npz", "-o", "back.dat"]);
+    let temporary = sample_folder();
+    let folder = temporary.path();
+    succeed(folder, &["convert", "a.dat", "-o", "a.npz"]);
+    succeed(folder, &["convert", "a.npz", "-o", "back.dat"]);
     let same = ["compare", "a.dat", "back.dat", "--tolerance", "0"];
-    let told = String::from_utf8(succeed(place, &same).out).unwrap();
-    assert!(told.contains("18 of 18 rotations are the same"), "{told}");
+    let report = String::from_utf8(succeed(folder, &same).out).unwrap();
+    assert!(
+        report.contains("18 of 18 rotations are the same"),
+        "{report}"
+    );
     let part = [
         "convert", "a.dat", "--start", "0.5", "--end", "1.5", "-o", "part.dat",
     ];
-    succeed(place, &part);
-    let text = std::fs::read_to_string(place.join("part.dat")).unwrap();
+    succeed(folder, &part);
+    let text = std::fs::read_to_string(folder.join("part.dat")).unwrap();
     let times: Vec<&str> = text
         .lines()
         .skip(1)
@@ -200,30 +203,30 @@ fn keys_come_back_as_dat() {
     let moved = "HIERARCHY\nROOT hip\n{\n OFFSET 0 1 0\n CHANNELS 6 Xposition Yposition Zposition \
                  Zrotation Xrotation Yrotation\n End Site\n {\n  OFFSET 0 1 0\n }\n}\nMOTION\nFrames: \
                  2\nFrame Time: 0.5\n0 1 0 0 0 0\n1 1 0 90 0 0\n";
-    std::fs::write(place.join("moved.bvh"), moved).unwrap();
-    let run = succeed(place, &["convert", "moved.bvh", "-o", "moved.dat"]);
+    std::fs::write(folder.join("moved.bvh"), moved).unwrap();
+    let run = succeed(folder, &["convert", "moved.bvh", "-o", "moved.dat"]);
     assert!(run.words.contains("warning[W208]"), "{}", run.words);
     let line = ["compare", "moved.bvh", "moved.dat", "--tolerance", "1e-4"];
-    let told = String::from_utf8(succeed(place, &line).out).unwrap();
-    assert!(told.contains("translation"), "{told}");
+    let report = String::from_utf8(succeed(folder, &line).out).unwrap();
+    assert!(report.contains("translation"), "{report}");
 }
 
 /// Trajectories in Unix time, of which one starts a second later: the poses of the first that the second
 /// reaches, without its gaps.
 #[test]
 fn an_estimate_beside_its_reference() {
-    let folder = sample_folder();
-    let place = folder.path();
+    let temporary = sample_folder();
+    let folder = temporary.path();
     let pose = |seconds: f64, x: f64| format!("{} {x} 0 0 0 0 0 1\n", 1_700_000_000.0 + seconds);
     let truth: String = [0.5, 1.0, 1.5, 2.0, 2.5, 3.0]
         .map(|time| pose(time, time))
         .concat();
     let estimate: String = [1.0, 2.0, 4.0].map(|time| pose(time, time + 1.0)).concat();
-    std::fs::write(place.join("truth.tum"), truth).unwrap();
-    std::fs::write(place.join("estimate.tum"), estimate).unwrap();
+    std::fs::write(folder.join("truth.tum"), truth).unwrap();
+    std::fs::write(folder.join("estimate.tum"), estimate).unwrap();
     let both = ["compare", "truth.tum", "estimate.tum", "--json"];
     let line = |more: &[&str]| [&both[..], more].concat().join(" ");
-    let measure = |more: &[&str]| json(place, &line(more).split(' ').collect::<Vec<_>>());
+    let measure = |more: &[&str]| json(folder, &line(more).split(' ').collect::<Vec<_>>());
 
     let (_, found) = measure(&["--ape", "--max-gap", "1.5", "--rpe", "1s"]);
     let found = &found["trajectory"];
@@ -258,7 +261,7 @@ fn an_estimate_beside_its_reference() {
         (&["--rpe", "1km"], 2, "1s or 0.5m"),
     ] {
         let line = [&["compare", "truth.tum", "estimate.tum"][..], line].concat();
-        let run = run(place, &line);
+        let run = run(folder, &line);
         assert_eq!(run.code, code, "{line:?}: {}", run.words);
         assert!(run.words.contains(says), "{line:?}: {}", run.words);
     }
@@ -273,18 +276,19 @@ fn an_estimate_beside_its_reference() {
         "-o",
         "at.tum",
     ];
-    let run = succeed(place, &at);
+    let run = succeed(folder, &at);
     assert!(
         run.words.contains("2 of 6 times lie between keys"),
         "{}",
         run.words
     );
     assert!(
-        run.words.contains("beyond them tracks are held"),
+        run.words
+            .contains("outside them tracks keep their end values"),
         "{}",
         run.words
     );
-    let text = std::fs::read_to_string(place.join("at.tum")).unwrap();
+    let text = std::fs::read_to_string(folder.join("at.tum")).unwrap();
     let poses: Vec<Vec<f64>> = text
         .lines()
         .filter(|line| !line.starts_with('#'))
@@ -299,7 +303,7 @@ fn an_estimate_beside_its_reference() {
     assert_eq!((poses[0][1], poses[1][1], poses[3][1]), (2.0, 2.0, 3.0));
     assert!((poses[2][1] - 2.5).abs() < 0.1, "{}", poses[2][1]);
     let text = succeed(
-        place,
+        folder,
         &["compare", "truth.tum", "estimate.tum", "--align", "yaw"],
     );
     let text = String::from_utf8(text.out).unwrap();

@@ -1,4 +1,4 @@
-//! Every way in which the software drivers can be set up gives the CPU's bits, or is
+//! Every configuration of the software drivers gives the CPU's bits, or is
 //! caught by a self-test, named and refused.
 #![cfg(target_os = "linux")]
 
@@ -54,8 +54,12 @@ fn lavapipe_gives_the_same_bits_at_every_width_and_number_of_threads() {
     // Each compiles every kernel anew. Every width and every number of threads is tried; with `SOAK`
     // set, all with all.
     let is_all = std::env::var_os("SOAK").is_some();
-    let tried = |(place, _): &(usize, _)| is_all || [0, 4, 8, 9].contains(place);
-    let all: Vec<(&str, String)> = all.enumerate().filter(tried).map(|(_, own)| own).collect();
+    let tried = |(index, _): &(usize, _)| is_all || [0, 4, 8, 9].contains(index);
+    let all: Vec<(&str, String)> = all
+        .enumerate()
+        .filter(tried)
+        .map(|(_, configuration)| configuration)
+        .collect();
     all.par_iter().for_each(|(width, threads)| {
         let environment = [
             ("LP_NATIVE_VECTOR_WIDTH", *width),
@@ -63,10 +67,10 @@ fn lavapipe_gives_the_same_bits_at_every_width_and_number_of_threads() {
         ];
         // All of both forms' kernels; methods differ on the host.
         let run = verify(LAVAPIPE, "slerp,c2", &environment);
-        let told = String::from_utf8(run.out).unwrap();
-        assert_eq!(run.code, 0, "{environment:?}: {told}{}", run.words);
-        assert!(told.contains(&format!("{width} bits")), "{told}");
-        assert!(told.contains(", 0 differ"), "{environment:?}: {told}");
+        let output = String::from_utf8(run.out).unwrap();
+        assert_eq!(run.code, 0, "{environment:?}: {output}{}", run.words);
+        assert!(output.contains(&format!("{width} bits")), "{output}");
+        assert!(output.contains(", 0 differ"), "{environment:?}: {output}");
     });
 }
 
@@ -76,15 +80,15 @@ fn swiftshader_gives_the_same_bits() {
         return;
     }
     let run = verify(SWIFTSHADER, "all", &[]);
-    let told = String::from_utf8(run.out).unwrap();
-    assert_eq!(run.code, 0, "{told}{}", run.words);
+    let output = String::from_utf8(run.out).unwrap();
+    assert_eq!(run.code, 0, "{output}{}", run.words);
     assert!(
-        told.contains("SwiftShader") && told.contains(", 0 differ"),
-        "{told}"
+        output.contains("SwiftShader") && output.contains(", 0 differ"),
+        "{output}"
     );
 }
 
-/// Told that there is no SSE, Mesa's compiler makes code that rounds otherwise: which self-test
+/// Without SSE, Mesa's compiler makes code that rounds otherwise: which self-test
 /// finds that first depends on the processor.
 #[test]
 fn a_driver_that_is_not_exact_is_named_and_refused() {
@@ -97,6 +101,6 @@ fn a_driver_that_is_not_exact_is_named_and_refused() {
         assert!(run.words.contains(word), "{word}: {}", run.words);
     }
     let self_tests = ["contraction", "re-association of a sum"];
-    let is_told = |check| (run.words).contains(&format!("is not exact: self-test `{check}`"));
-    assert!(self_tests.into_iter().any(is_told), "{}", run.words);
+    let is_reported = |check| (run.words).contains(&format!("is not exact: self-test `{check}`"));
+    assert!(self_tests.into_iter().any(is_reported), "{}", run.words);
 }

@@ -1,31 +1,29 @@
-//! What the program says of `.dat` files, good and bad: the fixtures of `formats/tests`.
+//! The program's verdicts on `.dat` files, good and bad: the fixtures of `formats/tests`.
 
 use std::fs;
-use std::path::PathBuf;
 
 use rayon::prelude::{IntoParallelRefIterator, ParallelIterator};
+
+use crate::cases;
 
 /// As a person meets them: by the program, with its exit code.
 #[test]
 fn the_program_says_of_every_fixture_what_is_expected() {
-    let folder = crate::program::root().join("formats/tests/fixtures/dat");
-    let files = fs::read_dir(&folder)
-        .unwrap()
-        .map(|entry| entry.unwrap().path());
-    let files: Vec<PathBuf> = files
-        .filter(|path| path.extension().unwrap() == "dat")
-        .collect();
-    assert!(files.len() >= 75, "{} fixtures", files.len());
-    let wrong: Vec<String> = files
+    let temporary = tempfile::tempdir().unwrap();
+    let times = temporary.path().join("times.txt");
+    fs::write(&times, "0\n").unwrap();
+    let folder = cases::folder("dat");
+    let all = cases::read("dat");
+    assert!(all.len() >= 75, "{} fixtures", all.len());
+    let wrong: Vec<String> = all
         .par_iter()
-        .filter_map(|path| {
-            let expected = fs::read_to_string(path.with_extension("expected")).unwrap();
+        .filter_map(|case| {
+            let (name, expected) = (&case.name, &case.expected);
             let mut lines = expected.lines();
             let refused = lines.next() == Some("refused");
-            let name = path.file_name().unwrap().to_str().unwrap().to_owned();
             let line = [
                 "eval",
-                &name,
+                name,
                 // Some begin as files of other formats do.
                 "--from",
                 "dat",
@@ -34,7 +32,7 @@ fn the_program_says_of_every_fixture_what_is_expected() {
                 "--device",
                 "cpu",
                 "--times",
-                "times.txt",
+                times.to_str().unwrap(),
             ];
             let run = crate::program::run(&folder, &line);
             let code = if refused { 4 } else { 0 };
@@ -42,7 +40,7 @@ fn the_program_says_of_every_fixture_what_is_expected() {
             let data = run.out.starts_with(b"\x93NUMPY");
             (run.code != code || !said || data == refused).then(|| {
                 format!(
-                    "{name}: {}, {}wanted {code}, {expected}",
+                    "{name}: {}, {}expected {code}, {expected}",
                     run.code, run.words
                 )
             })

@@ -1,5 +1,5 @@
-//! Everything that Vulkan can do wrong, done on purpose: by a loader of our own in the
-//! place of the system's (`tests/fault_loader`), which the program knows nothing of.
+//! Everything that Vulkan can do wrong, done on purpose: by a loader that stands
+//! between the program and the system's (`tests/fault_loader`) without the program knowing.
 #![cfg(target_os = "linux")]
 
 mod card;
@@ -30,18 +30,23 @@ const RESULTS: [i32; 4] = [
     DEVICE_LOST,
 ];
 
-/// Whether all faults are tried (`SOAK`); else those whose turn it is.
+/// Whether all faults are tried (`SOAK`); else a fixed part of them.
 fn is_soaked() -> bool {
     std::env::var_os("SOAK").is_some()
 }
 
-/// Whether the loader's own list is whole: a call that nobody makes fail proves nothing.
+/// The loader's list of calls is complete: a call that never fails proves nothing.
 #[test]
 fn every_call_that_can_fail_is_made_to() {
     let root = crate::program::root();
     let loader = fs::read_to_string(root.join("cli/tests/fault_loader/lib.rs")).unwrap();
     let mut names = 0;
-    let folders = ["src/gpu", "src/gpu/kernel_check"];
+    let folders = [
+        "src/gpu",
+        "src/gpu/engine",
+        "src/gpu/physical",
+        "src/gpu/kernel_check",
+    ];
     let entries = folders.map(|folder| fs::read_dir(root.join(folder)).unwrap());
     let files = entries
         .into_iter()
@@ -71,21 +76,21 @@ fn on(device: &str) -> Vec<&str> {
 #[test]
 fn a_fault_anywhere_changes_no_bit_and_leaks_nothing() {
     let Some(loader) = Loader::new() else { return };
-    let place = sample_folder();
-    let (undisturbed, log) = loader.run(place.path(), &on("first"), &[]);
+    let folder = sample_folder();
+    let (undisturbed, log) = loader.run(folder.path(), &on("first"), &[]);
     assert_eq!(undisturbed.code, 0, "{}", undisturbed.words);
     assert_eq!(log.left, BTreeMap::new(), "an undisturbed run leaks");
-    let expected = fs::read(place.path().join("o.npy")).unwrap();
+    let expected = fs::read(folder.path().join("o.npy")).unwrap();
 
     let mut faults: Vec<(String, i32, usize)> = Vec::new();
     for (call, &count) in &log.calls {
         let results = RESULTS
             .iter()
             .chain((call == "vkWaitForFences").then_some(&TIMEOUT));
-        for (turn, &result) in results.enumerate() {
+        for (index, &result) in results.enumerate() {
             for occurrence in 1..=count {
                 let sampled = occurrence == 1 || occurrence == count && is_soaked();
-                if sampled || occurrence % RESULTS.len() == turn {
+                if sampled || occurrence % RESULTS.len() == index {
                     faults.push((call.clone(), result, occurrence));
                 }
             }
@@ -95,10 +100,10 @@ fn a_fault_anywhere_changes_no_bit_and_leaks_nothing() {
     let wrong: Vec<String> = faults
         .par_iter()
         .filter_map(|(call, result, occurrence)| {
-            let place = sample_folder();
+            let folder = sample_folder();
             let fault = format!("{call},{result},{occurrence},1");
-            let (run, log) = loader.run(place.path(), &on("first"), &[("FAULTS", &fault)]);
-            let output = fs::read(place.path().join("o.npy")).unwrap_or_default();
+            let (run, log) = loader.run(folder.path(), &on("first"), &[("FAULTS", &fault)]);
+            let output = fs::read(folder.path().join("o.npy")).unwrap_or_default();
             let clean = log.left.is_empty() || *result == TIMEOUT;
             let right = run.code == 0 && output == expected && clean;
             (!right).then(|| format!("{fault}: {} {:?} {}", run.code, log.left, run.words))
@@ -118,9 +123,9 @@ fn a_fault_anywhere_changes_no_bit_and_leaks_nothing() {
 #[test]
 fn a_fault_that_stays_ends_vulkan() {
     let Some(loader) = Loader::new() else { return };
-    let place = sample_folder();
-    let (_, log) = loader.run(place.path(), &on("first"), &[]);
-    let expected = fs::read(place.path().join("o.npy")).unwrap();
+    let folder = sample_folder();
+    let (_, log) = loader.run(folder.path(), &on("first"), &[]);
+    let expected = fs::read(folder.path().join("o.npy")).unwrap();
     let harmless = [
         "vkGetQueryPoolResults",
         "vkDeviceWaitIdle",
@@ -132,20 +137,20 @@ fn a_fault_that_stays_ends_vulkan() {
         .filter(|call| !harmless.contains(&call.as_str()))
         .flat_map(|call| RESULTS.map(|result| (call, result)))
         .enumerate()
-        .filter(|(place, _)| (place + place / RESULTS.len()).is_multiple_of(2) || is_soaked())
+        .filter(|(index, _)| (index + index / RESULTS.len()).is_multiple_of(2) || is_soaked())
         .map(|(_, fault)| fault)
         .collect();
     faults.par_iter().for_each(|(call, result)| {
-        let place = sample_folder();
+        let folder = sample_folder();
         let fault = format!("{call},{result},1,1000000");
-        let (run, log) = loader.run(place.path(), &on("first"), &[("FAULTS", &fault)]);
+        let (run, log) = loader.run(folder.path(), &on("first"), &[("FAULTS", &fault)]);
         assert_eq!(run.code, 0, "{fault}: {}", run.words);
         assert!(run.words.contains("on CPU ("), "{fault}: {}", run.words);
-        assert_eq!(fs::read(place.path().join("o.npy")).unwrap(), expected);
+        assert_eq!(fs::read(folder.path().join("o.npy")).unwrap(), expected);
         assert_eq!(log.left, BTreeMap::new(), "{fault}");
 
-        fs::remove_file(place.path().join("o.npy")).unwrap();
-        let (run, log) = loader.run(place.path(), &on("vulkan"), &[("FAULTS", &fault)]);
+        fs::remove_file(folder.path().join("o.npy")).unwrap();
+        let (run, log) = loader.run(folder.path(), &on("vulkan"), &[("FAULTS", &fault)]);
         let absent = *result == INITIALIZATION_FAILED || run.words.contains("no Vulkan device");
         assert!(
             run.code == 6 || absent && run.code == 5,
@@ -157,7 +162,7 @@ fn a_fault_that_stays_ends_vulkan() {
             "{fault}: {}",
             run.words
         );
-        assert!(!place.path().join("o.npy").exists(), "{fault}");
+        assert!(!folder.path().join("o.npy").exists(), "{fault}");
         assert_eq!(log.left, BTreeMap::new(), "{fault}");
     });
 }
@@ -166,26 +171,26 @@ fn a_fault_that_stays_ends_vulkan() {
 #[test]
 fn a_lost_device_is_opened_again_three_times() {
     let Some(loader) = Loader::new() else { return };
-    let place = sample_folder();
+    let folder = sample_folder();
     let line = on("vulkan");
-    let (_, log) = loader.run(place.path(), &line, &[]);
-    let expected = fs::read(place.path().join("o.npy")).unwrap();
+    let (_, log) = loader.run(folder.path(), &line, &[]);
+    let expected = fs::read(folder.path().join("o.npy")).unwrap();
     let last = log.calls["vkQueueSubmit"];
     for call in ["vkQueueSubmit", "vkWaitForFences"] {
         for losses in 1..=5 {
             let fault = format!("{call},{DEVICE_LOST},{last},{losses}");
-            let _ = fs::remove_file(place.path().join("o.npy"));
-            let (run, log) = loader.run(place.path(), &line, &[("FAULTS", &fault)]);
+            let _ = fs::remove_file(folder.path().join("o.npy"));
+            let (run, log) = loader.run(folder.path(), &line, &[("FAULTS", &fault)]);
             assert_eq!(log.left, BTreeMap::new(), "{fault}");
             if losses <= 3 {
                 assert_eq!(run.code, 0, "{fault}: {}", run.words);
                 assert!(!run.words.contains("CPU"), "{fault}: {}", run.words);
-                assert_eq!(fs::read(place.path().join("o.npy")).unwrap(), expected);
+                assert_eq!(fs::read(folder.path().join("o.npy")).unwrap(), expected);
                 assert!(log.calls["vkCreateDevice"] > 1, "{fault}");
             } else {
                 assert_eq!(run.code, 6, "{fault}: {}", run.words);
                 assert!(run.words.contains("DEVICE_LOST"), "{fault}: {}", run.words);
-                assert!(!place.path().join("o.npy").exists());
+                assert!(!folder.path().join("o.npy").exists());
             }
         }
     }
@@ -196,13 +201,13 @@ fn a_lost_device_is_opened_again_three_times() {
 #[test]
 fn too_little_memory_makes_smaller_pieces() {
     let Some(loader) = Loader::new() else { return };
-    let place = sample_folder();
+    let folder = sample_folder();
     let long = |device: &'static str| {
         let line = ["eval", "a.dat", "-o", "o.npy", "--overwrite"];
         [&line[..], &["--fps", "1000000", "--device", device]].concat()
     };
-    succeed(place.path(), &long("cpu"));
-    let expected = fs::read(place.path().join("o.npy")).unwrap();
+    succeed(folder.path(), &long("cpu"));
+    let expected = fs::read(folder.path().join("o.npy")).unwrap();
     let enough = (64 << 20).to_string();
     for (memory, fits) in [
         (enough.as_str(), true),
@@ -210,12 +215,12 @@ fn too_little_memory_makes_smaller_pieces() {
         ("300000", false),
     ] {
         for device in ["first", "vulkan"] {
-            let _ = fs::remove_file(place.path().join("o.npy"));
-            let (run, log) = loader.run(place.path(), &long(device), &[("FAULT_MEMORY", memory)]);
+            let _ = fs::remove_file(folder.path().join("o.npy"));
+            let (run, log) = loader.run(folder.path(), &long(device), &[("FAULT_MEMORY", memory)]);
             assert_eq!(log.left, BTreeMap::new());
             if fits || device == "first" {
                 assert_eq!(run.code, 0, "{memory}: {}", run.words);
-                assert!(fs::read(place.path().join("o.npy")).unwrap() == expected);
+                assert!(fs::read(folder.path().join("o.npy")).unwrap() == expected);
                 assert_eq!(
                     run.words.contains("CPU ("),
                     !fits,
@@ -224,7 +229,7 @@ fn too_little_memory_makes_smaller_pieces() {
                 );
             } else {
                 assert_eq!(run.code, 6, "{memory}: {}", run.words);
-                assert!(!place.path().join("o.npy").exists());
+                assert!(!folder.path().join("o.npy").exists());
             }
             let is_short = memory != enough;
             assert_eq!(log.short > 0, is_short, "{memory}: {log:?}");
@@ -237,7 +242,7 @@ fn too_little_memory_makes_smaller_pieces() {
 #[test]
 fn a_slow_device_gets_less_at_once() {
     let Some(loader) = Loader::new() else { return };
-    let place = sample_folder();
+    let folder = sample_folder();
     let line = [
         "eval",
         "a.dat",
@@ -250,21 +255,24 @@ fn a_slow_device_gets_less_at_once() {
         "first",
     ];
     let submissions = |nanoseconds: &str| {
-        let (run, log) = loader.run(place.path(), &line, &[("FAULT_SLOW", nanoseconds)]);
+        let (run, log) = loader.run(folder.path(), &line, &[("FAULT_SLOW", nanoseconds)]);
         assert_eq!(run.code, 0, "{}", run.words);
         (
             log.calls["vkQueueSubmit"],
-            fs::read(place.path().join("o.npy")).unwrap(),
+            fs::read(folder.path().join("o.npy")).unwrap(),
         )
     };
-    let (usual, expected) = submissions("99000000");
-    let (more, found) = submissions("101000000");
+    let (below_limit, expected) = submissions("99000000");
+    let (above_limit, found) = submissions("101000000");
     assert!(found == expected);
     let rotations = expected.len() / 16;
-    assert!(more > 2 * usual, "{usual} and {more}");
     assert!(
-        more < usual + rotations / (1 << 16) + 8,
-        "{usual} and {more}"
+        above_limit > 2 * below_limit,
+        "{below_limit} and {above_limit}"
+    );
+    assert!(
+        above_limit < below_limit + rotations / (1 << 16) + 8,
+        "{below_limit} and {above_limit}"
     );
 }
 
@@ -272,10 +280,10 @@ fn a_slow_device_gets_less_at_once() {
 #[test]
 fn absence_is_told_within_a_second() {
     let Some(loader) = Loader::new() else { return };
-    let place = sample_folder();
+    let folder = sample_folder();
     let broken = tempfile::tempdir().unwrap();
     fs::write(broken.path().join("libvulkan.so.1"), "no library").unwrap();
-    let crashing = place.path().join("crash.json");
+    let crashing = folder.path().join("crash.json");
     let library = example("crashing_driver");
     let manifest = format!(
         r#"{{"file_format_version": "1.0.0", "ICD": {{"library_path": {library:?}, "api_version": "1.3.0"}}}}"#
@@ -293,30 +301,30 @@ fn absence_is_told_within_a_second() {
         ("a driver that crashes", set("VK_DRIVER_FILES", &crashing)),
         ("a driver that ends", set("VK_DRIVER_FILES", &crashing)),
     ];
-    for (what, (variable, value)) in cases {
+    for (case, (variable, value)) in cases {
         for device in ["first", "vulkan"] {
-            let mut command = loader.command(command(place.path(), &on(device)));
+            let mut command = loader.command(command(folder.path(), &on(device)));
             if variable == "VK_DRIVER_FILES" {
                 command.env("VK_ICD_FILENAMES", &value);
             }
-            if what == "a driver that ends" {
+            if case == "a driver that ends" {
                 command.env("CRASH_STATUS", "0");
             }
             let started = Instant::now();
             let run = finish(command.env(variable, &value).output().unwrap());
             assert!(
                 started.elapsed().as_secs_f64() < 1.0,
-                "{what}: {:?}",
+                "{case}: {:?}",
                 started.elapsed()
             );
             let code = if device == "first" { 0 } else { 5 };
-            assert_eq!(run.code, code, "{what}: {}", run.words);
+            assert_eq!(run.code, code, "{case}: {}", run.words);
             let words = if device == "first" {
                 "on CPU ("
             } else {
                 "no Vulkan device: "
             };
-            assert!(run.words.contains(words), "{what}: {}", run.words);
+            assert!(run.words.contains(words), "{case}: {}", run.words);
         }
     }
 }

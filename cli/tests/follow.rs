@@ -7,10 +7,11 @@ use std::path::Path;
 use crate::program::{run, sample_folder, succeed};
 use glam::{Quat, Vec3};
 use tumble::{
-    Device, Engine, Follow, Frames, Layout, PathSpeed, Smoothing, TrackSet, VectorMethod, method,
+    Device, Engine, Follow, Layout, PathSpeed, SampleTimes, Smoothing, TrackSet, VectorMethod,
+    method,
 };
 
-const WAY: &str =
+const PATH_CSV: &str =
     "t,x,y,z,ux,uy,uz\n0,0,0,0,,,\n1,1,2,0,,,\n2.5,3,3,1,,,\n3,4,1,2,,,\n4.5,6,0,0,0,1,0\n";
 
 fn set() -> TrackSet {
@@ -24,13 +25,13 @@ fn set() -> TrackSet {
     set
 }
 
-fn place() -> tempfile::TempDir {
-    let place = sample_folder();
-    fs::create_dir(place.path().join("paths")).unwrap();
-    fs::write(place.path().join("way.csv"), WAY).unwrap();
-    fs::write(place.path().join("paths/a.csv"), WAY).unwrap();
-    fs::write(place.path().join("paths/b.csv"), "x,y,z\n0,0,0\n1,0,0\n").unwrap();
-    place
+fn path_folder() -> tempfile::TempDir {
+    let folder = sample_folder();
+    fs::create_dir(folder.path().join("paths")).unwrap();
+    fs::write(folder.path().join("way.csv"), PATH_CSV).unwrap();
+    fs::write(folder.path().join("paths/a.csv"), PATH_CSV).unwrap();
+    fs::write(folder.path().join("paths/b.csv"), "x,y,z\n0,0,0\n1,0,0\n").unwrap();
+    folder
 }
 
 fn numbers(file: &Path) -> (Vec<u64>, Vec<f32>) {
@@ -41,7 +42,7 @@ fn numbers(file: &Path) -> (Vec<u64>, Vec<f32>) {
 
 #[test]
 fn results_are_the_library_s_bits() {
-    let place = place();
+    let folder = path_folder();
     let line = [
         "follow",
         "way.csv",
@@ -58,8 +59,8 @@ fn results_are_the_library_s_bits() {
         "-o",
         "out.npy",
     ];
-    succeed(place.path(), &line);
-    let (shape, found) = numbers(&place.path().join("out.npy"));
+    succeed(folder.path(), &line);
+    let (shape, found) = numbers(&folder.path().join("out.npy"));
     assert_eq!(shape, [271, 1, 7]);
     let follow = Follow {
         method: VectorMethod::C2,
@@ -72,12 +73,12 @@ fn results_are_the_library_s_bits() {
     };
     let engine = Engine::new(Device::Cpu).unwrap();
     let expected = engine
-        .follow(&set(), &follow, &Frames::fps(60), Layout::FrameMajor)
+        .follow(&set(), &follow, &SampleTimes::fps(60), Layout::FrameMajor)
         .unwrap();
     for (sample, row) in found.chunks(7).enumerate() {
-        let own = expected.positions.get(0, sample).unwrap();
-        let turn = expected.rotations.get(0, sample).unwrap();
-        let all = [own.to_array().to_vec(), turn.to_array().to_vec()].concat();
+        let position = expected.positions.get(0, sample).unwrap();
+        let rotation = expected.rotations.get(0, sample).unwrap();
+        let all = [position.to_array().to_vec(), rotation.to_array().to_vec()].concat();
         assert_eq!(
             row.iter().map(|c| c.to_bits()).collect::<Vec<_>>(),
             all.iter().map(|c| c.to_bits()).collect::<Vec<_>>()
@@ -87,22 +88,22 @@ fn results_are_the_library_s_bits() {
 
 #[test]
 fn other_formats_hold_the_same_poses() {
-    let place = place();
+    let folder = path_folder();
     succeed(
-        place.path(),
+        folder.path(),
         &["follow", "way.csv", "--fps", "2", "-o", "out.csv"],
     );
-    let text = fs::read_to_string(place.path().join("out.csv")).unwrap();
+    let text = fs::read_to_string(folder.path().join("out.csv")).unwrap();
     let mut lines = text.lines();
     let header = "frame,time,way.px,way.py,way.pz,way.x,way.y,way.z,way.w";
     assert_eq!(lines.next(), Some(header));
     assert!(lines.nth(2).unwrap().starts_with("2,1,1,2,0,"));
     succeed(
-        place.path(),
+        folder.path(),
         &["follow", "way.csv", "--fps", "2", "-o", "out.glb"],
     );
     succeed(
-        place.path(),
+        folder.path(),
         &[
             "eval",
             "out.glb",
@@ -115,26 +116,26 @@ fn other_formats_hold_the_same_poses() {
         ],
     );
     succeed(
-        place.path(),
+        folder.path(),
         &["follow", "way.csv", "--fps", "2", "-o", "out.npy"],
     );
-    let (_, own) = numbers(&place.path().join("out.npy"));
-    let (shape, again) = numbers(&place.path().join("again.npy"));
+    let (_, direct) = numbers(&folder.path().join("out.npy"));
+    let (shape, again) = numbers(&folder.path().join("again.npy"));
     assert_eq!(shape, [10, 1, 7]);
-    for (own, again) in own.chunks(7).zip(again.chunks(7)) {
-        let places = [own, again].map(|row| Vec3::from_slice(row));
-        assert!((places[0] - places[1]).length() < 1e-6);
-        let turns = [own, again].map(|row| Quat::from_slice(&row[3..]));
-        assert!(turns[0].dot(turns[1]).abs() > 1.0 - 1e-6);
+    for (pose, again) in direct.chunks(7).zip(again.chunks(7)) {
+        let positions = [pose, again].map(|row| Vec3::from_slice(row));
+        assert!((positions[0] - positions[1]).length() < 1e-6);
+        let rotations = [pose, again].map(|row| Quat::from_slice(&row[3..]));
+        assert!(rotations[0].dot(rotations[1]).abs() > 1.0 - 1e-6);
     }
 }
 
 #[test]
 fn paths_of_a_directory_get_a_file_each() {
-    let place = place();
+    let folder = path_folder();
     // b.csv has no times, and the batch goes on.
     let some = run(
-        place.path(),
+        folder.path(),
         &["follow", "paths", "-o", "poses", "--overwrite"],
     );
     assert_eq!(some.code, 3, "{}", some.words);
@@ -143,10 +144,10 @@ fn paths_of_a_directory_get_a_file_each() {
         "{}",
         some.words
     );
-    assert!(place.path().join("poses/a.npy").exists());
-    assert!(!place.path().join("poses/b.npy").exists());
+    assert!(folder.path().join("poses/a.npy").exists());
+    assert!(!folder.path().join("poses/b.npy").exists());
     succeed(
-        place.path(),
+        folder.path(),
         &[
             "follow",
             "paths/b.csv",
@@ -158,14 +159,14 @@ fn paths_of_a_directory_get_a_file_each() {
             "b.npy",
         ],
     );
-    let (shape, _) = numbers(&place.path().join("b.npy"));
+    let (shape, _) = numbers(&folder.path().join("b.npy"));
     assert_eq!(shape, [3, 1, 7]);
 }
 
 #[test]
 fn what_cannot_be_followed_is_refused() {
-    let place = place();
-    let write = |name: &str, text: &str| fs::write(place.path().join(name), text).unwrap();
+    let folder = path_folder();
+    let write = |name: &str, text: &str| fs::write(folder.path().join(name), text).unwrap();
     write("none.csv", "t,x,y,z\n");
     write("one.csv", "t,x,y,z\n0,1,2,3\n");
     write("still.csv", "t,x,y,z\n0,1,2,3\n1,1,2,3\n");
@@ -178,10 +179,10 @@ fn what_cannot_be_followed_is_refused() {
     );
     let refused = |code: i32, words: &str, line: &[&str]| {
         let all = [&["follow", "-o", "out.npy"], line].concat();
-        let run = run(place.path(), &all);
+        let run = run(folder.path(), &all);
         assert_eq!(run.code, code, "{line:?}: {}", run.words);
         assert!(run.words.contains(words), "{line:?}: {}", run.words);
-        assert!(!place.path().join("out.npy").exists(), "{line:?}");
+        assert!(!folder.path().join("out.npy").exists(), "{line:?}");
     };
     refused(4, "no point", &["none.csv"]);
     refused(4, "nan.csv:2", &["nan.csv"]);
@@ -214,7 +215,7 @@ fn what_cannot_be_followed_is_refused() {
     ] {
         let out = format!("{name}.npy");
         let run = succeed(
-            place.path(),
+            folder.path(),
             &["follow", &format!("{name}.csv"), "-o", &out],
         );
         assert!(run.words.contains(words), "{name}: {}", run.words);
@@ -223,41 +224,41 @@ fn what_cannot_be_followed_is_refused() {
 
 #[test]
 fn smoothed_keys_are_the_library_s() {
-    let place = place();
+    let folder = path_folder();
     succeed(
-        place.path(),
+        folder.path(),
         &[
             "smooth", "a.dat", "--kernel", "tent:2", "--passes", "2", "-o", "out.npy",
         ],
     );
-    let (shape, found) = numbers(&place.path().join("out.npy"));
+    let (shape, found) = numbers(&folder.path().join("out.npy"));
     assert_eq!(shape, [2, 5, 4]);
     let (times, keys) = crate::program::pendulum();
     let set = TrackSet::with_shared_times(&times, &keys).unwrap();
     let engine = Engine::new(Device::Cpu).unwrap();
-    let frames = Frames::at(times);
-    let given = engine
+    let frames = SampleTimes::at(times);
+    let unsmoothed = engine
         .evaluate(&set, method::BESSEL_OVERHAUSER, &frames)
         .unwrap();
     let smoothing = Smoothing {
         passes: 2,
         ..Smoothing::new("tent:2".parse().unwrap())
     };
-    let expected = engine.smooth(&given, &smoothing).unwrap();
+    let expected = engine.smooth(&unsmoothed, &smoothing).unwrap();
     for (found, expected) in found.chunks(4).zip(expected.as_quats()) {
         assert!(Quat::from_slice(found).dot(*expected).abs() > 1.0 - 1e-6);
     }
     succeed(
-        place.path(),
+        folder.path(),
         &["smooth", "a.dat", "-o", "out.glb", "--fps", "30"],
     );
-    assert!(place.path().join("out.glb").exists());
+    assert!(folder.path().join("out.glb").exists());
 }
 
 /// At its frequency a low-pass keeps 1/√2 of a motion, at twice of it a quarter, whatever the rate.
 #[test]
 fn a_low_pass_is_in_hz() {
-    let place = place();
+    let folder = path_folder();
     for rate in [50, 100] {
         let mut text = String::new();
         for sample in 0..=8 * rate {
@@ -271,7 +272,7 @@ fn a_low_pass_is_in_hz() {
                 wave(0.1)
             );
         }
-        fs::write(place.path().join("waves.tum"), text).unwrap();
+        fs::write(folder.path().join("waves.tum"), text).unwrap();
         let line = [
             "smooth",
             "waves.tum",
@@ -281,8 +282,8 @@ fn a_low_pass_is_in_hz() {
             "low.tum",
             "--overwrite",
         ];
-        succeed(place.path(), &line);
-        let text = fs::read_to_string(place.path().join("low.tum")).unwrap();
+        succeed(folder.path(), &line);
+        let text = fs::read_to_string(folder.path().join("low.tum")).unwrap();
         let rows = text.lines().filter(|line| !line.starts_with('#'));
         let rows = rows.map(|line| {
             let numbers = line
@@ -310,10 +311,10 @@ fn a_low_pass_is_in_hz() {
     }
     for (hz, words) in [
         ("50", "nothing faster than 50"),
-        ("0", "give a number of Hz over 0"),
+        ("0", "expected a number of Hz above 0"),
     ] {
         let line = ["smooth", "waves.tum", "--low-pass", hz, "-o", "no.tum"];
-        let refused = run(place.path(), &line);
+        let refused = run(folder.path(), &line);
         assert_eq!(refused.code, 2, "{}", refused.words);
         assert!(refused.words.contains(words), "{}", refused.words);
     }
@@ -321,9 +322,9 @@ fn a_low_pass_is_in_hz() {
 
 #[test]
 fn what_cannot_be_smoothed_is_refused() {
-    let place = place();
+    let folder = path_folder();
     fs::write(
-        place.path().join("uneven.dat"),
+        folder.path().join("uneven.dat"),
         "# 1 1\n0 1 0 0 0\n1 1 0 0 0\n3 1 0 0 0\n",
     )
     .unwrap();
@@ -339,13 +340,13 @@ fn what_cannot_be_smoothed_is_refused() {
         ),
     ] {
         let all = [&["smooth", "-o", "out.npy"], line].concat();
-        let run = run(place.path(), &all);
+        let run = run(folder.path(), &all);
         assert_eq!(run.code, code, "{line:?}: {}", run.words);
         assert!(run.words.contains(words), "{line:?}: {}", run.words);
     }
     // A kernel that is wider than the track is none the worse for it.
     succeed(
-        place.path(),
+        folder.path(),
         &[
             "smooth",
             "a.dat",

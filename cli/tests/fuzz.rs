@@ -6,6 +6,8 @@
 
 #![allow(clippy::disallowed_methods)] // as in tests/all.rs
 
+#[path = "../../formats/tests/cases.rs"]
+mod cases;
 #[path = "../../tests/support/mod.rs"]
 mod support;
 #[path = "../../fuzz/src/targets.rs"]
@@ -75,32 +77,32 @@ fn run(name: &str, target: Target, input: &[u8]) -> u64 {
 
 fn mutate(input: &mut Vec<u8>, random: &mut Random, corpus: &[Vec<u8>], words: &[&str]) {
     let mut below = |limit: usize| random.next() as usize % limit.max(1);
-    let place = below(input.len());
+    let offset = below(input.len());
     match below(9) {
-        0 if !input.is_empty() => input[place] ^= 1 << below(8),
-        1 if !input.is_empty() => input[place] = below(256) as u8,
-        2 => input.insert(place, below(256) as u8),
+        0 if !input.is_empty() => input[offset] ^= 1 << below(8),
+        1 if !input.is_empty() => input[offset] = below(256) as u8,
+        2 => input.insert(offset, below(256) as u8),
         3 if !input.is_empty() => {
-            let end = (place + 1 + below(16)).min(input.len());
-            input.drain(place..end);
+            let end = (offset + 1 + below(16)).min(input.len());
+            input.drain(offset..end);
         }
         4 if !input.is_empty() => {
-            let end = (place + 1 + below(64)).min(input.len());
-            let piece = input[place..end].to_vec();
+            let end = (offset + 1 + below(64)).min(input.len());
+            let piece = input[offset..end].to_vec();
             let to = below(input.len());
             input.splice(to..to, piece);
         }
-        5 => input.truncate(place),
+        5 => input.truncate(offset),
         6 => {
             let other = &corpus[below(corpus.len())];
             let from = below(other.len());
             let piece = other[from..(from + below(64)).min(other.len())].to_vec();
-            input.splice(place..place, piece);
+            input.splice(offset..offset, piece);
         }
         _ if !words.is_empty() => {
             let word = words[below(words.len())].bytes();
-            let end = (place + below(3) * below(8)).min(input.len());
-            input.splice(place..end, word);
+            let end = (offset + below(3) * below(8)).min(input.len());
+            input.splice(offset..end, word);
         }
         _ => {}
     }
@@ -109,9 +111,7 @@ fn mutate(input: &mut Vec<u8>, random: &mut Random, corpus: &[Vec<u8>], words: &
 
 /// Every good and bad file of a format's fixtures, by the format's name and extensions.
 fn fixtures(format: &str) -> Vec<Vec<u8>> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../formats/tests/fixtures");
-    let folder = folder.join(format);
-    let paths = fs::read_dir(folder)
+    let paths = fs::read_dir(cases::folder(format))
         .unwrap()
         .map(|entry| entry.unwrap().path());
     let of = tumble_formats::Format::of;

@@ -8,20 +8,20 @@ use crate::program::{run, sample_folder};
 const MARKS: [&str; 7] = ["Some(", "None", "Ok(", "Err(", "::", " { ", "\\\""];
 
 /// What is wrong with a value, and where.
-fn faults(value: &Value, place: &str, found: &mut Vec<String>) {
+fn faults(value: &Value, location: &str, found: &mut Vec<String>) {
     match value {
         Value::Object(members) => {
             for (name, value) in members {
                 let is_plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_';
                 if !name.chars().all(is_plain) {
-                    found.push(format!("{place}: the name `{name}`"));
+                    found.push(format!("{location}: the name `{name}`"));
                 }
-                faults(value, &format!("{place}.{name}"), found);
+                faults(value, &format!("{location}.{name}"), found);
             }
         }
         Value::Array(values) => {
             let each = values.iter().enumerate();
-            each.for_each(|(i, value)| faults(value, &format!("{place}[{i}]"), found));
+            each.for_each(|(i, value)| faults(value, &format!("{location}[{i}]"), found));
         }
         Value::String(text) => {
             let words = text.split(|c: char| !c.is_ascii_alphanumeric());
@@ -36,10 +36,10 @@ fn faults(value: &Value, place: &str, found: &mut Vec<String>) {
                 .clone()
                 .find(|word| is_camel(word) && !names.contains(word));
             // Names that others have given.
-            let is_name = place.contains("device") || place.ends_with(".source");
+            let is_name = location.contains("device") || location.ends_with(".source");
             let mark = MARKS.iter().copied().find(|mark| text.contains(mark));
             if let Some(mark) = mark.or(camel.filter(|_| !is_name)) {
-                found.push(format!("{place}: `{mark}` in `{text}`"));
+                found.push(format!("{location}: `{mark}` in `{text}`"));
             }
         }
         _ => {}
@@ -48,8 +48,8 @@ fn faults(value: &Value, place: &str, found: &mut Vec<String>) {
 
 #[test]
 fn every_command_prints_json_without_debug_text() {
-    let folder = sample_folder();
-    let place = folder.path();
+    let temporary = sample_folder();
+    let folder = temporary.path();
     let lines: &[&[&str]] = &[
         &["info", "a.dat", "b.dat", "antipodal.dat"],
         &["methods"],
@@ -76,9 +76,9 @@ fn every_command_prints_json_without_debug_text() {
     ];
     for line in lines {
         if line.contains(&"a.npy.again") {
-            std::fs::copy(place.join("a.npy"), place.join("a.npy.again")).unwrap();
+            std::fs::copy(folder.join("a.npy"), folder.join("a.npy.again")).unwrap();
         }
-        let run = run(place, &[*line, &["--json"]].concat());
+        let run = run(folder, &[*line, &["--json"]].concat());
         assert_eq!(run.code, 0, "{line:?}: {}", run.words);
         let text = String::from_utf8(run.out).unwrap();
         let mut found = Vec::new();

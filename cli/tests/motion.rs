@@ -1,20 +1,20 @@
 //! Motion files through the program: several animations a file, conversion between formats, bodies
-//! without places, and trees of mixed formats.
+//! without positions, and trees of mixed formats.
 
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
 
-use crate::program::{Run, root, run, sample_folder, succeed};
+use crate::program::{Run, run, sample_folder, succeed};
 
 /// Two animations of a node that turns about x, `Walk` and `Run`, and one that moves nothing.
 fn two_animations() -> String {
     let times = [0.0f32, 0.5, 1.0];
-    let turn = |angle: f32| [(angle / 2.0).sin(), 0.0, 0.0, (angle / 2.0).cos()];
+    let about_x = |angle: f32| [(angle / 2.0).sin(), 0.0, 0.0, (angle / 2.0).cos()];
     let numbers: Vec<f32> = times
         .into_iter()
-        .chain([0.0, 0.4, 1.0].into_iter().flat_map(turn))
-        .chain([0.0, -0.8, 0.3].into_iter().flat_map(turn))
+        .chain([0.0, 0.4, 1.0].into_iter().flat_map(about_x))
+        .chain([0.0, -0.8, 0.3].into_iter().flat_map(about_x))
         .collect();
     let bytes: Vec<u8> = numbers.iter().flat_map(|x| x.to_le_bytes()).collect();
     let encoded: String = bytes.iter().map(|byte| format!("%{byte:02x}")).collect();
@@ -46,27 +46,27 @@ fn names(folder: &Path) -> BTreeSet<String> {
         .collect()
 }
 
-fn line(place: &Path, line: &str) -> Run {
-    succeed(place, &line.split(' ').collect::<Vec<_>>())
+fn line(folder: &Path, line: &str) -> Run {
+    succeed(folder, &line.split(' ').collect::<Vec<_>>())
 }
 
-fn refused(place: &Path, line: &str) -> Run {
-    let run = run(place, &line.split(' ').collect::<Vec<_>>());
+fn refused(folder: &Path, line: &str) -> Run {
+    let run = run(folder, &line.split(' ').collect::<Vec<_>>());
     assert_ne!(run.code, 0, "{line}: {}", run.words);
     run
 }
 
 fn fixture(at: &Path, from: &str, to: &str) {
-    let from = root().join("formats/tests/fixtures").join(from);
-    fs::copy(from, at.join(to)).unwrap();
+    let (format, name) = from.split_once('/').unwrap();
+    fs::copy(crate::cases::folder(format).join(name), at.join(to)).unwrap();
 }
 
 #[test]
 fn a_file_of_several_animations_gives_several_results_that_are_checked_and_resumed() {
-    let place = sample_folder();
-    let at = place.path();
-    fs::write(at.join("fox.gltf"), two_animations()).unwrap();
-    let one_file = refused(at, "eval fox.gltf -o fox.npy");
+    let temporary = sample_folder();
+    let folder = temporary.path();
+    fs::write(folder.join("fox.gltf"), two_animations()).unwrap();
+    let one_file = refused(folder, "eval fox.gltf -o fox.npy");
     for words in [
         "has several animations, Walk, Run",
         "--animation",
@@ -74,58 +74,58 @@ fn a_file_of_several_animations_gives_several_results_that_are_checked_and_resum
     ] {
         assert!(one_file.words.contains(words), "{}", one_file.words);
     }
-    line(at, "eval fox.gltf --animation Run -o run.npy");
+    line(folder, "eval fox.gltf --animation Run -o run.npy");
 
-    line(at, "eval fox.gltf -o out/ --device cpu");
+    line(folder, "eval fox.gltf -o out/ --device cpu");
     let all = ["fox.Run.npy", "fox.Walk.npy", "manifest.jsonl"].map(str::to_owned);
-    assert_eq!(names(&at.join("out")), BTreeSet::from(all.clone()));
-    let run = fs::read(at.join("out/fox.Run.npy")).unwrap();
-    assert_eq!(run, fs::read(at.join("run.npy")).unwrap());
-    line(at, "check out");
-    let again = line(at, "eval fox.gltf -o out/ --device cpu --resume");
+    assert_eq!(names(&folder.join("out")), BTreeSet::from(all.clone()));
+    let run = fs::read(folder.join("out/fox.Run.npy")).unwrap();
+    assert_eq!(run, fs::read(folder.join("run.npy")).unwrap());
+    line(folder, "check out");
+    let again = line(folder, "eval fox.gltf -o out/ --device cpu --resume");
     assert!(again.words.contains("1 result skipped"), "{}", again.words);
 
     // One of both is missing: the file is done again.
-    fs::remove_file(at.join("out/fox.Run.npy")).unwrap();
-    refused(at, "check out");
-    let again = line(at, "eval fox.gltf -o out/ --device cpu --resume");
+    fs::remove_file(folder.join("out/fox.Run.npy")).unwrap();
+    refused(folder, "check out");
+    let again = line(folder, "eval fox.gltf -o out/ --device cpu --resume");
     assert!(!again.words.contains("skipped"), "{}", again.words);
-    assert_eq!(names(&at.join("out")), BTreeSet::from(all));
-    assert_eq!(run, fs::read(at.join("out/fox.Run.npy")).unwrap());
-    line(at, "check out");
+    assert_eq!(names(&folder.join("out")), BTreeSet::from(all));
+    assert_eq!(run, fs::read(folder.join("out/fox.Run.npy")).unwrap());
+    line(folder, "check out");
 }
 
 #[test]
 fn clips_and_inputs_of_one_name_do_not_overwrite_each_other() {
-    let place = sample_folder();
-    let at = place.path();
-    fs::write(at.join("fox.gltf"), two_animations()).unwrap();
-    fs::copy(at.join("a.dat"), at.join("fox.Run.dat")).unwrap();
+    let temporary = sample_folder();
+    let folder = temporary.path();
+    fs::write(folder.join("fox.gltf"), two_animations()).unwrap();
+    fs::copy(folder.join("a.dat"), folder.join("fox.Run.dat")).unwrap();
     let line = "eval fox.gltf fox.Run.dat -o out --overwrite";
-    let clash = run(at, &line.split(' ').collect::<Vec<_>>());
+    let clash = run(folder, &line.split(' ').collect::<Vec<_>>());
     let words = "another input's result is fox.Run.npy already";
     assert!(
         clash.code != 0 && clash.words.contains(words),
         "{}",
         clash.words
     );
-    let (found, own) = (at.join("out/fox.Run.npy"), at.join("own.npy"));
+    let (found, expected) = (folder.join("out/fox.Run.npy"), folder.join("own.npy"));
     succeed(
-        at,
+        folder,
         &["eval", "fox.gltf", "--animation", "Run", "-o", "own.npy"],
     );
-    assert_eq!(fs::read(found).unwrap(), fs::read(own).unwrap());
+    assert_eq!(fs::read(found).unwrap(), fs::read(expected).unwrap());
 }
 
-/// Sampled at the rate of its keys, what was converted is what it was.
+/// A converted clip, sampled at the rate of its keys, is unchanged.
 #[test]
 fn every_format_that_holds_clips_holds_a_walk() {
-    let place = sample_folder();
-    let at = place.path();
-    fixture(at, "bvh/good.bvh", "walk.bvh");
+    let temporary = sample_folder();
+    let folder = temporary.path();
+    fixture(folder, "bvh/good.bvh", "walk.bvh");
     let rotations = |file: &str| -> Vec<f32> {
         succeed(
-            at,
+            folder,
             &[
                 "eval",
                 file,
@@ -138,13 +138,13 @@ fn every_format_that_holds_clips_holds_a_walk() {
                 "--overwrite",
             ],
         );
-        let bytes = fs::read(at.join("x.npy")).unwrap();
+        let bytes = fs::read(folder.join("x.npy")).unwrap();
         npyz::NpyFile::new(&bytes[..]).unwrap().into_vec().unwrap()
     };
     let expected = rotations("walk.bvh");
     for format in ["glb", "gltf", "npz", "parquet", "arrow", "csv"] {
         let file = format!("walk.{format}");
-        succeed(at, &["convert", "walk.bvh", "-o", &file]);
+        succeed(folder, &["convert", "walk.bvh", "-o", &file]);
         let found = rotations(&file);
         assert_eq!(found.len(), expected.len(), "{format}");
         let pairs = found.chunks_exact(4).zip(expected.chunks_exact(4));
@@ -153,7 +153,7 @@ fn every_format_that_holds_clips_holds_a_walk() {
             assert!(dot.abs() > 1.0 - 1e-6, "{format}: {found:?} {expected:?}");
         }
         let back = format!("{format}.bvh");
-        succeed(at, &["convert", &file, "-o", &back]);
+        succeed(folder, &["convert", &file, "-o", &back]);
         let found = rotations(&back);
         assert_eq!(found.len(), expected.len(), "{format}");
     }
@@ -161,38 +161,38 @@ fn every_format_that_holds_clips_holds_a_walk() {
 
 #[test]
 fn a_tree_of_mixed_formats_is_walked() {
-    let place = sample_folder();
-    let at = place.path();
-    fs::create_dir_all(at.join("clips/deep")).unwrap();
-    fs::write(at.join("clips/fox.gltf"), two_animations()).unwrap();
-    fixture(at, "bvh/good.bvh", "clips/deep/walk.bvh");
-    fixture(at, "npz/smpl.npz", "clips/deep/body.npz");
-    fixture(at, "tum/good.tum", "clips/camera.tum");
-    line(at, "eval clips -o out --to glb --fps 30");
+    let temporary = sample_folder();
+    let folder = temporary.path();
+    fs::create_dir_all(folder.join("clips/deep")).unwrap();
+    fs::write(folder.join("clips/fox.gltf"), two_animations()).unwrap();
+    fixture(folder, "bvh/good.bvh", "clips/deep/walk.bvh");
+    fixture(folder, "npz/smpl.npz", "clips/deep/body.npz");
+    fixture(folder, "tum/good.tum", "clips/camera.tum");
+    line(folder, "eval clips -o out --to glb --fps 30");
     assert_eq!(
-        names(&at.join("out")),
+        names(&folder.join("out")),
         ["camera.glb", "deep", "fox.glb", "manifest.jsonl"]
             .map(str::to_owned)
             .into()
     );
     assert_eq!(
-        names(&at.join("out/deep")),
+        names(&folder.join("out/deep")),
         ["body.glb", "walk.glb"].map(str::to_owned).into()
     );
-    line(at, "check out");
+    line(folder, "check out");
 }
 
 #[test]
 fn bodies_have_places_in_the_world_when_they_are_given_offsets() {
-    let place = sample_folder();
-    let at = place.path();
-    fixture(at, "npz/smpl.npz", "body.npz");
-    let without = refused(at, "eval body.npz --output world -o world.npy");
+    let temporary = sample_folder();
+    let folder = temporary.path();
+    fixture(folder, "npz/smpl.npz", "body.npz");
+    let without = refused(folder, "eval body.npz --output world -o world.npy");
     assert!(without.words.contains("--offsets"), "{}", without.words);
-    assert!(!at.join("world.npy").exists());
-    fs::write(at.join("short.txt"), "0 0.1 0\n").unwrap();
+    assert!(!folder.join("world.npy").exists());
+    fs::write(folder.join("short.txt"), "0 0.1 0\n").unwrap();
     let short = refused(
-        at,
+        folder,
         "eval body.npz --output world --offsets short.txt -o world.npy",
     );
     assert!(
@@ -202,15 +202,15 @@ fn bodies_have_places_in_the_world_when_they_are_given_offsets() {
     );
 
     fs::write(
-        at.join("offsets.txt"),
+        folder.join("offsets.txt"),
         "# x y z\n".to_owned() + &"0 0.1 0\n".repeat(24),
     )
     .unwrap();
     line(
-        at,
+        folder,
         "eval body.npz --output world --offsets offsets.txt -o world.npy",
     );
-    let bytes = fs::read(at.join("world.npy")).unwrap();
+    let bytes = fs::read(folder.join("world.npy")).unwrap();
     let file = npyz::NpyFile::new(&bytes[..]).unwrap();
     assert_eq!(file.shape()[1..], [24, 7]);
     let poses = file.into_vec::<f32>().unwrap();
@@ -222,11 +222,11 @@ fn bodies_have_places_in_the_world_when_they_are_given_offsets() {
 
 #[test]
 fn the_page_has_a_menu_of_a_files_animations() {
-    let place = sample_folder();
-    let at = place.path();
-    fs::write(at.join("fox.gltf"), two_animations()).unwrap();
-    line(at, "view fox.gltf -o view.html");
-    let Some(mut page) = crate::browser::Page::open(&at.join("view.html")) else {
+    let temporary = sample_folder();
+    let folder = temporary.path();
+    fs::write(folder.join("fox.gltf"), two_animations()).unwrap();
+    line(folder, "view fox.gltf -o view.html");
+    let Some(mut page) = crate::browser::Page::open(&folder.join("view.html")) else {
         return;
     };
     let options =
@@ -242,18 +242,18 @@ fn the_page_has_a_menu_of_a_files_animations() {
 
 #[test]
 fn times_since_1970_are_kept_or_said_to_be_moved() {
-    let place = sample_folder();
-    let at = place.path();
+    let temporary = sample_folder();
+    let folder = temporary.path();
     let poses = "1305031098.6659 1 2 3 0 0 0 1\n1305031099.6659 1 2 4 0 0 0.6 0.8\n";
-    fs::write(at.join("camera.txt"), poses).unwrap();
-    line(at, "convert camera.txt --from tum -o camera.npz");
-    let told = line(at, "info camera.npz");
-    let told = String::from_utf8(told.out).unwrap();
+    fs::write(folder.join("camera.txt"), poses).unwrap();
+    line(folder, "convert camera.txt --from tum -o camera.npz");
+    let run = line(folder, "info camera.npz");
+    let info = String::from_utf8(run.out).unwrap();
     assert!(
-        told.contains("1305031098.6659 to 1305031099.6659"),
-        "{told}"
+        info.contains("1305031098.6659 to 1305031099.6659"),
+        "{info}"
     );
-    let moved = line(at, "convert camera.txt --from tum -o camera.glb");
+    let moved = line(folder, "convert camera.txt --from tum -o camera.glb");
     assert!(
         moved.words.contains("W204") && moved.words.contains("1305031098"),
         "{}",
@@ -261,93 +261,96 @@ fn times_since_1970_are_kept_or_said_to_be_moved() {
     );
 }
 
-/// A file written in its own format keeps what no clip holds.
+/// A file written in its own format keeps everything that is not part of a clip.
 #[test]
 fn converting_and_smoothing_keep_the_rest_of_a_file() {
-    let place = sample_folder();
-    let at = place.path();
+    let temporary = sample_folder();
+    let folder = temporary.path();
     let with = two_animations().replacen('{', r#"{"materials":[{"name":"skin"}],"#, 1);
-    fs::write(at.join("fox.gltf"), &with).unwrap();
+    fs::write(folder.join("fox.gltf"), &with).unwrap();
     for command in ["convert", "smooth --fps 8", "eval --fps 8", "reduce"] {
         let out = format!("{}.glb", command.split(' ').next().unwrap());
-        line(at, &format!("{command} fox.gltf -o {out}"));
-        let bytes = fs::read(at.join(&out)).unwrap();
+        line(folder, &format!("{command} fox.gltf -o {out}"));
+        let bytes = fs::read(folder.join(&out)).unwrap();
         let text = String::from_utf8_lossy(&bytes);
         assert!(
             text.contains(r#""materials":[{"name":"skin"}]"#),
             "{command}: {text}"
         );
-        let told = String::from_utf8(line(at, &format!("info {out}")).out).unwrap();
+        let info = String::from_utf8(line(folder, &format!("info {out}")).out).unwrap();
         assert!(
-            told.contains("animation Walk") && told.contains("animation Run"),
-            "{told}"
+            info.contains("animation Walk") && info.contains("animation Run"),
+            "{info}"
         );
     }
-    line(at, "convert fox.gltf -o copy.gltf");
-    assert_eq!(fs::read_to_string(at.join("copy.gltf")).unwrap(), with);
-    let part = line(at, "convert fox.gltf --animation Run -o run.glb");
+    line(folder, "convert fox.gltf -o copy.gltf");
+    assert_eq!(fs::read_to_string(folder.join("copy.gltf")).unwrap(), with);
+    let part = line(folder, "convert fox.gltf --animation Run -o run.glb");
     assert!(
         part.words
-            .contains("one animation makes a new file; stays behind: materials"),
+            .contains("one animation makes a new file; not copied: materials"),
         "{}",
         part.words
     );
-    let scaled = line(at, "convert fox.gltf --up z -o up.glb");
+    let scaled = line(folder, "convert fox.gltf --up z -o up.glb");
     assert!(
         scaled.words.contains("stays behind: materials"),
         "{}",
         scaled.words
     );
-    let other = line(at, "convert fox.gltf --animation Run -o run.csv");
+    let other = line(folder, "convert fox.gltf --animation Run -o run.csv");
     assert!(
         other.words.contains("left out: materials"),
         "{}",
         other.words
     );
-    line(at, "convert fox.gltf --start 0.25 --end 0.75 -o cut.glb");
-    let told = String::from_utf8(line(at, "info cut.glb").out).unwrap();
-    assert_eq!(told.matches("0.25 to 0.75 s").count(), 2, "{told}");
+    line(
+        folder,
+        "convert fox.gltf --start 0.25 --end 0.75 -o cut.glb",
+    );
+    let info = String::from_utf8(line(folder, "info cut.glb").out).unwrap();
+    assert_eq!(info.matches("0.25 to 0.75 s").count(), 2, "{info}");
 }
 
 #[test]
 fn one_name_of_two_animations_is_refused_with_their_places() {
-    let place = sample_folder();
-    let at = place.path();
+    let temporary = sample_folder();
+    let folder = temporary.path();
     fs::write(
-        at.join("two.gltf"),
+        folder.join("two.gltf"),
         two_animations().replace("\"Run\"", "\"Walk\""),
     )
     .unwrap();
-    let run = refused(at, "eval two.gltf --animation Walk -o out.npy");
+    let run = refused(folder, "eval two.gltf --animation Walk -o out.npy");
     assert!(
         run.words
-            .contains("2 animations `Walk`, at the places 0 and 1"),
+            .contains("2 animations `Walk`, at the indices 0 and 1"),
         "{}",
         run.words
     );
-    line(at, "eval two.gltf --animation 1 -o out.npy");
+    line(folder, "eval two.gltf --animation 1 -o out.npy");
 }
 
 #[test]
 fn angles_of_bvh_keep_their_order_or_get_the_one_that_is_asked_for() {
-    let place = sample_folder();
-    let at = place.path();
+    let temporary = sample_folder();
+    let folder = temporary.path();
     let text = "HIERARCHY\nROOT left hip\n{\n  OFFSET 0 0 0\n  CHANNELS 3 Xrotation Yrotation \
                 Zrotation\n  End Site\n  {\n    OFFSET 0 12.5 0\n  }\n}\nMOTION\nFrames: 3\nFrame \
                 Time: 0.04\n0 0 0\n10 20 30\n20 40 60\n";
-    fs::write(at.join("in.bvh"), text).unwrap();
-    line(at, "convert in.bvh -o same.bvh");
-    let same = fs::read_to_string(at.join("same.bvh")).unwrap();
+    fs::write(folder.join("in.bvh"), text).unwrap();
+    line(folder, "convert in.bvh -o same.bvh");
+    let same = fs::read_to_string(folder.join("same.bvh")).unwrap();
     assert_eq!(
         same.split("Frame Time").next(),
         text.split("Frame Time").next()
     );
     for command in ["convert", "smooth", "reduce --tolerance 0", "eval --fps 25"] {
         let run = line(
-            at,
+            folder,
             &format!("{command} in.bvh --sequence ZYX -o turned.bvh --overwrite"),
         );
-        let found = fs::read_to_string(at.join("turned.bvh")).unwrap();
+        let found = fs::read_to_string(folder.join("turned.bvh")).unwrap();
         assert!(
             found.contains("CHANNELS 3 Zrotation Yrotation Xrotation\n  End Site"),
             "{command}: {found} {}",
@@ -355,7 +358,7 @@ fn angles_of_bvh_keep_their_order_or_get_the_one_that_is_asked_for() {
         );
         assert!(found.contains("OFFSET 0 12.5 0"), "{found}");
     }
-    let run = refused(at, "convert in.bvh --sequence ZYX -o out.glb");
+    let run = refused(folder, "convert in.bvh --sequence ZYX -o out.glb");
     assert!(run.words.contains("leave out --sequence"), "{}", run.words);
 }
 
@@ -363,13 +366,13 @@ fn angles_of_bvh_keep_their_order_or_get_the_one_that_is_asked_for() {
 /// in others.
 #[test]
 fn fbx_goes_into_other_formats() {
-    let folder = sample_folder();
-    let place = folder.path();
+    let temporary = sample_folder();
+    let folder = temporary.path();
     let fixtures = concat!(env!("CARGO_MANIFEST_DIR"), "/../formats/tests/fixtures/fbx");
-    std::fs::copy(format!("{fixtures}/walk.fbx"), place.join("walk.fbx")).unwrap();
+    std::fs::copy(format!("{fixtures}/walk.fbx"), folder.join("walk.fbx")).unwrap();
     let info = |line: &[&str]| -> serde_json::Value {
         let line = [&["info", "walk.fbx", "--json"][..], line].concat();
-        serde_json::from_slice(&succeed(place, &line).out).unwrap()
+        serde_json::from_slice(&succeed(folder, &line).out).unwrap()
     };
     let found = &info(&[])[0];
     assert_eq!(found["metres"], 0.01);
@@ -378,18 +381,18 @@ fn fbx_goes_into_other_formats() {
     // One of the hips, which do not turn, and three of the knee.
     assert_eq!(info(&["--keyframes"])[0]["keys"], 4);
 
-    succeed(place, &["convert", "walk.fbx", "-o", "walk.glb"]);
+    succeed(folder, &["convert", "walk.fbx", "-o", "walk.glb"]);
     let alike = ["--world", "--tolerance", "1e-4", "--distance", "1e-4"];
     succeed(
-        place,
+        folder,
         &[&["compare", "walk.fbx", "walk.glb"][..], &alike].concat(),
     );
     let metres = ["--scale", "metres", "--up", "y", "-o", "metres.bvh"];
     succeed(
-        place,
+        folder,
         &[&["eval", "walk.fbx", "--fps", "30"][..], &metres].concat(),
     );
-    let text = std::fs::read_to_string(place.join("metres.bvh")).unwrap();
+    let text = std::fs::read_to_string(folder.join("metres.bvh")).unwrap();
     // The hips go 30 cm along x; z was up.
     let last = text.lines().last().unwrap();
     assert!(last.starts_with("0.3 0 0 0 -90 0 "), "{last}");
@@ -401,23 +404,23 @@ fn fbx_goes_into_other_formats() {
         ("curves.npy", &[]),
     ] {
         let line = ["eval", "walk.fbx", "--fps", "30", "-o", name];
-        succeed(place, &[&line[..], more].concat());
+        succeed(folder, &[&line[..], more].concat());
     }
     let zero = ["--tolerance", "0"];
     succeed(
-        place,
+        folder,
         &[&["compare", "slerp.npy", "keys.npy"][..], &zero].concat(),
     );
     let apart = run(
-        place,
+        folder,
         &[&["compare", "keys.npy", "curves.npy"][..], &zero].concat(),
     );
     assert_eq!(apart.code, 8, "{}", apart.words);
-    let refused = run(place, &["convert", "walk.glb", "-o", "back.fbx"]);
+    let refused = run(folder, &["convert", "walk.glb", "-o", "back.fbx"]);
     assert_ne!(refused.code, 0, "{}", refused.words);
-    let scaled = run(place, &["info", "walk.glb", "--scale", "metres"]);
+    let scaled = run(folder, &["info", "walk.glb", "--scale", "metres"]);
     assert!(
-        scaled.words.contains("does not say its unit"),
+        scaled.words.contains("does not state its unit of length"),
         "{}",
         scaled.words
     );

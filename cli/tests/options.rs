@@ -11,10 +11,10 @@ use std::path::{Path, PathBuf};
 
 const DONE: u8 = 0;
 const USAGE: u8 = 2;
-/// What is read in a format that it is not in.
+/// The exit code of inputs that are not in the format requested.
 const INPUT: u8 = 4;
 
-/// What is added to a command line to give one option, with what it needs to say anything. The values
+/// The words of each option, with those that it needs to have an effect. The values
 /// are such that they change the result.
 const OPTIONS: &[&[&str]] = &[
     &["--method", "c2"],
@@ -70,8 +70,8 @@ const OPTIONS: &[&[&str]] = &[
     &["--from", "dat"],
 ];
 
-/// Options that decide over no byte: they say who computes, what may be read and replaced, and what is
-/// told.
+/// Options that change no byte of a result: which device computes, what may be read and replaced, and what
+/// is reported.
 const SILENT: &[&[&str]] = &[
     &["--overwrite"],
     &["--pipes"],
@@ -85,7 +85,7 @@ const SILENT: &[&[&str]] = &[
 
 /// The bytes of a result by its command line; nothing where it was refused as a usage fault.
 struct Results {
-    place: PathBuf,
+    folder: PathBuf,
     known: HashMap<Vec<&'static str>, Option<Vec<u8>>>,
 }
 
@@ -101,15 +101,18 @@ impl Results {
         } else {
             "out.npy"
         };
-        let out = self.place.join(name);
+        let out = self.folder.join(name);
         let _ = std::fs::remove_file(&out);
-        let place = |word: &str| match word.contains('.') && !word.starts_with("--") {
-            true => Some(self.place.join(word)).filter(|path| path.exists()),
-            false => None,
+        let file = |word: &str| {
+            if word.contains('.') && !word.starts_with("--") {
+                Some(self.folder.join(word)).filter(|path| path.exists())
+            } else {
+                None
+            }
         };
         let mut words: Vec<OsString> = vec!["tumble".into(), "eval".into()];
         for word in &line {
-            words.push(place(word).map_or_else(|| word.into(), PathBuf::into_os_string));
+            words.push(file(word).map_or_else(|| word.into(), PathBuf::into_os_string));
         }
         words.extend(["-o".into(), out.clone().into_os_string()]);
         let code = tumble_cli::host::run(words);
@@ -169,17 +172,20 @@ fn dat() -> String {
     text
 }
 
-fn prepare(place: &Path) {
-    let write = |name: &str, text: &str| std::fs::write(place.join(name), text).unwrap();
+fn prepare(folder: &Path) {
+    let write = |name: &str, text: &str| std::fs::write(folder.join(name), text).unwrap();
     write("walk.bvh", &bvh());
     write("keys.dat", &dat());
     write("times.txt", "0.11\n0.31\n0.52\n0.97\n1.61\n");
     write("offsets.txt", "0 0 0\n0 -1 0\n");
     write("list.txt", "");
     let run = |line: &[&str]| {
-        let words = line.iter().map(|word| match word.contains('.') {
-            true => place.join(word).into_os_string(),
-            false => word.into(),
+        let words = line.iter().map(|word| {
+            if word.contains('.') {
+                folder.join(word).into_os_string()
+            } else {
+                word.into()
+            }
         });
         assert_eq!(tumble_cli::host::run(words), DONE, "{line:?}");
     };
@@ -189,33 +195,33 @@ fn prepare(place: &Path) {
 
 /// An input in a folder of its own.
 fn results() -> (tempfile::TempDir, Results) {
-    let place = tempfile::tempdir().unwrap();
-    prepare(place.path());
+    let folder = tempfile::tempdir().unwrap();
+    prepare(folder.path());
     let results = Results {
-        place: place.path().to_owned(),
+        folder: folder.path().to_owned(),
         known: HashMap::new(),
     };
-    (place, results)
+    (folder, results)
 }
 
 /// Every pair of options on one input.
 fn walk(input: &'static str) {
-    let (_place, mut results) = results();
+    let (_folder, mut results) = results();
     let mut ignored = Vec::new();
     let plain = results
         .of(input, &[])
         .expect("a plain command line succeeds");
     for silent in SILENT {
-        let own = results.of(input, &[silent]);
-        assert_eq!(own.as_ref(), Some(&plain), "{input} {silent:?}");
+        let with_option = results.of(input, &[silent]);
+        assert_eq!(with_option.as_ref(), Some(&plain), "{input} {silent:?}");
     }
-    for (place, &first) in OPTIONS.iter().enumerate() {
+    for (i, &first) in OPTIONS.iter().enumerate() {
         let alone = results.of(input, &[first]);
-        if alone.as_ref() == Some(&plain) && !is_usual(input, first, &[]) {
+        if alone.as_ref() == Some(&plain) && !is_redundant(input, first, &[]) {
             ignored.push(format!("{input} {first:?}"));
         }
-        for &second in &OPTIONS[place + 1..] {
-            // One option twice is a fault of its own.
+        for &second in &OPTIONS[i + 1..] {
+            // The same option twice is another error.
             if first
                 .iter()
                 .any(|word| word.starts_with("--") && second.contains(word))
@@ -225,10 +231,10 @@ fn walk(input: &'static str) {
             let Some(both) = results.of(input, &[first, second]) else {
                 continue;
             };
-            for (own, other) in [(first, second), (second, first)] {
+            for (option, other) in [(first, second), (second, first)] {
                 let without = results.of(input, &[other]);
-                if without.as_ref() == Some(&both) && !is_usual(input, own, other) {
-                    ignored.push(format!("{input} {other:?} {own:?}"));
+                if without.as_ref() == Some(&both) && !is_redundant(input, option, other) {
+                    ignored.push(format!("{input} {other:?} {option:?}"));
                 }
             }
         }
@@ -267,13 +273,13 @@ fn pairs_on_arrays() {
 
 #[test]
 fn every_option_is_obeyed_somewhere() {
-    let (_place, mut results) = results();
+    let (_folder, mut results) = results();
     for option in OPTIONS {
         let inputs = ["walk.bvh", "keys.dat", "walk.glb", "walk.npz"];
         let is_obeyed = inputs
             .iter()
             .any(|input| results.of(input, &[option]).is_some());
-        // What says nothing alone does beside what it is about.
+        // These have an effect only beside the option that they refine.
         let wanting = [
             "--sequence",
             "--major",
@@ -291,18 +297,18 @@ fn every_option_is_obeyed_somewhere() {
     }
 }
 
-/// Whether an option says what would be so without it, beside another: then it is obeyed, and nothing
+/// Whether an option, beside another, asks for what would be so without it: then it is obeyed, and nothing
 /// changes.
-fn is_usual(input: &str, own: &[&str], other: &[&str]) -> bool {
+fn is_redundant(input: &str, option: &[&str], other: &[&str]) -> bool {
     let has = |word: &str| other.contains(&word);
     let are_frames = has("csv") || has("world") || has("transform");
-    match own {
+    match option {
         ["--layout", "track"] | ["--order", "xyzw"] | ["--from", _] => true,
         ["--layout", "frame"] => are_frames,
         ["--order", "wxyz"] => has("csv"),
         // These files have quaternions whose signs continue.
         ["--path", _] => input != "keys.dat",
-        // What lasts a thousandth of the time has one frame.
+        // A clip of a thousandth of the length has one frame.
         _ if has("--time-unit") => true,
         // So its samplers say.
         ["--method", "slerp"] => input == "walk.glb",

@@ -49,38 +49,38 @@ impl Marks {
 
     /// Curves of that colour; the legend's mark is a line of two points.
     fn curves(&self, colour: &str) -> Vec<&Vec<(f64, f64)>> {
-        let own = self
+        let curves = self
             .lines
             .iter()
             .filter(|line| line.0 == colour && line.1.len() > 2);
-        own.map(|line| &line.1).collect()
+        curves.map(|line| &line.1).collect()
     }
 
     fn says(&self, text: &str) -> bool {
-        self.texts.iter().any(|own| own == text)
+        self.texts.iter().any(|shown| shown == text)
     }
 }
 
-fn plot(place: &Path, arguments: &[&str]) -> Marks {
+fn plot(folder: &Path, arguments: &[&str]) -> Marks {
     let line = [
         &["plot", "a.dat", "-o", "out.svg", "--overwrite"],
         arguments,
     ]
     .concat();
-    let run = succeed(place, &line);
+    let run = succeed(folder, &line);
     assert!(
         run.words.contains("1 picture of 1 input, on "),
         "{}",
         run.words
     );
-    Marks::of(&place.join("out.svg"))
+    Marks::of(&folder.join("out.svg"))
 }
 
 /// Would catch a component mistaken for another, a wrong order of boxes, and an axis that
 /// does not show the values it says.
 #[test]
 fn a_dimension_is_drawn_with_its_keys_where_its_values_are() {
-    let place = sample_folder();
+    let folder = sample_folder();
     let (times, keys) = pendulum();
     // z of box 1 and x of box 2 are what turns.
     for (dimension, title, track, component) in [
@@ -88,7 +88,7 @@ fn a_dimension_is_drawn_with_its_keys_where_its_values_are() {
         ("6", "dimension 6: x of box 2", 1, 0),
     ] {
         let marks = plot(
-            place.path(),
+            folder.path(),
             &["--dimension", dimension, "-m", "slerp", "--fps", "50"],
         );
         assert!(marks.says(title), "{:?}", marks.texts);
@@ -124,8 +124,8 @@ fn a_dimension_is_drawn_with_its_keys_where_its_values_are() {
 
 #[test]
 fn every_box_has_a_panel_and_every_method_a_curve() {
-    let place = sample_folder();
-    let marks = plot(place.path(), &[]);
+    let folder = sample_folder();
+    let marks = plot(folder.path(), &[]);
     assert!(marks.says("box 1: dimensions 1 to 4") && marks.says("box 2: dimensions 5 to 8"));
     for (name, colour) in [
         ("w", "#22262B"),
@@ -137,10 +137,10 @@ fn every_box_has_a_panel_and_every_method_a_curve() {
         assert_eq!(marks.curves(colour).len(), 2, "{name}");
     }
     assert_eq!(marks.dots.len(), 1 + 2 * 4 * 5);
-    let marks = plot(place.path(), &["-m", "slerp,bessel-overhauser,slerp"]);
+    let marks = plot(folder.path(), &["-m", "slerp,bessel-overhauser,slerp"]);
     assert_eq!(marks.curves(SLERP).len(), 8);
     assert_eq!(marks.curves(BESSEL_OVERHAUSER).len(), 8);
-    let marks = plot(place.path(), &["--box", "2", "-m", "all"]);
+    let marks = plot(folder.path(), &["--box", "2", "-m", "all"]);
     assert!(marks.says("dimension 5: w of box 2") && !marks.says("dimension 1: w of box 1"));
     for method in tumble::METHODS {
         assert!(marks.says(method.name), "{method}");
@@ -149,9 +149,9 @@ fn every_box_has_a_panel_and_every_method_a_curve() {
 
 #[test]
 fn speed_error_and_sphere_are_drawn_for_each_box() {
-    let place = sample_folder();
+    let folder = sample_folder();
     let both = |show| ["--show", show, "-m", "slerp,bessel-overhauser"];
-    let marks = plot(place.path(), &both("speed"));
+    let marks = plot(folder.path(), &both("speed"));
     assert!(marks.says("angular speed, rad/s") && marks.says("box 2"));
     assert_eq!(marks.curves(SLERP).len(), 2);
     // Slerp's speed: four plateaus, so five heights or fewer but more than one.
@@ -162,20 +162,20 @@ fn speed_error_and_sphere_are_drawn_for_each_box() {
     heights.dedup();
     assert!((2..=5).contains(&heights.len()), "{heights:?}");
 
-    let marks = plot(place.path(), &both("error"));
+    let marks = plot(folder.path(), &both("error"));
     assert!(marks.says("error, rad") && marks.says("bound") && marks.says("1e-7"));
     assert!(marks.curves(SLERP).len() >= 2, "in pieces: keys are exact");
 
-    let marks = plot(place.path(), &both("sphere"));
+    let marks = plot(folder.path(), &both("sphere"));
     assert_eq!(marks.dots.len(), 1 + 2 * 5);
     assert!(!marks.curves(SLERP).is_empty() && !marks.curves(BESSEL_OVERHAUSER).is_empty());
 }
 
 #[test]
 fn png_shows_the_same_picture() {
-    let place = sample_folder();
+    let folder = sample_folder();
     succeed(
-        place.path(),
+        folder.path(),
         &[
             "plot",
             "a.dat",
@@ -187,13 +187,13 @@ fn png_shows_the_same_picture() {
             "out.png",
         ],
     );
-    let file = fs::File::open(place.path().join("out.png")).unwrap();
+    let file = fs::File::open(folder.path().join("out.png")).unwrap();
     let mut reader = png::Decoder::new(std::io::BufReader::new(file))
         .read_info()
         .unwrap();
     let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
     let info = reader.next_frame(&mut pixels).unwrap();
-    let marks = plot(place.path(), &["-m", "slerp", "--dimension", "4"]);
+    let marks = plot(folder.path(), &["-m", "slerp", "--dimension", "4"]);
     // In the middle of a key's dot is the key's colour; two pixels for each of SVG's.
     for &(x, y) in &marks.dots {
         let (x, y) = ((x / FINER * 2.0) as usize, (y / FINER * 2.0) as usize);
@@ -209,13 +209,17 @@ fn png_shows_the_same_picture() {
 
 #[test]
 fn a_report_has_every_figure_and_a_page_that_shows_them() {
-    let place = sample_folder();
-    fs::rename(place.path().join("b.dat"), place.path().join("b & c.dat")).unwrap();
+    let temporary = sample_folder();
+    fs::rename(
+        temporary.path().join("b.dat"),
+        temporary.path().join("b & c.dat"),
+    )
+    .unwrap();
     succeed(
-        place.path(),
+        temporary.path(),
         &["plot", "--report", "a.dat", "b & c.dat", "-o", "report"],
     );
-    let folder = place.path().join("report");
+    let folder = temporary.path().join("report");
     let page = fs::read_to_string(folder.join("index.html")).unwrap();
     let shown: Vec<&str> = page
         .split("<img src=\"")
@@ -239,19 +243,22 @@ fn a_report_has_every_figure_and_a_page_that_shows_them() {
         assert!(shown.contains(&name), "{name} in {shown:?}");
     }
     assert!(page.contains("<h2>b &amp; c.dat</h2>") && page.contains("a key every 0.5000 s"));
-    let again = run(place.path(), &["plot", "--report", "a.dat", "-o", "report"]);
+    let again = run(
+        temporary.path(),
+        &["plot", "--report", "a.dat", "-o", "report"],
+    );
     assert!(again.code == 2 && again.words.contains("index.html: exists; give --overwrite"));
 }
 
 #[test]
 fn a_directory_gets_a_picture_for_each_box_or_dimension() {
-    let place = sample_folder();
+    let folder = sample_folder();
     succeed(
-        place.path(),
+        folder.path(),
         &["plot", "a.dat", "b.dat", "--show", "speed", "-o", "out"],
     );
     succeed(
-        place.path(),
+        folder.path(),
         &[
             "plot",
             "a.dat",
@@ -263,7 +270,7 @@ fn a_directory_gets_a_picture_for_each_box_or_dimension() {
             "out",
         ],
     );
-    let mut names: Vec<String> = fs::read_dir(place.path().join("out"))
+    let mut names: Vec<String> = fs::read_dir(folder.path().join("out"))
         .unwrap()
         .map(|entry| entry.unwrap().file_name().into_string().unwrap())
         .collect();
@@ -281,8 +288,8 @@ fn a_directory_gets_a_picture_for_each_box_or_dimension() {
 
 #[test]
 fn what_cannot_be_drawn_is_refused_and_nothing_is_written() {
-    let place = sample_folder();
-    fs::write(place.path().join("old.svg"), "old").unwrap();
+    let folder = sample_folder();
+    fs::write(folder.path().join("old.svg"), "old").unwrap();
     for (arguments, message) in [
         (
             "plot a.dat -o x.svg --dimension 9",
@@ -331,18 +338,18 @@ fn what_cannot_be_drawn_is_refused_and_nothing_is_written() {
         ("plot a.dat -o x.svg -m slurp", "slerp"),
     ] {
         let line: Vec<&str> = arguments.split(' ').collect();
-        let run = run(place.path(), &line);
+        let run = run(folder.path(), &line);
         assert_eq!(run.code, 2, "{arguments}: {}", run.words);
         assert!(run.words.contains(message), "{arguments}: {}", run.words);
-        assert!(!place.path().join("x.svg").exists(), "{arguments}");
+        assert!(!folder.path().join("x.svg").exists(), "{arguments}");
     }
-    assert_eq!(fs::read(place.path().join("old.svg")).unwrap(), b"old");
+    assert_eq!(fs::read(folder.path().join("old.svg")).unwrap(), b"old");
     let many = succeed(
-        place.path(),
+        folder.path(),
         &["generate", "--boxes", "65", "-o", "many.dat"],
     );
     assert!(many.words.contains("65 boxes"));
-    let run = run(place.path(), &["plot", "many.dat", "-o", "x.svg"]);
+    let run = run(folder.path(), &["plot", "many.dat", "-o", "x.svg"]);
     assert!(
         run.code == 2
             && run
@@ -354,15 +361,15 @@ fn what_cannot_be_drawn_is_refused_and_nothing_is_written() {
 /// A single key has no steps, no speed and no span of time.
 #[test]
 fn a_single_key_is_drawn_in_every_way() {
-    let place = sample_folder();
-    fs::write(place.path().join("one.dat"), "# 1 3\n0.5 1 0 0 0\n").unwrap();
+    let folder = sample_folder();
+    fs::write(folder.path().join("one.dat"), "# 1 3\n0.5 1 0 0 0\n").unwrap();
     for show in ["components", "speed", "error", "sphere"] {
         let out = format!("{show}.svg");
         succeed(
-            place.path(),
+            folder.path(),
             &["plot", "one.dat", "--show", show, "-o", &out],
         );
-        let marks = Marks::of(&place.path().join(out));
+        let marks = Marks::of(&folder.path().join(out));
         let finite =
             |points: &[(f64, f64)]| points.iter().all(|p| p.0.is_finite() && p.1.is_finite());
         assert!(
@@ -371,10 +378,10 @@ fn a_single_key_is_drawn_in_every_way() {
         );
     }
     succeed(
-        place.path(),
+        folder.path(),
         &["plot", "--report", "one.dat", "-o", "report"],
     );
-    let page = fs::read_to_string(place.path().join("report/index.html")).unwrap();
+    let page = fs::read_to_string(folder.path().join("report/index.html")).unwrap();
     assert!(
         page.contains("<p>1 box, 1 key in all, from 0.5 to 0.5 s</p>"),
         "{page}"
@@ -385,6 +392,6 @@ fn a_single_key_is_drawn_in_every_way() {
         } else {
             "render"
         };
-        succeed(place.path(), &[command, "one.dat", "-o", out]);
+        succeed(folder.path(), &[command, "one.dat", "-o", out]);
     }
 }

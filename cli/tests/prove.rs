@@ -28,8 +28,8 @@ fn is_there(driver: &str) -> bool {
 }
 
 /// The program with one driver.
-fn with_driver(place: &Path, driver: &str, line: &[&str]) -> Command {
-    let mut command = command(place, line);
+fn with_driver(folder: &Path, driver: &str, line: &[&str]) -> Command {
+    let mut command = command(folder, line);
     command
         .env("VK_DRIVER_FILES", driver)
         .env_remove("VK_ADD_DRIVER_FILES");
@@ -69,15 +69,15 @@ fn the_software_drivers_are_proved_and_compared() {
     if !is_there(LAVAPIPE) || !is_there(SWIFTSHADER) {
         return;
     }
-    let folder = tempfile::tempdir().unwrap();
-    let place = folder.path();
+    let temporary = tempfile::tempdir().unwrap();
+    let folder = temporary.path();
     for (driver, name, file, more) in [
         (LAVAPIPE, "llvmpipe", "one.json", "--validate"),
         (SWIFTSHADER, "SwiftShader", "two.json", "--overwrite"),
     ] {
         let line = ["prove", "--quick", "--seconds", "600", "-o", file, more];
-        let run = finish(with_driver(place, driver, &line).output().unwrap());
-        let proof = read(&place.join(file));
+        let run = finish(with_driver(folder, driver, &line).output().unwrap());
+        let proof = read(&folder.join(file));
         expect_proof(&run, &proof, name);
         if name == "llvmpipe" {
             assert!(proof["negative_control"]["differing"].as_u64().unwrap() > 100);
@@ -85,7 +85,7 @@ fn the_software_drivers_are_proved_and_compared() {
             assert!(proof["validation"]["renderer_values"].as_u64().unwrap() > 1000);
         }
     }
-    let compared = run(place, &["prove", "--compare", "one.json", "two.json"]);
+    let compared = run(folder, &["prove", "--compare", "one.json", "two.json"]);
     let page = String::from_utf8_lossy(&compared.out);
     assert_eq!(compared.code, 0, "{page}{}", compared.words);
     for word in [
@@ -97,13 +97,13 @@ fn the_software_drivers_are_proved_and_compared() {
     }
 
     // One bit of a digest, and the file that is there, are noticed.
-    let text = std::fs::read_to_string(place.join("two.json")).unwrap();
+    let text = std::fs::read_to_string(folder.join("two.json")).unwrap();
     let mut other: Value = serde_json::from_str(&text).unwrap();
     for digest in other["random"]["digests"].as_array_mut().unwrap() {
         digest["hash"] = "0".into();
     }
-    std::fs::write(place.join("other.json"), other.to_string()).unwrap();
-    let compared = run(place, &["prove", "--compare", "one.json", "other.json"]);
+    std::fs::write(folder.join("other.json"), other.to_string()).unwrap();
+    let compared = run(folder, &["prove", "--compare", "one.json", "other.json"]);
     assert_eq!(compared.code, 8, "{}", compared.words);
     assert!(
         compared.words.contains("made other bits"),
@@ -111,7 +111,7 @@ fn the_software_drivers_are_proved_and_compared() {
         compared.words
     );
     let line = ["prove", "-o", "one.json"];
-    let kept = finish(with_driver(place, LAVAPIPE, &line).output().unwrap());
+    let kept = finish(with_driver(folder, LAVAPIPE, &line).output().unwrap());
     assert!(
         kept.code == 2 && kept.words.contains("--overwrite"),
         "{}",
@@ -119,7 +119,7 @@ fn the_software_drivers_are_proved_and_compared() {
     );
 }
 
-/// Told that there is no SSE, Mesa's compiler makes code that rounds otherwise.
+/// Without SSE, Mesa's compiler makes code that rounds otherwise.
 #[test]
 fn a_driver_that_is_not_exact_is_told_with_code_6() {
     if !is_there(LAVAPIPE) {
@@ -146,24 +146,24 @@ fn a_driver_that_is_not_exact_is_told_with_code_6() {
 /// The CPU beside itself, time that is too short for all that must run, and no driver at all.
 #[test]
 fn what_proves_nothing_is_refused() {
-    let folder = tempfile::tempdir().unwrap();
-    let place = folder.path();
-    let cpu = run(place, &["prove", "--device", "cpu"]);
+    let temporary = tempfile::tempdir().unwrap();
+    let folder = temporary.path();
+    let cpu = run(folder, &["prove", "--device", "cpu"]);
     assert_eq!(cpu.code, 8, "{}", cpu.words);
     assert!(cpu.words.contains("nothing is proved"), "{}", cpu.words);
-    let mut none = command(place, &["prove"]);
+    let mut none = command(folder, &["prove"]);
     let none = finish(crate::program::no_vulkan(&mut none).output().unwrap());
     assert_eq!(none.code, 5, "{}", none.words);
-    std::fs::write(place.join("no.json"), "{}").unwrap();
+    std::fs::write(folder.join("no.json"), "{}").unwrap();
     for files in [["no.json", "no.json"], ["absent.json", "no.json"]] {
-        let run = run(place, &["prove", "--compare", files[0], files[1]]);
+        let run = run(folder, &["prove", "--compare", files[0], files[1]]);
         assert_eq!(run.code, 4, "{}", run.words);
     }
     if !is_there(LAVAPIPE) {
         return;
     }
     let line = ["prove", "--seconds", "1"];
-    let short = finish(with_driver(place, LAVAPIPE, &line).output().unwrap());
+    let short = finish(with_driver(folder, LAVAPIPE, &line).output().unwrap());
     let page = String::from_utf8_lossy(&short.out);
     assert_eq!(short.code, 8, "{page}{}", short.words);
     assert!(page.contains("NOT PROVED"), "{page}");
@@ -201,7 +201,7 @@ fn is_of(kind: &str, value: &Value) -> bool {
     }
 }
 
-fn check(schema: &Value, value: &Value, place: &str, found: &mut Vec<String>) {
+fn check(schema: &Value, value: &Value, location: &str, found: &mut Vec<String>) {
     const KNOWN: [&str; 11] = [
         "$schema",
         "title",
@@ -217,27 +217,30 @@ fn check(schema: &Value, value: &Value, place: &str, found: &mut Vec<String>) {
     ];
     let rules = schema.as_object().expect("a schema is an object");
     let unknown = rules.keys().find(|key| !KNOWN.contains(&key.as_str()));
-    assert_eq!(unknown, None, "{place}: the test does not know this rule");
+    assert_eq!(
+        unknown, None,
+        "{location}: the test does not know this rule"
+    );
     let kinds: Vec<&str> = match &rules.get("type") {
         Some(Value::String(kind)) => vec![kind],
         Some(Value::Array(kinds)) => kinds.iter().filter_map(Value::as_str).collect(),
         _ => Vec::new(),
     };
     if !kinds.is_empty() && !kinds.iter().any(|kind| is_of(kind, value)) {
-        found.push(format!("{place}: not of type {kinds:?}"));
+        found.push(format!("{location}: not of type {kinds:?}"));
         return;
     }
     if let Some(all) = rules.get("enum").and_then(Value::as_array)
         && !all.contains(value)
     {
-        found.push(format!("{place}: {value} is none of {all:?}"));
+        found.push(format!("{location}: {value} is none of {all:?}"));
     }
     if rules.get("const").is_some_and(|only| only != value) {
-        found.push(format!("{place}: {value} is not {}", rules["const"]));
+        found.push(format!("{location}: {value} is not {}", rules["const"]));
     }
     if let (Some(items), Some(values)) = (rules.get("items"), value.as_array()) {
         for (index, value) in values.iter().enumerate() {
-            check(items, value, &format!("{place}[{index}]"), found);
+            check(items, value, &format!("{location}[{index}]"), found);
         }
     }
     let Some(members) = value.as_object() else {
@@ -251,15 +254,15 @@ fn check(schema: &Value, value: &Value, place: &str, found: &mut Vec<String>) {
     {
         let name = name.as_str().expect("a name");
         if !members.contains_key(name) {
-            found.push(format!("{place}: no `{name}`"));
+            found.push(format!("{location}: no `{name}`"));
         }
     }
     let properties = rules.get("properties").and_then(Value::as_object);
     for (name, value) in members {
         match properties.and_then(|all| all.get(name)) {
-            Some(schema) => check(schema, value, &format!("{place}.{name}"), found),
+            Some(schema) => check(schema, value, &format!("{location}.{name}"), found),
             None if rules.get("additionalProperties") == Some(&Value::Bool(false)) => {
-                found.push(format!("{place}: `{name}` is not in the schema"));
+                found.push(format!("{location}: `{name}` is not in the schema"));
             }
             None => {}
         }
@@ -296,7 +299,10 @@ fn proofs() -> Vec<std::path::PathBuf> {
     let entries = std::fs::read_dir(root().join("proofs")).unwrap();
     let paths = entries.map(|entry| entry.unwrap().path());
     let mut paths: Vec<_> = paths
-        .filter(|path| path.extension().is_some_and(|own| own == "json"))
+        .filter(|path| {
+            path.extension()
+                .is_some_and(|extension| extension == "json")
+        })
         .collect();
     paths.sort();
     paths
@@ -427,12 +433,14 @@ fn tables() -> String {
     });
     row("filling memory, copying it", &|p| {
         let figures = &p["figures"];
-        let [fill, copy] = ["fill_rate", "device_copy_rate"].map(|own| rate(number(&figures[own])));
+        let [fill, copy] =
+            ["fill_rate", "device_copy_rate"].map(|figure| rate(number(&figures[figure])));
         format!("{fill}, {copy}")
     });
     row("bus up, down", &|p| {
         let figures = &p["figures"];
-        let [up, down] = ["upload_rate", "download_rate"].map(|own| rate(number(&figures[own])));
+        let [up, down] =
+            ["upload_rate", "download_rate"].map(|figure| rate(number(&figures[figure])));
         format!("{up}, {down}")
     });
     row("submit and fence", &|p| {
@@ -448,12 +456,15 @@ fn tables() -> String {
     ] {
         row(name, &|p| {
             let cases = p["figures"]["cases"].as_array().into_iter().flatten();
-            let mut found = cases.filter(|own| {
-                own["case"] == case && own["name"].as_str().is_some_and(|name| name.contains(part))
+            let mut found = cases.filter(|entry| {
+                entry["case"] == case
+                    && entry["name"]
+                        .as_str()
+                        .is_some_and(|name| name.contains(part))
             });
-            found.next().map_or_else(String::new, |own| {
-                let share = 100.0 * number(&own["share"]);
-                format!("{}, {share:.0} %", milliseconds(number(&own["seconds"])))
+            found.next().map_or_else(String::new, |entry| {
+                let share = 100.0 * number(&entry["share"]);
+                format!("{}, {share:.0} %", milliseconds(number(&entry["seconds"])))
             })
         });
     }

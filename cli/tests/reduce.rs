@@ -8,7 +8,7 @@ use serde_json::Value;
 use crate::program::{root, run, sample_folder, succeed};
 
 /// A joint that turns and moves smoothly, and one on it.
-fn walk(place: &Path) {
+fn walk(folder: &Path) {
     let mut text = String::from(
         "HIERARCHY\nROOT hip\n{\n OFFSET 0 1 0\n CHANNELS 6 Xposition Yposition Zposition Zrotation \
          Xrotation Yrotation\n JOINT knee\n {\n  OFFSET 0 -0.5 0\n  CHANNELS 3 Zrotation Xrotation \
@@ -25,15 +25,15 @@ fn walk(place: &Path) {
             -20.0 * (t * 1.5).cos()
         );
     }
-    fs::write(place.join("walk.bvh"), text).unwrap();
+    fs::write(folder.join("walk.bvh"), text).unwrap();
 }
 
 #[test]
 fn a_walk_gets_few_keys_and_compares() {
-    let folder = sample_folder();
-    let place = folder.path();
-    walk(place);
-    for (curve, most) in [("linear", 180), ("cubic", 30)] {
+    let temporary = sample_folder();
+    let folder = temporary.path();
+    walk(folder);
+    for (curve, max_keys) in [("linear", 180), ("cubic", 30)] {
         let line = [
             "reduce",
             "walk.bvh",
@@ -44,7 +44,7 @@ fn a_walk_gets_few_keys_and_compares() {
             curve,
         ];
         let said = succeed(
-            place,
+            folder,
             &[&line[..], &["--json", "--plot", "errors.svg"]].concat(),
         );
         assert!(said.words.contains("363 → "), "{}", said.words);
@@ -55,7 +55,7 @@ fn a_walk_gets_few_keys_and_compares() {
             (Some(363), Some(121))
         );
         let keys = clip["keys_after"].as_u64().unwrap();
-        assert!(keys <= most, "{curve}: {keys} keys");
+        assert!(keys <= max_keys, "{curve}: {keys} keys");
         let largest = clip["angle"]["largest"].as_f64().unwrap();
         let bound = clip["angle"]["bound"].as_f64().unwrap();
         assert!(largest > 0.01 && largest <= bound && (bound - 0.1).abs() < 1e-9);
@@ -64,8 +64,8 @@ fn a_walk_gets_few_keys_and_compares() {
         let bounds = ["--tolerance", "0.1001", "--distance", &distance];
         let times = ["--fps", "60", "--end", "2"];
         let line = ["compare", "walk.bvh", "walk.glb", "--world"];
-        succeed(place, &[&line[..], &bounds, &times].concat());
-        let svg = fs::read_to_string(place.join("errors.svg")).unwrap();
+        succeed(folder, &[&line[..], &bounds, &times].concat());
+        let svg = fs::read_to_string(folder.join("errors.svg")).unwrap();
         assert!(
             svg.contains("largest angle of all joints") && svg.contains(&format!("→ {keys} keys"))
         );
@@ -79,10 +79,13 @@ fn a_gltf_keeps_all_but_its_keys() {
         eprintln!("{} is not there: nothing was reduced", fox.display());
         return;
     }
-    let folder = sample_folder();
-    let place = folder.path();
+    let temporary = sample_folder();
+    let folder = temporary.path();
     let fox = fox.to_str().unwrap();
-    let said = succeed(place, &["reduce", fox, "-o", "fox.glb", "--curve", "cubic"]);
+    let said = succeed(
+        folder,
+        &["reduce", fox, "-o", "fox.glb", "--curve", "cubic"],
+    );
     assert!(
         said.words.contains("Survey: ") && said.words.contains("Run: "),
         "{}",
@@ -93,7 +96,7 @@ fn a_gltf_keeps_all_but_its_keys() {
         let length = u32::from_le_bytes(bytes[12..16].try_into().unwrap()) as usize;
         serde_json::from_slice(&bytes[20..20 + length]).unwrap()
     };
-    let (before, after) = (json(Path::new(fox)), json(&place.join("fox.glb")));
+    let (before, after) = (json(Path::new(fox)), json(&folder.join("fox.glb")));
     for kept in ["meshes", "materials", "skins", "nodes", "images", "scenes"] {
         assert_eq!(before[kept], after[kept], "{kept}");
     }
@@ -103,27 +106,27 @@ fn a_gltf_keeps_all_but_its_keys() {
         ("short.glb", &["--quantize"][..]),
         ("packed.glb", &["--quantize", "--meshopt"]),
     ] {
-        let said = succeed(place, &[&["reduce", fox, "-o", name][..], more].concat());
+        let said = succeed(folder, &[&["reduce", fox, "-o", name][..], more].concat());
         let is_new = said
             .words
-            .contains("compression makes a new file; stays behind: meshes");
+            .contains("compression makes a new file; not copied: meshes");
         assert_eq!(is_new, name == "packed.glb", "{}", said.words);
-        let found = json(&place.join(name));
+        let found = json(&folder.join(name));
         let accessors = found["accessors"].as_array().unwrap();
         let is_short =
             |accessor: &&Value| accessor["componentType"] == 5122 && accessor["normalized"] == true;
         assert!(accessors.iter().filter(is_short).count() > 20, "{found}");
         assert_eq!(before["meshes"] == found["meshes"], !is_new);
-        succeed(place, &[&["compare", fox, name][..], &bounds].concat());
+        succeed(folder, &[&["compare", fox, name][..], &bounds].concat());
     }
     let samplers = after["animations"][0]["samplers"].as_array().unwrap();
     let cubics = samplers
         .iter()
-        .filter(|own| own["interpolation"] == "CUBICSPLINE")
+        .filter(|sampler| sampler["interpolation"] == "CUBICSPLINE")
         .count();
     assert!(cubics > 5, "{cubics} of {}", samplers.len());
     // Arcs stay near between samples too, where the input has arcs.
-    succeed(place, &["reduce", fox, "-o", "arcs.glb"]);
+    succeed(folder, &["reduce", fox, "-o", "arcs.glb"]);
     let line = [
         "compare",
         fox,
@@ -132,14 +135,14 @@ fn a_gltf_keeps_all_but_its_keys() {
         "--tolerance",
         "0.1001",
     ];
-    succeed(place, &line);
+    succeed(folder, &line);
 }
 
 #[test]
 fn a_chain_goes_back_into_dat() {
-    let folder = sample_folder();
-    let place = folder.path();
-    succeed(place, &["convert", "a.dat", "-o", "a.npz"]);
+    let temporary = sample_folder();
+    let folder = temporary.path();
+    succeed(folder, &["convert", "a.dat", "-o", "a.npz"]);
     let line = [
         "reduce",
         "a.dat",
@@ -150,12 +153,12 @@ fn a_chain_goes_back_into_dat() {
         "--curve",
         "bessel-overhauser",
     ];
-    let said = succeed(place, &line);
+    let said = succeed(folder, &line);
     assert!(said.words.contains("402 → "), "{}", said.words);
-    let text = fs::read_to_string(place.join("few.dat")).unwrap();
+    let text = fs::read_to_string(folder.join("few.dat")).unwrap();
     assert!(text.lines().count() < 60, "{text}");
     succeed(
-        place,
+        folder,
         &[
             "compare",
             "a.dat",
@@ -170,9 +173,9 @@ fn a_chain_goes_back_into_dat() {
 
 #[test]
 fn what_cannot_be_reduced_is_refused() {
-    let folder = sample_folder();
-    let place = folder.path();
-    walk(place);
+    let temporary = sample_folder();
+    let folder = temporary.path();
+    walk(folder);
     for (line, code, says) in [
         (
             &[
@@ -189,7 +192,7 @@ fn what_cannot_be_reduced_is_refused() {
         (
             &["reduce", "walk.bvh", "-o", "a.glb", "--tolerance", "-3"],
             2,
-            "no finite number from 0",
+            "expected a finite number of 0 or more",
         ),
         (
             &["reduce", "walk.bvh", "-o", "a.glb", "--tolerance", "1e-9"],
@@ -233,11 +236,11 @@ fn what_cannot_be_reduced_is_refused() {
             "of one input",
         ),
     ] {
-        let run = run(place, line);
+        let run = run(folder, line);
         assert_eq!(run.code, code, "{line:?}: {}", run.words);
         assert!(run.words.contains(says), "{line:?}: {}", run.words);
     }
-    let left: Vec<_> = fs::read_dir(place)
+    let left: Vec<_> = fs::read_dir(folder)
         .unwrap()
         .map(|entry| entry.unwrap().file_name())
         .collect();
@@ -252,17 +255,17 @@ fn what_cannot_be_reduced_is_refused() {
 /// Channels at times of their own, and cubics with their tangents, go from glTF to glTF as they are.
 #[test]
 fn convert_keeps_cubics_and_times_of_channels() {
-    let folder = sample_folder();
-    let place = folder.path();
-    walk(place);
+    let temporary = sample_folder();
+    let folder = temporary.path();
+    walk(folder);
     succeed(
-        place,
+        folder,
         &["reduce", "walk.bvh", "-o", "cubic.glb", "--curve", "cubic"],
     );
-    succeed(place, &["convert", "cubic.glb", "-o", "again.glb"]);
+    succeed(folder, &["convert", "cubic.glb", "-o", "again.glb"]);
     let bits = ["--tolerance", "0", "--distance", "0"];
     let said = succeed(
-        place,
+        folder,
         &[&["compare", "cubic.glb", "again.glb"][..], &bits].concat(),
     );
     assert!(
@@ -270,7 +273,7 @@ fn convert_keeps_cubics_and_times_of_channels() {
             .unwrap()
             .contains("largest 0.000e0°")
     );
-    let refused = run(place, &["convert", "cubic.glb", "-o", "again.bvh"]);
+    let refused = run(folder, &["convert", "cubic.glb", "-o", "again.bvh"]);
     assert!(
         refused.code == 4 && refused.words.contains("other times"),
         "{}",

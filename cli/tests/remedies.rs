@@ -123,9 +123,9 @@ const REMEDIES: &[(&str, &str, &[&str])] = &[
 ];
 
 fn folder() -> tempfile::TempDir {
-    let place = sample_folder();
-    let at = place.path();
-    let write = |name: &str, text: &str| fs::write(at.join(name), text).unwrap();
+    let temporary = sample_folder();
+    let folder = temporary.path();
+    let write = |name: &str, text: &str| fs::write(folder.join(name), text).unwrap();
     write("points.csv", "x,y,z\n0,0,0\n1,0,0\n1,1,0\n");
     write("path.csv", "t,x,y,z\n0,0,0,0\n1,1,0,0\n2,1,1,0\n");
     write("uneven.dat", "# 1 1\n0 1 0 0 0\n1 1 0 0 0\n3 1 0 0 0\n");
@@ -136,23 +136,23 @@ fn folder() -> tempfile::TempDir {
     let waves = (0..100).map(|i| format!("{} {} 0 0 0 0 0 1\n", f64::from(i) / 50.0, i % 7));
     write("waves.tum", &waves.collect::<String>());
     write("m.gltf", &crate::attack::two_animations());
-    succeed(at, &["generate", "--hill", "-o", "hill.obj"]);
-    // The ways of `route` have upward directions.
+    succeed(folder, &["generate", "--hill", "-o", "hill.obj"]);
+    // The paths of `route` have upward directions.
     let route = "route hill.obj --from 1,0,1 --to 8,0,8 -o ups.csv";
-    succeed(at, &words(route));
-    let way = fs::read_to_string(at.join("ups.csv")).unwrap();
-    assert!(way.starts_with("x,y,z,ux,uy,uz\n"), "{way}");
-    let timed = way.lines().enumerate().map(|(at, line)| match at {
+    succeed(folder, &words(route));
+    let points = fs::read_to_string(folder.join("ups.csv")).unwrap();
+    assert!(points.starts_with("x,y,z,ux,uy,uz\n"), "{points}");
+    let timed = points.lines().enumerate().map(|(at, line)| match at {
         0 => format!("t,{line}\n"),
         at => format!("{at},{line}\n"),
     });
     write("way.csv", &timed.collect::<String>());
-    fs::create_dir(at.join("theirs")).unwrap();
+    fs::create_dir(folder.join("theirs")).unwrap();
     write("theirs/manifest.jsonl", "notes\n");
-    succeed(at, &words("eval a.dat b.dat -o done"));
-    succeed(at, &words("eval a.dat b.dat -o sharded --shard 1/1"));
-    crate::attack::pipe(&at.join("pipe.dat"));
-    place
+    succeed(folder, &words("eval a.dat b.dat -o done"));
+    succeed(folder, &words("eval a.dat b.dat -o sharded --shard 1/1"));
+    crate::attack::pipe(&folder.join("pipe.dat"));
+    temporary
 }
 
 fn clear(at: &Path) {
@@ -167,12 +167,12 @@ fn words(line: &str) -> Vec<&str> {
 
 #[test]
 fn what_a_message_says_to_do_works() {
-    let place = folder();
-    let at: &Path = place.path();
+    let temporary = folder();
+    let folder: &Path = temporary.path();
     let mut wrong = Vec::new();
     for (line, message, remedies) in REMEDIES {
-        clear(at);
-        let refused = run(at, &words(line));
+        clear(folder);
+        let refused = run(folder, &words(line));
         if refused.code == 0 || !refused.words.contains(message) {
             wrong.push(format!(
                 "{line}: {}, not `{message}`: {}",
@@ -180,8 +180,8 @@ fn what_a_message_says_to_do_works() {
             ));
         }
         for remedy in *remedies {
-            clear(at);
-            let done = run(at, &words(remedy));
+            clear(folder);
+            let done = run(folder, &words(remedy));
             if done.code != 0 {
                 wrong.push(format!("{remedy}: {}: {}", done.code, done.words));
             }

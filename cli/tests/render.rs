@@ -25,9 +25,9 @@ impl Image {
             let share = |colour: &[u8; 3], c: usize| f64::from(colour[c]) / sum(colour);
             (0..3).all(|c| (share(pixel, c) - share(&hue, c)).abs() < 0.04)
         };
-        let places = (0..self.pixels.len()).filter(|&place| like(&self.pixels[place]));
-        places.fold(None, |extent, place| {
-            let (x, y) = (place % self.width, place / self.width);
+        let matching = (0..self.pixels.len()).filter(|&i| like(&self.pixels[i]));
+        matching.fold(None, |extent, i| {
+            let (x, y) = (i % self.width, i / self.width);
             let [l, t, r, b] = extent.unwrap_or([x, y, x, y]);
             Some([l.min(x), t.min(y), r.max(x), b.max(y)])
         })
@@ -87,8 +87,8 @@ fn gif_film(path: &Path) -> (Vec<Image>, f64) {
     let (mut images, mut seconds) = (Vec::new(), 0.0);
     while let Some(frame) = reader.read_next_frame().unwrap() {
         seconds += f64::from(frame.delay) / 100.0;
-        for (place, pixel) in frame.buffer.chunks_exact(4).enumerate() {
-            let (x, y) = (place % frame.width as usize, place / frame.width as usize);
+        for (i, pixel) in frame.buffer.chunks_exact(4).enumerate() {
+            let (x, y) = (i % frame.width as usize, i / frame.width as usize);
             if pixel[3] > 0 {
                 let at = (frame.top as usize + y) * width + frame.left as usize + x;
                 canvas[at] = [pixel[0], pixel[1], pixel[2]];
@@ -106,12 +106,12 @@ fn gif_film(path: &Path) -> (Vec<Image>, f64) {
 /// as its palette comes.
 #[test]
 fn frames_apng_and_gif_show_the_same_film() {
-    let place = sample_folder();
+    let folder = sample_folder();
     for out in ["frames", "film.apng", "film.gif"] {
         let line = [
             "render", "a.dat", "--fps", "12", "--size", "200x150", "-o", out,
         ];
-        let run = succeed(place.path(), &line);
+        let run = succeed(folder.path(), &line);
         assert!(
             run.words.contains("a.dat: 25 frames, 2 boxes, on "),
             "{}",
@@ -119,25 +119,25 @@ fn frames_apng_and_gif_show_the_same_film() {
         );
     }
     let frames: Vec<Image> = (0..25)
-        .map(|frame| png(&place.path().join(format!("frames/{frame:05}.png"))))
+        .map(|frame| png(&folder.path().join(format!("frames/{frame:05}.png"))))
         .collect();
     assert_eq!(
-        fs::read_dir(place.path().join("frames")).unwrap().count(),
+        fs::read_dir(folder.path().join("frames")).unwrap().count(),
         25
     );
-    let (apng, seconds) = films(&place.path().join("film.apng"));
+    let (apng, seconds) = films(&folder.path().join("film.apng"));
     assert!(apng == frames, "APNG differs");
     assert!((seconds - 25.0 / 12.0).abs() < 2e-3, "{seconds} s");
-    let (gif, seconds) = gif_film(&place.path().join("film.gif"));
+    let (gif, seconds) = gif_film(&folder.path().join("film.gif"));
     assert_eq!(gif.len(), 25);
     assert!((seconds - 25.0 / 12.0).abs() < 2e-2, "{seconds} s");
     for (number, (found, expected)) in gif.iter().zip(&frames).enumerate() {
-        let far = |(a, b): &(&[u8; 3], &[u8; 3])| (0..3).any(|c| a[c].abs_diff(b[c]) > 24);
+        let is_different = |(a, b): &(&[u8; 3], &[u8; 3])| (0..3).any(|c| a[c].abs_diff(b[c]) > 24);
         let count = found
             .pixels
             .iter()
             .zip(&expected.pixels)
-            .filter(far)
+            .filter(is_different)
             .count();
         assert!(
             count < 90,
@@ -152,18 +152,18 @@ fn frames_apng_and_gif_show_the_same_film() {
 /// Would catch a wrong parent, a wrong axis, a box that hangs upwards, a mirrored picture.
 #[test]
 fn boxes_hang_where_their_rotations_say() {
-    let place = sample_folder();
+    let folder = sample_folder();
     let half = std::f32::consts::FRAC_1_SQRT_2;
     // Both straight down; then the first turned a quarter about z, which carries the second.
     let text = format!(
         "# 2 3\n0 1 0 0 0 1 0 0 0\n1 {half} 0 0 {half} 1 0 0 0\n2 {half} 0 0 {half} {half} 0 0 {half}\n"
     );
-    fs::write(place.path().join("hang.dat"), text).unwrap();
+    fs::write(folder.path().join("hang.dat"), text).unwrap();
     let still = |start: &str| {
         let line =
             format!("render hang.dat -m slerp --view 0,0 --start {start} -o s.png --overwrite");
-        succeed(place.path(), &line.split(' ').collect::<Vec<_>>());
-        let image = png(&place.path().join("s.png"));
+        succeed(folder.path(), &line.split(' ').collect::<Vec<_>>());
+        let image = png(&folder.path().join("s.png"));
         (image.extent(BLUE).unwrap(), image.extent(ORANGE).unwrap())
     };
     let tall = |[l, t, r, b]: [usize; 4]| b - t > r - l;
@@ -190,10 +190,10 @@ fn boxes_hang_where_their_rotations_say() {
 
 #[test]
 fn methods_stand_side_by_side_under_their_names() {
-    let place = sample_folder();
+    let folder = sample_folder();
     let line = "render a.dat -m slerp,step --size 400x200 --start 0.25 -o s.png";
-    succeed(place.path(), &line.split(' ').collect::<Vec<_>>());
-    let image = png(&place.path().join("s.png"));
+    succeed(folder.path(), &line.split(' ').collect::<Vec<_>>());
+    let image = png(&folder.path().join("s.png"));
     let half = |right: bool| {
         let columns = if right { 200..400 } else { 0..200 };
         let rows = image
@@ -218,16 +218,16 @@ fn methods_stand_side_by_side_under_their_names() {
         assert!(ink > 10, "{ink} pixels of letters");
     }
     let dark = "render a.dat --theme dark --size 64x64 --start 1 -o d.png";
-    succeed(place.path(), &dark.split(' ').collect::<Vec<_>>());
+    succeed(folder.path(), &dark.split(' ').collect::<Vec<_>>());
     assert_eq!(
-        png(&place.path().join("d.png")).pixels[0],
+        png(&folder.path().join("d.png")).pixels[0],
         [0x1d, 0x21, 0x27]
     );
 }
 
 #[test]
 fn a_gif_of_more_frames_than_it_can_show_is_warned_of() {
-    let place = sample_folder();
+    let folder = sample_folder();
     for (fps, out, warned) in [
         ("50", "a.gif", false),
         ("60", "b.gif", true),
@@ -236,7 +236,7 @@ fn a_gif_of_more_frames_than_it_can_show_is_warned_of() {
         let line = [
             "render", "a.dat", "--fps", fps, "--size", "32x32", "--end", "0.2", "-o", out,
         ];
-        let run = succeed(place.path(), &line);
+        let run = succeed(folder.path(), &line);
         assert_eq!(
             run.words.contains("warning: GIF shows no frame"),
             warned,
@@ -248,36 +248,32 @@ fn a_gif_of_more_frames_than_it_can_show_is_warned_of() {
 
 #[test]
 fn what_cannot_be_rendered_is_refused_and_nothing_is_written() {
-    let place = sample_folder();
-    fs::write(place.path().join("old.gif"), "old").unwrap();
-    fs::create_dir(place.path().join("used")).unwrap();
-    fs::write(place.path().join("used/00003.png"), "old").unwrap();
+    let folder = sample_folder();
+    fs::write(folder.path().join("old.gif"), "old").unwrap();
+    fs::create_dir(folder.path().join("used")).unwrap();
+    fs::write(folder.path().join("used/00003.png"), "old").unwrap();
     for (line, code, message) in [
         (
             "render a.dat -o x.mp4",
             2,
             "x.mp4: end the film in .gif or .apng, a picture in .png, or give a directory",
         ),
-        (
-            "render a.dat b.dat -o x.gif",
-            2,
-            "one input at a time is rendered",
-        ),
+        ("render a.dat b.dat -o x.gif", 2, "takes a single input"),
         (
             "render a.dat -o x.gif --size 0x100",
             2,
-            "`0x100` is no size; give 640x480",
+            "invalid size `0x100`: expected WIDTHxHEIGHT",
         ),
-        ("render a.dat -o x.gif --size big", 2, "`big` is no size"),
+        ("render a.dat -o x.gif --size big", 2, "invalid size `big`"),
         (
             "render a.dat -o x.gif --view 10,95",
             2,
-            "`10,95` is no view; give two angles in degrees",
+            "invalid view `10,95`: expected two angles in degrees",
         ),
         (
             "render a.dat -o x.gif -m all",
             2,
-            "15 methods side by side cannot be seen, at most 4",
+            "15 methods are too many for one picture, at most 4",
         ),
         (
             "render a.dat -o old.gif",
@@ -296,11 +292,11 @@ fn what_cannot_be_rendered_is_refused_and_nothing_is_written() {
             "its directory nowhere does not exist",
         ),
     ] {
-        let run = run(place.path(), &line.split(' ').collect::<Vec<_>>());
+        let run = run(folder.path(), &line.split(' ').collect::<Vec<_>>());
         assert_eq!(run.code, code, "{line}: {}", run.words);
         assert!(run.words.contains(message), "{line}: {}", run.words);
-        assert!(!place.path().join("x.gif").exists(), "{line}");
+        assert!(!folder.path().join("x.gif").exists(), "{line}");
     }
-    assert_eq!(fs::read(place.path().join("old.gif")).unwrap(), b"old");
-    assert_eq!(fs::read_dir(place.path().join("used")).unwrap().count(), 1);
+    assert_eq!(fs::read(folder.path().join("old.gif")).unwrap(), b"old");
+    assert_eq!(fs::read_dir(folder.path().join("used")).unwrap().count(), 1);
 }

@@ -7,7 +7,7 @@ use std::process::Command;
 use crate::program::{root, run, succeed};
 
 /// A terrain whose lengths are known, as OBJ; z is up.
-fn terrain(place: &Path) {
+fn terrain(folder: &Path) {
     let height =
         |x: u32, y: u32| f64::from((7 * x * x + 13 * y * y + 5 * x * y + 3 * x) % 17) / 8.0;
     let mut text = String::new();
@@ -19,19 +19,19 @@ fn terrain(place: &Path) {
         text += &format!("f {} {} {}\n", at(0, 0), at(1, 0), at(1, 1));
         text += &format!("f {} {} {}\n", at(0, 0), at(1, 1), at(0, 1));
     }
-    fs::write(place.join("hill.obj"), text).unwrap();
+    fs::write(folder.join("hill.obj"), text).unwrap();
 }
 
 /// A square of 10 by 10 in the plane of x and z, with y up, as glTF; beside it one of 1 by 1.
-fn plaza(place: &Path) {
+fn plaza(folder: &Path) {
     let corners: [f32; 24] = [
         0.0, 0.0, 0.0, 10.0, 0.0, 0.0, 10.0, 0.0, 10.0, 0.0, 0.0, 10.0, 20.0, 0.0, 0.0, 21.0, 0.0,
         0.0, 21.0, 0.0, 1.0, 20.0, 0.0, 1.0,
     ];
     let indices: [u16; 12] = [0, 2, 1, 0, 3, 2, 4, 6, 5, 4, 7, 6];
-    let mut bytes: Vec<u8> = corners.iter().flat_map(|own| own.to_le_bytes()).collect();
-    bytes.extend(indices.iter().flat_map(|own| own.to_le_bytes()));
-    fs::write(place.join("plaza.bin"), bytes).unwrap();
+    let mut bytes: Vec<u8> = corners.iter().flat_map(|x| x.to_le_bytes()).collect();
+    bytes.extend(indices.iter().flat_map(|index| index.to_le_bytes()));
+    fs::write(folder.join("plaza.bin"), bytes).unwrap();
     let text = r#"{"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],
         "nodes":[{"children":[1],"translation":[0,1,0]},{"mesh":0,"scale":[2,1,2]},{"mesh":0}],
         "meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1}]}],
@@ -39,7 +39,7 @@ fn plaza(place: &Path) {
             {"bufferView":1,"componentType":5123,"count":12,"type":"SCALAR"}],
         "bufferViews":[{"buffer":0,"byteLength":96},{"buffer":0,"byteOffset":96,"byteLength":24}],
         "buffers":[{"uri":"plaza.bin","byteLength":120}]}"#;
-    fs::write(place.join("plaza.gltf"), text).unwrap();
+    fs::write(folder.join("plaza.gltf"), text).unwrap();
 }
 
 fn rows(file: &Path) -> (String, Vec<Vec<f64>>) {
@@ -59,9 +59,9 @@ fn length(rows: &[Vec<f64>], first: usize) -> f64 {
 
 #[test]
 fn a_way_over_a_hill() {
-    let place = tempfile::tempdir().unwrap();
-    let place = place.path();
-    terrain(place);
+    let temporary = tempfile::tempdir().unwrap();
+    let folder = temporary.path();
+    terrain(folder);
     for (by, expected) in [
         ("exact", 7.986_460_126_6),
         ("plane", 8.413_577_301_2),
@@ -83,28 +83,28 @@ fn a_way_over_a_hill() {
             "--plot",
             "way.svg",
         ];
-        let told = succeed(place, &line).words;
-        let (header, rows) = rows(&place.join("way.csv"));
+        let words = succeed(folder, &line).words;
+        let (header, rows) = rows(&folder.join("way.csv"));
         assert_eq!(header, "x,y,z,ux,uy,uz");
         assert!(
             (length(&rows, 0) - expected).abs() < 1e-9,
             "{by}: {}",
             length(&rows, 0)
         );
-        assert!(told.contains(&format!("{} points", rows.len())), "{told}");
+        assert!(words.contains(&format!("{} points", rows.len())), "{words}");
     }
-    let svg = fs::read_to_string(place.join("way.svg")).unwrap();
+    let svg = fs::read_to_string(folder.join("way.svg")).unwrap();
     assert!(
         roxmltree::Document::parse(&svg)
             .unwrap()
             .descendants()
-            .filter(|own| own.has_tag_name("circle"))
+            .filter(|node| node.has_tag_name("circle"))
             .count()
             == 2
     );
     // To standard output, with a word about a start that is off the surface.
-    let told = succeed(
-        place,
+    let printed = succeed(
+        folder,
         &[
             "route",
             "hill.obj",
@@ -118,10 +118,14 @@ fn a_way_over_a_hill() {
             "way.png",
         ],
     );
-    assert!(told.words.contains("the start is"), "{}", told.words);
-    assert!(String::from_utf8(told.out).unwrap().starts_with("x,y,z,"));
+    assert!(printed.words.contains("the start is"), "{}", printed.words);
     assert!(
-        fs::read(place.join("way.png"))
+        String::from_utf8(printed.out)
+            .unwrap()
+            .starts_with("x,y,z,")
+    );
+    assert!(
+        fs::read(folder.join("way.png"))
             .unwrap()
             .starts_with(b"\x89PNG")
     );
@@ -129,17 +133,17 @@ fn a_way_over_a_hill() {
 
 #[test]
 fn many_pairs_and_what_fails_of_them() {
-    let place = tempfile::tempdir().unwrap();
-    let place = place.path();
-    plaza(place);
+    let temporary = tempfile::tempdir().unwrap();
+    let folder = temporary.path();
+    plaza(folder);
     // The child stands 1 up and is twice as large; the other node is in no scene.
     fs::write(
-        place.join("pairs.txt"),
+        folder.join("pairs.txt"),
         "# x y z, x y z\n0 1 0 20 1 20\n0,1,0,41,1,1\n\n5 1 5 5 1 5\n",
     )
     .unwrap();
-    let told = run(
-        place,
+    let batch = run(
+        folder,
         &[
             "route",
             "plaza.gltf",
@@ -150,43 +154,45 @@ fn many_pairs_and_what_fails_of_them() {
             "--json",
         ],
     );
-    assert_eq!(told.code, 3, "{}", told.words);
+    assert_eq!(batch.code, 3, "{}", batch.words);
     assert!(
-        told.words.contains("route-2: start and goal lie on pieces"),
+        batch
+            .words
+            .contains("route-2: start and goal lie on pieces"),
         "{}",
-        told.words
+        batch.words
     );
     assert!(
-        told.words.contains("the start's has 2 triangles"),
+        batch.words.contains("the start's has 2 triangles"),
         "{}",
-        told.words
+        batch.words
     );
-    let lines: serde_json::Value = serde_json::from_slice(&told.out).unwrap();
+    let lines: serde_json::Value = serde_json::from_slice(&batch.out).unwrap();
     assert!((lines[0]["length"].as_f64().unwrap() - 800f64.sqrt()).abs() < 1e-12);
     assert_eq!(
         (lines[1]["length"].is_null(), lines[2]["points"].as_u64()),
         (true, Some(1))
     );
-    assert!(place.join("ways/route-1.csv").exists() && !place.join("ways/route-2.csv").exists());
-    fs::write(place.join("pairs.txt"), "0 1 0 41 1 1\n").unwrap();
-    let told = run(
-        place,
+    assert!(folder.join("ways/route-1.csv").exists() && !folder.join("ways/route-2.csv").exists());
+    fs::write(folder.join("pairs.txt"), "0 1 0 41 1 1\n").unwrap();
+    let failed = run(
+        folder,
         &["route", "plaza.gltf", "--pairs", "pairs.txt", "-o", "none"],
     );
-    assert_eq!(told.code, 4, "{}", told.words);
+    assert_eq!(failed.code, 4, "{}", failed.words);
 }
 
 #[test]
 fn walkers_wait() {
-    let place = tempfile::tempdir().unwrap();
-    let place = place.path();
-    plaza(place);
+    let temporary = tempfile::tempdir().unwrap();
+    let folder = temporary.path();
+    plaza(folder);
     let walkers = "name,radius,speed,x,y,z,to_x,to_y,to_z,track\n\
                    one,0.5,1,5,1,10,15,1,10,\ntwo,0.5,1,10,1,5,10,1,15,\ngate,0.5,,,,,,,,gate.csv\n";
-    fs::write(place.join("walkers.csv"), walkers).unwrap();
-    fs::write(place.join("gate.csv"), "t,x,y,z\n90,10,1,10\n95,10,1,10\n").unwrap();
-    let told = succeed(
-        place,
+    fs::write(folder.join("walkers.csv"), walkers).unwrap();
+    fs::write(folder.join("gate.csv"), "t,x,y,z\n90,10,1,10\n95,10,1,10\n").unwrap();
+    let walked = succeed(
+        folder,
         &[
             "route",
             "plaza.gltf",
@@ -197,12 +203,12 @@ fn walkers_wait() {
             "--json",
         ],
     );
-    let lines: serde_json::Value = serde_json::from_slice(&told.out).unwrap();
+    let lines: serde_json::Value = serde_json::from_slice(&walked.out).unwrap();
     for (line, expected) in [(0, 10.0), (1, 10.0 + 2f64.sqrt())] {
         let arrival = lines[line]["arrival"].as_f64().unwrap();
         assert!((arrival - expected).abs() < 1e-9, "{arrival}");
     }
-    let (header, rows) = rows(&place.join("ways/two.csv"));
+    let (header, rows) = rows(&folder.join("ways/two.csv"));
     assert_eq!(header, "t,x,y,z,ux,uy,uz");
     assert!(
         rows.windows(2).all(|pair| pair[0][0] < pair[1][0]),
@@ -212,11 +218,11 @@ fn walkers_wait() {
 
 #[test]
 fn ways_between_rocks_and_on_nets() {
-    let place = tempfile::tempdir().unwrap();
-    let place = place.path();
-    plaza(place);
+    let temporary = tempfile::tempdir().unwrap();
+    let folder = temporary.path();
+    plaza(folder);
     let rock = "v 10 1 10\nv 10.01 1 10\nv 10 1.01 10\nf 1 2 3\n";
-    fs::write(place.join("rock.obj"), rock).unwrap();
+    fs::write(folder.join("rock.obj"), rock).unwrap();
     let line = |from, out| {
         [
             "route",
@@ -235,17 +241,17 @@ fn ways_between_rocks_and_on_nets() {
             out,
         ]
     };
-    succeed(place, &line("6,1,10", "way.csv"));
-    let (_, points) = rows(&place.join("way.csv"));
+    succeed(folder, &line("6,1,10", "way.csv"));
+    let (_, points) = rows(&folder.join("way.csv"));
     let shortest = 2.0 * (2.0 * 3f64.sqrt() + std::f64::consts::PI / 3.0);
     let over = length(&points, 0) - shortest;
     assert!(over > 0.0 && over < 0.6, "{over}");
-    let told = run(place, &line("9,1,10", "no.csv"));
-    assert_eq!(told.code, 4);
+    let refused = run(folder, &line("9,1,10", "no.csv"));
+    assert_eq!(refused.code, 4);
     assert!(
-        told.words.contains("is not on free ground"),
+        refused.words.contains("is not on free ground"),
         "{}",
-        told.words
+        refused.words
     );
     // z = x y, as NPY.
     let mut bytes =
@@ -256,7 +262,7 @@ fn ways_between_rocks_and_on_nets() {
     for number in [0, 0, 0, 0, 1, 0, 1, 0, 0, 1, 1, 1] {
         bytes.extend(f64::from(number).to_le_bytes());
     }
-    fs::write(place.join("net.npy"), bytes).unwrap();
+    fs::write(folder.join("net.npy"), bytes).unwrap();
     let net = |by| {
         [
             "route",
@@ -277,34 +283,34 @@ fn ways_between_rocks_and_on_nets() {
         ("line", 1.252_949_347_6, 1e-10),
         ("facets:40", 1.251_039, 3e-5),
     ] {
-        let told = succeed(place, &net(by));
-        let lines: serde_json::Value = serde_json::from_slice(&told.out).unwrap();
+        let routed = succeed(folder, &net(by));
+        let lines: serde_json::Value = serde_json::from_slice(&routed.out).unwrap();
         let length = lines[0]["length"].as_f64().unwrap();
         assert!((length - expected).abs() < bound, "{by}: {length}");
     }
     for by in ["exact", "facets:0", "facets:x"] {
-        assert_ne!(run(place, &net(by)).code, 0);
+        assert_ne!(run(folder, &net(by)).code, 0);
     }
 }
 
 #[test]
 fn bad_inputs_and_lines() {
-    let place = tempfile::tempdir().unwrap();
-    let place = place.path();
-    terrain(place);
+    let temporary = tempfile::tempdir().unwrap();
+    let folder = temporary.path();
+    terrain(folder);
     fs::write(
-        place.join("flat.obj"),
+        folder.join("flat.obj"),
         "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n",
     )
     .unwrap();
     fs::write(
-        place.join("empty.ply"),
+        folder.join("empty.ply"),
         "ply\nformat ascii 1.0\nend_header\n",
     )
     .unwrap();
-    fs::write(place.join("pairs.txt"), "1 2 3\n").unwrap();
-    fs::write(place.join("hill.txt"), "").unwrap();
-    fs::write(place.join("cube.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nv 0 0 1\nv 1 0 1\nv 0 1 1\nv 1 1 1\nf 1 3 4 2\nf 1 2 6 5\nf 1 5 7 3\nf 8 7 5 6\nf 8 6 2 4\nf 8 4 3 7\n").unwrap();
+    fs::write(folder.join("pairs.txt"), "1 2 3\n").unwrap();
+    fs::write(folder.join("hill.txt"), "").unwrap();
+    fs::write(folder.join("cube.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nv 0 0 1\nv 1 0 1\nv 0 1 1\nv 1 1 1\nf 1 3 4 2\nf 1 2 6 5\nf 1 5 7 3\nf 8 7 5 6\nf 8 6 2 4\nf 8 4 3 7\n").unwrap();
     let ends = ["--from", "0,0,0", "--to", "1,1,1", "-o", "out.csv"];
     for (code, words, message) in [
         (4, vec!["route", "flat.obj"], "face 0 (from 0) has no area"),
@@ -323,23 +329,27 @@ fn bad_inputs_and_lines() {
         (
             4,
             vec!["route", "cube.obj", "--by", "plane"],
-            "no plane is given",
+            "the plane is not defined",
         ),
     ] {
         let line: Vec<&str> = words.into_iter().chain(ends).collect();
-        let told = run(place, &line);
-        assert_eq!(told.code, code, "{line:?}: {}", told.words);
-        assert!(told.words.contains(message), "{line:?}: {}", told.words);
-        assert!(!place.join("out.csv").exists());
+        let refused = run(folder, &line);
+        assert_eq!(refused.code, code, "{line:?}: {}", refused.words);
+        assert!(
+            refused.words.contains(message),
+            "{line:?}: {}",
+            refused.words
+        );
+        assert!(!folder.join("out.csv").exists());
     }
-    let told = run(
-        place,
+    let refused = run(
+        folder,
         &["route", "hill.obj", "--pairs", "pairs.txt", "-o", "out"],
     );
-    assert_eq!(told.code, 4);
-    assert!(told.words.contains("pairs.txt:1"), "{}", told.words);
-    let told = run(place, &["route", "hill.obj", "-o", "out.csv"]);
-    assert_eq!(told.code, 2);
+    assert_eq!(refused.code, 4);
+    assert!(refused.words.contains("pairs.txt:1"), "{}", refused.words);
+    let refused = run(folder, &["route", "hill.obj", "-o", "out.csv"]);
+    assert_eq!(refused.code, 2);
 }
 
 /// An exact algorithm that is not ours has the same lengths.

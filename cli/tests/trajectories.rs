@@ -8,12 +8,12 @@ use serde_json::Value;
 
 use crate::program::{Run, root, run, sample_folder, succeed};
 
-fn line(place: &Path, line: &str) -> Run {
-    succeed(place, &line.split(' ').collect::<Vec<_>>())
+fn line(folder: &Path, line: &str) -> Run {
+    succeed(folder, &line.split(' ').collect::<Vec<_>>())
 }
 
-fn refused(place: &Path, line: &str, words: &str) {
-    let run = run(place, &line.split(' ').collect::<Vec<_>>());
+fn refused(folder: &Path, line: &str, words: &str) {
+    let run = run(folder, &line.split(' ').collect::<Vec<_>>());
     assert_ne!(run.code, 0, "{line}");
     assert!(run.words.contains(words), "{line}: {}", run.words);
 }
@@ -106,13 +106,13 @@ fn every_trajectory_becomes_every_other() {
     refused(
         at,
         "convert path.tum -o k.kitti --times-out k.kitti",
-        "two files of this command",
+        "would be written twice by this command",
     );
     refused(at, "info poses.txt", "--source-times");
     refused(
         at,
         "info path.tum --source-times times.txt",
-        "says nothing to tum",
+        "has no effect on tum",
     );
     fs::write(at.join("few.txt"), "0\n1\n").unwrap();
     refused(at, "info poses.txt --source-times few.txt", "E507");
@@ -197,7 +197,7 @@ fn times_in_gaps_are_left_out_held_or_refused() {
     refused(
         at,
         &format!("{eval} --in-gaps hold --output velocity -o no.npy"),
-        "does not turn",
+        "has no velocity",
     );
     refused(
         at,

@@ -12,10 +12,10 @@ use crate::program::{finish, root, run, sample_folder, succeed};
 /// A curve in space with bends to both sides.
 const ROAD: &str = "t,x,y,z\n0,0,0,0\n1,1,0.4,1\n2,2,0.8,-1\n3,3,0.3,1\n4,4,0,0\n";
 
-fn place() -> tempfile::TempDir {
-    let place = sample_folder();
-    fs::write(place.path().join("road.csv"), ROAD).unwrap();
-    place
+fn road_folder() -> tempfile::TempDir {
+    let folder = sample_folder();
+    fs::write(folder.path().join("road.csv"), ROAD).unwrap();
+    folder
 }
 
 fn words(line: &str) -> Vec<&str> {
@@ -51,43 +51,43 @@ fn commands(start: &str) -> String {
 /// The guide's pipe, as it stands there: the box stays on the hill, upright on it, and clear of rocks.
 #[test]
 fn the_guide_s_pipe_leads_a_box_over_the_hill() {
-    let place = tempfile::tempdir().unwrap();
+    let folder = tempfile::tempdir().unwrap();
     let program = Path::new(env!("CARGO_BIN_EXE_tumble")).parent().unwrap();
     let path = std::env::var("PATH").unwrap();
     let output = Command::new("sh")
         .args(["-euc", &commands("tumble generate --hill")])
         .env("PATH", format!("{}:{path}", program.display()))
-        .current_dir(place.path())
+        .current_dir(folder.path())
         .stdin(Stdio::null())
         .output()
         .unwrap();
     let done = finish(output);
     assert_eq!(done.code, 0, "{}", done.words);
-    let film = fs::metadata(place.path().join("walk.gif")).unwrap().len();
+    let film = fs::metadata(folder.path().join("walk.gif")).unwrap().len();
     assert!((20_000..400_000).contains(&film), "{film} bytes");
 
     succeed(
-        place.path(),
+        folder.path(),
         &words("eval walk.glb --output world -o walk.npy"),
     );
-    let bytes = fs::read(place.path().join("walk.npy")).unwrap();
+    let bytes = fs::read(folder.path().join("walk.npy")).unwrap();
     let poses = npyz::NpyFile::new(&bytes[..]).unwrap();
     let poses = poses.into_vec::<f32>().unwrap();
     let read = |name: &str| {
-        let bytes = fs::read(place.path().join(name)).unwrap();
+        let bytes = fs::read(folder.path().join(name)).unwrap();
         tumble_routes::mesh::Mesh::of_obj(&bytes).unwrap()
     };
     let (hill, rocks) = (read("hill.obj"), read("rocks.obj"));
-    let way: f32 = poses
+    let distance: f32 = poses
         .chunks(7)
         .zip(poses.chunks(7).skip(1))
         .map(|(from, to)| Vec3::from_slice(from).distance(Vec3::from_slice(to)))
         .sum();
-    assert!(way > 12.0, "{way}");
+    assert!(distance > 12.0, "{distance}");
     assert!(poses.chunks(7).any(|pose| pose[1] > 1.0), "it climbs");
     for pose in poses.chunks(7) {
         let at = Vec3::from_slice(pose).as_dvec3();
-        // Straight parts between f32 points of the way lie on the hill's triangles.
+        // Straight parts between f32 points of the path lie on the hill's triangles.
         let off = hill.nearest(at).distance(at);
         assert!(off < 0.01, "{at} is {off} off the hill");
         let clear = rocks.nearest(at).distance(at);
@@ -102,15 +102,15 @@ fn the_guide_s_pipe_leads_a_box_over_the_hill() {
 
 #[test]
 fn a_path_its_axes_and_a_box_are_rendered() {
-    let place = place();
+    let folder = road_folder();
     let line = "render road.csv --frame frenet,minimal --size 400x200 --start 1.5 -o a.png";
-    let run = succeed(place.path(), &words(line));
+    let run = succeed(folder.path(), &words(line));
     assert!(
         run.words.contains("road.csv: 1 frame, 1 path, on"),
         "{}",
         run.words
     );
-    let (found, width) = pixels(&place.path().join("a.png"));
+    let (found, width) = pixels(&folder.path().join("a.png"));
     let coloured = |columns: std::ops::Range<usize>| {
         let rows = found.chunks(width).flat_map(|row| &row[columns.clone()]);
         rows.filter(|pixel| colourful(pixel)).count()
@@ -122,8 +122,8 @@ fn a_path_its_axes_and_a_box_are_rendered() {
     // Without axes and with a small body less is coloured, and the body moves.
     let still = |start: &str, out: &str| {
         let line = format!("render road.csv --axes 0 --size 200x200 --start {start} -o {out}");
-        succeed(place.path(), &words(&line));
-        pixels(&place.path().join(out)).0
+        succeed(folder.path(), &words(&line));
+        pixels(&folder.path().join(out)).0
     };
     let (one, other) = (still("0.5", "b.png"), still("3.5", "c.png"));
     let middle = |pixels: &[[u8; 3]]| {
@@ -137,12 +137,12 @@ fn a_path_its_axes_and_a_box_are_rendered() {
     assert!(middle(&one) + 40 < middle(&other), "it goes to the right");
     // What `follow` has written looks the same.
     succeed(
-        place.path(),
+        folder.path(),
         &words("follow road.csv --fps 100 -o road.glb"),
     );
     let line = "render road.glb --axes 0 --size 200x200 --start 3.5 -o d.png";
-    succeed(place.path(), &words(line));
-    let again = pixels(&place.path().join("d.png")).0;
+    succeed(folder.path(), &words(line));
+    let again = pixels(&folder.path().join("d.png")).0;
     let differ = |(a, b): &(&[u8; 3], &[u8; 3])| (0..3).any(|c| a[c].abs_diff(b[c]) > 40);
     let count = other.iter().zip(&again).filter(differ).count();
     assert!(count < 400, "{count} pixels differ");
@@ -150,10 +150,10 @@ fn a_path_its_axes_and_a_box_are_rendered() {
 
 #[test]
 fn paths_are_plotted_by_each_frame() {
-    let place = place();
+    let folder = road_folder();
     let line = "plot road.csv --frame minimal,fixed -o road.svg";
-    succeed(place.path(), &words(line));
-    let svg = fs::read_to_string(place.path().join("road.svg")).unwrap();
+    succeed(folder.path(), &words(line));
+    let svg = fs::read_to_string(folder.path().join("road.svg")).unwrap();
     for word in [
         "speed along the path",
         "turning rate",
@@ -163,34 +163,34 @@ fn paths_are_plotted_by_each_frame() {
     ] {
         assert!(svg.contains(word), "no {word}");
     }
-    succeed(place.path(), &words("follow road.csv -o road.glb"));
+    succeed(folder.path(), &words("follow road.csv -o road.glb"));
     succeed(
-        place.path(),
+        folder.path(),
         &words("plot road.glb --show path -o again.png"),
     );
     let refused = |line: &str, message: &str| {
-        let run = run(place.path(), &words(line));
+        let run = run(folder.path(), &words(line));
         assert_eq!(run.code, 2, "{}", run.words);
         assert!(run.words.contains(message), "{}", run.words);
     };
     refused("plot road.csv --show error -o e.svg", "--show path");
-    refused("plot a.dat --show path -o e.svg", "no file of paths");
+    refused("plot a.dat --show path -o e.svg", "neither a file of paths");
     refused("render road.csv --frame sideways -o e.png", "--frame");
 }
 
 #[test]
 fn smoothing_is_plotted() {
-    let place = place();
+    let folder = road_folder();
     succeed(
-        place.path(),
+        folder.path(),
         &words("smooth a.dat -o calm.npy --plot calm.svg"),
     );
-    let svg = fs::read_to_string(place.path().join("calm.svg")).unwrap();
+    let svg = fs::read_to_string(folder.path().join("calm.svg")).unwrap();
     for word in ["before and after", "angular speed", "gaussian:2"] {
         assert!(svg.contains(word), "no {word}");
     }
     let run = run(
-        place.path(),
+        folder.path(),
         &words("smooth a.dat b.dat -o calm --plot c.svg"),
     );
     assert_eq!(run.code, 2, "{}", run.words);
@@ -198,38 +198,38 @@ fn smoothing_is_plotted() {
 
 #[test]
 fn a_batch_of_paths_goes_on_where_it_stopped() {
-    let place = place();
-    fs::create_dir(place.path().join("paths")).unwrap();
+    let folder = road_folder();
+    fs::create_dir(folder.path().join("paths")).unwrap();
     for name in ["a", "b"] {
-        fs::write(place.path().join(format!("paths/{name}.csv")), ROAD).unwrap();
+        fs::write(folder.path().join(format!("paths/{name}.csv")), ROAD).unwrap();
     }
-    succeed(place.path(), &words("follow paths -o poses --resume"));
-    let result = |name: &str| fs::read(place.path().join("poses").join(name)).unwrap();
+    succeed(folder.path(), &words("follow paths -o poses --resume"));
+    let result = |name: &str| fs::read(folder.path().join("poses").join(name)).unwrap();
     let first = result("a.npy");
-    fs::remove_file(place.path().join("poses/b.npy")).unwrap();
-    let again = succeed(place.path(), &words("follow paths -o poses --resume"));
+    fs::remove_file(folder.path().join("poses/b.npy")).unwrap();
+    let again = succeed(folder.path(), &words("follow paths -o poses --resume"));
     assert!(again.words.contains("1 result skipped"), "{}", again.words);
     assert_eq!(result("b.npy"), first, "the same path");
-    // Another way to follow makes all anew.
+    // With other options, `follow` makes all results again.
     let other = succeed(
-        place.path(),
+        folder.path(),
         &words("follow paths -o poses --resume --frame fixed"),
     );
     assert!(!other.words.contains("skipped"), "{}", other.words);
     assert!(result("a.npy") != first);
-    succeed(place.path(), &words("check poses"));
+    succeed(folder.path(), &words("check poses"));
 }
 
 #[test]
 fn the_page_shows_paths_with_axes_and_a_body_that_moves() {
-    let place = place();
+    let folder = road_folder();
     succeed(
-        place.path(),
+        folder.path(),
         &words("generate --hill -o hill.obj --rocks rocks.obj"),
     );
     let line = "view road.csv --frame minimal,frenet --fps 30 --mesh hill.obj -o view.html";
-    succeed(place.path(), &words(line));
-    let Some(mut page) = Page::open(&place.path().join("view.html")) else {
+    succeed(folder.path(), &words(line));
+    let Some(mut page) = Page::open(&folder.path().join("view.html")) else {
         return;
     };
     // One box and its roof, a curve with a bar between any two samples, 40 times three axes.
@@ -245,8 +245,11 @@ fn the_page_shows_paths_with_axes_and_a_body_that_moves() {
     );
 
     // Bodies are where `follow` puts them, and turned as it turns them.
-    succeed(place.path(), &words("follow road.csv --fps 1 -o poses.npy"));
-    let bytes = fs::read(place.path().join("poses.npy")).unwrap();
+    succeed(
+        folder.path(),
+        &words("follow road.csv --fps 1 -o poses.npy"),
+    );
+    let bytes = fs::read(folder.path().join("poses.npy")).unwrap();
     let poses = npyz::NpyFile::new(&bytes[..]).unwrap().into_vec::<f32>();
     for (time, pose) in poses.unwrap().chunks(7).enumerate() {
         page.value(&format!("tumble.seek({time})"));
@@ -256,8 +259,8 @@ fn the_page_shows_paths_with_axes_and_a_body_that_moves() {
         };
         let at = numbers(page.value("tumble.ends(0)[0]"));
         assert!(Vec3::from_slice(&at).distance(Vec3::from_slice(pose)) < 2e-4);
-        let turn = numbers(page.value("tumble.shown(0)"));
-        let cosine = Quat::from_slice(&turn).dot(Quat::from_slice(&pose[3..]));
+        let rotation = numbers(page.value("tumble.shown(0)"));
+        let cosine = Quat::from_slice(&rotation).dot(Quat::from_slice(&pose[3..]));
         assert!(cosine.abs() > 1.0 - 1e-6, "{cosine} at {time}");
     }
     let mut drawn = |time: &str| {

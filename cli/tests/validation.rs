@@ -36,7 +36,7 @@ fn each_kind_of_check_finds_its_planted_fault() {
 /// What the program does on Vulkan: all methods, forms, layouts and sources of times.
 #[test]
 fn no_layer_has_anything_to_say_of_the_program() {
-    let place = sample_folder();
+    let folder = sample_folder();
     let lines: [&[&str]; 5] = [
         &["verify", "a.dat", "-m", "all", "--device", "vulkan"],
         &[
@@ -82,8 +82,10 @@ fn no_layer_has_anything_to_say_of_the_program() {
     ];
     for layer in Layer::all() {
         for line in lines {
-            let messages =
-                layer.messages(&mut crate::program::command(place.path(), &on_vulkan(line)));
+            let messages = layer.messages(&mut crate::program::command(
+                folder.path(),
+                &on_vulkan(line),
+            ));
             assert_eq!(messages, Vec::<String>::new(), "{}: {line:?}", layer.name);
         }
     }
@@ -91,9 +93,10 @@ fn no_layer_has_anything_to_say_of_the_program() {
 
 /// The line, on a Vulkan device where it names none.
 fn on_vulkan<'a>(line: &[&'a str]) -> Vec<&'a str> {
-    match line.contains(&"--device") {
-        true => line.to_vec(),
-        false => [line, &["--device", "vulkan"]].concat(),
+    if line.contains(&"--device") {
+        line.to_vec()
+    } else {
+        [line, &["--device", "vulkan"]].concat()
     }
 }
 
@@ -157,12 +160,12 @@ fn run(application: &Application, record: impl FnOnce(vk::CommandBuffer, vk::Buf
     }
 }
 
-/// A kernel that writes one number into a buffer of 16, wherever it is told to.
-fn dispatch(application: &Application, place: u32) {
+/// A kernel that writes one number into a buffer of 16, at the index given.
+fn dispatch(application: &Application, index: u32) {
     let source = "
         @group(0) @binding(0) var<storage, read_write> values: array<u32>;
-        var<immediate> place: u32;
-        @compute @workgroup_size(1) fn main() { values[place] = 1u; }";
+        var<immediate> index: u32;
+        @compute @workgroup_size(1) fn main() { values[index] = 1u; }";
     let module = naga::front::wgsl::parse_str(source).unwrap();
     let info = naga::valid::Validator::new(
         naga::valid::ValidationFlags::all(),
@@ -231,9 +234,9 @@ fn dispatch(application: &Application, place: u32) {
             let compute = vk::PipelineBindPoint::COMPUTE;
             device.cmd_bind_pipeline(commands, compute, pipeline);
             device.cmd_bind_descriptor_sets(commands, compute, layout, 0, &sets, &[]);
-            let place = place.to_le_bytes();
+            let bytes = index.to_le_bytes();
             let stage = vk::ShaderStageFlags::COMPUTE;
-            device.cmd_push_constants(commands, layout, stage, 0, &place);
+            device.cmd_push_constants(commands, layout, stage, 0, &bytes);
             device.cmd_dispatch(commands, 1, 1, 1);
         });
         device.destroy_descriptor_pool(pool, None);

@@ -20,17 +20,17 @@ fn sample_data(name: &str) -> String {
     root().join("data").join(name).display().to_string()
 }
 
-pub(crate) fn page(place: &Path, line: &[&str]) -> Option<Page> {
+pub(crate) fn page(folder: &Path, line: &[&str]) -> Option<Page> {
     let line = [&["view", "-o", "view.html", "--overwrite"], line].concat();
-    succeed(place, &line);
-    Page::open(&place.join("view.html"))
+    succeed(folder, &line);
+    Page::open(&folder.join("view.html"))
 }
 
 /// Rotations `[track][sample]` by `tumble eval`.
-pub(crate) fn evaluated(place: &Path, line: &[&str]) -> (Vec<u64>, Vec<Quat>) {
+pub(crate) fn evaluated(folder: &Path, line: &[&str]) -> (Vec<u64>, Vec<Quat>) {
     let line = [&["eval", "-o", "out.npy", "--overwrite"], line].concat();
-    succeed(place, &line);
-    let bytes = fs::read(place.join("out.npy")).unwrap();
+    succeed(folder, &line);
+    let bytes = fs::read(folder.join("out.npy")).unwrap();
     let file = npyz::NpyFile::new(&bytes[..]).unwrap();
     let shape = file.shape().to_vec();
     let numbers = file.into_vec::<f32>().unwrap();
@@ -39,7 +39,7 @@ pub(crate) fn evaluated(place: &Path, line: &[&str]) -> (Vec<u64>, Vec<Quat>) {
 }
 
 pub(crate) fn quat(value: &serde_json::Value) -> Quat {
-    let component = |place: usize| value[place].as_f64().unwrap() as f32;
+    let component = |i: usize| value[i].as_f64().unwrap() as f32;
     Quat::from_xyzw(component(0), component(1), component(2), component(3))
 }
 
@@ -85,15 +85,15 @@ fn the_page_is_built_from_its_sources() {
 
 #[test]
 fn it_loads_alone_and_draws_boxes_that_move() {
-    let place = sample_folder();
+    let folder = sample_folder();
     let sample = sample_data("pendulum.dat");
-    let Some(mut page) = page(place.path(), &[&sample]) else {
+    let Some(mut page) = page(folder.path(), &[&sample]) else {
         return;
     };
-    let size = fs::metadata(place.path().join("view.html")).unwrap().len();
+    let size = fs::metadata(folder.path().join("view.html")).unwrap().len();
     assert!(size < 2_000_000, "{size} bytes");
     let about = page.value("document.querySelector('#about').textContent");
-    let device = succeed(place.path(), &["eval", &sample, "-o", "d.npy"]).words;
+    let device = succeed(folder.path(), &["eval", &sample, "-o", "d.npy"]).words;
     let device = device
         .split(" on ")
         .nth(1)
@@ -132,7 +132,7 @@ fn it_loads_alone_and_draws_boxes_that_move() {
     page.click("#play");
     assert_eq!(page.value("tumble.state.playing"), false);
 
-    let address = format!("file://{}", place.path().join("view.html").display());
+    let address = format!("file://{}", folder.path().join("view.html").display());
     assert!(
         page.requests.iter().all(|request| *request == address),
         "{:?}",
@@ -145,9 +145,9 @@ fn it_loads_alone_and_draws_boxes_that_move() {
 /// Keys at uneven times, between frames: the page shows a key itself there.
 #[test]
 fn the_rotations_shown_are_the_engine_s() {
-    let place = sample_folder();
+    let folder = sample_folder();
     let sample = sample_data("pendulum-random.dat");
-    let Some(mut page) = page(place.path(), &[&sample, "--fps", "30"]) else {
+    let Some(mut page) = page(folder.path(), &[&sample, "--fps", "30"]) else {
         return;
     };
     let text = fs::read_to_string(&sample).unwrap();
@@ -162,11 +162,11 @@ fn the_rotations_shown_are_the_engine_s() {
         .map(String::as_str)
         .chain(key_times.iter().copied())
         .collect();
-    fs::write(place.path().join("times.txt"), times.join("\n")).unwrap();
+    fs::write(folder.path().join("times.txt"), times.join("\n")).unwrap();
     let mut largest = 0.0f32;
     for method in METHODS {
         let line = [&sample, "-m", method.name, "--times", "times.txt"];
-        let (shape, expected) = evaluated(place.path(), &line);
+        let (shape, expected) = evaluated(folder.path(), &line);
         assert_eq!(shape[..2], [4, times.len() as u64]);
         page.choose("#method", method.name);
         page.value("tumble.loaded().then(() => true)");
@@ -190,8 +190,8 @@ fn the_rotations_shown_are_the_engine_s() {
 
 #[test]
 fn ghosts_and_pairs_are_drawn() {
-    let place = sample_folder();
-    let Some(mut page) = page(place.path(), &["a.dat"]) else {
+    let folder = sample_folder();
+    let Some(mut page) = page(folder.path(), &["a.dat"]) else {
         return;
     };
     page.value("tumble.seek(0.25)");
@@ -201,11 +201,14 @@ fn ghosts_and_pairs_are_drawn() {
     let (ghost, _) = page.pixels("#stage");
     assert!(alone != ghost);
     // The ghost shows its own method.
-    let (own, other) = (
+    let (shown, ghost_shown) = (
         page.value("tumble.shown(0)"),
         page.value("tumble.shown(0, 1)"),
     );
-    assert!(apart(quat(&own), quat(&other)) > 0.1, "{own} and {other}");
+    assert!(
+        apart(quat(&shown), quat(&ghost_shown)) > 0.1,
+        "{shown} and {ghost_shown}"
+    );
     page.choose("#pairing", "side");
     page.value("tumble.loaded().then(() => true)");
     let (side, width) = page.pixels("#stage");
@@ -225,8 +228,8 @@ fn ghosts_and_pairs_are_drawn() {
 /// The cursors of the curves move with time, the dots are where the keys are.
 #[test]
 fn curves_follow_time_and_box() {
-    let place = sample_folder();
-    let Some(mut page) = page(place.path(), &["a.dat", "--fps", "50"]) else {
+    let folder = sample_folder();
+    let Some(mut page) = page(folder.path(), &["a.dat", "--fps", "50"]) else {
         return;
     };
     let now = "Number(/translateX\\(([\\d.]+)px/.exec(document.querySelector('#components .now').style.transform)[1]) \
@@ -267,7 +270,11 @@ fn curves_follow_time_and_box() {
         "angular speed, bessel-overhauser, rad/s",
     ] {
         assert!(
-            labels.as_str().unwrap().split('|').any(|own| own == label),
+            labels
+                .as_str()
+                .unwrap()
+                .split('|')
+                .any(|text| text == label),
             "{label} in {labels}"
         );
     }
@@ -275,8 +282,8 @@ fn curves_follow_time_and_box() {
 
 #[test]
 fn it_is_readable_on_a_phone_by_night_and_by_keyboard() {
-    let place = sample_folder();
-    let Some(mut page) = page(place.path(), &["a.dat"]) else {
+    let folder = sample_folder();
+    let Some(mut page) = page(folder.path(), &["a.dat"]) else {
         return;
     };
     let ground = "getComputedStyle(document.body).backgroundColor";
@@ -330,7 +337,7 @@ fn it_is_readable_on_a_phone_by_night_and_by_keyboard() {
         "box",
     ] {
         assert!(
-            reached.iter().any(|own| own == id),
+            reached.iter().any(|found| found == id),
             "Tab does not reach {id}: {reached:?}"
         );
     }

@@ -6,8 +6,8 @@ use tumble::METHODS;
 
 #[test]
 fn every_key_does_what_it_says() {
-    let place = sample_folder();
-    let Some(mut page) = page(place.path(), &["a.dat"]) else {
+    let folder = sample_folder();
+    let Some(mut page) = page(folder.path(), &["a.dat"]) else {
         return;
     };
     // Keys at 0, 0.5, 1, 1.5 and 2 s; 60 frames a second.
@@ -96,8 +96,8 @@ fn every_key_does_what_it_says() {
 
 #[test]
 fn the_view_turns_and_fits_again() {
-    let place = sample_folder();
-    let Some(mut page) = page(place.path(), &["a.dat"]) else {
+    let folder = sample_folder();
+    let Some(mut page) = page(folder.path(), &["a.dat"]) else {
         return;
     };
     let (before, _) = page.pixels("#stage");
@@ -109,8 +109,8 @@ fn the_view_turns_and_fits_again() {
     }
     page.drag("#stage", (120.0, 30.0));
     seen.push(page.pixels("#stage").0);
-    for (place, pair) in seen.windows(2).enumerate() {
-        assert!(pair[0] != pair[1], "view {place} is that before it");
+    for (i, pair) in seen.windows(2).enumerate() {
+        assert!(pair[0] != pair[1], "view {i} is that before it");
     }
     page.press("r");
     assert!(
@@ -126,8 +126,8 @@ fn the_view_turns_and_fits_again() {
 
 #[test]
 fn every_control_does_what_it_says() {
-    let place = sample_folder();
-    let Some(mut page) = page(place.path(), &["a.dat", "b.dat"]) else {
+    let folder = sample_folder();
+    let Some(mut page) = page(folder.path(), &["a.dat", "b.dat"]) else {
         return;
     };
     for (selector, expected) in [
@@ -184,8 +184,8 @@ fn every_control_does_what_it_says() {
 
 #[test]
 fn a_click_on_a_box_shows_its_curves() {
-    let place = sample_folder();
-    let Some(mut page) = page(place.path(), &["a.dat"]) else {
+    let folder = sample_folder();
+    let Some(mut page) = page(folder.path(), &["a.dat"]) else {
         return;
     };
     let area = page.value("(() => { const r = document.querySelector('#stage').getBoundingClientRect(); return [r.x, r.y] })()");
@@ -194,7 +194,7 @@ fn a_click_on_a_box_shows_its_curves() {
     let orange = |pixel: &[u8; 3]| pixel[0] > 90 && pixel[1] > pixel[0] / 2 && pixel[2] < 30;
     let inside = (4 * width + 4..pixels.len() - 4 * width - 4).find(|&at| {
         let round = [at, at - 4, at + 4, at - 4 * width, at + 4 * width];
-        round.iter().all(|&place| orange(&pixels[place]))
+        round.iter().all(|&neighbour| orange(&pixels[neighbour]))
     });
     let at = inside.expect("the second box is seen");
     let (x, y) = ((at % width) as f64, (at / width) as f64);
@@ -205,8 +205,8 @@ fn a_click_on_a_box_shows_its_curves() {
 /// Without looping it stops at the end; with it, it begins again.
 #[test]
 fn it_loops_or_stops_at_the_end() {
-    let place = sample_folder();
-    let Some(mut page) = page(place.path(), &["a.dat"]) else {
+    let folder = sample_folder();
+    let Some(mut page) = page(folder.path(), &["a.dat"]) else {
         return;
     };
     page.value("tumble.seek(1.9)");

@@ -51,7 +51,7 @@ fn number(page: &mut Page, expression: &str) -> usize {
 }
 
 /// Rotations that the page has made, `[track][sample]`, bit for bit those of `tumble eval`.
-fn assert_same_bits(page: &mut Page, place: &Path, line: &[&str]) {
+fn assert_same_bits(page: &mut Page, folder: &Path, line: &[&str]) {
     let times = page.value("Array.from(tumble.state.input.times)");
     let times: Vec<String> = times
         .as_array()
@@ -59,9 +59,9 @@ fn assert_same_bits(page: &mut Page, place: &Path, line: &[&str]) {
         .iter()
         .map(Value::to_string)
         .collect();
-    fs::write(place.join("times.txt"), times.join("\n")).unwrap();
+    fs::write(folder.join("times.txt"), times.join("\n")).unwrap();
     let line = [line, &["--times", "times.txt", "--device", "cpu"]].concat();
-    let (shape, expected) = evaluated(place, &line);
+    let (shape, expected) = evaluated(folder, &line);
     let tracks = number(page, "tumble.state.input.boxes");
     assert_eq!(shape[..2], [tracks as u64, times.len() as u64]);
     let found = page.value("Array.from(tumble.results()[0].rotations)");
@@ -81,13 +81,13 @@ fn assert_same_bits(page: &mut Page, place: &Path, line: &[&str]) {
 
 #[test]
 fn methods_and_rates_that_were_not_written_have_the_program_s_bits() {
-    let place = sample_folder();
+    let folder = sample_folder();
     let data = root()
         .join("data/pendulum-random.dat")
         .display()
         .to_string();
     let line = [&*data, "-m", "slerp", "--fps", "10", "--ends", "natural"];
-    let Some(mut page) = page(place.path(), &line) else {
+    let Some(mut page) = page(folder.path(), &line) else {
         return;
     };
     let written = number(&mut page, "tumble.state.input.samples");
@@ -111,7 +111,7 @@ fn methods_and_rates_that_were_not_written_have_the_program_s_bits() {
         if method != "slerp" {
             line.extend(["--ends", "natural"]);
         }
-        assert_same_bits(&mut page, place.path(), &line);
+        assert_same_bits(&mut page, folder.path(), &line);
         let samples = number(&mut page, "tumble.state.input.samples");
         assert_eq!(samples > written, !rate.is_empty(), "{samples} at `{rate}`");
     }
@@ -120,7 +120,7 @@ fn methods_and_rates_that_were_not_written_have_the_program_s_bits() {
     page.value("tumble.loaded().then(() => true)");
     assert_eq!(number(&mut page, "tumble.state.input.samples"), written);
     assert_eq!(page.value("tumble.results()[0].unit"), 32767);
-    // What is too much is refused in words, and the rate stays.
+    // A rate with too many samples is refused with a message, and the old one stays.
     page.choose("#rate", "1e9");
     let trouble = page.value("document.querySelector('#trouble').textContent");
     assert!(
@@ -133,17 +133,20 @@ fn methods_and_rates_that_were_not_written_have_the_program_s_bits() {
 
 #[test]
 fn pictures_between_frames_are_evaluated_at_their_own_times() {
-    let place = sample_folder();
+    let folder = sample_folder();
     let data = root()
         .join("data/pendulum-random.dat")
         .display()
         .to_string();
-    let Some(mut page) = page(place.path(), &[&data, "-m", "c2", "--fps", "4"]) else {
+    let Some(mut page) = page(folder.path(), &[&data, "-m", "c2", "--fps", "4"]) else {
         return;
     };
     let times = ["0.1234", "1.77", "5.01"];
-    fs::write(place.path().join("between.txt"), times.join("\n")).unwrap();
-    let (_, expected) = evaluated(place.path(), &[&data, "-m", "c2", "--times", "between.txt"]);
+    fs::write(folder.path().join("between.txt"), times.join("\n")).unwrap();
+    let (_, expected) = evaluated(
+        folder.path(),
+        &[&data, "-m", "c2", "--times", "between.txt"],
+    );
     let shown =
         |page: &mut Page, time: &str| page.value(&format!("tumble.seek({time}), tumble.shown(0)"));
     let before = shown(&mut page, times[0]);
@@ -170,12 +173,12 @@ fn pictures_between_frames_are_evaluated_at_their_own_times() {
 
 #[test]
 fn without_its_engine_a_page_shows_what_was_written() {
-    let place = sample_folder();
+    let folder = sample_folder();
     let line = ["a.dat", "-m", "slerp,c2"];
-    let Some(mut whole) = page(place.path(), &line) else {
+    let Some(mut whole) = page(folder.path(), &line) else {
         return;
     };
-    let file = place.path().join("view.html");
+    let file = folder.path().join("view.html");
     let text = fs::read_to_string(&file).unwrap();
     // A browser that runs no module: one that is broken.
     let start = text.find("\"engine\":\"").unwrap() + 40;
@@ -184,7 +187,7 @@ fn without_its_engine_a_page_shows_what_was_written() {
     fs::write(&file, broken).unwrap();
     let mut pages = vec![Page::open(&file).unwrap()];
     pages.extend(page(
-        place.path(),
+        folder.path(),
         &[&line[..], &["--frames-only"]].concat(),
     ));
     assert_eq!(pages.len(), 2);
@@ -209,16 +212,16 @@ fn without_its_engine_a_page_shows_what_was_written() {
 
 #[test]
 fn a_mesh_follows_its_bones_and_keys_are_told() {
-    let place = sample_folder();
-    fs::copy(root().join(SKIN), place.path().join("bend.gltf")).unwrap();
+    let folder = sample_folder();
+    fs::copy(root().join(SKIN), folder.path().join("bend.gltf")).unwrap();
     let line = ["bend.gltf", "--fps", "4"];
     for frames_only in [false, true] {
         let extra: &[&str] = if frames_only { &["--frames-only"] } else { &[] };
-        let Some(mut page) = page(place.path(), &[&line[..], extra].concat()) else {
+        let Some(mut page) = page(folder.path(), &[&line[..], extra].concat()) else {
             return;
         };
         assert_eq!(number(&mut page, "tumble.vertices()"), 7);
-        // formats/tests/skins.rs has the same places.
+        // formats/tests/skins.rs has the same positions.
         for (time, vertex, [x, y]) in [
             (0.0, 2, [0.0, 2.0]),
             (1.0, 2, [-1.0, 1.0]),

@@ -9,8 +9,8 @@ const BVH: &str = "formats/tests/fixtures/bvh/good.bvh";
 
 #[test]
 fn bones_of_a_bvh_file_are_where_eval_puts_its_joints() {
-    let place = sample_folder();
-    let folder = place.path();
+    let temporary = sample_folder();
+    let folder = temporary.path();
     fs::copy(root().join(BVH), folder.join("walk.bvh")).unwrap();
     let run = succeed(folder, &["view", "walk.bvh", "a.dat", "-o", "view.html"]);
     assert!(run.words.contains("2 inputs, 15 methods"), "{}", run.words);
@@ -54,18 +54,18 @@ fn bones_of_a_bvh_file_are_where_eval_puts_its_joints() {
             .iter()
             .map(|x| x.as_f64().unwrap())
             .collect();
-        let places = expected.chunks_exact(7).map(|pose| &pose[..3]);
-        assert_eq!(drawn.len(), places.len() * 3);
+        let positions = expected.chunks_exact(7).map(|pose| &pose[..3]);
+        assert_eq!(drawn.len(), positions.len() * 3);
         let size = page.value("tumble.state.input.stored.results[0].positions.size");
         let size = (0..3)
             .map(|axis| size[axis].as_f64().unwrap())
             .fold(0.0, f64::max);
         assert!(size > 0.1, "it moves: {size}");
-        for (place, (found, &right)) in drawn.iter().zip(places.flatten()).enumerate() {
+        for (i, (found, &right)) in drawn.iter().zip(positions.flatten()).enumerate() {
             let off = (found - f64::from(right)).abs();
             assert!(
                 off < size / 65535.0 + 1e-6,
-                "{method}, {place}: {found}, {right}"
+                "{method}, {i}: {found}, {right}"
             );
         }
     }
@@ -84,10 +84,10 @@ fn bones_of_a_bvh_file_are_where_eval_puts_its_joints() {
 
 #[test]
 fn a_long_motion_is_refused_in_its_words() {
-    let place = sample_folder();
-    fs::copy(root().join(BVH), place.path().join("walk.bvh")).unwrap();
+    let folder = sample_folder();
+    fs::copy(root().join(BVH), folder.path().join("walk.bvh")).unwrap();
     let line = "view walk.bvh -o x.html --fps 1e9";
-    let run = run(place.path(), &line.split(' ').collect::<Vec<_>>());
+    let run = run(folder.path(), &line.split(' ').collect::<Vec<_>>());
     assert_eq!(run.code, 2, "{}", run.words);
     let words = [
         "joints ×",

@@ -18,9 +18,9 @@ pub enum UpAxis {
 }
 
 impl UpAxis {
-    /// The quarter turn about x for [`adjust`]. By no sine: those of systems differ in the last bit.
+    /// The rotation by 90° about x for [`adjust`]. By no sine: those of systems differ in the last bit.
     #[must_use]
-    pub fn turn(self) -> DQuat {
+    pub fn rotation(self) -> DQuat {
         let x = match self {
             Self::Y => -FRAC_1_SQRT_2,
             Self::Z => FRAC_1_SQRT_2,
@@ -29,9 +29,9 @@ impl UpAxis {
     }
 
     /// The rotation that makes this axis the one that is up: from the one that a file says, else by
-    /// [`turn`](Self::turn).
+    /// [`rotation`](Self::rotation).
     #[must_use]
-    pub fn turn_from(self, space: Option<Space>) -> DQuat {
+    pub fn rotation_from(self, space: Option<Space>) -> DQuat {
         let axis = match self {
             Self::Y => DVec3::Y,
             Self::Z => DVec3::Z,
@@ -41,7 +41,7 @@ impl UpAxis {
             DQuat::from_xyzw(x, y, z, FRAC_1_SQRT_2)
         };
         match space.map(|space| space.up) {
-            None => self.turn(),
+            None => self.rotation(),
             Some(up) if up == axis => DQuat::IDENTITY,
             Some(up) if up == -axis => DQuat::from_xyzw(1.0, 0.0, 0.0, 0.0),
             Some(up) => quarter(up.cross(axis)),
@@ -54,9 +54,9 @@ impl UpAxis {
 /// # Errors
 /// As [`adjust`].
 pub fn adjust_all(loaded: &mut Loaded, scale: f64, up: Option<UpAxis>) -> Result<(), TrackError> {
-    let turn = up.map_or(DQuat::IDENTITY, |up| up.turn_from(loaded.space));
+    let rotation = up.map_or(DQuat::IDENTITY, |up| up.rotation_from(loaded.space));
     for clip in &mut loaded.clips {
-        *clip = adjust(clip, scale, turn)?;
+        *clip = adjust(clip, scale, rotation)?;
     }
     if let Some(length) = &mut loaded.box_length {
         *length *= scale;
@@ -73,29 +73,32 @@ pub fn adjust_all(loaded: &mut Loaded, scale: f64, up: Option<UpAxis>) -> Result
     Ok(())
 }
 
-/// The clip with all translations multiplied by `scale`, and with all roots turned by `turn`, keys
+/// The clip with all translations multiplied by `scale`, and with all roots rotated by `rotation`, keys
 /// and tangents alike. Computed in f64, rounded once.
 ///
 /// # Errors
 /// When a translation passes the largest f32.
-pub fn adjust(clip: &Motion, scale: f64, turn: DQuat) -> Result<Motion, TrackError> {
+pub fn adjust(clip: &Motion, scale: f64, rotation: DQuat) -> Result<Motion, TrackError> {
     let mut adjusted = clip.without_tracks();
-    let ends = adjusted.bvh.iter_mut().flat_map(|own| &mut own.end_sites);
+    let ends = adjusted
+        .bvh
+        .iter_mut()
+        .flat_map(|joint| &mut joint.end_sites);
     for end in ends {
         *end = (end.as_dvec3() * scale).as_vec3();
     }
     if let Some(body) = &mut adjusted.body {
-        body.pelvis = (turn * (body.pelvis.as_dvec3() * scale)).as_vec3();
+        body.pelvis = (rotation * (body.pelvis.as_dvec3() * scale)).as_vec3();
     }
     for (index, track) in clip.set.tracks().enumerate() {
         let joint = clip.skeleton.get(index);
         let is_root = clip.is_world || joint.is_none_or(|joint| joint.parent.is_none());
-        let turn = if is_root { turn } else { DQuat::IDENTITY };
-        let turned = |key: Quat| match is_root {
-            true => (turn * key.as_dquat()).as_quat(),
+        let rotation = if is_root { rotation } else { DQuat::IDENTITY };
+        let rotated = |key: Quat| match is_root {
+            true => (rotation * key.as_dquat()).as_quat(),
             false => key,
         };
-        let exactly = |vector: DVec3| turn * (vector * scale);
+        let exactly = |vector: DVec3| rotation * (vector * scale);
         let moved = |vector: Vec3| exactly(vector.as_dvec3()).as_vec3();
         let before = clip.origin(index);
         // Whole numbers, which f64 adds exactly, where these are as near to the positions as before.
@@ -105,11 +108,15 @@ pub fn adjust(clip: &Motion, scale: f64, turn: DQuat) -> Result<Motion, TrackErr
             origin.round(),
             origin,
         );
-        let keys: Vec<Quat> = track.keys.iter().map(|&key| turned(key)).collect();
+        let keys: Vec<Quat> = track.keys.iter().map(|&key| rotated(key)).collect();
         let set = &mut adjusted.set;
         set.push(track.name.unwrap_or_default(), track.times, &keys)?;
         if !track.tangents.is_empty() {
-            let tangents: Vec<_> = track.tangents.iter().map(|both| both.map(turned)).collect();
+            let tangents: Vec<_> = track
+                .tangents
+                .iter()
+                .map(|both| both.map(rotated))
+                .collect();
             set.set_tangents(index, &tangents)?;
         }
         if !track.velocities.is_empty() {
@@ -132,7 +139,7 @@ pub fn adjust(clip: &Motion, scale: f64, turn: DQuat) -> Result<Motion, TrackErr
             joint.rest = Transform {
                 translation: (exactly(before + joint.rest.translation.as_dvec3()) - origin)
                     .as_vec3(),
-                rotation: turned(joint.rest.rotation),
+                rotation: rotated(joint.rest.rotation),
                 ..joint.rest
             };
         }
@@ -169,11 +176,11 @@ pub fn set_offsets(clip: &mut Motion, numbers: &[f64]) -> Result<(), OffsetsErro
         && let Some(&pelvis) = offsets.first()
     {
         let pelvis = DVec3::from_array(pelvis);
-        if let Some(own) = clip.set.vector_keys(Channel::Translation, 0) {
+        if let Some(translations) = clip.set.vector_keys(Channel::Translation, 0) {
             let before = body.pelvis.as_dvec3();
             let moved = |key: &Vec3| (key.as_dvec3() - before + pelvis).as_vec3();
-            let keys: Vec<Vec3> = own.keys.iter().map(moved).collect();
-            let (times, tangents) = (own.times.to_vec(), own.tangents.to_vec());
+            let keys: Vec<Vec3> = translations.keys.iter().map(moved).collect();
+            let (times, tangents) = (translations.times.to_vec(), translations.tangents.to_vec());
             clip.set.set_translations(0, &times, &keys, &tangents)?;
         }
         clip.body = Some(Body {
@@ -227,12 +234,12 @@ mod tests {
         for up in axes.into_iter().flat_map(|axis| [axis, -axis]) {
             let space = Some(Space { up, metres: 1.0 });
             for (to, axis) in [(UpAxis::Y, DVec3::Y), (UpAxis::Z, DVec3::Z)] {
-                let found = to.turn_from(space) * up;
+                let found = to.rotation_from(space) * up;
                 assert!(found.distance(axis) < 1e-15, "{up} to {axis}: {found}");
             }
         }
-        assert!((UpAxis::Y.turn_from(None) * DVec3::Z).distance(DVec3::Y) < 1e-15);
-        assert!((UpAxis::Z.turn_from(None) * DVec3::Y).distance(DVec3::Z) < 1e-15);
+        assert!((UpAxis::Y.rotation_from(None) * DVec3::Z).distance(DVec3::Y) < 1e-15);
+        assert!((UpAxis::Z.rotation_from(None) * DVec3::Y).distance(DVec3::Z) < 1e-15);
     }
 
     #[test]
@@ -253,10 +260,10 @@ mod tests {
             clip.skeleton.push(Joint { parent, rest });
         }
         // z up becomes y up.
-        let turn = UpAxis::Y.turn();
-        assert!(turn.abs_diff_eq(DQuat::from_rotation_x(-std::f64::consts::FRAC_PI_2), 2e-16));
-        assert_eq!(UpAxis::Z.turn(), turn.conjugate());
-        let adjusted = adjust(&clip, 0.01, turn).unwrap();
+        let rotation = UpAxis::Y.rotation();
+        assert!(rotation.abs_diff_eq(DQuat::from_rotation_x(-std::f64::consts::FRAC_PI_2), 2e-16));
+        assert_eq!(UpAxis::Z.rotation(), rotation.conjugate());
+        let adjusted = adjust(&clip, 0.01, rotation).unwrap();
         let at = |track| {
             adjusted
                 .set

@@ -54,23 +54,23 @@ pub fn is_beneath(name: &str) -> bool {
 pub fn is_refused(error: &io::Error) -> bool {
     error
         .get_ref()
-        .is_some_and(<dyn std::error::Error + Send + Sync>::is::<Refused>)
+        .is_some_and(<dyn std::error::Error + Send + Sync>::is::<OpenRefusal>)
 }
 
 #[derive(Debug, thiserror::Error)]
-enum Refused {
+enum OpenRefusal {
     #[error("leads out of its folder, which is not followed; put the file there itself")]
     LeadsOut,
-    #[error("is no regular file; give a file")]
+    #[error("is not a regular file; give a file")]
     NoFile,
 }
 
 fn leads_out() -> io::Error {
-    io::Error::other(Refused::LeadsOut)
+    io::Error::other(OpenRefusal::LeadsOut)
 }
 
 fn no_file() -> io::Error {
-    io::Error::other(Refused::NoFile)
+    io::Error::other(OpenRefusal::NoFile)
 }
 
 /// The name without `.` and `..`; nothing where it is absolute, empty or leads out.
@@ -152,7 +152,7 @@ mod tests {
     type Open = fn(&Path, &Path) -> io::Result<File>;
 
     /// As the system has it, and by steps.
-    const WAYS: [(&str, Open); 2] = [
+    const IMPLEMENTATIONS: [(&str, Open); 2] = [
         ("the system", open_beneath),
         ("by steps", |folder, name| {
             let name = plain(name).ok_or_else(leads_out)?;
@@ -168,15 +168,19 @@ mod tests {
 
     #[test]
     fn files_beneath_are_opened_and_no_others() {
-        let place = tempfile::tempdir().unwrap();
-        let folder = place.path().join("folder");
+        let directory = tempfile::tempdir().unwrap();
+        let folder = directory.path().join("folder");
         std::fs::create_dir_all(folder.join("deep")).unwrap();
         std::fs::write(folder.join("deep/a"), "beneath").unwrap();
-        std::fs::write(place.path().join("secret"), "outside").unwrap();
-        let absolute = place.path().join("secret");
-        for (way, open) in WAYS {
+        std::fs::write(directory.path().join("secret"), "outside").unwrap();
+        let absolute = directory.path().join("secret");
+        for (implementation, open) in IMPLEMENTATIONS {
             for name in ["deep/a", "./deep/a", "deep/../deep/a", "deep//a"] {
-                assert_eq!(content(open(&folder, Path::new(name))), "beneath", "{way}");
+                assert_eq!(
+                    content(open(&folder, Path::new(name))),
+                    "beneath",
+                    "{implementation}"
+                );
             }
             let outside = [
                 "../secret",
@@ -188,11 +192,11 @@ mod tests {
             ];
             for name in outside {
                 let error = open(&folder, Path::new(name)).unwrap_err();
-                assert!(is_refused(&error), "{way}, {name}: {error}");
+                assert!(is_refused(&error), "{implementation}, {name}: {error}");
             }
             assert!(is_refused(&open(&folder, Path::new("deep")).unwrap_err()));
             let missing = open(&folder, Path::new("deep/b")).unwrap_err();
-            assert_eq!(missing.kind(), io::ErrorKind::NotFound, "{way}");
+            assert_eq!(missing.kind(), io::ErrorKind::NotFound, "{implementation}");
         }
         assert!(is_beneath("deep/a") && !is_beneath("../a") && !is_beneath("/a"));
     }
@@ -202,13 +206,13 @@ mod tests {
     fn links_that_lead_out_pipes_and_devices_are_refused() {
         use std::os::unix::fs::symlink;
 
-        let place = tempfile::tempdir().unwrap();
-        let folder = place.path().join("folder");
+        let directory = tempfile::tempdir().unwrap();
+        let folder = directory.path().join("folder");
         std::fs::create_dir_all(folder.join("deep")).unwrap();
-        std::fs::write(place.path().join("secret"), "outside").unwrap();
+        std::fs::write(directory.path().join("secret"), "outside").unwrap();
         symlink("../secret", folder.join("up")).unwrap();
-        symlink(place.path().join("secret"), folder.join("absolute")).unwrap();
-        symlink(place.path(), folder.join("out")).unwrap();
+        symlink(directory.path().join("secret"), folder.join("absolute")).unwrap();
+        symlink(directory.path(), folder.join("out")).unwrap();
         symlink("/dev/zero", folder.join("zeros")).unwrap();
         symlink("/proc/self/root/etc/passwd", folder.join("magic")).unwrap();
         symlink("circle", folder.join("circle")).unwrap();
@@ -227,10 +231,10 @@ mod tests {
             "pipe",
             "socket",
         ];
-        for (way, open) in WAYS {
+        for (implementation, open) in IMPLEMENTATIONS {
             for name in names {
                 let error = open(&folder, Path::new(name)).unwrap_err();
-                assert!(is_refused(&error), "{way}, {name}: {error}");
+                assert!(is_refused(&error), "{implementation}, {name}: {error}");
             }
         }
         assert!(parent_beneath(&folder, Path::new("out/new")).is_err());

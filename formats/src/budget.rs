@@ -19,8 +19,8 @@ pub const FACTOR: u64 = 64;
 /// The memory of one input: what may be taken, and what is.
 #[derive(Debug)]
 pub(crate) struct Budget {
-    most: AtomicU64,
-    taken: AtomicU64,
+    limit: AtomicU64,
+    used: AtomicU64,
     /// Whether it grows with the input.
     grows: bool,
 }
@@ -28,24 +28,24 @@ pub(crate) struct Budget {
 /// More than the budget has.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error(
-    "reading it takes {needed} bytes of memory at least, and an input of this length gets {most}; it says more \
+    "reading it takes {needed} bytes of memory at least, and an input of this length gets {limit}; it says more \
      than it has"
 )]
 pub(crate) struct OverBudget {
     needed: u64,
-    most: u64,
+    limit: u64,
 }
 
 impl Budget {
     /// Of an input of so many bytes.
     pub(crate) fn of(input: usize, limits: Limits) -> Self {
-        let most = match limits.memory {
-            Some(most) => most,
+        let limit = match limits.memory {
+            Some(limit) => limit,
             None => BASE.saturating_add(FACTOR.saturating_mul(input as u64)),
         };
         Self {
-            most: AtomicU64::new(most),
-            taken: AtomicU64::new(0),
+            limit: AtomicU64::new(limit),
+            used: AtomicU64::new(0),
             grows: limits.memory.is_none(),
         }
     }
@@ -54,15 +54,15 @@ impl Budget {
     pub(crate) fn add_input(&self, bytes: usize) {
         if self.grows {
             let more = FACTOR.saturating_mul(bytes as u64);
-            self.most.fetch_add(more, Ordering::Relaxed);
+            self.limit.fetch_add(more, Ordering::Relaxed);
         }
     }
 
     /// Bytes that are not taken.
     #[cfg(feature = "fbx")]
     pub(crate) fn left(&self) -> u64 {
-        let most = self.most.load(Ordering::Relaxed);
-        most.saturating_sub(self.taken.load(Ordering::Relaxed))
+        let limit = self.limit.load(Ordering::Relaxed);
+        limit.saturating_sub(self.used.load(Ordering::Relaxed))
     }
 
     /// Takes memory for `count` things of `bytes` each, for as long as the input is read.
@@ -70,15 +70,15 @@ impl Budget {
     /// # Errors
     /// When that is more than there is.
     pub(crate) fn take(&self, count: usize, bytes: usize) -> Result<(), OverBudget> {
-        let own = (count as u64).saturating_mul(bytes as u64);
-        let (taken, most) = (&self.taken, self.most.load(Ordering::Relaxed));
-        let before = taken.fetch_add(own, Ordering::Relaxed);
-        let needed = before.saturating_add(own);
-        if needed <= most && before <= most {
+        let requested = (count as u64).saturating_mul(bytes as u64);
+        let (used, limit) = (&self.used, self.limit.load(Ordering::Relaxed));
+        let before = used.fetch_add(requested, Ordering::Relaxed);
+        let needed = before.saturating_add(requested);
+        if needed <= limit && before <= limit {
             return Ok(());
         }
-        taken.fetch_sub(own, Ordering::Relaxed);
-        Err(OverBudget { needed, most })
+        used.fetch_sub(requested, Ordering::Relaxed);
+        Err(OverBudget { needed, limit })
     }
 
     /// Takes memory that is given back when the value is dropped.
@@ -104,7 +104,7 @@ pub(crate) struct Borrowed<'a> {
 
 impl Drop for Borrowed<'_> {
     fn drop(&mut self) {
-        self.budget.taken.fetch_sub(self.bytes, Ordering::Relaxed);
+        self.budget.used.fetch_sub(self.bytes, Ordering::Relaxed);
     }
 }
 
@@ -123,7 +123,7 @@ mod tests {
         budget.take(100, 6).unwrap();
         let borrowed = budget.borrow(1, 400).unwrap();
         let over = budget.take(1, 1).unwrap_err();
-        assert_eq!((over.needed, over.most), (1001, 1000));
+        assert_eq!((over.needed, over.limit), (1001, 1000));
         drop(borrowed);
         budget.take(4, 100).unwrap();
         assert!(budget.take(usize::MAX, usize::MAX).is_err());

@@ -32,7 +32,7 @@ use tumble::{NORM_TOLERANCE, TrackSet};
 pub const MAX_BOXES: usize = 65_536;
 
 /// A dot product this close to 0 is a half turn within f32 rounding.
-const HALF_TURN: f64 = 1.0 / (1u64 << 21) as f64;
+const HALF_TURN_PRODUCT: f64 = 1.0 / (1u64 << 21) as f64;
 
 /// Keyframes of boxes with shared times, as text.
 pub static FORMAT: Format = Format {
@@ -69,7 +69,7 @@ pub fn read_dat(
 ) -> Result<Loaded, Diagnostic> {
     let mut lines = Lines::new(name, reader, options.limits)?;
     let header = read_header(&mut lines)?;
-    let mut keys = Keys::new(header.boxes);
+    let mut keys = DatKeys::new(header.boxes);
     while let Some(line) = lines.next()? {
         if line.trim_start().starts_with('#') {
             check_comment(&lines, &line)?;
@@ -83,12 +83,12 @@ pub fn read_dat(
     keys.finish(lines, header.box_length)
 }
 
-struct Header {
+struct DatHeader {
     boxes: usize,
     box_length: f64,
 }
 
-fn read_header<R: BufRead>(lines: &mut Lines<R>) -> Result<Header, Diagnostic> {
+fn read_header<R: BufRead>(lines: &mut Lines<R>) -> Result<DatHeader, Diagnostic> {
     let Some(line) = lines.next()? else {
         let message = "the file is empty; it starts with `# <boxes> <box length>`".to_owned();
         return Err(lines.refuse(1, Code::Empty, message));
@@ -99,8 +99,8 @@ fn read_header<R: BufRead>(lines: &mut Lines<R>) -> Result<Header, Diagnostic> {
     };
     let before = (line.len() - body.len()) as u64;
     let mut words = tokens(body).map(|(column, token)| (column + before, token));
-    let short = |lines: &Lines<R>, what: &str| {
-        let message = format!("the header lacks {what}; it is `# <boxes> <box length>`");
+    let short = |lines: &Lines<R>, missing: &str| {
+        let message = format!("the header lacks {missing}; it is `# <boxes> <box length>`");
         lines.refuse(line.len() as u64 + 1, Code::HeaderShort, message)
     };
     let (column, boxes) = words
@@ -121,7 +121,7 @@ fn read_header<R: BufRead>(lines: &mut Lines<R>) -> Result<Header, Diagnostic> {
         let message = format!("`{word}` after the header's two numbers; it is ignored");
         lines.warn(column, Code::HeaderWords, message);
     }
-    Ok(Header { boxes, box_length })
+    Ok(DatHeader { boxes, box_length })
 }
 
 fn parse_boxes(token: &str) -> Result<usize, String> {
@@ -131,7 +131,7 @@ fn parse_boxes(token: &str) -> Result<usize, String> {
         Some(boxes) if (1..=MAX_BOXES).contains(&boxes) => Ok(boxes),
         _ if plain => Err(format!("{token} boxes; there may be 1 to {MAX_BOXES}")),
         _ => Err(format!(
-            "`{token}` is no number of boxes; write a whole number from 1 to {MAX_BOXES} in digits"
+            "`{token}` is not a number of boxes; write a whole number from 1 to {MAX_BOXES} in digits"
         )),
     }
 }
@@ -170,23 +170,23 @@ impl<'a, T: Iterator<Item = (u64, &'a str)>> Row<'a, T> {
 
     /// The next number, and its column.
     fn next<R: BufRead>(&mut self, lines: &mut Lines<R>) -> Result<(u64, f64), Diagnostic> {
-        let Some((place, token)) = self.tokens.next() else {
+        let Some((column, token)) = self.tokens.next() else {
             return Err(lines.refuse(self.line.len() as u64, Code::Columns, String::new()));
         };
         let number =
-            number::parse(token).map_err(|(code, text)| lines.refuse(place, code, text))?;
+            number::parse(token).map_err(|(code, text)| lines.refuse(column, code, text))?;
         if number.vanished {
             let message = format!("`{token}` is too small for f32; it becomes 0");
-            lines.warn(place, Code::Tiny, message);
+            lines.warn(column, Code::Tiny, message);
         }
         self.fewest_digits = self.fewest_digits.min(self.last.1);
-        self.last = (place, number.digits);
-        Ok((place, number.value))
+        self.last = (column, number.digits);
+        Ok((column, number.value))
     }
 }
 
 /// What was read so far.
-struct Keys {
+struct DatKeys {
     times: Blocks<f64>,
     rows: Blocks<Quat>,
     /// The first blank line since the last key.
@@ -199,7 +199,7 @@ struct Keys {
     previous: Vec<DQuat>,
 }
 
-impl Keys {
+impl DatKeys {
     fn new(count: usize) -> Self {
         Self {
             times: Blocks::new(1),
@@ -233,22 +233,22 @@ impl Keys {
         let (_, time) = row.next(lines)?;
         self.check_time(lines, time)?;
         for index in 0..self.rows.width() {
-            let (place, w) = row.next(lines)?;
+            let (column, w) = row.next(lines)?;
             let (_, x) = row.next(lines)?;
             let (_, y) = row.next(lines)?;
             let (_, z) = row.next(lines)?;
-            self.push(lines, place, index, DQuat::from_xyzw(x, y, z, w))?;
+            self.push(lines, column, index, DQuat::from_xyzw(x, y, z, w))?;
         }
         if row.tokens.next().is_some() {
             self.check_columns(lines, line)?;
         }
         self.times.push(time);
         // A file that stops in the middle of its last number reads as a whole one.
-        let (place, digits) = row.last;
+        let (column, digits) = row.last;
         if !lines.ended && digits < row.fewest_digits {
             let message = "the file ends in the middle of a line, and its last number is shorter \
                            than all others; is it cut?";
-            lines.warn(place, Code::MaybeCut, message);
+            lines.warn(column, Code::MaybeCut, message);
         }
         self.fewest_digits = row.fewest_digits.min(digits);
         Ok(())
@@ -280,13 +280,13 @@ impl Keys {
             return Ok(());
         };
         if time <= previous {
-            let what = if time == previous {
+            let relation = if time == previous {
                 "repeats"
             } else {
                 "comes before"
             };
             let message = format!(
-                "time {time} {what} the one before it, {previous}; times increase strictly"
+                "time {time} {relation} the one before it, {previous}; times increase strictly"
             );
             return Err(lines.refuse(1, Code::TimeNotIncreasing, message));
         }
@@ -330,7 +330,7 @@ impl Keys {
         let exact = unit.as_dquat();
         match self.previous.get_mut(index) {
             Some(previous) => {
-                if dot(*previous, exact).abs() <= HALF_TURN {
+                if dot(*previous, exact).abs() <= HALF_TURN_PRODUCT {
                     let message = format!(
                         "box {} turns by exactly 180° from the key before; the signs decide which way",
                         index + 1
@@ -351,7 +351,7 @@ impl Keys {
         box_length: f64,
     ) -> Result<Loaded, Diagnostic> {
         if self.times.rows() == 0 {
-            let message = "no keys behind the header; a key line is `time w x y z …`".to_owned();
+            let message = "no keys after the header; a key line is `time w x y z …`".to_owned();
             return Err(lines.refuse_end(Code::NoKeys, message));
         }
         lines.number = lines.number.saturating_sub(1);

@@ -3,8 +3,8 @@
 use std::fmt;
 
 /// Steps of a second.
-const SECOND: i128 = 10i128.pow(PLACES);
-const PLACES: u32 = 24;
+const SECOND: i128 = 10i128.pow(SECOND_DECIMALS);
+const SECOND_DECIMALS: u32 = 24;
 
 /// Seconds either way of 0 that are taken, three million years.
 const LARGEST: i128 = 100_000_000_000_000 * SECOND;
@@ -14,7 +14,7 @@ const LARGEST: i128 = 100_000_000_000_000 * SECOND;
 pub(crate) struct Decimal(i128);
 
 impl Decimal {
-    /// A number as [`parse`](crate::text::number::parse) takes it; digits behind the 24th place
+    /// A number as [`parse`](crate::text::number::parse) takes it; digits after the 24th decimal
     /// are left out. `None` beyond ±1e14.
     pub(crate) fn parse(token: &str) -> Option<Self> {
         Self::parse_in(token, 0)
@@ -38,7 +38,7 @@ impl Decimal {
         };
         let zeros = exponent
             .saturating_sub(decimals.len() as i32)
-            .saturating_add(PLACES as i32 + power);
+            .saturating_add(SECOND_DECIMALS as i32 + power);
         let digits = match usize::try_from(zeros) {
             Ok(zeros) if zeros + digits.len() <= 39 => format!("{digits}{}", "0".repeat(zeros)),
             Ok(_) => return None,
@@ -103,7 +103,7 @@ impl fmt::Display for Decimal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (sign, steps) = (if self.0 < 0 { "-" } else { "" }, self.0.unsigned_abs());
         let (whole, rest) = (steps / SECOND as u128, steps % SECOND as u128);
-        let decimals = format!("{rest:0places$}", places = PLACES as usize);
+        let decimals = format!("{rest:0width$}", width = SECOND_DECIMALS as usize);
         let decimals = decimals.trim_end_matches('0');
         let least = f.precision().unwrap_or(0);
         if decimals.len().max(least) == 0 {

@@ -16,7 +16,7 @@ pub enum Severity {
 
 /// Where in an input a fault is.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
-pub enum Place {
+pub enum Location {
     /// In text: both count from 1, columns in characters.
     Text {
         /// The line.
@@ -29,11 +29,11 @@ pub enum Place {
     Inside(String),
 }
 
-impl fmt::Display for Place {
+impl fmt::Display for Location {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Text { line, column } => write!(f, "{line}:{column}"),
-            Self::Inside(place) => f.write_str(place),
+            Self::Inside(pointer) => f.write_str(pointer),
         }
     }
 }
@@ -47,20 +47,20 @@ pub struct Diagnostic {
     /// The input's name, as it was given.
     pub file: String,
     /// Where the fault is, unless it is the input as a whole.
-    pub place: Option<Place>,
+    pub location: Option<Location>,
     /// Which fault.
     pub code: Code,
     /// What is wrong, in words.
     pub message: String,
-    /// How often it occurs; the place is that of the first time.
+    /// How often it occurs; the location is that of the first time.
     pub count: u64,
 }
 
 impl fmt::Display for Diagnostic {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}:", printable(&self.file))?;
-        if let Some(place) = &self.place {
-            write!(f, "{}:", printable(&place.to_string()))?;
+        if let Some(location) = &self.location {
+            write!(f, "{}:", printable(&location.to_string()))?;
         }
         let severity = match self.code.severity() {
             Severity::Error => "error",
@@ -86,7 +86,7 @@ impl Diagnostic {
     pub fn new(file: impl Into<String>, code: Code, message: impl Into<String>) -> Self {
         Self {
             file: file.into(),
-            place: None,
+            location: None,
             code,
             message: message.into(),
             count: 1,
@@ -95,8 +95,8 @@ impl Diagnostic {
 
     /// The same fault, inside the input: at a JSON pointer, a member, a column.
     #[must_use]
-    pub fn inside(mut self, place: impl Into<String>) -> Self {
-        self.place = Some(Place::Inside(place.into()));
+    pub fn inside(mut self, pointer: impl Into<String>) -> Self {
+        self.location = Some(Location::Inside(pointer.into()));
         self
     }
 }
@@ -146,40 +146,40 @@ codes! {
     HeaderShort = "E012", "the header lacks a number", "The header has the number of boxes and the length of a box.";
     Boxes = "E013", "not a number of boxes", "The number of boxes is a whole number from 1 to 65536, in plain digits.";
     BoxLength = "E014", "not a box length", "The length of a box is a finite number.";
-    NoKeys = "E015", "no keys", "A set has at least one key line behind its header.";
+    NoKeys = "E015", "no keys", "A set has at least one key line after its header.";
     SecondHeader = "E016", "a second header", "Two sets in one file? Split it: one header, then keys.";
     Columns = "E020", "the wrong number of columns", "A key line has a time and four numbers for each box: `time w x y z w x y z …`.";
     Number = "E021", "not a number", "Numbers are decimal, with a point, and may have an exponent: `-1.25e-3`.";
-    NotFinite = "E022", "not finite", "NaN and infinity are no rotation and no time.";
+    NotFinite = "E022", "not finite", "NaN and infinity are not a rotation and no time.";
     TooLarge = "E023", "too large for f32", "Keys are kept in f32, whose largest value is 3.4e38.";
     TokenTooLong = "E024", "a number is too long", "No number needs more than 64 characters.";
     Norm = "E025", "not a unit quaternion", "A rotation is a quaternion of norm 1. Norms within 0.1 of it are normalised; others are more likely a mistake, such as a missing column.";
     TimeNotIncreasing = "E026", "times do not increase", "Key times increase strictly from line to line.";
-    KeyNorm = "E027", "no rotation", "A key's quaternion has a norm under 1e-6; no rotation can be told from it.";
+    KeyNorm = "E027", "no rotation", "A key's quaternion has a norm under 1e-6; it gives no rotation.";
     EqualTimes = "E028", "two keys at one time", "The values differ: --duplicates first or last keeps one of the keys, both keeps a jump.";
     Time = "E030", "not a list of times", "A list of times has finite numbers of seconds, separated by blanks, commas or line ends.";
     Map = "E032", "not a map of arrays or columns", "`--map` says what a file's arrays or columns are: entries `name=source[3:7]:order`, separated by commas, whose sources are in the file.";
     Memory = "E034", "more memory than an input of its length may take", "An input gets 64 times its length and 64 MiB (`--max-memory`); this one says that it holds more, by counts, by data that is packed or by parts that name one part many times.";
     // E1xx and W1xx: glTF.
-    Glb = "E100", "not a whole GLB", "A GLB has a header that says its length, a JSON chunk, and whole chunks behind it.";
+    Glb = "E100", "not a whole GLB", "A GLB has a header that says its length, a JSON chunk, and whole chunks after it.";
     GltfVersion = "E101", "not glTF 2.0", "Only version 2.0 is read; every exporter of today writes it.";
     Json = "E102", "not valid JSON", "A glTF file is a JSON object with `asset`; its text has a fault at this place.";
     Property = "E103", "a property that is not as glTF has it", "It is missing, given twice, or of another type than glTF 2.0 says.";
     NoAnimations = "E104", "no animations", "The file has nothing that moves.";
     IndexRange = "E105", "an index of nothing", "Parts of a glTF file name each other by number; there is nothing of this number.";
-    NodeTree = "E106", "nodes that make no tree", "A node hangs on one other node at most, and never on itself.";
+    NodeTree = "E106", "nodes that make no tree", "A node has one parent at most, and is never its own ancestor.";
     Uri = "E107", "a URI that is not followed", "Data is read from the file itself and from files in its folder and below, named by relative URIs; nothing is fetched from a network.";
     TooShort = "E108", "fewer bytes than needed", "A buffer, a view of it or an accessor says more than is there; the file may be cut.";
     AccessorType = "E109", "an accessor of the wrong type", "Times are floats; rotations are four, translations and scales three floats or normalized integers.";
     Sparse = "E110", "a sparse accessor that does not fit", "Its indices are unsigned integers, increase, and lie within the accessor.";
     OutputCount = "E111", "not as many values as times", "LINEAR and STEP have a value for each time, CUBICSPLINE three: tangent, value, tangent.";
     Interpolation = "E112", "an unknown interpolation", "glTF 2.0 has LINEAR, STEP and CUBICSPLINE.";
-    TwoChannels = "E113", "two channels for one target", "Which of them moves the node cannot be told.";
+    TwoChannels = "E113", "two channels for one target", "It is not clear which of them moves the node.";
     Extension = "E114", "data behind an unknown extension", "The file requires an extension to read these bytes, and that is not known here.";
     Meshopt = "E115", "compressed data that cannot be read", "A buffer view is compressed by meshopt in a way that is broken or not known.";
     GltfFolder = "E116", "a .gltf away from its files", "It names files relative to its own folder, and is written beside them alone; a .glb takes everything in.";
     NothingToAnimate = "E180", "nothing to animate", "An animation in glTF has at least one time and one channel; clips without tracks or samples cannot be written.";
-    NotTrees = "E181", "joints that are no trees", "Nodes of glTF have one parent, are not their own ancestors, and have finite transforms relative to it; the clip's joints are not such.";
+    NotTrees = "E181", "joints that are not trees", "Nodes of glTF have one parent, are not their own ancestors, and have finite transforms relative to it; the clip's joints are not such.";
     TimesInF32 = "E182", "times that f32 cannot tell apart", "Times in glTF are f32, which has 24 bits: after a day, times are 7.8 ms from each other. Use a lower rate, or times nearer to 0.";
     TimesBelowZero = "E183", "times below 0", "Times in glTF begin at 0 or later: `tumble convert --start 0` cuts what is before.";
     GlbTooLong = "E184", "too long for GLB", "A GLB has lengths of 32 bits, at most 4 GiB. Write fewer samples, or the clips to several files.";
@@ -189,10 +189,10 @@ codes! {
     BvhBraces = "E202", "braces that do not match", "Each joint and End Site has its own pair of braces.";
     BvhOffset = "E203", "no OFFSET", "Each joint says in three numbers where it is in its parent.";
     BvhChannel = "E204", "no channel of this name", "A joint has Xposition, Yposition, Zposition, Xrotation, Yrotation and Zrotation, each at most once.";
-    BvhChannelCount = "E205", "the wrong number of channels", "CHANNELS gives the number of the names behind it, on the same line.";
+    BvhChannelCount = "E205", "the wrong number of channels", "CHANNELS gives the number of the names after it, on the same line.";
     BvhMotion = "E206", "no MOTION", "The file ends within its hierarchy; it is probably cut.";
-    BvhFrames = "E207", "not a number of frames", "The line behind MOTION is `Frames: ` and a whole number.";
-    BvhFrameTime = "E208", "not a frame time", "The line behind Frames is `Frame Time: ` and the seconds of a frame, from 1e-9 to 1e9.";
+    BvhFrames = "E207", "not a number of frames", "The line after MOTION is `Frames: ` and a whole number.";
+    BvhFrameTime = "E208", "not a frame time", "The line after Frames is `Frame Time: ` and the seconds of a frame, from 1e-9 to 1e9.";
     BvhRow = "E209", "the wrong number of numbers", "Each frame is a line with a number for each channel, in the order of the hierarchy.";
     BvhCut = "E210", "fewer rows than frames", "The file ends before its last frame; it is probably cut.";
     BvhSecond = "E211", "a second HIERARCHY", "Two files in one? Split it.";
@@ -210,8 +210,8 @@ codes! {
     UnknownArrays = "E310", "arrays of unknown names", "Motion of SMPL bodies (`poses`), of bodies in the world (`body_rotations`) and our own layout (`rotations`) are known by the names of their arrays; of others `--map` says what they are.";
     NoRate = "E311", "no times", "Neither a list of times nor a frame rate is there, or the unit of the times is not known: `--source-fps` and `--time-unit` say them.";
     FrameRate = "E312", "not a frame rate", "A rate is one number of frames per second over 0.";
-    Ambiguous = "E313", "tracks and frames cannot be told apart", "Each of the two axes may be that of the frames; `--map` says which comes first.";
-    Parents = "E314", "parents that make no hierarchy", "Each track hangs on another one, or has the parent -1.";
+    Ambiguous = "E313", "tracks and frames cannot be distinguished", "Each of the two axes may be that of the frames; `--map` says which comes first.";
+    Parents = "E314", "parents that make no hierarchy", "The parent of each track is another track, or -1 for a root.";
     OneClip = "E315", "not one clip", "An NPZ file holds one clip.";
     Layout = "E316", "samples that do not fit the layout", "A file whose layout is kept has as many tracks as before, and frames at a rate if it has no list of times.";
     NotPerFrame = "E317", "an array that cannot be interpolated", "`--linear NAME`, in Python `linear=[NAME]`, names arrays of numbers with an entry for each frame, which are not keys.";
@@ -224,9 +224,9 @@ codes! {
     NoRotations = "E404", "no rotations among the columns", "Rotations are the columns `x y z w` (a row for each key), `knee.x knee.y knee.z knee.w` (a row for each time), or a part of a list that --map names.";
     NoTimes = "E405", "no times among the columns", "Times are a column `time`, `timestamp` or `t`, or `frame_index` with --source-fps; --map time=NAME names another.";
     ColumnMissing = "E406", "a column is missing", "A name that --map gives, or the others of a group of columns such as `tx ty tz`.";
-    ColumnTwice = "E407", "two columns of one name", "It cannot be told which of them is meant; rename one.";
+    ColumnTwice = "E407", "two columns of one name", "It is not clear which of them is meant; rename one.";
     ColumnType = "E408", "a column of another type", "Rotations, translations and scales are numbers, names are text or whole numbers, times are numbers or timestamps.";
-    Null = "E409", "a null", "A key without a value is no key; fill it in or remove its row. Rows count from 0.";
+    Null = "E409", "a null", "A key without a value is not a key; fill it in or remove its row. Rows count from 0.";
     WholeTimes = "E410", "times that are whole numbers", "They may be seconds or nanoseconds: --time-unit s, ms, us or ns says which.";
     ListLength = "E411", "a list of another length", "A rotation takes four numbers of a list, a translation or a scale three; `--map NAME=LIST[3:7]` says which.";
     NoRows = "E412", "a table without rows", "It has columns but no keys.";
@@ -235,10 +235,10 @@ codes! {
     TumPose = "E501", "not a pose", "A line has eight numbers: `t x y z qx qy qz qw`.";
     TumTime = "E502", "a time out of range", "Times are seconds, up to 1e14 before or after 0.";
     TumEmpty = "E503", "no poses", "All lines are blank or comments.";
-    TumWrite = "E504", "not to be written as a trajectory", "A trajectory is one clip of one track, at times that the format tells apart. KITTI has no times: poses that are no frames of a rate need a file of them, `--times-out`, in Python `times_out`.";
+    TumWrite = "E504", "not to be written as a trajectory", "A trajectory is one clip of one track, at times that the format tells apart. KITTI has no times: poses that are not frames of a rate need a file of them, `--times-out`, in Python `times_out`.";
     KittiPose = "E505", "not a pose", "A line has twelve numbers: the three rows of a matrix, a rotation and a translation.";
     FrameTimes = "E507", "not a time for each pose", "A file of times has the seconds of each pose, a number a line, in the order of the poses.";
-    NoRotation = "E506", "a matrix that is no rotation", "The rows of a rotation have length 1, stand at right angles, and do not mirror.";
+    NoRotation = "E506", "a matrix that is not a rotation", "The rows of a rotation have length 1, stand at right angles, and do not mirror.";
     // E6xx: paths.
     Path = "E601", "not a path", "A path is CSV with the header `t,x,y,z,ux,uy,uz`, of which `t` and `ux,uy,uz` may be missing, or NPY of shape (tracks, points, 3). An upward direction has a length; its cells may be blank.";
     PathTimes = "E602", "no times, or too many", "A path whose file has no times needs --seconds or --rate; one that has times takes neither.";
@@ -272,21 +272,21 @@ codes! {
     EqualKeys = "W013", "a key given twice", "Two keys at one time with equal values; the second is dropped.";
     AccelerationJumps = "W014", "an angular acceleration that jumps", "The method `c2` promises one that is continuous. At these keys no such curve was found, or they are passed so fast that it would whirl around; there only the velocity is continuous. Mostly a very short interval beside a very long one: add keys in the long one, or choose `-m bessel-overhauser`.";
     RequiredExtension = "W100", "an unknown required extension", "The animations are read without it; data that needs it is refused.";
-    CubicOfOne = "W101", "a cubic of one key", "There is nothing to interpolate; it holds.";
-    EmptySampler = "W102", "a sampler without keys", "What it is to move stays where it rests.";
+    CubicOfOne = "W101", "a cubic of one key", "There is nothing to interpolate; the value is constant.";
+    EmptySampler = "W102", "a sampler without keys", "Its target stays at rest.";
     NothingMoved = "W103", "an animation that moves no node", "It has no channels, or only those of weights and other properties; it is kept as it is.";
     NodeMatrix = "W104", "a moved node with a matrix", "glTF has moved nodes give translation, rotation and scale; the matrix is split into these.";
     Shear = "W105", "a matrix that shears", "No translation, rotation and scale say the same; the nearest are taken, and poses in the world are refused.";
     NegativeTime = "W106", "a negative time", "glTF has times from 0 on; players may not show what comes before.";
     ByteStride = "W107", "a stride in animation data", "glTF has strides for vertices alone; it is honoured.";
-    BufferLong = "W108", "a buffer longer than it says", "What is behind the length that it says is not read.";
+    BufferLong = "W108", "a buffer longer than it says", "What is after the length that it says is not read.";
     TargetPath = "W109", "an unknown target", "The channel moves something that glTF 2.0 does not name; it is kept as it is.";
     StaysOutside = "W110", "a file that stays outside", "It could not be taken into the GLB, or the output is in another folder than its input; the URI is kept.";
     StaysWhole = "W111", "channels that are not cut", "Channels of weights and other properties are kept as they are: the animation stays as long as they are.";
-    BvhMoreRows = "W201", "more rows than frames", "The rows behind the last frame are left out.";
+    BvhMoreRows = "W201", "more rows than frames", "The rows after the last frame are left out.";
     BvhNoFrames = "W202", "no frames", "The skeleton rests.";
     StartMoved = "W204", "the start is moved to 0", "BVH has no start time: its first frame is at 0. glTF keeps times in f32, which cannot tell frames apart in seconds since 1970: they count from the first whole second.";
-    SameName = "W206", "two joints of one name", "The second one gets its number behind its name, so that they are told apart; braces and control characters in names become `_`.";
+    SameName = "W206", "two joints of one name", "The second one gets its number after its name, so that names are unique; braces and control characters in names become `_`.";
     NameChanged = "W207", "a name is changed", "The format has no line ends, braces or control characters in names, and no name twice.";
     NoRoom = "W208", "what the format has no room for", "It is left out. A table in the documents says what each format holds.";
     UnknownBody = "W301", "a body of an unknown number of joints", "SMPL has 24 joints, SMPL-H 52, SMPL-X 55, and 22 are common to them; others are read without names and parents.";
@@ -297,9 +297,9 @@ codes! {
     ArraysNotRead = "W306", "arrays that are not read", "They are no part of a motion as far as their names tell; `--map` says what arrays are. The shape of a body (`betas`, `gender`) is used where `--body-model` brings its model. A result in the file's own layout keeps what is the same in all frames.";
     Bridged = "W401", "keys that are missing", "Cells are blank or NaN, and `--bridge-gaps` asks for the track to be interpolated from its other keys there.";
     ColumnsLeftOut = "W402", "columns that are left out", "Their names are none of those that keys have, or a list has more numbers than `--map` takes. `--map` gives columns the names of keys.";
-    FurtherNumbers = "W501", "further numbers behind a pose", "A line of a trajectory is a time, a position and a quaternion; what follows, such as a covariance or velocities, is not read.";
+    FurtherNumbers = "W501", "further numbers after a pose", "A line of a trajectory is a time, a position and a quaternion; what follows, such as a covariance or velocities, is not read.";
     FbxBeside = "W701", "what is not motion", "Meshes, skins, materials and the like are not read from FBX; nodes, and what moves them, are.";
-    FbxProperties = "W702", "curves of other properties", "They move what is no transform, such as blend shapes, visibility or a lens.";
+    FbxProperties = "W702", "curves of other properties", "They move something other than a transform, such as blend shapes, visibility or a lens.";
     FbxOutside = "W703", "keys outside the take", "An animation stack says when it begins and ends. Curves have keys before or after, which a player does not show.";
     FbxScaleNodes = "W704", "nodes that carry scales", "In FBX a node may keep its scale from its children. Where that changes something, the scale gets a node of its own beside them.";
     FbxWild = "W705", "a curve that is not followed", "Between two keys it changes so fast that a thousand times as many keys do not follow it within the bound.";

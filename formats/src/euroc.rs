@@ -13,7 +13,7 @@ use crate::feature::Feature;
 use crate::format::{
     Format, FormatOption, Loaded, MotionOptions, ReadOptions, TimeUnit, WriteError,
 };
-use crate::motion::Sampled;
+use crate::motion::SampledClip;
 use crate::source::Source;
 use crate::tum::{PoseLine, Trajectory, read_lines};
 
@@ -90,7 +90,7 @@ pub fn read_euroc(
 /// Writes one clip of one track. Times are rounded to nanoseconds; the other numbers have the fewest digits that
 /// read back as the same f32, about an origin where there is one.
 fn write_motion(
-    clips: &[Sampled<'_>],
+    clips: &[SampledClip<'_>],
     options: &MotionOptions,
     out: &mut dyn Write,
 ) -> Result<Vec<Diagnostic>, WriteError> {

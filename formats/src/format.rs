@@ -1,5 +1,8 @@
-//! The table of file formats. Help, the choice by a file's name, directory walks, shell
-//! completions and errors walk it: a format is its own file and one line in [`FORMATS`].
+//! What a file format is: how it is recognised, read and written, and what it has room for. The formats
+//! themselves build on this; the [registry](registry::FORMATS) names them all.
+
+pub mod registry;
+mod write_clips;
 
 use std::fmt;
 use std::io::{self, Write};
@@ -9,53 +12,17 @@ use std::sync::Arc;
 use glam::{DVec3, Quat};
 use tumble::{Encoding, EulerSequence, FrameRate, Layout, Timeline, TrackSet};
 
+use crate::carried_mesh::CarriedMesh;
 use crate::diagnostic::Diagnostic;
-#[cfg(feature = "fbx")]
-use crate::fbx;
-use crate::feature::{self, Feature};
+use crate::feature::Feature;
 pub use crate::gltf::quantized::Quantization;
-use crate::gltf::skins::CarriedMesh;
 use crate::keys::Duplicates;
-use crate::kitti::FrameTimes;
-#[cfg(feature = "mcap")]
-use crate::mcap;
-use crate::motion::{Motion, Sampled};
-use crate::npy::ComponentOrder;
+use crate::motion::{Motion, SampledClip};
 use crate::poses::Poses;
-use crate::signs::{Signs, continue_signs, signs_jump};
-use crate::source::{START, Source};
+use crate::quaternion::ComponentOrder;
+use crate::signs::Signs;
 use crate::text::lines::Limits;
-#[cfg(feature = "parquet")]
-use crate::{arrow, parquet};
-use crate::{bvh, csv, dat, euroc, gltf, kitti, npy, npz, tum};
-
-/// Every format. All of them are read. Inputs are known by their first bytes, then by the ending of
-/// their name; the first format is that of inputs which tell neither way, the first of
-/// [`Format::writable`] that of such outputs.
-pub static FORMATS: [&Format; COUNT] = [
-    &dat::FORMAT,
-    &gltf::FORMAT,
-    &bvh::FORMAT,
-    #[cfg(feature = "fbx")]
-    &fbx::FORMAT,
-    &npz::FORMAT,
-    &npy::FORMAT,
-    #[cfg(feature = "parquet")]
-    &parquet::FORMAT,
-    #[cfg(feature = "parquet")]
-    &arrow::FORMAT,
-    &csv::FORMAT,
-    &tum::FORMAT,
-    &euroc::FORMAT,
-    &kitti::FORMAT,
-    #[cfg(feature = "mcap")]
-    &mcap::FORMAT,
-];
-
-const COUNT: usize = 9
-    + 2 * cfg!(feature = "parquet") as usize
-    + cfg!(feature = "fbx") as usize
-    + cfg!(feature = "mcap") as usize;
+use crate::times::FrameTimes;
 
 /// A file format.
 pub struct Format {
@@ -77,11 +44,11 @@ pub struct Format {
     pub(crate) write_motion: Option<WriteMotion>,
     /// What its clips may hold beside rotations at times.
     pub features: &'static [Feature],
-    /// What its reader and its writers can be told.
+    /// The options that its reader and its writers take.
     pub options: &'static [FormatOption],
 }
 
-/// What not every format can be told: programs refuse to tell it the others.
+/// Options that not every format takes: programs refuse them for the others.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum FormatOption {
     /// [`ReadOptions::raw_times`].
@@ -108,14 +75,14 @@ pub enum FormatOption {
     Order,
     /// [`MotionOptions::box_length`].
     BoxLength,
-    /// [`Sampled::of_own_keys`].
-    OwnKeys,
+    /// [`SampledClip::is_at_keys`].
+    AtKeys,
     /// [`MotionOptions::quantize`] and [`MotionOptions::meshopt`].
     Quantize,
 }
 
 impl FormatOption {
-    /// All that tables and arrays, whose meaning is not fixed, can be told when they are read.
+    /// The options for reading tables and arrays, whose meaning is not fixed.
     pub(crate) const OF_ARRAYS: [Self; 5] = [
         Self::RawTimes,
         Self::Duplicates,
@@ -264,7 +231,7 @@ pub trait Document: fmt::Debug + Send + Sync {
     fn writes(&self, format: &Format) -> bool;
 
     /// What the file holds that no clip holds, by names that its format has for it (`meshes`).
-    fn beside(&self) -> Vec<String>;
+    fn other_contents(&self) -> Vec<String>;
 
     /// The meshes that tracks of one of its clips carry, where the format has meshes.
     ///
@@ -276,14 +243,14 @@ pub trait Document: fmt::Debug + Send + Sync {
     }
 
     /// Writes the file, as the one that `path` names, with the samples of some of its clips, each
-    /// with the clip's place, instead of their keys; without any, everything stays as it is. Gives
+    /// with the clip's index, instead of their keys; without any, everything stays as it is. Gives
     /// warnings.
     ///
     /// # Errors
     /// When writing fails, or what was read cannot be written in this way.
     fn write(
         &self,
-        clips: &[(usize, Sampled<'_>)],
+        clips: &[(usize, SampledClip<'_>)],
         options: &MotionOptions,
         path: &Path,
         out: &mut dyn Write,
@@ -292,7 +259,7 @@ pub trait Document: fmt::Debug + Send + Sync {
 
 /// Writes sampled clips; gives warnings of what becomes another thing.
 pub(crate) type WriteMotion =
-    fn(&[Sampled<'_>], &MotionOptions, &mut dyn Write) -> Result<Vec<Diagnostic>, WriteError>;
+    fn(&[SampledClip<'_>], &MotionOptions, &mut dyn Write) -> Result<Vec<Diagnostic>, WriteError>;
 
 /// How sampled clips are written.
 #[derive(Debug, Clone, Default)]
@@ -367,7 +334,7 @@ impl WriteResults {
             return Ok(writer);
         }
         let (tracks, samples) = (shape.set.track_count(), shape.timeline.len());
-        Ok(Box::new(Continued {
+        Ok(Box::new(ContinuedSigns {
             writer,
             signs: Signs::new(shape.layout, tracks, samples),
         }))
@@ -375,12 +342,12 @@ impl WriteResults {
 }
 
 /// Quaternions on their way into a file, with signs that continue.
-struct Continued<'a> {
+struct ContinuedSigns<'a> {
     writer: Box<dyn ResultWriter + 'a>,
     signs: Signs,
 }
 
-impl ResultWriter for Continued<'_> {
+impl ResultWriter for ContinuedSigns<'_> {
     fn write(&mut self, rotations: &[Quat]) -> io::Result<()> {
         self.writer.write(&self.signs.next(rotations))
     }
@@ -425,31 +392,6 @@ pub struct ResultShape<'a> {
 }
 
 impl Format {
-    /// The format with that name, in any case.
-    #[must_use]
-    pub fn named(name: &str) -> Option<&'static Self> {
-        let has_name = |format: &&Self| {
-            let mut names = [format.name]
-                .into_iter()
-                .chain(format.extensions.iter().copied());
-            names.any(|own| own.eq_ignore_ascii_case(name))
-        };
-        FORMATS.into_iter().find(has_name)
-    }
-
-    /// The format that the extension of a file tells.
-    #[must_use]
-    pub fn of(path: &Path) -> Option<&'static Self> {
-        Self::named(path.extension()?.to_str()?)
-    }
-
-    /// The formats that results are written in, those that hold them as they come first.
-    pub fn writable() -> impl Iterator<Item = &'static Self> {
-        let as_they_come = FORMATS.into_iter().filter(|format| format.write.is_some());
-        let whole = |format: &&Self| format.write.is_none() && format.write_motion.is_some();
-        as_they_come.chain(FORMATS.into_iter().filter(whole))
-    }
-
     /// Whether these clips, sampled, are written in it as clips, rather than the rotations of one
     /// alone: of a format that holds nothing else, or of clips that are more than rotations.
     #[must_use]
@@ -467,55 +409,11 @@ impl Format {
 
     /// Whether its files have room for that.
     #[must_use]
-    pub fn holds(&self, feature: Feature) -> bool {
+    pub fn supports(&self, feature: Feature) -> bool {
         self.features.contains(&feature)
     }
 
-    /// Writes sampled clips, each rotation with the sign that continues the one before it. Gives
-    /// warnings of what is left out, because the format has no room for it, or becomes another thing.
-    ///
-    /// # Errors
-    /// When writing fails, or the format cannot hold the clips; results alone ([`Format::writes_clips`])
-    /// are written by [`WriteResults`].
-    pub fn write_clips(
-        &self,
-        clips: &[Sampled<'_>],
-        options: &MotionOptions,
-        out: &mut dyn Write,
-    ) -> Result<Vec<Diagnostic>, WriteError> {
-        let Some(write) = self.write_motion else {
-            let message = format!("{} holds results, not clips", self.name);
-            return Err(io::Error::new(io::ErrorKind::Unsupported, message).into());
-        };
-        let mut warnings = feature::warnings(self, clips, options);
-        let continued: Vec<Vec<Quat>> = clips
-            .iter()
-            .map(|clip| {
-                let tracks = clip.clip.set.track_count();
-                let mut rotations = Vec::new();
-                if signs_jump(clip.rotations, tracks) {
-                    rotations = clip.rotations.to_vec();
-                    continue_signs(&mut rotations, tracks);
-                }
-                rotations
-            })
-            .collect();
-        let clips: Vec<Sampled<'_>> = clips
-            .iter()
-            .zip(&continued)
-            .map(|(clip, continued)| {
-                let mut clip = clip.clone();
-                if !continued.is_empty() {
-                    clip.rotations = continued;
-                }
-                clip
-            })
-            .collect();
-        warnings.extend(write(&clips, options, out)?);
-        Ok(warnings)
-    }
-
-    /// Whether it can be told that.
+    /// Whether it takes this option.
     #[must_use]
     pub fn takes(&self, option: FormatOption) -> bool {
         self.options.contains(&option)
@@ -527,52 +425,6 @@ impl Format {
         self.write.is_some() || self.write_motion.is_some()
     }
 
-    /// The format of a file that begins with these bytes; by its name where they tell nothing, by how
-    /// many numbers its lines have where that tells nothing either, and else the first of the table.
-    #[must_use]
-    pub fn detect(path: &Path, start: &[u8]) -> &'static Self {
-        let probed = FORMATS.into_iter().find(|format| (format.probe)(start));
-        // Trajectories are mostly called `.txt`, and few say what they are.
-        let by_numbers = || match table_width(start)? {
-            8 => Some(&tum::FORMAT),
-            12 => Some(&kitti::FORMAT),
-            _ => None,
-        };
-        probed
-            .or_else(|| Self::of(path))
-            .or_else(by_numbers)
-            .unwrap_or(FORMATS[0])
-    }
-
-    /// Reads a file in the format that it is in: see [`Format::detect`].
-    ///
-    /// # Errors
-    /// The first fault that refuses the file.
-    pub fn open_detected(path: &Path, options: &ReadOptions) -> Result<Loaded, Diagnostic> {
-        Self::detected(path).open(path, options)
-    }
-
-    /// Reads the bytes of a file in the format that they are in: see [`Format::detect`]. Files that it names
-    /// beside itself are not read.
-    ///
-    /// # Errors
-    /// The first fault that refuses the file.
-    pub fn read_detected(
-        name: &str,
-        bytes: Vec<u8>,
-        options: &ReadOptions,
-    ) -> Result<Loaded, Diagnostic> {
-        let start = &bytes[..bytes.len().min(START)];
-        (Self::detect(Path::new(name), start).read_bytes)(name, bytes, options)
-    }
-
-    /// The format that a file is in: see [`Format::detect`]. Nothing is known of one that cannot be
-    /// read, and that is told about when it is opened.
-    #[must_use]
-    pub fn detected(path: &Path) -> &'static Self {
-        Self::detect(path, &Source::start(path))
-    }
-
     /// Reads a file in this format.
     ///
     /// # Errors
@@ -582,71 +434,8 @@ impl Format {
     }
 }
 
-/// How many numbers the first line of text has that is no comment; nothing if it has anything else, or
-/// if the first line is the header of a `.dat` file.
-fn table_width(start: &[u8]) -> Option<usize> {
-    let start = start.strip_prefix(b"\xef\xbb\xbf").unwrap_or(start);
-    // The last line may be cut.
-    let whole = start.iter().rposition(|&byte| byte == b'\n')?;
-    let text = std::str::from_utf8(&start[..whole]).ok()?;
-    let header = text.lines().next()?.trim_start().strip_prefix('#');
-    let mut header = header.into_iter().flat_map(str::split_ascii_whitespace);
-    let boxes = header
-        .next()
-        .is_some_and(|word| word.parse::<usize>().is_ok());
-    if boxes
-        && header
-            .next()
-            .is_some_and(|word| word.parse::<f64>().is_ok())
-    {
-        return None;
-    }
-    let content = |line: &str| line.split('#').next().unwrap_or_default().replace(',', " ");
-    let line = text
-        .lines()
-        .map(content)
-        .find(|line| !line.trim().is_empty())?;
-    let mut words = line.split_ascii_whitespace();
-    let is_number = |word: &str| word.parse::<f64>().is_ok();
-    words.clone().all(is_number).then(|| words.by_ref().count())
-}
-
 impl fmt::Debug for Format {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_tuple("Format").field(&self.name).finish()
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn names_are_found_again() {
-        for format in FORMATS {
-            assert!(std::ptr::eq(Format::named(format.name).unwrap(), format));
-            let shouted = format!("a.b.{}", format.name.to_uppercase());
-            assert!(std::ptr::eq(
-                Format::of(Path::new(&shouted)).unwrap(),
-                format
-            ));
-        }
-        assert!(Format::of(Path::new("walk")).is_none());
-        assert_eq!(Format::detect(Path::new("walk"), b"# 4 3.0\n").name, "dat");
-        assert_eq!(Format::detect(Path::new("walk"), b"\x93NUMPY").name, "npy");
-        for (text, name) in [
-            ("1311868164.36 0 0 0 0 0 0 1\n", "tum"),
-            ("# a remark\n\n1,0,0,0,0,0,0,1 # here\n2,0", "tum"),
-            ("1 0 0 0 0 1 0 0 0 0 1 0\n", "kitti"),
-            ("# 2 1.0\n0 1 0 0 0 1 0 0\n", "dat"),
-            ("0 1 0 0 0\n", "dat"),
-            ("a 0 0 0 0 0 0 1\n", "dat"),
-            ("0 0 0 0 0 0 0 1", "dat"),
-        ] {
-            let found = Format::detect(Path::new("poses.txt"), text.as_bytes());
-            assert_eq!(found.name, name, "{text}");
-        }
-        let named = Format::detect(Path::new("a.dat"), b"1 0 0 0 0 0 0 1\n");
-        assert_eq!(named.name, "dat");
     }
 }

@@ -16,7 +16,7 @@ use crate::format::ReadOptions;
 
 /// How key times are spaced.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Steps {
+pub enum KeySpacing {
     /// Evenly.
     #[default]
     Uniform,
@@ -34,7 +34,7 @@ pub struct Generate {
     /// Time from the first key to the last, seconds.
     pub seconds: f64,
     /// How keys are spaced.
-    pub steps: Steps,
+    pub spacing: KeySpacing,
     /// Length of a box.
     pub length: f64,
     /// Which motion.
@@ -47,7 +47,7 @@ impl Default for Generate {
             boxes: 4,
             keys: 26,
             seconds: 20.0,
-            steps: Steps::Uniform,
+            spacing: KeySpacing::Uniform,
             length: 3.0,
             seed: 1,
         }
@@ -165,7 +165,7 @@ impl Generate {
 struct KeyTimes {
     seconds: f64,
     keys: usize,
-    steps: Steps,
+    spacing: KeySpacing,
     random: Random,
     total: f64,
     passed: f64,
@@ -176,7 +176,7 @@ impl KeyTimes {
         let &Generate {
             seconds,
             keys,
-            steps,
+            spacing: steps,
             ..
         } = generate;
         let mut rehearsal = Random(random.0);
@@ -184,7 +184,7 @@ impl KeyTimes {
         Self {
             seconds,
             keys,
-            steps,
+            spacing: steps,
             random,
             total,
             passed: 0.0,
@@ -193,11 +193,11 @@ impl KeyTimes {
 
     fn time(&mut self, key: usize) -> f64 {
         let last = self.keys.saturating_sub(1).max(1);
-        match self.steps {
-            Steps::Uniform => self.seconds * key as f64 / last as f64,
-            Steps::Random if key == 0 => 0.0,
-            Steps::Random if key == last => self.seconds,
-            Steps::Random => {
+        match self.spacing {
+            KeySpacing::Uniform => self.seconds * key as f64 / last as f64,
+            KeySpacing::Random if key == 0 => 0.0,
+            KeySpacing::Random if key == last => self.seconds,
+            KeySpacing::Random => {
                 self.passed += random_step(&mut self.random);
                 self.seconds * self.passed / self.total
             }
@@ -304,10 +304,10 @@ mod tests {
 
     #[test]
     fn times_are_exact_at_both_ends_and_increase() {
-        for steps in [Steps::Uniform, Steps::Random] {
+        for steps in [KeySpacing::Uniform, KeySpacing::Random] {
             for keys in [1, 2, 26, 1000] {
                 let set = Generate {
-                    steps,
+                    spacing: steps,
                     keys,
                     ..Generate::default()
                 }
@@ -336,8 +336,8 @@ mod tests {
         for track in set.tracks() {
             for pair in track.keys.windows(2) {
                 let [from, to] = [pair[0], pair[1]].map(glam::Quat::as_dquat);
-                let turn = from.conjugate() * to;
-                largest = largest.max(2.0 * turn.w.abs().min(1.0).acos());
+                let step_rotation = from.conjugate() * to;
+                largest = largest.max(2.0 * step_rotation.w.abs().min(1.0).acos());
             }
         }
         assert!((1.0..2.6).contains(&largest), "{largest} rad");

@@ -3,7 +3,7 @@
 use glam::{Quat, Vec3};
 use tumble::Channel;
 
-use crate::motion::{Motion, Sampler};
+use crate::motion::{ChannelInterpolation, Motion};
 use crate::sample::Samples;
 use crate::signs::continue_signs;
 
@@ -57,11 +57,11 @@ pub fn keyed(clip: &Motion) -> Result<Samples, KeyedError> {
         .to_vec();
     for track in 0..tracks {
         let name = set.track_name(track);
-        if lists(track).any(|own| own.len() > 1 && own != times) {
+        if lists(track).any(|list| list.len() > 1 && list != times) {
             return Err(KeyedError::TimesDiffer { track, name });
         }
-        let own = clip.channel(track);
-        if own.has(Sampler::Cubic) {
+        let channels = clip.channel(track);
+        if channels.has(ChannelInterpolation::Cubic) {
             return Err(KeyedError::Cubic { track, name });
         }
     }
@@ -83,8 +83,8 @@ pub fn keyed(clip: &Motion) -> Result<Samples, KeyedError> {
                 .rotations
                 .push(at(keys, sample).unwrap_or(Quat::IDENTITY));
             let vector = |channel| -> Vec3 {
-                let own = set.vector_keys(channel, track);
-                own.and_then(|own| at(own.keys, sample))
+                let keys = set.vector_keys(channel, track);
+                keys.and_then(|keys| at(keys.keys, sample))
                     .unwrap_or_else(|| clip.rest(channel, track))
             };
             if is_filled[0] {

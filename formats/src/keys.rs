@@ -3,7 +3,7 @@
 use glam::{DQuat, Quat};
 use tumble::UNIT_TOLERANCE;
 
-use crate::diagnostic::{Code, Diagnostic, Place};
+use crate::diagnostic::{Code, Diagnostic, Location};
 use crate::quaternion::{dot, nearest_unit, rounded};
 use crate::warnings::Warnings;
 
@@ -33,14 +33,14 @@ pub(crate) struct Origin<'a> {
     /// What messages call the input.
     pub(crate) file: &'a str,
     /// Where key `i` is.
-    pub(crate) place: &'a dyn Fn(usize) -> Place,
+    pub(crate) location: &'a dyn Fn(usize) -> Location,
     pub(crate) duplicates: Duplicates,
 }
 
 impl Origin<'_> {
     fn refuse(&self, key: usize, code: Code, message: String) -> Diagnostic {
         Diagnostic {
-            place: Some((self.place)(key)),
+            location: Some((self.location)(key)),
             ..Diagnostic::new(self.file, code, message)
         }
     }
@@ -54,20 +54,20 @@ impl Origin<'_> {
         keys: impl IntoIterator<Item = DQuat>,
         warnings: &mut Warnings,
     ) -> Result<Vec<Quat>, Diagnostic> {
-        let unit = |(place, key): (usize, DQuat)| {
+        let unit = |(index, key): (usize, DQuat)| {
             let norm = dot(key, key).sqrt();
             if !norm.is_finite() {
                 let message = format!("the quaternion {key} is not finite; repair or remove it");
-                return Err(self.refuse(place, Code::NotFinite, message));
+                return Err(self.refuse(index, Code::NotFinite, message));
             }
             if norm < LEAST_NORM {
                 let message = format!("the quaternion has norm {norm:e}; a rotation has norm 1");
-                return Err(self.refuse(place, Code::KeyNorm, message));
+                return Err(self.refuse(index, Code::KeyNorm, message));
             }
             if (norm - 1.0).abs() > QUIET_NORM {
                 warnings.warn(Code::NormOff, || {
                     let message = format!("the quaternion has norm {norm:.6}; it is normalised");
-                    (Some((self.place)(place)), message)
+                    (Some((self.location)(index)), message)
                 });
             }
             Ok(nearest_unit(key))
@@ -115,7 +115,7 @@ impl Origin<'_> {
             } else if equal(before, key) {
                 warnings.warn(Code::EqualKeys, || {
                     let message = format!("two equal keys at time {time}; one is dropped");
-                    (Some((self.place)(key)), message)
+                    (Some((self.location)(key)), message)
                 });
             } else {
                 match self.duplicates {
@@ -127,7 +127,7 @@ impl Origin<'_> {
                     }
                     Duplicates::First => {}
                     Duplicates::Both if !jumps => {
-                        let earlier = kept.len().checked_sub(2).map(|place| times[kept[place]]);
+                        let earlier = kept.len().checked_sub(2).map(|i| times[kept[i]]);
                         let Some(moved) = just_before(time, earlier) else {
                             let message = format!(
                                 "two different keys at time {time}, and no time is left before it; \
@@ -208,7 +208,7 @@ mod tests {
     fn origin(duplicates: Duplicates) -> Origin<'static> {
         Origin {
             file: "t",
-            place: &|key| Place::Inside(format!("key {key}")),
+            location: &|key| Location::Inside(format!("key {key}")),
             duplicates,
         }
     }
@@ -239,7 +239,7 @@ mod tests {
 
     #[test]
     fn quiet_keys_are_the_same_and_others_are_marked() {
-        let turned = DQuat::from_rotation_y(0.7);
+        let rotation = DQuat::from_rotation_y(0.7);
         for norm in [
             1.0,
             1.0 + 3.9e-7,
@@ -252,7 +252,7 @@ mod tests {
             1e200,
             f64::NAN,
         ] {
-            let key = turned * norm;
+            let key = rotation * norm;
             let mut warnings = Warnings::new("t");
             let unit = origin(Duplicates::Refuse).unit([key], &mut warnings);
             let quiet = quiet_unit(key);

@@ -13,12 +13,13 @@ use crate::decimal::Decimal;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::feature::Feature;
 use crate::format::{Format, FormatOption, Loaded, MotionOptions, ReadOptions, WriteError};
-use crate::motion::Sampled;
+use crate::motion::SampledClip;
 use crate::rotation_matrix::of_matrix;
 use crate::source::Source;
 use crate::text::lines::{Limits, Lines, tokens};
 use crate::text::number;
-use crate::tum::{Poses, Trajectory, places};
+use crate::times::FrameTimes;
+use crate::tum::{Trajectory, TrajectoryPoses, decimal_count};
 
 /// A path of one body, without times.
 pub static FORMAT: Format = Format {
@@ -38,14 +39,6 @@ pub static FORMAT: Format = Format {
         FormatOption::Duplicates,
     ],
 };
-
-/// The times of frames, as a file has them.
-#[derive(Debug, Clone, PartialEq)]
-pub struct FrameTimes {
-    times: Vec<Decimal>,
-    /// The most decimals of one.
-    places: u32,
-}
 
 /// Reads the times of frames: numbers of seconds, a line each; `-` is standard input.
 ///
@@ -69,7 +62,7 @@ pub fn read_frame_times(
     let mut lines = Lines::with_names(name, reader, limits)?;
     let mut found = FrameTimes {
         times: Vec::new(),
-        places: 0,
+        decimals: 0,
     };
     while let Some(line) = lines.next()? {
         let text = line.split('#').next().unwrap_or_default().replace(',', " ");
@@ -80,7 +73,7 @@ pub fn read_frame_times(
                 let message = format!("the time {token} is out of range");
                 return Err(lines.refuse(column, Code::TumTime, message));
             };
-            found.places = found.places.max(places(token, 0));
+            found.decimals = found.decimals.max(decimal_count(token, 0));
             found.times.push(time);
         }
         lines.reuse(line);
@@ -114,22 +107,22 @@ pub fn read_kitti(
                        of them";
         return Err(Diagnostic::new(name, Code::NoRate, message));
     }
-    let mut poses = Poses::default();
+    let mut poses = TrajectoryPoses::default();
     while let Some(line) = lines.next()? {
         let text = line.split('#').next().unwrap_or_default().replace(',', " ");
         if !text.trim().is_empty() {
             let [a, b, c] = read_rows(&lines, &text)?;
             let rotation = of_matrix([a, b, c].map(|[x, y, z, _]| [x, y, z]));
             let Some(rotation) = rotation else {
-                let message = "the first three columns of the matrix are no rotation".to_owned();
+                let message = "the first three columns of the matrix are not a rotation".to_owned();
                 return Err(lines.refuse(1, Code::NoRotation, message));
             };
             // A matrix has no sign.
             let last = poses.rotations.last();
-            let turns_back = last.is_some_and(|last: &DQuat| last.dot(rotation) < 0.0);
+            let is_negated = last.is_some_and(|last: &DQuat| last.dot(rotation) < 0.0);
             poses
                 .rotations
-                .push(if turns_back { -rotation } else { rotation });
+                .push(if is_negated { -rotation } else { rotation });
             poses.positions.push(DVec3::new(a[3], b[3], c[3]));
             poses.lines.push(lines.number);
         }
@@ -150,7 +143,7 @@ pub fn read_kitti(
                 return Err(Diagnostic::new(name, Code::FrameTimes, message));
             }
             poses.times.clone_from(&found.times);
-            poses.places = found.places;
+            poses.decimals = found.decimals;
             poses.into_clip(name, lines.warnings, options)
         }
         (None, Some(rate)) => {
@@ -190,7 +183,7 @@ const DECIMALS: usize = 12;
 /// Writes the poses of one clip of one track. Their times go into a file of their own
 /// ([`write_frame_times`]), where there is one; else they are frames of a rate, which is said.
 fn write_motion(
-    clips: &[Sampled<'_>],
+    clips: &[SampledClip<'_>],
     options: &MotionOptions,
     out: &mut dyn Write,
 ) -> Result<Vec<Diagnostic>, WriteError> {
@@ -204,7 +197,7 @@ fn write_motion(
         let are_frames =
             |&rate: &FrameRate| times.iter().enumerate().all(|frame| is_frame(rate, frame));
         let Some(rate) = path.sampled.rate.filter(are_frames) else {
-            let message = "its times are no frames of a rate, and KITTI has no times; give --times-out, a file of them";
+            let message = "its times are not frames of a rate, and KITTI has no times; give --times-out, a file of them";
             return Err(path.refuse(message.to_owned()));
         };
         let first = path.sampled.time_digits(0).unwrap_or_default();
@@ -241,7 +234,7 @@ fn decimals(number: f64) -> String {
 ///
 /// # Errors
 /// When writing fails, or (`InvalidInput`) a time is out of range.
-pub fn write_frame_times(sampled: &Sampled<'_>, out: &mut dyn Write) -> io::Result<()> {
+pub fn write_frame_times(sampled: &SampledClip<'_>, out: &mut dyn Write) -> io::Result<()> {
     for sample in 0..sampled.times.len() {
         let Some(digits) = sampled.time_digits(sample) else {
             let message = format!("the time {} s is out of range", sampled.times[sample]);

@@ -13,7 +13,7 @@ use std::str::FromStr;
 
 use tumble::Layout;
 
-use crate::npy::ComponentOrder;
+use crate::quaternion::ComponentOrder;
 use crate::rotation_form::RotationForm;
 
 /// What each of some names is made of.
@@ -51,7 +51,9 @@ pub enum MapError {
         entry: String,
     },
     /// The columns are no range.
-    #[error("`{columns}` in `{entry}` is no range of columns; give one such as `[3:7]` or `[0]`")]
+    #[error(
+        "`{columns}` in `{entry}` is not a range of columns; give one such as `[3:7]` or `[0]`"
+    )]
     Columns {
         /// The entry as given.
         entry: String,

@@ -1,9 +1,13 @@
 //! What motion files hold: clips of keyed joints over a skeleton.
 
+mod dense;
+pub(crate) mod grid;
+mod select;
+
 use glam::{DVec3, Quat, Vec3};
 use tumble::{Channel, FrameRate, TrackError, TrackSet};
 
-use crate::bvh::BvhJoint;
+use crate::bvh::joint::BvhJoint;
 use crate::decimal::Decimal;
 use crate::origin::{coordinate, origin_of, relative};
 
@@ -16,11 +20,11 @@ use crate::origin::{coordinate, origin_of, relative};
 pub struct Motion {
     /// The clip's name, if the file gives it one.
     pub name: Option<String>,
-    /// Its place among the file's clips, from 0, those that cannot be read included.
-    pub place: usize,
+    /// Its index among the file's clips, from 0, those that cannot be read included.
+    pub index: usize,
     /// Keys of rotations, one track a joint, and the keys of translations and scales beside them.
     pub set: TrackSet,
-    /// How the tracks hang together; empty for tracks that have nothing to do with each other.
+    /// The parents and rest transforms of the tracks; empty for tracks that are not joints of a skeleton.
     pub skeleton: Vec<Joint>,
     /// How each track is keyed; empty where rotations are keyed and the file names no method.
     pub channels: Vec<Channels>,
@@ -34,7 +38,7 @@ pub struct Motion {
     /// What each track's translations, at rest and moving, are to be moved by, as positions of maps would
     /// leave f32 only 0.5 m; empty where they count from 0.
     pub origins: Vec<DVec3>,
-    /// Why poses in the world cannot be told, where they cannot.
+    /// Why poses in the world cannot be computed, where they cannot.
     pub no_world: Option<String>,
     /// How BVH writes each track down; empty for clips of which no file says it.
     pub bvh: Vec<BvhJoint>,
@@ -58,11 +62,39 @@ impl Motion {
         }
     }
 
-    /// Whether a joint hangs on another, or rests elsewhere than at 0.
+    /// Whether a joint has a parent, or rests elsewhere than at 0.
     #[must_use]
-    pub fn hangs_together(&self) -> bool {
+    pub fn has_hierarchy(&self) -> bool {
         let moves = |joint: &Joint| joint.parent.is_some() || joint.rest.translation != Vec3::ZERO;
         self.skeleton.iter().any(moves)
+    }
+
+    /// How a track is keyed; nothing where the file says nothing of it.
+    #[must_use]
+    pub fn channel(&self, track: usize) -> Channels {
+        self.channels.get(track).copied().unwrap_or_default()
+    }
+
+    /// Where a track rests that has no keys of its translation or scale.
+    #[must_use]
+    pub fn rest(&self, channel: Channel, track: usize) -> Vec3 {
+        let rest = self
+            .skeleton
+            .get(track)
+            .map(|joint| joint.rest)
+            .unwrap_or_default();
+        match channel {
+            Channel::Translation => rest.translation,
+            Channel::Scale => rest.scale,
+        }
+    }
+
+    /// Whether any track has keys of translations or scales.
+    #[must_use]
+    pub fn has_vectors(&self) -> bool {
+        let channels = [Channel::Translation, Channel::Scale];
+        let keyed = |track| channels.map(|it| self.set.vector_keys(it, track).is_some());
+        (0..self.set.track_count()).any(|track| keyed(track).contains(&true))
     }
 
     /// What a track's translations are to be moved by.
@@ -81,7 +113,7 @@ impl Motion {
         self.origins[track] = origin;
     }
 
-    /// Where a track that hangs on none rests, about an [origin](Self::origins) where it needs one; keys of
+    /// Where a track without a parent rests, about an [origin](Self::origins) where it needs one; keys of
     /// translation have theirs already. Others rest near their parents, and have none but that of their keys.
     pub(crate) fn resting_at(
         &mut self,
@@ -137,7 +169,7 @@ pub struct Shape {
 /// A joint of a skeleton.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Joint {
-    /// The track of the joint that it hangs on; a root has none. Parents may come after their
+    /// The track of the parent joint; a root has none. Parents may come after their
     /// children.
     pub parent: Option<usize>,
     /// Its transform, relative to the parent, where nothing moves it.
@@ -170,17 +202,26 @@ impl Default for Transform {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Channels {
     /// Of the rotation.
-    pub rotation: Option<Sampler>,
+    pub rotation: Option<ChannelInterpolation>,
     /// Of the translation.
-    pub translation: Option<Sampler>,
+    pub translation: Option<ChannelInterpolation>,
     /// Of the scale.
-    pub scale: Option<Sampler>,
+    pub scale: Option<ChannelInterpolation>,
 }
 
 impl Channels {
+    /// The sampler of a translation or scale.
+    #[must_use]
+    pub fn of(&self, channel: Channel) -> Option<ChannelInterpolation> {
+        match channel {
+            Channel::Translation => self.translation,
+            Channel::Scale => self.scale,
+        }
+    }
+
     /// Whether any of them has that sampler.
     #[must_use]
-    pub fn has(self, sampler: Sampler) -> bool {
+    pub fn has(self, sampler: ChannelInterpolation) -> bool {
         [self.rotation, self.translation, self.scale].contains(&Some(sampler))
     }
 }
@@ -190,7 +231,7 @@ impl Channels {
     Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize, serde::Deserialize,
 )]
 #[serde(rename_all = "lowercase")]
-pub enum Sampler {
+pub enum ChannelInterpolation {
     /// The key at or before the time.
     Step,
     /// Straight lines; the shorter arc for rotations.
@@ -199,7 +240,7 @@ pub enum Sampler {
     Cubic,
 }
 
-impl Sampler {
+impl ChannelInterpolation {
     /// Its name in glTF.
     #[must_use]
     pub fn name(self) -> &'static str {
@@ -215,7 +256,7 @@ impl Sampler {
 ///
 /// Lists are in the order `[sample][track]`.
 #[derive(Debug, Clone)]
-pub struct Sampled<'a> {
+pub struct SampledClip<'a> {
     /// The clip.
     pub clip: &'a Motion,
     /// Times of the samples, seconds, increasing.
@@ -232,11 +273,11 @@ pub struct Sampled<'a> {
     pub notes: &'a [(&'a str, String)],
     /// The samples are those of the clip's own keys: a format that has keys of each channel at times of
     /// their own (glTF) writes these instead, unless the clip is in the world.
-    pub of_own_keys: bool,
+    pub is_at_keys: bool,
 }
 
-impl Sampled<'_> {
-    /// The digits of a sample's time in text. Where samples are no frames of a rate there are at least
+impl SampledClip<'_> {
+    /// The digits of a sample's time in text. Where samples are not frames of a rate there are at least
     /// nine behind the point, which tell readers that nothing was rounded to fewer. `None` out of range.
     pub(crate) fn time_digits(&self, sample: usize) -> Option<String> {
         let time = Decimal::of(self.clip.time_offset, self.times[sample])?;

@@ -1,4 +1,4 @@
-//! Names of joints that any program can read, and that are told apart.
+//! Names of joints that any program can read, and that are unique.
 
 use std::collections::HashSet;
 
@@ -7,32 +7,32 @@ use tumble::TrackSet;
 /// The name of joint `index` (from 0) in a file whose names are all that is on a line before a brace,
 /// and differ: braces and control characters become `_`, a joint without a name is `joint7`, and a name
 /// that is taken gets the joint's number behind it, `hand#12`. `taken` collects what was given.
-pub(crate) fn line_name(name: &str, index: usize, taken: &mut HashSet<String>) -> String {
+pub(crate) fn line_name(name: &str, index: usize, used: &mut HashSet<String>) -> String {
     let is_odd = |c: char| c.is_control() && c != '\t' || c == '{' || c == '}';
     let mut usable = name.trim().replace(is_odd, "_");
     if usable.is_empty() {
         usable = format!("joint{index}");
     }
-    untaken(usable, index, taken)
+    unique_name(usable, index, used)
 }
 
 /// The name itself; one that is taken gets the number behind it, and as many `_` as it takes.
-pub(crate) fn untaken(mut name: String, index: usize, taken: &mut HashSet<String>) -> String {
-    if taken.contains(&name) {
+pub(crate) fn unique_name(mut name: String, index: usize, used: &mut HashSet<String>) -> String {
+    if used.contains(&name) {
         name = format!("{name}#{index}");
     }
-    while taken.contains(&name) {
+    while used.contains(&name) {
         name.push('_');
     }
-    taken.insert(name.clone());
+    used.insert(name.clone());
     name
 }
 
-/// The names of a set's tracks, told apart: a name that is taken gets the track's number behind it.
+/// The names of a set's tracks, made unique: a repeated name gets the track's number after it.
 pub(crate) fn distinct_names(set: &TrackSet) -> Vec<String> {
-    let mut taken = HashSet::new();
+    let mut used = HashSet::new();
     let names =
-        (0..set.track_count()).map(|track| untaken(set.track_name(track), track, &mut taken));
+        (0..set.track_count()).map(|track| unique_name(set.track_name(track), track, &mut used));
     names.collect()
 }
 
@@ -42,13 +42,13 @@ mod tests {
 
     #[test]
     fn names_become_lines_that_differ() {
-        let given = [
+        let input = [
             "hips", "left arm", "", " a{b}\n", "hips", "hips#4", "joint2", "hips",
         ];
-        let mut taken = HashSet::new();
-        let names = given.iter().enumerate();
+        let mut used = HashSet::new();
+        let names = input.iter().enumerate();
         let names: Vec<_> = names
-            .map(|(index, name)| line_name(name, index, &mut taken))
+            .map(|(index, name)| line_name(name, index, &mut used))
             .collect();
         let expected = [
             "hips", "left arm", "joint2", "a_b_", "hips#4", "hips#4#5", "joint2#6", "hips#7",

@@ -10,29 +10,9 @@ use tumble::{ComponentType, Encoding, Layout};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::format::{Format, FormatOption, ResultShape, ResultWriter, WriteResults};
 use crate::npz::array::Array;
-use crate::npz::header::{Element, Header};
-use crate::npz::{Numbers, open_npy, read_npy};
-
-/// The order of a quaternion's components in a file.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
-pub enum ComponentOrder {
-    /// `x y z w`, as in memory, glTF and `SciPy`.
-    #[default]
-    Xyzw,
-    /// `w x y z`, as in `.dat` files.
-    Wxyz,
-}
-
-impl ComponentOrder {
-    /// As it is written: `xyzw`.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Xyzw => "xyzw",
-            Self::Wxyz => "wxyz",
-        }
-    }
-}
+use crate::npz::header::{ArrayHeader, Element};
+use crate::npz::{NumberArray, open_npy, read_npy};
+use crate::quaternion::ComponentOrder;
 
 /// `NumPy`'s array files.
 pub static FORMAT: Format = Format {
@@ -65,9 +45,9 @@ pub fn read_numbers(
     file: &str,
     bytes: &[u8],
     is_right: impl FnOnce(&[usize]) -> Result<(), String>,
-) -> Result<Numbers, Diagnostic> {
+) -> Result<NumberArray, Diagnostic> {
     let refuse = |code, message: String| Diagnostic::new(file, code, message);
-    let header = Header::parse(bytes).map_err(|why| {
+    let header = ArrayHeader::parse(bytes).map_err(|why| {
         let message = format!("the array's header cannot be read: {why}");
         refuse(Code::ArrayHeader, message)
     })?;
@@ -81,7 +61,7 @@ pub fn read_numbers(
     is_right(&header.shape).map_err(|message| refuse(Code::Shape, message))?;
     let found = bytes.len() - header.start;
     if header.byte_count() != Some(found) {
-        let message = format!("an array {header} has not the {found} bytes behind the header");
+        let message = format!("an array {header} has not the {found} bytes after the header");
         return Err(refuse(Code::ArraySize, message));
     }
     let array = Array {
@@ -89,7 +69,7 @@ pub fn read_numbers(
         bytes: Cow::Borrowed(bytes),
     };
     let values = array.numbers().unwrap_or_default();
-    Ok(Numbers {
+    Ok(NumberArray {
         shape: header.shape.clone(),
         values,
     })
@@ -98,7 +78,7 @@ pub fn read_numbers(
 /// The shape of the array that some bytes begin with; `None` where they are none, or its header is not
 /// whole.
 pub(crate) fn shape_of(start: &[u8]) -> Option<Vec<usize>> {
-    Header::parse(start).ok().map(|header| header.shape)
+    ArrayHeader::parse(start).ok().map(|header| header.shape)
 }
 
 /// Rotations written at once, so that a signal is noticed soon: 4 MB.
@@ -165,7 +145,7 @@ impl<W: Write> NpyWriter<W> {
             ComponentType::F16 => Element::F16,
             ComponentType::Snorm16 => Element::Signed(2),
         };
-        writer.write_all(&Header::write(&element, &shape))?;
+        writer.write_all(&ArrayHeader::write(&element, &shape))?;
         Ok(Self {
             writer,
             order,

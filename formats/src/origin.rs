@@ -72,7 +72,7 @@ pub fn relative(points: &[DVec3]) -> (DVec3, Vec<Vec3>) {
 #[must_use]
 pub fn coordinate(origin: f64, relative: f32) -> String {
     /// More decimals than f64 has for coordinates that need an origin.
-    const MOST: usize = 12;
+    const MAX_DECIMALS: usize = 12;
     let relative = if relative.is_normal() { relative } else { 0.0 };
     let digits = relative.to_string();
     if origin == 0.0 {
@@ -85,7 +85,7 @@ pub fn coordinate(origin: f64, relative: f32) -> String {
     let decimals = digits
         .split_once('.')
         .map_or(0, |(_, decimals)| decimals.len());
-    format!("{sum:.*}", decimals.min(MOST))
+    format!("{sum:.*}", decimals.min(MAX_DECIMALS))
 }
 
 #[cfg(test)]

@@ -32,7 +32,7 @@ pub enum OutputError {
         path: PathBuf,
     },
     /// It is a device, a pipe or a socket.
-    #[error("{}: is no file; give a file, or `-` for standard output", path.display())]
+    #[error("{}: is not a file; give a file, or `-` for standard output", path.display())]
     NotAFile {
         /// The output.
         path: PathBuf,
@@ -75,10 +75,10 @@ impl OutputError {
 /// behind.
 pub struct Output {
     path: PathBuf,
-    writer: Sink,
+    writer: OutputSink,
 }
 
-enum Sink {
+enum OutputSink {
     File {
         temporary: BufWriter<Temporary>,
         overwrite: bool,
@@ -103,9 +103,9 @@ fn unfinished() -> MutexGuard<'static, BTreeSet<PathBuf>> {
 }
 
 /// The entry of a temporary file in [`UNFINISHED`].
-struct Listed(PathBuf);
+struct UnfinishedEntry(PathBuf);
 
-impl Drop for Listed {
+impl Drop for UnfinishedEntry {
     fn drop(&mut self) {
         unfinished().remove(&self.0);
     }
@@ -142,7 +142,7 @@ pub fn remove_abandoned(directory: &Path) {
 /// Removes the temporary files in a directory that were created with that mark, whether or not they
 /// are locked: locks do not reach other machines.
 pub fn remove_marked(directory: &Path, mark: &str) {
-    for path in temporary_files(directory, |own| own.starts_with(mark)) {
+    for path in temporary_files(directory, |name| name.starts_with(mark)) {
         let _ = fs::remove_file(path); // the next run tries again
     }
 }
@@ -154,10 +154,10 @@ fn temporary_files(directory: &Path, is_good: impl Fn(&str) -> bool) -> Vec<Path
     let temporary = entries.filter(|entry| {
         let name = entry.file_name();
         let name = name.to_str().and_then(|name| name.strip_prefix(PREFIX));
-        let Some(own) = name.and_then(|name| name.strip_suffix(SUFFIX)) else {
+        let Some(stem) = name.and_then(|name| name.strip_suffix(SUFFIX)) else {
             return false;
         };
-        let (mark, random) = own.split_at(own.rfind('-').map_or(0, |at| at + 1));
+        let (mark, random) = stem.split_at(stem.rfind('-').map_or(0, |at| at + 1));
         // Python's temporary files have eight, underscores among them.
         let is_random = random.len() == RANDOM || !mark.is_empty() && random.len() == 8;
         is_random
@@ -194,7 +194,7 @@ impl Output {
     ) -> Result<Self, OutputError> {
         let path = path.to_owned();
         if path.as_os_str() == "-" {
-            let writer = Sink::Standard(BufWriter::with_capacity(BUFFER, io::stdout()));
+            let writer = OutputSink::Standard(BufWriter::with_capacity(BUFFER, io::stdout()));
             return Ok(Self { path, writer });
         }
         check_target(&path, overwrite, inputs)?;
@@ -206,7 +206,7 @@ impl Output {
         let temporary = BufWriter::with_capacity(BUFFER, temporary);
         Ok(Self {
             path,
-            writer: Sink::File {
+            writer: OutputSink::File {
                 temporary,
                 overwrite,
             },
@@ -221,7 +221,7 @@ impl Output {
     pub fn settle(self) -> Result<Self, OutputError> {
         let Self { path, writer } = self;
         let writer = match writer {
-            Sink::File {
+            OutputSink::File {
                 temporary,
                 overwrite,
             } => {
@@ -229,12 +229,12 @@ impl Output {
                     path: path.clone(),
                     source: e.into_error(),
                 })?;
-                Sink::File {
+                OutputSink::File {
                     temporary: BufWriter::with_capacity(0, file),
                     overwrite,
                 }
             }
-            standard @ Sink::Standard(_) => standard,
+            standard @ OutputSink::Standard(_) => standard,
         };
         Ok(Self { path, writer })
     }
@@ -258,8 +258,8 @@ impl Output {
             source,
         };
         match writer {
-            Sink::Standard(mut writer) => writer.flush().map(|()| None).map_err(named),
-            Sink::File {
+            OutputSink::Standard(mut writer) => writer.flush().map(|()| None).map_err(named),
+            OutputSink::File {
                 temporary,
                 overwrite,
             } => {
@@ -282,7 +282,7 @@ enum Temporary {
     #[cfg(target_os = "linux")]
     Unnamed { file: File, mark: String },
     /// Dropped before it is forgotten.
-    Named(NamedTempFile, Listed),
+    Named(NamedTempFile, UnfinishedEntry),
 }
 
 impl Temporary {
@@ -319,7 +319,7 @@ impl Temporary {
                 let name = named.path().to_owned();
                 unfinished.insert(name.clone());
                 drop(unfinished);
-                let _listed = Listed(name);
+                let _listed = UnfinishedEntry(name);
                 named.persist(path).map_err(|error| error.error)?;
                 Ok(file)
             }
@@ -402,13 +402,13 @@ fn named_in(parent: &Path, mark: &str) -> io::Result<Temporary> {
         let path = temporary.path().to_owned();
         unfinished.insert(path.clone());
         drop(unfinished);
-        let listed = Listed(path);
+        let listed = UnfinishedEntry(path);
         // Whoever looks for abandoned files may have met it before it was locked.
-        let is_taken = matches!(
+        let is_locked = matches!(
             temporary.as_file().try_lock(),
             Err(fs::TryLockError::WouldBlock)
         );
-        if !is_taken && is_there(&temporary) {
+        if !is_locked && is_there(&temporary) {
             return Ok(Temporary::Named(temporary, listed));
         }
     }
@@ -418,10 +418,10 @@ fn named_in(parent: &Path, mark: &str) -> io::Result<Temporary> {
 /// for each of many results.
 fn remove_abandoned_once(parent: &Path) {
     static SEEN: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
-    const MOST: usize = 4096;
+    const MAX_ENTRIES: usize = 4096;
     let is_new = (SEEN.lock().unwrap_or_else(PoisonError::into_inner)).insert(parent.to_owned());
     let entries = fs::read_dir(parent).into_iter().flatten();
-    if is_new && entries.take(MOST).count() < MOST {
+    if is_new && entries.take(MAX_ENTRIES).count() < MAX_ENTRIES {
         remove_abandoned(parent);
     }
 }
@@ -441,15 +441,15 @@ fn is_there(_: &NamedTempFile) -> bool {
 impl Write for Output {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         match &mut self.writer {
-            Sink::File { temporary, .. } => temporary.write(bytes),
-            Sink::Standard(writer) => writer.write(bytes),
+            OutputSink::File { temporary, .. } => temporary.write(bytes),
+            OutputSink::Standard(writer) => writer.write(bytes),
         }
     }
 
     fn flush(&mut self) -> io::Result<()> {
         match &mut self.writer {
-            Sink::File { temporary, .. } => temporary.flush(),
-            Sink::Standard(writer) => writer.flush(),
+            OutputSink::File { temporary, .. } => temporary.flush(),
+            OutputSink::Standard(writer) => writer.flush(),
         }
     }
 }
@@ -469,15 +469,15 @@ pub fn check_target(path: &Path, overwrite: bool, inputs: &[PathBuf]) -> Result<
             path: path.to_owned(),
         });
     }
-    // A rename would put a file in its place.
+    // A rename would replace it by a file.
     if fs::metadata(path).is_ok_and(|metadata| !metadata.is_file()) {
         return Err(OutputError::NotAFile {
             path: path.to_owned(),
         });
     }
     // Also through links: both names lead to one file.
-    if let Ok(own) = fs::canonicalize(path) {
-        let same = |input: &&PathBuf| fs::canonicalize(input).is_ok_and(|input| input == own);
+    if let Ok(target) = fs::canonicalize(path) {
+        let same = |input: &&PathBuf| fs::canonicalize(input).is_ok_and(|input| input == target);
         if let Some(input) = inputs.iter().find(same) {
             return Err(OutputError::IsInput {
                 path: path.to_owned(),
@@ -548,16 +548,16 @@ mod tests {
         for name in mine {
             fs::write(directory.path().join(name), "mine").unwrap();
         }
-        let own = named_in(directory.path(), "").unwrap();
-        let Temporary::Named(own, _) = &own else {
+        let current = named_in(directory.path(), "").unwrap();
+        let Temporary::Named(current, _) = &current else {
             panic!("it has a name");
         };
-        let own = own.path().file_name().unwrap();
+        let current_name = current.path().file_name().unwrap();
         remove_abandoned(directory.path());
         let left = names(directory.path());
         assert_eq!(left.len(), 4);
         assert!(mine.iter().all(|name| left.contains(&(*name).to_owned())));
-        assert!(left.contains(&own.to_str().unwrap().to_owned()));
+        assert!(left.contains(&current_name.to_str().unwrap().to_owned()));
     }
 
     /// Writers and those who look for abandoned files run at once.

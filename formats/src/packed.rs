@@ -10,7 +10,7 @@ use glam::{DVec3, Quat, Vec3};
 use serde::{Deserialize, Serialize};
 use tumble::{Channel, Tcb, Track, TrackError, VectorKeys};
 
-use crate::motion::{Channels, Joint, Motion, Sampler, Transform};
+use crate::motion::{ChannelInterpolation, Channels, Joint, Motion, Transform};
 
 /// Why bytes are no clip. Tracks count from 0.
 #[derive(Debug, thiserror::Error)]
@@ -23,15 +23,15 @@ pub enum PackedError {
         reason: String,
     },
     /// There are fewer numbers than the header says.
-    #[error("track {track}: the bytes end before its {what}")]
+    #[error("track {track}: the bytes end before its {missing}")]
     Short {
         /// The track.
         track: usize,
         /// What is missing.
-        what: &'static str,
+        missing: &'static str,
     },
     /// There are more numbers than the header says.
-    #[error("{bytes} bytes are left behind the last track")]
+    #[error("{bytes} bytes are left after the last track")]
     Left {
         /// How many.
         bytes: usize,
@@ -46,7 +46,7 @@ pub enum PackedError {
 
 #[derive(Debug, Default, Serialize, Deserialize)]
 #[serde(rename_all = "camelCase", deny_unknown_fields, default)]
-struct Header {
+struct ClipHeader {
     name: Option<String>,
     is_world: bool,
     no_world: Option<String>,
@@ -71,9 +71,9 @@ struct TrackHeader {
     scales: usize,
     scale_tangents: bool,
     parent: Option<usize>,
-    rotation_sampler: Option<Sampler>,
-    translation_sampler: Option<Sampler>,
-    scale_sampler: Option<Sampler>,
+    rotation_sampler: Option<ChannelInterpolation>,
+    translation_sampler: Option<ChannelInterpolation>,
+    scale_sampler: Option<ChannelInterpolation>,
     origin: bool,
     rest: bool,
 }
@@ -86,7 +86,7 @@ struct TrackHeader {
 )]
 pub fn to_bytes(clip: &Motion) -> Vec<u8> {
     let set = &clip.set;
-    let mut header = Header {
+    let mut header = ClipHeader {
         name: clip.name.clone(),
         is_world: clip.is_world,
         no_world: clip.no_world.clone(),
@@ -99,7 +99,7 @@ pub fn to_bytes(clip: &Motion) -> Vec<u8> {
     for (index, track) in set.tracks().enumerate() {
         let vectors = |channel| set.vector_keys(channel, index);
         let joint = clip.skeleton.get(index);
-        let written = Written {
+        let written = PackedTrack {
             track,
             shares_times: index > 0 && track.times == before,
             translations: vectors(Channel::Translation),
@@ -122,7 +122,7 @@ pub fn to_bytes(clip: &Motion) -> Vec<u8> {
 }
 
 /// What is written of a track.
-struct Written<'a> {
+struct PackedTrack<'a> {
     track: Track<'a>,
     shares_times: bool,
     translations: Option<VectorKeys<'a>>,
@@ -131,7 +131,7 @@ struct Written<'a> {
     rest: Option<Transform>,
 }
 
-impl Written<'_> {
+impl PackedTrack<'_> {
     fn header(&self, joint: Option<&Joint>, channels: Channels) -> TrackHeader {
         let has_tangents =
             |keys: Option<VectorKeys<'_>>| keys.is_some_and(|vectors| !vectors.tangents.is_empty());
@@ -215,7 +215,7 @@ pub fn from_bytes(bytes: &[u8]) -> Result<Motion, PackedError> {
             rest.len()
         ))
     })?;
-    let header: Header =
+    let header: ClipHeader =
         serde_json::from_slice(header).map_err(|error| refuse(error.to_string()))?;
     let mut clip = Motion {
         name: header.name,
@@ -223,7 +223,7 @@ pub fn from_bytes(bytes: &[u8]) -> Result<Motion, PackedError> {
         no_world: header.no_world,
         ..Motion::default()
     };
-    let mut numbers = Numbers {
+    let mut numbers = PackedNumbers {
         bytes: numbers,
         track: 0,
     };
@@ -262,47 +262,50 @@ pub fn from_bytes(bytes: &[u8]) -> Result<Motion, PackedError> {
 }
 
 /// The numbers that are not read yet.
-struct Numbers<'a> {
+struct PackedNumbers<'a> {
     bytes: &'a [u8],
     track: usize,
 }
 
-impl Numbers<'_> {
+impl PackedNumbers<'_> {
     fn take<const BYTES: usize, T>(
         &mut self,
         count: usize,
         components: usize,
-        what: &'static str,
+        quantity: &'static str,
         number: fn([u8; BYTES]) -> T,
     ) -> Result<Vec<T>, PackedError> {
         let track = self.track;
-        let short = || PackedError::Short { track, what };
+        let short = || PackedError::Short {
+            track,
+            missing: quantity,
+        };
         let length = count
             .checked_mul(components)
             .and_then(|numbers| numbers.checked_mul(BYTES))
             .ok_or_else(short)?;
-        let (taken, rest) = self.bytes.split_at_checked(length).ok_or_else(short)?;
+        let (bytes, rest) = self.bytes.split_at_checked(length).ok_or_else(short)?;
         self.bytes = rest;
-        let (numbers, _) = taken.as_chunks();
+        let (numbers, _) = bytes.as_chunks();
         Ok(numbers.iter().map(|&bytes| number(bytes)).collect())
     }
 
-    fn doubles(&mut self, count: usize, what: &'static str) -> Result<Vec<f64>, PackedError> {
-        self.take(count, 1, what, f64::from_le_bytes)
+    fn doubles(&mut self, count: usize, quantity: &'static str) -> Result<Vec<f64>, PackedError> {
+        self.take(count, 1, quantity, f64::from_le_bytes)
     }
 
-    fn triples(&mut self, count: usize, what: &'static str) -> Result<Vec<DVec3>, PackedError> {
-        let numbers = self.take(count, 3, what, f64::from_le_bytes)?;
+    fn triples(&mut self, count: usize, quantity: &'static str) -> Result<Vec<DVec3>, PackedError> {
+        let numbers = self.take(count, 3, quantity, f64::from_le_bytes)?;
         Ok(numbers.chunks_exact(3).map(DVec3::from_slice).collect())
     }
 
-    fn quats(&mut self, count: usize, what: &'static str) -> Result<Vec<Quat>, PackedError> {
-        let numbers = self.take(count, 4, what, f32::from_le_bytes)?;
+    fn quats(&mut self, count: usize, quantity: &'static str) -> Result<Vec<Quat>, PackedError> {
+        let numbers = self.take(count, 4, quantity, f32::from_le_bytes)?;
         Ok(numbers.chunks_exact(4).map(Quat::from_slice).collect())
     }
 
-    fn vectors(&mut self, count: usize, what: &'static str) -> Result<Vec<Vec3>, PackedError> {
-        let numbers = self.take(count, 3, what, f32::from_le_bytes)?;
+    fn vectors(&mut self, count: usize, quantity: &'static str) -> Result<Vec<Vec3>, PackedError> {
+        let numbers = self.take(count, 3, quantity, f32::from_le_bytes)?;
         Ok(numbers.chunks_exact(3).map(Vec3::from_slice).collect())
     }
 
@@ -411,8 +414,8 @@ mod tests {
             };
             clip.skeleton.push(Joint { parent, rest });
             clip.channels.push(Channels {
-                rotation: parent.map(|_| Sampler::Cubic),
-                translation: Some(Sampler::Linear),
+                rotation: parent.map(|_| ChannelInterpolation::Cubic),
+                translation: Some(ChannelInterpolation::Linear),
                 scale: None,
             });
         }
@@ -458,7 +461,7 @@ mod tests {
         }
         let longer = [&bytes[..], &[0, 0, 0]].concat();
         let error = from_bytes(&longer).unwrap_err().to_string();
-        assert_eq!(error, "3 bytes are left behind the last track");
+        assert_eq!(error, "3 bytes are left after the last track");
     }
 
     #[test]

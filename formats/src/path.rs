@@ -7,7 +7,7 @@ use std::path::Path;
 use glam::{DVec3, Vec3};
 use tumble::TrackSet;
 
-use crate::diagnostic::{Code, Diagnostic, Place};
+use crate::diagnostic::{Code, Diagnostic, Location};
 use crate::format::ReadOptions;
 use crate::motion::Motion;
 use crate::npy;
@@ -61,7 +61,7 @@ pub fn looks_like_paths(path: &Path) -> bool {
         return false; // a pipe would lose its first bytes
     }
     let read =
-        std::fs::File::open(path).and_then(|file| file.take(MOST_HEADER).read_to_end(&mut start));
+        std::fs::File::open(path).and_then(|file| file.take(MAX_HEADER).read_to_end(&mut start));
     if read.is_err() {
         return false;
     }
@@ -80,7 +80,7 @@ pub fn looks_like_paths(path: &Path) -> bool {
 }
 
 /// More than the header of an array or the first line of a table needs.
-const MOST_HEADER: u64 = 4096;
+const MAX_HEADER: u64 = 4096;
 
 /// Reads the bytes of a file; `file` is what messages call it, `name` what the tracks are called.
 ///
@@ -112,12 +112,12 @@ pub fn paths_of(
     let mut set = TrackSet::new();
     let several = paths.len() > 1;
     let origin = origin_of(paths.iter().flat_map(|path| path.points.iter().copied()));
-    for (place, mut path) in paths.into_iter().enumerate() {
-        path.give_times(file, pace)?;
+    for (index, mut path) in paths.into_iter().enumerate() {
+        path.set_times(file, pace)?;
         let points = path.points.iter().map(|&point| (point - origin).as_vec3());
         let points: Vec<Vec3> = points.collect();
         let track_name = if several {
-            format!("{name}{place}")
+            format!("{name}{index}")
         } else {
             name.to_owned()
         };
@@ -140,7 +140,7 @@ const NAMES: [&str; 7] = ["t", "x", "y", "z", "ux", "uy", "uz"];
 fn of_text(file: &str, bytes: &[u8]) -> Result<PathPoints, Diagnostic> {
     let refuse = |line: u64, code, message: String| {
         let mut fault = Diagnostic::new(file, code, message);
-        fault.place = Some(Place::Text { line, column: 1 });
+        fault.location = Some(Location::Text { line, column: 1 });
         fault
     };
     let text = std::str::from_utf8(bytes)
@@ -167,11 +167,11 @@ fn of_text(file: &str, bytes: &[u8]) -> Result<PathPoints, Diagnostic> {
     let column = |name: &str| {
         names
             .iter()
-            .position(|own| own == name || name == "t" && own == "time")
+            .position(|known| known == name || name == "t" && known == "time")
     };
-    let places = NAMES.map(column);
-    let known = places.iter().flatten().count();
-    let has = |range: std::ops::Range<usize>| places[range].iter().flatten().count();
+    let columns = NAMES.map(column);
+    let known = columns.iter().flatten().count();
+    let has = |range: std::ops::Range<usize>| columns[range].iter().flatten().count();
     if has(1..4) < 3 || !matches!(has(4..7), 0 | 3) || known != names.len() {
         let message = format!(
             "the header is `{}`; a path has t,x,y,z,ux,uy,uz, of which t and ux,uy,uz may be missing",
@@ -190,15 +190,15 @@ fn of_text(file: &str, bytes: &[u8]) -> Result<PathPoints, Diagnostic> {
             );
             return Err(refuse(line, Code::Columns, message));
         }
-        let number = |place: usize| -> Result<f64, Diagnostic> {
-            let cell = places[place]
+        let number = |field: usize| -> Result<f64, Diagnostic> {
+            let cell = columns[field]
                 .and_then(|column| record.get(column))
                 .unwrap_or_default();
             let read = number::parse(cell);
-            read.map(|own| own.value)
+            read.map(|parsed| parsed.value)
                 .map_err(|(code, message)| refuse(line, code, message))
         };
-        if places[0].is_some() {
+        if columns[0].is_some() {
             let time = number(0)?;
             if let Some(&before) = path.times.last()
                 && time <= before
@@ -216,12 +216,12 @@ fn of_text(file: &str, bytes: &[u8]) -> Result<PathPoints, Diagnostic> {
             ))
         };
         path.points.push(vector(1)?);
-        let is_blank = |place: &Option<usize>| {
-            place
+        let is_blank = |column: &Option<usize>| {
+            column
                 .and_then(|column| record.get(column))
                 .is_none_or(str::is_empty)
         };
-        let up = match places[4..7].iter().all(is_blank) {
+        let up = match columns[4..7].iter().all(is_blank) {
             true => None,
             false => Some(vector(4)?.as_vec3()),
         };
@@ -235,7 +235,7 @@ fn of_text(file: &str, bytes: &[u8]) -> Result<PathPoints, Diagnostic> {
         return Err(refuse(
             1,
             Code::NoKeys,
-            "there is no point behind the header".to_owned(),
+            "there is no point after the header".to_owned(),
         ));
     }
     Ok(path)
@@ -285,7 +285,7 @@ fn of_array(file: &str, bytes: &[u8]) -> Result<Vec<PathPoints>, Diagnostic> {
 impl PathPoints {
     /// Gives points without times the times at which a body passes them. Of points that repeat the
     /// one before, that one stays.
-    fn give_times(&mut self, file: &str, pace: Option<Pace>) -> Result<(), Diagnostic> {
+    fn set_times(&mut self, file: &str, pace: Option<Pace>) -> Result<(), Diagnostic> {
         let refuse = |message: &str| Err(Diagnostic::new(file, Code::PathTimes, message));
         let has_times = !self.times.is_empty();
         let Some(pace) = pace else {
@@ -297,24 +297,24 @@ impl PathPoints {
         if has_times {
             return refuse("the path has times of its own; leave out --seconds and --rate");
         }
-        let given = std::mem::take(self);
-        let mut way = 0.0;
-        for (i, &point) in given.points.iter().enumerate() {
+        let input = std::mem::take(self);
+        let mut length = 0.0;
+        for (i, &point) in input.points.iter().enumerate() {
             if let Some(before) = self.points.last() {
                 let step = (point - before).length();
-                if way + step <= way {
+                if length + step <= length {
                     continue;
                 }
-                way += step;
+                length += step;
             }
-            self.times.push(way);
+            self.times.push(length);
             self.points.push(point);
-            if !given.ups.is_empty() {
-                self.ups.push(given.ups[i]);
+            if !input.ups.is_empty() {
+                self.ups.push(input.ups[i]);
             }
         }
         let second = match pace {
-            Pace::Seconds(seconds) => way / seconds,
+            Pace::Seconds(seconds) => length / seconds,
             Pace::Rate(rate) => rate,
         };
         for time in self.times.iter_mut().skip(1) {

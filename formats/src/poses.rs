@@ -5,9 +5,9 @@ use std::io::{self, Write};
 use glam::DVec3;
 use tumble::{Timeline, TrackSet};
 
-use crate::csv::text_cell;
-use crate::npz::header::{Element, Header};
+use crate::npz::header::{ArrayHeader, Element};
 use crate::origin::coordinate;
+use crate::text::cell::text_cell;
 
 /// What the numbers of a local transform are called: moved, turned, scaled.
 pub const TRANSFORM: [&str; 10] = ["tx", "ty", "tz", "x", "y", "z", "w", "sx", "sy", "sz"];
@@ -44,7 +44,7 @@ impl Poses<'_> {
         self.origins.get(track).copied().unwrap_or_default()
     }
 
-    /// Each number, with its track and its place among those of a pose.
+    /// Each number, with its track and its component of the pose.
     fn each(&self) -> impl Iterator<Item = (usize, usize, f32)> {
         let (width, tracks) = (self.components.len().max(1), self.set.track_count().max(1));
         let numbers = self.numbers.iter().enumerate();
@@ -64,7 +64,7 @@ impl Poses<'_> {
             self.components.len(),
         ];
         if self.has_origins() {
-            writer.write_all(&Header::write(&Element::F64, &shape))?;
+            writer.write_all(&ArrayHeader::write(&Element::F64, &shape))?;
             return self.each().try_for_each(|(track, component, number)| {
                 let moved = if component < 3 {
                     self.origin(track)[component]
@@ -74,7 +74,7 @@ impl Poses<'_> {
                 writer.write_all(&(f64::from(number) + moved).to_le_bytes())
             });
         }
-        writer.write_all(&Header::write(&Element::F32, &shape))?;
+        writer.write_all(&ArrayHeader::write(&Element::F32, &shape))?;
         if cfg!(target_endian = "little") {
             return writer.write_all(bytemuck::cast_slice(self.numbers));
         }
@@ -128,13 +128,13 @@ mod tests {
     use glam::Quat;
 
     use super::*;
-    use tumble::Frames;
+    use tumble::SampleTimes;
 
     #[test]
     fn poses_are_written_frame_by_frame() {
         let mut set = TrackSet::new();
         set.push("hip", &[0.0], &[Quat::IDENTITY]).unwrap();
-        let timeline = Frames::at(vec![0.0, 0.5]).resolve(1, None).unwrap();
+        let timeline = SampleTimes::at(vec![0.0, 0.5]).resolve(1, None).unwrap();
         let numbers: Vec<f32> = (0..14u8).map(|i| f32::from(i) * 0.5).collect();
         let poses = Poses {
             set: &set,

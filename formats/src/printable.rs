@@ -30,7 +30,7 @@ pub fn printable_lines(text: &str) -> Cow<'_, str> {
     escaped(text, |character| character == '\n')
 }
 
-/// A path: bytes that are no UTF-8 are written out too, `\xff`, so that two paths never look the same
+/// A path: bytes that are not UTF-8 are written out too, `\xff`, so that two paths never look the same
 /// because of them.
 #[must_use]
 pub fn printable_path(path: &Path) -> String {

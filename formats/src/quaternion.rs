@@ -3,6 +3,27 @@
 use glam::{DQuat, Quat};
 use tumble::UNIT_TOLERANCE;
 
+/// The order of a quaternion's components in a file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
+pub enum ComponentOrder {
+    /// `x y z w`, as in memory, glTF and `SciPy`.
+    #[default]
+    Xyzw,
+    /// `w x y z`, as in `.dat` files.
+    Wxyz,
+}
+
+impl ComponentOrder {
+    /// As it is written: `xyzw`.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Xyzw => "xyzw",
+            Self::Wxyz => "wxyz",
+        }
+    }
+}
+
 /// The inner product in R⁴.
 #[inline(always)]
 pub(crate) fn dot(a: DQuat, b: DQuat) -> f64 {

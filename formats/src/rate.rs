@@ -56,7 +56,7 @@ impl Precision {
 }
 
 /// What a file says of its rate.
-pub(crate) enum Written<'a> {
+pub(crate) enum RateSource<'a> {
     /// The times of its keys, seconds: a list for each track or channel.
     Times(&'a [Vec<f64>], Precision),
     /// The digits of a frame's time, seconds.
@@ -67,7 +67,7 @@ pub(crate) enum Written<'a> {
 
 /// What follows from it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Found {
+pub(crate) struct FrameGrid {
     /// The rate of the frames that all keys lie on.
     pub(crate) grid: FrameRate,
     /// When one of these frames is, seconds.
@@ -76,7 +76,7 @@ pub(crate) struct Found {
     pub(crate) is_rate: bool,
 }
 
-impl Found {
+impl FrameGrid {
     fn at_zero(grid: FrameRate) -> Self {
         Self {
             grid,
@@ -92,22 +92,22 @@ impl Found {
 }
 
 /// Decides what rate was meant.
-pub(crate) fn of(written: &Written<'_>) -> Option<Found> {
+pub(crate) fn of(written: &RateSource<'_>) -> Option<FrameGrid> {
     match *written {
-        Written::Times(lists, precision) => of_times(lists, precision),
-        Written::FrameTime(digits) => of_period(digits).map(Found::at_zero),
-        Written::Number(number) => of_number(number).map(Found::at_zero),
+        RateSource::Times(lists, precision) => of_times(lists, precision),
+        RateSource::FrameTime(digits) => of_period(digits).map(FrameGrid::at_zero),
+        RateSource::Number(number) => of_number(number).map(FrameGrid::at_zero),
     }
 }
 
 /// The rates that people use. One of them is taken where a few digits leave several rates open.
-const USUAL: [u64; 32] = [
+const COMMON_RATES: [u64; 32] = [
     10, 12, 15, 16, 20, 24, 25, 30, 48, 50, 60, 72, 75, 90, 96, 100, 120, 125, 144, 150, 165, 180,
     200, 240, 250, 300, 360, 400, 480, 500, 600, 1000,
 ];
 
 /// Rates that are whole, or whole by 1.001, are looked for up to this.
-const MOST: f64 = 1000.0;
+const MAX_RATE: f64 = 1000.0;
 
 /// The largest numerator and denominator of a rate: those that f64 holds exactly.
 const LARGEST: u128 = 1 << f64::MANTISSA_DIGITS;
@@ -118,7 +118,7 @@ fn choose(low: f64, high: f64, fits: impl Fn(FrameRate) -> bool) -> Option<Frame
     for (frames, seconds) in [(1, 1), (1000, 1001)] {
         let scale = seconds as f64 / frames as f64;
         let from = (low * scale * (1.0 - 1e-9)).ceil().max(1.0);
-        let to = (high * scale * (1.0 + 1e-9)).floor().min(MOST);
+        let to = (high * scale * (1.0 + 1e-9)).floor().min(MAX_RATE);
         let rate = |number: u64| FrameRate::new(number * frames, seconds).ok();
         let fitting = || {
             let all = (from as u64..=to as u64).filter(|_| from <= to);
@@ -128,8 +128,8 @@ fn choose(low: f64, high: f64, fits: impl Fn(FrameRate) -> bool) -> Option<Frame
         match (first.next(), first.next()) {
             (Some(only), None) => return rate(only),
             (Some(_), Some(_)) => {
-                let mut usual = fitting().filter(|number| USUAL.contains(number));
-                return match (usual.next(), usual.next()) {
+                let mut common = fitting().filter(|number| COMMON_RATES.contains(number));
+                return match (common.next(), common.next()) {
                     (Some(only), None) => rate(only),
                     _ => None,
                 };
@@ -194,7 +194,7 @@ fn of_period(digits: &str) -> Option<FrameRate> {
     if written.is_some_and(is_whole) {
         return written;
     }
-    let half = 0.5 * whole_power(10.0, last_place(digits));
+    let half = 0.5 * whole_power(10.0, last_digit_power(digits));
     let fits = |rate: FrameRate| {
         let exact = rate.time_of(1);
         let near = |time: f64| (time - period).abs() <= half;
@@ -204,13 +204,13 @@ fn of_period(digits: &str) -> Option<FrameRate> {
     let high = if margin < period {
         1.0 / (period - margin)
     } else {
-        MOST
+        MAX_RATE
     };
     choose(1.0 / (period + margin), high, fits).or(written)
 }
 
 /// The power of ten that the last digit of a number counts.
-pub(crate) fn last_place(token: &str) -> i32 {
+pub(crate) fn last_digit_power(token: &str) -> i32 {
     let (mantissa, exponent) = token.split_once(['e', 'E']).unwrap_or((token, "0"));
     let decimals = mantissa
         .split_once('.')
@@ -232,10 +232,13 @@ fn ratio(number: f64) -> Option<(u64, u64)> {
     if !(1e-9..=1e9).contains(&number) {
         return None;
     }
-    // The number as a ratio of whole numbers; it has at most 82 binary places.
+    // The number as a ratio of whole numbers; it has at most 82 binary digits.
     let exponent = (number.to_bits() >> 52) as i32 - 1023;
-    let places = 52 - exponent;
-    let mut rest = ((number * whole_power(2.0, places)) as u128, 1u128 << places);
+    let binary_digits = 52 - exponent;
+    let mut rest = (
+        (number * whole_power(2.0, binary_digits)) as u128,
+        1u128 << binary_digits,
+    );
     let (mut before, mut last) = ((0u128, 1u128), (1u128, 0u128));
     while rest.1 > 0 {
         let whole = rest.0 / rest.1;
@@ -257,18 +260,18 @@ fn ratio(number: f64) -> Option<(u64, u64)> {
 
 /// A frame that some times stand for: when it can be, from what they may have been rounded by.
 #[derive(Debug, Clone, Copy)]
-struct Window {
+struct TimeWindow {
     from: f64,
     to: f64,
 }
 
-impl Window {
+impl TimeWindow {
     fn middle(self) -> f64 {
         0.5 * (self.from + self.to)
     }
 }
 
-fn of_times(lists: &[Vec<f64>], precision: Precision) -> Option<Found> {
+fn of_times(lists: &[Vec<f64>], precision: Precision) -> Option<FrameGrid> {
     let mut times: Vec<f64> = lists.iter().flatten().copied().collect();
     if times.iter().any(|time| !time.is_finite()) {
         return None;
@@ -279,10 +282,10 @@ fn of_times(lists: &[Vec<f64>], precision: Precision) -> Option<Found> {
         // A single time tells no rate, but it may be a frame of a usual one.
         let off = precision.rounding(time);
         let (from, to) = (time - off, time + off);
-        let grid = on_usual_grid(&[Window { from, to }]).filter(|_| time != 0.0)?;
-        return Some(Found {
+        let grid = on_common_grid(&[TimeWindow { from, to }]).filter(|_| time != 0.0)?;
+        return Some(FrameGrid {
             is_rate: false,
-            ..Found::at_zero(grid)
+            ..FrameGrid::at_zero(grid)
         });
     }
     if times.is_empty() {
@@ -302,7 +305,7 @@ fn of_times(lists: &[Vec<f64>], precision: Precision) -> Option<Found> {
 }
 
 /// The rate of increasing times.
-fn of_distinct(times: &[f64], precision: Precision) -> Option<Found> {
+fn of_distinct(times: &[f64], precision: Precision) -> Option<FrameGrid> {
     let steps = || times.windows(2).map(|pair| pair[1] - pair[0]);
     let step = steps().fold(f64::INFINITY, f64::min);
     let (first, last) = (times[0], times[times.len() - 1]);
@@ -328,7 +331,7 @@ fn of_distinct(times: &[f64], precision: Precision) -> Option<Found> {
         let on_frames = on_frames(times.iter().copied(), rate, 0.0, precision);
         let phase = if on_frames { 0.0 } else { first };
         if on_frames || precision != Precision::F32 {
-            return Some(Found {
+            return Some(FrameGrid {
                 grid: rate,
                 phase,
                 is_rate: true,
@@ -336,9 +339,9 @@ fn of_distinct(times: &[f64], precision: Precision) -> Option<Found> {
         }
     }
     let windows = windows(times, precision)?;
-    let steps = Steps::of(&windows);
+    let steps = StepRates::of(&windows);
     let at_zero = steps.as_ref().and_then(|steps| steps.on_zero(&windows));
-    let found = |grid, phase| Found {
+    let found = |grid, phase| FrameGrid {
         grid,
         phase,
         is_rate: true,
@@ -355,15 +358,15 @@ fn of_distinct(times: &[f64], precision: Precision) -> Option<Found> {
         Some(found(grid, first))
     };
     let simple = || {
-        let grid = at_zero.as_ref().and_then(Steps::simple);
+        let grid = at_zero.as_ref().and_then(StepRates::simple);
         let grid = grid.map(|grid| found(grid, 0.0));
         grid.or_else(|| Some(found(steps.as_ref()?.simple()?, first)))
     };
     let some_grid = || {
         let grid = on_some_grid(&windows)?;
-        Some(Found {
+        Some(FrameGrid {
             is_rate: false,
-            ..Found::at_zero(grid)
+            ..FrameGrid::at_zero(grid)
         })
     };
     chosen()
@@ -380,8 +383,8 @@ fn is_short(period: f64) -> bool {
 
 /// A number of as few decimals as there are near another.
 fn shortest(number: f64, near: f64) -> f64 {
-    let decimals = (0..17).map(|places| {
-        let text = format!("{number:.places$}");
+    let decimals = (0..17).map(|digits| {
+        let text = format!("{number:.digits$}");
         text.parse().unwrap_or(number)
     });
     let is_near = |short: &f64| *short > 0.0 && (short - number).abs() <= near;
@@ -389,8 +392,8 @@ fn shortest(number: f64, near: f64) -> f64 {
 }
 
 /// The frames that times stand for; `None` if they cannot be distinguished.
-fn windows(times: &[f64], precision: Precision) -> Option<Vec<Window>> {
-    let mut all: Vec<Window> = Vec::new();
+fn windows(times: &[f64], precision: Precision) -> Option<Vec<TimeWindow>> {
+    let mut all: Vec<TimeWindow> = Vec::new();
     for &time in times {
         let off = precision.rounding(time);
         let (from, to) = (time - off, time + off);
@@ -399,7 +402,7 @@ fn windows(times: &[f64], precision: Precision) -> Option<Vec<Window>> {
                 // Two roundings of one time.
                 (last.from, last.to) = (last.from.max(from), last.to.min(to));
             }
-            _ => all.push(Window { from, to }),
+            _ => all.push(TimeWindow { from, to }),
         }
     }
     (all.len() > 1).then_some(all)
@@ -407,16 +410,16 @@ fn windows(times: &[f64], precision: Precision) -> Option<Vec<Window>> {
 
 /// Rates at which the smallest step between times is one frame, and all others are whole numbers of
 /// them: those from `low` to `high`.
-struct Steps {
+struct StepRates {
     low: f64,
     high: f64,
     /// The number of each window's frame.
     counts: Vec<f64>,
 }
 
-impl Steps {
+impl StepRates {
     /// Frames count from the first window.
-    fn of(windows: &[Window]) -> Option<Self> {
+    fn of(windows: &[TimeWindow]) -> Option<Self> {
         let widest = windows
             .iter()
             .map(|window| window.to - window.from)
@@ -436,36 +439,36 @@ impl Steps {
         };
         let first = windows[0];
         for window in &windows[1..] {
-            let (least, most) = (window.from - first.to, window.to - first.from);
-            let count = all.count(0.5 * (least + most))?;
+            let (least, longest) = (window.from - first.to, window.to - first.from);
+            let count = all.count(0.5 * (least + longest))?;
             let is_next = all.counts.last().is_none_or(|&before| before < count);
-            all.narrow(count, least, most).filter(|()| is_next)?;
+            all.narrow(count, least, longest).filter(|()| is_next)?;
             all.counts.push(count);
         }
         Some(all)
     }
 
     /// The same where frames count from time 0.
-    fn on_zero(&self, windows: &[Window]) -> Option<Self> {
+    fn on_zero(&self, windows: &[TimeWindow]) -> Option<Self> {
         let mut all = Self {
             counts: Vec::with_capacity(windows.len()),
             ..*self
         };
         // Those near 0 tell how to count the others.
         let mut order: Vec<usize> = (0..windows.len()).collect();
-        let near = |place: usize| windows[place].middle().abs();
+        let near = |index: usize| windows[index].middle().abs();
         order.sort_by(|&a, &b| near(a).total_cmp(&near(b)));
         let mut numbered = vec![0.0; windows.len()];
-        for place in order {
-            let Window { from, to } = windows[place];
-            let count = all.count(windows[place].middle())?;
+        for index in order {
+            let TimeWindow { from, to } = windows[index];
+            let count = all.count(windows[index].middle())?;
             match count {
                 0.0 if from <= 0.0 && 0.0 <= to => {}
                 1.0.. => all.narrow(count, from, to)?,
                 ..=-1.0 => all.narrow(-count, -to, -from)?,
                 _ => return None,
             }
-            numbered[place] = count;
+            numbered[index] = count;
         }
         all.counts = numbered;
         let increase = all.counts.windows(2).all(|pair| pair[0] < pair[1]);
@@ -479,16 +482,16 @@ impl Steps {
     }
 
     /// Keeps the rates that have a number of frames in a time from `least` to `most`.
-    fn narrow(&mut self, count: f64, least: f64, most: f64) -> Option<()> {
+    fn narrow(&mut self, count: f64, least: f64, longest: f64) -> Option<()> {
         if count < 1.0 || least <= 0.0 {
             return None;
         }
-        (self.low, self.high) = (self.low.max(count / most), self.high.min(count / least));
+        (self.low, self.high) = (self.low.max(count / longest), self.high.min(count / least));
         (self.low <= self.high).then_some(())
     }
 
     /// Whether some phase puts a frame of the rate into each window.
-    fn fit(&self, windows: &[Window], rate: FrameRate) -> bool {
+    fn fit(&self, windows: &[TimeWindow], rate: FrameRate) -> bool {
         let (mut from, mut to) = (f64::NEG_INFINITY, f64::INFINITY);
         for (window, count) in windows.iter().zip(&self.counts) {
             let behind = count / rate.per_second();
@@ -551,34 +554,34 @@ const ACCIDENT: f64 = 1e-3;
 
 /// A rate on whose frames, counted from 0, all times lie, though none on neighbouring ones: the lowest
 /// usual one, else the lowest.
-fn on_some_grid(windows: &[Window]) -> Option<FrameRate> {
-    let whole = || (1..=MOST as u64).map(|rate| (rate, 1));
+fn on_some_grid(windows: &[TimeWindow]) -> Option<FrameRate> {
+    let whole = || (1..=MAX_RATE as u64).map(|rate| (rate, 1));
     let ntsc = || {
         [24, 30, 48, 60, 120]
             .map(|rate| (rate * 1000, 1001))
             .into_iter()
     };
-    on_usual_grid(windows).or_else(|| on_one_of(windows, whole().chain(ntsc())))
+    on_common_grid(windows).or_else(|| on_one_of(windows, whole().chain(ntsc())))
 }
 
 /// The lowest usual rate on whose frames all times lie.
-fn on_usual_grid(windows: &[Window]) -> Option<FrameRate> {
-    let usual = USUAL.iter().filter(|&&rate| rate >= 24);
-    on_one_of(windows, usual.map(|&rate| (rate, 1)))
+fn on_common_grid(windows: &[TimeWindow]) -> Option<FrameRate> {
+    let common = COMMON_RATES.iter().filter(|&&rate| rate >= 24);
+    on_one_of(windows, common.map(|&rate| (rate, 1)))
 }
 
 /// The first of some rates on whose frames all times lie, if that is no accident.
 fn on_one_of(
-    windows: &[Window],
+    windows: &[TimeWindow],
     rates: impl Iterator<Item = (u64, u64)> + Clone,
 ) -> Option<FrameRate> {
     let tried = rates.clone().count() as f64;
     let widths = windows.iter().map(|window| window.to - window.from);
     let widest = widths.fold(0.0, f64::max);
     // Whole seconds are frames of every whole rate, and 0 is one of all: they show nothing.
-    let is_whole_second = |window: &Window| window.from.ceil() <= window.to;
-    let at_zero = |window: &Window| window.from <= 0.0 && 0.0 <= window.to;
-    let count = |shows_nothing: &dyn Fn(&Window) -> bool| {
+    let is_whole_second = |window: &TimeWindow| window.from.ceil() <= window.to;
+    let at_zero = |window: &TimeWindow| window.from <= 0.0 && 0.0 <= window.to;
+    let count = |shows_nothing: &dyn Fn(&TimeWindow) -> bool| {
         let all = windows.iter().filter(|window| !shows_nothing(window));
         all.count() as i32
     };

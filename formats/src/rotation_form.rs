@@ -3,7 +3,7 @@
 use glam::{DQuat, DVec3};
 use tumble::EulerSequence;
 
-use crate::npy::ComponentOrder;
+use crate::quaternion::ComponentOrder;
 use crate::rotation_matrix::of_matrix;
 
 /// What the numbers of a rotation are.
@@ -65,14 +65,14 @@ impl RotationForm {
             }
             (Self::Euler { sequence, degrees }, &[a, b, c]) => {
                 let axes = sequence.axes();
-                let turns = [(axes[0], a), (axes[1], b), (axes[2], c)].map(|(axis, about)| {
+                let factors = [(axes[0], a), (axes[1], b), (axes[2], c)].map(|(axis, about)| {
                     let (sine, cosine) = libm::sincos(0.5 * about * angle(degrees));
                     let [x, y, z] = (DVec3::AXES[axis] * sine).to_array();
                     DQuat::from_xyzw(x, y, z, cosine)
                 });
                 match sequence.is_intrinsic() {
-                    true => turns[0] * turns[1] * turns[2],
-                    false => turns[2] * turns[1] * turns[0],
+                    true => factors[0] * factors[1] * factors[2],
+                    false => factors[2] * factors[1] * factors[0],
                 }
             }
             _ => return None,

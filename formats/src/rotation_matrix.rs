@@ -12,14 +12,14 @@ pub(crate) fn of_matrix(rows: [[f64; 3]; 3]) -> Option<DQuat> {
     let lengths = [dot(a, a), dot(b, b), dot(c, c)];
     let products = [dot(a, b), dot(b, c), dot(c, a)];
     let is_near = |value: f64, to: f64| (value - to).abs() <= TOLERANCE;
-    let turned = [
+    let cross = [
         a[1] * b[2] - a[2] * b[1],
         a[2] * b[0] - a[0] * b[2],
         a[0] * b[1] - a[1] * b[0],
     ];
     let is_rotation = lengths.iter().all(|&length| is_near(length, 1.0))
         && products.iter().all(|&product| is_near(product, 0.0))
-        && dot(turned, c) > 0.0;
+        && dot(cross, c) > 0.0;
     if !is_rotation {
         return None;
     }
@@ -33,10 +33,13 @@ pub(crate) fn of_matrix(rows: [[f64; 3]; 3]) -> Option<DQuat> {
     let [x, y, z, w] = squares;
     let (xy, yz, zx) = (a[1] + b[0], b[2] + c[1], c[0] + a[2]);
     let (wx, wy, wz) = (c[1] - b[2], a[2] - c[0], b[0] - a[1]);
-    let largest = (0..4).fold(
-        3,
-        |most, i| if squares[i] > squares[most] { i } else { most },
-    );
+    let largest = (0..4).fold(3, |largest, i| {
+        if squares[i] > squares[largest] {
+            i
+        } else {
+            largest
+        }
+    });
     let q = match largest {
         0 => DQuat::from_xyzw(x, xy, zx, wx),
         1 => DQuat::from_xyzw(xy, y, yz, wy),

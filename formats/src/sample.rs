@@ -4,11 +4,11 @@ use std::borrow::Cow;
 
 use glam::{Quat, Vec3, Vec4};
 use tumble::{
-    Channel, Engine, Error, FrameRate, Frames, Interpolation, Layout, Method, Rotations, TrackSet,
-    VectorMethod, Vectors, method,
+    Channel, Engine, Error, FrameRate, Interpolation, Layout, Method, Rotations, SampleTimes,
+    TrackSet, VectorMethod, Vectors, method,
 };
 
-use crate::motion::{Channels, Motion, Sampled, Sampler};
+use crate::motion::{ChannelInterpolation, Channels, Motion, SampledClip};
 use crate::signs::continue_signs;
 
 /// The methods by which the channels of clips are interpolated.
@@ -63,8 +63,9 @@ impl ChannelMethods<'_> {
         let tracks = 0..clip.set.track_count();
         let all = tracks.flat_map(|track| channels.map(|channel| (track, channel)));
         let mut methods = all.filter_map(|(track, channel)| {
-            let own = clip.set.vector_keys(channel, track)?;
-            let moves = !own.tangents.is_empty() || own.keys.iter().any(|key| *key != own.keys[0]);
+            let keys = clip.set.vector_keys(channel, track)?;
+            let moves =
+                !keys.tangents.is_empty() || keys.keys.iter().any(|key| *key != keys.keys[0]);
             moves.then(|| self.vector_method(clip.channel(track).of(channel)))
         });
         let first = methods.next().unwrap_or_default();
@@ -74,23 +75,23 @@ impl ChannelMethods<'_> {
     /// The method of tracks whose rotation has no sampler. One at rest has one key, which every
     /// method holds: it goes with most of the others.
     fn resting_method(&self, clip: &Motion) -> Method {
-        self.method.unwrap_or_else(|| clip.most_common_method())
+        self.method.unwrap_or_else(|| most_common_method(clip))
     }
 
     fn rotation_method(&self, channels: Channels, resting: Method) -> Method {
         match channels.rotation {
-            Some(Sampler::Step) => method::STEP,
-            Some(Sampler::Linear) => self.method.unwrap_or(method::SLERP),
-            Some(Sampler::Cubic) => self.method.unwrap_or(method::GLTF_CUBIC),
+            Some(ChannelInterpolation::Step) => method::STEP,
+            Some(ChannelInterpolation::Linear) => self.method.unwrap_or(method::SLERP),
+            Some(ChannelInterpolation::Cubic) => self.method.unwrap_or(method::GLTF_CUBIC),
             None => resting,
         }
     }
 
-    fn vector_method(&self, sampler: Option<Sampler>) -> VectorMethod {
+    fn vector_method(&self, sampler: Option<ChannelInterpolation>) -> VectorMethod {
         match (sampler, self.method) {
-            (Some(Sampler::Step), _) => VectorMethod::Step,
-            (Some(Sampler::Linear), None) => VectorMethod::Linear,
-            (Some(Sampler::Cubic), None) => VectorMethod::GltfCubic,
+            (Some(ChannelInterpolation::Step), _) => VectorMethod::Step,
+            (Some(ChannelInterpolation::Linear), None) => VectorMethod::Linear,
+            (Some(ChannelInterpolation::Cubic), None) => VectorMethod::GltfCubic,
             (None, None) => VectorMethod::BesselOverhauser,
             (_, Some(method)) => match method.name {
                 "step" => VectorMethod::Step,
@@ -110,7 +111,7 @@ impl ChannelMethods<'_> {
         &self,
         engine: &Engine,
         clip: &Motion,
-        frames: &Frames,
+        frames: &SampleTimes,
     ) -> Result<Samples, Error> {
         let tracks = clip.set.track_count();
         let frames = over(clip, frames);
@@ -147,7 +148,7 @@ impl ChannelMethods<'_> {
         &self,
         engine: &Engine,
         clip: &Motion,
-        frames: &Frames,
+        frames: &SampleTimes,
         layout: Layout,
     ) -> Result<Vec<Quat>, Error> {
         let frames = over(clip, frames);
@@ -164,7 +165,7 @@ impl ChannelMethods<'_> {
         &self,
         engine: &Engine,
         clip: &Motion,
-        frames: &Frames,
+        frames: &SampleTimes,
         layout: Layout,
     ) -> Result<Vec<Vec4>, Error> {
         let frames = over(clip, frames);
@@ -184,7 +185,7 @@ impl ChannelMethods<'_> {
         let mut all = Vec::new();
         for (method, group) in self.groups_of(clip) {
             let interpolation = (self.with)(method);
-            let set = clip.tracks(&group)?;
+            let set = selected(clip, &group)?;
             let found = evaluate(&set, interpolation)?;
             all.resize(tracks * found.samples(), T::default());
             scatter(values(&found), &group, tracks, layout, &mut all);
@@ -197,7 +198,7 @@ impl ChannelMethods<'_> {
         &self,
         engine: &Engine,
         clip: &Motion,
-        frames: &Frames,
+        frames: &SampleTimes,
         channel: Channel,
     ) -> Result<Vec<Vec3>, Error> {
         let tracks = clip.set.track_count();
@@ -216,7 +217,7 @@ impl ChannelMethods<'_> {
             if !is_keyed(group[0]) {
                 continue;
             }
-            let set = clip.tracks(&group)?;
+            let set = selected(clip, &group)?;
             let interpolation = (self.with)(method::SLERP);
             let method = method(group[0]);
             let layout = Layout::FrameMajor;
@@ -236,8 +237,8 @@ impl Samples {
         clip: &'a Motion,
         rate: Option<FrameRate>,
         notes: &'a [(&'a str, String)],
-    ) -> Sampled<'a> {
-        Sampled {
+    ) -> SampledClip<'a> {
+        SampledClip {
             clip,
             times: &self.times,
             rate,
@@ -245,84 +246,43 @@ impl Samples {
             translations: &self.translations,
             scales: &self.scales,
             notes,
-            of_own_keys: false,
+            is_at_keys: false,
         }
     }
 }
 
-impl Channels {
-    /// The sampler of a translation or scale.
-    #[must_use]
-    pub fn of(&self, channel: Channel) -> Option<Sampler> {
-        match channel {
-            Channel::Translation => self.translation,
-            Channel::Scale => self.scale,
-        }
+/// Some tracks as a separate set; borrowed where the group is all tracks.
+fn selected<'a>(clip: &'a Motion, group: &[usize]) -> Result<Cow<'a, TrackSet>, Error> {
+    if group.len() == clip.set.track_count() {
+        return Ok(Cow::Borrowed(&clip.set));
     }
+    Ok(Cow::Owned(clip.set.select(group.iter().copied())?))
 }
 
-impl Motion {
-    /// How a track is keyed; nothing where the file says nothing of it.
-    #[must_use]
-    pub fn channel(&self, track: usize) -> Channels {
-        self.channels.get(track).copied().unwrap_or_default()
-    }
-
-    /// Where a track rests that has no keys of its translation or scale.
-    #[must_use]
-    pub fn rest(&self, channel: Channel, track: usize) -> Vec3 {
-        let rest = self
-            .skeleton
-            .get(track)
-            .map(|joint| joint.rest)
-            .unwrap_or_default();
-        match channel {
-            Channel::Translation => rest.translation,
-            Channel::Scale => rest.scale,
-        }
-    }
-
-    /// Some tracks as a set of their own, without a copy where they are all tracks in their order.
-    fn tracks(&self, group: &[usize]) -> Result<Cow<'_, TrackSet>, Error> {
-        if group.len() == self.set.track_count() {
-            return Ok(Cow::Borrowed(&self.set));
-        }
-        Ok(Cow::Owned(self.set.select(group.iter().copied())?))
-    }
-
-    /// Whether any track has keys of translations or scales.
-    #[must_use]
-    pub fn has_vectors(&self) -> bool {
-        let channels = [Channel::Translation, Channel::Scale];
-        let keyed = |track| channels.map(|it| self.set.vector_keys(it, track).is_some());
-        (0..self.set.track_count()).any(|track| keyed(track).contains(&true))
-    }
-
-    /// What most of the rotations are keyed for.
-    fn most_common_method(&self) -> Method {
-        let count = |sampler| {
-            let own = self
-                .channels
-                .iter()
-                .filter(|own| own.rotation == Some(sampler));
-            own.count()
-        };
-        let samplers = [
-            (count(Sampler::Linear), method::SLERP),
-            (count(Sampler::Cubic), method::GLTF_CUBIC),
-            (count(Sampler::Step), method::STEP),
-        ];
-        let most = samplers.into_iter().rev().max_by_key(|(count, _)| *count);
-        match most {
-            Some((count, method)) if count > 0 => method,
-            _ => method::BESSEL_OVERHAUSER,
-        }
+/// What most of the rotations are keyed for.
+fn most_common_method(clip: &Motion) -> Method {
+    let count = |sampler| {
+        let keyed = clip
+            .channels
+            .iter()
+            .filter(|channels| channels.rotation == Some(sampler));
+        keyed.count()
+    };
+    let samplers = [
+        (count(ChannelInterpolation::Linear), method::SLERP),
+        (count(ChannelInterpolation::Cubic), method::GLTF_CUBIC),
+        (count(ChannelInterpolation::Step), method::STEP),
+    ];
+    let commonest = samplers.into_iter().rev().max_by_key(|(count, _)| *count);
+    match commonest {
+        Some((count, method)) if count > 0 => method,
+        _ => method::BESSEL_OVERHAUSER,
     }
 }
 
 /// Frames over the whole of a clip: all tracks are sampled at the same times, whatever their own keys
 /// span and whichever of them are evaluated together.
-fn over(clip: &Motion, frames: &Frames) -> Frames {
+fn over(clip: &Motion, frames: &SampleTimes) -> SampleTimes {
     let span = clip.set.time_span();
     span.map_or_else(|| frames.clone(), |span| frames.clone().spanning(span))
 }
@@ -331,10 +291,10 @@ fn over(clip: &Motion, frames: &Frames) -> Frames {
 fn groups<P: PartialEq>(tracks: usize, property: impl Fn(usize) -> P) -> Vec<Vec<usize>> {
     let mut groups: Vec<(P, Vec<usize>)> = Vec::new();
     for track in 0..tracks {
-        let own = property(track);
-        match groups.iter_mut().find(|(known, _)| *known == own) {
+        let value = property(track);
+        match groups.iter_mut().find(|(known, _)| *known == value) {
             Some((_, group)) => group.push(track),
-            None => groups.push((own, vec![track])),
+            None => groups.push((value, vec![track])),
         }
     }
     groups.into_iter().map(|(_, group)| group).collect()
@@ -343,10 +303,10 @@ fn groups<P: PartialEq>(tracks: usize, property: impl Fn(usize) -> P) -> Vec<Vec
 /// Puts the values of a group of tracks where they belong among those of all.
 fn scatter<T: Copy>(values: &[T], group: &[usize], tracks: usize, layout: Layout, all: &mut [T]) {
     let samples = values.len() / group.len();
-    for (place, &track) in group.iter().enumerate() {
+    for (index, &track) in group.iter().enumerate() {
         for sample in 0..samples {
             let to = layout.index(track, sample, tracks, samples);
-            let from = layout.index(place, sample, group.len(), samples);
+            let from = layout.index(index, sample, group.len(), samples);
             if let (Some(to), Some(from)) = (to, from) {
                 all[to] = values[from];
             }
@@ -362,7 +322,10 @@ mod tests {
     fn tracks_of_other_methods_and_spans_are_sampled_at_the_same_times() {
         let mut clip = Motion::default();
         let keys = [Quat::IDENTITY, Quat::from_rotation_x(1.0)];
-        for (last, sampler) in [(1.0, Sampler::Linear), (3.0, Sampler::Step)] {
+        for (last, sampler) in [
+            (1.0, ChannelInterpolation::Linear),
+            (3.0, ChannelInterpolation::Step),
+        ] {
             clip.set.push("", &[0.0, last], &keys).unwrap();
             clip.channels.push(Channels {
                 rotation: Some(sampler),
@@ -374,7 +337,7 @@ mod tests {
             with: &Interpolation::from,
         };
         let engine = Engine::new(tumble::Device::Cpu).unwrap();
-        let (frames, layout) = (Frames::fps(2), Layout::TrackMajor);
+        let (frames, layout) = (SampleTimes::fps(2), Layout::TrackMajor);
         let found = methods.rotations(&engine, &clip, &frames, layout).unwrap();
         assert_eq!(found.len(), 2 * 7);
         assert_eq!(
@@ -392,13 +355,17 @@ mod tests {
         let methods = ChannelMethods::AUTHORED;
         assert_eq!(methods.vector_method_of(&clip), Some(VectorMethod::Linear));
         let (times, moving) = ([0.0, 1.0], [Vec3::ZERO, Vec3::X]);
-        clip.channels = [Sampler::Step, Sampler::Cubic, Sampler::Linear]
-            .map(|sampler| Channels {
-                translation: Some(sampler),
-                scale: Some(sampler),
-                ..Channels::default()
-            })
-            .to_vec();
+        clip.channels = [
+            ChannelInterpolation::Step,
+            ChannelInterpolation::Cubic,
+            ChannelInterpolation::Linear,
+        ]
+        .map(|sampler| Channels {
+            translation: Some(sampler),
+            scale: Some(sampler),
+            ..Channels::default()
+        })
+        .to_vec();
         clip.set
             .set_translations(0, &times, &[Vec3::Y; 2], &[])
             .unwrap();

@@ -16,7 +16,7 @@ pub(crate) struct Signs {
     /// The rotations before the next ones, each with the sign that it was given: of every track in
     /// turn where all tracks of a sample come together, else of the track that comes.
     before: Vec<Quat>,
-    place: usize,
+    index: usize,
 }
 
 impl Signs {
@@ -30,7 +30,7 @@ impl Signs {
             layout,
             samples,
             before: vec![Quat::from_array([0.0; 4]); tracks],
-            place: 0,
+            index: 0,
         }
     }
 
@@ -40,19 +40,19 @@ impl Signs {
             return Cow::Borrowed(rotations);
         }
         let mut all = Cow::Borrowed(rotations);
-        for (place, &rotation) in rotations.iter().enumerate() {
-            let track = self.place % self.before.len().max(1);
+        for (i, &rotation) in rotations.iter().enumerate() {
+            let track = self.index % self.before.len().max(1);
             let is_first =
-                self.layout == Layout::TrackMajor && self.place.is_multiple_of(self.samples);
+                self.layout == Layout::TrackMajor && self.index.is_multiple_of(self.samples);
             let Some(before) = self.before.get_mut(track) else {
                 break;
             };
-            let turns = !is_first && signs_differ(*before, rotation);
-            *before = if turns { -rotation } else { rotation };
-            if turns {
-                all.to_mut()[place] = *before;
+            let is_negated = !is_first && signs_differ(*before, rotation);
+            *before = if is_negated { -rotation } else { rotation };
+            if is_negated {
+                all.to_mut()[i] = *before;
             }
-            self.place += 1;
+            self.index += 1;
         }
         all
     }
@@ -63,18 +63,18 @@ impl Signs {
         let [mut before] = self.before[..] else {
             return false;
         };
-        let mut place = self.place;
+        let mut index = self.index;
         while let [first, ..] = *rotations {
-            let done = place % self.samples;
+            let done = index % self.samples;
             let (row, rest) = rotations.split_at(rotations.len().min(self.samples - done));
             if done > 0 && signs_jump(&[before, first], 1) || signs_jump(row, 1) {
                 return false;
             }
-            (before, place) = (row[row.len() - 1], place + row.len());
+            (before, index) = (row[row.len() - 1], index + row.len());
             rotations = rest;
         }
         self.before[0] = before;
-        self.place = place;
+        self.index = index;
         true
     }
 }
@@ -87,24 +87,24 @@ mod tests {
     fn signs_are_those_of_the_samples_before_in_every_layout_and_piece() {
         let (tracks, samples) = (3, 7);
         let rotation = |track: usize, sample: usize| {
-            let turned = Quat::from_rotation_y(0.3 * (track * samples + sample) as f32);
+            let exact = Quat::from_rotation_y(0.3 * (track * samples + sample) as f32);
             let flips = sample * (track + 2) % 3 == 1;
-            if flips { -turned } else { turned }
+            if flips { -exact } else { exact }
         };
         let mut expected: Vec<Quat> = (0..samples * tracks)
-            .map(|place| rotation(place % tracks, place / tracks))
+            .map(|index| rotation(index % tracks, index / tracks))
             .collect();
         assert!(signs_jump(&expected, tracks));
         continue_signs(&mut expected, tracks);
         assert!(!signs_jump(&expected, tracks));
         for piece in 1..=samples * tracks {
             for layout in [Layout::TrackMajor, Layout::FrameMajor] {
-                let place = |place: usize| match layout {
-                    Layout::FrameMajor => (place % tracks, place / tracks),
-                    Layout::TrackMajor => (place / samples, place % samples),
+                let position = |index: usize| match layout {
+                    Layout::FrameMajor => (index % tracks, index / tracks),
+                    Layout::TrackMajor => (index / samples, index % samples),
                 };
                 let all: Vec<Quat> = (0..samples * tracks)
-                    .map(|at| rotation(place(at).0, place(at).1))
+                    .map(|at| rotation(position(at).0, position(at).1))
                     .collect();
                 let mut signs = Signs::new(layout, tracks, samples);
                 let found: Vec<Quat> = all
@@ -112,7 +112,7 @@ mod tests {
                     .flat_map(|piece| signs.next(piece).into_owned())
                     .collect();
                 for (at, found) in found.into_iter().enumerate() {
-                    let (track, sample) = place(at);
+                    let (track, sample) = position(at);
                     assert_eq!(found, expected[sample * tracks + track], "{layout:?} {at}");
                 }
             }

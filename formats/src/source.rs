@@ -102,16 +102,16 @@ impl Source {
     ///
     /// # Errors
     /// When reading fails, or the file is longer or changes meanwhile.
-    pub(super) fn into_bytes(mut self, most: u64) -> Result<Vec<u8>, Diagnostic> {
+    pub(super) fn into_bytes(mut self, limit: u64) -> Result<Vec<u8>, Diagnostic> {
         let known = self.file.as_ref().map_or(0, |(_, metadata)| metadata.len());
         let refuse = |code, message: String| Diagnostic::new(&self.name, code, message);
         let too_long = || {
             refuse(
                 Code::FileTooLong,
-                format!("the input is longer than {most} bytes"),
+                format!("the input is longer than {limit} bytes"),
             )
         };
-        if known > most {
+        if known > limit {
             return Err(too_long());
         }
         let mut bytes = Vec::new();
@@ -119,11 +119,11 @@ impl Source {
         let read = reserved.map_err(io::Error::from).and_then(|()| {
             // What the buffer holds already, then all else past it: it would be copied once more.
             bytes.extend_from_slice(self.reader.buffer());
-            let rest = (most + 1).saturating_sub(bytes.len() as u64);
+            let rest = (limit + 1).saturating_sub(bytes.len() as u64);
             self.reader.get_mut().take(rest).read_to_end(&mut bytes)
         });
         read.map_err(|error| refuse(Code::Open, format!("cannot be read: {error}")))?;
-        if bytes.len() as u64 > most {
+        if bytes.len() as u64 > limit {
             return Err(too_long());
         }
         self.check_unchanged()?;

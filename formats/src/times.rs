@@ -4,10 +4,19 @@
 use std::io::BufRead;
 use std::path::Path;
 
+use crate::decimal::Decimal;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::source::Source;
 use crate::text::lines::{Limits, Lines, tokens};
 use crate::text::number;
+
+/// The times of frames, as a file has them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FrameTimes {
+    pub(crate) times: Vec<Decimal>,
+    /// The most decimals of one.
+    pub(crate) decimals: u32,
+}
 
 /// Reads a file; `-` is standard input.
 ///
@@ -43,7 +52,7 @@ pub fn read_times(name: &str, reader: impl BufRead) -> Result<Vec<f64>, Diagnost
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::diagnostic::Place;
+    use crate::diagnostic::Location;
 
     #[test]
     fn blanks_commas_lines_and_comments_separate() {
@@ -55,8 +64,8 @@ mod tests {
     #[test]
     fn faults_have_their_place() {
         let error = read_times("t", "0\n 1 x".as_bytes()).unwrap_err();
-        let place = Place::Text { line: 2, column: 4 };
-        assert_eq!((error.place, error.code), (Some(place), Code::Number));
+        let location = Location::Text { line: 2, column: 4 };
+        assert_eq!((error.location, error.code), (Some(location), Code::Number));
         assert_eq!(
             read_times("t", "#\n".as_bytes()).unwrap_err().code,
             Code::Time

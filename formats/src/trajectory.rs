@@ -377,10 +377,11 @@ mod tests {
                 0.04 * (5.0 * t).cos(),
                 0.03 * (11.0 * t + 1.0).sin(),
             );
-            let turn = 0.05 * DVec3::new((3.0 * t).sin(), (4.0 * t).cos(), (5.0 * t).sin());
+            let noise_rotation =
+                0.05 * DVec3::new((3.0 * t).sin(), (4.0 * t).cos(), (5.0 * t).sin());
             Pose {
                 position: 1.25 * (off * exact.position) + DVec3::new(4.0, -2.0, 1.0) + noise,
-                rotation: off * exact.rotation * DQuat::from_scaled_axis(turn),
+                rotation: off * exact.rotation * DQuat::from_scaled_axis(noise_rotation),
             }
         };
         let poses = (
@@ -551,19 +552,19 @@ mod tests {
     #[test]
     fn yaw_turns_about_z_alone() {
         let (_, reference, _) = paths();
-        let turn = DQuat::from_rotation_z(-2.5);
-        let moved = |turn: DQuat| -> Vec<Pose> {
+        let heading = DQuat::from_rotation_z(-2.5);
+        let moved = |rotation: DQuat| -> Vec<Pose> {
             let all = reference.iter().map(|pose| Pose {
-                position: turn * pose.position + DVec3::new(1.0, 2.0, 3.0),
-                rotation: turn * pose.rotation,
+                position: rotation * pose.position + DVec3::new(1.0, 2.0, 3.0),
+                rotation: rotation * pose.rotation,
             });
             all.collect()
         };
-        let found = Alignment::of(&reference, &moved(turn), Align::Yaw);
-        assert!(found.rotation.angle_between(turn.conjugate()) < 1e-7);
+        let found = Alignment::of(&reference, &moved(heading), Align::Yaw);
+        assert!(found.rotation.angle_between(heading.conjugate()) < 1e-7);
         let errors = Errors::absolute(
             &reference,
-            &moved(turn)
+            &moved(heading)
                 .into_iter()
                 .map(|pose| found.apply(pose))
                 .collect::<Vec<_>>(),

@@ -1,7 +1,7 @@
 //! A part of a clip, from one time to another.
 
 use glam::Vec3;
-use tumble::{Channel, Engine, Error, Frames, TrackError, TrackSet, signs_differ};
+use tumble::{Channel, Engine, Error, SampleTimes, TrackError, TrackSet, signs_differ};
 
 use crate::motion::Motion;
 use crate::rate::{Precision, on_frames};
@@ -28,7 +28,7 @@ pub enum TrimError {
         "track {track} (`{name}`) has tangents, velocities or tensions at its keys, and none lies at \
          {time} s: cut at one of its keys, or sample it (`tumble eval --start --end`)"
     )]
-    Given {
+    NoKeyAtCut {
         /// The first such track, from 0.
         track: usize,
         /// Its name.
@@ -64,28 +64,28 @@ pub fn trim(clip: &Motion, start: f64, end: f64, engine: &Engine) -> Result<Moti
         });
     }
     let methods = ChannelMethods::AUTHORED;
-    let cuts = methods.sample(engine, clip, &Frames::at(vec![start, end]))?;
+    let cuts = methods.sample(engine, clip, &SampleTimes::at(vec![start, end]))?;
     let tracks = set.track_count();
     let mut trimmed = TrackSet::new();
     for (index, track) in set.tracks().enumerate() {
         let name = || set.track_name(index);
-        let given = |time| TrimError::Given {
+        let refuse = |time| TrimError::NoKeyAtCut {
             track: index,
             name: name(),
             time,
         };
-        let part = Part::of(track.times, start, end);
+        let part = TrimmedKeys::of(track.times, start, end);
         let has_more =
             !track.tangents.is_empty() || !track.velocities.is_empty() || !track.tcb.is_empty();
         if let Some(time) = part.made().filter(|_| has_more) {
-            return Err(given(time));
+            return Err(refuse(time));
         }
         let values = [cuts.rotations[index], cuts.rotations[tracks + index]];
         let (times, mut keys) = part.keys(track.times, track.keys, values);
         // The sign in which the curve goes on.
-        for place in 1..keys.len() {
-            if part.is_made(place) && signs_differ(keys[place - 1], keys[place]) {
-                keys[place] = -keys[place];
+        for i in 1..keys.len() {
+            if part.is_made(i) && signs_differ(keys[i - 1], keys[i]) {
+                keys[i] = -keys[i];
             }
         }
         if let [first, second, ..] = &mut keys[..]
@@ -95,15 +95,15 @@ pub fn trim(clip: &Motion, start: f64, end: f64, engine: &Engine) -> Result<Moti
             *first = -*first;
         }
         trimmed.push(track.name.unwrap_or_default(), &times, &keys)?;
-        let own = trimmed.track_count() - 1;
+        let new_track = trimmed.track_count() - 1;
         if !track.tangents.is_empty() {
-            trimmed.set_tangents(own, &track.tangents[part.kept.clone()])?;
+            trimmed.set_tangents(new_track, &track.tangents[part.kept.clone()])?;
         }
         if !track.velocities.is_empty() {
-            trimmed.set_velocities(own, &track.velocities[part.kept.clone()])?;
+            trimmed.set_velocities(new_track, &track.velocities[part.kept.clone()])?;
         }
         if !track.tcb.is_empty() {
-            trimmed.set_tcb(own, &track.tcb[part.kept.clone()])?;
+            trimmed.set_tcb(new_track, &track.tcb[part.kept.clone()])?;
         }
         for (channel, samples) in [
             (Channel::Translation, &cuts.translations),
@@ -112,9 +112,9 @@ pub fn trim(clip: &Motion, start: f64, end: f64, engine: &Engine) -> Result<Moti
             let Some(vectors) = set.vector_keys(channel, index) else {
                 continue;
             };
-            let part = Part::of(vectors.times, start, end);
+            let part = TrimmedKeys::of(vectors.times, start, end);
             if let Some(time) = part.made().filter(|_| !vectors.tangents.is_empty()) {
-                return Err(given(time));
+                return Err(refuse(time));
             }
             let values: [Vec3; 2] = [samples[index], samples[tracks + index]];
             let (times, keys) = part.keys(vectors.times, vectors.keys, values);
@@ -123,8 +123,10 @@ pub fn trim(clip: &Motion, start: f64, end: f64, engine: &Engine) -> Result<Moti
                 false => &vectors.tangents[part.kept.clone()],
             };
             match channel {
-                Channel::Translation => trimmed.set_translations(own, &times, &keys, tangents)?,
-                Channel::Scale => trimmed.set_scales(own, &times, &keys, tangents)?,
+                Channel::Translation => {
+                    trimmed.set_translations(new_track, &times, &keys, tangents)?
+                }
+                Channel::Scale => trimmed.set_scales(new_track, &times, &keys, tangents)?,
             }
         }
     }
@@ -140,7 +142,7 @@ pub fn trim(clip: &Motion, start: f64, end: f64, engine: &Engine) -> Result<Moti
 }
 
 /// What of a channel's keys lies between the cuts, and where keys are to be made.
-struct Part {
+struct TrimmedKeys {
     /// The keys that stay.
     kept: std::ops::Range<usize>,
     start: f64,
@@ -151,7 +153,7 @@ struct Part {
     after: bool,
 }
 
-impl Part {
+impl TrimmedKeys {
     fn of(times: &[f64], start: f64, end: f64) -> Self {
         let first = times.partition_point(|&time| time < start);
         let behind = times.partition_point(|&time| time <= end).max(first);
@@ -188,10 +190,10 @@ impl Part {
         }
     }
 
-    /// Whether the key at a place of the new ones is made.
-    fn is_made(&self, place: usize) -> bool {
+    /// Whether the new key at this index is made by sampling.
+    fn is_made(&self, index: usize) -> bool {
         let behind = usize::from(self.before) + self.kept.len();
-        self.before && place == 0 || self.after && place == behind
+        self.before && index == 0 || self.after && index == behind
     }
 
     /// The keys of the part; `made` are the values at the two cuts.
@@ -210,9 +212,9 @@ mod tests {
     use tumble::Device;
 
     use super::*;
-    use crate::motion::{Channels, Sampler};
+    use crate::motion::{ChannelInterpolation, Channels};
 
-    fn clip(sampler: Option<Sampler>) -> Motion {
+    fn clip(sampler: Option<ChannelInterpolation>) -> Motion {
         let mut clip = Motion::default();
         for (track, times) in [
             [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0],
@@ -225,9 +227,9 @@ mod tests {
                 .map(|key| Quat::from_rotation_y(f32::from(key * key) * 0.2 + track as f32))
                 .collect();
             clip.set.push("", times, &keys).unwrap();
-            let places: Vec<Vec3> = keys.iter().map(|q| *q * Vec3::X).collect();
+            let positions: Vec<Vec3> = keys.iter().map(|q| *q * Vec3::X).collect();
             clip.set
-                .set_translations(track, times, &places, &[])
+                .set_translations(track, times, &positions, &[])
                 .unwrap();
             clip.channels.push(Channels {
                 rotation: sampler,
@@ -241,7 +243,7 @@ mod tests {
     /// The largest angle and distance between a clip and its part, from a time to a time.
     fn largest(whole: &Motion, part: &Motion, from: f64, to: f64) -> (f64, f32) {
         let engine = Engine::new(Device::Cpu).unwrap();
-        let frames = Frames::fps(60).between(from, to);
+        let frames = SampleTimes::fps(60).between(from, to);
         let methods = ChannelMethods::AUTHORED;
         let [a, b] = [whole, part].map(|clip| methods.sample(&engine, clip, &frames).unwrap());
         let angle =
@@ -263,7 +265,7 @@ mod tests {
     #[test]
     fn arcs_lines_and_steps_stay_the_same_curve() {
         let engine = Engine::new(Device::Cpu).unwrap();
-        for sampler in [Sampler::Linear, Sampler::Step] {
+        for sampler in [ChannelInterpolation::Linear, ChannelInterpolation::Step] {
             let whole = clip(Some(sampler));
             let part = trim(&whole, 1.25, 5.5, &engine).unwrap();
             assert_eq!(part.set.track(0).times, [1.25, 2.0, 3.0, 4.0, 5.0, 5.5]);
@@ -291,7 +293,7 @@ mod tests {
     #[test]
     fn cuts_on_keys_make_none_and_empty_parts_are_refused() {
         let engine = Engine::new(Device::Cpu).unwrap();
-        let mut whole = clip(Some(Sampler::Linear));
+        let mut whole = clip(Some(ChannelInterpolation::Linear));
         whole.set = whole.set.select([0]).unwrap();
         whole.channels.truncate(1);
         let part = trim(&whole, 2.0, 5.0, &engine).unwrap();

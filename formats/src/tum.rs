@@ -9,15 +9,15 @@ use glam::{DQuat, DVec3, Quat};
 use tumble::{TrackError, TrackSet};
 
 use crate::decimal::Decimal;
-use crate::diagnostic::{Code, Diagnostic, Place};
+use crate::diagnostic::{Code, Diagnostic, Location};
 use crate::feature::Feature;
 use crate::format::{
     Format, FormatOption, Loaded, MotionOptions, ReadOptions, TimeUnit, WriteError,
 };
-use crate::grid::restore;
 use crate::keys::{Origin, select};
-use crate::motion::{Joint, Motion, Sampled, Transform};
-use crate::rate::{Precision, last_place};
+use crate::motion::grid::restore;
+use crate::motion::{Joint, Motion, SampledClip, Transform};
+use crate::rate::{Precision, last_digit_power};
 use crate::source::Source;
 use crate::text::lines::{Lines, tokens};
 use crate::text::number;
@@ -100,9 +100,9 @@ pub(crate) fn read_lines(
     format: &PoseLine,
 ) -> Result<Loaded, Diagnostic> {
     let mut lines = Lines::with_names(name, reader, options.limits)?;
-    let mut poses = Poses {
+    let mut poses = TrajectoryPoses {
         unit: options.time_unit.or(format.unit),
-        ..Poses::default()
+        ..TrajectoryPoses::default()
     };
     while let Some(line) = lines.next()? {
         let numbers = line.split('#').next().unwrap_or_default();
@@ -123,10 +123,10 @@ const NANOSECONDS: f64 = 1e17;
 
 /// The poses of a body as a file has them.
 #[derive(Default)]
-pub(crate) struct Poses {
+pub(crate) struct TrajectoryPoses {
     pub(crate) times: Vec<Decimal>,
     /// The most decimals of a time in seconds.
-    pub(crate) places: u32,
+    pub(crate) decimals: u32,
     /// The numbers of a line, of the first one; 0 before it.
     columns: usize,
     /// The unit of the times.
@@ -137,7 +137,7 @@ pub(crate) struct Poses {
     pub(crate) lines: Vec<u64>,
 }
 
-impl Poses {
+impl TrajectoryPoses {
     /// Reads a line, given also as the file has it, with its commas.
     fn read<R: BufRead>(
         &mut self,
@@ -148,7 +148,7 @@ impl Poses {
     ) -> Result<(), Diagnostic> {
         let found = tokens(line).count();
         if self.columns == 0 && found > 8 && !has_decimal_commas(original) {
-            let message = format!("{} numbers behind each pose are left out", found - 8);
+            let message = format!("{} numbers after each pose are left out", found - 8);
             lines.warn(
                 tokens(line).nth(8).map_or(1, |(at, _)| at),
                 Code::FurtherNumbers,
@@ -162,7 +162,7 @@ impl Poses {
                 .nth(columns)
                 .map_or(line.trim_end().len() as u64 + 1, |(at, _)| at);
             let more = if columns > 8 {
-                " and those behind the first pose"
+                " and those after the first pose"
             } else {
                 ""
             };
@@ -195,7 +195,7 @@ impl Poses {
             );
             return Err(lines.refuse(column, Code::TumTime, message));
         };
-        self.places = self.places.max(places(token, power));
+        self.decimals = self.decimals.max(decimal_count(token, power));
         if format.is_w_first {
             numbers[4..].rotate_left(1);
         }
@@ -219,7 +219,7 @@ impl Poses {
         let mut times = [self.times.iter().map(|time| time.since(offset)).collect()];
         let rate = match options.raw_times {
             true => None,
-            false => restore(&mut times, Precision::Decimals(self.places)),
+            false => restore(&mut times, Precision::Decimals(self.decimals)),
         };
         let [times] = times;
         let mut loaded = self.at(name, offset, times, of_lines, options)?;
@@ -236,13 +236,13 @@ impl Poses {
         of_lines: Vec<Diagnostic>,
         options: &ReadOptions,
     ) -> Result<Loaded, Diagnostic> {
-        let place = |key: usize| Place::Text {
+        let location = |key: usize| Location::Text {
             line: self.lines[key],
             column: 1,
         };
         let origin = Origin {
             file: name,
-            place: &place,
+            location: &location,
             duplicates: options.duplicates,
         };
         let mut warnings = Warnings::new(name);
@@ -283,8 +283,8 @@ impl Poses {
 }
 
 /// How many decimals a number has in a unit of `10^power` seconds, as seconds.
-pub(crate) fn places(token: &str, power: i32) -> u32 {
-    last_place(token)
+pub(crate) fn decimal_count(token: &str, power: i32) -> u32 {
+    last_digit_power(token)
         .saturating_add(power)
         .min(0)
         .unsigned_abs()
@@ -298,7 +298,7 @@ fn has_decimal_commas(line: &str) -> bool {
 
 /// The samples of the one track of one clip, which are to be written as a trajectory.
 pub(crate) struct Trajectory<'a> {
-    pub(crate) sampled: &'a Sampled<'a>,
+    pub(crate) sampled: &'a SampledClip<'a>,
     options: &'a MotionOptions,
 }
 
@@ -306,7 +306,7 @@ impl<'a> Trajectory<'a> {
     /// # Errors
     /// When there is not one clip of one track, or lists of samples differ in length.
     pub(crate) fn of(
-        clips: &'a [Sampled<'a>],
+        clips: &'a [SampledClip<'a>],
         options: &'a MotionOptions,
     ) -> Result<Self, WriteError> {
         let refuse = |message: String| Diagnostic::new(&options.name, Code::TumWrite, message);
@@ -361,7 +361,7 @@ impl<'a> Trajectory<'a> {
 /// Writes one clip of one track. Times keep all digits, also those that count from 1970; the other
 /// numbers have the fewest digits that read back as the same f32, about an origin where there is one.
 fn write_motion(
-    clips: &[Sampled<'_>],
+    clips: &[SampledClip<'_>],
     options: &MotionOptions,
     out: &mut dyn Write,
 ) -> Result<Vec<Diagnostic>, WriteError> {

@@ -1,13 +1,13 @@
 //! Warnings of one input, one for each kind.
 
-use crate::diagnostic::{Code, Diagnostic, Place};
+use crate::diagnostic::{Code, Diagnostic, Location};
 
 /// Names of what is left out, for a message; `None` where nothing is.
 pub(crate) fn listed(mut names: Vec<String>) -> Option<String> {
     /// More names than anybody reads.
-    const MOST: usize = 12;
+    const MAX_NAMES: usize = 12;
     let count = names.len();
-    names.truncate(MOST);
+    names.truncate(MAX_NAMES);
     let more = match count - names.len() {
         0 => String::new(),
         more => format!(" and {more} more"),
@@ -15,7 +15,7 @@ pub(crate) fn listed(mut names: Vec<String>) -> Option<String> {
     (count > 0).then(|| format!("{}{more}", names.join(", ")))
 }
 
-/// Collects what is remarkable about an input: the first of each code keeps its place and words,
+/// Collects what is remarkable about an input: the first of each code keeps its location and message,
 /// the others are counted.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Warnings {
@@ -32,19 +32,19 @@ impl Warnings {
         }
     }
 
-    /// Counts a warning; `place` and `message` are made only for the first of its code.
+    /// Counts a warning; location and message are made only for the first of its code.
     pub(crate) fn warn<M: Into<String>>(
         &mut self,
         code: Code,
-        describe: impl FnOnce() -> (Option<Place>, M),
+        describe: impl FnOnce() -> (Option<Location>, M),
     ) {
         if let Some(known) = self.list.iter_mut().find(|known| known.code == code) {
             known.count += 1;
             return;
         }
-        let (place, message) = describe();
+        let (location, message) = describe();
         let mut warning = Diagnostic::new(&self.file, code, message);
-        warning.place = place;
+        warning.location = location;
         self.list.push(warning);
     }
 

@@ -14,7 +14,7 @@ pub struct WorldPose {
     pub rotation: Quat,
 }
 
-/// Why joints have no place in the world.
+/// Why poses in the world cannot be computed.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum HierarchyError {
@@ -24,14 +24,14 @@ pub enum HierarchyError {
         /// What it is.
         reason: String,
     },
-    /// A joint hangs on itself.
-    #[error("joint {joint} hangs on itself")]
+    /// A joint is its own ancestor.
+    #[error("joint {joint} is its own ancestor")]
     Circle {
         /// One joint of the circle, from 0.
         joint: usize,
     },
     /// A parent that does not exist.
-    #[error("joint {joint} hangs on joint {parent}, of {joints}")]
+    #[error("joint {joint} has the parent {parent}, but there are {joints} joints")]
     NoSuchParent {
         /// The joint, from 0.
         joint: usize,
@@ -46,7 +46,7 @@ pub enum HierarchyError {
 /// and their rotations rounded once. Joints of a clip without a skeleton are roots.
 ///
 /// # Errors
-/// When the parents make no hierarchy, or the clip says why its poses cannot be told.
+/// When the parents make no hierarchy, or the clip says why its poses cannot be computed.
 pub fn world(clip: &Motion, samples: &Samples) -> Result<Vec<WorldPose>, HierarchyError> {
     along_hierarchy(clip, samples, |pose| WorldPose {
         position: pose.position,
@@ -60,7 +60,7 @@ pub fn world(clip: &Motion, samples: &Samples) -> Result<Vec<WorldPose>, Hierarc
 /// As there.
 pub fn world_matrices(clip: &Motion, samples: &Samples) -> Result<Vec<DAffine3>, HierarchyError> {
     along_hierarchy(clip, samples, |pose| {
-        DAffine3::from_mat3_translation(pose.turned_and_scaled, pose.position)
+        DAffine3::from_mat3_translation(pose.linear, pose.position)
     })
 }
 
@@ -81,9 +81,9 @@ fn along_hierarchy<T>(
     for (sample, rotations) in samples.rotations.chunks_exact(joints.max(1)).enumerate() {
         let at = |list: &[Vec3], joint: usize| list.get(sample * joints + joint).copied();
         for &joint in &order {
-            let own = Accumulated {
+            let local = Accumulated {
                 rotation: rotations[joint].as_dquat(),
-                turned_and_scaled: DMat3::from_quat(rotations[joint].as_dquat())
+                linear: DMat3::from_quat(rotations[joint].as_dquat())
                     * DMat3::from_diagonal(at(&samples.scales, joint).unwrap_or(Vec3::ONE).into()),
                 position: clip.origin(joint)
                     + at(&samples.translations, joint)
@@ -92,8 +92,8 @@ fn along_hierarchy<T>(
             };
             let parent = clip.skeleton.get(joint).and_then(|joint| joint.parent);
             done[joint] = match parent {
-                Some(parent) if !clip.is_world => done[parent].then(&own),
-                _ => own,
+                Some(parent) if !clip.is_world => done[parent].then(&local),
+                _ => local,
             };
         }
         poses.extend(done.iter().map(&make));
@@ -105,7 +105,7 @@ fn along_hierarchy<T>(
 #[derive(Clone, Default)]
 struct Accumulated {
     rotation: DQuat,
-    turned_and_scaled: DMat3,
+    linear: DMat3,
     position: DVec3,
 }
 
@@ -114,13 +114,13 @@ impl Accumulated {
     fn then(&self, child: &Self) -> Self {
         Self {
             rotation: self.rotation * child.rotation,
-            turned_and_scaled: self.turned_and_scaled * child.turned_and_scaled,
-            position: self.position + self.turned_and_scaled * child.position,
+            linear: self.linear * child.linear,
+            position: self.position + self.linear * child.position,
         }
     }
 }
 
-/// All joints, each after the one that it hangs on.
+/// All joints, parents before their children.
 pub(crate) fn parents_first(clip: &Motion, joints: usize) -> Result<Vec<usize>, HierarchyError> {
     let parent = |joint: usize| clip.skeleton.get(joint).and_then(|joint| joint.parent);
     let mut order = Vec::with_capacity(joints);
@@ -128,23 +128,23 @@ pub(crate) fn parents_first(clip: &Motion, joints: usize) -> Result<Vec<usize>, 
     let mut line = Vec::new();
     for joint in 0..joints {
         let mut next = Some(joint);
-        while let Some(own) = next.filter(|&own| !is_placed[own]) {
+        while let Some(current) = next.filter(|&joint| !is_placed[joint]) {
             if line.len() >= joints {
                 return Err(HierarchyError::Circle { joint });
             }
-            line.push(own);
-            next = parent(own);
+            line.push(current);
+            next = parent(current);
             if let Some(parent) = next.filter(|&parent| parent >= joints) {
                 return Err(HierarchyError::NoSuchParent {
-                    joint: own,
+                    joint: current,
                     parent,
                     joints,
                 });
             }
         }
-        while let Some(own) = line.pop() {
-            is_placed[own] = true;
-            order.push(own);
+        while let Some(current) = line.pop() {
+            is_placed[current] = true;
+            order.push(current);
         }
     }
     Ok(order)

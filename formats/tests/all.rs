@@ -6,6 +6,7 @@
 mod body;
 mod bvh;
 mod bvh_write;
+mod cases;
 mod dat_fixtures;
 #[cfg(feature = "fbx")]
 mod fbx;
@@ -18,6 +19,7 @@ mod gltf_new;
 mod gltf_times;
 mod gltf_values;
 mod kept;
+mod layers;
 mod left_out;
 mod maps;
 #[cfg(feature = "mcap")]

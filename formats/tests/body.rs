@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use glam::DVec3;
-use tumble::{Device, Engine, Frames};
+use tumble::{Device, Engine, SampleTimes};
 use tumble_formats::adjust::set_offsets;
 use tumble_formats::motion::Motion;
 use tumble_formats::npz::{body_offsets, read_npz};
@@ -27,9 +27,9 @@ fn motion(gender: &str) -> Motion {
     loaded.clips.remove(0)
 }
 
-/// Gender, joint, its place in the world in the last frame: by `make.py`.
+/// Gender, joint, its position in the world in the last frame: by `make.py`.
 #[rustfmt::skip]
-const PLACES: [(&str, usize, [f64; 3]); 8] = [
+const JOINT_POSITIONS: [(&str, usize, [f64; 3]); 8] = [
     ("male", 0, [0.739601876, 2.134199698, -0.477145803]),
     ("male", 5, [0.671289189, 2.142247895, -0.412429092]),
     ("male", 15, [0.682057473, 2.159934554, -0.375826037]),
@@ -44,14 +44,14 @@ const PLACES: [(&str, usize, [f64; 3]); 8] = [
 #[test]
 fn joints_are_where_the_model_has_them_for_the_shape() {
     let engine = Engine::new(Device::Cpu).unwrap();
-    for (gender, joint, expected) in PLACES {
+    for (gender, joint, expected) in JOINT_POSITIONS {
         let mut clip = motion(gender);
         assert!(clip.no_world.is_some());
         let shape = &clip.body.as_ref().unwrap().shape;
         assert_eq!((shape.betas.len(), &*shape.gender), (5, gender));
         let offsets = body_offsets(&folder().join("models"), &clip, Limits::default()).unwrap();
         set_offsets(&mut clip, &offsets).unwrap();
-        let frames = Frames::at(vec![2.0 / 30.0]);
+        let frames = SampleTimes::at(vec![2.0 / 30.0]);
         let samples = ChannelMethods::AUTHORED
             .sample(&engine, &clip, &frames)
             .unwrap();

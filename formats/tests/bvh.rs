@@ -60,7 +60,7 @@ fn compare(name: &str, clip: &Motion, expected: &Value) {
             ..Transform::default()
         };
         assert_eq!(clip.skeleton[index].rest, rest, "{name}");
-        for (place, frame) in expected["shown"].as_array().unwrap().iter().enumerate() {
+        for (i, frame) in expected["shown"].as_array().unwrap().iter().enumerate() {
             let frame = frame.as_u64().unwrap() as usize;
             assert!(frame < frames);
             let key = frame.min(track.keys.len() - 1);
@@ -68,19 +68,20 @@ fn compare(name: &str, clip: &Motion, expected: &Value) {
                 assert_eq!(track.keys.len(), frames, "{name}");
                 assert_eq!(track.times[key], rate.time_of(frame as u64), "{name}");
             }
-            let wanted = DQuat::from_array(numbers(&joint["rotations"][place]));
-            let off = angle(track.keys[key].as_dquat(), wanted);
+            let rotation = DQuat::from_array(numbers(&joint["rotations"][i]));
+            let off = angle(track.keys[key].as_dquat(), rotation);
             assert!(
                 off < 3e-7,
                 "{name}, {:?}, frame {frame}: {off:e}",
                 track.name
             );
-            let wanted = Vec3::from_array(numbers(&joint["translations"][place]).map(|x| x as f32));
+            let translation =
+                Vec3::from_array(numbers(&joint["translations"][i]).map(|x| x as f32));
             // A file whose joints are all at rest has no list of translations.
             let found = found.get(frame * joints.len() + index);
             assert_eq!(
                 found.copied().unwrap_or_default(),
-                wanted,
+                translation,
                 "{name}, frame {frame}"
             );
         }
@@ -203,8 +204,8 @@ fn joints_without_a_word_for_a_name_get_one() {
     let clip = read(text, &ReadOptions::default()).unwrap();
     let names: Vec<_> = clip.set.tracks().map(|track| track.name.unwrap()).collect();
     assert_eq!(names, ["joint0", "linke Größe", "joint0#2"]);
-    let turned = Quat::from_rotation_x(std::f32::consts::FRAC_PI_2);
-    assert!(clip.set.track(1).keys[0].abs_diff_eq(turned, 1e-7));
+    let rotated = Quat::from_rotation_x(std::f32::consts::FRAC_PI_2);
+    assert!(clip.set.track(1).keys[0].abs_diff_eq(rotated, 1e-7));
 }
 
 /// A long line of the hierarchy costs time in proportion to its length.
@@ -240,14 +241,14 @@ proptest! {
     /// Nearly right files reach deeper than arbitrary bytes.
     #[test]
     fn damaged_files_never_panic(
-        places in prop::collection::vec((0usize..160, any::<u8>()), 0..4),
+        changes in prop::collection::vec((0usize..160, any::<u8>()), 0..4),
         from in 0usize..160,
         cut in 100usize..200,
     ) {
         let mut bytes = format!("{HEAD}Frame Time: 0.04\n7 0 0 0\n8 0 1e1 0\n9 0 0 -0.0\n").into_bytes();
-        for (place, byte) in places {
-            let place = place % bytes.len();
-            bytes[place] = byte;
+        for (offset, byte) in changes {
+            let offset = offset % bytes.len();
+            bytes[offset] = byte;
         }
         let (from, cut) = (from % bytes.len(), cut % bytes.len());
         let piece = bytes[from..(from + 20).min(bytes.len())].to_vec();

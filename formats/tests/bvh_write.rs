@@ -5,7 +5,7 @@ use proptest::prelude::*;
 use tumble::{EulerSequence, FrameRate, TrackSet};
 use tumble_formats::bvh::FORMAT;
 use tumble_formats::format::{MotionOptions, WriteError};
-use tumble_formats::motion::{Joint, Motion, Sampled, Transform};
+use tumble_formats::motion::{Joint, Motion, SampledClip, Transform};
 use tumble_formats::{Code, Diagnostic, ReadOptions};
 
 use crate::bvh::{angle, moved, read};
@@ -33,8 +33,8 @@ fn clip(parents: &[Option<usize>], names: &[&str], samples: usize, rotations: &[
     }
 }
 
-fn sampled<'a>(clip: &'a Motion, times: &'a [f64], rotations: &'a [Quat]) -> Sampled<'a> {
-    Sampled {
+fn sampled<'a>(clip: &'a Motion, times: &'a [f64], rotations: &'a [Quat]) -> SampledClip<'a> {
+    SampledClip {
         clip,
         times,
         rate: FrameRate::new(30, 1).ok(),
@@ -42,12 +42,12 @@ fn sampled<'a>(clip: &'a Motion, times: &'a [f64], rotations: &'a [Quat]) -> Sam
         translations: &[],
         scales: &[],
         notes: &[],
-        of_own_keys: false,
+        is_at_keys: false,
     }
 }
 
 fn write(
-    clips: &[Sampled<'_>],
+    clips: &[SampledClip<'_>],
     options: &MotionOptions,
 ) -> Result<(String, Vec<Diagnostic>), WriteError> {
     let mut out = Vec::new();
@@ -70,7 +70,7 @@ fn rows(text: &str) -> Vec<Vec<f64>> {
         .collect()
 }
 
-const TURNED: EulerSequence = EulerSequence::XYZ;
+const ANGLE_ORDER: EulerSequence = EulerSequence::XYZ;
 
 #[test]
 fn joints_are_written_below_their_parents_with_usable_names() {
@@ -103,14 +103,14 @@ fn joints_are_written_below_their_parents_with_usable_names() {
         text.ends_with(" 0.0000001 0.25 300000000 0 0 0 28.64789 0 0 0.1 0.7 0 0 0 0\n"),
         "{text}"
     );
-    let told: Vec<_> = warnings
+    let reported: Vec<_> = warnings
         .iter()
-        .map(|own| (own.code, &*own.message))
+        .map(|warning| (warning.code, &*warning.message))
         .collect();
     let no_room = "BVH has no room for it, left out: the scales";
     let changed = "`hips` is called `hips#3` in BVH";
     assert_eq!(
-        told,
+        reported,
         [(Code::NoRoom, no_room), (Code::NameChanged, changed)]
     );
     let back = read(&text, &ReadOptions::default()).unwrap();
@@ -127,7 +127,7 @@ fn what_bvh_cannot_hold_is_refused() {
     let times = [0.0, 1.0 / 30.0];
     let good = sampled(&clip, &times, &rotations);
     let options = MotionOptions::default();
-    let refusal = |clips: &[Sampled<'_>], options: &MotionOptions| match write(clips, options) {
+    let refusal = |clips: &[SampledClip<'_>], options: &MotionOptions| match write(clips, options) {
         Err(WriteError::Refused(error)) => {
             assert_eq!(error.code, Code::BvhWrite);
             error.message
@@ -195,14 +195,14 @@ fn angles_are_unwrapped_and_exact_after_many_turns() {
     let clip = clip(&[None], &["wheel"], rotations.len(), &rotations);
     let times: Vec<f64> = (0..4000).map(|k| f64::from(k) / 30.0).collect();
     let options = MotionOptions {
-        sequence: Some(TURNED),
+        sequence: Some(ANGLE_ORDER),
         ..MotionOptions::default()
     };
     let (text, _) = write(&[sampled(&clip, &times, &rotations)], &options).unwrap();
     let rows = rows(&text);
     let last = rows.last().unwrap();
-    let turned = f64::from(3999) * 0.7f64.to_degrees();
-    assert!((last[4] - turned).abs() < 1e-4, "{last:?} {turned}");
+    let total = f64::from(3999) * 0.7f64.to_degrees();
+    assert!((last[4] - total).abs() < 1e-4, "{last:?} {total}");
     let back = read(&text, &ReadOptions::default()).unwrap();
     for (read, written) in back.set.track(0).keys.iter().zip(&rotations) {
         assert!(angle(read.as_dquat(), written.as_dquat()) < 1e-6);
@@ -224,14 +224,15 @@ fn rotation() -> impl Strategy<Value = Quat> {
         anywhere.prop_map(|q| DQuat::from_array(q).normalize().as_quat()),
         // Near gimbal lock: a quarter turn about one axis between turns about others.
         lock.prop_map(|(first, middle, a, b, near, down)| {
-            let turn = |axis: usize, angle| match axis {
+            let about_axis = |axis: usize, angle| match axis {
                 0 => DQuat::from_rotation_x(angle),
                 1 => DQuat::from_rotation_y(angle),
                 _ => DQuat::from_rotation_z(angle),
             };
             let quarter =
                 (std::f64::consts::FRAC_PI_2 + 10f64.powf(near)) * if down { -1.0 } else { 1.0 };
-            (turn(first, a) * turn(middle, quarter) * turn(3 - first, b)).as_quat()
+            (about_axis(first, a) * about_axis(middle, quarter) * about_axis(3 - first, b))
+                .as_quat()
         }),
     ]
 }

@@ -1,4 +1,4 @@
-//! `.dat` files beyond those in `tests/fixtures/dat/`: endless, unreadable, arbitrary, the widest.
+//! `.dat` files beyond those in `tests/fixtures/dat.cases`: endless, unreadable, arbitrary, the widest.
 
 use std::io;
 use std::io::{BufReader, Read};
@@ -70,7 +70,7 @@ fn limits_refuse_before_memory_runs_out() {
     );
 }
 
-/// A disk that fails, at once or on the way, is a refusal with the system's reason.
+/// A disk that fails, at once or while it is read, is a refusal with the system's reason.
 #[test]
 fn what_cannot_be_read_on_is_refused() {
     struct Failing;
@@ -121,10 +121,10 @@ proptest! {
 
     /// Nearly right files reach deeper than arbitrary bytes.
     #[test]
-    fn damaged_files_never_panic(place in 0usize..60, byte in any::<u8>(), cut in 0usize..70) {
+    fn damaged_files_never_panic(offset in 0usize..60, byte in any::<u8>(), cut in 0usize..70) {
         let mut bytes = b"# 2 3.0\n0.5 1 0 0 0 0.6 0.8 0 0\n1.25 0 1 0 0 0 0 1e0 -0.0\n".to_vec();
-        let place = place % bytes.len();
-        bytes[place] = byte;
+        let offset = offset % bytes.len();
+        bytes[offset] = byte;
         bytes.truncate(cut);
         let _ = read_dat("t", &*bytes, &ReadOptions::default());
     }

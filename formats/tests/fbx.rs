@@ -5,9 +5,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use glam::{DQuat, DVec3};
-use tumble::{Device, Engine, FrameRate, Frames};
+use tumble::{Device, Engine, FrameRate, SampleTimes};
 use tumble_formats::fbx::read_fbx;
-use tumble_formats::motion::{Motion, Sampler};
+use tumble_formats::motion::{ChannelInterpolation, Motion};
 use tumble_formats::sample::ChannelMethods;
 use tumble_formats::world::world;
 use tumble_formats::{Code, Limits, Loaded, ReadOptions};
@@ -61,7 +61,7 @@ fn clips_follow_the_curves_of_files() {
         assert_eq!(loaded.clips.len(), scene.anim_stacks.len(), "{name}");
         for (clip, stack) in loaded.clips.iter().zip(&scene.anim_stacks) {
             let times = times(clip);
-            let frames = Frames::at(times.clone());
+            let frames = SampleTimes::at(times.clone());
             let samples = ChannelMethods::AUTHORED
                 .sample(&engine, clip, &frames)
                 .unwrap();
@@ -92,9 +92,10 @@ fn clips_follow_the_curves_of_files() {
                     let off = sampled.position(sample, track).distance(t);
                     assert!(off < 3e-6 * size, "{of}: {off:e} of {t}");
                     let s = DVec3::new(exact.scale.x, exact.scale.y, exact.scale.z);
-                    let scale = match samples.scales.is_empty() {
-                        true => clip.skeleton[track].rest.scale,
-                        false => samples.scales[sample * tracks + track],
+                    let scale = if samples.scales.is_empty() {
+                        clip.skeleton[track].rest.scale
+                    } else {
+                        samples.scales[sample * tracks + track]
                     };
                     let off = scale.as_dvec3().distance(s);
                     assert!(off < 3e-6 * s.length(), "{of}: {off:e} of {s}");
@@ -170,7 +171,7 @@ fn joints_are_where_autodesks_sdk_has_them() {
         let loaded = read(&folder.join("fbx").join(file), &ReadOptions::default());
         let space = loaded.space.unwrap();
         let clip = &loaded.clips[clip];
-        let frames = Frames::at(vec![time]);
+        let frames = SampleTimes::at(vec![time]);
         let samples = ChannelMethods::AUTHORED
             .sample(&engine, clip, &frames)
             .unwrap();
@@ -180,10 +181,10 @@ fn joints_are_where_autodesks_sdk_has_them() {
             .enumerate()
             .position(|(_, track)| track.name == Some(node))
             .unwrap();
-        let turn = DQuat::from_rotation_arc(space.up, DVec3::Y);
+        let to_y_up = DQuat::from_rotation_arc(space.up, DVec3::Y);
         let pose = &poses[track];
         let point = pose.rotation.as_dquat() * DVec3::new(1.0, 2.0, 3.0);
-        let found = turn * (pose.position + point) * space.metres;
+        let found = to_y_up * (pose.position + point) * space.metres;
         let expected = DVec3::from_array(expected);
         let size = expected.length().max(0.1);
         let off = found.distance(expected);
@@ -212,10 +213,16 @@ fn nodes_become_a_skeleton_in_the_units_of_the_file() {
         .channels
         .iter()
         .map(|all| (all.rotation, all.translation));
-    let expected = [(None, Some(Sampler::Linear)), (Some(Sampler::Cubic), None)];
+    let expected = [
+        (None, Some(ChannelInterpolation::Linear)),
+        (Some(ChannelInterpolation::Cubic), None),
+    ];
     assert_eq!(samplers.collect::<Vec<_>>(), expected);
     let steps = read(&fixture("steps"), &ReadOptions::default());
-    assert_eq!(steps.clips[0].channels[1].rotation, Some(Sampler::Step));
+    assert_eq!(
+        steps.clips[0].channels[1].rotation,
+        Some(ChannelInterpolation::Step)
+    );
     let same = read(&fixture("two_of_one_name"), &ReadOptions::default());
     let names: Vec<_> = same.clips[0].set.tracks().map(|track| track.name).collect();
     assert_eq!(names, ["hips", "knee", "knee#2", "node3"].map(Some));
@@ -231,7 +238,10 @@ fn keyframes_are_those_of_the_file() {
     let walk = read(&fixture("walk"), &options);
     let knee = walk.clips[0].set.track(1);
     assert_eq!(knee.times, [0.0, 0.5, 1.0]);
-    assert_eq!(walk.clips[0].channels[1].rotation, Some(Sampler::Linear));
+    assert_eq!(
+        walk.clips[0].channels[1].rotation,
+        Some(ChannelInterpolation::Linear)
+    );
     let followed = read(&fixture("walk"), &ReadOptions::default());
     assert!(followed.clips[0].set.track(1).times.len() > 3);
 }
@@ -250,10 +260,10 @@ fn whole_turns_between_two_keys_are_kept() {
             let [a, b] = [pair[0], pair[1]].map(|key| key.as_dquat().normalize());
             a.angle_between(b)
         });
-        let turns = arcs.sum::<f64>() / std::f64::consts::TAU;
+        let revolutions = arcs.sum::<f64>() / std::f64::consts::TAU;
         assert!(
-            (turns - 12.0).abs() < 1e-4,
-            "{keyframes}: {turns}, {}",
+            (revolutions - 12.0).abs() < 1e-4,
+            "{keyframes}: {revolutions}, {}",
             keys.len()
         );
     }
@@ -331,9 +341,9 @@ fn broken_files_are_refused() {
         for cut in (0..bytes.len()).step_by(bytes.len() / 12) {
             let _ = read_fbx(name, &bytes[..cut], &ReadOptions::default());
         }
-        for turned in (27..bytes.len()).step_by(bytes.len() / 40) {
+        for i in (27..bytes.len()).step_by(bytes.len() / 40) {
             let mut bytes = bytes.clone();
-            bytes[turned] ^= 1 << (turned % 8);
+            bytes[i] ^= 1 << (i % 8);
             let _ = read_fbx(name, &bytes, &ReadOptions::default());
         }
     }

@@ -1,5 +1,4 @@
-//! Every kind of file, good and bad, with what is said of it: the fixtures in
-//! `tests/fixtures/FORMAT/`, each with its `.expected` beside it.
+//! Every kind of file, good and bad, with what is reported of it: the fixtures of all formats (`cases.rs`).
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -8,29 +7,29 @@ use std::path::{Path, PathBuf};
 use tumble_formats::Code;
 use tumble_formats::{FORMATS, Format, ReadOptions, Severity};
 
-/// The files in the folders of all formats, those that end in a format's name or extension.
+use crate::cases;
+
+/// The files of all formats. Those that end in a format's name or extension all have a case.
 fn fixtures() -> Vec<PathBuf> {
     let mut files = Vec::new();
     for format in FORMATS {
-        let folder = Path::new(env!("CARGO_MANIFEST_DIR"))
-            .join("tests/fixtures")
-            .join(format.name);
+        let folder = cases::folder(format.name);
         let entries = fs::read_dir(&folder).expect("fixtures of every format");
         let paths = entries.map(|entry| entry.unwrap().path());
-        let own = paths.filter(|path| Format::of(path).is_some_and(|of| of.name == format.name));
-        let before = files.len();
-        files.extend(own);
-        files[before..].sort();
+        let matching =
+            paths.filter(|path| Format::of(path).is_some_and(|of| of.name == format.name));
+        let mut matching: Vec<PathBuf> = matching.collect();
+        matching.sort();
+        let all = cases::read(format.name);
+        let named: Vec<PathBuf> = all.iter().map(|case| folder.join(&case.name)).collect();
+        assert_eq!(matching, named, "a case for every file, by name");
+        files.extend(named);
     }
     files
 }
 
-fn name(path: &Path) -> String {
-    path.file_name().unwrap().to_str().unwrap().to_owned()
-}
-
-/// What a person would be told: the verdict, then each message.
-fn said(path: &Path) -> String {
+/// What a user reads: the verdict, then each message.
+fn verdict(path: &Path) -> String {
     let folder = path.parent().unwrap();
     let format = Format::of(path).unwrap();
     let read = format.open(path, &ReadOptions::default());
@@ -58,23 +57,29 @@ fn said(path: &Path) -> String {
     text.replace(&format!("{}/", folder.display()), "")
 }
 
-/// Set `UPDATE_EXPECTED=1` to write what is said now, then read the difference.
+/// Set `UPDATE_EXPECTED=1` to write the verdicts of now into the tables, then read the difference.
 #[test]
 fn every_fixture_gets_its_verdict_and_message() {
-    let files = fixtures();
-    assert!(files.len() >= 75, "{} fixtures", files.len());
     let mut wrong = Vec::new();
-    for path in files {
-        let expected = path.with_extension("expected");
-        let said = said(&path);
-        if std::env::var_os("UPDATE_EXPECTED").is_some() {
-            fs::write(&expected, &said).unwrap();
+    let mut count = 0;
+    for format in FORMATS {
+        let folder = cases::folder(format.name);
+        let mut all = cases::read(format.name);
+        count += all.len();
+        for case in &mut all {
+            let found = verdict(&folder.join(&case.name));
+            if found != case.expected {
+                let (name, expected) = (&case.name, &case.expected);
+                wrong.push(format!("{name}:\n{found}expected:\n{expected}"));
+            }
+            case.expected = found;
         }
-        let wanted = fs::read_to_string(&expected).unwrap_or_default();
-        if said != wanted {
-            wrong.push(format!("{}:\n{said}wanted:\n{wanted}", name(&path)));
+        if std::env::var_os("UPDATE_EXPECTED").is_some() {
+            cases::write(format.name, &all);
+            wrong.clear();
         }
     }
+    assert!(count >= 75, "{count} fixtures");
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
@@ -82,7 +87,7 @@ fn every_fixture_gets_its_verdict_and_message() {
 #[cfg(all(feature = "fbx", feature = "mcap", feature = "parquet"))]
 #[test]
 fn every_code_of_a_file_is_shown_by_a_fixture_or_a_test() {
-    let all: String = fixtures().iter().map(|path| said(path)).collect();
+    let all: String = fixtures().iter().map(|path| verdict(path)).collect();
     // Those that need a system's fault, an option or a size that no fixture has, and those of
     // writing; each has a test.
     let elsewhere = [
@@ -147,7 +152,7 @@ fn every_code_of_a_file_is_shown_by_a_fixture_or_a_test() {
 fn the_page_of_codes_is_up_to_date() {
     use std::fmt::Write;
 
-    let messages: Vec<String> = fixtures().iter().map(|path| said(path)).collect();
+    let messages: Vec<String> = fixtures().iter().map(|path| verdict(path)).collect();
     let mut page = String::from(
         "# Codes\n\nWhat `tumble` says of its inputs, as `FILE:LINE:COLUMN: error[CODE]: …`. \
          Codes with `E` refuse an\ninput, those with `W` are warnings, told once for each file. \

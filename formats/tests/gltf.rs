@@ -7,10 +7,10 @@ use std::path::{Path, PathBuf};
 use glam::Vec3;
 use proptest::prelude::*;
 use serde_json::Value;
-use tumble::{Channel, Device, Engine, Frames, Interpolation, NORM_TOLERANCE};
+use tumble::{Channel, Device, Engine, Interpolation, NORM_TOLERANCE, SampleTimes};
 use tumble_formats::gltf::{open_gltf, read_gltf};
 use tumble_formats::keys::Duplicates;
-use tumble_formats::motion::{Motion, Sampler};
+use tumble_formats::motion::{ChannelInterpolation, Motion};
 use tumble_formats::sample::{ChannelMethods, Samples};
 use tumble_formats::world::world;
 use tumble_formats::{Code, Diagnostic, Format, Limits, Loaded, ReadOptions};
@@ -18,9 +18,7 @@ use tumble_formats::{Code, Diagnostic, Format, Limits, Loaded, ReadOptions};
 use crate::support::shared_data;
 
 pub(crate) fn fixture(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("tests/fixtures/glb")
-        .join(name)
+    crate::cases::folder("glb").join(name)
 }
 
 pub(crate) fn open(path: &Path) -> Loaded {
@@ -41,27 +39,28 @@ pub(crate) fn sample(clip: &Motion, times: Vec<f64>) -> Samples {
         method: None,
         with: &|method| Interpolation::from(method),
     };
-    methods.sample(&engine, clip, &Frames::at(times)).unwrap()
+    methods
+        .sample(&engine, clip, &SampleTimes::at(times))
+        .unwrap()
 }
 
 pub(crate) fn json_of(path: &Path) -> Value {
     let bytes = fs::read(path).unwrap();
-    let text = match bytes.starts_with(b"glTF") {
-        true => {
-            let length = u32::from_le_bytes(*bytes[12..].first_chunk().unwrap());
-            &bytes[20..20 + length as usize]
-        }
-        false => &bytes,
+    let text = if bytes.starts_with(b"glTF") {
+        let length = u32::from_le_bytes(*bytes[12..].first_chunk().unwrap());
+        &bytes[20..20 + length as usize]
+    } else {
+        &bytes
     };
     serde_json::from_slice(text).unwrap()
 }
 
 /// The track of a node, by the names that nodes have.
 pub(crate) fn track_of(clip: &Motion, json: &Value, node: usize) -> usize {
-    let own = json["nodes"][node]["name"].as_str().unwrap_or_default();
-    let names = match own {
+    let named = json["nodes"][node]["name"].as_str().unwrap_or_default();
+    let names = match named {
         "" => [format!("node{node}"), String::new()],
-        own => [format!("{own}#{node}"), own.to_owned()],
+        name => [format!("{name}#{node}"), name.to_owned()],
     };
     let found = names.iter().find_map(|name| {
         let mut tracks = clip.set.tracks();
@@ -145,20 +144,26 @@ fn broken_files_are_refused_or_read_with_a_warning() {
             "/animations/0/samplers/0/input",
         ),
     ];
-    for (file, code, place) in verdicts {
+    for (file, code, location) in verdicts {
         let path = data.join("gltf/bad").join(file);
         let said = match open_gltf(&path, &ReadOptions::default()) {
             Err(error) => vec![error],
             Ok(loaded) => [loaded.refused, loaded.warnings].concat(),
         };
-        let said: Vec<_> = said.iter().map(|own| (own.code, place_of(own))).collect();
-        assert!(said.contains(&(code, place.to_owned())), "{file}: {said:?}");
+        let said: Vec<_> = said
+            .iter()
+            .map(|diagnostic| (diagnostic.code, location_of(diagnostic)))
+            .collect();
+        assert!(
+            said.contains(&(code, location.to_owned())),
+            "{file}: {said:?}"
+        );
     }
 }
 
-fn place_of(diagnostic: &Diagnostic) -> String {
-    let place = diagnostic.place.as_ref();
-    place.map(ToString::to_string).unwrap_or_default()
+fn location_of(diagnostic: &Diagnostic) -> String {
+    let location = diagnostic.location.as_ref();
+    location.map(ToString::to_string).unwrap_or_default()
 }
 
 #[test]
@@ -170,7 +175,10 @@ fn tracks_are_nodes_that_are_moved_or_carry_such() {
     assert_eq!(clip.skeleton[1].parent, Some(0));
     assert_eq!(clip.skeleton[0].parent, None);
     assert_eq!(clip.channels[0].rotation, None);
-    assert_eq!(clip.channels[1].rotation, Some(Sampler::Linear));
+    assert_eq!(
+        clip.channels[1].rotation,
+        Some(ChannelInterpolation::Linear)
+    );
     // The base stands still, turned, moved and doubled; its one key is at the clip's first time.
     let rest = clip.skeleton[0].rest;
     assert_eq!(
@@ -235,7 +243,7 @@ fn half_turns_go_the_way_of_a_product_that_is_not_negative() {
         let found = loaded
             .warnings
             .iter()
-            .filter(|own| own.code == Code::HalfTurn);
+            .filter(|diagnostic| diagnostic.code == Code::HalfTurn);
         assert_eq!(found.count(), count, "{file}: {:?}", loaded.warnings);
     }
 }
@@ -305,18 +313,18 @@ fn damaged() -> impl Strategy<Value = Vec<u8>> {
     let digits = prop::collection::vec((any::<prop::sample::Index>(), b'0'..=b'9'), 0..4);
     (prop::sample::select(names.to_vec()), edits, digits).prop_map(|(name, edits, digits)| {
         let mut bytes = fs::read(fixture(name)).unwrap();
-        for (place, byte) in edits {
-            let place = place.index(bytes.len());
-            bytes[place] = byte;
+        for (index, byte) in edits {
+            let offset = index.index(bytes.len());
+            bytes[offset] = byte;
         }
         // Other numbers reach deeper than other letters.
-        for (place, digit) in digits {
+        for (index, digit) in digits {
             let all = bytes
                 .iter()
                 .enumerate()
                 .filter(|(_, byte)| byte.is_ascii_digit());
-            let places: Vec<usize> = all.map(|(place, _)| place).collect();
-            bytes[places[place.index(places.len())]] = digit;
+            let offsets: Vec<usize> = all.map(|(offset, _)| offset).collect();
+            bytes[offsets[index.index(offsets.len())]] = digit;
         }
         bytes
     })

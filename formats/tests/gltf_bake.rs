@@ -7,7 +7,7 @@ use serde_json::Value;
 use tumble::FrameRate;
 use tumble_formats::format::{Document, MotionOptions, WriteError};
 use tumble_formats::gltf::read_gltf;
-use tumble_formats::motion::{Motion, Sampled, Sampler};
+use tumble_formats::motion::{ChannelInterpolation, Motion, SampledClip};
 use tumble_formats::sample::Samples;
 use tumble_formats::{Diagnostic, Loaded, ReadOptions};
 
@@ -21,10 +21,10 @@ fn baked(loaded: &Loaded, fps: u64, to: &Path) -> Result<(Vec<u8>, Vec<Diagnosti
     let document = loaded.document.as_ref().unwrap();
     let rate = FrameRate::new(fps, 1).unwrap();
     let samples: Vec<Samples> = (loaded.clips.iter())
-        .map(|clip| sample(clip, document.times(clip.place, rate).unwrap()))
+        .map(|clip| sample(clip, document.times(clip.index, rate).unwrap()))
         .collect();
-    let clips: Vec<(usize, Sampled<'_>)> = (loaded.clips.iter().zip(&samples))
-        .map(|(clip, samples)| (clip.place, samples.of(clip, Some(rate), &[])))
+    let clips: Vec<(usize, SampledClip<'_>)> = (loaded.clips.iter().zip(&samples))
+        .map(|(clip, samples)| (clip.index, samples.of(clip, Some(rate), &[])))
         .collect();
     let mut bytes = Vec::new();
     let warnings = document.write(&clips, &MotionOptions::default(), to, &mut bytes)?;
@@ -51,7 +51,7 @@ fn files() -> Vec<PathBuf> {
         files.extend(paths.filter(|path| {
             let is_gltf = path
                 .extension()
-                .is_some_and(|own| own == "gltf" || own == "glb");
+                .is_some_and(|extension| extension == "gltf" || extension == "glb");
             let read = || tumble_formats::gltf::open_gltf(path, &ReadOptions::default());
             is_gltf && read().is_ok_and(|loaded| !loaded.clips.is_empty())
         }));
@@ -67,7 +67,7 @@ fn everything_but_the_samples_comes_back() {
     let files = files();
     assert!(files.len() >= 35, "{}", files.len());
     for path in &files {
-        let what = path.display();
+        let label = path.display();
         let is_glb = path.extension().unwrap() == "glb";
         let (loaded, glb) = glb_of(path, 60);
         let (old_text, new_text) = (text_of(path), glb.text.clone());
@@ -77,44 +77,44 @@ fn everything_but_the_samples_comes_back() {
         );
         for (name, value) in &old {
             let changed = ["animations", "accessors", "bufferViews", "buffers"].contains(&&**name);
-            assert!(changed || new[name].get() == value.get(), "{what}: {name}");
+            assert!(changed || new[name].get() == value.get(), "{label}: {name}");
         }
-        assert!(new.keys().eq(old.keys()), "{what}");
+        assert!(new.keys().eq(old.keys()), "{label}");
         for list in ["accessors", "bufferViews"] {
             let (old, new) = (entries(&old, list), entries(&new, list));
             // A .gltf of several buffers has them in one.
             if is_glb || list == "accessors" {
-                assert_eq!(raw(&old), raw(&new)[..old.len()], "{what}: {list}");
+                assert_eq!(raw(&old), raw(&new)[..old.len()], "{label}: {list}");
             }
         }
         if is_glb {
             let before = Glb::parse(&fs::read(path).unwrap());
-            assert!(glb.bin.starts_with(&before.bin), "{what}");
-            assert_eq!(glb.others, before.others, "{what}");
+            assert!(glb.bin.starts_with(&before.bin), "{label}");
+            assert_eq!(glb.others, before.others, "{label}");
         }
-        check_new_entries(&glb, &old, &what.to_string());
+        check_new_entries(&glb, &old, &label.to_string());
         let again = read_gltf("t", glb.bytes, None, &ReadOptions::default()).unwrap();
-        assert_eq!(again.refused.len(), loaded.refused.len(), "{what}");
-        check_clips(&loaded, &again.clips, &what.to_string());
+        assert_eq!(again.refused.len(), loaded.refused.len(), "{label}");
+        check_clips(&loaded, &again.clips, &label.to_string());
     }
 }
 
 /// What was appended is packed floats, aligned, with `min` and `max` for times.
-fn check_new_entries(glb: &Glb, old: &Text, what: &str) {
+fn check_new_entries(glb: &Glb, old: &Text, label: &str) {
     let json = glb.json();
     let before = |list| entries(old, list).len();
     for view in &json["bufferViews"].as_array().unwrap()[before("bufferViews")..] {
         let names: Vec<_> = view.as_object().unwrap().keys().collect();
-        assert_eq!(names, ["buffer", "byteLength", "byteOffset"], "{what}");
-        assert_eq!(view["byteOffset"].as_u64().unwrap() % 4, 0, "{what}");
+        assert_eq!(names, ["buffer", "byteLength", "byteOffset"], "{label}");
+        assert_eq!(view["byteOffset"].as_u64().unwrap() % 4, 0, "{label}");
     }
     for accessor in &json["accessors"].as_array().unwrap()[before("accessors")..] {
-        assert_eq!(accessor["componentType"], 5126, "{what}");
-        assert_eq!(accessor["byteOffset"].as_u64().unwrap() % 4, 0, "{what}");
+        assert_eq!(accessor["componentType"], 5126, "{label}");
+        assert_eq!(accessor["byteOffset"].as_u64().unwrap() % 4, 0, "{label}");
         assert_eq!(
             accessor["type"] == "SCALAR",
             accessor["min"].is_array(),
-            "{what}"
+            "{label}"
         );
     }
     let names = |json: &Value| -> Vec<Value> {
@@ -125,23 +125,23 @@ fn check_new_entries(glb: &Glb, old: &Text, what: &str) {
     assert_eq!(
         names(&serde_json::json!({ "animations": animations })),
         names(&json),
-        "{what}"
+        "{label}"
     );
 }
 
 /// Channels that were sampled have the samples as keys, all others the keys that they had.
-fn check_clips(loaded: &Loaded, again: &[Motion], what: &str) {
-    assert_eq!(loaded.clips.len(), again.len(), "{what}");
+fn check_clips(loaded: &Loaded, again: &[Motion], label: &str) {
+    assert_eq!(loaded.clips.len(), again.len(), "{label}");
     let document = loaded.document.as_ref().unwrap();
     for (clip, new) in loaded.clips.iter().zip(again) {
         let rate = FrameRate::new(60, 1).unwrap();
-        let times = document.times(clip.place, rate).unwrap();
+        let times = document.times(clip.index, rate).unwrap();
         let samples = sample(clip, times.clone());
         // To the last bit where times are read as they are: see the next test.
         let ends = |clip: &Motion| clip.set.time_span().unwrap();
-        let (old, own) = (ends(clip), ends(new));
-        let is_near = (old.0 - own.0).abs() <= 2e-7 && (old.1 - own.1).abs() <= 2e-7;
-        assert!(is_near, "{what}: {old:?} {own:?}");
+        let (old, written) = (ends(clip), ends(new));
+        let is_near = (old.0 - written.0).abs() <= 2e-7 && (old.1 - written.1).abs() <= 2e-7;
+        assert!(is_near, "{label}: {old:?} {written:?}");
         let tracks = clip.set.track_count();
         for track in 0..tracks {
             let old = clip.channel(track);
@@ -151,10 +151,10 @@ fn check_clips(loaded: &Loaded, again: &[Motion], what: &str) {
                 ("scale", old.scale),
             ] {
                 let (before, after) = (keys_of(clip, track, path), keys_of(new, track, path));
-                let is_sampled =
-                    before.len() > 1 && sampler.is_some_and(|own| own != Sampler::Step);
+                let is_sampled = before.len() > 1
+                    && sampler.is_some_and(|kind| kind != ChannelInterpolation::Step);
                 if !is_sampled {
-                    assert_eq!(before, after, "{what}: {path} of track {track}");
+                    assert_eq!(before, after, "{label}: {path} of track {track}");
                     continue;
                 }
                 let near = times
@@ -163,17 +163,19 @@ fn check_clips(loaded: &Loaded, again: &[Motion], what: &str) {
                     .all(|(a, b)| (a - b).abs() <= 1e-7 * a.abs().max(1.0));
                 assert!(
                     near && times.len() == after.len(),
-                    "{what}: {times:?} {after:?}"
+                    "{label}: {times:?} {after:?}"
                 );
-                let own = new.channel(track);
+                let channels = new.channel(track);
                 let now = match path {
-                    "rotation" => own.rotation,
-                    "translation" => own.translation,
-                    _ => own.scale,
+                    "rotation" => channels.rotation,
+                    "translation" => channels.translation,
+                    _ => channels.scale,
                 };
-                assert_eq!(now, Some(Sampler::Linear), "{what}");
+                assert_eq!(now, Some(ChannelInterpolation::Linear), "{label}");
             }
-            if old.rotation.is_some_and(|own| own != Sampler::Step)
+            if old
+                .rotation
+                .is_some_and(|kind| kind != ChannelInterpolation::Step)
                 && clip.set.track(track).keys.len() > 1
             {
                 for (at, key) in new.set.track(track).keys.iter().enumerate() {
@@ -182,7 +184,7 @@ fn check_clips(loaded: &Loaded, again: &[Motion], what: &str) {
                     let is_near = expected.abs_diff_eq(*key, 6e-7);
                     assert!(
                         is_near,
-                        "{what}: track {track}, sample {at}: {expected} {key}"
+                        "{label}: track {track}, sample {at}: {expected} {key}"
                     );
                 }
             }

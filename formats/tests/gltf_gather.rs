@@ -196,7 +196,7 @@ fn a_glb_away_from_its_files_has_a_warning() {
     assert!(bytes == glb);
     assert_eq!(warnings[0].code, Code::StaysOutside);
     assert_eq!(
-        warnings[0].place.as_ref().unwrap().to_string(),
+        warnings[0].location.as_ref().unwrap().to_string(),
         "/images/0/uri"
     );
 }
@@ -230,7 +230,10 @@ fn buffers_without_a_uri_stay_such() {
         let (found, bin) = json_and_bin(&glb);
         let list = found["buffers"].as_array().unwrap();
         assert_eq!(list.len(), buffers, "{name}: {found}");
-        assert!(list.iter().all(|own| own.get("uri").is_none()), "{found}");
+        assert!(
+            list.iter().all(|entry| entry.get("uri").is_none()),
+            "{found}"
+        );
         assert_eq!(list[1], unnamed, "{found}");
         assert_eq!(list[0]["byteLength"], json!(bin.len()), "{found}");
         let path = folder.path().join(format!("{name}.glb"));
@@ -263,6 +266,6 @@ fn images_of_extensions_are_embedded_for_them_alone() {
     let (found, _) = json_and_bin(&glb);
     assert_eq!(found["images"][0], json!({"uri": "a.ktx2"}));
     assert_eq!(found["images"][1]["mimeType"], json!("image/ktx2"));
-    let told: Vec<Code> = warnings.iter().map(|own| own.code).collect();
-    assert!(told.contains(&Code::StaysOutside), "{warnings:?}");
+    let codes: Vec<Code> = warnings.iter().map(|warning| warning.code).collect();
+    assert!(codes.contains(&Code::StaysOutside), "{warnings:?}");
 }

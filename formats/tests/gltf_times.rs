@@ -5,7 +5,7 @@ use std::path::Path;
 use tumble::FrameRate;
 use tumble_formats::Code;
 use tumble_formats::format::MotionOptions;
-use tumble_formats::motion::Sampled;
+use tumble_formats::motion::SampledClip;
 
 use crate::gltf::open;
 use crate::gltf_bake::{document, refused};
@@ -54,7 +54,7 @@ fn times_are_whole_frames_and_both_ends() {
         .unwrap();
     let of = |fps| {
         document(&fox)
-            .times(walk.place, FrameRate::new(fps, 1).unwrap())
+            .times(walk.index, FrameRate::new(fps, 1).unwrap())
             .unwrap()
     };
     assert_eq!((of(120).len(), of(120)[85]), (86, 17.0 / 24.0));
@@ -69,7 +69,7 @@ fn more_than_a_glb_holds_is_refused_before_any_work() {
     let Some(data) = shared_data() else { return };
     let loaded = open(&data.join("gltf/Fox.glb"));
     let times: Vec<f64> = (0..6_000_000).map(f64::from).collect();
-    let sampled = |clip| Sampled {
+    let sampled = |clip| SampledClip {
         clip,
         times: &times,
         rate: None,
@@ -77,7 +77,7 @@ fn more_than_a_glb_holds_is_refused_before_any_work() {
         translations: &[],
         scales: &[],
         notes: &[],
-        of_own_keys: false,
+        is_at_keys: false,
     };
     let clips: Vec<_> = loaded.clips.iter().map(sampled).enumerate().collect();
     let mut out = Vec::new();

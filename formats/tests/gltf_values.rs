@@ -32,9 +32,9 @@ fn error_of(clip: &Motion, json: &Value, channel: &Value) -> f64 {
     let found = sample(clip, times.clone());
     let tracks = clip.set.track_count();
     let mut worst = 0.0f64;
-    for (place, expected) in channel["values"].as_array().unwrap().iter().enumerate() {
+    for (frame, expected) in channel["values"].as_array().unwrap().iter().enumerate() {
         let expected = numbers(expected);
-        let at = place * tracks + track;
+        let at = frame * tracks + track;
         let error = match channel["path"].as_str().unwrap() {
             "rotation" => {
                 let expected = DQuat::from_slice(&expected).normalize();
@@ -122,8 +122,8 @@ fn compressed_files_have_the_keys_of_other_decoders() {
                 let keys = clip.set.track(track);
                 assert_eq!(keys.keys.len() as u64, channel["keys"].as_u64().unwrap());
                 let last = keys.keys.len() - 1;
-                for (place, key) in [("first", 0), ("last", last)] {
-                    let expected = &channel[place];
+                for (end, key) in [("first", 0), ("last", last)] {
+                    let expected = &channel[end];
                     let value = DQuat::from_slice(&numbers(&expected[1])).normalize();
                     let found = keys.keys[key].as_dquat().normalize();
                     assert!((found - value).length() < 1e-6, "{file}: {channel}");

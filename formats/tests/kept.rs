@@ -14,7 +14,7 @@ use tumble_formats::csv::read::read_csv;
 use tumble_formats::format::MotionOptions;
 use tumble_formats::gltf::read_gltf;
 use tumble_formats::keyed::keyed;
-use tumble_formats::motion::{Motion, Sampled};
+use tumble_formats::motion::{Motion, SampledClip};
 use tumble_formats::npz::read_npz;
 use tumble_formats::trim::trim;
 use tumble_formats::{Code, Format, Loaded, ReadOptions};
@@ -60,7 +60,7 @@ fn bvh() -> Motion {
 fn written(clips: &[&Motion], format: &str, options: &MotionOptions) -> Vec<u8> {
     let samples: Vec<_> = clips.iter().map(|clip| keyed(clip).unwrap()).collect();
     let pairs = clips.iter().zip(&samples);
-    let sampled: Vec<Sampled<'_>> = pairs
+    let sampled: Vec<SampledClip<'_>> = pairs
         .map(|(clip, samples)| samples.of(clip, clip.rate, &[]))
         .collect();
     let mut bytes = Vec::new();
@@ -79,23 +79,23 @@ fn as_bvh(clip: &Motion, sequence: Option<&str>) -> String {
 
 /// The words of a file, and its numbers within what f32 leaves of angles.
 fn assert_same(text: &str) {
-    let [own, expected] = [text, BVH].map(|text| text.split_once("Frame Time").unwrap());
-    assert_eq!(own.0, expected.0);
-    let [own, expected] = [own.1, expected.1].map(|text| {
+    let [written, expected] = [text, BVH].map(|text| text.split_once("Frame Time").unwrap());
+    assert_eq!(written.0, expected.0);
+    let [found, expected] = [written.1, expected.1].map(|text| {
         let numbers = text.split_ascii_whitespace().skip(1);
         numbers
             .map(|word| word.parse::<f64>().unwrap())
             .collect::<Vec<_>>()
     });
-    assert_eq!(own.len(), expected.len());
-    let mut pairs = own.iter().zip(&expected);
+    assert_eq!(found.len(), expected.len());
+    let mut pairs = found.iter().zip(&expected);
     assert!(
-        pairs.all(|(own, expected)| (own - expected).abs() < 1e-5),
+        pairs.all(|(found, expected)| (found - expected).abs() < 1e-5),
         "{text}"
     );
 }
 
-/// By way of glTF and NPZ too, which have no channels of their own.
+/// Through glTF and NPZ too, which have no channels of their own.
 #[test]
 fn bvh_comes_back_word_for_word() {
     let clip = bvh();
@@ -138,11 +138,11 @@ fn channels_are_added_where_the_motion_needs_them() {
     let times = clip.set.track(0).times.to_vec();
     let mut set = tumble::TrackSet::new();
     for track in clip.set.tracks() {
-        let own = track.name == Some("toe");
+        let is_toe = track.name == Some("toe");
         set.push(
             track.name.unwrap(),
             &times,
-            if own { &keys } else { track.keys },
+            if is_toe { &keys } else { track.keys },
         )
         .unwrap();
     }
@@ -161,7 +161,7 @@ fn channels_are_added_where_the_motion_needs_them() {
     assert!(
         toe.iter()
             .zip(keys)
-            .all(|(own, key)| own.dot(key).abs() > 1.0 - 1e-6),
+            .all(|(rotation, key)| rotation.dot(key).abs() > 1.0 - 1e-6),
         "{toe:?}"
     );
 }
@@ -242,19 +242,19 @@ fn animations_of_one_skeleton_stay_of_one() {
         assert_eq!(found["skins"].as_array().unwrap().len(), 1);
         assert_eq!(found["scenes"][0]["nodes"].as_array().unwrap().len(), 1);
         let again = read_gltf("t", glb, None, &ReadOptions::default()).unwrap();
-        for (own, other) in clips.iter().zip(&again.clips) {
-            let name = |track: usize| own.set.track_name(track);
+        for (clip, found) in clips.iter().zip(&again.clips) {
+            let name = |track: usize| clip.set.track_name(track);
             let moved =
-                (0..own.set.track_count()).find(|&track| own.set.track(track).keys.len() > 1);
+                (0..clip.set.track_count()).find(|&track| clip.set.track(track).keys.len() > 1);
             let moved = moved.unwrap();
-            let mut tracks = other.set.tracks();
+            let mut tracks = found.set.tracks();
             let same = tracks
                 .find(|track| track.name == Some(&*name(moved)))
                 .unwrap();
-            assert_eq!(same.keys, own.set.track(moved).keys);
+            assert_eq!(same.keys, clip.set.track(moved).keys);
         }
     }
-    // Skeletons that rest in other places are others.
+    // Skeletons with other rest positions are other skeletons.
     let mut other = loaded.clips[0].clone();
     other.skeleton[1].rest.translation = Vec3::X;
     let glb = written(
@@ -280,7 +280,7 @@ fn all_joints_of_a_skin_are_tracks() {
     // The root is no joint of the skin.
     assert_eq!(names(&loaded.clips[1]), ["root"]);
     assert_eq!(loaded.clips[0].skeleton[2].rest.translation, Vec3::Y);
-    // What is no skin is not looked at.
+    // Malformed skins are ignored.
     for skins in [
         json!(3),
         json!([{"joints": [77]}]),
@@ -332,22 +332,22 @@ fn a_part_of_a_file_is_the_file_with_shorter_animations() {
         .iter()
         .map(|part| part.ends(&engine).unwrap())
         .collect();
-    let clips: Vec<(usize, Sampled<'_>)> = parts
+    let clips: Vec<(usize, SampledClip<'_>)> = parts
         .iter()
         .zip(&ends)
         .map(|(part, ends)| {
-            let own = ends.of(part, None, &[]);
+            let sampled = ends.of(part, None, &[]);
             (
-                part.place,
-                Sampled {
-                    of_own_keys: true,
-                    ..own
+                part.index,
+                SampledClip {
+                    is_at_keys: true,
+                    ..sampled
                 },
             )
         })
         .collect();
     let document = loaded.document.as_ref().unwrap();
-    assert_eq!(document.beside(), ["materials"]);
+    assert_eq!(document.other_contents(), ["materials"]);
     let mut glb = Vec::new();
     let options = MotionOptions::default();
     document
@@ -358,11 +358,11 @@ fn a_part_of_a_file_is_the_file_with_shorter_animations() {
     for (part, found) in parts.iter().zip(&again.clips) {
         assert_eq!(found.set.time_span(), Some((0.5, 1.5)));
         assert_eq!(found.channels, part.channels);
-        for (own, other) in part.set.tracks().zip(found.set.tracks()) {
-            assert_eq!(own.keys, other.keys);
+        for (track, other) in part.set.tracks().zip(found.set.tracks()) {
+            assert_eq!(track.keys, other.keys);
             // What rests does so from the first key on.
-            let is_moved = own.keys.len() > 1;
-            assert!(!is_moved || own.times == other.times, "{:?}", other.times);
+            let is_moved = track.keys.len() > 1;
+            assert!(!is_moved || track.times == other.times, "{:?}", other.times);
         }
     }
     // Without clips, everything stays.
@@ -379,11 +379,11 @@ fn the_pelvis_of_a_body_is_at_both_its_places() {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/npz/smpl.npz");
     let bytes = std::fs::read(file).unwrap();
     let loaded = read_npz("t", bytes.clone(), &ReadOptions::default()).unwrap();
-    let places = |clip: &Motion| -> Vec<Vec3> {
+    let positions = |clip: &Motion| -> Vec<Vec3> {
         let keys = clip.set.vector_keys(Channel::Translation, 0);
         keys.unwrap().keys.to_vec()
     };
-    let before = places(&loaded.clips[0]);
+    let before = positions(&loaded.clips[0]);
     let mut clip = loaded.clips[0].clone();
     let joints = clip.set.track_count();
     let pelvis = Vec3::new(-0.25, -0.5, 0.125);
@@ -391,21 +391,25 @@ fn the_pelvis_of_a_body_is_at_both_its_places() {
     offsets[..3].copy_from_slice(&pelvis.as_dvec3().to_array());
     set_offsets(&mut clip, &offsets).unwrap();
     let expected: Vec<Vec3> = before.iter().map(|at| *at + pelvis).collect();
-    let near = |own: &[Vec3], other: &[Vec3]| {
-        own.iter()
+    let near = |found: &[Vec3], other: &[Vec3]| {
+        found
+            .iter()
             .zip(other)
-            .all(|(own, other)| own.distance(*other) < 1e-6)
+            .all(|(found, other)| found.distance(*other) < 1e-6)
     };
-    assert!(near(&places(&clip), &expected));
-    // Given again, they are those that count.
+    assert!(near(&positions(&clip), &expected));
+    // Setting them again replaces them; they are not added.
     set_offsets(&mut clip, &offsets).unwrap();
-    assert!(near(&places(&clip), &expected));
-    let turn = glam::DQuat::from_rotation_x(-std::f64::consts::FRAC_PI_2);
-    let turned: Vec<Vec3> = expected
+    assert!(near(&positions(&clip), &expected));
+    let quarter_turn = glam::DQuat::from_rotation_x(-std::f64::consts::FRAC_PI_2);
+    let rotated: Vec<Vec3> = expected
         .iter()
         .map(|at| Vec3::new(at.x, at.z, -at.y))
         .collect();
-    assert!(near(&places(&adjust(&clip, 1.0, turn).unwrap()), &turned));
+    assert!(near(
+        &positions(&adjust(&clip, 1.0, quarter_turn).unwrap()),
+        &rotated
+    ));
     let samples = keyed(&clip).unwrap();
     let sampled = samples.of(&clip, clip.rate, &[]);
     let document = loaded.document.as_ref().unwrap();
@@ -415,8 +419,12 @@ fn the_pelvis_of_a_body_is_at_both_its_places() {
         .write(&[(0, sampled)], &options, Path::new("o.npz"), &mut out)
         .unwrap();
     let again = read_npz("t", out, &ReadOptions::default()).unwrap();
-    assert!(near(&places(&again.clips[0]), &before));
-    assert!(document.beside().is_empty(), "{:?}", document.beside());
+    assert!(near(&positions(&again.clips[0]), &before));
+    assert!(
+        document.other_contents().is_empty(),
+        "{:?}",
+        document.other_contents()
+    );
     // A copy has the same arrays, bytes and all.
     let mut copy = Vec::new();
     document
@@ -427,7 +435,10 @@ fn the_pelvis_of_a_body_is_at_both_its_places() {
         again.clips[0].set.track(3).keys,
         loaded.clips[0].set.track(3).keys
     );
-    assert_eq!(again.document.unwrap().beside(), document.beside());
+    assert_eq!(
+        again.document.unwrap().other_contents(),
+        document.other_contents()
+    );
 }
 
 /// The usual columns of trajectories, with others behind them, need no map; `EuRoC`'s need one.

@@ -1,13 +1,10 @@
 //! What is in a file and no part of its motion is said, by name, whatever the format.
 
-use std::path::Path;
-
 use tumble_formats::{Code, Format, Loaded, ReadOptions};
 
 fn read(fixture: &str, options: &ReadOptions) -> Loaded {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("tests/fixtures")
-        .join(fixture);
+    let (format, name) = fixture.split_once('/').unwrap();
+    let path = crate::cases::folder(format).join(name);
     Format::open_detected(&path, options).unwrap()
 }
 
@@ -52,7 +49,7 @@ fn what_is_no_part_of_the_motion_is_named() {
         (
             "bvh/frames_fewer.bvh",
             Code::BvhMoreRows,
-            "a row behind the last of 2 frames",
+            "a row after the last of 2 frames",
         ),
         #[cfg(feature = "fbx")]
         ("fbx/properties.fbx", Code::FbxProperties, "`Visibility`"),

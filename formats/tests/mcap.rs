@@ -7,7 +7,7 @@ use glam::{Quat, Vec3};
 use proptest::prelude::*;
 use tumble::{Channel, FrameRate};
 use tumble_formats::mcap::read_mcap;
-use tumble_formats::{Code, Loaded, Place, ReadOptions};
+use tumble_formats::{Code, Loaded, Location, ReadOptions};
 
 fn fixture(name: &str) -> Vec<u8> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/mcap");
@@ -32,8 +32,8 @@ fn topics_and_pairs_of_frames_are_tracks() {
         // The first stamp of all is 0.5 s before the whole second that the others begin with.
         assert_eq!(clip.time_offset, 1_699_999_999);
         let of = |name: &str| {
-            let place = clip.set.tracks().position(|track| track.name == Some(name));
-            place.unwrap_or_else(|| panic!("{name}"))
+            let index = clip.set.tracks().position(|track| track.name == Some(name));
+            index.unwrap_or_else(|| panic!("{name}"))
         };
         let close = |found: Quat, angle: f32| {
             let off = found.dot(Quat::from_rotation_z(angle)).abs();
@@ -87,7 +87,7 @@ fn a_topic_that_is_broken_is_refused_alone() {
     };
     assert_eq!(refused.code, Code::EqualTimes);
     assert!(
-        matches!(&refused.place, Some(Place::Inside(place)) if place.starts_with("/twice at byte "))
+        matches!(&refused.location, Some(Location::Inside(path)) if path.starts_with("/twice at byte "))
     );
     let loaded = read("cut.mcap");
     assert!(
@@ -101,11 +101,11 @@ fn a_topic_that_is_broken_is_refused_alone() {
 
 proptest! {
     #[test]
-    fn damaged_files_never_panic(place in 0usize..16_000, byte in any::<u8>(), cut in 0usize..20_000) {
+    fn damaged_files_never_panic(offset in 0usize..16_000, byte in any::<u8>(), cut in 0usize..20_000) {
         for name in ["good.mcap", "plain.mcap", "lz4.mcap"] {
             let mut bytes = fixture(name);
-            let place = place % bytes.len();
-            bytes[place] = byte;
+            let offset = offset % bytes.len();
+            bytes[offset] = byte;
             bytes.truncate(cut);
             let _ = read_mcap("t", &bytes, &ReadOptions::default());
         }

@@ -9,7 +9,7 @@ mod write;
 use std::path::{Path, PathBuf};
 
 use glam::{Quat, Vec3};
-use tumble_formats::motion::{Motion, Sampled};
+use tumble_formats::motion::{Motion, SampledClip};
 use tumble_formats::npz::read_npz;
 use tumble_formats::{Diagnostic, Loaded, ReadOptions};
 
@@ -44,7 +44,7 @@ struct Picked {
 }
 
 impl Picked {
-    /// Each `step`th frame; all tracks are moved by a vector of their own.
+    /// Each `step`th frame; each track is moved by another vector.
     fn of(clip: &Motion, step: usize) -> Self {
         let all = clip.set.track(0).times;
         let frames: Vec<usize> = (0..all.len()).step_by(step).collect();
@@ -67,8 +67,8 @@ impl Picked {
         }
     }
 
-    fn sampled<'a>(&'a self, clip: &'a Motion) -> Sampled<'a> {
-        Sampled {
+    fn sampled<'a>(&'a self, clip: &'a Motion) -> SampledClip<'a> {
+        SampledClip {
             clip,
             times: &self.times,
             rate: None,
@@ -76,7 +76,7 @@ impl Picked {
             translations: &self.translations,
             scales: &[],
             notes: &[],
-            of_own_keys: false,
+            is_at_keys: false,
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Positions far from 0 keep their digits through every format that has room for them.
 
 use glam::{DQuat, DVec3, Quat};
-use tumble::{Channel, Device, Engine, Frames, TrackSet};
+use tumble::{Channel, Device, Engine, SampleTimes, TrackSet};
 use tumble_formats::adjust::adjust;
 use tumble_formats::format::MotionOptions;
 use tumble_formats::keyed::keyed;
@@ -37,7 +37,7 @@ fn utm(step: f64) -> (Motion, Vec<DVec3>) {
 }
 
 /// Where the one track of a clip is at its keys.
-fn places(clip: &Motion) -> Vec<DVec3> {
+fn positions(clip: &Motion) -> Vec<DVec3> {
     let keys = clip.set.vector_keys(Channel::Translation, 0).unwrap().keys;
     keys.iter()
         .map(|key| clip.origin(0) + key.as_dvec3())
@@ -61,7 +61,7 @@ fn a_map_s_positions_come_back_from_every_format() {
     let folder = tempfile::tempdir().unwrap();
     let holding = FORMATS
         .into_iter()
-        .filter(|format| format.holds(Feature::Translations));
+        .filter(|format| format.supports(Feature::Translations));
     let mut names = Vec::new();
     for format in holding.filter(|format| format.writes_clips()) {
         for step in [0.01, 3.0, 2000.0] {
@@ -89,7 +89,7 @@ fn a_map_s_positions_come_back_from_every_format() {
                 panic!("{case}: {} clips", found.clips.len());
             };
             assert_eq!(found.set.track_count(), 1, "{case}");
-            assert_near(&places(found), &points, &case);
+            assert_near(&positions(found), &points, &case);
             // What is read and written again is the same to the last byte.
             let samples = keyed(found).unwrap();
             let mut again = Vec::new();
@@ -113,7 +113,9 @@ fn between_two_keys_of_a_map_lie_their_millimetres() {
     assert_eq!(clip.origins, [DVec3::new(458_075.0, 5_429_380.0, 163.0)]);
     let engine = Engine::new(Device::Cpu).unwrap();
     let methods = ChannelMethods::AUTHORED;
-    let samples = methods.sample(&engine, clip, &Frames::fps(10)).unwrap();
+    let samples = methods
+        .sample(&engine, clip, &SampleTimes::fps(10))
+        .unwrap();
     let poses = world(clip, &samples).unwrap();
     for (frame, pose) in poses.iter().enumerate() {
         let moved = frame as f64 * 0.001 * DVec3::new(1.0, 1.0, 0.0);
@@ -149,7 +151,7 @@ fn each_track_has_its_origin() {
     );
     let second = clip.select(&[1]).unwrap();
     assert_near(
-        &places(&second),
+        &positions(&second),
         &[
             DVec3::new(-70_000.5, 1.0, 2.0),
             DVec3::new(-70_000.25, 1.0, 2.0),
@@ -163,7 +165,7 @@ fn each_track_has_its_origin() {
         DVec3::new(5_400.000_25, -0.002, 0.001),
         DVec3::new(5_400.000_75, -0.003, 0.001),
     ];
-    let found = places(&adjusted);
+    let found = positions(&adjusted);
     for (found, expected) in found.iter().zip(expected) {
         assert!((*found - expected).length() < 1e-9, "{found} {expected}");
     }
@@ -181,7 +183,7 @@ fn paths_of_a_map_keep_their_shape() {
     assert!((step - expected).length() < 1e-7, "{step}");
 }
 
-/// Catches a root without keys of translation, whose place f32 alone would move by up to a quarter of a metre.
+/// Catches a root without keys of translation, whose position f32 alone would move by up to a quarter of a metre.
 #[test]
 fn a_root_that_rests_on_a_map_comes_back() {
     let text = format!(

@@ -19,7 +19,7 @@ fn the_table_of_formats_is_that_of_the_code() {
         let written = match (
             &format.write,
             format.writes_clips(),
-            format.holds(Feature::SeveralClips),
+            format.supports(Feature::SeveralClips),
         ) {
             (None, false, _) => "no",
             (Some(_), false, _) => "results",
@@ -49,7 +49,11 @@ fn the_table_of_what_formats_hold_is_that_of_the_code() {
     for feature in Feature::ALL {
         write!(table, "| {} |", feature.summary()).unwrap();
         for format in &all {
-            let cell = if format.holds(feature) { "yes" } else { "–" };
+            let cell = if format.supports(feature) {
+                "yes"
+            } else {
+                "–"
+            };
             write!(table, " {cell} |").unwrap();
         }
         table.push('\n');

@@ -4,10 +4,12 @@ use std::path::Path;
 
 use glam::{DVec3, Quat, Vec3};
 use tumble::reduce::ReducedCurve;
-use tumble::{Channel, Device, Engine, Frames, Interpolation};
+use tumble::{Channel, Device, Engine, Interpolation, SampleTimes};
 use tumble_formats::format::{MotionOptions, Quantization};
-use tumble_formats::motion::{Channels, Joint, Motion, Sampled, Sampler, Transform};
-use tumble_formats::reduce::{ReduceMotionError, ReduceOptions, Reduced, all_in_few_bits, reduce};
+use tumble_formats::motion::{
+    ChannelInterpolation, Channels, Joint, Motion, SampledClip, Transform,
+};
+use tumble_formats::reduce::{ReduceMotionError, ReduceOptions, Reduced, quantize_all, reduce};
 use tumble_formats::sample::ChannelMethods;
 use tumble_formats::world::{WorldPose, world};
 use tumble_formats::{Format, ReadOptions};
@@ -34,7 +36,7 @@ fn poses(clip: &Motion, times: &[f64]) -> Vec<WorldPose> {
         with: &|method| Interpolation::from(method),
     };
     let samples = methods
-        .sample(&engine, clip, &Frames::at(times.to_vec()))
+        .sample(&engine, clip, &SampleTimes::at(times.to_vec()))
         .unwrap();
     world(clip, &samples).unwrap()
 }
@@ -80,7 +82,7 @@ fn check(clip: &Motion, reduced: &Reduced, options: &ReduceOptions) -> [f64; 2] 
         reduced
             .errors
             .iter()
-            .map(|own| own[kind])
+            .map(|error| error[kind])
             .fold(0.0, f64::max)
     });
     assert!(
@@ -111,7 +113,7 @@ fn a_captured_walk_is_near_everywhere() {
     let engine = Engine::new(Device::Cpu).unwrap();
     let loaded = Format::open_detected(path, &ReadOptions::default()).unwrap();
     let clip = &loaded.clips[0];
-    for (curve, distance, shell, most) in [
+    for (curve, distance, shell, max_keys) in [
         (ReducedCurve::Linear, Some(0.0202), 0.0, 64_136),
         (ReducedCurve::Linear, None, 0.0, 53_000),
         (ReducedCurve::GltfCubic, Some(0.0202), 0.0, 23_000),
@@ -125,7 +127,7 @@ fn a_captured_walk_is_near_everywhere() {
         let reduced = reduce(clip, &engine, &options).unwrap();
         check(clip, &reduced, &options);
         assert!(
-            reduced.keys[1] <= most,
+            reduced.keys[1] <= max_keys,
             "{curve:?}: {} keys",
             reduced.keys[1]
         );
@@ -137,17 +139,21 @@ fn a_captured_walk_is_near_everywhere() {
 fn chain() -> Motion {
     let times: Vec<f64> = (0..90).map(|i| f64::from(i) / 30.0).collect();
     let mut clip = Motion::default();
-    let turn = |i: usize, speed: f32| Quat::from_rotation_z((i as f32 * 0.05 * speed).sin());
+    let swing = |i: usize, speed: f32| Quat::from_rotation_z((i as f32 * 0.05 * speed).sin());
     for track in 0..4 {
         let keys: Vec<Quat> = (0..90)
             .map(|i| match track {
-                2 => turn(i / 30, 9.0),
-                _ => turn(i, 1.0 + track as f32) * Quat::from_rotation_x(0.2 * track as f32),
+                2 => swing(i / 30, 9.0),
+                _ => swing(i, 1.0 + track as f32) * Quat::from_rotation_x(0.2 * track as f32),
             })
             .collect();
-        let own = if track == 3 { 1 } else { 90 };
+        let key_count = if track == 3 { 1 } else { 90 };
         clip.set
-            .push(format!("joint{track}"), &times[..own], &keys[..own])
+            .push(
+                format!("joint{track}"),
+                &times[..key_count],
+                &keys[..key_count],
+            )
             .unwrap();
         let rest = Transform {
             translation: Vec3::Y * 2.0,
@@ -158,21 +164,23 @@ fn chain() -> Motion {
             rest,
         });
         let sampler = [
-            Sampler::Linear,
-            Sampler::Linear,
-            Sampler::Step,
-            Sampler::Linear,
+            ChannelInterpolation::Linear,
+            ChannelInterpolation::Linear,
+            ChannelInterpolation::Step,
+            ChannelInterpolation::Linear,
         ][track];
         clip.channels.push(Channels {
             rotation: (track != 3).then_some(sampler),
-            translation: (track == 1).then_some(Sampler::Linear),
-            scale: (track == 0).then_some(Sampler::Linear),
+            translation: (track == 1).then_some(ChannelInterpolation::Linear),
+            scale: (track == 0).then_some(ChannelInterpolation::Linear),
         });
     }
-    let way: Vec<Vec3> = (0..90)
+    let positions: Vec<Vec3> = (0..90)
         .map(|i| Vec3::new(i as f32 * 0.1, 1.0, (i as f32 * 0.2).sin()))
         .collect();
-    clip.set.set_translations(1, &times, &way, &[]).unwrap();
+    clip.set
+        .set_translations(1, &times, &positions, &[])
+        .unwrap();
     let sizes: Vec<Vec3> = (0..90)
         .map(|i| Vec3::splat(1.0 + i as f32 * 0.01))
         .collect();
@@ -191,7 +199,10 @@ fn steps_rests_and_scales_are_kept() {
         let set = &reduced.clip.set;
         let step = set.track(2);
         assert_eq!(step.times, [0.0, 1.0, 2.0]);
-        assert_eq!(reduced.clip.channels[2].rotation, Some(Sampler::Step));
+        assert_eq!(
+            reduced.clip.channels[2].rotation,
+            Some(ChannelInterpolation::Step)
+        );
         assert_eq!(reduced.clip.channels[3].rotation, None);
         assert_eq!(set.track(3).keys, clip.set.track(3).keys);
         // Sizes grow evenly.
@@ -217,8 +228,8 @@ fn rotations_of_16_bits_stay_within_the_bounds() {
         };
         let reduced = reduce(&clip, &engine, &options).unwrap();
         let ends = reduced.clip.ends(&engine).unwrap();
-        let sampled = Sampled {
-            of_own_keys: true,
+        let sampled = SampledClip {
+            is_at_keys: true,
             ..ends.of(&reduced.clip, None, &[])
         };
         let mut bytes = Vec::new();
@@ -271,9 +282,7 @@ fn rotations_of_16_bits_stay_within_the_bounds() {
     }
     // All samples of fewer bits are within the bounds too.
     let options_of = options(ReducedCurve::Linear);
-    let (all, bits) = all_in_few_bits(&clip, &engine, &options_of)
-        .unwrap()
-        .unwrap();
+    let (all, bits) = quantize_all(&clip, &engine, &options_of).unwrap().unwrap();
     assert!(
         matches!(bits, Quantization::Filtered(256..=16_384)),
         "{bits:?}"

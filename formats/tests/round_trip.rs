@@ -8,7 +8,7 @@ use tumble::{Channel, FrameRate, TrackSet};
 use tumble_formats::bvh::{BvhChannel, BvhJoint};
 use tumble_formats::format::{MotionOptions, WriteError};
 use tumble_formats::keyed::keyed;
-use tumble_formats::motion::{Channels, Joint, Motion, Sampler, Transform};
+use tumble_formats::motion::{ChannelInterpolation, Channels, Joint, Motion, Transform};
 use tumble_formats::sample::Samples;
 use tumble_formats::world::world;
 use tumble_formats::{Code, Diagnostic, FORMATS, Feature, Format, ReadOptions};
@@ -78,10 +78,11 @@ fn clip(numbers: &mut Numbers) -> Motion {
     let frames = 1 + numbers.below(9);
     let mut time = 0.0;
     let times: Vec<f64> = (0..frames as u64)
-        .map(|frame| match is_even {
-            true => rate.time_of(frame),
-            // f32 holds these exactly.
-            false => {
+        .map(|frame| {
+            if is_even {
+                rate.time_of(frame)
+            } else {
+                // Multiples of 2^-10, which are exact in f32.
                 time += f64::from(1 + numbers.below(60) as u32) / 64.0 + 1.0 / 1024.0;
                 time
             }
@@ -115,9 +116,10 @@ fn clip(numbers: &mut Numbers) -> Motion {
                 .collect();
             motion.set.set_scales(track, &times, &keys, &[]).unwrap();
         }
-        let sampler = match is_stepped {
-            true => Sampler::Step,
-            false => Sampler::Linear,
+        let sampler = if is_stepped {
+            ChannelInterpolation::Step
+        } else {
+            ChannelInterpolation::Linear
         };
         if !from_bvh {
             motion.channels.push(Channels {
@@ -129,12 +131,12 @@ fn clip(numbers: &mut Numbers) -> Motion {
         if !has_skeleton {
             continue;
         }
-        let turned = numbers.coin() && !from_bvh;
+        let is_rotated = numbers.coin() && !from_bvh;
         motion.skeleton.push(Joint {
             parent: (track > 0).then(|| numbers.below(track)),
             rest: Transform {
                 translation: numbers.vector(2.0),
-                rotation: if turned {
+                rotation: if is_rotated {
                     numbers.rotation()
                 } else {
                     Quat::IDENTITY
@@ -143,11 +145,11 @@ fn clip(numbers: &mut Numbers) -> Motion {
             },
         });
         if from_bvh {
-            let turns = [[2, 0, 1], [0, 1, 2], [1, 2, 0]][numbers.below(3)];
+            let axes = [[2, 0, 1], [0, 1, 2], [1, 2, 0]][numbers.below(3)];
             let positions = (0..3).map(BvhChannel::Position);
             let all = positions.filter(|_| is_moved || numbers.coin());
             motion.bvh.push(BvhJoint {
-                channels: all.chain(turns.map(BvhChannel::Rotation)).collect(),
+                channels: all.chain(axes.map(BvhChannel::Rotation)).collect(),
                 end_sites: (0..numbers.below(2)).map(|_| numbers.vector(3.0)).collect(),
             });
         }
@@ -164,8 +166,8 @@ fn clip(numbers: &mut Numbers) -> Motion {
 
 /// The formats of clips, glTF as text too.
 fn formats() -> impl Iterator<Item = (&'static Format, &'static str)> {
-    let own = FORMATS.into_iter().filter(|format| format.writes_clips());
-    let names = own.map(|format| (format, format.name));
+    let writable = FORMATS.into_iter().filter(|format| format.writes_clips());
+    let names = writable.map(|format| (format, format.name));
     names.chain(Format::named("gltf").map(|format| (format, "gltf")))
 }
 
@@ -222,9 +224,12 @@ fn poses(motion: &Motion, in_world: bool) -> (Vec<f64>, Vec<Quat>, Vec<Vec3>, Ve
         let positions = world.iter().map(|pose| pose.position.as_vec3()).collect();
         return (times, rotations, positions, vec![Vec3::ONE; count]);
     }
-    let full = |list: &[Vec3], empty| match list.is_empty() {
-        true => vec![empty; count],
-        false => list.to_vec(),
+    let full = |list: &[Vec3], empty| {
+        if list.is_empty() {
+            vec![empty; count]
+        } else {
+            list.to_vec()
+        }
     };
     let translations = full(&samples.translations, Vec3::ZERO);
     let scales = full(&samples.scales, Vec3::ONE);
@@ -241,34 +246,33 @@ fn in_order(found: &Motion, clip: &Motion) -> Motion {
         return found.clone();
     }
     let name = |track: usize| clip.set.track_name(track);
-    let place =
+    let track_named =
         |name: String| (0..found.set.track_count()).find(|&it| found.set.track_name(it) == name);
     let order: Option<Vec<usize>> = (0..clip.set.track_count())
-        .map(|track| place(name(track)))
+        .map(|track| track_named(name(track)))
         .collect();
     let order = order.unwrap_or_else(|| panic!("names are lost: {:?}", found.set));
     found.select(&order).unwrap()
 }
 
 fn compare(clip: &Motion, found: &Motion, warnings: &[Diagnostic], format: &Format, case: &str) {
-    let left_out = warnings.iter().find(|own| own.code == Code::NoRoom);
-    let left_out = left_out.map_or("", |own| &own.message);
-    let holds = |feature| format.holds(feature);
-    let is_told = |words: &str| left_out.contains(words);
-    let found = match holds(Feature::TrackNames) {
-        true => in_order(found, clip),
-        false => {
-            let has_names = clip.set.tracks().any(|track| {
-                track
-                    .name
-                    .is_some_and(|name| !name.is_empty() && name != "body")
-            });
-            assert!(
-                !has_names || is_told("names of the tracks"),
-                "{case}: {left_out}"
-            );
-            found.clone()
-        }
+    let left_out = warnings.iter().find(|warning| warning.code == Code::NoRoom);
+    let left_out = left_out.map_or("", |warning| &warning.message);
+    let supports = |feature| format.supports(feature);
+    let is_reported = |words: &str| left_out.contains(words);
+    let found = if supports(Feature::TrackNames) {
+        in_order(found, clip)
+    } else {
+        let has_names = clip.set.tracks().any(|track| {
+            track
+                .name
+                .is_some_and(|name| !name.is_empty() && name != "body")
+        });
+        assert!(
+            !has_names || is_reported("names of the tracks"),
+            "{case}: {left_out}"
+        );
+        found.clone()
     };
     let in_world = clip.is_world != found.is_world;
     let ((times, rotations, positions, scales), other) =
@@ -280,86 +284,101 @@ fn compare(clip: &Motion, found: &Motion, warnings: &[Diagnostic], format: &Form
             "{case}: {time} {other}"
         );
     }
-    for (place, (own, other)) in rotations.iter().zip(&other.1).enumerate() {
-        let (own, other) = (own.as_dquat().normalize(), other.as_dquat().normalize());
-        let off = 2.0 * (own.conjugate() * other).xyz().length();
-        assert!(off < 2e-6, "{case}: rotation {place}: {own} {other}");
+    for (i, (before, after)) in rotations.iter().zip(&other.1).enumerate() {
+        let (before, after) = (before.as_dquat().normalize(), after.as_dquat().normalize());
+        let off = 2.0 * (before.conjugate() * after).xyz().length();
+        assert!(off < 2e-6, "{case}: rotation {i}: {before} {after}");
     }
     let tracks = found.set.track_count();
     let continued = other.1.iter().zip(other.1.iter().skip(tracks));
     for (before, after) in continued.filter(|_| !in_world) {
         assert!(before.dot(*after) >= -1e-6, "{case}: signs jump");
     }
-    let near = |own: &[Vec3], other: &[Vec3]| {
-        let mut pairs = own.iter().zip(other);
-        pairs.all(|(own, other)| (*own - *other).length() <= 1e-6 * own.length().max(100.0))
+    let near = |before: &[Vec3], after: &[Vec3]| {
+        let mut pairs = before.iter().zip(after);
+        pairs
+            .all(|(before, after)| (*before - *after).length() <= 1e-6 * before.length().max(100.0))
     };
-    let has_translations = positions.iter().any(|own| *own != Vec3::ZERO);
+    let has_translations = positions.iter().any(|position| *position != Vec3::ZERO);
     let same = near(&positions, &other.2);
     assert!(
-        same && holds(Feature::Translations) || !has_translations || is_told("the translations"),
+        same && supports(Feature::Translations)
+            || !has_translations
+            || is_reported("the translations"),
         "{case}: {positions:?} {:?}",
         other.2
     );
-    let has_scales = scales.iter().any(|own| *own != Vec3::ONE);
+    let has_scales = scales.iter().any(|scale| *scale != Vec3::ONE);
     let same = near(&scales, &other.3);
     assert!(
-        same && holds(Feature::Scales) || !has_scales || is_told("the scales"),
+        same && supports(Feature::Scales) || !has_scales || is_reported("the scales"),
         "{case}: {left_out}"
     );
     let parents =
         |of: &Motion| -> Vec<_> { of.skeleton.iter().map(|joint| joint.parent).collect() };
     let hangs = clip.skeleton.iter().any(|joint| joint.parent.is_some());
-    match holds(Feature::Skeleton) && !(clip.is_world && format.name == "bvh") {
-        true if hangs => {
+    if supports(Feature::Skeleton) && !(clip.is_world && format.name == "bvh") {
+        if hangs {
             assert_eq!(parents(&found), parents(clip), "{case}");
             let rests = clip.skeleton.iter().zip(&found.skeleton);
-            for (track, (own, other)) in rests.enumerate() {
-                let is_kept = own.rest.translation == other.rest.translation
-                    // BVH without positions has the place of the joint there.
+            for (track, (before, after)) in rests.enumerate() {
+                let is_kept = before.rest.translation == after.rest.translation
+                    // BVH without positions has the position of the joint there.
                     || format.name == "bvh" && clip.bvh.is_empty();
-                assert!(is_kept, "{case}: {track}: {own:?} {other:?}");
+                assert!(is_kept, "{case}: {track}: {before:?} {after:?}");
             }
         }
-        true => {}
-        false => assert!(
-            !hangs || is_told("the skeleton") || clip.is_world,
+    } else {
+        assert!(
+            !hangs || is_reported("the skeleton") || clip.is_world,
             "{case}: {left_out}"
-        ),
+        );
     }
-    if holds(Feature::RestRotations) {
+    if supports(Feature::RestRotations) {
         let rests = clip.skeleton.iter().zip(&found.skeleton);
-        let mut rests = rests.map(|(own, other)| own.rest.rotation.dot(other.rest.rotation).abs());
+        let mut rests =
+            rests.map(|(before, after)| before.rest.rotation.dot(after.rest.rotation).abs());
         assert!(rests.all(|dot| dot > 1.0 - 1e-6), "{case}");
     } else {
-        let turned = clip
+        let is_rotated = clip
             .skeleton
             .iter()
             .any(|joint| joint.rest.rotation != Quat::IDENTITY);
         assert!(
-            !turned || is_told("rotations in which joints rest"),
+            !is_rotated || is_reported("rotations in which joints rest"),
             "{case}: {left_out}"
         );
     }
-    match holds(Feature::ClipName) {
-        true => assert_eq!(found.name, clip.name, "{case}"),
-        false => assert!(clip.name.is_none() || is_told("name of the clip"), "{case}"),
-    }
-    let is_stepped = |of: &Motion| of.channels.iter().any(|own| own.has(Sampler::Step));
-    match holds(Feature::Steps) {
-        true => assert_eq!(is_stepped(&found), is_stepped(clip), "{case}"),
-        false => assert!(
-            !is_stepped(clip) || is_told("hold each key"),
-            "{case}: {left_out}"
-        ),
-    }
-    match holds(Feature::Bvh) && !clip.is_world {
-        true if !clip.bvh.is_empty() => assert_eq!(found.bvh, clip.bvh, "{case}"),
-        true => {}
-        false => assert!(
-            clip.bvh.is_empty() || clip.is_world || is_told("End Sites"),
+    if supports(Feature::ClipName) {
+        assert_eq!(found.name, clip.name, "{case}");
+    } else {
+        assert!(
+            clip.name.is_none() || is_reported("name of the clip"),
             "{case}"
-        ),
+        );
+    }
+    let is_stepped = |of: &Motion| {
+        of.channels
+            .iter()
+            .any(|channels| channels.has(ChannelInterpolation::Step))
+    };
+    if supports(Feature::Steps) {
+        assert_eq!(is_stepped(&found), is_stepped(clip), "{case}");
+    } else {
+        assert!(
+            !is_stepped(clip) || is_reported("hold each key"),
+            "{case}: {left_out}"
+        );
+    }
+    if supports(Feature::Bvh) && !clip.is_world {
+        if !clip.bvh.is_empty() {
+            assert_eq!(found.bvh, clip.bvh, "{case}");
+        }
+    } else {
+        assert!(
+            clip.bvh.is_empty() || clip.is_world || is_reported("End Sites"),
+            "{case}"
+        );
     }
 }
 
@@ -381,7 +400,7 @@ fn may_be_refused(clip: &Motion, format: &Format) -> bool {
         .rate
         .or_else(|| clip.rate_of_keys())
         .is_some_and(is_frame)
-        && !format.holds(Feature::UnevenTimes);
+        && !format.supports(Feature::UnevenTimes);
     is_uneven || ["tum", "euroc", "kitti"].contains(&format.name) && tracks != 1
 }
 
@@ -442,7 +461,7 @@ fn signs_continue_whatever_writes_them() {
         let moved = moved.map_or(0, |keys| keys.keys.len());
         assert_eq!(
             moved > 0,
-            format.0.holds(Feature::Translations),
+            format.0.supports(Feature::Translations),
             "{}",
             format.1
         );

@@ -3,9 +3,9 @@
 use std::fs;
 
 use glam::{DAffine3, DMat4, DVec3};
-use tumble::{Device, Engine, Frames};
+use tumble::{Device, Engine, SampleTimes};
+use tumble_formats::carried_mesh::CarriedMesh;
 use tumble_formats::gltf::read_gltf;
-use tumble_formats::gltf::skins::CarriedMesh;
 use tumble_formats::motion::Motion;
 use tumble_formats::sample::ChannelMethods;
 use tumble_formats::world::world_matrices;
@@ -28,7 +28,7 @@ fn mesh(loaded: &Loaded) -> Result<Option<CarriedMesh>, String> {
 }
 
 /// Where a vertex is, by glTF's formula (3.7.3.3).
-fn place(mesh: &CarriedMesh, joints: &[DAffine3], vertex: usize) -> DVec3 {
+fn vertex_position(mesh: &CarriedMesh, joints: &[DAffine3], vertex: usize) -> DVec3 {
     let at = DVec3::from(glam::Vec3::from(mesh.positions[vertex]));
     let parts = mesh.bones_of[vertex].iter().zip(mesh.weights[vertex]);
     parts
@@ -49,7 +49,7 @@ fn vertices_follow_their_joints_and_what_is_fixed_to_one() {
     assert_eq!(mesh.triangles, [[0, 1, 2], [1, 3, 2], [4, 5, 6]]);
     let clip = &loaded.clips[0];
     let engine = Engine::new(Device::Cpu).unwrap();
-    let frames = Frames::at(vec![0.0, 1.0]);
+    let frames = SampleTimes::at(vec![0.0, 1.0]);
     let samples = ChannelMethods::AUTHORED
         .sample(&engine, clip, &frames)
         .unwrap();
@@ -62,7 +62,7 @@ fn vertices_follow_their_joints_and_what_is_fixed_to_one() {
     for (sample, expected) in [at_rest, bent].into_iter().enumerate() {
         let matrices = &matrices[sample * joints..][..joints];
         for (vertex, [x, y]) in expected.into_iter().enumerate() {
-            let found = place(&mesh, matrices, vertex);
+            let found = vertex_position(&mesh, matrices, vertex);
             let off = found.distance(DVec3::new(x, y, 0.0));
             assert!(off < 1e-6, "vertex {vertex} of sample {sample}: {found}");
         }
@@ -107,6 +107,6 @@ fn files_without_meshes_have_none_and_broken_ones_say_why() {
     // A clip whose tracks were chosen without the joints.
     let document = read(&fixture()).document.unwrap();
     let error = document.carried_mesh(&Motion::default()).unwrap_err();
-    let words = "the joint root of the skin is no track of the clip";
+    let words = "the joint root of the skin is not a track of the clip";
     assert!(error.to_string().contains(words), "{error}");
 }

@@ -1,4 +1,4 @@
-//! What the tests of the files share.
+//! Helpers that several tests of the formats use.
 
 use std::path::PathBuf;
 

@@ -5,7 +5,7 @@ use tumble::{Channel, FrameRate};
 use tumble_formats::csv::read::read_csv;
 use tumble_formats::format::TimeUnit;
 use tumble_formats::keys::Duplicates;
-use tumble_formats::{Code, Diagnostic, Loaded, Place, ReadOptions};
+use tumble_formats::{Code, Diagnostic, Loaded, Location, ReadOptions};
 
 fn read(text: &str, options: &ReadOptions) -> Result<Loaded, Diagnostic> {
     read_csv("t", text.as_bytes().to_vec(), options)
@@ -93,8 +93,8 @@ fn decimals_of_unix_time_keep_their_digits() {
         (same.time_offset, same.set.track(0).times),
         (clip.time_offset, clip.set.track(0).times)
     );
-    let far = read(&text, &ReadOptions::default()).unwrap_err();
-    assert_eq!(far.code, Code::Time);
+    let error = read(&text, &ReadOptions::default()).unwrap_err();
+    assert_eq!(error.code, Code::Time);
 }
 
 /// A rate beside times would be another, and one of them would be ignored.
@@ -122,8 +122,8 @@ fn frames_are_times_at_the_rate_that_is_given() {
     assert_eq!(clip.set.track(0).times[3], 3.0 * 1001.0 / 30_000.0);
     assert_eq!(clip.rate, Some(rate));
     let error = read(&text.replace("\n1,", "\n-1,"), &options).unwrap_err();
-    let place = Place::Text { line: 3, column: 1 };
-    assert_eq!((error.code, error.place), (Code::Time, Some(place)));
+    let location = Location::Text { line: 3, column: 1 };
+    assert_eq!((error.code, error.location), (Code::Time, Some(location)));
 }
 
 #[test]
@@ -185,15 +185,15 @@ proptest! {
         let _ = read_csv("t", [FOUR.as_bytes(), &bytes].concat(), &ReadOptions::default());
     }
 
-    /// Every refusal has a place within the text.
+    /// Every refusal names a position within the text.
     #[test]
-    fn damaged_text_is_refused_within_it(place in 0usize..70, piece in "[0-9,.\"\nx é-]{0,4}", cut in 0usize..80) {
+    fn damaged_text_is_refused_within_it(offset in 0usize..70, piece in "[0-9,.\"\nx é-]{0,4}", cut in 0usize..80) {
         let mut text = FOUR.to_owned();
-        text.insert_str(place.min(text.len()), &piece);
+        text.insert_str(offset.min(text.len()), &piece);
         let cut = (0..=cut.min(text.len())).rev().find(|&cut| text.is_char_boundary(cut));
         text.truncate(cut.unwrap());
         let error = read(&text, &ReadOptions::default()).err();
-        if let Some(Place::Text { line, column }) = error.and_then(|error| error.place) {
+        if let Some(Location::Text { line, column }) = error.and_then(|error| error.location) {
             let lines = text.matches('\n').count() as u64 + 1;
             prop_assert!((1..=lines).contains(&line), "line {} of {:?}", line, text);
             prop_assert!(column <= text.len() as u64 + 1, "column {} of {:?}", column, text);

@@ -9,14 +9,14 @@ use arrow_ipc::reader::FileReader;
 use bytes::Bytes;
 use glam::{Quat, Vec3};
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
-use tumble::{Channel, Encoding, FrameRate, Frames, Layout, MatrixOrder, Timeline, TrackSet};
+use tumble::{Channel, Encoding, FrameRate, Layout, MatrixOrder, SampleTimes, Timeline, TrackSet};
 use tumble_formats::arrow::read_arrow;
 use tumble_formats::csv::read::read_csv;
 use tumble_formats::format::{MotionOptions, ResultShape, WriteError};
-use tumble_formats::motion::{Motion, Sampled};
-use tumble_formats::npy::ComponentOrder;
+use tumble_formats::motion::{Motion, SampledClip};
 use tumble_formats::parquet::read_parquet;
 use tumble_formats::poses::{Poses, TRANSFORM};
+use tumble_formats::quaternion::ComponentOrder;
 use tumble_formats::{Code, Diagnostic, Format, Loaded, ReadOptions};
 
 fn read(format: &str, bytes: &[u8]) -> Result<Loaded, Diagnostic> {
@@ -30,11 +30,11 @@ fn read(format: &str, bytes: &[u8]) -> Result<Loaded, Diagnostic> {
 
 /// Rotations that differ, [frame][track].
 fn rotations(count: usize) -> Vec<Quat> {
-    let turned = |i: usize| {
+    let rotation = |i: usize| {
         let angles = [0.3, 0.17, 0.71].map(|step| (i as f32 * step).sin());
         Quat::from_scaled_axis(Vec3::from_array(angles))
     };
-    (0..count).map(turned).collect()
+    (0..count).map(rotation).collect()
 }
 
 fn clip(name: Option<&str>, tracks: &[&str]) -> Motion {
@@ -49,13 +49,13 @@ fn clip(name: Option<&str>, tracks: &[&str]) -> Motion {
     }
 }
 
-fn written(format: &str, clips: &[Sampled<'_>]) -> Result<Vec<u8>, WriteError> {
+fn written(format: &str, clips: &[SampledClip<'_>]) -> Result<Vec<u8>, WriteError> {
     let mut bytes = Vec::new();
     let options = MotionOptions::default();
     let format = Format::named(format).unwrap();
     let warnings = format.write_clips(clips, &options, &mut bytes)?;
-    let is_told = |own: &Diagnostic| own.code == Code::NameChanged;
-    assert!(warnings.iter().all(is_told), "{warnings:?}");
+    let is_reported = |warning: &Diagnostic| warning.code == Code::NameChanged;
+    assert!(warnings.iter().all(is_reported), "{warnings:?}");
     Ok(bytes)
 }
 
@@ -66,7 +66,7 @@ fn sampled_clips_come_back_bit_for_bit() {
     let quats = rotations(150);
     let moved: Vec<Vec3> = (0..150).map(|i| Vec3::new(i as f32, -0.1, 1e-7)).collect();
     let scaled: Vec<Vec3> = (0..150).map(|i| Vec3::splat(1.0 + i as f32)).collect();
-    let sampled = Sampled {
+    let sampled = SampledClip {
         clip: &motion,
         times: &times,
         rate: FrameRate::new(30, 1).ok(),
@@ -74,7 +74,7 @@ fn sampled_clips_come_back_bit_for_bit() {
         translations: &moved,
         scales: &scaled,
         notes: &[("method", "slerp".to_owned())],
-        of_own_keys: false,
+        is_at_keys: false,
     };
     for format in ["parquet", "arrow", "csv"] {
         let bytes = written(format, std::slice::from_ref(&sampled)).unwrap();
@@ -93,10 +93,10 @@ fn sampled_clips_come_back_bit_for_bit() {
             assert_eq!(keys.times, times);
             let vectors = |channel| found.set.vector_keys(channel, track).unwrap().keys;
             for frame in 0..50 {
-                let place = frame * 3 + track;
-                assert_eq!(keys.keys[frame], quats[place], "{format}: {place}");
-                assert_eq!(vectors(Channel::Translation)[frame], moved[place]);
-                assert_eq!(vectors(Channel::Scale)[frame], scaled[place]);
+                let index = frame * 3 + track;
+                assert_eq!(keys.keys[frame], quats[index], "{format}: {index}");
+                assert_eq!(vectors(Channel::Translation)[frame], moved[index]);
+                assert_eq!(vectors(Channel::Scale)[frame], scaled[index]);
             }
         }
     }
@@ -106,7 +106,7 @@ fn sampled_clips_come_back_bit_for_bit() {
 fn several_clips_are_told_apart_and_have_row_groups_of_their_own() {
     let motions = [clip(Some("walk"), &["hip", "knee"]), clip(None, &["knee"])];
     let (times, quats) = ([0.0, 0.5, 0.75], rotations(6));
-    let sampled = |motion, tracks: usize, method: &'static str| Sampled {
+    let sampled = |motion, tracks: usize, method: &'static str| SampledClip {
         clip: motion,
         times: &times,
         rate: None,
@@ -117,7 +117,7 @@ fn several_clips_are_told_apart_and_have_row_groups_of_their_own() {
             "slerp" => &NOTES[..1],
             _ => &NOTES[1..],
         },
-        of_own_keys: false,
+        is_at_keys: false,
     };
     let clips = [
         sampled(&motions[0], 2, "slerp"),
@@ -130,7 +130,7 @@ fn several_clips_are_told_apart_and_have_row_groups_of_their_own() {
             (
                 clip.name.clone().unwrap(),
                 clip.set.track_count(),
-                clip.place,
+                clip.index,
             )
         };
         let shapes: Vec<_> = loaded.clips.iter().map(shape).collect();
@@ -177,7 +177,7 @@ fn offsets_of_times_are_written_and_lists_of_other_lengths_are_not() {
         time_offset: 1_403_636_579,
         ..clip(None, &["hip"])
     };
-    let sampled = Sampled {
+    let sampled = SampledClip {
         clip: &motion,
         times: &[0.5, 1.25],
         rate: None,
@@ -185,7 +185,7 @@ fn offsets_of_times_are_written_and_lists_of_other_lengths_are_not() {
         translations: &[],
         scales: &[],
         notes: &[],
-        of_own_keys: false,
+        is_at_keys: false,
     };
     for format in ["parquet", "arrow", "csv"] {
         let bytes = written(format, std::slice::from_ref(&sampled)).unwrap();
@@ -193,7 +193,7 @@ fn offsets_of_times_are_written_and_lists_of_other_lengths_are_not() {
         let clip = &loaded.clips[0];
         let times = (clip.time_offset, clip.set.track(0).times);
         assert_eq!(times, (1_403_636_579, &[0.5, 1.25][..]), "{format}");
-        let short = Sampled {
+        let short = SampledClip {
             times: &[0.5],
             ..sampled.clone()
         };
@@ -231,7 +231,7 @@ impl Shape {
                 .unwrap();
         }
         let times: Vec<f64> = (0..frames).map(|frame| frame as f64 / 60.0).collect();
-        let timeline = Frames::at(times).resolve(tracks, None).unwrap();
+        let timeline = SampleTimes::at(times).resolve(tracks, None).unwrap();
         Self { set, timeline }
     }
 
@@ -275,12 +275,12 @@ fn results_do_not_depend_on_the_windows_in_which_they_come() {
             assert_eq!(write(format, &result, &all, 5).unwrap(), whole);
             let clip = &read(format, &whole).unwrap().clips[0];
             assert_eq!(clip.rate, FrameRate::new(60, 1).ok());
-            for (place, &q) in all.iter().enumerate() {
+            for (i, &q) in all.iter().enumerate() {
                 let (track, frame) = match layout {
-                    Layout::TrackMajor => (place / 31, place % 31),
-                    Layout::FrameMajor => (place % 7, place / 7),
+                    Layout::TrackMajor => (i / 31, i % 31),
+                    Layout::FrameMajor => (i % 7, i / 7),
                 };
-                assert_eq!(clip.set.track(track).keys[frame], q, "{format}: {place}");
+                assert_eq!(clip.set.track(track).keys[frame], q, "{format}: {i}");
             }
             assert!(write(format, &result, &all[1..], 5).is_err());
             let more = rotations(7 * 31 + 1);
@@ -310,8 +310,10 @@ fn every_representation_has_its_columns() {
                 batch.column(1).as_primitive::<Float64Type>().value(5),
                 2.0 / 60.0
             );
-            let mut wanted = vec![0; encoding.bytes()];
-            encoding.encode(&[all[4].to_array()], &mut wanted).unwrap();
+            let mut expected = vec![0; encoding.bytes()];
+            encoding
+                .encode(&[all[4].to_array()], &mut expected)
+                .unwrap();
             let found: Vec<u8> = (3..names.len())
                 .flat_map(|column| {
                     let column = batch.column(column);
@@ -333,7 +335,7 @@ fn every_representation_has_its_columns() {
                     }
                 })
                 .collect();
-            assert_eq!(found, wanted, "{format}: {encoding:?}");
+            assert_eq!(found, expected, "{format}: {encoding:?}");
         }
         let first = ResultShape {
             order: Some(ComponentOrder::Wxyz),

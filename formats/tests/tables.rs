@@ -10,7 +10,7 @@ use tumble::{Channel, FrameRate};
 use tumble_formats::arrow::read_arrow;
 use tumble_formats::motion::Motion;
 use tumble_formats::parquet::read_parquet;
-use tumble_formats::{Code, Diagnostic, Format, Loaded, Place, ReadOptions};
+use tumble_formats::{Code, Diagnostic, Format, Loaded, Location, ReadOptions};
 
 use crate::support::shared_data;
 
@@ -165,12 +165,12 @@ fn episodes_are_clips_and_parts_of_lists_are_tracks() {
     let refused = open(&path, &mapped("hand=observation.state[5:9]:xyzw"))
         .unwrap()
         .refused;
-    let places: Vec<String> = refused
+    let locations: Vec<String> = refused
         .iter()
-        .map(|r| r.place.clone().unwrap().to_string())
+        .map(|r| r.location.clone().unwrap().to_string())
         .collect();
     assert_eq!(
-        places,
+        locations,
         [
             "column observation.state, row 0",
             "column observation.state, row 30"
@@ -188,8 +188,8 @@ fn a_null_and_a_cut_are_refused_where_they_are() {
         &ReadOptions::default(),
     )
     .unwrap_err();
-    let place = Place::Inside("column x, row 7".to_owned());
-    assert_eq!((error.code, error.place), (Code::Null, Some(place)));
+    let location = Location::Inside("column x, row 7".to_owned());
+    assert_eq!((error.code, error.location), (Code::Null, Some(location)));
     let error = open(
         &folder.join("parquet/bad_cut.parquet"),
         &ReadOptions::default(),
@@ -205,11 +205,11 @@ fn fixtures(format: &str) -> Vec<PathBuf> {
     let paths = fs::read_dir(folder)
         .unwrap()
         .map(|entry| entry.unwrap().path());
-    let mut own: Vec<PathBuf> = paths
+    let mut matching: Vec<PathBuf> = paths
         .filter(|path| Format::of(path).is_some_and(|of| of.name == format))
         .collect();
-    own.sort();
-    own
+    matching.sort();
+    matching
 }
 
 /// However a table is packed, it is the same table.
@@ -225,8 +225,8 @@ fn every_way_to_pack_a_table_gives_the_same_keys() {
             (times.to_vec(), keys.to_vec())
         })
     };
-    let wanted = keys("parquet/long.parquet");
-    assert_eq!(wanted[1].0, [0.0, 1.0 / 30.0, 2.0 / 30.0]);
+    let expected = keys("parquet/long.parquet");
+    assert_eq!(expected[1].0, [0.0, 1.0 / 30.0, 2.0 / 30.0]);
     for name in [
         "parquet/packed_snappy.parquet",
         "parquet/packed_lz4.parquet",
@@ -238,7 +238,7 @@ fn every_way_to_pack_a_table_gives_the_same_keys() {
         "arrow/packed_zstd.arrow",
         "arrow/stream.arrows",
     ] {
-        assert_eq!(keys(name), wanted, "{name}");
+        assert_eq!(keys(name), expected, "{name}");
     }
 }
 
@@ -292,9 +292,9 @@ fn damaged(format: &str, file: usize, damage: &[(usize, u8)]) -> Vec<u8> {
     let paths = fixtures(format);
     let mut bytes = fs::read(&paths[file % paths.len()]).unwrap();
     if !bytes.is_empty() {
-        for &(place, byte) in damage {
+        for &(offset, byte) in damage {
             let length = bytes.len();
-            bytes[place % length] = byte;
+            bytes[offset % length] = byte;
         }
     }
     bytes

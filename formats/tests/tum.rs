@@ -9,7 +9,7 @@ use tumble::{FrameRate, TrackSet};
 use tumble_formats::format::{MotionOptions, WriteError};
 use tumble_formats::keyed::keyed;
 use tumble_formats::keys::Duplicates;
-use tumble_formats::motion::{Motion, Sampled};
+use tumble_formats::motion::{Motion, SampledClip};
 use tumble_formats::tum::{FORMAT, open_tum, read_tum};
 use tumble_formats::{Code, Diagnostic, Format, ReadOptions};
 
@@ -20,7 +20,7 @@ fn read(text: &str) -> Motion {
     loaded.clips[0].clone()
 }
 
-fn write(clips: &[Sampled<'_>]) -> Result<(String, Vec<Diagnostic>), WriteError> {
+fn write(clips: &[SampledClip<'_>]) -> Result<(String, Vec<Diagnostic>), WriteError> {
     let mut out = Vec::new();
     let warnings = FORMAT.write_clips(clips, &MotionOptions::default(), &mut out)?;
     Ok((String::from_utf8(out).unwrap(), warnings))
@@ -76,15 +76,15 @@ fn a_path_at_unix_times_keeps_every_digit() {
     };
     let mut count = 0;
     for (line, found) in lines.zip(found) {
-        let [given, shown] = [line, found].map(|line| line.split_once(' ').unwrap().0);
+        let [input, shown] = [line, found].map(|line| line.split_once(' ').unwrap().0);
         let short = |time: &str| time.trim_end_matches('0').trim_end_matches('.').to_owned();
-        assert_eq!(short(given), short(shown));
-        let (given, shown) = (numbers(line), numbers(found));
-        let norm = given[3..].iter().map(|x| x * x).sum::<f64>().sqrt();
+        assert_eq!(short(input), short(shown));
+        let (input, shown) = (numbers(line), numbers(found));
+        let norm = input[3..].iter().map(|x| x * x).sum::<f64>().sqrt();
         for i in 0..7 {
-            let wanted = if i < 3 { given[i] } else { given[i] / norm };
+            let expected = if i < 3 { input[i] } else { input[i] / norm };
             // Keys whose norm is within 4e-7 of 1 keep their digits.
-            assert!((shown[i] - wanted).abs() < 5e-7, "{line}: {found}");
+            assert!((shown[i] - expected).abs() < 5e-7, "{line}: {found}");
         }
         count += 1;
     }
@@ -117,8 +117,8 @@ fn files_are_known_by_their_heading_or_ending() {
     assert_eq!(detect("data.csv", positions), "csv");
     let poses = format!("{positions},q_RS_w [],q_RS_x [],q_RS_y [],q_RS_z []\n");
     assert_eq!(detect("data.csv", &poses), "euroc");
-    let turned = format!("{positions},q_RS_x [],q_RS_y [],q_RS_z [],q_RS_w []\n");
-    assert_eq!(detect("data.csv", &turned), "csv");
+    let reordered = format!("{positions},q_RS_x [],q_RS_y [],q_RS_z [],q_RS_w []\n");
+    assert_eq!(detect("data.csv", &reordered), "csv");
     assert_eq!(detect("a.dat", "# 4 3.0\n# tx ty tz"), "dat");
 }
 
@@ -200,7 +200,7 @@ fn what_a_trajectory_cannot_hold_is_refused() {
     let expected = "# timestamp tx ty tz qx qy qz qw\n# method: slerp or so\n1 0 0 0 0 0 0 1\n2 1 0 \
                     0 0 0 0 1\n";
     assert_eq!((text.as_str(), warnings), (expected, Vec::new()));
-    let refusal = |clips: &[Sampled<'_>]| match write(clips) {
+    let refusal = |clips: &[SampledClip<'_>]| match write(clips) {
         Err(WriteError::Refused(error)) => {
             assert_eq!(error.code, Code::TumWrite);
             error.message
@@ -256,10 +256,10 @@ proptest! {
     }
 
     #[test]
-    fn damaged_files_never_panic(place in 0usize..80, byte in any::<u8>(), cut in 0usize..90) {
+    fn damaged_files_never_panic(offset in 0usize..80, byte in any::<u8>(), cut in 0usize..90) {
         let mut bytes = b"1700000000.125 1 2 3 0 0 0 1\n1.7000000015e9,1e-3,2,3,0,0.6,0,.8 # x\n".to_vec();
-        let place = place % bytes.len();
-        bytes[place] = byte;
+        let offset = offset % bytes.len();
+        bytes[offset] = byte;
         bytes.truncate(cut);
         let _ = read_tum("t", &*bytes, &ReadOptions::default());
     }

@@ -2,7 +2,7 @@
 
 use tumble::{FrameRate, TrackSet};
 use tumble_formats::format::{Loaded, MotionOptions};
-use tumble_formats::motion::Sampled;
+use tumble_formats::motion::SampledClip;
 use tumble_formats::npz::write::write_npz;
 use tumble_formats::npz::{read_npy, read_npz};
 use tumble_formats::{Diagnostic, Limits, ReadOptions};
@@ -46,7 +46,7 @@ fn outcome(read: Result<Loaded, Diagnostic>) -> u64 {
     let rotations: Vec<_> = (0..frames)
         .flat_map(|frame| tracks().map(move |track| track.keys[frame]))
         .collect();
-    let sampled = Sampled {
+    let sampled = SampledClip {
         clip,
         times: clip.set.track(0).times,
         rate: None,
@@ -54,11 +54,12 @@ fn outcome(read: Result<Loaded, Diagnostic>) -> u64 {
         translations: &[],
         scales: &[],
         notes: &[],
-        of_own_keys: false,
+        is_at_keys: false,
     };
     let mut written = Vec::new();
     write_npz(&[sampled], &MotionOptions::default(), &mut written).expect("memory takes it");
-    let again = read_npz("again", written, &ReadOptions::default()).expect("our own");
+    let again =
+        read_npz("again", written, &ReadOptions::default()).expect("a written file is read again");
     assert_eq!(bits(&again.clips[0].set), bits(&clip.set));
     let names = |set: &TrackSet| {
         let names = set.tracks().map(|track| track.name.map(str::to_owned));

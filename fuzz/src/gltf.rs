@@ -2,13 +2,13 @@
 
 use std::path::Path;
 
-use tumble::{Device, Engine, FrameRate, Frames, Interpolation};
+use tumble::{Device, Engine, FrameRate, Interpolation, SampleTimes};
 use tumble_formats::format::{MotionOptions, WriteError};
 use tumble_formats::gltf::read_gltf;
 use tumble_formats::sample::{ChannelMethods, Samples};
 use tumble_formats::{Limits, ReadOptions};
 
-use super::{place_is_inside, signature};
+use super::{location_is_inside, signature};
 
 /// What is read is a valid set over a tree; sampled and written again it has as many clips.
 pub(crate) fn gltf(bytes: &[u8]) -> u64 {
@@ -23,7 +23,7 @@ pub(crate) fn gltf(bytes: &[u8]) -> u64 {
     let loaded = match read_gltf("fuzz", bytes.to_vec(), None, &options) {
         Ok(loaded) => loaded,
         Err(error) => {
-            place_is_inside(bytes, &error);
+            location_is_inside(bytes, &error);
             let hint: String = error.message.chars().rev().take(12).collect();
             return signature((error.code, hint));
         }
@@ -45,26 +45,27 @@ pub(crate) fn gltf(bytes: &[u8]) -> u64 {
                 assert!((key.as_dquat().length() - 1.0).abs() < 1e-6, "{key}");
             }
         }
-        let times = document.times(clip.place, rate).unwrap_or_default();
-        let few = (1..500).contains(&times.len());
-        sampled.push(few.then(|| {
+        let times = document.times(clip.index, rate).unwrap_or_default();
+        let is_short = (1..500).contains(&times.len());
+        sampled.push(is_short.then(|| {
             assert!(times.windows(2).all(|pair| pair[0] < pair[1]), "{times:?}");
             methods
-                .sample(&engine, clip, &Frames::at(times))
+                .sample(&engine, clip, &SampleTimes::at(times))
                 .expect("unit keys in order")
         }));
     }
     let clips = loaded.clips.iter().zip(&sampled);
     let clips = clips.filter_map(|(clip, samples)| Some((clip, samples.as_ref()?)));
     let clips: Vec<_> = clips
-        .map(|(clip, samples)| (clip.place, samples.of(clip, Some(rate), &[])))
+        .map(|(clip, samples)| (clip.index, samples.of(clip, Some(rate), &[])))
         .collect();
     let mut outcomes = Vec::new();
     for name in ["/fuzz.glb", "/fuzz.gltf"] {
         let mut out = Vec::new();
         match document.write(&clips, &MotionOptions::default(), Path::new(name), &mut out) {
             Ok(warnings) => {
-                let again = read_gltf("fuzz", out, None, &ReadOptions::default()).expect("our own");
+                let again = read_gltf("fuzz", out, None, &ReadOptions::default())
+                    .expect("a written file is read again");
                 assert_eq!(again.clips.len(), loaded.clips.len(), "{:?}", again.refused);
                 outcomes.push(warnings.first().map(|warning| warning.code));
             }

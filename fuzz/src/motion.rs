@@ -13,7 +13,7 @@ use tumble_formats::motion::Motion;
 use tumble_formats::tum::{self, read_tum};
 use tumble_formats::{Diagnostic, Limits, ReadOptions};
 
-use super::{place_is_inside, signature};
+use super::{location_is_inside, signature};
 
 fn options() -> ReadOptions {
     ReadOptions {
@@ -26,20 +26,20 @@ fn options() -> ReadOptions {
     }
 }
 
-/// The one clip of a file, its keys written again. What is refused has a place within the input.
+/// The one clip of a file, its keys written again. An error has a location within the input.
 fn written(
     bytes: &[u8],
     read: Result<Loaded, Diagnostic>,
     format: &Format,
 ) -> Result<(Motion, Vec<u8>, u64), u64> {
     let loaded = read.map_err(|error| {
-        place_is_inside(bytes, &error);
+        location_is_inside(bytes, &error);
         assert!(!error.message.is_empty());
         let hint: String = error.message.chars().rev().take(12).collect();
         signature((error.code, hint))
     })?;
     for warning in &loaded.warnings {
-        place_is_inside(bytes, warning);
+        location_is_inside(bytes, warning);
     }
     let codes: Vec<_> = loaded.warnings.iter().map(|warning| warning.code).collect();
     let clip = loaded.clips.into_iter().next().expect("one clip");
@@ -64,7 +64,7 @@ fn written(
 
 /// The same tracks below the same parents, with the same times and translations.
 fn are_alike(again: &Motion, clip: &Motion) {
-    let [found, wanted] = [again, clip].map(|clip| {
+    let [found, expected] = [again, clip].map(|clip| {
         let names = (0..clip.set.track_count()).map(|track| clip.set.track_name(track));
         let parents = clip.skeleton.iter().map(|joint| joint.parent);
         let mut samples = keyed(clip).expect("one list of times");
@@ -78,7 +78,7 @@ fn are_alike(again: &Motion, clip: &Motion) {
             samples.translations,
         )
     });
-    assert_eq!(found, wanted);
+    assert_eq!(found, expected);
 }
 
 /// The BVH parser: what it takes reads back within a millionth of a radian when it is written.
@@ -88,7 +88,8 @@ pub(crate) fn bvh(bytes: &[u8]) -> u64 {
         Ok(found) => found,
         Err(refused) => return refused,
     };
-    let again = read_bvh("fuzz", &*out, &ReadOptions::default()).expect("our own");
+    let again =
+        read_bvh("fuzz", &*out, &ReadOptions::default()).expect("a written file is read again");
     are_alike(&again.clips[0], &clip);
     let rotations = |clip: &Motion| keyed(clip).expect("one list of times").rotations;
     for (found, expected) in rotations(&again.clips[0]).into_iter().zip(rotations(&clip)) {
@@ -139,7 +140,7 @@ pub(crate) fn kitti(bytes: &[u8]) -> u64 {
         Ok(found) => found,
         Err(refused) => return refused,
     };
-    let again = read_kitti("fuzz", &*out, &options).expect("our own");
+    let again = read_kitti("fuzz", &*out, &options).expect("a written file is read again");
     are_alike(&again.clips[0], &clip);
     let rotations = |clip: &Motion| keyed(clip).expect("one list of times").rotations;
     for (found, expected) in rotations(&again.clips[0]).into_iter().zip(rotations(&clip)) {
@@ -155,7 +156,7 @@ pub(crate) fn euroc(bytes: &[u8]) -> u64 {
     let loaded = match read {
         Ok(loaded) => loaded,
         Err(error) => {
-            place_is_inside(bytes, &error);
+            location_is_inside(bytes, &error);
             assert!(!error.message.is_empty());
             let hint: String = error.message.chars().rev().take(12).collect();
             return signature((error.code, hint));
@@ -170,7 +171,8 @@ pub(crate) fn euroc(bytes: &[u8]) -> u64 {
     let Ok(_) = written else {
         return signature("times in one nanosecond");
     };
-    let again = read_euroc("fuzz", &*out, &ReadOptions::default()).expect("our own");
+    let again =
+        read_euroc("fuzz", &*out, &ReadOptions::default()).expect("a written file is read again");
     let found = keyed(&again.clips[0]).expect("one list of times");
     assert_eq!(found.rotations, samples.rotations);
     assert_eq!(found.translations.len(), samples.translations.len());
@@ -207,7 +209,8 @@ pub(crate) fn tum(bytes: &[u8]) -> u64 {
         Ok(found) => found,
         Err(refused) => return refused,
     };
-    let again = read_tum("fuzz", &*out, &ReadOptions::default()).expect("our own");
+    let again =
+        read_tum("fuzz", &*out, &ReadOptions::default()).expect("a written file is read again");
     are_alike(&again.clips[0], &clip);
     let rotations = |clip: &Motion| keyed(clip).expect("one list of times").rotations;
     assert_eq!(rotations(&again.clips[0]), rotations(&clip));

@@ -1,4 +1,4 @@
-//! The readers of what ways lead over, and of paths.
+//! The readers of meshes, nets and paths.
 
 use tumble_formats::gltf::meshes::triangles_of;
 use tumble_formats::npy::read_numbers;

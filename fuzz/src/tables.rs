@@ -4,7 +4,7 @@ use tumble_formats::arrow::read_arrow;
 use tumble_formats::csv::read::read_csv;
 use tumble_formats::format::TimeUnit;
 use tumble_formats::parquet::read_parquet;
-use tumble_formats::{Diagnostic, Loaded, Place, ReadOptions};
+use tumble_formats::{Diagnostic, Loaded, Location, ReadOptions};
 
 use super::signature;
 
@@ -56,7 +56,7 @@ fn outcome(bytes: &[u8], read: Result<Loaded, Diagnostic>) -> u64 {
         }
         Err(error) => {
             let lines = bytes.iter().filter(|&&byte| byte == b'\n').count() as u64;
-            if let Some(Place::Text { line, column }) = error.place {
+            if let Some(Location::Text { line, column }) = error.location {
                 assert!(1 <= line && line <= lines + 1, "line {line} of {lines}");
                 assert!(1 <= column && column <= bytes.len() as u64 + 1);
             }

@@ -1,4 +1,4 @@
-//! What is fuzzed, and what must hold of every outcome. Each target takes bytes and gives
+//! What is fuzzed, and what must be true of every outcome. Each target takes bytes and gives
 //! back a signature of what became of them: inputs with a new signature are worth keeping.
 
 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -12,17 +12,18 @@ mod exactness;
 use exactness::no_contraction;
 use exactness::spirv::{FloatControls, float_controls, without_decorations};
 use tumble::{
-    Device, Encoding, Engine, FrameRate, Frames, Interpolation, Layout, MAX_FRAMES, METHODS, Path,
-    Speed, TrackSet, WrapMode,
+    Device, Encoding, Engine, FrameRate, Interpolation, KeySigns, Layout, MAX_FRAMES, METHODS,
+    SampleTimes, Speed, TrackSet, WrapMode,
 };
 use tumble_formats::Limits;
 use tumble_formats::ReadOptions;
 use tumble_formats::csv::CsvWriter;
 use tumble_formats::dat::read_dat;
 use tumble_formats::dat::write::write_dat;
-use tumble_formats::npy::{ComponentOrder, NpyWriter};
+use tumble_formats::npy::NpyWriter;
+use tumble_formats::quaternion::ComponentOrder;
 use tumble_formats::times::read_times;
-use tumble_formats::{Diagnostic, Place};
+use tumble_formats::{Diagnostic, Location};
 
 #[path = "arrays.rs"]
 pub(crate) mod arrays;
@@ -37,7 +38,7 @@ pub(crate) mod surfaces;
 #[path = "tables.rs"]
 pub(crate) mod tables;
 
-/// What a target is given, and what it gives back.
+/// A target: from bytes to a hash of the outcome.
 pub(crate) type Target = fn(&[u8]) -> u64;
 
 fn signature(of: impl Hash) -> u64 {
@@ -65,10 +66,10 @@ fn bits(set: &TrackSet) -> Vec<(Vec<u64>, Vec<[u32; 4]>)> {
         .collect()
 }
 
-/// Numbers from bytes, wild ones among them.
-struct Numbers<'a>(&'a [u8]);
+/// ByteReader from bytes, wild ones among them.
+struct ByteReader<'a>(&'a [u8]);
 
-impl Numbers<'_> {
+impl ByteReader<'_> {
     fn byte(&mut self) -> u8 {
         let Some((&first, rest)) = self.0.split_first() else {
             return 0;
@@ -96,17 +97,17 @@ impl Numbers<'_> {
     }
 }
 
-/// What is said of text is said of a place in it.
-fn place_is_inside(bytes: &[u8], said: &Diagnostic) {
+/// An error or warning about text has a line and column within it.
+fn location_is_inside(bytes: &[u8], said: &Diagnostic) {
     let lines = bytes.iter().filter(|&&byte| byte == b'\n').count() as u64;
-    if let Some(Place::Text { line, column }) = said.place {
+    if let Some(Location::Text { line, column }) = said.location {
         assert!(1 <= line && line <= lines + 1, "line {line} of {lines}");
         assert!(1 <= column && column <= bytes.len() as u64 + 1);
     }
 }
 
 /// The `.dat` parser: what it takes is a valid set that reads back bit for bit, what it
-/// refuses has a place within the input.
+/// refuses has a location within the input.
 pub(crate) fn dat(bytes: &[u8]) -> u64 {
     let options = ReadOptions {
         limits: Limits {
@@ -120,7 +121,7 @@ pub(crate) fn dat(bytes: &[u8]) -> u64 {
     match read_dat("fuzz", bytes, &options) {
         Ok(loaded) => {
             for warning in &loaded.warnings {
-                place_is_inside(bytes, warning);
+                location_is_inside(bytes, warning);
             }
             for track in loaded.clips[0].set.tracks() {
                 assert!(!track.keys.is_empty());
@@ -136,13 +137,14 @@ pub(crate) fn dat(bytes: &[u8]) -> u64 {
                 loaded.box_length.unwrap_or(1.0),
             )
             .expect("memory takes everything");
-            let again = read_dat("fuzz", &*written, &ReadOptions::default()).expect("our own");
+            let again = read_dat("fuzz", &*written, &ReadOptions::default())
+                .expect("a written file is read again");
             assert_eq!(bits(&again.clips[0].set), bits(&loaded.clips[0].set));
             let codes: Vec<_> = loaded.warnings.iter().map(|w| w.code).collect();
             signature((codes, loaded.clips[0].set.track_count().min(3)))
         }
         Err(error) => {
-            place_is_inside(bytes, &error);
+            location_is_inside(bytes, &error);
             assert!(!error.message.is_empty());
             let hint: String = error.message.chars().rev().take(12).collect();
             signature((error.code, hint))
@@ -152,7 +154,7 @@ pub(crate) fn dat(bytes: &[u8]) -> u64 {
 
 /// The writers of results: what they write reads back bit for bit.
 pub(crate) fn outputs(bytes: &[u8]) -> u64 {
-    let mut numbers = Numbers(bytes);
+    let mut numbers = ByteReader(bytes);
     let (tracks, frames) = (1 + numbers.byte() as usize % 5, numbers.byte() as usize % 9);
     let kind = numbers.byte();
     let count = if kind % 16 == 15 {
@@ -206,7 +208,7 @@ pub(crate) fn outputs(bytes: &[u8]) -> u64 {
         set.push(name, &[0.0], &[Quat::IDENTITY]).expect("a key");
     }
     let times: Vec<f64> = (0..frames).map(|frame| frame as f64 / 7.0).collect();
-    let timeline = Frames::at(times)
+    let timeline = SampleTimes::at(times)
         .resolve(tracks, None)
         .expect("a few times");
     let mut text = Vec::new();
@@ -265,7 +267,7 @@ pub(crate) fn arguments(bytes: &[u8]) -> u64 {
 
 /// Frame rates and frames: the count is right, times lie in order and within the range.
 pub(crate) fn frames(bytes: &[u8]) -> u64 {
-    let mut numbers = Numbers(bytes);
+    let mut numbers = ByteReader(bytes);
     let rate = match numbers.byte() % 3 {
         0 => FrameRate::new(numbers.word(), numbers.word()),
         1 => FrameRate::new(1 + u64::from(numbers.byte()) * 250, 1001),
@@ -285,11 +287,11 @@ pub(crate) fn frames(bytes: &[u8]) -> u64 {
     let (start, end) = (numbers.float(), numbers.float());
     let tracks = numbers.word() as usize >> (numbers.byte() % 64);
     let mut requests = vec![
-        Frames::rate(rate),
-        Frames::rate(rate).between(start, end),
-        Frames::at(vec![start, end, span.0]),
+        SampleTimes::rate(rate),
+        SampleTimes::rate(rate).between(start, end),
+        SampleTimes::at(vec![start, end, span.0]),
     ];
-    requests.push(Frames::at_each(vec![start; numbers.byte() as usize]));
+    requests.push(SampleTimes::at_each(vec![start; numbers.byte() as usize]));
     let mut outcomes = Vec::new();
     for frames in requests {
         match frames.resolve(tracks, Some(span)) {
@@ -317,7 +319,7 @@ pub(crate) fn frames(bytes: &[u8]) -> u64 {
 /// Sets from slices: refused whole, or evaluated to unit rotations by every method, the
 /// same ones however the samples are asked for.
 pub(crate) fn tracks(bytes: &[u8]) -> u64 {
-    let mut numbers = Numbers(bytes);
+    let mut numbers = ByteReader(bytes);
     let method = METHODS[numbers.byte() as usize % METHODS.len()];
     let choice = numbers.byte();
     let mut set = TrackSet::new();
@@ -347,7 +349,7 @@ pub(crate) fn tracks(bytes: &[u8]) -> u64 {
     }
     let mut interpolation = Interpolation::from(method);
     if choice & 1 != 0 && method.path.is_none() {
-        interpolation.path = Path::AsAuthored;
+        interpolation.signs = KeySigns::AsAuthored;
     }
     if choice >= 250 {
         // Slow: most inputs go without.
@@ -368,14 +370,14 @@ pub(crate) fn tracks(bytes: &[u8]) -> u64 {
     let mut times: Vec<f64> = (-3..13).map(|i| at(f64::from(i) / 8.0)).collect();
     times[0] = numbers.float();
     times[15] = at(numbers.float());
-    let frames = Frames::at(times);
+    let frames = SampleTimes::at(times);
     match engine.evaluate(&set, interpolation, &frames) {
         Ok(rotations) => {
-            for (place, q) in rotations.as_quats().iter().enumerate() {
+            for (index, q) in rotations.as_quats().iter().enumerate() {
                 let norm = q.as_dquat().length();
                 assert!(
                     (norm - 1.0).abs() < 1e-5,
-                    "{method}, {place}: {q} of norm {norm}"
+                    "{method}, {index}: {q} of norm {norm}"
                 );
             }
             let clip = engine

@@ -106,14 +106,14 @@ pub(crate) struct Calls {
 /// A clip that a call is about.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct OfClip {
+struct ClipHeader {
     clip: usize,
 }
 
 /// A track of a clip.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct OfTrack {
+struct TrackHeader {
     clip: usize,
     track: usize,
 }
@@ -121,7 +121,7 @@ struct OfTrack {
 /// A file whose bytes come behind.
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase", deny_unknown_fields)]
-struct OfFile {
+struct FileHeader {
     name: String,
     /// The rate of the keys, where the file does not say it.
     source_rate: Option<String>,
@@ -155,8 +155,8 @@ impl Calls {
     /// Refuses files.
     #[cfg(not(feature = "files"))]
     #[allow(clippy::unused_self)] // as where files are read
-    fn read(&mut self, file: OfFile, _: Vec<u8>) -> Result<Answer, Fault> {
-        let OfFile {
+    fn read(&mut self, file: FileHeader, _: Vec<u8>) -> Result<Answer, Fault> {
+        let FileHeader {
             name,
             source_rate: _,
         } = file;
@@ -165,7 +165,7 @@ impl Calls {
 
     /// Reads the clips of a file.
     #[cfg(feature = "files")]
-    fn read(&mut self, file: OfFile, bytes: Vec<u8>) -> Result<Answer, Fault> {
+    fn read(&mut self, file: FileHeader, bytes: Vec<u8>) -> Result<Answer, Fault> {
         let mut options = ReadOptions::default();
         if let Some(rate) = &file.source_rate {
             options.source_rate = Some(rate.parse()?);
@@ -195,7 +195,7 @@ impl Calls {
     }
 
     /// The keys of a track.
-    fn keys(&self, of: &OfTrack) -> Result<Answer, Fault> {
+    fn keys(&self, of: &TrackHeader) -> Result<Answer, Fault> {
         let set = &find(&self.clips, of.clip)?.set;
         let track = set.get(of.track).ok_or_else(|| {
             let tracks = set.track_count();
@@ -220,7 +220,7 @@ impl Calls {
         Ok(Answer::new(json!({}), arrays))
     }
 
-    fn free(&mut self, of: &OfClip) -> Result<Answer, Fault> {
+    fn free(&mut self, of: &ClipHeader) -> Result<Answer, Fault> {
         find(&self.clips, of.clip)?;
         self.clips[of.clip] = None;
         Ok(Answer::new(json!({}), Vec::new()))
@@ -244,12 +244,12 @@ impl Calls {
             "rate": clip.rate.map(|rate| rate.to_string()),
         });
         let free = self.clips.iter().position(Option::is_none);
-        let place = free.unwrap_or(self.clips.len());
+        let slot = free.unwrap_or(self.clips.len());
         if free.is_none() {
             self.clips.push(None);
         }
-        self.clips[place] = Some(clip);
-        found["clip"] = place.into();
+        self.clips[slot] = Some(clip);
+        found["clip"] = slot.into();
         found
     }
 }

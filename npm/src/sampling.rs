@@ -4,8 +4,8 @@ use glam::{DVec3, Quat, Vec3};
 use serde::Deserialize;
 use serde_json::json;
 use tumble::{
-    Axes, Ends, Engine, FrameRate, Frames, Interpolation, Layout, METHODS, Method, Path, Quantity,
-    Speed, Tcb, WrapMode,
+    Axes, Ends, Engine, FrameRate, Interpolation, KeySigns, Layout, METHODS, Method, Quantity,
+    SampleTimes, Speed, Tcb, WrapMode,
 };
 use tumble_formats::motion::Motion;
 use tumble_formats::sample::{ChannelMethods, Samples};
@@ -145,14 +145,14 @@ impl Request {
         Method::named(name).map(Some).ok_or_else(unknown)
     }
 
-    fn frames(&self, numbers: &[f64]) -> Result<Frames, Fault> {
+    fn frames(&self, numbers: &[f64]) -> Result<SampleTimes, Fault> {
         let Some(rate) = &self.rate else {
-            return Ok(Frames::at(numbers.to_vec()));
+            return Ok(SampleTimes::at(numbers.to_vec()));
         };
         let rate: FrameRate = rate.parse()?;
         match *numbers {
-            [start, end] => Ok(Frames::rate(rate).between(start, end)),
-            [] => Ok(Frames::rate(rate)),
+            [start, end] => Ok(SampleTimes::rate(rate).between(start, end)),
+            [] => Ok(SampleTimes::rate(rate)),
             _ => Err(Fault::new("frames have a start and an end")),
         }
     }
@@ -227,9 +227,9 @@ pub(crate) fn sample(
     let (tcb, quantity) = (request.tcb()?, request.quantity());
     let with = |method: Method| Interpolation {
         method,
-        path: method.path.unwrap_or(match request.path {
-            Some(PathName::AsAuthored) => Path::AsAuthored,
-            _ => Path::Shortest,
+        signs: method.path.unwrap_or(match request.path {
+            Some(PathName::AsAuthored) => KeySigns::AsAuthored,
+            _ => KeySigns::Shortest,
         }),
         ends: request.ends.map_or(method.ends, EndsName::ends),
         tcb,

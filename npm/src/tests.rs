@@ -2,7 +2,7 @@
 
 use glam::{Quat, Vec3};
 use serde_json::{Value, json};
-use tumble::{Device, Engine, Frames, METHODS, TrackSet};
+use tumble::{Device, Engine, METHODS, SampleTimes, TrackSet};
 use tumble_formats::motion::Motion;
 use tumble_formats::packed;
 
@@ -52,7 +52,7 @@ fn samples_have_the_engine_s_bits_in_both_orders() {
     let engine = Engine::new(Device::Cpu).unwrap();
     for method in METHODS {
         let right = engine
-            .evaluate(&clip.set, method, &Frames::at(times.to_vec()))
+            .evaluate(&clip.set, method, &SampleTimes::at(times.to_vec()))
             .unwrap();
         for layout in ["track", "frame"] {
             let header = json!({
@@ -116,7 +116,7 @@ fn what_cannot_be_done_is_refused_in_words() {
         (
             3,
             json!({"clip": 0, "quantity": "pose", "rate": "0/0"}),
-            "`0/0` is no frame rate",
+            "`0/0` is not a frame rate",
         ),
         (
             3,

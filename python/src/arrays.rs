@@ -220,7 +220,7 @@ fn fours<T: Copy + Default>(
     (0..count).map(next).collect()
 }
 
-/// Rounded to f32, normalised before where that is a matter of rounding; what is no rotation is
+/// Rounded to f32, normalised before where that is a matter of rounding; what is not a rotation is
 /// left for the set to refuse.
 fn unit(key: DQuat) -> Quat {
     let is_near = (key.length() - 1.0).abs() <= tumble::NORM_TOLERANCE;

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use pyo3::prelude::*;
-use tumble::Frames;
+use tumble::SampleTimes;
 use tumble_formats::compare::{self as differences, ClipPair, CompareError, PathMeasure};
 use tumble_formats::motion::Motion;
 use tumble_formats::npz;
@@ -306,7 +306,7 @@ fn engine_of(py: Python<'_>, engine: Option<&Bound<'_, Engine>>) -> PyResult<tum
 fn of_arrays(arrays: [&Bound<'_, PyAny>; 2]) -> PyResult<ArrayDifference> {
     let read = |value: &Bound<'_, PyAny>, name: &str| {
         let Numbers { shape, values } = doubles(value, name)?;
-        Ok::<_, PyErr>(npz::Numbers { shape, values })
+        Ok::<_, PyErr>(npz::NumberArray { shape, values })
     };
     let [first, second] = [read(arrays[0], "first")?, read(arrays[1], "second")?];
     let found = differences::ArrayDifference::of(["first", "second"], [&first, &second]);
@@ -336,12 +336,12 @@ fn of_clips(
     let frames = match samples {
         None => pair.keys(&common),
         Some(Samples::Rate(rate, start, end)) => {
-            Frames::rate(rate).between(start.unwrap_or(common.start), end.unwrap_or(common.end))
+            SampleTimes::rate(rate).between(start.unwrap_or(common.start), end.unwrap_or(common.end))
         }
         Some(Samples::Shared { times, .. }) => {
             // The times are known, whatever the clips have.
             warning = None;
-            Frames::at(times.to_vec())
+            SampleTimes::at(times.to_vec())
         }
         Some(_) => {
             return Err(input(

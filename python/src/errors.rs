@@ -9,8 +9,8 @@ use pyo3::exceptions::{PyKeyboardInterrupt, PyRuntimeError};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyDict, PyType};
-use tumble::{Error, FramesError, InterpolationError, TrackError};
-use tumble_formats::diagnostic::{Code, Diagnostic, Place, Severity};
+use tumble::{Error, SampleTimesError, InterpolationError, TrackError};
+use tumble_formats::diagnostic::{Code, Diagnostic, Location, Severity};
 use tumble_formats::format::WriteError;
 use tumble_formats::output::OutputError;
 
@@ -71,11 +71,11 @@ impl From<&Diagnostic> for Found {
             file: Some(diagnostic.file.clone()),
             ..Self::default()
         };
-        match &diagnostic.place {
-            Some(Place::Text { line, column }) => {
+        match &diagnostic.location {
+            Some(Location::Text { line, column }) => {
                 (found.line, found.column) = (Some(*line), Some(*column));
             }
-            Some(Place::Inside(place)) => found.pointer = Some(place.clone()),
+            Some(Location::Inside(place)) => found.pointer = Some(place.clone()),
             None => {}
         }
         found
@@ -215,9 +215,9 @@ pub(crate) fn of_track(error: &TrackError) -> PyErr {
             input_at(&message, Code::NotFinite, at("keys", track, key))
         }
         TrackError::DataTooLarge {
-            track, key, what, ..
+            track, key, quantity: what, ..
         } => input_at(&message, Code::TooLarge, at(what, track, key)),
-        TrackError::DataNotFinite { track, key, what } => {
+        TrackError::DataNotFinite { track, key, quantity: what } => {
             input_at(&message, Code::NotFinite, at(what, track, key))
         }
         _ => input(message),
@@ -230,7 +230,7 @@ pub(crate) fn of_engine(error: &Error) -> PyErr {
     match error {
         Error::Vulkan(_) | Error::Threads(_) | Error::ExportOnCpu => device(&message),
         Error::Stopped(_) => PyKeyboardInterrupt::new_err(message),
-        Error::Frames(FramesError::TimeNotFinite { index, .. }) => {
+        Error::SampleTimes(SampleTimesError::TimeNotFinite { index, .. }) => {
             input_at(&message, Code::NotFinite, format!("at[{index}]"))
         }
         Error::Interpolation(

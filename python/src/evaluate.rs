@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyList, PySlice};
 use tumble::method::{C2, SLERP};
 use tumble::{
-    ComponentType, Encoding, Engine, Frames, Interpolation, Layout, Method, Quantity, TrackSet,
+    ComponentType, Encoding, Engine, SampleTimes, Interpolation, Layout, Method, Quantity, TrackSet,
 };
 use tumble_cli::host;
 use tumble_formats::Diagnostic;
@@ -85,7 +85,7 @@ struct Work<'a> {
     clip: &'a Motion,
     request: &'a Request,
     samples: &'a Samples,
-    frames: &'a Frames,
+    frames: &'a SampleTimes,
     /// Samples of a track.
     count: usize,
 }

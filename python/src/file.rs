@@ -50,7 +50,7 @@ impl File {
             motion
                 .name
                 .clone()
-                .unwrap_or_else(|| motion.place.to_string())
+                .unwrap_or_else(|| motion.index.to_string())
         };
         self.clips.iter().map(name).collect()
     }

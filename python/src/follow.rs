@@ -6,7 +6,7 @@ use numpy::PyArrayMethods;
 use pyo3::prelude::*;
 use pyo3::types::{PyString, PyTuple};
 use tumble::{
-    BodyAxis, Direction, Follow, FollowError, Frame, Layout, PathSpeed, Twist, VectorMethod,
+    BodyAxis, Direction, Follow, FollowError, PathFrame, Layout, PathSpeed, Twist, VectorMethod,
 };
 use tumble_formats::path::{Pace, PathPoints, paths_of};
 
@@ -80,9 +80,9 @@ impl Options<'_, '_> {
             },
         };
         let frames = [
-            ("minimal", Frame::Minimal),
-            ("fixed", Frame::Fixed),
-            ("frenet", Frame::Frenet),
+            ("minimal", PathFrame::Minimal),
+            ("fixed", PathFrame::Fixed),
+            ("frenet", PathFrame::Frenet),
         ];
         let twists = [("spread", Twist::Spread), ("free", Twist::Free)];
         let rest = Follow::default();

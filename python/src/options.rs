@@ -8,7 +8,7 @@ use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString};
 use tumble::{
-    Ends, FrameRate, Frames, Interpolation, METHODS, Method, Path, Quantity, Speed, Tcb, TrackSet,
+    Ends, FrameRate, SampleTimes, Interpolation, METHODS, Method, KeySigns, Quantity, Speed, Tcb, TrackSet,
     WrapMode,
 };
 
@@ -41,7 +41,7 @@ pub(crate) struct Request {
 
 #[derive(Debug, Clone, Copy)]
 struct Manner {
-    path: Path,
+    path: KeySigns,
     ends: Option<Ends>,
     speed: Speed,
     before: WrapMode,
@@ -59,7 +59,7 @@ impl Request {
             samples: None,
             method: None,
             manner: Manner {
-                path: Path::Shortest,
+                path: KeySigns::Shortest,
                 ends: None,
                 speed: Speed::AsKeyed,
                 before: WrapMode::Hold,
@@ -91,8 +91,8 @@ impl Request {
                         &value,
                         "path",
                         &[
-                            ("shortest", Path::Shortest),
-                            ("as-authored", Path::AsAuthored),
+                            ("shortest", KeySigns::Shortest),
+                            ("as-authored", KeySigns::AsAuthored),
                         ],
                     )?;
                 }
@@ -128,7 +128,7 @@ impl Request {
         let manner = self.manner;
         move |method| Interpolation {
             method,
-            path: method.path.unwrap_or(manner.path),
+            signs: method.path.unwrap_or(manner.path),
             ends: manner.ends.unwrap_or(method.ends),
             tcb: manner.tcb,
             quantity,
@@ -146,13 +146,13 @@ impl Request {
 
 impl Samples {
     /// The samples of some tracks of a set as the engine takes them.
-    pub(crate) fn frames(&self, set: &TrackSet, tracks: Option<&[usize]>) -> PyResult<Frames> {
+    pub(crate) fn frames(&self, set: &TrackSet, tracks: Option<&[usize]>) -> PyResult<SampleTimes> {
         Ok(match self {
             &Self::Rate(rate, start, end) => {
                 let (first, last) = set.time_span().unwrap_or((0.0, 0.0));
-                Frames::rate(rate).between(start.unwrap_or(first), end.unwrap_or(last))
+                SampleTimes::rate(rate).between(start.unwrap_or(first), end.unwrap_or(last))
             }
-            Self::Shared { times, .. } => Frames::at(times.to_vec()),
+            Self::Shared { times, .. } => SampleTimes::at(times.to_vec()),
             Self::Each { times, count } => {
                 let given = times.len() / (*count).max(1);
                 if given != set.track_count() && !times.is_empty() {
@@ -162,10 +162,10 @@ impl Samples {
                     )));
                 }
                 match tracks {
-                    None => Frames::at_each(times.to_vec()),
+                    None => SampleTimes::at_each(times.to_vec()),
                     Some(tracks) => {
                         let row = |&track: &usize| &times[track * count..(track + 1) * count];
-                        Frames::at_each(tracks.iter().flat_map(row).copied().collect())
+                        SampleTimes::at_each(tracks.iter().flat_map(row).copied().collect())
                     }
                 }
             }
@@ -179,7 +179,7 @@ impl Samples {
     }
 
     /// As [`Samples::frames`], and how many there are.
-    pub(crate) fn resolved(&self, set: &TrackSet) -> PyResult<(Frames, usize)> {
+    pub(crate) fn resolved(&self, set: &TrackSet) -> PyResult<(SampleTimes, usize)> {
         let frames = self.frames(set, None)?;
         let timeline = frames
             .resolve(set.track_count(), set.time_span())
@@ -235,7 +235,7 @@ pub(crate) fn frame_rate(value: &Bound<'_, PyAny>) -> PyResult<FrameRate> {
     let text = value.str()?;
     text.to_str()?
         .parse()
-        .map_err(|error: tumble::FramesError| input(format!("fps: {error}")))
+        .map_err(|error: tumble::SampleTimesError| input(format!("fps: {error}")))
 }
 
 fn method(value: &Bound<'_, PyAny>) -> PyResult<Option<Method>> {

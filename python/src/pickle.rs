@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 use tumble::{Channel, Tcb, Track, TrackError, TrackSet};
 use tumble_formats::bvh::{BvhChannel, BvhJoint};
-use tumble_formats::motion::{Body, Channels, Joint, Motion, Sampler, Shape, Transform};
+use tumble_formats::motion::{Body, Channels, Joint, Motion, ChannelInterpolation, Shape, Transform};
 
 use crate::clip::{Clip, Source};
 use crate::errors::{guarded, input, of_track};
@@ -18,7 +18,7 @@ use crate::errors::{guarded, input, of_track};
 const VECTORS: [Channel; 2] = [Channel::Translation, Channel::Scale];
 
 /// The samplers, as they are numbered in a pickle, from 1; 0 is none.
-const SAMPLERS: [Sampler; 3] = [Sampler::Step, Sampler::Linear, Sampler::Cubic];
+const SAMPLERS: [ChannelInterpolation; 3] = [ChannelInterpolation::Step, ChannelInterpolation::Linear, ChannelInterpolation::Cubic];
 
 /// An array of rows with so many numbers each.
 fn rows<T: numpy::Element>(
@@ -109,7 +109,7 @@ pub(crate) fn state<'py>(py: Python<'py>, clip: &Clip) -> PyResult<Bound<'py, Py
     };
     let rests: Vec<f32> = motion.skeleton.iter().flat_map(rest).collect();
     state.set_item("rests", rows(py, rests, 10)?)?;
-    let number = |sampler: Option<Sampler>| {
+    let number = |sampler: Option<ChannelInterpolation>| {
         let place = SAMPLERS.iter().position(|&one| Some(one) == sampler);
         place.map_or(0, |place| place as i64 + 1)
     };
@@ -132,7 +132,7 @@ pub(crate) fn state<'py>(py: Python<'py>, clip: &Clip) -> PyResult<Bound<'py, Py
     }
     state.set_item("bvh", bvh)?;
     state.set_item("name", &motion.name)?;
-    state.set_item("place", motion.place)?;
+    state.set_item("place", motion.index)?;
     state.set_item("rate", motion.rate.map(|rate| rate.to_string()))?;
     state.set_item("is_world", motion.is_world)?;
     state.set_item("time_offset", motion.time_offset)?;
@@ -323,11 +323,11 @@ fn motion_of(state: &Bound<'_, PyDict>) -> PyResult<Motion> {
     };
     Ok(Motion {
         name: entry(state, "name")?.extract()?,
-        place: entry(state, "place")?.extract()?,
+        index: entry(state, "place")?.extract()?,
         set,
         skeleton: parents.into_iter().zip(rests).map(joint).collect(),
         channels: channels.collect(),
-        rate: rate.map_err(|error: tumble::FramesError| input(error.to_string()))?,
+        rate: rate.map_err(|error: tumble::SampleTimesError| input(error.to_string()))?,
         is_world: entry(state, "is_world")?.extract()?,
         time_offset: entry(state, "time_offset")?.extract()?,
         origins: origins.into_iter().map(DVec3::from_array).collect(),

@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use numpy::PyArray1;
 use pyo3::prelude::*;
-use tumble::Frames;
+use tumble::SampleTimes;
 use tumble::reduce::ReducedCurve;
-use tumble_formats::motion::Sampler;
+use tumble_formats::motion::ChannelInterpolation;
 use tumble_formats::reduce::{ReduceMotionError, ReduceOptions, Reduced, reduce as reduced};
 
 use crate::clip::Clip;
@@ -124,7 +124,7 @@ pub(crate) fn reduce(
         && motion
             .channels
             .iter()
-            .any(|channels| channels.has(Sampler::Cubic))
+            .any(|channels| channels.has(ChannelInterpolation::Cubic))
     {
         return Err(input(
             "its keys are joined by cubics with tangents, so they are not its samples; give `fps`",
@@ -145,7 +145,7 @@ pub(crate) fn reduce(
     let found = interruptible(py, move || {
         let sampled = match rate {
             Some(rate) => {
-                let sampled = motion.sampled(&engine, &Frames::rate(rate));
+                let sampled = motion.sampled(&engine, &SampleTimes::rate(rate));
                 Some(sampled.map_err(|error| of_engine(&error))?)
             }
             None => None,

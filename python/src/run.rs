@@ -7,7 +7,7 @@ use std::time::Duration;
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use tumble::{
-    Encoding, Engine, ExportedResult, Frames, Interpolation, Layout, Speed, Stop, TrackSet,
+    Encoding, Engine, ExportedResult, SampleTimes, Interpolation, Layout, Speed, Stop, TrackSet,
 };
 
 use crate::errors::{guarded, of_engine};
@@ -31,7 +31,7 @@ pub(crate) struct Job<'a> {
     pub(crate) engine: &'a Engine,
     pub(crate) set: &'a TrackSet,
     pub(crate) interpolation: Interpolation,
-    pub(crate) frames: &'a Frames,
+    pub(crate) frames: &'a SampleTimes,
     /// Samples of each track.
     pub(crate) samples: usize,
     pub(crate) layout: Layout,

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use tumble::{Encoding, Engine, Error, FrameRate, Frames, Layout, Quantity, Stop};
+use tumble::{Encoding, Engine, Error, FrameRate, SampleTimes, Layout, Quantity, Stop};
 use tumble_formats::Diagnostic;
 use tumble_formats::diagnostic::Code;
 use tumble_formats::format::{
@@ -15,8 +15,8 @@ use tumble_formats::format::{
 };
 use tumble_formats::keyed::keyed;
 use tumble_formats::kitti::write_frame_times;
-use tumble_formats::motion::{Motion, Sampled};
-use tumble_formats::npy::ComponentOrder;
+use tumble_formats::motion::{Motion, SampledClip};
+use tumble_formats::quaternion::ComponentOrder;
 use tumble_formats::output::Output;
 use tumble_formats::sample::{ChannelMethods, Samples};
 
@@ -300,7 +300,7 @@ impl Save {
         let keys = self.clips.iter().map(|clip| keyed(&clip.motion));
         let keys: Result<Vec<Samples>, _> = keys.collect();
         let keys = keys.map_err(|error| input(error.to_string()))?;
-        let sampled: Vec<Sampled<'_>> = (self.clips.iter().zip(&keys))
+        let sampled: Vec<SampledClip<'_>> = (self.clips.iter().zip(&keys))
             .map(|(clip, keys)| {
                 let rate = clip.motion.rate.or_else(|| clip.motion.rate_of_keys());
                 keys.of(&clip.motion, rate, &[])
@@ -312,7 +312,7 @@ impl Save {
 
     fn write_clips(
         &self,
-        sampled: &[Sampled<'_>],
+        sampled: &[SampledClip<'_>],
         out: &mut dyn Write,
         times: &mut Vec<u8>,
     ) -> Result<Vec<Diagnostic>, WriteError> {
@@ -331,12 +331,12 @@ impl Save {
         rate: FrameRate,
         out: &mut dyn Write,
     ) -> PyResult<Vec<Diagnostic>> {
-        let times = |clip: &&Motion| document.times(clip.place, rate).map(Frames::at);
-        let frames: Result<Vec<Frames>, Diagnostic> = clips.iter().map(times).collect();
+        let times = |clip: &&Motion| document.times(clip.index, rate).map(SampleTimes::at);
+        let frames: Result<Vec<SampleTimes>, Diagnostic> = clips.iter().map(times).collect();
         let frames = frames.map_err(|error| of_write(&error.into()))?;
         self.written(clips, &frames, Some(rate), |sampled| {
-            let places = clips.iter().map(|clip| clip.place);
-            let clips: Vec<(usize, Sampled<'_>)> = places.zip(sampled.iter().cloned()).collect();
+            let places = clips.iter().map(|clip| clip.index);
+            let clips: Vec<(usize, SampledClip<'_>)> = places.zip(sampled.iter().cloned()).collect();
             document.write(&clips, &self.motion, &self.path, out)
         })
     }
@@ -350,7 +350,7 @@ impl Save {
         times: &mut Vec<u8>,
     ) -> PyResult<Vec<Diagnostic>> {
         let frames = clips.iter().map(|clip| Ok(samples.resolved(&clip.set)?.0));
-        let frames: Vec<Frames> = frames.collect::<PyResult<_>>()?;
+        let frames: Vec<SampleTimes> = frames.collect::<PyResult<_>>()?;
         let rate = match samples {
             Wanted::Rate(rate, ..) => Some(*rate),
             _ => None,
@@ -363,9 +363,9 @@ impl Save {
     fn written(
         &self,
         clips: &[&Motion],
-        frames: &[Frames],
+        frames: &[SampleTimes],
         rate: Option<FrameRate>,
-        write: impl FnOnce(&[Sampled<'_>]) -> Result<Vec<Diagnostic>, WriteError>,
+        write: impl FnOnce(&[SampledClip<'_>]) -> Result<Vec<Diagnostic>, WriteError>,
     ) -> PyResult<Vec<Diagnostic>> {
         let mut all = Vec::new();
         for (clip, frames) in clips.iter().zip(frames) {
@@ -380,7 +380,7 @@ impl Save {
             all.push(samples.map_err(|error| of_engine(&error))?);
         }
         let notes = self.notes();
-        let sampled: Vec<Sampled<'_>> = (clips.iter().zip(&all))
+        let sampled: Vec<SampledClip<'_>> = (clips.iter().zip(&all))
             .map(|(clip, samples)| samples.of(clip, rate, &notes))
             .collect();
         write(&sampled).map_err(|error| of_write(&error))
@@ -446,7 +446,7 @@ fn stream(
     engine: &Engine,
     clip: &Motion,
     interpolation: tumble::Interpolation,
-    frames: &Frames,
+    frames: &SampleTimes,
     layout: Layout,
     mut sink: impl FnMut(&[glam::Quat]) -> PyResult<()>,
 ) -> PyResult<()> {

@@ -48,7 +48,7 @@ pub(crate) fn merge(py: Python<'_>, folder: PathBuf) -> PyResult<Outcome> {
 /// A library, cut into shards.
 #[pyclass(frozen, module = "tumble")]
 pub(crate) struct Plan {
-    own: shards::Plan,
+    own: shards::LibraryPlan,
 }
 
 #[pymethods]
@@ -65,7 +65,7 @@ impl Plan {
     ) -> PyResult<Self> {
         py.detach(|| {
             guarded(|| {
-                let own = shards::Plan::new(&line, &library, listed, &folder, shard_bytes, into);
+                let own = shards::LibraryPlan::new(&line, &library, listed, &folder, shard_bytes, into);
                 Ok(Self {
                     own: own.map_err(refuse)?,
                 })
@@ -164,7 +164,7 @@ impl Worker {
         inputs: Vec<(PathBuf, PathBuf)>,
         record: bool,
     ) -> PyResult<Outcome> {
-        let task = shards::Task {
+        let task = shards::ShardTask {
             shard,
             of,
             plan,

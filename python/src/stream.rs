@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use numpy::{PyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PySlice;
-use tumble::{Encoding, Engine, Frames, Interpolation, Layout, Quantity};
+use tumble::{Encoding, Engine, SampleTimes, Interpolation, Layout, Quantity};
 use tumble_formats::motion::Motion;
 
 use crate::arrays::Order;
@@ -34,7 +34,7 @@ pub(crate) struct Chunks {
 /// How the rotations of a chunk are made.
 enum Source {
     /// Tracks that one method interpolates, prepared for each chunk.
-    Tracks(Box<Interpolation>, Frames),
+    Tracks(Box<Interpolation>, SampleTimes),
     /// Tracks that have been prepared: all of them by one method, or those of each method.
     Prepared(Vec<Group>),
 }
@@ -42,7 +42,7 @@ enum Source {
 /// Tracks that one method interpolates.
 struct Group {
     clip: tumble::Clip,
-    frames: Frames,
+    frames: SampleTimes,
     /// Their places among all tracks, increasing; nothing where they are all.
     tracks: Option<Vec<usize>>,
 }

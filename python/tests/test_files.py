@@ -398,7 +398,7 @@ def test_clips_of_a_table_keep_skeletons_of_their_own(tmp_path, rng):
 
 def test_columns_that_are_left_out_are_said(tmp_path):
     (tmp_path / "a.csv").write_text("time,x,y,z,w,note\n0,0,0,0,1,a\n1,0,0,0,1,b\n", encoding="utf-8")
-    with pytest.warns(tumble.InputWarning, match="left out, .*: `note`; map names what is"):
+    with pytest.warns(tumble.InputWarning, match="left out, .*: `note`; name the keys with map"):
         tumble.load(tmp_path / "a.csv")
     pa = pytest.importorskip("pyarrow")
     parquet = pytest.importorskip("pyarrow.parquet")

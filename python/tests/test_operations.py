@@ -153,7 +153,7 @@ def test_smooth_has_the_bits_of_the_program(rng, engine, tmp_path):
 def test_what_cannot_be_smoothed(rng, engine):
     q = unit(rng, 9)
     for options, message in [
-        (dict(kernel="median:3"), "kernel: there is no kernel `median:3`"),
+        (dict(kernel="median:3"), "kernel: unknown kernel `median:3`"),
         (dict(kernel="box:2", low_pass=3.0, fps=60), "exclude each other"),
         (dict(low_pass=3.0), "low_pass: give `fps` too"),
         (dict(fps=60), "it goes with `low_pass`"),

@@ -36,7 +36,7 @@ fn terrain(triangles: usize, roughness: f64) -> (Vec<DVec3>, Vec<[u32; 3]>) {
     (positions, faces)
 }
 
-/// The most memory that the process had, in bytes, where the system tells.
+/// The peak memory of the process, in bytes, where the system reports it.
 fn peak() -> Option<f64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status
@@ -48,7 +48,7 @@ fn peak() -> Option<f64> {
 
 fn main() {
     let mut arguments = std::env::args().skip(1);
-    let given: Option<usize> = arguments.next().and_then(|text| text.parse().ok());
+    let requested: Option<usize> = arguments.next().and_then(|text| text.parse().ok());
     let by: By = arguments
         .next()
         .and_then(|text| text.parse().ok())
@@ -57,7 +57,7 @@ fn main() {
         .next()
         .and_then(|text| text.parse().ok())
         .unwrap_or(0.3);
-    let sizes = given.map_or(vec![10_000, 100_000], |own| vec![own]);
+    let sizes = requested.map_or(vec![10_000, 100_000], |count| vec![count]);
     for size in sizes {
         let (positions, faces) = terrain(size, roughness);
         let started = Instant::now();

@@ -1,11 +1,11 @@
-//! The shortest way along edges (Dijkstra, 1959).
+//! The shortest path along edges (Dijkstra, 1959).
 
 use std::cmp::{Ordering, Reverse};
 use std::collections::BinaryHeap;
 
+use crate::endpoints::Task;
 use crate::mesh::links::NONE;
 use crate::mesh::surface::{Spot, Surface};
-use crate::places::Task;
 
 /// A distance that can be ordered: none is NaN.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -25,8 +25,8 @@ impl Ord for Distance {
     }
 }
 
-/// For every vertex the length of the shortest way along edges, and the vertex before it on that
-/// way; infinite and [`NONE`] where no way leads.
+/// For every vertex the length of the shortest path along edges, and the vertex before it on that
+/// path; infinite and [`NONE`] where no path leads.
 pub(crate) fn distances(surface: &Surface, start: u32) -> (Vec<f64>, Vec<u32>) {
     let mut lengths = vec![f64::INFINITY; surface.positions.len()];
     let mut before = vec![NONE; surface.positions.len()];
@@ -48,15 +48,15 @@ pub(crate) fn distances(surface: &Surface, start: u32) -> (Vec<f64>, Vec<u32>) {
     (lengths, before)
 }
 
-/// The way from start to goal, which lie on one piece.
-pub(crate) fn way(task: &Task<'_>) -> Vec<Spot> {
+/// The path from start to goal, which lie on one piece.
+pub(crate) fn find_path(task: &Task<'_>) -> Vec<Spot> {
     let (_, before) = distances(&task.surface, task.start);
-    let mut way = vec![Spot::vertex(task.goal)];
+    let mut path = vec![Spot::vertex(task.goal)];
     let mut vertex = task.goal;
     while vertex != task.start && before[vertex as usize] != NONE {
         vertex = before[vertex as usize];
-        way.push(Spot::vertex(vertex));
+        path.push(Spot::vertex(vertex));
     }
-    way.reverse();
-    way
+    path.reverse();
+    path
 }

@@ -1,4 +1,4 @@
-//! What is wrong with an input, in words for people.
+//! Errors and warnings about meshes and routes.
 
 use glam::DVec3;
 use thiserror::Error;
@@ -10,7 +10,7 @@ pub enum MeshError {
     /// No face that has an area.
     #[error("the mesh has no faces; give one with triangles or polygons")]
     Empty,
-    /// A coordinate is NaN or infinite, or beyond 1e75, where areas are no numbers.
+    /// A coordinate is NaN or infinite, or beyond 1e75, where areas overflow.
     #[error("vertex {vertex} (from 0) is at {position}; coordinates must be numbers below 1e75")]
     NotFinite {
         /// Counted from 0.
@@ -55,7 +55,7 @@ pub enum MeshError {
     },
     /// A polygon of very many corners that is not convex.
     #[error(
-        "face {face} (from 0) is not convex and has {corners} corners, and can have {most}; cut it into triangles"
+        "face {face} (from 0) is not convex and has {corners} corners, and can have {max}; cut it into triangles"
     )]
     TooManyCorners {
         /// Counted from 0.
@@ -63,25 +63,25 @@ pub enum MeshError {
         /// How many it has.
         corners: usize,
         /// How many it can have.
-        most: usize,
+        max: usize,
     },
     /// A distance for welding that is none.
     #[error("vertices cannot be welded within {tolerance}; give a distance from 0")]
     Weld {
-        /// What was given.
+        /// The distance.
         tolerance: f64,
     },
     /// More triangles than are counted in 32 bits, three corners each.
-    #[error("the mesh has {triangles} triangles, and can have {most}; simplify it")]
+    #[error("the mesh has {triangles} triangles, and can have {max}; simplify it")]
     TooMany {
         /// How many it has.
         triangles: usize,
         /// How many it can have.
-        most: usize,
+        max: usize,
     },
 }
 
-/// What is odd with a mesh that is used all the same.
+/// Something unusual about a mesh, which is used all the same.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum MeshWarning {
@@ -123,7 +123,7 @@ pub enum MeshWarning {
     },
     /// Open sides that almost touch.
     #[error(
-        "{count} corners are within {distance:e} of an open side that they do not touch, as at a seam; ways do not cross it: weld them (--weld DISTANCE)"
+        "{count} corners are within {distance:e} of an open side that they do not touch, as at a seam; routes do not cross it: weld them (--weld DISTANCE)"
     )]
     Seam {
         /// How many.
@@ -131,9 +131,11 @@ pub enum MeshWarning {
         /// The distance that was looked at.
         distance: f64,
     },
-    /// Triangles that ran the other way round than their neighbours.
-    #[error("{count} triangles wind otherwise than their neighbours; they are turned")]
-    Turned {
+    /// Triangles that were wound in the opposite direction to their neighbours.
+    #[error(
+        "{count} triangles wind in the opposite direction to their neighbours; they are reversed"
+    )]
+    Rewound {
         /// How many.
         count: usize,
     },
@@ -147,7 +149,7 @@ pub enum MeshWarning {
 #[non_exhaustive]
 pub enum RouteError {
     /// A coordinate of the start or the goal is NaN or infinite.
-    #[error("{point} is no point; its coordinates must be finite numbers")]
+    #[error("invalid point {point}: coordinates must be finite numbers")]
     NotFinite {
         /// The point.
         point: DVec3,
@@ -175,33 +177,33 @@ pub enum RouteError {
         distance: f64,
     },
     /// Neither half of the cut arrives.
-    #[error("the cut by the plane does not lead from start to goal; take `--by exact`")]
-    NoPlaneWay,
+    #[error("the cut by the plane does not lead from start to goal; use `--by exact`")]
+    NoPlaneRoute,
     /// No normal tells which plane is meant.
     #[error(
-        "no plane is given: the normals at start and goal are opposite, or run along the line \
-         between them; take `--by exact`"
+        "the plane is not defined: the normals at start and goal are opposite, or run along the line \
+         between them; use `--by exact`"
     )]
     NoPlane,
     /// An edge of three faces: the cut branches.
     #[error(
-        "a cut by a plane wants edges of at most two faces, and the mesh has edges of more; take `--by exact`"
+        "a cut by a plane needs edges of at most two faces, and this mesh has edges of three or more; use `--by exact`"
     )]
     PlaneBranches,
     /// A surface with one side has no normals.
     #[error(
-        "the surface has one side only, as a Möbius strip, and so no normals; take `--by exact`"
+        "the surface has one side only, as a Möbius strip, and so no normals; use `--by exact`"
     )]
     OneSided,
-    /// The search for the shortest way would take more memory than it may.
+    /// The search for the shortest route needs too much memory.
     #[error(
-        "the shortest way over {triangles} triangles needs more than {most} windows, about 1 GiB; \
-         simplify the mesh, or take `--by edges`"
+        "the shortest route over {triangles} triangles needs more than {max} windows, about 1 GiB; \
+         simplify the mesh, or use `--by edges`"
     )]
     TooLarge {
         /// Triangles of the mesh.
         triangles: usize,
         /// Windows that are kept at most.
-        most: usize,
+        max: usize,
     },
 }

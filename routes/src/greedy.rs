@@ -1,20 +1,20 @@
 //! A walk along edges, each time the one that points most nearly to the goal.
 
+use crate::endpoints::Task;
 use crate::mesh::surface::Spot;
-use crate::places::Task;
 
 /// Cosines nearer to each other than this are the same; the vertex with the lower number is taken.
 const SAME: f64 = 1e-12;
 
-/// The way from start to goal, which lie on one piece. No vertex is visited twice: from a dead end
-/// the walk goes back, and what it went back from is no part of the way.
-pub(crate) fn way(task: &Task<'_>) -> Vec<Spot> {
+/// The path from start to goal, which lie on one piece. No vertex is visited twice: from a dead end
+/// the walk goes back, and the vertices that it went back from are not part of the path.
+pub(crate) fn find_path(task: &Task<'_>) -> Vec<Spot> {
     let surface = &*task.surface;
     let goal = surface.positions[task.goal as usize];
     let mut visited = vec![false; surface.positions.len()];
     visited[task.start as usize] = true;
-    let mut way = vec![task.start];
-    while let Some(&vertex) = way.last() {
+    let mut path = vec![task.start];
+    while let Some(&vertex) = path.last() {
         if vertex == task.goal {
             break;
         }
@@ -32,8 +32,8 @@ pub(crate) fn way(task: &Task<'_>) -> Vec<Spot> {
             } else {
                 edge.dot(to_goal)
             };
-            let is_better = best.is_none_or(|(most, lowest)| {
-                cosine > most + SAME || (cosine >= most - SAME && other < lowest)
+            let is_better = best.is_none_or(|(highest, lowest)| {
+                cosine > highest + SAME || (cosine >= highest - SAME && other < lowest)
             });
             if is_better {
                 best = Some((cosine, other));
@@ -42,12 +42,12 @@ pub(crate) fn way(task: &Task<'_>) -> Vec<Spot> {
         match best {
             Some((_, other)) => {
                 visited[other as usize] = true;
-                way.push(other);
+                path.push(other);
             }
             None => {
-                way.pop();
+                path.pop();
             }
         }
     }
-    way.into_iter().map(Spot::vertex).collect()
+    path.into_iter().map(Spot::vertex).collect()
 }

@@ -11,18 +11,18 @@ use crate::route::{By, Route};
 use crate::together;
 
 /// Triangles that halving may make.
-pub const MOST_TRIANGLES: usize = 4_000_000;
+pub const MAX_TRIANGLES: usize = 4_000_000;
 
 /// A point is on free ground when that is nearer than this part of the mesh's size.
 const ON_GROUND: f64 = 1e-9;
 
-/// What is kept clear of.
+/// The obstacles and slopes that a route keeps clear of.
 #[derive(Debug, Clone, Copy)]
 pub struct Clear<'a> {
     /// The obstacles, which stand still. Their surfaces count: ground within them is cut off by the
     /// hole about it.
     pub obstacles: Option<&'a Mesh>,
-    /// How far every point of a way stays from them, in the unit of the mesh.
+    /// How far every point of a route stays from them, in the unit of the mesh.
     pub clearance: f64,
     /// Triangles at the edge of a hole are halved until their longest edge is at most so long.
     pub finest: f64,
@@ -39,33 +39,33 @@ pub enum GroundError {
     /// The clearance is negative, or no number.
     #[error("the clearance is {clearance}; give a number of 0 or more")]
     Clearance {
-        /// What was given.
+        /// The value.
         clearance: f64,
     },
     /// The finest edge is not a number over 0.
     #[error("the finest edge is {finest}; give a number over 0")]
     Finest {
-        /// What was given.
+        /// The value.
         finest: f64,
     },
-    /// The slope is not between 0 and a quarter turn, or there is no direction upwards.
+    /// The slope is not between 0 and 90°, or there is no direction upwards.
     #[error("slopes are from 0 to 90 degrees against a direction that is not 0")]
     Slope,
     /// Halving to the finest edge makes too many triangles.
-    #[error("more than {MOST_TRIANGLES} triangles at a finest edge of {finest}; give a longer one")]
+    #[error("more than {MAX_TRIANGLES} triangles at a finest edge of {finest}; give a longer one")]
     TooFine {
-        /// What was given.
+        /// The value.
         finest: f64,
     },
     /// Nothing is free.
     #[error("no ground is free: all of it is within the clearance, or too steep")]
     Nothing,
-    /// What is left is no mesh.
+    /// The free triangles do not make a valid mesh.
     #[error(transparent)]
     Mesh(#[from] MeshError),
 }
 
-/// What is free of a mesh.
+/// The part of a mesh that is free.
 #[derive(Debug, Clone)]
 pub struct Ground<'a> {
     whole: &'a Mesh,
@@ -75,9 +75,9 @@ pub struct Ground<'a> {
     pub triangles: usize,
 }
 
-/// What becomes of a triangle.
+/// Whether a triangle is free.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Fate {
+enum TriangleClass {
     Free,
     Closed,
     /// Partly both, as far as one can tell.
@@ -87,7 +87,7 @@ enum Fate {
 impl<'a> Ground<'a> {
     /// Cuts holes into a mesh. A triangle stays when the distance of its centre from the obstacles
     /// is at least the clearance and its own radius together, so that all of its points are clear;
-    /// ways on what is left are free by construction, and shortest up to the finest edge.
+    /// routes on the rest are free by construction, and shortest up to the finest edge.
     ///
     /// Triangles at the edge of a hole are halved at their longest edges, together with their
     /// neighbours there, so that no vertex lies within an edge (Rivara, 1984).
@@ -114,43 +114,43 @@ impl<'a> Ground<'a> {
             let normal = (b - a).cross(c - a).normalize_or_zero();
             normal.dot(up).abs() >= least_up - 1e-12
         };
-        let fate = |corners: [DVec3; 3]| match clear.obstacles {
-            Some(obstacles) => fate(obstacles, clearance, corners),
-            None => Fate::Free,
+        let class_of = |corners: [DVec3; 3]| match clear.obstacles {
+            Some(obstacles) => classify(obstacles, clearance, corners),
+            None => TriangleClass::Free,
         };
         let mut positions = mesh.positions().to_vec();
         let level = mesh.triangles().iter().copied();
         let mut triangles: Vec<[u32; 3]> = level
-            .filter(|own| is_level(own.map(|vertex| positions[vertex as usize])))
+            .filter(|corners| is_level(corners.map(|vertex| positions[vertex as usize])))
             .collect();
         // Halves of a triangle that is free are free, and so for one that is closed.
-        let mut fates = vec![Fate::Open; triangles.len()];
+        let mut classes = vec![TriangleClass::Open; triangles.len()];
         loop {
-            let corners = |own: &[u32; 3]| own.map(|vertex| positions[vertex as usize]);
-            let open = |own: &usize| fates[*own] == Fate::Open;
+            let corners = |triangle: &[u32; 3]| triangle.map(|vertex| positions[vertex as usize]);
+            let open = |i: &usize| classes[*i] == TriangleClass::Open;
             let open: Vec<usize> = (0..triangles.len()).filter(open).collect();
-            let found = together::map(&open, |&own| fate(corners(&triangles[own])));
-            for (own, fate) in open.into_iter().zip(found) {
-                fates[own] = fate;
+            let found = together::map(&open, |&i| class_of(corners(&triangles[i])));
+            for (i, class) in open.into_iter().zip(found) {
+                classes[i] = class;
             }
-            let is_coarse = |(own, triangle): (&Fate, &[u32; 3])| {
-                *own == Fate::Open
+            let is_coarse = |(class, triangle): (&TriangleClass, &[u32; 3])| {
+                *class == TriangleClass::Open
                     && sides(corners(triangle)).into_iter().fold(0.0, f64::max) > finest
             };
-            let coarse: Vec<bool> = fates.iter().zip(&triangles).map(is_coarse).collect();
+            let coarse: Vec<bool> = classes.iter().zip(&triangles).map(is_coarse).collect();
             if !coarse.contains(&true) {
                 break;
             }
-            halve(&mut positions, &mut triangles, &mut fates, &coarse);
-            if triangles.len() > MOST_TRIANGLES {
+            halve(&mut positions, &mut triangles, &mut classes, &coarse);
+            if triangles.len() > MAX_TRIANGLES {
                 return Err(GroundError::TooFine { finest });
             }
         }
         let count = triangles.len();
-        let free = triangles.into_iter().zip(fates);
+        let free = triangles.into_iter().zip(classes);
         let free: Vec<[u32; 3]> = free
-            .filter(|&(_, own)| own == Fate::Free)
-            .map(|(own, _)| own)
+            .filter(|&(_, class)| class == TriangleClass::Free)
+            .map(|(triangle, _)| triangle)
             .collect();
         if free.is_empty() {
             return Err(GroundError::Nothing);
@@ -162,8 +162,8 @@ impl<'a> Ground<'a> {
         })
     }
 
-    /// The route between the points of the whole mesh that are nearest to `from` and `to`, over what
-    /// is free.
+    /// The route between the points of the whole mesh that are nearest to `from` and `to`, over
+    /// the free triangles.
     ///
     /// # Errors
     /// When one of them is not free, or as [`Mesh::route`].
@@ -171,12 +171,12 @@ impl<'a> Ground<'a> {
         let mut off = [0.0; 2];
         let mut ends = [from, to];
         for (end, off) in ends.iter_mut().zip(&mut off) {
-            let given = *end;
-            if !given.is_finite() {
-                return Err(RouteError::NotFinite { point: given });
+            let requested = *end;
+            if !requested.is_finite() {
+                return Err(RouteError::NotFinite { point: requested });
             }
-            *end = self.whole.nearest(given);
-            *off = end.distance(given);
+            *end = self.whole.nearest(requested);
+            *off = end.distance(requested);
             let distance = self.mesh.nearest(*end).distance(*end);
             if distance > ON_GROUND * self.whole.size() {
                 let point = *end;
@@ -195,19 +195,19 @@ impl<'a> Ground<'a> {
     }
 }
 
-fn fate(obstacles: &Mesh, clearance: f64, corners: [DVec3; 3]) -> Fate {
+fn classify(obstacles: &Mesh, clearance: f64, corners: [DVec3; 3]) -> TriangleClass {
     let centre = (corners[0] + corners[1] + corners[2]) / 3.0;
     let radius = corners
         .iter()
-        .map(|own| own.distance(centre))
+        .map(|corner| corner.distance(centre))
         .fold(0.0, f64::max);
     let distance = obstacles.nearest(centre).distance(centre);
     if distance >= clearance + radius {
-        Fate::Free
+        TriangleClass::Free
     } else if distance + radius < clearance {
-        Fate::Closed
+        TriangleClass::Closed
     } else {
-        Fate::Open
+        TriangleClass::Open
     }
 }
 
@@ -238,12 +238,12 @@ fn edge(one: u32, other: u32) -> (u32, u32) {
 fn halve(
     positions: &mut Vec<DVec3>,
     triangles: &mut Vec<[u32; 3]>,
-    fates: &mut Vec<Fate>,
+    classes: &mut Vec<TriangleClass>,
     coarse: &[bool],
 ) {
     let longest_sides: Vec<usize> = triangles
         .iter()
-        .map(|&own| longest(positions, own))
+        .map(|&triangle| longest(positions, triangle))
         .collect();
     let mut middles: HashMap<(u32, u32), u32> = HashMap::new();
     let split =
@@ -266,8 +266,9 @@ fn halve(
     }
     loop {
         let mut is_done = true;
-        for (index, own) in triangles.iter().enumerate() {
-            let is_cut = (0..3).any(|k| middles.contains_key(&edge(own[k], own[(k + 1) % 3])));
+        for (index, triangle) in triangles.iter().enumerate() {
+            let is_cut =
+                (0..3).any(|k| middles.contains_key(&edge(triangle[k], triangle[(k + 1) % 3])));
             if is_cut && split(positions, &mut middles, index) {
                 is_done = false;
             }
@@ -292,9 +293,9 @@ fn halve(
             Some(ca) => parts.extend([[ab, c, ca], [ab, ca, a]]),
             None => parts.push([ab, c, a]),
         }
-        let fate = fates[index];
+        let class = classes[index];
         triangles[index] = parts[0];
         triangles.extend(&parts[1..]);
-        fates.extend(parts[1..].iter().map(|_| fate));
+        classes.extend(parts[1..].iter().map(|_| class));
     }
 }

@@ -2,10 +2,10 @@
 
 use glam::DVec3;
 
+use crate::endpoints::Task;
 use crate::error::RouteError;
 use crate::mesh::links::{NONE, at, next, previous};
 use crate::mesh::surface::{Spot, Surface};
-use crate::places::Task;
 
 /// A direction is along another when the sine of the angle between them is below this.
 const ALONG: f64 = 1e-9;
@@ -13,8 +13,8 @@ const ALONG: f64 = 1e-9;
 /// The shorter of the two halves of the cut, where they lead from start to goal.
 ///
 /// # Errors
-/// When no plane is given, or neither half arrives.
-pub(crate) fn way(task: &Task<'_>) -> Result<Vec<Spot>, RouteError> {
+/// When the plane is not defined, or neither half arrives.
+pub(crate) fn find_path(task: &Task<'_>) -> Result<Vec<Spot>, RouteError> {
     let surface = &*task.surface;
     let normal = plane_normal(task)?;
     let start = surface.positions[task.start as usize];
@@ -30,32 +30,32 @@ pub(crate) fn way(task: &Task<'_>) -> Result<Vec<Spot>, RouteError> {
     // A vertex in the plane counts as above it, so that every cut of a face has two ends. Where
     // that leads nowhere, as along a boundary, it counts as below.
     for _ in 0..2 {
-        let cut = Cut {
+        let cut = PlaneCut {
             task,
             surface,
             heights: &heights,
         };
-        let ways = cut.exits().into_iter().filter_map(|exit| cut.follow(exit));
-        let length = |way: &Vec<Spot>| -> f64 {
-            let points = way.iter().map(|&spot| surface.position(spot));
+        let paths = cut.exits().into_iter().filter_map(|exit| cut.follow(exit));
+        let length = |path: &Vec<Spot>| -> f64 {
+            let points = path.iter().map(|&spot| surface.position(spot));
             points
                 .clone()
                 .zip(points.skip(1))
                 .map(|(a, b)| a.distance(b))
                 .sum()
         };
-        if let Some(way) = ways.min_by(|a, b| length(a).total_cmp(&length(b))) {
-            return Ok(way);
+        if let Some(path) = paths.min_by(|a, b| length(a).total_cmp(&length(b))) {
+            return Ok(path);
         }
         for height in &mut heights {
             *height = -*height;
         }
     }
-    Err(RouteError::NoPlaneWay)
+    Err(RouteError::NoPlaneRoute)
 }
 
 /// The unit normal of the plane: it runs through both points and along the sum of their normals;
-/// where that tells nothing along the start's, then along the goal's.
+/// where that is undefined along the start's, then along the goal's.
 fn plane_normal(task: &Task<'_>) -> Result<DVec3, RouteError> {
     let surface = &*task.surface;
     let [start, goal] = [task.start, task.goal].map(|vertex| surface.positions[vertex as usize]);
@@ -74,13 +74,13 @@ fn plane_normal(task: &Task<'_>) -> Result<DVec3, RouteError> {
         .ok_or(RouteError::NoPlane)
 }
 
-struct Cut<'a> {
+struct PlaneCut<'a> {
     task: &'a Task<'a>,
     surface: &'a Surface,
     heights: &'a [f64],
 }
 
-impl Cut<'_> {
+impl PlaneCut<'_> {
     fn is_above(&self, vertex: u32) -> bool {
         self.heights[vertex as usize] >= 0.0
     }
@@ -102,17 +102,17 @@ impl Cut<'_> {
     /// to where it was.
     fn follow(&self, exit: u32) -> Option<Vec<Spot>> {
         let faces = &self.surface.faces;
-        let mut way = vec![Spot::vertex(self.task.start)];
+        let mut path = vec![Spot::vertex(self.task.start)];
         let mut half_edge = exit;
         // The cut passes each face once.
         for _ in 0..=faces.len() {
             let (from, to) = (at(faces, half_edge), at(faces, next(half_edge)));
             if from == self.task.goal || to == self.task.goal {
-                way.push(Spot::vertex(self.task.goal));
-                return Some(way);
+                path.push(Spot::vertex(self.task.goal));
+                return Some(path);
             }
             let (low, high) = (self.heights[from as usize], self.heights[to as usize]);
-            way.push(Spot {
+            path.push(Spot {
                 from,
                 to,
                 fraction: low / (low - high),

@@ -5,23 +5,23 @@ use std::str::FromStr;
 
 use glam::DVec3;
 
+use crate::endpoints::{Task, locate_endpoints};
 use crate::error::RouteError;
 use crate::mesh::Mesh;
 use crate::mesh::surface::Spot;
-use crate::places::{Task, place};
 use crate::{edges, exact, greedy, plane, together};
 
 /// How a route is found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum By {
-    /// The shortest way over the surface.
+    /// The shortest path over the surface.
     #[default]
     Exact,
     /// The cut of the surface by the plane through start and goal and along their normals.
     Plane,
     /// Along edges, each time the one that points most nearly to the goal.
     Greedy,
-    /// The shortest way along edges.
+    /// The shortest path along edges.
     Edges,
 }
 
@@ -56,7 +56,7 @@ impl FromStr for By {
     }
 }
 
-/// A way over a surface: straight from each point to the next.
+/// A path over a surface: straight from each point to the next.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Route {
     /// From the start to the goal, in the unit of the mesh. One point where the two are the same.
@@ -74,22 +74,22 @@ impl Mesh {
     /// The route between the points of the surface that are nearest to `from` and `to`.
     ///
     /// # Errors
-    /// When a point is none, no way leads from one to the other, or `by` finds none.
+    /// When a point is not finite, no path leads from one to the other, or `by` finds none.
     pub fn route(&self, from: DVec3, to: DVec3, by: By) -> Result<Route, RouteError> {
         if by == By::Plane && self.has_branches {
             return Err(RouteError::PlaneBranches);
         }
-        let task = place(self, from, to)?;
+        let task = locate_endpoints(self, from, to)?;
         if task.start == task.goal {
             return Ok(Route::new(&task, &[Spot::vertex(task.start)]));
         }
-        let way = match by {
-            By::Exact => exact::way(&task)?,
-            By::Plane => plane::way(&task)?,
-            By::Greedy => greedy::way(&task),
-            By::Edges => edges::way(&task),
+        let spots = match by {
+            By::Exact => exact::find_path(&task)?,
+            By::Plane => plane::find_path(&task)?,
+            By::Greedy => greedy::find_path(&task),
+            By::Edges => edges::find_path(&task),
         };
-        Ok(Route::new(&task, &way))
+        Ok(Route::new(&task, &spots))
     }
 
     /// The routes of many pairs, each on a thread of its own. Each takes the memory of one alone.
@@ -101,10 +101,10 @@ impl Mesh {
 }
 
 impl Route {
-    /// The point so far along the straight lines from the start, and the unit normal there.
+    /// The point at a distance along the straight lines from the start, and the unit normal there.
     #[must_use]
-    pub fn at(&self, gone: f64) -> (DVec3, Option<DVec3>) {
-        let mut rest = gone.max(0.0);
+    pub fn at(&self, distance: f64) -> (DVec3, Option<DVec3>) {
+        let mut rest = distance.max(0.0);
         let normals = |index: usize| self.normals.as_ref().map(|normals| normals[index]);
         for (index, pair) in self.points.windows(2).enumerate() {
             let length = pair[0].distance(pair[1]);
@@ -120,12 +120,12 @@ impl Route {
         (self.points[last], normals(last))
     }
 
-    /// Of places on edges; those at the same position become one.
-    pub(crate) fn new(task: &Task<'_>, way: &[Spot]) -> Self {
+    /// The route through points on edges; those at the same position become one.
+    pub(crate) fn new(task: &Task<'_>, spots: &[Spot]) -> Self {
         let surface = &*task.surface;
-        let mut points: Vec<DVec3> = Vec::with_capacity(way.len());
-        let mut kept: Vec<Spot> = Vec::with_capacity(way.len());
-        for &spot in way {
+        let mut points: Vec<DVec3> = Vec::with_capacity(spots.len());
+        let mut kept: Vec<Spot> = Vec::with_capacity(spots.len());
+        for &spot in spots {
             let point = surface.position(spot);
             if points.last() != Some(&point) {
                 points.push(point);

@@ -3,7 +3,7 @@
 
 use rayon::prelude::*;
 
-/// What `of` makes of each, in order.
+/// The results of `of` for each, in order.
 pub(crate) fn map<T: Sync, R: Send>(all: &[T], of: impl Fn(&T) -> R + Sync) -> Vec<R> {
     let together = || all.par_iter().map(&of).collect();
     if all.len() < 2 {

@@ -1,10 +1,10 @@
-//! Walkers that wait for each other, and for what moves on known tracks.
+//! Walkers that wait for each other, and for bodies that move on known tracks.
 //!
-//! What moves is a matter of speed, not of the way (Kant and Zucker, 1986): each walker keeps its
-//! route, and waits on it. With the *delay* w = t - s/v (s the way gone, v the speed) walking keeps w
+//! Moving obstacles are avoided by speed, not by the route (Kant and Zucker, 1986): each walker keeps its
+//! route, and waits on it. With the *delay* w = t - s/v (s the distance walked, v the speed) walking keeps w
 //! and waiting raises it, and the obstacle of a moving thing in (s, w) is a convex region for each
 //! straight stretch of both. A walker's plan is a staircase between those regions with the least
-//! delay at its end. One walker is planned after another; each is in the way of the next.
+//! delay at its end. One walker is planned after another; each is an obstacle for the next.
 
 mod plan;
 mod region;
@@ -15,10 +15,10 @@ use thiserror::Error;
 use crate::route::Route;
 use crate::walkers::plan::Stay;
 
-/// Something that moves on a known track: straight from each place to the next.
+/// Something that moves on a known track: straight from each position to the next.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mover {
-    /// Seconds and places, times increasing. It is not there before the first and after the last.
+    /// Seconds and positions, times increasing. It is not there before the first and after the last.
     pub track: Vec<(f64, DVec3)>,
     /// Of the ball that it fills.
     pub radius: f64,
@@ -27,7 +27,7 @@ pub struct Mover {
 /// Somebody who walks a route, and waits on it where that is needed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Walker {
-    /// The way.
+    /// The route that it walks.
     pub route: Route,
     /// Of the ball that it fills.
     pub radius: f64,
@@ -40,8 +40,8 @@ pub struct Walker {
 /// When a walker is where.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plan {
-    /// Seconds, the way gone until then, in the unit of the mesh, and the place. Two with the same
-    /// place are a wait between them.
+    /// Seconds, the distance walked until then, in the unit of the mesh, and the position. Two with the same
+    /// position are a wait between them.
     pub times: Vec<(f64, f64, DVec3)>,
     /// When it arrives, in seconds. It stays at its goal.
     pub arrival: f64,
@@ -65,12 +65,12 @@ pub enum WalkerError {
     },
     /// No waiting on the route leads past the others.
     #[error(
-        "cannot pass: wherever it waits on its way, something comes too near; give it another way, or plan it before others"
+        "cannot pass: wherever it waits on its route, something comes too near; give it another route, or plan it before others"
     )]
     Blocked,
     /// Its route is too long or too many others come near.
     #[error(
-        "{stretches} stretches of the way and {others} of others are too many; simplify the tracks"
+        "{stretches} stretches of the route and {others} of other tracks are too many; simplify the tracks"
     )]
     TooMany {
         /// Of the route.
@@ -81,23 +81,26 @@ pub enum WalkerError {
 }
 
 /// Stretches of a route times stretches of others that are looked at.
-const MOST_PAIRS: usize = 100_000_000;
+const MAX_PAIRS: usize = 100_000_000;
 
 /// Plans one walker after another; each keeps away from all movers and from all walkers before it.
-/// A walker that cannot pass has no plan, and is in nobody's way.
+/// A walker that cannot pass has no plan, and is no obstacle for others.
 ///
-/// Not complete: another order, or other ways, may lead where this does not.
+/// Not complete: another order, or other routes, may lead where this does not.
 #[must_use]
 pub fn plan(walkers: &[Walker], movers: &[Mover]) -> Vec<Result<Plan, WalkerError>> {
     let mut others: Vec<(Mover, Stay)> = movers
         .iter()
-        .map(|own| (own.clone(), Stay::Leaves))
+        .map(|mover| (mover.clone(), Stay::Leaves))
         .collect();
     let mut plans = Vec::with_capacity(walkers.len());
     for walker in walkers {
         let planned = plan_one(walker, &others);
         if let Ok(plan) = &planned {
-            let track = plan.times.iter().map(|&(time, _, place)| (time, place));
+            let track = plan
+                .times
+                .iter()
+                .map(|&(time, _, position)| (time, position));
             let radius = walker.radius;
             let track = track.collect();
             others.push((Mover { track, radius }, Stay::Remains));
@@ -125,9 +128,9 @@ fn plan_one(walker: &Walker, others: &[(Mover, Stay)]) -> Result<Plan, WalkerErr
     let stretches = walker.route.points.len();
     let stretches_of_others = others
         .iter()
-        .map(|(own, _)| own.track.len() + 1)
+        .map(|(mover, _)| mover.track.len() + 1)
         .sum::<usize>();
-    if stretches.saturating_mul(stretches_of_others) > MOST_PAIRS {
+    if stretches.saturating_mul(stretches_of_others) > MAX_PAIRS {
         return Err(WalkerError::TooMany {
             stretches,
             others: stretches_of_others,

@@ -20,7 +20,7 @@ fn of_obj(text: &str) -> Mesh {
     Mesh::of_obj(text.as_bytes()).unwrap()
 }
 
-/// An L whose face begins at any corner, in any plane: the way bends at the inner corner.
+/// An L whose face begins at any corner, in any plane: the route bends at the inner corner.
 #[test]
 fn ways_stay_on_a_concave_face() {
     let corners = [[0, 0], [5, 0], [5, 2], [2, 2], [2, 5], [0, 5]];

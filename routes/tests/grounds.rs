@@ -1,4 +1,4 @@
-//! Ways between obstacles.
+//! Routes between obstacles.
 
 use std::f64::consts::PI;
 
@@ -70,9 +70,9 @@ fn halving_leaves_no_gaps() {
     };
     let ground = Ground::new(&plain, options).unwrap();
     let mut edges = std::collections::HashMap::new();
-    for own in ground.mesh.triangles() {
+    for triangle in ground.mesh.triangles() {
         for k in 0..3 {
-            let (a, b) = (own[k], own[(k + 1) % 3]);
+            let (a, b) = (triangle[k], triangle[(k + 1) % 3]);
             *edges.entry((a.min(b), a.max(b))).or_insert(0) += 1;
         }
     }
@@ -174,8 +174,8 @@ fn what_cannot_be_is_refused() {
             ..clear(&wall, 0.2)
         },
     );
-    let error = ground.map(|own| {
-        let route = own.route(dvec3(-3.0, 0.0, 0.0), dvec3(3.0, 0.0, 0.0), By::Exact);
+    let error = ground.map(|ground| {
+        let route = ground.route(dvec3(-3.0, 0.0, 0.0), dvec3(3.0, 0.0, 0.0), By::Exact);
         route.unwrap_err()
     });
     assert!(

@@ -1,4 +1,4 @@
-//! What is odd, and what is no mesh.
+//! Odd meshes, and inputs that are no mesh.
 
 use std::f64::consts::PI;
 
@@ -94,10 +94,10 @@ fn windings_that_disagree_are_turned() {
     for index in [1, 4, 5] {
         triangles[index].swap(0, 1);
     }
-    let turned = Mesh::new(cube.positions(), &triangles).unwrap();
-    assert_eq!(turned.warnings(), [MeshWarning::Turned { count: 3 }]);
-    let normals = turned.normals().unwrap();
-    for (position, normal) in turned.positions().iter().zip(normals) {
+    let mesh = Mesh::new(cube.positions(), &triangles).unwrap();
+    assert_eq!(mesh.warnings(), [MeshWarning::Rewound { count: 3 }]);
+    let normals = mesh.normals().unwrap();
+    for (position, normal) in mesh.positions().iter().zip(normals) {
         let outwards = (*position - DVec3::splat(0.5)).normalize();
         assert!((*normal - outwards).length() < 1e-12);
     }
@@ -147,10 +147,10 @@ fn a_moebius_strip_has_ways_and_no_normals() {
     assert_eq!(strip.route(from, to, By::Plane), Err(RouteError::OneSided));
 }
 
-/// Three pages of a book: ways lead over its back from each to each.
+/// Three pages of a book: routes lead over its back from each to each.
 #[test]
 fn edges_of_three_faces_are_crossed() {
-    let pages = [0.0, 2.0, 4.0].map(|turn: f64| dvec3(turn.cos(), 0.0, turn.sin()));
+    let pages = [0.0, 2.0, 4.0].map(|angle: f64| dvec3(angle.cos(), 0.0, angle.sin()));
     let mut positions = vec![DVec3::ZERO, DVec3::Y];
     let mut quads = Vec::new();
     for page in pages {
@@ -309,9 +309,9 @@ proptest! {
     ) {
         let files = [OBJ.as_bytes().to_vec(), PLY.as_bytes().to_vec(), binary_ply(true)];
         let mut bytes = files[kind].clone();
-        for (place, byte) in changes {
-            let place = place.index(bytes.len());
-            bytes[place] = byte;
+        for (index, byte) in changes {
+            let offset = index.index(bytes.len());
+            bytes[offset] = byte;
         }
         bytes.truncate(keep.index(2 * bytes.len()).max(1));
         let _ = (obj(&bytes), ply(&bytes));

@@ -27,7 +27,7 @@ fn assert_length(mesh: &Mesh, from: DVec3, to: DVec3, by: By, expected: f64, bou
             .map(|pair| pair[0].distance(pair[1]))
             .sum();
         assert!((sum - route.length).abs() <= 1e-12 * expected);
-        // Back again greedy may go another way.
+        // Back again, greedy may find another route.
         if by == By::Greedy {
             break;
         }
@@ -95,7 +95,7 @@ fn polyhedra_of_equal_triangles() {
     assert_exact(&tetrahedron, middle(0, 1), middle(2, 3), 1.0);
 }
 
-/// Ways bend at the middle, about which there are 480°.
+/// Routes bend at the middle, about which there are 480°.
 #[test]
 fn saddle_of_eight_triangles() {
     let up = ((SQRT_2 - 1.0) / (2.0 + SQRT_2)).sqrt();
@@ -116,7 +116,7 @@ fn saddle_of_eight_triangles() {
     }
 }
 
-/// Ways bend at inner corners of boundaries.
+/// Routes bend at inner corners of boundaries.
 #[test]
 fn boundaries() {
     let l = squares([(0, 0), (1, 0), (0, 1)]);
@@ -176,7 +176,7 @@ fn dead_ends() {
     assert_length(&alley, from, to, By::Greedy, 10.0, 1e-12);
 }
 
-/// A disc as a hole of 16 and of 64 corners: the way runs along the hole.
+/// A disc as a hole of 16 and of 64 corners: the route runs along the hole.
 #[test]
 fn way_round_a_disc() {
     for (count, length) in [(16, 4.505_554_582_7), (64, 4.510_893_429_8)] {

@@ -1,4 +1,4 @@
-//! What holds for all routes, whatever the mesh.
+//! Properties of all routes, whatever the mesh.
 
 use glam::{DQuat, DVec3, dvec3};
 use proptest::prelude::*;
@@ -7,26 +7,26 @@ use tumble_routes::route::{By, Route};
 
 use crate::shapes::heights;
 
-/// A rough terrain and three places near it.
+/// A rough terrain and three points on it.
 fn terrains() -> impl Strategy<Value = (Mesh, [DVec3; 3])> {
     let height = prop_oneof![Just(0.0), -2.0..2.0];
     let width = 4..9u32;
-    let places = prop::array::uniform3(prop::array::uniform2(0.0..1.0));
+    let coordinates = prop::array::uniform3(prop::array::uniform2(0.0..1.0));
     (
         width,
         prop::collection::vec(height, 81),
-        places,
+        coordinates,
         any::<bool>(),
     )
-        .prop_map(|(width, all, places, rounded)| {
+        .prop_map(|(width, all, coordinates, rounded)| {
             let (positions, triangles) = heights(width, |x, y| all[(y * 9 + x) as usize]);
             let mesh = Mesh::new(&positions, &triangles).unwrap();
             let side = f64::from(width - 1);
-            let places = places.map(|[x, y]| {
-                let place = dvec3(x * side, y * side, 0.0);
-                mesh.nearest(if rounded { place.round() } else { place })
+            let points = coordinates.map(|[x, y]| {
+                let point = dvec3(x * side, y * side, 0.0);
+                mesh.nearest(if rounded { point.round() } else { point })
             });
-            (mesh, places)
+            (mesh, points)
         })
 }
 
@@ -84,14 +84,14 @@ proptest! {
     #[test]
     fn the_frame_does_not_matter(
         (mesh, [a, b, _]) in terrains(),
-        turn in prop::array::uniform4(-1.0..1.0),
+        rotation in prop::array::uniform4(-1.0..1.0),
         scale in 0.01..100.0,
         first in any::<prop::sample::Index>(),
     ) {
-        prop_assume!(DQuat::from_array(turn).length() > 0.1);
-        let turn = DQuat::from_array(turn).normalize();
-        let moved = |point: DVec3| scale * (turn * point + dvec3(1.0, -2.0, 3.0));
-        let positions: Vec<DVec3> = mesh.positions().iter().map(|&own| moved(own)).collect();
+        prop_assume!(DQuat::from_array(rotation).length() > 0.1);
+        let rotation = DQuat::from_array(rotation).normalize();
+        let moved = |point: DVec3| scale * (rotation * point + dvec3(1.0, -2.0, 3.0));
+        let positions: Vec<DVec3> = mesh.positions().iter().map(|&position| moved(position)).collect();
         let mut triangles = mesh.triangles().to_vec();
         let middle = first.index(triangles.len());
         triangles.rotate_left(middle);

@@ -22,7 +22,7 @@ fn along_x() -> Walker {
     straight(DVec3::ZERO, dvec3(10.0, 0.0, 0.0))
 }
 
-/// Closes the way from 4 to 6 for a while.
+/// Closes the stretch from 4 to 6 for a while.
 fn gate(from: f64, to: f64) -> Mover {
     let middle = dvec3(5.0, 0.0, 0.0);
     Mover {
@@ -31,9 +31,9 @@ fn gate(from: f64, to: f64) -> Mover {
     }
 }
 
-fn place(track: &[(f64, DVec3)], time: f64) -> DVec3 {
+fn position_at(track: &[(f64, DVec3)], time: f64) -> DVec3 {
     let next = track
-        .partition_point(|own| own.0 <= time)
+        .partition_point(|key| key.0 <= time)
         .clamp(1, track.len() - 1);
     let ((from, one), (to, other)) = (track[next - 1], track[next]);
     if to <= from {
@@ -46,7 +46,7 @@ fn place(track: &[(f64, DVec3)], time: f64) -> DVec3 {
 fn track(plan: &Plan) -> Vec<(f64, DVec3)> {
     plan.times
         .iter()
-        .map(|&(time, _, place)| (time, place))
+        .map(|&(time, _, position)| (time, position))
         .collect()
 }
 
@@ -81,15 +81,15 @@ fn who_comes_second_lets_the_first_pass() {
     let plans = plan(&[along_x(), crossing], &[]);
     assert_arrives(&plans[0], 10.0);
     assert_arrives(&plans[1], 10.0 + 2f64.sqrt());
-    let [one, other] = [0, 1].map(|own| track(plans[own].as_ref().unwrap()));
+    let [one, other] = [0, 1].map(|i| track(plans[i].as_ref().unwrap()));
     for step in 0..=1200 {
         let time = f64::from(step) / 100.0;
-        let apart = place(&one, time).distance(place(&other, time));
+        let apart = position_at(&one, time).distance(position_at(&other, time));
         assert!(apart >= 1.0 - 1e-9, "{apart} at {time}");
     }
 }
 
-/// One stands still in the way for ever; the other comes the other way.
+/// One stands still on the line for ever; the other comes towards it.
 #[test]
 fn who_cannot_pass_is_told() {
     let ends = straight(dvec3(5.0, 5.0, 0.0), dvec3(5.0, 0.0, 0.0));
@@ -184,7 +184,7 @@ fn crowds_keep_apart() {
         for other in &tracks[..index] {
             for step in 0..6000 {
                 let time = f64::from(step) / 100.0;
-                let apart = place(one, time).distance(place(other, time));
+                let apart = position_at(one, time).distance(position_at(other, time));
                 assert!(apart >= 0.8 - 1e-6, "{apart} at {time}");
             }
         }

@@ -111,12 +111,12 @@ pub fn no_contraction(module: &[u32]) -> Result<Vec<u32>, PassError> {
         .flat_map(|&id| [instruction_word(op::DECORATE, 3), id, NO_CONTRACTION])
         .collect();
     // Annotations come after the debug instructions and before the types.
-    let place = code
+    let position = code
         .iter()
         .find(|i| !precedes_annotations(i.opcode))
         .map(|i| i.start)
         .ok_or(SpirvError::Incomplete)?;
-    Ok([&module[..place], &additions, &module[place..]].concat())
+    Ok([&module[..position], &additions, &module[position..]].concat())
 }
 
 /// Writes each product of a vector and a scalar as the product of two vectors, the second of which has

@@ -70,7 +70,9 @@ fn compile() -> Files {
         };
         let bindings = storage.parsed.global_variables.iter();
         compiled.push(Compiled {
-            bindings: bindings.filter(|(_, own)| own.binding.is_some()).count(),
+            bindings: bindings
+                .filter(|(_, variable)| variable.binding.is_some())
+                .count(),
             words: emit(&storage),
             texel_words: texels.as_ref().map(emit),
             name: kernel.name,
@@ -117,7 +119,7 @@ pub fn sources() -> BTreeMap<String, String> {
         .flat_map(|(storage, texels)| [Some(storage), texels]);
     modules
         .flatten()
-        .map(|own| (own.name, own.source))
+        .map(|module| (module.name, module.source))
         .collect()
 }
 

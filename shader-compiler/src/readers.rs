@@ -84,7 +84,7 @@ fn reader(read: &Read, module: &Module) -> String {
             _ => format!("{}({})", read.element, all.join(", ")),
         }
     };
-    let own = read.buffer;
+    let buffer = read.buffer;
     match size {
         4 => format!(
             "let four = {};
@@ -115,7 +115,7 @@ fn reader(read: &Read, module: &Module) -> String {
         ),
         16 if fields.len() == 4 => {
             let Field::Scalar(kind) = fields[0] else {
-                panic!("{own}: four fields of four bytes are scalars");
+                panic!("{buffer}: four fields of four bytes are scalars");
             };
             let words = vector(kind, load("place"));
             let (element, all) = (read.element, ["all.x", "all.y", "all.z", "all.w"]);
@@ -126,18 +126,18 @@ fn reader(read: &Read, module: &Module) -> String {
         }
         16 if fields.len() == 1 => match fields[0] {
             Field::Vector(kind) => format!("return {};\n", vector(kind, load("place"))),
-            _ => panic!("{own}: no reader for one field of 16 bytes"),
+            _ => panic!("{buffer}: no reader for one field of 16 bytes"),
         },
         _ if size.is_multiple_of(16) => {
             let texels = size / 16;
             let mut next = 0;
             let mut texel = || {
-                let own = load(&match next {
+                let loaded = load(&match next {
                     0 => "first".to_owned(),
                     _ => format!("first + {next}u"),
                 });
                 next += 1;
-                vector(ScalarKind::Float, own)
+                vector(ScalarKind::Float, loaded)
             };
             let all = fields.iter().map(|field| match *field {
                 Field::Vector(_) => texel(),
@@ -145,17 +145,17 @@ fn reader(read: &Read, module: &Module) -> String {
                     let each: Vec<String> = (0..count).map(|_| texel()).collect();
                     format!("array({})", each.join(", "))
                 }
-                Field::Scalar(_) => panic!("{own}: scalars beside vectors have no reader"),
+                Field::Scalar(_) => panic!("{buffer}: scalars beside vectors have no reader"),
             });
             let all: Vec<String> = all.collect();
-            assert_eq!(next, texels, "{own}: fields fill all texels");
+            assert_eq!(next, texels, "{buffer}: fields fill all texels");
             let element = read.element;
             format!(
                 "let first = {texels}u * place;\nreturn {element}({});\n",
                 all.join(", ")
             )
         }
-        _ => panic!("{own}: no reader for elements of {size} bytes; write one"),
+        _ => panic!("{buffer}: no reader for elements of {size} bytes; write one"),
     }
 }
 

@@ -91,7 +91,7 @@ impl Declared {
         for (name, value) in &self.constants {
             writeln!(text, "pub(crate) const {name}: {value};").unwrap();
         }
-        for rust in self.structs.values().filter_map(|own| own.rust.as_ref()) {
+        for rust in self.structs.values().filter_map(|item| item.rust.as_ref()) {
             text.push_str(rust);
         }
         text
@@ -164,10 +164,10 @@ fn declaration(module: &Module, ty: Handle<Type>, name: &str) -> String {
     text + &asserts + "};\n"
 }
 
-fn padding(text: &mut String, bytes: u32, place: usize) {
+fn padding(text: &mut String, bytes: u32, offset: usize) {
     if bytes > 0 {
         let words = bytes / 4;
-        writeln!(text, "    pub(crate) padding_{place}: [u32; {words}],").unwrap();
+        writeln!(text, "    pub(crate) padding_{offset}: [u32; {words}],").unwrap();
     }
 }
 
@@ -186,14 +186,17 @@ fn rust_type(module: &Module, ty: Handle<Type>) -> (String, u32) {
         other => panic!("no Rust type for {other:?}"),
     };
     match module.types[ty].inner {
-        TypeInner::Scalar(own) => (scalar(own).to_owned(), 4),
-        TypeInner::Vector { size, scalar: own } => {
+        TypeInner::Scalar(scalar_type) => (scalar(scalar_type).to_owned(), 4),
+        TypeInner::Vector {
+            size,
+            scalar: scalar_type,
+        } => {
             let count = match size {
                 VectorSize::Bi => 2,
                 VectorSize::Tri => 3,
                 VectorSize::Quad => 4,
             };
-            (format!("[{}; {count}]", scalar(own)), 4 * count)
+            (format!("[{}; {count}]", scalar(scalar_type)), 4 * count)
         }
         TypeInner::Array {
             base,
@@ -228,7 +231,7 @@ pub(crate) fn kernels(all: &[Compiled]) -> String {
         writeln!(text, "    {},", variant(&kernel.name)).unwrap();
     }
     text.push_str("}\n");
-    for (what, names) in [
+    for (summary, names) in [
         (
             "How the work over segments is listed.",
             ("List", LISTS.map(|list| list.0).to_vec()),
@@ -243,7 +246,7 @@ pub(crate) fn kernels(all: &[Compiled]) -> String {
         let variants = variants.join(",\n    ");
         writeln!(
             text,
-            "/// {what}\n#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]\n\
+            "/// {summary}\n#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]\n\
              pub(crate) enum {name} {{\n    {variants},\n}}"
         )
         .unwrap();

@@ -225,7 +225,7 @@ static CROWD_READS: [Read; 4] = [
     read("entries", "CrowdEntry", "entry_at"),
     read("channels", "CrowdChannel", "channel_at"),
     read("cells", "vec4f", "cell_at"),
-    read("places", "CrowdPlace", "place_at"),
+    read("positions", "CrowdPosition", "position_at"),
 ];
 
 /// Kernels that evaluate the joints of a crowd, each with the files that it needs behind some that
@@ -321,10 +321,10 @@ pub(crate) fn kernels() -> Vec<Kernel> {
         }
     }
     for (name, needed, reads) in FROM_KEYS {
-        let own = format!("from_keys/{name}").leak();
+        let file = format!("from_keys/{name}").leak();
         let mut files = vec!["math/canonical", "from_keys"];
         files.extend(needed);
-        files.extend([&*own, "stores/f32"]);
+        files.extend([&*file, "stores/f32"]);
         kernels.push(Kernel {
             name: format!("from_keys_{name}"),
             files,
@@ -347,18 +347,18 @@ pub(crate) fn kernels() -> Vec<Kernel> {
             has_texels: false,
         });
     }
-    for (name, shared, own) in CROWD_JOINTS {
+    for (name, shared, parts) in CROWD_JOINTS {
         kernels.push(Kernel {
             name: format!("crowd_{name}"),
-            files: [&["crowd/dispatch"], shared, own, &["stores/f32", "crowd"]].concat(),
+            files: [&["crowd/dispatch"], shared, parts, &["stores/f32", "crowd"]].concat(),
             reads: CROWD_READS.iter().collect(),
             has_texels: true,
         });
     }
-    for (name, own) in CROWD {
+    for (name, parts) in CROWD {
         kernels.push(Kernel {
             name: format!("crowd_{name}"),
-            files: [&["crowd/dispatch"], own].concat(),
+            files: [&["crowd/dispatch"], parts].concat(),
             reads: Vec::new(),
             has_texels: false,
         });

@@ -6,14 +6,14 @@ var<workgroup> tile: array<array<Stored, PARTS>, WORKGROUP>;
 // Whether an invocation has a value there.
 var<workgroup> is_there: array<u32, WORKGROUP>;
 
-fn finish(lane: u32, place: u32, rotation: vec4f, is_stored: bool) {
+fn finish(lane: u32, index: u32, rotation: vec4f, is_stored: bool) {
     is_there[lane] = select(0u, 1u, is_stored);
     if is_stored {
         tile[lane] = parts(rotation);
     }
     workgroupBarrier();
     let within = lane & (LINE - 1u);
-    let first = (place - within) * PARTS;
+    let first = (index - within) * PARTS;
     for (var part = within; part < LINE * PARTS; part += LINE) {
         let value = part / PARTS;
         let other = lane - within + value;

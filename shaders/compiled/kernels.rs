@@ -83,11 +83,11 @@ pub(crate) const LOG_1: f32 = 0.16666667;
 pub(crate) const LOG_2: f32 = 0.075;
 pub(crate) const LOG_3: f32 = 0.04464286;
 pub(crate) const LOG_4: f32 = 0.030381944;
+pub(crate) const LONGEST_ANGLE_SQUARE: f32 = 2.4674;
 pub(crate) const LONGEST_STEP: f32 = 0.0034;
 pub(crate) const LONGEST_TANGENT_PART: f32 = 0.01;
-pub(crate) const LONGEST_TURN_SQUARE: f32 = 2.4674;
+pub(crate) const MAX_WALKED: u32 = 128;
 pub(crate) const MAY_BE_TINY: u32 = 1073741824;
-pub(crate) const MOST_WALKED: u32 = 128;
 pub(crate) const NEGATIVE: u32 = 128;
 pub(crate) const ON_KEY: u32 = 2147483648;
 pub(crate) const PI: f32 = 3.1415927;
@@ -126,7 +126,7 @@ pub(crate) const SERIES_6: f32 = -0.0013888889;
 pub(crate) const SERIES_7: f32 = -0.0001984127;
 pub(crate) const SERIES_8: f32 = 2.4801588e-5;
 pub(crate) const SERIES_9: f32 = 2.7557319e-6;
-pub(crate) const SIGN_TURNED: u32 = 1073741824;
+pub(crate) const SIGN_NEGATED: u32 = 1073741824;
 pub(crate) const SINC_1: f32 = -0.16666667;
 pub(crate) const SINC_2: f32 = 0.008333334;
 pub(crate) const SINE_3: f32 = -0.16666657;
@@ -201,7 +201,7 @@ pub(crate) struct CrowdChannel {
 /// How many channels lie beside each other: the next constant is `count` cells on. 0 for a channel
 /// that is constant.
     pub(crate) count: u32,
-/// The form, 8 bits, above the place of its time base in the clip, 24 bits.
+/// The form, 8 bits, above the index of its time base in the clip, 24 bits.
     pub(crate) form_and_base: u32,
 /// The cell of its first key.
     pub(crate) keys: u32,
@@ -300,16 +300,16 @@ const _: () = {
 /// Where a layer stands in one time base of its clip.
 #[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
-pub(crate) struct CrowdPlace {
+pub(crate) struct CrowdPosition {
 /// The span; with the bit `ON_KEY` exactly at its first key.
     pub(crate) span: u32,
 /// The parameter in the span, about -1/2 to 1/2.
     pub(crate) parameter: f32,
 }
 const _: () = {
-    assert!(size_of::<CrowdPlace>() == 8);
-    assert!(std::mem::offset_of!(CrowdPlace, span) == 0);
-    assert!(std::mem::offset_of!(CrowdPlace, parameter) == 4);
+    assert!(size_of::<CrowdPosition>() == 8);
+    assert!(std::mem::offset_of!(CrowdPosition, span) == 0);
+    assert!(std::mem::offset_of!(CrowdPosition, parameter) == 4);
 };
 /// A span of time.
 #[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]

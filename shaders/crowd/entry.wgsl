@@ -15,7 +15,7 @@ struct CrowdEntry {
 }
 
 /// Where a layer stands in one time base of its clip.
-struct CrowdPlace {
+struct CrowdPosition {
     /// The span; with the bit `ON_KEY` exactly at its first key.
     span: u32,
     /// The parameter in the span, about -1/2 to 1/2.
@@ -29,7 +29,7 @@ struct CrowdChannel {
     /// How many channels lie beside each other: the next constant is `count` cells on. 0 for a channel
     /// that is constant.
     count: u32,
-    /// The form, 8 bits, above the place of its time base in the clip, 24 bits.
+    /// The form, 8 bits, above the index of its time base in the clip, 24 bits.
     form_and_base: u32,
     /// The cell of its first key.
     keys: u32,
@@ -38,6 +38,6 @@ struct CrowdChannel {
 // Channels of a joint: the rotation, the translation and the scale.
 const CHANNELS: u32 = 3;
 
-// Set in a span's start, and in a place: there is a key.
+// Set in a span's start, and in a position: there is a key.
 const ON_KEY: u32 = 0x80000000;
 const TICKS: u32 = 0x7fffffff;

@@ -17,7 +17,7 @@ fn to_any_half(value: vec4f) -> vec4u {
     return select(to_half(small), sign | vec4u(HALF_INFINITE), large);
 }
 
-fn crowd_work(place: u32) {
-    let half = to_any_half(values[place]);
-    halves[place] = vec2u(half.x | (half.y << 16u), half.z | (half.w << 16u));
+fn crowd_work(index: u32) {
+    let half = to_any_half(values[index]);
+    halves[index] = vec2u(half.x | (half.y << 16u), half.z | (half.w << 16u));
 }

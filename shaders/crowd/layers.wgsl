@@ -6,10 +6,10 @@ const WEIGHT_UNIT: f32 = 0.000030517578125;
 const UNMOVED: vec4f = vec4f(0.0, 0.0, 0.0, 1.0);
 
 // Turns a base on by what a layer differs from its reference: base (reference⁻¹ layer)^weight.
-fn turn_added(base: vec4f, layer: vec4f, reference: vec4f, weight: f32) -> vec4f {
+fn rotation_added(base: vec4f, layer: vec4f, reference: vec4f, weight: f32) -> vec4f {
     let inverse = vec4f(-reference.x, -reference.y, -reference.z, reference.w);
-    let turn = slerp(UNMOVED, product(inverse, layer), weight);
-    return canonical(normalised(product(base, turn)));
+    let weighted = slerp(UNMOVED, product(inverse, layer), weight);
+    return canonical(normalised(product(base, weighted)));
 }
 
 // A rotation, a translation or a scale under the next layer. For scales `reference` holds reciprocals.
@@ -23,7 +23,7 @@ fn laid_over(
 ) -> vec4f {
     if kind == ROTATION {
         if is_additive {
-            return turn_added(below, layer, reference, weight);
+            return rotation_added(below, layer, reference, weight);
         }
         return canonical(over(below, layer, weight));
     }
@@ -47,11 +47,11 @@ fn layered(instance: u32, joint: u32, kind: u32) -> vec4f {
         if weight != 0u {
             let modes = entry.speed_and_modes;
             let mask = dispatch.masks + ((modes >> 24u) & 0x1fu) * dispatch.joints + joint;
-            let own = f32(i32(weight)) * WEIGHT_UNIT * cell_at(mask).x;
+            let joint_weight = f32(i32(weight)) * WEIGHT_UNIT * cell_at(mask).x;
             let clip = entry.clip_and_weight & 0xffffu;
             let reference = dispatch.references + (clip * dispatch.joints + joint) * CHANNELS + kind;
             let next = layer_value(first + layer, entry, joint, kind);
-            value = laid_over(kind, (modes >> 31u) != 0u, value, next, cell_at(reference), own);
+            value = laid_over(kind, (modes >> 31u) != 0u, value, next, cell_at(reference), joint_weight);
         }
     }
     return value;

@@ -3,19 +3,19 @@
 // Twin: src/twin/crowd_matrices.rs.
 
 // A row of R with the columns scaled, and the translation behind it.
-fn transform_row(turned: vec3f, scale: vec4f, moved: f32) -> vec4f {
-    let row = canonical(vec4f(turned, 0.0));
+fn transform_row(axis: vec3f, scale: vec4f, moved: f32) -> vec4f {
+    let row = canonical(vec4f(axis, 0.0));
     return canonical(vec4f(row.x * scale.x, row.y * scale.y, row.z * scale.z, moved));
 }
 
-// `place` is a joint of an instance.
-fn crowd_work(place: u32) {
-    let instance = place / dispatch.joints;
-    let joint = place - instance * dispatch.joints;
+// `index` is a joint of an instance.
+fn crowd_work(index: u32) {
+    let instance = index / dispatch.joints;
+    let joint = index - instance * dispatch.joints;
     let rows = matrix_rows(layered(instance, joint, ROTATION), 0u);
     let moved = layered(instance, joint, TRANSLATION);
     let scale = layered(instance, joint, SCALE);
-    let first = place * 3u;
+    let first = index * 3u;
     store(first, transform_row(rows.first, scale, moved.x));
     store(first + 1u, transform_row(rows.second, scale, moved.y));
     store(first + 2u, transform_row(rows.third, scale, moved.z));

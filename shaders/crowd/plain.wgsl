@@ -7,41 +7,41 @@ const TRANSLATION: u32 = 1;
 const SCALE: u32 = 2;
 
 // An arc where its time base stands. The first cell is 0: a constant is an arc without a tangent.
-fn arc_value(channel: CrowdChannel, place: CrowdPlace) -> vec4f {
-    let is_key = (place.span & ON_KEY) != 0u;
-    let along = (place.span & TICKS) * channel.count;
+fn arc_value(channel: CrowdChannel, at: CrowdPosition) -> vec4f {
+    let is_key = (at.span & ON_KEY) != 0u;
+    let along = (at.span & TICKS) * channel.count;
     let middle = channel.first + along * 2u;
-    let own = cell_at(select(middle, channel.keys + along, is_key));
+    let key_or_first = cell_at(select(middle, channel.keys + along, is_key));
     let tangent = cell_at(select(middle + channel.count, 0u, channel.count == 0u));
-    return select(canonical(evaluate(Segment(own, tangent), place.parameter)), own, is_key);
+    return select(canonical(evaluate(Segment(key_or_first, tangent), at.parameter)), key_or_first, is_key);
 }
 
 // A cubic likewise.
-fn cubic_value(channel: CrowdChannel, place: CrowdPlace) -> vec4f {
-    let is_key = (place.span & ON_KEY) != 0u;
+fn cubic_value(channel: CrowdChannel, at: CrowdPosition) -> vec4f {
+    let is_key = (at.span & ON_KEY) != 0u;
     let is_constant = channel.count == 0u;
-    let along = (place.span & TICKS) * channel.count;
+    let along = (at.span & TICKS) * channel.count;
     let first = channel.first + along * 4u;
     let second = first + channel.count;
     let third = second + channel.count;
-    let own = cell_at(select(first, channel.keys + along, is_key));
+    let key_or_first = cell_at(select(first, channel.keys + along, is_key));
     let value = cubic(
-        own,
+        key_or_first,
         cell_at(select(second, 0u, is_constant)),
         cell_at(select(third, 0u, is_constant)),
         cell_at(select(third + channel.count, 0u, is_constant)),
-        place.parameter,
+        at.parameter,
     );
-    return select(canonical(value), own, is_key);
+    return select(canonical(value), key_or_first, is_key);
 }
 
 // The `kind`th channel of a joint; `instance` counts within the window.
 fn layered(instance: u32, joint: u32, kind: u32) -> vec4f {
     let clip = entry_at(dispatch.first_instance + instance).clip_and_weight & 0xffffu;
     let channel = channel_at((clip * dispatch.joints + joint) * CHANNELS + kind);
-    let place = place_at(instance * dispatch.bases + (channel.form_and_base & 0xffffffu));
+    let at = position_at(instance * dispatch.bases + (channel.form_and_base & 0xffffffu));
     if kind == ROTATION {
-        return arc_value(channel, place);
+        return arc_value(channel, at);
     }
-    return cubic_value(channel, place);
+    return cubic_value(channel, at);
 }

@@ -1,8 +1,8 @@
 // Stores the rotation of every joint of every instance.
 // Twin: src/twin/crowd_layers.rs.
 
-// `place` is a joint of an instance.
-fn crowd_work(place: u32) {
-    let instance = place / dispatch.joints;
-    store(place, layered(instance, place - instance * dispatch.joints, ROTATION));
+// `index` is a joint of an instance.
+fn crowd_work(index: u32) {
+    let instance = index / dispatch.joints;
+    store(index, layered(instance, index - instance * dispatch.joints, ROTATION));
 }

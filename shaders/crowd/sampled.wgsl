@@ -13,15 +13,15 @@ const TRANSLATION: u32 = 1;
 const SCALE: u32 = 2;
 
 // A channel where its time base stands.
-fn sampled(channel: CrowdChannel, place: CrowdPlace) -> vec4f {
+fn sampled(channel: CrowdChannel, at: CrowdPosition) -> vec4f {
     let form = channel.form_and_base >> 24u;
-    let span = place.span & TICKS;
+    let span = at.span & TICKS;
     let count = channel.count;
-    let s = place.parameter;
+    let s = at.parameter;
     if form == FORM_CONSTANT {
         return cell_at(channel.first);
     }
-    if (place.span & ON_KEY) != 0u {
+    if (at.span & ON_KEY) != 0u {
         return cell_at(channel.keys + span * count);
     }
     if form == FORM_ARC {
@@ -49,6 +49,6 @@ fn sampled(channel: CrowdChannel, place: CrowdPlace) -> vec4f {
 fn layer_value(layer: u32, entry: CrowdEntry, joint: u32, kind: u32) -> vec4f {
     let clip = entry.clip_and_weight & 0xffffu;
     let channel = channel_at((clip * dispatch.joints + joint) * CHANNELS + kind);
-    let place = place_at(layer * dispatch.bases + (channel.form_and_base & 0xffffffu));
-    return sampled(channel, place);
+    let at = position_at(layer * dispatch.bases + (channel.form_and_base & 0xffffffu));
+    return sampled(channel, at);
 }

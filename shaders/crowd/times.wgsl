@@ -33,7 +33,7 @@ struct CrowdSpan {
 @group(0) @binding(1) var<storage, read> clips: array<CrowdClip>;
 @group(0) @binding(2) var<storage, read> time_bases: array<CrowdBase>;
 @group(0) @binding(3) var<storage, read> spans: array<CrowdSpan>;
-@group(0) @binding(4) var<storage, read_write> places: array<CrowdPlace>;
+@group(0) @binding(4) var<storage, read_write> positions: array<CrowdPosition>;
 
 // Added to every start, so that none is negative.
 const START_BIAS: u32 = 0x20000;
@@ -143,20 +143,20 @@ fn span_at(base: CrowdBase, tick: u32) -> u32 {
     return found;
 }
 
-// `place` is a time base of an entry, of those of the window.
-fn crowd_work(place: u32) {
-    let layer = place / dispatch.bases;
-    let own = place - layer * dispatch.bases;
+// `index_in_window` is a time base of an entry, of those of the window.
+fn crowd_work(index_in_window: u32) {
+    let layer = index_in_window / dispatch.bases;
+    let base_index = index_in_window - layer * dispatch.bases;
     let entry = entries[dispatch.first_instance * dispatch.layers + layer];
     let clip = clips[entry.clip_and_weight & 0xffffu];
-    if own < clip.bases {
+    if base_index < clip.bases {
         let tick = tick_of(entry, clip.period);
-        let base = time_bases[clip.first_base + own];
+        let base = time_bases[clip.first_base + base_index];
         let index = span_at(base, tick);
         let span = spans[base.first + index];
         let distance = distance_from_middle(i32(tick) - span.whole, 0u);
         let is_key = span.start == (tick | ON_KEY);
-        places[place].span = index | select(0u, ON_KEY, is_key);
-        places[place].parameter = distance * span.scale + span.offset;
+        positions[index_in_window].span = index | select(0u, ON_KEY, is_key);
+        positions[index_in_window].parameter = distance * span.scale + span.offset;
     }
 }

@@ -3,10 +3,10 @@
 // Twin: src/twin/crowd_matrices.rs.
 
 // Joints of a skeleton, at most: 6 KiB of a workgroup's memory, of which Vulkan promises 16.
-const MOST_WALKED: u32 = 128;
+const MAX_WALKED: u32 = 128;
 
 // The rows of the matrices.
-var<workgroup> rows: array<vec4f, 3u * MOST_WALKED>;
+var<workgroup> rows: array<vec4f, 3u * MAX_WALKED>;
 
 @compute @workgroup_size(CROWD_WORKGROUP)
 fn main(

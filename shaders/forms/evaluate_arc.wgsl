@@ -16,8 +16,8 @@ alias Segment = ArcSegment;
 // `parameter` runs from -1/2 to 1/2 over the segment.
 fn evaluate(segment: Segment, parameter: f32) -> vec4f {
     let z = parameter * parameter * norm_squared(segment.tangent);
-    let turn = sine_cosm1_quarter(parameter, z);
-    return segment.middle + (segment.middle * turn.y + segment.tangent * turn.x);
+    let sines = sine_cosm1_quarter(parameter, z);
+    return segment.middle + (segment.middle * sines.y + segment.tangent * sines.x);
 }
 
 fn norm_squared(q: vec4f) -> f32 {

@@ -204,12 +204,12 @@ fn small_angle_cubic(
         & (last.kind != KEY_UNKNOWN);
 
     // The middle, and the vectors rotated back to it.
-    let third_turn = small_exp(w3 * 0.125);
-    let second_turn = composed(small_exp(w2 * 0.5), third_turn);
-    let turn = composed(small_exp(w1 * 0.875), second_turn);
-    let m = canonical_product(start, turn.vector, turn.cosm1) + start;
-    let v1 = inverse_rotated(w1, second_turn);
-    let v2 = inverse_rotated(w2, third_turn);
+    let third_step = small_exp(w3 * 0.125);
+    let second_step = composed(small_exp(w2 * 0.5), third_step);
+    let all_steps = composed(small_exp(w1 * 0.875), second_step);
+    let m = canonical_product(start, all_steps.vector, all_steps.cosm1) + start;
+    let v1 = inverse_rotated(w1, second_step);
+    let v2 = inverse_rotated(w2, third_step);
     let v3 = w3;
 
     // The first order is a s + b s² + c s³; then the products of the vectors.

@@ -2,7 +2,7 @@
 // those are.
 
 /// The arguments of one dispatch over a grid of samples. Track by track (`stride` is 1), the
-/// samples of all tracks are one row, and a sample's position is the place where it is stored, less
+/// samples of all tracks are one row, and a sample's position is where it is stored, less
 /// `shift`. Frame by frame each track is a row, and a position is a sample's number.
 struct Grid {
     /// What the store needs beside the rotation: the order of a matrix, the axes of angles.
@@ -61,7 +61,7 @@ struct Corner {
 }
 
 struct Cell {
-    place: u32,
+    output: u32,
     // The row, and the position in it.
     row: u32,
     position: u32,
@@ -82,22 +82,22 @@ fn corner_of(group: vec3u, groups: vec3u, lane: u32) -> Corner {
     return Corner(first, tile * LINE + within, block);
 }
 
-// The sample that an invocation takes in its `turn`. Eight neighbours always store at eight
-// neighbouring places, the first of which is a multiple of eight. An invocation's own samples are
+// The sample that an invocation takes in its `iteration`. Eight neighbours always store at eight
+// neighbouring cells, the first of which is a multiple of eight. An invocation's own samples are
 // near each other: track by track 8 apart, frame by frame one.
-fn cell_of(corner: Corner, turn: u32) -> Cell {
+fn cell_of(corner: Corner, iteration: u32) -> Cell {
     if dispatch.stride == 1u {
-        let index = corner.first + turn * LINE;
+        let index = corner.first + iteration * LINE;
         let position = dispatch.first_output + index;
-        let place = position + dispatch.shift;
-        let block = corner.block + turn * LINE / BLOCK_SAMPLES;
-        return Cell(place, 0u, position, block, index < dispatch.samples);
+        let output = position + dispatch.shift;
+        let block = corner.block + iteration * LINE / BLOCK_SAMPLES;
+        return Cell(output, 0u, position, block, index < dispatch.samples);
     }
-    let sample = corner.first + turn;
+    let sample = corner.first + iteration;
     let row = sample * dispatch.stride + dispatch.first_output;
-    let place = (row & ~(LINE - 1u)) + corner.column;
+    let output = (row & ~(LINE - 1u)) + corner.column;
     // What lies before the row wraps to a large number.
-    let track = place - row;
+    let track = output - row;
     let is_inside = (sample < dispatch.samples) & (track < dispatch.rows);
-    return Cell(place, track, sample, corner.block + track, is_inside);
+    return Cell(output, track, sample, corner.block + track, is_inside);
 }

@@ -76,6 +76,6 @@ fn arc_tangent(y: f32, x: f32) -> f32 {
     let tail = (((high * z + ARC_3) * z + ARC_2) * z + ARC_1) * z + ARC_0;
     let flat = tail * (z * t) + t;
     let acute = select(flat, (HALF_PI - flat) + HALF_PI_LOW, steep);
-    let turned = select(acute, (PI - acute) + PI_LOW, x < 0.0);
-    return select(turned, -turned, y < 0.0);
+    let obtuse = select(acute, (PI - acute) + PI_LOW, x < 0.0);
+    return select(obtuse, -obtuse, y < 0.0);
 }

@@ -43,11 +43,11 @@ fn slerp(a: vec4f, b: vec4f, t: f32) -> vec4f {
     let difference = flushed4(near - a);
     let square = dot4(difference, difference);
     let whole = dot4(sum, sum);
-    // Half of the angle between them in R⁴; `turn` is for the angle from the middle of the arc.
+    // Half of the angle between them in R⁴; `sines` is for the angle from the middle of the arc.
     let half = arc_tangent(root(square), root(whole));
-    let turn = sine_cosine((t + t - 1.0) * half);
+    let sines = sine_cosine((t + t - 1.0) * half);
     let partner = difference * select(reciprocal_root(square), 0.0, square == 0.0);
-    return sum * reciprocal_root(whole) * turn.y + partner * turn.x;
+    return sum * reciprocal_root(whole) * sines.y + partner * sines.x;
 }
 
 // Slerp whose ends are the bits of a and b themselves.

@@ -16,8 +16,8 @@ const COSINE_10: f32 = -2.620901966565725e-7;
 
 // Sine (x) and cosine (y).
 fn sine_cosine(angle: f32) -> vec2f {
-    let turn = sine_cosm1(angle, angle * angle);
-    return vec2f(turn.x, turn.y + 1.0);
+    let sines = sine_cosm1(angle, angle * angle);
+    return vec2f(sines.x, sines.y + 1.0);
 }
 
 // x sin(a)/a and cos(a) - 1, for an angle |a| <= pi/2 that is given by its square z.

@@ -9,9 +9,9 @@
 
 const IDENTITY: vec4f = vec4f(0.0, 0.0, 0.0, 1.0);
 
-fn pose(place: u32) {
-    let own = reference[place];
-    let inverse = vec4f(-own.x, -own.y, -own.z, own.w);
-    let turn = slerp(IDENTITY, product(inverse, layer[place]), reference[dispatch.count].x);
-    added[place] = canonical(normalised(product(base[place], turn)));
+fn pose(index: u32) {
+    let reference_pose = reference[index];
+    let inverse = vec4f(-reference_pose.x, -reference_pose.y, -reference_pose.z, reference_pose.w);
+    let weighted = slerp(IDENTITY, product(inverse, layer[index]), reference[dispatch.count].x);
+    added[index] = canonical(normalised(product(base[index], weighted)));
 }

@@ -10,14 +10,14 @@
 const LEAST_SQUARED_SUM: f32 = 9.094947017729282e-13;
 
 // `dispatch.detail` is the number of layers, which lie one after another.
-fn pose(place: u32) {
-    let first = layers[place];
+fn pose(index: u32) {
+    let first = layers[index];
     var sum = first * weights[0];
     for (var layer = 1u; layer < dispatch.detail; layer++) {
-        let next = layers[layer * dispatch.count + place];
+        let next = layers[layer * dispatch.count + index];
         let near = select(next, -next, dot4(first, next) < 0.0);
         sum = sum + near * weights[layer];
     }
     let short = dot4(sum, sum) < LEAST_SQUARED_SUM;
-    blended[place] = canonical(select(normalised(sum), first, short));
+    blended[index] = canonical(select(normalised(sum), first, short));
 }

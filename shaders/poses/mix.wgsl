@@ -6,6 +6,6 @@
 @group(0) @binding(2) var<storage, read> weights: array<f32>;
 @group(0) @binding(3) var<storage, read_write> mixed: array<vec4f>;
 
-fn pose(place: u32) {
-    mixed[place] = canonical(over(from_layer[place], to_layer[place], weights[0]));
+fn pose(index: u32) {
+    mixed[index] = canonical(over(from_layer[index], to_layer[index], weights[0]));
 }

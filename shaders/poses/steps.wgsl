@@ -10,21 +10,21 @@
 fn rotation_step(from_value: vec4f, to_value: vec4f) -> vec4f {
     let near = select(to_value, -to_value, dot4(from_value, to_value) < 0.0);
     let inverse = vec4f(-from_value.x, -from_value.y, -from_value.z, from_value.w);
-    let turn = flushed4(product(inverse, near - from_value));
-    let square = turn.x * turn.x + turn.y * turn.y + turn.z * turn.z;
+    let half_step = flushed4(product(inverse, near - from_value));
+    let square = half_step.x * half_step.x + half_step.y * half_step.y + half_step.z * half_step.z;
     let sine = root(square);
     let half = arc_tangent(sine, dot4(from_value, near));
     let scale = select(half * reciprocal_root(square), 0.0, square == 0.0);
-    return vec4f(turn.x * scale, turn.y * scale, turn.z * scale, 0.0);
+    return vec4f(half_step.x * scale, half_step.y * scale, half_step.z * scale, 0.0);
 }
 
 // `dispatch.detail` is 1 for rotations, 0 for vectors.
-fn pose(place: u32) {
-    let own = values[place];
-    let next = values[place + 1u];
+fn pose(index: u32) {
+    let value = values[index];
+    let next = values[index + 1u];
     if dispatch.detail == 1u {
-        steps[place] = canonical(rotation_step(own, next));
+        steps[index] = canonical(rotation_step(value, next));
     } else {
-        steps[place] = canonical(next - own);
+        steps[index] = canonical(next - value);
     }
 }

@@ -2,7 +2,7 @@
 // positions in the world, R = R_parent q and p = p_parent + R_parent offset.
 // Twin: src/twin/pose_world.rs.
 
-/// A track's place in a skeleton.
+/// Where a track stands in a skeleton.
 struct Link {
     /// Its offset in its parent's frame; that of a root in the world.
     offset: vec3f,
@@ -21,19 +21,19 @@ const ROOT: u32 = 0xffffffff;
 // [frame][track]: the rotation, then the position.
 @group(0) @binding(2) var<storage, read_write> world: array<vec4f>;
 
-// `place` is the frame, `dispatch.detail` the number of tracks.
-fn pose(place: u32) {
+// `sample` is the frame, `dispatch.detail` the number of tracks.
+fn pose(sample: u32) {
     let tracks = dispatch.detail;
-    let first = place * tracks;
+    let first = sample * tracks;
     for (var i = 0u; i < tracks; i++) {
         let link = links[i];
-        let own = local[first + link.track];
-        var rotation = own;
+        let in_parent = local[first + link.track];
+        var rotation = in_parent;
         var position = link.offset;
         if link.parent != ROOT {
             let parent = 2u * (first + link.parent);
             let above = world[parent];
-            rotation = normalised(product(above, own));
+            rotation = normalised(product(above, in_parent));
             position = world[parent + 1u].xyz + rotated(above, link.offset);
         }
         let there = 2u * (first + link.track);

@@ -12,10 +12,10 @@ fn axis_angle(rotation: vec4f) -> vec4f {
     let square = x * x + y * y + z * z;
     let scale = reciprocal_root(square);
     let angle = arc_tangent(root(square), flushed(rotation.w)) * (2.0 * DEGREES);
-    let turned = vec4f(x * scale, y * scale, z * scale, angle);
-    return select(turned, vec4f(1.0, 0.0, 0.0, angle), square == 0.0);
+    let axis_and_angle = vec4f(x * scale, y * scale, z * scale, angle);
+    return select(axis_and_angle, vec4f(1.0, 0.0, 0.0, angle), square == 0.0);
 }
 
-fn store(place: u32, rotation: vec4f) {
-    rotations[place] = canonical(axis_angle(rotation));
+fn store(index: u32, rotation: vec4f) {
+    rotations[index] = canonical(axis_angle(rotation));
 }

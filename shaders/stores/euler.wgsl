@@ -35,12 +35,12 @@ fn euler(rotation: vec4f, detail: u32) -> vec3f {
     let b = flushed(select(i + k, i, symmetric));
     let c = flushed(select(j + w, j, symmetric));
     let d = flushed(select(k - i, k, symmetric));
-    let near = root(c * c + d * d);
-    let far = root(a * a + b * b);
+    let sine = root(c * c + d * d);
+    let cosine = root(a * a + b * b);
     let half_sum = arc_tangent(b, a);
     let half_difference = arc_tangent(d, c);
-    let closed = near < GIMBAL;
-    let open = far < GIMBAL;
+    let closed = sine < GIMBAL;
+    let open = cosine < GIMBAL;
     let locked = closed || open;
     let sum = half_sum + half_difference;
     let difference = half_sum - half_difference;
@@ -50,7 +50,7 @@ fn euler(rotation: vec4f, detail: u32) -> vec3f {
     let outer = select(select(difference, sum * third_sign, intrinsic), together, locked);
     let inner = select(select(sum * third_sign, difference, intrinsic), 0.0, locked);
     let first = select(outer, outer * third_sign, locked && intrinsic);
-    let whole = 2.0 * arc_tangent(near, far);
+    let whole = 2.0 * arc_tangent(sine, cosine);
     let second = select((whole - HALF_PI) - HALF_PI_LOW, whole, symmetric);
     return vec3f(
         wrapped(first) * DEGREES,
@@ -64,9 +64,9 @@ fn parts(rotation: vec4f) -> array<Stored, PARTS> {
     return array<Stored, PARTS>(angles.x, angles.y, angles.z);
 }
 
-fn store(place: u32, rotation: vec4f) {
+fn store(index: u32, rotation: vec4f) {
     var all = parts(rotation);
     for (var part = 0u; part < PARTS; part++) {
-        rotations[place * PARTS + part] = all[part];
+        rotations[index * PARTS + part] = all[part];
     }
 }

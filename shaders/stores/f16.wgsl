@@ -4,7 +4,7 @@
 
 alias Stored = vec2u;
 
-fn store(place: u32, rotation: vec4f) {
+fn store(index: u32, rotation: vec4f) {
     let half = to_half(rotation);
-    rotations[place] = vec2u(half.x | (half.y << 16u), half.z | (half.w << 16u));
+    rotations[index] = vec2u(half.x | (half.y << 16u), half.z | (half.w << 16u));
 }

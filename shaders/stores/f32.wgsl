@@ -2,6 +2,6 @@
 
 alias Stored = vec4f;
 
-fn store(place: u32, rotation: vec4f) {
-    rotations[place] = rotation;
+fn store(index: u32, rotation: vec4f) {
+    rotations[index] = rotation;
 }

@@ -2,6 +2,6 @@
 
 alias Stored = vec2<u64>;
 
-fn store(place: u32, rotation: vec4f) {
-    rotations[place] = wide(rotation);
+fn store(index: u32, rotation: vec4f) {
+    rotations[index] = wide(rotation);
 }

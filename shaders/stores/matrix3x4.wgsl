@@ -21,9 +21,9 @@ fn parts(rotation: vec4f) -> array<Stored, PARTS> {
     );
 }
 
-fn store(place: u32, rotation: vec4f) {
+fn store(index: u32, rotation: vec4f) {
     var all = parts(rotation);
     for (var part = 0u; part < PARTS; part++) {
-        rotations[place * PARTS + part] = all[part];
+        rotations[index * PARTS + part] = all[part];
     }
 }

@@ -11,7 +11,7 @@ fn to_snorm(value: vec4f) -> vec4u {
     return bitcast<vec4u>(value * vec4f(32767.0) + vec4f(SNORM_SHIFT)) & vec4u(0xffffu);
 }
 
-fn store(place: u32, rotation: vec4f) {
+fn store(index: u32, rotation: vec4f) {
     let whole = to_snorm(rotation);
-    rotations[place] = vec2u(whole.x | (whole.y << 16u), whole.z | (whole.w << 16u));
+    rotations[index] = vec2u(whole.x | (whole.y << 16u), whole.z | (whole.w << 16u));
 }

@@ -1,10 +1,12 @@
-//! Twin of `shaders/runs.wgsl`: the samples of one run, in vector lanes.
+//! Twin of `shaders/runs.wgsl`: the samples of one run, in vector lanes, and where they are stored: in a slice by
+//! ordinary stores, or in whole cache lines by streaming stores.
 
 use std::marker::PhantomData;
+use std::slice;
 
-use crate::cpu::sink::{Places, Sink, Turns};
 use crate::shader::ArcSegment;
-use crate::simd::lanes::{Lanes, Number as _};
+use crate::simd::cache_line::CacheLine;
+use crate::simd::lanes::{Lanes, MAX_LANES, Number as _};
 use crate::time::runs::Affine;
 use crate::twin::evaluate::{Evaluate, Parameters};
 
@@ -43,12 +45,12 @@ pub(crate) fn frames_past_caches<L: Lanes, S: Evaluate>(
     affine: Affine,
     first: f32,
     count: usize,
-    places: Places<'_>,
+    lines: StreamingLines<'_>,
 ) {
     // The evaluation starts where the line does; the rotations that are there already stay.
-    let (_, there) = places.begun;
+    let (_, there) = lines.begun;
     let (first, count) = (first - there as f32, there + count);
-    frames_in_vectors::<L, S>(segment, affine, first, count, places);
+    frames_in_vectors::<L, S>(segment, affine, first, count, lines);
 }
 
 #[inline(always)]
@@ -63,9 +65,21 @@ fn frames_in_vectors<L: Lanes, S: Evaluate>(
     // vector.
     let (all, narrow) = (S::samples::<L>(), S::samples::<L::Narrow>());
     if all > narrow && count <= narrow {
-        run::<L::Narrow, S, _>(segment, affine, count, Frames::new::<S>(first), output);
+        run::<L::Narrow, S, _>(
+            segment,
+            affine,
+            count,
+            FrameDistances::new::<S>(first),
+            output,
+        );
     } else {
-        run::<L, S, _>(segment, affine, count, Frames::new::<S>(first), output);
+        run::<L, S, _>(
+            segment,
+            affine,
+            count,
+            FrameDistances::new::<S>(first),
+            output,
+        );
     }
 }
 
@@ -85,7 +99,7 @@ pub(crate) fn distances<L: Lanes, S: Evaluate>(
         }
         return;
     }
-    let distances = Listed::<S>(distances, PhantomData);
+    let distances = ListedDistances::<S>(distances, PhantomData);
     run::<L, S, _>(segment, affine, count, distances, output);
 }
 
@@ -114,15 +128,15 @@ impl<L: Lanes, D: Distances<L>> Parameters<L> for OfDistances<L, D> {
     }
 }
 
-struct Frames<L> {
+struct FrameDistances<L> {
     next: L,
-    /// The distances of the turn after the next, computed a turn ahead so that none waits for the
+    /// The distances of the iteration after the next, computed an iteration ahead so that none waits for the
     /// addition.
     after: L,
     step: L,
 }
 
-impl<L: Lanes> Frames<L> {
+impl<L: Lanes> FrameDistances<L> {
     #[inline(always)]
     fn new<S: Evaluate>(first: f32) -> Self {
         let next = L::all(first) + S::load(&STEPS);
@@ -135,27 +149,27 @@ impl<L: Lanes> Frames<L> {
     }
 }
 
-impl<L: Lanes> Distances<L> for Frames<L> {
+impl<L: Lanes> Distances<L> for FrameDistances<L> {
     #[inline(always)]
     fn next(&mut self) -> L {
-        let own = self.next;
+        let current = self.next;
         self.next = self.after;
         self.after = self.after + self.step;
-        own
+        current
     }
 }
 
-struct Listed<'a, S>(&'a [f32], PhantomData<S>);
+struct ListedDistances<'a, S>(&'a [f32], PhantomData<S>);
 
-impl<L: Lanes, S: Evaluate> Distances<L> for Listed<'_, S> {
+impl<L: Lanes, S: Evaluate> Distances<L> for ListedDistances<'_, S> {
     #[inline(always)]
     fn next(&mut self) -> L {
-        // The loop asks for parameters beyond its last turn; their values do not count.
-        let Some((own, rest)) = self.0.split_at_checked(S::samples::<L>()) else {
+        // The loop asks for parameters after its last iteration; their values do not count.
+        let Some((vector, rest)) = self.0.split_at_checked(S::samples::<L>()) else {
             return L::all(0.0);
         };
         self.0 = rest;
-        S::load(own)
+        S::load(vector)
     }
 }
 
@@ -167,20 +181,20 @@ fn run<L: Lanes, S: Evaluate, O: Sink>(
     distances: impl Distances<L>,
     output: O,
 ) {
-    let turns = count.div_ceil(S::samples::<L>());
-    let is_far = matches!(S::FAR_FROM, Some(from) if turns >= from);
+    let iterations = count.div_ceil(S::samples::<L>());
+    let prefetches = matches!(S::PIPELINE_FROM, Some(from) if iterations >= from);
     if !segment.is_canonical() {
         vectors::<L, S, O, true, false>(segment, affine, count, distances, output);
-    } else if is_far {
+    } else if prefetches {
         vectors::<L, S, O, false, true>(segment, affine, count, distances, output);
     } else {
         vectors::<L, S, O, false, false>(segment, affine, count, distances, output);
     }
 }
 
-/// Evaluates a run in turns; [`Turns`] explains `FILTER` and `FAR`.
+/// Evaluates a run; [`VectorLoop`] explains `FILTER` and `PREFETCH`.
 #[inline(always)]
-fn vectors<L: Lanes, S: Evaluate, O: Sink, const FILTER: bool, const FAR: bool>(
+fn vectors<L: Lanes, S: Evaluate, O: Sink, const FILTER: bool, const PREFETCH: bool>(
     segment: &S,
     affine: Affine,
     count: usize,
@@ -193,7 +207,7 @@ fn vectors<L: Lanes, S: Evaluate, O: Sink, const FILTER: bool, const FAR: bool>(
         offset: L::all(affine.offset),
     };
     let constant = L::all(segment.constant());
-    let begun = S::begin::<L, FAR>(constant, &mut parameters);
+    let begun = S::begin::<L, PREFETCH>(constant, &mut parameters);
     // A copy is loaded as a whole before the first sample is stored. That is faster for arcs, and for
     // polynomials that come from memory, as those of long results do; of a polynomial in the caches
     // each coefficient is better loaded where it is used.
@@ -206,13 +220,157 @@ fn vectors<L: Lanes, S: Evaluate, O: Sink, const FILTER: bool, const FAR: bool>(
         }
         false => segment,
     };
-    let turns = Turns::<_, _, _, FILTER, FAR> {
+    let vector_loop = VectorLoop::<_, _, _, FILTER, PREFETCH> {
         segment,
         constant,
         begun,
         parameters,
     };
-    output.take(count, turns);
+    output.store_samples(count, vector_loop);
+}
+
+/// The most samples that one iteration of the evaluation loop makes.
+const MAX_SAMPLES: usize = MAX_LANES;
+
+/// Evaluates a run, [`Evaluate::samples`] samples in each iteration. With `FILTER`
+/// components below 2^-64 become 0; with `PREFETCH` samples are begun several iterations ahead.
+pub(crate) struct VectorLoop<'a, L: Lanes, S: Evaluate, P, const FILTER: bool, const PREFETCH: bool>
+{
+    pub(crate) segment: &'a S,
+    pub(crate) constant: L,
+    pub(crate) begun: S::Begun<L>,
+    pub(crate) parameters: P,
+}
+
+/// The vectors of a run, whatever their parameters.
+pub(crate) trait NextVectors<L: Lanes, S: Evaluate> {
+    fn next(&mut self) -> S::Vectors<L>;
+}
+
+impl<L: Lanes, S: Evaluate, P: Parameters<L>, const FILTER: bool, const PREFETCH: bool>
+    NextVectors<L, S> for VectorLoop<'_, L, S, P, FILTER, PREFETCH>
+{
+    #[inline(always)]
+    fn next(&mut self) -> S::Vectors<L> {
+        let (begun, parameters) = (self.begun, &mut self.parameters);
+        let (begun, vectors) =
+            (self.segment).evaluate::<L, FILTER, PREFETCH>(self.constant, begun, parameters);
+        self.begun = begun;
+        vectors
+    }
+}
+
+pub(crate) trait Sink {
+    /// Whether its stores bypass the caches.
+    const STREAMS: bool;
+
+    /// Stores the first `count` samples.
+    fn store_samples<L: Lanes, S: Evaluate>(self, count: usize, vectors: impl NextVectors<L, S>);
+}
+
+/// Ordinary stores. Elements after `count` may be overwritten, up to the end of an iteration.
+impl Sink for &mut [[f32; 4]] {
+    const STREAMS: bool = false;
+
+    #[inline(always)]
+    fn store_samples<L: Lanes, S: Evaluate>(
+        self,
+        count: usize,
+        mut vectors: impl NextVectors<L, S>,
+    ) {
+        let samples = S::samples::<L>();
+        let whole = count.next_multiple_of(samples).min(self.len());
+        let mut all = self[..whole].chunks_exact_mut(samples);
+        for rotations in &mut all {
+            store(&vectors.next(), rotations);
+        }
+        let rest = all.into_remainder();
+        if !rest.is_empty() {
+            let mut rotations = AlignedRotations([[0.0; 4]; MAX_SAMPLES]);
+            store(&vectors.next(), &mut rotations.0[..samples]);
+            rest.copy_from_slice(&rotations.0[..rest.len()]);
+        }
+    }
+}
+
+#[repr(align(64))]
+struct AlignedRotations([[f32; 4]; MAX_SAMPLES]);
+
+#[inline(always)]
+fn store<L: Lanes>(vectors: &impl AsRef<[L]>, rotations: &mut [[f32; 4]]) {
+    let parts = rotations.chunks_exact_mut(L::COUNT / 4);
+    for (vector, part) in vectors.as_ref().iter().zip(parts) {
+        vector.store_side_by_side(part);
+    }
+}
+
+/// Streaming stores: the whole cache lines of the result, and the staging lines before and after
+/// them. The first sample of the first iteration lies at the start of a line.
+pub(crate) struct StreamingLines<'a> {
+    /// The first line as it is staged, and how many of its rotations are there already; these
+    /// stay.
+    pub(crate) begun: (CacheLine, usize),
+    pub(crate) whole: &'a mut [CacheLine],
+    /// The staging line for the samples after the whole lines.
+    pub(crate) rest: &'a mut CacheLine,
+}
+
+impl Sink for StreamingLines<'_> {
+    const STREAMS: bool = true;
+
+    #[inline(always)]
+    fn store_samples<L: Lanes, S: Evaluate>(
+        self,
+        count: usize,
+        mut vectors: impl NextVectors<L, S>,
+    ) {
+        let rotations = L::COUNT / 4;
+        let vectors_each = S::samples::<L>() / rotations;
+        let (begun, there) = self.begun;
+        let begun: &[L::Block] = bytemuck::cast_slice(slice::from_ref(&begun));
+        let whole: &mut [L::Block] = bytemuck::cast_slice_mut(self.whole);
+        let rest = bytemuck::cast_slice_mut(slice::from_mut(self.rest));
+        // From here on samples are counted in vectors.
+        let (count, mut made) = (count.div_ceil(rotations), 0);
+        while made < begun.len() {
+            for (i, vector) in (made..).zip(vectors.next().as_ref()) {
+                let vector = match begun.get(i) {
+                    Some(staged) => {
+                        let there = there.saturating_sub(i * rotations).min(rotations);
+                        vector.behind(staged, there)
+                    }
+                    None => *vector,
+                };
+                put(vector, i, whole, rest);
+            }
+            made += vectors_each;
+        }
+        let first = made.min(whole.len());
+        let mut all = whole[first..].chunks_exact_mut(vectors_each);
+        for blocks in &mut all {
+            for (vector, block) in vectors.next().as_ref().iter().zip(blocks) {
+                vector.store_past_caches(block);
+            }
+            made += vectors_each;
+        }
+        let whole = all.into_remainder();
+        let left = count.saturating_sub(made);
+        for first in (0..left).step_by(vectors_each) {
+            for (i, vector) in (first..).zip(vectors.next().as_ref()) {
+                put(*vector, i, whole, rest);
+            }
+        }
+    }
+}
+
+/// Stores the `i`th vector: into a whole line, or into the rest after the whole lines.
+#[inline(always)]
+fn put<L: Lanes>(vector: L, i: usize, whole: &mut [L::Block], rest: &mut [L::Block]) {
+    if let Some(block) = whole.get_mut(i) {
+        vector.store_past_caches(block);
+    } else if let Some(block) = rest.get_mut(i - whole.len()) {
+        vector.store_side_by_side(bytemuck::cast_slice_mut(slice::from_mut(block)));
+    }
 }
 
 #[cfg(test)]

@@ -4,15 +4,15 @@ use bytemuck::Zeroable as _;
 use glam::Vec4;
 
 use crate::cpu::evaluate::{SAMPLES_ONE_BY_ONE, distances, frames};
-use crate::cpu::streaming::{Output, Samples};
+use crate::cpu::streaming::{RowOutput, Samples};
 use crate::prepare::clip_data::PartRef;
 use crate::simd::dispatch::{InLanesInto, VectorWidth, in_lanes_into};
 use crate::simd::lanes::Lanes;
 use crate::time::frame_clock::FrameClock;
-use crate::time::frames::{FramesError, Ticks, Timeline};
+use crate::time::frames::{SampleTimesError, Ticks, Timeline};
 use crate::time::interval_blocks::{IntervalBlock, IntervalBlocks};
 use crate::time::runs::{Distance, Emit, Parameter, Run, RunSource};
-use crate::time::spans::{NONE, Source};
+use crate::time::spans::{NONE, SpanSource};
 use crate::time::wrap::TrackCopy;
 use crate::twin::evaluate::Evaluate;
 
@@ -32,23 +32,23 @@ impl Row<'_> {
     pub(crate) fn evaluate<S: Evaluate>(
         &self,
         segments: &[S],
-        output: &mut Output<'_, '_>,
-    ) -> Result<(), FramesError> {
+        output: &mut RowOutput<'_, '_>,
+    ) -> Result<(), SampleTimesError> {
         match output {
-            Output::Here(samples) => in_lanes_into(self.width, self, segments, *samples),
-            Output::Staged(staged) => in_lanes_into(self.width, self, segments, staged),
+            RowOutput::Here(samples) => in_lanes_into(self.width, self, segments, *samples),
+            RowOutput::Staged(staged) => in_lanes_into(self.width, self, segments, staged),
         }
     }
 }
 
 impl<S: Evaluate, O: Samples + ?Sized> InLanesInto<[S], O> for Row<'_> {
-    type Outcome = Result<(), FramesError>;
+    type Outcome = Result<(), SampleTimesError>;
 
     #[inline(always)]
-    fn run<L: Lanes>(&self, segments: &[S], output: &mut O) -> Result<(), FramesError> {
+    fn run<L: Lanes>(&self, segments: &[S], output: &mut O) -> Result<(), SampleTimesError> {
         let PartRef { prepared, part } = self.part;
         if self.copy.samples.len() <= SAMPLES_ONE_BY_ONE {
-            return self.few(segments, output.samples());
+            return self.one_by_one(segments, output.samples());
         }
         if let (&Ticks::Frames { rate, start }, true) = (&self.timeline.ticks, self.copy.is_track())
         {
@@ -85,12 +85,12 @@ impl Row<'_> {
         let starts = &spans.starts[part.spans.clone()];
         let mut intervals = IntervalBlocks::new(starts, part.end, clock, samples.clone());
         let mut block = IntervalBlock::zeroed();
-        while let Some(own) = intervals.fill(&mut block) {
+        while let Some(filled) = intervals.fill(&mut block) {
             if !block.are_near {
                 return false;
             }
-            let own = part.spans.start + own.start..part.spans.start + own.end;
-            let (sources, keys) = (&spans.sources[own.clone()], &spans.keys[own]);
+            let range = part.spans.start + filled.start..part.spans.start + filled.end;
+            let (sources, keys) = (&spans.sources[range.clone()], &spans.keys[range]);
             for j in block.occupied {
                 let (source, key) = (sources[j], keys[j]);
                 let (first, last) = (block.first[j], block.first[j + 1]);
@@ -103,20 +103,20 @@ impl Row<'_> {
                     distance += 1.0;
                 }
                 match source {
-                    Source::Segment(index) => {
+                    SpanSource::Segment(index) => {
                         let affine = block.affine(j);
                         let segment = &segments[index as usize];
                         output.frames::<L, S>(segment, affine, distance, start, count);
                     }
-                    Source::Constant(index) => {
+                    SpanSource::Constant(index) => {
                         let constant = prepared.constants[index as usize];
                         output.samples()[start..][..count].fill(constant);
                         output.made(start..start + count);
                     }
-                    Source::Exact(index) => {
+                    SpanSource::Exact(index) => {
                         let parameter = block.parameter(j, clock);
-                        let own = &mut output.samples()[start..][..count];
-                        self.exact(last - count, index, parameter, own);
+                        let values = &mut output.samples()[start..][..count];
+                        self.exact(last - count, index, parameter, values);
                         output.made(start..start + count);
                     }
                 }
@@ -127,7 +127,11 @@ impl Row<'_> {
 
     /// Evaluates at most [`SAMPLES_ONE_BY_ONE`] samples, one by one.
     #[inline(never)]
-    fn few<S: Evaluate>(&self, segments: &[S], output: &mut [[f32; 4]]) -> Result<(), FramesError> {
+    fn one_by_one<S: Evaluate>(
+        &self,
+        segments: &[S],
+        output: &mut [[f32; 4]],
+    ) -> Result<(), SampleTimesError> {
         let PartRef { prepared, part } = self.part;
         let mut samples = OneByOne {
             row: self,
@@ -144,7 +148,7 @@ impl Row<'_> {
         &self,
         segments: &[S],
         output: &mut [[f32; 4]],
-    ) -> Result<(), FramesError> {
+    ) -> Result<(), SampleTimesError> {
         let PartRef { prepared, part } = self.part;
         let mut runs = Vec::new();
         (prepared.spans).runs(part, self.timeline, self.copy, &mut runs)?;
@@ -172,9 +176,9 @@ impl Row<'_> {
                 let mut from_middle = [0.0; CHUNK];
                 for (chunk, output) in output.chunks_mut(CHUNK).enumerate() {
                     let count = output.len();
-                    for (j, own) in (chunk * CHUNK..).zip(&mut from_middle[..count]) {
+                    for (j, value) in (chunk * CHUNK..).zip(&mut from_middle[..count]) {
                         let time = || self.timeline.time_at(part.track as usize, run.sample + j);
-                        *own = distance.of(j, time);
+                        *value = distance.of(j, time);
                     }
                     distances::<L, S>(segment, affine, &from_middle, count, output);
                 }
@@ -221,7 +225,7 @@ struct OneByOne<'a, 'r, S> {
 }
 
 impl<S: Evaluate> Emit for OneByOne<'_, '_, S> {
-    // Not inlined, because runs come from many places.
+    // Not inlined, because it has many callers.
     #[inline(never)]
     fn run(&mut self, run: Run) {
         (self.row).evaluate_run::<Vec4, S>(&run, self.segments, self.output);

@@ -1,19 +1,41 @@
 //! The scratch pool: the buffers that preparing needs are kept from call to call, because
 //! allocating them takes as long as preparing a hundred keys.
 
+use std::ops::Range;
 use std::sync::{Mutex, MutexGuard, TryLockError};
 
 use crate::method::interpolation::Interpolation;
+use crate::prepare::clip_data::PartRef;
+use crate::prepare::error::SetError;
 use crate::prepare::preparation::Preparation;
 use crate::prepare::prepared::Prepared;
-use crate::prepare::request::Request;
+use crate::prepare::request::SetRequest;
 use crate::threads;
+use crate::tracks::set::TrackSet;
 
 /// The scratch buffers of one thread, for one interpolation.
-pub(crate) struct Memory {
+pub(crate) struct Scratch {
     interpolation: Interpolation,
     pub(crate) prepared: Prepared,
     pub(crate) preparation: Preparation,
+}
+
+impl Scratch {
+    /// Prepares some intervals of tracks together; what was prepared before is forgotten.
+    pub(crate) fn prepare(
+        &mut self,
+        set: &TrackSet,
+        intervals: impl Iterator<Item = (usize, Range<usize>)>,
+    ) -> Result<(), SetError> {
+        self.prepared.clear();
+        self.preparation.push(&mut self.prepared, set, intervals)
+    }
+
+    /// The parts that were prepared last.
+    pub(crate) fn parts(&self) -> impl Iterator<Item = PartRef<'_>> {
+        let prepared = &self.prepared;
+        (prepared.parts.iter()).map(move |part| PartRef { prepared, part })
+    }
 }
 
 /// How many are kept for each thread. Programs alternate between interpolations; transforms alone
@@ -23,7 +45,7 @@ const KEPT_EACH: usize = 4;
 /// What threads have given back, the latest last. Nobody waits for it: a process may be forked while a thread
 /// that is not in it has it locked.
 #[derive(Default)]
-pub(crate) struct ScratchPool(Mutex<Vec<Memory>>);
+pub(crate) struct ScratchPool(Mutex<Vec<Scratch>>);
 
 /// How often a thread looks whether the pool is free before it does without: others have it for some
 /// nanoseconds.
@@ -32,9 +54,9 @@ const LOOKS: usize = 1000;
 impl ScratchPool {
     /// Takes scratch buffers for an interpolation out of the pool, or allocates them. They prepare
     /// only what the samples of this timeline need.
-    pub(crate) fn take(&self, request: &Request<'_>) -> Memory {
+    pub(crate) fn take(&self, request: &SetRequest<'_>) -> Scratch {
         let interpolation = request.interpolation;
-        let mut memory = self.find(interpolation).unwrap_or_else(|| Memory {
+        let mut memory = self.find(interpolation).unwrap_or_else(|| Scratch {
             interpolation: *interpolation,
             prepared: Prepared::new(interpolation),
             preparation: Preparation::new(interpolation),
@@ -43,15 +65,15 @@ impl ScratchPool {
         memory
     }
 
-    fn find(&self, interpolation: &Interpolation) -> Option<Memory> {
+    fn find(&self, interpolation: &Interpolation) -> Option<Scratch> {
         let mut kept = self.kept()?;
-        let place = (kept.iter()).rposition(|memory| memory.interpolation == *interpolation)?;
-        Some(kept.remove(place))
+        let index = (kept.iter()).rposition(|memory| memory.interpolation == *interpolation)?;
+        Some(kept.remove(index))
     }
 
     /// Puts scratch buffers back into the pool. Call it only after success: a failed preparation
     /// may leave them half filled.
-    pub(crate) fn give_back(&self, memory: Memory) {
+    pub(crate) fn give_back(&self, memory: Scratch) {
         let Some(mut kept) = self.kept() else {
             return;
         };
@@ -61,7 +83,7 @@ impl ScratchPool {
         kept.push(memory);
     }
 
-    fn kept(&self) -> Option<MutexGuard<'_, Vec<Memory>>> {
+    fn kept(&self) -> Option<MutexGuard<'_, Vec<Scratch>>> {
         for _ in 0..LOOKS {
             match self.0.try_lock() {
                 Ok(kept) => return Some(kept),
@@ -85,7 +107,7 @@ mod tests {
         let pool = ScratchPool::default();
         let new = |method: Method| {
             let interpolation = method.into();
-            Memory {
+            Scratch {
                 interpolation,
                 prepared: Prepared::new(&interpolation),
                 preparation: Preparation::new(&interpolation),
@@ -109,7 +131,7 @@ mod tests {
         let locked = pool.kept().unwrap();
         let interpolation = method::SLERP.into();
         assert!(pool.find(&interpolation).is_none());
-        pool.give_back(Memory {
+        pool.give_back(Scratch {
             interpolation,
             prepared: Prepared::new(&interpolation),
             preparation: Preparation::new(&interpolation),

@@ -4,13 +4,13 @@
 
 use std::ops::Range;
 
+use crate::cpu::evaluate::StreamingLines;
 use crate::cpu::evaluate::{SAMPLES_ONE_BY_ONE, frames, frames_past_caches};
-use crate::cpu::sink::Places;
+use crate::simd::cache_line::{CacheLine, EACH};
 use crate::simd::dispatch::{
     InLanesInto, VectorWidth, fence, in_lanes_into, streaming_stores_from,
 };
 use crate::simd::lanes::Lanes;
-use crate::simd::line::{EACH, Line};
 use crate::time::runs::Affine;
 use crate::twin::evaluate::Evaluate;
 
@@ -24,23 +24,23 @@ const ROW: usize = 64;
 /// Number of staging lines.
 const LINES: usize = 512;
 
-/// Writes consecutive rows: directly into their places, or through staging lines by streaming
+/// Writes consecutive rows: directly to where they belong, or through staging lines by streaming
 /// stores.
 pub(crate) struct Stage<'o> {
     width: VectorWidth,
-    place: Place<'o>,
+    destination: Destination<'o>,
     /// The staging lines; `None` where rows are written directly.
-    lines: Option<Box<[Line; LINES]>>,
+    lines: Option<Box<[CacheLine; LINES]>>,
     /// Rotations that are staged, if any are, counted from the start of the first staging line.
     filled: usize,
 }
 
 /// The part of the output that is still to be stored to.
-struct Place<'o> {
+struct Destination<'o> {
     /// Without staging lines all of it. Else what lies before the first whole line of the output:
     /// it is staged at the end of the first staging line.
     before: &'o mut [[f32; 4]],
-    lines: &'o mut [Line],
+    lines: &'o mut [CacheLine],
     after: &'o mut [[f32; 4]],
     /// How many of the staging lines are stored already.
     stored: usize,
@@ -79,7 +79,7 @@ impl<'o> Stage<'o> {
             width,
             lines: is_staged.then(bytemuck::zeroed_box),
             filled: before.len().wrapping_neg() % EACH,
-            place: Place {
+            destination: Destination {
                 before,
                 lines,
                 after,
@@ -92,7 +92,7 @@ impl<'o> Stage<'o> {
     pub(crate) fn row<E>(
         &mut self,
         count: usize,
-        mut make: impl FnMut(Range<usize>, &mut Output<'_, 'o>) -> Result<(), E>,
+        mut make: impl FnMut(Range<usize>, &mut RowOutput<'_, 'o>) -> Result<(), E>,
     ) -> Result<(), E> {
         let mut first = 0;
         while first < count {
@@ -100,16 +100,20 @@ impl<'o> Stage<'o> {
                 self.clear();
             }
             let Some(lines) = &mut self.lines else {
-                let row = self.place.before.split_off_mut(..count).unwrap_or_default();
-                return make(0..count, &mut Output::Here(row));
+                let row = self
+                    .destination
+                    .before
+                    .split_off_mut(..count)
+                    .unwrap_or_default();
+                return make(0..count, &mut RowOutput::Here(row));
             };
             let some = (count - first).min(EACH * LINES - self.filled);
-            let mut output = Output::Staged(Staged {
+            let mut output = RowOutput::Staged(Staged {
                 lines: &mut lines[..],
                 start: self.filled,
                 end: self.filled + some,
                 made: self.filled,
-                place: &mut self.place,
+                destination: &mut self.destination,
             });
             make(first..first + some, &mut output)?;
             self.filled += some;
@@ -123,7 +127,7 @@ impl<'o> Stage<'o> {
         self.clear();
         if let Some(lines) = &self.lines {
             let rest = &lines[0].0[..self.filled];
-            self.place.after.copy_from_slice(rest);
+            self.destination.after.copy_from_slice(rest);
         }
     }
 
@@ -133,12 +137,17 @@ impl<'o> Stage<'o> {
             return;
         };
         let whole = self.filled / EACH;
-        in_lanes_into(self.width, &WholeLines, &lines[..whole], &mut self.place);
+        in_lanes_into(
+            self.width,
+            &WholeLines,
+            &lines[..whole],
+            &mut self.destination,
+        );
         if whole < LINES {
             lines[0] = lines[whole];
         }
         self.filled %= EACH;
-        self.place.stored = 0;
+        self.destination.stored = 0;
     }
 }
 
@@ -150,10 +159,10 @@ impl Drop for Stage<'_> {
     }
 }
 
-impl<'o> Place<'o> {
+impl<'o> Destination<'o> {
     /// Stores `lines`, the first staging lines, except those that are stored already.
     #[inline(always)]
-    fn store<L: Lanes>(&mut self, lines: &[Line]) {
+    fn store<L: Lanes>(&mut self, lines: &[CacheLine]) {
         if let [first, ..] = lines
             && !self.before.is_empty()
         {
@@ -163,16 +172,16 @@ impl<'o> Place<'o> {
         }
         if lines.len() > self.stored {
             let lines = &lines[self.stored..];
-            let places = bytemuck::cast_slice_mut(self.next(lines.len()));
-            for (block, place) in bytemuck::cast_slice(lines).iter().zip(places) {
-                L::of_block(block).store_past_caches(place);
+            let blocks = bytemuck::cast_slice_mut(self.next(lines.len()));
+            for (block, target) in bytemuck::cast_slice(lines).iter().zip(blocks) {
+                L::of_block(block).store_past_caches(target);
             }
         }
     }
 
-    /// Takes the places of the next `count` lines, which the caller stores.
+    /// Takes the next `count` lines of the output, which the caller stores.
     #[inline(always)]
-    fn next(&mut self, count: usize) -> &'o mut [Line] {
+    fn next(&mut self, count: usize) -> &'o mut [CacheLine] {
         let (lines, others) = std::mem::take(&mut self.lines).split_at_mut(count);
         self.lines = others;
         self.stored += count;
@@ -183,35 +192,35 @@ impl<'o> Place<'o> {
 /// Stores whole staging lines.
 struct WholeLines;
 
-impl<'o> InLanesInto<[Line], Place<'o>> for WholeLines {
+impl<'o> InLanesInto<[CacheLine], Destination<'o>> for WholeLines {
     const WIDE_IN_TESTS: bool = true;
     type Outcome = ();
 
     #[inline(always)]
-    fn run<L: Lanes>(&self, lines: &[Line], place: &mut Place<'o>) {
-        place.store::<L>(lines);
+    fn run<L: Lanes>(&self, lines: &[CacheLine], destination: &mut Destination<'o>) {
+        destination.store::<L>(lines);
     }
 }
 
 /// Where some samples of a row are made.
-pub(crate) enum Output<'s, 'o> {
-    /// In their final place.
+pub(crate) enum RowOutput<'s, 'o> {
+    /// Where they belong in the output.
     Here(&'s mut [[f32; 4]]),
     Staged(Staged<'s, 'o>),
 }
 
 /// Samples in the staging lines.
 pub(crate) struct Staged<'s, 'o> {
-    lines: &'s mut [Line],
+    lines: &'s mut [CacheLine],
     /// Where these samples start in the lines, and where they end.
     start: usize,
     end: usize,
     /// All staged rotations before this one are made.
     made: usize,
-    place: &'s mut Place<'o>,
+    destination: &'s mut Destination<'o>,
 }
 
-impl Output<'_, '_> {
+impl RowOutput<'_, '_> {
     pub(crate) fn samples(&mut self) -> &mut [[f32; 4]] {
         match self {
             Self::Here(samples) => samples,
@@ -266,19 +275,19 @@ impl Samples for Staged<'_, '_> {
         start: usize,
         count: usize,
     ) {
-        let own = self.start + start;
-        let (line, end) = (own / EACH, own + count);
-        let is_next = self.made == own;
+        let staged_start = self.start + start;
+        let (line, end) = (staged_start / EACH, staged_start + count);
+        let is_next = self.made == staged_start;
         if is_next && count > SAMPLES_ONE_BY_ONE && end / EACH < LINES {
             // First the staged lines before these samples.
-            self.place.store::<L>(&self.lines[..line]);
-            if self.place.before.is_empty() {
-                let places = Places {
-                    begun: (self.lines[line], own % EACH),
-                    whole: self.place.next(end / EACH - line),
+            self.destination.store::<L>(&self.lines[..line]);
+            if self.destination.before.is_empty() {
+                let streaming_lines = StreamingLines {
+                    begun: (self.lines[line], staged_start % EACH),
+                    whole: self.destination.next(end / EACH - line),
                     rest: &mut self.lines[end / EACH],
                 };
-                frames_past_caches::<L, S>(segment, affine, first, count, places);
+                frames_past_caches::<L, S>(segment, affine, first, count, streaming_lines);
                 self.made = end;
                 return;
             }
@@ -306,7 +315,7 @@ mod tests {
 
     use super::*;
 
-    /// Catches lines that are stored too early, in a wrong place or not at all, and gaps between
+    /// Catches lines that are stored too early, at a wrong offset or not at all, and gaps between
     /// rows, for every alignment of the output.
     #[test]
     fn rows_come_to_their_places() {
@@ -321,12 +330,12 @@ mod tests {
                     assert_eq!(output.samples().len(), samples.len());
                     for from in (0..samples.len()).step_by(each) {
                         let to = (from + each).min(samples.len());
-                        for place in &mut output.samples()[from..to] {
-                            *place = [next; 4];
+                        for value in &mut output.samples()[from..to] {
+                            *value = [next; 4];
                             next += 1.0;
                         }
                         // Not all samples are reported as made at once.
-                        if let Output::Staged(staged) = output
+                        if let RowOutput::Staged(staged) = output
                             && from % 3 != 1
                         {
                             staged.made(from..to);

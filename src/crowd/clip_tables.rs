@@ -6,28 +6,28 @@ use std::ops::Range;
 use bytemuck::Zeroable as _;
 use glam::Vec3;
 
-use crate::crowd_error::{CrowdError, MOST_TICKS};
+use crate::crowd_error::{CrowdError, MAX_TICKS};
 use crate::curve::options::Quantity;
 use crate::math::canonical::round_f32;
 use crate::memory::reserved;
 use crate::method::interpolation::Interpolation;
 use crate::method::vector_method::VectorMethod;
-use crate::prepare::clip_data::{ClipData, Wanted};
+use crate::prepare::clip_data::{ClipData, PrepareRequest};
 use crate::shader::{
     CHANNELS, CrowdBase, CrowdChannel, CrowdClip, CrowdSpan, FORM_ARC, FORM_CONSTANT, FORM_CUBIC,
     FORM_POLYNOMIAL, Form, ON_KEY, POWERS, SCALE,
 };
 use crate::time::frame_clock::{FrameClock, FrameStart, in_frames};
 use crate::time::frame_rate::FrameRate;
-use crate::time::spans::{NONE, Source};
+use crate::time::spans::{NONE, SpanSource};
 use crate::time::wrap::{TrackCopy, WrapMode};
 use crate::tracks::set::TrackSet;
-use crate::tracks::vectors::Channel;
+use crate::tracks::set::vectors::Channel;
 use crate::twin::crowd_layers::sampled;
-use crate::twin::crowd_times::place_at;
+use crate::twin::crowd_times::position_at;
 
-/// Places in a table are counted in 32 bits, with some to spare.
-pub(crate) const MOST_PLACES: usize = 1 << 31;
+/// Entries of a table are counted in 32 bits, with some to spare.
+pub(crate) const MAX_ENTRIES: usize = 1 << 31;
 
 /// The tables of all clips.
 #[derive(Debug, Clone, Default)]
@@ -44,9 +44,9 @@ pub(crate) struct ClipTables {
     pub(crate) runs: Vec<Vec<Range<u32>>>,
 }
 
-/// One channel before it has its place: its spans, and what it is in each.
+/// One channel before it is laid out in the tables: its spans, and its constants in each.
 #[derive(Default)]
-struct Curve {
+struct ChannelCurve {
     form: u32,
     spans: Vec<CrowdSpan>,
     /// The constants of each span, as many as its form has.
@@ -65,7 +65,7 @@ pub(crate) fn constants_of(form: u32) -> usize {
     }
 }
 
-impl Curve {
+impl ChannelCurve {
     fn constant(value: [f32; 4]) -> Self {
         Self {
             form: FORM_CONSTANT,
@@ -75,7 +75,7 @@ impl Curve {
     }
 
     /// Adds a span in which the value stays. A curve whose other constants are 0 gives it, bit for bit.
-    fn hold(&mut self, start: u32, value: [f32; 4], key: Option<[f32; 4]>) {
+    fn push_constant(&mut self, start: u32, value: [f32; 4], key: Option<[f32; 4]>) {
         let span = CrowdSpan {
             start,
             whole: start as i32,
@@ -105,33 +105,33 @@ fn curve(
     track: usize,
     form: u32,
     (rate, start, period): (FrameRate, FrameStart, u32),
-) -> Result<Curve, CrowdError> {
-    let mut curve = Curve {
+) -> Result<ChannelCurve, CrowdError> {
+    let mut curve = ChannelCurve {
         form,
-        ..Curve::default()
+        ..ChannelCurve::default()
     };
     let whole = TrackCopy::of_track(0..0);
     let last_tick = f64::from(period);
-    for own in data.parts_in(track, &whole) {
-        let (prepared, part) = (own.prepared, own.part);
+    for part_ref in data.parts_in(track, &whole) {
+        let (prepared, part) = (part_ref.prepared, part_ref.part);
         let frames = FrameClock::new(rate, start, prepared.spans.steps);
         let constant = |index: u32| prepared.constants[index as usize];
         let starts = &prepared.spans.starts[part.spans.clone()];
         let begin = frames.boundary(*starts.first().unwrap_or(&part.end));
         if part.before != NONE && begin.first > 0.0 {
-            curve.hold(0, constant(part.before), None);
+            curve.push_constant(0, constant(part.before), None);
         }
         let ends = starts.iter().skip(1).chain([&part.end]);
-        for ((place, &own_start), &end) in part.spans.clone().zip(starts).zip(ends) {
-            let (from, to) = (frames.boundary(own_start), frames.boundary(end));
+        for ((index, &span_start), &end) in part.spans.clone().zip(starts).zip(ends) {
+            let (from, to) = (frames.boundary(span_start), frames.boundary(end));
             if from.first >= to.first || from.first > last_tick {
                 continue; // no tick lies in it
             }
             let first = from.first as u32;
-            let key = prepared.spans.keys[place];
+            let key = prepared.spans.keys[index];
             let key = (key != NONE && from.first == from.frame).then(|| constant(key));
-            match prepared.spans.sources[place] {
-                Source::Segment(index) => {
+            match prepared.spans.sources[index] {
+                SpanSource::Segment(index) => {
                     let along = in_frames(from.frame, to.frame, 1.0);
                     let span = CrowdSpan {
                         start: first,
@@ -151,27 +151,29 @@ fn curve(
                     };
                     curve.push(span, &constants, key);
                 }
-                Source::Constant(index) => curve.hold(first, constant(index), key),
-                Source::Exact(_) => {
+                SpanSource::Constant(index) => curve.push_constant(first, constant(index), key),
+                SpanSource::Exact(_) => {
                     return Err(CrowdError::TooWild {
                         track,
-                        seconds: own_start,
+                        seconds: span_start,
                     });
                 }
             }
         }
         let end = frames.boundary(part.end);
         if part.after != NONE && (end.first <= last_tick || curve.spans.is_empty()) {
-            let at_end = part.beyond.as_ref().map(|beyond| beyond.at_end);
+            let at_end = part.extension.as_ref().map(|extension| extension.at_end);
             let key = at_end.filter(|&key| key != NONE && end.first == end.frame);
             let first = end.first.min(last_tick) as u32;
             let first = if curve.spans.is_empty() { 0 } else { first };
-            curve.hold(first, constant(part.after), key.map(constant));
+            curve.push_constant(first, constant(part.after), key.map(constant));
         }
     }
     let is_still = curve.spans.len() == 1 && curve.spans[0].scale == 0.0;
     Ok(match curve.constants.first() {
-        Some(&value) if is_still && curve.spans[0].start & ON_KEY == 0 => Curve::constant(value),
+        Some(&value) if is_still && curve.spans[0].start & ON_KEY == 0 => {
+            ChannelCurve::constant(value)
+        }
         _ => curve,
     })
 }
@@ -195,7 +197,7 @@ impl ClipTables {
         let (start, end) = set.time_span().unwrap_or((0.0, 0.0));
         let rate = FrameRate::whole(ticks_per_second);
         let ticks = rate.frames_in(end - start).round();
-        if ticks.is_nan() || ticks > f64::from(MOST_TICKS) {
+        if ticks.is_nan() || ticks > f64::from(MAX_TICKS) {
             return Err(CrowdError::TooLong {
                 seconds: end - start,
                 ticks_per_second,
@@ -203,7 +205,7 @@ impl ClipTables {
         }
         let period = (ticks as u32).max(1);
         let clock = (rate, FrameStart::new(start), period);
-        let rotations = ClipData::new(set, interpolation, Wanted::all(set))?;
+        let rotations = ClipData::new(set, interpolation, PrepareRequest::all(set))?;
         let form = match interpolation.form() {
             Form::Arc => FORM_ARC,
             Form::Polynomial => FORM_POLYNOMIAL,
@@ -217,12 +219,12 @@ impl ClipTables {
             curves.push(curve(&rotations, joint, form, clock)?);
             curves.push(match set.vectors(Channel::Translation, joint) {
                 Some(_) => curve(&translations, joint, FORM_CUBIC, clock)?,
-                None => Curve::constant([offset.x, offset.y, offset.z, 0.0]),
+                None => ChannelCurve::constant([offset.x, offset.y, offset.z, 0.0]),
             });
             curves.push(curve(&scales, joint, FORM_CUBIC, clock)?);
         }
         // Every curve has its constants and keys, and may have spans of its own.
-        let constants = |curve: &Curve| curve.constants.len() + curve.keys.len();
+        let constants = |curve: &ChannelCurve| curve.constants.len() + curve.keys.len();
         let more: usize = curves.iter().map(constants).sum();
         let spans: usize = curves.iter().map(|curve| curve.spans.len()).sum();
         let counts = [
@@ -230,23 +232,23 @@ impl ClipTables {
             self.spans.len() + spans + 1,
             self.channels.len() + curves.len(),
         ];
-        if counts.iter().any(|&count| count > MOST_PLACES) || curves.len() >= 1 << 24 {
+        if counts.iter().any(|&count| count > MAX_ENTRIES) || curves.len() >= 1 << 24 {
             return Err(CrowdError::TooLarge);
         }
         self.add(period, &curves);
         Ok(())
     }
 
-    /// Gives the curves of a clip their places.
-    fn add(&mut self, period: u32, curves: &[Curve]) {
+    /// Lays the curves of a clip out in the tables.
+    fn add(&mut self, period: u32, curves: &[ChannelCurve]) {
         let first_base = self.bases.len();
         if self.cells.is_empty() {
             self.cells.push([0.0; 4]); // kernels use the first cell as 0
         }
         let mut known: HashMap<Vec<u8>, u32> = HashMap::new();
         // Channels of one kind, one form and one time base lie side by side.
-        let mut sides = BTreeMap::<_, Vec<(usize, &Curve)>>::new();
-        for (place, curve) in curves.iter().enumerate() {
+        let mut sides = BTreeMap::<_, Vec<(usize, &ChannelCurve)>>::new();
+        for (index, curve) in curves.iter().enumerate() {
             let mut base = 0;
             if curve.form != FORM_CONSTANT {
                 let bytes = bytemuck::cast_slice(&curve.spans).to_vec();
@@ -255,8 +257,8 @@ impl ClipTables {
                     (self.bases.len() - 1 - first_base) as u32
                 });
             }
-            let side = (place as u32 % CHANNELS, curve.form, base);
-            sides.entry(side).or_default().push((place, curve));
+            let side = (index as u32 % CHANNELS, curve.form, base);
+            sides.entry(side).or_default().push((index, curve));
         }
         if self.bases.len() == first_base {
             // Entries always stand somewhere.
@@ -266,11 +268,11 @@ impl ClipTables {
         let none = CrowdChannel::zeroed();
         self.channels.resize(first_channel + curves.len(), none);
         for ((_, form, base), members) in sides {
-            let mut lay_out = |column: fn(&Curve) -> &[[f32; 4]]| {
+            let mut lay_out = |column: fn(&ChannelCurve) -> &[[f32; 4]]| {
                 let first = self.cells.len();
-                for place in 0..column(members[0].1).len() {
-                    let own = members.iter().map(|(_, curve)| column(curve)[place]);
-                    self.cells.extend(own);
+                for row in 0..column(members[0].1).len() {
+                    let cells = members.iter().map(|(_, curve)| column(curve)[row]);
+                    self.cells.extend(cells);
                 }
                 first
             };
@@ -284,8 +286,8 @@ impl ClipTables {
                 FORM_CONSTANT => 0,
                 _ => members.len() as u32,
             };
-            for (slot, (place, _)) in members.into_iter().enumerate() {
-                self.channels[first_channel + place] = CrowdChannel {
+            for (slot, (index, _)) in members.into_iter().enumerate() {
+                self.channels[first_channel + index] = CrowdChannel {
                     first: (first + slot) as u32,
                     count,
                     form_and_base: form << 24 | base,
@@ -328,18 +330,18 @@ impl ClipTables {
         clip: usize,
         tick: u32,
     ) -> impl Iterator<Item = [f32; 4]> {
-        let own = &self.clips[clip];
-        let tick = tick.min(own.period);
-        let bases = &self.bases[own.first_base as usize..][..own.bases as usize];
-        let places: Vec<_> = (bases.iter())
-            .map(|base| place_at(base, &self.spans, tick))
+        let clip_entry = &self.clips[clip];
+        let tick = tick.min(clip_entry.period);
+        let bases = &self.bases[clip_entry.first_base as usize..][..clip_entry.bases as usize];
+        let positions: Vec<_> = (bases.iter())
+            .map(|base| position_at(base, &self.spans, tick))
             .collect();
         let each = joints * CHANNELS as usize;
         let channels = &self.channels[clip * each..][..each];
-        (0..).zip(channels).map(move |(place, channel)| {
-            let own = places[(channel.form_and_base & 0x00ff_ffff) as usize];
-            let value = sampled(&self.cells, channel, own);
-            match place % CHANNELS {
+        (0..).zip(channels).map(move |(index, channel)| {
+            let position = positions[(channel.form_and_base & 0x00ff_ffff) as usize];
+            let value = sampled(&self.cells, channel, position);
+            match index % CHANNELS {
                 SCALE => value.map(|scale| match scale == 0.0 {
                     true => 1.0,
                     false => round_f32(1.0 / f64::from(scale)),

@@ -26,38 +26,38 @@ impl Instances {
         still: CrowdEntry,
     ) -> Result<Self, OutOfMemory> {
         let count = instances * layers;
-        let mut own = Self {
+        let mut all = Self {
             entries: zeroed(count, "a crowd")?,
             changed: zeroed(count.div_ceil(64), "a crowd")?,
             clock: 0,
             since: 0,
         };
-        for (place, entry) in own.entries.iter_mut().enumerate() {
+        for (index, entry) in all.entries.iter_mut().enumerate() {
             *entry = still;
-            if place % layers > 0 {
+            if index % layers > 0 {
                 entry.clip_and_weight &= 0xffff;
             }
         }
-        own.forget();
-        Ok(own)
+        all.forget();
+        Ok(all)
     }
 
-    pub(crate) fn set(&mut self, place: usize, entry: CrowdEntry) {
-        self.entries[place] = entry;
-        self.changed[place / 64] |= 1 << (place % 64);
+    pub(crate) fn set(&mut self, index: usize, entry: CrowdEntry) {
+        self.entries[index] = entry;
+        self.changed[index / 64] |= 1 << (index % 64);
     }
 
-    /// Sets the clock. Entries tell times from their anchors on, up to 2^40 ticks later; where that would
+    /// Sets the clock. Entries have times relative to their anchors, up to 2^40 ticks later; where that would
     /// not do, all get new anchors.
     pub(crate) fn set_clock(&mut self, clock: u64, clips: &[CrowdClip], masks: usize) {
         let is_near = clock >= self.clock && clock - self.since < 1 << (ELAPSED_BITS - 1);
         if !is_near {
-            for place in 0..self.entries.len() {
-                let layer = CrowdLayer::moved(&self.entries[place], clips, self.clock, clock);
-                // What an entry says can be said again.
+            for index in 0..self.entries.len() {
+                let layer = CrowdLayer::moved(&self.entries[index], clips, self.clock, clock);
+                // What was packed once can be packed again.
                 if let Ok(mut entry) = layer.packed(clips, masks, clock) {
-                    entry.clip_and_weight = self.entries[place].clip_and_weight;
-                    self.set(place, entry);
+                    entry.clip_and_weight = self.entries[index].clip_and_weight;
+                    self.set(index, entry);
                 }
             }
             self.since = clock;
@@ -86,16 +86,16 @@ impl Instances {
     }
 }
 
-/// The first place from `place` on whose bit is `wanted`; `count` if none of so many is.
-fn first_that(changed: &[u64], mut place: usize, count: usize, wanted: bool) -> usize {
-    while place < count {
-        let word = changed[place / 64];
-        let word = if wanted { word } else { !word };
-        let left = word >> (place % 64);
+/// The first index from `index` on whose bit is `value`; `count` if none of so many is.
+fn first_that(changed: &[u64], mut index: usize, count: usize, value: bool) -> usize {
+    while index < count {
+        let word = changed[index / 64];
+        let word = if value { word } else { !word };
+        let left = word >> (index % 64);
         if left != 0 {
-            return (place + left.trailing_zeros() as usize).min(count);
+            return (index + left.trailing_zeros() as usize).min(count);
         }
-        place = (place / 64 + 1) * 64;
+        index = (index / 64 + 1) * 64;
     }
     count
 }
@@ -111,13 +111,15 @@ mod tests {
         let still = CrowdEntry::zeroed();
         let mut all = Instances::new(100, 2, still).unwrap();
         let ranges = |all: &mut Instances| -> Vec<_> {
-            let ranges = all.take_changes().map(|(first, own)| (first, own.len()));
+            let ranges = all
+                .take_changes()
+                .map(|(first, entries)| (first, entries.len()));
             ranges.collect()
         };
         assert_eq!(ranges(&mut all), [(0, 200)]);
         assert_eq!(ranges(&mut all), []);
-        for place in [0, 1, 63, 64, 65, 130, 199] {
-            all.set(place, still);
+        for index in [0, 1, 63, 64, 65, 130, 199] {
+            all.set(index, still);
         }
         assert_eq!(ranges(&mut all), [(0, 2), (63, 3), (130, 1), (199, 1)]);
         all.forget();

@@ -2,15 +2,12 @@
 
 use crate::math::quaternion::{dot, product, step};
 use crate::shader::{CHANNELS, ROTATION};
-use crate::simd::lanes::{Lanes, Number as _, canonical};
+use crate::simd::lanes::{Lanes, MAX_LANES, Number as _, canonical};
 use crate::simd::together::Together;
 use crate::twin::arc_tangent::{flat_arc_tangent, reciprocal_root, root_by};
 use crate::twin::crowd_layers::{Layers, laid_over};
 use crate::twin::quaternion::{along, chord, normalised};
 use crate::twin::sine_cosine::sine_cosine;
-
-/// Lanes of the widest vectors.
-pub(super) const MOST_LANES: usize = 16;
 
 const UNMOVED: [f32; 4] = [0.0, 0.0, 0.0, 1.0];
 
@@ -51,10 +48,10 @@ impl Over<'_> {
         while first < output.len() {
             let vectors = (output.len() - first).div_ceil(L::COUNT);
             // Few ways, for each is compiled for each width. The widest vectors have as many joints as most skeletons.
-            if L::COUNT == MOST_LANES && vectors <= 2 {
+            if L::COUNT == MAX_LANES && vectors <= 2 {
                 self.some::<L, 2>(first, output);
                 first += 2 * L::COUNT;
-            } else if L::COUNT == MOST_LANES || vectors <= 4 {
+            } else if L::COUNT == MAX_LANES || vectors <= 4 {
                 self.some::<L, 4>(first, output);
                 first += 4 * L::COUNT;
             } else {
@@ -106,10 +103,10 @@ impl Over<'_> {
             let weight = self
                 .mask
                 .map_or(self.weight, |mask| self.weight * mask[joint][0]);
-            let place = joint * CHANNELS as usize + ROTATION as usize;
+            let channel = joint * CHANNELS as usize + ROTATION as usize;
             let reference = self
                 .references
-                .map_or(UNMOVED, |references| references[place]);
+                .map_or(UNMOVED, |references| references[channel]);
             let is_additive = self.references.is_some();
             let layer = self.layered[joint];
             *value = laid_over(ROTATION, is_additive, *value, layer, reference, weight);
@@ -135,8 +132,8 @@ fn slerp<L: Lanes, const VECTORS: usize>(
         return None;
     }
     let half = flat_arc_tangent(small, large);
-    let turn = sine_cosine((t + t - Together::all(1.0)) * half);
-    Some(along(sum, difference, (to_unit, inverse), turn))
+    let sine_and_cosine = sine_cosine((t + t - Together::all(1.0)) * half);
+    Some(along(sum, difference, (to_unit, inverse), sine_and_cosine))
 }
 
 /// Vectors of the rotations from a joint on, filled up with rotations that change nothing.
@@ -151,7 +148,7 @@ fn load<L: Lanes, const VECTORS: usize>(
         let vectors = if rotations.len() >= L::COUNT {
             L::load_rotations(rotations)
         } else {
-            let mut end = [UNMOVED; MOST_LANES];
+            let mut end = [UNMOVED; MAX_LANES];
             end[..rotations.len()].copy_from_slice(rotations);
             L::load_rotations(&end)
         };
@@ -172,12 +169,12 @@ fn reference<L: Lanes, const VECTORS: usize>(
     let last = channels.len() / each - 1;
     let mut loaded = [Together::all(0.0); 4];
     for v in 0..VECTORS {
-        let mut places = [0; MOST_LANES];
-        for (lane, place) in places.iter_mut().enumerate().take(L::COUNT) {
+        let mut rows = [0; MAX_LANES];
+        for (lane, row) in rows.iter_mut().enumerate().take(L::COUNT) {
             let joint = (first + v * L::COUNT + lane).min(last);
-            *place = (joint * each) as u32 + ROTATION;
+            *row = (joint * each) as u32 + ROTATION;
         }
-        let vectors = L::gather_rotations(channels, &places[..L::COUNT]);
+        let vectors = L::gather_rotations(channels, &rows[..L::COUNT]);
         for c in 0..4 {
             loaded[c].0[v] = vectors[c];
         }
@@ -213,14 +210,14 @@ mod tests {
     use crate::simd::dispatch::{InLanes, VectorWidth, in_lanes_of};
 
     /// Rotations of so many joints, and a weight in the mask of each.
-    struct Case {
+    struct LayOverCase {
         joints: usize,
         random: fastrand::Rng,
         /// How often rotations that are as far apart as can be were met.
-        far: usize,
+        opposite: usize,
     }
 
-    impl Case {
+    impl LayOverCase {
         fn rotation(&mut self) -> [f32; 4] {
             let random = std::array::from_fn(|_| self.random.f32() - 0.5);
             let whole = std::array::from_fn(|_| f32::from(self.random.i8(-1..=1)));
@@ -232,7 +229,7 @@ mod tests {
         }
     }
 
-    impl InLanes for Case {
+    impl InLanes for LayOverCase {
         const WIDE_IN_TESTS: bool = true;
 
         fn run<L: Lanes>(&mut self) {
@@ -277,28 +274,28 @@ mod tests {
                     let expected = laid_over(ROTATION, is_additive, a, b, reference, weight);
                     let bits = |q: [f32; 4]| q.map(f32::to_bits);
                     assert_eq!(bits(found[joint]), bits(expected), "{a:?} {b:?} {weight}");
-                    self.far += usize::from(!is_additive && dot(a, b) == 0.0);
+                    self.opposite += usize::from(!is_additive && dot(a, b) == 0.0);
                 }
             }
         }
     }
 
     /// Catches an operation in another order than the twin's, a lane of another joint, and rotations for which
-    /// the shorter way of vectors does not hold.
+    /// the short form in vectors is not valid.
     #[test]
     fn rotations_are_laid_over_each_other_as_the_twin_does() {
         for width in VectorWidth::available() {
             let random = fastrand::Rng::with_seed(7);
-            let mut case = Case {
+            let mut case = LayOverCase {
                 joints: 0,
                 random,
-                far: 0,
+                opposite: 0,
             };
             for joints in (1..140).chain([1000]) {
                 case.joints = joints;
                 in_lanes_of(width, &mut case);
             }
-            assert!(case.far > 100, "{}", case.far);
+            assert!(case.opposite > 100, "{}", case.opposite);
         }
     }
 }

@@ -1,6 +1,6 @@
 //! What one layer of an instance plays, and the 16 bytes that say so to the kernels.
 
-use crate::crowd_error::{CrowdError, FASTEST, MOST_MASKS};
+use crate::crowd_error::{CrowdError, FASTEST, MAX_MASKS};
 use crate::shader::{
     CrowdClip, CrowdEntry, RUNS_BACKWARDS, SPEED_MAGNITUDE, START_BIAS, WEIGHT_UNIT, WRAP_HOLD,
     WRAP_LOOP, WRAP_MIRROR,
@@ -65,13 +65,19 @@ impl CrowdLayer {
         masks: usize,
         clock: u64,
     ) -> Result<CrowdEntry, CrowdError> {
-        let missing = |what, given, count| Err(CrowdError::Missing { what, given, count });
+        let missing = |subject, index, count| {
+            Err(CrowdError::Missing {
+                subject,
+                index,
+                count,
+            })
+        };
         let Some(clip) = clips.get(self.clip) else {
             return missing("clip", self.clip, clips.len());
         };
         let mask = match self.mask {
             None => 0,
-            Some(mask) if mask < masks.min(MOST_MASKS) => mask as u32 + 1,
+            Some(mask) if mask < masks.min(MAX_MASKS) => mask as u32 + 1,
             Some(mask) => return missing("mask", mask, masks),
         };
         if !(0.0..=1.0).contains(&self.weight) {
@@ -146,7 +152,7 @@ impl CrowdEntry {
     }
 
     /// Whether nothing of the layers below is left: all joints have the clip's rotations, bit for bit.
-    pub(crate) fn hides_what_is_below(&self) -> bool {
+    pub(crate) fn hides_lower_layers(&self) -> bool {
         let is_whole = (self.clip_and_weight >> 16) as f32 * WEIGHT_UNIT == 1.0;
         let is_additive = self.speed_and_modes >> 31 != 0;
         is_whole && !is_additive && !self.has_mask()
@@ -184,7 +190,7 @@ mod tests {
             (clock, passed) in (0u64..1 << 50, 0u64..1 << 39),
             (speed, wrap) in (-127.9f32..127.9, 0usize..3),
         ) {
-            let period = period.min(crate::crowd_error::MOST_TICKS);
+            let period = period.min(crate::crowd_error::MAX_TICKS);
             let clips = [CrowdClip { period, first_base: 0, bases: 0 }];
             let wrap = [WrapMode::Hold, WrapMode::Loop, WrapMode::Mirror][wrap];
             let layer = CrowdLayer { time: time >> 2, speed, wrap, ..CrowdLayer::new(0) };
@@ -203,7 +209,7 @@ mod tests {
             prop_assert!((0..=back).contains(&off), "{found}, {along:?}");
         }
 
-        /// A layer that was just set stands where it was told to.
+        /// A layer that was just set is at the time that was asked for.
         #[test]
         fn what_is_set_is_where_it_says(
             (period, time, clock) in (1u32..1 << 30, 0i64..1 << 30, 0u64..1 << 50),

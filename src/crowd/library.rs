@@ -3,8 +3,9 @@
 use bytemuck::Zeroable as _;
 use glam::{Affine3A, Vec3};
 
-use crate::crowd::clip_tables::{ClipTables, MOST_PLACES};
-use crate::crowd_error::{CrowdError, MOST_CLIPS, MOST_MASKS, MOST_TICKS};
+use crate::crowd::clip_tables::{ClipTables, MAX_ENTRIES};
+use crate::crowd::states::MotionTables;
+use crate::crowd_error::{CrowdError, MAX_CLIPS, MAX_MASKS, MAX_TICKS};
 use crate::math::canonical::canonical;
 use crate::memory::reserved;
 use crate::method::interpolation::Interpolation;
@@ -73,9 +74,8 @@ impl CrowdLibrary {
     /// # Errors
     /// When the skeleton has no joints, or there are no ticks.
     pub fn with_ticks(skeleton: &Skeleton, ticks_per_second: u32) -> Result<Self, CrowdError> {
-        if !(1..=MOST_TICKS).contains(&ticks_per_second) {
-            let given = ticks_per_second;
-            return Err(CrowdError::TicksPerSecond { given });
+        if !(1..=MAX_TICKS).contains(&ticks_per_second) {
+            return Err(CrowdError::TicksPerSecond { ticks_per_second });
         }
         let joints = skeleton.len();
         if joints == 0 {
@@ -159,12 +159,12 @@ impl CrowdLibrary {
         interpolation: impl Into<Interpolation>,
         vectors: VectorMethod,
     ) -> Result<usize, CrowdError> {
-        let (given, joints) = (set.track_count(), self.joints());
-        if given != joints {
-            return Err(CrowdError::Tracks { given, joints });
+        let (tracks, joints) = (set.track_count(), self.joints());
+        if tracks != joints {
+            return Err(CrowdError::Tracks { tracks, joints });
         }
         let clip = self.clips();
-        if clip == MOST_CLIPS {
+        if clip == MAX_CLIPS {
             return Err(CrowdError::TooManyClips);
         }
         let (ticks, offsets) = (self.ticks_per_second, &self.offsets);
@@ -182,16 +182,20 @@ impl CrowdLibrary {
     /// When there are no such clips.
     pub fn set_reference(&mut self, clip: usize, from: usize, tick: u32) -> Result<(), CrowdError> {
         let (joints, count) = (self.joints(), self.clips());
-        if let Some(given) = [clip, from].into_iter().find(|&given| given >= count) {
-            let what = "clip";
-            return Err(CrowdError::Missing { what, given, count });
+        if let Some(index) = [clip, from].into_iter().find(|&index| index >= count) {
+            let subject = "clip";
+            return Err(CrowdError::Missing {
+                subject,
+                index,
+                count,
+            });
         }
-        let own = &mut self.references[clip * joints * CHANNELS as usize..];
-        for (own, value) in own
+        let references = &mut self.references[clip * joints * CHANNELS as usize..];
+        for (reference, value) in references
             .iter_mut()
             .zip(self.tables.reference(joints, from, tick))
         {
-            *own = value;
+            *reference = value;
         }
         Ok(())
     }
@@ -204,7 +208,7 @@ impl CrowdLibrary {
     pub fn push_mask(&mut self, weights: &[f32]) -> Result<usize, CrowdError> {
         let mask = self.masks();
         self.check_joints("weights", weights.len())?;
-        if mask == MOST_MASKS {
+        if mask == MAX_MASKS {
             return Err(CrowdError::TooManyMasks);
         }
         let outside = |weight: &f32| !(0.0..=1.0).contains(weight);
@@ -234,13 +238,13 @@ impl CrowdLibrary {
         Ok(())
     }
 
-    fn check_joints(&self, what: &'static str, given: usize) -> Result<(), CrowdError> {
+    fn check_joints(&self, subject: &'static str, count: usize) -> Result<(), CrowdError> {
         let joints = self.joints();
-        match given == joints {
+        match count == joints {
             true => Ok(()),
             false => Err(CrowdError::Joints {
-                what,
-                given,
+                subject,
+                count,
                 joints,
             }),
         }
@@ -249,19 +253,19 @@ impl CrowdLibrary {
     /// All constants that kernels read: those of segments and keys, then the masks, then the reference
     /// poses.
     pub(crate) fn cells(&self) -> Result<Vec<[f32; 4]>, CrowdError> {
-        let own = &self.tables.cells;
-        let count = own.len() + self.masks.len() + self.references.len();
-        if count > MOST_PLACES {
+        let clip_cells = &self.tables.cells;
+        let count = clip_cells.len() + self.masks.len() + self.references.len();
+        if count > MAX_ENTRIES {
             return Err(CrowdError::TooLarge);
         }
         let mut cells = reserved(count, "a crowd's library")?;
-        cells.extend_from_slice(own);
+        cells.extend_from_slice(clip_cells);
         cells.extend(self.masks.iter().map(|&weight| [weight, 0.0, 0.0, 0.0]));
         cells.extend_from_slice(&self.references);
         Ok(cells)
     }
 
-    /// What kernels are told of a crowd with so many layers: its sizes, and where masks and reference
+    /// The push constants of a crowd with so many layers: its sizes, and where masks and reference
     /// poses start among the cells.
     pub(crate) fn arguments(&self, layers: usize) -> CrowdDispatch {
         let masks = self.tables.cells.len();
@@ -274,5 +278,13 @@ impl CrowdLibrary {
             references: (masks + self.masks.len()) as u32,
             ..CrowdDispatch::zeroed()
         }
+    }
+
+    /// The library's clips as tables, with the spans and the cells that belong to them. Masks, reference
+    /// poses and inverse bind matrices stay behind.
+    #[must_use]
+    pub fn into_tables(self) -> (MotionTables, Vec<[u32; 4]>, Vec<[f32; 4]>) {
+        let (ticks_per_second, joints) = (self.ticks_per_second(), self.joints());
+        MotionTables::of_library(self.tables, self.links, joints, ticks_per_second)
     }
 }

@@ -1,14 +1,43 @@
-//! Crowds: many instances of one skeleton, each at its own time in clips of its own, evaluated in one
-//! go on the CPU or on a Vulkan device, with the same bits.
+//! Crowds: many instances of one skeleton, each at its own time in clips of its own, evaluated in one go on the CPU
+//! or on a Vulkan device, with the same bits.
+//!
+//! Thousands of characters change what they play a few times a second and are drawn at every frame. So an instance
+//! is 16 bytes that change only when it plays something else, where it stands follows from one clock of whole ticks,
+//! and the device finds each instance's segments itself.
+//!
+//! # Types
+//!
+//! * [`CrowdLibrary`](library::CrowdLibrary): the clips of a skeleton, its masks and reference poses, as flat tables
+//!   ([`ClipTables`](clip_tables::ClipTables)): per clip its time bases, per time base its spans, per joint a rotation,
+//!   a translation and a scale, each with a form and cells of four numbers.
+//! * [`Crowd`](player::Crowd): instances with up to four [`CrowdLayer`](layer::CrowdLayer)s, each packed into an entry
+//!   of 16 bytes ([`Instances`](instances::Instances)), and the clock.
+//! * [`MotionTables`](states::MotionTables): a library's clips without instances, for those who train on motion.
+//!
+//! # From a call to its bytes
+//!
+//! 1. `Crowd::set` packs a layer into its entry and notes that it changed.
+//! 2. An evaluation finds, for each layer of each instance, its tick and from that its position in each time base
+//!    (`twin::crowd_times`).
+//! 3. It evaluates the rotation, translation and scale of each joint in the lowest layer and lays the others over it
+//!    (`twin::crowd_layers`, [`lay_over`]).
+//! 4. It walks the skeleton down, level by level, and multiplies with the inverse bind matrices where skinning
+//!    matrices are asked for.
+//!
+//! A device does each step by a kernel over a window of instances (`gpu::crowd`); [`on_cpu`] does all of them for
+//! 32 instances a task.
+//!
+//! # Where memory lies
+//!
+//! Cells of channels with one form and one time base lie side by side, constant by constant, so that neighbouring
+//! joints are neighbouring lanes. On a device the tables stay; entries that changed are written with the next
+//! evaluation; positions live for a window alone.
 
 pub(crate) mod clip_tables;
-pub(crate) mod clock;
 pub(crate) mod instances;
 pub(crate) mod lay_over;
 pub(crate) mod layer;
 pub(crate) mod library;
 pub(crate) mod on_cpu;
-#[cfg(feature = "vulkan")]
-pub(crate) mod own_device;
 pub(crate) mod player;
 pub(crate) mod states;

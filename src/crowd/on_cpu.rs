@@ -5,50 +5,53 @@ use rayon::prelude::*;
 
 use crate::cpu::engine::CpuEngine;
 use crate::crowd::clip_tables::ClipTables;
-use crate::crowd::lay_over::{MOST_LANES, lay_over};
+use crate::crowd::lay_over::lay_over;
 use crate::crowd::library::CrowdLibrary;
 use crate::output::crowd::{CrowdOutput, CrowdValues};
 use crate::shader::{
-    CHANNELS, CrowdEntry, CrowdPlace, FORM_ARC, ON_KEY, ROTATION, SCALE, TRANSLATION,
+    CHANNELS, CrowdEntry, CrowdPosition, FORM_ARC, ON_KEY, ROTATION, SCALE, TRANSLATION,
 };
 use crate::simd::dispatch::{InLanes, in_lanes_of};
-use crate::simd::lanes::{Lanes, canonical};
+use crate::simd::lanes::{Lanes, MAX_LANES, canonical};
 use crate::threads::OutOfThreads;
 use crate::twin::crowd_layers::Layers;
 use crate::twin::crowd_matrices::{affine_product, transform};
-use crate::twin::crowd_times::places;
+use crate::twin::crowd_times::base_positions;
 use crate::twin::evaluate_arc::{norm_squared, on_arc};
 
 const TASK: usize = 32;
 
 /// What is evaluated: the same for all instances.
 #[derive(Clone, Copy)]
-pub(crate) struct Scene<'a> {
+pub(crate) struct CrowdScene<'a> {
     pub(crate) library: &'a CrowdLibrary,
     pub(crate) values: CrowdValues,
     pub(crate) clock: u64,
-    /// With all entries, and without places: these are found here.
+    /// With all entries, and without positions in the clips: these are found here.
     pub(crate) context: Layers<'a>,
 }
 
 /// Evaluates all instances into vectors of four numbers.
 pub(crate) fn evaluate(
-    scene: Scene<'_>,
+    scene: CrowdScene<'_>,
     engine: &CpuEngine,
     output: &mut [[f32; 4]],
 ) -> Result<(), OutOfThreads> {
     let (context, width) = (scene.context, engine.width);
-    let task = |(places, rotations): &mut (Vec<_>, Vec<_>),
+    let task = |(positions, rotations): &mut (Vec<_>, Vec<_>),
                 (output, entries): (&mut [[f32; 4]], &[CrowdEntry])| {
-        places.resize(entries.len() * context.bases as usize, CrowdPlace::zeroed());
+        positions.resize(
+            entries.len() * context.bases as usize,
+            CrowdPosition::zeroed(),
+        );
         rotations.resize(2 * scene.library.joints(), [0.0; 4]);
         let context = Layers { entries, ..context };
-        let scene = Scene { context, ..scene };
+        let scene = CrowdScene { context, ..scene };
         in_lanes_of(
             width,
-            &mut Task {
+            &mut InstancesTask {
                 scene,
-                places,
+                positions,
                 rotations,
                 output,
             },
@@ -67,30 +70,31 @@ pub(crate) fn evaluate(
     })
 }
 
-/// Some instances, and memory for what is found on the way.
-struct Task<'a, 'b> {
-    scene: Scene<'a>,
-    places: &'b mut Vec<CrowdPlace>,
+/// Some instances, and scratch memory.
+struct InstancesTask<'a, 'b> {
+    scene: CrowdScene<'a>,
+    positions: &'b mut Vec<CrowdPosition>,
     /// Those of an instance, and those of one of its layers.
     rotations: &'b mut Vec<[f32; 4]>,
     output: &'b mut [[f32; 4]],
 }
 
-impl InLanes for Task<'_, '_> {
+impl InLanes for InstancesTask<'_, '_> {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
         let (scene, context) = (self.scene, self.scene.context);
         let tables = &scene.library.tables;
         let (layers, bases) = (context.layers as usize, context.bases as usize);
-        let own = self.places.chunks_exact_mut(bases);
-        for (place, (entry, own)) in context.entries.iter().zip(own).enumerate() {
-            if place.is_multiple_of(layers) || entry.clip_and_weight >> 16 != 0 {
+        let rows = self.positions.chunks_exact_mut(bases);
+        let entries = context.entries.iter().zip(rows).enumerate();
+        for (entry_index, (entry, entry_positions)) in entries {
+            if entry_index.is_multiple_of(layers) || entry.clip_and_weight >> 16 != 0 {
                 let (clips, bases, spans) = (&tables.clips, &tables.bases, &tables.spans);
-                places(entry, scene.clock, clips, bases, spans, own);
+                base_positions(entry, scene.clock, clips, bases, spans, entry_positions);
             }
         }
         let context = Layers {
-            places: &self.places[..],
+            positions: &self.positions[..],
             ..context
         };
         let (found, layered) = self.rotations.split_at_mut(scene.library.joints());
@@ -125,7 +129,7 @@ impl InLanes for Task<'_, '_> {
     }
 }
 
-impl Scene<'_> {
+impl CrowdScene<'_> {
     fn vectors(&self) -> usize {
         self.library.joints() * CrowdOutput::from(self.values).vectors()
     }
@@ -144,7 +148,7 @@ fn rotations<L: Lanes>(
     let first = instance * context.layers as usize;
     let mut layers = first + 1..first + context.layers as usize;
     // What lies below a layer that hides it is not seen.
-    let hides = |layer: &usize| context.entries[*layer].hides_what_is_below();
+    let hides = |layer: &usize| context.entries[*layer].hides_lower_layers();
     let lowest = layers.clone().rfind(hides).unwrap_or(first);
     layers.start = lowest + 1;
     of_layer::<L>(context, tables, lowest, output);
@@ -168,10 +172,10 @@ fn of_layer<L: Lanes>(
     let clip = entry.clip_and_weight & 0xffff;
     for run in &tables.runs[clip as usize] {
         let values = &mut output[run.start as usize..run.end as usize];
-        let place = ((clip * context.joints + run.start) * CHANNELS) as usize;
-        let channel = &context.channels[place];
+        let first_channel = ((clip * context.joints + run.start) * CHANNELS) as usize;
+        let channel = &context.channels[first_channel];
         let base = (channel.form_and_base & 0x00ff_ffff) as usize;
-        let stands = context.places[layer * context.bases as usize + base];
+        let stands = context.positions[layer * context.bases as usize + base];
         if channel.form_and_base >> 24 == FORM_ARC && stands.span & ON_KEY == 0 {
             let middle = (channel.first + stands.span * channel.count * 2) as usize;
             let tangent = middle + channel.count as usize;
@@ -209,14 +213,18 @@ pub(super) fn arcs<L: Lanes>(
 ) {
     let whole = output.len() / L::COUNT * L::COUNT;
     for first in (0..whole).step_by(L::COUNT) {
-        let own = first..first + L::COUNT;
-        let found = block::<L>(&middles[own.clone()], &tangents[own.clone()], parameter);
-        output[own].copy_from_slice(found.as_ref());
+        let joints = first..first + L::COUNT;
+        let found = block::<L>(
+            &middles[joints.clone()],
+            &tangents[joints.clone()],
+            parameter,
+        );
+        output[joints].copy_from_slice(found.as_ref());
     }
     let rest = output.len() - whole;
     if rest > 0 {
         // The last vector is filled up with arcs that are left out.
-        let mut ends = [[[0.0; 4]; MOST_LANES]; 2];
+        let mut ends = [[[0.0; 4]; MAX_LANES]; 2];
         ends[0][..rest].copy_from_slice(&middles[whole..]);
         ends[1][..rest].copy_from_slice(&tangents[whole..]);
         let found = block::<L>(&ends[0][..L::COUNT], &ends[1][..L::COUNT], parameter);

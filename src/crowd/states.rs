@@ -6,23 +6,22 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use crate::crowd::clip_tables::{constants_of, runs_of};
-use crate::crowd::library::CrowdLibrary;
+use crate::crowd::clip_tables::{ClipTables, constants_of, runs_of};
 use crate::crowd::on_cpu::arcs;
 use crate::crowd_error::CrowdError;
 use crate::engine::Engine;
-use crate::evaluate::uploaded::Backend;
+use crate::evaluate::backend::Backend;
 use crate::math::canonical::canonical;
 use crate::math::quaternion::{cross3, dot, product, scaled, sum};
 use crate::shader::{
-    CHANNELS, CrowdBase, CrowdChannel, CrowdClip, CrowdLink, CrowdPlace, CrowdSpan, FORM_ARC,
+    CHANNELS, CrowdBase, CrowdChannel, CrowdClip, CrowdLink, CrowdPosition, CrowdSpan, FORM_ARC,
     FORM_CONSTANT, FORM_CUBIC, FORM_POLYNOMIAL, ON_KEY, POWERS, TICKS, TRANSLATION,
 };
 use crate::simd::dispatch::{InLanes, VectorWidth, in_lanes_of};
 use crate::simd::lanes::Lanes;
 use crate::threads::{on_threads, stop};
 use crate::twin::crowd_layers::sampled;
-use crate::twin::crowd_times::place_at;
+use crate::twin::crowd_times::position_at;
 use crate::twin::quaternion::rotated;
 
 /// Instances of one task.
@@ -44,7 +43,7 @@ pub struct MotionStates<'a> {
     pub angular_velocities: &'a mut [[f32; 3]],
 }
 
-/// The clips of a [`CrowdLibrary`] as plain tables, of which the large ones may lie in a file that several
+/// The clips of a [`CrowdLibrary`](crate::crowd::library::CrowdLibrary) as plain tables, of which the large ones may lie in a file that several
 /// processes map.
 ///
 /// ```
@@ -94,30 +93,28 @@ pub struct MotionWords {
     pub ticks_per_second: u32,
 }
 
-impl CrowdLibrary {
-    /// The library's clips as tables, with the spans and the cells that belong to them. Masks, reference
-    /// poses and inverse bind matrices stay behind.
-    #[must_use]
-    pub fn into_tables(self) -> (MotionTables, Vec<[u32; 4]>, Vec<[f32; 4]>) {
-        let ticks_per_second = self.ticks_per_second();
-        let joints = self.joints();
-        let library_tables = self.tables;
+impl MotionTables {
+    /// The tables of a library's clips, with their spans and cells.
+    pub(crate) fn of_library(
+        library_tables: ClipTables,
+        links: Vec<CrowdLink>,
+        joints: usize,
+        ticks_per_second: u32,
+    ) -> (Self, Vec<[u32; 4]>, Vec<[f32; 4]>) {
         let spans: Vec<[u32; 4]> = bytemuck::cast_vec(library_tables.spans);
-        let tables = MotionTables {
+        let tables = Self {
             sizes: (spans.len(), library_tables.cells.len()),
             clips: library_tables.clips,
             bases: library_tables.bases,
             channels: library_tables.channels,
-            links: self.links,
+            links,
             runs: library_tables.runs,
             joints,
             ticks_per_second,
         };
         (tables, spans, library_tables.cells)
     }
-}
 
-impl MotionTables {
     /// The tables of these words, with these spans and cells.
     ///
     /// # Errors
@@ -148,7 +145,7 @@ impl MotionTables {
         }
     }
 
-    /// Whether every place that a table names is there.
+    /// Whether every index in the tables is within its table.
     fn are_sound(&self, spans: &[CrowdSpan], cells: usize) -> bool {
         let each = self.joints.saturating_mul(CHANNELS as usize);
         let is_sound_base = |base: &CrowdBase| {
@@ -171,7 +168,7 @@ impl MotionTables {
             let has_parent = &mut has_parents[link.joint as usize];
             is_there && !std::mem::replace(has_parent, true)
         };
-        let is_sound_clip = |(place, clip): (usize, &CrowdClip)| {
+        let is_sound_clip = |(index, clip): (usize, &CrowdClip)| {
             let first = clip.first_base as usize;
             let Some(bases) = self.bases.get(first..first + clip.bases as usize) else {
                 return false;
@@ -198,7 +195,7 @@ impl MotionTables {
                     && end < cells
                     && (!has_keys || keys < cells)
             };
-            let channels = &self.channels[place * each..][..each];
+            let channels = &self.channels[index * each..][..each];
             clip.bases > 0 && clip.period > 0 && channels.iter().all(is_sound_channel)
         };
         each > 0
@@ -264,8 +261,12 @@ impl MotionTables {
         }
         let count = self.clips.len();
         if let Some(&(clip, _)) = at.iter().find(|(clip, _)| *clip as usize >= count) {
-            let (what, given) = ("clip", clip as usize);
-            return Err(CrowdError::Missing { what, given, count });
+            let (subject, index) = ("clip", clip as usize);
+            return Err(CrowdError::Missing {
+                subject,
+                index,
+                count,
+            });
         }
         let needed = at.len() * self.joints;
         let lengths = [
@@ -275,11 +276,11 @@ impl MotionTables {
             states.velocities.len(),
             states.angular_velocities.len(),
         ];
-        if let Some(&given) = lengths
+        if let Some(&length) = lengths
             .iter()
             .find(|&&length| length != 0 && length != needed)
         {
-            return Err(CrowdError::OutputLength { given, needed });
+            return Err(CrowdError::OutputLength { length, needed });
         }
         let width = match &*engine.backend {
             Backend::Cpu(engine) => engine.width,
@@ -287,13 +288,13 @@ impl MotionTables {
         };
         let stop = stop::current();
         let each = TASK * self.joints;
-        let task = |memory: &mut Memory, (at, states): (&[(u32, u32)], MotionStates<'_>)| {
+        let task = |memory: &mut StateScratch, (at, states): (&[(u32, u32)], MotionStates<'_>)| {
             stop::check_of(stop.as_ref())?;
             let spans = bytemuck::cast_slice(spans);
             let tables = self;
             in_lanes_of(
                 width,
-                &mut Task {
+                &mut StatesTask {
                     tables,
                     spans,
                     cells,
@@ -305,14 +306,14 @@ impl MotionTables {
             Ok(())
         };
         if at.len() <= TASK {
-            return task(&mut Memory::default(), (at, states));
+            return task(&mut StateScratch::default(), (at, states));
         }
         let mut left = states;
         let tasks: Vec<_> = at
             .chunks(TASK)
             .map(|at| (at, left.split_off(each)))
             .collect();
-        let work = || (tasks.into_par_iter()).try_for_each_init(Memory::default, task);
+        let work = || (tasks.into_par_iter()).try_for_each_init(StateScratch::default, task);
         match &*engine.backend {
             Backend::Cpu(engine) => engine.on_threads(work)?,
             Backend::Vulkan(_) => on_threads(work)?,
@@ -336,10 +337,10 @@ impl<'a> MotionStates<'a> {
     }
 }
 
-/// What one thread needs on the way.
+/// Scratch memory of one thread.
 #[derive(Default)]
-struct Memory {
-    places: Vec<CrowdPlace>,
+struct StateScratch {
+    positions: Vec<CrowdPosition>,
     rotations: Vec<[f32; 4]>,
     joints: Vec<Joint>,
 }
@@ -354,24 +355,24 @@ struct Joint {
 }
 
 /// Some instances.
-struct Task<'a, 'b> {
+struct StatesTask<'a, 'b> {
     tables: &'a MotionTables,
     spans: &'a [CrowdSpan],
     cells: &'a [[f32; 4]],
     at: &'a [(u32, u32)],
     states: MotionStates<'a>,
-    memory: &'b mut Memory,
+    memory: &'b mut StateScratch,
 }
 
-impl InLanes for Task<'_, '_> {
+impl InLanes for StatesTask<'_, '_> {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
         let (tables, joints) = (self.tables, self.tables.joints);
         let states = &mut self.states;
         let moves = !(states.velocities.is_empty() && states.angular_velocities.is_empty());
         let in_world = moves || !(states.positions.is_empty() && states.world_rotations.is_empty());
-        let Memory {
-            places,
+        let StateScratch {
+            positions,
             rotations,
             joints: world,
         } = &mut *self.memory;
@@ -382,9 +383,9 @@ impl InLanes for Task<'_, '_> {
             let tick = tick.min(clip_entry.period);
             let bases =
                 &tables.bases[clip_entry.first_base as usize..][..clip_entry.bases as usize];
-            places.clear();
-            let place = |base| place_of(base, self.spans, tick, clip_entry.period);
-            places.extend(bases.iter().map(place));
+            positions.clear();
+            let position = |base| guessed_position(base, self.spans, tick, clip_entry.period);
+            positions.extend(bases.iter().map(position));
             let each = joints * CHANNELS as usize;
             let channels = &tables.channels[clip as usize * each..][..each];
             let at = instance * joints..(instance + 1) * joints;
@@ -396,22 +397,22 @@ impl InLanes for Task<'_, '_> {
                 &tables.runs[clip as usize],
                 channels,
                 self.cells,
-                places,
+                positions,
                 local,
             );
             if !in_world {
                 continue;
             }
-            let moment = Moment {
+            let moment = ClipMoment {
                 bases,
                 spans: self.spans,
                 cells: self.cells,
-                places,
+                positions,
                 tick,
                 per_second: tables.ticks_per_second as f32,
             };
             for (joint, state) in world.iter_mut().enumerate() {
-                let [turn, moved] = [
+                let [rotation, moved] = [
                     &channels[joint * 3],
                     &channels[joint * 3 + TRANSLATION as usize],
                 ];
@@ -422,7 +423,7 @@ impl InLanes for Task<'_, '_> {
                     ..Joint::default()
                 };
                 if moves {
-                    state.angular_velocity = moment.angular_velocity(turn);
+                    state.angular_velocity = moment.angular_velocity(rotation);
                     state.velocity = moment.velocity(moved);
                 }
             }
@@ -454,10 +455,10 @@ impl Joint {
     fn hang_on(&mut self, parent: &Self, moves: bool) {
         let arm = rotated(parent.rotation, self.position);
         self.position = sum(parent.position, arm).map(canonical);
-        let turned = product(parent.rotation, self.rotation);
+        let rotation = product(parent.rotation, self.rotation);
         // One step of Newton's: rounding does not add up along the skeleton.
-        let scale = 1.5 - 0.5 * dot(turned, turned);
-        self.rotation = turned.map(|component| canonical(component * scale));
+        let scale = 1.5 - 0.5 * dot(rotation, rotation);
+        self.rotation = rotation.map(|component| canonical(component * scale));
         if !moves {
             return;
         }
@@ -469,10 +470,15 @@ impl Joint {
     }
 }
 
-/// Where a time base stands, as [`place_at`] says. Keys mostly lie at even times: where the span is that would
+/// Where a time base stands, as [`position_at`] says. Keys mostly lie at even times: where the span is that would
 /// hold the tick then, no search is needed, each step of which waits for memory.
 #[inline(always)]
-fn place_of(base: &CrowdBase, spans: &[CrowdSpan], tick: u32, period: u32) -> CrowdPlace {
+fn guessed_position(
+    base: &CrowdBase,
+    spans: &[CrowdSpan],
+    tick: u32,
+    period: u32,
+) -> CrowdPosition {
     let count = base.count as usize;
     let base_spans = &spans[base.first as usize..][..count];
     let even = (u64::from(tick) * (count as u64 - 1)).checked_div(u64::from(period));
@@ -487,12 +493,12 @@ fn place_of(base: &CrowdBase, spans: &[CrowdSpan], tick: u32, period: u32) -> Cr
                 count: 1,
                 step: 0,
             };
-            let place = place_at(&only, spans, tick);
-            let span = place.span + index as u32;
-            return CrowdPlace { span, ..place };
+            let position = position_at(&only, spans, tick);
+            let span = position.span + index as u32;
+            return CrowdPosition { span, ..position };
         }
     }
-    place_at(base, spans, tick)
+    position_at(base, spans, tick)
 }
 
 /// The rotations of an instance: as a crowd's, with one layer.
@@ -501,14 +507,14 @@ fn local_rotations<L: Lanes>(
     runs: &[Range<u32>],
     channels: &[CrowdChannel],
     cells: &[[f32; 4]],
-    places: &[CrowdPlace],
+    positions: &[CrowdPosition],
     output: &mut [[f32; 4]],
 ) {
     for run in runs {
         let values = &mut output[run.start as usize..run.end as usize];
         let of = |joint: u32| &channels[(joint * CHANNELS) as usize];
         let channel = of(run.start);
-        let stands = places[(channel.form_and_base & 0x00ff_ffff) as usize];
+        let stands = positions[(channel.form_and_base & 0x00ff_ffff) as usize];
         if channel.form_and_base >> 24 == FORM_ARC && stands.span & ON_KEY == 0 {
             let middle = (channel.first + stands.span * channel.count * 2) as usize;
             let tangent = middle + channel.count as usize;
@@ -523,20 +529,20 @@ fn local_rotations<L: Lanes>(
 }
 
 /// A moment of a clip.
-struct Moment<'a> {
+struct ClipMoment<'a> {
     bases: &'a [CrowdBase],
     spans: &'a [CrowdSpan],
     cells: &'a [[f32; 4]],
-    places: &'a [CrowdPlace],
+    positions: &'a [CrowdPosition],
     tick: u32,
     per_second: f32,
 }
 
-impl Moment<'_> {
+impl ClipMoment<'_> {
     #[inline(always)]
     fn value(&self, channel: &CrowdChannel) -> [f32; 4] {
-        let place = self.places[(channel.form_and_base & 0x00ff_ffff) as usize];
-        sampled(self.cells, channel, place)
+        let position = self.positions[(channel.form_and_base & 0x00ff_ffff) as usize];
+        sampled(self.cells, channel, position)
     }
 
     /// The span of a channel, the parameter in it and its rate a second: at the last key those of the span
@@ -544,11 +550,11 @@ impl Moment<'_> {
     #[inline(always)]
     fn along(&self, channel: &CrowdChannel) -> (u32, f32, f32) {
         let base = (channel.form_and_base & 0x00ff_ffff) as usize;
-        let place = self.places[base];
-        let mut index = place.span & TICKS;
+        let position = self.positions[base];
+        let mut index = position.span & TICKS;
         let first = self.bases[base].first;
         let mut span = &self.spans[(first + index) as usize];
-        let mut parameter = place.parameter;
+        let mut parameter = position.parameter;
         let is_end = span.scale == 0.0 && span.start & TICKS == self.tick;
         if is_end && index > 0 {
             index -= 1;
@@ -572,7 +578,7 @@ impl Moment<'_> {
             FORM_ARC => {
                 let first = channel.first + span * channel.count * 2;
                 let [middle, tangent] =
-                    [first, first + channel.count].map(|place| self.cells[place as usize]);
+                    [first, first + channel.count].map(|cell| self.cells[cell as usize]);
                 (middle, tangent)
             }
             _ => self.polynomial::<POWERS>(channel, span, s),

@@ -5,13 +5,78 @@
 //! them, the same form for all.
 
 use crate::math::dual::Scalar;
-use crate::math::quaternion::{dot, exp_by, product, square, sum};
+use crate::math::quaternion::{Quaternion, Vector, dot, exp_by, product, square, sum};
 
 /// How many numbers a formula may take.
 pub(crate) const NUMBERS: usize = 25;
 
 /// The numbers of one curve.
-pub(crate) type Numbers = [f64; NUMBERS];
+pub(crate) type FormulaNumbers = [f64; NUMBERS];
+
+/// The numbers of a [`RotationVector`] curve.
+#[derive(Default)]
+pub(crate) struct RotationVectorNumbers {
+    pub(crate) base: Quaternion,
+    /// The half-rotation vectors that are multiplied by t, t² and t³.
+    pub(crate) linear: Vector,
+    pub(crate) quadratic: Vector,
+    pub(crate) cubic: Vector,
+}
+
+impl From<RotationVectorNumbers> for FormulaNumbers {
+    fn from(numbers: RotationVectorNumbers) -> Self {
+        let RotationVectorNumbers {
+            base,
+            linear,
+            quadratic,
+            cubic,
+        } = numbers;
+        in_order([&base[..], &linear, &quadratic, &cubic])
+    }
+}
+
+/// The numbers of [`DeCasteljau`], [`Squad`], [`Linear`] and [`Hermite`] curves: the keys at both ends, and
+/// the control rotations or tangents between them.
+#[derive(Default)]
+pub(crate) struct ControlNumbers {
+    pub(crate) start: Quaternion,
+    pub(crate) after_start: Quaternion,
+    pub(crate) before_end: Quaternion,
+    pub(crate) end: Quaternion,
+}
+
+impl From<ControlNumbers> for FormulaNumbers {
+    fn from(numbers: ControlNumbers) -> Self {
+        let ControlNumbers {
+            start,
+            after_start,
+            before_end,
+            end,
+        } = numbers;
+        in_order([&start[..], &after_start, &before_end, &end])
+    }
+}
+
+/// The numbers of a [`StraightLine`].
+pub(crate) struct LineNumbers {
+    pub(crate) start: [f64; 4],
+    pub(crate) slope: [f64; 4],
+}
+
+impl From<LineNumbers> for FormulaNumbers {
+    fn from(LineNumbers { start, slope }: LineNumbers) -> Self {
+        in_order([&start[..], &slope])
+    }
+}
+
+/// Numbers one behind the other, and 0 after them.
+fn in_order<const PARTS: usize>(parts: [&[f64]; PARTS]) -> FormulaNumbers {
+    let mut numbers = [0.0; NUMBERS];
+    for (number, &part) in numbers.iter_mut().zip(parts.into_iter().flatten()) {
+        *number = part;
+    }
+    numbers
+}
 
 /// A curve of rotations.
 pub(crate) trait Formula: 'static {
@@ -20,24 +85,24 @@ pub(crate) trait Formula: 'static {
     fn rotation<S: Scalar>(numbers: &[S::Constant; NUMBERS], t: S) -> [S; 4];
 }
 
-/// The quaternion that starts at a place among the numbers.
+/// The quaternion that starts at an offset among the numbers.
 #[inline(always)]
-fn quaternion<S: Scalar>(numbers: &[S::Constant; NUMBERS], place: usize) -> [S; 4] {
+fn quaternion<S: Scalar>(numbers: &[S::Constant; NUMBERS], offset: usize) -> [S; 4] {
     [
-        S::constant(numbers[place]),
-        S::constant(numbers[place + 1]),
-        S::constant(numbers[place + 2]),
-        S::constant(numbers[place + 3]),
+        S::constant(numbers[offset]),
+        S::constant(numbers[offset + 1]),
+        S::constant(numbers[offset + 2]),
+        S::constant(numbers[offset + 3]),
     ]
 }
 
-/// The vector that starts at a place among the numbers, times `k`.
+/// The vector that starts at an offset among the numbers, times `k`.
 #[inline(always)]
-fn vector<S: Scalar>(numbers: &[S::Constant; NUMBERS], place: usize, k: S) -> [S; 3] {
+fn vector<S: Scalar>(numbers: &[S::Constant; NUMBERS], offset: usize, k: S) -> [S; 3] {
     [
-        S::constant(numbers[place]) * k,
-        S::constant(numbers[place + 1]) * k,
-        S::constant(numbers[place + 2]) * k,
+        S::constant(numbers[offset]) * k,
+        S::constant(numbers[offset + 1]) * k,
+        S::constant(numbers[offset + 2]) * k,
     ]
 }
 
@@ -101,7 +166,7 @@ impl Product {
     ];
 
     /// The numbers of a curve with that basis; base and vectors are still 0.
-    pub(crate) const WITH_BERNSTEIN: Numbers = {
+    pub(crate) const WITH_BERNSTEIN: FormulaNumbers = {
         let mut numbers = [0.0; NUMBERS];
         let (_, basis) = numbers.split_at_mut(Self::BASIS);
         basis.copy_from_slice(Self::BERNSTEIN.as_flattened());
@@ -127,11 +192,16 @@ impl Formula for Product {
 /// Numbers: the base and the three half-rotation vectors.
 pub(crate) struct RotationVector;
 
+impl RotationVector {
+    /// Where [`RotationVectorNumbers::linear`] starts.
+    pub(crate) const LINEAR: usize = 4;
+}
+
 impl Formula for RotationVector {
     #[inline(always)]
     fn rotation<S: Scalar>(numbers: &[S::Constant; NUMBERS], t: S) -> [S; 4] {
         let square = t * t;
-        let first = vector(numbers, 4, t);
+        let first = vector(numbers, Self::LINEAR, t);
         let second = vector(numbers, 7, square);
         let third = vector(numbers, 10, square * t);
         product(quaternion(numbers, 0), exp(sum(sum(first, second), third)))
@@ -190,9 +260,9 @@ impl Formula for Linear {
 }
 
 /// A straight line, not normalised. Numbers: its value at 0, and its slope.
-pub(crate) struct Line;
+pub(crate) struct StraightLine;
 
-impl Formula for Line {
+impl Formula for StraightLine {
     #[inline(always)]
     fn rotation<S: Scalar>(numbers: &[S::Constant; NUMBERS], t: S) -> [S; 4] {
         let start = quaternion(numbers, 0);

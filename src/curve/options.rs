@@ -6,8 +6,8 @@ use std::ops::Range;
 use glam::Quat;
 
 use crate::math::quaternion::{self, dot, length, log, unit};
-use crate::tracks::key_data::LARGEST_TCB;
 use crate::tracks::set::TrackSet;
+use crate::tracks::set::key_data::LARGEST_TCB;
 use crate::tracks::signs::Signs;
 
 /// What is evaluated: the rotation, or how fast it changes. Velocities and accelerations are
@@ -17,12 +17,12 @@ use crate::tracks::signs::Signs;
 ///
 /// ```
 /// use tumble::glam::{Quat, Vec3};
-/// use tumble::{Axes, Device, Engine, Frames, Interpolation, Layout, Quantity, TrackSet, method};
+/// use tumble::{Axes, Device, Engine, SampleTimes, Interpolation, Layout, Quantity, TrackSet, method};
 /// let mut set = TrackSet::new();
 /// set.push("wheel", &[0.0, 2.0], &[Quat::IDENTITY, Quat::from_rotation_z(1.0)])?;
 /// let quantity = Quantity::Velocity(Axes::Body);
 /// let how = Interpolation { quantity, ..method::SLERP.into() };
-/// let found = Engine::new(Device::Cpu)?.rates(&set, how, &Frames::fps(1), Layout::TrackMajor)?;
+/// let found = Engine::new(Device::Cpu)?.rates(&set, how, &SampleTimes::fps(1), Layout::TrackMajor)?;
 /// assert!(found.get(0, 0).unwrap().distance(Vec3::Z * 0.5) < 1e-6);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -62,7 +62,7 @@ pub enum Axes {
 
 /// Which of the two quaternions of each key counts: `q` and `-q` are one rotation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Path {
+pub enum KeySigns {
     /// Each key is taken with the sign nearer to its predecessor, so no rotation
     /// goes the long way round. Keys 180° apart keep the sign they were given.
     #[default]
@@ -71,12 +71,12 @@ pub enum Path {
     AsAuthored,
 }
 
-impl Path {
+impl KeySigns {
     /// The signs of a track's keys on this path.
     pub(crate) fn signs(self, set: &TrackSet, index: usize) -> Signs<'_> {
         match self {
             Self::Shortest => set.signs(index),
-            Self::AsAuthored => Signs::AS_GIVEN,
+            Self::AsAuthored => Signs::AS_AUTHORED,
         }
     }
 
@@ -149,7 +149,7 @@ impl Ends {
         Ok(())
     }
 
-    /// Refuses loops whose last key is not their first. `index` is the track's place in its set.
+    /// Refuses loops whose last key is not their first. `index` is the track's index in its set.
     pub(crate) fn check_loop(self, keys: &[Quat], index: usize) -> Result<(), InterpolationError> {
         let (Self::Loop, [first, .., last]) = (self, keys) else {
             return Ok(());
@@ -171,14 +171,14 @@ impl Ends {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum InterpolationError {
-    /// Under [`Path::AsAuthored`] neighbouring keys are each other's negative: no
+    /// Under [`KeySigns::AsAuthored`] neighbouring keys are each other's negative: no
     /// great circle is defined.
     #[error(
         "track {track}: keys {key} and {} are opposite quaternions, between which as-authored has no path; flip one sign or use the shortest path",
         key + 1
     )]
     Antipodal {
-        /// The track's place in the set.
+        /// The track's index in the set.
         track: usize,
         /// The first of the two keys.
         key: usize,
@@ -189,7 +189,7 @@ pub enum InterpolationError {
     MirroredVelocity,
     /// Under [`Ends::Clamped`] a velocity is not finite, or too large.
     #[error(
-        "the end velocity ({}, {}, {}) rad/s cannot be met; give a finite one of at most 1e12",
+        "the end velocity ({}, {}, {}) rad/s is out of range; give a finite one of at most 1e12",
         velocity.x, velocity.y, velocity.z
     )]
     EndVelocity {
@@ -198,7 +198,7 @@ pub enum InterpolationError {
     },
     /// A tension, a continuity or a bias is not finite, or too large.
     #[error(
-        "the {option} {value} cannot be met; give a number between -{LARGEST_TCB:e} and {LARGEST_TCB:e}, mostly within -1 and 1"
+        "the {option} {value} is out of range; give a number between -{LARGEST_TCB:e} and {LARGEST_TCB:e}, mostly within -1 and 1"
     )]
     Tcb {
         /// `tension`, `continuity` or `bias`.
@@ -211,7 +211,7 @@ pub enum InterpolationError {
         "track {track}: the last key is {degrees:.3}° from the first; a loop needs the last key to repeat the first"
     )]
     OpenLoop {
-        /// The track's place in the set.
+        /// The track's index in the set.
         track: usize,
         /// Angle between first and last key, degrees.
         degrees: f64,
@@ -227,7 +227,7 @@ pub enum InterpolationWarning {
         "track {track}: c2 found no curve with continuous angular acceleration; it jumps at {count} keys, the first is key {key}; add keys in long intervals beside short ones, or use bessel-overhauser"
     )]
     AccelerationJumps {
-        /// The track's place in the set.
+        /// The track's index in the set.
         track: usize,
         /// The first such key.
         key: usize,

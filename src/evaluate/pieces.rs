@@ -7,14 +7,15 @@ use glam::Quat;
 
 use crate::curve::options::Speed;
 use crate::curve::segment::segment_size;
-use crate::evaluate::uploaded::{Backend, Uploaded};
+use crate::evaluate::backend::Backend;
+use crate::evaluate::uploaded::Uploaded;
 use crate::gpu::error::EvaluateError;
 use crate::method::interpolation::Interpolation;
 use crate::output::encoding::Encoding;
 use crate::output::rotations::Layout;
 use crate::output::window::Window;
 use crate::prepare::batch::Batch;
-use crate::prepare::clip_data::Wanted;
+use crate::prepare::clip_data::PrepareRequest;
 use crate::time::frames::{Ticks, Timeline};
 use crate::tracks::set::TrackSet;
 
@@ -29,7 +30,7 @@ const SCATTERED: usize = 1 << 16;
 /// then few beside the others.
 const KEYS_TO_CUT: usize = 8;
 
-/// Bytes that a key takes when it is prepared: its segment, its constant, and its place in time.
+/// Bytes that a key takes when it is prepared: its segment, its constant, and its span.
 fn key_bytes(interpolation: &Interpolation) -> usize {
     const SPAN: usize = size_of::<f64>() + 3 * size_of::<u32>();
     segment_size(interpolation.form()) + size_of::<Quat>() + SPAN
@@ -41,7 +42,7 @@ pub(crate) fn segment_bytes(set: &TrackSet, interpolation: &Interpolation) -> us
 }
 
 /// What is evaluated in pieces.
-pub(crate) struct Pieces<'a> {
+pub(crate) struct SetPieces<'a> {
     pub(crate) backend: &'a Arc<Backend>,
     pub(crate) set: &'a TrackSet,
     pub(crate) interpolation: &'a Interpolation,
@@ -52,7 +53,7 @@ pub(crate) struct Pieces<'a> {
     pub(crate) limit: usize,
 }
 
-impl Pieces<'_> {
+impl SetPieces<'_> {
     /// Evaluates a window of the result into `output`, which is exactly as long.
     pub(crate) fn evaluate_into(
         &self,
@@ -136,7 +137,7 @@ impl Pieces<'_> {
         (tracks.len() > 1).then(|| [part(tracks.start..middle), part(middle..tracks.end)])
     }
 
-    /// Evaluates one piece into its places in the window.
+    /// Evaluates one piece into its part of the window.
     fn evaluate(
         &self,
         piece: &Window,
@@ -147,12 +148,18 @@ impl Pieces<'_> {
         let first_track = piece.tracks.start;
         let of_set = |error: EvaluateError| error.of_tracks_from(first_track);
         let (timeline, first_sample) = self.timeline.part(&piece.tracks, &piece.samples);
-        let request = Wanted {
+        let to_prepare = PrepareRequest {
             batch: self.batch(piece),
             only_for: Some(&timeline),
-            ..Wanted::all(self.set)
+            ..PrepareRequest::all(self.set)
         };
-        let clip = Uploaded::new(self.backend, self.set, *self.interpolation, request, None)?;
+        let clip = Uploaded::new(
+            self.backend,
+            self.set,
+            *self.interpolation,
+            to_prepare,
+            None,
+        )?;
         let folded = clip.data.folded(&timeline)?;
         let samples = Window::of(
             0..piece.tracks.len(),
@@ -165,7 +172,7 @@ impl Pieces<'_> {
             Layout::FrameMajor => piece.tracks == window.tracks || piece.samples.len() == 1,
         };
         if is_together {
-            let start = window.place(first_track, piece.samples.start) * each;
+            let start = window.offset(first_track, piece.samples.start) * each;
             let output = &mut output[start..start + piece.len() * each];
             let evaluated = clip.evaluate_into(&folded, &samples, self.encoding, output);
             return evaluated.map_err(of_set);
@@ -179,7 +186,7 @@ impl Pieces<'_> {
             evaluated.map_err(of_set)?;
             let of_window = |track: usize, sample: usize| {
                 let sample = sample - first_sample + piece.samples.start;
-                window.place(first_track + track, sample) * each
+                window.offset(first_track + track, sample) * each
             };
             let (row, starts): (usize, Vec<usize>) = match part.layout {
                 Layout::TrackMajor => {

@@ -1,22 +1,22 @@
-//! What an engine evaluates on, and prepared tracks there.
+//! Prepared tracks, on what an engine evaluates on.
 
 use std::borrow::Cow;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use crate::cpu::engine::CpuEngine;
-use crate::evaluate::pieces::{Pieces, segment_bytes};
+use crate::evaluate::backend::Backend;
+use crate::evaluate::pieces::{SetPieces, segment_bytes};
 use crate::gpu::engine::{ClipBuffers, Job, VulkanEngine, lock};
 use crate::gpu::error::{EvaluateError, VulkanError};
+use crate::gpu::exclusive::Exclusive;
 use crate::gpu::kept_lists::ListCache;
 use crate::gpu::recovery::Opened;
-use crate::gpu::turns::Turns;
 use crate::memory::{OutOfMemory, refuse_more_than_there_is};
 use crate::method::interpolation::Interpolation;
 use crate::output::buffer::OutputBuffer;
 use crate::output::encoding::Encoding;
 use crate::output::rotations::{Layout, Storage};
 use crate::output::window::Window;
-use crate::prepare::clip_data::{ClipData, Wanted};
+use crate::prepare::clip_data::{ClipData, PrepareRequest};
 use crate::prepare::prepared::{Prepared, SEGMENTS};
 use crate::time::frames::Timeline;
 use crate::tracks::set::TrackSet;
@@ -27,7 +27,7 @@ pub(crate) struct Uploaded {
     pub(crate) data: ClipData,
     /// Uploaded again after the device was lost.
     buffers: Mutex<Option<Arc<ClipBuffers>>>,
-    uploading: Turns<()>,
+    uploading: Exclusive<()>,
     /// What a device reads of samples that were asked for before.
     lists: ListCache,
     /// The set, where its segments would take more memory than the engine may use, with how much that is: then
@@ -42,11 +42,11 @@ impl Uploaded {
         backend: &Arc<Backend>,
         set: &TrackSet,
         interpolation: Interpolation,
-        mut wanted: Wanted<'_>,
+        mut to_prepare: PrepareRequest<'_>,
         spare: Option<ClipBuffers>,
     ) -> Result<Self, EvaluateError> {
-        wanted.group_bytes = backend.group_bytes();
-        let data = ClipData::new(set, interpolation, wanted)?;
+        to_prepare.group_bytes = backend.group_bytes();
+        let data = ClipData::new(set, interpolation, to_prepare)?;
         Self::of_data(backend, data, spare)
     }
 
@@ -62,7 +62,7 @@ impl Uploaded {
             backend: Arc::clone(backend),
             data,
             buffers: Mutex::new(buffers),
-            uploading: Turns::default(),
+            uploading: Exclusive::default(),
             lists: ListCache::default(),
             in_pieces: None,
         })
@@ -77,13 +77,13 @@ impl Uploaded {
         let needed = segment_bytes(set, &interpolation);
         let Some(limit) = backend.budget().filter(|&limit| needed > limit) else {
             refuse_more_than_there_is::<u8>(needed, SEGMENTS)?;
-            return Self::new(backend, set, interpolation, Wanted::all(set), None);
+            return Self::new(backend, set, interpolation, PrepareRequest::all(set), None);
         };
         Ok(Self {
             backend: Arc::clone(backend),
             data: ClipData::unprepared(set, interpolation)?,
             buffers: Mutex::default(),
-            uploading: Turns::default(),
+            uploading: Exclusive::default(),
             lists: ListCache::default(),
             in_pieces: Some((set.clone(), limit)),
         })
@@ -109,7 +109,7 @@ impl Uploaded {
         encoding: Encoding,
         output: &mut [u8],
     ) -> Result<(), EvaluateError> {
-        let pieces = Pieces {
+        let pieces = SetPieces {
             backend: &self.backend,
             set,
             interpolation: &self.data.interpolation,
@@ -210,14 +210,14 @@ impl Uploaded {
     /// The segments on a device; uploaded again where it is not the device that had them.
     fn buffers_on(&self, engine: &VulkanEngine) -> Result<Arc<ClipBuffers>, VulkanError> {
         let there = |buffers: &Option<Arc<ClipBuffers>>| {
-            let there = buffers.as_ref().filter(|there| engine.holds(there));
+            let there = buffers.as_ref().filter(|there| engine.owns(there));
             there.map(Arc::clone)
         };
         if let Some(there) = there(&lock(&self.buffers)) {
             return Ok(there);
         }
         // One caller at a time uploads, and nothing is locked while it does.
-        let _turn = self.uploading.take();
+        let _uploading = self.uploading.take();
         let old = {
             let mut buffers = lock(&self.buffers);
             if let Some(there) = there(&buffers) {
@@ -229,34 +229,5 @@ impl Uploaded {
         let made = Arc::new(engine.upload(&self.data, None)?);
         *lock(&self.buffers) = Some(Arc::clone(&made));
         Ok(made)
-    }
-}
-
-/// What an engine evaluates on.
-pub(crate) enum Backend {
-    Cpu(CpuEngine),
-    Vulkan(Box<Opened>),
-}
-
-impl Backend {
-    /// Bytes of segments that go into one buffer of a Vulkan device.
-    pub(crate) fn group_bytes(&self) -> Option<usize> {
-        self.opened().map(|opened| opened.engine().group_bytes)
-    }
-
-    /// Bytes that segments may take, if there is a limit.
-    pub(crate) fn budget(&self) -> Option<usize> {
-        match self {
-            Self::Cpu(engine) => engine.memory,
-            Self::Vulkan(opened) => opened.engine().clip_bytes,
-        }
-    }
-
-    /// The Vulkan device; `None` for the CPU.
-    pub(crate) fn opened(&self) -> Option<&Opened> {
-        match self {
-            Self::Cpu(_) => None,
-            Self::Vulkan(opened) => Some(opened),
-        }
     }
 }

@@ -1,12 +1,16 @@
-//! The nodes at which curves are sampled, and the way from the samples to the coefficients of
-//! powers: Newton's divided differences.
+//! The nodes at which curves are sampled, and how the coefficients of powers follow from the
+//! samples: Newton's divided differences. Both ways of fitting end here.
+//!
+//! One node is the middle, which the polynomial meets exactly; the others enter as differences from it,
+//! for which f32 is precise enough. Divided differences come first and powers last, which keeps the
+//! rounding errors of f32 small.
 
-use crate::fit::double::fit::Samples;
-use crate::simd::lanes::Lanes;
+use crate::shader::{POWERS, PolynomialSegment};
+use crate::simd::lanes::{Lanes, canonical};
 
-/// Pairs of nodes at `-s` and `s`, given by `s`; the middle, s = 0, is always one more node. If the
-/// first `s` is 0, the first and the second derivative at the middle are given too. If the last `s`
-/// is there twice, the first derivatives at `-s` and `s` are given too.
+/// Pairs of nodes at `-s` and `s`, by their `s`; the middle, s = 0, is always one more node. If the
+/// first `s` is 0, the first and the second derivative at the middle are known too. If the last `s`
+/// is there twice, the first derivatives at `-s` and `s` are known too.
 pub(crate) struct Nodes<const PAIRS: usize> {
     /// The nodes in the order in which Newton's polynomials take them, which is chosen for small
     /// rounding errors in f32.
@@ -28,13 +32,13 @@ pub(crate) const SMALL_ANGLE_NODES: Nodes<3> = Nodes::new([0.39091575, 0.2169418
 pub(crate) const FULL_NODES: Nodes<5> =
     Nodes::new([0.45481598, 0.49491072, 0.14086628, 0.27032042, 0.3778748]);
 
-/// Degree 10, with the derivatives at the middle and at both ends given. The two pairs between are
+/// Degree 10, with the derivatives at the middle and at both ends known. The two pairs between are
 /// those with the least truncation error, which grows with the product of the distances to all
 /// nodes: 2.71 times that of Chebyshev nodes.
 pub(crate) const END_NODES: Nodes<5> = Nodes::new([0.0, 0.265_266_77, 0.394_327_03, 0.5, 0.5]);
 
 /// The same for degree 8: 3.53 times the truncation error of Chebyshev nodes.
-pub(crate) const FEW_END_NODES: Nodes<4> = Nodes::new([0.0, 0.331_538_23, 0.5, 0.5]);
+pub(crate) const DEGREE_8_END_NODES: Nodes<4> = Nodes::new([0.0, 0.331_538_23, 0.5, 0.5]);
 
 /// As [`END_NODES`] with the pairs nearer to the middle, for the halves of longer curves, whose
 /// truncation error is small: 3.85 times that of Chebyshev nodes.
@@ -89,7 +93,7 @@ impl<const PAIRS: usize> Nodes<PAIRS> {
     #[inline(always)]
     pub(crate) fn powers<L: Lanes>(
         &self,
-        samples: &Samples<L, PAIRS>,
+        samples: &NodeSamples<L, PAIRS>,
         c: usize,
     ) -> [[L; PAIRS]; 2] {
         let mut odd = [L::all(0.0); PAIRS];
@@ -118,7 +122,7 @@ impl<const PAIRS: usize> Nodes<PAIRS> {
 
 /// An estimate of twice the truncation error of a component's fit, from its last Chebyshev
 /// coefficients, which follow from those of the powers. If the curves are
-/// [entire](crate::fit::double::shape::Shape::entire), the last two coefficients suffice.
+/// [entire](crate::fit::exact::shape::Shape::entire), the last two coefficients suffice.
 #[inline(always)]
 pub(crate) fn tail<L: Lanes, const PAIRS: usize>(
     are_entire: bool,
@@ -139,6 +143,90 @@ pub(crate) fn tail<L: Lanes, const PAIRS: usize>(
     last_even.magnitude() + last_odd.magnitude() + L::all(0.25) * before_last
 }
 
+/// Samples of curves: the rotations at the middle, and for each pair of nodes `-s` and `s` the
+/// differences from the middle, as their sum (`even`) and their difference (`odd`).
+pub(crate) struct NodeSamples<L, const PAIRS: usize> {
+    pub(crate) middle: [L; 4],
+    pub(crate) even: [[L; 4]; PAIRS],
+    pub(crate) odd: [[L; 4]; PAIRS],
+}
+
+impl<L: Lanes, const PAIRS: usize> NodeSamples<L, PAIRS> {
+    /// Samples that all have the same value.
+    #[inline(always)]
+    pub(crate) fn all(number: L) -> Self {
+        Self {
+            middle: [number; 4],
+            even: [[number; 4]; PAIRS],
+            odd: [[number; 4]; PAIRS],
+        }
+    }
+
+    /// Sets the samples of the `k`th pair of nodes from the differences of the rotations before
+    /// and after the middle from the one at the middle.
+    #[inline(always)]
+    pub(crate) fn set_differences(&mut self, k: usize, before: [L; 4], after: [L; 4]) {
+        for c in 0..4 {
+            self.even[k][c] = after[c] + before[c];
+            self.odd[k][c] = after[c] - before[c];
+        }
+    }
+
+    /// Sets the derivatives by s at the ends, which are the last pair of nodes and are there twice.
+    /// Each is stored as a second sample, whose difference from the first is the derivative by s²
+    /// that the divided differences of [`Nodes::powers`] need there.
+    #[inline(always)]
+    pub(crate) fn set_slopes(&mut self, before: [L; 4], after: [L; 4]) {
+        // At s = 1/2 the polynomials even / 2s² and odd / 2s have the values 2 even and odd, and
+        // the derivatives by s² 2 (after - before) - 8 even and after + before - 2 odd.
+        for c in 0..4 {
+            let (even, odd) = (self.even[PAIRS - 2][c], self.odd[PAIRS - 2][c]);
+            self.even[PAIRS - 1][c] = (after[c] - before[c]) - L::all(3.0) * even;
+            self.odd[PAIRS - 1][c] = (after[c] + before[c]) - odd;
+        }
+    }
+}
+
+/// Interpolates samples and writes the coefficients to each lane's segment. Returns estimates of
+/// twice the truncation error.
+#[inline(always)]
+pub(crate) fn interpolate<L: Lanes, const PAIRS: usize>(
+    are_entire: bool,
+    nodes: &Nodes<PAIRS>,
+    samples: &NodeSamples<L, PAIRS>,
+    indices: &[usize],
+    segments: &mut [PolynomialSegment],
+) -> L {
+    let mut powers = [[L::all(0.0); 4]; POWERS];
+    let tails = coefficients(are_entire, nodes, samples, &mut powers);
+    L::store_powers(&powers[..=2 * PAIRS], segments, indices);
+    tails
+}
+
+/// Sets the coefficients of the polynomials through samples. Returns estimates of twice the
+/// truncation error, which depend on whether the curves are [entire](Shape::entire).
+#[allow(clippy::needless_range_loop)]
+#[inline(always)]
+pub(crate) fn coefficients<L: Lanes, const PAIRS: usize>(
+    are_entire: bool,
+    nodes: &Nodes<PAIRS>,
+    samples: &NodeSamples<L, PAIRS>,
+    powers: &mut [[L; 4]; POWERS],
+) -> L {
+    powers[0] = canonical(samples.middle);
+    let mut tails = L::all(0.0);
+    for c in 0..4 {
+        let odd_even = nodes.powers(samples, c);
+        tails = tail(are_entire, &odd_even).larger(tails);
+        let [odd, even] = odd_even;
+        for i in 0..PAIRS {
+            powers[2 * i + 1][c] = odd[i].canonical();
+            powers[2 * i + 2][c] = even[i].canonical();
+        }
+    }
+    tails
+}
+
 #[cfg(test)]
 mod tests {
     use std::f64::consts::FRAC_PI_2;
@@ -154,7 +242,7 @@ mod tests {
         come_back(&SMALL_ANGLE_NODES);
         come_back(&FULL_NODES);
         come_back(&END_NODES);
-        come_back(&FEW_END_NODES);
+        come_back(&DEGREE_8_END_NODES);
         come_back(&HALF_END_NODES);
     }
 
@@ -168,14 +256,14 @@ mod tests {
                 nodes.fold(s, |product, node| product * (s * s - node * node))
             };
             let all = (0..=10_000).map(|i| distances(i).abs());
-            let most = all.fold(0.0, f64::max);
+            let largest = all.fold(0.0, f64::max);
             // The coefficient of sⁿ in Tₙ(2s), n = 2 PAIRS + 1.
-            let factor = most * f64::from(1 << (4 * PAIRS + 1));
+            let factor = largest * f64::from(1 << (4 * PAIRS + 1));
             assert!((factor - expected).abs() < 0.005, "{factor}");
         }
         assert_factor(&FULL_NODES, 1.0);
         assert_factor(&END_NODES, 2.71);
-        assert_factor(&FEW_END_NODES, 3.53);
+        assert_factor(&DEGREE_8_END_NODES, 3.53);
         assert_factor(&HALF_END_NODES, 3.85);
     }
 
@@ -188,7 +276,7 @@ mod tests {
             let chebyshev = |s: f64| libm::cos(n as f64 * libm::acos(2.0 * s));
             let slope =
                 |s: f32| f64::from((2 * n * n) as u32) * f64::from(s.signum()).powi(n as i32 + 1);
-            let mut samples = Samples::all(Vec4::ZERO);
+            let mut samples = NodeSamples::all(Vec4::ZERO);
             for (k, &s) in nodes.at.iter().enumerate() {
                 let comes_again = k > 0 && nodes.at[k - 1] == s;
                 let value = |s: f32| match comes_again {

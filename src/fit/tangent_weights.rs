@@ -3,7 +3,7 @@
 //! in f64.
 
 use crate::curve::options::Ends;
-use crate::fit::double::intervals::{Intervals, ROOM, Stretch};
+use crate::fit::block::{Intervals, ROOM, TrackStretch};
 use crate::shader::{KEY_AT_END, KEY_INNER, KEY_UNKNOWN, TangentWeights};
 use crate::simd::dispatch::{InLanes, in_lanes};
 use crate::simd::lanes::Lanes;
@@ -19,8 +19,8 @@ pub(crate) enum WeightRule {
 
 const SIXTH: f32 = 1.0 / 6.0;
 
-/// The largest ratio of two neighbouring durations for which the weights hold.
-const MOST_UNEVEN: f64 = 16.0;
+/// The largest ratio of two neighbouring durations for which the weights are valid.
+const MAX_DURATION_RATIO: f64 = 16.0;
 
 /// A key whose tangent f32 weights do not give.
 pub(crate) const UNKNOWN: TangentWeights = TangentWeights {
@@ -38,7 +38,7 @@ impl WeightRule {
         let (left, right) = (after / before, before / after);
         let outgoing = after / (3.0 * (before + after));
         // Both comparisons are false for NaN, whose weights are unknown then.
-        let is_even = (left <= MOST_UNEVEN) & (right <= MOST_UNEVEN);
+        let is_even = (left <= MAX_DURATION_RATIO) & (right <= MAX_DURATION_RATIO);
         TangentWeights {
             before: if by_time { left as f32 } else { 1.0 },
             after: if by_time { right as f32 } else { 1.0 },
@@ -86,7 +86,7 @@ impl KeyWeights {
     }
 
     /// Computes the weights of all keys of a block.
-    pub(crate) fn bring(&mut self, intervals: &Intervals, stretches: &[Stretch]) {
+    pub(crate) fn compute(&mut self, intervals: &Intervals, stretches: &[TrackStretch]) {
         let count = intervals.count;
         in_lanes(&mut Between {
             rule: self.rule,

@@ -6,8 +6,9 @@
 use bytemuck::Zeroable;
 
 use crate::fit::constant_velocity::arc_component;
+use crate::from_keys::evaluate::{OutputIter, SignedKeys};
 use crate::shader::{Form, IS_KEY, KeySample};
-use crate::simd::dispatch::InLanes;
+use crate::simd::dispatch::{InLanes, in_lanes};
 use crate::simd::lanes::{Lanes, canonical as canonical_rotations};
 use crate::twin::arc_between::arc_between;
 use crate::twin::evaluate_arc::{norm_squared, on_arc};
@@ -119,10 +120,46 @@ impl<L: Lanes> Arcs<L> {
         let tangent = self.tangents[vector % VECTORS];
         let square = norm_squared(tangent);
         for c in 0..4 {
-            let own = arc_component(found[c], tangent[c], square);
-            found[c] = polynomial(own, parameter).canonical();
+            let coefficients = arc_component(found[c], tangent[c], square);
+            found[c] = polynomial(coefficients, parameter).canonical();
         }
         found
+    }
+}
+
+impl TwoKeyBlock {
+    /// Adds a sample, and evaluates the block when it is full.
+    #[inline(always)]
+    pub(super) fn push(
+        &mut self,
+        keys: SignedKeys<'_>,
+        sample: KeySample,
+        output: &mut OutputIter<'_>,
+    ) {
+        let lane = self.count;
+        let key = (sample.key & !IS_KEY) as usize;
+        if sample.key & IS_KEY == 0 {
+            self.from[lane] = keys.get(key);
+            self.to[lane] = keys.get(key + 1);
+        } else {
+            // The arc from a key to itself is that key.
+            self.from[lane] = keys.authored[key];
+            self.to[lane] = self.from[lane];
+        }
+        self.parameters[lane] = sample.parameter;
+        self.count += 1;
+        if self.count == LANES {
+            self.flush(output);
+        }
+    }
+
+    pub(super) fn flush(&mut self, output: &mut OutputIter<'_>) {
+        in_lanes(self);
+        // `zip` takes from the output second: first, it would lose an element when rotations end.
+        for (&rotation, value) in self.rotations[..self.count].iter().zip(output) {
+            *value = rotation;
+        }
+        self.count = 0;
     }
 }
 

@@ -5,9 +5,10 @@
 use bytemuck::Zeroable;
 
 use crate::from_keys::arcs::LANES;
+use crate::from_keys::evaluate::{OutputIter, SignedKeys};
 use crate::math::canonical::canonical;
-use crate::shader::TangentWeights;
-use crate::simd::dispatch::InLanes;
+use crate::shader::{IS_KEY, KEY_INNER, KeySample, TangentWeights};
+use crate::simd::dispatch::{InLanes, in_lanes};
 use crate::simd::lanes::Lanes;
 use crate::twin::small_angle::small_angle_cubic;
 
@@ -46,15 +47,15 @@ impl InLanes for CubicBlock {
             let s = self.parameters[j];
             let t = s * s;
             let is_held = self.held[j] == 1.0;
-            let found = if curve.holds { 1.0 } else { 0.0 };
+            let found = if curve.is_valid { 1.0 } else { 0.0 };
             macro_rules! component {
                 ($c:literal) => {{
                     let third = c[3][$c] * s + c[2][$c];
                     let high = c[6][$c] * t + (c[5][$c] * s + c[4][$c]);
                     let gain = high * (t * t) + (third * t + c[1][$c] * s);
-                    let own = canonical(c[0][$c] + gain);
-                    let own = if curve.holds { own } else { 0.0 };
-                    if is_held { start[j][$c] } else { own }
+                    let value = canonical(c[0][$c] + gain);
+                    let value = if curve.is_valid { value } else { 0.0 };
+                    if is_held { start[j][$c] } else { value }
                 }};
             }
             (x[j], y[j], z[j], w[j]) = (component!(0), component!(1), component!(2), component!(3));
@@ -64,5 +65,49 @@ impl InLanes for CubicBlock {
             self.rotations[j] = [x[j], y[j], z[j], w[j]];
         }
         self.unresolved += unresolved as usize;
+    }
+}
+
+impl CubicBlock {
+    /// As [`TwoKeyBlock::push`], with the tangent weights of the keys.
+    #[inline(always)]
+    pub(super) fn push(
+        &mut self,
+        keys: SignedKeys<'_>,
+        weights: &[TangentWeights],
+        sample: KeySample,
+        output: &mut OutputIter<'_>,
+    ) {
+        let lane = self.count;
+        let key = (sample.key & !IS_KEY) as usize;
+        if sample.key & IS_KEY == 0 {
+            let (first, last) = (weights[key], weights[key + 1]);
+            let before = key - usize::from(first.kind == KEY_INNER);
+            let after = key + 1 + usize::from(last.kind == KEY_INNER);
+            self.weights[0][lane] = first;
+            self.weights[1][lane] = last;
+            for (i, key) in [before, key, key + 1, after].into_iter().enumerate() {
+                self.keys[i][lane] = keys.get(key);
+            }
+            self.held[lane] = 0.0;
+        } else {
+            self.keys[1][lane] = keys.authored[key];
+            self.held[lane] = 1.0;
+        }
+        self.parameters[lane] = sample.parameter;
+        self.count += 1;
+        if self.count == LANES {
+            self.flush(output);
+        }
+    }
+
+    pub(super) fn flush(&mut self, output: &mut OutputIter<'_>) {
+        // Unused lanes are evaluated too; marked as held, they do not count as unresolved.
+        self.held[self.count..].fill(1.0);
+        in_lanes(self);
+        for (&rotation, value) in self.rotations[..self.count].iter().zip(output) {
+            *value = rotation;
+        }
+        self.count = 0;
     }
 }

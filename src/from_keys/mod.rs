@@ -5,9 +5,8 @@ pub(crate) mod arcs;
 pub(crate) mod cubics;
 pub(crate) mod dispatches;
 pub(crate) mod evaluate;
-pub(crate) mod upload;
 
-use crate::curve::options::Path;
+use crate::curve::options::KeySigns;
 use crate::fit::tangent_weights::WeightRule;
 use crate::method::interpolation::Interpolation;
 use crate::shader::{Form, LONGEST_STEP};
@@ -44,7 +43,7 @@ impl KeyCurve {
     ) -> Option<Self> {
         let are_fewer = timeline.len() * set.track_count() < set.key_count();
         // On the path as authored an arc may exceed half a turn; it is then two segments.
-        let arcs_are_short = interpolation.path == Path::Shortest || set.arcs_are_short();
+        let arcs_are_short = interpolation.signs == KeySigns::Shortest || set.arcs_are_short();
         if !are_fewer || !arcs_are_short || !interpolation.wrap().are_held() {
             return None;
         }
@@ -55,7 +54,7 @@ impl KeyCurve {
             }
             Form::Polynomial => {
                 let weights = interpolation.plain()?.direct?.weights;
-                turns_little(set).then_some(Self::Cubics(weights))
+                has_small_steps(set).then_some(Self::Cubics(weights))
             }
         }
     }
@@ -64,16 +63,16 @@ impl KeyCurve {
 /// Whether, of at most 64 keys, more than two thirds are within a small angle of the next. With
 /// fewer, preparing all segments takes no longer. Only speed depends on this, no bit does.
 #[allow(clippy::disallowed_methods)] // as it says
-fn turns_little(set: &TrackSet) -> bool {
-    const LOOKS: usize = 64;
-    let (mut near, mut looks) = (0, 0);
-    for look in 0..LOOKS {
-        let (_, keys) = set.times_and_keys(look * set.track_count() / LOOKS);
-        let place = keys.len() * look / LOOKS;
-        if let [from, to, ..] = keys[place..] {
-            looks += 1;
+fn has_small_steps(set: &TrackSet) -> bool {
+    const PROBES: usize = 64;
+    let (mut near, mut probes) = (0, 0);
+    for probe in 0..PROBES {
+        let (_, keys) = set.times_and_keys(probe * set.track_count() / PROBES);
+        let index = keys.len() * probe / PROBES;
+        if let [from, to, ..] = keys[index..] {
+            probes += 1;
             near += usize::from(1.0 - from.dot(to).abs() <= 0.5 * LONGEST_STEP);
         }
     }
-    3 * near > 2 * looks
+    3 * near > 2 * probes
 }

@@ -1,16 +1,16 @@
-//! What stands in the place of Vulkan in a build without the feature `vulkan`: the names that the rest of
+//! Replaces Vulkan in a build without the feature `vulkan`: the names that the rest of
 //! the engine uses, of types that have no value. No device is ever listed, so none is ever opened.
 
 #[path = "cache.rs"]
 pub(crate) mod cache;
 #[path = "error.rs"]
 pub(crate) mod error;
+#[path = "exclusive.rs"]
+pub(crate) mod exclusive;
 #[path = "options.rs"]
 pub(crate) mod options;
 #[path = "reports.rs"]
 pub(crate) mod reports;
-#[path = "turns.rs"]
-pub(crate) mod turns;
 
 /// There is none.
 #[derive(Clone, Copy)]
@@ -51,7 +51,7 @@ pub(crate) mod engine {
     use crate::gpu::error::{EvaluateError, VulkanError};
     use crate::gpu::kept_lists::ListCache;
     use crate::gpu::options::Timings;
-    use crate::gpu::reports::{KernelCheck, NegativeControl};
+    use crate::gpu::reports::KernelCheck;
     use crate::output::encoding::Encoding;
     use crate::output::rotations::{Layout, Storage};
     use crate::output::window::Window;
@@ -80,14 +80,14 @@ pub(crate) mod engine {
         pub(crate) group_bytes: usize,
         pub(crate) clip_bytes: Option<usize>,
         pub(crate) timings: Mutex<Timings>,
-        pub(crate) device: Arc<Device>,
+        pub(crate) device: Arc<LogicalDevice>,
     }
 
-    pub(crate) struct Device {
-        pub(crate) physical: Physical,
+    pub(crate) struct LogicalDevice {
+        pub(crate) physical: OpenedPhysical,
     }
 
-    pub(crate) struct Physical {
+    pub(crate) struct OpenedPhysical {
         pub(crate) instance: Instance,
     }
 
@@ -106,7 +106,7 @@ pub(crate) mod engine {
             match self.never {}
         }
 
-        pub(crate) fn holds(&self, _buffers: &ClipBuffers) -> bool {
+        pub(crate) fn owns(&self, _buffers: &ClipBuffers) -> bool {
             match self.never {}
         }
 
@@ -173,11 +173,15 @@ pub(crate) mod engine {
             match self.never {}
         }
     }
+}
 
-    impl NegativeControl {
-        pub(crate) fn run(engine: &VulkanEngine) -> Result<Self, VulkanError> {
-            match engine.never {}
-        }
+pub(crate) mod self_test {
+    use crate::gpu::engine::VulkanEngine;
+    use crate::gpu::error::VulkanError;
+    use crate::gpu::reports::NegativeControl;
+
+    pub(crate) fn negative_control(engine: &VulkanEngine) -> Result<NegativeControl, VulkanError> {
+        match engine.never {}
     }
 }
 
@@ -239,7 +243,8 @@ pub(crate) mod crowd {
     use crate::gpu::Never;
     use crate::gpu::engine::VulkanEngine;
     use crate::gpu::error::VulkanError;
-    use crate::shader::CrowdDispatch;
+    use crate::output::crowd::CrowdOutput;
+    use crate::shader::{CrowdDispatch, CrowdEntry};
 
     pub(crate) struct CrowdTables {
         pub(crate) instances: u32,
@@ -267,27 +272,17 @@ pub(crate) mod crowd {
             match engine.never {}
         }
     }
-}
-
-pub(crate) mod crowd_target {
-    use std::sync::Arc;
-
-    use crate::gpu::Never;
-    use crate::gpu::crowd::DeviceCrowd;
-    use crate::gpu::error::VulkanError;
-    use crate::output::crowd::CrowdOutput;
-    use crate::shader::CrowdEntry;
 
     pub(crate) struct CrowdReader {
-        pub(crate) target: Target,
+        pub(crate) target: CrowdTarget,
         pub(crate) results: Results,
     }
 
-    pub(crate) struct Target {
+    pub(crate) struct CrowdTarget {
         never: Never,
     }
 
-    impl Target {
+    impl CrowdTarget {
         pub(crate) fn output(&self) -> CrowdOutput {
             match self.never {}
         }

@@ -55,7 +55,7 @@ pub(crate) struct ApplicationBuffer {
 
 /// How long work took.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Taken {
+pub(crate) struct Elapsed {
     /// By the device's time stamps, where it has any.
     pub(crate) on_device: Option<Duration>,
     /// From before it was submitted until its fence was seen.
@@ -172,7 +172,7 @@ impl Application {
         }
     }
 
-    /// What the validation layer has said so far.
+    /// The messages of the validation layer so far.
     pub(crate) fn validation_messages(&self) -> Vec<String> {
         self.instance.validation_messages()
     }
@@ -221,14 +221,14 @@ impl Application {
                 cached.or_else(|| find(mapped, Flags::empty()))
             }
         };
-        let wanted = match memory {
+        let required = match memory {
             ApplicationMemory::Device => Flags::DEVICE_LOCAL,
             ApplicationMemory::Host => mapped,
         };
         let info = vk::MemoryAllocateInfo::default()
             .allocation_size(needs.size)
             .memory_type_index(index.ok_or(VulkanError::NoMemoryType {
-                wanted: wanted.as_raw(),
+                properties: required.as_raw(),
             })?);
         // SAFETY: as above.
         buffer.memory =
@@ -330,16 +330,16 @@ impl Application {
     }
 
     /// Submits commands one after another, without a wait between them, and waits for the last.
-    pub(crate) fn run(&mut self, all: &[vk::CommandBuffer]) -> Result<Taken, VulkanError> {
+    pub(crate) fn run(&mut self, all: &[vk::CommandBuffer]) -> Result<Elapsed, VulkanError> {
         let device = &self.device;
         // SAFETY: the device is alive, here and below, and nobody else uses its queue now.
         let fence = unsafe { device.create_fence(&vk::FenceCreateInfo::default(), None) }
             .named("vkCreateFence")?;
         let started = Instant::now();
-        let submitted = (0..).zip(all).try_for_each(|(place, &commands)| {
+        let submitted = (0..).zip(all).try_for_each(|(index, &commands)| {
             let commands = [commands];
             let info = [vk::SubmitInfo::default().command_buffers(&commands)];
-            let last = place + 1 == all.len();
+            let last = index + 1 == all.len();
             let fence = if last { fence } else { vk::Fence::null() };
             // SAFETY: as above.
             unsafe { device.queue_submit(self.queue, &info, fence) }
@@ -362,26 +362,26 @@ impl Application {
         // SAFETY: as above.
         unsafe { device.destroy_fence(fence, None) };
         waited.named("vkQueueSubmit")?;
-        Ok(Taken {
+        Ok(Elapsed {
             on_device: None,
             on_host,
         })
     }
 
     /// Runs commands that were recorded with time stamps.
-    pub(crate) fn timed(&mut self, commands: vk::CommandBuffer) -> Result<Taken, VulkanError> {
-        let mut taken = self.run(&[commands])?;
+    pub(crate) fn timed(&mut self, commands: vk::CommandBuffer) -> Result<Elapsed, VulkanError> {
+        let mut elapsed = self.run(&[commands])?;
         if self.stamps != vk::QueryPool::null() {
             let mut stamps = [0u64; 2];
             let flags = vk::QueryResultFlags::TYPE_64;
             // SAFETY: the pool has two queries, and what writes them has ended.
             let read =
                 unsafe { (self.device).get_query_pool_results(self.stamps, 0, &mut stamps, flags) };
-            taken.on_device = (read.is_ok())
+            elapsed.on_device = (read.is_ok())
                 .then(|| self.physical.between(stamps[0], stamps[1]))
                 .filter(|time| !time.is_zero());
         }
-        Ok(taken)
+        Ok(elapsed)
     }
 
     /// Takes back all commands, none of which is in flight.
@@ -448,7 +448,7 @@ impl Drop for Application {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gpu::cards::card;
+    use crate::gpu::physical::cards::card;
 
     /// NVIDIA's copy engines are also for sparse memory; the family for video copies too, and is left alone.
     #[test]

@@ -45,22 +45,22 @@ impl Cache {
     /// What was last written under a name: a file's name without a folder. `None` where there is
     /// nothing, it is longer than `most` bytes, or it was damaged. The contents may come from another
     /// version, another machine or somebody else all the same: whoever reads them must check them.
-    pub(crate) fn read(&self, name: &str, most: usize) -> Option<Vec<u8>> {
+    pub(crate) fn read(&self, name: &str, max_bytes: usize) -> Option<Vec<u8>> {
         let path = self.path(name)?;
         // What is no file might never end.
         if !fs::metadata(&path).ok()?.is_file() {
             return None;
         }
         let head = MARK.len() + size_of::<u64>();
-        let limit = head.checked_add(most)?.checked_add(1)?;
+        let limit = head.checked_add(max_bytes)?.checked_add(1)?;
         let mut bytes = Vec::new();
         let file = File::open(path).ok()?;
         file.take(limit as u64).read_to_end(&mut bytes).ok()?;
         if bytes.len() == limit {
             return None;
         }
-        let (given, contents) = bytes.strip_prefix(MARK)?.split_first_chunk()?;
-        (u64::from_le_bytes(*given) == sum(name, contents)).then(|| contents.to_owned())
+        let (stored_sum, contents) = bytes.strip_prefix(MARK)?.split_first_chunk()?;
+        (u64::from_le_bytes(*stored_sum) == sum(name, contents)).then(|| contents.to_owned())
     }
 
     /// Replaces what is under a name, as a whole: who reads meanwhile gets the old contents or the new
@@ -115,7 +115,7 @@ fn folder(variable: impl Fn(&str) -> Option<OsString>) -> Option<PathBuf> {
     Some(all.join("tumble"))
 }
 
-/// A sum (64-bit FNV-1a) that tells files that were cut short or overwritten; it keeps nobody out.
+/// A checksum (64-bit FNV-1a) that detects files which were cut short or overwritten. It does not protect against intent.
 pub(crate) fn sum(name: &str, contents: &[u8]) -> u64 {
     let all = name.bytes().chain(contents.iter().copied());
     all.fold(0xcbf2_9ce4_8422_2325, |sum, byte| {
@@ -129,7 +129,7 @@ mod tests {
 
     fn of(variables: &[(&str, &str)]) -> Option<PathBuf> {
         folder(|name| {
-            let found = variables.iter().find(|(own, _)| *own == name);
+            let found = variables.iter().find(|(known, _)| *known == name);
             found.map(|(_, value)| value.into())
         })
     }

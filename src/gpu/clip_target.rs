@@ -1,15 +1,15 @@
-//! A clip's samples on their way into an application's buffer: everything that recording needs, made once.
+//! Recording a clip's samples into an application's commands and buffer: everything that it takes, made once.
 
 use std::sync::Arc;
 
 use ash::vk;
 
-use crate::gpu::descriptors::DescriptorPool;
 use crate::gpu::engine::{ClipBuffers, Job, VulkanEngine};
 use crate::gpu::error::{EvaluateError, VulkanError};
 use crate::gpu::handles::VulkanBuffer;
 use crate::gpu::kept_lists::KeptLists;
 use crate::gpu::pipeline::Pipeline;
+use crate::gpu::submission::DescriptorPool;
 use crate::gpu::submission::{Access, Binding, Commands};
 use crate::output::encoding::Encoding;
 use crate::output::window::Window;
@@ -46,10 +46,10 @@ impl ClipTarget {
         let bound = engine.binding_before(buffer.offset, each);
         let range = buffer.offset + buffer.size - bound;
         (engine.device.physical).check_range("the buffer", range)?;
-        let most = engine
+        let values_per_window = engine
             .at_once()
             .unwrap_or_else(|| engine.window_of(job.encoding));
-        let lists = KeptLists::new(engine, job, whole, most)?;
+        let lists = KeptLists::new(engine, job, whole, values_per_window)?;
         let mut pool = DescriptorPool::new(&engine.device);
         let sets = lists
             .windows
@@ -109,7 +109,7 @@ impl ClipTarget {
             .checked_add(self.bytes)
             .is_some_and(|end| end <= self.buffer.size);
         if !fits || !offset.is_multiple_of(each) {
-            return Err(VulkanError::OwnBuffer {
+            return Err(VulkanError::BufferRange {
                 offset: self.buffer.offset.saturating_add(offset),
                 size: self.buffer.size.saturating_sub(offset),
                 rotation: each,

@@ -7,21 +7,21 @@ use std::time::Duration;
 
 use ash::{ext, khr, vk};
 
+use crate::gpu::buffer::SharedMemory;
 use crate::gpu::buffer::{may_be_exported, may_be_imported};
 use crate::gpu::engine::lock;
 use crate::gpu::error::{Named, VulkanError};
 use crate::gpu::exported::timelines_may_be_exported;
 use crate::gpu::handles::{QueueLock, VulkanQueue};
-use crate::gpu::memory_types::{Placing, direct};
 use crate::gpu::options::{EngineOptions, ReadBack};
+use crate::gpu::physical::queues::{Copies, QueueIndex};
 use crate::gpu::physical::{DeviceKind, PhysicalDevice};
-use crate::gpu::pipeline_cache::PipelineCache;
-use crate::gpu::queues::{Copies, QueuePlace};
-use crate::gpu::shared_memory::SharedMemory;
+use crate::gpu::pipeline::PipelineCache;
+use crate::gpu::upload::{Placing, direct};
 
 /// What a submission is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Lane {
+pub(crate) enum QueueLane {
     /// Kernels, and whatever goes with them.
     Kernels,
     /// Copies of results to the host.
@@ -32,14 +32,14 @@ pub(crate) enum Lane {
 const PATIENCE: usize = 6000;
 
 /// A queue, which Vulkan wants to have one user at a time.
-struct Queue {
+struct DeviceQueue {
     raw: Mutex<vk::Queue>,
     family: u32,
     /// What an application that uses it too locks.
     shared: Option<QueueLock>,
 }
 
-impl Queue {
+impl DeviceQueue {
     /// Does work with it while nobody else uses it.
     fn with<T>(&self, work: impl FnOnce(vk::Queue) -> T) -> Option<T> {
         let queue = lock(&self.raw);
@@ -58,9 +58,9 @@ pub(crate) struct LogicalDevice {
     pub(crate) reads_texels: bool,
     /// Where what the host writes for kernels goes.
     pub(crate) placing: Placing,
-    queue: Queue,
+    queue: DeviceQueue,
     /// The queue of [`Lane::Copies`], where that is another one.
-    copy_queue: Option<Queue>,
+    copy_queue: Option<DeviceQueue>,
     /// Whether staged results are copied in submissions of their own.
     pub(crate) copies_apart: bool,
     names: Option<ext::debug_utils::Device>,
@@ -87,7 +87,7 @@ impl LogicalDevice {
         options: &EngineOptions,
     ) -> Result<Arc<Self>, VulkanError> {
         let copies = physical.copies(options);
-        let own = physical.queue_family;
+        let family = physical.queue_family;
         let priorities = [1.0; 2];
         let of_family = |family, count| {
             vk::DeviceQueueCreateInfo::default()
@@ -96,12 +96,12 @@ impl LogicalDevice {
         };
         let beside = match copies {
             Copies::Together | Copies::Apart => None,
-            Copies::Beside(place) => Some(place),
+            Copies::Beside(queue) => Some(queue),
         };
         let queues: Vec<_> = match beside {
-            Some(place) if place.family == own => vec![of_family(own, 2)],
-            Some(place) => vec![of_family(own, 1), of_family(place.family, 1)],
-            None => vec![of_family(own, 1)],
+            Some(other) if other.family == family => vec![of_family(family, 2)],
+            Some(other) => vec![of_family(family, 1), of_family(other.family, 1)],
+            None => vec![of_family(family, 1)],
         };
         // Memory is imported on software devices only. They work in threads of this process: a
         // wait for them ends, and afterwards none of them touches memory that its owner may free.
@@ -125,8 +125,8 @@ impl LogicalDevice {
             (timelines, khr::timeline_semaphore::NAME),
             (physical.portability_subset, khr::portability_subset::NAME),
         ];
-        let wanted = extensions.iter().filter(|(wanted, _)| *wanted);
-        let extensions: Vec<_> = wanted.map(|(_, name)| name.as_ptr()).collect();
+        let enabled = extensions.iter().filter(|(is_enabled, _)| *is_enabled);
+        let extensions: Vec<_> = enabled.map(|(_, name)| name.as_ptr()).collect();
         let features = vk::PhysicalDeviceFeatures::default().shader_int64(reads_texels);
         let mut timelines =
             vk::PhysicalDeviceTimelineSemaphoreFeatures::default().timeline_semaphore(true);
@@ -143,11 +143,11 @@ impl LogicalDevice {
             unsafe { instance.create_device(physical.raw, &info, None) }.named("vkCreateDevice")?;
         // SAFETY: these queues were just created.
         let queue = |family, index| unsafe { raw.get_device_queue(family, index) };
-        let copy_queue = beside.map(|QueuePlace { family, index }| VulkanQueue {
+        let copy_queue = beside.map(|QueueIndex { family, index }| VulkanQueue {
             queue: queue(family, index),
             family,
         });
-        let first = queue(own, 0);
+        let first = queue(family, 0);
         let borrows = borrows.then(|| ext::external_memory_host::Device::new(instance, &raw));
         let exports = exports.then(|| khr::external_memory_fd::Device::new(instance, &raw));
         let exports_timelines =
@@ -174,7 +174,7 @@ impl LogicalDevice {
         let named = copy_queue.filter(|_| !stay);
         let queue_of_family = |(raw, family), shared| {
             let raw = Mutex::new(raw);
-            Queue {
+            DeviceQueue {
                 raw,
                 family,
                 shared,
@@ -211,17 +211,21 @@ impl LogicalDevice {
 
     /// Does work with the queue of a lane, for one user at a time; `None` where an application's lock did not
     /// call it.
-    pub(crate) fn with_queue<T>(&self, lane: Lane, work: impl FnOnce(vk::Queue) -> T) -> Option<T> {
+    pub(crate) fn with_queue<T>(
+        &self,
+        lane: QueueLane,
+        work: impl FnOnce(vk::Queue) -> T,
+    ) -> Option<T> {
         self.queue_of(lane).with(work)
     }
 
-    pub(crate) fn family(&self, lane: Lane) -> u32 {
+    pub(crate) fn family(&self, lane: QueueLane) -> u32 {
         self.queue_of(lane).family
     }
 
-    fn queue_of(&self, lane: Lane) -> &Queue {
+    fn queue_of(&self, lane: QueueLane) -> &DeviceQueue {
         match (lane, &self.copy_queue) {
-            (Lane::Copies, Some(own)) => own,
+            (QueueLane::Copies, Some(copy_queue)) => copy_queue,
             _ => &self.queue,
         }
     }
@@ -233,9 +237,17 @@ impl LogicalDevice {
     }
 
     /// Nobody else uses any queue of a device that the engine opened meanwhile.
-    fn all_queues(&self) -> (MutexGuard<'_, vk::Queue>, Option<MutexGuard<'_, vk::Queue>>) {
-        let own = lock(&self.queue.raw);
-        (own, self.copy_queue.as_ref().map(|other| lock(&other.raw)))
+    fn all_queues(
+        &self,
+    ) -> (
+        MutexGuard<'_, vk::Queue>,
+        Option<MutexGuard<'_, vk::Queue>>,
+    ) {
+        let kernels = lock(&self.queue.raw);
+        (
+            kernels,
+            self.copy_queue.as_ref().map(|other| lock(&other.raw)),
+        )
     }
 
     /// Gives an object the name that validation and debuggers show.
@@ -295,8 +307,8 @@ impl LogicalDevice {
     pub(crate) fn settle(&self) {
         // The queue that computes on an application's device is not the engine's to wait for.
         let lanes = match self.owned {
-            true => &[Lane::Kernels, Lane::Copies][..],
-            false => &[Lane::Copies],
+            true => &[QueueLane::Kernels, QueueLane::Copies][..],
+            false => &[QueueLane::Copies],
         };
         for &lane in lanes {
             self.with_queue(lane, |queue| {

@@ -1,9 +1,9 @@
 //! What can go wrong with Vulkan.
 
+use crate::prepare::error::SetError;
+use crate::time::frames::SampleTimesError;
 #[cfg(feature = "vulkan")]
 use ash::vk;
-
-use crate::prepare::error::SetError;
 
 /// Why a Vulkan device could not be used, or stopped working.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -102,11 +102,11 @@ pub enum VulkanError {
     NoValidation,
     /// No memory type has what a buffer needs.
     #[error(
-        "the device offers no memory with the properties {wanted:#x} (VkMemoryPropertyFlagBits)"
+        "the device offers no memory with the properties {properties:#x} (VkMemoryPropertyFlagBits)"
     )]
     NoMemoryType {
         /// The properties needed, as `VkMemoryPropertyFlagBits`.
-        wanted: u32,
+        properties: u32,
     },
     /// The device did not finish in time.
     #[error("the device did not finish a dispatch within {seconds} s")]
@@ -146,7 +146,7 @@ pub enum VulkanError {
     #[error(
         "the buffer's range of {size} bytes at {offset} does not fit: the result has {needed} bytes, and starts at a multiple of {rotation}"
     )]
-    OwnBuffer {
+    BufferRange {
         /// Where the range starts, bytes.
         offset: u64,
         /// Its length, bytes.
@@ -168,11 +168,11 @@ pub enum VulkanError {
     },
     /// One track alone exceeds the device's limits.
     #[error(
-        "{what} needs {bytes} bytes, over the device's limit of {limit}; use the CPU for this set"
+        "{subject} needs {bytes} bytes, over the device's limit of {limit}; use the CPU for this set"
     )]
     TooLarge {
         /// What is too large.
-        what: &'static str,
+        subject: &'static str,
         /// Bytes needed.
         bytes: u64,
         /// Bytes allowed.
@@ -238,6 +238,16 @@ pub(crate) enum EvaluateError {
     Vulkan(#[from] VulkanError),
     #[error(transparent)]
     Set(SetError),
+}
+
+impl EvaluateError {
+    /// Turns the index of a track in a batch, which starts at `first`, into its index in the set.
+    pub(crate) fn of_tracks_from(mut self, first: usize) -> Self {
+        if let Self::Set(SetError::Frames(SampleTimesError::GapTooLong { track, .. })) = &mut self {
+            *track += first;
+        }
+        self
+    }
 }
 
 impl<E: Into<SetError>> From<E> for EvaluateError {

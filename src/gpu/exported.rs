@@ -12,8 +12,8 @@ use crate::gpu::device::LogicalDevice;
 use crate::gpu::engine::lock;
 use crate::gpu::error::{Named, VulkanError};
 use crate::gpu::physical::PhysicalDevice;
-use crate::gpu::read_back::Semaphore;
 use crate::gpu::submission::Point;
+use crate::gpu::submission::Semaphore;
 
 /// The handle type of exported semaphores: a file of the driver's own.
 const SEMAPHORE_FILE: vk::ExternalSemaphoreHandleTypeFlags =
@@ -152,8 +152,8 @@ impl ExportedResult {
         self.bytes
     }
 
-    /// Bytes of the memory, which belongs to one buffer alone (a dedicated allocation): what an importer has to be
-    /// told.
+    /// Bytes of the memory, which belongs to one buffer alone (a dedicated allocation): what an importer needs to
+    /// know.
     #[must_use]
     pub fn memory_bytes(&self) -> u64 {
         self.exported.buffer.memory().1
@@ -224,7 +224,7 @@ impl ExportedResult {
         Ok(Some((file, value)))
     }
 
-    /// Whether the device has written all of it, as far as a look tells.
+    /// Whether the device has written all of it, without waiting.
     ///
     /// # Errors
     /// When the device was lost, or the process was forked from that which opened it.

@@ -1,17 +1,11 @@
-//! Vulkan objects of an application's own.
+//! An application's Vulkan objects.
 
 use std::fmt;
 use std::sync::{Arc, Mutex};
 
 use ash::vk;
 
-use crate::gpu::device::LogicalDevice;
-use crate::gpu::engine::{VulkanEngine, lock};
-use crate::gpu::error::VulkanError;
-use crate::gpu::instance::Instance;
-use crate::gpu::options::EngineOptions;
-use crate::gpu::physical::PhysicalDevice;
-use crate::shader::spirv::FloatControls;
+use crate::gpu::engine::lock;
 
 /// An application's instance, device and queue, to evaluate on
 /// ([`Engine::from_vulkan`](crate::engine::Engine::from_vulkan)).
@@ -101,7 +95,7 @@ impl fmt::Debug for QueueLock {
     }
 }
 
-/// A queue of an application's own device.
+/// A queue of an application's device.
 #[derive(Debug, Clone, Copy)]
 pub struct VulkanQueue {
     /// The queue.
@@ -110,7 +104,7 @@ pub struct VulkanQueue {
     pub family: u32,
 }
 
-/// A range of a buffer on an application's own device.
+/// A range of a buffer on an application's device.
 #[derive(Debug, Clone, Copy)]
 pub struct VulkanBuffer {
     /// The buffer.
@@ -119,42 +113,4 @@ pub struct VulkanBuffer {
     pub offset: u64,
     /// Its length, bytes: at least the size of the result.
     pub size: u64,
-}
-
-impl VulkanEngine {
-    /// # Safety
-    /// As [`Engine::from_vulkan`](crate::engine::Engine::from_vulkan) says.
-    pub(crate) unsafe fn from_handles(
-        handles: VulkanHandles,
-        options: &EngineOptions,
-    ) -> Result<Self, VulkanError> {
-        use vk::QueueFlags as Flags;
-        let instance = Instance::borrowed(handles.entry, handles.instance);
-        let mut physical = PhysicalDevice::new(&instance, handles.physical_device)?
-            .ok_or(VulkanError::NoDevice)?;
-        physical.queue_family = handles.queue_family;
-        physical.check_family(handles.queue_family, Flags::COMPUTE, "compute")?;
-        if let Some(copies) = &handles.copy_queue {
-            // Whoever computes or draws can copy.
-            let can_copy = Flags::TRANSFER | Flags::COMPUTE | Flags::GRAPHICS;
-            physical.check_family(copies.family, can_copy, "copy")?;
-            if copies.queue == handles.queue {
-                return Err(VulkanError::SameQueue);
-            }
-        }
-        if handles.api_version < vk::API_VERSION_1_2 && !handles.shader_float_controls {
-            // The application did not enable what the device offers.
-            physical.float_controls = FloatControls::default();
-        }
-        physical.has_int64 &= handles.shader_int64;
-        let device = LogicalDevice::borrowed(
-            physical,
-            handles.device,
-            handles.queue,
-            handles.copy_queue,
-            handles.queue_lock,
-            options,
-        );
-        Ok(Self::new(Arc::new(device), options))
-    }
 }

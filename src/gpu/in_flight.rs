@@ -1,7 +1,7 @@
-//! Work in flight: the host starts one piece of it while the device works on those before, and does
-//! what is left to do when they have been computed.
+//! Work in flight: the host starts one piece of it while the device works on those before, brings its results
+//! to the host, and does what is left to do then. Results are read where kernels wrote them, or copied out of the
+//! device's memory: by the submission of the kernels, or by another one beside later kernels.
 
-use std::mem::take;
 use std::ops::Range;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -9,38 +9,35 @@ use std::time::{Duration, Instant};
 use ash::vk;
 use rayon::prelude::*;
 
-use crate::gpu::buffer::Buffer;
-use crate::gpu::device::LogicalDevice;
-use crate::gpu::engine::{ClipBuffers, VulkanEngine, lock};
-use crate::gpu::error::{EvaluateError, VulkanError};
+use crate::gpu::buffer::{Buffer, Residence};
+use crate::gpu::device::{LogicalDevice, QueueLane};
+use crate::gpu::engine::ClipBuffers;
+use crate::gpu::error::VulkanError;
 use crate::gpu::exported::Exported;
 use crate::gpu::handles::VulkanBuffer;
 use crate::gpu::imported_memory::ImportedMemory;
 use crate::gpu::options::Timings;
 use crate::gpu::pipeline::Pipeline;
-use crate::gpu::read_back::ReadBack;
-use crate::gpu::submission::Spent;
-use crate::gpu::turns::Turns;
+use crate::gpu::submission::{Access, Semaphore, Spent, Submission};
 use crate::gpu::work_list::Patch;
 use crate::output::encoding::Encoding;
-use crate::prepare::error::SetError;
-use crate::threads::{on_threads, stop};
+use crate::threads::on_threads;
 
 /// What one piece of work in flight needs; `U` are its uploads.
 pub(crate) struct InFlight<U> {
     // It goes first: it waits for its work to end before the buffers are freed.
-    pub(crate) results: ReadBack,
+    pub(crate) results: KernelResults,
     pub(crate) uploads: U,
     pub(crate) done: Option<Finish>,
     /// Whether the kernel had run before: some drivers compile at the first dispatch, which then
     /// does not count as slow.
     pub(crate) compiled: bool,
     /// What work that goes on after its call uses, until it has ended.
-    pub(crate) kept: Option<Kept>,
+    pub(crate) kept: Option<KeptAlive>,
 }
 
 /// What work on an exported result uses besides its uploads and the result, which waits for the work itself.
-pub(crate) struct Kept {
+pub(crate) struct KeptAlive {
     pub(crate) _segments: Arc<ClipBuffers>,
     pub(crate) _pipeline: Arc<Pipeline>,
 }
@@ -50,7 +47,7 @@ pub(crate) struct Finish {
     /// The bytes of the whole result that it makes.
     pub(crate) output: Range<usize>,
     pub(crate) encoding: Encoding,
-    /// Rotations that the host computed, by their places among those of the piece.
+    /// Rotations that the host computed, by their index among those of the piece.
     pub(crate) patches: Vec<Patch>,
 }
 
@@ -62,7 +59,7 @@ pub(crate) struct Stopwatch {
     /// must not count twice.
     last: Option<Instant>,
     /// A window took longer than [`LONG`].
-    slow: bool,
+    pub(crate) slow: bool,
 }
 
 /// A window should take no longer. Systems reset a device that one program keeps busy for seconds
@@ -73,7 +70,7 @@ impl Stopwatch {
     pub(crate) fn ran(&mut self, spent: Spent, compiled: bool) {
         let submitted = spent.submitted;
         let waited = spent.finished - self.last.map_or(submitted, |last| last.max(submitted));
-        let by_its_clock = Some(spent.on_device).filter(|own| !own.is_zero());
+        let by_its_clock = Some(spent.on_device).filter(|time| !time.is_zero());
         let took = by_its_clock.unwrap_or(waited);
         self.slow |= compiled && took > LONG;
         self.timings.submit_to_fence += waited;
@@ -115,7 +112,7 @@ impl<'a> Target<'a> {
 
     /// The buffer that kernels write into and where the result starts in it, bytes; `None` where each
     /// piece of work has a buffer of its own.
-    pub(crate) fn place(&self) -> Option<(vk::Buffer, u64)> {
+    pub(crate) fn destination(&self) -> Option<(vk::Buffer, u64)> {
         match self {
             Self::Buffer(buffer) => Some((buffer.raw, 0)),
             Self::ImportedMemory(memory) => Some((memory.buffer.raw, memory.start as u64)),
@@ -126,79 +123,15 @@ impl<'a> Target<'a> {
     }
 
     /// Whether whoever uses the result waits by itself for the device to end.
-    fn is_waited_for_elsewhere(&self) -> bool {
+    pub(crate) fn is_waited_for_elsewhere(&self) -> bool {
         matches!(self, Self::Exported(result) if result.has_timeline())
-    }
-}
-
-impl VulkanEngine {
-    /// Starts pieces of work one after another, and finishes all that is in flight, also after an
-    /// error: work that was submitted uses the caller's buffers. Where a piece takes long, windows are
-    /// halved before `work` is asked for more. Of several callers each waits for its turn, so that the
-    /// memory in flight is that of one; nothing is locked meanwhile. Work on a result that others wait for
-    /// goes on after the call: whoever uses the same buffers next waits for it.
-    pub(crate) fn fly<U: Default, W>(
-        &self,
-        kept: &Turns<Vec<InFlight<U>>>,
-        target: &mut Target<'_>,
-        mut work: impl Iterator<Item = W>,
-        mut start: impl FnMut(&mut InFlight<U>, &Target<'_>, W) -> Result<(), EvaluateError>,
-    ) -> Result<(), EvaluateError> {
-        let mut in_flight = kept.take();
-        let mut stopwatch = Stopwatch::default();
-        let mut ended = in_flight.iter_mut().filter(|flight| flight.kept.is_some());
-        let finished = ended.try_for_each(|flight| match flight.results.is_done()? {
-            true => flight.finish(target, &mut stopwatch),
-            false => Ok(()),
-        });
-        if let Err(error) = finished {
-            in_flight.clear(); // as below
-            return Err(error.into());
-        }
-        let is_free = |flight: &InFlight<U>| flight.kept.is_none();
-        let beside = in_flight.len() % self.in_flight_count;
-        let mut next = in_flight.iter().position(is_free).unwrap_or(beside);
-        let mut result = work.try_for_each(|work| {
-            stop::check().map_err(SetError::from)?;
-            if next == in_flight.len() {
-                in_flight.push(InFlight::new(&self.device)?);
-            }
-            let own = &mut in_flight[next];
-            next = (next + 1) % self.in_flight_count;
-            own.finish(target, &mut stopwatch)?;
-            if take(&mut stopwatch.slow) {
-                self.halve_windows();
-            }
-            let listing = Instant::now();
-            let started = start(own, target, work);
-            stopwatch.timings.work_lists += listing.elapsed();
-            started
-        });
-        let count = in_flight.len();
-        let goes_on = result.is_ok() && target.is_waited_for_elsewhere();
-        for i in (0..count).filter(|_| !goes_on) {
-            let oldest = &mut in_flight[(next + i) % count];
-            let finished = oldest.finish(target, &mut stopwatch);
-            result = result.and(finished.map_err(EvaluateError::from));
-        }
-        if let (Target::ImportedMemory(memory), Ok(())) = (target, &result) {
-            memory.has_come_back();
-        }
-        if stopwatch.slow {
-            self.halve_windows(); // those of the next call
-        }
-        if result.is_err() {
-            in_flight.clear(); // a fence or a recording may be half way
-        }
-        *lock(&self.timings) += stopwatch.timings;
-        result
     }
 }
 
 impl<U: Default> InFlight<U> {
     pub(crate) fn new(device: &Arc<LogicalDevice>) -> Result<Self, VulkanError> {
         Ok(Self {
-            results: ReadBack::new(device)?,
+            results: KernelResults::new(device)?,
             uploads: U::default(),
             done: None,
             compiled: false,
@@ -239,10 +172,10 @@ impl<U> InFlight<U> {
             }
         };
         let rotation = done.encoding.bytes();
-        for (place, value) in done.patches {
-            let place = place * rotation;
-            let own = &mut output[place..place + rotation];
-            done.encoding.encode_all(&[value], own);
+        for (index, value) in done.patches {
+            let offset = index * rotation;
+            let patched = &mut output[offset..offset + rotation];
+            done.encoding.encode_all(&[value], patched);
         }
         stopwatch.timings.read_back += copying.elapsed();
         Ok(())
@@ -263,6 +196,151 @@ pub(crate) fn copy(to: &mut [u8], from: &[u8]) {
     if !matches!(copied, Some(Ok(()))) {
         to.copy_from_slice(from);
     }
+}
+
+/// Submitted kernels, and the memory that their results come back through. It must be dropped before anything else
+/// that the kernels use.
+pub(crate) struct KernelResults {
+    // Kernels and copy go first: they wait for their end before the buffers are freed.
+    pub(crate) kernels: Submission,
+    apart: Option<CopyApart>,
+    /// What kernels write.
+    output: Option<Buffer>,
+    /// What the host reads, where that is not the same.
+    host: Option<Buffer>,
+}
+
+/// Copies in submissions of their own.
+struct CopyApart {
+    submission: Submission,
+    /// What the kernels' queue has reached.
+    done: Semaphore,
+}
+
+impl KernelResults {
+    pub(crate) fn new(device: &Arc<LogicalDevice>) -> Result<Self, VulkanError> {
+        Ok(Self {
+            kernels: Submission::new(device, QueueLane::Kernels)?,
+            apart: None,
+            output: None,
+            host: None,
+        })
+    }
+
+    /// The buffer for kernels to write, of this size or longer; `staged` results are copied out of
+    /// the device's own memory.
+    pub(crate) fn room(
+        &mut self,
+        device: &Arc<LogicalDevice>,
+        size: u64,
+        staged: bool,
+    ) -> Result<&Buffer, VulkanError> {
+        if !staged {
+            return grow(device, &mut self.output, size, Residence::InPlace);
+        }
+        self.copy_apart(device)?;
+        grow(device, &mut self.host, size, Residence::Readback)?;
+        grow(device, &mut self.output, size, Residence::Results)
+    }
+
+    /// The same for results that are copied to a buffer which is not one of these.
+    pub(crate) fn room_apart(
+        &mut self,
+        device: &Arc<LogicalDevice>,
+        size: u64,
+    ) -> Result<&Buffer, VulkanError> {
+        self.copy_apart(device)?;
+        grow(device, &mut self.output, size, Residence::Results)
+    }
+
+    fn copy_apart(&mut self, device: &Arc<LogicalDevice>) -> Result<(), VulkanError> {
+        if self.apart.is_none() && device.copies_apart {
+            self.apart = Some(CopyApart {
+                submission: Submission::new(device, QueueLane::Copies)?,
+                done: Semaphore::new(device)?,
+            });
+        }
+        Ok(())
+    }
+
+    /// Submits the recorded kernels, and what brings the first `size` bytes of the results to the host;
+    /// with `None` they were written into other memory, where the host sees them.
+    pub(crate) fn submit(&mut self, size: Option<u64>) -> Result<(), VulkanError> {
+        self.submit_to(size, None)
+    }
+
+    /// As [`ReadBack::submit`]; the results go to another buffer that the host sees, from an offset on, if one
+    /// is named.
+    pub(crate) fn submit_to(
+        &mut self,
+        size: Option<u64>,
+        destination: Option<(&Buffer, u64)>,
+    ) -> Result<(), VulkanError> {
+        let kernels = &mut self.kernels;
+        let destination = destination.or(self.host.as_ref().map(|host| (host, 0)));
+        let (Some(size), Some(output), Some(destination)) = (size, &self.output, destination)
+        else {
+            (kernels.commands()).barrier(Access::Kernel, Access::Host);
+            return kernels.submit();
+        };
+        let size = size.max(4); // no copy may be of nothing, and no buffer is shorter
+        let Some(CopyApart { submission, done }) = &mut self.apart else {
+            (kernels.commands()).barrier(Access::Kernel, Access::Copy);
+            (kernels.commands()).copy_to(output, destination, size);
+            (kernels.commands()).barrier(Access::Copy, Access::Host);
+            return kernels.submit();
+        };
+        // The semaphore orders the copy and makes the kernels' writes visible to it: there is no
+        // barrier in between, and none that the next kernels would wait for.
+        submission.begin(0)?;
+        (submission.commands()).copy_to(output, destination, size);
+        (submission.commands()).barrier(Access::Copy, Access::Host);
+        let point = done.advance();
+        kernels.submit_between(None, Some(point))?;
+        submission.submit_between(Some(point), None)
+    }
+
+    /// Whether the kernels and the copy have ended, without waiting.
+    pub(crate) fn is_done(&self) -> Result<bool, VulkanError> {
+        let copied = match &self.apart {
+            Some(apart) => apart.submission.is_done()?,
+            None => true,
+        };
+        Ok(copied && self.kernels.is_done()?)
+    }
+
+    /// Waits for the copy and for the kernels, whose time it returns, the copy's end included.
+    pub(crate) fn wait(&mut self) -> Result<Option<Spent>, VulkanError> {
+        if let Some(apart) = &mut self.apart {
+            apart.submission.wait()?;
+        }
+        self.kernels.wait()
+    }
+
+    /// Some of the results, after the wait.
+    pub(crate) fn bytes(&self, range: Range<usize>) -> Result<&[u8], VulkanError> {
+        let Some(buffer) = self.host.as_ref().or(self.output.as_ref()) else {
+            return Ok(&[]);
+        };
+        buffer.invalidate(&range)?;
+        Ok(buffer.bytes(range))
+    }
+}
+
+/// A kept buffer of at least `size` bytes, which is replaced if it is shorter.
+fn grow<'b>(
+    device: &Arc<LogicalDevice>,
+    kept: &'b mut Option<Buffer>,
+    size: u64,
+    residence: Residence,
+) -> Result<&'b Buffer, VulkanError> {
+    // A shorter one is freed before the new one is made, so that both need not fit.
+    let buffer = kept.take().filter(|buffer| buffer.size >= size);
+    let buffer = buffer.map_or_else(
+        || Buffer::new(device, "tumble results", size, residence),
+        Ok,
+    );
+    Ok(kept.insert(buffer?))
 }
 
 #[cfg(test)]

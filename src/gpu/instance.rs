@@ -30,7 +30,7 @@ pub(crate) struct Instance {
 struct Messenger {
     functions: ext::debug_utils::Instance,
     raw: vk::DebugUtilsMessengerEXT,
-    /// What the validation layer said; boxed, because the callback holds its address.
+    /// The messages of the validation layer; boxed, because the callback holds its address.
     messages: Box<Mutex<Vec<String>>>,
 }
 
@@ -72,12 +72,12 @@ impl Instance {
         if validation && !layers.any(|layer| layer.layer_name_as_c_str() == Ok(VALIDATION)) {
             return Err(VulkanError::NoValidation);
         }
-        let has_extension = |layer: Option<&CStr>, wanted: &CStr| -> Result<bool, VulkanError> {
+        let has_extension = |layer: Option<&CStr>, name: &CStr| -> Result<bool, VulkanError> {
             // SAFETY: the layer's name is a valid string.
             let found = unsafe { entry.enumerate_instance_extension_properties(layer) }
                 .named("vkEnumerateInstanceExtensionProperties")?;
             let mut found = found.iter();
-            Ok(found.any(|own| own.extension_name_as_c_str() == Ok(wanted)))
+            Ok(found.any(|extension| extension.extension_name_as_c_str() == Ok(name)))
         };
         let debug_utils = has_extension(None, ext::debug_utils::NAME)?
             || validation && has_extension(Some(VALIDATION), ext::debug_utils::NAME)?;
@@ -182,10 +182,10 @@ impl Instance {
         version.ok().flatten().unwrap_or(vk::API_VERSION_1_0)
     }
 
-    /// What the validation layer has said so far.
+    /// The messages of the validation layer so far.
     pub(crate) fn validation_messages(&self) -> Vec<String> {
         let messenger = self.messenger.as_ref();
-        messenger.map_or_else(Vec::new, |own| lock(&own.messages).clone())
+        messenger.map_or_else(Vec::new, |messenger| lock(&messenger.messages).clone())
     }
 }
 
@@ -220,8 +220,8 @@ const HOMEBREW: [&str; 4] = [
 /// The loader's library.
 fn loader() -> Result<ash::Entry, VulkanError> {
     // SAFETY: loading a library runs its initialisers; that is what is asked for.
-    let usual = unsafe { ash::Entry::load() };
-    usual.or_else(|error| {
+    let default = unsafe { ash::Entry::load() };
+    default.or_else(|error| {
         let others = HOMEBREW.iter().filter(|_| cfg!(target_os = "macos"));
         // SAFETY: as above.
         let mut found = others.filter_map(|path| unsafe { ash::Entry::load_from(path) }.ok());

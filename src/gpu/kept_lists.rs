@@ -3,7 +3,7 @@
 
 use std::sync::{Arc, Mutex};
 
-use crate::gpu::device::{Lane, LogicalDevice};
+use crate::gpu::device::{LogicalDevice, QueueLane};
 use crate::gpu::engine::{Job, VulkanEngine, lock};
 use crate::gpu::error::EvaluateError;
 use crate::gpu::submission::{Binding, Submission};
@@ -41,10 +41,10 @@ impl KeptLists {
         engine: &VulkanEngine,
         job: Job<'_>,
         whole: &Window,
-        most: usize,
+        values_per_window: usize,
     ) -> Result<Self, EvaluateError> {
         let mut windows = Vec::new();
-        for window in whole.cut(most) {
+        for window in whole.cut(values_per_window) {
             let mut lists = WorkLists::default();
             let list = || lists.list(engine, job.clip, job.timeline, &window);
             let work = on_threads(list)??;
@@ -62,7 +62,7 @@ impl KeptLists {
                 .flat_map(|kept| kept.lists.uploads(kept.work.list))
         };
         if uploads().any(Upload::is_copied) {
-            let mut submission = Submission::new(device, Lane::Kernels)?;
+            let mut submission = Submission::new(device, QueueLane::Kernels)?;
             submission.begin(0)?;
             Upload::record(uploads(), &mut submission);
             submission.submit()?;
@@ -80,11 +80,11 @@ impl KeptLists {
     /// The lists of a window of the result, where the result was cut as it is now.
     pub(crate) fn of(&self, window: &Window) -> Option<&KeptWindow> {
         let start = |kept: &KeptWindow| kept.window.start;
-        let place = self
+        let index = self
             .windows
             .partition_point(|kept| start(kept) < window.start);
         self.windows
-            .get(place)
+            .get(index)
             .filter(|kept| kept.window == *window)
     }
 
@@ -97,18 +97,18 @@ impl KeptLists {
 }
 
 /// More bytes of lists than this are not kept.
-const MOST_BYTES: u64 = 256 << 20;
+const MAX_BYTES: u64 = 256 << 20;
 
 /// Results of which a clip keeps the lists.
-const MOST_KEPT: usize = 2;
+const MAX_RESULTS: usize = 2;
 
 /// The lists that a clip keeps, of frames at a rate: from the second time on that the same ones are asked for,
 /// so that whoever never asks twice pays for none.
 #[derive(Default)]
-pub(crate) struct ListCache(Mutex<Kept>);
+pub(crate) struct ListCache(Mutex<CachedLists>);
 
 #[derive(Default)]
-struct Kept {
+struct CachedLists {
     /// What was asked for last.
     last: Option<Asked>,
     /// What was asked for again, and whose lists are too long to keep.
@@ -127,19 +127,19 @@ impl ListCache {
         engine: &VulkanEngine,
         job: Job<'_>,
         whole: &Window,
-        most: usize,
+        values_per_window: usize,
     ) -> Result<Option<Arc<KeptLists>>, EvaluateError> {
         let is_rate = matches!(job.timeline.ticks, Ticks::Frames { .. });
         if !is_rate || engine.clip_bytes.is_some() {
             return Ok(None);
         }
-        let asked = (job.timeline.clone(), whole.clone(), most);
+        let asked = (job.timeline.clone(), whole.clone(), values_per_window);
         {
             let mut kept = lock(&self.0);
             // Those of a device that was lost are of no use.
             (kept.lists).retain(|(_, lists)| Arc::ptr_eq(&lists.device, &engine.device));
-            if let Some(place) = kept.lists.iter().position(|(known, _)| *known == asked) {
-                kept.lists[..=place].rotate_right(1);
+            if let Some(index) = kept.lists.iter().position(|(known, _)| *known == asked) {
+                kept.lists[..=index].rotate_right(1);
                 return Ok(Some(Arc::clone(&kept.lists[0].1)));
             }
             let is_new = kept.last.replace(asked.clone()).as_ref() != Some(&asked);
@@ -148,14 +148,14 @@ impl ListCache {
             }
         }
         // Nothing is locked while they are made. Of several callers who make the same, the last one's stay.
-        let made = match KeptLists::new(engine, job, whole, most) {
+        let made = match KeptLists::new(engine, job, whole, values_per_window) {
             Err(EvaluateError::Vulkan(error)) if error.is_out_of_memory() => None,
-            made => Some(Arc::new(made?)).filter(|made| made.bytes() <= MOST_BYTES),
+            made => Some(Arc::new(made?)).filter(|made| made.bytes() <= MAX_BYTES),
         };
         let mut kept = lock(&self.0);
         match &made {
             Some(made) => {
-                kept.lists.truncate(MOST_KEPT - 1);
+                kept.lists.truncate(MAX_RESULTS - 1);
                 kept.lists.insert(0, (asked, Arc::clone(made)));
             }
             None => kept.too_long = Some(asked),
@@ -165,6 +165,6 @@ impl ListCache {
 
     /// Lets go of all, where memory is short.
     pub(crate) fn forget(&self) {
-        *lock(&self.0) = Kept::default();
+        *lock(&self.0) = CachedLists::default();
     }
 }

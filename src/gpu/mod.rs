@@ -1,47 +1,78 @@
-//! Vulkan, through `ash`: evaluation on a device, its work lists and memory, the self-test and
-//! recovery from errors. One type owns one Vulkan object and destroys it; unsafe code is allowed.
+//! Vulkan, through `ash`: evaluation on a device, with the bits of the CPU. Unsafe code is allowed here.
+//!
+//! A driver may be slow to compile, run out of memory, lose its device, round otherwise than Vulkan demands, or
+//! belong to an application that draws at the same time. So work goes to the device in windows that are short and
+//! of bounded memory, what a kernel computes is compared with the CPU before it is used, and whatever fails is
+//! repeated by one piece of code.
+//!
+//! # Types
+//!
+//! One type owns one Vulkan object, destroys it, and keeps what it was made from alive:
+//!
+//! * [`Instance`](instance::Instance), [`PhysicalDevice`](physical::PhysicalDevice) with its queue families and memory
+//!   types, [`LogicalDevice`](device::LogicalDevice) with a queue for kernels and, on cards, one for copies;
+//! * [`Buffer`](buffer::Buffer), [`Pipeline`](pipeline::Pipeline), [`Submission`](submission::Submission): commands, a
+//!   fence and descriptor sets that are used again and again;
+//! * [`VulkanEngine`](engine::VulkanEngine): a device with its pipelines, and buffers kept for the next call;
+//! * [`Opened`](recovery::Opened): what the rest of the crate holds. It has the current `VulkanEngine`, opens a lost
+//!   device again, and repeats work that ran out of memory in smaller windows.
+//!
+//! # From a call to its bytes
+//!
+//! 1. `evaluate::uploaded` makes a [`Job`](engine::Job): prepared segments, which lie on the device as
+//!    [`ClipBuffers`](engine::ClipBuffers), sample times and an encoding. `Opened::attempt_smaller` runs it.
+//! 2. [`engine::run`] cuts the result into windows of at most 2²¹ rotations and runs them pipelined: while the device
+//!    works on one, the host lists the next ([`in_flight`]).
+//! 3. [`work_list`] lists which samples of a window belong to which segment, as runs, single samples, or a grid;
+//!    [`kept_lists`] keeps the lists of frames that are asked for again. [`upload`] writes them where kernels read.
+//! 4. [`submission`] records the copies of the lists, barriers, and a dispatch for each group of segments.
+//! 5. `InFlight::finish` waits for the fence, copies the bytes to the caller where they are not there yet, and
+//!    overwrites the rotations that the host computed in f64 because no polynomial fits their curve.
+//!
+//! Sets with fewer samples than keys go to [`engine::from_keys`] without segments. Crowds have their own tables and
+//! targets ([`crowd`]); [`clip_target`] records a clip into an application's commands.
+//!
+//! # Where memory lies
+//!
+//! | what | memory |
+//! |---|---|
+//! | segments, constants, tables of crowds | the device's own |
+//! | lists and keys | the device's own where the host can write it ([`UploadMemory`](upload::UploadMemory)), else copied there, or read from the host's |
+//! | results | where the host reads them on devices that share its memory, and in the caller's memory on software devices ([`imported_memory`]); else the device's own, copied by the second queue beside later kernels |
+//! | results for CUDA | the device's own, exported as a file ([`exported`]) |
+//!
+//! Small buffers share allocations of 4 MiB ([`buffer::SharedMemory`]).
+//!
+//! # Trust
+//!
+//! [`self_test`] runs when a device is opened, [`kernel_check`] when a pipeline is first made; what passed is
+//! remembered ([`cache`]). Without the feature `vulkan`, `absent.rs` stands here instead: the names that the rest of
+//! the crate uses, with nothing behind them.
 #![allow(unsafe_code)]
 
 #[cfg(feature = "prove")]
 pub(crate) mod application;
 pub(crate) mod buffer;
 pub(crate) mod cache;
-#[cfg(test)]
-pub(crate) mod cards;
 pub(crate) mod clip_target;
 pub(crate) mod crowd;
-pub(crate) mod crowd_target;
-pub(crate) mod descriptors;
-#[cfg(feature = "prove")]
-pub(crate) mod details;
 pub(crate) mod device;
 pub(crate) mod engine;
 pub(crate) mod error;
+pub(crate) mod exclusive;
 pub(crate) mod exported;
-pub(crate) mod from_keys;
-pub(crate) mod grid;
 pub(crate) mod handles;
 pub(crate) mod imported_memory;
 pub(crate) mod in_flight;
 pub(crate) mod instance;
 pub(crate) mod kept_lists;
 pub(crate) mod kernel_check;
-pub(crate) mod memory_types;
 pub(crate) mod options;
 pub(crate) mod physical;
 pub(crate) mod pipeline;
-pub(crate) mod pipeline_cache;
-pub(crate) mod queues;
-pub(crate) mod read_back;
 pub(crate) mod recovery;
 pub(crate) mod reports;
-pub(crate) mod run;
-pub(crate) mod sample_list;
 pub(crate) mod self_test;
-pub(crate) mod shared_memory;
 pub(crate) mod submission;
-pub(crate) mod turns;
 pub(crate) mod upload;
 pub(crate) mod work_list;
-#[cfg(feature = "prove")]
-pub(crate) mod write_rates;

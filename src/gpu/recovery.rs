@@ -7,10 +7,10 @@ use std::sync::{Arc, Mutex};
 use crate::gpu::device::LogicalDevice;
 use crate::gpu::engine::{ClipBuffers, VulkanEngine, lock};
 use crate::gpu::error::{EvaluateError, VulkanError};
+use crate::gpu::exclusive::Exclusive;
 use crate::gpu::options::EngineOptions;
 use crate::gpu::physical::{DeviceInfo, PhysicalDevice};
 use crate::gpu::self_test::{self, SelfTestReport};
-use crate::gpu::turns::Turns;
 use crate::output::encoding::Encoding;
 use crate::prepare::clip_data::ClipData;
 use crate::shader::{Form, Kernel};
@@ -23,7 +23,7 @@ pub(crate) struct Opened {
     /// Replaced when the device is lost.
     current: Mutex<Arc<VulkanEngine>>,
     /// Of several callers that lost it, one opens it again.
-    reopening: Turns<()>,
+    reopening: Exclusive<()>,
     options: EngineOptions,
     pub(crate) self_tests: Vec<SelfTestReport>,
     pub(crate) info: DeviceInfo,
@@ -58,7 +58,7 @@ impl Opened {
             self_tests: trust(&engine, options)?,
             info: engine.device.physical.info.clone(),
             current: Mutex::new(Arc::new(engine)),
-            reopening: Turns::default(),
+            reopening: Exclusive::default(),
             options: options.clone(),
         })
     }
@@ -149,10 +149,10 @@ impl Opened {
         }
     }
 
-    /// Opens a lost device again and replaces it; false for an application's own, which only the
+    /// Opens a lost device again and replaces it; false for an application's device, which only the
     /// application can open.
     fn reopen(&self, lost: &Arc<VulkanEngine>) -> Result<bool, VulkanError> {
-        let _turn = self.reopening.take();
+        let _reopening = self.reopening.take();
         if !Arc::ptr_eq(&self.engine(), lost) {
             return Ok(true); // another thread was faster
         }
@@ -164,7 +164,7 @@ impl Opened {
         engine.window.store(lost.window(), Ordering::Relaxed);
         trust(&engine, &self.options)?;
         let mut current = lock(&self.current);
-        // The engine's own threads do not wait for each other's turns.
+        // The engine's own threads do not wait for each other.
         if Arc::ptr_eq(&current, lost) {
             *current = Arc::new(engine);
         }

@@ -58,7 +58,7 @@ pub enum DeviceKind {
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct SelfTestReport {
-    /// What it looks for: a way in which a driver can be inexact.
+    /// What it checks: one of the errors that an inexact driver makes.
     pub name: &'static str,
     /// Results compared.
     pub total: usize,
@@ -88,7 +88,7 @@ impl NegativeControl {
     /// False where the driver is known to compute some expressions otherwise, and the comparison found none: then
     /// it proves nothing.
     #[must_use]
-    pub fn holds(&self) -> bool {
+    pub fn is_conclusive(&self) -> bool {
         !self.must_differ || self.differing() > 0
     }
 }

@@ -20,14 +20,13 @@ pub(crate) fn run(engine: &VulkanEngine) -> Result<Vec<SelfTestReport>, VulkanEr
     expressions(&engine.device, Exactness::Demanded)
 }
 
-impl NegativeControl {
-    pub(crate) fn run(engine: &VulkanEngine) -> Result<Self, VulkanError> {
-        let info = &engine.device.physical.info;
-        Ok(Self {
-            expressions: expressions(&engine.device, Exactness::LeftToTheDriver)?,
-            must_differ: info.kind == DeviceKind::Cpu && info.name.starts_with("llvmpipe"),
-        })
-    }
+/// Runs them where the driver is left free to compute otherwise.
+pub(crate) fn negative_control(engine: &VulkanEngine) -> Result<NegativeControl, VulkanError> {
+    let info = &engine.device.physical.info;
+    Ok(NegativeControl {
+        expressions: expressions(&engine.device, Exactness::LeftToTheDriver)?,
+        must_differ: info.kind == DeviceKind::Cpu && info.name.starts_with("llvmpipe"),
+    })
 }
 
 type Value = fn(&Reply) -> f32;
@@ -81,8 +80,8 @@ pub(super) fn trial() -> Trial {
     let (probes, dispatch) = (probes(), Dispatch::zeroed());
     let groups = [(probes.len() as u32).div_ceil(WORKGROUP), 1, 1];
     let mut trial = Trial::new([bytes(&probes)], &dispatch, groups);
-    for (i, &own) in probes.iter().enumerate() {
-        trial.expect(i, &reply(own));
+    for (i, &probe) in probes.iter().enumerate() {
+        trial.expect(i, &reply(probe));
     }
     trial
 }

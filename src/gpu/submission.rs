@@ -1,4 +1,5 @@
-//! One submission at a time: a command buffer, its fence and its descriptor sets.
+//! One submission at a time: a command buffer, its fence and its descriptor sets, and the semaphores by which
+//! one submission waits for another.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -6,8 +7,7 @@ use std::time::{Duration, Instant};
 use ash::vk;
 
 use crate::gpu::buffer::Buffer;
-use crate::gpu::descriptors::DescriptorPool;
-use crate::gpu::device::{Lane, LogicalDevice};
+use crate::gpu::device::{LogicalDevice, QueueLane};
 use crate::gpu::error::{Named, VulkanError};
 use crate::gpu::pipeline::Pipeline;
 
@@ -17,7 +17,7 @@ const TIMEOUT_SECONDS: u64 = 60;
 /// Command buffer, fence and descriptor pool, used again and again.
 pub(crate) struct Submission {
     device: Arc<LogicalDevice>,
-    lane: Lane,
+    lane: QueueLane,
     pool: vk::CommandPool,
     commands: vk::CommandBuffer,
     fence: vk::Fence,
@@ -75,7 +75,7 @@ impl Binding {
 }
 
 impl Submission {
-    pub(crate) fn new(device: &Arc<LogicalDevice>, lane: Lane) -> Result<Self, VulkanError> {
+    pub(crate) fn new(device: &Arc<LogicalDevice>, lane: QueueLane) -> Result<Self, VulkanError> {
         let mut submission = Self {
             device: Arc::clone(device),
             lane,
@@ -101,7 +101,7 @@ impl Submission {
         // SAFETY: as above.
         submission.fence = unsafe { raw.create_fence(&vk::FenceCreateInfo::default(), None) }
             .named("vkCreateFence")?;
-        if lane == Lane::Kernels && device.physical.timestamp_bits() > 0 {
+        if lane == QueueLane::Kernels && device.physical.timestamp_bits() > 0 {
             let info = vk::QueryPoolCreateInfo::default()
                 .query_type(vk::QueryType::TIMESTAMP)
                 .query_count(2);
@@ -110,8 +110,8 @@ impl Submission {
                 unsafe { raw.create_query_pool(&info, None) }.named("vkCreateQueryPool")?;
         }
         let name = match lane {
-            Lane::Kernels => "tumble window",
-            Lane::Copies => "tumble read back",
+            QueueLane::Kernels => "tumble window",
+            QueueLane::Copies => "tumble read back",
         };
         device.name(submission.commands, name);
         Ok(submission)
@@ -124,7 +124,7 @@ impl Submission {
         unsafe { Commands::new(&self.device, self.commands) }
     }
 
-    /// Whether submitted work has ended, as far as a look tells.
+    /// Whether submitted work has ended, without waiting.
     pub(crate) fn is_done(&self) -> Result<bool, VulkanError> {
         if self.submitted.is_none() {
             return Ok(true);
@@ -269,7 +269,7 @@ impl Submission {
     }
 }
 
-/// A command buffer in recording: a submission's, or one of an application's own.
+/// A command buffer in recording: a submission's, or an application's.
 #[derive(Clone, Copy)]
 pub(crate) struct Commands<'a> {
     device: &'a ash::Device,
@@ -313,7 +313,7 @@ impl<'a> Commands<'a> {
         unsafe { (self.device).cmd_copy_buffer(self.raw, from.raw, to.raw, &region) };
     }
 
-    /// Records a copy of the first `size` bytes of a buffer to a place in another.
+    /// Records a copy of the first `size` bytes of a buffer to an offset in another.
     pub(crate) fn copy_to(self, from: &Buffer, (to, offset): (&Buffer, u64), size: u64) {
         let size = size.min(to.size - offset);
         let region = [vk::BufferCopy::default().dst_offset(offset).size(size)];
@@ -415,6 +415,177 @@ impl Drop for Submission {
                 raw.destroy_fence(self.fence, None);
                 raw.destroy_command_pool(self.pool, None);
             }
+        }
+    }
+}
+
+/// A timeline semaphore, whose device has that feature: what one queue has reached, for another that
+/// waits.
+pub(crate) struct Semaphore {
+    device: Arc<LogicalDevice>,
+    pub(crate) raw: vk::Semaphore,
+    /// The value of the point that was given last.
+    last: u64,
+    /// Whether others than this device may wait for it.
+    is_exported: bool,
+}
+
+impl Semaphore {
+    pub(crate) fn new(device: &Arc<LogicalDevice>) -> Result<Self, VulkanError> {
+        Self::made(device, "tumble kernels done", None)
+    }
+
+    /// One that may be exported as a file, of a device that can.
+    pub(crate) fn exportable(device: &Arc<LogicalDevice>) -> Result<Self, VulkanError> {
+        let file = vk::ExternalSemaphoreHandleTypeFlags::OPAQUE_FD;
+        Self::made(device, "tumble result done", Some(file))
+    }
+
+    fn made(
+        device: &Arc<LogicalDevice>,
+        name: &str,
+        exported: Option<vk::ExternalSemaphoreHandleTypeFlags>,
+    ) -> Result<Self, VulkanError> {
+        let mut kind =
+            vk::SemaphoreTypeCreateInfo::default().semaphore_type(vk::SemaphoreType::TIMELINE);
+        let mut export =
+            vk::ExportSemaphoreCreateInfo::default().handle_types(exported.unwrap_or_default());
+        let mut info = vk::SemaphoreCreateInfo::default().push_next(&mut kind);
+        if exported.is_some() {
+            info = info.push_next(&mut export);
+        }
+        // SAFETY: the device is alive, with the feature; what is made is destroyed in `drop`.
+        let raw = unsafe { device.raw.create_semaphore(&info, None) }.named("vkCreateSemaphore")?;
+        device.name(raw, name);
+        Ok(Self {
+            device: Arc::clone(device),
+            raw,
+            last: 0,
+            is_exported: exported.is_some(),
+        })
+    }
+
+    /// The next point, later than all that were given before. One that is never reached, because
+    /// its submission failed, does no harm.
+    pub(crate) fn advance(&mut self) -> Point {
+        self.last += 1;
+        (self.raw, self.last)
+    }
+}
+
+impl Drop for Semaphore {
+    fn drop(&mut self) {
+        if self.device.may_destroy() {
+            // Fences say that copies have ended. But Mesa's drivers that make timelines of plain
+            // semaphores let go of them a moment after they signal the fence.
+            if !self.is_exported {
+                self.device.settle(); // timelines that can be exported are no such
+            }
+            // SAFETY: created from this device; whoever submits with it waits for that before.
+            unsafe { self.device.raw.destroy_semaphore(self.raw, None) };
+        }
+    }
+}
+
+/// The most buffers that a kernel binds.
+const MAX_BINDINGS: u32 = 6;
+
+/// A pool of descriptor sets. Whoever has one drops it when no submitted work uses its sets any more.
+pub(crate) struct DescriptorPool {
+    device: Arc<LogicalDevice>,
+    /// Null while there is no room.
+    raw: vk::DescriptorPool,
+    /// Sets that it can hold.
+    room: u32,
+}
+
+impl DescriptorPool {
+    /// A pool without room.
+    pub(crate) fn new(device: &Arc<LogicalDevice>) -> Self {
+        Self {
+            device: Arc::clone(device),
+            raw: vk::DescriptorPool::null(),
+            room: 0,
+        }
+    }
+
+    /// Takes back all sets, which no submitted work may use any more, and has room for so many.
+    pub(crate) fn make_room(&mut self, sets: u32) -> Result<(), VulkanError> {
+        let raw = &self.device.raw;
+        if sets <= self.room {
+            if self.room > 0 {
+                let flags = vk::DescriptorPoolResetFlags::empty();
+                // SAFETY: no set is in use.
+                unsafe { raw.reset_descriptor_pool(self.raw, flags) }
+                    .named("vkResetDescriptorPool")?;
+            }
+            return Ok(());
+        }
+        let sizes = [
+            vk::DescriptorType::STORAGE_BUFFER,
+            vk::DescriptorType::UNIFORM_TEXEL_BUFFER,
+        ]
+        .map(|kind| {
+            vk::DescriptorPoolSize::default()
+                .ty(kind)
+                .descriptor_count(sets * MAX_BINDINGS)
+        });
+        let info = vk::DescriptorPoolCreateInfo::default()
+            .max_sets(sets)
+            .pool_sizes(&sizes);
+        // SAFETY: no set of the old pool is in use; null is allowed.
+        unsafe { raw.destroy_descriptor_pool(self.raw, None) };
+        (self.raw, self.room) = (vk::DescriptorPool::null(), 0);
+        // SAFETY: the device is alive; the pool is destroyed above or in `drop`.
+        self.raw =
+            unsafe { raw.create_descriptor_pool(&info, None) }.named("vkCreateDescriptorPool")?;
+        self.room = sets;
+        Ok(())
+    }
+
+    /// A set with one buffer for each binding of a pipeline.
+    pub(crate) fn set(
+        &mut self,
+        pipeline: &Pipeline,
+        bindings: &[Binding],
+    ) -> Result<vk::DescriptorSet, VulkanError> {
+        debug_assert_eq!(bindings.len(), pipeline.bindings as usize);
+        let raw = &self.device.raw;
+        let layouts = [pipeline.set_layout];
+        let info = vk::DescriptorSetAllocateInfo::default()
+            .descriptor_pool(self.raw)
+            .set_layouts(&layouts);
+        // SAFETY: `make_room` made room for this set.
+        let set =
+            unsafe { raw.allocate_descriptor_sets(&info) }.named("vkAllocateDescriptorSets")?[0];
+        for (index, binding) in (0..).zip(bindings) {
+            let info = [vk::DescriptorBufferInfo::default()
+                .buffer(binding.buffer)
+                .offset(binding.offset)
+                .range(binding.size)];
+            let views = [binding.view];
+            let kind = pipeline.kind(index);
+            let write = vk::WriteDescriptorSet::default()
+                .dst_set(set)
+                .dst_binding(index)
+                .descriptor_type(kind);
+            let write = match kind {
+                vk::DescriptorType::STORAGE_BUFFER => write.buffer_info(&info),
+                _ => write.texel_buffer_view(&views),
+            };
+            // SAFETY: nothing uses the set yet, and the buffers are alive.
+            unsafe { raw.update_descriptor_sets(&[write], &[]) };
+        }
+        Ok(set)
+    }
+}
+
+impl Drop for DescriptorPool {
+    fn drop(&mut self) {
+        if self.device.may_destroy() {
+            // SAFETY: created from this device, and no submitted work uses its sets any more (see the
+            // type); null is allowed.
+            unsafe { self.device.raw.destroy_descriptor_pool(self.raw, None) };
         }
     }
 }

@@ -42,10 +42,14 @@ impl Scalar for f64 {
     #[inline(always)]
     fn arc_square(self) -> f64 {
         let rest = if self < 1.0 { 1.0 - self } else { 0.0 };
-        let far = self > rest;
-        let (small, large) = if far { (rest, self) } else { (self, rest) };
+        let is_greater = self > rest;
+        let (small, large) = if is_greater {
+            (rest, self)
+        } else {
+            (self, rest)
+        };
         let half = arc_tangent((small / large).sqrt());
-        let angle = if far {
+        let angle = if is_greater {
             std::f64::consts::PI - 2.0 * half
         } else {
             2.0 * half
@@ -226,10 +230,10 @@ mod tests {
             (Dual::arc_square, f64::arc_square),
             (Dual::reciprocal_root, f64::reciprocal_root),
         ];
-        for (place, (of_jet, of_number)) in functions.into_iter().enumerate() {
+        for (index, (of_jet, of_number)) in functions.into_iter().enumerate() {
             for i in 1..99 {
-                let x = f64::from(i) * 0.01 * if place < 2 { 9.0 } else { 1.0 };
-                let h = 1e-3 * x.min(if place == 2 { 1.0 - x } else { 1.0 });
+                let x = f64::from(i) * 0.01 * if index < 2 { 9.0 } else { 1.0 };
+                let h = 1e-3 * x.min(if index == 2 { 1.0 - x } else { 1.0 });
                 let at = |k: f64| of_number(x + k * h);
                 let first = (8.0 * (at(1.0) - at(-1.0)) - (at(2.0) - at(-2.0))) / (12.0 * h);
                 let second = (16.0 * (at(1.0) + at(-1.0)) - (at(2.0) + at(-2.0)) - 30.0 * at(0.0))
@@ -239,12 +243,12 @@ mod tests {
                 let near = |a: f64, b: f64, within: f64| (a - b).abs() <= within * (1.0 + a.abs());
                 assert!(
                     near(dual.first, first, 1e-9),
-                    "{place} {x} {dual:?} {first}"
+                    "{index} {x} {dual:?} {first}"
                 );
                 let within = 1e-15 / (h * h) + 1e-8;
                 assert!(
                     near(dual.second, second, within),
-                    "{place} {x} {dual:?} {second}"
+                    "{index} {x} {dual:?} {second}"
                 );
             }
         }

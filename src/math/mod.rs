@@ -1,5 +1,5 @@
 //! Arithmetic with the same bits on every machine: quaternions in f64, exponential and logarithm,
-//! dual numbers, quadrature, and the rounding of what a kernel reads.
+//! dual numbers, quadrature, and the rounding of the numbers that kernels read.
 
 pub(crate) mod canonical;
 pub(crate) mod dual;

@@ -17,7 +17,7 @@ pub(crate) fn gauss(function: &impl Fn(f64) -> f64, from: f64, to: f64) -> f64 {
 }
 
 /// The integral of a function: the interval is halved, at most so often, while both halves together
-/// differ from the whole. What `differ` gets is the whole and their sum.
+/// differ from the whole. `differ` gets the whole and their sum.
 pub(crate) fn integral(
     function: &impl Fn(f64) -> f64,
     from: f64,

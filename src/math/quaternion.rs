@@ -333,19 +333,19 @@ pub(crate) fn log_toward(q: Quaternion, axis: Vector) -> Vector {
 #[inline(always)]
 pub(crate) fn log_near(q: Quaternion, near: Vector) -> Vector {
     let principal = log_toward(q, near);
-    let own = length(principal);
-    let far = length(near);
+    let angle = length(principal);
+    let near_length = length(near);
     // If the principal logarithm is almost zero it has no axis, and its branches lie along `near`.
-    let has_axis = own > 1e-9;
-    let to_own = if has_axis { 1.0 / own } else { 0.0 };
-    let to_near = if !has_axis && far > PI {
-        1.0 / far
+    let has_axis = angle > 1e-9;
+    let inverse = if has_axis { 1.0 / angle } else { 0.0 };
+    let to_near = if !has_axis && near_length > PI {
+        1.0 / near_length
     } else {
         0.0
     };
-    let axis = sum(scaled(principal, to_own), scaled(near, to_near));
-    let turns = nearest_whole((dot3(axis, near) - own) / TAU);
-    sum(principal, scaled(axis, turns * TAU))
+    let axis = sum(scaled(principal, inverse), scaled(near, to_near));
+    let revolutions = nearest_whole((dot3(axis, near) - angle) / TAU);
+    sum(principal, scaled(axis, revolutions * TAU))
 }
 
 #[cfg(test)]
@@ -384,10 +384,13 @@ mod tests {
             let v = scaled(direction, angle);
             let q = exp(v);
             assert!(distance(log(q), v) < 1e-9, "{angle}");
-            for turns in [-2.0, 1.0, 3.0] {
-                let far = scaled(direction, angle + turns * TAU);
-                let branch = log_near(q, far);
-                assert!(distance(branch, far) < 1e-6, "{angle} {turns} {branch:?}");
+            for revolutions in [-2.0, 1.0, 3.0] {
+                let vector = scaled(direction, angle + revolutions * TAU);
+                let branch = log_near(q, vector);
+                assert!(
+                    distance(branch, vector) < 1e-6,
+                    "{angle} {revolutions} {branch:?}"
+                );
             }
         }
         assert_eq!(log([0.0, 0.0, 0.0, -1.0]), [PI, 0.0, 0.0]);

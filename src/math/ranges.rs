@@ -70,7 +70,7 @@ pub(crate) struct PrincipalRange<R> {
 
 /// `sin(x)/x` and `cos(x)` by polynomials in x².
 pub(crate) struct Waves<const N: usize> {
-    /// The largest x² for which they hold.
+    /// The largest x² for which they are valid.
     pub(crate) limit: f64,
     /// The coefficients of `(sin(x)/x - 1) / x²` in powers of x²; from Chebyshev nodes.
     sinc: [f64; N],
@@ -103,7 +103,7 @@ pub(crate) const LONG_WAVES: Waves<8> = Waves {
     ],
 };
 
-/// For angles up to 1/2, within 3e-12: for what is rounded to f32.
+/// For angles up to 1/2, within 3e-12: for numbers that are rounded to f32.
 pub(crate) const SHORT_WAVES: Waves<4> = Waves {
     limit: 0.25,
     sinc: [

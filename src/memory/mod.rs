@@ -4,52 +4,52 @@
 #[cfg(target_os = "linux")]
 const LARGE: u128 = 1 << 30;
 
-/// There is not the memory that a result needs.
+/// Not enough memory for a result.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "no memory for {what}: {bytes} bytes; ask for less at once, as `stream` and `Clip::request` do"
+    "not enough memory for {purpose}: {bytes} bytes needed; ask for less at once, as `stream` and `Clip::request` do"
 )]
 #[non_exhaustive]
 pub struct OutOfMemory {
-    /// What it was to hold.
-    pub what: &'static str,
+    /// What the memory was for.
+    pub purpose: &'static str,
     /// Bytes that were asked for.
     pub bytes: u128,
 }
 
 impl OutOfMemory {
-    pub(crate) fn new<T>(what: &'static str, count: usize) -> Self {
+    pub(crate) fn new<T>(purpose: &'static str, count: usize) -> Self {
         let bytes = count as u128 * size_of::<T>() as u128;
-        Self { what, bytes }
+        Self { purpose, bytes }
     }
 }
 
 /// Room for `count` values. The system may promise memory that it does not have and end the process
 /// that uses it, so large amounts are refused if less is available.
-pub(crate) fn reserved<T>(count: usize, what: &'static str) -> Result<Vec<T>, OutOfMemory> {
-    refuse_more_than_there_is::<T>(count, what)?;
+pub(crate) fn reserved<T>(count: usize, purpose: &'static str) -> Result<Vec<T>, OutOfMemory> {
+    refuse_more_than_there_is::<T>(count, purpose)?;
     let mut values = Vec::new();
     match values.try_reserve_exact(count) {
         Ok(()) => Ok(values),
-        Err(_) => Err(OutOfMemory::new::<T>(what, count)),
+        Err(_) => Err(OutOfMemory::new::<T>(purpose, count)),
     }
 }
 
 /// Zeros.
 pub(crate) fn zeroed<T: bytemuck::Zeroable>(
     count: usize,
-    what: &'static str,
+    purpose: &'static str,
 ) -> Result<Vec<T>, OutOfMemory> {
-    refuse_more_than_there_is::<T>(count, what)?;
-    bytemuck::try_zeroed_vec(count).map_err(|()| OutOfMemory::new::<T>(what, count))
+    refuse_more_than_there_is::<T>(count, purpose)?;
+    bytemuck::try_zeroed_vec(count).map_err(|()| OutOfMemory::new::<T>(purpose, count))
 }
 
 /// Refuses a large amount if the system has less left.
 pub(crate) fn refuse_more_than_there_is<T>(
     count: usize,
-    what: &'static str,
+    purpose: &'static str,
 ) -> Result<(), OutOfMemory> {
-    let asked = OutOfMemory::new::<T>(what, count);
+    let asked = OutOfMemory::new::<T>(purpose, count);
     #[cfg(target_os = "linux")]
     if asked.bytes >= LARGE
         && let Ok(text) = std::fs::read_to_string("/proc/meminfo")
@@ -84,7 +84,7 @@ mod tests {
     fn what_no_machine_has_is_refused_and_named() {
         for count in [1 << 46, usize::MAX / 16, usize::MAX] {
             let expected = OutOfMemory {
-                what: "a result",
+                purpose: "a result",
                 bytes: 16 * count as u128,
             };
             assert_eq!(zeroed::<[f32; 4]>(count, "a result").unwrap_err(), expected);

@@ -1,14 +1,15 @@
 //! The cumulative cubic B-spline, with the key times as knots.
 
-use crate::curve::formula::Product;
 use crate::curve::options::Ends;
-use crate::fit::double::handles::BetweenNeighbours;
-use crate::fit::double::intervals::{Intervals, Stretch, at, put};
-use crate::fit::double::shape::Shape;
+use crate::fit::block::{Intervals, TrackStretch, at, put};
+use crate::fit::exact::handles::BetweenNeighbours;
+use crate::fit::exact::shape::Shape;
 use crate::math::quaternion::{Vector, exp, ratio, rotated, scaled, sum};
-use crate::method::ends::End;
+use crate::method::ends::EndCondition;
 use crate::method::interpolation::Interpolation;
-use crate::method::{Continuity, Cost, Curves, Given, Keys, Method, Smooth, USUAL};
+use crate::method::{
+    Continuity, Cost, CurveKind, DEFAULTS, Keys, Method, MethodInput, SmoothCurves,
+};
 use crate::reference;
 use crate::simd::dispatch::in_lanes;
 use crate::tracks::set::Track;
@@ -29,11 +30,12 @@ pub const B_SPLINE: Method = Method {
     cost: Cost::new(220.0, 3.0),
     reference: reference::b_spline::B_SPLINE,
     curves: &CURVES,
-    ..USUAL
+    ..DEFAULTS
 };
 
-static CURVES: Curves =
-    Curves::Smooth(Smooth::new(Shape::PRODUCT, curves).with(Given::Numbers(spacing)));
+static CURVES: CurveKind = CurveKind::Smooth(
+    SmoothCurves::new(Shape::PRODUCT, curves).with(MethodInput::Numbers(spacing)),
+);
 
 /// The durations of the two intervals before this one and of the two after it, in units of its own
 /// duration.
@@ -54,8 +56,8 @@ pub(crate) fn neighbours(times: &[f64], interval: usize, closed: bool) -> [f64; 
         } as usize;
         times[i + 1] - times[i]
     };
-    let own = duration(0);
-    [-2, -1, 1, 2].map(|offset| ratio(duration(offset), own))
+    let length = duration(0);
+    [-2, -1, 1, 2].map(|offset| ratio(duration(offset), length))
 }
 
 /// Coefficients of 1, t, t², t³ in the three cumulative basis functions over an interval of length
@@ -78,20 +80,20 @@ pub(crate) fn basis([before_that, before, after, after_that]: [f64; 4]) -> [[f64
     ]
 }
 
-fn curves(intervals: &mut Intervals, stretches: &[Stretch], ends: Ends) {
-    let [start, end] = ends.both();
+fn curves(intervals: &mut Intervals, stretches: &[TrackStretch], ends: Ends) {
+    let [start, end] = EndCondition::both(ends);
     for stretch in stretches {
         if matches!(ends, Ends::Loop) && stretch.all > 1 {
             continue; // the context already has the neighbours across the seam
         }
         // Two keys turn at constant velocity. With frozen ends the outer intervals stand still, and
         // any continuation will do.
-        let repeats_own = stretch.all == 1 || matches!(ends, Ends::Frozen);
-        let before = |lane| match repeats_own {
+        let repeats_interval = stretch.all == 1 || matches!(ends, Ends::Frozen);
+        let before = |lane| match repeats_interval {
             true => (lane - 1, at(&intervals.logs, lane)),
             false => (lane - 1, before_first(intervals, lane, start)),
         };
-        let after = |lane| match repeats_own {
+        let after = |lane| match repeats_interval {
             true => (lane + 1, at(&intervals.logs, lane)),
             false => (lane + 1, after_last(intervals, lane, end)),
         };
@@ -101,53 +103,53 @@ fn curves(intervals: &mut Intervals, stretches: &[Stretch], ends: Ends) {
         }
     }
     in_lanes(&mut BetweenNeighbours(intervals));
-    for lane in stretches.iter().flat_map(Stretch::lanes) {
+    for lane in stretches.iter().flat_map(TrackStretch::lanes) {
         let basis = basis(at(&intervals.outward, lane));
-        intervals.set_numbers(lane, Product::BASIS, basis.as_flattened());
+        intervals.set_basis(lane, basis);
     }
 }
 
 /// The logarithm that continues the curve before the first interval.
-fn before_first(intervals: &Intervals, lane: usize, end: End) -> Vector {
-    let own = at(&intervals.logs, lane);
+fn before_first(intervals: &Intervals, lane: usize, end: EndCondition) -> Vector {
+    let log = at(&intervals.logs, lane);
     let [[_, slope1, ..], [value2, slope2, bend2, _], _] = basis(at(&intervals.outward, lane));
-    let turn = match end {
-        End::Parabolic => return extrapolated(intervals, lane, lane + 1),
+    let end_step = match end {
+        EndCondition::Parabolic => return extrapolated(intervals, lane, lane + 1),
         // B₁'' = -2 B₁' at t = 0.
-        End::Natural => return scaled(own, bend2 / slope1),
-        End::Secant => own,
-        End::Clamped(half) => scaled(half, intervals.durations[lane]),
+        EndCondition::Natural => return scaled(log, bend2 / slope1),
+        EndCondition::Secant => log,
+        EndCondition::Clamped(half) => scaled(half, intervals.durations[lane]),
     };
-    let rest = sum(turn, scaled(own, -slope2));
-    rotated(exp(scaled(own, value2)), scaled(rest, 1.0 / slope1))
+    let rest = sum(end_step, scaled(log, -slope2));
+    rotated(exp(scaled(log, value2)), scaled(rest, 1.0 / slope1))
 }
 
 /// The logarithm that continues the curve after the last interval.
-fn after_last(intervals: &Intervals, lane: usize, end: End) -> Vector {
-    let own = at(&intervals.logs, lane);
+fn after_last(intervals: &Intervals, lane: usize, end: EndCondition) -> Vector {
+    let log = at(&intervals.logs, lane);
     let [_, [_, c1, c2, c3], [.., value3]] = basis(at(&intervals.outward, lane));
     let slope3 = 3.0 * value3;
-    let turn = match end {
-        End::Parabolic => return extrapolated(intervals, lane, lane - 1),
-        End::Natural => return scaled(own, -(c2 + 3.0 * c3) / slope3),
-        End::Secant => own,
-        End::Clamped(half) => scaled(half, intervals.durations[lane]),
+    let end_step = match end {
+        EndCondition::Parabolic => return extrapolated(intervals, lane, lane - 1),
+        EndCondition::Natural => return scaled(log, -(c2 + 3.0 * c3) / slope3),
+        EndCondition::Secant => log,
+        EndCondition::Clamped(half) => scaled(half, intervals.durations[lane]),
     };
-    // The unknown step also rotates the slope of the own step, so the equation is iterated.
-    let own_slope = c1 + 2.0 * c2 + 3.0 * c3;
-    (0..END_ITERATIONS).fold(own, |step, _| {
-        let turned = rotated(exp(scaled(step, -value3)), own);
-        let rest = sum(turn, scaled(turned, -own_slope));
+    // The unknown step also rotates the slope of this interval's step, so the equation is iterated.
+    let interval_slope = c1 + 2.0 * c2 + 3.0 * c3;
+    (0..END_ITERATIONS).fold(log, |step, _| {
+        let rotated_log = rotated(exp(scaled(step, -value3)), log);
+        let rest = sum(end_step, scaled(rotated_log, -interval_slope));
         scaled(rest, 1.0 / slope3)
     })
 }
 
 /// The logarithm of one more interval of the parabola through the three keys at an end.
 fn extrapolated(intervals: &Intervals, lane: usize, next: usize) -> Vector {
-    let (own, other) = (at(&intervals.logs, lane), at(&intervals.logs, next));
+    let (log, other) = (at(&intervals.logs, lane), at(&intervals.logs, next));
     let (h, next_h) = (intervals.durations[lane], intervals.durations[next]);
-    let change = sum(scaled(other, ratio(h, next_h)), scaled(own, -1.0));
-    sum(own, scaled(change, -2.0 / (1.0 + ratio(next_h, h))))
+    let change = sum(scaled(other, ratio(h, next_h)), scaled(log, -1.0));
+    sum(log, scaled(change, -2.0 / (1.0 + ratio(next_h, h))))
 }
 
 /// Each iteration reduces the error by at least a fifth, and usually by more than half.

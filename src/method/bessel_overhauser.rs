@@ -1,12 +1,12 @@
 //! Bessel-Overhauser: the tangent at a key is that of the parabola through it and
 //! its two neighbours.
 
-use crate::fit::double::handles::{BothSides, HandleRule, Handles};
-use crate::fit::double::shape::Shape;
+use crate::fit::exact::handles::{BothSides, HandlePair, HandleRule};
+use crate::fit::exact::shape::Shape;
 use crate::fit::tangent_weights::WeightRule;
 use crate::math::quaternion::{Real as _, product, ratio, scaled, sum};
 use crate::math::ranges::Algebra;
-use crate::method::{Continuity, Cost, Curves, Keys, Method, Smooth, USUAL, ends};
+use crate::method::{Continuity, Cost, CurveKind, DEFAULTS, Keys, Method, SmoothCurves, ends};
 use crate::reference;
 
 /// Bessel-Overhauser on rotations: smooth in time for any spacing of keys, and
@@ -22,20 +22,24 @@ pub const BESSEL_OVERHAUSER: Method = Method {
     cost: Cost::new(210.0, 2.8),
     reference: reference::handles::BESSEL_OVERHAUSER,
     curves: &CURVES,
-    ..USUAL
+    ..DEFAULTS
 };
 
-static CURVES: Curves = Curves::Smooth(
-    Smooth::new(Shape::BERNSTEIN, ends::curves::<Rule>).direct::<Rule>(WeightRule::ByTime),
+static CURVES: CurveKind = CurveKind::Smooth(
+    SmoothCurves::new(Shape::BERNSTEIN, ends::curves::<BesselOverhauserRule>)
+        .direct::<BesselOverhauserRule>(WeightRule::ByTime),
 );
 
-struct Rule;
+struct BesselOverhauserRule;
 
-impl HandleRule for Rule {
+impl HandleRule for BesselOverhauserRule {
     const IS_CUMULATIVE: bool = true;
 
     #[inline(always)]
-    fn handles<A: Algebra>(algebra: &mut A, [before, after]: BothSides<A>) -> Handles<A::Number> {
+    fn handles<A: Algebra>(
+        algebra: &mut A,
+        [before, after]: BothSides<A>,
+    ) -> HandlePair<A::Number> {
         let both = before.duration + after.duration;
         // The slope on each side is weighted by the other side's duration. The left factor comes
         // first: otherwise the curve would not equal Catmull-Rom on uniform keys.
@@ -49,12 +53,12 @@ impl HandleRule for Rule {
         );
         // The product's logarithm wraps: on its principal branch a long tangent would
         // point backwards.
-        let turn = product(algebra.exp(left), algebra.exp(right));
+        let rotation = product(algebra.exp(left), algebra.exp(right));
         let tangent = scaled(
-            algebra.log_near(turn, sum(left, right)),
+            algebra.log_near(rotation, sum(left, right)),
             ratio(A::Number::all(1.0), A::Number::all(3.0) * both),
         );
-        Handles {
+        HandlePair {
             incoming: scaled(tangent, before.duration),
             outgoing: scaled(tangent, after.duration),
         }

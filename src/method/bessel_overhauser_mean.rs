@@ -1,11 +1,11 @@
 //! Bessel-Overhauser by the weighted mean of the slopes: the tangent is that of the parabola
 //! through three keys, computed with logarithms.
 
-use crate::fit::double::handles::{BothSides, HandleRule, Handles, Interval};
-use crate::fit::double::shape::Shape;
+use crate::fit::exact::handles::{BothSides, HandlePair, HandleRule, KeyInterval};
+use crate::fit::exact::shape::Shape;
 use crate::math::quaternion::{Real, ratio, scaled, sum};
 use crate::math::ranges::Algebra;
-use crate::method::{Continuity, Cost, Curves, Keys, Method, Smooth, USUAL, ends};
+use crate::method::{Continuity, Cost, CurveKind, DEFAULTS, Keys, Method, SmoothCurves, ends};
 use crate::reference;
 
 /// Bessel-Overhauser with tangents that are means of logarithms: they never wrap, and the
@@ -22,20 +22,23 @@ pub const BESSEL_OVERHAUSER_MEAN: Method = Method {
     cost: Cost::new(840.0, 3.2),
     reference: reference::handles::BESSEL_OVERHAUSER_MEAN,
     curves: &CURVES,
-    ..USUAL
+    ..DEFAULTS
 };
 
-static CURVES: Curves = Curves::Smooth(Smooth {
+static CURVES: CurveKind = CurveKind::Smooth(SmoothCurves {
     steady_alone: true,
-    ..Smooth::new(Shape::DE_CASTELJAU, ends::curves::<Rule>)
+    ..SmoothCurves::new(
+        Shape::DE_CASTELJAU,
+        ends::curves::<BesselOverhauserMeanRule>,
+    )
 });
 
-struct Rule;
+struct BesselOverhauserMeanRule;
 
-impl HandleRule for Rule {
+impl HandleRule for BesselOverhauserMeanRule {
     #[inline(always)]
-    fn handles<A: Algebra>(_: &mut A, [before, after]: BothSides<A>) -> Handles<A::Number> {
-        Handles {
+    fn handles<A: Algebra>(_: &mut A, [before, after]: BothSides<A>) -> HandlePair<A::Number> {
+        HandlePair {
             incoming: handle(before, after, before.duration, [A::Number::all(1.0); 2]),
             outgoing: handle(before, after, after.duration, [A::Number::all(1.0); 2]),
         }
@@ -46,8 +49,8 @@ impl HandleRule for Rule {
 /// sides, each weighted by the other side's duration and by a factor of its own.
 #[inline(always)]
 pub(crate) fn handle<R: Real>(
-    before: Interval<R>,
-    after: Interval<R>,
+    before: KeyInterval<R>,
+    after: KeyInterval<R>,
     duration: R,
     [left, right]: [R; 2],
 ) -> [R; 3] {

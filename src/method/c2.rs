@@ -4,13 +4,16 @@ use std::ops::Range;
 
 use glam::{DMat3, DVec3};
 
+use crate::curve::formula::RotationVectorNumbers;
 use crate::curve::options::Ends;
-use crate::fit::double::intervals::{Intervals, Stretch, at, squared_extent};
-use crate::fit::double::shape::Shape;
+use crate::fit::block::{Intervals, TrackStretch, at, squared_extent};
+use crate::fit::exact::shape::Shape;
 use crate::math::quaternion::{self, Vector, log, scaled, sine_cosine, sum};
-use crate::method::ends::End;
+use crate::method::ends::EndCondition;
 use crate::method::interpolation::Interpolation;
-use crate::method::{Continuity, Cost, Curves, Given, Keys, Method, Smooth, USUAL};
+use crate::method::{
+    Continuity, Cost, CurveKind, DEFAULTS, Keys, Method, MethodInput, SmoothCurves,
+};
 use crate::reference;
 use crate::threads::stop;
 use crate::tracks::set::Track;
@@ -42,15 +45,16 @@ pub const C2: Method = Method {
     cost: Cost::new(1100.0, 3.2),
     reference: reference::c2::C2,
     curves: &CURVES,
-    ..USUAL
+    ..DEFAULTS
 };
 
-static CURVES: Curves = Curves::Smooth(
-    Smooth::new(Shape::ROTATION_VECTOR, curves).with(Given::Velocities(velocities, jumps)),
+static CURVES: CurveKind = CurveKind::Smooth(
+    SmoothCurves::new(Shape::ROTATION_VECTOR, curves)
+        .with(MethodInput::Velocities(velocities, jumps)),
 );
 
-fn curves(intervals: &mut Intervals, stretches: &[Stretch], _: Ends) {
-    for lane in stretches.iter().flat_map(Stretch::lanes) {
+fn curves(intervals: &mut Intervals, stretches: &[TrackStretch], _: Ends) {
+    for lane in stretches.iter().flat_map(TrackStretch::lanes) {
         let half = 0.5 * intervals.durations[lane].max(SHORTEST);
         let ([x, y, z, _], [u, v, w, _]) = (
             at(&intervals.outward, lane),
@@ -67,8 +71,13 @@ fn curves(intervals: &mut Intervals, stretches: &[Stretch], _: Ends) {
             sum(scaled(start, -1.0), scaled(both, -1.0)),
         );
         let third = sum(both, scaled(log, -2.0));
-        intervals.set_numbers(lane, 0, &intervals.key(lane));
-        intervals.set_numbers(lane, 4, [start, second, third].as_flattened());
+        let numbers = RotationVectorNumbers {
+            base: intervals.key(lane),
+            linear: start,
+            quadratic: second,
+            cubic: third,
+        };
+        intervals.set_curve(lane, numbers);
         intervals.squared_extents[lane] = squared_extent([start, second, third]);
     }
 }
@@ -123,7 +132,7 @@ fn jumps(track: Track, signs: Signs<'_>, interpolation: &Interpolation) -> Vec<u
     let mut jumps = Vec::new();
     for key in usize::from(!is_closed)..last {
         let after = Step::new(track, signs, key);
-        let equation = Equation::between(&before, &after);
+        let equation = KeyEquation::between(&before, &after);
         let previous = if key == 0 { last - 1 } else { key - 1 };
         let nearby = [previous, key, key + 1].map(|key| velocities[key]);
         let bend = before.bend(nearby[1]) * equation.bend_scale;
@@ -157,10 +166,14 @@ fn solve(
         .map(|i| Step::new(track, signs, i.rem_euclid(all.max(1)) as usize))
         .collect();
     // Two keys are joined by slerp, whatever the ends.
-    let end_at = |at_end: bool, end: End| {
-        if at_end && all > 1 { end } else { End::Secant }
+    let end_at = |at_end: bool, end: EndCondition| {
+        if at_end && all > 1 {
+            end
+        } else {
+            EndCondition::Secant
+        }
     };
-    let [start, end] = interpolation.ends.both();
+    let [start, end] = EndCondition::both(interpolation.ends);
     let start = end_at(!closed && first == 0, start);
     let end = end_at(!closed && last == all, end);
     (first, Spline::new(&steps, [start, end]).solve())
@@ -309,7 +322,7 @@ fn outer(a: DVec3, b: DVec3) -> DMat3 {
 
 /// The three equations of a key, of which the velocities at the key before it, at it and behind it are
 /// the unknowns: `lower·before + diagonal velocity + upper·behind + bend_scale bend(velocity) = right`.
-struct Equation {
+struct KeyEquation {
     lower: DMat3,
     diagonal: f64,
     upper: DMat3,
@@ -318,7 +331,7 @@ struct Equation {
     bend_scale: f64,
 }
 
-impl Equation {
+impl KeyEquation {
     /// The velocity is set.
     fn set_to(velocity: DVec3) -> Self {
         Self {
@@ -402,7 +415,7 @@ impl Equation {
 /// of Newton's steps do, however unevenly keys are spaced.
 struct Spline<'a> {
     steps: &'a [Step],
-    equations: Vec<Equation>,
+    equations: Vec<KeyEquation>,
 }
 
 /// How strong a bend may be that counts: the angle of the step before the key, times the rate of its rotation
@@ -432,37 +445,37 @@ const CONVERGED: f64 = 1e-8;
 const NOTHING: f64 = 1e-15;
 
 impl<'a> Spline<'a> {
-    fn new(steps: &'a [Step], [start, end]: [End; 2]) -> Self {
-        let set_velocity = |end: End, step: &Step, next: Option<&Step>| match (end, next) {
-            (End::Clamped(half), _) => Some(DVec3::from_array(half) * 2.0),
-            (End::Secant, _) | (_, None) => Some(step.secant()),
+    fn new(steps: &'a [Step], [start, end]: [EndCondition; 2]) -> Self {
+        let set_velocity = |end: EndCondition, step: &Step, next: Option<&Step>| match (end, next) {
+            (EndCondition::Clamped(half), _) => Some(DVec3::from_array(half) * 2.0),
+            (EndCondition::Secant, _) | (_, None) => Some(step.secant()),
             // The parabola through three keys, in logarithms.
-            (End::Parabolic, Some(next)) => {
+            (EndCondition::Parabolic, Some(next)) => {
                 let bend = (next.secant() - step.secant()) * step.duration;
                 Some(step.secant() - bend / (step.duration + next.duration))
             }
-            (End::Natural, Some(_)) => None,
+            (EndCondition::Natural, Some(_)) => None,
         };
         let mut equations = Vec::with_capacity(steps.len() + 1);
         if let [first, ..] = steps {
             equations.push(match set_velocity(start, first, steps.get(1)) {
-                Some(velocity) => Equation::set_to(velocity),
-                None => Equation::natural_start(first),
+                Some(velocity) => KeyEquation::set_to(velocity),
+                None => KeyEquation::natural_start(first),
             });
         }
         let inner = steps
             .windows(2)
-            .map(|pair| Equation::inner(&pair[0], &pair[1]));
+            .map(|pair| KeyEquation::inner(&pair[0], &pair[1]));
         equations.extend(inner);
         if let [.., last] = steps {
             let before_last = steps.len().checked_sub(2).map(|i| &steps[i]);
             equations.push(match set_velocity(end, last, before_last) {
-                Some(velocity) => Equation::set_to(velocity),
-                None => Equation::natural_end(last),
+                Some(velocity) => KeyEquation::set_to(velocity),
+                None => KeyEquation::natural_end(last),
             });
         }
         if equations.is_empty() {
-            equations.push(Equation::set_to(DVec3::ZERO));
+            equations.push(KeyEquation::set_to(DVec3::ZERO));
         }
         Self { steps, equations }
     }

@@ -1,11 +1,11 @@
 //! Catmull-Rom: the tangent at a key is half of the step between its neighbours.
 
-use crate::fit::double::handles::{BothSides, HandleRule, Handles};
-use crate::fit::double::shape::Shape;
+use crate::fit::exact::handles::{BothSides, HandlePair, HandleRule};
+use crate::fit::exact::shape::Shape;
 use crate::fit::tangent_weights::WeightRule;
 use crate::math::quaternion::{Real as _, product, scaled, sum};
 use crate::math::ranges::Algebra;
-use crate::method::{Cost, Curves, Keys, Method, Smooth, USUAL, ends};
+use crate::method::{Cost, CurveKind, DEFAULTS, Keys, Method, SmoothCurves, ends};
 use crate::reference;
 
 /// Catmull-Rom on rotations, in cumulative form. It ignores the time steps, so its velocity jumps
@@ -21,26 +21,30 @@ pub const CATMULL_ROM: Method = Method {
     cost: Cost::new(150.0, 2.6),
     reference: reference::handles::CATMULL_ROM,
     curves: &CURVES,
-    ..USUAL
+    ..DEFAULTS
 };
 
-static CURVES: Curves = Curves::Smooth(
-    Smooth::new(Shape::BERNSTEIN, ends::curves::<Rule>).direct::<Rule>(WeightRule::Alike),
+static CURVES: CurveKind = CurveKind::Smooth(
+    SmoothCurves::new(Shape::BERNSTEIN, ends::curves::<CatmullRomRule>)
+        .direct::<CatmullRomRule>(WeightRule::Alike),
 );
 
-struct Rule;
+struct CatmullRomRule;
 
-impl HandleRule for Rule {
+impl HandleRule for CatmullRomRule {
     const IS_CUMULATIVE: bool = true;
 
     #[inline(always)]
-    fn handles<A: Algebra>(algebra: &mut A, [before, after]: BothSides<A>) -> Handles<A::Number> {
+    fn handles<A: Algebra>(
+        algebra: &mut A,
+        [before, after]: BothSides<A>,
+    ) -> HandlePair<A::Number> {
         // The half-angle of both steps together may approach pi, so its sign is not changed to the
         // nearer one.
         let two_step = product(before.step, after.step);
         let log = algebra.log_toward(two_step, sum(before.log, after.log));
         let handle = scaled(log, A::Number::all(1.0 / 6.0));
-        Handles {
+        HandlePair {
             incoming: handle,
             outgoing: handle,
         }

@@ -6,15 +6,19 @@ use std::marker::PhantomData;
 use glam::DVec3;
 
 use crate::curve::options::Ends;
-use crate::fit::double::handles::{
+use crate::fit::block::{Intervals, TrackStretch, at, put};
+use crate::fit::exact::handles::{
     BetweenHandles, ControlRotations, EndHandle, HandleRule, KeyHandles,
 };
-use crate::fit::double::intervals::{Intervals, Stretch, at, put};
 use crate::math::quaternion::{self, Vector, exp, product, scaled};
 use crate::simd::dispatch::in_lanes;
 
 /// The curves of a method with that rule for handles.
-pub(crate) fn curves<R: HandleRule>(intervals: &mut Intervals, stretches: &[Stretch], ends: Ends) {
+pub(crate) fn curves<R: HandleRule>(
+    intervals: &mut Intervals,
+    stretches: &[TrackStretch],
+    ends: Ends,
+) {
     set_handles::<R>(intervals, stretches, ends);
     if R::IS_CUMULATIVE {
         in_lanes(&mut BetweenHandles(intervals));
@@ -23,18 +27,18 @@ pub(crate) fn curves<R: HandleRule>(intervals: &mut Intervals, stretches: &[Stre
     }
 }
 
-fn set_handles<R: HandleRule>(intervals: &mut Intervals, stretches: &[Stretch], ends: Ends) {
+fn set_handles<R: HandleRule>(intervals: &mut Intervals, stretches: &[TrackStretch], ends: Ends) {
     in_lanes(&mut KeyHandles::<R> {
         intervals,
         stretches,
         rule: PhantomData,
     });
-    let [start, end] = ends.both();
+    let [start, end] = EndCondition::both(ends);
     for stretch in stretches {
         if let (Some(lane), 1) = (stretch.first(), stretch.all) {
             // Two keys: the handles of constant velocity.
             let log = at(&intervals.logs, lane);
-            let handle = R::end(log, [0.0; 3], EndHandle::Turn(log));
+            let handle = R::end(log, [0.0; 3], EndHandle::Velocity(log));
             put(&mut intervals.outgoing, lane, handle);
             put(&mut intervals.incoming, lane + 1, handle);
             continue;
@@ -52,14 +56,16 @@ fn set_handles<R: HandleRule>(intervals: &mut Intervals, stretches: &[Stretch], 
                 false => at(&intervals.outgoing, lane),
             };
             let handle = match end {
-                End::Parabolic => EndHandle::Parabolic,
-                End::Natural => {
+                EndCondition::Parabolic => EndHandle::Parabolic,
+                EndCondition::Natural => {
                     let back = exp(scaled(other, -1.0));
                     let (a, b) = if is_first { (step, back) } else { (back, step) };
                     EndHandle::Natural(quaternion::log(product(a, b)))
                 }
-                End::Secant => EndHandle::Turn(log),
-                End::Clamped(half) => EndHandle::Turn(scaled(half, intervals.durations[lane])),
+                EndCondition::Secant => EndHandle::Velocity(log),
+                EndCondition::Clamped(half) => {
+                    EndHandle::Velocity(scaled(half, intervals.durations[lane]))
+                }
             };
             let handle = R::end(log, other, handle);
             match is_first {
@@ -72,7 +78,7 @@ fn set_handles<R: HandleRule>(intervals: &mut Intervals, stretches: &[Stretch], 
 
 /// The condition at one end of a track.
 #[derive(Clone, Copy)]
-pub(crate) enum End {
+pub(crate) enum EndCondition {
     Parabolic,
     Natural,
     Secant,
@@ -80,15 +86,15 @@ pub(crate) enum End {
     Clamped(Vector),
 }
 
-impl Ends {
-    /// What happens at the first and at the last key.
-    pub(crate) fn both(self) -> [End; 2] {
-        let clamped = |rate: DVec3| End::Clamped(scaled(rate.to_array(), 0.5));
-        match self {
-            Self::Clamped { start, end } => [clamped(start), clamped(end)],
-            Self::Natural => [End::Natural; 2],
-            Self::Secant => [End::Secant; 2],
-            Self::Parabolic | Self::Loop | Self::Frozen => [End::Parabolic; 2],
+impl EndCondition {
+    /// The conditions at the first and at the last key.
+    pub(crate) fn both(ends: Ends) -> [Self; 2] {
+        let clamped = |rate: DVec3| Self::Clamped(scaled(rate.to_array(), 0.5));
+        match ends {
+            Ends::Clamped { start, end } => [clamped(start), clamped(end)],
+            Ends::Natural => [Self::Natural; 2],
+            Ends::Secant => [Self::Secant; 2],
+            Ends::Parabolic | Ends::Loop | Ends::Frozen => [Self::Parabolic; 2],
         }
     }
 }

@@ -1,11 +1,12 @@
 //! The cubic spline of glTF.
 
-use crate::curve::options::{Ends, Path};
-use crate::fit::double::intervals::{Intervals, Stretch, at, squared_extent};
-use crate::fit::double::shape::Shape;
+use crate::curve::formula::ControlNumbers;
+use crate::curve::options::{Ends, KeySigns};
+use crate::fit::block::{Intervals, TrackStretch, at, squared_extent};
+use crate::fit::exact::shape::Shape;
 use crate::math::quaternion::{Quaternion, Vector, length};
 use crate::method::interpolation::Interpolation;
-use crate::method::{Continuity, Cost, Curves, Given, Method, Smooth, USUAL};
+use crate::method::{Continuity, Cost, CurveKind, DEFAULTS, Method, MethodInput, SmoothCurves};
 use crate::reference;
 use crate::tracks::set::Track;
 
@@ -20,15 +21,16 @@ pub const GLTF_CUBIC: Method = Method {
     source: "glTF 2.0, appendix C.5, Cubic Spline Interpolation",
     continuity: Continuity::C1,
     uses_neighbours: false,
-    path: Some(Path::AsAuthored),
+    path: Some(KeySigns::AsAuthored),
     cost: Cost::new(350.0, 3.8),
-    reference: reference::given::GLTF_CUBIC,
+    reference: reference::two_keys::GLTF_CUBIC,
     curves: &CURVES,
-    ..USUAL
+    ..DEFAULTS
 };
 
-static CURVES: Curves =
-    Curves::Smooth(Smooth::new(Shape::HERMITE, curves).with(Given::Numbers(numbers)));
+static CURVES: CurveKind = CurveKind::Smooth(
+    SmoothCurves::new(Shape::HERMITE, curves).with(MethodInput::Numbers(numbers)),
+);
 
 /// The tangents with which an interval leaves its first key and reaches its last.
 fn numbers(track: Track, interval: usize, _: &Interpolation) -> [[f64; 4]; 2] {
@@ -39,14 +41,19 @@ fn numbers(track: Track, interval: usize, _: &Interpolation) -> [[f64; 4]; 2] {
     [tangent(interval, 1), tangent(interval + 1, 0)]
 }
 
-fn curves(intervals: &mut Intervals, stretches: &[Stretch], _: Ends) {
-    for lane in stretches.iter().flat_map(Stretch::lanes) {
+fn curves(intervals: &mut Intervals, stretches: &[TrackStretch], _: Ends) {
+    for lane in stretches.iter().flat_map(TrackStretch::lanes) {
         let duration = intervals.durations[lane];
         let outgoing = at(&intervals.outward, lane).map(|c| c * duration);
         let incoming = at(&intervals.inward, lane + 1).map(|c| c * duration);
         let (start, end) = (intervals.key(lane), intervals.end_key(lane));
-        let numbers = [start, outgoing, incoming, end];
-        intervals.set_numbers(lane, 0, numbers.as_flattened());
+        let numbers = ControlNumbers {
+            start,
+            after_start: outgoing,
+            before_end: incoming,
+            end,
+        };
+        intervals.set_curve(lane, numbers);
         // An estimate of the squared extent: the component of a tangent along its key changes only
         // the quaternion's length.
         let log = at(&intervals.logs, lane);

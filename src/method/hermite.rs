@@ -1,12 +1,12 @@
 //! The Hermite method: angular velocities at the keys are given.
 
 use crate::curve::options::Ends;
-use crate::fit::double::handles::BetweenHandles;
-use crate::fit::double::intervals::{Intervals, Stretch, at, put};
-use crate::fit::double::shape::Shape;
+use crate::fit::block::{Intervals, TrackStretch, at, put};
+use crate::fit::exact::handles::BetweenHandles;
+use crate::fit::exact::shape::Shape;
 use crate::math::quaternion::scaled;
 use crate::method::interpolation::Interpolation;
-use crate::method::{Continuity, Cost, Curves, Given, Method, Smooth, USUAL};
+use crate::method::{Continuity, Cost, CurveKind, DEFAULTS, Method, MethodInput, SmoothCurves};
 use crate::reference;
 use crate::simd::dispatch::in_lanes;
 use crate::tracks::set::Track;
@@ -23,13 +23,14 @@ pub const HERMITE: Method = Method {
     symmetric: false,
     uses_neighbours: false,
     cost: Cost::new(160.0, 2.8),
-    reference: reference::given::HERMITE,
+    reference: reference::two_keys::HERMITE,
     curves: &CURVES,
-    ..USUAL
+    ..DEFAULTS
 };
 
-static CURVES: Curves =
-    Curves::Smooth(Smooth::new(Shape::BERNSTEIN, curves).with(Given::Numbers(numbers)));
+static CURVES: CurveKind = CurveKind::Smooth(
+    SmoothCurves::new(Shape::BERNSTEIN, curves).with(MethodInput::Numbers(numbers)),
+);
 
 fn numbers(track: Track, interval: usize, _: &Interpolation) -> [[f64; 4]; 2] {
     [interval, interval + 1].map(|key| {
@@ -38,8 +39,8 @@ fn numbers(track: Track, interval: usize, _: &Interpolation) -> [[f64; 4]; 2] {
     })
 }
 
-fn curves(intervals: &mut Intervals, stretches: &[Stretch], _: Ends) {
-    for lane in stretches.iter().flat_map(Stretch::lanes) {
+fn curves(intervals: &mut Intervals, stretches: &[TrackStretch], _: Ends) {
+    for lane in stretches.iter().flat_map(TrackStretch::lanes) {
         let sixth = intervals.durations[lane] / 6.0;
         let ([x, y, z, _], [u, v, w, _]) = (
             at(&intervals.outward, lane),

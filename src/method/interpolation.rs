@@ -4,14 +4,14 @@ use glam::Quat;
 use rayon::prelude::*;
 
 use crate::curve::options::{
-    Ends, InterpolationError, InterpolationWarning, Path, Quantity, Speed,
+    Ends, InterpolationError, InterpolationWarning, KeySigns, Quantity, Speed,
 };
-use crate::method::{Curves, Given, Method, Smooth};
-use crate::reference::curve::Curve;
+use crate::method::{CurveKind, Method, MethodInput, SmoothCurves};
+use crate::reference::curve::ReferenceCurve;
 use crate::shader::Form;
 use crate::threads::on_threads;
 use crate::time::wrap::{Wrap, WrapMode};
-use crate::tracks::key_data::Tcb;
+use crate::tracks::set::key_data::Tcb;
 use crate::tracks::set::{Track, TrackSet};
 
 /// A method with its options: what [`Engine::upload`](crate::engine::Engine::upload)
@@ -19,25 +19,25 @@ use crate::tracks::set::{Track, TrackSet};
 ///
 /// ```
 /// use tumble::glam::Quat;
-/// use tumble::{Device, Ends, Engine, Frames, Interpolation, Path, Speed, Tcb, TrackSet, WrapMode, method};
+/// use tumble::{Device, Ends, Engine, SampleTimes, Interpolation, KeySigns, Speed, Tcb, TrackSet, WrapMode, method};
 /// let mut set = TrackSet::new();
 /// let keys = [0.0, 0.8, 2.0, 0.0].map(Quat::from_rotation_z);
 /// set.push("wheel", &[0.0, 1.0, 2.0, 4.0], &keys)?;
 /// let looped = Interpolation {
 ///     ends: Ends::Loop,       // the last key repeats the first
 ///     after: WrapMode::Loop,  // and behind it the track starts again
-///     path: Path::Shortest,
+///     signs: KeySigns::Shortest,
 ///     speed: Speed::AsKeyed,
 ///     ..Interpolation::from(method::CATMULL_ROM)
 /// };
 /// let engine = Engine::new(Device::Cpu)?;
-/// let found = engine.evaluate(&set, looped, &Frames::at(vec![1.0, 5.0]))?;
+/// let found = engine.evaluate(&set, looped, &SampleTimes::at(vec![1.0, 5.0]))?;
 /// assert_eq!(found.get(0, 0), found.get(0, 1));
 ///
 /// // Kochanek-Bartels with a tension of 1 stands still at its keys.
 /// let tcb = Tcb { tension: 1.0, continuity: 0.0, bias: 0.0 };
 /// let still = Interpolation { tcb, ..Interpolation::from(method::KOCHANEK_BARTELS) };
-/// let near = engine.evaluate(&set, still, &Frames::at(vec![1.0, 1.001]))?;
+/// let near = engine.evaluate(&set, still, &SampleTimes::at(vec![1.0, 1.001]))?;
 /// assert!(near.as_quats()[0].angle_between(near.as_quats()[1]) < 1e-3);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -46,7 +46,7 @@ pub struct Interpolation {
     /// The method.
     pub method: Method,
     /// Which of the two ways round between keys is taken.
-    pub path: Path,
+    pub signs: KeySigns,
     /// What happens at the first and the last key.
     pub ends: Ends,
     /// Tension, continuity and bias for
@@ -111,13 +111,13 @@ impl Interpolation {
     /// ```
     #[must_use]
     pub fn warnings(&self, set: &TrackSet) -> Vec<InterpolationWarning> {
-        let (Curves::Smooth(smooth) | Curves::Arcs(smooth)) = *self.method.curves else {
+        let (CurveKind::Smooth(smooth) | CurveKind::Arcs(smooth)) = *self.method.curves else {
             return Vec::new();
         };
-        let Given::Velocities(_, jumps) = smooth.given else {
+        let MethodInput::Velocities(_, jumps) = smooth.input else {
             return Vec::new();
         };
-        let path = self.method.path.unwrap_or(self.path);
+        let path = self.method.path.unwrap_or(self.signs);
         let of_track = |index: usize| {
             if self
                 .check_track(set.times_and_keys(index).1, index)
@@ -145,12 +145,12 @@ impl Interpolation {
     }
 
     /// The smooth curves as keyed on the shortest path, if these are what is asked for.
-    pub(crate) fn plain(&self) -> Option<Smooth> {
-        let is_plain = self.path == Path::Shortest
+    pub(crate) fn plain(&self) -> Option<SmoothCurves> {
+        let is_plain = self.signs == KeySigns::Shortest
             && self.quantity == Quantity::Rotation
             && self.speed == Speed::AsKeyed;
         match *self.method.curves {
-            Curves::Smooth(smooth) if is_plain => Some(smooth),
+            CurveKind::Smooth(smooth) if is_plain => Some(smooth),
             _ => None,
         }
     }
@@ -170,7 +170,7 @@ impl Interpolation {
 
     /// Whether keys are held until the next one.
     pub(crate) fn steps(&self) -> bool {
-        matches!(*self.method.curves, Curves::Steps)
+        matches!(*self.method.curves, CurveKind::Steps)
     }
 
     pub(crate) fn wrap(&self) -> Wrap {
@@ -181,12 +181,15 @@ impl Interpolation {
     }
 }
 
-impl Curve {
+impl ReferenceCurve {
     /// The curve of a track of a set, as the textbook has it.
     #[must_use]
     pub fn of(interpolation: &Interpolation, track: Track<'_>) -> Self {
         let &Interpolation {
-            method, path, ends, ..
+            method,
+            signs: path,
+            ends,
+            ..
         } = interpolation;
         let path = method.path.unwrap_or(path);
         let curve = Self::of_track(method.reference, path, ends, interpolation.tcb, track);
@@ -201,7 +204,7 @@ impl From<Method> for Interpolation {
     fn from(method: Method) -> Self {
         Self {
             method,
-            path: method.path.unwrap_or_default(),
+            signs: method.path.unwrap_or_default(),
             ends: method.ends,
             tcb: Tcb::default(),
             quantity: Quantity::Rotation,

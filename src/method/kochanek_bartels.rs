@@ -1,16 +1,18 @@
 //! Kochanek-Bartels: tension, continuity and bias at each key.
 
-use crate::fit::double::handles::{BothSides, HandleRule, Handles};
-use crate::fit::double::shape::Shape;
+use crate::fit::exact::handles::{BothSides, HandlePair, HandleRule};
+use crate::fit::exact::shape::Shape;
 use crate::math::quaternion::Real as _;
 use crate::math::ranges::Algebra;
 use crate::method::bessel_overhauser_mean::handle;
 use crate::method::interpolation::Interpolation;
-use crate::method::{Continuity, Cost, Curves, Given, Keys, Method, Smooth, USUAL, ends};
+use crate::method::{
+    Continuity, Cost, CurveKind, DEFAULTS, Keys, Method, MethodInput, SmoothCurves, ends,
+};
 use crate::reference;
 use crate::tracks::set::Track;
 
-/// Kochanek-Bartels, with [`Tcb`](crate::tracks::key_data::Tcb) for each key
+/// Kochanek-Bartels, with [`Tcb`](crate::tracks::set::key_data::Tcb) for each key
 /// ([`TrackSet::set_tcb`](crate::tracks::set::TrackSet::set_tcb)) or for all
 /// ([`Interpolation::tcb`]). With zeros it is
 /// [`BESSEL_OVERHAUSER_MEAN`](crate::method::BESSEL_OVERHAUSER_MEAN).
@@ -24,11 +26,12 @@ pub const KOCHANEK_BARTELS: Method = Method {
     cost: Cost::new(860.0, 3.2),
     reference: reference::handles::KOCHANEK_BARTELS,
     curves: &CURVES,
-    ..USUAL
+    ..DEFAULTS
 };
 
-static CURVES: Curves = Curves::Smooth(
-    Smooth::new(Shape::DE_CASTELJAU, ends::curves::<Rule>).with(Given::Numbers(numbers)),
+static CURVES: CurveKind = CurveKind::Smooth(
+    SmoothCurves::new(Shape::DE_CASTELJAU, ends::curves::<KochanekBartelsRule>)
+        .with(MethodInput::Numbers(numbers)),
 );
 
 /// Tension, continuity and bias of the key that an interval starts with.
@@ -37,11 +40,11 @@ fn numbers(track: Track, interval: usize, interpolation: &Interpolation) -> [[f6
     [[tcb.tension, tcb.continuity, tcb.bias, 0.0], [0.0; 4]]
 }
 
-struct Rule;
+struct KochanekBartelsRule;
 
-impl HandleRule for Rule {
+impl HandleRule for KochanekBartelsRule {
     #[inline(always)]
-    fn handles<A: Algebra>(_: &mut A, [before, after]: BothSides<A>) -> Handles<A::Number> {
+    fn handles<A: Algebra>(_: &mut A, [before, after]: BothSides<A>) -> HandlePair<A::Number> {
         let [tension, continuity, bias, _] = after.key;
         let one = A::Number::all(1.0);
         let tight = one - tension;
@@ -49,7 +52,7 @@ impl HandleRule for Rule {
             let left = tight * (one + corner) * (one + bias);
             [left, tight * (one - corner) * (one - bias)]
         };
-        Handles {
+        HandlePair {
             incoming: handle(before, after, before.duration, weights(-continuity)),
             outgoing: handle(before, after, after.duration, weights(continuity)),
         }

@@ -24,7 +24,7 @@ pub(crate) mod step;
 pub(crate) mod vector_curve;
 pub(crate) mod vector_method;
 
-pub use crate::curve::options::{Axes, Ends, InterpolationError, Path, Quantity, Speed};
+pub use crate::curve::options::{Axes, Ends, InterpolationError, KeySigns, Quantity, Speed};
 pub use crate::method::b_spline::B_SPLINE;
 pub use crate::method::bessel_overhauser::BESSEL_OVERHAUSER;
 pub use crate::method::bessel_overhauser_mean::BESSEL_OVERHAUSER_MEAN;
@@ -46,10 +46,11 @@ use std::fmt;
 use std::ops::Range;
 use std::str::FromStr;
 
-use crate::fit::double::handles::{HandleRule, Steps};
-use crate::fit::double::intervals::{Intervals, Stretch};
-use crate::fit::double::shape::Shape;
-use crate::fit::single::handles::HandlesF32;
+use crate::fit::block::{Intervals, TrackStretch};
+use crate::fit::exact::handles::{ExactSteps, HandleRule};
+use crate::fit::exact::shape::Shape;
+use crate::fit::fast::handles::HandlesF32;
+use crate::fit::fast::long_tangents::set_long;
 use crate::fit::tangent_weights::WeightRule;
 use crate::math::quaternion::Vector;
 use crate::reference;
@@ -114,7 +115,7 @@ pub struct Method {
     /// The ends that it has by default.
     pub ends: Ends,
     /// The path that it always takes, if its definition prescribes one.
-    pub path: Option<Path>,
+    pub path: Option<KeySigns>,
     /// Its cost on one thread.
     pub cost: Cost,
     /// Its textbook definition in f64.
@@ -122,12 +123,12 @@ pub struct Method {
     /// How its curves follow from the keys. This is a reference to a static because every crate
     /// that names a constant would compile its functions again, and all that they call, for each
     /// vector width.
-    pub(crate) curves: &'static Curves,
+    pub(crate) curves: &'static CurveKind,
 }
 
 /// What most methods have in common, and how they are unless they say otherwise. Names, formula,
 /// textbook definition and curves are each method's own.
-const USUAL: Method = Method {
+const DEFAULTS: Method = Method {
     name: "",
     summary: "",
     formula: "",
@@ -142,28 +143,28 @@ const USUAL: Method = Method {
     ends: Ends::Parabolic,
     path: None,
     cost: Cost::new(0.0, 0.0),
-    reference: reference::given::STEP,
-    curves: &Curves::Steps,
+    reference: reference::two_keys::STEP,
+    curves: &CurveKind::Steps,
 };
 
 /// The kind of curve between two keys.
 #[derive(Clone, Copy)]
-pub(crate) enum Curves {
+pub(crate) enum CurveKind {
     /// The first key is held.
     Steps,
     /// The great-circle arc at constant speed; its formula serves where derivatives are needed.
-    Arcs(Smooth),
+    Arcs(SmoothCurves),
     /// A curve that is given by a formula.
-    Smooth(Smooth),
+    Smooth(SmoothCurves),
 }
 
 /// How a method's curves follow from the keys.
 #[derive(Clone, Copy)]
-pub(crate) struct Smooth {
+pub(crate) struct SmoothCurves {
     pub(crate) shape: &'static Shape,
     /// Sets the numbers of every curve in a block, with these ends where a track ends.
-    pub(crate) curves: fn(&mut Intervals, &[Stretch], Ends),
-    pub(crate) given: Given,
+    pub(crate) curves: fn(&mut Intervals, &[TrackStretch], Ends),
+    pub(crate) input: MethodInput,
     /// Whether a track of two keys turns at constant velocity, whatever the ends.
     pub(crate) steady_alone: bool,
     /// How curves follow in f32 straight from keys, for methods that allow it.
@@ -181,7 +182,7 @@ pub(crate) struct FromKeys {
 
 /// The numbers that a method has for an interval beside its keys.
 #[derive(Clone, Copy)]
-pub(crate) enum Given {
+pub(crate) enum MethodInput {
     Nothing,
     /// Numbers for the key at the interval's start, and for the key at its end.
     Numbers(fn(Track, usize, &Interpolation) -> [[f64; 4]; 2]),
@@ -200,20 +201,20 @@ impl Method {
     /// Whether equations of many keys are solved for each of its curves.
     pub(crate) fn is_solved(&self) -> bool {
         match self.curves {
-            Curves::Smooth(smooth) | Curves::Arcs(smooth) => {
-                matches!(smooth.given, Given::Velocities(..))
+            CurveKind::Smooth(smooth) | CurveKind::Arcs(smooth) => {
+                matches!(smooth.input, MethodInput::Velocities(..))
             }
-            Curves::Steps => false,
+            CurveKind::Steps => false,
         }
     }
 }
 
-impl Smooth {
-    const fn new(shape: &'static Shape, curves: fn(&mut Intervals, &[Stretch], Ends)) -> Self {
+impl SmoothCurves {
+    const fn new(shape: &'static Shape, curves: fn(&mut Intervals, &[TrackStretch], Ends)) -> Self {
         Self {
             shape,
             curves,
-            given: Given::Nothing,
+            input: MethodInput::Nothing,
             steady_alone: false,
             direct: None,
         }
@@ -225,19 +226,24 @@ impl Smooth {
             steady_alone: true,
             direct: Some(FromKeys {
                 weights,
-                set_long: HandlesF32::set_long::<R>,
+                set_long: set_long::<R>,
             }),
             ..self
         }
     }
 
-    const fn with(self, given: Given) -> Self {
-        Self { given, ..self }
+    const fn with(self, input: MethodInput) -> Self {
+        Self { input, ..self }
     }
 
     /// Computes the curves of a block's intervals.
-    pub(crate) fn find_curves(&self, intervals: &mut Intervals, stretches: &[Stretch], ends: Ends) {
-        in_lanes(&mut Steps(intervals));
+    pub(crate) fn find_curves(
+        &self,
+        intervals: &mut Intervals,
+        stretches: &[TrackStretch],
+        ends: Ends,
+    ) {
+        in_lanes(&mut ExactSteps(intervals));
         (self.curves)(intervals, stretches, ends);
     }
 }
@@ -333,7 +339,7 @@ impl Eq for Method {}
 
 /// The error for a name that no method has.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("there is no method `{name}`; there are {}", METHODS.map(|own| own.name).join(", "))]
+#[error("there is no method `{name}`; there are {}", METHODS.map(|method| method.name).join(", "))]
 pub struct UnknownMethod {
     /// The name given.
     pub name: String,

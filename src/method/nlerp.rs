@@ -1,9 +1,10 @@
 //! Normalised linear interpolation.
 
+use crate::curve::formula::ControlNumbers;
 use crate::curve::options::Ends;
-use crate::fit::double::intervals::{Intervals, Stretch, at, squared_extent};
-use crate::fit::double::shape::Shape;
-use crate::method::{Continuity, Cost, Curves, Keys, Method, Smooth, USUAL};
+use crate::fit::block::{Intervals, TrackStretch, at, squared_extent};
+use crate::fit::exact::shape::Shape;
+use crate::method::{Continuity, Cost, CurveKind, DEFAULTS, Keys, Method, SmoothCurves};
 use crate::reference;
 
 /// Nlerp: the straight line between neighbouring keys, normalised. It follows the path of slerp at
@@ -18,18 +19,22 @@ pub const NLERP: Method = Method {
     keeps_constant_velocity: Keys::Never,
     uses_neighbours: false,
     cost: Cost::new(150.0, 2.8),
-    reference: reference::given::NLERP,
+    reference: reference::two_keys::NLERP,
     curves: &CURVES,
-    ..USUAL
+    ..DEFAULTS
 };
 
-static CURVES: Curves = Curves::Smooth(Smooth::new(Shape::LINEAR, curves));
+static CURVES: CurveKind = CurveKind::Smooth(SmoothCurves::new(Shape::LINEAR, curves));
 
-fn curves(intervals: &mut Intervals, stretches: &[Stretch], _: Ends) {
-    for lane in stretches.iter().flat_map(Stretch::lanes) {
+fn curves(intervals: &mut Intervals, stretches: &[TrackStretch], _: Ends) {
+    for lane in stretches.iter().flat_map(TrackStretch::lanes) {
         let (start, end) = (intervals.key(lane), intervals.end_key(lane));
-        intervals.set_numbers(lane, 0, &start);
-        intervals.set_numbers(lane, 12, &end);
+        let numbers = ControlNumbers {
+            start,
+            end,
+            ..ControlNumbers::default()
+        };
+        intervals.set_curve(lane, numbers);
         intervals.squared_extents[lane] =
             squared_extent([at(&intervals.logs, lane), [0.0; 3], [0.0; 3]]);
     }

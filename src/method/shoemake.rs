@@ -1,10 +1,10 @@
 //! Shoemake's first approach, as lectured, and the handle rule of all three approaches.
 
-use crate::fit::double::handles::{BothSides, HandleRule, Handles};
-use crate::fit::double::shape::Shape;
+use crate::fit::exact::handles::{BothSides, HandlePair, HandleRule};
+use crate::fit::exact::shape::Shape;
 use crate::math::quaternion::{Real as _, dot, scaled, sum};
 use crate::math::ranges::Algebra;
-use crate::method::{Cost, Curves, Method, Smooth, USUAL, ends};
+use crate::method::{Cost, CurveKind, DEFAULTS, Method, SmoothCurves, ends};
 use crate::reference;
 
 /// Approach I of the lecture: the control rotation is the bisector itself. It passes its keys three
@@ -18,10 +18,10 @@ pub const SHOEMAKE: Method = Method {
     cost: Cost::new(1500.0, 4.1),
     reference: reference::handles::SHOEMAKE,
     curves: &CURVES,
-    ..USUAL
+    ..DEFAULTS
 };
 
-static CURVES: Curves = Curves::Smooth(Smooth::new(
+static CURVES: CurveKind = CurveKind::Smooth(SmoothCurves::new(
     Shape::DE_CASTELJAU,
     ends::curves::<Bisector<1>>,
 ));
@@ -34,10 +34,13 @@ pub(crate) struct Bisector<const DIVISOR: u8>;
 
 impl<const DIVISOR: u8> HandleRule for Bisector<DIVISOR> {
     // These handles are 3/DIVISOR times as long as the parabola's, at inner keys too.
-    const HANDLES_OF_TURN: f64 = 2.0 / DIVISOR as f64;
+    const HANDLE_SHARE: f64 = 2.0 / DIVISOR as f64;
 
     #[inline(always)]
-    fn handles<A: Algebra>(algebra: &mut A, [before, after]: BothSides<A>) -> Handles<A::Number> {
+    fn handles<A: Algebra>(
+        algebra: &mut A,
+        [before, after]: BothSides<A>,
+    ) -> HandlePair<A::Number> {
         let (a, b) = (before.step, after.step);
         let both = [a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3]];
         let norm = dot(both, both).root();
@@ -52,7 +55,7 @@ impl<const DIVISOR: u8> HandleRule for Bisector<DIVISOR> {
         let bisector = [both[0] * scale, both[1] * scale, both[2] * scale, w];
         let log = algebra.log_toward(bisector, sum(before.log, after.log));
         let handle = scaled(log, A::Number::all(1.0 / f64::from(DIVISOR)));
-        Handles {
+        HandlePair {
             incoming: handle,
             outgoing: handle,
         }

@@ -1,8 +1,8 @@
 //! Shoemake's construction, as published.
 
-use crate::fit::double::shape::Shape;
+use crate::fit::exact::shape::Shape;
 use crate::method::shoemake::Bisector;
-use crate::method::{Cost, Curves, Keys, Method, Smooth, USUAL, ends};
+use crate::method::{Cost, CurveKind, DEFAULTS, Keys, Method, SmoothCurves, ends};
 use crate::reference;
 
 /// Shoemake's own construction: the handle goes a third of the way to the bisector. It ignores the
@@ -16,10 +16,10 @@ pub const SHOEMAKE_1985: Method = Method {
     cost: Cost::new(530.0, 2.8),
     reference: reference::handles::SHOEMAKE_1985,
     curves: &CURVES,
-    ..USUAL
+    ..DEFAULTS
 };
 
-static CURVES: Curves = Curves::Smooth(Smooth::new(
+static CURVES: CurveKind = CurveKind::Smooth(SmoothCurves::new(
     Shape::DE_CASTELJAU,
     ends::curves::<Bisector<3>>,
 ));

@@ -1,8 +1,8 @@
 //! Shoemake's second approach, as lectured.
 
-use crate::fit::double::shape::Shape;
+use crate::fit::exact::shape::Shape;
 use crate::method::shoemake::Bisector;
-use crate::method::{Cost, Curves, Method, Smooth, USUAL, ends};
+use crate::method::{Cost, CurveKind, DEFAULTS, Method, SmoothCurves, ends};
 use crate::reference;
 
 /// Approach II of the lecture: the handle goes half of the way to the bisector. It passes its keys
@@ -16,10 +16,10 @@ pub const SHOEMAKE_2: Method = Method {
     cost: Cost::new(700.0, 3.1),
     reference: reference::handles::SHOEMAKE_2,
     curves: &CURVES,
-    ..USUAL
+    ..DEFAULTS
 };
 
-static CURVES: Curves = Curves::Smooth(Smooth::new(
+static CURVES: CurveKind = CurveKind::Smooth(SmoothCurves::new(
     Shape::DE_CASTELJAU,
     ends::curves::<Bisector<2>>,
 ));

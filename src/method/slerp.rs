@@ -1,9 +1,10 @@
 //! Spherical linear interpolation.
 
+use crate::curve::formula::RotationVectorNumbers;
 use crate::curve::options::Ends;
-use crate::fit::double::intervals::{Intervals, Stretch, at, squared_extent};
-use crate::fit::double::shape::Shape;
-use crate::method::{Continuity, Cost, Curves, Keys, Method, Smooth, USUAL};
+use crate::fit::block::{Intervals, TrackStretch, at, squared_extent};
+use crate::fit::exact::shape::Shape;
+use crate::method::{Continuity, Cost, CurveKind, DEFAULTS, Keys, Method, SmoothCurves};
 use crate::reference;
 use crate::shader::Form;
 
@@ -18,19 +19,23 @@ pub const SLERP: Method = Method {
     uses_neighbours: false,
     form: Form::Arc,
     cost: Cost::new(10.0, 1.7),
-    reference: reference::given::SLERP,
+    reference: reference::two_keys::SLERP,
     curves: &CURVES,
-    ..USUAL
+    ..DEFAULTS
 };
 
-static CURVES: Curves = Curves::Arcs(Smooth::new(Shape::ROTATION_VECTOR, curves));
+static CURVES: CurveKind = CurveKind::Arcs(SmoothCurves::new(Shape::ROTATION_VECTOR, curves));
 
 /// The formula `q0 exp(t log(q0⁻¹ q1))`, for quantities that need derivatives.
-fn curves(intervals: &mut Intervals, stretches: &[Stretch], _: Ends) {
-    for lane in stretches.iter().flat_map(Stretch::lanes) {
+fn curves(intervals: &mut Intervals, stretches: &[TrackStretch], _: Ends) {
+    for lane in stretches.iter().flat_map(TrackStretch::lanes) {
         let log = at(&intervals.logs, lane);
-        intervals.set_numbers(lane, 0, &intervals.key(lane));
-        intervals.set_numbers(lane, 4, &log);
+        let numbers = RotationVectorNumbers {
+            base: intervals.key(lane),
+            linear: log,
+            ..RotationVectorNumbers::default()
+        };
+        intervals.set_curve(lane, numbers);
         intervals.squared_extents[lane] = squared_extent([log, [0.0; 3], [0.0; 3]]);
     }
 }

@@ -1,10 +1,10 @@
 //! Spherical quadrangle interpolation.
 
-use crate::fit::double::handles::{BothSides, EndHandle, HandleRule, Handles};
-use crate::fit::double::shape::Shape;
+use crate::fit::exact::handles::{BothSides, EndHandle, HandlePair, HandleRule};
+use crate::fit::exact::shape::Shape;
 use crate::math::quaternion::{Real as _, Vector, scaled, sum};
 use crate::math::ranges::Algebra;
-use crate::method::{Cost, Curves, Keys, Method, Smooth, USUAL, ends};
+use crate::method::{Cost, CurveKind, DEFAULTS, Keys, Method, SmoothCurves, ends};
 use crate::reference;
 
 /// Squad. It ignores the time steps, so its velocity jumps on uneven keys.
@@ -17,19 +17,20 @@ pub const SQUAD: Method = Method {
     cost: Cost::new(300.0, 2.9),
     reference: reference::handles::SQUAD,
     curves: &CURVES,
-    ..USUAL
+    ..DEFAULTS
 };
 
-static CURVES: Curves = Curves::Smooth(Smooth::new(Shape::SQUAD, ends::curves::<Rule>));
+static CURVES: CurveKind =
+    CurveKind::Smooth(SmoothCurves::new(Shape::SQUAD, ends::curves::<SquadRule>));
 
 /// `s_i = q_i exp(outgoing) = q_i exp(-incoming)`.
-struct Rule;
+struct SquadRule;
 
-impl HandleRule for Rule {
+impl HandleRule for SquadRule {
     #[inline(always)]
-    fn handles<A: Algebra>(_: &mut A, [before, after]: BothSides<A>) -> Handles<A::Number> {
+    fn handles<A: Algebra>(_: &mut A, [before, after]: BothSides<A>) -> HandlePair<A::Number> {
         let bend = sum(after.log, scaled(before.log, A::Number::all(-1.0)));
-        Handles {
+        HandlePair {
             incoming: scaled(bend, A::Number::all(0.25)),
             outgoing: scaled(bend, A::Number::all(-0.25)),
         }
@@ -39,7 +40,7 @@ impl HandleRule for Rule {
     /// end, as half-rotation vectors per interval.
     fn end(log: Vector, other: Vector, handle: EndHandle) -> Vector {
         match handle {
-            EndHandle::Turn(turn) => scaled(sum(turn, scaled(log, -1.0)), 0.5),
+            EndHandle::Velocity(vector) => scaled(sum(vector, scaled(log, -1.0)), 0.5),
             EndHandle::Parabolic => scaled(other, -1.0),
             EndHandle::Natural(_) => scaled(other, -0.5),
         }

@@ -1,6 +1,6 @@
 //! The step method: each key is held until the next.
 
-use crate::method::{Continuity, Cost, Curves, Method, USUAL};
+use crate::method::{Continuity, Cost, CurveKind, DEFAULTS, Method};
 use crate::reference;
 
 /// Holds each key until the next: for things that switch and do not move.
@@ -14,7 +14,7 @@ pub const STEP: Method = Method {
     symmetric: false,
     uses_neighbours: false,
     cost: Cost::new(3.4, 0.87),
-    reference: reference::given::STEP,
-    curves: &Curves::Steps,
-    ..USUAL
+    reference: reference::two_keys::STEP,
+    curves: &CurveKind::Steps,
+    ..DEFAULTS
 };

@@ -6,18 +6,18 @@ use crate::curve::options::Ends;
 use crate::math::quaternion::ratio;
 use crate::method::b_spline;
 use crate::method::vector_method::VectorMethod;
-use crate::tracks::vectors::VectorTrack;
+use crate::tracks::set::vectors::VectorTrack;
 
 /// A cubic by its ends and its slopes there, per unit of a parameter that goes from 0 to 1.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Cubic {
+pub(crate) struct VectorCubic {
     pub(crate) start: DVec3,
     pub(crate) leaving: DVec3,
     pub(crate) arriving: DVec3,
     pub(crate) end: DVec3,
 }
 
-impl Cubic {
+impl VectorCubic {
     /// The coefficients of 1, t, t², t³.
     pub(crate) fn powers(&self) -> [DVec3; 4] {
         let rise = self.end - self.start;
@@ -31,7 +31,7 @@ impl Cubic {
 }
 
 /// The curves of a track's intervals.
-pub(crate) struct Curves<'a> {
+pub(crate) struct VectorCurves<'a> {
     track: &'a VectorTrack,
     method: VectorMethod,
     ends: Ends,
@@ -39,18 +39,18 @@ pub(crate) struct Curves<'a> {
     slopes: Vec<DVec3>,
 }
 
-impl<'a> Curves<'a> {
+impl<'a> VectorCurves<'a> {
     pub(crate) fn new(track: &'a VectorTrack, method: VectorMethod, ends: Ends) -> Self {
-        let mut own = Self {
+        let mut curves = Self {
             track,
             method,
             ends,
             slopes: Vec::new(),
         };
         if method == VectorMethod::C2 && track.keys.len() > 2 {
-            own.slopes = own.c2_slopes();
+            curves.slopes = curves.c2_slopes();
         }
-        own
+        curves
     }
 
     /// Whether an interval is held at its first key.
@@ -83,7 +83,7 @@ impl<'a> Curves<'a> {
     }
 
     /// The curve of an interval.
-    pub(crate) fn of(&self, i: usize) -> Cubic {
+    pub(crate) fn of(&self, i: usize) -> VectorCubic {
         let is_held = self.is_held(i);
         if !is_held && self.method == VectorMethod::BSpline && self.track.keys.len() > 2 {
             return self.b_spline(i);
@@ -92,7 +92,7 @@ impl<'a> Curves<'a> {
             true => [DVec3::ZERO; 2],
             false => self.slopes_of(i),
         };
-        Cubic {
+        VectorCubic {
             start: self.key(i),
             leaving,
             arriving,
@@ -160,9 +160,9 @@ impl<'a> Curves<'a> {
             let (h, next_h) = (self.duration(before), self.duration(after));
             let (l, r) = (ratio(h, h + next_h), ratio(next_h, h + next_h));
             let side = (self.secant(before) * r + self.secant(after) * l) * 3.0;
-            Equation([r, 2.0, l], side)
+            SlopeEquation([r, 2.0, l], side)
         };
-        let mut equations: Vec<Equation> = (1..last).map(|i| inner(i - 1, i)).collect();
+        let mut equations: Vec<SlopeEquation> = (1..last).map(|i| inner(i - 1, i)).collect();
         if self.ends == Ends::Loop {
             equations.insert(0, inner(last - 1, 0));
             return cyclic(equations);
@@ -173,53 +173,53 @@ impl<'a> Curves<'a> {
             Ends::Clamped { .. } => (1.0, 0.0, DVec3::ZERO),
             Ends::Parabolic | Ends::Loop | Ends::Frozen => (1.0, 1.0, secant * 2.0),
         };
-        let (own, next, side) = at_end(self.secant(0));
-        equations.insert(0, Equation([0.0, own, next], side));
-        let (own, next, side) = at_end(self.secant(last - 1));
-        equations.push(Equation([next, own, 0.0], side));
+        let (diagonal, next, side) = at_end(self.secant(0));
+        equations.insert(0, SlopeEquation([0.0, diagonal, next], side));
+        let (diagonal, next, side) = at_end(self.secant(last - 1));
+        equations.push(SlopeEquation([next, diagonal, 0.0], side));
         solved(&equations)
     }
 
     /// Interval `i` of the cubic B-spline in cumulative form, as it is for rotations: the basis and
     /// the steps beyond the ends are the same, with sums in the place of products.
-    fn b_spline(&self, i: usize) -> Cubic {
+    fn b_spline(&self, i: usize) -> VectorCubic {
         let last = self.track.keys.len() - 2;
         let closed = self.ends == Ends::Loop;
-        let own = self.rise(i);
+        let rise = self.rise(i);
         let basis = b_spline::basis(b_spline::neighbours(&self.track.times, i, closed));
         let [
             [_, slope1, ..],
             [_, slope2, bend2, cube2],
             [_, _, _, value3],
         ] = basis;
-        // The step beyond an end, from the own basis function's bend and slope there, and the slope of
+        // The step outside an end, from this interval's basis function's bend and slope there, and the slope of
         // that step's.
-        let beyond = |bend: f64, own_slope: f64, slope: f64, next: usize| match self.ends {
-            Ends::Natural => own * (bend / slope),
-            Ends::Clamped { .. } => own * (-own_slope / slope),
-            Ends::Secant => own * ((1.0 - own_slope) / slope),
+        let outside = |bend: f64, inner_slope: f64, slope: f64, next: usize| match self.ends {
+            Ends::Natural => rise * (bend / slope),
+            Ends::Clamped { .. } => rise * (-inner_slope / slope),
+            Ends::Secant => rise * ((1.0 - inner_slope) / slope),
             _ => self.extrapolated(i, next),
         };
         let before = match i.checked_sub(1).or(closed.then_some(last)) {
             Some(before) => self.rise(before),
-            None => beyond(bend2, slope2, slope1, i + 1),
+            None => outside(bend2, slope2, slope1, i + 1),
         };
         let after = match (i < last).then_some(i + 1).or(closed.then_some(0)) {
             Some(after) => self.rise(after),
             None => {
-                let own_slope = slope2 + 2.0 * bend2 + 3.0 * cube2;
-                beyond(-(bend2 + 3.0 * cube2), own_slope, 3.0 * value3, i - 1)
+                let inner_slope = slope2 + 2.0 * bend2 + 3.0 * cube2;
+                outside(-(bend2 + 3.0 * cube2), inner_slope, 3.0 * value3, i - 1)
             }
         };
         let mut powers = [DVec3::ZERO; 4];
-        for (weights, step) in basis.iter().zip([before, own, after]) {
+        for (weights, step) in basis.iter().zip([before, rise, after]) {
             for (power, weight) in powers.iter_mut().zip(weights) {
                 *power += step * *weight;
             }
         }
         powers[0] += self.key(i) - before;
         let [start, c1, c2, c3] = powers;
-        Cubic {
+        VectorCubic {
             start,
             leaving: c1,
             arriving: c1 + c2 * 2.0 + c3 * 3.0,
@@ -228,26 +228,26 @@ impl<'a> Curves<'a> {
     }
 
     /// One more step of the parabola through the three keys at an end.
-    fn extrapolated(&self, own: usize, next: usize) -> DVec3 {
-        let (h, next_h) = (self.duration(own), self.duration(next));
-        let change = self.rise(next) * ratio(h, next_h) - self.rise(own);
-        self.rise(own) - change * (2.0 / (1.0 + ratio(next_h, h)))
+    fn extrapolated(&self, interval: usize, next: usize) -> DVec3 {
+        let (h, next_h) = (self.duration(interval), self.duration(next));
+        let change = self.rise(next) * ratio(h, next_h) - self.rise(interval);
+        self.rise(interval) - change * (2.0 / (1.0 + ratio(next_h, h)))
     }
 }
 
-/// One of a system of equations: the coefficients of the unknowns before its own, its own and after
+/// One of a system of equations: the coefficients of the unknown before its diagonal, of the diagonal and after
 /// it, and the right side.
 #[derive(Clone, Copy)]
-struct Equation([f64; 3], DVec3);
+struct SlopeEquation([f64; 3], DVec3);
 
 /// Solves a system without the corners, by elimination from the first equation on.
-fn solved(equations: &[Equation]) -> Vec<DVec3> {
+fn solved(equations: &[SlopeEquation]) -> Vec<DVec3> {
     let mut above = Vec::with_capacity(equations.len());
     let mut values: Vec<DVec3> = Vec::with_capacity(equations.len());
-    for &Equation([below, own, next], side) in equations {
+    for &SlopeEquation([below, diagonal, next], side) in equations {
         let (factor, value) = match (above.last(), values.last()) {
-            (Some(&before), Some(&value)) => (own - below * before, side - value * below),
-            _ => (own, side),
+            (Some(&before), Some(&value)) => (diagonal - below * before, side - value * below),
+            _ => (diagonal, side),
         };
         above.push(next / factor);
         values.push(value / factor);
@@ -261,7 +261,7 @@ fn solved(equations: &[Equation]) -> Vec<DVec3> {
 
 /// Solves a system whose first equation follows its last, and repeats the first unknown at the end
 /// (Sherman and Morrison 1950).
-fn cyclic(mut equations: Vec<Equation>) -> Vec<DVec3> {
+fn cyclic(mut equations: Vec<SlopeEquation>) -> Vec<DVec3> {
     let last = equations.len() - 1;
     let (corner, other) = (equations[0].0[0], equations[last].0[2]);
     let gamma = -equations[0].0[1];

@@ -14,7 +14,7 @@ use crate::output::rotations::Storage;
 const LONG: usize = 32 << 20;
 
 /// What [`OutOfMemory`] calls it.
-const WHAT: &str = "a result";
+const LABEL: &str = "a result";
 
 /// Memory for a result, zero at first, for functions that write to the caller's memory, such as
 /// [`Engine::evaluate_into`](crate::engine::Engine::evaluate_into). On Linux, buffers of 32 MiB or
@@ -22,19 +22,19 @@ const WHAT: &str = "a result";
 ///
 /// ```
 /// # use glam::Quat;
-/// # use tumble::{Device, Engine, Error, Frames, Layout, OutputBuffer, TrackSet, method};
+/// # use tumble::{Device, Engine, Error, SampleTimes, Layout, OutputBuffer, TrackSet, method};
 /// # let mut set = TrackSet::new();
 /// # set.push("", &[0.0, 1.0], &[Quat::IDENTITY, Quat::from_rotation_x(1.0)]).unwrap();
 /// # let clip = Engine::new(Device::Cpu)?.upload(&set, method::SLERP)?;
-/// let frames = Frames::fps(60);
+/// let frames = SampleTimes::fps(60);
 /// let mut rotations = OutputBuffer::new(clip.track_count() * clip.timeline(&frames)?.len())?;
 /// clip.evaluate_into(&frames, Layout::TrackMajor, &mut rotations)?;
 /// # assert_eq!(rotations[0], Quat::IDENTITY);
 /// # Ok::<(), Error>(())
 /// ```
-pub struct OutputBuffer(Memory);
+pub struct OutputBuffer(BufferMemory);
 
-enum Memory {
+enum BufferMemory {
     Heap(Vec<Quat>),
     #[cfg(target_os = "linux")]
     HugePages(memmap2::MmapMut),
@@ -46,7 +46,7 @@ impl OutputBuffer {
     /// # Errors
     /// When there is not so much memory.
     pub fn new(rotations: usize) -> Result<Self, OutOfMemory> {
-        refuse_more_than_there_is::<Quat>(rotations, WHAT)?;
+        refuse_more_than_there_is::<Quat>(rotations, LABEL)?;
         #[cfg(target_os = "linux")]
         if let Some(bytes) = rotations.checked_mul(size_of::<Quat>())
             && bytes >= LONG
@@ -54,9 +54,9 @@ impl OutputBuffer {
         {
             // If the system does not take the advice, pages are of the ordinary size.
             let _ = memory.advise(memmap2::Advice::HugePage);
-            return Ok(Self(Memory::HugePages(memory)));
+            return Ok(Self(BufferMemory::HugePages(memory)));
         }
-        Ok(Self(Memory::Heap(zeroed(rotations, WHAT)?)))
+        Ok(Self(BufferMemory::Heap(zeroed(rotations, LABEL)?)))
     }
 }
 
@@ -65,9 +65,9 @@ impl Deref for OutputBuffer {
 
     fn deref(&self) -> &[Quat] {
         match &self.0 {
-            Memory::Heap(rotations) => rotations,
+            BufferMemory::Heap(rotations) => rotations,
             #[cfg(target_os = "linux")]
-            Memory::HugePages(bytes) => bytemuck::cast_slice(bytes),
+            BufferMemory::HugePages(bytes) => bytemuck::cast_slice(bytes),
         }
     }
 }
@@ -75,9 +75,9 @@ impl Deref for OutputBuffer {
 impl DerefMut for OutputBuffer {
     fn deref_mut(&mut self) -> &mut [Quat] {
         match &mut self.0 {
-            Memory::Heap(rotations) => rotations,
+            BufferMemory::Heap(rotations) => rotations,
             #[cfg(target_os = "linux")]
-            Memory::HugePages(bytes) => bytemuck::cast_slice_mut(bytes),
+            BufferMemory::HugePages(bytes) => bytemuck::cast_slice_mut(bytes),
         }
     }
 }

@@ -31,11 +31,11 @@ pub(crate) struct Representation {
     /// Stores rotations, given the parameter.
     encode: fn(&[[f32; 4]], u32, &mut [u8]),
     /// Makes a rotation of its numbers, given the parameter.
-    decode: fn(&Numbers, u32) -> [f32; 4],
+    decode: fn(&StoredNumbers, u32) -> [f32; 4],
 }
 
-/// The numbers of one rotation, by their places.
-type Numbers<'a> = dyn Fn(usize) -> f32 + 'a;
+/// The numbers of one rotation, by their indices.
+type StoredNumbers<'a> = dyn Fn(usize) -> f32 + 'a;
 
 /// Quaternions in f32.
 const QUATERNION: Representation = Representation {
@@ -72,9 +72,9 @@ macro_rules! by {
                 fn run<L: Lanes>(&mut self) {
                     let (rotations, detail, output) = (self.0, self.1, &mut *self.2);
                     let (numbers, _) = rotations.as_flattened().as_chunks();
-                    let places = output.chunks_exact_mut(stored_bytes($store));
-                    for (&own, place) in numbers.iter().zip(places) {
-                        place.copy_from_slice(bytemuck::bytes_of(&$store(own, detail)));
+                    let outputs = output.chunks_exact_mut(stored_bytes($store));
+                    for (&input, output) in numbers.iter().zip(outputs) {
+                        output.copy_from_slice(bytemuck::bytes_of(&$store(input, detail)));
                     }
                 }
             }
@@ -190,7 +190,7 @@ representations! {
         store: Store::AxisAngle,
         encode: by!(axis_angle::store),
         decode: |number, _| {
-            let axis = [0, 1, 2].map(|place| f64::from(number(place)));
+            let axis = [0, 1, 2].map(|i| f64::from(number(i)));
             about(axis, f64::from(number(3))).map(|c| c as f32)
         },
         ..OF_ROTATIONS
@@ -289,13 +289,13 @@ pub struct EncodingOptions {
 
 /// Memory is not as long as the rotations that are to be stored in it.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{rotations} rotations take {needed} bytes, and {given} were given")]
+#[error("{rotations} rotations take {needed} bytes, and {bytes} were given")]
 #[non_exhaustive]
 pub struct EncodingLength {
     /// Number of rotations.
     pub rotations: usize,
-    /// Bytes given.
-    pub given: usize,
+    /// Bytes of the memory.
+    pub bytes: usize,
     /// Bytes that they take.
     pub needed: usize,
 }
@@ -395,13 +395,13 @@ impl Encoding {
         Ok(self.decode_one(bytes))
     }
 
-    fn check_length(self, rotations: usize, given: usize) -> Result<(), EncodingLength> {
+    fn check_length(self, rotations: usize, bytes: usize) -> Result<(), EncodingLength> {
         let needed = rotations.saturating_mul(self.bytes());
-        match given == needed {
+        match bytes == needed {
             true => Ok(()),
             false => Err(EncodingLength {
                 rotations,
-                given,
+                bytes,
                 needed,
             }),
         }
@@ -411,13 +411,13 @@ impl Encoding {
     pub(crate) fn decode_one(self, bytes: &[u8]) -> [f32; 4] {
         let row = self.row();
         let size = row.component_type.bytes();
-        let number = |place: usize| (row.component_type).decode(&bytes[place * size..][..size]);
+        let number = |index: usize| (row.component_type).decode(&bytes[index * size..][..size]);
         (row.decode)(&number, row.detail)
     }
 }
 
 /// The rotation of a matrix whose rows, or columns if `order` is 1, start `length` numbers apart.
-fn of_matrix(number: &Numbers, length: usize, order: u32) -> [f32; 4] {
+fn of_matrix(number: &StoredNumbers, length: usize, order: u32) -> [f32; 4] {
     let columns = Mat3::from_cols_array(&std::array::from_fn(|i| number(i / 3 * length + i % 3)));
     let matrix = match order {
         0 => columns.transpose(),

@@ -90,13 +90,13 @@ impl EulerSequence {
     /// The rotation of three angles in degrees, by the sequence that the parameter of the kernels'
     /// store stands for.
     pub(crate) fn decode(degrees: &dyn Fn(usize) -> f32, detail: u32) -> [f32; 4] {
-        let axis = |place: u32| AXES[(detail >> (2 * place) & 3) as usize];
+        let axis = |index: u32| AXES[(detail >> (2 * index) & 3) as usize];
         let last_axis = axis(if detail & SYMMETRIC != 0 { 0 } else { 2 });
         let is_intrinsic = detail & INTRINSIC != 0;
         let (first, last) = if is_intrinsic { (2, 0) } else { (0, 2) };
-        let turn = |axis, angle| -> Quaternion { about(axis, f64::from(degrees(angle))) };
-        let later = product(turn(last_axis, last), turn(axis(1), 1));
-        product(later, turn(axis(0), first)).map(|c| c as f32)
+        let rotation = |axis, angle| -> Quaternion { about(axis, f64::from(degrees(angle))) };
+        let later = product(rotation(last_axis, last), rotation(axis(1), 1));
+        product(later, rotation(axis(0), first)).map(|c| c as f32)
     }
 }
 
@@ -111,7 +111,7 @@ impl fmt::Display for EulerSequence {
 /// The text is not a sequence of Euler angles.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "`{name}` is no sequence of Euler angles; give three axes, no two neighbours the same: XYZ, ZXZ … about turned axes, xyz, zxz … about fixed ones"
+    "`{name}` is not a sequence of Euler angles; give three axes, no two neighbours the same: XYZ, ZXZ … for intrinsic angles, xyz, zxz … for extrinsic ones"
 )]
 pub struct UnknownSequence {
     /// What was given.
@@ -144,13 +144,13 @@ mod tests {
     const AXES: [DVec3; 3] = [DVec3::X, DVec3::Y, DVec3::Z];
 
     fn composed(sequence: EulerSequence, degrees: [f32; 3]) -> DQuat {
-        let turns = [0, 1, 2].map(|i| {
+        let rotations = [0, 1, 2].map(|i| {
             let angle = f64::from(degrees[i]).to_radians();
             DQuat::from_axis_angle(AXES[sequence.axes()[i]], angle)
         });
         match sequence.is_intrinsic() {
-            true => turns[0] * turns[1] * turns[2],
-            false => turns[2] * turns[1] * turns[0],
+            true => rotations[0] * rotations[1] * rotations[2],
+            false => rotations[2] * rotations[1] * rotations[0],
         }
     }
 
@@ -164,9 +164,9 @@ mod tests {
         // In gimbal lock, and next to it.
         for axis in AXES {
             for angle in [90.0, -90.0, 180.0, 90.001, 1e-4, 179.999] {
-                let turn = DQuat::from_axis_angle(axis, f64::to_radians(angle));
-                all.push(turn);
-                all.push(DQuat::from_rotation_x(0.3) * turn * DQuat::from_rotation_x(-0.8));
+                let rotation = DQuat::from_axis_angle(axis, f64::to_radians(angle));
+                all.push(rotation);
+                all.push(DQuat::from_rotation_x(0.3) * rotation * DQuat::from_rotation_x(-0.8));
             }
         }
         all

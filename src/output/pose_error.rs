@@ -15,13 +15,13 @@ pub enum PoseError {
     /// Layers must be of the same tracks and samples, in the same order in memory.
     #[error(
         "layer {layer} has {} tracks with {} samples, {}, and the first {} with {}, {}; evaluate them at the same frames",
-        given.0, given.1, given.2, first.0, first.1, first.2
+        shape.0, shape.1, shape.2, first.0, first.1, first.2
     )]
     Shape {
-        /// The layer's place.
+        /// The layer's index.
         layer: usize,
         /// Its tracks, samples and layout.
-        given: (usize, usize, Layout),
+        shape: (usize, usize, Layout),
         /// Those of the first layer.
         first: (usize, usize, Layout),
     },
@@ -30,7 +30,7 @@ pub enum PoseError {
         "the weight of layer {layer} is {weight}; weights are finite, and within ±{LARGEST_WEIGHT:e}"
     )]
     WeightNotFinite {
-        /// The layer's place.
+        /// The layer's index.
         layer: usize,
         /// Its weight.
         weight: f32,
@@ -42,36 +42,38 @@ pub enum PoseError {
         weight: f32,
     },
     /// An additive layer needs a reference rotation for each track.
-    #[error("{given} reference rotations were given for {tracks} tracks; give one for each")]
+    #[error("{references} reference rotations were given for {tracks} tracks; give one for each")]
     References {
         /// Rotations given.
-        given: usize,
+        references: usize,
         /// Tracks of the layer.
         tracks: usize,
     },
     /// A skeleton of other tracks.
-    #[error("the skeleton has {given} tracks, the poses have {tracks}; give one that has as many")]
+    #[error(
+        "the skeleton has {skeleton_tracks} tracks, the poses have {tracks}; give one that has as many"
+    )]
     Skeleton {
         /// Tracks of the skeleton.
-        given: usize,
+        skeleton_tracks: usize,
         /// Tracks of the poses.
         tracks: usize,
     },
     /// It must be known of each track whether it has translations.
-    #[error("`has_translation` has {given} entries for {tracks} tracks; give one for each")]
+    #[error("`has_translation` has {entries} entries for {tracks} tracks; give one for each")]
     HasTranslation {
         /// Entries given.
-        given: usize,
+        entries: usize,
         /// Tracks of the poses.
         tracks: usize,
     },
     /// An inverse bind matrix is needed for each track.
     #[error(
-        "{given} inverse bind matrices were given for {tracks} tracks; give one for each, or none"
+        "{matrices} inverse bind matrices were given for {tracks} tracks; give one for each, or none"
     )]
     InverseBind {
         /// Matrices given.
-        given: usize,
+        matrices: usize,
         /// Tracks of the poses.
         tracks: usize,
     },
@@ -81,14 +83,14 @@ pub enum PoseError {
 pub(crate) const LARGEST_WEIGHT: f32 = 1e9;
 
 /// The most tracks of a skeleton.
-pub(crate) const MOST_TRACKS: usize = u32::MAX as usize;
+pub(crate) const MAX_TRACKS: usize = u32::MAX as usize;
 
 /// Why parents make no skeleton. Places count from 0.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SkeletonError {
     /// The numbers of parents and offsets differ.
-    #[error("there are {parents} parents but {offsets} offsets; give one of each for a track")]
+    #[error("there are {parents} parents but {offsets} offsets; give one of each for every track")]
     Lengths {
         /// Parents given.
         parents: usize,
@@ -96,7 +98,7 @@ pub enum SkeletonError {
         offsets: usize,
     },
     /// A parent that does not exist.
-    #[error("track {track} hangs from track {parent}, of {tracks}")]
+    #[error("the parent of track {track} is track {parent}, but there are {tracks} tracks")]
     NoSuchParent {
         /// The track.
         track: usize,
@@ -106,13 +108,13 @@ pub enum SkeletonError {
         tracks: usize,
     },
     /// A track that is its own ancestor.
-    #[error("track {track} hangs from itself")]
+    #[error("track {track} is its own ancestor")]
     Cycle {
         /// One track of the circle.
         track: usize,
     },
     /// An offset is NaN or infinite.
-    #[error("track {track} hangs at {offset}, which is not finite")]
+    #[error("the offset of track {track} is {offset}, which is not finite")]
     OffsetNotFinite {
         /// The track.
         track: usize,
@@ -120,7 +122,7 @@ pub enum SkeletonError {
         offset: Vec3,
     },
     /// Tracks are counted in 32 bits on a device.
-    #[error("a skeleton of {tracks} tracks; there can be {} at most", MOST_TRACKS)]
+    #[error("a skeleton of {tracks} tracks; the limit is {}", MAX_TRACKS)]
     TooMany {
         /// Tracks given.
         tracks: usize,

@@ -47,12 +47,18 @@ impl Layout {
         samples: usize,
     ) -> Option<usize> {
         let inside = track < tracks && sample < samples && tracks.checked_mul(samples).is_some();
-        inside.then(|| self.place(track, sample, tracks, samples))
+        inside.then(|| self.offset(track, sample, tracks, samples))
     }
 
     /// Where a sample that there is lies.
     #[inline]
-    pub(crate) fn place(self, track: usize, sample: usize, tracks: usize, samples: usize) -> usize {
+    pub(crate) fn offset(
+        self,
+        track: usize,
+        sample: usize,
+        tracks: usize,
+        samples: usize,
+    ) -> usize {
         match self {
             Self::TrackMajor => track * samples + sample,
             Self::FrameMajor => sample * tracks + track,
@@ -98,7 +104,7 @@ pub enum SamplesError {
     /// A rotation is no unit quaternion as far as [`NORM_TOLERANCE`], or a vector is not finite.
     #[error("value {index} is {value:?}; rotations are unit quaternions, and vectors finite")]
     OutOfRange {
-        /// Its place among the values.
+        /// Its index among the values.
         index: usize,
         /// `x y z w`, or `x y z 0` of a vector.
         value: [f32; 4],
@@ -176,7 +182,7 @@ impl<T> Samples<T> {
     }
 
     /// Where the value of one track at one sample lies; `None` out of range.
-    fn place(&self, track: usize, sample: usize) -> Option<usize> {
+    fn offset(&self, track: usize, sample: usize) -> Option<usize> {
         (self.layout).index(track, sample, self.tracks, self.samples)
     }
 }
@@ -219,7 +225,7 @@ impl Rotations {
     /// The rotation of one track at one sample; `None` out of range.
     #[must_use]
     pub fn get(&self, track: usize, sample: usize) -> Option<Quat> {
-        Some(self.as_quats()[self.place(track, sample)?])
+        Some(self.as_quats()[self.offset(track, sample)?])
     }
 }
 
@@ -246,7 +252,7 @@ impl Vectors {
     /// The vector of one track at one sample; `None` out of range.
     #[must_use]
     pub fn get(&self, track: usize, sample: usize) -> Option<Vec3> {
-        Some(self.as_slice()[self.place(track, sample)?].truncate())
+        Some(self.as_slice()[self.offset(track, sample)?].truncate())
     }
 }
 
@@ -268,8 +274,9 @@ mod tests {
     fn what_is_no_result_is_refused() {
         let unit = [0.0, 0.6, 0.0, 0.8];
         let of = |second, tracks| {
-            let given = [unit, second];
-            Rotations::of(&given, tracks, Layout::TrackMajor).map(|own| own.as_arrays()[1])
+            let rotations = [unit, second];
+            Rotations::of(&rotations, tracks, Layout::TrackMajor)
+                .map(|result| result.as_arrays()[1])
         };
         let tiny = [1e-20, 0.0, 0.0, 1.05];
         assert_eq!(of(tiny, 2), Ok([0.0, 0.0, 0.0, 1.05]));

@@ -42,10 +42,10 @@ impl Window {
     }
 
     /// Where a rotation lies in the window.
-    pub(crate) fn place(&self, track: usize, sample: usize) -> usize {
+    pub(crate) fn offset(&self, track: usize, sample: usize) -> usize {
         let (track, sample) = (track - self.tracks.start, sample - self.samples.start);
         self.layout
-            .place(track, sample, self.tracks.len(), self.samples.len())
+            .offset(track, sample, self.tracks.len(), self.samples.len())
     }
 
     /// Cuts it into windows of at most `limit` rotations, in the order in which they lie in memory.
@@ -63,11 +63,11 @@ impl Window {
             of.step_by(each)
                 .map(move |from| from..from.saturating_add(each).min(end))
         };
-        let places = pieces(rows, rows_each).flat_map(move |row| {
+        let parts = pieces(rows, rows_each).flat_map(move |row| {
             pieces(columns.clone(), columns_each).map(move |column| (row.clone(), column))
         });
         let mut start = 0;
-        places.map(move |(row, column)| {
+        parts.map(move |(row, column)| {
             let (tracks, samples) = match layout {
                 Layout::TrackMajor => (row, column),
                 Layout::FrameMajor => (column, row),
@@ -109,9 +109,9 @@ mod tests {
                             assert_eq!(part.start, next);
                             for track in part.tracks.clone() {
                                 for sample in part.samples.clone() {
-                                    let place = next + part.place(track, sample);
-                                    let expected = layout.place(track, sample, tracks, samples);
-                                    assert_eq!(place, expected);
+                                    let offset = next + part.offset(track, sample);
+                                    let expected = layout.offset(track, sample, tracks, samples);
+                                    assert_eq!(offset, expected);
                                 }
                             }
                             next += part.len();

@@ -1,7 +1,7 @@
 //! The frame that never turns about its direction, carried along stretches.
 //!
-//! In a piece with the direction m at its middle, `q(t) = A(m→w) q_m R_z(ψ)`, with the least turn
-//! `A = [1 + m·w; m × w] / |·|` from m to the direction w, and `ψ = ∫ (m × w)·w' / (1 + m·w) dt` from
+//! In a piece with the direction m at its middle, `q(t) = A(m→w) q_m R_z(ψ)`, with the shortest rotation
+//! (the swing) `A = [1 + m·w; m × w] / |·|` from m to the direction w, and `ψ = ∫ (m × w)·w' / (1 + m·w) dt` from
 //! the middle on. Only the constant roll of a piece depends on the pieces before it.
 
 use std::f64::consts::PI;
@@ -9,12 +9,13 @@ use std::sync::LazyLock;
 
 use glam::{DQuat, DVec3};
 
-use crate::fit::double::fit::MOST;
-use crate::fit::double::intervals::at;
+use crate::fit::block::at;
 use crate::math::quaternion::{Quaternion, sine_cosine};
-use crate::path::lanes::{self, Rolled, Rolling, Row, find_directions};
-use crate::path::route::{Route, Stretch};
+use crate::path::lanes::{self, LaneValues, RollResults, Rolling, find_directions};
+use crate::path::stretch::PathStretch;
+use crate::path::timed_path::TimedPath;
 use crate::simd::dispatch::in_lanes;
+use crate::simd::lanes::MAX_LANES;
 use crate::threads::stop;
 
 /// The integrand of ψ is the polynomial through so many Chebyshev nodes of a piece.
@@ -28,7 +29,7 @@ const SHORTEST: f64 = 1e-12;
 
 /// A stretch has no more pieces: where numbers are so large or so near that none ever fits, they stay as
 /// they are.
-const MOST_PIECES: usize = 1 << 14;
+const MAX_PIECES: usize = 1 << 14;
 
 /// The Chebyshev nodes cos(π (k + ½) / 11), and the polynomials there: cos(j π (k + ½) / 11) for node
 /// k and degree j.
@@ -46,15 +47,15 @@ pub(crate) static CHEBYSHEV: LazyLock<Chebyshev> = LazyLock::new(|| {
     }
 });
 
-/// The places of a piece's middle and ends, behind those of the nodes.
+/// The indices of a piece's middle and ends among its samples; those of the nodes come first.
 pub(crate) const MIDDLE: usize = NODES;
 const FROM: usize = NODES + 1;
 const TO: usize = NODES + 2;
-const PLACES: usize = NODES + 3;
+const SAMPLES: usize = NODES + 3;
 
 /// A piece of a stretch.
 #[derive(Debug, Clone)]
-pub(crate) struct Piece {
+pub(crate) struct CarriedPiece {
     pub(crate) from: f64,
     pub(crate) to: f64,
     /// The direction and the rotation at the middle.
@@ -64,68 +65,68 @@ pub(crate) struct Piece {
     pub(crate) roll: [f64; NODES + 1],
 }
 
-/// A piece whose rotation is not known yet, and what turns one from its start to its end.
-struct Unturned {
+/// A piece whose rotation is not known yet, with the rotations from its start to its end.
+struct RelativePiece {
     stretch: usize,
-    piece: Piece,
+    piece: CarriedPiece,
     /// The directions at its ends.
-    ways: [DVec3; 2],
-    /// The least turns to these from that at the middle.
-    turns: [DQuat; 2],
+    directions: [DVec3; 2],
+    /// The shortest rotations to these from that at the middle.
+    swings: [DQuat; 2],
     /// The rolls from the start to the middle, and from there to the end.
     rolls: [DQuat; 2],
 }
 
-/// The pieces of some stretches, before they are turned.
-pub(crate) struct Uncarried {
+/// The pieces of some stretches, before a frame is carried along them.
+pub(crate) struct RelativePieces {
     /// In the order of stretches and parameters.
-    pieces: Vec<Unturned>,
+    pieces: Vec<RelativePiece>,
     /// Where the pieces of each stretch begin, and where those of the last one end.
     firsts: Vec<usize>,
 }
 
-impl Uncarried {
+impl RelativePieces {
     /// Cuts stretches of any paths into pieces in which the roll is exact.
-    pub(crate) fn new(stretches: &[(&Route, &Stretch)]) -> Self {
-        let mut block = Box::<Block>::default();
-        let whole = |(stretch, (_, own)): (usize, &(&Route, &Stretch))| Waiting {
+    pub(crate) fn new(stretches: &[(&TimedPath, &PathStretch)]) -> Self {
+        let mut block = Box::<PieceBlock>::default();
+        let whole = |(stretch, (_, part)): (usize, &(&TimedPath, &PathStretch))| PieceRange {
             stretch,
-            from: own.from,
-            to: own.to,
+            from: part.from,
+            to: part.to,
         };
-        let mut waiting: Vec<Waiting> = stretches.iter().enumerate().map(whole).collect();
+        let mut waiting: Vec<PieceRange> = stretches.iter().enumerate().map(whole).collect();
         let mut counts = vec![1; stretches.len()];
-        let mut pieces: Vec<Unturned> = Vec::with_capacity(stretches.len());
+        let mut pieces: Vec<RelativePiece> = Vec::with_capacity(stretches.len());
         let mut done = 0;
         while done < waiting.len() {
             if stop::is_stopped() {
-                // Whoever prepares paths looks again when this is done.
+                // The preparation checks again when this returns.
                 (pieces, counts) = (Vec::new(), vec![0; stretches.len()]);
                 break;
             }
-            let some = done..waiting.len().min(done + MOST);
+            let some = done..waiting.len().min(done + MAX_LANES);
             done = some.end;
             block.find(stretches, &waiting[some.clone()]);
-            for (lane, place) in some.enumerate() {
-                let own @ Waiting { stretch, from, to } = waiting[place];
+            for (lane, index) in some.enumerate() {
+                let range @ PieceRange { stretch, from, to } = waiting[index];
                 let middle = 0.5 * (from + to);
-                let is_finest = to - from <= SHORTEST || counts[stretch] > MOST_PIECES;
+                let is_finest = to - from <= SHORTEST || counts[stretch] > MAX_PIECES;
                 let rolled = &block.rolled;
-                let is_exact = rolled.least[lane] > 0.5 && rolled.rest[lane] <= TOLERANCE;
+                let is_exact = rolled.least[lane] > 0.5 && rolled.tail[lane] <= TOLERANCE;
                 if !is_exact && !is_finest && from < middle && middle < to {
                     counts[stretch] += 1;
                     for (from, to) in [(from, middle), (middle, to)] {
-                        waiting.push(Waiting { stretch, from, to });
+                        waiting.push(PieceRange { stretch, from, to });
                     }
                     continue;
                 }
-                pieces.push(block.unturned(lane, own));
+                pieces.push(block.relative_piece(lane, range));
             }
         }
-        // Most often no stretch was cut, and they are in order already.
+        // Usually no stretch was cut, and they are in order already.
         pieces.sort_by(|a, b| {
-            let by_place = a.piece.from.total_cmp(&b.piece.from);
-            a.stretch.cmp(&b.stretch).then(by_place)
+            let by_start = a.piece.from.total_cmp(&b.piece.from);
+            a.stretch.cmp(&b.stretch).then(by_start)
         });
         let mut firsts = Vec::with_capacity(stretches.len() + 1);
         firsts.push(0);
@@ -135,27 +136,35 @@ impl Uncarried {
         Self { pieces, firsts }
     }
 
-    fn of(&self, stretch: usize) -> &[Unturned] {
+    fn of(&self, stretch: usize) -> &[RelativePiece] {
         &self.pieces[self.firsts[stretch]..self.firsts[stretch + 1]]
     }
 
     /// The directions at both ends of a stretch.
     pub(crate) fn ends(&self, stretch: usize) -> [DVec3; 2] {
-        let own = self.of(stretch);
-        [own[0].ways[0], own[own.len() - 1].ways[1]]
+        let pieces = self.of(stretch);
+        [
+            pieces[0].directions[0],
+            pieces[pieces.len() - 1].directions[1],
+        ]
     }
 
     /// Carries a rotation along a stretch, adds its pieces to others, and returns the rotation at the
     /// end.
-    pub(crate) fn carry(&self, stretch: usize, start: DQuat, pieces: &mut Vec<Piece>) -> DQuat {
+    pub(crate) fn carry(
+        &self,
+        stretch: usize,
+        start: DQuat,
+        pieces: &mut Vec<CarriedPiece>,
+    ) -> DQuat {
         let mut rotation = start;
-        for own in self.of(stretch) {
-            let unrolled = own.turns[0].conjugate() * rotation;
-            let base = unrolled * own.rolls[0];
-            rotation = own.turns[1] * (base * own.rolls[1]);
-            pieces.push(Piece {
+        for relative in self.of(stretch) {
+            let unrolled = relative.swings[0].conjugate() * rotation;
+            let base = unrolled * relative.rolls[0];
+            rotation = relative.swings[1] * (base * relative.rolls[1]);
+            pieces.push(CarriedPiece {
                 base,
-                ..own.piece.clone()
+                ..relative.piece.clone()
             });
         }
         rotation
@@ -164,7 +173,7 @@ impl Uncarried {
 
 /// A part of a stretch that waits to become a piece.
 #[derive(Clone, Copy)]
-struct Waiting {
+struct PieceRange {
     stretch: usize,
     from: f64,
     to: f64,
@@ -172,83 +181,96 @@ struct Waiting {
 
 /// Pieces that are found at once, one in each lane.
 #[derive(Default)]
-struct Block {
-    places: [Row; PLACES],
-    ways: [[Row; 3]; PLACES],
-    changes: [[Row; 3]; PLACES],
-    rolled: Rolled,
+struct PieceBlock {
+    parameters: [LaneValues; SAMPLES],
+    directions: [[LaneValues; 3]; SAMPLES],
+    derivatives: [[LaneValues; 3]; SAMPLES],
+    rolled: RollResults,
 }
 
-impl Block {
-    fn find(&mut self, stretches: &[(&Route, &Stretch)], waiting: &[Waiting]) {
-        for (lane, own) in waiting.iter().enumerate() {
-            (self.places[FROM][lane], self.places[TO][lane]) = (own.from, own.to);
+impl PieceBlock {
+    fn find(&mut self, stretches: &[(&TimedPath, &PathStretch)], waiting: &[PieceRange]) {
+        for (lane, range) in waiting.iter().enumerate() {
+            (self.parameters[FROM][lane], self.parameters[TO][lane]) = (range.from, range.to);
         }
-        let ends = [self.places[FROM], self.places[TO]];
+        let ends = [self.parameters[FROM], self.parameters[TO]];
         let [from, to] = &ends;
-        let centers: Row = std::array::from_fn(|lane| 0.5 * (from[lane] + to[lane]));
-        let halves: Row = std::array::from_fn(|lane| 0.5 * (to[lane] - from[lane]));
-        for (row, node) in self.places.iter_mut().zip(&CHEBYSHEV.nodes) {
-            for ((place, center), half) in row.iter_mut().zip(&centers).zip(&halves) {
-                *place = center + half * node;
+        let centers: LaneValues = std::array::from_fn(|lane| 0.5 * (from[lane] + to[lane]));
+        let halves: LaneValues = std::array::from_fn(|lane| 0.5 * (to[lane] - from[lane]));
+        for (row, node) in self.parameters.iter_mut().zip(&CHEBYSHEV.nodes) {
+            for ((parameter, center), half) in row.iter_mut().zip(&centers).zip(&halves) {
+                *parameter = center + half * node;
             }
         }
-        self.places[MIDDLE] = centers;
-        let own = waiting.iter().map(|own| stretches[own.stretch]);
-        let changes = Some(&mut self.changes);
-        find_directions(own, &self.places, &mut self.ways, changes);
+        self.parameters[MIDDLE] = centers;
+        let selected = waiting.iter().map(|range| stretches[range.stretch]);
+        let derivatives = Some(&mut self.derivatives);
+        find_directions(
+            selected,
+            &self.parameters,
+            &mut self.directions,
+            derivatives,
+        );
         in_lanes(&mut Rolling {
             count: waiting.len(),
-            ways: &self.ways,
-            changes: &self.changes,
+            directions: &self.directions,
+            derivatives: &self.derivatives,
             ends: &ends,
-            own: &mut self.rolled,
+            results: &mut self.rolled,
         });
     }
 
-    fn unturned(&self, lane: usize, Waiting { stretch, from, to }: Waiting) -> Unturned {
-        let way = |place: usize| DVec3::from_array(at(&self.ways[place], lane));
+    fn relative_piece(
+        &self,
+        lane: usize,
+        PieceRange { stretch, from, to }: PieceRange,
+    ) -> RelativePiece {
+        let direction = |sample: usize| DVec3::from_array(at(&self.directions[sample], lane));
         let found = &self.rolled;
         let roll = |end: usize| {
             let [sine, cosine] = at(&found.halves[end], lane);
             DQuat::from_xyzw(0.0, 0.0, sine, cosine)
         };
-        let turn = |end: usize| turn_of(at(&found.turns[end], lane));
-        Unturned {
+        let swing = |end: usize| or_identity(at(&found.swings[end], lane));
+        RelativePiece {
             stretch,
-            piece: Piece {
+            piece: CarriedPiece {
                 from,
                 to,
-                middle: way(MIDDLE),
+                middle: direction(MIDDLE),
                 base: DQuat::IDENTITY,
                 roll: at(&found.roll, lane),
             },
-            ways: [way(FROM), way(TO)],
-            turns: [turn(0), turn(1)],
+            directions: [direction(FROM), direction(TO)],
+            swings: [swing(0), swing(1)],
             rolls: [roll(0), roll(1)],
         }
     }
 }
 
-/// The turn by the least angle from one direction to another that is not opposite.
-pub(crate) fn least_turn(from: DVec3, to: DVec3) -> DQuat {
-    turn_of(lanes::least_turn(from.to_array(), to.to_array()))
+/// The shortest rotation from one direction to another that is not opposite.
+pub(crate) fn rotation_between(from: DVec3, to: DVec3) -> DQuat {
+    or_identity(lanes::rotation_between(from.to_array(), to.to_array()))
 }
 
-/// A turn, or none where numbers overflow.
-fn turn_of(turn: Quaternion) -> DQuat {
-    let turn = DQuat::from_array(turn);
-    if turn.is_nan() { DQuat::IDENTITY } else { turn }
+/// The rotation, or none where numbers overflow.
+fn or_identity(rotation: Quaternion) -> DQuat {
+    let rotation = DQuat::from_array(rotation);
+    if rotation.is_nan() {
+        DQuat::IDENTITY
+    } else {
+        rotation
+    }
 }
 
-/// The rotation carried over a corner: by the least turn, and where the direction is reversed by half
-/// a turn about the body's y axis.
+/// The rotation carried over a corner: by the shortest rotation, and where the direction is reversed
+/// by 180° about the body's y axis.
 pub(crate) fn around_corner(rotation: DQuat, from: DVec3, to: DVec3) -> DQuat {
     if (from + to).length() < REVERSED {
         let half_turn = DQuat::from_xyzw(0.0, 1.0, 0.0, 0.0);
-        return least_turn(-from, to) * rotation * half_turn;
+        return rotation_between(-from, to) * rotation * half_turn;
     }
-    least_turn(from, to) * rotation
+    rotation_between(from, to) * rotation
 }
 
 /// Directions nearer than this to being opposite are reversed.

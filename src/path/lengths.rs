@@ -17,7 +17,7 @@ pub(crate) struct Lengths {
 const PARTS: usize = 8;
 
 /// The most halvings of a quadrature.
-const FINEST: u32 = 24;
+const MAX_HALVINGS: u32 = 24;
 
 impl Lengths {
     /// The lengths of curves with these slopes, which vanish at these parameters: their speed has a
@@ -30,17 +30,17 @@ impl Lengths {
         let mut total = 0.0;
         for (slope, stops) in lengths.slopes.iter().zip(stops) {
             let even = (1..=PARTS).map(|part| part as f64 / PARTS as f64);
-            let mut places: Vec<f64> = even.chain(stops.iter().copied()).collect();
-            places.sort_by(f64::total_cmp);
+            let mut ends: Vec<f64> = even.chain(stops.iter().copied()).collect();
+            ends.sort_by(f64::total_cmp);
             let mut marks = vec![(0.0, total)];
             if stop::is_stopped() {
-                // Whoever prepares paths looks again when this is done.
+                // The preparation checks again when this returns.
                 marks.push((1.0, total));
                 lengths.marks.push(marks);
                 continue;
             }
             let mut from = 0.0;
-            for to in places {
+            for to in ends {
                 if to > from {
                     total += between(slope, from, to);
                     marks.push((to, total));
@@ -70,7 +70,7 @@ impl Lengths {
         [marks[0].1, marks[marks.len() - 1].1]
     }
 
-    /// The length up to a place.
+    /// The length up to a parameter of an interval.
     pub(crate) fn at(&self, interval: usize, t: f64) -> f64 {
         let marks = &self.marks[interval];
         let after = marks.partition_point(|mark| mark.0 <= t).max(1);
@@ -81,11 +81,11 @@ impl Lengths {
     /// The interval in which a length is reached; the last one that has a length if it is beyond.
     pub(crate) fn interval(&self, length: f64) -> usize {
         let after = self.marks.partition_point(|marks| marks[0].1 <= length);
-        let mut own = after.saturating_sub(1);
-        while own > 0 && self.of(own)[0] == self.of(own)[1] {
-            own -= 1;
+        let mut interval = after.saturating_sub(1);
+        while interval > 0 && self.of(interval)[0] == self.of(interval)[1] {
+            interval -= 1;
         }
-        own
+        interval
     }
 
     /// The parameter of an interval where a length is reached: Newton's method, or bisection where
@@ -134,9 +134,9 @@ impl Lengths {
 
 fn between(slope: &Polynomial, from: f64, to: f64) -> f64 {
     let tolerance = 1e-14 * slope.size();
-    // What overflows is no number, and halving it finds none.
+    // Where numbers overflow the sum is NaN, and halving would not end that.
     let differ = |whole: f64, sum: f64| (sum - whole).abs() > tolerance;
-    integral(&speed(slope), from, to, FINEST, &differ)
+    integral(&speed(slope), from, to, MAX_HALVINGS, &differ)
 }
 
 fn speed(slope: &Polynomial) -> impl Fn(f64) -> f64 {

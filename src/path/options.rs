@@ -1,28 +1,29 @@
-//! How bodies follow paths: the options, and what can be wrong with them or with a path.
+//! How bodies follow paths: the options, and the errors and warnings about them and about paths.
 
 use glam::{DQuat, DVec3};
 
 use crate::curve::options::Ends;
 use crate::method::vector_method::VectorMethod;
+use crate::path::speed::PathSpeed;
 use crate::threads::stop::Stopped;
 
 /// How the bodies of a set follow their paths, which are the tracks' translations.
 ///
 /// ```
 /// use tumble::glam::{DVec3, Vec3};
-/// use tumble::{Device, Direction, Engine, Follow, Frame, Frames, Layout, PathSpeed, TrackSet};
+/// use tumble::{Device, Direction, Engine, Follow, PathFrame, SampleTimes, Layout, PathSpeed, TrackSet};
 /// let mut set = TrackSet::new();
 /// let road = [[0.0, 0.0, 0.0], [4.0, 0.0, 1.0], [8.0, 1.0, 0.0]];
 /// set.push_path("car", &[0.0, 1.0, 3.0], &road, &[])?;
 /// let follow = Follow {
 ///     speed: PathSpeed::Eased { start: 0.2, end: 0.2 },
 ///     direction: Direction::Point(DVec3::new(4.0, 3.0, 0.0)),
-///     frame: Frame::Fixed,
+///     frame: PathFrame::Fixed,
 ///     axes: ["z".parse()?, "y".parse()?],
 ///     ..Follow::default()
 /// };
 /// let engine = Engine::new(Device::Cpu)?;
-/// let found = engine.follow(&set, &follow, &Frames::fps(30), Layout::TrackMajor)?;
+/// let found = engine.follow(&set, &follow, &SampleTimes::fps(30), Layout::TrackMajor)?;
 /// assert_eq!(found.positions.get(0, 0), Some(Vec3::ZERO));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -33,13 +34,13 @@ pub struct Follow {
     /// Its ends. With [`Ends::Loop`] the path is closed: its last point repeats the first, and so
     /// does its last pose.
     pub ends: Ends,
-    /// Which way a body faces.
+    /// The direction in which a body faces.
     pub direction: Direction,
     /// How it is turned about its direction.
-    pub frame: Frame,
-    /// The upward direction: at the start for [`Frame::Minimal`], everywhere for [`Frame::Fixed`].
+    pub frame: PathFrame,
+    /// The upward direction: at the start for [`PathFrame::Minimal`], everywhere for [`PathFrame::Fixed`].
     pub up: DVec3,
-    /// What becomes of the turn that a closed path leaves over.
+    /// What is done with the roll by which a closed path misses its first pose.
     pub twist: Twist,
     /// When a body is where.
     pub speed: PathSpeed,
@@ -48,14 +49,14 @@ pub struct Follow {
 }
 
 impl Default for Follow {
-    /// Along the tangent of a Bessel-Overhauser curve, without a turn about it, as keyed, with z
+    /// Along the tangent of a Bessel-Overhauser curve, without a roll about it, as keyed, with z
     /// forward and y up.
     fn default() -> Self {
         Self {
             method: VectorMethod::BesselOverhauser,
             ends: Ends::Parabolic,
             direction: Direction::Tangent,
-            frame: Frame::Minimal,
+            frame: PathFrame::Minimal,
             up: DVec3::Y,
             twist: Twist::Spread,
             speed: PathSpeed::Keys,
@@ -64,7 +65,7 @@ impl Default for Follow {
     }
 }
 
-/// Which way a body on a path faces. One that stands still keeps its last direction, at the start
+/// The direction in which a body on a path faces. One that stands still keeps its last direction, at the start
 /// the first to come.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Direction {
@@ -81,18 +82,18 @@ pub enum Direction {
 
 /// How a body is turned about its direction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-pub enum Frame {
+pub enum PathFrame {
     /// It never turns about its direction (Bishop 1975; Wang et al. 2008).
     #[default]
     Minimal,
     /// Its upward axis is as near to the upward direction as it can be.
     Fixed,
-    /// As the path's principal normal has it, without its half turns: they are undone where the
+    /// As the path's principal normal has it, without its flips by 180°: they are undone where the
     /// path has an inflection and where its second derivative jumps.
     Frenet,
 }
 
-/// What becomes of the angle by which a minimal frame is off after one round of a closed path.
+/// What is done with the angle by which a minimal frame is off after one round of a closed path.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Twist {
     /// It is spread evenly over the path, so that the last pose is the first.
@@ -100,24 +101,6 @@ pub enum Twist {
     Spread,
     /// It stays.
     Free,
-}
-
-/// When a body is where on its path.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub enum PathSpeed {
-    /// As the key times say.
-    #[default]
-    Keys,
-    /// At one speed from the first key time to the last.
-    Constant,
-    /// From rest to rest: the speed grows over the first part of the time and falls over the last
-    /// (smoothstep), and is constant between.
-    Eased {
-        /// The part of the time in which the speed grows.
-        start: f64,
-        /// The part of the time in which it falls; both parts together are at most 1.
-        end: f64,
-    },
 }
 
 /// An axis of a body: x, y or z (0, 1 or 2) and its sign.
@@ -132,7 +115,9 @@ impl std::str::FromStr for BodyAxis {
             Some(letter) => (-1.0, letter),
             None => (1.0, name.strip_prefix('+').unwrap_or(name)),
         };
-        let axis = ["x", "y", "z"].iter().position(|own| *own == letter);
+        let axis = ["x", "y", "z"]
+            .iter()
+            .position(|axis_name| *axis_name == letter);
         axis.map(|axis| Self(axis, sign)).ok_or(FollowError::Axes)
     }
 }
@@ -157,7 +142,7 @@ impl Follow {
                 return Err(FollowError::Point { point });
             }
             Direction::Tangent => {}
-            _ if self.frame == Frame::Frenet => return Err(FollowError::FrenetAside),
+            _ if self.frame == PathFrame::Frenet => return Err(FollowError::FrenetAside),
             _ => {}
         }
         if let PathSpeed::Eased { start, end } = self.speed {
@@ -174,7 +159,7 @@ impl Follow {
     }
 
     /// The rotation from the body's own axes to z forward, y up.
-    pub(crate) fn body(&self) -> DQuat {
+    pub(crate) fn body_axes(&self) -> DQuat {
         let [forward, up] = self.axes.map(BodyAxis::vector);
         let axes = glam::DMat3::from_cols(up.cross(forward), up, forward);
         DQuat::from_mat3(&axes).conjugate()
@@ -185,14 +170,14 @@ impl Follow {
     }
 }
 
-/// Why bodies cannot follow as asked. Places count from 0.
+/// Why bodies cannot follow as asked. Indices count from 0.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum FollowError {
     /// The track has no translations.
     #[error("track {track} has no path; give it translations, or push it as a path")]
     NoPath {
-        /// The track's place in the set.
+        /// The track's index in the set.
         track: usize,
     },
     /// A closed path's ends are apart.
@@ -200,7 +185,7 @@ pub enum FollowError {
         "track {track}: the last point of the loop is {gap:e} from the first, more than a millionth of its size; repeat the first point at the end"
     )]
     OpenLoop {
-        /// The track's place in the set.
+        /// The track's index in the set.
         track: usize,
         /// The distance.
         gap: f64,
@@ -208,7 +193,7 @@ pub enum FollowError {
     /// No direction.
     #[error("the upward direction ({}, {}, {}) has no length", up.x, up.y, up.z)]
     Up {
-        /// What was given.
+        /// The value.
         up: DVec3,
     },
     /// An upward direction at a key, with a frame that has its own.
@@ -217,31 +202,33 @@ pub enum FollowError {
          frame, or leave the directions out"
     )]
     UpsUnused {
-        /// The track's place in the set.
+        /// The track's index in the set.
         track: usize,
     },
     /// The distance must be positive.
     #[error("the body cannot look {distance} ahead; give a distance above 0")]
     Ahead {
-        /// What was given.
+        /// The value.
         distance: f64,
     },
     /// The point is not finite.
     #[error("the body cannot look at ({}, {}, {}); give finite numbers", point.x, point.y, point.z)]
     Point {
-        /// What was given.
+        /// The value.
         point: DVec3,
     },
     /// There is no track to look at.
-    #[error("track {track} cannot look at track {target}, which the set has not")]
+    #[error("track {track} cannot look at track {target}: the set has no such track")]
     Target {
-        /// The track's place in the set.
+        /// The track's index in the set.
         track: usize,
         /// The track to look at.
         target: usize,
     },
     /// Frenet's frame belongs to the tangent.
-    #[error("Frenet's frame faces along the path; choose another frame, or the tangent")]
+    #[error(
+        "Frenet's frame faces along the path only; choose another frame, or the tangent as the direction"
+    )]
     FrenetAside,
     /// The parts must be between 0 and 1, together too.
     #[error(
@@ -257,26 +244,26 @@ pub enum FollowError {
     #[error(transparent)]
     Stopped(#[from] Stopped),
     /// Forward and upward must be different axes.
-    #[error("a body's forward and upward axes are two different ones of x, y, z, -x, -y, -z")]
+    #[error("a body's forward and upward axes must be two different ones of x, y, z, -x, -y, -z")]
     Axes,
 }
 
-/// What is unusual about a path that is followed all the same.
+/// Something unusual about a path, which is followed all the same.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum FollowWarning {
     /// There is no direction.
     #[error("track {track} stands still; it looks along +z")]
     StandsStill {
-        /// The track's place in the set.
+        /// The track's index in the set.
         track: usize,
     },
     /// Both ways round are equally far.
     #[error(
-        "track {track}: the turn left over about the path is 180°; it could go either way round"
+        "track {track}: the roll left over at the end of the path is 180°, so its direction is ambiguous"
     )]
     HalfTurn {
-        /// The track's place in the set.
+        /// The track's index in the set.
         track: usize,
     },
 }

@@ -71,8 +71,8 @@ impl Polynomial {
             c0 + c1 + c2 + c3,
         ];
         let middle = control.iter().sum::<DVec3>();
-        let far = tolerance * middle.length();
-        if control.iter().all(|point| point.dot(middle) > far) {
+        let limit = tolerance * middle.length();
+        if control.iter().all(|point| point.dot(middle) > limit) {
             return None;
         }
         let derivative = self.derivative();
@@ -114,23 +114,23 @@ mod tests {
     /// Catches a zero that is missed, and a rest that is not the direction beside it.
     #[test]
     fn zeros_are_divided_out() {
-        let way = Polynomial([DVec3::X, DVec3::Y, DVec3::Z, DVec3::ZERO]);
+        let direction = Polynomial([DVec3::X, DVec3::Y, DVec3::Z, DVec3::ZERO]);
         let times = |p: &Polynomial, zero: f64| {
             let [c0, c1, c2, _] = p.0;
             Polynomial([c0 * -zero, c0 - c1 * zero, c1 - c2 * zero, c2])
         };
         for zero in [0.0, 0.3, 0.77, 1.0] {
-            let (zeros, rest) = times(&way, zero).without_zeros(1e-12);
+            let (zeros, rest) = times(&direction, zero).without_zeros(1e-12);
             assert!(
                 zeros.len() == 1 && (zeros[0] - zero).abs() < 1e-9,
                 "{zeros:?}"
             );
-            assert!((rest.at(0.4) - way.at(0.4)).length() < 1e-9);
+            assert!((rest.at(0.4) - direction.at(0.4)).length() < 1e-9);
         }
         let line = Polynomial([DVec3::X, DVec3::ZERO, DVec3::ZERO, DVec3::ZERO]);
         let twice = times(&times(&line, 0.25), 0.25);
         let (zeros, _) = twice.without_zeros(1e-12);
         assert_eq!(zeros.len(), 2, "{zeros:?}");
-        assert!(way.without_zeros(1e-12).0.is_empty());
+        assert!(direction.without_zeros(1e-12).0.is_empty());
     }
 }

@@ -9,26 +9,27 @@ use crate::curve::options::{Axes, Quantity};
 use crate::math::canonical::round_quat;
 use crate::method::bessel_overhauser::BESSEL_OVERHAUSER;
 use crate::method::interpolation::Interpolation;
-use crate::path::carry::Uncarried;
+use crate::path::body::BodyOnPath;
+use crate::path::carry::RelativePieces;
 use crate::path::fit::fit;
-use crate::path::frames::Frames;
-use crate::path::options::{Direction, Follow, FollowError, FollowWarning, Frame, Twist};
+use crate::path::options::{Direction, Follow, FollowError, FollowWarning, PathFrame, Twist};
 use crate::path::rolls::is_half_turn;
-use crate::path::route::{Route, Stretch, diagonal, stretches};
-use crate::path::sample::{Kind, Sampler, Span};
+use crate::path::sample::{SampleKind, Sampler, Span};
+use crate::path::stretch::{PathStretch, stretches};
+use crate::path::timed_path::{TimedPath, diagonal};
 use crate::prepare::clip_data::ClipData;
 use crate::prepare::prepared::Prepared;
 use crate::prepare::vectors;
 use crate::threads::stop;
-use crate::time::spans::{NONE, Source};
+use crate::time::spans::{NONE, SpanSource};
 use crate::tracks::set::TrackSet;
-use crate::tracks::vectors::{Channel, VectorTrack};
+use crate::tracks::set::vectors::{Channel, VectorTrack};
 
 /// The most keys, beside those of one path, that are followed together: as many as fill the vector
 /// lanes, and whose numbers stay in a thread's cache.
-const TOGETHER: usize = 256;
+const MAX_BATCH_KEYS: usize = 256;
 
-/// Prepared positions and rotations, and what is unusual about them.
+/// Prepared positions and rotations, and warnings about them.
 pub(crate) struct PreparedPaths {
     pub(crate) positions: ClipData,
     pub(crate) rotations: ClipData,
@@ -36,7 +37,7 @@ pub(crate) struct PreparedPaths {
 }
 
 /// The largest gap of a closed path, as a part of its size.
-const GAP: f64 = 1e-6;
+const MAX_GAP: f64 = 1e-6;
 
 impl PreparedPaths {
     /// Prepares the paths of all tracks of a set. Segments of at most `group_bytes` go into one
@@ -64,7 +65,9 @@ impl PreparedPaths {
         let batches: Vec<_> = batches(set).into_par_iter().map(prepared).collect();
         // Of several errors that of the first track counts.
         let batches = batches.into_iter().collect::<Result<Vec<_>, _>>()?;
-        let batches = batches.into_iter().map(|([a, b], own)| ((a, b), own));
+        let batches = batches
+            .into_iter()
+            .map(|([a, b], batch_warnings)| ((a, b), batch_warnings));
         let ((of_positions, of_rotations), warnings): ((Vec<_>, Vec<_>), Vec<_>) = batches.unzip();
         Ok(Self {
             positions: ClipData::of_groups(of_positions, set, positions, group_bytes),
@@ -81,7 +84,7 @@ fn batches(set: &TrackSet) -> Vec<Range<usize>> {
         let path = set.vectors(Channel::Translation, track);
         keys += path.map_or(0, |path| path.keys.len());
         match all.last_mut() {
-            Some(last) if keys <= TOGETHER => last.end += 1,
+            Some(last) if keys <= MAX_BATCH_KEYS => last.end += 1,
             _ => {
                 keys = 0;
                 all.push(track..track + 1);
@@ -97,13 +100,13 @@ fn path_of<'a>(
     track: usize,
     follow: &Follow,
 ) -> Result<&'a VectorTrack, FollowError> {
-    let own = set.vectors(Channel::Translation, track);
-    let path = own.ok_or(FollowError::NoPath { track })?;
+    let translations = set.vectors(Channel::Translation, track);
+    let path = translations.ok_or(FollowError::NoPath { track })?;
     if follow.is_closed() {
         let keys = path.keys.iter().map(|key| key.as_dvec3());
         let (first, last) = (path.keys[0], path.keys[path.keys.len() - 1]);
         let gap = (last.as_dvec3() - first.as_dvec3()).length();
-        if gap > GAP * diagonal(keys) {
+        if gap > MAX_GAP * diagonal(keys) {
             return Err(FollowError::OpenLoop { track, gap });
         }
     }
@@ -116,11 +119,11 @@ fn body_on(
     set: &TrackSet,
     track: usize,
     follow: &Follow,
-) -> Result<Frames, FollowError> {
-    if follow.frame != Frame::Minimal && path.ups.iter().any(Option::is_some) {
+) -> Result<BodyOnPath, FollowError> {
+    if follow.frame != PathFrame::Minimal && path.ups.iter().any(Option::is_some) {
         return Err(FollowError::UpsUnused { track });
     }
-    let route = Route::new(path, follow);
+    let timed_path = TimedPath::new(path, follow);
     stop::check()?;
     // The body that others look at looks along its own path.
     let direction = match follow.direction {
@@ -133,89 +136,93 @@ fn body_on(
         }
         Direction::Track(target) => {
             let path = path_of(set, target, follow)?;
-            Some(Arc::new(Route::new(path, follow)))
+            Some(Arc::new(TimedPath::new(path, follow)))
         }
         _ => None,
     };
-    let stretches = stretches(&route, direction, target.as_ref());
+    let stretches = stretches(&timed_path, direction, target.as_ref());
     stop::check()?;
-    Ok(Frames::new(route, stretches, follow))
+    Ok(BodyOnPath::new(timed_path, stretches, follow))
 }
 
-/// The positions and rotations of some tracks, and what is unusual about them.
+/// The positions and rotations of some tracks, and warnings about them.
 fn prepared(
     set: &TrackSet,
     tracks: Range<usize>,
     follow: &Follow,
     interpolations: [&Interpolation; 2],
 ) -> Result<([Prepared; 2], Vec<FollowWarning>), FollowError> {
-    let (mut points, mut paths) = (Vec::new(), Vec::new());
+    let (mut paths, mut bodies) = (Vec::new(), Vec::new());
     for track in tracks.clone() {
         let path = path_of(set, track, follow)?;
-        paths.push(body_on(path, set, track, follow)?);
+        bodies.push(body_on(path, set, track, follow)?);
         stop::check()?;
-        points.push(path);
+        paths.push(path);
     }
-    let minimal = (paths.iter()).filter(|_| follow.frame == Frame::Minimal);
-    let carried = minimal.flat_map(|own| own.stretches.iter().map(|stretch| (&own.route, stretch)));
-    let uncarried = Uncarried::new(&carried.collect::<Vec<_>>());
+    let minimal = (bodies.iter()).filter(|_| follow.frame == PathFrame::Minimal);
+    let carried = minimal.flat_map(|body| {
+        body.stretches
+            .iter()
+            .map(|stretch| (&body.timed_path, stretch))
+    });
+    let relative_pieces = RelativePieces::new(&carried.collect::<Vec<_>>());
     stop::check()?;
     let (mut first_stretch, mut spans, mut warnings) = (0, Vec::new(), Vec::new());
-    for (place, (path, own)) in points.iter().zip(&mut paths).enumerate() {
-        let (track, count) = (tracks.start + place, own.stretches.len());
-        own.turn(follow, &path.ups, &uncarried, first_stretch);
+    for (i, (path, body)) in paths.iter().zip(&mut bodies).enumerate() {
+        let (track, count) = (tracks.start + i, body.stretches.len());
+        body.find_rotations(follow, &path.ups, &relative_pieces, first_stretch);
         first_stretch += count;
         if count == 0 {
             warnings.push(FollowWarning::StandsStill { track });
-        } else if is_half_turn(own.left_over) {
+        } else if is_half_turn(body.left_over) {
             warnings.push(FollowWarning::HalfTurn { track });
         }
-        add_spans(&mut spans, own, place);
+        add_spans(&mut spans, body, i);
     }
-    let adding = Adding {
+    let adding = PathPreparation {
         first_track: tracks.start,
-        points: &points,
         paths: &paths,
+        bodies: &bodies,
         spans: &spans,
         follow,
         interpolation: interpolations[0],
     };
     let [mut positions, mut rotations] = interpolations.map(Prepared::new);
-    adding.add(&mut positions, Kind::Vector);
+    adding.add(&mut positions, SampleKind::Vector);
     stop::check()?;
-    adding.add(&mut rotations, Kind::Rotation);
+    adding.add(&mut rotations, SampleKind::Rotation);
     stop::check()?;
     Ok(([positions, rotations], warnings))
 }
 
 /// The stretches of a path that are used: of one on which a body stands the first alone.
-fn used(frames: &Frames) -> &[Stretch] {
-    let all = &frames.stretches[..];
-    match frames.route.stands() {
+fn used(body: &BodyOnPath) -> &[PathStretch] {
+    let all = &body.stretches[..];
+    match body.timed_path.stands() {
         true => &all[..all.len().min(1)],
         false => all,
     }
 }
 
 /// Adds the spans of a path: those of its stretches, cut where the speed is not smooth.
-fn add_spans(spans: &mut Vec<Span>, frames: &Frames, path: usize) {
-    let (route, used) = (&frames.route, used(frames));
-    let (start, end) = route.span();
-    for (stretch, own) in used.iter().enumerate() {
-        let is_last = stretch + 1 == used.len();
-        let mut from = match route.stands() {
+fn add_spans(spans: &mut Vec<Span>, body: &BodyOnPath, path: usize) {
+    let (timed_path, used) = (&body.timed_path, used(body));
+    let (start, end) = timed_path.span();
+    for (index, stretch) in used.iter().enumerate() {
+        let is_last = index + 1 == used.len();
+        let mut from = match timed_path.stands() {
             true => start,
-            false => route.time(own.interval, own.from),
+            false => timed_path.time(stretch.interval, stretch.from),
         };
         let to = match is_last {
             true => end,
-            false => route.time(own.interval, own.to),
+            false => timed_path.time(stretch.interval, stretch.to),
         };
-        for joint in route.joints(from..to).chain([to]) {
+        for joint in timed_path.joints(from..to).chain([to]) {
             if joint > from {
                 spans.push(Span {
                     path: path as u32,
-                    stretch: stretch as u32,
+                    stretch: index as u32,
                     from,
                     to: joint,
                 });
@@ -226,11 +233,11 @@ fn add_spans(spans: &mut Vec<Span>, frames: &Frames, path: usize) {
 }
 
 /// Adds the positions or the rotations of tracks.
-struct Adding<'a> {
+struct PathPreparation<'a> {
     first_track: usize,
     /// The path of each track, and the body on it.
-    points: &'a [&'a VectorTrack],
-    paths: &'a [Frames],
+    paths: &'a [&'a VectorTrack],
+    bodies: &'a [BodyOnPath],
     /// Those of the first path, then those of the next.
     spans: &'a [Span],
     follow: &'a Follow,
@@ -238,43 +245,44 @@ struct Adding<'a> {
     interpolation: &'a Interpolation,
 }
 
-impl Adding<'_> {
-    fn add(&self, prepared: &mut Prepared, kind: Kind) {
+impl PathPreparation<'_> {
+    fn add(&self, prepared: &mut Prepared, kind: SampleKind) {
         let follow = self.follow;
-        let is_fitted = |path: &Frames| kind == Kind::Rotation || path.route.is_retimed();
-        let of_fitted = |span: &Span| is_fitted(&self.paths[span.path as usize]);
-        let own: Vec<Span> = self.spans.iter().copied().filter(of_fitted).collect();
-        let mut sampler = Sampler::new(self.paths, kind, follow);
-        let fitted = fit(prepared, &own, &mut sampler);
-        let is_spread = follow.frame != Frame::Minimal || follow.twist == Twist::Spread;
-        let repeats = follow.is_closed() && (kind == Kind::Vector || is_spread);
+        let is_fitted =
+            |path: &BodyOnPath| kind == SampleKind::Rotation || path.timed_path.is_retimed();
+        let of_fitted = |span: &Span| is_fitted(&self.bodies[span.path as usize]);
+        let fitted_spans: Vec<Span> = self.spans.iter().copied().filter(of_fitted).collect();
+        let mut sampler = Sampler::new(self.bodies, kind, follow);
+        let fitted = fit(prepared, &fitted_spans, &mut sampler);
+        let is_spread = follow.frame != PathFrame::Minimal || follow.twist == Twist::Spread;
+        let repeats = follow.is_closed() && (kind == SampleKind::Vector || is_spread);
         let (mut pieces, mut next) = (&fitted.pieces[..], 0);
-        for (path, frames) in self.paths.iter().enumerate() {
-            let (track, times) = (self.first_track + path, &frames.route.times);
-            if frames.stretches.is_empty() || !is_fitted(frames) {
+        for (path, body) in self.bodies.iter().enumerate() {
+            let (track, times) = (self.first_track + path, &body.timed_path.times);
+            if body.stretches.is_empty() || !is_fitted(body) {
                 match kind {
                     // Positions at the times of the keys are cubics already.
-                    Kind::Vector => vectors::add(
+                    SampleKind::Vector => vectors::add(
                         prepared,
                         track,
-                        self.points[path],
+                        self.paths[path],
                         follow.method,
                         self.interpolation,
                     ),
                     // A body that never moves looks along +z.
-                    Kind::Rotation => {
-                        let values = [follow.body().to_array(); 2];
+                    SampleKind::Rotation => {
+                        let values = [follow.body_axes().to_array(); 2];
                         add_part(prepared, track, times, &[], values, true);
                     }
                 }
                 continue;
             }
             let first = next;
-            next = own.partition_point(|span| span.path as usize <= path);
-            let (spans, ends) = (&own[first..next], &fitted.ends[first..next]);
-            let (start, end) = frames.route.span();
-            let last = used(frames).len() - 1;
-            // Most often a span begins or ends there.
+            next = fitted_spans.partition_point(|span| span.path as usize <= path);
+            let (spans, ends) = (&fitted_spans[first..next], &fitted.ends[first..next]);
+            let (start, end) = body.timed_path.span();
+            let last = used(body).len() - 1;
+            // Usually a span begins or ends there.
             let starts = |span: &&Span| span.stretch == 0 && span.from == start;
             let arrives = |span: &&Span| span.stretch as usize == last && span.to == end;
             let first_value = match spans.first().filter(starts) {
@@ -295,12 +303,12 @@ impl Adding<'_> {
 }
 
 /// Adds a part: a track with keys at these times, and its pieces of spans. The first and last values
-/// are held outside; if it repeats, the last is the first.
+/// are used outside the keys; if it repeats, the last is the first.
 fn add_part(
     prepared: &mut Prepared,
     track: usize,
     times: &[f64],
-    pieces: &[(u32, f64, Source)],
+    pieces: &[(u32, f64, SpanSource)],
     values: [[f64; 4]; 2],
     repeats: bool,
 ) {

@@ -9,17 +9,17 @@ pub(crate) struct Rolls(Vec<[f64; 3]>);
 impl Rolls {
     /// Through these points: lengths, which do not decrease, and angles.
     pub(crate) fn through(points: &[(f64, f64)]) -> Self {
-        let mut own: Vec<(f64, f64)> = Vec::with_capacity(points.len());
+        let mut keys: Vec<(f64, f64)> = Vec::with_capacity(points.len());
         for &point in points {
-            match own.last_mut() {
+            match keys.last_mut() {
                 Some(last) if point.0 <= last.0 => *last = point,
-                _ => own.push(point),
+                _ => keys.push(point),
             }
         }
-        let last = own.len().saturating_sub(1);
-        let secant = |i: usize| (own[i + 1].1 - own[i].1) / (own[i + 1].0 - own[i].0);
+        let last = keys.len().saturating_sub(1);
+        let secant = |i: usize| (keys[i + 1].1 - keys[i].1) / (keys[i + 1].0 - keys[i].0);
         let inner = |i: usize| {
-            let (l, r) = (own[i].0 - own[i - 1].0, own[i + 1].0 - own[i].0);
+            let (l, r) = (keys[i].0 - keys[i - 1].0, keys[i + 1].0 - keys[i].0);
             (secant(i - 1) * r + secant(i) * l) / (l + r)
         };
         let slope = |i: usize| match i {
@@ -29,8 +29,8 @@ impl Rolls {
             i if i == last => 2.0 * secant(last - 1) - inner(last - 1),
             i => inner(i),
         };
-        let row = |i: usize| [own[i].0, own[i].1, slope(i)];
-        Self((0..own.len()).map(row).collect())
+        let row = |i: usize| [keys[i].0, keys[i].1, slope(i)];
+        Self((0..keys.len()).map(row).collect())
     }
 
     /// Whether there are any but one for all.
@@ -60,12 +60,12 @@ pub(crate) fn wrapped(angle: f64) -> f64 {
     angle - TAU * (angle / TAU).round()
 }
 
-/// The angle modulo a turn that is nearest to another.
+/// The angle, plus a multiple of 360°, that is nearest to another.
 pub(crate) fn unwrapped(angle: f64, near: f64) -> f64 {
     near + wrapped(angle - near)
 }
 
-/// Whether an angle left over goes either way round.
+/// Whether an angle is 180°, so that it could be undone in either direction.
 pub(crate) fn is_half_turn(angle: f64) -> bool {
     wrapped(angle).abs() > PI - 1e-6
 }

@@ -6,17 +6,17 @@ use crate::output::rotations::{Layout, Rotations, Vectors};
 use crate::path::options::{Follow, FollowError, FollowWarning};
 use crate::path::prepare::PreparedPaths;
 use crate::threads::{on_threads, stop};
-use crate::time::frames::Frames;
+use crate::time::frames::SampleTimes;
 use crate::tracks::set::TrackSet;
 
-/// Where the bodies on a set's paths are at every sample, and how they are turned.
+/// The positions and rotations of the bodies on a set's paths at every sample.
 #[derive(Debug)]
 pub struct Followed {
     /// Positions.
     pub positions: Vectors,
     /// Rotations from the body's axes to the world's.
     pub rotations: Rotations,
-    /// What is unusual about some paths.
+    /// Warnings about some paths.
     pub warnings: Vec<FollowWarning>,
 }
 
@@ -26,12 +26,12 @@ impl Engine {
     ///
     /// ```
     /// use glam::Vec3;
-    /// use tumble::{Device, Engine, Follow, Frames, Layout, TrackSet};
+    /// use tumble::{Device, Engine, Follow, SampleTimes, Layout, TrackSet};
     /// let mut set = TrackSet::new();
     /// let points = [Vec3::ZERO, Vec3::new(1.0, 2.0, 0.0), Vec3::new(3.0, 3.0, 1.0)];
     /// set.push_path("car", &[0.0, 1.0, 2.5], &points, &[])?;
     /// let engine = Engine::new(Device::Cpu)?;
-    /// let frames = Frames::fps(60);
+    /// let frames = SampleTimes::fps(60);
     /// let found = engine.follow(&set, &Follow::default(), &frames, Layout::TrackMajor)?;
     /// assert_eq!(found.positions.get(0, 60), Some(points[1]));
     /// let forward = found.rotations.get(0, 60).unwrap() * Vec3::Z;
@@ -46,7 +46,7 @@ impl Engine {
         &self,
         set: &TrackSet,
         follow: &Follow,
-        frames: &Frames,
+        frames: &SampleTimes,
         layout: Layout,
     ) -> Result<Followed, Error> {
         let group_bytes = self.backend.group_bytes();

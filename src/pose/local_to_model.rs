@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use crate::engine::Engine;
 use crate::error::Error;
-use crate::evaluate::uploaded::Backend;
+use crate::evaluate::backend::Backend;
 use crate::math::canonical::canonical;
 use crate::memory::zeroed;
 use crate::output::encoding::MatrixOrder;
@@ -19,18 +19,18 @@ use crate::threads::on_threads;
 use crate::twin::matrix;
 
 /// The three rows of an affine matrix for column vectors.
-type Rows = [[f32; 4]; 3];
+type AffineRows = [[f32; 4]; 3];
 
 impl Engine {
     /// Walks a skeleton from its roots down: `M = M_parent T R S` for every joint, with its
-    /// translation, rotation and scale, and `M B` where inverse bind matrices `B` are given, one for
+    /// translation, rotation and scale, and `M B` with inverse bind matrices `B`, one for
     /// each track, as a renderer skins vertices with. The translation of a track that has keys of it
-    /// takes the place of the skeleton's offset, as in glTF and BVH; other tracks stay at their
+    /// replaces the skeleton's offset, as in glTF and BVH; other tracks stay at their
     /// offsets. The host computes them in f32 for every device, so the bits are the same.
     ///
     /// ```
     /// # use glam::{Quat, Vec3};
-    /// # use tumble::{Device, Engine, Frames, Layout, Skeleton, TrackSet, VectorMethod, method};
+    /// # use tumble::{Device, Engine, SampleTimes, Layout, Skeleton, TrackSet, VectorMethod, method};
     /// let mut set = TrackSet::new();
     /// set.push("hip", &[0.0], &[Quat::IDENTITY])?;
     /// set.push("knee", &[0.0], &[Quat::IDENTITY])?;
@@ -38,7 +38,7 @@ impl Engine {
     /// let offsets = vec![Vec3::ZERO, Vec3::new(0.0, -0.5, 0.0)];
     /// let skeleton = Skeleton::new(vec![None, Some(0)], offsets)?;
     /// let engine = Engine::new(Device::Cpu)?;
-    /// let (frames, layout) = (Frames::at(vec![0.75]), Layout::FrameMajor);
+    /// let (frames, layout) = (SampleTimes::at(vec![0.75]), Layout::FrameMajor);
     /// let local = engine.transforms(&set, method::SLERP, VectorMethod::Linear, &frames, layout)?;
     /// let model = engine.local_to_model(&local, &skeleton, None)?;
     /// assert_eq!(model.position(0, 0), Some(Vec3::new(0.0, 1.0, 0.75)));
@@ -48,7 +48,7 @@ impl Engine {
     ///
     /// # Errors
     /// When the three are not of the same tracks and samples, the skeleton or the inverse bind
-    /// matrices are of other tracks, or there is not the memory.
+    /// matrices are of other tracks, or there is not enough memory.
     #[doc(alias = "skinning")]
     #[doc(alias = "model space")]
     #[doc(alias = "object space")]
@@ -59,26 +59,31 @@ impl Engine {
         inverse_bind: Option<&[Affine3A]>,
     ) -> Result<ModelMatrices, Error> {
         let (tracks, samples) = (local.rotations.tracks(), local.rotations.samples());
-        local.check()?;
+        check(local)?;
         if skeleton.len() != tracks {
-            let given = skeleton.len();
-            return Err(PoseError::Skeleton { given, tracks }.into());
+            let joints = skeleton.len();
+            return Err(PoseError::Skeleton {
+                skeleton_tracks: joints,
+                tracks,
+            }
+            .into());
         }
-        if let Some(given) = inverse_bind.map(<[_]>::len)
-            && given != tracks
+        if let Some(bind) = inverse_bind
+            && bind.len() != tracks
         {
-            return Err(PoseError::InverseBind { given, tracks }.into());
+            let matrices = bind.len();
+            return Err(PoseError::InverseBind { matrices, tracks }.into());
         }
         let count = tracks.saturating_mul(samples);
-        let mut matrices: Vec<Rows> = zeroed(count, "model matrices")?;
+        let mut matrices: Vec<AffineRows> = zeroed(count, "model matrices")?;
         let links = skeleton.links();
-        let bind: Option<Vec<Rows>> =
+        let bind: Option<Vec<AffineRows>> =
             inverse_bind.map(|all| all.iter().map(|&matrix| rows(matrix)).collect());
-        let walk = || {
+        let walk_all = || {
             let frames = matrices.par_chunks_mut(tracks.max(1)).enumerate();
             frames.for_each(|(sample, model)| {
                 for link in links {
-                    local.walk(link, sample, model);
+                    walk(local, link, sample, model);
                 }
                 for (matrix, bind) in model.iter_mut().zip(bind.iter().flatten()) {
                     *matrix = product(matrix, bind);
@@ -89,8 +94,8 @@ impl Engine {
             });
         };
         match &*self.backend {
-            Backend::Cpu(engine) => engine.on_threads(walk),
-            Backend::Vulkan(_) => on_threads(walk),
+            Backend::Cpu(engine) => engine.on_threads(walk_all),
+            Backend::Vulkan(_) => on_threads(walk_all),
         }?;
         Ok(ModelMatrices {
             matrices,
@@ -100,65 +105,63 @@ impl Engine {
     }
 }
 
-impl Transforms {
-    /// Refuses translations, rotations and scales of different shapes.
-    fn check(&self) -> Result<(), PoseError> {
-        let first = self.rotations.shape();
-        let others = [self.translations.shape(), self.scales.shape()];
-        if let Some(place) = others.iter().position(|shape| *shape != first) {
-            return Err(PoseError::Shape {
-                layer: place + 1,
-                given: others[place],
-                first,
-            });
-        }
-        let (given, tracks) = (self.has_translation.len(), self.rotations.tracks());
-        match given == tracks {
-            true => Ok(()),
-            false => Err(PoseError::HasTranslation { given, tracks }),
-        }
+/// Refuses translations, rotations and scales of different shapes.
+fn check(local: &Transforms) -> Result<(), PoseError> {
+    let first = local.rotations.shape();
+    let others = [local.translations.shape(), local.scales.shape()];
+    if let Some(index) = others.iter().position(|shape| *shape != first) {
+        return Err(PoseError::Shape {
+            layer: index + 1,
+            shape: others[index],
+            first,
+        });
     }
-
-    /// Finds the matrix of one joint, after that of its parent.
-    fn walk(&self, link: &Link, sample: usize, model: &mut [Rows]) {
-        let (track, layout) = (link.track as usize, self.rotations.layout());
-        let (tracks, samples) = (self.rotations.tracks(), self.rotations.samples());
-        let place = layout.place(track, sample, tracks, samples);
-        let [sx, sy, sz, _] = self.scales.as_arrays()[place];
-        let [tx, ty, tz, _] = self.translations.as_arrays()[place];
-        let hung = match self.has_translation[track] {
-            true => [tx, ty, tz],
-            false => link.offset,
-        };
-        let turned = matrix::rows(
-            self.rotations.as_arrays()[place],
-            MatrixOrder::RowMajor as u32,
-        );
-        let row = |i: usize| {
-            let [x, y, z]: [f32; 3] = turned[i];
-            [x * sx, y * sy, z * sz, hung[i]]
-        };
-        let own = [row(0), row(1), row(2)];
-        model[track] = match link.parent {
-            ROOT => own,
-            parent => product(&model[parent as usize], &own),
-        };
+    let (entries, tracks) = (local.has_translation.len(), local.rotations.tracks());
+    match entries == tracks {
+        true => Ok(()),
+        false => Err(PoseError::HasTranslation { entries, tracks }),
     }
 }
 
+/// Finds the matrix of one joint, after that of its parent.
+fn walk(local: &Transforms, link: &Link, sample: usize, model: &mut [AffineRows]) {
+    let (track, layout) = (link.track as usize, local.rotations.layout());
+    let (tracks, samples) = (local.rotations.tracks(), local.rotations.samples());
+    let index = layout.offset(track, sample, tracks, samples);
+    let [sx, sy, sz, _] = local.scales.as_arrays()[index];
+    let [tx, ty, tz, _] = local.translations.as_arrays()[index];
+    let translation = match local.has_translation[track] {
+        true => [tx, ty, tz],
+        false => link.offset,
+    };
+    let rotated = matrix::rows(
+        local.rotations.as_arrays()[index],
+        MatrixOrder::RowMajor as u32,
+    );
+    let row = |i: usize| {
+        let [x, y, z]: [f32; 3] = rotated[i];
+        [x * sx, y * sy, z * sz, translation[i]]
+    };
+    let relative = [row(0), row(1), row(2)];
+    model[track] = match link.parent {
+        ROOT => relative,
+        parent => product(&model[parent as usize], &relative),
+    };
+}
+
 /// The product of two affine matrices.
-fn product(a: &Rows, b: &Rows) -> Rows {
+fn product(a: &AffineRows, b: &AffineRows) -> AffineRows {
     a.map(|[x, y, z, moved]| {
         let [mut row, second, third] = *b;
-        for ((own, second), third) in row.iter_mut().zip(second).zip(third) {
-            *own = (x * *own + y * second) + z * third;
+        for ((first, second), third) in row.iter_mut().zip(second).zip(third) {
+            *first = (x * *first + y * second) + z * third;
         }
         row[3] += moved;
         row
     })
 }
 
-fn rows(matrix: Affine3A) -> Rows {
+fn rows(matrix: Affine3A) -> AffineRows {
     let [x, y, z, moved] = matrix.to_cols_array_2d();
     std::array::from_fn(|i| [x[i], y[i], z[i], moved[i]])
 }
@@ -167,7 +170,7 @@ fn rows(matrix: Affine3A) -> Rows {
 /// vectors, the last column the translation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ModelMatrices {
-    matrices: Vec<Rows>,
+    matrices: Vec<AffineRows>,
     tracks: usize,
     samples: usize,
 }
@@ -208,8 +211,8 @@ impl ModelMatrices {
         Some(Vec3::from_array(rows.map(|[.., moved]| moved)))
     }
 
-    fn rows_of(&self, track: usize, sample: usize) -> Option<&Rows> {
-        let place = Layout::FrameMajor.index(track, sample, self.tracks, self.samples)?;
-        Some(&self.matrices[place])
+    fn rows_of(&self, track: usize, sample: usize) -> Option<&AffineRows> {
+        let index = Layout::FrameMajor.index(track, sample, self.tracks, self.samples)?;
+        Some(&self.matrices[index])
     }
 }

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use crate::engine::Engine;
 use crate::error::Error;
-use crate::evaluate::uploaded::Backend;
+use crate::evaluate::backend::Backend;
 use crate::gpu::engine::VulkanEngine;
 use crate::gpu::error::EvaluateError;
 use crate::memory::zeroed;
@@ -31,8 +31,8 @@ impl Engine {
         let Some((&(first, _), others)) = layers.split_first() else {
             return Err(PoseError::NoLayer.into());
         };
-        for (place, &(layer, _)) in (1..).zip(others) {
-            same_shape(first, layer, place)?;
+        for (index, &(layer, _)) in (1..).zip(others) {
+            same_shape(first, layer, index)?;
         }
         let weights: Vec<f32> = layers.iter().map(|&(_, weight)| weight).collect();
         let is_refused = |weight: &f32| weight.is_nan() || weight.abs() > LARGEST_WEIGHT;
@@ -49,7 +49,7 @@ impl Engine {
             let values: &[[f32; 4]] = bytemuck::cast_slice(&gathered);
             let Some(device) = device else {
                 let count = output.len();
-                let blended = |place| pose_blend::pose(values, &weights, count, place);
+                let blended = |index| pose_blend::pose(values, &weights, count, index);
                 return Ok(set_all(output, blended)?);
             };
             let inputs = [bytes(values), bytes(&weights)];
@@ -58,7 +58,7 @@ impl Engine {
         })
     }
 
-    /// Mixes two results: slerp, the shorter way, from every rotation of one to that of the other,
+    /// Mixes two results: slerp along the shorter arc from every rotation of one to that of the other,
     /// by `weight` from 0 to 1.
     ///
     /// # Errors
@@ -69,7 +69,7 @@ impl Engine {
         self.each_rotation(from, 1, |device, start, output| {
             let [a, b] = [from, to].map(|layer| values(layer, start, output.len()));
             let Some(device) = device else {
-                let mixed = |place: usize| pose_mix::pose(a[place], b[place], weight);
+                let mixed = |index: usize| pose_mix::pose(a[index], b[index], weight);
                 return Ok(set_all(output, mixed)?);
             };
             let weight = [weight];
@@ -95,44 +95,49 @@ impl Engine {
         same_shape(base, layer, 1)?;
         fraction(weight)?;
         if reference.len() != base.tracks() {
-            let (given, tracks) = (reference.len(), base.tracks());
-            return Err(PoseError::References { given, tracks }.into());
+            let (reference_count, tracks) = (reference.len(), base.tracks());
+            return Err(PoseError::References {
+                references: reference_count,
+                tracks,
+            }
+            .into());
         }
-        let mut own: Vec<[f32; 4]> = Vec::new();
+        let mut repeated: Vec<[f32; 4]> = Vec::new();
         self.each_rotation(base, 1, |device, start, output| {
             let [a, b] = [base, layer].map(|layer| values(layer, start, output.len()));
-            own.clear();
-            own.extend((start..start + output.len()).map(|place| {
+            repeated.clear();
+            repeated.extend((start..start + output.len()).map(|index| {
                 let track = match base.layout() {
-                    Layout::TrackMajor => place / base.samples(),
-                    Layout::FrameMajor => place % base.tracks(),
+                    Layout::TrackMajor => index / base.samples(),
+                    Layout::FrameMajor => index % base.tracks(),
                 };
                 reference[track].to_array()
             }));
             let Some(device) = device else {
-                let added = |place: usize| pose_add::pose(a[place], b[place], own[place], weight);
+                let added =
+                    |index: usize| pose_add::pose(a[index], b[index], repeated[index], weight);
                 return Ok(set_all(output, added)?);
             };
-            own.push([weight, 0.0, 0.0, 0.0]);
-            let inputs = [bytes(a), bytes(b), bytes(&own)];
+            repeated.push([weight, 0.0, 0.0, 0.0]);
+            let inputs = [bytes(a), bytes(b), bytes(&repeated)];
             Ok(device.pass(Kernel::PosesAdd, &inputs, [output.len(), 0], output)?)
         })
     }
 
-    /// Turns rotations in their parents' frames into rotations and positions in the world, at the
+    /// Converts rotations in their parents' frames to rotations and positions in the world, at the
     /// skeleton's offsets. With translations and scales [`Engine::local_to_model`] does so.
     ///
     /// ```
     /// # use glam::{Quat, Vec3};
-    /// # use tumble::{Device, Engine, Frames, Skeleton, TrackSet, method};
+    /// # use tumble::{Device, Engine, SampleTimes, Skeleton, TrackSet, method};
     /// # let mut set = TrackSet::new();
     /// # let keys = [Quat::IDENTITY, Quat::from_rotation_z(std::f32::consts::FRAC_PI_2)];
     /// set.push("upper", &[0.0, 1.0], &keys)?;
     /// set.push("lower", &[0.0, 1.0], &[keys[0]; 2])?;
     /// let engine = Engine::new(Device::Cpu)?;
-    /// let local = engine.evaluate(&set, method::SLERP, &Frames::fps(1))?;
+    /// let local = engine.evaluate(&set, method::SLERP, &SampleTimes::fps(1))?;
     /// let world = engine.world(&local, &Skeleton::chain(2, 3.0)?)?;
-    /// // The lower box hangs at the end of the upper one, which has turned aside.
+    /// // The lower joint is at the end of the upper one, which has rotated aside.
     /// assert!(world.position(1, 1).unwrap().distance(Vec3::new(3.0, 0.0, 0.0)) < 1e-6);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
@@ -142,8 +147,12 @@ impl Engine {
     pub fn world(&self, local: &Rotations, skeleton: &Skeleton) -> Result<WorldPoses, Error> {
         let (tracks, samples) = (local.tracks(), local.samples());
         if skeleton.len() != tracks {
-            let given = skeleton.len();
-            return Err(PoseError::Skeleton { given, tracks }.into());
+            let joints = skeleton.len();
+            return Err(PoseError::Skeleton {
+                skeleton_tracks: joints,
+                tracks,
+            }
+            .into());
         }
         let links = skeleton.links();
         self.on_device(|device| {
@@ -156,9 +165,9 @@ impl Engine {
                 let count = output.len() / (2 * tracks);
                 frame_major.clear();
                 for frame in first..first + count {
-                    let own = (0..tracks)
-                        .map(|track| local.layout().place(track, frame, tracks, samples));
-                    frame_major.extend(own.map(|place| local.as_quats()[place].to_array()));
+                    let indices = (0..tracks)
+                        .map(|track| local.layout().offset(track, frame, tracks, samples));
+                    frame_major.extend(indices.map(|index| local.as_quats()[index].to_array()));
                 }
                 match device {
                     None => on_threads(|| {
@@ -190,8 +199,8 @@ impl Engine {
     ) -> Result<Rotations, Error> {
         self.on_device(|device| {
             let mut made = OutputBuffer::new(like.as_quats().len())?;
-            let most = (limit(device) / layers).clamp(1, usize::MAX / 4);
-            for (start, output) in (0..).step_by(most).zip(made.chunks_mut(most)) {
+            let max_len = (limit(device) / layers).clamp(1, usize::MAX / 4);
+            for (start, output) in (0..).step_by(max_len).zip(made.chunks_mut(max_len)) {
                 work(device, start, bytemuck::cast_slice_mut(output))?;
             }
             let (tracks, samples, layout) = like.shape();
@@ -214,7 +223,7 @@ impl Engine {
 /// Values that one pass takes on the CPU: enough for all threads, and gathered in 16 MiB.
 const CPU_PASS: usize = 1 << 20;
 
-/// The most values of 16 bytes that one pass takes.
+/// The largest number of values of 16 bytes in one pass.
 fn limit(device: Option<&VulkanEngine>) -> usize {
     device.map_or(CPU_PASS, VulkanEngine::window)
 }
@@ -244,14 +253,14 @@ impl WorldPoses {
     /// The rotation of a track at a sample; `None` out of range.
     #[must_use]
     pub fn rotation(&self, track: usize, sample: usize) -> Option<Quat> {
-        let place = self.place(track, sample)?;
-        Some(Quat::from_array(self.values[place]))
+        let index = self.index_of(track, sample)?;
+        Some(Quat::from_array(self.values[index]))
     }
 
     /// The position of a track at a sample, in the world; `None` out of range.
     #[must_use]
     pub fn position(&self, track: usize, sample: usize) -> Option<Vec3> {
-        let [x, y, z, _] = self.values[self.place(track, sample)? + 1];
+        let [x, y, z, _] = self.values[self.index_of(track, sample)? + 1];
         Some(Vec3::new(x, y, z))
     }
 
@@ -261,20 +270,20 @@ impl WorldPoses {
         &self.values
     }
 
-    fn place(&self, track: usize, sample: usize) -> Option<usize> {
-        let place = Layout::FrameMajor.index(track, sample, self.tracks, self.samples)?;
-        Some(2 * place)
+    fn index_of(&self, track: usize, sample: usize) -> Option<usize> {
+        let index = Layout::FrameMajor.index(track, sample, self.tracks, self.samples)?;
+        Some(2 * index)
     }
 }
 
 /// Refuses a layer of another shape than the first.
-fn same_shape(first: &Rotations, own: &Rotations, layer: usize) -> Result<(), PoseError> {
-    let (first, given) = (first.shape(), own.shape());
-    match first == given {
+fn same_shape(first: &Rotations, other: &Rotations, layer: usize) -> Result<(), PoseError> {
+    let (first, shape) = (first.shape(), other.shape());
+    match first == shape {
         true => Ok(()),
         false => Err(PoseError::Shape {
             layer,
-            given,
+            shape,
             first,
         }),
     }
@@ -298,13 +307,13 @@ pub(super) fn bytes<T: bytemuck::Pod>(values: &[T]) -> &[u8] {
 /// Values in one task of the CPU.
 const TASK: usize = 8192;
 
-struct Task<'a, F> {
+struct PoseTask<'a, F> {
     first: usize,
     output: &'a mut [[f32; 4]],
     pose: &'a F,
 }
 
-impl<F: Fn(usize) -> [f32; 4]> InLanes for Task<'_, F> {
+impl<F: Fn(usize) -> [f32; 4]> InLanes for PoseTask<'_, F> {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
         for (i, value) in self.output.iter_mut().enumerate() {
@@ -313,13 +322,13 @@ impl<F: Fn(usize) -> [f32; 4]> InLanes for Task<'_, F> {
     }
 }
 
-/// Sets the values at all places, on the CPU.
+/// Sets all values, on the CPU.
 fn set_all(
     output: &mut [[f32; 4]],
     pose: impl Fn(usize) -> [f32; 4] + Sync,
 ) -> Result<(), OutOfThreads> {
     let task = |(task, output): (usize, &mut [[f32; 4]])| {
-        in_lanes(&mut Task {
+        in_lanes(&mut PoseTask {
             first: task * TASK,
             output,
             pose: &pose,

@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use crate::math::canonical::canonical;
 use crate::memory::reserved;
-use crate::output::pose_error::{MOST_TRACKS, SkeletonError};
+use crate::output::pose_error::{MAX_TRACKS, SkeletonError};
 use crate::shader::{Link, ROOT};
 
 /// The parent of each track, and its offset in the parent's frame.
@@ -22,7 +22,7 @@ impl Skeleton {
     /// A [`SkeletonError`] that names the track.
     pub fn new(parents: Vec<Option<usize>>, offsets: Vec<Vec3>) -> Result<Self, SkeletonError> {
         let tracks = parents.len();
-        if tracks > MOST_TRACKS {
+        if tracks > MAX_TRACKS {
             return Err(SkeletonError::TooMany { tracks });
         }
         if offsets.len() != tracks {
@@ -72,17 +72,17 @@ impl Skeleton {
         Ok(Self { links })
     }
 
-    /// A chain of boxes: the first hangs at the origin, each other at the lower end of
+    /// A chain of joints: the first is at the origin, each other at the lower end of
     /// the one before it, `(0, -length, 0)`.
     ///
     /// # Errors
     /// When the length is not finite, or there are too many.
     pub fn chain(boxes: usize, length: f64) -> Result<Self, SkeletonError> {
-        if boxes > MOST_TRACKS {
+        if boxes > MAX_TRACKS {
             return Err(SkeletonError::TooMany { tracks: boxes });
         }
-        let what = "a chain";
-        let (mut parents, mut offsets) = (reserved(boxes, what)?, reserved(boxes, what)?);
+        let label = "a chain";
+        let (mut parents, mut offsets) = (reserved(boxes, label)?, reserved(boxes, label)?);
         parents.extend((0..boxes).map(|track| track.checked_sub(1)));
         offsets.extend((0..boxes).map(|track| match track {
             0 => Vec3::ZERO,
@@ -116,11 +116,11 @@ mod tests {
     fn parents_come_first_and_circles_are_refused() {
         let parents = vec![Some(2), None, Some(1), Some(2)];
         let skeleton = Skeleton::new(parents, vec![Vec3::ZERO; 4]).unwrap();
-        let places = |own: &Skeleton| -> Vec<_> {
-            let links = own.links.iter();
+        let pairs = |tree: &Skeleton| -> Vec<_> {
+            let links = tree.links.iter();
             links.map(|link| (link.track, link.parent)).collect()
         };
-        assert_eq!(places(&skeleton), [(1, ROOT), (2, 1), (0, 2), (3, 2)]);
+        assert_eq!(pairs(&skeleton), [(1, ROOT), (2, 1), (0, 2), (3, 2)]);
         let refused = |parents: &[Option<usize>]| {
             Skeleton::new(parents.to_vec(), vec![Vec3::ZERO; parents.len()]).unwrap_err()
         };
@@ -143,6 +143,6 @@ mod tests {
             Err(SkeletonError::OffsetNotFinite { track: 0, .. })
         ));
         let chain = Skeleton::chain(3, 2.0).unwrap();
-        assert_eq!(places(&chain), [(0, ROOT), (1, 0), (2, 1)]);
+        assert_eq!(pairs(&chain), [(0, ROOT), (1, 0), (2, 1)]);
     }
 }

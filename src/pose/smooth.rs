@@ -12,7 +12,7 @@ use crate::pose::poses::bytes;
 use crate::shader::Kernel;
 use crate::simd::dispatch::in_lanes;
 use crate::smooth::kernel::Smoothing;
-use crate::smooth::rows::{Block, Pass, Row};
+use crate::smooth::rows::{SampleRow, SmoothingBlock, SmoothingPass};
 use crate::threads::on_threads;
 
 impl Engine {
@@ -23,12 +23,12 @@ impl Engine {
     ///
     /// ```
     /// use glam::Quat;
-    /// use tumble::{Device, Engine, Frames, Smoothing, SmoothingKernel, TrackSet, method};
+    /// use tumble::{Device, Engine, SampleTimes, Smoothing, SmoothingKernel, TrackSet, method};
     /// let mut set = TrackSet::new();
     /// let keys = [0.0, 0.2, -0.1, 0.3, 0.0].map(Quat::from_rotation_z);
     /// set.push("noise", &[0.0, 1.0, 2.0, 3.0, 4.0], &keys)?;
     /// let engine = Engine::new(Device::Cpu)?;
-    /// let samples = engine.evaluate(&set, method::STEP, &Frames::fps(1))?;
+    /// let samples = engine.evaluate(&set, method::STEP, &SampleTimes::fps(1))?;
     /// let smooth = engine.smooth(&samples, &Smoothing::new(SmoothingKernel::Linear))?;
     /// // ¼ 0.2 - ½ 0.1 + ¼ 0.3
     /// let expected = Quat::from_rotation_z(0.075);
@@ -63,7 +63,7 @@ impl Engine {
         let (tracks, samples, layout) = (values.tracks(), values.samples(), values.layout());
         let weights = smoothing.step_weights(samples)?;
         let passes = if samples > 1 { smoothing.passes } else { 0 };
-        let pass = Pass {
+        let pass = SmoothingPass {
             smoothing,
             weights: &weights,
             are_rotations,
@@ -79,7 +79,7 @@ impl Engine {
                 1 => (&other, &mut output),
                 _ => (&output, &mut other),
             };
-            let set = Set {
+            let input = PassInput {
                 values: match done {
                     0 => values.as_arrays(),
                     _ => bytemuck::cast_slice(from),
@@ -90,12 +90,12 @@ impl Engine {
             };
             let to = bytemuck::cast_slice_mut(to);
             self.on_device(|device| match device {
-                Some(device) if !weights.is_empty() => Ok(set.on(&pass, device, to)?),
-                _ => Ok(on_threads(|| set.on_cpu(&pass, to))?),
+                Some(device) if !weights.is_empty() => Ok(input.on(&pass, device, to)?),
+                _ => Ok(on_threads(|| input.on_cpu(&pass, to))?),
             })?;
             for track in 0..tracks {
-                pass.set_ends(set.row(track), |sample, value| {
-                    to[layout.place(track, sample, tracks, samples)] = value;
+                pass.set_ends(input.row(track), |sample, value| {
+                    to[layout.offset(track, sample, tracks, samples)] = value;
                 });
             }
         }
@@ -108,17 +108,17 @@ impl Engine {
 const BLOCK: usize = 1024;
 
 /// The values of a pass.
-struct Set<'a> {
+struct PassInput<'a> {
     values: &'a [[f32; 4]],
     tracks: usize,
     samples: usize,
     layout: Layout,
 }
 
-impl Set<'_> {
-    fn row(&self, track: usize) -> Row<'_> {
-        let at = |sample| self.layout.place(track, sample, self.tracks, self.samples);
-        Row {
+impl PassInput<'_> {
+    fn row(&self, track: usize) -> SampleRow<'_> {
+        let at = |sample| self.layout.offset(track, sample, self.tracks, self.samples);
+        SampleRow {
             values: self.values,
             first: at(0),
             stride: at(1) - at(0),
@@ -127,20 +127,21 @@ impl Set<'_> {
     }
 
     /// On the engine's threads.
-    fn on_cpu(&self, pass: &Pass<'_>, output: &mut [[f32; 4]]) {
+    fn on_cpu(&self, pass: &SmoothingPass<'_>, output: &mut [[f32; 4]]) {
         let length = BLOCK.max(4 * pass.weights.len());
-        let block = |steps: &mut _, output: &mut [[f32; 4]], track: usize, place, i: usize| {
-            let row = self.row(track);
-            in_lanes(&mut Block {
-                pass: *pass,
-                row,
-                first: i * length,
-                steps,
-                count: output.len() / row.stride,
-                output,
-                place,
-            });
-        };
+        let block =
+            |steps: &mut _, output: &mut [[f32; 4]], track: usize, output_start, i: usize| {
+                let row = self.row(track);
+                in_lanes(&mut SmoothingBlock {
+                    pass: *pass,
+                    row,
+                    first: i * length,
+                    steps,
+                    count: output.len() / row.stride,
+                    output,
+                    output_start,
+                });
+            };
         match self.layout {
             Layout::TrackMajor => {
                 let rows = output.par_chunks_mut(self.samples).enumerate();
@@ -166,21 +167,21 @@ impl Set<'_> {
     /// are copied there by the host.
     fn on(
         &self,
-        pass: &Pass<'_>,
+        pass: &SmoothingPass<'_>,
         device: &VulkanEngine,
         output: &mut [[f32; 4]],
     ) -> Result<(), VulkanError> {
         let (limit, radius) = (device.window().max(2), pass.weights.len());
         let detail = usize::from(pass.are_rotations);
         let stride = self.samples - 1 + 2 * radius;
-        // Between rows that are smoothed at once the kernel runs over what lies beyond their ends too:
+        // Between rows that are smoothed at once the kernel runs over the values beyond their ends too:
         // more than the rows themselves where it is wider than they are long.
         let each = match 2 * radius > self.samples {
             true => 1,
             false => (limit / stride).max(1),
         };
         for first in (0..self.tracks).step_by(each) {
-            let rows: Vec<Row<'_>> = (first..self.tracks.min(first + each))
+            let rows: Vec<SampleRow<'_>> = (first..self.tracks.min(first + each))
                 .map(|track| self.row(track))
                 .collect();
             let samples = rows
@@ -197,8 +198,8 @@ impl Set<'_> {
             let mut padded = Vec::with_capacity(rows.len() * stride);
             let mut spaced = Vec::with_capacity(rows.len() * stride);
             for (values, first) in values.chunks(self.samples).zip((0..).step_by(self.samples)) {
-                let before = (0..stride).map(|place| place as isize - radius as isize);
-                padded.extend(before.map(|place| steps[first + pass.step_at(place, self.samples)]));
+                let before = (0..stride).map(|step| step as isize - radius as isize);
+                padded.extend(before.map(|step| steps[first + pass.step_at(step, self.samples)]));
                 spaced.extend_from_slice(values);
                 spaced.resize(padded.len(), [0.0; 4]);
             }
@@ -215,9 +216,9 @@ impl Set<'_> {
                 for sample in 0..self.samples {
                     let mut value = found[start + sample];
                     if pass.are_rotations && value == [0.0; 4] {
-                        let place = (start + sample + radius) as isize;
-                        value = pass.turned_far(row.get(sample), |step| {
-                            let [x, y, z, _] = padded[(place + step) as usize];
+                        let center = (start + sample + radius) as isize;
+                        value = pass.smoothed_in_f64(row.get(sample), |step| {
+                            let [x, y, z, _] = padded[(center + step) as usize];
                             [x, y, z]
                         });
                     }

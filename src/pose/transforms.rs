@@ -8,11 +8,11 @@ use crate::method::interpolation::Interpolation;
 use crate::method::vector_method::VectorMethod;
 use crate::output::rotations::{Layout, Rotations, Samples, Vectors};
 use crate::prepare::clip_data::ClipData;
-use crate::time::frames::Frames;
+use crate::time::frames::SampleTimes;
 use crate::tracks::set::TrackSet;
-use crate::tracks::vectors::Channel;
+use crate::tracks::set::vectors::Channel;
 
-/// The transform of every track at every sample: scaled first, then turned, then moved.
+/// The transform of every track at every sample: scaled first, then rotated, then translated.
 #[derive(Debug)]
 pub struct Transforms {
     /// Translations; 0 for tracks that have no keys of them.
@@ -32,12 +32,12 @@ impl Engine {
     ///
     /// ```
     /// use glam::{Quat, Vec3};
-    /// use tumble::{Device, Engine, Frames, Layout, TrackSet, VectorMethod, method};
+    /// use tumble::{Device, Engine, SampleTimes, Layout, TrackSet, VectorMethod, method};
     /// let mut set = TrackSet::new();
     /// set.push("hip", &[0.0, 1.0], &[Quat::IDENTITY, Quat::from_rotation_y(1.0)])?;
     /// set.set_translations(0, &[0.0, 2.0], &[Vec3::ZERO, Vec3::X], &[])?;
     /// let engine = Engine::new(Device::Cpu)?;
-    /// let frames = Frames::fps(2); // from the first key of anything to the last
+    /// let frames = SampleTimes::fps(2); // from the first key of anything to the last
     /// let linear = VectorMethod::Linear;
     /// let found = engine.transforms(&set, method::SLERP, linear, &frames, Layout::TrackMajor)?;
     /// assert_eq!(found.translations.get(0, 1), Some(Vec3::new(0.25, 0.0, 0.0)));
@@ -52,7 +52,7 @@ impl Engine {
         set: &TrackSet,
         interpolation: impl Into<Interpolation>,
         vectors: VectorMethod,
-        frames: &Frames,
+        frames: &SampleTimes,
         layout: Layout,
     ) -> Result<Transforms, Error> {
         let interpolation = interpolation.into();
@@ -77,7 +77,7 @@ impl Engine {
         channel: Channel,
         method: VectorMethod,
         interpolation: impl Into<Interpolation>,
-        frames: &Frames,
+        frames: &SampleTimes,
         layout: Layout,
     ) -> Result<Vectors, Error> {
         let interpolation = interpolation.into();
@@ -94,7 +94,7 @@ impl Engine {
     pub(super) fn samples_of<T>(
         &self,
         data: ClipData,
-        frames: &Frames,
+        frames: &SampleTimes,
         layout: Layout,
     ) -> Result<Samples<T>, Error> {
         let uploaded = Uploaded::of_data(&self.backend, data, None)?;

@@ -5,32 +5,32 @@ use std::ops::Range;
 
 use bytemuck::Zeroable;
 
-use crate::curve::options::Path;
+use crate::curve::options::KeySigns;
 use crate::math::canonical::round_f32;
 use crate::math::quaternion::{dot, unit};
 use crate::prepare::prepared::Prepared;
 use crate::shader::ArcSegment;
 use crate::simd::dispatch::{InLanes, in_lanes};
 use crate::simd::lanes::Lanes;
-use crate::time::spans::{NONE, Source};
+use crate::time::spans::{NONE, SpanSource};
 use crate::tracks::set::TrackSet;
 use crate::tracks::signs::Signs;
 use crate::twin::arc_between::arc_between;
 
 /// The most arcs that are computed together.
-const LANES: usize = 64;
+const BLOCK_ARCS: usize = 64;
 
 /// Intervals that wait for their block, and the arcs that they become.
 #[derive(Zeroable)]
 pub(crate) struct ArcPreparation {
     /// Whether no arc is longer than half a turn.
     is_shortest: bool,
-    from: [[f32; 4]; LANES],
+    from: [[f32; 4]; BLOCK_ARCS],
     /// The key at the end of each interval, in the sign nearer to `from`.
-    to: [[f32; 4]; LANES],
+    to: [[f32; 4]; BLOCK_ARCS],
     count: usize,
-    middles: [[f32; 4]; LANES],
-    tangents: [[f32; 4]; LANES],
+    middles: [[f32; 4]; BLOCK_ARCS],
+    tangents: [[f32; 4]; BLOCK_ARCS],
 }
 
 impl InLanes for ArcPreparation {
@@ -49,9 +49,9 @@ impl InLanes for ArcPreparation {
 }
 
 impl ArcPreparation {
-    pub(crate) fn new(path: Path) -> Self {
+    pub(crate) fn new(signs: KeySigns) -> Self {
         Self {
-            is_shortest: path == Path::Shortest,
+            is_shortest: signs == KeySigns::Shortest,
             ..Self::zeroed()
         }
     }
@@ -69,14 +69,14 @@ impl ArcPreparation {
         let first_key = prepared.constants.len() as u32;
         let first_span = prepared.spans.len();
         let last_key = first_key + intervals.len() as u32;
-        let own = &keys[intervals.start..=intervals.end];
-        prepared.constants.extend_from_slice(own);
+        let stored = &keys[intervals.start..=intervals.end];
+        prepared.constants.extend_from_slice(stored);
         if self.is_shortest {
             let segments = (prepared.segments.len() + self.count) as u32;
-            let places = segments..segments + intervals.len() as u32;
+            let indices = segments..segments + intervals.len() as u32;
             let spans = &mut prepared.spans;
             spans.starts.extend_from_slice(&times[intervals.clone()]);
-            spans.sources.extend(places.map(Source::Segment));
+            spans.sources.extend(indices.map(SpanSource::Segment));
             spans.keys.extend(first_key..last_key);
             self.push(prepared, keys, set.signs(index), intervals.clone());
         } else {
@@ -105,14 +105,14 @@ impl ArcPreparation {
         mut intervals: Range<usize>,
     ) {
         while !intervals.is_empty() {
-            if self.count == LANES {
+            if self.count == BLOCK_ARCS {
                 self.finish(prepared);
             }
-            let own = self.count..LANES.min(self.count + intervals.len());
-            let (start, end) = (intervals.start, intervals.start + own.len());
-            signs.copy(keys, start..end, &mut self.from[own.clone()]);
-            signs.copy(keys, start + 1..end + 1, &mut self.to[own.clone()]);
-            self.count = own.end;
+            let lanes = self.count..BLOCK_ARCS.min(self.count + intervals.len());
+            let (start, end) = (intervals.start, intervals.start + lanes.len());
+            signs.copy(keys, start..end, &mut self.from[lanes.clone()]);
+            signs.copy(keys, start + 1..end + 1, &mut self.to[lanes.clone()]);
+            self.count = lanes.end;
             intervals.start = end;
         }
     }
@@ -125,11 +125,11 @@ impl ArcPreparation {
         key: u32,
         [from, to]: [[f32; 4]; 2],
     ) {
-        if self.count == LANES {
+        if self.count == BLOCK_ARCS {
             self.finish(prepared);
         }
-        let place = (prepared.segments.len() + self.count) as u32;
-        prepared.push_span(start, Source::Segment(place), key);
+        let segment = (prepared.segments.len() + self.count) as u32;
+        prepared.push_span(start, SpanSource::Segment(segment), key);
         (self.from[self.count], self.to[self.count]) = (from, to);
         self.count += 1;
     }

@@ -102,12 +102,13 @@ pub(crate) struct BatchSize {
 /// The batches of a set's tracks, or of a batch, in order.
 pub(crate) fn batches(set: &TrackSet, whole: Batch, size: BatchSize) -> Vec<Batch> {
     let each = size.cut.unwrap_or(usize::MAX);
-    let parts = |track: usize, own: Range<usize>| {
-        own.clone()
+    let parts = |track: usize, intervals: Range<usize>| {
+        intervals
+            .clone()
             .step_by(each)
             .map(move |start| Batch::Intervals {
                 track,
-                intervals: start..own.end.min(start.saturating_add(each)),
+                intervals: start..intervals.end.min(start.saturating_add(each)),
             })
     };
     let mut all = Vec::new();
@@ -141,8 +142,8 @@ pub(crate) fn batches(set: &TrackSet, whole: Batch, size: BatchSize) -> Vec<Batc
     };
     let mut start = tracks.start;
     while start < tracks.end {
-        let most = (tracks.end).min(start.saturating_add(size.tracks.max(1)));
-        let next = set.tracks_within(start..most, size.keys);
+        let limit = (tracks.end).min(start.saturating_add(size.tracks.max(1)));
+        let next = set.tracks_within(start..limit, size.keys);
         let intervals = 0..set.times_and_keys(start).1.len() - 1;
         if next == start && each < intervals.len() {
             all.extend(parts(start, intervals));
@@ -159,7 +160,7 @@ mod tests {
     use glam::Quat;
 
     use super::*;
-    use crate::time::frames::Frames;
+    use crate::time::frames::SampleTimes;
 
     fn with_keys(counts: &[usize]) -> TrackSet {
         let mut set = TrackSet::new();
@@ -192,7 +193,7 @@ mod tests {
             Batch::Tracks(7..8),
         ];
         assert_eq!(found, expected);
-        let timeline = Frames::fps(2).resolve(8, set.time_span()).unwrap();
+        let timeline = SampleTimes::fps(2).resolve(8, set.time_span()).unwrap();
         let samples: Vec<_> = (found[2..5].iter())
             .map(|batch| batch.samples(&set, &timeline, false))
             .collect();

@@ -1,4 +1,4 @@
-//! A set, prepared: its tracks in groups, and the places of each track's parts.
+//! A set, prepared: its tracks in groups, and the indices of each track's parts.
 
 use std::borrow::Cow;
 use std::ops::Range;
@@ -20,10 +20,10 @@ use crate::prepare::vectors;
 use crate::shader::Form;
 use crate::threads::{self, OutOfThreads, on_threads, stop};
 use crate::time::frames::{Ticks, Timeline};
-use crate::time::spans::Part;
+use crate::time::spans::TrackPart;
 use crate::time::wrap::{TrackCopy, WrapMode};
 use crate::tracks::set::TrackSet;
-use crate::tracks::vectors::{Channel, VectorTrack};
+use crate::tracks::set::vectors::{Channel, VectorTrack};
 
 /// The number of tracks whose vectors are prepared as one piece of work.
 const VECTOR_BATCH: usize = 256;
@@ -32,7 +32,7 @@ const VECTOR_BATCH: usize = 256;
 pub(crate) struct ClipData {
     pub(crate) interpolation: Interpolation,
     pub(crate) groups: Vec<Prepared>,
-    /// Every part in order of tracks and time, as (group, place in the group).
+    /// Every part in order of tracks and time, as (group, index in the group).
     parts: Vec<(u32, u32)>,
     /// The start of each track's parts in `parts`, and the end of the last track's.
     tracks: Vec<usize>,
@@ -44,45 +44,45 @@ pub(crate) struct ClipData {
 #[derive(Clone, Copy)]
 pub(crate) struct PartRef<'a> {
     pub(crate) prepared: &'a Prepared,
-    pub(crate) part: &'a Part,
+    pub(crate) part: &'a TrackPart,
 }
 
-/// Which tracks of a set to prepare, and for what.
-pub(crate) struct Wanted<'a> {
+/// Which tracks of a set to prepare, and for which timelines.
+pub(crate) struct PrepareRequest<'a> {
     pub(crate) batch: Batch,
     /// Groups are merged while the segments of each stay within this many bytes, as each becomes a
     /// buffer of a device. With `None` they stay as they were prepared.
     pub(crate) group_bytes: Option<usize>,
-    /// Few groups are made from the start and not merged: copying them together would cost more
+    /// Groups are made large from the start and not merged: copying them together would cost more
     /// than one dispatch for each.
-    pub(crate) few_groups: bool,
+    pub(crate) large_groups: bool,
     /// The only timeline that will be sampled; intervals without a sample of it may be left out.
     pub(crate) only_for: Option<&'a Timeline>,
     /// Groups whose memory is reused.
     pub(crate) spare: Vec<Prepared>,
 }
 
-impl Wanted<'_> {
+impl PrepareRequest<'_> {
     /// All tracks of a set, for any timeline.
     pub(crate) fn all(set: &TrackSet) -> Self {
         Self {
             batch: Batch::Tracks(0..set.track_count()),
             group_bytes: None,
-            few_groups: false,
+            large_groups: false,
             only_for: None,
             spare: Vec::new(),
         }
     }
 
-    /// The most keys of a group. If few groups are wanted, it is as many as leave four groups for
+    /// The most keys of a group. If groups are to be large, it is as many as leave four groups for
     /// each thread, within the limit of bytes.
     fn group_keys(&self, set: &TrackSet, form: Form) -> usize {
-        let (Some(limit), true) = (self.group_bytes, self.few_groups) else {
+        let (Some(limit), true) = (self.group_bytes, self.large_groups) else {
             return PART_INTERVALS;
         };
-        let most = limit / (segment_size(form) + size_of::<Quat>()) / 2;
+        let max_keys = limit / (segment_size(form) + size_of::<Quat>()) / 2;
         let each = set.keys_of(self.batch.tracks()) / (4 * threads::count());
-        each.min(most).max(PART_INTERVALS)
+        each.min(max_keys).max(PART_INTERVALS)
     }
 }
 
@@ -90,20 +90,20 @@ impl Wanted<'_> {
 fn prepare(
     set: &TrackSet,
     interpolation: &Interpolation,
-    wanted: Wanted<'_>,
+    request: PrepareRequest<'_>,
 ) -> Result<Vec<Prepared>, SetError> {
     let size = BatchSize {
-        keys: wanted.group_keys(set, interpolation.form()),
+        keys: request.group_keys(set, interpolation.form()),
         tracks: usize::MAX,
         cut: (interpolation.speed == Speed::AsKeyed).then_some(PART_INTERVALS),
     };
-    let only_for = (wanted.only_for).filter(|_| interpolation.wrap().are_held());
-    let first_track = wanted.batch.tracks().start as u32;
-    let spare = Mutex::new(wanted.spare);
+    let only_for = (request.only_for).filter(|_| interpolation.wrap().are_held());
+    let first_track = request.batch.tracks().start as u32;
+    let spare = Mutex::new(request.spare);
     let stop = stop::current();
     let group = |batch: Batch| {
-        let own = spare.lock().unwrap_or_else(PoisonError::into_inner).pop();
-        let mut prepared = own.unwrap_or_else(|| Prepared::new(interpolation));
+        let reused = spare.lock().unwrap_or_else(PoisonError::into_inner).pop();
+        let mut prepared = reused.unwrap_or_else(|| Prepared::new(interpolation));
         prepared.clear();
         let mut preparation = Preparation::new(interpolation);
         if let Some(timeline) = only_for {
@@ -128,7 +128,7 @@ fn prepare(
         }
         Ok(prepared)
     };
-    let batches: Vec<Batch> = batches(set, wanted.batch, size);
+    let batches: Vec<Batch> = batches(set, request.batch, size);
     match batches.len() {
         0 | 1 => batches.into_iter().map(group).collect(),
         _ => on_threads(|| batches.into_par_iter().map(group).collect())?,
@@ -167,11 +167,11 @@ impl ClipData {
     pub(crate) fn new(
         set: &TrackSet,
         interpolation: Interpolation,
-        wanted: Wanted<'_>,
+        request: PrepareRequest<'_>,
     ) -> Result<Self, SetError> {
         Self::check(&interpolation)?;
-        let merged_bytes = wanted.group_bytes.filter(|_| !wanted.few_groups);
-        let groups = prepare(set, &interpolation, wanted)?;
+        let merged_bytes = request.group_bytes.filter(|_| !request.large_groups);
+        let groups = prepare(set, &interpolation, request)?;
         Ok(Self::of_groups(groups, set, interpolation, merged_bytes))
     }
 
@@ -263,9 +263,9 @@ impl ClipData {
         self.tracks.len() - 1
     }
 
-    /// The places of a track's parts, in order of time.
+    /// The indices of a track's parts, in order of time.
     #[inline(always)]
-    fn places(&self, track: usize) -> &[(u32, u32)] {
+    fn part_indices(&self, track: usize) -> &[(u32, u32)] {
         &self.parts[self.tracks[track]..self.tracks[track + 1]]
     }
 
@@ -278,28 +278,28 @@ impl ClipData {
         timeline: &Timeline,
         samples: Range<usize>,
     ) -> impl Iterator<Item = PartRef<'_>> {
-        let all = self.places(track);
-        let own = match timeline.ticks {
+        let all = self.part_indices(track);
+        let chosen = match timeline.ticks {
             Ticks::Frames { .. } if all.len() > 2 && !samples.is_empty() => {
                 let first = timeline.time_at(track, samples.start);
                 let last = timeline.time_at(track, samples.end - 1);
                 // A part starts where the one before it ends.
-                let end = |&place: &(u32, u32)| self.part(place).part.end;
-                let from = all.partition_point(|place| end(place) < first);
-                let to = all.partition_point(|place| end(place) <= last) + 1;
+                let end = |&index: &(u32, u32)| self.part(index).part.end;
+                let from = all.partition_point(|index| end(index) < first);
+                let to = all.partition_point(|index| end(index) <= last) + 1;
                 // One more part on either side: a time within rounding of a boundary may lie on
                 // the other side of it.
                 &all[from.saturating_sub(1).min(all.len() - 1)..(to + 1).min(all.len())]
             }
             _ => all,
         };
-        own.iter().map(|&place| self.part(place))
+        chosen.iter().map(|&index| self.part(index))
     }
 
     /// The part of a track that has exactly one part.
     #[inline(always)]
     pub(crate) fn only_part(&self, track: usize) -> Option<PartRef<'_>> {
-        match self.places(track) {
+        match self.part_indices(track) {
             &[only] => Some(self.part(only)),
             _ => None,
         }
@@ -311,11 +311,11 @@ impl ClipData {
         track: usize,
         copy: &TrackCopy,
     ) -> impl Iterator<Item = PartRef<'_>> {
-        let all = self.places(track);
+        let all = self.part_indices(track);
         let backwards = copy.is_backwards();
         (0..all.len()).map(move |i| {
-            let place = if backwards { all.len() - 1 - i } else { i };
-            self.part(all[place])
+            let position = if backwards { all.len() - 1 - i } else { i };
+            self.part(all[position])
         })
     }
 
@@ -332,8 +332,8 @@ impl ClipData {
 
     /// The first and the last key time of a track, if its wrap mode needs them.
     fn track_span(&self, track: usize) -> Option<(f64, f64)> {
-        let first = self.part(*self.places(track).first()?);
-        Some(first.part.beyond.as_ref()?.span)
+        let first = self.part(*self.part_indices(track).first()?);
+        Some(first.part.extension.as_ref()?.span)
     }
 
     /// The timeline with explicit times folded into the time range of their track's keys, if the

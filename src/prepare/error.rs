@@ -4,13 +4,13 @@ use crate::curve::options::InterpolationError;
 use crate::memory::OutOfMemory;
 use crate::threads::OutOfThreads;
 use crate::threads::stop::Stopped;
-use crate::time::frames::FramesError;
+use crate::time::frames::SampleTimesError;
 
 /// Why a set cannot be evaluated as asked, on any device.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum SetError {
     #[error(transparent)]
-    Frames(#[from] FramesError),
+    Frames(#[from] SampleTimesError),
     #[error(transparent)]
     Interpolation(#[from] InterpolationError),
     #[error(transparent)]

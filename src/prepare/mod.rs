@@ -2,8 +2,54 @@
 //! once per clip. They do not depend on frame rate or device, so the CPU and every Vulkan device
 //! evaluate the same segments.
 //!
-//! Arcs are computed in f32, with the operations of the arc kernel's twin. Curves are computed in
-//! f64 and rounded once; curves of moderate angle that depend on four keys alone mostly in f32.
+//! # Why so
+//!
+//! Tracks of a crowd have few keys, and a vector has up to 16 lanes: blocks are filled with intervals of as
+//! many tracks as it takes, and what is left of a block waits for the next one. Batches are small: on the
+//! CPU the segments of a batch are evaluated while they lie in a thread's cache, and then forgotten. Arcs are
+//! computed in f32 with the operations of the arc kernel's twin, curves as [`crate::fit`] says.
+//!
+//! # Types
+//!
+//! | type | what it is |
+//! |---|---|
+//! | [`batch::Batch`] | the intervals that are prepared together: whole tracks, or some of a long one |
+//! | [`preparation::Preparation`] | applies an interpolation to a batch, by one of three strategies |
+//! | [`arcs::ArcPreparation`] | the strategy for slerp: up to 64 arcs at once |
+//! | [`smooth::SmoothPreparation`] | the strategy for all other curves: blocks of 128 intervals |
+//! | [`direct::Direct`] | its fast way, in f32 straight from four keys |
+//! | [`fitting::Fitting`] | its exact way: queues of curves that wait for a full block, and the cutter |
+//! | [`constant_speed::PendingInterval`] | a curve at constant speed, until its whole track is there |
+//! | [`prepared::Prepared`] | what comes of a batch |
+//! | [`clip_data::ClipData`] | all that is prepared of a clip, and which parts a track has |
+//!
+//! # From a key to its stored curve
+//!
+//! ```text
+//! TrackSet ─► Batch ─► Preparation ─┬─ steps ──────────────────────────────► constants
+//!                                   ├─ arcs: block of 64 ──────────────────► segments
+//!                                   └─ smooth: block of 128 ─┬─ Direct ────► segments
+//!                                                            └─ Fitting ─┬─► segments
+//!                                                                        └─► exact (f64)
+//! ```
+//!
+//! Each interval has a span at once, in order of time, and a place for its segment; a block that is fitted
+//! later writes the segment there. A curve that had to be cut has its span replaced by several at the end.
+//!
+//! # Memory
+//!
+//! [`prepared::Prepared`] is lists and indices into them: a part is a range of spans, and a span (three lists of
+//! one length, which are searched in vectors) says where its value is.
+//!
+//! ```text
+//! parts      track 0           track 1        track 2, first 4096 intervals …
+//! starts     0.0   0.5   1.0   0.0   0.7  …   seconds, f64
+//! sources    seg 0 seg 1 exact seg 2 con 5…   index of a segment, a constant or an exact curve
+//! keys       0     1     -     3     4    …   the constant to store at exactly the start
+//! segments   32 bytes an arc, 176 a polynomial
+//! constants  16 bytes: keys, and values held at ends
+//! exact      curves that no polynomial fits, and those outside the keys: the host evaluates them in f64
+//! ```
 
 pub(crate) mod arcs;
 pub(crate) mod batch;

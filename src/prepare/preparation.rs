@@ -1,11 +1,11 @@
-//! Prepares tracks in the way of their method: key intervals become segments.
+//! Prepares tracks as their method says: key intervals become segments.
 
 use std::ops::Range;
 
 use glam::Quat;
 
 use crate::curve::options::{InterpolationError, Quantity};
-use crate::method::Curves;
+use crate::method::CurveKind;
 use crate::method::interpolation::Interpolation;
 use crate::prepare::arcs::ArcPreparation;
 use crate::prepare::error::SetError;
@@ -13,18 +13,18 @@ use crate::prepare::prepared::Prepared;
 use crate::prepare::smooth::SmoothPreparation;
 use crate::threads::stop;
 use crate::time::frames::{Ticks, Timeline};
-use crate::time::spans::{NONE, Source};
+use crate::time::spans::{NONE, SpanSource};
 use crate::tracks::set::TrackSet;
 
 /// Prepares tracks by an interpolation; its memory is reused.
 pub(crate) struct Preparation {
     interpolation: Interpolation,
-    way: Way,
+    strategy: Strategy,
 }
 
-/// How intervals become segments: in blocks that may hold intervals of several tracks, but for
-/// steps, which have no segments.
-enum Way {
+/// How intervals become segments: in blocks with intervals of several tracks, except for steps,
+/// which have no segments.
+enum Strategy {
     Steps,
     Arcs(Box<ArcPreparation>),
     Smooth(Box<SmoothPreparation>),
@@ -32,18 +32,18 @@ enum Way {
 
 impl Preparation {
     pub(crate) fn new(interpolation: &Interpolation) -> Self {
-        let way = match *interpolation.method.curves {
-            Curves::Steps => Way::Steps,
-            Curves::Arcs(_) if !interpolation.is_by_formula() => {
-                Way::Arcs(Box::new(ArcPreparation::new(interpolation.path)))
+        let strategy = match *interpolation.method.curves {
+            CurveKind::Steps => Strategy::Steps,
+            CurveKind::Arcs(_) if !interpolation.is_by_formula() => {
+                Strategy::Arcs(Box::new(ArcPreparation::new(interpolation.signs)))
             }
-            Curves::Arcs(smooth) | Curves::Smooth(smooth) => {
-                Way::Smooth(Box::new(SmoothPreparation::new(interpolation, smooth)))
+            CurveKind::Arcs(smooth) | CurveKind::Smooth(smooth) => {
+                Strategy::Smooth(Box::new(SmoothPreparation::new(interpolation, smooth)))
             }
         };
         Self {
             interpolation: *interpolation,
-            way,
+            strategy,
         }
     }
 
@@ -66,12 +66,12 @@ impl Preparation {
     ) -> Result<(), InterpolationError> {
         interpolation.check_track(keys, track)?;
         match Self::has_path(interpolation) {
-            true => (interpolation.path).check(keys, 0..keys.len() - 1, track),
+            true => (interpolation.signs).check(keys, 0..keys.len() - 1, track),
             false => Ok(()),
         }
     }
 
-    /// Whether an option says which way the curves go. Steps have no path, and a method that fixes the path also
+    /// Whether an option chooses the path between keys. Steps have no path, and a method that fixes the path also
     /// defines the curve between opposite keys.
     fn has_path(interpolation: &Interpolation) -> bool {
         !interpolation.steps() && interpolation.method.path.is_none()
@@ -82,7 +82,7 @@ impl Preparation {
     /// other timeline.
     pub(crate) fn only_for(&mut self, timeline: &Timeline, set: &TrackSet) {
         let keys = set.key_count() / set.track_count().max(1);
-        if let Way::Smooth(smooth) = &mut self.way {
+        if let Strategy::Smooth(smooth) = &mut self.strategy {
             smooth.frames = match timeline.ticks {
                 Ticks::Frames { rate, start } if timeline.len() < keys => Some((rate, start)),
                 _ => None,
@@ -97,27 +97,30 @@ impl Preparation {
         set: &TrackSet,
         intervals: impl Iterator<Item = (usize, Range<usize>)>,
     ) -> Result<(), SetError> {
-        let Self { interpolation, way } = self;
+        let Self {
+            interpolation,
+            strategy,
+        } = self;
         let has_path = Self::has_path(interpolation);
-        for (track, own) in intervals {
+        for (track, range) in intervals {
             stop::check()?;
             let (_, keys) = set.times_and_keys(track);
             interpolation.check_track(keys, track)?;
             if has_path {
-                interpolation.path.check(keys, own.clone(), track)?;
+                interpolation.signs.check(keys, range.clone(), track)?;
             }
-            match way {
-                Way::Steps => add_steps(prepared, set, track, own, interpolation.quantity),
-                Way::Arcs(arcs) => arcs.add(prepared, set, track, own),
-                Way::Smooth(smooth) => smooth.add(prepared, set, track, own),
+            match strategy {
+                Strategy::Steps => add_steps(prepared, set, track, range, interpolation.quantity),
+                Strategy::Arcs(arcs) => arcs.add(prepared, set, track, range),
+                Strategy::Smooth(smooth) => smooth.add(prepared, set, track, range),
             }
         }
-        match way {
-            Way::Steps => {}
-            Way::Arcs(arcs) => arcs.finish(prepared),
-            Way::Smooth(smooth) => smooth.finish(prepared),
+        match strategy {
+            Strategy::Steps => {}
+            Strategy::Arcs(arcs) => arcs.finish(prepared),
+            Strategy::Smooth(smooth) => smooth.finish(prepared),
         }
-        // What gives up half way leaves something that must not be used.
+        // Work that was stopped leaves something that must not be used.
         Ok(stop::check()?)
     }
 }
@@ -144,6 +147,6 @@ fn add_steps(
     let spans = first_span..first_span + intervals.len();
     prepared.push_part(index, times, &intervals, spans, [first, last]);
     for (i, constant) in intervals.zip(first..last) {
-        prepared.push_span(times[i], Source::Constant(constant), NONE);
+        prepared.push_span(times[i], SpanSource::Constant(constant), NONE);
     }
 }

@@ -5,15 +5,16 @@ use std::ops::Range;
 use bytemuck::Zeroable;
 
 use crate::curve::segment::{Segments, segment_size};
-use crate::fit::double::curve::Curve;
-use crate::fit::double::intervals::LANES;
+use crate::fit::block::LANES;
+use crate::fit::exact::curve::IntervalCurve;
+use crate::fit::exact::cut::Cutter;
 use crate::math::canonical::round_quat;
 use crate::memory::OutOfMemory;
 use crate::method::interpolation::Interpolation;
 use crate::shader::PolynomialSegment;
 use crate::time::frames::{Ticks, Timeline};
 use crate::time::runs::Parameter;
-use crate::time::spans::{Beyond, NONE, Part, Source, Spans};
+use crate::time::spans::{NONE, SpanSource, Spans, TrackExtension, TrackPart};
 use crate::time::wrap::{TrackCopy, Wrap};
 use crate::tracks::check::LATEST;
 
@@ -23,10 +24,10 @@ pub(crate) struct Prepared {
     /// Rotations that are stored as they are: keys and end values.
     pub(crate) constants: Vec<[f32; 4]>,
     /// Curves that the host evaluates in f64: pieces that no polynomial fits, and the continuation
-    /// of tracks beyond their ends.
-    pub(crate) exact: Vec<Curve>,
+    /// of tracks outside their keys.
+    pub(crate) exact: Vec<IntervalCurve>,
     pub(crate) spans: Spans,
-    pub(crate) parts: Vec<Part>,
+    pub(crate) parts: Vec<TrackPart>,
     /// The wrap modes before the first key and after the last.
     pub(crate) wrap: Wrap,
 }
@@ -36,7 +37,7 @@ pub(crate) const SEGMENTS: &str = "the segments of a set";
 
 /// Where a curve goes: its span, and the segment of that.
 #[derive(Debug, Clone, Copy, Zeroable)]
-pub(crate) struct Place {
+pub(crate) struct CurveSlot {
     pub(crate) span: usize,
     pub(crate) segment: usize,
 }
@@ -81,40 +82,42 @@ impl Prepared {
         self.parts.clear();
     }
 
-    /// Moves all of `other` behind its own.
+    /// Moves all of `other` behind what it has.
     pub(crate) fn append(&mut self, other: Self) {
         let constants = self.constants.len() as u32;
         let segments = self.segments.len() as u32;
         let exact = self.exact.len() as u32;
         let spans = self.spans.len();
-        let place = |own: u32, before: u32| match own {
+        let shifted = |index: u32, before: u32| match index {
             NONE => NONE,
-            _ => own + before,
+            _ => index + before,
         };
-        let shift = |constant: u32| place(constant, constants);
-        let own = &mut self.spans;
-        own.starts.extend(other.spans.starts);
-        own.sources
+        let shift = |constant: u32| shifted(constant, constants);
+        let target = &mut self.spans;
+        target.starts.extend(other.spans.starts);
+        target
+            .sources
             .extend(other.spans.sources.iter().map(|&source| match source {
-                Source::Segment(i) => Source::Segment(i + segments),
-                Source::Constant(i) => Source::Constant(shift(i)),
-                Source::Exact(i) => Source::Exact(i + exact),
+                SpanSource::Segment(i) => SpanSource::Segment(i + segments),
+                SpanSource::Constant(i) => SpanSource::Constant(shift(i)),
+                SpanSource::Exact(i) => SpanSource::Exact(i + exact),
             }));
-        own.keys.extend(other.spans.keys.into_iter().map(shift));
-        self.parts.extend(other.parts.into_iter().map(|part| Part {
-            spans: part.spans.start + spans..part.spans.end + spans,
-            before: shift(part.before),
-            after: shift(part.after),
-            beyond: part.beyond.map(|beyond| {
-                Box::new(Beyond {
-                    at_end: shift(beyond.at_end),
-                    from_before: place(beyond.from_before, exact),
-                    from_after: place(beyond.from_after, exact),
-                    ..*beyond
-                })
-            }),
-            ..part
-        }));
+        target.keys.extend(other.spans.keys.into_iter().map(shift));
+        self.parts
+            .extend(other.parts.into_iter().map(|part| TrackPart {
+                spans: part.spans.start + spans..part.spans.end + spans,
+                before: shift(part.before),
+                after: shift(part.after),
+                extension: part.extension.map(|extension| {
+                    Box::new(TrackExtension {
+                        at_end: shift(extension.at_end),
+                        from_before: shifted(extension.from_before, exact),
+                        from_after: shifted(extension.from_after, exact),
+                        ..*extension
+                    })
+                }),
+                ..part
+            }));
         self.segments.arcs.extend(other.segments.arcs);
         let polynomials = other.segments.polynomials;
         self.segments.polynomials.extend(polynomials);
@@ -142,11 +145,11 @@ impl Prepared {
     /// The copies of a part's track among some samples.
     pub(crate) fn copies(
         &self,
-        part: &Part,
+        part: &TrackPart,
         timeline: &Timeline,
         samples: Range<usize>,
     ) -> impl Iterator<Item = TrackCopy> {
-        let span = part.beyond.as_ref().map(|beyond| beyond.span);
+        let span = part.extension.as_ref().map(|extension| extension.span);
         self.wrap.copies(span, timeline, samples)
     }
 
@@ -162,15 +165,15 @@ impl Prepared {
         [before, after]: [u32; 2],
     ) {
         let is_last = intervals.end + 1 == times.len();
-        let new_beyond = || Box::new(Beyond::new(times));
-        self.parts.push(Part {
+        let new_extension = || Box::new(TrackExtension::new(times));
+        self.parts.push(TrackPart {
             track: index as u32,
             first_key: intervals.start as u32,
             spans,
             end: times[intervals.end],
             before: if intervals.start == 0 { before } else { NONE },
             after: if is_last { after } else { NONE },
-            beyond: self.wrap.repeats().then(new_beyond),
+            extension: self.wrap.repeats().then(new_extension),
         });
     }
 
@@ -186,16 +189,16 @@ impl Prepared {
         start: f64,
         segment: PolynomialSegment,
         key: u32,
-    ) -> Place {
-        let place = self.next_place();
+    ) -> CurveSlot {
+        let slot = self.next_slot();
         self.segments.polynomials.push(segment);
-        self.push_span(start, Source::Segment(place.segment as u32), key);
-        place
+        self.push_span(start, SpanSource::Segment(slot.segment as u32), key);
+        slot
     }
 
     /// Where the next span with a segment of its own goes.
-    pub(crate) fn next_place(&self) -> Place {
-        Place {
+    pub(crate) fn next_slot(&self) -> CurveSlot {
+        CurveSlot {
             span: self.spans.len(),
             segment: self.segments.polynomials.len(),
         }
@@ -205,17 +208,61 @@ impl Prepared {
     /// which is zero.
     pub(crate) fn push_segments(&mut self, starts: &[f64], keys: &[u32]) {
         let segments = &mut self.segments.polynomials;
-        let places = segments.len()..segments.len() + starts.len();
+        let indices = segments.len()..segments.len() + starts.len();
         segments.extend_from_slice(&ZEROS[..starts.len()]);
-        let sources = places.map(|place| Source::Segment(place as u32));
+        let sources = indices.map(|index| SpanSource::Segment(index as u32));
         self.spans.sources.extend(sources);
         self.spans.starts.extend_from_slice(starts);
         self.spans.keys.extend_from_slice(keys);
     }
 
-    pub(crate) fn push_span(&mut self, start: f64, source: Source, key: u32) {
+    pub(crate) fn push_span(&mut self, start: f64, source: SpanSource, key: u32) {
         self.spans.starts.push(start);
         self.spans.sources.push(source);
         self.spans.keys.push(key);
+    }
+
+    /// Replaces the spans of curves that were cut by those of their parts.
+    pub(crate) fn replace_cut_spans(&mut self, cutter: &Cutter) {
+        let mut cut = &cutter.subcurves[..];
+        if cut.is_empty() {
+            return;
+        }
+        let uncut = std::mem::take(&mut self.spans);
+        self.spans.reserve(uncut.len() + cut.len());
+        for part in 0..self.parts.len() {
+            let (spans, first_span) = (self.parts[part].spans.clone(), self.spans.len());
+            let mut next = spans.start;
+            loop {
+                let first_cut = cut.first().map_or(spans.end, |first| first.span);
+                let span = first_cut.min(spans.end);
+                self.spans.extend_from(&uncut, next..span);
+                if span == spans.end {
+                    break;
+                }
+                next = span + 1;
+                let (start, key) = (uncut.starts[span], uncut.keys[span]);
+                let end = match next < spans.end {
+                    true => uncut.starts[next],
+                    false => self.parts[part].end,
+                };
+                let count = cut.partition_point(|subcurve| subcurve.span <= span);
+                let (pieces, others) = cut.split_at(count);
+                for subcurve in pieces {
+                    let (from, _) = subcurve.piece.extent();
+                    let key = if from == 0.0 { key } else { NONE };
+                    let source = match subcurve.segment {
+                        Some(segment) => SpanSource::Segment(segment as u32),
+                        None => {
+                            self.exact.push(cutter.curve(subcurve));
+                            SpanSource::Exact(self.exact.len() as u32 - 1)
+                        }
+                    };
+                    self.push_span(subcurve.piece.begins(start, end - start), source, key);
+                }
+                cut = others;
+            }
+            self.parts[part].spans = first_span..self.spans.len();
+        }
     }
 }

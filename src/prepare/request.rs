@@ -9,14 +9,14 @@ use crate::tracks::set::TrackSet;
 /// What is asked of a set: some of its tracks, by a method, at the samples of a timeline, which is
 /// that of the whole set.
 #[derive(Clone)]
-pub(crate) struct Request<'a> {
+pub(crate) struct SetRequest<'a> {
     pub(crate) set: &'a TrackSet,
     pub(crate) tracks: Range<usize>,
     pub(crate) interpolation: &'a Interpolation,
     pub(crate) timeline: &'a Timeline,
 }
 
-impl<'a> Request<'a> {
+impl<'a> SetRequest<'a> {
     /// All tracks.
     pub(crate) fn whole(
         set: &'a TrackSet,

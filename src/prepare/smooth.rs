@@ -6,15 +6,15 @@ use std::ops::Range;
 use bytemuck::Zeroable as _;
 
 use crate::curve::options::{Ends, Quantity, Speed};
+use crate::fit::block::{Intervals, LANES, TrackStretch, put};
 use crate::fit::constant_velocity::arc_polynomial;
-use crate::fit::double::curve::Curve;
-use crate::fit::double::handles::FramesHeld;
-use crate::fit::double::intervals::{Intervals, LANES, Stretch, put};
+use crate::fit::exact::curve::IntervalCurve;
+use crate::fit::exact::handles::FindFrames;
 use crate::math::canonical::round_quat;
 use crate::math::quaternion::Vector;
 use crate::method::interpolation::Interpolation;
-use crate::method::{Given, Smooth};
-use crate::prepare::constant_speed::{Waiting, retime};
+use crate::method::{MethodInput, SmoothCurves};
+use crate::prepare::constant_speed::{PendingInterval, retime};
 use crate::prepare::direct::Direct;
 use crate::prepare::fitting::Fitting;
 use crate::prepare::prepared::Prepared;
@@ -23,7 +23,7 @@ use crate::simd::dispatch::in_lanes;
 use crate::threads::stop;
 use crate::time::frame_clock::{FrameClock, FrameStart};
 use crate::time::frame_rate::FrameRate;
-use crate::time::spans::{NONE, Source};
+use crate::time::spans::{NONE, SpanSource};
 use crate::time::wrap::WrapMode;
 use crate::tracks::set::{Track, TrackSet};
 use crate::tracks::signs::Signs;
@@ -37,20 +37,20 @@ pub(crate) const CONTEXT: usize = 2;
 /// Prepares smooth curves; its blocks are made once for many tracks.
 pub(crate) struct SmoothPreparation {
     interpolation: Interpolation,
-    smooth: Smooth,
+    smooth: SmoothCurves,
     intervals: Intervals,
-    stretches: Vec<Stretch>,
+    stretches: Vec<TrackStretch>,
     fitting: Fitting,
     /// Prepares curves straight from keys in f32, if method and options allow it.
     direct: Option<Box<Direct>>,
     /// Curves that are traversed at constant speed, until their whole track is there.
-    waiting: Vec<Waiting>,
-    /// The frames' rate and start, if only intervals that contain a frame are wanted.
+    waiting: Vec<PendingInterval>,
+    /// The frames' rate and start, if only intervals that contain a frame are prepared.
     pub(crate) frames: Option<(FrameRate, FrameStart)>,
 }
 
 impl SmoothPreparation {
-    pub(crate) fn new(interpolation: &Interpolation, smooth: Smooth) -> Self {
+    pub(crate) fn new(interpolation: &Interpolation, smooth: SmoothCurves) -> Self {
         let suits =
             interpolation.quantity == Quantity::Rotation && interpolation.speed == Speed::AsKeyed;
         let direct = smooth.direct.filter(|_| suits);
@@ -58,7 +58,7 @@ impl SmoothPreparation {
             direct: direct.map(|how| Box::new(Direct::new(how, smooth, interpolation.ends))),
             interpolation: *interpolation,
             smooth,
-            intervals: Intervals::new(smooth.shape.own),
+            intervals: Intervals::new(smooth.shape.per_curve),
             stretches: Vec::new(),
             fitting: Fitting::new(smooth.shape, interpolation.quantity),
             waiting: Vec::new(),
@@ -76,7 +76,7 @@ impl SmoothPreparation {
     ) {
         let track = set.track(index);
         let path = self.interpolation.method.path;
-        let path = path.unwrap_or(self.interpolation.path);
+        let path = path.unwrap_or(self.interpolation.signs);
         let signs = path.signs(set, index);
         let all = track.keys.len() - 1;
         let first_key = prepared.constants.len() as u32;
@@ -94,8 +94,12 @@ impl SmoothPreparation {
             prepared.constant(STILL);
         }
         let held = |key: u32, outside: WrapMode| {
-            let goes_on = self.goes_on(outside) && all > 0;
-            if meets_keys && !goes_on { key } else { NONE }
+            let is_extrapolated = self.extrapolates(outside) && all > 0;
+            if meets_keys && !is_extrapolated {
+                key
+            } else {
+                NONE
+            }
         };
         let held = [
             held(first_key, self.interpolation.before),
@@ -106,8 +110,8 @@ impl SmoothPreparation {
         // Two keys are joined by constant velocity, whatever lies beside them.
         let alone = all == 1 && self.interpolation.method.interpolates;
         let context = if alone { 0 } else { CONTEXT };
-        let velocities = match self.smooth.given {
-            Given::Velocities(solve, _) => {
+        let velocities = match self.smooth.input {
+            MethodInput::Velocities(solve, _) => {
                 solve(track, signs, intervals.clone(), &self.interpolation)
             }
             _ => Vec::new(),
@@ -123,18 +127,23 @@ impl SmoothPreparation {
             if context > 0 {
                 self.push_context(track, signs, from.checked_sub(1), all - 1);
             }
-            let own_key = first_key + (from - intervals.start) as u32;
-            self.stretches.push(Stretch {
+            let stretch_key = first_key + (from - intervals.start) as u32;
+            self.stretches.push(TrackStretch {
                 lane: self.intervals.count,
                 intervals: from..to,
                 all,
                 span: (track.times[0], track.times[all]),
                 part,
-                key: if meets_keys { own_key } else { NONE },
-                still: if self.is_frozen() { own_key } else { NONE },
+                key: if meets_keys { stretch_key } else { NONE },
+                still: if self.is_frozen() { stretch_key } else { NONE },
             });
-            let own = velocities.get(from - intervals.start..);
-            self.push(track, signs, from..to, own.unwrap_or_default());
+            let stretch_velocities = velocities.get(from - intervals.start..);
+            self.push(
+                track,
+                signs,
+                from..to,
+                stretch_velocities.unwrap_or_default(),
+            );
             if context > 0 {
                 self.push_context(track, signs, (to < all).then_some(to), 0);
             }
@@ -164,7 +173,7 @@ impl SmoothPreparation {
     ) {
         let lane = self.intervals.count;
         match interval {
-            Some(own) => self.push(track, signs, own..own + 1, &[]),
+            Some(inner) => self.push(track, signs, inner..inner + 1, &[]),
             None if self.interpolation.ends == Ends::Loop => {
                 self.push(track, signs, other..other + 1, &[]);
                 // Across the seam, keys are multiplied by the last key's sign, so that they continue
@@ -191,9 +200,9 @@ impl SmoothPreparation {
         let first = self.intervals.count;
         self.intervals.push(track, signs, intervals.clone());
         for (i, interval) in intervals.enumerate() {
-            let [outward, inward] = match (self.smooth.given, velocities.get(i..i + 2)) {
-                (Given::Numbers(numbers), _) => numbers(track, interval, &self.interpolation),
-                (Given::Velocities(..), Some(both)) => {
+            let [outward, inward] = match (self.smooth.input, velocities.get(i..i + 2)) {
+                (MethodInput::Numbers(numbers), _) => numbers(track, interval, &self.interpolation),
+                (MethodInput::Velocities(..), Some(both)) => {
                     [both[0], both[1]].map(|[x, y, z]| [x, y, z, 0.0])
                 }
                 _ => break, // the method has no numbers of its own for any interval
@@ -219,7 +228,7 @@ impl SmoothPreparation {
             let (intervals, fitting) = (&self.intervals, &mut self.fitting);
             direct.fit(prepared, intervals, &stretches, is_exact, fitting);
         }
-        self.fitting.bring(prepared, &self.intervals);
+        self.fitting.copy_queued(prepared, &self.intervals);
         self.intervals.count = 0;
         self.stretches = stretches;
         self.stretches.clear();
@@ -231,7 +240,7 @@ impl SmoothPreparation {
             direct.find_curves(&self.intervals, &self.stretches);
             // Extrapolation needs the derivatives at the ends.
             let Interpolation { before, after, .. } = self.interpolation;
-            if !self.goes_on(before) && !self.goes_on(after) {
+            if !self.extrapolates(before) && !self.extrapolates(after) {
                 return false;
             }
         }
@@ -241,16 +250,16 @@ impl SmoothPreparation {
     }
 
     /// The curve in a lane, in f64.
-    fn curve(&self, lane: usize) -> Curve {
+    fn curve(&self, lane: usize) -> IntervalCurve {
         let (shape, quantity) = (self.smooth.shape, self.interpolation.quantity);
         self.intervals.curve(lane, shape, quantity)
     }
 
     /// Lets the curves of a stretch wait until all of its track is there.
-    fn wait(&mut self, stretch: &Stretch) {
+    fn wait(&mut self, stretch: &TrackStretch) {
         for (i, lane) in stretch.lanes().enumerate() {
-            let moves = !self.holds(stretch, lane);
-            self.waiting.push(Waiting {
+            let moves = !self.is_still(stretch, lane);
+            self.waiting.push(PendingInterval {
                 part: stretch.part,
                 start: self.intervals.starts[lane],
                 key: stretch.key_at(i),
@@ -260,22 +269,22 @@ impl SmoothPreparation {
     }
 
     /// Makes the intervals of a stretch into spans.
-    fn push_spans(&mut self, prepared: &mut Prepared, stretch: &Stretch) {
+    fn push_spans(&mut self, prepared: &mut Prepared, stretch: &TrackStretch) {
         let first_span = prepared.spans.len();
         let is_steady = stretch.all == 1 && self.interpolation.is_steady_alone();
-        let mut holds_frame = [true; LANES];
+        let mut has_frame = [true; LANES];
         if let Some((rate, start)) = self.frames {
-            let mut frames = FramesHeld {
+            let mut frames = FindFrames {
                 clock: FrameClock::new(rate, start, false),
                 intervals: &self.intervals,
                 lanes: stretch.lanes(),
-                held: holds_frame,
+                has_frame,
             };
             in_lanes(&mut frames);
-            holds_frame = frames.held;
+            has_frame = frames.has_frame;
         }
         let is_fitted =
-            |own: &Self, lane| holds_frame[lane] && !is_steady && !own.holds(stretch, lane);
+            |this: &Self, lane| has_frame[lane] && !is_steady && !this.is_still(stretch, lane);
         let Range {
             start: mut lane,
             end,
@@ -286,15 +295,15 @@ impl SmoothPreparation {
                 .take_while(|&lane| is_fitted(self, lane))
                 .count();
             if fitted > 0 {
-                self.take(prepared, lane..lane + fitted, stretch.key_at(i));
-            } else if !holds_frame[lane] {
-                prepared.push_span(start, Source::Constant(NONE), NONE);
-            } else if self.holds(stretch, lane) {
+                self.queue(prepared, lane..lane + fitted, stretch.key_at(i));
+            } else if !has_frame[lane] {
+                prepared.push_span(start, SpanSource::Constant(NONE), NONE);
+            } else if self.is_still(stretch, lane) {
                 let constant = match self.interpolation.quantity {
                     Quantity::Rotation => stretch.still + i as u32,
                     _ => prepared.constant(STILL),
                 };
-                prepared.push_span(start, Source::Constant(constant), NONE);
+                prepared.push_span(start, SpanSource::Constant(constant), NONE);
             } else {
                 let keys = [self.intervals.from[lane], self.intervals.to[lane]];
                 prepared.push_segment(start, arc_polynomial(keys), stretch.key_at(i));
@@ -309,29 +318,29 @@ impl SmoothPreparation {
         spans.end = end;
     }
 
-    /// Takes the curves in some lanes to be fitted: they become the next spans. `key` is the
+    /// Queues the curves in some lanes to be fitted: they become the next spans. `key` is the
     /// constant at the start of the first.
-    fn take(&mut self, prepared: &mut Prepared, lanes: Range<usize>, key: u32) {
+    fn queue(&mut self, prepared: &mut Prepared, lanes: Range<usize>, key: u32) {
         if let Some(direct) = &mut self.direct {
-            return direct.take(prepared, &self.intervals, lanes, key);
+            return direct.queue(prepared, &self.intervals, lanes, key);
         }
         for (i, lane) in lanes.enumerate() {
             let (start, segment) = (self.intervals.starts[lane], PolynomialSegment::zeroed());
             let key = if key == NONE { NONE } else { key + i as u32 };
-            let place = prepared.push_segment(start, segment, key);
-            self.fitting.take(&self.intervals, lane, place);
+            let slot = prepared.push_segment(start, segment, key);
+            self.fitting.queue(&self.intervals, lane, slot);
         }
     }
 
     /// Whether an interval stands still.
-    fn holds(&self, stretch: &Stretch, lane: usize) -> bool {
+    fn is_still(&self, stretch: &TrackStretch, lane: usize) -> bool {
         let at_end = || stretch.first() == Some(lane) || stretch.last() == Some(lane);
         self.is_frozen() && stretch.all > 1 && at_end()
     }
 
     /// Whether tracks are extrapolated on a side with this wrap mode. A track that stands still in
     /// its first and last interval stands still outside them too.
-    fn goes_on(&self, outside: WrapMode) -> bool {
+    fn extrapolates(&self, outside: WrapMode) -> bool {
         outside == WrapMode::Extrapolate && !self.is_frozen()
     }
 
@@ -342,31 +351,33 @@ impl SmoothPreparation {
 
     /// Adds what lies at a track's ends, where a stretch reaches them, and outside: the curves that
     /// extrapolate the track at the angular velocity of its ends, where the wrap mode asks for it,
-    /// and what a curve that does not pass through its keys holds instead of them: its own end
+    /// and what is held for a curve that does not pass through its keys instead of them: its end
     /// values for rotations, 0 for velocities and accelerations.
-    fn add_ends(&self, prepared: &mut Prepared, stretch: &Stretch) {
+    fn add_ends(&self, prepared: &mut Prepared, stretch: &TrackStretch) {
         let Interpolation { before, after, .. } = self.interpolation;
         let of_rotations = self.interpolation.quantity == Quantity::Rotation;
         let sides = [(stretch.first(), before, 0), (stretch.last(), after, 1)];
         for (lane, outside, end) in sides {
             let Some(lane) = lane else { continue };
-            let goes_on = self.goes_on(outside);
-            if goes_on {
-                prepared.exact.push(self.curve(lane).beyond(end as f64));
-                let place = prepared.exact.len() as u32 - 1;
-                let beyond = prepared.parts[stretch.part].beyond(stretch.span);
-                *[&mut beyond.from_before, &mut beyond.from_after][end] = place;
+            let is_extrapolated = self.extrapolates(outside);
+            if is_extrapolated {
+                prepared
+                    .exact
+                    .push(self.curve(lane).extended_from(end as f64));
+                let index = prepared.exact.len() as u32 - 1;
+                let extension = prepared.parts[stretch.part].extension_mut(stretch.span);
+                *[&mut extension.from_before, &mut extension.from_after][end] = index;
             }
             if stretch.key != NONE {
                 continue;
             }
-            let own = || round_quat(self.curve(lane).value(end as f64));
-            if !goes_on {
+            let end_value = || round_quat(self.curve(lane).value(end as f64));
+            if !is_extrapolated {
                 let held = match of_rotations {
                     true if self.is_frozen() => {
                         prepared.constants[stretch.still as usize + (lane - stretch.lane) + end]
                     }
-                    true => own(),
+                    true => end_value(),
                     false => STILL,
                 };
                 let held = prepared.constant(held);
@@ -374,9 +385,11 @@ impl SmoothPreparation {
                 *[&mut part.before, &mut part.after][end] = held;
             }
             if !of_rotations && end == 1 {
-                let at_end = if self.is_frozen() { STILL } else { own() };
+                let at_end = if self.is_frozen() { STILL } else { end_value() };
                 let at_end = prepared.constant(at_end);
-                prepared.parts[stretch.part].beyond(stretch.span).at_end = at_end;
+                prepared.parts[stretch.part]
+                    .extension_mut(stretch.span)
+                    .at_end = at_end;
             }
         }
     }

@@ -6,19 +6,20 @@ use std::borrow::Cow;
 use bytemuck::Zeroable;
 use glam::{DVec3, Vec3};
 
+use crate::curve::formula::LineNumbers;
 use crate::curve::options::Quantity;
-use crate::fit::double::curve::Curve;
-use crate::fit::double::shape::Shape;
+use crate::fit::exact::curve::IntervalCurve;
+use crate::fit::exact::shape::Shape;
 use crate::math::canonical::{canonical, round_f32, round_quat};
 use crate::math::quaternion::ratio;
 use crate::method::interpolation::Interpolation;
-use crate::method::vector_curve::{Cubic, Curves};
+use crate::method::vector_curve::{VectorCubic, VectorCurves};
 use crate::method::vector_method::VectorMethod;
 use crate::prepare::prepared::Prepared;
 use crate::shader::PolynomialSegment;
-use crate::time::spans::{NONE, Source};
+use crate::time::spans::{NONE, SpanSource};
 use crate::time::wrap::{Wrap, WrapMode};
-use crate::tracks::vectors::VectorTrack;
+use crate::tracks::set::vectors::VectorTrack;
 
 /// Keys beside a sample on either side that its curve may depend on, and one for the rounding of times.
 const BESIDE: usize = 3;
@@ -49,22 +50,22 @@ pub(crate) fn thinned<'t>(
         track.times.partition_point(|&key| key <= time)
     }));
     near.sort_unstable();
-    let mut places: Vec<usize> = Vec::new();
+    let mut indices: Vec<usize> = Vec::new();
     for near in near {
-        let from = places.last().map_or(0, |&last| last + 1);
-        places.extend(from.max(near.saturating_sub(BESIDE + 1))..count.min(near + BESIDE + 1));
+        let from = indices.last().map_or(0, |&last| last + 1);
+        indices.extend(from.max(near.saturating_sub(BESIDE + 1))..count.min(near + BESIDE + 1));
     }
-    fn of<T: Copy>(all: &[T], places: &[usize]) -> Vec<T> {
+    fn of<T: Copy>(all: &[T], indices: &[usize]) -> Vec<T> {
         match all {
             [] => Vec::new(),
-            all => places.iter().map(|&place| all[place]).collect(),
+            all => indices.iter().map(|&index| all[index]).collect(),
         }
     }
     Cow::Owned(VectorTrack {
-        times: of(&track.times, &places),
-        keys: of(&track.keys, &places),
-        tangents: of(&track.tangents, &places),
-        ups: of(&track.ups, &places),
+        times: of(&track.times, &indices),
+        keys: of(&track.keys, &indices),
+        tangents: of(&track.tangents, &indices),
+        ups: of(&track.ups, &indices),
     })
 }
 
@@ -81,7 +82,7 @@ pub(crate) fn add(
     let stored = |key: &Vec3| [canonical(key.x), canonical(key.y), canonical(key.z), 0.0];
     prepared.constants.extend(track.keys.iter().map(stored));
     let first_span = prepared.spans.len();
-    let curves = Curves::new(track, method, interpolation.ends);
+    let curves = VectorCurves::new(track, method, interpolation.ends);
     // A B-spline passes near its keys.
     let meets_keys = method != VectorMethod::BSpline;
     let mut held = [first_key, first_key + last as u32];
@@ -89,7 +90,7 @@ pub(crate) fn add(
     for i in 0..last {
         let (start, key) = (track.times[i], first_key + i as u32);
         if curves.is_held(i) {
-            prepared.push_span(start, Source::Constant(key), NONE);
+            prepared.push_span(start, SpanSource::Constant(key), NONE);
             continue;
         }
         let curve = curves.of(i);
@@ -115,13 +116,13 @@ pub(crate) fn add(
     if lines != [NONE; 2]
         && let Some(part) = prepared.parts.last_mut()
     {
-        let beyond = part.beyond((track.times[0], track.times[last]));
-        [beyond.from_before, beyond.from_after] = lines;
+        let extension = part.extension_mut((track.times[0], track.times[last]));
+        [extension.from_before, extension.from_after] = lines;
     }
 }
 
 /// A cubic in powers about its middle.
-fn segment(cubic: &Cubic) -> PolynomialSegment {
+fn segment(cubic: &VectorCubic) -> PolynomialSegment {
     let (start, end) = (cubic.start, cubic.end);
     let (leaving, arriving) = (cubic.leaving, cubic.arriving);
     let rise = end - start;
@@ -139,10 +140,10 @@ fn segment(cubic: &Cubic) -> PolynomialSegment {
 }
 
 /// A straight line from a point, with this slope per second.
-fn line(from: DVec3, slope: DVec3) -> Curve {
-    let shape = Shape::LINE;
-    let mut numbers = shape.shared;
-    numbers[..3].copy_from_slice(&from.to_array());
-    numbers[4..7].copy_from_slice(&slope.to_array());
-    Curve::new(shape, numbers, Quantity::Rotation, 1.0)
+fn line(from: DVec3, slope: DVec3) -> IntervalCurve {
+    let numbers = LineNumbers {
+        start: [from.x, from.y, from.z, 0.0],
+        slope: [slope.x, slope.y, slope.z, 0.0],
+    };
+    IntervalCurve::new(Shape::LINE, numbers.into(), Quantity::Rotation, 1.0)
 }

@@ -3,7 +3,7 @@
 
 use std::ops::Range;
 
-use crate::reduce::Task;
+use crate::reduce::ReductionTask;
 use crate::reduce::value::Value;
 
 /// A curve changes as far as this many keys from one that is put in or taken out.
@@ -13,7 +13,7 @@ const REACH: usize = 2;
 /// of the tolerance. The keys are all that the curve of these intervals depends on.
 pub(crate) type Worst<'a> = dyn Fn(&[usize], Range<usize>) -> Vec<(usize, f64)> + 'a;
 
-/// The places of the keys of a curve that is near to all samples: the fewest of those that are found from
+/// The indices of the keys of a curve that is near to all samples: the fewest of those that are found from
 /// the two ends, from all samples, and from the keys of `cubics`, whose intervals are cubics too.
 pub(crate) fn inserted(
     samples: usize,
@@ -23,41 +23,41 @@ pub(crate) fn inserted(
     let starts = [vec![0, samples - 1], cubics];
     let filled = starts.map(|start| filled(start, worst_of_each));
     let all = filled.into_iter().chain([(0..samples).collect()]);
-    let thinned = all.map(|places| thinned(places, worst_of_each));
+    let thinned = all.map(|indices| thinned(indices, worst_of_each));
     thinned.min_by_key(Vec::len).unwrap_or_default()
 }
 
 /// Puts keys in until the curve is near: every interval whose curve is too far from a sample gets the
 /// worst one. It ends: at last every sample is a key.
-fn filled(mut places: Vec<usize>, worst_of_each: &Worst<'_>) -> Vec<usize> {
+fn filled(mut indices: Vec<usize>, worst_of_each: &Worst<'_>) -> Vec<usize> {
     loop {
-        let worst = worst_of_each(&places, 0..places.len() - 1);
-        let more = worst.into_iter().filter(|own| own.1 > 1.0);
-        let more: Vec<usize> = more.map(|own| own.0).collect();
+        let worst = worst_of_each(&indices, 0..indices.len() - 1);
+        let more = worst.into_iter().filter(|candidate| candidate.1 > 1.0);
+        let more: Vec<usize> = more.map(|candidate| candidate.0).collect();
         if more.is_empty() {
-            return places;
+            return indices;
         }
-        places.extend(more);
-        places.sort_unstable();
-        places.dedup();
+        indices.extend(more);
+        indices.sort_unstable();
+        indices.dedup();
     }
 }
 
 /// Takes keys out while the curve stays near: of two neighbours one in each round, so that those that
 /// stay are spread evenly.
-fn thinned(mut places: Vec<usize>, worst_of_each: &Worst<'_>) -> Vec<usize> {
+fn thinned(mut indices: Vec<usize>, worst_of_each: &Worst<'_>) -> Vec<usize> {
     loop {
-        let before = places.len();
-        let mut place = 1;
-        while place + 1 < places.len() {
-            if can_miss(&places, place, worst_of_each) {
-                places.remove(place);
+        let before = indices.len();
+        let mut i = 1;
+        while i + 1 < indices.len() {
+            if can_miss(&indices, i, worst_of_each) {
+                indices.remove(i);
             }
             // Behind a key that is out the next one stays for this round.
-            place += 1;
+            i += 1;
         }
-        if places.len() == before {
-            return places;
+        if indices.len() == before {
+            return indices;
         }
     }
 }
@@ -67,19 +67,19 @@ fn can_miss(keys: &[usize], key: usize, worst_of_each: &Worst<'_>) -> bool {
     // One key more on each side than the curve that changes: its tangents depend on those.
     let first = key.saturating_sub(REACH + 1);
     let end = (key + REACH + 2).min(keys.len());
-    let own: Vec<usize> = (first..end)
+    let kept: Vec<usize> = (first..end)
         .filter(|&k| k != key)
         .map(|k| keys[k])
         .collect();
     // Cut ends are not those of the curve, and their intervals do not change.
     let skipped = usize::from(first > 0);
-    let count = own.len() - 1 - usize::from(end < keys.len());
-    worst_of_each(&own, skipped..count)
+    let count = kept.len() - 1 - usize::from(end < keys.len());
+    worst_of_each(&kept, skipped..count)
         .iter()
-        .all(|own| own.1 <= 1.0)
+        .all(|candidate| candidate.1 <= 1.0)
 }
 
-impl<T: Value> Task<'_, T> {
+impl<T: Value> ReductionTask<'_, T> {
     pub(crate) fn worst_of_each(
         &self,
         keys: &[usize],
@@ -90,16 +90,16 @@ impl<T: Value> Task<'_, T> {
         let curve = T::bessel_overhauser(&times, &values);
         let worst = |interval: usize| {
             let mut worst = (keys[interval], 0.0);
-            for place in keys[interval] + 1..keys[interval + 1] {
-                let apart = self.samples[place].apart(curve(self.times[place]));
+            for i in keys[interval] + 1..keys[interval + 1] {
+                let apart = self.samples[i].apart(curve(self.times[i]));
                 let part = match apart <= self.tolerance {
                     // Also where both are 0.
                     true => (apart / self.tolerance).min(1.0),
-                    // What is no number is not near.
+                    // NaN is not near.
                     false => (apart / self.tolerance).max(1.0).next_up(),
                 };
                 if part > worst.1 {
-                    worst = (place, part);
+                    worst = (i, part);
                 }
             }
             worst

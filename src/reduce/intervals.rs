@@ -3,18 +3,18 @@
 
 use glam::DVec4;
 
-use crate::reduce::Task;
+use crate::reduce::ReductionTask;
 use crate::reduce::value::Value;
 use crate::reference::vector::hermite;
 
-/// The places of the keys of intervals that are as long as possible: the farthest sample from each key
+/// The indices of the keys of intervals that are as long as possible: the farthest sample from each key
 /// that `fits` lets an interval reach. Its length is doubled until it does not, and then halved down
 /// between the two, so that each sample is looked at about `log n` times. A neighbour is always
 /// reached: there is no sample in between.
 pub(crate) fn longest(samples: usize, fits: impl Fn(usize, usize) -> bool) -> Vec<usize> {
     let last = samples - 1;
-    let mut places = vec![0];
-    while let Some(&from) = places.last().filter(|&&from| from < last) {
+    let mut indices = vec![0];
+    while let Some(&from) = indices.last().filter(|&&from| from < last) {
         let mut reached = from + 1;
         let mut refused = last + 1;
         let mut step = 2;
@@ -34,35 +34,37 @@ pub(crate) fn longest(samples: usize, fits: impl Fn(usize, usize) -> bool) -> Ve
                 false => refused = middle,
             }
         }
-        places.push(reached);
+        indices.push(reached);
     }
-    places
+    indices
 }
 
-impl<T: Value> Task<'_, T> {
+impl<T: Value> ReductionTask<'_, T> {
     /// Whether all samples within an interval are near.
     pub(crate) fn fits(&self, from: usize, to: usize, is_cubic: bool) -> bool {
         let error = self.interval(from, to, is_cubic, self.tolerance);
         error.is_some()
     }
 
-    /// The largest distance of a sample from the intervals between the keys at some places.
-    pub(crate) fn interval_error(&self, places: &[usize], is_cubic: bool) -> f64 {
+    /// The largest distance of a sample from the intervals between the keys at some samples.
+    pub(crate) fn interval_error(&self, indices: &[usize], is_cubic: bool) -> f64 {
         let error = |pair: &[usize]| self.interval(pair[0], pair[1], is_cubic, f64::INFINITY);
-        let errors = places.windows(2).map(error);
-        errors.fold(0.0, |most, own| most.max(own.unwrap_or(f64::INFINITY)))
+        let errors = indices.windows(2).map(error);
+        errors.fold(0.0, |largest, found| {
+            largest.max(found.unwrap_or(f64::INFINITY))
+        })
     }
 
-    /// The tangents of cubics at the keys at some places, per second.
-    pub(crate) fn tangents_at(&self, places: &[usize]) -> Vec<[T; 2]> {
-        let mut found = Vec::with_capacity(places.len());
+    /// The tangents of cubics at some keys, per second.
+    pub(crate) fn tangents_at(&self, indices: &[usize]) -> Vec<[T; 2]> {
+        let mut found = Vec::with_capacity(indices.len());
         let still = T::of_numbers(DVec4::ZERO);
         let mut arriving = still;
-        for pair in places.windows(2) {
+        for pair in indices.windows(2) {
             let (from, to) = (pair[0], pair[1]);
             let seconds = self.times[to] - self.times[from];
             let tangents = self.tangents(from, to);
-            let [leaving, next] = tangents.map(|own| T::of_numbers(own / seconds));
+            let [leaving, next] = tangents.map(|tangent| T::of_numbers(tangent / seconds));
             found.push([arriving, leaving]);
             arriving = next;
         }
@@ -70,12 +72,12 @@ impl<T: Value> Task<'_, T> {
         found
     }
 
-    /// The largest distance of the samples within an interval; nothing where it is over `most`.
-    fn interval(&self, from: usize, to: usize, is_cubic: bool, most: f64) -> Option<f64> {
+    /// The largest distance of the samples within an interval; `None` where it is over `limit`.
+    fn interval(&self, from: usize, to: usize, is_cubic: bool, limit: f64) -> Option<f64> {
         let (times, samples) = (self.times, self.samples);
         let (start, end) = (samples[from], samples[to]);
         let seconds = times[to] - times[from];
-        let part = |place: usize| (times[place] - times[from]) / seconds;
+        let part = |i: usize| (times[i] - times[from]) / seconds;
         let tangents = match is_cubic {
             true => self.tangents(from, to),
             false => [DVec4::ZERO; 2],
@@ -87,26 +89,26 @@ impl<T: Value> Task<'_, T> {
         };
         // A cubic could pass all samples and stray between them. Neighbours are always joined.
         if is_cubic && to > from + 1 {
-            for place in from..to {
+            for i in from..to {
                 // Samples say as little as the difference between the two.
-                let [straight, smooth] = self.middle(place);
+                let [straight, smooth] = self.middle(i);
                 let (middle, slack) = (straight.towards(smooth, 0.5), 0.5 * straight.apart(smooth));
-                let curve = cubic(f64::midpoint(part(place), part(place + 1)));
+                let curve = cubic(f64::midpoint(part(i), part(i + 1)));
                 let apart = middle.apart(curve);
-                if apart.is_nan() || apart > most + slack {
+                if apart.is_nan() || apart > limit + slack {
                     return None;
                 }
             }
         }
         let mut error = 0.0f64;
-        for (place, &sample) in samples.iter().enumerate().take(to).skip(from + 1) {
+        for (i, &sample) in samples.iter().enumerate().take(to).skip(from + 1) {
             let curve = match is_cubic {
-                true => cubic(part(place)),
-                false => start.towards(end, part(place)),
+                true => cubic(part(i)),
+                false => start.towards(end, part(i)),
             };
             let apart = sample.apart(curve);
-            // What is no number is not near.
-            if apart.is_nan() || apart > most {
+            // NaN is not near.
+            if apart.is_nan() || apart > limit {
                 return None;
             }
             error = error.max(apart);
@@ -114,15 +116,15 @@ impl<T: Value> Task<'_, T> {
         Some(error)
     }
 
-    /// What may lie half way between a sample and the next one: on the straight way, and on the cubic
-    /// through the four samples around (the parabola through three, at an end).
-    fn middle(&self, place: usize) -> [T; 2] {
+    /// Two estimates of the value half way between a sample and the next one: on the straight line, and on
+    /// the cubic through the four samples around (the parabola through three, at an end).
+    fn middle(&self, i: usize) -> [T; 2] {
         let samples = self.samples;
-        let straight = samples[place].towards(samples[place + 1], 0.5);
-        let own = |place: usize| samples.get(place).map(|sample| sample.numbers());
-        let [b, c] = [place, place + 1].map(|place| samples[place].numbers());
-        let before = place.checked_sub(1).and_then(own);
-        let smooth = match (before, own(place + 2)) {
+        let straight = samples[i].towards(samples[i + 1], 0.5);
+        let numbers_at = |j: usize| samples.get(j).map(|sample| sample.numbers());
+        let [b, c] = [i, i + 1].map(|j| samples[j].numbers());
+        let before = i.checked_sub(1).and_then(numbers_at);
+        let smooth = match (before, numbers_at(i + 2)) {
             (Some(a), Some(d)) => (b + c) * (9.0 / 16.0) - (a + d) / 16.0,
             (None, Some(d)) => b * (3.0 / 8.0) + c * (3.0 / 4.0) - d / 8.0,
             (Some(a), None) => c * (3.0 / 8.0) + b * (3.0 / 4.0) - a / 8.0,
@@ -132,7 +134,7 @@ impl<T: Value> Task<'_, T> {
     }
 
     /// The tangents whose cubic is nearest to the samples of an interval, by least squares over their
-    /// numbers. What lies half way between them counts a little: with few samples those alone tell too
+    /// numbers. The values half way between them count a little: with few samples those alone tell too
     /// little.
     fn tangents(&self, from: usize, to: usize) -> [DVec4; 2] {
         /// As parts of the weight of a sample.
@@ -144,7 +146,7 @@ impl<T: Value> Task<'_, T> {
         let (mut aa, mut ab, mut bb) = (STRAIGHT, 0.0, STRAIGHT);
         let (mut ar, mut br) = (straight * STRAIGHT, straight * STRAIGHT);
         let seconds = times[to] - times[from];
-        let part = |place: usize| (times[place] - times[from]) / seconds;
+        let part = |i: usize| (times[i] - times[from]) / seconds;
         let mut add = |part: f64, value: DVec4, weight: f64| {
             let [p0, a, p1, b] = hermite(part);
             let rest = (value - start * p0 - end * p1) * weight;
@@ -154,12 +156,12 @@ impl<T: Value> Task<'_, T> {
             ar += rest * a;
             br += rest * b;
         };
-        for (place, sample) in samples.iter().enumerate().take(to).skip(from) {
-            if place > from {
-                add(part(place), sample.numbers(), 1.0);
+        for (i, sample) in samples.iter().enumerate().take(to).skip(from) {
+            if i > from {
+                add(part(i), sample.numbers(), 1.0);
             }
-            let middle = f64::midpoint(part(place), part(place + 1));
-            add(middle, self.middle(place)[1].numbers(), MIDDLE);
+            let middle = f64::midpoint(part(i), part(i + 1));
+            add(middle, self.middle(i)[1].numbers(), MIDDLE);
         }
         let determinant = aa * bb - ab * ab;
         [

@@ -43,7 +43,7 @@ pub enum ReducedCurve {
 pub struct ReducedKeys<T> {
     /// Which samples are keys, increasing. A channel that stands still has one, every other the first
     /// and the last sample at least.
-    pub places: Vec<usize>,
+    pub indices: Vec<usize>,
     /// Values of the keys: those of the samples; rotations with the sign that continues the one before.
     pub keys: Vec<T>,
     /// For [`ReducedCurve::GltfCubic`] the tangents with which the curve arrives at each key and leaves
@@ -60,29 +60,29 @@ pub enum ReduceError {
     /// Every sample has a time.
     #[error("there are {samples} samples and {times} times; give a time for each sample")]
     Lengths {
-        /// Samples given.
+        /// The number of samples.
         samples: usize,
-        /// Times given.
+        /// The number of times.
         times: usize,
     },
     /// Times are finite and increase.
-    #[error("time {place} is {time} s; times are finite and increase")]
+    #[error("time {index} is {time} s; times must be finite and increase")]
     Time {
-        /// Its place, from 0.
-        place: usize,
+        /// Its index, from 0.
+        index: usize,
         /// Seconds.
         time: f64,
     },
     /// A sample is not finite, or a rotation of norm 0.
-    #[error("sample {place} is no finite value")]
+    #[error("sample {index} is not finite")]
     Sample {
-        /// Its place, from 0.
-        place: usize,
+        /// Its index, from 0.
+        index: usize,
     },
     /// A tolerance is finite and at least 0.
-    #[error("the tolerance is {tolerance}; give a finite number from 0")]
+    #[error("the tolerance is {tolerance}; give a finite number of 0 or more")]
     Tolerance {
-        /// What was given.
+        /// The tolerance.
         tolerance: f64,
     },
 }
@@ -96,7 +96,7 @@ pub enum ReduceError {
 /// let times: Vec<f64> = (0..100).map(|i| f64::from(i) / 100.0).collect();
 /// let even: Vec<DQuat> = times.iter().map(|&t| DQuat::from_rotation_y(t)).collect();
 /// let reduced = reduce_rotations(&times, &even, 1e-4, ReducedCurve::Linear)?;
-/// assert_eq!(reduced.places, [0, 99]);
+/// assert_eq!(reduced.indices, [0, 99]);
 /// # Ok::<(), tumble::reduce::ReduceError>(())
 /// ```
 ///
@@ -108,8 +108,8 @@ pub fn reduce_rotations(
     tolerance: f64,
     curve: ReducedCurve,
 ) -> Result<ReducedKeys<DQuat>, ReduceError> {
-    let own = continued(samples);
-    let task = Task::new(times, &own, tolerance)?;
+    let unit_samples = continued(samples);
+    let task = ReductionTask::new(times, &unit_samples, tolerance)?;
     let mut found = reduced(times.len(), &[task], &[], curve);
     Ok(found.rotations.pop().unwrap_or_default())
 }
@@ -124,13 +124,13 @@ pub fn reduce_vectors(
     tolerance: f64,
     curve: ReducedCurve,
 ) -> Result<ReducedKeys<DVec3>, ReduceError> {
-    let task = Task::new(times, samples, tolerance)?;
+    let task = ReductionTask::new(times, samples, tolerance)?;
     let mut found = reduced(times.len(), &[], &[task], curve);
     Ok(found.vectors.pop().unwrap_or_default())
 }
 
 /// Keys of several channels at the same times: every sample of each is within its tolerance. For files
-/// that hold all tracks at the same times.
+/// in which all tracks have keys at the same times.
 ///
 /// # Errors
 /// As of [`reduce_rotations`].
@@ -140,56 +140,77 @@ pub fn reduce_together(
     vectors: &[(Vec<DVec3>, f64)],
     curve: ReducedCurve,
 ) -> Result<ReducedTogether, ReduceError> {
-    let turned: Vec<Vec<DQuat>> = rotations.iter().map(|own| continued(&own.0)).collect();
-    let turning = (turned.iter().zip(rotations))
-        .map(|(samples, own)| Task::new(times, samples, own.1))
+    let unit_rotations: Vec<Vec<DQuat>> = rotations
+        .iter()
+        .map(|rotation| continued(&rotation.0))
+        .collect();
+    let rotation_tasks = (unit_rotations.iter().zip(rotations))
+        .map(|(samples, rotation)| ReductionTask::new(times, samples, rotation.1))
         .collect::<Result<Vec<_>, _>>()?;
-    let moving = (vectors.iter())
-        .map(|(samples, tolerance)| Task::new(times, samples, *tolerance))
+    let vector_tasks = (vectors.iter())
+        .map(|(samples, tolerance)| ReductionTask::new(times, samples, *tolerance))
         .collect::<Result<Vec<_>, _>>()?;
-    Ok(reduced(times.len(), &turning, &moving, curve))
+    Ok(reduced(times.len(), &rotation_tasks, &vector_tasks, curve))
 }
 
 /// The keys of channels with so many samples each.
 fn reduced(
     samples: usize,
-    turning: &[Task<'_, DQuat>],
-    moving: &[Task<'_, DVec3>],
+    rotation_tasks: &[ReductionTask<'_, DQuat>],
+    vector_tasks: &[ReductionTask<'_, DVec3>],
     curve: ReducedCurve,
 ) -> ReducedTogether {
     if samples == 0 {
         return ReducedTogether::default();
     }
-    let is_still = turning.iter().all(|task| task.still().is_some())
-        && moving.iter().all(|task| task.still().is_some());
+    let is_still = rotation_tasks
+        .iter()
+        .all(|task| task.constant_error().is_some())
+        && vector_tasks
+            .iter()
+            .all(|task| task.constant_error().is_some());
     let by_intervals = |is_cubic| {
         longest(samples, |from, to| {
-            turning.iter().all(|task| task.fits(from, to, is_cubic))
-                && moving.iter().all(|task| task.fits(from, to, is_cubic))
+            rotation_tasks
+                .iter()
+                .all(|task| task.fits(from, to, is_cubic))
+                && vector_tasks
+                    .iter()
+                    .all(|task| task.fits(from, to, is_cubic))
         })
     };
     let worst_of_each = |keys: &[usize], intervals: Range<usize>| {
-        let own = || intervals.clone();
-        let turning = turning.iter().map(|task| task.worst_of_each(keys, own()));
-        let moving = moving.iter().map(|task| task.worst_of_each(keys, own()));
+        let all_intervals = || intervals.clone();
+        let rotation_worst = rotation_tasks
+            .iter()
+            .map(|task| task.worst_of_each(keys, all_intervals()));
+        let vector_worst = vector_tasks
+            .iter()
+            .map(|task| task.worst_of_each(keys, all_intervals()));
         let further = |(a, b): ((usize, f64), (usize, f64))| if b.1 > a.1 { b } else { a };
-        let all = turning.chain(moving);
+        let all = rotation_worst.chain(vector_worst);
         let all = all.reduce(|a, b| a.into_iter().zip(b).map(further).collect());
         all.unwrap_or_default()
     };
-    let places = match curve {
+    let indices = match curve {
         _ if is_still => vec![0],
         ReducedCurve::BesselOverhauser => inserted(samples, by_intervals(true), &worst_of_each),
         ReducedCurve::Linear => by_intervals(false),
         ReducedCurve::GltfCubic => by_intervals(true),
     };
     ReducedTogether {
-        rotations: turning.iter().map(|own| own.keys(&places, curve)).collect(),
-        vectors: moving.iter().map(|own| own.keys(&places, curve)).collect(),
+        rotations: rotation_tasks
+            .iter()
+            .map(|task| task.keys(&indices, curve))
+            .collect(),
+        vectors: vector_tasks
+            .iter()
+            .map(|task| task.keys(&indices, curve))
+            .collect(),
     }
 }
 
-/// The keys of several channels, all at the same places.
+/// The keys of several channels, all at the same samples.
 #[derive(Debug, Clone, PartialEq, Default)]
 #[non_exhaustive]
 pub struct ReducedTogether {
@@ -201,23 +222,23 @@ pub struct ReducedTogether {
 
 /// Unit quaternions, each with the sign that continues the one before it.
 fn continued(samples: &[DQuat]) -> Vec<DQuat> {
-    let mut own: Vec<DQuat> = samples.to_vec();
-    for place in 0..own.len() {
-        let unit = own[place].normalize();
-        let continues = place == 0 || own[place - 1].dot(unit) >= 0.0;
-        own[place] = if continues { unit } else { -unit };
+    let mut continuous: Vec<DQuat> = samples.to_vec();
+    for i in 0..continuous.len() {
+        let unit = continuous[i].normalize();
+        let continues = i == 0 || continuous[i - 1].dot(unit) >= 0.0;
+        continuous[i] = if continues { unit } else { -unit };
     }
-    own
+    continuous
 }
 
 /// Samples that have been checked, and how near to them the curve has to be.
-pub(crate) struct Task<'a, T> {
+pub(crate) struct ReductionTask<'a, T> {
     pub(crate) times: &'a [f64],
     pub(crate) samples: &'a [T],
     pub(crate) tolerance: f64,
 }
 
-impl<'a, T: Value> Task<'a, T> {
+impl<'a, T: Value> ReductionTask<'a, T> {
     fn new(times: &'a [f64], samples: &'a [T], tolerance: f64) -> Result<Self, ReduceError> {
         if samples.len() != times.len() {
             return Err(ReduceError::Lengths {
@@ -229,13 +250,13 @@ impl<'a, T: Value> Task<'a, T> {
             return Err(ReduceError::Tolerance { tolerance });
         }
         let is_bad = |sample: &T| !sample.numbers().is_finite();
-        if let Some(place) = samples.iter().position(is_bad) {
-            return Err(ReduceError::Sample { place });
+        if let Some(index) = samples.iter().position(is_bad) {
+            return Err(ReduceError::Sample { index });
         }
-        let increases = |place: usize| place == 0 || times[place - 1] < times[place];
-        if let Some(place) = (0..times.len()).find(|&i| !(times[i].is_finite() && increases(i))) {
-            let time = times[place];
-            return Err(ReduceError::Time { place, time });
+        let increases = |i: usize| i == 0 || times[i - 1] < times[i];
+        if let Some(index) = (0..times.len()).find(|&i| !(times[i].is_finite() && increases(i))) {
+            let time = times[index];
+            return Err(ReduceError::Time { index, time });
         }
         Ok(Self {
             times,
@@ -245,30 +266,34 @@ impl<'a, T: Value> Task<'a, T> {
     }
 
     /// How far the samples are from the first one, if that is near to all.
-    fn still(&self) -> Option<f64> {
+    fn constant_error(&self) -> Option<f64> {
         let first = *self.samples.first()?;
-        let apart = self.samples.iter().map(|own| own.apart(first));
+        let apart = self.samples.iter().map(|sample| sample.apart(first));
         let farthest = apart.fold(0.0, |a: f64, b| if b > a || b.is_nan() { b } else { a });
         (farthest <= self.tolerance).then_some(farthest)
     }
 
-    /// The keys at some places.
-    fn keys(&self, places: &[usize], curve: ReducedCurve) -> ReducedKeys<T> {
+    /// The keys at some samples.
+    fn keys(&self, indices: &[usize], curve: ReducedCurve) -> ReducedKeys<T> {
         ReducedKeys {
-            places: places.to_vec(),
-            keys: places.iter().map(|&place| self.samples[place]).collect(),
+            indices: indices.to_vec(),
+            keys: indices.iter().map(|&i| self.samples[i]).collect(),
             tangents: match curve {
-                ReducedCurve::GltfCubic => self.tangents_at(places),
+                ReducedCurve::GltfCubic => self.tangents_at(indices),
                 _ => Vec::new(),
             },
             error: match curve {
-                _ if places.len() < 2 => self.still().unwrap_or(f64::INFINITY),
+                _ if indices.len() < 2 => self.constant_error().unwrap_or(f64::INFINITY),
                 ReducedCurve::BesselOverhauser => {
-                    let worst = self.worst_of_each(places, 0..places.len() - 1);
-                    worst.iter().map(|own| own.1).fold(0.0, f64::max) * self.tolerance
+                    let worst = self.worst_of_each(indices, 0..indices.len() - 1);
+                    worst
+                        .iter()
+                        .map(|candidate| candidate.1)
+                        .fold(0.0, f64::max)
+                        * self.tolerance
                 }
-                ReducedCurve::Linear => self.interval_error(places, false),
-                ReducedCurve::GltfCubic => self.interval_error(places, true),
+                ReducedCurve::Linear => self.interval_error(indices, false),
+                ReducedCurve::GltfCubic => self.interval_error(indices, true),
             },
         }
     }

@@ -1,10 +1,10 @@
-//! What is reduced: rotations and vectors.
+//! The values that are reduced: rotations and vectors.
 
 use glam::{DQuat, DVec3, DVec4};
 
-use crate::curve::options::{Ends, Path};
+use crate::curve::options::{Ends, KeySigns};
 use crate::method::bessel_overhauser::BESSEL_OVERHAUSER;
-use crate::reference::curve::Curve;
+use crate::reference::curve::ReferenceCurve;
 use crate::reference::quaternion::slerp;
 use crate::reference::vector::VectorCurve;
 
@@ -13,7 +13,7 @@ pub(crate) trait Value: Copy + Default + PartialEq {
     /// How far two are apart: the angle of the rotation between them, or their distance.
     fn apart(self, other: Self) -> f64;
 
-    /// The value at a part of the way to another.
+    /// The interpolated value at a part of the distance to another.
     fn towards(self, other: Self, part: f64) -> Self;
 
     fn numbers(self) -> DVec4;
@@ -54,7 +54,13 @@ impl Value for DQuat {
     fn bessel_overhauser(times: &[f64], keys: &[Self]) -> Box<dyn Fn(f64) -> Self> {
         let keys: Vec<_> = keys.iter().map(|key| key.as_quat()).collect();
         let definition = BESSEL_OVERHAUSER.reference;
-        let curve = Curve::new(definition, Path::Shortest, Ends::Parabolic, times, &keys);
+        let curve = ReferenceCurve::new(
+            definition,
+            KeySigns::Shortest,
+            Ends::Parabolic,
+            times,
+            &keys,
+        );
         Box::new(move |time| curve.rotation(time))
     }
 }

@@ -4,24 +4,24 @@ use glam::DVec3;
 
 use crate::curve::options::Ends;
 use crate::reference::curve::Definition;
-use crate::reference::given::with_frozen_ends;
-use crate::reference::quaternion::{exponential, logarithm, multiply, turned};
+use crate::reference::quaternion::{exponential, logarithm, multiply, rotated};
 use crate::reference::segment::{Basis, Segment};
-use crate::reference::track::Track;
+use crate::reference::track::ReferenceTrack;
+use crate::reference::two_keys::with_frozen_ends;
 
 /// The cumulative cubic B-spline.
 pub(crate) const B_SPLINE: Definition =
     Definition::new(|track, ends| with_frozen_ends(track, ends, |i| b_spline(track, ends, i)));
 
-fn b_spline(track: &Track, ends: Ends, i: usize) -> Segment {
+fn b_spline(track: &ReferenceTrack, ends: Ends, i: usize) -> Segment {
     let last = track.last() - 1;
     let step = |i: usize| logarithm(track.difference(i));
     let basis = Basis::Knots(knots(&track.times, ends, i));
     // The step beyond the first interval or, `at_end`, beyond the last.
-    let beyond = |at_end: bool| {
+    let outer_step = |at_end: bool| {
         // The outermost interval, the next one, where the curve ends in the former, and which factor
-        // turns beyond it.
-        let (own, next, t, outer) = match at_end {
+        // acts beyond it.
+        let (outermost, next, t, outer) = match at_end {
             false => (0, 1, 0.0, 0),
             true => (last, last.saturating_sub(1), 1.0, 2),
         };
@@ -29,23 +29,31 @@ fn b_spline(track: &Track, ends: Ends, i: usize) -> Segment {
         match ends {
             _ if last == 0 => step(0),
             // Across the seam.
-            Ends::Loop => step(last - own),
-            Ends::Parabolic => parabola(track, own, next),
+            Ends::Loop => step(last - outermost),
+            Ends::Parabolic => parabola(track, outermost, next),
             Ends::Natural => {
                 // The second derivatives of the two factors that bend there cancel.
                 let second = bends(basis, t);
-                step(own) * (-second[1] / second[outer])
+                step(outermost) * (-second[1] / second[outer])
             }
             Ends::Clamped { start, end } => {
                 let rate = if at_end { end } else { start };
-                solved(basis, rate * track.step(own) / 2.0, step(own))
+                solved(basis, rate * track.step(outermost) / 2.0, step(outermost))
             }
-            Ends::Secant => solved(basis, step(own), step(own)),
-            Ends::Frozen => step(own),
+            Ends::Secant => solved(basis, step(outermost), step(outermost)),
+            Ends::Frozen => step(outermost),
         }
     };
-    let before = if i > 0 { step(i - 1) } else { beyond(false) };
-    let after = if i < last { step(i + 1) } else { beyond(true) };
+    let before = if i > 0 {
+        step(i - 1)
+    } else {
+        outer_step(false)
+    };
+    let after = if i < last {
+        step(i + 1)
+    } else {
+        outer_step(true)
+    };
     Segment::Product {
         base: multiply(track.keys[i], exponential(-before)),
         w: [before, step(i), after],
@@ -74,7 +82,7 @@ pub(crate) fn knots(times: &[f64], ends: Ends, i: usize) -> [f64; 6] {
 
 /// The step beyond an end, as long as the interval at that end, on the parabola through the three
 /// keys there.
-fn parabola(track: &Track, end: usize, next: usize) -> DVec3 {
+fn parabola(track: &ReferenceTrack, end: usize, next: usize) -> DVec3 {
     let rate = |i: usize| logarithm(track.difference(i)) / track.step(i);
     let (h, next_h) = (track.step(end), track.step(next));
     let second_difference = (rate(next) - rate(end)) / (h + next_h);
@@ -95,18 +103,18 @@ fn bends(basis: Basis, t: f64) -> [f64; 3] {
     })
 }
 
-/// `w₁` such that the curve starts with `turn = exp(-w₂ B₂) w₁ B₁' exp(w₂ B₂) + w₂ B₂'`.
-fn first(basis: Basis, turn: DVec3, own: DVec3) -> DVec3 {
+/// `w₁` such that the curve starts with `rate = exp(-w₂ B₂) w₁ B₁' exp(w₂ B₂) + w₂ B₂'`.
+fn first(basis: Basis, rate: DVec3, step: DVec3) -> DVec3 {
     let (values, slopes) = (basis.values(0.0), basis.derivatives(0.0));
-    turned(turn - own * slopes[1], exponential(own * values[1])) / slopes[0]
+    rotated(rate - step * slopes[1], exponential(step * values[1])) / slopes[0]
 }
 
-/// `w₃` such that the curve ends with `turn = exp(-w₃ B₃) w₂ B₂' exp(w₃ B₃) + w₃ B₃'`.
-fn third(basis: Basis, turn: DVec3, own: DVec3) -> DVec3 {
+/// `w₃` such that the curve ends with `rate = exp(-w₃ B₃) w₂ B₂' exp(w₃ B₃) + w₃ B₃'`.
+fn third(basis: Basis, rate: DVec3, step: DVec3) -> DVec3 {
     let (values, slopes) = (basis.values(1.0), basis.derivatives(1.0));
-    let mut w = own;
+    let mut w = step;
     for _ in 0..200 {
-        w = (turn - turned(own * slopes[1], exponential(-w * values[2]))) / slopes[2];
+        w = (rate - rotated(step * slopes[1], exponential(-w * values[2]))) / slopes[2];
     }
     w
 }

@@ -6,17 +6,17 @@ use glam::{DMat3, DQuat, DVec3};
 
 use crate::curve::options::Ends;
 use crate::reference::curve::Definition;
-use crate::reference::given::smooth;
 use crate::reference::quaternion::{exponential, from_parts, invert, logarithm, multiply, vector};
 use crate::reference::segment::Segment;
-use crate::reference::track::Track;
+use crate::reference::track::ReferenceTrack;
+use crate::reference::two_keys::smooth;
 
 /// Cubic rotation vectors with continuous angular acceleration.
 pub(crate) const C2: Definition = Definition::new(|track, ends| {
     let velocities = velocities(track, ends);
     smooth(track, ends, |i| Segment::RotationVector {
         base: track.keys[i],
-        powers: Interval::new(track, i).cubic(&velocities, i).powers,
+        powers: C2Interval::new(track, i).cubic(&velocities, i).powers,
     })
 });
 
@@ -25,7 +25,7 @@ const KEYS_AROUND: usize = 48;
 
 /// The angular velocities at the keys (rad/s, body frame) that make the angular acceleration
 /// continuous.
-fn velocities(track: &Track, ends: Ends) -> Vec<DVec3> {
+fn velocities(track: &ReferenceTrack, ends: Ends) -> Vec<DVec3> {
     let last = track.last();
     if last < 2 {
         // Two keys are joined by an arc, and one has no curve.
@@ -37,8 +37,8 @@ fn velocities(track: &Track, ends: Ends) -> Vec<DVec3> {
     } else {
         0
     };
-    let intervals: Vec<Interval> = (0..last * (2 * copies + 1))
-        .map(|i| Interval::new(track, i % last))
+    let intervals: Vec<C2Interval> = (0..last * (2 * copies + 1))
+        .map(|i| C2Interval::new(track, i % last))
         .collect();
     let secant = |i: usize| intervals[i].whole * 2.0 / intervals[i].duration;
     let parabola = |end: usize, next: usize| {
@@ -67,7 +67,7 @@ fn velocities(track: &Track, ends: Ends) -> Vec<DVec3> {
 /// is the one that grows out of the linear equations' as the bends are brought in, which Newton's iteration
 /// follows in steps so small that it contracts to half with each iteration.
 struct System<'a> {
-    intervals: &'a [Interval],
+    intervals: &'a [C2Interval],
     /// The velocities at the keys where they are not free.
     set: Vec<Option<DVec3>>,
     /// How the equations depend on the neighbours' velocities.
@@ -86,7 +86,7 @@ const STEPS_FOR_PART: usize = 32;
 const ALL_STEPS: usize = 1024;
 
 impl<'a> System<'a> {
-    fn new(intervals: &'a [Interval], [start, end]: [Option<DVec3>; 2]) -> Self {
+    fn new(intervals: &'a [C2Interval], [start, end]: [Option<DVec3>; 2]) -> Self {
         let last = intervals.len();
         let secant = |i: usize| 2.0 * intervals[i].whole / intervals[i].duration;
         // Beside long steps Bessel's mean.
@@ -172,7 +172,7 @@ impl<'a> System<'a> {
         weight * f64::max(angle, 0.1) * rate.length()
     }
 
-    /// The size of what the equations of a key sum, as a velocity.
+    /// The sum of the magnitudes of the terms of a key's equations, as a velocity.
     fn size(&self, key: usize, velocities: &[DVec3]) -> f64 {
         let [before, velocity, behind] = Self::around(velocities, key);
         let still = self.excess(key, [DVec3::ZERO; 3], 0.0);
@@ -370,7 +370,7 @@ impl Band {
 }
 
 /// The constants of an interval, which do not depend on the velocities.
-struct Interval {
+struct C2Interval {
     /// Half of the rotation vector from its first key to its last.
     whole: DVec3,
     /// From the angular velocity at the last key to that vector's rate of change.
@@ -378,8 +378,8 @@ struct Interval {
     duration: f64,
 }
 
-impl Interval {
-    fn new(track: &Track, i: usize) -> Self {
+impl C2Interval {
+    fn new(track: &ReferenceTrack, i: usize) -> Self {
         let whole = logarithm(track.difference(i));
         Self {
             whole,
@@ -388,9 +388,9 @@ impl Interval {
         }
     }
 
-    fn cubic(&self, velocities: &[DVec3], i: usize) -> Cubic {
+    fn cubic(&self, velocities: &[DVec3], i: usize) -> RotationVectorCubic {
         let [start, end] = self.slopes(velocities[i], velocities[i + 1]);
-        Cubic {
+        RotationVectorCubic {
             powers: [
                 start,
                 3.0 * self.whole - 2.0 * start - end,
@@ -413,7 +413,7 @@ impl Interval {
         acceleration(DVec3::ZERO, DVec3::ZERO, second) / (self.duration * self.duration)
     }
 
-    /// The angular acceleration at the interval's end, with that part of what is quadratic in the
+    /// The angular acceleration at the interval's end, with that part of the term quadratic in the
     /// velocity there.
     fn acceleration_at_end(&self, from: DVec3, to: DVec3, part: f64) -> DVec3 {
         let [start, end] = self.slopes(from, to);
@@ -425,7 +425,7 @@ impl Interval {
 }
 
 /// Half of a rotation vector as a cubic in `t`.
-struct Cubic {
+struct RotationVectorCubic {
     powers: [DVec3; 3],
 }
 

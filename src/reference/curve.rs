@@ -5,18 +5,18 @@ use std::fmt;
 
 use glam::{DQuat, DVec3, Quat};
 
-use crate::curve::options::{Ends, Path};
-use crate::reference::pace::Pace;
+use crate::curve::options::{Ends, KeySigns};
+use crate::reference::curve_lengths::CurveLengths;
 use crate::reference::segment::Segment;
-use crate::reference::track::Track;
-use crate::tracks::key_data::Tcb;
+use crate::reference::track::ReferenceTrack;
 use crate::tracks::set as tracks;
+use crate::tracks::set::key_data::Tcb;
 
 /// A method by the book: how the curve of a track follows from its keys. Every method has one.
 #[derive(Clone, Copy)]
 pub struct Definition {
     /// The curve of every interval of a track.
-    pub(super) segments: fn(&Track, Ends) -> Vec<Segment>,
+    pub(super) segments: fn(&ReferenceTrack, Ends) -> Vec<Segment>,
 }
 
 impl fmt::Debug for Definition {
@@ -26,70 +26,70 @@ impl fmt::Debug for Definition {
 }
 
 impl Definition {
-    pub(crate) const fn new(segments: fn(&Track, Ends) -> Vec<Segment>) -> Self {
+    pub(crate) const fn new(segments: fn(&ReferenceTrack, Ends) -> Vec<Segment>) -> Self {
         Self { segments }
     }
 }
 
 /// One track's curve.
-pub struct Curve {
-    track: Track,
+pub struct ReferenceCurve {
+    track: ReferenceTrack,
     segments: Vec<Segment>,
     /// Its arc lengths, if it is run through at constant speed.
-    pace: Option<Pace>,
+    lengths: Option<CurveLengths>,
 }
 
-impl Curve {
+impl ReferenceCurve {
     /// The curve through (or near) `keys` at `times` (seconds), which carry nothing
     /// beside their rotations. Keys are taken as unit quaternions: normalised in f64. A
     /// track that [`Ends::Loop`] closes must repeat its first key at its end.
     #[must_use]
     pub fn new(
         definition: Definition,
-        path: Path,
+        signs: KeySigns,
         ends: Ends,
         times: &[f64],
         keys: &[Quat],
     ) -> Self {
-        Self::build(definition, ends, Track::new(path, times, keys))
+        Self::build(definition, ends, ReferenceTrack::new(signs, times, keys))
     }
 
-    /// The curve of a track with all the data of its keys. `tcb` holds for every key if the track
-    /// has none of its own.
+    /// The curve of a track with all the data of its keys. `tcb` applies to every key if the track
+    /// has no parameters for each key.
     pub(crate) fn of_track(
         definition: Definition,
-        path: Path,
+        signs: KeySigns,
         ends: Ends,
         tcb: Tcb,
         track: tracks::Track<'_>,
     ) -> Self {
-        let mut own = Track::new(path, track.times, track.keys);
-        own.velocities = track.velocities.to_vec();
-        own.tangents = track.tangents.to_vec();
-        own.tcb = match track.tcb {
+        let mut reference_track = ReferenceTrack::new(signs, track.times, track.keys);
+        reference_track.velocities = track.velocities.to_vec();
+        reference_track.tangents = track.tangents.to_vec();
+        reference_track.tcb = match track.tcb {
             [] => vec![tcb; track.keys.len()],
-            given => given.to_vec(),
+            values => values.to_vec(),
         };
-        Self::build(definition, ends, own)
+        Self::build(definition, ends, reference_track)
     }
 
     /// The same curve, run through at one angular speed; a curve of held keys stays as it is.
     pub(crate) fn at_constant_speed(mut self) -> Self {
-        let pace = Pace::new(&self.segments);
-        self.pace = (pace.total() > 0.0).then_some(pace);
+        let lengths = CurveLengths::new(&self.segments);
+        self.lengths = (lengths.total() > 0.0).then_some(lengths);
         self
     }
 
-    fn build(definition: Definition, ends: Ends, track: Track) -> Self {
+    fn build(definition: Definition, ends: Ends, track: ReferenceTrack) -> Self {
         Self {
             segments: (definition.segments)(&track, ends),
             track,
-            pace: None,
+            lengths: None,
         }
     }
 
     /// The rotation at a time in seconds; before the first key and after the last
-    /// it holds the end values.
+    /// the end values.
     #[must_use]
     pub fn rotation(&self, time: f64) -> DQuat {
         let last = self.track.last();
@@ -98,7 +98,7 @@ impl Curve {
         }
         if time >= self.track.times[last] {
             return match self.segments[last - 1] {
-                Segment::Hold(_) => self.track.keys[last],
+                Segment::Constant(_) => self.track.keys[last],
                 segment => segment.rotation(1.0),
             };
         }
@@ -113,13 +113,13 @@ impl Curve {
         let Some((i, t)) = self.inside(time) else {
             return DVec3::ZERO;
         };
-        match &self.pace {
-            Some(pace) => {
+        match &self.lengths {
+            Some(lengths) => {
                 // A segment may start or end at rest, without a direction: that next to it is
                 // taken.
                 let moving = t.clamp(1e-6, 1.0 - 1e-6);
                 let direction = self.segments[i].velocity(moving).normalize_or_zero();
-                direction * (pace.total() / self.duration())
+                direction * (lengths.total() / self.duration())
             }
             None => self.segment_velocity(i, t),
         }
@@ -132,11 +132,11 @@ impl Curve {
         let Some((i, t)) = self.inside(time) else {
             return DVec3::ZERO;
         };
-        let Some(pace) = &self.pace else {
+        let Some(lengths) = &self.lengths else {
             return self.segment_acceleration(i, t);
         };
         // At constant speed only the direction of the velocity changes.
-        let speed = pace.total() / self.duration();
+        let speed = lengths.total() / self.duration();
         let (velocity, bend) = (
             self.segments[i].velocity(t),
             self.segments[i].acceleration(t),
@@ -153,7 +153,7 @@ impl Curve {
         self.segments[i].velocity(t) / self.track.step(i)
     }
 
-    /// As [`Curve::segment_velocity`], the angular acceleration.
+    /// As [`ReferenceCurve::segment_velocity`], the angular acceleration.
     #[must_use]
     pub fn segment_acceleration(&self, i: usize, t: f64) -> DVec3 {
         let step = self.track.step(i);
@@ -173,9 +173,9 @@ impl Curve {
 
     fn locate(&self, time: f64) -> (usize, f64) {
         let times = &self.track.times;
-        if let Some(pace) = &self.pace {
+        if let Some(lengths) = &self.lengths {
             let part = (time - times[0]) / self.duration();
-            return pace.place(&self.segments, part.clamp(0.0, 1.0));
+            return lengths.locate(&self.segments, part.clamp(0.0, 1.0));
         }
         let after = times.partition_point(|&key| key <= time);
         let i = after.saturating_sub(1).min(self.track.last() - 1);

@@ -5,7 +5,7 @@ use std::fmt;
 
 use glam::{DMat3, DQuat, DVec3};
 
-use crate::reference::pace::{bisected, gauss};
+use crate::reference::curve_lengths::{bisected, gauss};
 use crate::reference::quaternion::exponential;
 use crate::reference::vector::{VectorCurve, hermite};
 
@@ -13,9 +13,9 @@ use crate::reference::vector::{VectorCurve, hermite};
 /// the direction turns by a few radians.
 const STEPS: usize = 512;
 
-/// Which way a body on a path faces.
+/// The direction in which a body on a path faces.
 #[derive(Debug, Clone)]
-pub enum Heading {
+pub enum FollowerDirection {
     /// Along the path.
     Tangent,
     /// To the point this far ahead along the path.
@@ -26,7 +26,7 @@ pub enum Heading {
 
 /// How the body is turned about its direction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Frame {
+pub enum FollowerFrame {
     /// It never turns about its direction.
     Minimal,
     /// Its y axis is as near to the upward direction as it can be.
@@ -38,7 +38,7 @@ pub enum Frame {
 
 /// When a body is where.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Travel {
+pub enum FollowerSpeed {
     /// As the keys say.
     Keys,
     /// At one speed.
@@ -52,23 +52,23 @@ pub enum Travel {
 pub struct Follower {
     /// Its path.
     pub curve: VectorCurve,
-    /// Which way it faces.
-    pub heading: Heading,
-    /// Its turn about this direction.
-    pub frame: Frame,
+    /// The direction in which it faces.
+    pub heading: FollowerDirection,
+    /// Its roll about this direction.
+    pub frame: FollowerFrame,
     /// The upward direction at the start.
     pub up: DVec3,
     /// Upward directions at keys; may be empty.
     pub ups: Vec<Option<DVec3>>,
-    /// Whether the path is closed, and what its frame is off after one round is spread over it.
+    /// Whether the path is closed, and the angle by which its frame is off after one round is spread over it.
     pub spread: bool,
     /// When it is where.
-    pub travel: Travel,
+    pub travel: FollowerSpeed,
 }
 
 /// A follower with all that takes a walk along its path.
-pub struct Followed<'a> {
-    own: &'a Follower,
+pub struct FollowerWalk<'a> {
+    follower: &'a Follower,
     /// Position, velocity and second derivative on each interval.
     curves: Vec<Box<dyn Fn(f64) -> [DVec3; 3] + 'a>>,
     /// The y axis of the frame that does not turn, and the length, at every step of every interval.
@@ -83,10 +83,10 @@ pub struct Followed<'a> {
 impl Follower {
     /// Walks along the path.
     #[must_use]
-    pub fn walk(&self) -> Followed<'_> {
+    pub fn walk(&self) -> FollowerWalk<'_> {
         let intervals = self.curve.keys.len() - 1;
-        let mut walk = Followed {
-            own: self,
+        let mut walk = FollowerWalk {
+            follower: self,
             curves: (0..intervals).map(|i| self.curve.interval(i)).collect(),
             ups: Vec::new(),
             lengths: vec![0.0],
@@ -101,16 +101,22 @@ impl Follower {
         }
         let mut up = across(
             self.ups.first().copied().flatten().unwrap_or(self.up),
-            walk.way(0, 0.0).0,
+            walk.direction(0, 0.0).0,
         );
         let mut keys = vec![(0.0, 0.0)];
         for i in 0..intervals {
             if i > 0 {
-                let (before, after) = (walk.way(i - 1, 1.0).0, walk.way(i, 0.0).0);
+                let (before, after) = (walk.direction(i - 1, 1.0).0, walk.direction(i, 0.0).0);
                 up = DQuat::from_rotation_arc(before, after) * up;
             }
-            if let (Some(Some(given)), true) = (self.ups.get(i), i > 0) {
-                walk.give(&mut keys, i * STEPS, up, *given, walk.way(i, 0.0).0);
+            if let (Some(Some(requested)), true) = (self.ups.get(i), i > 0) {
+                walk.add_roll(
+                    &mut keys,
+                    i * STEPS,
+                    up,
+                    *requested,
+                    walk.direction(i, 0.0).0,
+                );
             }
             for step in 0..STEPS {
                 walk.ups.push(up);
@@ -118,15 +124,15 @@ impl Follower {
                 up = walk.carried(i, from, to, up);
             }
         }
-        let last = walk.way(intervals - 1, 1.0).0;
-        if let Some(Some(given)) = self.ups.get(intervals) {
-            walk.give(&mut keys, intervals * STEPS, up, *given, last);
+        let last = walk.direction(intervals - 1, 1.0).0;
+        if let Some(Some(requested)) = self.ups.get(intervals) {
+            walk.add_roll(&mut keys, intervals * STEPS, up, *requested, last);
         }
         walk.ups.push(up);
         if self.spread {
-            let start = walk.way(0, 0.0).0;
+            let start = walk.direction(0, 0.0).0;
             let arrived = DQuat::from_rotation_arc(last, start) * up;
-            walk.give(&mut keys, intervals * STEPS, arrived, walk.ups[0], start);
+            walk.add_roll(&mut keys, intervals * STEPS, arrived, walk.ups[0], start);
         }
         walk.left_over = -keys[keys.len() - 1].1;
         walk.rolls = slopes(&keys);
@@ -134,16 +140,16 @@ impl Follower {
     }
 }
 
-impl fmt::Debug for Followed<'_> {
+impl fmt::Debug for FollowerWalk<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Followed")
-            .field("own", &self.own)
+        f.debug_struct("FollowerWalk")
+            .field("follower", &self.follower)
             .field("left_over", &self.left_over)
             .finish_non_exhaustive()
     }
 }
 
-impl Followed<'_> {
+impl FollowerWalk<'_> {
     fn speed(&self, i: usize, t: f64) -> f64 {
         self.curves[i](t)[1].length()
     }
@@ -157,16 +163,16 @@ impl Followed<'_> {
     /// Position and rotation at a time: the rotation takes z forward and y up.
     #[must_use]
     pub fn pose(&self, time: f64) -> (DVec3, DQuat) {
-        let (i, t) = self.place(time);
-        let (forward, _) = self.way(i, t);
-        let up = match self.own.frame {
-            Frame::Fixed => across(self.own.up, forward),
-            Frame::Minimal => {
+        let (i, t) = self.locate(time);
+        let (forward, _) = self.direction(i, t);
+        let up = match self.follower.frame {
+            FollowerFrame::Fixed => across(self.follower.up, forward),
+            FollowerFrame::Minimal => {
                 let (step, from) = step_at(t);
                 let up = self.carried(i, from, t, self.ups[i * STEPS + step]);
                 exponential(forward * (0.5 * self.roll(self.length_at(i, t)))) * up
             }
-            Frame::Frenet => self.frenet(i, t),
+            FollowerFrame::Frenet => self.frenet(i, t),
         };
         let up = across(up, forward);
         let axes = DMat3::from_cols(up.cross(forward), up, forward);
@@ -174,25 +180,25 @@ impl Followed<'_> {
     }
 
     /// The interval and its parameter at a time.
-    fn place(&self, time: f64) -> (usize, f64) {
-        let times = &self.own.curve.times;
+    fn locate(&self, time: f64) -> (usize, f64) {
+        let times = &self.follower.curve.times;
         let last = times.len() - 2;
         let time = time.clamp(times[0], times[last + 1]);
         let x = (time - times[0]) / (times[last + 1] - times[0]);
-        let part = match self.own.travel {
-            Travel::Keys => {
+        let part = match self.follower.travel {
+            FollowerSpeed::Keys => {
                 let i = (times.partition_point(|&key| key <= time) - 1).min(last);
                 return (i, (time - times[i]) / (times[i + 1] - times[i]));
             }
-            Travel::Constant => x,
-            Travel::Eased(a, b) => eased(a, b, x),
+            FollowerSpeed::Constant => x,
+            FollowerSpeed::Eased(a, b) => eased(a, b, x),
         };
-        self.place_of(part * self.length())
+        self.locate_length(part * self.length())
     }
 
     /// The interval and its parameter where a length is reached, by bisection.
-    fn place_of(&self, length: f64) -> (usize, f64) {
-        let after = self.lengths.partition_point(|&own| own <= length);
+    fn locate_length(&self, length: f64) -> (usize, f64) {
+        let after = self.lengths.partition_point(|&end| end <= length);
         let step = (after - 1).min(self.lengths.len() - 2);
         let i = step / STEPS;
         let from = (step % STEPS) as f64 / STEPS as f64;
@@ -200,22 +206,22 @@ impl Followed<'_> {
         (i, bisected(from, from + 1.0 / STEPS as f64, is_before))
     }
 
-    /// The length up to a place.
+    /// The length up to a parameter of an interval.
     fn length_at(&self, i: usize, t: f64) -> f64 {
         let (step, from) = step_at(t);
         self.lengths[i * STEPS + step] + gauss(|t| self.speed(i, t), from, t)
     }
 
     /// The direction, and its derivative by the interval's parameter.
-    fn way(&self, i: usize, t: f64) -> (DVec3, DVec3) {
-        let [place, velocity, bend] = self.curves[i](t);
-        let (to, change) = match self.own.heading {
-            Heading::Tangent => (velocity, bend),
-            Heading::At(point) => (point - place, -velocity),
-            Heading::Ahead(distance) => {
+    fn direction(&self, i: usize, t: f64) -> (DVec3, DVec3) {
+        let [position, velocity, bend] = self.curves[i](t);
+        let (to, change) = match self.follower.heading {
+            FollowerDirection::Tangent => (velocity, bend),
+            FollowerDirection::At(point) => (point - position, -velocity),
+            FollowerDirection::Ahead(distance) => {
                 let target = self.length_at(i, t) + distance;
                 let (end, tangent) = self.at_length(target);
-                (end - place, tangent * velocity.length() - velocity)
+                (end - position, tangent * velocity.length() - velocity)
             }
         };
         let forward = to.normalize();
@@ -228,22 +234,22 @@ impl Followed<'_> {
     /// The point and the tangent at a length; beyond an open path's end straight on.
     fn at_length(&self, length: f64) -> (DVec3, DVec3) {
         let whole = self.length();
-        let length = if self.own.spread {
+        let length = if self.follower.spread {
             length % whole
         } else {
             length
         };
-        let (i, t) = self.place_of(length);
-        let [place, velocity, _] = self.curves[i](t);
+        let (i, t) = self.locate_length(length);
+        let [point, velocity, _] = self.curves[i](t);
         let tangent = velocity.normalize();
-        (place + tangent * (length - whole).max(0.0), tangent)
+        (point + tangent * (length - whole).max(0.0), tangent)
     }
 
     /// Carries an axis across the direction along it: `y' = -(y·w') w`, by Runge and Kutta's method.
     fn carried(&self, i: usize, from: f64, to: f64, up: DVec3) -> DVec3 {
         let h = to - from;
         let slope = |t: f64, up: DVec3| {
-            let (forward, change) = self.way(i, t);
+            let (forward, change) = self.direction(i, t);
             -forward * up.dot(change)
         };
         let k1 = slope(from, up);
@@ -252,21 +258,28 @@ impl Followed<'_> {
         let k4 = slope(to, up + k3 * h);
         across(
             up + (k1 + k2 * 2.0 + k3 * 2.0 + k4) * (h / 6.0),
-            self.way(i, to).0,
+            self.direction(i, to).0,
         )
     }
 
-    /// Adds the roll that turns `up` into the given one, nearest to the one before.
-    fn give(&self, keys: &mut Vec<(f64, f64)>, step: usize, up: DVec3, given: DVec3, way: DVec3) {
-        let given = across(given, way);
-        let angle = libm::atan2(way.dot(up.cross(given)), up.dot(given));
+    /// Adds the roll that takes `up` to the requested direction, nearest to the roll before.
+    fn add_roll(
+        &self,
+        keys: &mut Vec<(f64, f64)>,
+        step: usize,
+        up: DVec3,
+        requested: DVec3,
+        direction: DVec3,
+    ) {
+        let target = across(requested, direction);
+        let angle = libm::atan2(direction.dot(up.cross(target)), up.dot(target));
         let before = keys[keys.len() - 1].1;
-        let turn = std::f64::consts::TAU;
-        let own = angle + turn * ((before - angle) / turn).round();
-        let place = (self.lengths[step], own);
+        let full_circle = std::f64::consts::TAU;
+        let unwrapped = angle + full_circle * ((before - angle) / full_circle).round();
+        let point = (self.lengths[step], unwrapped);
         match keys.last_mut() {
-            Some(key) if key.0 == place.0 => *key = place,
-            _ => keys.push(place),
+            Some(key) if key.0 == point.0 => *key = point,
+            _ => keys.push(point),
         }
     }
 
@@ -298,8 +311,8 @@ impl Followed<'_> {
         let before = (0..i).flat_map(|i| steps(i, 1.0).chain([(i, 1.0 - 1e-9)]));
         let mut last = raw(0, 1e-9);
         for (i, t) in before.chain(steps(i, t)).chain([(i, t)]) {
-            let own = raw(i, t);
-            last = if own.dot(last) < 0.0 { -own } else { own };
+            let side = raw(i, t);
+            last = if side.dot(last) < 0.0 { -side } else { side };
         }
         last
     }
@@ -329,12 +342,12 @@ pub fn eased(a: f64, b: f64, x: f64) -> f64 {
 }
 
 /// The part of `up` across a direction, of unit length.
-fn across(up: DVec3, way: DVec3) -> DVec3 {
-    let own = up - way * way.dot(up);
-    if own.length() > 1e-6 * up.length() {
-        return own.normalize();
+fn across(up: DVec3, direction: DVec3) -> DVec3 {
+    let part = up - direction * direction.dot(up);
+    if part.length() > 1e-6 * up.length() {
+        return part.normalize();
     }
-    let magnitude = way.abs();
+    let magnitude = direction.abs();
     let axis = if magnitude.x <= magnitude.y && magnitude.x <= magnitude.z {
         DVec3::X
     } else if magnitude.y <= magnitude.z {
@@ -342,10 +355,10 @@ fn across(up: DVec3, way: DVec3) -> DVec3 {
     } else {
         DVec3::Z
     };
-    (axis - way * way.dot(axis)).normalize()
+    (axis - direction * direction.dot(axis)).normalize()
 }
 
-/// Bessel and Overhauser's slopes at points (place, value), with parabolas at the ends.
+/// Bessel and Overhauser's slopes at points (position, value), with parabolas at the ends.
 fn slopes(points: &[(f64, f64)]) -> Vec<[f64; 3]> {
     let last = points.len() - 1;
     let secant = |i: usize| (points[i + 1].1 - points[i].1) / (points[i + 1].0 - points[i].0);
@@ -360,6 +373,6 @@ fn slopes(points: &[(f64, f64)]) -> Vec<[f64; 3]> {
         i if i == last => 2.0 * secant(last - 1) - inner(last - 1),
         i => inner(i),
     };
-    let row = |(i, &(place, value)): (usize, &(f64, f64))| [place, value, slope(i)];
+    let row = |(i, &(position, value)): (usize, &(f64, f64))| [position, value, slope(i)];
     points.iter().enumerate().map(row).collect()
 }

@@ -5,39 +5,39 @@ use glam::{DQuat, DVec3};
 
 use crate::curve::options::Ends;
 use crate::reference::curve::Definition;
-use crate::reference::given::smooth;
 use crate::reference::quaternion::{
     exponential, inner, invert, logarithm, logarithm_or, multiply, normalise, slerp,
 };
 use crate::reference::segment::{Basis, Segment};
-use crate::reference::track::Track;
-use crate::tracks::key_data::Tcb;
+use crate::reference::track::ReferenceTrack;
+use crate::reference::two_keys::smooth;
+use crate::tracks::set::key_data::Tcb;
 
-/// What one method says of handles.
+/// How one method finds the handles of its curves.
 #[derive(Clone, Copy)]
-pub(crate) struct Handles {
+pub(crate) struct HandleRule {
     /// The incoming and the outgoing handle of the key between two intervals.
     inner: fn(&Sides) -> (DVec3, DVec3),
     /// The handle of an end of the track whose interval turns by `whole`, where `other` is the
     /// handle at the other end of the interval.
     parabolic: fn(whole: DVec3, other: DVec3) -> DVec3,
-    /// The same for ends without angular acceleration, where `rest` is what is left of the interval
+    /// The same for ends without angular acceleration, where `rest` is the rotation of the interval
     /// without the other handle.
     natural: fn(rest: DVec3, other: DVec3) -> DVec3,
-    /// The same for an end that turns as if by `turn` in the interval, which turns by `whole`.
-    turning: fn(turn: DVec3, whole: DVec3) -> DVec3,
+    /// The same for an end whose velocity would rotate by `rate` in the interval, which rotates by `whole`.
+    by_rate: fn(rate: DVec3, whole: DVec3) -> DVec3,
     /// The curve of an interval with an outgoing and an incoming handle.
-    segment: fn(&Track, usize, DVec3, DVec3) -> Segment,
+    segment: fn(&ReferenceTrack, usize, DVec3, DVec3) -> Segment,
 }
 
-impl Handles {
+impl HandleRule {
     /// Those of Bézier curves.
     const fn bezier(inner: fn(&Sides) -> (DVec3, DVec3)) -> Self {
         Self {
             inner,
             parabolic: |whole, other| 2.0 / 3.0 * whole - other,
             natural: |rest, _| rest / 2.0,
-            turning: |turn, _| turn / 3.0,
+            by_rate: |rate, _| rate / 3.0,
             segment: |track, i, out, incoming| Segment::Bezier(controls(track, i, out, incoming)),
         }
     }
@@ -51,7 +51,7 @@ impl Handles {
     }
 
     /// The curves of a track.
-    pub(crate) fn segments(&self, track: &Track, ends: Ends) -> Vec<Segment> {
+    pub(crate) fn segments(&self, track: &ReferenceTrack, ends: Ends) -> Vec<Segment> {
         smooth(track, ends, |i| {
             let [out, incoming] = self.of_interval(track, ends, i);
             (self.segment)(track, i, out, incoming)
@@ -59,7 +59,7 @@ impl Handles {
     }
 
     /// The handles of an interval: outgoing from its first key, incoming to its second.
-    fn of_interval(&self, track: &Track, ends: Ends, i: usize) -> [DVec3; 2] {
+    fn of_interval(&self, track: &ReferenceTrack, ends: Ends, i: usize) -> [DVec3; 2] {
         let last = track.last() - 1;
         let closed = ends == Ends::Loop;
         let handles = |key: usize| (self.inner)(&Sides::new(track, key));
@@ -68,9 +68,9 @@ impl Handles {
         let (q, r) = (track.keys[i], track.keys[i + 1]);
         let whole = logarithm(track.difference(i));
         let at_end = |other: DVec3, clamped: Option<DVec3>, rest: DQuat| match (ends, clamped) {
-            (Ends::Secant, _) => (self.turning)(whole, whole),
+            (Ends::Secant, _) => (self.by_rate)(whole, whole),
             // Half of the angle that the end turns by in the whole interval.
-            (_, Some(velocity)) => (self.turning)(velocity / 2.0 * track.step(i), whole),
+            (_, Some(velocity)) => (self.by_rate)(velocity / 2.0 * track.step(i), whole),
             (Ends::Natural, None) => (self.natural)(logarithm(rest), other),
             _ => (self.parabolic)(whole, other),
         };
@@ -92,7 +92,7 @@ impl Handles {
     }
 }
 
-/// A key between two intervals: what these turn by, its logarithms and their times.
+/// A key between two intervals: the rotations of these, their logarithms and their times.
 pub(crate) struct Sides {
     key: DQuat,
     tcb: Tcb,
@@ -106,7 +106,7 @@ pub(crate) struct Sides {
 }
 
 impl Sides {
-    fn new(track: &Track, key: usize) -> Self {
+    fn new(track: &ReferenceTrack, key: usize) -> Self {
         let (before, h_before) = track.side(key, true);
         let (after, h_after) = track.side(key, false);
         Self {
@@ -123,7 +123,7 @@ impl Sides {
     }
 }
 
-/// A definition whose curves follow from these [`Handles`]: a macro, because a function pointer cannot
+/// A definition whose curves follow from these [`HandleRule`]: a macro, because a function pointer cannot
 /// capture them.
 macro_rules! by_handles {
     ($handles:expr) => {
@@ -132,14 +132,14 @@ macro_rules! by_handles {
 }
 
 /// A cumulative cubic with tangents from the neighbouring keys.
-pub(crate) const CATMULL_ROM: Definition = by_handles!(Handles::cumulative(|sides| {
+pub(crate) const CATMULL_ROM: Definition = by_handles!(HandleRule::cumulative(|sides| {
     let sum = sides.l + sides.r;
     let sixth = logarithm_or(multiply(sides.before, sides.after), sum) / 6.0;
     (sixth, sixth)
 }));
 
 /// A cumulative cubic with tangents of the parabola through three keys.
-pub(crate) const BESSEL_OVERHAUSER: Definition = by_handles!(Handles::cumulative(|sides| {
+pub(crate) const BESSEL_OVERHAUSER: Definition = by_handles!(HandleRule::cumulative(|sides| {
     let (before, after) = (sides.h_before, sides.h_after);
     let (left, right) = (sides.l * (after / before), sides.r * (before / after));
     let product = multiply(exponential(left), exponential(right));
@@ -148,14 +148,14 @@ pub(crate) const BESSEL_OVERHAUSER: Definition = by_handles!(Handles::cumulative
 }));
 
 /// Bézier curves with the mean of the logarithms of the slopes.
-pub(crate) const BESSEL_OVERHAUSER_MEAN: Definition = by_handles!(Handles::bezier(|sides| {
+pub(crate) const BESSEL_OVERHAUSER_MEAN: Definition = by_handles!(HandleRule::bezier(|sides| {
     let (before, after) = (sides.h_before, sides.h_after);
     let mean = (sides.l * (after / before) + sides.r * (before / after)) / sides.both;
     (mean * (before / 3.0), mean * (after / 3.0))
 }));
 
 /// Bézier curves with tension, continuity and bias.
-pub(crate) const KOCHANEK_BARTELS: Definition = by_handles!(Handles::bezier(|sides| {
+pub(crate) const KOCHANEK_BARTELS: Definition = by_handles!(HandleRule::bezier(|sides| {
     let Tcb {
         tension,
         continuity,
@@ -174,51 +174,51 @@ pub(crate) const KOCHANEK_BARTELS: Definition = by_handles!(Handles::bezier(|sid
 }));
 
 /// Spherical quadrangles. One starts with `log(q0⁻¹ q1) + 2 log(q0⁻¹ s0)`.
-pub(crate) const SQUAD: Definition = by_handles!(Handles {
+pub(crate) const SQUAD: Definition = by_handles!(HandleRule {
     inner: |&Sides { l, r, .. }| ((r - l) / 4.0, (l - r) / 4.0),
     parabolic: |_, other| -other,
     natural: |_, other| -other / 2.0,
-    turning: |turn, whole| (turn - whole) / 2.0,
+    by_rate: |rate, whole| (rate - whole) / 2.0,
     segment: |track, i, out, incoming| Segment::Squad(controls(track, i, out, incoming)),
 });
 
 /// Bézier curves, their control rotations the bisectors.
-pub(crate) const SHOEMAKE: Definition = by_handles!(Handles {
+pub(crate) const SHOEMAKE: Definition = by_handles!(HandleRule {
     parabolic: |whole, other| {
         let handle: DVec3 = 2.0 * whole - other;
-        // No arc leads to the opposite of a quaternion more than any other: the turn itself then.
+        // No arc leads to the opposite of a quaternion more than any other: the rotation itself then.
         match (handle.length_squared() - std::f64::consts::PI * std::f64::consts::PI).abs() < 1e-5 {
             true => whole,
             false => handle,
         }
     },
-    ..Handles::bezier(|sides| shoemake(sides, |_, bisector| bisector))
+    ..HandleRule::bezier(|sides| shoemake(sides, |_, bisector| bisector))
 });
 
 /// Bézier curves, their control rotations half way to the bisectors.
-pub(crate) const SHOEMAKE_2: Definition = by_handles!(Handles {
+pub(crate) const SHOEMAKE_2: Definition = by_handles!(HandleRule {
     parabolic: |whole, other| whole - other,
-    ..Handles::bezier(|sides| shoemake(sides, |q, bisector| bisect(q, bisector, q)))
+    ..HandleRule::bezier(|sides| shoemake(sides, |q, bisector| bisect(q, bisector, q)))
 });
 
 /// Bézier curves, their control rotations a third of the way to the bisectors.
-pub(crate) const SHOEMAKE_1985: Definition = by_handles!(Handles::bezier(|sides| {
+pub(crate) const SHOEMAKE_1985: Definition = by_handles!(HandleRule::bezier(|sides| {
     shoemake(sides, |q, bisector| slerp(q, bisector, 1.0 / 3.0))
 }));
 
-/// Handles whose outgoing control rotation `place` finds between the key and the bisector of its
+/// Handles whose outgoing control rotation `control_of` finds between the key and the bisector of its
 /// neighbours.
-fn shoemake(sides: &Sides, place: impl Fn(DQuat, DQuat) -> DQuat) -> (DVec3, DVec3) {
+fn shoemake(sides: &Sides, control_of: impl Fn(DQuat, DQuat) -> DQuat) -> (DVec3, DVec3) {
     let q = sides.key;
     let (p, next) = (multiply(q, invert(sides.before)), multiply(q, sides.after));
-    let a = place(q, bisect(double(p, q), next, q));
+    let a = control_of(q, bisect(double(p, q), next, q));
     let b = double(a, q);
     let to = |control: DQuat| logarithm(multiply(invert(q), control));
     (-to(b), to(a))
 }
 
 /// The control rotations `q, q exp(out), r exp(-in), r`.
-fn controls(track: &Track, i: usize, out: DVec3, incoming: DVec3) -> [DQuat; 4] {
+fn controls(track: &ReferenceTrack, i: usize, out: DVec3, incoming: DVec3) -> [DQuat; 4] {
     let (q, r) = (track.keys[i], track.keys[i + 1]);
     [
         q,
@@ -229,7 +229,7 @@ fn controls(track: &Track, i: usize, out: DVec3, incoming: DVec3) -> [DQuat; 4] 
 }
 
 /// The cumulative cubic with these handles.
-pub(crate) fn cumulative(track: &Track, i: usize, out: DVec3, incoming: DVec3) -> Segment {
+pub(crate) fn cumulative(track: &ReferenceTrack, i: usize, out: DVec3, incoming: DVec3) -> Segment {
     let a = multiply(track.keys[i], exponential(out));
     let b = multiply(track.keys[i + 1], exponential(-incoming));
     Segment::Product {

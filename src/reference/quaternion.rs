@@ -23,7 +23,7 @@ pub(crate) fn invert(q: DQuat) -> DQuat {
 }
 
 /// `q v q⁻¹` for a unit quaternion.
-pub(crate) fn turned(v: DVec3, q: DQuat) -> DVec3 {
+pub(crate) fn rotated(v: DVec3, q: DQuat) -> DVec3 {
     vector(multiply(multiply(q, from_parts(0.0, v)), invert(q)))
 }
 
@@ -44,7 +44,7 @@ pub(crate) fn exponential(a: DVec3) -> DQuat {
 }
 
 /// `log q = v/|v| atan2(|v|, w)`: half of the rotation vector, length 0 to pi. At
-/// -1 it has no direction of its own and takes that of `or`.
+/// -1 it has no direction, and takes that of `or`.
 pub(crate) fn logarithm_or(q: DQuat, or: DVec3) -> DVec3 {
     let v = vector(q);
     let sine = v.length();
@@ -125,6 +125,6 @@ pub fn nlerp(a: DQuat, b: DQuat, t: f64) -> DQuat {
 #[must_use]
 pub fn angle_between(a: DQuat, b: DQuat) -> f64 {
     let (a, b) = (normalise(a), normalise(b));
-    let (near, far) = ((a - b).length(), (a + b).length());
-    4.0 * libm::atan2(near.min(far), near.max(far))
+    let (difference, sum) = ((a - b).length(), (a + b).length());
+    4.0 * libm::atan2(difference.min(sum), difference.max(sum))
 }

@@ -3,7 +3,7 @@
 use glam::{DQuat, DVec3};
 
 use crate::reference::quaternion::{
-    exponential, from_parts, invert, logarithm, multiply, nlerp, normalise, slerp, squad, turned,
+    exponential, from_parts, invert, logarithm, multiply, nlerp, normalise, rotated, slerp, squad,
     vector,
 };
 use crate::reference::vector::hermite;
@@ -11,7 +11,7 @@ use crate::reference::vector::hermite;
 /// A curve over `t` from 0 to 1.
 #[derive(Clone, Copy)]
 pub(crate) enum Segment {
-    Hold(DQuat),
+    Constant(DQuat),
     Arc(DQuat, DQuat),
     Line(DQuat, DQuat),
     /// `base Π exp(w_j B_j(t))` (Kim, Kim, Shin 1995).
@@ -84,7 +84,7 @@ fn b_spline(knots: [f64; 6], degree: usize, u: f64) -> [f64; 4] {
         let mut next = [0.0; 4];
         for j in 3 - k..4 {
             // N_j of degree k starts at knot j - 1, counted from the first of the six.
-            let knot = |place: usize| knots[(place + j).saturating_sub(1)];
+            let knot = |offset: usize| knots[(offset + j).saturating_sub(1)];
             if n[j] != 0.0 {
                 next[j] += (u - knot(0)) / (knot(k) - knot(0)) * n[j];
             }
@@ -100,7 +100,7 @@ fn b_spline(knots: [f64; 6], degree: usize, u: f64) -> [f64; 4] {
 impl Segment {
     pub(crate) fn rotation(self, t: f64) -> DQuat {
         match self {
-            Self::Hold(key) => key,
+            Self::Constant(key) => key,
             Self::Arc(from, to) => slerp(from, to, t),
             Self::Line(from, to) => nlerp(from, to, t),
             Self::Product { base, w, basis } => {
@@ -126,13 +126,13 @@ impl Segment {
     /// The angular velocity per unit of `t`, in the body frame.
     pub(crate) fn velocity(self, t: f64) -> DVec3 {
         match self {
-            Self::Hold(_) => DVec3::ZERO,
+            Self::Constant(_) => DVec3::ZERO,
             Self::Arc(from, to) => 2.0 * logarithm(multiply(invert(from), to)),
             Self::Product { w, basis, .. } => {
                 let (b, slopes) = (basis.values(t), basis.derivatives(t));
                 (0..3).fold(DVec3::ZERO, |velocity, j| {
                     let factor = exponential(w[j] * b[j]);
-                    turned(velocity, invert(factor)) + 2.0 * w[j] * slopes[j]
+                    rotated(velocity, invert(factor)) + 2.0 * w[j] * slopes[j]
                 })
             }
             _ => {

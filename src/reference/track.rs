@@ -1,16 +1,16 @@
-//! Keys with their signs aligned, and what they carry.
+//! Keys with their signs aligned, and their velocities, tangents and parameters.
 
 use glam::{DQuat, DVec3, Quat};
 
-use crate::curve::options::Path;
+use crate::curve::options::KeySigns;
 use crate::reference::quaternion::{inner, invert, multiply, normalise};
-use crate::tracks::key_data::Tcb;
+use crate::tracks::set::key_data::Tcb;
 
 /// The sign of a dot product of smaller magnitude may be due to the rounding of f32 keys.
 const SIGN_NOISE: f64 = 4.76837158203125e-7; // 2^-21
 
 /// One track in f64.
-pub(crate) struct Track {
+pub(crate) struct ReferenceTrack {
     pub(crate) times: Vec<f64>,
     pub(crate) keys: Vec<DQuat>,
     pub(crate) velocities: Vec<DVec3>,
@@ -18,14 +18,15 @@ pub(crate) struct Track {
     pub(crate) tcb: Vec<Tcb>,
 }
 
-impl Track {
-    pub(crate) fn new(path: Path, times: &[f64], keys: &[Quat]) -> Self {
+impl ReferenceTrack {
+    pub(crate) fn new(signs: KeySigns, times: &[f64], keys: &[Quat]) -> Self {
         let keys: Vec<DQuat> = keys.iter().map(|key| normalise(key.as_dquat())).collect();
         let mut aligned: Vec<DQuat> = Vec::with_capacity(keys.len());
         for (i, &key) in keys.iter().enumerate() {
             let flipped = i > 0 && inner(keys[i - 1], aligned[i - 1]) < 0.0;
-            let turns = i > 0 && path == Path::Shortest && inner(keys[i - 1], key) < -SIGN_NOISE;
-            aligned.push(if flipped == turns { key } else { -key });
+            let is_opposite =
+                i > 0 && signs == KeySigns::Shortest && inner(keys[i - 1], key) < -SIGN_NOISE;
+            aligned.push(if flipped == is_opposite { key } else { -key });
         }
         Self {
             times: times.to_vec(),

@@ -29,7 +29,7 @@ impl VectorCurve {
         if last == 0 {
             return self.keys[0];
         }
-        // The ends themselves belong to what is held.
+        // The end times themselves have the end values.
         if time >= self.times[last] {
             return match self.method {
                 "b-spline" if !self.is_frozen(last - 1) => self.interval(last - 1)(1.0)[0],
@@ -70,11 +70,11 @@ impl VectorCurve {
         }
         let (m0, m1) = match self.method {
             "gltf-cubic" => {
-                let given = |key: usize, side: usize| match self.tangents.get(key) {
+                let tangent = |key: usize, side: usize| match self.tangents.get(key) {
                     Some(both) => both[side] * h,
                     None => DVec3::ZERO,
                 };
-                (given(i, 1), given(i + 1, 0))
+                (tangent(i, 1), tangent(i + 1, 0))
             }
             _ if self.method == "linear" || last == 1 => (p1 - p0, p1 - p0),
             "b-spline" => return self.b_spline(i),
@@ -121,13 +121,13 @@ impl VectorCurve {
             rows[last].0[0] = -1.0;
         } else {
             for (row, other, i) in [(0, 1, 0), (last, last - 1, last - 1)] {
-                let (own, next, side) = match self.ends {
+                let (diagonal, next, side) = match self.ends {
                     Ends::Natural => (2.0, 1.0, 3.0 * secant(i)),
                     Ends::Secant => (1.0, 0.0, secant(i)),
                     Ends::Clamped { .. } => (1.0, 0.0, DVec3::ZERO),
                     _ => (1.0, 1.0, 2.0 * secant(i)),
                 };
-                rows[row].0[row] = own;
+                rows[row].0[row] = diagonal;
                 rows[row].0[other] = next;
                 rows[row].1 = side;
             }
@@ -136,11 +136,11 @@ impl VectorCurve {
             let size = |row: &usize| rows[*row].0[column].abs();
             let pivot = (column..keys).max_by(|a, b| size(a).total_cmp(&size(b)));
             rows.swap(column, pivot.unwrap_or(column));
-            let (own, side) = rows[column].clone();
+            let (pivot_row, side) = rows[column].clone();
             for (row, (coefficients, other)) in rows.iter_mut().enumerate() {
                 if row != column {
-                    let factor = coefficients[column] / own[column];
-                    for (to, from) in coefficients.iter_mut().zip(&own) {
+                    let factor = coefficients[column] / pivot_row[column];
+                    for (to, from) in coefficients.iter_mut().zip(&pivot_row) {
                         *to -= factor * from;
                     }
                     *other -= side * factor;
@@ -153,8 +153,8 @@ impl VectorCurve {
     }
 
     /// Interval `i` of the cubic B-spline whose control points are the keys, by the recursion of
-    /// Cox and de Boor, with one more control point beyond each end. It is not asked for at frozen
-    /// ends, nor of two keys.
+    /// Cox and de Boor, with one more control point beyond each end. It is not called for frozen
+    /// ends, nor for two keys.
     fn b_spline(&self, i: usize) -> Box<dyn Fn(f64) -> [DVec3; 3] + '_> {
         let count = self.keys.len() - 1;
         // The knots from three before the interval to two after its end, in its parameter.
@@ -162,10 +162,10 @@ impl VectorCurve {
             let knots = knots(&self.times, self.ends, i);
             knots.map(|knot| (knot - knots[2]) / self.step(i))
         };
-        let beyond = |at_end: bool| -> DVec3 {
-            let [own, inner, next] = [0, 1, 2].map(|j| if at_end { count - j } else { j });
+        let outer_point = |at_end: bool| -> DVec3 {
+            let [outer, inner, next] = [0, 1, 2].map(|j| if at_end { count - j } else { j });
             let [interval, second] = [0, 1].map(|j| if at_end { count - 1 - j } else { j });
-            let [p, q, r] = [own, inner, next].map(|key| self.keys[key]);
+            let [p, q, r] = [outer, inner, next].map(|key| self.keys[key]);
             if self.ends == Ends::Parabolic {
                 // The parabola through the last three keys, as far beyond as the last interval is.
                 let (a, b) = (self.step(interval), self.step(second));
@@ -175,12 +175,12 @@ impl VectorCurve {
                     + q * ((at - x) * (at - z) / ((y - x) * (y - z)))
                     + r * ((at - x) * (at - y) / ((z - x) * (z - y)));
             }
-            // What must vanish is linear in the point beyond.
+            // The quantity that must vanish is linear in the outer point.
             let knots = knots_of(interval);
-            let off = |beyond: DVec3| {
+            let off = |candidate: DVec3| {
                 let [_, slope, bend] = match at_end {
-                    false => de_boor(&knots, [beyond, p, q, r], 0.0),
-                    true => de_boor(&knots, [r, q, p, beyond], 1.0),
+                    false => de_boor(&knots, [candidate, p, q, r], 0.0),
+                    true => de_boor(&knots, [r, q, p, candidate], 1.0),
                 };
                 match self.ends {
                     Ends::Natural => bend,
@@ -194,8 +194,8 @@ impl VectorCurve {
         // Counted from the key before the first.
         let point = |j: usize| match j {
             _ if self.ends == Ends::Loop => self.keys[(j + count - 1) % count],
-            0 => beyond(false),
-            j if j > count + 1 => beyond(true),
+            0 => outer_point(false),
+            j if j > count + 1 => outer_point(true),
             j => self.keys[j - 1],
         };
         let points = [0, 1, 2, 3].map(|offset| point(i + offset));
@@ -237,7 +237,7 @@ impl VectorCurve {
     }
 }
 
-/// What the two values and the two tangents of a cubic count for at a parameter, in the order value,
+/// The weights of the two values and the two tangents of a cubic at a parameter, in the order value,
 /// tangent, value, tangent.
 pub(crate) fn hermite(t: f64) -> [f64; 4] {
     let (t2, t3) = (t * t, t * t * t);

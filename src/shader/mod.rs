@@ -57,10 +57,10 @@ impl Kernel {
     /// Its name, its code, and whether that reads texel buffers: it does if asked to and if the
     /// kernel has such code.
     pub(crate) fn code(self, reads_texels: bool) -> (&'static str, &'static [u32], bool) {
-        let own = self.compiled();
-        let (name, reads_texels) = match own.texels {
+        let variants = self.compiled();
+        let (name, reads_texels) = match variants.texels {
             Some((name, _)) if reads_texels => (name, true),
-            _ => (own.storage.0, false),
+            _ => (variants.storage.0, false),
         };
         let mut all = kernels();
         let (_, code) = all

@@ -41,8 +41,8 @@ pub(crate) struct Instruction<'a> {
 }
 
 impl Instruction<'_> {
-    pub(crate) fn word(&self, place: usize) -> Result<u32, SpirvError> {
-        let word = self.words.get(place).copied();
+    pub(crate) fn word(&self, index: usize) -> Result<u32, SpirvError> {
+        let word = self.words.get(index).copied();
         word.ok_or(SpirvError::Truncated { word: self.start })
     }
 
@@ -101,7 +101,7 @@ pub fn float_controls(module: &[u32], offered: FloatControls) -> Result<Vec<u32>
         (offered.round_to_nearest_even, (4467, 4462)),
     ]
     .into_iter()
-    .filter_map(|(wanted, mode)| wanted.then_some(mode))
+    .filter_map(|(is_offered, mode)| is_offered.then_some(mode))
     .collect();
     let code = instructions(module)?;
     if modes.is_empty() {

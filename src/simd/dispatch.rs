@@ -10,14 +10,14 @@
 use std::str::FromStr;
 use std::sync::OnceLock;
 
-use glam::Vec4;
+use glam::{Quat, Vec4};
 
+use crate::simd::cache_line::CacheLine;
 #[cfg(wide_vectors)]
 use crate::simd::eight::Eight;
+use crate::simd::lanes::Lanes;
 #[cfg(wide_vectors)]
 use crate::simd::sixteen::Sixteen;
-
-use crate::simd::lanes::Lanes;
 
 /// Vector instructions that the twins can be compiled for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -245,9 +245,39 @@ pub(crate) fn fence() {
     }
 }
 
+/// Stores one rotation everywhere.
+struct FillPastCaches([f32; 4]);
+
+impl InLanesInto<(), [CacheLine]> for FillPastCaches {
+    const WIDE_IN_TESTS: bool = true;
+    type Outcome = ();
+
+    #[inline(always)]
+    fn run<L: Lanes>(&self, (): &(), lines: &mut [CacheLine]) {
+        let value = L::repeated(self.0);
+        for block in bytemuck::cast_slice_mut::<CacheLine, L::Block>(lines) {
+            value.store_past_caches(block);
+        }
+        fence();
+    }
+}
+
+impl VectorWidth {
+    /// Fills `output` with one rotation by streaming stores, on some processors the fastest way to
+    /// write more than the caches hold: a limit with which the speed of evaluation is compared.
+    pub fn fill_past_caches(self, output: &mut [Quat], value: Quat) {
+        let rotations: &mut [[f32; 4]] = bytemuck::cast_slice_mut(output);
+        let (before, lines, after) = bytemuck::pod_align_to_mut(rotations);
+        let value = value.to_array();
+        before.fill(value);
+        in_lanes_into(self, &FillPastCaches(value), &(), lines);
+        after.fill(value);
+    }
+}
+
 #[cfg(test)]
 mod tests {
-    use super::VectorWidth;
+    use super::*;
 
     #[test]
     fn widths_have_names() {
@@ -255,5 +285,20 @@ mod tests {
         assert_eq!("sse2".parse(), Ok(VectorWidth::Baseline));
         let error = "avx".parse::<VectorWidth>().unwrap_err();
         assert!(error.to_string().contains("baseline, avx2 and avx512"));
+    }
+
+    #[test]
+    fn memory_is_filled_from_any_start() {
+        let value = Quat::from_array([1.0, 2.0, 3.0, 4.0]);
+        for width in VectorWidth::available() {
+            for (start, count) in (0..5).flat_map(|start| [0, 1, 7, 100].map(|n| (start, n))) {
+                let mut memory = vec![Quat::IDENTITY; 110];
+                width.fill_past_caches(&mut memory[start..start + count], value);
+                for (i, found) in memory.iter().enumerate() {
+                    let is_inside = (start..start + count).contains(&i);
+                    assert_eq!(*found, if is_inside { value } else { Quat::IDENTITY });
+                }
+            }
+        }
     }
 }

@@ -225,11 +225,11 @@ pub(crate) mod tests {
                 assert!(L::Doubles::load(&all).are_at_most(4.0));
                 all[k] = other;
                 assert!(!L::Doubles::load(&all).are_at_most(4.0));
-                let own = L::Doubles::load(&all);
+                let numbers = L::Doubles::load(&all);
                 for (doubles, of_none) in [
-                    (own.larger(two), 2.0),
-                    (own.smaller(two), 2.0),
-                    (own.up_to(two, own, two + two), 4.0),
+                    (numbers.larger(two), 2.0),
+                    (numbers.smaller(two), 2.0),
+                    (numbers.up_to(two, numbers, two + two), 4.0),
                 ] {
                     doubles.store(&mut stored);
                     assert!(!other.is_nan() || stored[k] == of_none);

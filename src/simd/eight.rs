@@ -199,8 +199,8 @@ impl Lanes for Eight {
     }
 
     #[inline(always)]
-    fn gather_rotations(rotations: &[[f32; 4]], places: &[u32]) -> [Self; 4] {
-        let [a, b, c, d, e, f, g, h]: [u32; 8] = *places.first_chunk().expect("eight places");
+    fn gather_rotations(rotations: &[[f32; 4]], indices: &[u32]) -> [Self; 4] {
+        let [a, b, c, d, e, f, g, h]: [u32; 8] = *indices.first_chunk().expect("eight indices");
         // Written out: closures are not always inlined.
         Self::transposed([
             Self::of_two(rotations[a as usize], rotations[b as usize]),
@@ -223,10 +223,10 @@ impl Lanes for Eight {
 
     #[inline(always)]
     fn behind(self, half: &HalfLine, count: usize) -> Self {
-        let places = Self(bytemuck::cast([0.0f32, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]));
+        let lane_numbers = Self(bytemuck::cast([0.0f32, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]));
         let (half, end) = (Self::of_block(half), Self::all((4 * count) as f32));
         Self(avx2! {
-            let is_first = _mm256_cmp_ps::<_CMP_LT_OQ>(places.0, end.0);
+            let is_first = _mm256_cmp_ps::<_CMP_LT_OQ>(lane_numbers.0, end.0);
             _mm256_blendv_ps(self.0, half.0, is_first)
         })
     }

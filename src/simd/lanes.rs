@@ -66,6 +66,9 @@ pub(crate) fn canonical<N: Number>([x, y, z, w]: [N; 4]) -> [N; 4] {
     [x.canonical(), y.canonical(), z.canonical(), w.canonical()]
 }
 
+/// The number of lanes in the widest vector.
+pub(crate) const MAX_LANES: usize = 16;
+
 /// A vector with the numbers of several consecutive samples. Each width has an order of lanes of
 /// its own; [`Lanes::load`] and [`Lanes::store`] convert it.
 pub(crate) trait Lanes: Number + Pod {
@@ -109,8 +112,8 @@ pub(crate) trait Lanes: Number + Pod {
         ])
     }
 
-    /// The same for rotations that lie at the first [`Lanes::COUNT`] of the `places`.
-    fn gather_rotations(rotations: &[[f32; 4]], places: &[u32]) -> [Self; 4];
+    /// The same for rotations with the first [`Lanes::COUNT`] of the `indices`.
+    fn gather_rotations(rotations: &[[f32; 4]], indices: &[u32]) -> [Self; 4];
 
     /// Loads the first of some rotations, a quarter of [`Lanes::COUNT`]: `x y z w x y z w …`.
     #[inline(always)]
@@ -150,14 +153,14 @@ pub(crate) trait Lanes: Number + Pod {
         rotations.copy_from_slice(Self::rotations(components).as_ref());
     }
 
-    /// Stores coefficients of polynomials, each lane's to the segment at its place. There is a
+    /// Stores coefficients of polynomials, each lane's to the segment with its index. There is a
     /// vector for each of `x y z w` of every power, and at least four powers.
     #[inline(always)]
-    fn store_powers(powers: &[[Self; 4]], segments: &mut [PolynomialSegment], places: &[usize]) {
+    fn store_powers(powers: &[[Self; 4]], segments: &mut [PolynomialSegment], indices: &[usize]) {
         for (power, &components) in powers.iter().enumerate() {
             let rotations = Self::rotations(components);
-            for (&place, rotation) in places.iter().zip(rotations.as_ref()) {
-                segments[place].coefficients[power] = *rotation;
+            for (&index, rotation) in indices.iter().zip(rotations.as_ref()) {
+                segments[index].coefficients[power] = *rotation;
             }
         }
     }
@@ -266,8 +269,8 @@ impl Lanes for Vec4 {
     }
 
     #[inline(always)]
-    fn gather_rotations(rotations: &[[f32; 4]], places: &[u32]) -> [Self; 4] {
-        let [a, b, c, d]: [u32; 4] = *places.first_chunk().expect("four places");
+    fn gather_rotations(rotations: &[[f32; 4]], indices: &[u32]) -> [Self; 4] {
+        let [a, b, c, d]: [u32; 4] = *indices.first_chunk().expect("four indices");
         Self::transposed([
             Self::from_array(rotations[a as usize]),
             Self::from_array(rotations[b as usize]),

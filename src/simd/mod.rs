@@ -2,13 +2,13 @@
 //! chosen at run time. Unsafe code is allowed here, for the processor's own vector instructions.
 #![allow(unsafe_code)]
 
+pub(crate) mod cache_line;
 pub(crate) mod components;
 pub(crate) mod dispatch;
 pub(crate) mod doubles;
 #[cfg(wide_vectors)]
 pub(crate) mod eight;
 pub(crate) mod lanes;
-pub(crate) mod line;
 #[cfg(wide_vectors)]
 pub(crate) mod sixteen;
 pub(crate) mod together;

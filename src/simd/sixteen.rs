@@ -6,10 +6,10 @@ use bytemuck::{Pod, Zeroable};
 
 use crate::math::operators::operators;
 use crate::shader::PolynomialSegment;
+use crate::simd::cache_line::CacheLine;
 use crate::simd::doubles::doubles;
 use crate::simd::eight::{Eight, alike_at_any_width};
 use crate::simd::lanes::{Lanes, Number};
-use crate::simd::line::Line;
 
 /// Calls instructions of AVX-512.
 macro_rules! avx512 {
@@ -133,10 +133,10 @@ impl Lanes for Sixteen {
     type Narrow = Eight;
     type Rotations = [[f32; 4]; 16];
     type Doubles = SixteenDoubles;
-    type Block = Line;
+    type Block = CacheLine;
 
     alike_at_any_width! {
-        avx512, Line, _mm512_permute_ps, _mm512_castps_pd, _mm512_castpd_ps, _mm512_unpacklo_ps,
+        avx512, CacheLine, _mm512_permute_ps, _mm512_castps_pd, _mm512_castpd_ps, _mm512_unpacklo_ps,
         _mm512_unpackhi_ps, _mm512_unpacklo_pd, _mm512_unpackhi_pd, _mm512_max_ps, _mm512_stream_ps
     }
 
@@ -168,16 +168,16 @@ impl Lanes for Sixteen {
     }
 
     #[inline(always)]
-    fn gather_rotations(rotations: &[[f32; 4]], places: &[u32]) -> [Self; 4] {
-        let places: &[u32; 16] = places.first_chunk().expect("sixteen places");
+    fn gather_rotations(rotations: &[[f32; 4]], indices: &[u32]) -> [Self; 4] {
+        let indices: &[u32; 16] = indices.first_chunk().expect("sixteen indices");
         // Written out: closures are not always inlined.
         macro_rules! four {
             ($a:literal $b:literal $c:literal $d:literal) => {
                 Self::of_four([
-                    rotations[places[$a] as usize],
-                    rotations[places[$b] as usize],
-                    rotations[places[$c] as usize],
-                    rotations[places[$d] as usize],
+                    rotations[indices[$a] as usize],
+                    rotations[indices[$b] as usize],
+                    rotations[indices[$c] as usize],
+                    rotations[indices[$d] as usize],
                 ])
             };
         }
@@ -201,7 +201,7 @@ impl Lanes for Sixteen {
     }
 
     #[inline(always)]
-    fn store_powers(powers: &[[Self; 4]], segments: &mut [PolynomialSegment], places: &[usize]) {
+    fn store_powers(powers: &[[Self; 4]], segments: &mut [PolynomialSegment], indices: &[usize]) {
         // One store for four powers of a lane, a quarter as many. If the number of powers is not a
         // multiple of four, the last store repeats some that are stored already.
         for i in 0..powers.len().div_ceil(4) {
@@ -211,11 +211,11 @@ impl Lanes for Sixteen {
             let c = Self::transposed(powers[first + 2]);
             let d = Self::transposed(powers[first + 3]);
             for quarter in 0..4 {
-                let own = [a[quarter], b[quarter], c[quarter], d[quarter]];
-                let own = Self::quarters_exchanged(own);
+                let vectors = [a[quarter], b[quarter], c[quarter], d[quarter]];
+                let vectors = Self::quarters_exchanged(vectors);
                 for j in 0..4 {
-                    let rotations: [[f32; 4]; 4] = bytemuck::cast(own[j].0);
-                    let segment = &mut segments[places[4 * quarter + j]];
+                    let rotations: [[f32; 4]; 4] = bytemuck::cast(vectors[j].0);
+                    let segment = &mut segments[indices[4 * quarter + j]];
                     segment.coefficients[first..first + 4].copy_from_slice(&rotations);
                 }
             }
@@ -223,7 +223,7 @@ impl Lanes for Sixteen {
     }
 
     #[inline(always)]
-    fn behind(self, line: &Line, count: usize) -> Self {
+    fn behind(self, line: &CacheLine, count: usize) -> Self {
         let first = (1u32 << (4 * count)) - 1;
         let line = Self::of_block(line);
         Self(avx512!(_mm512_mask_blend_ps(first as u16, self.0, line.0)))

@@ -81,10 +81,10 @@ impl<L: Lanes, const VECTORS: usize> Together<L, VECTORS> {
     /// Whether any number is at least `limit`.
     #[inline(always)]
     pub(crate) fn any_at_least(self, limit: f32) -> bool {
-        let mut most = self.0[0];
+        let mut largest = self.0[0];
         for v in 1..VECTORS {
-            most = most.larger(self.0[v]);
+            largest = largest.larger(self.0[v]);
         }
-        (-most).any_at_most(-limit)
+        (-largest).any_at_most(-limit)
     }
 }

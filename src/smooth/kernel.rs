@@ -8,7 +8,7 @@ use std::str::FromStr;
 pub struct Smoothing {
     /// The weights.
     pub kernel: SmoothingKernel,
-    /// What lies beyond the first and the last sample.
+    /// The values assumed beyond the first and the last sample.
     pub ends: SmoothingEnds,
     /// How often.
     pub passes: u32,
@@ -39,7 +39,7 @@ pub enum SmoothingKernel {
     },
 }
 
-/// What lies beyond the first and the last sample.
+/// The values assumed beyond the first and the last sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum SmoothingEnds {
     /// The steps mirrored, so that both end samples stay.
@@ -59,20 +59,20 @@ pub enum SmoothingError {
     /// The width must be positive, and not too large.
     #[error("a kernel cannot be {width} samples wide; give a width above 0 and up to 250000")]
     Width {
-        /// What was given.
+        /// The value.
         width: f64,
     },
     /// The polynomial would pass through all samples, or has no unique one.
-    #[error("a polynomial of order {order} through {radius} samples to either side has no unique least squares; the order is at most {}", 2 * radius)]
+    #[error("a polynomial of order {order} through {radius} samples to either side has no unique least-squares fit; give an order of at most {}", 2 * radius)]
     Order {
         /// Samples to either side.
         radius: usize,
         /// The order.
         order: usize,
     },
-    /// Samples hold nothing at the frequency.
+    /// Samples at this rate contain no such frequency.
     #[error(
-        "a low-pass at {hz} Hz leaves samples at {rate} Hz as they are, which hold nothing faster than {} Hz; give a lower frequency above 0",
+        "a low-pass at {hz} Hz has no effect on samples at {rate} Hz, which contain no frequencies above {} Hz; give a lower frequency above 0",
         0.5 * rate
     )]
     Frequency {
@@ -82,32 +82,32 @@ pub enum SmoothingError {
         rate: f64,
     },
     /// Too many passes.
-    #[error("{passes} passes are too many; give at most {MOST_PASSES}, or a wider kernel")]
+    #[error("{passes} passes are too many; give at most {MAX_PASSES}, or a wider kernel")]
     Passes {
-        /// What was given.
+        /// The value.
         passes: u32,
     },
-    /// Only the cubic kernel has ends of its own.
-    #[error("parabolic ends are the cubic kernel's; keep the ends of others")]
+    /// Only the cubic kernel has other ends than these.
+    #[error("parabolic ends apply only to the cubic kernel; choose other ends")]
     Ends,
     /// No kernel has that name.
     #[error(
-        "there is no kernel `{name}`; there are linear, cubic, box:S, tent:S, gaussian:S and savitzky-golay:RADIUS:ORDER"
+        "unknown kernel `{name}`: choose linear, cubic, box:S, tent:S, gaussian:S or savitzky-golay:RADIUS:ORDER"
     )]
     Unknown {
-        /// The name given.
+        /// The name.
         name: String,
     },
 }
 
-/// The most samples to either side of a kernel.
-const MOST_RADIUS: usize = 1_000_000;
+/// The largest radius of a kernel, samples.
+const MAX_RADIUS: usize = 1_000_000;
 
-/// The most passes: more take longer than anybody waits.
-const MOST_PASSES: u32 = 10_000;
+/// The largest number of passes: more would take very long.
+const MAX_PASSES: u32 = 10_000;
 
 /// The highest order of Savitzky and Golay's polynomials for which f64 is exact enough.
-const MOST_ORDER: usize = 20;
+const MAX_ORDER: usize = 20;
 
 impl Smoothing {
     /// Once, with ends that stay.
@@ -120,10 +120,10 @@ impl Smoothing {
         }
     }
 
-    /// Refuses what means nothing.
+    /// Refuses options without a meaning.
     ///
     /// # Errors
-    /// What it is.
+    /// The first of them that is found.
     pub fn check(&self) -> Result<(), SmoothingError> {
         self.step_weights(usize::MAX).map(drop)
     }
@@ -133,7 +133,7 @@ impl Smoothing {
         if self.ends == SmoothingEnds::Parabolic && self.kernel != SmoothingKernel::Cubic {
             return Err(SmoothingError::Ends);
         }
-        if self.passes > MOST_PASSES {
+        if self.passes > MAX_PASSES {
             let passes = self.passes;
             return Err(SmoothingError::Passes { passes });
         }
@@ -174,7 +174,7 @@ impl SmoothingKernel {
 
     /// The weights of a sample and of each neighbour on one side.
     pub(crate) fn weights(self) -> Result<Vec<f64>, SmoothingError> {
-        let checked = |width: f64| match width > 0.0 && width <= MOST_RADIUS as f64 / 4.0 {
+        let checked = |width: f64| match width > 0.0 && width <= MAX_RADIUS as f64 / 4.0 {
             true => Ok(width),
             false => Err(SmoothingError::Width { width }),
         };
@@ -195,7 +195,7 @@ impl SmoothingKernel {
         Ok(weights)
     }
 
-    /// The integral of the kernel's function from one place to another.
+    /// The integral of the kernel's function from one position to another.
     fn mass(self, from: f64, to: f64) -> f64 {
         let up_to = |x: f64| match self {
             Self::Tent(half) => {
@@ -216,30 +216,30 @@ impl SmoothingKernel {
 /// The weights with which the polynomial's value at the middle follows from the samples: by
 /// polynomials that are orthogonal over the samples (Gram), built by their recurrence.
 fn savitzky_golay(radius: usize, order: usize) -> Result<Vec<f64>, SmoothingError> {
-    if order > 2 * radius || order > MOST_ORDER {
+    if order > 2 * radius || order > MAX_ORDER {
         return Err(SmoothingError::Order { radius, order });
     }
-    if radius > MOST_RADIUS {
+    if radius > MAX_RADIUS {
         return Err(SmoothingError::Width {
             width: radius as f64,
         });
     }
-    let places: Vec<f64> = (0..=2 * radius).map(|i| i as f64 - radius as f64).collect();
+    let positions: Vec<f64> = (0..=2 * radius).map(|i| i as f64 - radius as f64).collect();
     let scale = (radius as f64).max(1.0);
     let mut weights = vec![0.0; 2 * radius + 1];
-    let mut before = vec![0.0; places.len()];
-    let mut own = vec![1.0; places.len()];
+    let mut before = vec![0.0; positions.len()];
+    let mut current = vec![1.0; positions.len()];
     let mut norm_before = 1.0;
     for degree in 0..=order {
-        let norm: f64 = own.iter().map(|value| value * value).sum();
-        let at_middle = own[radius];
-        for (weight, value) in weights.iter_mut().zip(&own) {
+        let norm: f64 = current.iter().map(|value| value * value).sum();
+        let at_middle = current[radius];
+        for (weight, value) in weights.iter_mut().zip(&current) {
             *weight += at_middle * value / norm;
         }
         let back = if degree == 0 { 0.0 } else { norm / norm_before };
-        let next = |i: usize| places[i] / scale * own[i] - back * before[i];
-        let next: Vec<f64> = (0..own.len()).map(next).collect();
-        before = std::mem::replace(&mut own, next);
+        let next = |i: usize| positions[i] / scale * current[i] - back * before[i];
+        let next: Vec<f64> = (0..current.len()).map(next).collect();
+        before = std::mem::replace(&mut current, next);
         norm_before = norm;
     }
     Ok(weights.split_off(radius))

@@ -1,4 +1,4 @@
-//! Smoothing of evaluated rotations and positions: the weights of kernels, and what they make of the
+//! Smoothing of evaluated rotations and positions: the weights of kernels, and their sums of the
 //! steps from sample to sample.
 
 pub(crate) mod kernel;

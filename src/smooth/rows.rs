@@ -13,7 +13,7 @@ use crate::twin::{pose_smooth, pose_steps};
 
 /// The samples of a track among those of others.
 #[derive(Clone, Copy)]
-pub(crate) struct Row<'a> {
+pub(crate) struct SampleRow<'a> {
     /// All values; those of the track are every `stride`th from `first` on.
     pub(crate) values: &'a [[f32; 4]],
     pub(crate) first: usize,
@@ -21,7 +21,7 @@ pub(crate) struct Row<'a> {
     pub(crate) count: usize,
 }
 
-impl Row<'_> {
+impl SampleRow<'_> {
     #[inline(always)]
     pub(crate) fn get(&self, sample: usize) -> [f32; 4] {
         self.values[self.first + sample * self.stride]
@@ -30,31 +30,31 @@ impl Row<'_> {
 
 /// One pass over the samples of a track, of which there are at least two.
 #[derive(Clone, Copy)]
-pub(crate) struct Pass<'a> {
+pub(crate) struct SmoothingPass<'a> {
     pub(crate) smoothing: &'a Smoothing,
     /// The weights of steps.
     pub(crate) weights: &'a [f32],
     pub(crate) are_rotations: bool,
 }
 
-impl Pass<'_> {
-    /// The step within a row that stands at a place before its start, in it, or beyond its end.
+impl SmoothingPass<'_> {
+    /// The step of a track's samples for an index before the start, within it, or beyond the end.
     #[inline(always)]
-    pub(crate) fn step_at(&self, place: isize, samples: usize) -> usize {
+    pub(crate) fn step_at(&self, index: isize, samples: usize) -> usize {
         let count = samples as isize - 1;
-        if place >= 0 && place < count {
-            return place as usize;
+        if index >= 0 && index < count {
+            return index as usize;
         }
         if self.smoothing.ends == SmoothingEnds::Loop {
-            return place.rem_euclid(count) as usize;
+            return index.rem_euclid(count) as usize;
         }
         // Mirrored again and again: 0 1 2 2 1 0 0 1 2.
-        let there = place.rem_euclid(2 * count);
-        there.min(2 * count - 1 - there) as usize
+        let mirrored = index.rem_euclid(2 * count);
+        mirrored.min(2 * count - 1 - mirrored) as usize
     }
 
     /// Sets the samples next to the ends of a row, where the cubic kernel has other weights.
-    pub(crate) fn set_ends(&self, row: Row<'_>, mut set: impl FnMut(usize, [f32; 4])) {
+    pub(crate) fn set_ends(&self, row: SampleRow<'_>, mut set: impl FnMut(usize, [f32; 4])) {
         let last = row.count - 1;
         let is_cubic = self.smoothing.kernel == SmoothingKernel::Cubic && last >= 3;
         if !is_cubic || self.smoothing.ends == SmoothingEnds::Loop {
@@ -72,7 +72,7 @@ impl Pass<'_> {
             let moved = match (self.are_rotations, sum.map(f64::from)) {
                 (false, _) => pose_smooth::moved(value, sum, false),
                 (true, [0.0, 0.0, 0.0, _]) => value,
-                (true, [x, y, z, _]) => turned_by(value, [x, y, z]),
+                (true, [x, y, z, _]) => rotated_by(value, [x, y, z]),
             };
             set(sample, moved);
         };
@@ -89,9 +89,13 @@ impl Pass<'_> {
         }
     }
 
-    /// A rotation that turns too far for the kernels' polynomials, in f64. `step` gives the steps
-    /// about it by their places: 0 is the one after it, -1 the one before.
-    pub(crate) fn turned_far(&self, value: [f32; 4], step: impl Fn(isize) -> [f32; 3]) -> [f32; 4] {
+    /// A smoothed rotation whose step is too long for the kernels' polynomials, in f64. `step` gives the
+    /// steps about it by index: 0 is the one after it, -1 the one before.
+    pub(crate) fn smoothed_in_f64(
+        &self,
+        value: [f32; 4],
+        step: impl Fn(isize) -> [f32; 3],
+    ) -> [f32; 4] {
         let mut sum = [0.0; 3];
         for (m, weight) in (0..).zip(self.weights) {
             let (after, before) = (step(m), step(-1 - m));
@@ -99,13 +103,13 @@ impl Pass<'_> {
                 sum[c] += (f64::from(after[c]) - f64::from(before[c])) * f64::from(*weight);
             }
         }
-        turned_by(value, sum)
+        rotated_by(value, sum)
     }
 }
 
-fn turned_by(value: [f32; 4], half: [f64; 3]) -> [f32; 4] {
-    let own = DQuat::from_array(product(unit(value), exp(half)));
-    round_quat(own.normalize().to_array())
+fn rotated_by(value: [f32; 4], half: [f64; 3]) -> [f32; 4] {
+    let rotated = DQuat::from_array(product(unit(value), exp(half)));
+    round_quat(rotated.normalize().to_array())
 }
 
 /// Whether any rotation is 0, without a branch for each.
@@ -119,7 +123,7 @@ fn are_any_zero([x, y, z, w]: &Components) -> bool {
     found != 0
 }
 
-impl Row<'_> {
+impl SampleRow<'_> {
     /// The components of consecutive samples, at most [`BLOCK`] of them.
     #[inline(always)]
     fn load<L: Lanes>(&self, first: usize, count: usize, components: &mut Components) {
@@ -139,9 +143,9 @@ impl Row<'_> {
 fn rotation_steps(from: &Components, to: &Components, found: &mut Components) {
     let [mut squares, mut sines, mut ratios] = [[0.0; BLOCK]; 3];
     for (i, square) in squares.iter_mut().enumerate() {
-        let turn = pose_steps::turn(at(from, i), at(to, i));
-        *square = pose_steps::square_of(turn);
-        put(found, i, turn);
+        let rotation = pose_steps::relative_rotation(at(from, i), at(to, i));
+        *square = pose_steps::square_of(rotation);
+        put(found, i, rotation);
     }
     for ((square, sine), ratio) in squares.iter().zip(&mut sines).zip(&mut ratios) {
         *sine = root(*square);
@@ -157,21 +161,21 @@ fn rotation_steps(from: &Components, to: &Components, found: &mut Components) {
 }
 
 /// Smooths consecutive samples of a row on the CPU.
-pub(crate) struct Block<'a> {
-    pub(crate) pass: Pass<'a>,
-    pub(crate) row: Row<'a>,
+pub(crate) struct SmoothingBlock<'a> {
+    pub(crate) pass: SmoothingPass<'a>,
+    pub(crate) row: SampleRow<'a>,
     /// The first of the samples.
     pub(crate) first: usize,
     /// The steps about the samples, from the first that reaches the first of them: a list for each
     /// component, which is made once for many blocks.
     pub(crate) steps: &'a mut [Vec<f32>; 4],
-    /// As [`Row`]: every `stride`th from the `place`th on is a smoothed sample.
+    /// As [`SampleRow`]: every `stride`th from `output_start` on is a smoothed sample.
     pub(crate) output: &'a mut [[f32; 4]],
-    pub(crate) place: usize,
+    pub(crate) output_start: usize,
     pub(crate) count: usize,
 }
 
-impl Block<'_> {
+impl SmoothingBlock<'_> {
     #[inline(always)]
     fn find_steps<L: Lanes, const ARE_ROTATIONS: bool>(&mut self) {
         let (row, radius) = (self.row, self.pass.weights.len());
@@ -185,13 +189,13 @@ impl Block<'_> {
         let (mut from, mut to): (Components, Components) = ([[0.0; BLOCK]; 4], [[0.0; BLOCK]; 4]);
         for lane in (0..rounded).step_by(BLOCK) {
             let lanes = BLOCK.min(count - lane);
-            let place = before + lane as isize;
-            if place >= 0 && place + (lanes as isize) < row.count as isize {
-                row.load::<L>(place as usize, lanes, &mut from);
-                row.load::<L>(place as usize + 1, lanes, &mut to);
+            let start = before + lane as isize;
+            if start >= 0 && start + (lanes as isize) < row.count as isize {
+                row.load::<L>(start as usize, lanes, &mut from);
+                row.load::<L>(start as usize + 1, lanes, &mut to);
             } else {
                 for i in 0..lanes {
-                    let step = self.pass.step_at(place + i as isize, row.count);
+                    let step = self.pass.step_at(start + i as isize, row.count);
                     put(&mut from, i, row.get(step));
                     put(&mut to, i, row.get(step + 1));
                 }
@@ -246,21 +250,21 @@ impl Block<'_> {
                     if at(&moved, i) != [0.0; 4] {
                         continue;
                     }
-                    let place = (lane + i + radius) as isize;
+                    let center = (lane + i + radius) as isize;
                     let value = row.get(self.first + lane + i);
-                    let value = self.pass.turned_far(value, |step| {
-                        let step = (place + step) as usize;
+                    let value = self.pass.smoothed_in_f64(value, |step| {
+                        let step = (center + step) as usize;
                         [0, 1, 2].map(|c| self.steps[c][step])
                     });
                     put(&mut moved, i, value);
                 }
             }
             if row.stride == 1 {
-                let output = &mut self.output[self.place + lane..][..lanes];
+                let output = &mut self.output[self.output_start + lane..][..lanes];
                 put_together::<L>(&moved, output);
             } else {
                 for i in 0..lanes {
-                    self.output[self.place + (lane + i) * row.stride] = at(&moved, i);
+                    self.output[self.output_start + (lane + i) * row.stride] = at(&moved, i);
                 }
             }
         }
@@ -295,7 +299,7 @@ impl Block<'_> {
             }
         }
         let values = values[4 * self.first..].chunks(EACH);
-        let output = bytemuck::cast_slice_mut(&mut self.output[self.place..][..self.count]);
+        let output = bytemuck::cast_slice_mut(&mut self.output[self.output_start..][..self.count]);
         for (i, (output, values)) in output.chunks_mut(EACH).zip(values).enumerate() {
             let mut sums = [0.0; EACH];
             for (m, weight) in self.pass.weights.iter().enumerate() {
@@ -305,14 +309,14 @@ impl Block<'_> {
                     sums[j] += (after[j] - before[j]) * weight;
                 }
             }
-            for ((output, own), sum) in output.iter_mut().zip(values).zip(&sums) {
-                *output = canonical(own + sum);
+            for ((output, value), sum) in output.iter_mut().zip(values).zip(&sums) {
+                *output = canonical(value + sum);
             }
         }
     }
 }
 
-impl InLanes for Block<'_> {
+impl InLanes for SmoothingBlock<'_> {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
         if self.pass.are_rotations {

@@ -124,7 +124,7 @@ impl Threads {
         match IS_WORKER.get() {
             _ if !HAS_THREADS => 1,
             true => rayon::current_num_threads(),
-            false => self.count.unwrap_or_else(usual_count),
+            false => self.count.unwrap_or_else(default_count),
         }
     }
 
@@ -157,13 +157,13 @@ impl Threads {
         }
         // Nobody works while this is locked: threads are started, and not waited for.
         let mut forked = self.forked.lock().unwrap_or_else(PoisonError::into_inner);
-        let there = of_first().or(forked.as_ref().filter(|own| own.process == process));
-        if let Some(own) = there {
-            return Ok(Arc::clone(&own.threads));
+        let there = of_first().or(forked.as_ref().filter(|pool| pool.process == process));
+        if let Some(pool) = there {
+            return Ok(Arc::clone(&pool.threads));
         }
         let made = Pool {
             process,
-            threads: Arc::new(start(self.count.unwrap_or_else(usual_count))?),
+            threads: Arc::new(start(self.count.unwrap_or_else(default_count))?),
         };
         let threads = Arc::clone(&made.threads);
         if let Err(made) = self.first.set(made) {
@@ -235,7 +235,7 @@ fn start_one(worker: rayon::ThreadBuilder) -> io::Result<()> {
 }
 
 /// As many as `RAYON_NUM_THREADS` says, else one for each core that this process may use.
-fn usual_count() -> usize {
+fn default_count() -> usize {
     static COUNT: OnceLock<usize> = OnceLock::new();
     *COUNT.get_or_init(|| {
         let named = std::env::var("RAYON_NUM_THREADS").ok();
@@ -256,10 +256,10 @@ mod tests {
 
     #[test]
     fn work_inside_work_uses_the_same_threads() {
-        let own = Threads::new(Some(3));
-        let inner = own.run(|| {
+        let threads = Threads::new(Some(3));
+        let inner = threads.run(|| {
             let inner = (on_threads(rayon::current_num_threads), count());
-            assert_eq!(own.count(), 3);
+            assert_eq!(threads.count(), 3);
             inner
         });
         assert_eq!(inner, Ok((Ok(3), 3)));
@@ -274,17 +274,17 @@ mod tests {
             .num_threads(2)
             .build()
             .unwrap();
-        let (inside, most) = (AtomicUsize::new(0), AtomicUsize::new(0));
+        let (inside, max_inside) = (AtomicUsize::new(0), AtomicUsize::new(0));
         callers.install(|| {
             (0..64).into_par_iter().for_each(|_| {
                 let now = 1 + inside.fetch_add(1, Ordering::SeqCst);
-                most.fetch_max(now, Ordering::SeqCst);
+                max_inside.fetch_max(now, Ordering::SeqCst);
                 let sum = on_threads(|| (0..1000u64).into_par_iter().sum::<u64>());
                 assert_eq!(sum, Ok(499_500));
                 inside.fetch_sub(1, Ordering::SeqCst);
             });
         });
-        assert!(most.into_inner() <= 2);
+        assert!(max_inside.into_inner() <= 2);
     }
 
     #[test]

@@ -18,13 +18,13 @@ thread_local! {
 ///
 /// ```
 /// # use glam::Quat;
-/// use tumble::{Device, Engine, Error, Frames, Stop, TrackSet, method};
+/// use tumble::{Device, Engine, Error, SampleTimes, Stop, TrackSet, method};
 /// # let mut set = TrackSet::new();
 /// # set.push("", &[0.0, 1.0], &[Quat::IDENTITY, Quat::from_rotation_x(1.0)])?;
 /// let engine = Engine::new(Device::Cpu)?;
 /// let stop = Stop::new();
 /// stop.stop(); // another thread's, while the engine works
-/// let found = stop.during(|| engine.evaluate(&set, method::C2, &Frames::fps(60)));
+/// let found = stop.during(|| engine.evaluate(&set, method::C2, &SampleTimes::fps(60)));
 /// assert!(matches!(found, Err(Error::Stopped(_))));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```

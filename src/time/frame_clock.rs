@@ -3,7 +3,7 @@
 
 use crate::math::canonical::{nearest_whole, round_f32};
 use crate::time::frame_rate::FrameRate;
-use crate::time::wrap::{CopyPlace, TrackCopy};
+use crate::time::wrap::{CopyPosition, TrackCopy};
 
 /// How the parameter of a frame within a span follows from the frame's number.
 pub(crate) struct InFrames {
@@ -65,10 +65,14 @@ const CLIP: f64 = 64.0;
 /// rounding, is a key moved by up to a step of its f64.
 #[inline(always)]
 pub(crate) fn rounding(magnitude: f64, held: bool) -> f64 {
-    let few = 4.0 * f64::EPSILON * magnitude;
+    let rounded_steps = 4.0 * f64::EPSILON * magnitude;
     let step = if held { f64::EPSILON * magnitude } else { 0.0 };
-    let most = if step > RESOLUTION { step } else { RESOLUTION };
-    if few < most { few } else { most }
+    let limit = if step > RESOLUTION { step } else { RESOLUTION };
+    if rounded_steps < limit {
+        rounded_steps
+    } else {
+        limit
+    }
 }
 
 /// Converts the key times of a track, or of one of its copies, to frame coordinates, in f64 and by an
@@ -120,9 +124,9 @@ impl FrameClock {
     /// The same in a copy of the track.
     #[inline]
     pub(crate) fn in_copy(self, copy: &TrackCopy) -> Self {
-        match copy.place {
-            CopyPlace::Track | CopyPlace::At(_) => self,
-            CopyPlace::Frames {
+        match copy.position {
+            CopyPosition::Track | CopyPosition::At(_) => self,
+            CopyPosition::Frames {
                 first,
                 at_first,
                 backwards,

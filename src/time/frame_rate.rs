@@ -3,7 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-use crate::time::frames::FramesError;
+use crate::time::frames::SampleTimesError;
 
 /// Frames per second as a ratio: 30000/1001 is exact, 29.97 is not.
 ///
@@ -25,7 +25,7 @@ impl FrameRate {
     ///
     /// # Errors
     /// When either is zero or exceeds 2^53 (no longer exact in f64).
-    pub fn new(frames: u64, seconds: u64) -> Result<Self, FramesError> {
+    pub fn new(frames: u64, seconds: u64) -> Result<Self, SampleTimesError> {
         let exact = 1..=1u64 << f64::MANTISSA_DIGITS;
         let divisor = gcd(frames, seconds).max(1);
         let rate = Self {
@@ -33,8 +33,8 @@ impl FrameRate {
             seconds: seconds / divisor,
         };
         if !exact.contains(&rate.frames) || !exact.contains(&rate.seconds) {
-            return Err(FramesError::Rate {
-                given: format!("{frames}/{seconds}"),
+            return Err(SampleTimesError::Rate {
+                text: format!("{frames}/{seconds}"),
             });
         }
         Ok(rate)
@@ -111,12 +111,12 @@ impl fmt::Display for FrameRate {
 }
 
 impl FromStr for FrameRate {
-    type Err = FramesError;
+    type Err = SampleTimesError;
 
     /// `25`, `12.5`, `1e-3` or `30000/1001`; decimals are taken exactly.
-    fn from_str(text: &str) -> Result<Self, FramesError> {
-        let refuse = || FramesError::Rate {
-            given: text.to_owned(),
+    fn from_str(text: &str) -> Result<Self, SampleTimesError> {
+        let refuse = || SampleTimesError::Rate {
+            text: text.to_owned(),
         };
         let (frames, seconds) = match text.split_once('/') {
             Some((frames, seconds)) => (
@@ -140,10 +140,10 @@ fn decimal_ratio(text: &str) -> Option<(u64, u64)> {
     if digits.is_empty() || !digits.bytes().all(|b| b.is_ascii_digit()) {
         return None;
     }
-    let places = exponent.checked_sub(i32::try_from(fraction.trim_end_matches('0').len()).ok()?)?;
-    let power = 10u64.checked_pow(places.unsigned_abs())?;
+    let shift = exponent.checked_sub(i32::try_from(fraction.trim_end_matches('0').len()).ok()?)?;
+    let power = 10u64.checked_pow(shift.unsigned_abs())?;
     let digits: u64 = digits.parse().ok()?;
-    match places {
+    match shift {
         ..0 => Some((digits, power)),
         _ => Some((digits.checked_mul(power)?, 1)),
     }

@@ -24,16 +24,16 @@ const LAST_FRAME_TOLERANCE: f64 = 1e-6;
 /// Before its first key and after its last a track holds its end values.
 ///
 /// ```
-/// use tumble::Frames;
-/// let frames = Frames::fps(25);                       // from the first key to the last
-/// let second = Frames::fps(60).between(1.0, 2.0);     // 61 frames
-/// let sparse = Frames::at(vec![0.0, 0.125, 7.5]);     // any times, in any order
+/// use tumble::SampleTimes;
+/// let frames = SampleTimes::fps(25);                       // from the first key to the last
+/// let second = SampleTimes::fps(60).between(1.0, 2.0);     // 61 frames
+/// let sparse = SampleTimes::at(vec![0.0, 0.125, 7.5]);     // any times, in any order
 /// ```
 #[derive(Debug, Clone, PartialEq)]
-pub struct Frames(Request);
+pub struct SampleTimes(SampleRequest);
 
 #[derive(Debug, Clone, PartialEq)]
-enum Request {
+enum SampleRequest {
     Rate {
         rate: FrameRate,
         start: Option<f64>,
@@ -48,14 +48,14 @@ enum Request {
 /// Why samples were refused.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
-pub enum FramesError {
+pub enum SampleTimesError {
     /// The frame rate is zero, too large, or not a number.
     #[error(
-        "`{given}` is no frame rate; give a positive number or a ratio, such as 25 or 30000/1001"
+        "`{text}` is not a frame rate; give a positive number or a ratio, such as 25 or 30000/1001"
     )]
     Rate {
-        /// What was given.
-        given: String,
+        /// The text that was refused.
+        text: String,
     },
     /// The range ends before it starts.
     #[error("the range ends at {end} s, before it starts at {start} s")]
@@ -67,13 +67,13 @@ pub enum FramesError {
     },
     /// A range was given beside explicit times.
     #[error(
-        "explicit times have no range; give a rate with a start and an end, or those of the times that are wanted"
+        "explicit times have no range; give a rate with a start and an end, or only the times within the range"
     )]
     TimesInRange,
     /// A time is NaN or infinite.
     #[error("time {index} is {time}; times are finite numbers of seconds")]
     TimeNotFinite {
-        /// Its place in the list, from 0.
+        /// Its index in the list, from 0.
         index: usize,
         /// The offending time.
         time: f64,
@@ -102,7 +102,7 @@ pub enum FramesError {
     /// counted in 32 bits.
     #[error("track {track}: {frames:.3e} frames between key {key} and the next; the limit is 2^32")]
     GapTooLong {
-        /// The track's place in the set.
+        /// The track's index in the set.
         track: usize,
         /// The key before the gap.
         key: usize,
@@ -111,7 +111,7 @@ pub enum FramesError {
     },
 }
 
-impl Frames {
+impl SampleTimes {
     /// Whole frames per second, from the set's first key to its last. A rate of 0 is
     /// refused when the frames are resolved against a set.
     #[must_use]
@@ -123,7 +123,7 @@ impl Frames {
     /// `start + k / rate`, for every `k` with a time not past the end.
     #[must_use]
     pub fn rate(rate: FrameRate) -> Self {
-        Self(Request::Rate {
+        Self(SampleRequest::Rate {
             rate,
             start: None,
             end: None,
@@ -135,18 +135,18 @@ impl Frames {
     #[must_use]
     pub fn between(mut self, from: f64, to: f64) -> Self {
         match &mut self.0 {
-            Request::Rate { start, end, .. } => (*start, *end) = (Some(from), Some(to)),
-            request => *request = Request::TimesInRange,
+            SampleRequest::Rate { start, end, .. } => (*start, *end) = (Some(from), Some(to)),
+            request => *request = SampleRequest::TimesInRange,
         }
         self
     }
 
     /// The same frames for sets whose keys span another time: a start or an end that
-    /// [`Frames::between`] did not give is taken from here, instead of from the set's first and last
+    /// [`SampleTimes::between`] did not give is taken from here, instead of from the set's first and last
     /// key. Explicit times depend on no keys and stay.
     #[must_use]
     pub fn spanning(mut self, (first, last): (f64, f64)) -> Self {
-        if let Request::Rate { start, end, .. } = &mut self.0 {
+        if let SampleRequest::Rate { start, end, .. } = &mut self.0 {
             start.get_or_insert(first);
             end.get_or_insert(last);
         }
@@ -157,14 +157,14 @@ impl Frames {
     #[must_use]
     #[doc(alias = "sample times")]
     pub fn at(times: Vec<f64>) -> Self {
-        Self(Request::Shared(Arc::new(times)))
+        Self(SampleRequest::Shared(Arc::new(times)))
     }
 
     /// Explicit times, seconds, for each track its own: first those of the first track, then those
     /// of the second, and so on, the same number for each.
     #[must_use]
     pub fn at_each(times: Vec<f64>) -> Self {
-        Self(Request::PerTrack(Arc::new(times)))
+        Self(SampleRequest::PerTrack(Arc::new(times)))
     }
 
     /// The samples of a set with `tracks` tracks whose keys span `span` seconds.
@@ -175,9 +175,9 @@ impl Frames {
         &self,
         tracks: usize,
         span: Option<(f64, f64)>,
-    ) -> Result<Timeline, FramesError> {
+    ) -> Result<Timeline, SampleTimesError> {
         let finite = |times: &[f64]| match times.iter().position(|time| !time.is_finite()) {
-            Some(index) => Err(FramesError::TimeNotFinite {
+            Some(index) => Err(SampleTimesError::TimeNotFinite {
                 index,
                 time: times[index],
             }),
@@ -185,15 +185,15 @@ impl Frames {
         };
         let (first, last) = span.unwrap_or((0.0, 0.0));
         let (ticks, count) = match &self.0 {
-            Request::Rate { rate, start, end } => {
+            SampleRequest::Rate { rate, start, end } => {
                 if rate.is_zero() {
-                    let given = rate.to_string();
-                    return Err(FramesError::Rate { given });
+                    let text = rate.to_string();
+                    return Err(SampleTimesError::Rate { text });
                 }
                 let (start, end) = (start.unwrap_or(first), end.unwrap_or(last));
                 finite(&[start, end])?;
                 if end < start {
-                    return Err(FramesError::ReversedRange { start, end });
+                    return Err(SampleTimesError::ReversedRange { start, end });
                 }
                 // Times that were rounded to f64 may have moved by a step of it.
                 let step = f64::EPSILON * start.abs().max(end.abs());
@@ -203,17 +203,17 @@ impl Frames {
                 let (rate, start) = (*rate, FrameStart::new(start));
                 (Ticks::Frames { rate, start }, count as usize)
             }
-            Request::Shared(times) => {
+            SampleRequest::Shared(times) => {
                 finite(times)?;
                 check_size(tracks, times.len() as f64)?;
                 let (times, stride) = (Arc::clone(times), 0);
                 let count = times.len();
                 (Ticks::Times { times, stride }, count)
             }
-            Request::PerTrack(times) => {
+            SampleRequest::PerTrack(times) => {
                 finite(times)?;
                 if tracks == 0 || !times.len().is_multiple_of(tracks) {
-                    return Err(FramesError::Uneven {
+                    return Err(SampleTimesError::Uneven {
                         times: times.len(),
                         tracks,
                     });
@@ -221,16 +221,16 @@ impl Frames {
                 let (times, stride) = (Arc::clone(times), times.len() / tracks);
                 (Ticks::Times { times, stride }, stride)
             }
-            Request::TimesInRange => return Err(FramesError::TimesInRange),
+            SampleRequest::TimesInRange => return Err(SampleTimesError::TimesInRange),
         };
         Ok(Timeline { ticks, count })
     }
 }
 
-fn check_size(tracks: usize, frames: f64) -> Result<(), FramesError> {
+fn check_size(tracks: usize, frames: f64) -> Result<(), SampleTimesError> {
     let bytes = tracks as f64 * frames * size_of::<glam::Quat>() as f64;
     if frames > MAX_FRAMES as f64 || bytes > isize::MAX as f64 {
-        return Err(FramesError::TooMany {
+        return Err(SampleTimesError::TooMany {
             tracks,
             frames,
             bytes,
@@ -239,7 +239,7 @@ fn check_size(tracks: usize, frames: f64) -> Result<(), FramesError> {
     Ok(())
 }
 
-/// The samples of one evaluation: [`Frames`] resolved against a set.
+/// The samples of one evaluation: [`SampleTimes`] resolved against a set.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Timeline {
     pub(crate) ticks: Ticks,
@@ -279,12 +279,12 @@ impl Timeline {
 
     /// The same samples for a set that has only some of the tracks.
     pub(crate) fn of_tracks(&self, tracks: std::ops::Range<usize>) -> Self {
-        let mut own = self.clone();
-        if let Ticks::Times { times, stride: 1.. } = &mut own.ticks {
-            let own = tracks.start * self.count..tracks.end * self.count;
-            *times = Arc::new(times[own].to_vec());
+        let mut timeline = self.clone();
+        if let Ticks::Times { times, stride: 1.. } = &mut timeline.ticks {
+            let range = tracks.start * self.count..tracks.end * self.count;
+            *times = Arc::new(times[range].to_vec());
         }
-        own
+        timeline
     }
 
     /// The same for some samples of some tracks, and which of its samples is the first of these: explicit times
@@ -322,8 +322,8 @@ impl Timeline {
         let count = tracks.saturating_mul(self.count);
         let mut times = reserved(count, "the times of every track")?;
         for track in 0..tracks {
-            let own = (0..self.count).map(|sample| map(track, self.time_at(track, sample)));
-            times.extend(own);
+            let mapped = (0..self.count).map(|sample| map(track, self.time_at(track, sample)));
+            times.extend(mapped);
         }
         Ok(Self {
             ticks: Ticks::Times {
@@ -379,45 +379,55 @@ mod tests {
     fn the_last_key_keeps_its_frame() {
         let set = |last| Some((0.1, last));
         // 0.1 + 20 s is not 20.1 in binary.
-        let frames = Frames::fps(25).resolve(1, set(0.1 + 20.0)).unwrap();
+        let frames = SampleTimes::fps(25).resolve(1, set(0.1 + 20.0)).unwrap();
         assert_eq!(frames.len(), 501);
-        assert_eq!(Frames::fps(25).resolve(1, set(20.09)).unwrap().len(), 500);
-        assert_eq!(Frames::fps(1).resolve(1, set(0.1)).unwrap().len(), 1);
+        assert_eq!(
+            SampleTimes::fps(25).resolve(1, set(20.09)).unwrap().len(),
+            500
+        );
+        assert_eq!(SampleTimes::fps(1).resolve(1, set(0.1)).unwrap().len(), 1);
     }
 
     #[test]
     fn the_last_key_of_unix_time_keeps_its_frame() {
         for frames in 1..200u32 {
             let last = 1.7e9 + f64::from(frames) / 100.0;
-            let timeline = Frames::fps(100).resolve(1, Some((1.7e9, last))).unwrap();
+            let timeline = SampleTimes::fps(100)
+                .resolve(1, Some((1.7e9, last)))
+                .unwrap();
             assert_eq!(timeline.len(), frames as usize + 1);
         }
     }
 
     #[test]
     fn times_are_told_of_samples_that_there_are() {
-        let each = Frames::at_each(vec![1.0, 2.0, 3.0, 4.0]);
+        let each = SampleTimes::at_each(vec![1.0, 2.0, 3.0, 4.0]);
         let each = each.resolve(2, None).unwrap();
         let found = [(0, 1), (1, 0), (1, 2), (2, 0), (usize::MAX, 0)];
         let found = found.map(|(track, sample)| each.time(track, sample));
         assert_eq!(found, [Some(2.0), Some(3.0), None, None, None]);
-        let frames = Frames::fps(2).resolve(1, Some((1.0, 2.0))).unwrap();
+        let frames = SampleTimes::fps(2).resolve(1, Some((1.0, 2.0))).unwrap();
         assert_eq!((frames.time(0, 2), frames.time(0, 3)), (Some(2.0), None));
     }
 
     #[test]
     fn impossible_requests_are_refused_before_any_work() {
         let span = Some((0.0, 1e9));
-        let ranged = Frames::at(vec![0.0, 1.0]).between(0.0, 1.0);
-        assert_eq!(ranged.resolve(1, span), Err(FramesError::TimesInRange));
-        let nan = Frames::at(vec![0.0, f64::NAN])
+        let ranged = SampleTimes::at(vec![0.0, 1.0]).between(0.0, 1.0);
+        assert_eq!(ranged.resolve(1, span), Err(SampleTimesError::TimesInRange));
+        let nan = SampleTimes::at(vec![0.0, f64::NAN])
             .resolve(1, span)
             .unwrap_err();
-        assert!(matches!(nan, FramesError::TimeNotFinite { index: 1, .. }));
-        let uneven = Frames::at_each(vec![0.0; 3]).resolve(2, span).unwrap_err();
+        assert!(matches!(
+            nan,
+            SampleTimesError::TimeNotFinite { index: 1, .. }
+        ));
+        let uneven = SampleTimes::at_each(vec![0.0; 3])
+            .resolve(2, span)
+            .unwrap_err();
         assert_eq!(
             uneven,
-            FramesError::Uneven {
+            SampleTimesError::Uneven {
                 times: 3,
                 tracks: 2
             }

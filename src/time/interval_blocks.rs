@@ -32,7 +32,7 @@ pub(crate) struct IntervalBlock {
     pub(crate) offset: [f32; LEN],
     /// Whether f32 holds the distances of all samples from `whole` exactly.
     pub(crate) are_near: bool,
-    /// The intervals that hold samples, by their places in the block.
+    /// The intervals in which samples lie, by their indices in the block.
     pub(crate) occupied: Occupied,
 }
 
@@ -66,7 +66,7 @@ impl IntervalBlock {
     }
 }
 
-/// A bit for each interval that holds samples; iterates over their places in order. Where keys are
+/// A bit for each interval in which samples lie; iterates over their indices in order. Where keys are
 /// denser than samples, a branch for each interval would often be mispredicted.
 #[derive(Clone, Copy, Zeroable)]
 pub(crate) struct Occupied(u64);
@@ -76,9 +76,9 @@ impl Iterator for Occupied {
 
     #[inline(always)]
     fn next(&mut self) -> Option<usize> {
-        let place = self.0.trailing_zeros();
+        let index = self.0.trailing_zeros();
         self.0 &= self.0.wrapping_sub(1);
-        (place < u64::BITS).then_some(place as usize)
+        (index < u64::BITS).then_some(index as usize)
     }
 }
 
@@ -108,7 +108,7 @@ impl<'a> IntervalBlocks<'a> {
         if samples.start > 0
             && let Some(first_time) = clock.time_of_track(samples.start)
         {
-            // Most parts of a long track hold no requested sample. To compare with the last start
+            // Most parts of a long track have no requested sample. To compare with the last start
             // avoids a search through memory that is not in the caches.
             let found = match starts.last() {
                 Some(&last) if last <= first_time => starts.len(),
@@ -138,15 +138,15 @@ impl<'a> IntervalBlocks<'a> {
         let (starts, next) = if self.clock.is_reversed() {
             let times = (self.starts[count - to..].iter().copied().chain([self.end])).rev();
             let times = times.skip(from);
-            for (place, time) in reversed[..to - from].iter_mut().zip(times) {
-                *place = time;
+            for (start, time) in reversed[..to - from].iter_mut().zip(times) {
+                *start = time;
             }
             (&reversed[..to - from], self.starts[count - to])
         } else {
             let next = self.starts.get(to).copied().unwrap_or(self.end);
             (&self.starts[from..to], next)
         };
-        in_lanes(&mut Fill {
+        in_lanes(&mut FillBlock {
             clock: self.clock,
             starts,
             next,
@@ -157,7 +157,7 @@ impl<'a> IntervalBlocks<'a> {
     }
 }
 
-struct Fill<'a> {
+struct FillBlock<'a> {
     clock: FrameClock,
     /// At most [`LEN`].
     starts: &'a [f64],
@@ -167,7 +167,7 @@ struct Fill<'a> {
     block: &'a mut IntervalBlock,
 }
 
-impl InLanes for Fill<'_> {
+impl InLanes for FillBlock<'_> {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
         let (clock, samples, starts) = (self.clock, self.samples, self.starts);
@@ -196,28 +196,28 @@ impl InLanes for Fill<'_> {
         let scale = &mut block.scale[..count];
         let offset = &mut block.offset[..count];
         let extent = if clock.is_reversed() { -1.0 } else { 1.0 };
-        let (mut far, mut occupied) = (0, 0);
+        let (mut distant, mut occupied) = (0, 0);
         for j in 0..count {
             let span = in_frames(frame[j], next_frame[j], extent);
             let (before, after) = (first[j] - span.whole, next_first[j] - span.whole);
-            let is_far = (before.abs() >= FAR) | (after.abs() >= FAR);
-            let own = u64::from(first[j] < next_first[j]) << j;
-            occupied |= own;
-            far |= if is_far { own } else { 0 };
+            let is_distant = (before.abs() >= NEAR_LIMIT) | (after.abs() >= NEAR_LIMIT);
+            let bit = u64::from(first[j] < next_first[j]) << j;
+            occupied |= bit;
+            distant |= if is_distant { bit } else { 0 };
             is_held[j] = u64::from(first[j] == frame[j]);
             whole[j] = span.whole;
             distance[j] = before as f32;
             scale[j] = span.scale;
             offset[j] = span.offset;
         }
-        block.are_near = far == 0;
+        block.are_near = distant == 0;
         block.occupied = Occupied(occupied);
     }
 }
 
 /// f32 holds whole numbers exactly below 2^24. With distances below this limit, so are those of the
 /// samples that fill a run's last vector.
-const FAR: f64 = (1u64 << 23) as f64;
+const NEAR_LIMIT: f64 = (1u64 << 23) as f64;
 
 /// Clamps a sample to the requested range.
 #[inline(always)]

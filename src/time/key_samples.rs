@@ -7,7 +7,7 @@ use bytemuck::Zeroable as _;
 
 use crate::shader::{IS_KEY, KeySample};
 use crate::time::frame_clock::FrameClock;
-use crate::time::frames::FramesError;
+use crate::time::frames::SampleTimesError;
 use crate::time::interval_blocks::{IntervalBlock, IntervalBlocks};
 use crate::tracks::track_keys::TrackKeys;
 
@@ -38,7 +38,7 @@ impl<'a> FramePlan<'a> {
         of: TrackKeys<'a>,
         clock: FrameClock,
         window: &Range<usize>,
-    ) -> Result<&[KeySample], FramesError> {
+    ) -> Result<&[KeySample], SampleTimesError> {
         let times = of.times;
         if std::ptr::eq(self.times, times) && self.clock == Some(clock) && self.window == *window {
             return Ok(&self.samples);
@@ -48,12 +48,12 @@ impl<'a> FramePlan<'a> {
         self.samples.clear();
         self.samples.resize(window.len(), held(0));
         let mut intervals = IntervalBlocks::new(&times[..last], times[last], clock, window.clone());
-        while let Some(own) = intervals.fill(&mut self.block) {
+        while let Some(filled) = intervals.fill(&mut self.block) {
             let block = &self.block;
             for j in block.occupied {
-                let key = own.start + j;
+                let key = filled.start + j;
                 if !block.are_near && !block.is_countable(j) {
-                    return Err(FramesError::GapTooLong {
+                    return Err(SampleTimesError::GapTooLong {
                         track: of.index,
                         key: of.first_key + key,
                         frames: block.frame[j + 1] - block.frame[j],
@@ -65,17 +65,17 @@ impl<'a> FramePlan<'a> {
                     key: key as u32,
                     parameter: (sample as f64 - whole) as f32 * scale + offset,
                 };
-                let places = samples.start - window.start..samples.end - window.start;
-                let places = &mut self.samples[places];
-                if let [only] = places {
+                let range = samples.start - window.start..samples.end - window.start;
+                let stored = &mut self.samples[range];
+                if let [only] = stored {
                     *only = at(samples.start);
                 } else {
-                    for (place, sample) in places.iter_mut().zip(samples) {
-                        *place = at(sample);
+                    for (slot, sample) in stored.iter_mut().zip(samples) {
+                        *slot = at(sample);
                     }
                 }
                 if block.is_held[j] == 1 {
-                    places[0] = held(key);
+                    stored[0] = held(key);
                 }
             }
         }

@@ -1,6 +1,52 @@
 //! From seconds to frames: frame rates, requested samples, wrap modes, and which span of a track or
 //! which interval between keys each sample falls into. Results do not depend on the window of
 //! samples that is asked for.
+//!
+//! # Why so
+//!
+//! Seconds are f64 and stay on the host. A kernel gets a whole number of frames from the frame nearest to a
+//! segment's middle, with a scale and an offset in f32: a frame at hour 24 is as exact as the first. The
+//! parameter of a sample is a function of its number, never the sum of steps, so that no window, chunk or
+//! vector width shows. A key time within its rounding of a whole frame counts as that frame
+//! ([`frame_clock::FrameClock::boundary`]), and the sample there is the key, bit for bit.
+//!
+//! # Types
+//!
+//! | type | what it is |
+//! |---|---|
+//! | [`frames::SampleTimes`] | which samples are asked for: a rate and a range, or explicit times |
+//! | [`frames::Timeline`] | the same for a set: how many samples, and the time of each |
+//! | [`frame_rate::FrameRate`] | frames per second, as an exact ratio |
+//! | [`frame_clock::FrameClock`] | from key times to frame coordinates, for a track or one of its copies |
+//! | [`moment::Moment`] | an exact time as the sum of two f64, for copies far from the track |
+//! | [`wrap::TrackCopy`] | consecutive samples in one copy of a track that repeats |
+//! | [`interval_blocks::IntervalBlock`] | frame coordinates of 32 intervals, and the samples in each |
+//! | [`spans::Spans`], [`spans::TrackPart`] | where in time the segments of prepared tracks lie |
+//! | [`runs::Run`] | consecutive samples with one source: the unit of work of every device |
+//! | [`key_samples::FramePlan`] | for each frame the key before it, where there are no segments |
+//!
+//! # From a key time to runs
+//!
+//! ```text
+//! SampleTimes ─► Timeline ─► TrackCopy ─┬─ frames: FrameClock ─► IntervalBlock ─┬─► Run (spans)
+//!                                       │                                       └─► FramePlan (keys)
+//!                                       └─ explicit times: a search in the starts ─► Run, key sample
+//! ```
+//!
+//! # Memory
+//!
+//! Key times are read once, in order. Of 32 intervals a block keeps these rows, about 1.5 KB, which vectors
+//! fill without a branch; the bits of `occupied` then lead to the intervals that have samples, as
+//! a branch for each would often be mispredicted where keys are denser than samples.
+//!
+//! ```text
+//! interval   0     1     2     …  31    32
+//! frame      0.0   1.25  1.75  …  40.0  41.5   f64: where it starts, in frames
+//! first      0     2     2     …  40    42     the first sample that is not before that
+//! is_held    1     0     0     …  1            whether that sample lies at exactly the start
+//! whole, distance, scale, offset               how a parameter follows from the sample's number
+//! occupied   1     0     1     …  1            a bit each
+//! ```
 
 pub(crate) mod frame_clock;
 pub(crate) mod frame_rate;

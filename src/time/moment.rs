@@ -150,7 +150,7 @@ impl Period {
         let from_first = time.minus(Moment::new(self.first));
         let mut number = (from_first.high / length.high).floor();
         if number.abs() > COUNTED {
-            return self.far_out(from_first);
+            return self.find_uncounted(from_first);
         }
         let mut into = from_first.minus(length.times(number));
         while into.is_negative() {
@@ -173,7 +173,7 @@ impl Period {
         }
     }
 
-    fn far_out(&self, from_first: Moment) -> InCopy {
+    fn find_uncounted(&self, from_first: Moment) -> InCopy {
         let (length, twice) = (self.length.high, 2.0 * self.length.high);
         // Remainders are exact, however large the quotient is.
         let into = (from_first.high.rem_euclid(twice) + from_first.low.rem_euclid(twice)) % twice;
@@ -200,7 +200,7 @@ impl Period {
         time.in_frames(rate)
     }
 
-    /// The track's time at a place in a copy.
+    /// The track's time at a position in a copy.
     pub(crate) fn time_in_track(&self, into: Moment, backwards: bool) -> Moment {
         let from_first = match backwards {
             true => self.length.minus(into),

@@ -1,11 +1,20 @@
-//! Where in time the segments of prepared tracks lie.
+//! Where in time the segments of prepared tracks lie, and the runs of samples that they give.
 
 use std::collections::TryReserveError;
 use std::ops::Range;
 
-use crate::time::frames::FramesError;
+use bytemuck::Zeroable as _;
 
-/// In the place of an index: there is nothing.
+use crate::math::canonical::round_f32;
+use crate::time::frame_clock::{FrameClock, finite_scale};
+use crate::time::frames::{SampleTimesError, Ticks, Timeline};
+use crate::time::interval_blocks::{IntervalBlock, IntervalBlocks};
+use crate::time::moment::Moment;
+use crate::time::runs::{Affine, Distance, Emit, Parameter, Run, RunSource};
+use crate::time::times::interval_at;
+use crate::time::wrap::{CopyPosition, TrackCopy};
+
+/// Instead of an index: there is nothing.
 pub(crate) const NONE: u32 = u32::MAX;
 
 /// Spans of tracks' time, each from its start to the start of the next one. Each field has a list
@@ -14,7 +23,7 @@ pub(crate) const NONE: u32 = u32::MAX;
 pub(crate) struct Spans {
     /// Seconds.
     pub(crate) starts: Vec<f64>,
-    pub(crate) sources: Vec<Source>,
+    pub(crate) sources: Vec<SpanSource>,
     /// The constant to store at exactly the start, or [`NONE`].
     pub(crate) keys: Vec<u32>,
     /// Whether keys are held until the next one.
@@ -23,7 +32,7 @@ pub(crate) struct Spans {
 
 /// What gives the rotations of a span: indices in the lists of `Prepared`.
 #[derive(Debug, Clone, Copy)]
-pub(crate) enum Source {
+pub(crate) enum SpanSource {
     Segment(u32),
     Constant(u32),
     Exact(u32),
@@ -32,8 +41,8 @@ pub(crate) enum Source {
 /// Some consecutive key intervals of one track: all of them, unless the track is
 /// so long that its segments are spread over several buffers.
 #[derive(Debug, Clone)]
-pub(crate) struct Part {
-    /// The track's place in the set.
+pub(crate) struct TrackPart {
+    /// The track's index in the set.
     pub(crate) track: u32,
     /// The index of its first key in the track.
     pub(crate) first_key: u32,
@@ -44,14 +53,14 @@ pub(crate) struct Part {
     pub(crate) before: u32,
     /// The constant held from the last key on; [`NONE`] when another part has it.
     pub(crate) after: u32,
-    /// What its ends need beyond these two constants, which is rare. Boxed, because a crowd has a
+    /// What its ends need besides these two constants, which is rare. Boxed, because a crowd has a
     /// million parts.
-    pub(crate) beyond: Option<Box<Beyond>>,
+    pub(crate) extension: Option<Box<TrackExtension>>,
 }
 
 /// What lies at a track's ends and outside its keys.
 #[derive(Debug, Clone)]
-pub(crate) struct Beyond {
+pub(crate) struct TrackExtension {
     /// The constant at exactly the last key; [`NONE`] if the one held after it serves there too.
     pub(crate) at_end: u32,
     /// The curves, evaluated in f64, that extrapolate before the first key and after the last.
@@ -62,7 +71,7 @@ pub(crate) struct Beyond {
     pub(crate) span: (f64, f64),
 }
 
-impl Beyond {
+impl TrackExtension {
     pub(crate) fn new(times: &[f64]) -> Self {
         Self {
             at_end: NONE,
@@ -73,30 +82,34 @@ impl Beyond {
     }
 }
 
-impl Part {
+impl TrackPart {
     /// The constant at exactly the last key, and the curves that extrapolate before the first key
     /// and after the last; [`NONE`] for what there is not.
     #[inline]
     pub(crate) fn at_ends(&self) -> [u32; 3] {
-        (self.beyond.as_ref()).map_or([NONE; 3], |beyond| {
-            [beyond.at_end, beyond.from_before, beyond.from_after]
+        (self.extension.as_ref()).map_or([NONE; 3], |extension| {
+            [
+                extension.at_end,
+                extension.from_before,
+                extension.from_after,
+            ]
         })
     }
 
     /// Whether its track starts with it, and whether it ends with it; `begin` is when its first span
-    /// starts. Both for a track without [`Beyond`], which has one part or is not repeated.
+    /// starts. Both for a track without [`TrackExtension`], which has one part or is not repeated.
     pub(crate) fn is_at_ends(&self, begin: f64) -> [bool; 2] {
-        let span = self.beyond.as_ref().map(|beyond| beyond.span);
+        let span = self.extension.as_ref().map(|extension| extension.span);
         span.map_or([true; 2], |(first, last)| {
             [begin <= first, self.end >= last]
         })
     }
 
-    /// Its [`Beyond`], which is created if it has none. `times` are when the whole track starts and
+    /// Its [`TrackExtension`], which is created if it has none. `times` are when the whole track starts and
     /// ends, seconds.
-    pub(crate) fn beyond(&mut self, times: (f64, f64)) -> &mut Beyond {
-        let new = || Box::new(Beyond::new(&[times.0, times.1]));
-        self.beyond.get_or_insert_with(new)
+    pub(crate) fn extension_mut(&mut self, times: (f64, f64)) -> &mut TrackExtension {
+        let new = || Box::new(TrackExtension::new(&[times.0, times.1]));
+        self.extension.get_or_insert_with(new)
     }
 }
 
@@ -133,23 +146,347 @@ impl Spans {
 
     /// The error for a part's span with too many frames to count, with the keys around it.
     #[cold]
-    pub(crate) fn gap_too_long(&self, part: &Part, span: usize, rate: f64) -> FramesError {
+    pub(crate) fn gap_too_long(
+        &self,
+        part: &TrackPart,
+        span: usize,
+        rate: f64,
+    ) -> SampleTimesError {
         let (starts, keys) = (&self.starts, &self.keys);
         // An interval may be cut into several spans, and only the first of them starts at a key.
         // Curves that do not meet their keys do not show it: there each span counts as an interval.
         let meets_keys = keys[part.spans.clone()].iter().any(|&key| key != NONE);
         let is_at_key = |&span: &usize| {
-            let stands = matches!(self.sources[span], Source::Constant(_));
+            let stands = matches!(self.sources[span], SpanSource::Constant(_));
             keys[span] != NONE || stands || !meets_keys
         };
         let until = part.spans.start..=span;
         let behind = until.clone().skip(1).filter(is_at_key).count();
         let from = until.rev().find(is_at_key).unwrap_or(span);
         let to = (span + 1..part.spans.end).find(is_at_key);
-        FramesError::GapTooLong {
+        SampleTimesError::GapTooLong {
             track: part.track as usize,
             key: part.first_key as usize + behind,
             frames: (to.map_or(part.end, |to| starts[to]) - starts[from]) * rate,
         }
+    }
+
+    /// Emits the runs of one part among the samples of a track copy, in order.
+    #[inline(always)]
+    pub(crate) fn runs(
+        &self,
+        part: &TrackPart,
+        timeline: &Timeline,
+        copy: &TrackCopy,
+        emit: &mut impl Emit,
+    ) -> Result<(), SampleTimesError> {
+        match (&timeline.ticks, copy.position) {
+            (_, CopyPosition::At(time)) => {
+                let run = |source| Run::new(copy.samples.start, copy.samples.len(), source);
+                if let Some(source) = self.source_within(part, time) {
+                    emit.run(run(source));
+                }
+                Ok(())
+            }
+            (Ticks::Frames { rate, start }, _) => {
+                let clock = FrameClock::new(*rate, *start, self.steps).in_copy(copy);
+                self.runs_of_frames(part, clock, copy, emit)
+            }
+            (Ticks::Times { times, stride }, _) => {
+                let track_times = &times[part.track as usize * stride..];
+                self.runs_of_times(part, track_times, copy.samples.clone(), emit);
+                Ok(())
+            }
+        }
+    }
+
+    /// Emits the runs of one part among frames, in order.
+    #[inline(always)]
+    fn runs_of_frames(
+        &self,
+        part: &TrackPart,
+        clock: FrameClock,
+        copy: &TrackCopy,
+        emit: &mut impl Emit,
+    ) -> Result<(), SampleTimesError> {
+        let (starts, samples) = (&self.starts[part.spans.clone()], &copy.samples);
+        let [first, at_end, last] = match copy.is_track() {
+            true => self.runs_outside(part, clock, samples),
+            false => self.runs_at_ends(part, clock, samples),
+        };
+        if let Some(run) = first {
+            emit.run(run);
+        }
+        let mut intervals = IntervalBlocks::new(starts, part.end, clock, samples.clone());
+        let mut block = IntervalBlock::zeroed();
+        while let Some(filled) = intervals.fill(&mut block) {
+            for j in block.occupied {
+                let met = filled.start + j;
+                let (span, key) = match (clock.is_reversed(), met) {
+                    (false, _) => (part.spans.start + met, self.keys[part.spans.start + met]),
+                    (true, 0) => (part.spans.end - 1, part.after),
+                    (true, _) => (part.spans.end - 1 - met, self.keys[part.spans.end - met]),
+                };
+                let (mut first, last) = (block.first[j], block.first[j + 1]);
+                if key != NONE && block.is_held[j] == 1 {
+                    emit.run(Run::new(first, 1, RunSource::Constant(key)));
+                    first += 1;
+                    if first == last {
+                        continue;
+                    }
+                }
+                let count = last - first;
+                match self.sources[span] {
+                    SpanSource::Segment(index) => {
+                        let distance = if block.are_near {
+                            let held = first - block.first[j];
+                            Distance::Near {
+                                first: block.distance[j] + held as f32,
+                            }
+                        } else if block.is_countable(j) {
+                            Distance::Frames {
+                                first: (first as f64 - block.whole[j]) as i32,
+                            }
+                        } else {
+                            return Err(self.gap_too_long(part, span, clock.rate()));
+                        };
+                        let source = RunSource::Segment(index, distance, block.affine(j));
+                        emit.run(Run::new(first, count, source));
+                    }
+                    SpanSource::Constant(constant) => {
+                        emit.run(Run::new(first, count, RunSource::Constant(constant)));
+                    }
+                    SpanSource::Exact(index) => {
+                        let parameter = block.parameter(j, clock);
+                        let source = RunSource::Exact { index, parameter };
+                        emit.run(Run::new(first, count, source));
+                    }
+                }
+            }
+        }
+        for run in [at_end, last].into_iter().flatten() {
+            emit.run(run);
+        }
+        Ok(())
+    }
+
+    /// When the first span of a part starts, in seconds.
+    #[inline(always)]
+    pub(crate) fn begin(&self, part: &TrackPart) -> f64 {
+        let starts = &self.starts[part.spans.clone()];
+        starts.first().copied().unwrap_or(part.end)
+    }
+
+    /// The runs outside a part's keys, those of the requested samples that it has: before the first key,
+    /// at exactly the last one, and from there on.
+    pub(crate) fn runs_outside(
+        &self,
+        part: &TrackPart,
+        clock: FrameClock,
+        samples: &Range<usize>,
+    ) -> [Option<Run>; 3] {
+        let [at_end, from_before, from_after] = part.at_ends();
+        let (begin, end) = (clock.boundary(self.begin(part)), clock.boundary(part.end));
+        let (from, to) = (begin.first as usize, end.first as usize);
+        let is_key = at_end != NONE && to as f64 == end.frame;
+        let after = to.saturating_add(usize::from(is_key));
+        let second = clock.rate();
+        let first = RunSource::outside(part.before, from_before, begin.frame, second);
+        let last = RunSource::outside(part.after, from_after, end.frame, second);
+        [
+            run_among(samples, 0..from, first),
+            run_among(samples, to..after, RunSource::held(at_end)),
+            run_among(samples, after..usize::MAX, last),
+        ]
+    }
+
+    /// The runs of a copy's samples that rounding put beyond its ends. Every sample of a copy is of its
+    /// track's keys, also where the values outside are not constants.
+    fn runs_at_ends(
+        &self,
+        part: &TrackPart,
+        clock: FrameClock,
+        samples: &Range<usize>,
+    ) -> [Option<Run>; 3] {
+        let begin = self.begin(part);
+        let [is_first, is_last] = part.is_at_ends(begin);
+        let at_start = is_first.then(|| self.at_start(part));
+        let at_end = is_last.then(|| self.at_end(part));
+        let (begin, end) = (clock.boundary(begin), clock.boundary(part.end));
+        let [(first, from), (last, to)] = match clock.is_reversed() {
+            true => [(at_end, end.first), (at_start, begin.first)],
+            false => [(at_start, begin.first), (at_end, end.first)],
+        };
+        [
+            run_among(samples, 0..from as usize, first),
+            None,
+            run_among(samples, to as usize..usize::MAX, last),
+        ]
+    }
+
+    /// The value of a part's curve where its first span starts.
+    fn at_start(&self, part: &TrackPart) -> RunSource {
+        let first = part.spans.start;
+        let key = self.keys.get(first).filter(|_| !part.spans.is_empty());
+        let constant = [part.before, key.copied().unwrap_or(NONE)];
+        self.at_bound(constant, part.spans.clone().next(), -0.5, 0.0)
+    }
+
+    /// The value of a part's curve where its last span ends.
+    fn at_end(&self, part: &TrackPart) -> RunSource {
+        let [at_end, ..] = part.at_ends();
+        self.at_bound([at_end, part.after], part.spans.clone().last(), 0.5, 1.0)
+    }
+
+    /// The first of two constants that there is, or else a span's value at this parameter; `t` is that of
+    /// a curve in f64.
+    fn at_bound(
+        &self,
+        constants: [u32; 2],
+        span: Option<usize>,
+        parameter: f32,
+        t: f64,
+    ) -> RunSource {
+        let constant = constants.into_iter().find(|&constant| constant != NONE);
+        match (constant, span.map(|span| self.sources[span])) {
+            (Some(constant), _) | (None, Some(SpanSource::Constant(constant))) => {
+                RunSource::Constant(constant)
+            }
+            (None, Some(SpanSource::Segment(index))) => RunSource::at(index, parameter),
+            (None, Some(SpanSource::Exact(index))) => RunSource::exact_at(index, t),
+            (None, None) => RunSource::Constant(0),
+        }
+    }
+
+    /// What gives a part's rotation at one of its track's times; `None` if another part has it.
+    fn source_within(&self, part: &TrackPart, time: Moment) -> Option<RunSource> {
+        let (begin, starts) = (self.begin(part), &self.starts[part.spans.clone()]);
+        let [is_first, is_last] = part.is_at_ends(begin);
+        if time.since(begin) < 0.0 {
+            return is_first.then(|| self.at_start(part));
+        }
+        if time.since(part.end) >= 0.0 {
+            return is_last.then(|| self.at_end(part));
+        }
+        let i = starts.partition_point(|&start| time.since(start) >= 0.0) - 1;
+        let span = part.spans.start + i;
+        let end = starts.get(i + 1).copied().unwrap_or(part.end);
+        let (from_start, length) = (time.since(starts[i]), end - starts[i]);
+        let key = self.keys[span];
+        if from_start == 0.0 && key != NONE {
+            return Some(RunSource::Constant(key));
+        }
+        Some(match self.sources[span] {
+            SpanSource::Constant(constant) => RunSource::Constant(constant),
+            SpanSource::Segment(index) => {
+                let parameter = (from_start - length * 0.5) / length;
+                RunSource::at(index, round_f32(parameter))
+            }
+            SpanSource::Exact(index) => RunSource::exact_at(index, from_start / length),
+        })
+    }
+
+    /// Emits the runs of one part among samples with explicit times.
+    #[inline(always)]
+    pub(crate) fn runs_of_times(
+        &self,
+        part: &TrackPart,
+        times: &[f64],
+        samples: Range<usize>,
+        emit: &mut impl Emit,
+    ) {
+        let starts = &self.starts[part.spans.clone()];
+        let begin = starts.first().copied().unwrap_or(part.end);
+        let (mut sample, mut i) = (samples.start, 0);
+        while sample < samples.end {
+            let time = times[sample];
+            let (covered, source) = if begin <= time && time < part.end {
+                i = interval_at(starts, time, i);
+                let (start, span) = (starts[i], part.spans.start + i);
+                let end = starts.get(i + 1).copied().unwrap_or(part.end);
+                let key = self.keys[span];
+                if time == start && key != NONE {
+                    (start..time.next_up(), Some(RunSource::Constant(key)))
+                } else {
+                    let open = if key == NONE { start } else { start.next_up() };
+                    (open..end, Some(self.time_source(span, end)))
+                }
+            } else {
+                outside(part, begin, time)
+            };
+            let run = times[sample..samples.end].iter();
+            let count = run.take_while(|time| covered.contains(time)).count();
+            if let Some(source) = source {
+                emit.run(Run::new(sample, count, source));
+            }
+            sample += count;
+        }
+    }
+
+    /// The source of one part's rotation at a time; `None` outside its keys.
+    #[inline(always)]
+    pub(crate) fn source_at(&self, part: &TrackPart, time: f64) -> Option<RunSource> {
+        let starts = &self.starts[part.spans.clone()];
+        let i = interval_at(starts, time, 0);
+        let end = starts.get(i + 1).copied().unwrap_or(part.end);
+        // Written out: closures are not always inlined.
+        let is_within = !starts.is_empty() && starts[i] <= time && time < end;
+        if !is_within {
+            return None;
+        }
+        let span = part.spans.start + i;
+        let key = self.keys[span];
+        if time == starts[i] && key != NONE {
+            return Some(RunSource::Constant(key));
+        }
+        Some(self.time_source(span, end))
+    }
+
+    #[inline(always)]
+    fn time_source(&self, span: usize, end: f64) -> RunSource {
+        let start = self.starts[span];
+        let seconds = end - start;
+        match self.sources[span] {
+            SpanSource::Constant(constant) => RunSource::Constant(constant),
+            SpanSource::Exact(index) => {
+                let length = seconds;
+                let parameter = Parameter { start, length };
+                RunSource::Exact { index, parameter }
+            }
+            SpanSource::Segment(index) => {
+                let half = seconds * 0.5;
+                let (scale, offset) = (finite_scale(1.0 / seconds), 0.0);
+                let distance = Distance::Seconds { start, half };
+                RunSource::Segment(index, distance, Affine { scale, offset })
+            }
+        }
+    }
+}
+
+/// The run of those requested samples that lie in a range, if anything gives them.
+fn run_among(
+    samples: &Range<usize>,
+    outside: Range<usize>,
+    source: Option<RunSource>,
+) -> Option<Run> {
+    let first = outside.start.max(samples.start);
+    let last = outside.end.min(samples.end);
+    let source = source.filter(|_| first < last);
+    source.map(|source| Run::new(first, last - first, source))
+}
+
+/// The source of a sample outside a part's keys, `None` if another part has it, and the times that
+/// have the same source. Not inlined, so that the usual path stays small.
+#[inline(never)]
+fn outside(part: &TrackPart, begin: f64, time: f64) -> (Range<f64>, Option<RunSource>) {
+    let [at_end, from_before, from_after] = part.at_ends();
+    if time < begin {
+        let source = RunSource::outside(part.before, from_before, begin, 1.0);
+        (f64::NEG_INFINITY..begin, source)
+    } else if time == part.end && at_end != NONE {
+        (time..time.next_up(), RunSource::held(at_end))
+    } else {
+        let source = RunSource::outside(part.after, from_after, part.end, 1.0);
+        (part.end..f64::INFINITY, source)
     }
 }

@@ -49,8 +49,8 @@ impl TimeBase {
     #[must_use]
     pub fn seconds(self, nanoseconds: i64) -> f64 {
         let behind = i128::from(nanoseconds) - i128::from(self.0) * i128::from(NANOSECONDS);
-        let (unit, most) = (i128::from(NANOSECONDS), 1i128 << f64::MANTISSA_DIGITS);
-        if behind.abs() <= most {
+        let (unit, exact_limit) = (i128::from(NANOSECONDS), 1i128 << f64::MANTISSA_DIGITS);
+        if behind.abs() <= exact_limit {
             return behind as f64 / NANOSECONDS as f64;
         }
         // Whole seconds are exact, and a part of one then is nearly so.
@@ -93,8 +93,8 @@ mod tests {
                 assert_eq!(base.nanoseconds(time), Some(stamp), "{stamp}");
             }
         }
-        let far = TimeBase::new(-3).seconds(i64::MAX);
-        assert_eq!(far, 9_223_372_039.854_776);
+        let late = TimeBase::new(-3).seconds(i64::MAX);
+        assert_eq!(late, 9_223_372_039.854_776);
         for seconds in [f64::NAN, f64::INFINITY, 1e300, -1e12, 1e10] {
             assert_eq!(TimeBase::default().nanoseconds(seconds), None, "{seconds}");
         }

@@ -38,12 +38,12 @@ impl WrapMode {
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct TrackCopy {
     pub(crate) samples: Range<usize>,
-    pub(crate) place: CopyPlace,
+    pub(crate) position: CopyPosition,
 }
 
 /// Where a copy lies.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum CopyPlace {
+pub(crate) enum CopyPosition {
     /// It is the track itself.
     Track,
     /// The track's first key, at `first` seconds, lies at the frame coordinate `at_first` in it.
@@ -62,18 +62,18 @@ impl TrackCopy {
     pub(crate) fn of_track(samples: Range<usize>) -> Self {
         Self {
             samples,
-            place: CopyPlace::Track,
+            position: CopyPosition::Track,
         }
     }
 
     pub(crate) fn is_track(&self) -> bool {
-        self.place == CopyPlace::Track
+        self.position == CopyPosition::Track
     }
 
     pub(crate) fn is_backwards(&self) -> bool {
         matches!(
-            self.place,
-            CopyPlace::Frames {
+            self.position,
+            CopyPosition::Frames {
                 backwards: true,
                 ..
             }
@@ -82,7 +82,7 @@ impl TrackCopy {
 }
 
 /// A copy of fewer frames is not laid out in frames.
-const FEW_FRAMES: f64 = 2.0;
+const MIN_FRAMES: f64 = 2.0;
 
 /// The wrap modes on both sides of a track.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -101,7 +101,7 @@ impl Wrap {
         self.before.repeats() || self.after.repeats()
     }
 
-    /// The samples of a track, cut where its copies meet. `span` holds the times of its first and
+    /// The samples of a track, cut where its copies meet. `span` is the times of its first and
     /// last key, seconds; `None` if it has no copies. The copy of a sample does not depend on which
     /// other samples are requested.
     #[inline]
@@ -149,36 +149,36 @@ impl Wrap {
             return vec![TrackCopy::of_track(samples)];
         };
         let length = rate.frames_in(period.length().seconds());
-        let place = |sample: usize| {
+        let position = |sample: usize| {
             let time = Moment::of_frame(start.seconds, rate, sample as u64);
             let magnitude = time.high.abs().max(start.latest);
             let found = self.copy_at(&period, time, rounding(magnitude, false));
             let Some((found, backwards)) = found else {
-                return CopyPlace::Track;
+                return CopyPosition::Track;
             };
-            match found.number.filter(|_| length >= FEW_FRAMES) {
-                Some(number) => CopyPlace::Frames {
+            match found.number.filter(|_| length >= MIN_FRAMES) {
+                Some(number) => CopyPosition::Frames {
                     first: span.0,
                     at_first: period.frame_of_first(number, backwards, (rate, start.seconds)),
                     backwards,
                 },
-                None => CopyPlace::At(period.time_in_track(found.into, backwards)),
+                None => CopyPosition::At(period.time_in_track(found.into, backwards)),
             }
         };
         let mut copies = Vec::new();
         let mut sample = samples.start;
-        let mut next_place = None;
+        let mut next_position = None;
         while sample < samples.end {
-            let at_sample = next_place.take().unwrap_or_else(|| place(sample));
+            let at_sample = next_position.take().unwrap_or_else(|| position(sample));
             let mut next = sample + 1;
-            // The next copy starts near here; the loops find its first sample by `place` alone.
+            // The next copy starts near here; the loops find its first sample by `position` alone.
             let end = match at_sample {
-                CopyPlace::At(_) => None,
-                CopyPlace::Track => {
-                    let is_in = |sample: usize| place(sample) == CopyPlace::Track;
-                    Some(first_beyond(sample + 1, samples.end, is_in))
+                CopyPosition::At(_) => None,
+                CopyPosition::Track => {
+                    let is_in = |sample: usize| position(sample) == CopyPosition::Track;
+                    Some(first_outside(sample + 1, samples.end, is_in))
                 }
-                CopyPlace::Frames {
+                CopyPosition::Frames {
                     at_first,
                     backwards,
                     ..
@@ -193,13 +193,13 @@ impl Wrap {
             };
             if let Some(end) = end {
                 next = end.clamp(sample + 1, samples.end);
-                while next > sample + 1 && place(next - 1) != at_sample {
+                while next > sample + 1 && position(next - 1) != at_sample {
                     next -= 1;
                 }
                 while next < samples.end {
-                    let at_next = place(next);
+                    let at_next = position(next);
                     if at_next != at_sample {
-                        next_place = Some(at_next);
+                        next_position = Some(at_next);
                         break;
                     }
                     next += 1;
@@ -207,7 +207,7 @@ impl Wrap {
             }
             copies.push(TrackCopy {
                 samples: sample..next,
-                place: at_sample,
+                position: at_sample,
             });
             sample = next;
         }
@@ -227,7 +227,7 @@ impl Wrap {
 }
 
 /// The first number from `from` on, up to `end`, that is not in a stretch which has those before it.
-fn first_beyond(from: usize, end: usize, is_in: impl Fn(usize) -> bool) -> usize {
+fn first_outside(from: usize, end: usize, is_in: impl Fn(usize) -> bool) -> usize {
     let (mut from, mut end) = (from, end);
     while from < end {
         let middle = from + (end - from) / 2;
@@ -242,7 +242,7 @@ fn first_beyond(from: usize, end: usize, is_in: impl Fn(usize) -> bool) -> usize
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::time::frames::Frames;
+    use crate::time::frames::SampleTimes;
 
     #[test]
     fn samples_fall_into_copies_whatever_is_asked_for() {
@@ -250,7 +250,10 @@ mod tests {
             before: WrapMode::Mirror,
             after: WrapMode::Loop,
         };
-        let timeline = Frames::fps(10).between(-2.0, 5.0).resolve(1, None).unwrap();
+        let timeline = SampleTimes::fps(10)
+            .between(-2.0, 5.0)
+            .resolve(1, None)
+            .unwrap();
         let span = Some((0.25, 1.25));
         let whole: Vec<TrackCopy> = wrap.copies(span, &timeline, 0..71).collect();
         assert_eq!(whole.len(), 8);
@@ -268,7 +271,7 @@ mod tests {
             for copy in wrap.copies(span, &timeline, from..from + 1) {
                 let has_sample = |copy: &&TrackCopy| copy.samples.contains(&from);
                 let of_whole = whole.iter().find(has_sample).unwrap();
-                assert_eq!(copy.place, of_whole.place);
+                assert_eq!(copy.position, of_whole.position);
             }
         }
     }
@@ -281,20 +284,20 @@ mod tests {
             after: WrapMode::Mirror,
         };
         let start = 1.7e9 + 0.5;
-        let frames = Frames::fps(8).between(start, start + 3.0);
+        let frames = SampleTimes::fps(8).between(start, start + 3.0);
         let timeline = frames.resolve(1, None).unwrap();
         // 3.125 s: 1.7e9 s are 544 000 000 copies.
         let span = Some((0.0, 3.125));
         let copies: Vec<TrackCopy> = wrap.copies(span, &timeline, 0..25).collect();
-        let at = |at_first, backwards| CopyPlace::Frames {
+        let at = |at_first, backwards| CopyPosition::Frames {
             first: 0.0,
             at_first,
             backwards,
         };
         let expected = [(0..21, at(-4.0, false)), (21..25, at(46.0, true))];
         assert_eq!(copies.len(), 2);
-        for (copy, (samples, place)) in copies.iter().zip(expected) {
-            assert_eq!((copy.samples.clone(), copy.place), (samples, place));
+        for (copy, (samples, position)) in copies.iter().zip(expected) {
+            assert_eq!((copy.samples.clone(), copy.position), (samples, position));
         }
     }
 }

@@ -60,17 +60,17 @@ pub(crate) fn check_times(track: usize, times: &[f64], keys: usize) -> Result<()
 /// Refuses data beside the rotations of which there is not one value for each key.
 pub(crate) fn check_length(
     track: usize,
-    what: &'static str,
+    quantity: &'static str,
     keys: usize,
-    given: usize,
+    values: usize,
 ) -> Result<(), TrackError> {
-    match given == keys {
+    match values == keys {
         true => Ok(()),
         false => Err(TrackError::DataLength {
             track,
-            what,
+            quantity,
             keys,
-            given,
+            values,
         }),
     }
 }
@@ -78,12 +78,16 @@ pub(crate) fn check_length(
 /// Refuses data that is NaN or infinite at a key.
 pub(crate) fn check_finite<T>(
     track: usize,
-    what: &'static str,
+    quantity: &'static str,
     values: &[T],
     is_finite: impl Fn(&T) -> bool,
 ) -> Result<(), TrackError> {
     match values.iter().position(|value| !is_finite(value)) {
-        Some(key) => Err(TrackError::DataNotFinite { track, key, what }),
+        Some(key) => Err(TrackError::DataNotFinite {
+            track,
+            key,
+            quantity,
+        }),
         None => Ok(()),
     }
 }
@@ -120,7 +124,7 @@ mod tests {
         );
         assert_eq!(check_times(1, &[], 0), Err(TrackError::Empty { track: 1 }));
         assert!(check_times(0, &[-LATEST, LATEST], 2).is_ok());
-        for place in 0..9 {
+        for index in 0..9 {
             for bad in [
                 f64::NAN,
                 f64::INFINITY,
@@ -129,19 +133,19 @@ mod tests {
                 -2.0 * LATEST,
             ] {
                 let mut times = good.clone();
-                times[place] = bad;
+                times[index] = bad;
                 let error = check_times(0, &times, 9).unwrap_err();
                 let is_named = match error {
-                    TrackError::TimeNotFinite { key, .. } => !bad.is_finite() && key == place,
+                    TrackError::TimeNotFinite { key, .. } => !bad.is_finite() && key == index,
                     _ => bad.is_finite(),
                 };
-                assert!(is_named, "{bad} at {place}: {error}");
+                assert!(is_named, "{bad} at {index}: {error}");
             }
-            if place > 0 {
+            if index > 0 {
                 let mut times = good.clone();
-                times[place] = times[place - 1];
+                times[index] = times[index - 1];
                 let error = check_times(0, &times, 9).unwrap_err();
-                assert!(matches!(error, TrackError::TimeNotIncreasing { key, .. } if key == place));
+                assert!(matches!(error, TrackError::TimeNotIncreasing { key, .. } if key == index));
             }
         }
     }

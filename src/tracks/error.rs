@@ -9,13 +9,13 @@ pub enum TrackError {
     /// A track must have at least one key.
     #[error("track {track} has no keys; give it at least one")]
     Empty {
-        /// The track's place in the set.
+        /// The track's index in the set.
         track: usize,
     },
     /// Each key needs one time.
     #[error("track {track} has {keys} keys but {times} times; give one time for each key")]
     LengthMismatch {
-        /// The track's place in the set.
+        /// The track's index in the set.
         track: usize,
         /// Number of keys given.
         keys: usize,
@@ -25,9 +25,9 @@ pub enum TrackError {
     /// A time is NaN or infinite.
     #[error("track {track}, key {key}: time {time} is not finite")]
     TimeNotFinite {
-        /// The track's place in the set.
+        /// The track's index in the set.
         track: usize,
-        /// The key's place in the track.
+        /// The key's index in the track.
         key: usize,
         /// The offending time, seconds.
         time: f64,
@@ -35,9 +35,9 @@ pub enum TrackError {
     /// A time is so far away that arithmetic would overflow.
     #[error("track {track}, key {key}: time {time} s; times lie within ±{LATEST:e} s")]
     TimeOutOfRange {
-        /// The track's place in the set.
+        /// The track's index in the set.
         track: usize,
-        /// The key's place in the track.
+        /// The key's index in the track.
         key: usize,
         /// The offending time, seconds.
         time: f64,
@@ -47,9 +47,9 @@ pub enum TrackError {
         "track {track}, key {key}: time {time} s does not come after {previous} s; sort the keys and remove duplicates"
     )]
     TimeNotIncreasing {
-        /// The track's place in the set.
+        /// The track's index in the set.
         track: usize,
-        /// The key's place in the track.
+        /// The key's index in the track.
         key: usize,
         /// The offending time, seconds.
         time: f64,
@@ -61,61 +61,65 @@ pub enum TrackError {
         "track {track}, key {key}: quaternion norm is {norm}; a rotation has norm 1 (±{NORM_TOLERANCE})"
     )]
     NotUnit {
-        /// The track's place in the set.
+        /// The track's index in the set.
         track: usize,
-        /// The key's place in the track.
+        /// The key's index in the track.
         key: usize,
         /// Its norm.
         norm: f64,
     },
-    /// There is no track at that place.
+    /// There is no track with that index.
     #[error("there is no track {track}; the set has {tracks}")]
     NoSuchTrack {
-        /// The place asked for.
+        /// The index asked for.
         track: usize,
         /// Number of tracks in the set.
         tracks: usize,
     },
     /// Data beside the rotations, such as velocities, must be given for every key of a track.
-    #[error("track {track} has {keys} keys but {given} values of {what}; give one for each key")]
+    #[error(
+        "track {track} has {keys} keys but {values} values of {quantity}; give one for each key"
+    )]
     DataLength {
-        /// The track's place in the set.
+        /// The track's index in the set.
         track: usize,
-        /// What was given, such as `velocity`.
-        what: &'static str,
+        /// What the values are, such as `velocity`.
+        quantity: &'static str,
         /// Number of keys of the track.
         keys: usize,
         /// Number of values given.
-        given: usize,
+        values: usize,
     },
     /// An upward direction of a path has no length, or is not finite.
     #[error("track {track}, point {key}: the upward direction has no length, or is not finite")]
     NoUp {
-        /// The track's place in the set.
+        /// The track's index in the set.
         track: usize,
-        /// The point's place in the path.
+        /// The point's index in the path.
         key: usize,
     },
     /// A value beside a rotation is too large.
-    #[error("track {track}, key {key}: the {what} is too large; its numbers lie within ±{limit:e}")]
+    #[error(
+        "track {track}, key {key}: the {quantity} is too large; its numbers lie within ±{limit:e}"
+    )]
     DataTooLarge {
-        /// The track's place in the set.
+        /// The track's index in the set.
         track: usize,
-        /// The key's place in the track.
+        /// The key's index in the track.
         key: usize,
-        /// What was given, such as `velocity`.
-        what: &'static str,
+        /// What the values are, such as `velocity`.
+        quantity: &'static str,
         /// The largest magnitude.
         limit: f64,
     },
     /// A value beside a rotation is NaN or infinite.
-    #[error("track {track}, key {key}: the {what} is not finite")]
+    #[error("track {track}, key {key}: the {quantity} is not finite")]
     DataNotFinite {
-        /// The track's place in the set.
+        /// The track's index in the set.
         track: usize,
-        /// The key's place in the track.
+        /// The key's index in the track.
         key: usize,
-        /// What was given, such as `velocity`.
-        what: &'static str,
+        /// What the values are, such as `velocity`.
+        quantity: &'static str,
     },
 }

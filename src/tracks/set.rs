@@ -5,16 +5,19 @@
 //! everything behind it trusts it: every track has at least one key, times are
 //! finite and strictly increasing, keys are unit quaternions.
 
+pub(crate) mod key_data;
+pub(crate) mod vectors;
+
 use std::ops::Range;
 
 use glam::{DVec3, Quat};
 
 use crate::tracks::check::{check_times, unit_key};
 use crate::tracks::error::TrackError;
-use crate::tracks::key_data::{KeyData, Tcb};
 use crate::tracks::rotation::Rotation;
+use crate::tracks::set::key_data::{KeyData, Tcb};
+use crate::tracks::set::vectors::VectorTracks;
 use crate::tracks::signs::{SignBits, Signs};
-use crate::tracks::vectors::VectorTracks;
 
 /// A set of keyframe tracks: the input of every evaluation.
 ///
@@ -38,7 +41,7 @@ pub struct TrackSet {
     pub(crate) velocities: KeyData<DVec3>,
     pub(crate) tangents: KeyData<[Quat; 2]>,
     pub(crate) tcb: KeyData<Tcb>,
-    /// Translations and scales, in the order of [`Channel`](crate::tracks::vectors::Channel).
+    /// Translations and scales, in the order of [`Channel`](crate::tracks::set::vectors::Channel).
     pub(crate) vectors: [VectorTracks; 2],
     /// First and last key time over all tracks.
     span: Option<(f64, f64)>,
@@ -118,10 +121,10 @@ impl TrackSet {
     }
 
     /// A set whose tracks all have the same key times, as in a `.dat` file.
-    /// `keys` holds one track after another, `times.len()` keys each.
+    /// `keys` are those of one track after another, `times.len()` keys each.
     ///
     /// # Errors
-    /// As [`TrackSet::push`]; also when `keys` is no whole number of tracks.
+    /// As [`TrackSet::push`]; also when `keys` is not a whole number of tracks.
     pub fn with_shared_times<R: Rotation>(times: &[f64], keys: &[R]) -> Result<Self, TrackError> {
         let keys = keys.iter().map(|rotation| rotation.quat());
         Self::from_shared_times(times.to_vec(), keys.collect())
@@ -141,8 +144,8 @@ impl TrackSet {
             });
         }
         check_times(0, &times, len)?;
-        for (place, key) in keys.iter_mut().enumerate() {
-            *key = unit_key(place / len, place % len, *key)?;
+        for (index, key) in keys.iter_mut().enumerate() {
+            *key = unit_key(index / len, index % len, *key)?;
         }
         let mut set = Self {
             keys,
@@ -232,9 +235,12 @@ impl TrackSet {
     /// [`Track`] would take longer than to evaluate it.
     #[inline]
     pub(crate) fn times_and_keys(&self, index: usize) -> (&[f64], &[Quat]) {
-        let own = self.tracks[index];
-        let times = &self.times[own.first_time..own.first_time + own.len];
-        (times, &self.keys[own.first_key..own.first_key + own.len])
+        let range = self.tracks[index];
+        let times = &self.times[range.first_time..range.first_time + range.len];
+        (
+            times,
+            &self.keys[range.first_key..range.first_key + range.len],
+        )
     }
 
     /// The keys of all tracks, one track after another.
@@ -250,8 +256,8 @@ impl TrackSet {
     /// The end of the longest range that starts with the first of `tracks` and has at most `keys`
     /// keys.
     pub(crate) fn tracks_within(&self, tracks: Range<usize>, keys: usize) -> usize {
-        let most = self.first_key(tracks.start).saturating_add(keys);
-        let fits = |own: &TrackRange| own.first_key + own.len <= most;
+        let key_limit = self.first_key(tracks.start).saturating_add(keys);
+        let fits = |track: &TrackRange| track.first_key + track.len <= key_limit;
         tracks.start + self.tracks[tracks].partition_point(fits)
     }
 
@@ -267,7 +273,7 @@ impl TrackSet {
         (0..self.tracks.len()).map(|index| self.track(index))
     }
 
-    /// The track's name, or `box1`, `box2` … by its place if it has none, or if there is no such
+    /// The track's name, or `box1`, `box2` … by its index if it has none, or if there is no such
     /// track.
     pub fn track_name(&self, index: usize) -> String {
         let name = self.get(index).and_then(|track| track.name);
@@ -289,13 +295,13 @@ impl TrackSet {
         for index in tracks {
             self.check_track(index)?;
             let track = self.track(index);
-            let (own, first_key) = (set.track_count(), set.keys.len());
+            let (new_index, first_key) = (set.track_count(), set.keys.len());
             set.keys.extend_from_slice(track.keys);
             let name = track.name.unwrap_or_default().to_owned();
             set.add_track(name, track.times, first_key);
-            set.velocities.set(own, track.velocities);
-            set.tangents.set(own, track.tangents);
-            set.tcb.set(own, track.tcb);
+            set.velocities.set(new_index, track.velocities);
+            set.tangents.set(new_index, track.tangents);
+            set.tcb.set(new_index, track.tcb);
             for (to, from) in set.vectors.iter_mut().zip(&self.vectors) {
                 to.push(from.get(index).cloned().flatten());
             }

@@ -29,15 +29,15 @@ pub(crate) struct SignBits {
 impl SignBits {
     /// Adds a track whose first key has the index `first` among all keys of the set.
     pub(crate) fn push_track(&mut self, first: usize, keys: &[[f32; 4]]) {
-        let mut is_turned = false;
+        let mut is_negated = false;
         for (key, pair) in (first + 1..).zip(keys.windows(2)) {
             let inner = dot(pair[0], pair[1]);
             if inner <= IN_DOUBT {
                 self.any_long = true;
                 let exact = || dot(unit(pair[0]), unit(pair[1]));
-                is_turned ^= inner < -IN_DOUBT || exact() < -DOT_NOISE;
+                is_negated ^= inner < -IN_DOUBT || exact() < -DOT_NOISE;
             }
-            if is_turned {
+            if is_negated {
                 let words = self.bits.len().max(key / BITS + 1);
                 self.bits.resize(words, 0);
                 self.bits[key / BITS] |= 1 << (key % BITS);
@@ -66,7 +66,7 @@ pub(crate) struct Signs<'a> {
 
 impl Signs<'_> {
     /// Every key with the sign that it was given.
-    pub(crate) const AS_GIVEN: Self = Self {
+    pub(crate) const AS_AUTHORED: Self = Self {
         bits: &[],
         first: 0,
         count: usize::MAX,
@@ -84,7 +84,7 @@ impl Signs<'_> {
 
     /// Whether the `i`th key counts with the other sign than it was given.
     #[inline]
-    pub(crate) fn is_turned(self, i: usize) -> bool {
+    pub(crate) fn is_negated(self, i: usize) -> bool {
         let key = self.first + i;
         (self.bits.get(key / BITS)).is_some_and(|word| word >> (key % BITS) & 1 == 1)
     }
@@ -92,10 +92,10 @@ impl Signs<'_> {
     /// -1 if the `i`th key counts with the other sign than it was given, else 1.
     #[inline]
     pub(crate) fn sign(self, i: usize) -> f32 {
-        if self.is_turned(i) { -1.0 } else { 1.0 }
+        if self.is_negated(i) { -1.0 } else { 1.0 }
     }
 
-    /// Whether any key is turned.
+    /// Whether any key counts with the other sign.
     #[inline]
     pub(crate) fn any(self) -> bool {
         !self.bits.is_empty() && self.words().any(|(word, mask)| word & mask != 0)
@@ -118,18 +118,18 @@ impl Signs<'_> {
         let end = (self.first.saturating_add(self.count)).min(self.bits.len() * BITS);
         let start = self.first.min(end);
         let words = start / BITS..end.div_ceil(BITS);
-        words.map(move |place| {
-            let from = start.saturating_sub(place * BITS);
-            let to = (end - place * BITS).min(BITS);
+        words.map(move |index| {
+            let from = start.saturating_sub(index * BITS);
+            let to = (end - index * BITS).min(BITS);
             let mask = (u64::MAX << from) & (u64::MAX >> (BITS - to));
-            (self.bits[place], mask)
+            (self.bits[index], mask)
         })
     }
 
     /// Copies some of the keys, each multiplied by its sign.
     #[inline]
-    pub(crate) fn copy(self, keys: &[[f32; 4]], own: Range<usize>, to: &mut [[f32; 4]]) {
-        let (signs, keys) = (self.between(own.clone()), &keys[own]);
+    pub(crate) fn copy(self, keys: &[[f32; 4]], range: Range<usize>, to: &mut [[f32; 4]]) {
+        let (signs, keys) = (self.between(range.clone()), &keys[range]);
         if !signs.any() {
             to.copy_from_slice(keys);
             return;
@@ -152,20 +152,24 @@ mod tests {
         bits.push_track(100, keys);
         let signs = bits.of(100..100 + keys.len());
         let each: Vec<f32> = (0..keys.len()).map(|i| signs.sign(i)).collect();
-        let turned = |sign: &f32| *sign < 0.0;
-        assert_eq!(signs.any(), each.iter().any(turned));
+        let is_negated = |sign: &f32| *sign < 0.0;
+        assert_eq!(signs.any(), each.iter().any(is_negated));
         let shared = match () {
-            () if !each.iter().any(turned) => Some(1.0),
-            () if each.iter().all(turned) => Some(-1.0),
+            () if !each.iter().any(is_negated) => Some(1.0),
+            () if each.iter().all(is_negated) => Some(-1.0),
             () => None,
         };
         assert_eq!(signs.shared(), shared);
         for from in 0..keys.len() {
             for to in from..=keys.len() {
-                let own = signs.between(from..to);
-                assert_eq!(own.any(), each[from..to].iter().any(turned), "{from}..{to}");
-                if from < to && each[from..to].iter().all(turned) {
-                    assert_eq!(own.shared(), Some(-1.0), "{from}..{to}");
+                let part = signs.between(from..to);
+                assert_eq!(
+                    part.any(),
+                    each[from..to].iter().any(is_negated),
+                    "{from}..{to}"
+                );
+                if from < to && each[from..to].iter().all(is_negated) {
+                    assert_eq!(part.shared(), Some(-1.0), "{from}..{to}");
                 }
             }
         }
@@ -174,15 +178,15 @@ mod tests {
 
     #[test]
     fn a_key_turns_where_the_other_sign_is_nearer() {
-        let turn = |degrees: f32, sign: f32| {
+        let rotation = |degrees: f32, sign: f32| {
             (Quat::from_rotation_x(degrees.to_radians()) * sign).to_array()
         };
         let keys = [
-            turn(0.0, 1.0),
-            turn(90.0, -1.0),
-            turn(150.0, -1.0),
-            turn(200.0, 1.0),
-            turn(250.0, -1.0),
+            rotation(0.0, 1.0),
+            rotation(90.0, -1.0),
+            rotation(150.0, -1.0),
+            rotation(200.0, 1.0),
+            rotation(250.0, -1.0),
         ];
         assert_eq!(continued(&keys), [1.0, -1.0, -1.0, 1.0, -1.0]);
         // Half a turn apart: the sign given counts.
@@ -207,7 +211,7 @@ mod tests {
         let mut bits = SignBits::default();
         bits.push_track(0, &keys);
         bits.of(0..200).copy(&keys, 0..200, &mut copied);
-        assert!(copied.iter().all(|own| own[3] == first));
-        assert!(!Signs::AS_GIVEN.between(3..90).any());
+        assert!(copied.iter().all(|key| key[3] == first));
+        assert!(!Signs::AS_AUTHORED.between(3..90).any());
     }
 }

@@ -14,7 +14,7 @@ pub(crate) struct TrackKeys<'a> {
     pub(crate) keys: &'a [Quat],
     /// Their signs along the shortest path.
     pub(crate) signs: Signs<'a>,
-    /// The track's place in the set.
+    /// The track's index in the set.
     pub(crate) index: usize,
     /// The index of the first of them in the track.
     pub(crate) first_key: usize,
@@ -40,12 +40,12 @@ impl<'a> TrackKeys<'a> {
     /// Of a whole track, the keys of some intervals and up to `beside` more on both sides.
     pub(crate) fn around(self, intervals: &Range<usize>, beside: usize) -> Self {
         let end = self.all.min(intervals.end + 1 + beside);
-        let own = intervals.start.saturating_sub(beside)..end;
+        let range = intervals.start.saturating_sub(beside)..end;
         Self {
-            times: &self.times[own.clone()],
-            keys: &self.keys[own.clone()],
-            signs: self.signs.between(own.clone()),
-            first_key: own.start,
+            times: &self.times[range.clone()],
+            keys: &self.keys[range.clone()],
+            signs: self.signs.between(range.clone()),
+            first_key: range.start,
             ..self
         }
     }

@@ -72,12 +72,12 @@ pub(crate) fn arc_tangent(y: f32, x: f32) -> f32 {
     } else {
         flat
     };
-    let turned = if x < 0.0 {
+    let angle = if x < 0.0 {
         (PI - acute) + PI_LOW
     } else {
         acute
     };
-    if y < 0.0 { -turned } else { turned }
+    if y < 0.0 { -angle } else { angle }
 }
 
 #[cfg(test)]

@@ -12,11 +12,11 @@ pub(crate) fn axis_angle(rotation: [f32; 4]) -> [f32; 4] {
     let square = x * x + y * y + z * z;
     let scale = reciprocal_root(square);
     let angle = arc_tangent(root(square), flushed(rotation[3])) * (2.0 * DEGREES);
-    let turned = [x * scale, y * scale, z * scale, angle];
+    let result = [x * scale, y * scale, z * scale, angle];
     if square == 0.0 {
         [1.0, 0.0, 0.0, angle]
     } else {
-        turned
+        result
     }
 }
 

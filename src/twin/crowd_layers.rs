@@ -5,7 +5,7 @@ use glam::Vec4;
 
 use crate::math::canonical::canonical;
 use crate::shader::{
-    ArcSegment, CHANNELS, CrowdChannel, CrowdEntry, CrowdPlace, FORM_ARC, FORM_CONSTANT,
+    ArcSegment, CHANNELS, CrowdChannel, CrowdEntry, CrowdPosition, FORM_ARC, FORM_CONSTANT,
     FORM_CUBIC, ON_KEY, POWERS, PolynomialSegment, ROTATION, TICKS, TRANSLATION, WEIGHT_UNIT,
 };
 use crate::simd::lanes::Number;
@@ -13,19 +13,19 @@ use crate::twin::evaluate::Evaluate as _;
 use crate::twin::quaternion::over;
 
 /// The function of the shader with this name does what `pose` of `shaders/poses/add.wgsl` does.
-pub(crate) use crate::twin::pose_add::pose as turn_added;
+pub(crate) use crate::twin::pose_add::pose as rotation_added;
 
-/// What the kernels over layers read. Entries and places are those of a window of instances.
+/// The buffers that the kernels over layers read. Entries and positions are those of a window of instances.
 #[derive(Clone, Copy)]
 pub(crate) struct Layers<'a> {
     pub(crate) entries: &'a [CrowdEntry],
     pub(crate) channels: &'a [CrowdChannel],
     pub(crate) cells: &'a [[f32; 4]],
-    pub(crate) places: &'a [CrowdPlace],
+    pub(crate) positions: &'a [CrowdPosition],
     pub(crate) joints: u32,
     /// Layers of an instance.
     pub(crate) layers: u32,
-    /// The most time bases of a clip.
+    /// The largest number of time bases of a clip.
     pub(crate) bases: u32,
     /// The cell of the first mask, and that of the first reference pose.
     pub(crate) masks: u32,
@@ -49,7 +49,7 @@ pub(crate) fn laid_over(
 ) -> [f32; 4] {
     if kind == ROTATION {
         return match is_additive {
-            true => turn_added(below, layer, reference, weight),
+            true => rotation_added(below, layer, reference, weight),
             false => over(below, layer, weight).map(canonical),
         };
     }
@@ -70,16 +70,20 @@ pub(crate) fn laid_over(
 
 /// A channel where its time base stands.
 #[inline(always)]
-pub(crate) fn sampled(cells: &[[f32; 4]], channel: &CrowdChannel, place: CrowdPlace) -> [f32; 4] {
+pub(crate) fn sampled(
+    cells: &[[f32; 4]],
+    channel: &CrowdChannel,
+    position: CrowdPosition,
+) -> [f32; 4] {
     let form = channel.form_and_base >> 24;
-    let span = place.span & TICKS;
+    let span = position.span & TICKS;
     let count = channel.count;
-    let s = place.parameter;
-    let cell = |place: u32| cells[place as usize];
+    let s = position.parameter;
+    let cell = |index: u32| cells[index as usize];
     if form == FORM_CONSTANT {
         return cell(channel.first);
     }
-    if place.span & ON_KEY != 0 {
+    if position.span & ON_KEY != 0 {
         return cell(channel.keys + span * count);
     }
     let value = if form == FORM_ARC {
@@ -88,20 +92,28 @@ pub(crate) fn sampled(cells: &[[f32; 4]], channel: &CrowdChannel, place: CrowdPl
         ArcSegment { middle, tangent }.at(s)
     } else if form == FORM_CUBIC {
         let first = channel.first + span * count * 4;
-        let own = |power: u32| Vec4::from_array(cell(first + power * count));
-        cubic([own(0), own(1), own(2), own(3)], Vec4::splat(s))
+        let coefficient = |power: u32| Vec4::from_array(cell(first + power * count));
+        cubic(
+            [
+                coefficient(0),
+                coefficient(1),
+                coefficient(2),
+                coefficient(3),
+            ],
+            Vec4::splat(s),
+        )
     } else {
         let first = channel.first + span * count * POWERS as u32;
-        let own = |power: usize| cell(first + power as u32 * count);
-        let coefficients = std::array::from_fn(own);
+        let coefficient = |power: usize| cell(first + power as u32 * count);
+        let coefficients = std::array::from_fn(coefficient);
         PolynomialSegment { coefficients }.at(s)
     };
     value.to_array().map(canonical)
 }
 
 impl Layers<'_> {
-    fn cell(&self, place: u32) -> [f32; 4] {
-        self.cells[place as usize]
+    fn cell(&self, index: u32) -> [f32; 4] {
+        self.cells[index as usize]
     }
 
     /// The weight of a layer, and the cells of its mask: the first number of each is its joint's part of it.
@@ -131,8 +143,8 @@ impl Layers<'_> {
     ) -> [f32; 4] {
         let clip = entry.clip_and_weight & 0xffff;
         let channel = &self.channels[((clip * self.joints + joint) * CHANNELS + kind) as usize];
-        let place = layer * self.bases + (channel.form_and_base & 0x00ff_ffff);
-        sampled(self.cells, channel, self.places[place as usize])
+        let index = layer * self.bases + (channel.form_and_base & 0x00ff_ffff);
+        sampled(self.cells, channel, self.positions[index as usize])
     }
 
     /// Lays the layers above the first over its value of a channel.
@@ -151,12 +163,12 @@ impl Layers<'_> {
             if weight != 0 {
                 let modes = entry.speed_and_modes;
                 let mask = self.masks + ((modes >> 24) & 0x1f) * self.joints + joint;
-                let own = weight as f32 * WEIGHT_UNIT * self.cell(mask)[0];
+                let layer_weight = weight as f32 * WEIGHT_UNIT * self.cell(mask)[0];
                 let clip = entry.clip_and_weight & 0xffff;
                 let reference = self.references + (clip * self.joints + joint) * CHANNELS + kind;
                 let next = self.layer_value(layer, entry, joint, kind);
                 let reference = self.cell(reference);
-                value = laid_over(kind, modes >> 31 != 0, value, next, reference, own);
+                value = laid_over(kind, modes >> 31 != 0, value, next, reference, layer_weight);
             }
         }
         value

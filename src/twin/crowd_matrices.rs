@@ -14,8 +14,8 @@ pub(crate) type Rows = [[f32; 4]; 3];
 
 /// A row of a rotation's matrix with the columns scaled, and the translation behind it.
 #[inline(always)]
-pub(crate) fn transform_row(turned: [f32; 3], scale: [f32; 4], moved: f32) -> [f32; 4] {
-    let [x, y, z] = turned;
+pub(crate) fn transform_row(rotated: [f32; 3], scale: [f32; 4], moved: f32) -> [f32; 4] {
+    let [x, y, z] = rotated;
     let row = Vec4::new(x, y, z, 0.0).canonical() * Vec4::from_array(scale);
     row.with_w(moved).canonical().to_array()
 }
@@ -31,7 +31,7 @@ pub(crate) fn transform(rotation: [f32; 4], moved: [f32; 4], scale: [f32; 4]) ->
     ]
 }
 
-/// A row of the product: this row times the rows of the other matrix. What is added to the first three
+/// A row of the product: this row times the rows of the other matrix. The term added to the first three
 /// numbers is 0, which changes none but -0, and the last step makes that +0.
 #[inline(always)]
 pub(crate) fn row_product(row: [f32; 4], other: &Rows) -> [f32; 4] {

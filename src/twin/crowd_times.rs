@@ -2,7 +2,7 @@
 //! numbers of 64 bits that the shader makes of two words.
 
 use crate::shader::{
-    CrowdBase, CrowdClip, CrowdEntry, CrowdPlace, CrowdSpan, ON_KEY, RUNS_BACKWARDS,
+    CrowdBase, CrowdClip, CrowdEntry, CrowdPosition, CrowdSpan, ON_KEY, RUNS_BACKWARDS,
     SPEED_MAGNITUDE, START_BIAS, TICKS, WRAP_HOLD, WRAP_LOOP,
 };
 
@@ -79,13 +79,13 @@ pub(crate) fn span_at(base: &CrowdBase, spans: &[CrowdSpan], tick: u32) -> u32 {
 
 /// Where a layer stands in one of its clip's time bases.
 #[inline(always)]
-pub(crate) fn place_at(base: &CrowdBase, spans: &[CrowdSpan], tick: u32) -> CrowdPlace {
+pub(crate) fn position_at(base: &CrowdBase, spans: &[CrowdSpan], tick: u32) -> CrowdPosition {
     let index = span_at(base, spans, tick);
     let span = &spans[(base.first + index) as usize];
     // An integer converts with one rounding, like the shader's sum of two exact halves.
     let distance = (tick as i32).wrapping_sub(span.whole) as f32;
     let is_key = span.start == tick | ON_KEY;
-    CrowdPlace {
+    CrowdPosition {
         span: index | if is_key { ON_KEY } else { 0 },
         parameter: distance * span.scale + span.offset,
     }
@@ -93,18 +93,18 @@ pub(crate) fn place_at(base: &CrowdBase, spans: &[CrowdSpan], tick: u32) -> Crow
 
 /// Where a layer stands in every time base of its clip.
 #[inline(always)]
-pub(crate) fn places(
+pub(crate) fn base_positions(
     entry: &CrowdEntry,
     clock: u64,
     clips: &[CrowdClip],
     bases: &[CrowdBase],
     spans: &[CrowdSpan],
-    places: &mut [CrowdPlace],
+    output: &mut [CrowdPosition],
 ) {
     let clip = &clips[(entry.clip_and_weight & 0xffff) as usize];
     let tick = tick_of(entry, clip.period, clock);
-    let own = &bases[clip.first_base as usize..][..clip.bases as usize];
-    for (base, place) in own.iter().zip(places) {
-        *place = place_at(base, spans, tick);
+    let clip_bases = &bases[clip.first_base as usize..][..clip.bases as usize];
+    for (base, position) in clip_bases.iter().zip(output) {
+        *position = position_at(base, spans, tick);
     }
 }

@@ -29,11 +29,11 @@ pub(crate) fn euler(rotation: [f32; 4], detail: u32) -> [f32; 3] {
     let c = flushed(select(j + w, j, symmetric));
     let d = flushed(select(k - i, k, symmetric));
     let near = root(c * c + d * d);
-    let far = root(a * a + b * b);
+    let wide = root(a * a + b * b);
     let half_sum = arc_tangent(b, a);
     let half_difference = arc_tangent(d, c);
     let closed = near < GIMBAL;
-    let open = far < GIMBAL;
+    let open = wide < GIMBAL;
     let locked = closed || open;
     let sum = half_sum + half_difference;
     let difference = half_sum - half_difference;
@@ -47,7 +47,7 @@ pub(crate) fn euler(rotation: [f32; 4], detail: u32) -> [f32; 3] {
     );
     let inner = select(select(sum * third_sign, difference, intrinsic), 0.0, locked);
     let first = select(outer, outer * third_sign, locked && intrinsic);
-    let whole = 2.0 * arc_tangent(near, far);
+    let whole = 2.0 * arc_tangent(near, wide);
     let second = select((whole - HALF_PI) - HALF_PI_LOW, whole, symmetric);
     [
         wrapped(first) * DEGREES,

@@ -9,7 +9,7 @@ use glam::Vec4;
 use crate::simd::lanes::Lanes;
 
 /// The formula of one form, for segments of constants `x y z w`, that of the middle first. A run is
-/// evaluated in turns, each of as many samples as are computed at once.
+/// evaluated in iterations, each of as many samples as are computed at once.
 pub(crate) trait Evaluate: NoUninit {
     /// A number that is the same for all samples of a run.
     #[inline(always)]
@@ -17,34 +17,34 @@ pub(crate) trait Evaluate: NoUninit {
         0.0
     }
 
-    /// Number of samples of a turn.
+    /// Number of samples of an iteration.
     fn samples<L: Lanes>() -> usize;
 
-    /// Loads the distances of a turn's samples, in the lanes in which [`Evaluate::evaluate`] takes
+    /// Loads the distances of an iteration's samples, in the lanes in which [`Evaluate::evaluate`] takes
     /// their parameters.
     fn load<L: Lanes>(distances: &[f32]) -> L;
 
-    /// The smallest number of turns in a run for which it pays to begin samples several turns
-    /// ahead, if it ever pays. A sample takes a long chain of dependent operations, and a processor
-    /// looks ahead no farther than a turn or two.
-    const FAR_FROM: Option<usize> = None;
+    /// The smallest number of iterations in a run for which it pays to begin samples several iterations
+    /// ahead (software pipelining), if it ever pays. A sample takes a long chain of dependent operations, and a processor
+    /// looks ahead no farther than an iteration or two.
+    const PIPELINE_FROM: Option<usize> = None;
 
-    /// Intermediate results of samples before it is their turn.
+    /// Intermediate results of samples of later iterations.
     type Begun<L: Lanes>: Copy;
 
-    /// An array of vectors with the rotations of a turn's samples, side by side.
+    /// An array of vectors with the rotations of an iteration's samples, side by side.
     type Vectors<L: Lanes>: AsRef<[L]>;
 
-    /// Begins the samples of the first turn and, if `FAR`, those of later turns.
-    fn begin<L: Lanes, const FAR: bool>(
+    /// Begins the samples of the first iteration and, if `IS_PIPELINED`, those of later ones.
+    fn begin<L: Lanes, const IS_PIPELINED: bool>(
         constant: L,
         parameters: &mut impl Parameters<L>,
     ) -> Self::Begun<L>;
 
-    /// Finishes the samples of a turn. Returns the intermediate results for the turns after it, and
-    /// the turn's rotations. With `FILTER` all components are made
+    /// Finishes the samples of an iteration. Returns the intermediate results for the iterations after it,
+    /// and the rotations. With `FILTER` all components are made
     /// [`canonical`](crate::math::canonical::canonical).
-    fn evaluate<L: Lanes, const FILTER: bool, const FAR: bool>(
+    fn evaluate<L: Lanes, const FILTER: bool, const IS_PIPELINED: bool>(
         &self,
         constant: L,
         begun: Self::Begun<L>,
@@ -67,7 +67,7 @@ pub(crate) trait Evaluate: NoUninit {
     }
 }
 
-/// The magnitude of a middle's component from which on [`Evaluate::is_canonical`] holds for it.
+/// The magnitude of a middle's component from which on [`Evaluate::is_canonical`] is true for it.
 pub(crate) const COARSE: f32 = 1.0 / (1u64 << 40) as f32;
 
 /// As [`Evaluate::is_canonical`], for a middle with a small component. That is rare, so it is not
@@ -78,7 +78,7 @@ fn are_coarse_or_zero(constants: &[[f32; 4]]) -> bool {
     (0..4).all(|c| constants[0][c].abs() >= COARSE || is_zero(c))
 }
 
-/// The parameters of a run's samples, a turn at a time. After the last sample it gives more
+/// The parameters of a run's samples, an iteration at a time. After the last sample it gives more
 /// numbers, of which nothing is used.
 pub(crate) trait Parameters<L> {
     fn next(&mut self) -> L;

@@ -24,26 +24,26 @@ impl Evaluate for ArcSegment {
         L::load(distances)
     }
 
-    const FAR_FROM: Option<usize> = Some(5);
+    const PIPELINE_FROM: Option<usize> = Some(5);
 
     type Begun<L: Lanes> = Begun<L>;
     type Vectors<L: Lanes> = [L; 4];
 
     #[inline(always)]
-    fn begin<L: Lanes, const FAR: bool>(
+    fn begin<L: Lanes, const IS_PIPELINED: bool>(
         square: L,
         parameters: &mut impl Parameters<L>,
     ) -> Begun<L> {
         let (parameter, z) = parameter_and_square(square, parameters);
         let halves = quarter_halves(parameter, z);
         let mut begun = Begun {
-            turn: halves.sine_cosm1(),
+            sine_cosine: halves.sine_cosm1(),
             halves,
             parameter,
             z,
         };
-        if FAR {
-            // After two steps `turn` belongs to the first turn, `halves` to the second and
+        if IS_PIPELINED {
+            // After two steps `sine_cosine` belongs to the first iteration, `halves` to the second and
             // `parameter` to the third; the values before were placeholders.
             begun = begun.next(square, parameters).next(square, parameters);
         }
@@ -51,25 +51,25 @@ impl Evaluate for ArcSegment {
     }
 
     #[inline(always)]
-    fn evaluate<L: Lanes, const FILTER: bool, const FAR: bool>(
+    fn evaluate<L: Lanes, const FILTER: bool, const IS_PIPELINED: bool>(
         &self,
         square: L,
         begun: Begun<L>,
         parameters: &mut impl Parameters<L>,
     ) -> (Begun<L>, [L; 4]) {
         let (middle, tangent) = (L::repeated(self.middle), L::repeated(self.tangent));
-        let (sine, cosine_minus_one) = if FAR {
-            begun.turn
+        let (sine, cosine_minus_one) = if IS_PIPELINED {
+            begun.sine_cosine
         } else {
             quarter_halves(begun.parameter, begun.z).sine_cosm1()
         };
         let (s, f) = (sine.fourfold(), cosine_minus_one.fourfold());
         // Written out: closures are not always inlined.
         let mut quarters = [
-            turned(middle, tangent, s[0], f[0]),
-            turned(middle, tangent, s[1], f[1]),
-            turned(middle, tangent, s[2], f[2]),
-            turned(middle, tangent, s[3], f[3]),
+            arc_component(middle, tangent, s[0], f[0]),
+            arc_component(middle, tangent, s[1], f[1]),
+            arc_component(middle, tangent, s[2], f[2]),
+            arc_component(middle, tangent, s[3], f[3]),
         ];
         if FILTER {
             // Written out: with a call of `lanes::canonical` SSE2 takes half as long again.
@@ -88,7 +88,7 @@ impl Evaluate for ArcSegment {
         let z = parameter * parameter * self.constant();
         let (sine, cosine_minus_one) = sine_cosm1_quarter(parameter, z);
         let (sine, cosine_minus_one) = (Vec4::splat(sine), Vec4::splat(cosine_minus_one));
-        turned(
+        arc_component(
             self.middle.into(),
             self.tangent.into(),
             sine,
@@ -97,26 +97,26 @@ impl Evaluate for ArcSegment {
     }
 }
 
-/// Intermediate results of the samples of the next three turns. Without `FAR` only `parameter` and
-/// `z` are used, and belong to the next turn.
+/// Intermediate results of the samples of the next three iterations. Without `IS_PIPELINED` only
+/// `parameter` and `z` are used, and belong to the next iteration.
 #[derive(Clone, Copy)]
 pub(crate) struct Begun<L> {
-    /// Sine and cosine minus one, for the next turn.
-    turn: (L, L),
-    /// The half-finished sine and cosine of the turn after it.
+    /// Sine and cosine minus one, for the next iteration.
+    sine_cosine: (L, L),
+    /// The half-finished sine and cosine of the iteration after it.
     halves: QuarterHalves<L>,
-    /// The parameter and the angle's square of the third turn.
+    /// The parameter and the angle's square of the third iteration.
     parameter: L,
     z: L,
 }
 
 impl<L: Lanes> Begun<L> {
-    /// The intermediate results one turn later.
+    /// The intermediate results one iteration later.
     #[inline(always)]
     fn next(self, square: L, parameters: &mut impl Parameters<L>) -> Self {
         let (parameter, z) = parameter_and_square(square, parameters);
         Self {
-            turn: self.halves.sine_cosm1(),
+            sine_cosine: self.halves.sine_cosm1(),
             halves: quarter_halves(self.parameter, self.z),
             parameter,
             z,
@@ -141,15 +141,15 @@ pub(crate) fn on_arc<N: Number>(
     let z = parameter * parameter * square;
     let (sine, cosine_minus_one) = sine_cosm1_quarter(parameter, z);
     [
-        turned(middle[0], tangent[0], sine, cosine_minus_one),
-        turned(middle[1], tangent[1], sine, cosine_minus_one),
-        turned(middle[2], tangent[2], sine, cosine_minus_one),
-        turned(middle[3], tangent[3], sine, cosine_minus_one),
+        arc_component(middle[0], tangent[0], sine, cosine_minus_one),
+        arc_component(middle[1], tangent[1], sine, cosine_minus_one),
+        arc_component(middle[2], tangent[2], sine, cosine_minus_one),
+        arc_component(middle[3], tangent[3], sine, cosine_minus_one),
     ]
 }
 
 #[inline(always)]
-fn turned<N: Number>(middle: N, tangent: N, sine: N, cosine_minus_one: N) -> N {
+fn arc_component<N: Number>(middle: N, tangent: N, sine: N, cosine_minus_one: N) -> N {
     middle + (middle * cosine_minus_one + tangent * sine)
 }
 

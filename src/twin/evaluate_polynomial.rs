@@ -25,15 +25,18 @@ impl Evaluate for PolynomialSegment {
 
     /// `s`, `s²` and `s⁴`.
     #[inline(always)]
-    fn begin<L: Lanes, const FAR: bool>(_: L, parameters: &mut impl Parameters<L>) -> [L; 3] {
+    fn begin<L: Lanes, const IS_PIPELINED: bool>(
+        _: L,
+        parameters: &mut impl Parameters<L>,
+    ) -> [L; 3] {
         powers(parameters.next())
     }
 
     #[inline(always)]
-    fn evaluate<L: Lanes, const FILTER: bool, const FAR: bool>(
+    fn evaluate<L: Lanes, const FILTER: bool, const IS_PIPELINED: bool>(
         &self,
         _: L,
-        own: [L; 3],
+        begun: [L; 3],
         parameters: &mut impl Parameters<L>,
     ) -> ([L; 3], [L; 1]) {
         let next = powers(parameters.next());
@@ -43,7 +46,7 @@ impl Evaluate for PolynomialSegment {
                 [$(L::repeated(self.coefficients[$power])),+]
             };
         }
-        let mut q = by_powers(coefficients!(0 1 2 3 4 5 6 7 8 9 10), own);
+        let mut q = by_powers(coefficients!(0 1 2 3 4 5 6 7 8 9 10), begun);
         if FILTER {
             q = q.canonical();
         }

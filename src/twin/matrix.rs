@@ -30,13 +30,13 @@ pub(crate) fn matrix_rows(rotation: [f32; 4], detail: u32) -> [[f32; 3]; 3] {
     ]
 }
 
-/// What `store` writes row by row.
+/// The rows that `store` writes in row-major order.
 #[inline(always)]
 pub(crate) fn store3x4_rows(rotation: [f32; 4], detail: u32) -> [[f32; 4]; 3] {
     rows(rotation, detail).map(|[x, y, z]| [x, y, z, 0.0])
 }
 
-/// What `store` writes column by column.
+/// The columns that `store` writes in column-major order.
 #[inline(always)]
 pub(crate) fn store3x4_columns(rotation: [f32; 4], detail: u32) -> [f32; 12] {
     let columns = rows(rotation, detail);

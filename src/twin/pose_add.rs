@@ -6,6 +6,6 @@ use crate::twin::quaternion::{normalised, slerp};
 
 #[inline(always)]
 pub(crate) fn pose(base: [f32; 4], layer: [f32; 4], reference: [f32; 4], weight: f32) -> [f32; 4] {
-    let turn = slerp([0.0, 0.0, 0.0, 1.0], step(reference, layer), weight);
-    normalised(product(base, turn)).map(canonical)
+    let rotation = slerp([0.0, 0.0, 0.0, 1.0], step(reference, layer), weight);
+    normalised(product(base, rotation)).map(canonical)
 }

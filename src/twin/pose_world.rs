@@ -10,19 +10,19 @@ use crate::twin::quaternion::{normalised, rotated};
 #[inline(always)]
 pub(crate) fn pose(local: &[[f32; 4]], links: &[Link], world: &mut [[f32; 4]]) {
     for link in links {
-        let own = local[link.track as usize];
-        let mut rotation = own;
+        let local_rotation = local[link.track as usize];
+        let mut rotation = local_rotation;
         let mut position = link.offset;
         if link.parent != ROOT {
             let parent = 2 * link.parent as usize;
-            let above = world[parent];
-            rotation = normalised(product(above, own));
-            let hung = rotated(above, link.offset);
-            position = std::array::from_fn(|c| world[parent + 1][c] + hung[c]);
+            let parent_rotation = world[parent];
+            rotation = normalised(product(parent_rotation, local_rotation));
+            let rotated_offset = rotated(parent_rotation, link.offset);
+            position = std::array::from_fn(|c| world[parent + 1][c] + rotated_offset[c]);
         }
-        let there = 2 * link.track as usize;
+        let output = 2 * link.track as usize;
         let [x, y, z] = position;
-        world[there] = rotation.map(canonical);
-        world[there + 1] = [x, y, z, 0.0].map(canonical);
+        world[output] = rotation.map(canonical);
+        world[output + 1] = [x, y, z, 0.0].map(canonical);
     }
 }

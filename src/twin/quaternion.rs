@@ -22,7 +22,7 @@ pub(crate) fn normalised<N: Number>(q: [N; 4]) -> [N; 4] {
     [q[0] * scale, q[1] * scale, q[2] * scale, q[3] * scale]
 }
 
-/// The sum of two rotations, and what leads from the first to the nearer sign of the second.
+/// The sum of two rotations, and the difference from the first to the nearer sign of the second.
 #[inline(always)]
 pub(crate) fn chord<N: Number>(a: [N; 4], b: [N; 4]) -> ([N; 4], [N; 4]) {
     let sign = dot(a, b).sign();
@@ -42,20 +42,20 @@ pub(crate) fn chord<N: Number>(a: [N; 4], b: [N; 4]) -> ([N; 4], [N; 4]) {
     (sum, difference)
 }
 
-/// The rotation at an angle from the middle of a chord, whose sine and cosine are `turn`, with the inverse
+/// The rotation at an angle from the middle of a chord, whose sine and cosine are given, with the inverse
 /// lengths of the sum and of the difference.
 #[inline(always)]
 pub(crate) fn along<N: Number>(
     sum: [N; 4],
     difference: [N; 4],
     (to_unit, inverse): (N, N),
-    turn: (N, N),
+    sine_and_cosine: (N, N),
 ) -> [N; 4] {
     [
-        sum[0] * to_unit * turn.1 + difference[0] * inverse * turn.0,
-        sum[1] * to_unit * turn.1 + difference[1] * inverse * turn.0,
-        sum[2] * to_unit * turn.1 + difference[2] * inverse * turn.0,
-        sum[3] * to_unit * turn.1 + difference[3] * inverse * turn.0,
+        sum[0] * to_unit * sine_and_cosine.1 + difference[0] * inverse * sine_and_cosine.0,
+        sum[1] * to_unit * sine_and_cosine.1 + difference[1] * inverse * sine_and_cosine.0,
+        sum[2] * to_unit * sine_and_cosine.1 + difference[2] * inverse * sine_and_cosine.0,
+        sum[3] * to_unit * sine_and_cosine.1 + difference[3] * inverse * sine_and_cosine.0,
     ]
 }
 
@@ -67,13 +67,18 @@ pub(crate) fn slerp(a: [f32; 4], b: [f32; 4], t: f32) -> [f32; 4] {
     let square = dot(difference, difference);
     let whole = dot(sum, sum);
     let half = arc_tangent(root(square), root(whole));
-    let turn = sine_cosine((t + t - 1.0) * half);
+    let sine_and_cosine = sine_cosine((t + t - 1.0) * half);
     let inverse = if square == 0.0 {
         0.0
     } else {
         reciprocal_root(square)
     };
-    along(sum, difference, (reciprocal_root(whole), inverse), turn)
+    along(
+        sum,
+        difference,
+        (reciprocal_root(whole), inverse),
+        sine_and_cosine,
+    )
 }
 
 #[inline(always)]

@@ -7,7 +7,7 @@ use crate::twin::sine_cosine::sine_cosine;
 /// The reply of a device that is exact.
 pub(crate) fn reply(probe: Probe) -> Reply {
     let Probe { a, b, c, n } = probe;
-    let turn = sine_cosine(c);
+    let sine_and_cosine = sine_cosine(c);
     Reply {
         contraction: a * b + c,
         reassociation: (a + b) - a,
@@ -15,8 +15,8 @@ pub(crate) fn reply(probe: Probe) -> Reply {
         association: (a * b) * c,
         conversion: n as f32,
         cancellation: (a * c + b) - a * c,
-        sine: turn.0,
-        cosine: turn.1,
+        sine: sine_and_cosine.0,
+        cosine: sine_and_cosine.1,
         root: root(a * a + c * c),
         arc_tangent: arc_tangent(a, c),
     }

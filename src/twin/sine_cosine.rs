@@ -10,7 +10,7 @@ pub(crate) fn sine_cosine<N: Number>(angle: N) -> (N, N) {
     (sine, cosine_minus_one + N::all(1.0))
 }
 
-/// `x sin(a)/a` and `cos(a) - 1` for an angle |a| <= pi/2 that is given by its square `z`. With
+/// `x sin(a)/a` and `cos(a) - 1` for an angle |a| <= pi/2 with the square `z`. With
 /// `x = a` the first is the sine.
 #[inline(always)]
 pub(crate) fn sine_cosm1<N: Number>(x: N, z: N) -> (N, N) {
@@ -27,7 +27,7 @@ pub(crate) fn sine_cosm1_quarter<N: Number>(x: N, z: N) -> (N, N) {
     quarter_halves(x, z).sine_cosm1()
 }
 
-/// Intermediate results, half of the way to [`sine_cosm1_quarter`].
+/// Intermediate results of [`sine_cosm1_quarter`].
 #[derive(Clone, Copy)]
 pub(crate) struct QuarterHalves<N> {
     x: N,

@@ -5,9 +5,6 @@ use crate::shader::*;
 use crate::simd::lanes::canonical;
 use crate::twin::evaluate_arc::norm_squared;
 
-type Vector = [f32; 3];
-type Quaternion = [f32; 4];
-
 /// A rotation as its difference from the identity, which keeps the digits of a small rotation.
 #[derive(Clone, Copy)]
 pub(crate) struct FromIdentity<N> {
@@ -19,9 +16,9 @@ pub(crate) struct FromIdentity<N> {
 /// A cubic through small angles, as a polynomial about its middle.
 pub(crate) struct SmallAngleCubic {
     /// The coefficients of 1, s, s², … s⁶.
-    pub(crate) powers: [Quaternion; 7],
+    pub(crate) powers: [[f32; 4]; 7],
     /// Whether the curve is within the limits of small angles; if not, `powers` mean nothing.
-    pub(crate) holds: bool,
+    pub(crate) is_valid: bool,
 }
 
 #[inline(always)]
@@ -40,7 +37,7 @@ pub(crate) fn step_vector<N: Arithmetic>(a: [N; 4], chord: [N; 4]) -> [N; 3] {
 
 /// The logarithm by a series in the squared sine, for small angles.
 #[inline(always)]
-pub(super) fn small_log(v: Vector) -> Vector {
+pub(super) fn small_log(v: [f32; 3]) -> [f32; 3] {
     let x = dot3(v, v);
     let tail = ((LOG_4 * x + LOG_3) * x + LOG_2) * x + LOG_1;
     sum(scaled(v, tail * x), v)
@@ -49,7 +46,7 @@ pub(super) fn small_log(v: Vector) -> Vector {
 /// The exponential by a series from the identity, for small angles: it adds `v` last, so that no
 /// digit of it is lost.
 #[inline(always)]
-pub(super) fn small_exp(v: Vector) -> FromIdentity<f32> {
+pub(super) fn small_exp(v: [f32; 3]) -> FromIdentity<f32> {
     let x = dot3(v, v);
     let sinc = (SINC_2 * x + SINC_1) * x;
     FromIdentity {
@@ -77,7 +74,7 @@ pub(crate) fn inverse_rotated<N: Arithmetic>(v: [N; 3], r: FromIdentity<N>) -> [
 }
 
 #[inline(always)]
-pub(super) fn canonical_product(m: Quaternion, v: Vector, w: f32) -> Quaternion {
+pub(super) fn canonical_product(m: [f32; 4], v: [f32; 3], w: f32) -> [f32; 4] {
     canonical(product(m, [v[0], v[1], v[2], w]))
 }
 
@@ -85,7 +82,7 @@ pub(super) fn canonical_product(m: Quaternion, v: Vector, w: f32) -> Quaternion 
 /// its predecessor.
 #[inline(always)]
 pub(crate) fn small_angle_cubic(
-    keys: [Quaternion; 4],
+    keys: [[f32; 4]; 4],
     first: TangentWeights,
     last: TangentWeights,
 ) -> SmallAngleCubic {
@@ -127,7 +124,7 @@ pub(crate) fn small_angle_cubic(
     let w2 = small_log(composed(without_first, back).vector);
 
     let squared_extent = dot3(w1, w1) + dot3(w2, w2) + dot3(w3, w3);
-    let holds = (squared_extent <= SMALL_SQUARED_EXTENT)
+    let is_valid = (squared_extent <= SMALL_SQUARED_EXTENT)
         & (norm_squared(chord_before) <= LONGEST_STEP)
         & (norm_squared(chord) <= LONGEST_STEP)
         & (norm_squared(chord_after) <= LONGEST_STEP)
@@ -138,18 +135,18 @@ pub(crate) fn small_angle_cubic(
         & (first.kind != KEY_UNKNOWN)
         & (last.kind != KEY_UNKNOWN);
 
-    let third_turn = small_exp(scaled(w3, 0.125));
-    let second_turn = composed(small_exp(scaled(w2, 0.5)), third_turn);
-    let turn = composed(small_exp(scaled(w1, 0.875)), second_turn);
-    let gain = canonical_product(start, turn.vector, turn.cosm1);
+    let third_rotation = small_exp(scaled(w3, 0.125));
+    let second_rotation = composed(small_exp(scaled(w2, 0.5)), third_rotation);
+    let rotation = composed(small_exp(scaled(w1, 0.875)), second_rotation);
+    let gain = canonical_product(start, rotation.vector, rotation.cosm1);
     let m = [
         gain[0] + start[0],
         gain[1] + start[1],
         gain[2] + start[2],
         gain[3] + start[3],
     ];
-    let v1 = inverse_rotated(w1, second_turn);
-    let v2 = inverse_rotated(w2, third_turn);
+    let v1 = inverse_rotated(w1, second_rotation);
+    let v2 = inverse_rotated(w2, third_rotation);
     let v3 = w3;
 
     let outer = sum(v1, v3);
@@ -213,6 +210,6 @@ pub(crate) fn small_angle_cubic(
             canonical_product(m, sum(scaled(odd, 3.0), f5), -dot3(b, c) - volume * B_123_5),
             canonical_product(m, sixth, dot3(c, c) * -0.5),
         ],
-        holds,
+        is_valid,
     }
 }

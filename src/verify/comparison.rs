@@ -9,10 +9,10 @@ use crate::engine::Engine;
 use crate::error::Error;
 use crate::memory::{OutOfMemory, reserved};
 use crate::method::interpolation::Interpolation;
-use crate::time::frames::Frames;
+use crate::time::frames::SampleTimes;
 use crate::tracks::rotation::Rotation;
 use crate::tracks::set::TrackSet;
-use crate::verify::{Errors, NORM_BOUND, Place, beyond_rounding, differences, error_bound};
+use crate::verify::{Errors, NORM_BOUND, SamplePosition, differences, error_bound, norm_excess};
 
 /// What [`compare`] found of results that were not this engine's.
 #[derive(Debug, Clone, PartialEq)]
@@ -28,13 +28,13 @@ pub struct Comparison {
     /// Those of them that are the engine's with the other sign: `q` and `-q` are one rotation.
     pub of_other_sign: u64,
     /// The first whose bits differ.
-    pub first_difference: Option<Place>,
+    pub first_difference: Option<SamplePosition>,
     /// Largest angle between their result and the reference, radians.
     pub max_error: f64,
     /// Root mean square of that angle, radians.
     pub rms_error: f64,
     /// Where the largest error is.
-    pub worst: Option<Place>,
+    pub worst: Option<SamplePosition>,
     /// Largest | |q| - 1 | of theirs.
     pub max_norm_error: f64,
     /// Largest angle between the engine's result and the reference, radians.
@@ -103,7 +103,7 @@ impl std::fmt::Display for Comparison {
             self.norm_bound
         )?;
         match self.worst {
-            Some(Place { track, frame, time }) if self.max_error > self.error_bound => {
+            Some(SamplePosition { track, frame, time }) if self.max_error > self.error_bound => {
                 write!(f, "; worst at track {track}, frame {frame}, {time} s")
             }
             _ => Ok(()),
@@ -119,7 +119,7 @@ impl std::fmt::Display for Comparison {
 /// [`Device::first_vulkan`](crate::Device::first_vulkan), and so fails where there is none.
 ///
 /// ```
-/// use tumble::{Frames, TrackSet, method};
+/// use tumble::{SampleTimes, TrackSet, method};
 /// use tumble::verify::{Agreement, compare};
 /// # use glam::Quat;
 /// # let mut set = TrackSet::new();
@@ -128,7 +128,7 @@ impl std::fmt::Display for Comparison {
 /// let theirs: Vec<[f32; 4]> = (0..=25)
 ///     .map(|frame| Quat::IDENTITY.slerp(Quat::from_rotation_x(1.0), frame as f32 / 25.0).into())
 ///     .collect();
-/// let found = compare(&set, method::SLERP.into(), &Frames::fps(25), &theirs)?;
+/// let found = compare(&set, method::SLERP.into(), &SampleTimes::fps(25), &theirs)?;
 /// assert!(found.agreement() <= Agreement::WithinBounds, "{found}");
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -139,7 +139,7 @@ impl std::fmt::Display for Comparison {
 pub fn compare<R: Rotation>(
     set: &TrackSet,
     interpolation: Interpolation,
-    frames: &Frames,
+    frames: &SampleTimes,
     theirs: &[R],
 ) -> Result<Comparison, Error> {
     let theirs = quats(theirs)?;
@@ -149,7 +149,7 @@ pub fn compare<R: Rotation>(
     let engine = engine.as_quats();
     if theirs.len() != engine.len() {
         return Err(Error::ComparedLength {
-            given: theirs.len(),
+            length: theirs.len(),
             needed: engine.len(),
         });
     }
@@ -165,14 +165,14 @@ pub fn compare<R: Rotation>(
         rotations: theirs.len() as u64,
         differing,
         of_other_sign: of_other_sign as u64,
-        first_difference: first.map(|index| Place::new(&timeline, index)),
+        first_difference: first.map(|index| SamplePosition::new(&timeline, index)),
         max_error: found.max,
         rms_error: found.rms,
         worst: found.worst,
         max_norm_error: found.norm,
         engine_error: Errors::measure(set, interpolation, &timeline, engine)?.max,
         error_bound: error_bound(interpolation.form()),
-        norm_bound: NORM_BOUND + beyond_rounding(set),
+        norm_bound: NORM_BOUND + norm_excess(set),
     })
 }
 

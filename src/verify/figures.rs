@@ -6,17 +6,17 @@ use std::time::{Duration, Instant};
 use crate::device::VulkanDevice;
 use crate::engine::Engine;
 use crate::error::Error;
-use crate::gpu::application::{ApplicationBuffer, ApplicationMemory, Taken};
+use crate::gpu::application::{ApplicationBuffer, ApplicationMemory, Elapsed};
 use crate::gpu::options::EngineOptions;
 use crate::gpu::physical::DeviceKind;
 use crate::method::{self, Method};
 use crate::output::crowd::{CrowdOutput, CrowdValues};
 use crate::output::encoding::Encoding;
 use crate::output::rotations::Layout;
-use crate::time::frames::Frames;
+use crate::time::frames::SampleTimes;
 use crate::verify::golden::GoldenError;
 use crate::verify::renderer::{Renderer, record, record_clip};
-use crate::verify::sets::{Random, crowd_layer, crowd_library, shared_set};
+use crate::verify::sets::{SeededRandom, crowd_layer, crowd_library, shared_set};
 
 /// Seconds of the keys of the cases: 26 keys, 0.8 s apart.
 const SECONDS: f64 = 20.0;
@@ -129,9 +129,9 @@ fn measured<T>(mut run: impl FnMut() -> Result<T, Error>) -> Result<(T, Vec<T>),
 }
 
 /// Seconds by the device's clock, where every run has them, and by the host's.
-fn seconds(runs: &[Taken]) -> (Option<f64>, f64) {
-    let on_device: Option<Vec<_>> = runs.iter().map(|taken| taken.on_device).collect();
-    let on_host = runs.iter().map(|taken| taken.on_host).collect();
+fn seconds(runs: &[Elapsed]) -> (Option<f64>, f64) {
+    let on_device: Option<Vec<_>> = runs.iter().map(|run| run.on_device).collect();
+    let on_host = runs.iter().map(|run| run.on_host).collect();
     (on_device.map(median), median(on_host))
 }
 
@@ -160,8 +160,8 @@ impl Bench {
     ) -> Result<f64, Error> {
         let application = &mut self.renderer.application;
         let (_, runs) = measured(|| {
-            let recorded = application.recorded(true, |own| {
-                commands(application, own);
+            let recorded = application.recorded(true, |buffer| {
+                commands(application, buffer);
                 Ok::<_, Error>(())
             })?;
             Ok(application.timed(recorded)?)
@@ -209,7 +209,7 @@ impl Bench {
         (case, name): (&'static str, String),
         (values, bytes): (u64, u64),
         first_call: Duration,
-        runs: &[Taken],
+        runs: &[Elapsed],
         limit: &'static str,
     ) {
         let (on_device, on_host) = seconds(runs);
@@ -260,7 +260,7 @@ impl Bench {
         let tracks = self.tracks();
         let set = shared_set(51, tracks, 26, SECONDS / 25.0, 0.6, 0);
         // 1200 frames of 60 a second.
-        let frames = Frames::fps(60).between(0.0, SECONDS - 1.0 / 60.0);
+        let frames = SampleTimes::fps(60).between(0.0, SECONDS - 1.0 / 60.0);
         let samples = frames.resolve(tracks, set.time_span())?.len();
         let bytes = (tracks * samples * encoding.bytes()) as u64;
         let buffer = self.device_buffer(bytes)?;
@@ -315,7 +315,7 @@ impl Bench {
             }
             let tracks = self.tracks();
             let set = shared_set(51, tracks, 26, SECONDS / 25.0, 0.6, 0);
-            let frames = Frames::fps(60).between(0.0, SECONDS - 1.0 / 60.0);
+            let frames = SampleTimes::fps(60).between(0.0, SECONDS - 1.0 / 60.0);
             let samples = frames.resolve(tracks, set.time_span())?.len();
             let started = Instant::now();
             let clip = self.renderer.engine.upload(&set, method)?;
@@ -326,7 +326,7 @@ impl Bench {
                 drop(clip.evaluate(&frames)?);
                 let on_host = call.elapsed();
                 first_call.get_or_insert_with(|| started.elapsed());
-                Ok(taken(engine, on_host))
+                Ok(elapsed(engine, on_host))
             })?;
             let values = (tracks * samples) as u64;
             let name = format!("{tracks} tracks × {samples} frames, {method}");
@@ -346,7 +346,7 @@ impl Bench {
     fn crowds(&mut self) -> Result<(), GoldenError> {
         const JOINTS: usize = 60;
         let instances = if self.is_software { 500 } else { 10_000 };
-        let mut random = Random(61);
+        let mut random = SeededRandom(61);
         let library = crowd_library(&mut random, JOINTS, &[method::SLERP, method::SLERP])?;
         for values in [
             CrowdValues::Rotations,
@@ -383,7 +383,7 @@ impl Bench {
                     first_call = Some(started.elapsed());
                     continue;
                 }
-                runs.push(Taken {
+                runs.push(Elapsed {
                     on_host: call.elapsed(),
                     ..ran
                 });
@@ -401,9 +401,9 @@ impl Bench {
 }
 
 /// What the engine says of its last call.
-fn taken(engine: &Engine, on_host: Duration) -> Taken {
+fn elapsed(engine: &Engine, on_host: Duration) -> Elapsed {
     let timings = engine.take_timings();
-    Taken {
+    Elapsed {
         on_device: (!timings.on_device.is_zero()).then_some(timings.on_device),
         on_host,
     }

@@ -23,7 +23,7 @@ use glam::{DVec3, Quat};
 use sha2::{Digest, Sha256};
 
 use crate::crowd_error::CrowdError;
-use crate::curve::options::{Axes, Ends, Path, Quantity, Speed};
+use crate::curve::options::{Axes, Ends, KeySigns, Quantity, Speed};
 use crate::engine::Engine;
 use crate::error::Error;
 use crate::method;
@@ -33,15 +33,16 @@ use crate::method::{METHODS, Method};
 use crate::output::crowd::{CrowdOutput, CrowdValues};
 use crate::output::encoding::Encoding;
 use crate::output::rotations::Layout;
-use crate::path::options::{Direction, Follow, Frame, PathSpeed};
+use crate::path::options::{Direction, Follow, PathFrame};
+use crate::path::speed::PathSpeed;
 use crate::pose::skeleton::Skeleton;
 use crate::smooth::kernel::Smoothing;
 use crate::stream::Chunk;
-use crate::time::frames::Frames;
+use crate::time::frames::SampleTimes;
 use crate::time::wrap::WrapMode;
 use crate::tracks::set::TrackSet;
 use crate::verify::sets::{
-    Random, closed_set, crowd_layer, crowd_library, later, paths_set, random_set, shared_set,
+    SeededRandom, closed_set, crowd_layer, crowd_library, later, paths_set, random_set, shared_set,
     vectors_set,
 };
 
@@ -83,13 +84,13 @@ struct Case {
 
 enum Evaluation {
     /// From keys, in one go.
-    Set(Interpolation, Frames, Layout),
+    Set(Interpolation, SampleTimes, Layout),
     /// From a clip that stays on the device, encoded.
-    Encoded(Interpolation, Frames, Layout, Encoding),
+    Encoded(Interpolation, SampleTimes, Layout, Encoding),
     /// In chunks.
-    Stream(Interpolation, Frames, Layout),
+    Stream(Interpolation, SampleTimes, Layout),
     /// Translations, rotations and scales.
-    Transforms(Interpolation, VectorMethod, Frames),
+    Transforms(Interpolation, VectorMethod, SampleTimes),
     /// Layers blended, mixed and added, and walked down a skeleton.
     Poses,
     /// Bodies on paths.
@@ -197,7 +198,7 @@ impl Golden {
         set: &'static str,
         name: &str,
         interpolation: Interpolation,
-        frames: &Frames,
+        frames: &SampleTimes,
     ) {
         self.add(
             set,
@@ -247,7 +248,7 @@ impl Golden {
             (
                 "fixed at",
                 Follow {
-                    frame: Frame::Fixed,
+                    frame: PathFrame::Fixed,
                     direction: point,
                     ..c2()
                 },
@@ -255,7 +256,7 @@ impl Golden {
             (
                 "frenet",
                 Follow {
-                    frame: Frame::Frenet,
+                    frame: PathFrame::Frenet,
                     ..c2()
                 },
             ),
@@ -290,13 +291,13 @@ impl Golden {
 
     /// Every method, on every kind of keys, and its derivatives.
     fn methods(&mut self) {
-        let frames = Frames::fps(60).between(-1.0, 9.0);
+        let frames = SampleTimes::fps(60).between(-1.0, 9.0);
         for method in METHODS {
             for set in ["even", "uneven", "hostile"] {
                 self.rows(set, method.name, shortest(method), &frames);
             }
-            let film =
-                Frames::rate("24000/1001".parse().expect("a rate")).between(86_399.0, 86_409.0);
+            let film = SampleTimes::rate("24000/1001".parse().expect("a rate"))
+                .between(86_399.0, 86_409.0);
             self.rows("day", method.name, shortest(method), &film);
             for (name, quantity) in [
                 ("velocity body", Quantity::Velocity(Axes::Body)),
@@ -318,7 +319,7 @@ impl Golden {
 
     /// Every encoding in both layouts, and results in chunks.
     fn outputs(&mut self) {
-        let frames = Frames::fps(30);
+        let frames = SampleTimes::fps(30);
         for encoding in Encoding::KINDS {
             for (name, layout) in [("rows", Layout::TrackMajor), ("frames", Layout::FrameMajor)] {
                 for method in [method::SLERP, method::BESSEL_OVERHAUSER] {
@@ -349,8 +350,8 @@ impl Golden {
 
     /// Ends, paths, speeds, and what lies outside the keys.
     fn options(&mut self) {
-        let frames = Frames::fps(50).between(-7.0, 21.0);
-        let times = Frames::at(
+        let frames = SampleTimes::fps(50).between(-7.0, 21.0);
+        let times = SampleTimes::at(
             (0..500)
                 .map(|k| f64::from(k * 317 % 500) * 0.06 - 8.0)
                 .collect(),
@@ -408,7 +409,7 @@ impl Golden {
             method::C2,
         ] {
             let interpolation = Interpolation {
-                path: Path::AsAuthored,
+                signs: KeySigns::AsAuthored,
                 ..shortest(method)
             };
             self.rows(
@@ -417,12 +418,12 @@ impl Golden {
                 interpolation,
                 &frames,
             );
-            let few = Frames::fps(19).between(1.0, 9.0);
+            let sparse = SampleTimes::fps(19).between(1.0, 9.0);
             self.rows(
                 "dense turned",
                 &format!("{method} as authored"),
                 interpolation,
-                &few,
+                &sparse,
             );
         }
         for method in [method::SLERP, method::BESSEL_OVERHAUSER, method::SQUAD] {
@@ -465,7 +466,7 @@ impl Golden {
             after: WrapMode::Loop,
             ..shortest(method::SLERP)
         };
-        let tomorrow = Frames::fps(60).between(86_400.0, 86_403.0);
+        let tomorrow = SampleTimes::fps(60).between(86_400.0, 86_403.0);
         self.rows("uneven", "slerp Loop tomorrow", looped, &tomorrow);
         let velocity = Interpolation {
             quantity: Quantity::Velocity(Axes::Parent),
@@ -486,23 +487,28 @@ impl Golden {
             method::B_SPLINE,
             method::C2,
         ];
-        let mut random = Random(77);
+        let mut random = SeededRandom(77);
         let mut draw = |count: usize, end: f64| -> Vec<f64> {
             (0..count).map(|_| random.between(-0.5, end)).collect()
         };
-        let shared = Frames::at(draw(300, 30.0));
-        let few = Frames::at(draw(2, 1.2));
-        let each = Frames::at_each(draw(700, 1.2));
-        let each_dense = Frames::at_each(draw(12, 25.0));
+        let shared = SampleTimes::at(draw(300, 30.0));
+        let sparse = SampleTimes::at(draw(2, 1.2));
+        let each = SampleTimes::at_each(draw(700, 1.2));
+        let each_dense = SampleTimes::at_each(draw(12, 25.0));
         for method in methods {
             let shortest = shortest(method);
             for set in ["dense", "dense turned", "dense wild"] {
-                self.rows(set, &format!("{method} 30 fps"), shortest, &Frames::fps(30));
+                self.rows(
+                    set,
+                    &format!("{method} 30 fps"),
+                    shortest,
+                    &SampleTimes::fps(30),
+                );
                 self.rows(
                     set,
                     &format!("{method} 211 fps"),
                     shortest,
-                    &Frames::fps(211).between(1.0, 4.0),
+                    &SampleTimes::fps(211).between(1.0, 4.0),
                 );
                 self.rows(set, &format!("{method} times"), shortest, &shared);
             }
@@ -516,34 +522,34 @@ impl Golden {
                 "crowd",
                 &format!("{method} 60 fps"),
                 shortest,
-                &Frames::fps(60),
+                &SampleTimes::fps(60),
             );
             self.rows(
                 "crowd",
                 &format!("{method} one frame"),
                 shortest,
-                &Frames::fps(1).between(0.3, 0.3),
+                &SampleTimes::fps(1).between(0.3, 0.3),
             );
-            self.rows("crowd", &format!("{method} few times"), shortest, &few);
+            self.rows("crowd", &format!("{method} few times"), shortest, &sparse);
             self.rows(
                 "crowd",
                 &format!("{method} a time of each"),
                 shortest,
                 &each,
             );
-            let evaluation = Evaluation::Set(shortest, few.clone(), Layout::FrameMajor);
+            let evaluation = Evaluation::Set(shortest, sparse.clone(), Layout::FrameMajor);
             self.add("crowd", &format!("{method} few times, frames"), evaluation);
             self.rows(
                 "long",
                 &format!("{method} 7 fps"),
                 shortest,
-                &Frames::fps(7),
+                &SampleTimes::fps(7),
             );
             self.rows(
                 "long",
                 &format!("{method} 120 fps"),
                 shortest,
-                &Frames::fps(120),
+                &SampleTimes::fps(120),
             );
         }
     }
@@ -680,14 +686,14 @@ impl Evaluation {
                 hash.add(found.scales.as_slice());
             }
             Self::Follow(follow) => {
-                let found = engine.follow(set, follow, &Frames::fps(30), rows)?;
+                let found = engine.follow(set, follow, &SampleTimes::fps(30), rows)?;
                 hash.add(found.positions.as_slice());
                 hash.add(found.rotations.as_quats());
             }
             Self::Smooth(smoothing) => {
                 let linear = VectorMethod::Linear;
                 let found =
-                    engine.transforms(set, method::SLERP, linear, &Frames::fps(30), rows)?;
+                    engine.transforms(set, method::SLERP, linear, &SampleTimes::fps(30), rows)?;
                 hash.add(engine.smooth(&found.rotations, smoothing)?.as_quats());
                 hash.add(
                     engine
@@ -696,7 +702,7 @@ impl Evaluation {
                 );
             }
             Self::Poses => {
-                let frames = Frames::fps(30);
+                let frames = SampleTimes::fps(30);
                 let one = engine.evaluate(set, method::SLERP, &frames)?;
                 let two = engine.evaluate(set, method::C2, &frames)?;
                 let three = engine.evaluate(set, method::B_SPLINE, &frames)?;
@@ -719,7 +725,7 @@ impl Evaluation {
 
 impl CrowdMix {
     fn run(self, engine: &Engine, output: CrowdOutput, hash: &mut Hash) -> Result<(), CrowdError> {
-        let mut random = Random(41);
+        let mut random = SeededRandom(41);
         let library = crowd_library(&mut random, self.joints, self.methods)?;
         let mut crowd = engine.crowd(&library, self.instances, self.layers)?;
         for (step, ticks) in CLOCK.into_iter().enumerate() {

@@ -34,7 +34,7 @@ use crate::reference::quaternion::angle_between;
 use crate::shader::Form;
 use crate::threads::{on_threads, stop};
 use crate::time::frame_clock::rounding;
-use crate::time::frames::{Frames, Timeline};
+use crate::time::frames::{SampleTimes, Timeline};
 use crate::tracks::set::{Track, TrackSet};
 
 /// Largest allowed distance of a quaternion's norm from 1.
@@ -64,13 +64,13 @@ pub struct Verification {
     /// Rotations whose bits differ between the device and the CPU.
     pub differing: u64,
     /// The first of them.
-    pub first_difference: Option<Place>,
+    pub first_difference: Option<SamplePosition>,
     /// Largest angle between a result and the reference, radians.
     pub max_error: f64,
     /// Root mean square of that angle, radians.
     pub rms_error: f64,
     /// Where the largest error is.
-    pub worst: Option<Place>,
+    pub worst: Option<SamplePosition>,
     /// Largest | |q| - 1 |.
     pub max_norm_error: f64,
     /// The largest `max_error` allowed, radians.
@@ -85,17 +85,17 @@ pub struct Verification {
 /// One rotation of a result.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
-pub struct Place {
-    /// The track's place in the set, from 0.
+pub struct SamplePosition {
+    /// The index of the track in the set.
     pub track: usize,
-    /// The frame (the sample's place), from 0.
+    /// The frame: the index of the sample.
     pub frame: usize,
     /// Its time, seconds.
     pub time: f64,
 }
 
-impl Place {
-    /// Of a rotation by its place in a track-major result.
+impl SamplePosition {
+    /// Of a rotation by its index in a track-major result.
     fn new(timeline: &Timeline, index: usize) -> Self {
         let (track, frame) = (index / timeline.len(), index % timeline.len());
         let time = timeline.time_at(track, frame);
@@ -167,13 +167,13 @@ impl Verification {
 /// rotation and all that follows from it: velocities, accelerations, encodings.
 ///
 /// ```
-/// use tumble::{Engine, Frames, TrackSet, method};
+/// use tumble::{Engine, SampleTimes, TrackSet, method};
 /// use tumble::verify::{Verdict, verify};
 /// # use glam::Quat;
 /// # let mut set = TrackSet::new();
 /// # set.push("", &[0.0, 1.0], &[Quat::IDENTITY, Quat::from_rotation_x(1.0)])?;
 /// let engine = Engine::auto()?;
-/// let found = verify(&engine, &set, method::SLERP.into(), &Frames::fps(25))?;
+/// let found = verify(&engine, &set, method::SLERP.into(), &SampleTimes::fps(25))?;
 /// match found.verdict() {
 ///     Verdict::Passed => println!("{} gives the CPU's bits", engine.device_name()),
 ///     Verdict::ReferenceOnly => println!("no Vulkan device took part"),
@@ -188,7 +188,7 @@ pub fn verify(
     engine: &Engine,
     set: &TrackSet,
     interpolation: Interpolation,
-    frames: &Frames,
+    frames: &SampleTimes,
 ) -> Result<Verification, Error> {
     let timeline = frames.resolve(set.track_count(), set.time_span())?;
     let found = engine.evaluate(set, interpolation, frames)?;
@@ -208,13 +208,13 @@ pub fn verify(
         device,
         rotations: found.as_quats().len() as u64,
         differing,
-        first_difference: first.map(|index| Place::new(&timeline, index)),
+        first_difference: first.map(|index| SamplePosition::new(&timeline, index)),
         max_error: errors.max,
         rms_error: errors.rms,
         worst: errors.worst,
         max_norm_error: errors.norm,
         error_bound: error_bound(interpolation.form()),
-        norm_bound: NORM_BOUND + beyond_rounding(set),
+        norm_bound: NORM_BOUND + norm_excess(set),
         outputs,
     })
 }
@@ -222,7 +222,7 @@ pub fn verify(
 /// By how much the norms of keys differ from 1, beyond what rounding a unit quaternion to f32 does.
 /// Keys within [`UNIT_TOLERANCE`](crate::tracks::check::UNIT_TOLERANCE) are kept as they are, and
 /// curves through them are as long as they.
-fn beyond_rounding(set: &TrackSet) -> f64 {
+fn norm_excess(set: &TrackSet) -> f64 {
     let keys = set.tracks().flat_map(|track| track.keys);
     let off = keys.map(|key| (key.as_dquat().length() - 1.0).abs());
     (off.fold(0.0, f64::max) - f64::from(f32::EPSILON)).max(0.0)
@@ -288,7 +288,7 @@ struct Errors {
     /// Largest angle, and root mean square, radians.
     max: f64,
     rms: f64,
-    worst: Option<Place>,
+    worst: Option<SamplePosition>,
     /// Largest | |q| - 1 |.
     norm: f64,
 }
@@ -319,9 +319,9 @@ impl Errors {
         Ok(Self {
             max: worst.map_or(0.0, |(_, track)| track.max),
             rms: (squares / found.len().max(1) as f64).sqrt(),
-            worst: worst
-                .filter(|_| !found.is_empty())
-                .map(|(track, errors)| Place::new(timeline, track * timeline.len() + errors.worst)),
+            worst: worst.filter(|_| !found.is_empty()).map(|(track, errors)| {
+                SamplePosition::new(timeline, track * timeline.len() + errors.worst)
+            }),
             norm: tracks.iter().map(|track| track.norm).fold(0.0, f64::max),
         })
     }
@@ -350,7 +350,7 @@ impl TrackErrors {
         let track = set.track(index);
         let keys = KeyTimes::new(&track, &interpolation);
         let times = &*keys.times;
-        let curve = reference::Curve::of(&interpolation, Track { times, ..track });
+        let curve = reference::ReferenceCurve::of(&interpolation, Track { times, ..track });
         let samples = timeline.len();
         let row = &found[index * samples..(index + 1) * samples];
         let mut errors = Self::default();
@@ -376,7 +376,7 @@ impl TrackErrors {
 mod tests {
     use super::*;
     use crate::method::slerp::SLERP;
-    use crate::reference::Curve;
+    use crate::reference::ReferenceCurve;
 
     fn set() -> TrackSet {
         let keys = [0.0, 1.0, -0.4, 2.0].map(Quat::from_rotation_z);
@@ -387,9 +387,9 @@ mod tests {
     #[test]
     fn a_wrong_result_is_noticed() {
         let set = set();
-        let timeline = Frames::fps(10).resolve(2, set.time_span()).unwrap();
+        let timeline = SampleTimes::fps(10).resolve(2, set.time_span()).unwrap();
         let rows = set.tracks().flat_map(|track| {
-            let curve = Curve::of(&SLERP.into(), track);
+            let curve = ReferenceCurve::of(&SLERP.into(), track);
             (0..26).map(move |sample| curve.rotation(0.1 * f64::from(sample)).as_quat())
         });
         let good: Vec<Quat> = rows.collect();

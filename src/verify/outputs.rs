@@ -12,10 +12,10 @@ use crate::method::interpolation::Interpolation;
 use crate::output::encoding::Encoding;
 use crate::output::rotations::{Layout, Rotations, Vectors};
 use crate::pose::skeleton::Skeleton;
-use crate::reference::curve::Curve;
+use crate::reference::curve::ReferenceCurve;
 use crate::reference::quaternion::angle_between;
 use crate::threads::{OutOfThreads, on_threads, stop};
-use crate::time::frames::{Frames, Timeline};
+use crate::time::frames::{SampleTimes, Timeline};
 use crate::tracks::set::{Track, TrackSet};
 use crate::verify::{KeyTimes, differences, worse};
 
@@ -61,7 +61,7 @@ pub(crate) fn verify(
     engine: &Engine,
     set: &TrackSet,
     interpolation: Interpolation,
-    frames: &Frames,
+    frames: &SampleTimes,
     timeline: &Timeline,
 ) -> Result<Vec<OutputVerification>, Error> {
     let cpu = Engine::new(Device::Cpu)?;
@@ -101,7 +101,7 @@ pub(crate) fn verify(
         encoding.encode_all(rotations, &mut expected);
         let error = |(stored, &rotation): (&[u8], &[f32; 4])| {
             let both = [encoding.decode_one(stored), rotation];
-            let [decoded, rotation] = both.map(|own| Quat::from_array(own).as_dquat());
+            let [decoded, rotation] = both.map(|value| Quat::from_array(value).as_dquat());
             worse(angle_between(decoded, rotation))
         };
         outputs.push(OutputVerification {
@@ -139,8 +139,8 @@ fn world(
     for sample in 0..samples {
         let mut above = DQuat::IDENTITY;
         for track in 0..tracks {
-            let own = local.get(track, sample).unwrap_or(Quat::NAN);
-            above = (above * own.as_dquat()).normalize();
+            let rotation = local.get(track, sample).unwrap_or(Quat::NAN);
+            above = (above * rotation.as_dquat()).normalize();
             let rotation = found.rotation(track, sample).unwrap_or(Quat::NAN);
             let error = worse(angle_between(rotation.as_dquat(), above));
             output.max_error = output.max_error.max(error);
@@ -162,7 +162,7 @@ fn rate_error(
         let track = set.track(index);
         let keys = KeyTimes::new(&track, &interpolation);
         let times = &*keys.times;
-        let curve = Curve::of(&interpolation, Track { times, ..track });
+        let curve = ReferenceCurve::of(&interpolation, Track { times, ..track });
         let expected = |time: f64| {
             let (body, axes) = match interpolation.quantity {
                 Quantity::Velocity(axes) => (curve.velocity(time), axes),

@@ -7,7 +7,7 @@ use std::mem::discriminant;
 use sha2::{Digest, Sha256};
 
 use crate::crowd_error::CrowdError;
-use crate::curve::options::{Axes, Ends, Path, Quantity, Speed};
+use crate::curve::options::{Axes, Ends, KeySigns, Quantity, Speed};
 use crate::engine::Engine;
 use crate::error::Error;
 use crate::method::interpolation::Interpolation;
@@ -16,12 +16,14 @@ use crate::output::crowd::{CrowdOutput, CrowdValues};
 use crate::output::encoding::Encoding;
 use crate::output::rotations::Layout;
 use crate::time::frame_rate::FrameRate;
-use crate::time::frames::Frames;
+use crate::time::frames::SampleTimes;
 use crate::time::wrap::WrapMode;
 use crate::tracks::set::TrackSet;
 use crate::verify::differences;
 use crate::verify::golden::GoldenError;
-use crate::verify::sets::{Random, crowd_layer, crowd_library, later, random_set, shared_set};
+use crate::verify::sets::{
+    SeededRandom, crowd_layer, crowd_library, later, random_set, shared_set,
+};
 
 /// What a round found.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -34,7 +36,7 @@ pub struct RandomRound {
     pub bytes: u64,
     /// Values whose bits differ.
     pub differing: u64,
-    /// The first of them, by its place in the result.
+    /// The first of them, by its index in the result.
     pub first_difference: Option<usize>,
     /// SHA-256 of what the CPU made: the same on every machine.
     pub hash: [u8; 32],
@@ -61,7 +63,8 @@ pub fn round(
     number: u64,
 ) -> Result<RandomRound, GoldenError> {
     // Neighbouring seeds and rounds have nothing in common.
-    let mut random = Random(seed.rotate_left(32) ^ number.wrapping_mul(0x9e37_79b9_7f4a_7c15));
+    let mut random =
+        SeededRandom(seed.rotate_left(32) ^ number.wrapping_mul(0x9e37_79b9_7f4a_7c15));
     random.next();
     match number % 4 {
         3 => crowd_round(device, cpu, &mut random),
@@ -87,7 +90,7 @@ fn compared(description: String, found: &[u8], expected: &[u8], size: usize) -> 
     }
 }
 
-/// What both engines make of one request, or why both refuse it: for one kind of reason, of which each tells the
+/// What both engines make of one request, or why both refuse it: for one kind of reason, of which each reports the
 /// first that one of its threads meets.
 fn both<E: std::fmt::Display>(
     mut evaluate: impl FnMut(&Engine) -> Result<Vec<u8>, E>,
@@ -113,7 +116,7 @@ fn refused(mut description: String, reason: &str) -> RandomRound {
 fn set_round(
     device: &Engine,
     cpu: &Engine,
-    random: &mut Random,
+    random: &mut SeededRandom,
 ) -> Result<RandomRound, GoldenError> {
     let mut interpolation = interpolation(random);
     let (kind, set) = set(random);
@@ -144,7 +147,7 @@ fn set_round(
         description,
         ", {:?}, {:?}, {:?} to {:?}, {:?}, {:?}",
         interpolation.ends,
-        interpolation.path,
+        interpolation.signs,
         interpolation.before,
         interpolation.after,
         interpolation.speed,
@@ -178,22 +181,22 @@ fn set_round(
     })
 }
 
-fn interpolation(random: &mut Random) -> Interpolation {
+fn interpolation(random: &mut SeededRandom) -> Interpolation {
     let sides = [
         WrapMode::Hold,
         WrapMode::Loop,
         WrapMode::Mirror,
         WrapMode::Extrapolate,
     ];
-    let usual = |random: &mut Random| random.below(3) > 0;
+    let is_default = |random: &mut SeededRandom| random.below(3) > 0;
     let mut interpolation = Interpolation::from(random.pick(&METHODS));
-    if !usual(random) {
+    if !is_default(random) {
         interpolation.ends = random.pick(&[Ends::Natural, Ends::Secant, Ends::Frozen]);
     }
-    if !usual(random) {
-        interpolation.path = Path::AsAuthored;
+    if !is_default(random) {
+        interpolation.signs = KeySigns::AsAuthored;
     }
-    if !usual(random) {
+    if !is_default(random) {
         interpolation.before = random.pick(&sides);
         interpolation.after = random.pick(&sides);
     }
@@ -210,7 +213,7 @@ fn interpolation(random: &mut Random) -> Interpolation {
 
 /// Steps of nothing, of next to nothing, of half a turn and more, at times from milliseconds to seconds
 /// apart; dense keys; one key; the second day.
-fn set(random: &mut Random) -> (&'static str, TrackSet) {
+fn set(random: &mut SeededRandom) -> (&'static str, TrackSet) {
     let seed = random.next();
     let every = [0.0, 1e-7, 1e-4, 0.02, 0.4, 2.0, 9.0];
     match random.below(8) {
@@ -254,7 +257,7 @@ fn set(random: &mut Random) -> (&'static str, TrackSet) {
 
 /// So many samples that a round takes milliseconds on a card and at most about a tenth of a second on two
 /// cores.
-fn frames(random: &mut Random, set: &TrackSet) -> Frames {
+fn frames(random: &mut SeededRandom, set: &TrackSet) -> SampleTimes {
     let (start, end) = set.time_span().unwrap_or_default();
     let tracks = set.track_count().max(1);
     let samples = (random.pick(&[10_000, 100_000, 400_000]) / tracks).max(1);
@@ -264,31 +267,31 @@ fn frames(random: &mut Random, set: &TrackSet) -> Frames {
     match random.below(6) {
         0 => {
             let times = (0..samples.min(2_000)).map(|_| random.between(low, high));
-            Frames::at(times.collect())
+            SampleTimes::at(times.collect())
         }
         1 => {
             let each = samples.min(40);
             let times = (0..tracks * each).map(|_| random.between(low, high));
-            Frames::at_each(times.collect())
+            SampleTimes::at_each(times.collect())
         }
         2 => {
             let rate = FrameRate::new(24_000, 1001).expect("a rate of films");
             let last = low + (samples as f64 / 24.0).min(high - low);
-            Frames::rate(rate).between(low, last)
+            SampleTimes::rate(rate).between(low, last)
         }
         3 => {
             let rate = random.pick(&[7, 24, 30, 60, 120, 211]);
             let last = low + (samples as f64 / f64::from(rate)).min(high - low);
-            Frames::fps(rate).between(low, last)
+            SampleTimes::fps(rate).between(low, last)
         }
-        _ => Frames::fps(filling).between(low, high),
+        _ => SampleTimes::fps(filling).between(low, high),
     }
 }
 
 fn crowd_round(
     device: &Engine,
     cpu: &Engine,
-    random: &mut Random,
+    random: &mut SeededRandom,
 ) -> Result<RandomRound, GoldenError> {
     const MIXES: [&[crate::method::Method]; 3] = [
         &[method::SLERP],
@@ -346,11 +349,12 @@ fn crowd_round(
 mod tests {
     use super::*;
 
-    /// Each engine tells of the first track that one of its threads refuses; what only one refuses is an error.
+    /// Each engine reports the first track that one of its threads refuses; what only one refuses is an error.
     #[test]
     fn both_may_refuse_in_other_words() {
         let cpu = Engine::new(crate::device::Device::Cpu).expect("threads");
-        let lengths = [(1, 2), (3, 4)].map(|(given, needed)| Error::OutputLength { given, needed });
+        let lengths =
+            [(1, 2), (3, 4)].map(|(length, needed)| Error::OutputLength { length, needed });
         let mut words = lengths.into_iter();
         let refuse = |_: &Engine| Err(words.next().expect("asked twice"));
         assert!(matches!(both(refuse, [&cpu, &cpu]), Ok(Err(_))));

@@ -11,18 +11,18 @@ use crate::crowd_error::CrowdError;
 use crate::device::{Device, VulkanDevice};
 use crate::engine::Engine;
 use crate::error::Error;
-use crate::gpu::application::{Application, ApplicationBuffer, ApplicationMemory, Taken};
+use crate::gpu::application::{Application, ApplicationBuffer, ApplicationMemory, Elapsed};
 use crate::gpu::clip_target::ClipTarget;
-use crate::gpu::crowd_target::CrowdTarget;
+use crate::gpu::crowd::CrowdTarget;
 use crate::gpu::options::{EngineOptions, ReadBack, Transfer};
 use crate::method::{self, Method};
 use crate::output::crowd::{CrowdOutput, CrowdValues};
 use crate::output::encoding::Encoding;
 use crate::output::rotations::Layout;
-use crate::time::frames::Frames;
+use crate::time::frames::SampleTimes;
 use crate::verify::differences;
 use crate::verify::golden::GoldenError;
-use crate::verify::sets::{Random, crowd_layer, crowd_library, random_set, shared_set};
+use crate::verify::sets::{SeededRandom, crowd_layer, crowd_library, random_set, shared_set};
 
 /// Frames in flight.
 const FRAMES: usize = 3;
@@ -80,7 +80,7 @@ impl Renderer {
     /// Leaves a clip's result in a buffer, from `offset` on.
     pub(crate) fn to_buffer(
         clip: &Clip,
-        frames: &Frames,
+        frames: &SampleTimes,
         (layout, encoding): (Layout, Encoding),
         (buffer, offset): (&ApplicationBuffer, u64),
     ) -> Result<(), Error> {
@@ -93,7 +93,7 @@ impl Renderer {
     /// Makes ready what it takes to record a clip's samples into a buffer, from `offset` on.
     pub(crate) fn clip_target(
         clip: &Clip,
-        frames: &Frames,
+        frames: &SampleTimes,
         (layout, encoding): (Layout, Encoding),
         (buffer, offset): (&ApplicationBuffer, u64),
     ) -> Result<ClipTarget, Error> {
@@ -120,7 +120,7 @@ impl Renderer {
         Ok(buffer)
     }
 
-    fn fill(&mut self, buffer: &ApplicationBuffer) -> Result<Taken, Error> {
+    fn fill(&mut self, buffer: &ApplicationBuffer) -> Result<Elapsed, Error> {
         let application = &self.application;
         let commands = application.recorded(false, |commands| {
             application.fill(commands, buffer, u32::MAX);
@@ -129,7 +129,7 @@ impl Renderer {
         Ok(self.application.run(&[commands])?)
     }
 
-    /// The bytes of a buffer, copied by the application's own commands.
+    /// The bytes of a buffer, copied by the application's commands.
     fn bytes(
         &mut self,
         from: &ApplicationBuffer,
@@ -222,12 +222,12 @@ fn buffer_to_buffer(
     report: &mut RendererReport,
 ) -> Result<(), GoldenError> {
     let set = random_set(seed ^ 0x17, 37, 14, &[0.0, 1e-4, 0.02, 0.4, 2.0], true);
-    let mut random = Random(seed);
+    let mut random = SeededRandom(seed);
     let mut times: Vec<f64> = (0..90).map(|_| random.between(-0.5, 7.0)).collect();
     times.sort_by(f64::total_cmp);
     let requests = [
-        ("frames", Frames::fps(60).between(-0.5, 6.0)),
-        ("times", Frames::at(times)),
+        ("frames", SampleTimes::fps(60).between(-0.5, 6.0)),
+        ("times", SampleTimes::at(times)),
     ];
     for &method in methods {
         for (name, frames) in &requests {
@@ -256,7 +256,7 @@ fn buffer_to_buffer(
                     let offset = offset_rotations * each;
                     let expected = expected_clip.evaluate_encoded(frames, layout, encoding)?;
                     let like = (layout, encoding);
-                    // A range that begins where no line does, and a record to a place further on in it.
+                    // A range that begins where no line does, and a record to an offset further on in it.
                     let further = 3 * each;
                     let range = (&buffer, (offset - further) as u64);
                     let target = Renderer::clip_target(&clip, frames, like, range)?;
@@ -264,8 +264,8 @@ fn buffer_to_buffer(
                         record_clip(&target, commands, further as u64)
                     })?;
                     // What is listed anew, what was kept from then on, and what was recorded.
-                    for way in 0..4 {
-                        match way {
+                    for attempt in 0..4 {
+                        match attempt {
                             0 | 1 => {
                                 Renderer::to_buffer(&clip, frames, like, (&buffer, offset as u64))?;
                             }
@@ -299,7 +299,7 @@ fn frames_in_flight(
 ) -> Result<(), GoldenError> {
     const LAYERS: usize = 2;
     const INSTANCES: usize = 33;
-    let mut random = Random(seed ^ 0x29);
+    let mut random = SeededRandom(seed ^ 0x29);
     let methods = [method::SLERP, method::BESSEL_OVERHAUSER];
     let library = crowd_library(&mut random, 21, &methods)?;
     for values in [
@@ -375,7 +375,7 @@ fn frames_in_flight(
 /// Results of several windows that a queue of their own copies while the next window is evaluated.
 fn copied_beside(engine: &Engine, cpu: &Engine, seed: u64) -> Result<RendererCheck, Error> {
     let set = shared_set(seed ^ 0x31, 1024, 26, 0.4, 0.6, 4);
-    let frames = Frames::fps(400).between(0.0, 10.0);
+    let frames = SampleTimes::fps(400).between(0.0, 10.0);
     let [found, expected] =
         [engine, cpu].map(|engine| engine.evaluate(&set, method::SLERP, &frames));
     let (found, expected) = (found?, expected?);

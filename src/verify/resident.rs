@@ -5,17 +5,17 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use crate::clip::Clip;
-use crate::engine::Engine;
+use crate::engine::{Engine, check_encoding};
 use crate::error::Error;
-use crate::evaluate::uploaded::Backend;
+use crate::evaluate::backend::Backend;
 use crate::gpu::buffer::{Buffer, Residence};
 use crate::gpu::engine::VulkanEngine;
+pub use crate::gpu::engine::write_rates::WriteRates;
 use crate::gpu::error::VulkanError;
 use crate::gpu::handles::VulkanBuffer;
-pub use crate::gpu::write_rates::WriteRates;
 use crate::output::encoding::Encoding;
 use crate::output::rotations::Layout;
-use crate::time::frames::{Frames, Timeline};
+use crate::time::frames::{SampleTimes, Timeline};
 
 /// A clip with room for one of its results in the memory of its device.
 pub struct Resident<'a> {
@@ -59,14 +59,14 @@ impl Clip {
     /// When the frames do not fit the clip, or the device fails.
     pub fn resident(
         &self,
-        frames: &Frames,
+        frames: &SampleTimes,
         layout: Layout,
         encoding: Encoding,
     ) -> Result<Option<Resident<'_>>, Error> {
         let Some(opened) = self.engine().backend.opened() else {
             return Ok(None);
         };
-        encoding.check(self.quantity())?;
+        check_encoding(encoding, self.quantity())?;
         let timeline = self.timeline(frames)?;
         let timeline = self.uploaded.folded(&timeline)?;
         let engine = opened.engine();

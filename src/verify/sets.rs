@@ -11,13 +11,13 @@ use crate::method::Method;
 use crate::method::vector_method::VectorMethod;
 use crate::pose::skeleton::Skeleton;
 use crate::time::wrap::WrapMode;
-use crate::tracks::key_data::Tcb;
 use crate::tracks::set::TrackSet;
+use crate::tracks::set::key_data::Tcb;
 
 /// `SplitMix64` (Steele, Lea, Flood 2014).
-pub(crate) struct Random(pub(crate) u64);
+pub(crate) struct SeededRandom(pub(crate) u64);
 
-impl Random {
+impl SeededRandom {
     pub(crate) fn next(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;
@@ -49,7 +49,7 @@ fn normalised(q: [f64; 4]) -> [f64; 4] {
     q.map(|c| c / length)
 }
 
-pub(crate) fn random_rotation(random: &mut Random) -> [f64; 4] {
+pub(crate) fn random_rotation(random: &mut SeededRandom) -> [f64; 4] {
     loop {
         let q = [(); 4].map(|()| random.between(-1.0, 1.0));
         if (0.01..1.0).contains(&q.iter().map(|c| c * c).sum::<f64>()) {
@@ -59,7 +59,7 @@ pub(crate) fn random_rotation(random: &mut Random) -> [f64; 4] {
 }
 
 /// The rotation moved a little: the step's half-angle is about `size` where that is small.
-fn stepped(random: &mut Random, q: [f64; 4], size: f64) -> [f64; 4] {
+fn stepped(random: &mut SeededRandom, q: [f64; 4], size: f64) -> [f64; 4] {
     let step = random_rotation(random);
     normalised([0, 1, 2, 3].map(|c| q[c] + size * step[c]))
 }
@@ -75,9 +75,9 @@ pub(crate) fn random_set(
     tracks: usize,
     keys: usize,
     sizes: &[f64],
-    turned: bool,
+    has_negated_keys: bool,
 ) -> TrackSet {
-    let mut random = Random(seed);
+    let mut random = SeededRandom(seed);
     let mut set = TrackSet::new();
     for track in 0..tracks {
         let count = match track % 8 {
@@ -91,18 +91,18 @@ pub(crate) fn random_set(
         let (mut times, mut quats) = (Vec::new(), Vec::new());
         for index in 0..count {
             times.push(time);
-            let sign = if turned && random.next().is_multiple_of(4) {
+            let sign = if has_negated_keys && random.next().is_multiple_of(4) {
                 -1.0
             } else {
                 1.0
             };
             let mut quat = key(rotation, sign);
-            if turned && index % 7 == 5 {
+            if has_negated_keys && index % 7 == 5 {
                 // A component far below what f32 resolves beside the others.
                 quat = key(normalised([1e-30, 0.6, rotation[2], rotation[3]]), sign);
             }
             quats.push(quat);
-            time += if turned {
+            time += if has_negated_keys {
                 random.pick(&[0.04, 0.001, 0.3, 1.0, 0.55])
             } else {
                 random.between(0.1, 0.9)
@@ -117,14 +117,14 @@ pub(crate) fn random_set(
 }
 
 fn give_data(set: &mut TrackSet, seed: u64) {
-    let mut random = Random(seed ^ 0xdada);
+    let mut random = SeededRandom(seed ^ 0xdada);
     for index in (0..set.track_count()).filter(|index| index % 5 != 3) {
         let keys = set.track(index).keys.len();
-        let three = |random: &mut Random| [(); 3].map(|()| random.between(-1.0, 1.0));
+        let three = |random: &mut SeededRandom| [(); 3].map(|()| random.between(-1.0, 1.0));
         let velocities: Vec<DVec3> = (0..keys)
             .map(|_| DVec3::from_array(three(&mut random)) * 2.0)
             .collect();
-        let four = |random: &mut Random| {
+        let four = |random: &mut SeededRandom| {
             Quat::from_array([(); 4].map(|()| random.between(-1.0, 1.0) as f32))
         };
         let tangents: Vec<[Quat; 2]> = (0..keys)
@@ -155,15 +155,15 @@ pub(crate) fn shared_set(
     keys: usize,
     step: f64,
     size: f64,
-    turned: u64,
+    negated_every: u64,
 ) -> TrackSet {
-    let mut random = Random(seed);
+    let mut random = SeededRandom(seed);
     let times: Vec<f64> = (0..keys).map(|k| k as f64 * step).collect();
     let mut all = Vec::with_capacity(tracks * keys);
     for _ in 0..tracks {
         let mut rotation = random_rotation(&mut random);
         for _ in 0..keys {
-            let sign = if turned > 0 && random.next().is_multiple_of(turned) {
+            let sign = if negated_every > 0 && random.next().is_multiple_of(negated_every) {
                 -1.0
             } else {
                 1.0
@@ -206,7 +206,7 @@ pub(crate) fn vectors_set() -> TrackSet {
         let times: Vec<f64> = (0..7)
             .map(|k| f64::from(k) * (0.5 + 0.1 * track as f64))
             .collect();
-        let mut random = Random(track as u64 + 5);
+        let mut random = SeededRandom(track as u64 + 5);
         let mut vector = || Vec3::from_array([(); 3].map(|()| random.between(-3.0, 3.0) as f32));
         let keys: Vec<Vec3> = times.iter().map(|_| vector()).collect();
         let tangents: Vec<[Vec3; 2]> = times.iter().map(|_| [vector(), vector()]).collect();
@@ -224,17 +224,17 @@ pub(crate) fn vectors_set() -> TrackSet {
 
 /// Walks of points, some of which stand still for a while.
 pub(crate) fn paths_set() -> TrackSet {
-    let mut random = Random(14);
+    let mut random = SeededRandom(14);
     let mut set = TrackSet::new();
     for track in 0..9 {
-        let (mut place, mut time) = (Vec3::ZERO, 0.0);
+        let (mut position, mut time) = (Vec3::ZERO, 0.0);
         let (mut times, mut points) = (Vec::new(), Vec::new());
         for point in 0..3 + track {
             times.push(time);
-            points.push(place);
+            points.push(position);
             time += random.between(0.3, 1.5);
             let step = Vec3::from_array([(); 3].map(|()| random.between(-3.0, 4.0) as f32));
-            place += if (track + point) % 7 == 5 {
+            position += if (track + point) % 7 == 5 {
                 Vec3::ZERO
             } else {
                 step
@@ -247,13 +247,13 @@ pub(crate) fn paths_set() -> TrackSet {
 }
 
 /// A point whose coordinates are at most `reach` from 0.
-fn point(random: &mut Random, reach: f64) -> Vec3 {
+fn point(random: &mut SeededRandom, reach: f64) -> Vec3 {
     Vec3::from_array([(); 3].map(|()| random.between(-reach, reach) as f32))
 }
 
 /// A skeleton whose joints hang from random ones before them; some are roots.
-fn skeleton(random: &mut Random, joints: usize) -> Skeleton {
-    let parent = |joint: usize, random: &mut Random| match random.below(8) {
+fn skeleton(random: &mut SeededRandom, joints: usize) -> Skeleton {
+    let parent = |joint: usize, random: &mut SeededRandom| match random.below(8) {
         0 => None,
         _ => (joint > 0).then(|| random.below(joint)),
     };
@@ -264,7 +264,7 @@ fn skeleton(random: &mut Random, joints: usize) -> Skeleton {
 
 /// Keys as games have them: most joints at the same times, some at fewer, some still; a few with
 /// translations and scales.
-fn joints_set(random: &mut Random, joints: usize, keys: usize) -> TrackSet {
+fn joints_set(random: &mut SeededRandom, joints: usize, keys: usize) -> TrackSet {
     let mut shared = Vec::new();
     let mut time = random.between(-1.0, 2.0);
     for _ in 0..keys {
@@ -302,7 +302,7 @@ fn joints_set(random: &mut Random, joints: usize, keys: usize) -> TrackSet {
 
 /// A library of a clip for each method, with masks, a reference pose and inverse bind matrices.
 pub(crate) fn crowd_library(
-    random: &mut Random,
+    random: &mut SeededRandom,
     joints: usize,
     methods: &[Method],
 ) -> Result<CrowdLibrary, CrowdError> {
@@ -341,7 +341,7 @@ pub(crate) fn crowd_library(
 }
 
 /// What a layer of an instance may play.
-pub(crate) fn crowd_layer(random: &mut Random, library: &CrowdLibrary) -> CrowdLayer {
+pub(crate) fn crowd_layer(random: &mut SeededRandom, library: &CrowdLibrary) -> CrowdLayer {
     CrowdLayer {
         clip: random.below(library.clips()),
         time: random.between(-3e6, 3e6) as i64,

@@ -1,7 +1,7 @@
-//! Crowds: what the engine evaluates of each clip alone, at each instance's own time, with the same
+//! Crowds: what the engine evaluates of each clip alone, at each instance's time, with the same
 //! bits on every device, in any second of any day.
 
-mod own_device;
+mod application_device;
 mod refusals;
 mod states;
 
@@ -9,8 +9,8 @@ use glam::{Affine3A, Quat, Vec3};
 use proptest::prelude::*;
 use tumble::{
     Crowd, CrowdError, CrowdLayer, CrowdLibrary, CrowdOutput, CrowdValues, Device, Engine,
-    EngineOptions, Frames, Layout, METHODS, Method, Skeleton, TrackSet, VectorMethod, VectorWidth,
-    WrapMode, method,
+    EngineOptions, Layout, METHODS, Method, SampleTimes, Skeleton, TrackSet, VectorMethod,
+    VectorWidth, WrapMode, method,
 };
 
 use crate::support::{Random, vulkan_devices};
@@ -36,7 +36,7 @@ pub(crate) fn skeleton(random: &mut Random, joints: usize) -> Skeleton {
     Skeleton::new(parents, offsets).unwrap()
 }
 
-/// Keys as games have them: most joints at the same times, some at times of their own, some still;
+/// Keys as games have them: most joints at the same times, some at other times, some constant;
 /// a few with translations and scales.
 pub(crate) fn clip(random: &mut Random, joints: usize, keys: usize) -> TrackSet {
     let mut shared = Vec::new();
@@ -50,7 +50,7 @@ pub(crate) fn clip(random: &mut Random, joints: usize, keys: usize) -> TrackSet 
     }
     let mut set = TrackSet::new();
     for joint in 0..joints {
-        let own: Vec<f64> = match random.next() % 5 {
+        let key_times: Vec<f64> = match random.next() % 5 {
             0 => shared.iter().step_by(3).copied().collect(),
             1 => shared
                 .iter()
@@ -62,15 +62,17 @@ pub(crate) fn clip(random: &mut Random, joints: usize, keys: usize) -> TrackSet 
         };
         let mut rotation = random.rotation();
         let mut rotations = Vec::new();
-        for _ in &own {
+        for _ in &key_times {
             rotations.push(rotation.as_quat());
-            let turn = glam::DQuat::from_axis_angle(random.direction(), random.between(0.0, 0.9));
-            rotation = (rotation * turn).normalize();
+            let step = glam::DQuat::from_axis_angle(random.direction(), random.between(0.0, 0.9));
+            rotation = (rotation * step).normalize();
         }
-        set.push(format!("{joint}"), &own, &rotations).unwrap();
+        set.push(format!("{joint}"), &key_times, &rotations)
+            .unwrap();
         let vectors = |random: &mut Random, from: f64, to: f64| -> Vec<Vec3> {
-            let own = shared.iter().step_by(2);
-            own.map(|_| (random.direction() * random.between(from, to)).as_vec3())
+            let times = shared.iter().step_by(2);
+            times
+                .map(|_| (random.direction() * random.between(from, to)).as_vec3())
                 .collect()
         };
         let times: Vec<f64> = shared.iter().step_by(2).copied().collect();
@@ -92,7 +94,7 @@ pub(crate) fn cpu() -> Engine {
 }
 
 pub(crate) fn bits(values: &[[f32; 4]]) -> Vec<[u32; 4]> {
-    values.iter().map(|own| own.map(f32::to_bits)).collect()
+    values.iter().map(|value| value.map(f32::to_bits)).collect()
 }
 
 pub(crate) fn evaluated(crowd: &mut Crowd, values: CrowdValues) -> Vec<[f32; 4]> {
@@ -128,7 +130,7 @@ fn every_tick_is_the_engines_frame() {
                 };
                 crowd.set(tick, 0, still.at(tick as i64)).unwrap();
             }
-            let frames = Frames::fps(TICKS);
+            let frames = SampleTimes::fps(TICKS);
             let layout = Layout::FrameMajor;
             let local = cpu()
                 .transforms(&set, method, vectors, &frames, layout)
@@ -140,10 +142,10 @@ fn every_tick_is_the_engines_frame() {
             let model = cpu().local_to_model(&local, &skeleton, None).unwrap();
             let found = evaluated(&mut crowd, CrowdValues::Model);
             let expected = model.as_arrays().as_flattened();
-            for (place, (found, expected)) in found.iter().zip(expected).enumerate() {
+            for (index, (found, expected)) in found.iter().zip(expected).enumerate() {
                 for (found, expected) in found.iter().zip(expected) {
                     let off = (found - expected).abs() / (1.0 + expected.abs());
-                    assert!(off < 2e-6, "{method}, {place}: {found}, {expected}");
+                    assert!(off < 2e-6, "{method}, {index}: {found}, {expected}");
                 }
             }
         }
@@ -153,10 +155,10 @@ fn every_tick_is_the_engines_frame() {
 /// A library of several clips, with masks, references and inverse bind matrices.
 pub(crate) fn library(random: &mut Random, joints: usize, methods: &[Method]) -> CrowdLibrary {
     let mut library = CrowdLibrary::new(&skeleton(random, joints)).unwrap();
-    for (place, &method) in methods.iter().enumerate() {
-        // What turns too wildly is refused, and leaves nothing behind.
-        while library.clips() == place {
-            let set = clip(random, joints, 2 + 3 * place);
+    for (index, &method) in methods.iter().enumerate() {
+        // A clip that rotates too far between keys is refused, and the library stays as it was.
+        while library.clips() == index {
+            let set = clip(random, joints, 2 + 3 * index);
             match library.push(&set, method, VectorMethod::CatmullRom) {
                 Ok(_) | Err(CrowdError::TooWild { .. }) => {}
                 Err(error) => panic!("{method}: {error}"),
@@ -246,18 +248,18 @@ fn every_device_has_the_bits_of_the_cpu() {
                 .filter(|_| step == 0 || random.next().is_multiple_of(5))
                 .collect();
             let plays: Vec<_> = (changed.into_iter())
-                .map(|place| (place, layer(&mut random, &library)))
+                .map(|slot| (slot, layer(&mut random, &library)))
                 .collect();
             let ticks = [0, 11_760, 1 << 33, 61_000_000_000][step];
             let mut expected: Vec<Vec<[u32; 4]>> = Vec::new();
             for (name, crowd) in &mut all {
-                for &(place, plays) in &plays {
-                    crowd.set(place / layers, place % layers, plays).unwrap();
+                for &(slot, plays) in &plays {
+                    crowd.set(slot / layers, slot % layers, plays).unwrap();
                 }
                 crowd.advance_ticks(ticks).unwrap();
-                for (place, values) in ALL.into_iter().enumerate() {
+                for (i, values) in ALL.into_iter().enumerate() {
                     let found = bits(&evaluated(crowd, values));
-                    match expected.get(place) {
+                    match expected.get(i) {
                         None => expected.push(found),
                         Some(expected) => {
                             let first = expected.iter().zip(&found).position(|(a, b)| a != b);
@@ -266,13 +268,13 @@ fn every_device_has_the_bits_of_the_cpu() {
                     }
                     let mut half = vec![[0; 4]; crowd.output_len(values)];
                     crowd.evaluate_half_into(values, &mut half).unwrap();
-                    let same = |(half, own): (&[u16; 4], &[u32; 4])| {
-                        (half.iter().zip(own)).all(|(&half, &own)| {
-                            let nearest = half::f16_bits(f32::from_bits(own));
+                    let same = |(half, single): (&[u16; 4], &[u32; 4])| {
+                        (half.iter().zip(single)).all(|(&half, &single)| {
+                            let nearest = half::f16_bits(f32::from_bits(single));
                             half == nearest
                         })
                     };
-                    let rounded = half.iter().zip(&expected[place]).all(same);
+                    let rounded = half.iter().zip(&expected[i]).all(same);
                     assert!(rounded, "{name}, {values:?} in 16 bits");
                 }
             }
@@ -281,7 +283,7 @@ fn every_device_has_the_bits_of_the_cpu() {
             assert!(
                 numbers
                     .into_iter()
-                    .all(|&own| f32::from_bits(own).is_finite())
+                    .all(|&bits| f32::from_bits(bits).is_finite())
             );
         }
     }
@@ -352,30 +354,30 @@ fn a_day_later_the_bits_are_those_of_the_first_second() {
     }
 }
 
-/// Many steps and one jump come to the same place; a time in the clip and the clock's are the same.
+/// Many steps and one jump give the same state; a time in the clip and the clock's are the same.
 #[test]
 fn steps_add_up_without_a_rounding() {
     let mut random = Random(13);
     let library = library(&mut random, 5, &[method::SLERP, method::BESSEL_OVERHAUSER]);
     let engine = cpu();
     let [mut slow, mut fast] = [0; 2].map(|_| engine.crowd(&library, 60, 2).unwrap());
-    for place in 0..120 {
+    for slot in 0..120 {
         let plays = layer(&mut random, &library);
         for crowd in [&mut slow, &mut fast] {
-            crowd.set(place / 2, place % 2, plays).unwrap();
+            crowd.set(slot / 2, slot % 2, plays).unwrap();
         }
     }
     for _ in 0..1000 {
         slow.advance(1.0 / 60.0).unwrap();
     }
     fast.advance_ticks(1000 * 11_760).unwrap();
-    let [a, b] = [&mut slow, &mut fast].map(|own| bits(&evaluated(own, CrowdValues::Local)));
+    let [a, b] = [&mut slow, &mut fast].map(|crowd| bits(&evaluated(crowd, CrowdValues::Local)));
     assert_eq!(a, b);
     // What `get` says, set again, changes nothing where speeds are whole.
-    for place in 0..120 {
-        let own = slow.get(place / 2, place % 2).unwrap();
-        if own.speed.fract() == 0.0 {
-            slow.set(place / 2, place % 2, own).unwrap();
+    for slot in 0..120 {
+        let layer = slow.get(slot / 2, slot % 2).unwrap();
+        if layer.speed.fract() == 0.0 {
+            slow.set(slot / 2, slot % 2, layer).unwrap();
         }
     }
     assert_eq!(bits(&evaluated(&mut slow, CrowdValues::Local)), a);
@@ -401,24 +403,25 @@ fn layers_are_mixed_and_added_as_poses_are() {
         wrap: WrapMode::Hold,
         ..CrowdLayer::new(clip)
     };
-    let own = [0, 1].map(|clip| {
+    let sources = [0, 1].map(|clip| {
         crowd.set(0, 0, still(clip).at(300_000)).unwrap();
         evaluated(&mut crowd, CrowdValues::Rotations)
     });
     crowd.set(0, 0, still(1)).unwrap();
     let reference = evaluated(&mut crowd, CrowdValues::Rotations);
-    let quats =
-        |own: &[[f32; 4]]| -> Vec<Quat> { own.iter().map(|&q| Quat::from_array(q)).collect() };
-    let rotations = |own: &[[f32; 4]]| {
+    let quats = |values: &[[f32; 4]]| -> Vec<Quat> {
+        values.iter().map(|&q| Quat::from_array(q)).collect()
+    };
+    let rotations = |values: &[[f32; 4]]| {
         let mut set = TrackSet::new();
-        for (joint, key) in quats(own).into_iter().enumerate() {
+        for (joint, key) in quats(values).into_iter().enumerate() {
             set.push(format!("{joint}"), &[0.0], &[key]).unwrap();
         }
         engine
-            .evaluate(&set, method::STEP, &Frames::at(vec![0.0]))
+            .evaluate(&set, method::STEP, &SampleTimes::at(vec![0.0]))
             .unwrap()
     };
-    let [below, above] = [&own[0], &own[1]].map(|own| rotations(own));
+    let [below, above] = [&sources[0], &sources[1]].map(|values| rotations(values));
     crowd.set(0, 0, still(0).at(300_000)).unwrap();
     for weight in [0.25, 0.5, 1.0] {
         let over = CrowdLayer {
@@ -496,7 +499,7 @@ fn submissions_are_taken_once() {
         crowd.wait_into(&mut found).unwrap();
         let moved: Vec<_> = (0..still.len()).filter(|&i| found[i] != still[i]).collect();
         assert!(
-            !moved.is_empty() && moved.iter().all(|place| place / 8 == 3),
+            !moved.is_empty() && moved.iter().all(|index| index / 8 == 3),
             "{name}: {moved:?}"
         );
     }

@@ -22,9 +22,9 @@ fn libraries_refuse_what_does_not_fit() {
     let none = Skeleton::new(vec![], vec![]).unwrap();
     assert_eq!(CrowdLibrary::new(&none).unwrap_err(), CrowdError::NoJoints);
     let single = Skeleton::chain(1, 1.0).unwrap();
-    for given in [0, u32::MAX] {
-        let refused = CrowdLibrary::with_ticks(&single, given).unwrap_err();
-        assert_eq!(refused, CrowdError::TicksPerSecond { given });
+    for ticks_per_second in [0, u32::MAX] {
+        let refused = CrowdLibrary::with_ticks(&single, ticks_per_second).unwrap_err();
+        assert_eq!(refused, CrowdError::TicksPerSecond { ticks_per_second });
     }
     let mut library = CrowdLibrary::new(&single).unwrap();
     assert_eq!(
@@ -36,7 +36,7 @@ fn libraries_refuse_what_does_not_fit() {
     assert_eq!(
         refused,
         CrowdError::Tracks {
-            given: 0,
+            tracks: 0,
             joints: 1
         }
     );
@@ -111,16 +111,16 @@ fn crowds_refuse_what_is_not_there_and_stay_as_they_were() {
         ("mask", CrowdLayer { mask, ..plays }),
         ("wrap", CrowdLayer { wrap, ..plays }),
     ];
-    for (what, plays) in hostile {
+    for (expected, plays) in hostile {
         let reason = crowd.set(1, 1, plays).unwrap_err();
         let found = match reason {
-            CrowdError::Missing { what, .. } => what,
+            CrowdError::Missing { subject, .. } => subject,
             CrowdError::Speed { .. } => "speed",
             CrowdError::Weight { .. } => "weight",
             CrowdError::Wrap { .. } => "wrap",
             _ => "something else",
         };
-        assert_eq!(found, what, "{reason}");
+        assert_eq!(found, expected, "{reason}");
         let good = CrowdLayer::new(0).at(5_555);
         let refused = crowd.set_all(&[(0, 0, good), (1, 1, plays), (9, 9, good)]);
         let refused = refused.unwrap_err().to_string();
@@ -136,10 +136,10 @@ fn crowds_refuse_what_is_not_there_and_stay_as_they_were() {
     let needed = crowd.output_len(CrowdValues::Model);
     let mut short = vec![[0.0; 4]; needed - 1];
     let refused = crowd.evaluate_into(CrowdValues::Model, &mut short);
-    let given = needed - 1;
+    let length = needed - 1;
     assert_eq!(
         refused.unwrap_err(),
-        CrowdError::OutputLength { given, needed }
+        CrowdError::OutputLength { length, needed }
     );
     assert_eq!(bits(&evaluated(&mut crowd, CrowdValues::Skinning)), before);
     let changes = [(0, 0, plays.at(9)), (2, 1, plays), (0, 0, plays.at(7_777))];

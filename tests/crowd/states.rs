@@ -36,7 +36,7 @@ fn library(random: &mut Random, joints: usize, method: Method) -> CrowdLibrary {
     library
 }
 
-struct Found {
+struct StateResults {
     rotations: Vec<[f32; 4]>,
     positions: Vec<[f32; 3]>,
     world_rotations: Vec<[f32; 4]>,
@@ -49,9 +49,9 @@ fn states(
     tables: &MotionTables,
     parts: (&[[u32; 4]], &[[f32; 4]]),
     at: &[(u32, u32)],
-) -> Found {
+) -> StateResults {
     let joints = at.len() * tables.joints();
-    let mut found = Found {
+    let mut found = StateResults {
         rotations: vec![[0.0; 4]; joints],
         positions: vec![[0.0; 3]; joints],
         world_rotations: vec![[0.0; 4]; joints],
@@ -71,10 +71,10 @@ fn states(
 
 /// Instances in every clip, within it, at its ends and behind.
 fn instances(random: &mut Random, tables: &MotionTables, count: usize) -> Vec<(u32, u32)> {
-    let one = |place: usize| {
-        let clip = place % tables.clips();
+    let one = |i: usize| {
+        let clip = i % tables.clips();
         let ticks = tables.ticks(clip).unwrap();
-        let tick = match place % 7 {
+        let tick = match i % 7 {
             0 => 0,
             1 => ticks,
             2 => ticks + 5,
@@ -162,19 +162,19 @@ fn rates_are_those_of_differences() {
         let four = |of: [f32; 4]| Quat::from_array(of).as_dquat();
         // At a key a rate may jump: a few samples have one between the two differences.
         let (mut compared, mut jumps) = (0, 0);
-        for place in 0..found.rotations.len() {
-            let rate = (three(after.positions[place]) - three(before.positions[place])) / seconds;
-            let velocity = three(found.velocities[place]);
+        for i in 0..found.rotations.len() {
+            let rate = (three(after.positions[i]) - three(before.positions[i])) / seconds;
+            let velocity = three(found.velocities[i]);
             let (a, b) = (
-                four(before.world_rotations[place]),
-                four(after.world_rotations[place]),
+                four(before.world_rotations[i]),
+                four(after.world_rotations[i]),
             );
-            let turn: DQuat = b * a.conjugate();
-            let turn = if turn.w < 0.0 { -turn } else { turn };
-            let turned: DVec3 = turn.to_scaled_axis() / seconds;
-            let angular = three(found.angular_velocities[place]);
+            let step: DQuat = b * a.conjugate();
+            let step = if step.w < 0.0 { -step } else { step };
+            let spin: DVec3 = step.to_scaled_axis() / seconds;
+            let angular = three(found.angular_velocities[i]);
             let is_near = (rate - velocity).length() <= 2e-3 * (1.0 + velocity.length())
-                && (turned - angular).length() <= 2e-3 * (1.0 + angular.length());
+                && (spin - angular).length() <= 2e-3 * (1.0 + angular.length());
             compared += usize::from(is_near);
             jumps += usize::from(!is_near);
         }
@@ -235,13 +235,13 @@ fn tables_come_back_from_words_and_broken_ones_are_refused() {
     for _ in 0..3000 {
         let mut broken = words.clone();
         let value = random.pick(&[0, 1, 2, 77, 1 << 24, 3 << 24, u32::MAX]);
-        let place = random.next() as usize;
+        let index = random.next() as usize;
         match random.next() % 5 {
-            0 => broken.clips[place % words.clips.len()][place % 3] = value,
-            1 => broken.bases[place % words.bases.len()][place % 3] = value,
-            2 => broken.channels[place % words.channels.len()][place % 4] = value,
+            0 => broken.clips[index % words.clips.len()][index % 3] = value,
+            1 => broken.bases[index % words.bases.len()][index % 3] = value,
+            2 => broken.channels[index % words.channels.len()][index % 4] = value,
             3 if !words.links.is_empty() => {
-                broken.links[place % words.links.len()][place % 2] = value;
+                broken.links[index % words.links.len()][index % 2] = value;
             }
             _ => broken.joints = value as usize % 9,
         }
@@ -254,7 +254,7 @@ fn tables_come_back_from_words_and_broken_ones_are_refused() {
     }
     let states = MotionStates::default();
     let missing = tables.sample_into(&engine, parts, &[(3, 0)], states);
-    assert!(matches!(missing, Err(CrowdError::Missing { given: 3, .. })));
+    assert!(matches!(missing, Err(CrowdError::Missing { index: 3, .. })));
     let states = MotionStates::default();
     let others = tables.sample_into(&engine, (&spans[1..], &cells), &[(0, 0)], states);
     assert_eq!(others, Err(CrowdError::BrokenTables));

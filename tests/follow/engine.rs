@@ -3,34 +3,47 @@
 use super::examples::{
     FIXED, FRENET, LOOP, MINIMAL, MINIMAL_AT_END, UP_AT_END, assert_rotation, c, following, k,
 };
-use crate::support::{Random, in_turn, vulkan_engines};
+use crate::support::{Random, round_robin, vulkan_engines};
 use crate::widths::paths;
 use glam::{DQuat, DVec3, Quat, Vec3};
-use tumble::reference::{self, Follower, Heading, Travel, VectorCurve, angle_between};
+use tumble::reference::{
+    self, Follower, FollowerDirection, FollowerSpeed, VectorCurve, angle_between,
+};
 use tumble::{
     Device, Direction, Ends, Engine, EngineOptions, Error, Follow, FollowError, FollowWarning,
-    Followed, Frame, Frames, Layout, PathSpeed, TrackError, TrackSet, Twist, VectorMethod,
+    Followed, Layout, PathFrame, PathSpeed, SampleTimes, TrackError, TrackSet, Twist, VectorMethod,
     VectorWidth,
 };
 
-fn set_of(own: &Follower) -> TrackSet {
+fn set_of(follower: &Follower) -> TrackSet {
     let mut set = TrackSet::new();
-    push(&mut set, own);
+    push(&mut set, follower);
     set
 }
 
-fn push(set: &mut TrackSet, own: &Follower) {
-    let keys: Vec<Vec3> = own.curve.keys.iter().map(|key| key.as_vec3()).collect();
-    let ups: Vec<Option<Vec3>> = own.ups.iter().map(|up| up.map(DVec3::as_vec3)).collect();
-    let track = set.push_path("", &own.curve.times, &keys, &ups).unwrap();
-    if !own.curve.tangents.is_empty() {
-        let tangents: Vec<[Vec3; 2]> = own
+fn push(set: &mut TrackSet, follower: &Follower) {
+    let keys: Vec<Vec3> = follower
+        .curve
+        .keys
+        .iter()
+        .map(|key| key.as_vec3())
+        .collect();
+    let ups: Vec<Option<Vec3>> = follower
+        .ups
+        .iter()
+        .map(|up| up.map(DVec3::as_vec3))
+        .collect();
+    let track = set
+        .push_path("", &follower.curve.times, &keys, &ups)
+        .unwrap();
+    if !follower.curve.tangents.is_empty() {
+        let tangents: Vec<[Vec3; 2]> = follower
             .curve
             .tangents
             .iter()
             .map(|both| both.map(DVec3::as_vec3))
             .collect();
-        set.set_translations(track, &own.curve.times, &keys, &tangents)
+        set.set_translations(track, &follower.curve.times, &keys, &tangents)
             .unwrap();
     }
 }
@@ -49,39 +62,44 @@ fn widths() -> Vec<Engine> {
     VectorWidth::available().into_iter().map(at).collect()
 }
 
-fn follow_of(own: &Follower) -> Follow {
+fn follow_of(follower: &Follower) -> Follow {
     Follow {
-        method: own.curve.method.parse().unwrap(),
-        ends: own.curve.ends,
-        direction: match own.heading {
-            Heading::Tangent => Direction::Tangent,
-            Heading::Ahead(distance) => Direction::Ahead(distance),
-            Heading::At(point) => Direction::Point(point),
+        method: follower.curve.method.parse().unwrap(),
+        ends: follower.curve.ends,
+        direction: match follower.heading {
+            FollowerDirection::Tangent => Direction::Tangent,
+            FollowerDirection::Ahead(distance) => Direction::Ahead(distance),
+            FollowerDirection::At(point) => Direction::Point(point),
         },
-        frame: match own.frame {
-            reference::Frame::Minimal => Frame::Minimal,
-            reference::Frame::Fixed => Frame::Fixed,
-            reference::Frame::Frenet => Frame::Frenet,
+        frame: match follower.frame {
+            reference::FollowerFrame::Minimal => PathFrame::Minimal,
+            reference::FollowerFrame::Fixed => PathFrame::Fixed,
+            reference::FollowerFrame::Frenet => PathFrame::Frenet,
         },
-        up: own.up,
-        twist: if own.spread {
+        up: follower.up,
+        twist: if follower.spread {
             Twist::Spread
         } else {
             Twist::Free
         },
-        speed: match own.travel {
-            Travel::Keys => PathSpeed::Keys,
-            Travel::Constant => PathSpeed::Constant,
-            Travel::Eased(start, end) => PathSpeed::Eased { start, end },
+        speed: match follower.travel {
+            FollowerSpeed::Keys => PathSpeed::Keys,
+            FollowerSpeed::Constant => PathSpeed::Constant,
+            FollowerSpeed::Eased(start, end) => PathSpeed::Eased { start, end },
         },
         ..Follow::default()
     }
 }
 
-fn at(own: &Follower, times: &[f64]) -> Followed {
-    let frames = Frames::at(times.to_vec());
+fn at(follower: &Follower, times: &[f64]) -> Followed {
+    let frames = SampleTimes::at(times.to_vec());
     cpu()
-        .follow(&set_of(own), &follow_of(own), &frames, Layout::TrackMajor)
+        .follow(
+            &set_of(follower),
+            &follow_of(follower),
+            &frames,
+            Layout::TrackMajor,
+        )
         .unwrap()
 }
 
@@ -91,30 +109,30 @@ fn rotation(found: &Followed, sample: usize) -> DQuat {
 
 #[test]
 fn examples_come_out() {
-    let own = k("bessel-overhauser", Ends::Parabolic);
-    let found = at(&own, &[1.75, 4.5]);
-    let place = found.positions.get(0, 0).unwrap();
-    assert!((place - Vec3::new(1.86875, 3.30625, 0.2375)).length() < 1e-6);
+    let follower = k("bessel-overhauser", Ends::Parabolic);
+    let found = at(&follower, &[1.75, 4.5]);
+    let position = found.positions.get(0, 0).unwrap();
+    assert!((position - Vec3::new(1.86875, 3.30625, 0.2375)).length() < 1e-6);
     assert_rotation(rotation(&found, 0), MINIMAL, 3e-7);
     assert_rotation(rotation(&found, 1), MINIMAL_AT_END, 3e-7);
     let with = |frame| Follower {
         frame,
-        ..own.clone()
+        ..follower.clone()
     };
     assert_rotation(
-        rotation(&at(&with(reference::Frame::Fixed), &[1.75]), 0),
+        rotation(&at(&with(reference::FollowerFrame::Fixed), &[1.75]), 0),
         FIXED,
         3e-7,
     );
     assert_rotation(
-        rotation(&at(&with(reference::Frame::Frenet), &[1.75]), 0),
+        rotation(&at(&with(reference::FollowerFrame::Frenet), &[1.75]), 0),
         FRENET,
         3e-7,
     );
     let mut ups = vec![None; 5];
     ups[4] = Some(DVec3::Y);
-    let given = Follower { ups, ..own };
-    assert_rotation(rotation(&at(&given, &[1.75]), 0), UP_AT_END, 3e-7);
+    let with_up = Follower { ups, ..follower };
+    assert_rotation(rotation(&at(&with_up, &[1.75]), 0), UP_AT_END, 3e-7);
     let round = at(&c(), &[2.5, 0.0, 5.0]);
     assert_rotation(rotation(&round, 0), LOOP, 3e-7);
     assert_eq!(round.rotations.get(0, 1), round.rotations.get(0, 2));
@@ -125,7 +143,7 @@ fn examples_come_out() {
     assert!((natural.as_dvec3() - DVec3::new(1.83366935, 3.51814516, 0.125)).length() < 1e-6);
 }
 
-/// The straight stretch between two bends: a quarter of the way it has turned by a quarter.
+/// The straight stretch between two bends: after a quarter of the length it has turned by a quarter of the angle.
 #[test]
 fn frenet_s_frame_turns_evenly_on_straight_stretches() {
     let (a, b) = (DVec3::Y, DVec3::new(0.0, -0.5, 0.75f64.sqrt()));
@@ -145,21 +163,21 @@ fn frenet_s_frame_turns_evenly_on_straight_stretches() {
     let mut tangents = tangents.to_vec();
     tangents[1] = [DVec3::X, DVec3::X * 4.0];
     tangents[2] = [DVec3::X * 4.0, DVec3::X];
-    let mut own = following(VectorCurve {
+    let mut follower = following(VectorCurve {
         method: "gltf-cubic",
         ends: Ends::Parabolic,
         times: vec![0.0, 1.0, 2.0, 3.0],
         keys: keys.to_vec(),
         tangents,
     });
-    own.frame = reference::Frame::Frenet;
-    let found = at(&own, &[1.0, 1.25, 2.0]);
+    follower.frame = reference::FollowerFrame::Frenet;
+    let found = at(&follower, &[1.0, 1.25, 2.0]);
     let y = |sample| rotation(&found, sample) * DVec3::Y;
     let quarter = 15f64.to_radians();
-    let turned = DVec3::new(0.0, quarter.cos(), -quarter.sin());
+    let expected = DVec3::new(0.0, quarter.cos(), -quarter.sin());
     let sign = y(0).y.signum();
     assert!((y(0) * sign - DVec3::Y).length() < 1e-6, "{}", y(0));
-    assert!((y(1) * sign - turned).length() < 1e-6, "{}", y(1));
+    assert!((y(1) * sign - expected).length() < 1e-6, "{}", y(1));
     assert!((y(2) * sign + b).length() < 1e-6, "{}", y(2));
 }
 
@@ -168,25 +186,30 @@ fn frenet_s_frame_turns_evenly_on_straight_stretches() {
 fn cusps_and_inflections() {
     let cusp = |t: f64| DVec3::new(t * t, t * t * t, 0.0);
     let slope = |t: f64| DVec3::new(2.0 * t, 3.0 * t * t, 0.0) * 2.0;
-    let mut own = following(VectorCurve {
+    let mut follower = following(VectorCurve {
         method: "gltf-cubic",
         ends: Ends::Parabolic,
         times: vec![0.0, 1.0],
         keys: vec![cusp(-1.0), cusp(1.0)],
         tangents: vec![[DVec3::ZERO, slope(-1.0)], [slope(1.0), DVec3::ZERO]],
     });
-    own.up = DVec3::Z;
-    let found = at(&own, &[0.49, 0.4999999, 0.5000001, 0.51]);
+    follower.up = DVec3::Z;
+    let found = at(&follower, &[0.49, 0.4999999, 0.5000001, 0.51]);
     for (sample, expected) in [(1, -DVec3::X), (2, DVec3::X)] {
         let forward = rotation(&found, sample) * DVec3::Z;
         assert!((forward - expected).length() < 1e-5, "{forward}");
         let up = rotation(&found, sample) * DVec3::Y;
         assert!((up - DVec3::Z).length() < 1e-6, "{up}");
     }
-    own.travel = Travel::Constant;
-    let frames = Frames::fps(240);
+    follower.travel = FollowerSpeed::Constant;
+    let frames = SampleTimes::fps(240);
     let found = cpu()
-        .follow(&set_of(&own), &follow_of(&own), &frames, Layout::TrackMajor)
+        .follow(
+            &set_of(&follower),
+            &follow_of(&follower),
+            &frames,
+            Layout::TrackMajor,
+        )
         .unwrap();
     let steps: Vec<f32> = (0..240)
         .map(|i| {
@@ -204,7 +227,7 @@ fn cusps_and_inflections() {
     );
     let slope = DVec3::new(2.0, 6.0, 0.0);
     let bend = Follower {
-        frame: reference::Frame::Frenet,
+        frame: reference::FollowerFrame::Frenet,
         ..super::examples::cubic(
             DVec3::new(-1.0, -1.0, 0.0),
             slope,
@@ -222,22 +245,22 @@ fn cusps_and_inflections() {
 /// Random walks that turn by up to about a right angle at each key.
 fn walk(random: &mut Random, method: &'static str, closed: bool) -> Follower {
     let count = 3 + (random.next() % 8) as usize;
-    let mut place = random.direction() * random.between(0.0, 20.0);
-    let mut way = random.direction();
+    let mut position = random.direction() * random.between(0.0, 20.0);
+    let mut direction = random.direction();
     let mut time = random.between(-1.0, 1.0);
     let (mut times, mut keys) = (Vec::new(), Vec::new());
     for _ in 0..count {
         times.push(time);
-        keys.push(place.as_vec3().as_dvec3());
+        keys.push(position.as_vec3().as_dvec3());
         let step = random.between(0.5, 2.0);
         time += step * random.between(0.7, 1.4);
-        way = (way + random.direction() * 0.8).normalize();
-        place += way * step;
+        direction = (direction + random.direction() * 0.8).normalize();
+        position += direction * step;
     }
     if closed {
-        let turn = |i: usize| std::f64::consts::TAU * i as f64 / count as f64;
+        let angle = |i: usize| std::f64::consts::TAU * i as f64 / count as f64;
         for (i, key) in keys.iter_mut().enumerate() {
-            let round = DVec3::new(turn(i).cos(), turn(i).sin(), 0.0) * 5.0;
+            let round = DVec3::new(angle(i).cos(), angle(i).sin(), 0.0) * 5.0;
             *key = (round + random.direction() * 0.6).as_vec3().as_dvec3();
         }
         keys.push(keys[0]);
@@ -252,7 +275,7 @@ fn walk(random: &mut Random, method: &'static str, closed: bool) -> Follower {
         tangents: Vec::new(),
     };
     let mut up = random.direction();
-    while up.dot(way).abs() > 0.9 {
+    while up.dot(direction).abs() > 0.9 {
         up = random.direction();
     }
     Follower {
@@ -266,7 +289,7 @@ fn walk(random: &mut Random, method: &'static str, closed: bool) -> Follower {
 fn followers_are_the_reference_s() {
     let mut random = Random(11);
     let (mut squares, mut count) = (0.0f64, 0.0f64);
-    let mut most = [0.0f64; 3];
+    let mut largest = [0.0f64; 3];
     for round in 0..60 {
         let method = [
             "bessel-overhauser",
@@ -275,55 +298,56 @@ fn followers_are_the_reference_s() {
             "catmull-rom",
             "linear",
         ][round % 5];
-        let mut own = walk(&mut random, method, round % 3 == 2);
-        own.frame = match round % 7 {
-            0 if method != "linear" => reference::Frame::Frenet,
-            3 => reference::Frame::Fixed,
-            _ => reference::Frame::Minimal,
+        let mut follower = walk(&mut random, method, round % 3 == 2);
+        follower.frame = match round % 7 {
+            0 if method != "linear" => reference::FollowerFrame::Frenet,
+            3 => reference::FollowerFrame::Fixed,
+            _ => reference::FollowerFrame::Minimal,
         };
-        own.heading = match round % 8 {
-            _ if own.frame == reference::Frame::Frenet => Heading::Tangent,
-            5 => Heading::Ahead(0.7),
-            6 => Heading::At(DVec3::new(40.0, 30.0, -20.0)),
-            _ => Heading::Tangent,
+        follower.heading = match round % 8 {
+            _ if follower.frame == reference::FollowerFrame::Frenet => FollowerDirection::Tangent,
+            5 => FollowerDirection::Ahead(0.7),
+            6 => FollowerDirection::At(DVec3::new(40.0, 30.0, -20.0)),
+            _ => FollowerDirection::Tangent,
         };
-        own.travel = match round % 4 {
-            1 => Travel::Constant,
-            2 => Travel::Eased(0.2, 0.3),
-            _ => Travel::Keys,
+        follower.travel = match round % 4 {
+            1 => FollowerSpeed::Constant,
+            2 => FollowerSpeed::Eased(0.2, 0.3),
+            _ => FollowerSpeed::Keys,
         };
-        if own.frame == reference::Frame::Minimal && round % 5 == 1 {
-            own.ups = own.curve.keys.iter().map(|_| None).collect();
-            own.ups[1] = Some(random.direction().as_vec3().as_dvec3());
+        if follower.frame == reference::FollowerFrame::Minimal && round % 5 == 1 {
+            follower.ups = follower.curve.keys.iter().map(|_| None).collect();
+            follower.ups[1] = Some(random.direction().as_vec3().as_dvec3());
         }
-        let walk = own.walk();
-        let times = &own.curve.times;
+        let walk = follower.walk();
+        let times = &follower.curve.times;
         let (first, last) = (times[0], times[times.len() - 1]);
         let samples: Vec<f64> = (0..150)
             .map(|i| first + (last - first) * (f64::from(i) + 0.37) / 150.0)
             .collect();
-        let found = at(&own, &samples);
-        let far = own
+        let found = at(&follower, &samples);
+        let scale = follower
             .curve
             .keys
             .iter()
-            .fold(0.0f64, |far, key| far.max(key.abs().max_element()));
+            .fold(0.0f64, |scale, key| scale.max(key.abs().max_element()));
         for (sample, &time) in samples.iter().enumerate() {
             if times.iter().any(|key| (key - time).abs() < 1e-6) {
                 continue;
             }
-            let (place, expected) = walk.pose(time);
-            let off = (found.positions.get(0, sample).unwrap().as_dvec3() - place).length() / far;
-            let turned = angle_between(rotation(&found, sample), expected);
+            let (position, expected) = walk.pose(time);
+            let off =
+                (found.positions.get(0, sample).unwrap().as_dvec3() - position).length() / scale;
+            let angle = angle_between(rotation(&found, sample), expected);
             let aside = (rotation(&found, sample) * DVec3::Z).angle_between(expected * DVec3::Z);
-            most = [most[0].max(off), most[1], most[2].max(aside)];
+            largest = [largest[0].max(off), largest[1], largest[2].max(aside)];
             assert!(
                 off < 2e-7,
                 "{round} {method} at {time}: position off by {off:e}"
             );
             // Where the point ahead passes a corner, the direction's derivative jumps, and a step of the
             // reference's integration errs by as much.
-            let ahead = matches!(own.heading, Heading::Ahead(_));
+            let ahead = matches!(follower.heading, FollowerDirection::Ahead(_));
             let bound = if ahead && method == "linear" {
                 5e-6
             } else {
@@ -334,14 +358,14 @@ fn followers_are_the_reference_s() {
                 "{round} {method} at {time}: forward off by {aside:e}"
             );
             assert!(
-                turned < bound,
-                "{round} {method} {:?} {:?} at {time}: {turned:e}",
-                own.frame,
-                own.heading
+                angle < bound,
+                "{round} {method} {:?} {:?} at {time}: {angle:e}",
+                follower.frame,
+                follower.heading
             );
             if bound == 1e-6 {
-                most[1] = most[1].max(turned);
-                squares += turned * turned;
+                largest[1] = largest[1].max(angle);
+                squares += angle * angle;
                 count += 1.0;
             }
         }
@@ -349,7 +373,7 @@ fn followers_are_the_reference_s() {
     let rms = (squares / count).sqrt();
     eprintln!(
         "positions {:.2e}, rotations {:.2e} (rms {rms:.2e}), forward {:.2e}",
-        most[0], most[1], most[2]
+        largest[0], largest[1], largest[2]
     );
     assert!(rms < 1e-7, "{rms:e}");
 }
@@ -361,16 +385,16 @@ pub(super) fn trouble() -> TrackSet {
     for track in 0..9 {
         let count = 1 + track % 9;
         let mut time = random.between(-1.0, 1.0);
-        let mut place = DVec3::ZERO;
+        let mut position = DVec3::ZERO;
         let (mut times, mut keys) = (Vec::new(), Vec::new());
         for key in 0..count {
             times.push(time);
-            keys.push(place.as_vec3());
+            keys.push(position.as_vec3());
             time += random.pick(&[1e-4, 0.1, 1.0, 3.0]);
-            place += match (track + key) % 6 {
+            position += match (track + key) % 6 {
                 0 => DVec3::ZERO,
                 1 => DVec3::Y * random.between(-2.0, 2.0),
-                2 => -place,
+                2 => -position,
                 3 => DVec3::X,
                 _ => random.direction() * random.pick(&[1e-6, 1.0, 300.0]),
             };
@@ -390,16 +414,16 @@ pub(super) fn trouble() -> TrackSet {
 }
 
 fn bits(found: &Followed) -> Vec<u32> {
-    let places = found
+    let positions = found
         .positions
         .as_slice()
         .iter()
         .flat_map(glam::Vec4::to_array);
-    let turns = found.rotations.as_quats().iter().flat_map(Quat::to_array);
-    places.chain(turns).map(f32::to_bits).collect()
+    let rotations = found.rotations.as_quats().iter().flat_map(Quat::to_array);
+    positions.chain(rotations).map(f32::to_bits).collect()
 }
 
-pub(super) fn manners() -> Vec<Follow> {
+pub(super) fn option_sets() -> Vec<Follow> {
     let mut all = Vec::new();
     let directions = [
         Direction::Tangent,
@@ -417,8 +441,8 @@ pub(super) fn manners() -> Vec<Follow> {
     ];
     for (i, direction) in directions.into_iter().enumerate() {
         for (j, speed) in speeds.into_iter().enumerate() {
-            for frame in [Frame::Minimal, Frame::Fixed, Frame::Frenet] {
-                if frame == Frame::Frenet && i > 0 {
+            for frame in [PathFrame::Minimal, PathFrame::Fixed, PathFrame::Frenet] {
+                if frame == PathFrame::Frenet && i > 0 {
                     continue;
                 }
                 let method = VectorMethod::ALL[(i + j + all.len()) % 7];
@@ -435,44 +459,44 @@ pub(super) fn manners() -> Vec<Follow> {
     all
 }
 
-/// The set without what this manner refuses.
-pub(super) fn taken(set: &TrackSet, follow: &Follow) -> TrackSet {
-    let mut own = TrackSet::new();
+/// The set without the tracks that these options refuse.
+pub(super) fn accepted(set: &TrackSet, follow: &Follow) -> TrackSet {
+    let mut subset = TrackSet::new();
     for track in 0..set.track_count() {
         let keys = set
             .vector_keys(tumble::Channel::Translation, track)
             .unwrap();
         let ups = match follow.frame {
-            Frame::Minimal if track % 5 == 0 => (0..keys.keys.len())
+            PathFrame::Minimal if track % 5 == 0 => (0..keys.keys.len())
                 .map(|key| (key % 2 == 1).then_some(Vec3::Z))
                 .collect(),
             _ => Vec::new(),
         };
-        own.push_path("", keys.times, keys.keys, &ups).unwrap();
+        subset.push_path("", keys.times, keys.keys, &ups).unwrap();
     }
-    own
+    subset
 }
 
 /// Every rotation is one, at every moment of every path, and all devices and widths give the same.
 #[test]
 fn the_same_bits_on_every_device() {
     let set = trouble();
-    let frames = Frames::fps(50).between(-2.0, 9.0);
+    let frames = SampleTimes::fps(50).between(-2.0, 9.0);
     let devices = vulkan_engines(|_| {});
     let widths = widths();
-    for (i, follow) in manners().into_iter().enumerate() {
-        let own = taken(&set, &follow);
+    for (i, follow) in option_sets().into_iter().enumerate() {
+        let subset = accepted(&set, &follow);
         let layout = [Layout::TrackMajor, Layout::FrameMajor][i % 2];
-        let expected = cpu().follow(&own, &follow, &frames, layout).unwrap();
+        let expected = cpu().follow(&subset, &follow, &frames, layout).unwrap();
         for &rotation in expected.rotations.as_quats() {
             let norm = rotation.as_dquat().length();
             assert!((norm - 1.0).abs() < 6e-7, "{follow:?}: {rotation:?} {norm}");
         }
         let expected = bits(&expected);
         // What takes long is to prepare the paths, again for each.
-        for engine in in_turn(&devices, i + i / 3).chain([&widths[i % widths.len()]]) {
+        for engine in round_robin(&devices, i + i / 3).chain([&widths[i % widths.len()]]) {
             assert!(
-                bits(&engine.follow(&own, &follow, &frames, layout).unwrap()) == expected,
+                bits(&engine.follow(&subset, &follow, &frames, layout).unwrap()) == expected,
                 "{follow:?}, {engine:?}"
             );
         }
@@ -483,28 +507,28 @@ fn the_same_bits_on_every_device() {
 #[test]
 fn paths_are_followed_together_as_alone() {
     let set = paths();
-    let own = Follow::default();
+    let base = Follow::default();
     let follows = [
-        own.clone(),
+        base.clone(),
         Follow {
             axes: ["x", "-z"].map(|axis| axis.parse().unwrap()),
-            ..own.clone()
+            ..base.clone()
         },
         Follow {
             speed: PathSpeed::Constant,
-            ..own.clone()
+            ..base.clone()
         },
         Follow {
-            frame: Frame::Fixed,
+            frame: PathFrame::Fixed,
             direction: Direction::Point(DVec3::new(0.0, 2.0, 9.0)),
-            ..own.clone()
+            ..base.clone()
         },
         Follow {
-            frame: Frame::Frenet,
-            ..own
+            frame: PathFrame::Frenet,
+            ..base
         },
     ];
-    let frames = Frames::fps(100).between(-0.1, 12.1);
+    let frames = SampleTimes::fps(100).between(-0.1, 12.1);
     let found = |engine: &Engine, set: &TrackSet, follow: &Follow| {
         bits(
             &engine
@@ -519,8 +543,8 @@ fn paths_are_followed_together_as_alone() {
         let tracks = positions.len() / 23;
         for track in 0..23 {
             let alone = found(&cpu(), &set.select([track]).unwrap(), &follow);
-            let own = track * tracks..(track + 1) * tracks;
-            let expected = [&positions[own.clone()], &rotations[own]].concat();
+            let range = track * tracks..(track + 1) * tracks;
+            let expected = [&positions[range.clone()], &rotations[range]].concat();
             assert!(alone == expected, "{track}, {follow:?}");
         }
     }
@@ -531,11 +555,11 @@ fn paths_are_followed_together_as_alone() {
 #[test]
 fn a_body_looks_at_another() {
     let mut random = Random(8);
-    let own = walk(&mut random, "bessel-overhauser", false);
+    let follower = walk(&mut random, "bessel-overhauser", false);
     let other = walk(&mut random, "bessel-overhauser", false);
     let away = |key: &DVec3| (*key + DVec3::splat(60.0)).as_vec3();
     let keys: Vec<Vec3> = other.curve.keys.iter().map(away).collect();
-    let mut set = set_of(&own);
+    let mut set = set_of(&follower);
     set.push_path("", &other.curve.times, &keys, &[]).unwrap();
     let eased = PathSpeed::Eased {
         start: 0.4,
@@ -546,7 +570,7 @@ fn a_body_looks_at_another() {
             speed,
             ..Follow::default()
         };
-        let frames = Frames::fps(60);
+        let frames = SampleTimes::fps(60);
         let at = |direction| {
             let follow = Follow {
                 direction,
@@ -567,11 +591,11 @@ fn a_body_looks_at_another() {
             at(Direction::Tangent).unwrap(),
         );
         for sample in 0..found.rotations.samples() {
-            let place = |track| found.positions.get(track, sample).unwrap().as_dvec3();
+            let position = |track| found.positions.get(track, sample).unwrap().as_dvec3();
             let forward = found.rotations.get(0, sample).unwrap().as_dquat() * DVec3::Z;
-            let off = (forward - (place(1) - place(0)).normalize()).length();
+            let off = (forward - (position(1) - position(0)).normalize()).length();
             assert!(off < 1e-6, "{speed:?} {sample}: {off:e}");
-            // The other one faces along its own path.
+            // The other body faces along its path.
             assert_eq!(
                 found.rotations.get(1, sample),
                 plain.rotations.get(1, sample)
@@ -601,7 +625,7 @@ fn what_cannot_be_followed_is_refused() {
         let mut set = TrackSet::new();
         let times: Vec<f64> = (0..keys.len()).map(|i| i as f64).collect();
         set.push_path("", &times, keys, &[]).unwrap();
-        let frames = Frames::at(vec![0.5]);
+        let frames = SampleTimes::at(vec![0.5]);
         cpu()
             .follow(&set, &Follow::default(), &frames, Layout::TrackMajor)
             .unwrap()
@@ -614,11 +638,15 @@ fn what_cannot_be_followed_is_refused() {
     }
 
     let set = set_of(&k("bessel-overhauser", Ends::Parabolic));
-    let refused =
-        |follow: Follow| match cpu().follow(&set, &follow, &Frames::fps(1), Layout::TrackMajor) {
-            Err(Error::Follow(error)) => error,
-            other => panic!("{other:?}"),
-        };
+    let refused = |follow: Follow| match cpu().follow(
+        &set,
+        &follow,
+        &SampleTimes::fps(1),
+        Layout::TrackMajor,
+    ) {
+        Err(Error::Follow(error)) => error,
+        other => panic!("{other:?}"),
+    };
     let base = Follow::default;
     assert!(matches!(
         refused(Follow {
@@ -652,7 +680,7 @@ fn what_cannot_be_followed_is_refused() {
         FollowError::Eased { .. }
     ));
     let aside = Follow {
-        frame: Frame::Frenet,
+        frame: PathFrame::Frenet,
         direction: Direction::Ahead(1.0),
         ..base()
     };
@@ -661,20 +689,25 @@ fn what_cannot_be_followed_is_refused() {
     assert_eq!(refused(Follow { axes, ..base() }), FollowError::Axes);
     let mut rotations = TrackSet::new();
     rotations.push("", &[0.0], &[Quat::IDENTITY]).unwrap();
-    let error = cpu().follow(&rotations, &base(), &Frames::fps(1), Layout::TrackMajor);
+    let error = cpu().follow(
+        &rotations,
+        &base(),
+        &SampleTimes::fps(1),
+        Layout::TrackMajor,
+    );
     assert!(matches!(
         error,
         Err(Error::Follow(FollowError::NoPath { track: 0 }))
     ));
 }
 
-/// Up along the direction is no up, and half a turn left over may go either way.
+/// An up direction along the path is ignored with a warning, and so is a leftover of half a turn, whose sign is arbitrary.
 #[test]
 fn what_is_unusual_is_said() {
     let keys = [Vec3::ZERO, Vec3::Y, Vec3::Y * 2.0];
     let mut set = TrackSet::new();
     set.push_path("", &[0.0, 1.0, 2.0], &keys, &[]).unwrap();
-    let frames = Frames::at(vec![0.0, 1.5]);
+    let frames = SampleTimes::at(vec![0.0, 1.5]);
     let found = cpu()
         .follow(&set, &Follow::default(), &frames, Layout::TrackMajor)
         .unwrap();
@@ -691,11 +724,11 @@ fn what_is_unusual_is_said() {
     assert_eq!(found.warnings, [FollowWarning::HalfTurn { track: 0 }]);
 }
 
-/// Renamed axes turn the body in its own frame.
+/// Renamed axes rotate the body in its local frame.
 #[test]
 fn other_axes_face_forward() {
     let set = set_of(&k("bessel-overhauser", Ends::Parabolic));
-    let frames = Frames::at(vec![1.75]);
+    let frames = SampleTimes::at(vec![1.75]);
     let of = |forward: &str, up: &str| {
         let axes = [forward.parse().unwrap(), up.parse().unwrap()];
         let follow = Follow {
@@ -709,7 +742,7 @@ fn other_axes_face_forward() {
             .get(0, 0)
             .unwrap()
     };
-    let (usual, other) = (of("z", "y"), of("-x", "z"));
-    assert!((usual * Vec3::Z + other * Vec3::X).length() < 1e-6);
-    assert!((usual * Vec3::Y - other * Vec3::Z).length() < 1e-6);
+    let (default_rotation, other) = (of("z", "y"), of("-x", "z"));
+    assert!((default_rotation * Vec3::Z + other * Vec3::X).length() < 1e-6);
+    assert!((default_rotation * Vec3::Y - other * Vec3::Z).length() < 1e-6);
 }

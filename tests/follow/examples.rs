@@ -3,7 +3,9 @@
 use glam::{DQuat, DVec3};
 use std::f64::consts::{PI, TAU};
 use tumble::Ends;
-use tumble::reference::{Followed, Follower, Frame, Heading, Travel, VectorCurve, eased};
+use tumble::reference::{
+    Follower, FollowerDirection, FollowerFrame, FollowerSpeed, FollowerWalk, VectorCurve, eased,
+};
 
 fn vectors(keys: &[[f64; 3]]) -> Vec<DVec3> {
     keys.iter().map(|&key| DVec3::from_array(key)).collect()
@@ -37,7 +39,7 @@ pub(super) fn c() -> Follower {
         [-1, 1, 0],
         [0, 0, 0],
     ];
-    let own = following(VectorCurve {
+    let follower = following(VectorCurve {
         method: "bessel-overhauser",
         ends: Ends::Loop,
         times: (0..6).map(f64::from).collect(),
@@ -48,19 +50,19 @@ pub(super) fn c() -> Follower {
     });
     Follower {
         spread: true,
-        ..own
+        ..follower
     }
 }
 
 pub(super) fn following(curve: VectorCurve) -> Follower {
     Follower {
         curve,
-        heading: Heading::Tangent,
-        frame: Frame::Minimal,
+        heading: FollowerDirection::Tangent,
+        frame: FollowerFrame::Minimal,
         up: DVec3::Y,
         ups: Vec::new(),
         spread: false,
-        travel: Travel::Keys,
+        travel: FollowerSpeed::Keys,
     }
 }
 
@@ -80,7 +82,7 @@ fn closed(point: impl Fn(f64) -> DVec3) -> Follower {
     let count = 400;
     let at = |i: i32| TAU * f64::from(i) / f64::from(count);
     let slope = |t: f64| (point(t + 1e-5) - point(t - 1e-5)) / 2e-5;
-    let own = following(VectorCurve {
+    let follower = following(VectorCurve {
         method: "gltf-cubic",
         ends: Ends::Parabolic,
         times: (0..=count).map(at).collect(),
@@ -89,7 +91,7 @@ fn closed(point: impl Fn(f64) -> DVec3) -> Follower {
     });
     Follower {
         spread: true,
-        ..own
+        ..follower
     }
 }
 
@@ -119,7 +121,7 @@ fn assert_angle(found: f64, expected: f64, bound: f64) {
     assert!(off.abs() < bound, "{found} instead of {expected}");
 }
 
-fn axes(walk: &Followed<'_>, time: f64) -> [DVec3; 3] {
+fn axes(walk: &FollowerWalk<'_>, time: f64) -> [DVec3; 3] {
     let (_, rotation) = walk.pose(time);
     [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| rotation * axis)
 }
@@ -133,23 +135,34 @@ pub(super) const LOOP: [f64; 4] = [0.281688536, -0.27308274, 0.0516313436, 0.918
 
 #[test]
 fn the_path_of_five_keys() {
-    let own = k("bessel-overhauser", Ends::Parabolic);
-    let walk = own.walk();
+    let follower = k("bessel-overhauser", Ends::Parabolic);
+    let walk = follower.walk();
     assert_near(walk.pose(1.75).0, [1.86875, 3.30625, 0.2375], 1e-9);
     assert!((walk.length() - 12.115_238_5).abs() < 5e-8);
     assert_rotation(walk.pose(1.75).1, MINIMAL, 2e-9);
     assert_rotation(walk.pose(4.5).1, MINIMAL_AT_END, 2e-9);
     let with = |frame| Follower {
         frame,
-        ..own.clone()
+        ..follower.clone()
     };
-    assert_rotation(with(Frame::Fixed).walk().pose(1.75).1, FIXED, 2e-9);
-    assert_rotation(with(Frame::Frenet).walk().pose(1.75).1, FRENET, 2e-9);
+    assert_rotation(with(FollowerFrame::Fixed).walk().pose(1.75).1, FIXED, 2e-9);
+    assert_rotation(
+        with(FollowerFrame::Frenet).walk().pose(1.75).1,
+        FRENET,
+        2e-9,
+    );
     let mut ups = vec![None; 5];
     ups[4] = Some(DVec3::Y);
-    let given = Follower { ups, ..own.clone() };
-    assert_rotation(given.walk().pose(1.75).1, UP_AT_END, 2e-9);
-    assert_near(given.walk().pose(4.5).1 * DVec3::X, [-0.67, 0.0, 0.0], 2.0);
+    let with_up = Follower {
+        ups,
+        ..follower.clone()
+    };
+    assert_rotation(with_up.walk().pose(1.75).1, UP_AT_END, 2e-9);
+    assert_near(
+        with_up.walk().pose(4.5).1 * DVec3::X,
+        [-0.67, 0.0, 0.0],
+        2.0,
+    );
 }
 
 #[test]
@@ -165,8 +178,8 @@ fn splines_with_continuous_curvature() {
 
 #[test]
 fn a_closed_path() {
-    let own = c();
-    let walk = own.walk();
+    let follower = c();
+    let walk = follower.walk();
     assert_rotation(walk.pose(2.5).1, LOOP, 2e-9);
     assert!(
         (walk.left_over - 0.0272464337).abs() < 1e-9,
@@ -179,11 +192,11 @@ fn a_closed_path() {
 
 #[test]
 fn frenet_s_frame() {
-    let own = Follower {
-        frame: Frame::Frenet,
+    let follower = Follower {
+        frame: FollowerFrame::Frenet,
         ..cubic(DVec3::ZERO, DVec3::X, DVec3::new(1.0, 2.0, 3.0), DVec3::ONE)
     };
-    let [u, v, w] = axes(&own.walk(), 0.5);
+    let [u, v, w] = axes(&follower.walk(), 0.5);
     assert_near(w, [0.624695048, 0.624695048, 0.468521286], 2e-9);
     assert_near(u, [0.38411064, -0.76822128, 0.51214752], 2e-9);
     assert_near(v, [0.679864041, -0.139972008, -0.719856043], 2e-9);
@@ -194,8 +207,8 @@ fn frenet_s_frame() {
 #[test]
 fn frenet_s_frame_past_an_inflection() {
     let slope = DVec3::new(2.0, 6.0, 0.0);
-    let own = Follower {
-        frame: Frame::Frenet,
+    let follower = Follower {
+        frame: FollowerFrame::Frenet,
         ..cubic(
             DVec3::new(-1.0, -1.0, 0.0),
             slope,
@@ -203,7 +216,7 @@ fn frenet_s_frame_past_an_inflection() {
             DVec3::new(1.0, 1.0, 0.0),
         )
     };
-    let walk = own.walk();
+    let walk = follower.walk();
     let lectured = |t: f64| {
         let [_, velocity, bend] =
             [t.powi(3), 3.0 * t * t, 6.0 * t].map(|y| DVec3::new(0.0, y, 0.0));
@@ -226,12 +239,12 @@ fn the_fixed_frame() {
         keys,
         tangents: vec![],
     };
-    let own = Follower {
-        frame: Frame::Fixed,
+    let follower = Follower {
+        frame: FollowerFrame::Fixed,
         ..following(curve)
     };
     let expected = [0.880476239, -0.279848142, 0.3647052, 0.115916896];
-    assert_rotation(own.walk().pose(0.3).1, expected, 2e-9);
+    assert_rotation(follower.walk().pose(0.3).1, expected, 2e-9);
 }
 
 /// A helix turns by its torsion; closed curves by all of theirs.
@@ -271,20 +284,20 @@ fn what_is_left_over_after_a_round() {
 #[test]
 fn lengths() {
     let of = |start, leaving, arriving, end| {
-        let own = cubic(
+        let follower = cubic(
             DVec3::from_array(start),
             DVec3::from_array(leaving),
             DVec3::from_array(arriving),
             DVec3::from_array(end),
         );
-        own.walk().length()
+        follower.walk().length()
     };
     let parabola = of([0.0; 3], [1.0, 0.0, 0.0], [1.0, 2.0, 0.0], [1.0, 1.0, 0.0]);
     assert!((parabola - 1.4789428575).abs() < 1e-9);
     let twisted = cubic(DVec3::ZERO, DVec3::X, DVec3::new(1.0, 2.0, 3.0), DVec3::ONE);
     assert!((twisted.walk().length() - 1.8630229825).abs() < 1e-9);
     let steady = Follower {
-        travel: Travel::Constant,
+        travel: FollowerSpeed::Constant,
         ..twisted
     };
     assert!((steady.walk().pose(0.5).0.x - 0.67967939055).abs() < 1e-9);

@@ -1,10 +1,10 @@
 //! Smoothing: worked examples, the bounds, and the same bits on every device.
 
-use crate::support::{Random, first_difference, in_turn, vulkan_engines};
+use crate::support::{Random, first_difference, round_robin, vulkan_engines};
 use glam::{DQuat, DVec3, Quat, Vec3};
 use tumble::reference::angle_between;
 use tumble::{
-    Channel, Device, Engine, Error, Frames, Interpolation, Layout, Rotations, Smoothing,
+    Channel, Device, Engine, Error, Interpolation, Layout, Rotations, SampleTimes, Smoothing,
     SmoothingEnds, SmoothingError, SmoothingKernel, TrackSet, VectorMethod, Vectors, method,
 };
 
@@ -28,9 +28,9 @@ fn rotations(engine: &Engine, tracks: &[Vec<Quat>], layout: Layout) -> Rotations
     for track in tracks {
         set.push("", &seconds(track.len()), track).unwrap();
     }
-    let frames = Frames::fps(1);
+    let frames = SampleTimes::fps(1);
     let as_authored = Interpolation {
-        path: tumble::Path::AsAuthored,
+        signs: tumble::KeySigns::AsAuthored,
         ..method::STEP.into()
     };
     engine
@@ -44,7 +44,7 @@ fn vectors(engine: &Engine, tracks: &[Vec<Vec3>], layout: Layout) -> Vectors {
         set.push_path("", &seconds(track.len()), track, &[])
             .unwrap();
     }
-    let (frames, step) = (Frames::fps(1), VectorMethod::Step);
+    let (frames, step) = (SampleTimes::fps(1), VectorMethod::Step);
     engine
         .vectors(
             &set,
@@ -59,13 +59,13 @@ fn vectors(engine: &Engine, tracks: &[Vec<Vec3>], layout: Layout) -> Vectors {
 
 fn smoothed_numbers(name: &str, ends: SmoothingEnds, values: &[f32]) -> Vec<f32> {
     let engine = cpu();
-    let own: Vec<Vec3> = values.iter().map(|&y| Vec3::new(0.0, y, 0.0)).collect();
-    let given = vectors(&engine, &[own], Layout::TrackMajor);
+    let track: Vec<Vec3> = values.iter().map(|&y| Vec3::new(0.0, y, 0.0)).collect();
+    let input = vectors(&engine, &[track], Layout::TrackMajor);
     let smoothing = Smoothing {
         ends,
         ..Smoothing::new(kernel(name))
     };
-    let found = engine.smooth_vectors(&given, &smoothing).unwrap();
+    let found = engine.smooth_vectors(&input, &smoothing).unwrap();
     (0..values.len())
         .map(|i| found.get(0, i).unwrap().y)
         .collect()
@@ -125,9 +125,9 @@ fn q() -> Vec<Quat> {
 fn rotations_of_the_examples() {
     let engine = cpu();
     let of = |name: &str, track: Vec<Quat>| {
-        let given = rotations(&engine, &[track], Layout::TrackMajor);
+        let input = rotations(&engine, &[track], Layout::TrackMajor);
         engine
-            .smooth(&given, &Smoothing::new(kernel(name)))
+            .smooth(&input, &Smoothing::new(kernel(name)))
             .unwrap()
     };
     let third = of("linear", q()).get(0, 2).unwrap().as_dquat();
@@ -170,8 +170,8 @@ fn tracks(random: &mut Random, samples: usize) -> Vec<Vec<Quat>> {
     let track = |wild: f64, random: &mut Random| {
         let mut rotation = random.rotation();
         let mut next = || {
-            let turn = DQuat::from_axis_angle(random.direction(), random.between(0.0, wild));
-            rotation = (rotation * turn).normalize();
+            let step = DQuat::from_axis_angle(random.direction(), random.between(0.0, wild));
+            rotation = (rotation * step).normalize();
             rotation.as_quat() * if random.unit() < 0.2 { -1.0 } else { 1.0 }
         };
         (0..samples).map(|_| next()).collect()
@@ -216,8 +216,8 @@ fn by_the_book(weights: &[f64], track: &[DQuat], ends: SmoothingEnds) -> Vec<DQu
         } else {
             1.0
         };
-        let turn = sum * sinc;
-        track[i] * DQuat::from_xyzw(turn.x, turn.y, turn.z, angle.cos())
+        let axis = sum * sinc;
+        track[i] * DQuat::from_xyzw(axis.x, axis.y, axis.z, angle.cos())
     };
     (0..track.len()).map(smoothed).collect()
 }
@@ -234,14 +234,14 @@ fn rotations_are_smoothed_by_the_book() {
     for samples in [2, 3, 4, 40] {
         for name in ["linear", "box:2.25"] {
             for ends in [SmoothingEnds::Keep, SmoothingEnds::Loop] {
-                let given = tracks(&mut random, samples);
+                let input = tracks(&mut random, samples);
                 let smoothing = Smoothing {
                     ends,
                     ..Smoothing::new(kernel(name))
                 };
-                let own = rotations(&engine, &given, Layout::FrameMajor);
-                let found = engine.smooth(&own, &smoothing).unwrap();
-                for (track, keys) in given.iter().enumerate() {
+                let evaluated = rotations(&engine, &input, Layout::FrameMajor);
+                let found = engine.smooth(&evaluated, &smoothing).unwrap();
+                for (track, keys) in input.iter().enumerate() {
                     let keys: Vec<DQuat> =
                         keys.iter().map(|key| key.as_dquat().normalize()).collect();
                     // Where steps of nearly half a turn change their sign, rounding decides.
@@ -267,8 +267,8 @@ fn the_same_bits_on_every_device() {
     let engines = vulkan_engines(|options| options.memory = Some(1 << 20));
     let mut round = 0;
     for samples in [1, 2, 3, 4, 9, 700] {
-        let given = tracks(&mut random, samples);
-        let places: Vec<Vec<Vec3>> = given
+        let input = tracks(&mut random, samples);
+        let positions: Vec<Vec<Vec3>> = input
             .iter()
             .map(|track| {
                 track
@@ -290,16 +290,16 @@ fn the_same_bits_on_every_device() {
                         kernel: kernel(name),
                     };
                     let on = |engine: &Engine| {
-                        let turns =
-                            engine.smooth(&rotations(&cpu(), &given, layout), &smoothing)?;
-                        let moved =
-                            engine.smooth_vectors(&vectors(&cpu(), &places, layout), &smoothing)?;
+                        let smoothed =
+                            engine.smooth(&rotations(&cpu(), &input, layout), &smoothing)?;
+                        let moved = engine
+                            .smooth_vectors(&vectors(&cpu(), &positions, layout), &smoothing)?;
                         let moved: Vec<Quat> = moved
                             .as_slice()
                             .iter()
                             .map(|v| Quat::from_vec4(*v))
                             .collect();
-                        Ok::<_, Error>((turns.as_quats().to_vec(), moved))
+                        Ok::<_, Error>((smoothed.as_quats().to_vec(), moved))
                     };
                     if ends == SmoothingEnds::Parabolic && name != "cubic" {
                         assert!(matches!(
@@ -310,7 +310,7 @@ fn the_same_bits_on_every_device() {
                     }
                     let expected = on(&cpu()).unwrap();
                     round += 1;
-                    for engine in in_turn(&engines, round) {
+                    for engine in round_robin(&engines, round) {
                         let found = on(engine).unwrap();
                         assert_eq!(
                             first_difference(&found.0, &expected.0),
@@ -350,22 +350,22 @@ fn still_tracks_keep_their_bits_and_even_motion_stays() {
             ..Smoothing::new(kernel(name))
         };
         let of = |track: &[Quat]| {
-            let given = rotations(&engine, &[track.to_vec()], Layout::TrackMajor);
+            let input = rotations(&engine, &[track.to_vec()], Layout::TrackMajor);
             (
-                given.as_quats().to_vec(),
+                input.as_quats().to_vec(),
                 engine
-                    .smooth(&given, &smoothing)
+                    .smooth(&input, &smoothing)
                     .unwrap()
                     .as_quats()
                     .to_vec(),
             )
         };
-        let (given, found) = of(&still);
-        assert_eq!(first_difference(&found, &given), None, "{name}");
-        let places = vectors(&engine, std::slice::from_ref(&line), Layout::TrackMajor);
-        let moved = engine.smooth_vectors(&places, &smoothing).unwrap();
-        for (i, place) in line.iter().enumerate().skip(13).take(4) {
-            assert_eq!(moved.get(0, i), Some(*place), "{name}");
+        let (input, found) = of(&still);
+        assert_eq!(first_difference(&found, &input), None, "{name}");
+        let positions = vectors(&engine, std::slice::from_ref(&line), Layout::TrackMajor);
+        let moved = engine.smooth_vectors(&positions, &smoothing).unwrap();
+        for (i, position) in line.iter().enumerate().skip(13).take(4) {
+            assert_eq!(moved.get(0, i), Some(*position), "{name}");
         }
         let (_, found) = of(&even);
         for i in 13..17 {
@@ -382,21 +382,21 @@ fn still_tracks_keep_their_bits_and_even_motion_stays() {
 fn smoothing_turns_with_its_samples() {
     let engine = cpu();
     let mut random = Random(9);
-    let given = tracks(&mut random, 50)[2].clone();
+    let input = tracks(&mut random, 50)[2].clone();
     let (left, right) = (random.rotation(), random.rotation());
-    let turned = |q: &Quat| (left * q.as_dquat() * right).as_quat();
+    let rotated = |q: &Quat| (left * q.as_dquat() * right).as_quat();
     for name in KERNELS {
         let of = |track: Vec<Quat>| {
-            let own = rotations(&engine, &[track], Layout::TrackMajor);
+            let evaluated = rotations(&engine, &[track], Layout::TrackMajor);
             engine
-                .smooth(&own, &Smoothing::new(kernel(name)))
+                .smooth(&evaluated, &Smoothing::new(kernel(name)))
                 .unwrap()
                 .as_quats()
                 .to_vec()
         };
-        let (plain, other) = (of(given.clone()), of(given.iter().map(turned).collect()));
+        let (plain, other) = (of(input.clone()), of(input.iter().map(rotated).collect()));
         for (plain, other) in plain.iter().zip(other) {
-            let off = angle_between(turned(plain).as_dquat(), other.as_dquat());
+            let off = angle_between(rotated(plain).as_dquat(), other.as_dquat());
             assert!(off < 2e-6, "{name}: {off:e}");
         }
     }
@@ -414,8 +414,10 @@ fn about_one_axis_it_is_the_scalar_filter() {
             .iter()
             .map(|&angle| Quat::from_rotation_x(angle))
             .collect();
-        let own = rotations(&engine, &[track], Layout::TrackMajor);
-        let found = engine.smooth(&own, &Smoothing::new(kernel(name))).unwrap();
+        let evaluated = rotations(&engine, &[track], Layout::TrackMajor);
+        let found = engine
+            .smooth(&evaluated, &Smoothing::new(kernel(name)))
+            .unwrap();
         for (i, &angle) in numbers.iter().enumerate() {
             let expected = DQuat::from_rotation_x(f64::from(angle));
             let off = angle_between(found.get(0, i).unwrap().as_dquat(), expected);

@@ -1,5 +1,5 @@
-//! Compiles the engine's kernels with whatever driver this process was given, and writes down what
-//! became of them. Run in a process of its own, because a driver reads its environment once.
+//! Compiles the engine's kernels with the driver of this process, and writes the results into
+//! files. Runs in a separate process, because a driver reads its environment once.
 #![allow(unsafe_code)] // a device that the engine does not open: it cannot compute
 
 use std::ffi::CStr;
@@ -24,12 +24,12 @@ pub(super) const REPRESENTATION: &str = "#### ";
 #[ignore = "compiles for the driver of its environment; run by the tests of mesa::radv"]
 fn every_kernel() {
     let folder = PathBuf::from(std::env::var_os(FOLDER).expect("set by the test that runs it"));
-    let wanted = std::env::var(KERNELS).ok();
+    let requested = std::env::var(KERNELS).ok();
     let is_bare = std::env::var_os(BARE).is_some();
     let compiler = Compiler::new();
     for (name, code) in tumble::kernels() {
-        if let Some(wanted) = &wanted
-            && !wanted.split(' ').any(|kernel| kernel == name)
+        if let Some(requested) = &requested
+            && !requested.split(' ').any(|kernel| kernel == name)
         {
             continue;
         }
@@ -194,15 +194,18 @@ impl Compiler {
             get(handle, &raw const of, &raw mut count, all.as_mut_ptr())
                 .result()
                 .unwrap();
-            let mut bytes: Vec<Vec<u8>> = all.iter().map(|own| vec![0; own.data_size]).collect();
-            for (own, bytes) in all.iter_mut().zip(&mut bytes) {
-                own.p_data = bytes.as_mut_ptr().cast();
+            let mut bytes: Vec<Vec<u8>> = all
+                .iter()
+                .map(|representation| vec![0; representation.data_size])
+                .collect();
+            for (representation, bytes) in all.iter_mut().zip(&mut bytes) {
+                representation.p_data = bytes.as_mut_ptr().cast();
             }
             get(handle, &raw const of, &raw mut count, all.as_mut_ptr())
                 .result()
                 .unwrap();
-            for (own, bytes) in all.iter().zip(&bytes) {
-                let name = own.name_as_c_str().unwrap().to_str().unwrap();
+            for (representation, bytes) in all.iter().zip(&bytes) {
+                let name = representation.name_as_c_str().unwrap().to_str().unwrap();
                 let words = CStr::from_bytes_until_nul(bytes).unwrap().to_string_lossy();
                 write!(text, "{REPRESENTATION}{name}\n{words}\n").unwrap();
             }

@@ -18,7 +18,7 @@ pub(super) enum Generation {
 pub(super) struct Listing {
     statistics: BTreeMap<String, u64>,
     instructions: Vec<String>,
-    /// The place in `instructions` that each label stands before.
+    /// The index in `instructions` that each label stands before.
     labels: BTreeMap<String, usize>,
 }
 
@@ -40,21 +40,21 @@ impl Listing {
             let lines = representations.get(name).copied().unwrap_or_default();
             Self::of_lines(lines.lines())
         };
-        let mut own = of("Assembly");
-        if own.vector_instructions() == 0 {
-            own = of("ACO IR");
+        let mut listing = of("Assembly");
+        if listing.vector_instructions() == 0 {
+            listing = of("ACO IR");
         }
         assert!(
-            own.vector_instructions() > 0,
+            listing.vector_instructions() > 0,
             "no instructions in {:?}",
             representations.keys()
         );
-        own.statistics = statistics.collect();
-        own
+        listing.statistics = statistics.collect();
+        listing
     }
 
     fn of_lines<'a>(lines: impl Iterator<Item = &'a str>) -> Self {
-        let mut own = Self {
+        let mut listing = Self {
             statistics: BTreeMap::new(),
             instructions: Vec::new(),
             labels: BTreeMap::new(),
@@ -63,8 +63,8 @@ impl Listing {
             let line = line.split(';').next().unwrap_or_default().trim();
             let first = line.split([' ', ':']).next().unwrap_or_default();
             if first.strip_prefix("BB").is_some_and(is_number) {
-                let place = own.instructions.len();
-                own.labels.insert(first.to_owned(), place);
+                let index = listing.instructions.len();
+                listing.labels.insert(first.to_owned(), index);
                 continue;
             }
             let instruction = match line.rsplit_once(" = ") {
@@ -72,10 +72,10 @@ impl Listing {
                 None => line.to_owned(),
             };
             if instruction.starts_with(|letter: char| letter.is_ascii_lowercase()) {
-                own.instructions.push(instruction);
+                listing.instructions.push(instruction);
             }
         }
-        own
+        listing
     }
 
     pub(super) fn statistic(&self, name: &str) -> u64 {
@@ -91,23 +91,23 @@ impl Listing {
     /// sample takes where a kernel walks over the samples of an item, or evaluates one.
     pub(super) fn vector_instructions_a_sample(&self) -> usize {
         let mut loops = Vec::new();
-        for (place, instruction) in self.instructions.iter().enumerate() {
+        for (index, instruction) in self.instructions.iter().enumerate() {
             let (_, operands) = instruction.split_once("branch").unwrap_or_default();
             let words = operands.split(|letter: char| !letter.is_ascii_alphanumeric());
             let targets = words.filter_map(|word| self.labels.get(word));
             loops.extend(
                 targets
-                    .filter(|&&start| start <= place)
-                    .map(|&start| start..place),
+                    .filter(|&&start| start <= index)
+                    .map(|&start| start..index),
             );
         }
-        let is_innermost = |own: &&std::ops::Range<usize>| {
-            let mut others = loops.iter().filter(|other| other != own);
-            !others.any(|other| own.start <= other.start && other.end <= own.end)
+        let is_innermost = |range: &&std::ops::Range<usize>| {
+            let mut others = loops.iter().filter(|other| other != range);
+            !others.any(|other| range.start <= other.start && other.end <= range.end)
         };
         let lengths = loops.iter().filter(is_innermost);
         lengths
-            .map(|own| count_vector(&self.instructions[own.clone()]))
+            .map(|range| count_vector(&self.instructions[range.clone()]))
             .max()
             .unwrap_or_else(|| self.vector_instructions())
     }
@@ -142,7 +142,7 @@ fn count_vector(instructions: &[String]) -> usize {
     instructions.iter().filter(is_vector).count()
 }
 
-/// Whether an instruction gives the bits that the shader's own operations give: it is not one on
+/// Whether an instruction gives the bits that the shader's operations give: it is not one on
 /// floats, or it rounds once what the shader rounds once. A list of what is allowed, so that what
 /// nobody thought of is refused.
 fn is_exact(instruction: &str, generation: Generation) -> bool {
@@ -163,7 +163,11 @@ fn is_exact(instruction: &str, generation: Generation) -> bool {
         return false;
     }
     let operands: Vec<&str> = operands.split(',').map(str::trim).collect();
-    let is_power = |place: usize| operands.get(place).is_some_and(|own| is_power_of_two(own));
+    let is_power = |i: usize| {
+        operands
+            .get(i)
+            .is_some_and(|operand| is_power_of_two(operand))
+    };
     match name {
         "add_f32" | "sub_f32" | "subrev_f32" | "mul_f32" => true,
         // One of its operands, and so does not round: made of a comparison and a selection, which
@@ -248,7 +252,7 @@ fn the_loop_over_samples_is_found() {
     let listing = Listing::of_lines(text.lines());
     assert_eq!(listing.vector_instructions(), 4);
     assert_eq!(listing.vector_instructions_a_sample(), 2);
-    // The compiler's own text.
+    // Text of the compiler.
     let text = "BB1\n/* logical preds: BB0 */\n\tv1: %5:v[1] = v_add_f32 %3:v[1], %4:v[2]\n\t\
                 v1: %6:v[3] = v_fmamk_f32 %3:v[1], %4:v[2], 0x40000000\n\t\
                 v1: %7:v[4] = v_fma_f32 %3:v[1], %4:v[2], 2.0\n\t\

@@ -12,12 +12,12 @@ use std::process::Command;
 
 /// The manifest of a driver of the newer Mesa. CI must have it where there is such a package.
 fn newer(driver: &str) -> Option<PathBuf> {
-    let place = Path::new(env!("CARGO_MANIFEST_DIR")).join("target/mesa");
-    let manifest = place.join(format!("{driver}_icd.json"));
-    if place.join("complete").exists() && manifest.exists() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("target/mesa");
+    let manifest = folder.join(format!("{driver}_icd.json"));
+    if folder.join("complete").exists() && manifest.exists() {
         return Some(manifest);
     }
-    let reason = std::fs::read_to_string(place.join("unavailable"));
+    let reason = std::fs::read_to_string(folder.join("unavailable"));
     assert!(
         reason.is_ok() || std::env::var_os("CI").is_none(),
         "CI must have the newer Mesa: scripts/mesa.sh unpacks it into target/mesa"

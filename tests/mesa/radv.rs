@@ -1,5 +1,5 @@
-//! AMD's real compiler over every kernel, for six families of processors in turn, without one of them:
-//! told a family (`RADV_FORCE_FAMILY`), Mesa's RADV makes a device that cannot compute, and
+//! AMD's real compiler over every kernel, for six families of processors, none of which need be there:
+//! with `RADV_FORCE_FAMILY` set, Mesa's RADV makes a device that cannot compute, and
 //! compiles for it. What it made is read, and every instruction on floats must round as the shader
 //! says.
 //!
@@ -13,7 +13,7 @@ use super::compile::child;
 use super::listing::{Generation, Listing};
 use super::table::{self, Cost};
 use super::{newer, with_driver};
-use crate::support::is_turn;
+use crate::support::is_due;
 use rayon::prelude::*;
 
 /// A family of processors.
@@ -44,8 +44,8 @@ const FAMILIES: [Family; 6] = [
 ];
 
 /// A processor with so many vector registers for an invocation keeps at least a quarter of the
-/// waves that it can hold (polaris10 to navi31, waves of 64).
-const MOST_REGISTERS: u64 = 128;
+/// waves that fit (polaris10 to navi31, waves of 64).
+const MAX_REGISTERS: u64 = 128;
 
 /// RADV as the system has it.
 fn system() -> Option<PathBuf> {
@@ -112,10 +112,10 @@ fn divisions(kernel: &str) -> usize {
         .chunks_exact(4)
         .map(|word| u32::from_le_bytes(word.try_into().unwrap()));
     let words: Vec<u32> = words.collect();
-    let (mut place, mut found) = (5, 0);
-    while let Some(&word) = words.get(place) {
+    let (mut offset, mut found) = (5, 0);
+    while let Some(&word) = words.get(offset) {
         found += usize::from([DIVISION, REMAINDER].contains(&(word & 0xffff)));
-        place += (word >> 16).max(1) as usize;
+        offset += (word >> 16).max(1) as usize;
     }
     found
 }
@@ -126,7 +126,7 @@ fn faults(kernel: &str, listing: &Listing, generation: Generation) -> Vec<String
     let mut left = [divisions(kernel); 2];
     for instruction in listing.inexact(generation) {
         let of_division = ["rcp_", "cvt_u32_f32"].map(|part| instruction.contains(part));
-        let of_division = of_division.into_iter().position(|own| own);
+        let of_division = of_division.into_iter().position(|is_found| is_found);
         match of_division.map(|part| &mut left[part]) {
             Some(left) if *left > 0 => *left -= 1,
             _ => faults.push(format!("`{instruction}` is not exact")),
@@ -139,54 +139,58 @@ fn faults(kernel: &str, listing: &Listing, generation: Generation) -> Vec<String
         }
     }
     let registers = listing.statistic("VGPRs");
-    if registers > MOST_REGISTERS {
+    if registers > MAX_REGISTERS {
         faults.push(format!("{registers} vector registers"));
     }
     faults
 }
 
-/// It is the turn of every third family for each kernel: the newer compiler compiles it for a
+/// Each kernel is due on every third family: the newer compiler compiles it for a
 /// processor of the older kind and for one of the newer, the system's for one or two. Those of the table
 /// are compiled for all.
 #[test]
 fn every_kernel_is_exact_on_families_in_turn() {
     let newer = newer("radeon");
-    let newer_families = FAMILIES.iter().map(|own| (own, Some(own.name), &newer));
+    let newer_families = FAMILIES
+        .iter()
+        .map(|family| (family, Some(family.name), &newer));
     let system = system();
-    let older_families = FAMILIES.iter().map(|own| (own, own.older, &system));
+    let older_families = FAMILIES
+        .iter()
+        .map(|family| (family, family.older, &system));
     let asked: Vec<(&Family, &str, &Path)> = newer_families
         .chain(older_families)
-        .filter_map(|(own, name, manifest)| Some((own, name?, manifest.as_deref()?)))
+        .filter_map(|(family, name, manifest)| Some((family, name?, manifest.as_deref()?)))
         .collect();
     let in_table = table::kernels();
     let of_all: Vec<_> = asked
         .into_par_iter()
         .enumerate()
-        .map(|(round, (own, name, manifest))| {
-            let is_next = |place: usize, kernel: &str| {
-                is_turn(round, place, 3) || in_table.iter().any(|own| own == kernel)
+        .map(|(round, (family, name, manifest))| {
+            let is_next = |i: usize, kernel: &str| {
+                is_due(round, i, 3) || in_table.iter().any(|listed| listed == kernel)
             };
             let kernels = tumble::kernels().map(|(kernel, _)| kernel).enumerate();
-            let kernels = kernels.filter(|(place, kernel)| is_next(*place, kernel));
+            let kernels = kernels.filter(|(i, kernel)| is_next(*i, kernel));
             let kernels: Vec<&str> = kernels.map(|(_, kernel)| kernel).collect();
-            (own, manifest, compiled(manifest, name, &kernels, false))
+            (family, manifest, compiled(manifest, name, &kernels, false))
         })
         .collect();
     let mut wrong = Vec::new();
     let mut costs = BTreeMap::new();
-    for (own, manifest, listings) in &of_all {
-        assert!(listings.len() > 50, "{}: {}", own.name, listings.len());
+    for (family, manifest, listings) in &of_all {
+        assert!(listings.len() > 50, "{}: {}", family.name, listings.len());
         for (kernel, listing) in listings {
-            for fault in faults(kernel, listing, own.generation) {
+            for fault in faults(kernel, listing, family.generation) {
                 let manifest = manifest.display();
-                wrong.push(format!("{} ({manifest}), {kernel}: {fault}", own.name));
+                wrong.push(format!("{} ({manifest}), {kernel}: {fault}", family.name));
             }
             if newer.as_deref() == Some(manifest) {
                 let cost = Cost {
                     instructions: listing.vector_instructions_a_sample(),
                     registers: listing.statistic("VGPRs"),
                 };
-                costs.insert((kernel.clone(), own.name), cost);
+                costs.insert((kernel.clone(), family.name), cost);
             }
         }
     }

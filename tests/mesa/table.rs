@@ -28,12 +28,12 @@ fn cells(line: &str) -> Vec<&str> {
 /// The kernels that the table has.
 pub(super) fn kernels() -> Vec<String> {
     let text = std::fs::read_to_string(page()).unwrap();
-    let own = text
+    let lines = text
         .lines()
         .skip_while(|line| !line.starts_with(HEAD))
         .skip(2);
-    let own = own.take_while(|line| line.starts_with('|'));
-    own.map(|line| cells(line)[0].to_owned()).collect()
+    let lines = lines.take_while(|line| line.starts_with('|'));
+    lines.map(|line| cells(line)[0].to_owned()).collect()
 }
 
 /// Compares the table with what was measured, by kernel and family; returns what is wrong with it.
@@ -49,19 +49,19 @@ pub(super) fn check(measured: &BTreeMap<(String, &str), Cost>) -> Vec<String> {
         .collect();
     let mut wrong = Vec::new();
     let mut rows = 0;
-    let own = lines[head + 2..].iter_mut();
-    for line in own.take_while(|line| line.starts_with('|')) {
+    let rows_after = lines[head + 2..].iter_mut();
+    for line in rows_after.take_while(|line| line.starts_with('|')) {
         rows += 1;
-        let told = cells(line);
-        let kernel = told[0].to_owned();
+        let documented = cells(line);
+        let kernel = documented[0].to_owned();
         let mut row = format!("| `{kernel}` |");
-        for (family, told) in families.iter().zip(&told[1..]) {
+        for (family, documented) in families.iter().zip(&documented[1..]) {
             let Some(&found) = measured.get(&(kernel.clone(), family)) else {
                 wrong.push(format!("docs/gpu.md: there is no {kernel} for {family}"));
                 continue;
             };
             row += &format!(" {}, {} |", found.instructions, found.registers);
-            if let Some(why) = differs(told, found) {
+            if let Some(why) = differs(documented, found) {
                 wrong.push(format!("docs/gpu.md: {kernel} for {family}: {why}"));
             }
         }
@@ -75,22 +75,24 @@ pub(super) fn check(measured: &BTreeMap<(String, &str), Cost>) -> Vec<String> {
     wrong
 }
 
-/// Why a cell does not tell what was measured. Another version of the compiler may differ by a
+/// Why a cell of the table differs from what was measured. Another version of the compiler may differ by a
 /// little; a bound that is far above what is measured bounds nothing.
-fn differs(told: &str, found: Cost) -> Option<String> {
-    let numbers = told.split_once(", ");
+fn differs(documented: &str, found: Cost) -> Option<String> {
+    let numbers = documented.split_once(", ");
     let numbers = numbers.and_then(|(a, b)| Some((a.parse().ok()?, b.parse().ok()?)));
     let Some((instructions, registers)): Option<(usize, u64)> = numbers else {
-        return Some(format!("`{told}` is not instructions and registers"));
+        return Some(format!("`{documented}` is not instructions and registers"));
     };
-    let is_near = |told: f64, found: f64| (0.9 * told - 2.0..=1.02 * told + 1.0).contains(&found);
+    let is_near = |documented: f64, found: f64| {
+        (0.9 * documented - 2.0..=1.02 * documented + 1.0).contains(&found)
+    };
     let instructions_are_near = is_near(instructions as f64, found.instructions as f64);
     // Registers are allocated by eights.
     let registers_are_near = found.registers.abs_diff(registers) <= 8;
     match instructions_are_near && registers_are_near {
         true => None,
         false => Some(format!(
-            "{found:?}, not {told} (UPDATE_RADV=1 writes what is measured)"
+            "{found:?}, not {documented} (UPDATE_RADV=1 writes what is measured)"
         )),
     }
 }
@@ -101,12 +103,12 @@ fn a_cell_that_is_not_measured_is_refused() {
         instructions: 100,
         registers: 72,
     };
-    for told in ["100, 72", "105, 80", "98, 64"] {
-        assert_eq!(differs(told, found), None);
+    for documented in ["100, 72", "105, 80", "98, 64"] {
+        assert_eq!(differs(documented, found), None);
     }
-    for told in [
+    for documented in [
         "90, 72", "130, 72", "100, 48", "100, 128", "100", "", "x, y",
     ] {
-        assert!(differs(told, found).is_some(), "{told}");
+        assert!(differs(documented, found).is_some(), "{documented}");
     }
 }

@@ -42,7 +42,7 @@ impl Application {
                 let only_copies = flags.contains(Flags::TRANSFER) && !flags.intersects(others);
                 only_copies && family.queue_count > 0
             };
-            let copy_family = families.iter().position(copies).map(|place| place as u32);
+            let copy_family = families.iter().position(copies).map(|index| index as u32);
             let of_family = |family| {
                 vk::DeviceQueueCreateInfo::default()
                     .queue_family_index(family)
@@ -132,12 +132,12 @@ impl Application {
             let types = self
                 .instance
                 .get_physical_device_memory_properties(self.physical_device);
-            let wanted =
+            let required =
                 vk::MemoryPropertyFlags::HOST_VISIBLE | vk::MemoryPropertyFlags::HOST_COHERENT;
             let index = (0..types.memory_type_count)
                 .find(|&i| {
                     let flags = types.memory_types[i as usize].property_flags;
-                    needs.memory_type_bits & 1 << i != 0 && flags.contains(wanted)
+                    needs.memory_type_bits & 1 << i != 0 && flags.contains(required)
                 })
                 .unwrap();
             let info = vk::MemoryAllocateInfo::default()
@@ -165,7 +165,7 @@ impl Application {
 
 impl Drop for Application {
     fn drop(&mut self) {
-        // SAFETY: the engine and its clips are gone.
+        // SAFETY: the engine and its clips are dropped.
         unsafe {
             self.device.destroy_device(None);
             self.instance.destroy_instance(None);
@@ -207,8 +207,8 @@ impl<'a> Commands<'a> {
     /// Submits several without a wait between them, then waits.
     pub(crate) fn run(&self, all: &[vk::CommandBuffer]) {
         for &commands in all {
-            let own = [commands];
-            let submit = [vk::SubmitInfo::default().command_buffers(&own)];
+            let buffers = [commands];
+            let submit = [vk::SubmitInfo::default().command_buffers(&buffers)];
             let fence = vk::Fence::null();
             let _lock = self.application.queue_lock.lock().unwrap();
             // SAFETY: whoever uses the queue has its lock.

@@ -9,11 +9,11 @@ use crate::support::{lavapipe, vulkan_devices};
 
 const CHROMIUM: &str = "/usr/lib/chromium/libVkLayer_khronos_validation.so";
 
-/// A validation layer, told what to check, that says what it finds on standard output.
+/// A validation layer with its settings, which prints its messages on standard output.
 pub(crate) struct Layer {
     pub(crate) name: &'static str,
     folder: tempfile::TempDir,
-    own_manifest: bool,
+    has_manifest: bool,
     /// The one driver to run with; else all there are.
     driver: Option<PathBuf>,
     pub(crate) planted: &'static [(&'static str, &'static str)],
@@ -49,7 +49,7 @@ impl Layer {
         let layer = Self {
             name: "the system's layer",
             folder: tempfile::tempdir().unwrap(),
-            own_manifest: false,
+            has_manifest: false,
             driver: None,
             planted: &[CORE, OLD_SYNCHRONIZATION],
         };
@@ -69,12 +69,12 @@ impl Layer {
         let layer = Self {
             name,
             folder: tempfile::tempdir().unwrap(),
-            own_manifest: true,
+            has_manifest: true,
             // Checks on the device need buffer addresses, which SwiftShader has not.
             driver: on_device.then(lavapipe).flatten(),
             planted,
         };
-        // What it says of its own settings is no fault.
+        // Its messages about its settings are no faults.
         let filter = "message_id_filter = VALIDATION-SETTINGS,WARNING-Setting-Limit-Adjusted";
         match on_device {
             true => layer.settings(&["validate_core = false", "gpuav_enable = true", filter]),
@@ -111,7 +111,7 @@ impl Layer {
         command
             .env("VK_INSTANCE_LAYERS", "VK_LAYER_KHRONOS_validation")
             .env("VK_LAYER_SETTINGS_PATH", self.folder.path());
-        if self.own_manifest {
+        if self.has_manifest {
             command.env("VK_LAYER_PATH", self.folder.path());
         }
         if let Some(driver) = &self.driver {

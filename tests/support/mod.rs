@@ -6,7 +6,7 @@ use std::sync::{Mutex, PoisonError};
 
 use glam::{DQuat, DVec3, Quat};
 use tumble::{
-    Device, Engine, EngineOptions, Frames, Mapping, ReadBack, Reads, Tcb, TrackSet, Transfer,
+    Device, Engine, EngineOptions, Mapping, ReadBack, Reads, SampleTimes, Tcb, TrackSet, Transfer,
     Uploads,
 };
 
@@ -27,8 +27,8 @@ pub fn vulkan_devices() -> Vec<Device> {
     devices
 }
 
-/// How kernels read, and what an invocation takes.
-pub const WAYS: [(Reads, Mapping); 3] = [
+/// How kernels read their input, and whether an invocation evaluates runs or single samples.
+pub const KERNEL_OPTIONS: [(Reads, Mapping); 3] = [
     (Reads::StorageBuffers, Mapping::Runs),
     (Reads::TexelBuffers, Mapping::Runs),
     (Reads::StorageBuffers, Mapping::Samples),
@@ -41,29 +41,29 @@ pub const STAGED: [(Uploads, ReadBack); 3] = [
     (Uploads::Staged, ReadBack::Overlapped),
 ];
 
-/// Results are staged, in each turn by the next of [`STAGED`].
-pub fn stage(options: &mut EngineOptions, turn: usize) {
+/// Stages results, in each round by the next of [`STAGED`].
+pub fn stage(options: &mut EngineOptions, round: usize) {
     options.transfer = Transfer::Staged;
-    (options.uploads, options.read_back) = STAGED[turn % STAGED.len()];
+    (options.uploads, options.read_back) = STAGED[round % STAGED.len()];
 }
 
-/// [`WAYS`], or the first alone where `TUMBLE_TEST_ONE_WAY` is set: for drivers that are tried beside those of
+/// [`KERNEL_OPTIONS`], or the first alone where `TUMBLE_TEST_ONE_WAY` is set: for drivers that are tried beside those of
 /// the system.
-fn ways() -> &'static [(Reads, Mapping)] {
+fn kernel_options() -> &'static [(Reads, Mapping)] {
     match std::env::var_os("TUMBLE_TEST_ONE_WAY") {
-        Some(_) => &WAYS[..1],
-        None => &WAYS,
+        Some(_) => &KERNEL_OPTIONS[..1],
+        None => &KERNEL_OPTIONS,
     }
 }
 
-/// Every Vulkan device in all of [`WAYS`]. Tests share the engines of the same options: what takes
+/// Every Vulkan device in all of [`KERNEL_OPTIONS`]. Tests share the engines of the same options: what takes
 /// longest of most of them is that drivers compile kernels.
 pub fn vulkan_engines(change: impl Fn(&mut EngineOptions)) -> Vec<Engine> {
     static OPEN: Mutex<BTreeMap<String, Engine>> = Mutex::new(BTreeMap::new());
     let mut open = OPEN.lock().unwrap_or_else(PoisonError::into_inner);
     let mut engines = Vec::new();
     for (index, device) in vulkan_devices().into_iter().enumerate() {
-        for &(reads, mapping) in ways() {
+        for &(reads, mapping) in kernel_options() {
             let mut options = EngineOptions::default();
             (options.reads, options.mapping) = (reads, mapping);
             change(&mut options);
@@ -75,17 +75,18 @@ pub fn vulkan_engines(change: impl Fn(&mut EngineOptions)) -> Vec<Engine> {
     engines
 }
 
-/// Of [`vulkan_engines`], called once or more often, those whose turn it is in this round: each device in
-/// one of [`WAYS`], in the next round in the next.
-pub fn in_turn(engines: &[Engine], round: usize) -> impl Iterator<Item = &Engine> {
-    let is_next = move |(place, _): &(usize, &Engine)| is_turn(round, *place, ways().len());
+/// Of the engines of one or more calls of [`vulkan_engines`] those that are due in this round: each device with
+/// one of [`KERNEL_OPTIONS`], in the next round with the next.
+pub fn round_robin(engines: &[Engine], round: usize) -> impl Iterator<Item = &Engine> {
+    let is_next =
+        move |(index, _): &(usize, &Engine)| is_due(round, *index, kernel_options().len());
     (engines.iter().enumerate().filter(is_next)).map(|(_, engine)| engine)
 }
 
-/// Whether the case at a place is tried in this round: the rounds of a test share its cases out, so that
+/// Whether the case at an index is tried in this round: the rounds of a test share its cases out, so that
 /// all are tried once in so many rounds. With `SOAK` set every round tries all.
-pub fn is_turn(round: usize, place: usize, rounds: usize) -> bool {
-    (round + place).is_multiple_of(rounds) || std::env::var_os("SOAK").is_some()
+pub fn is_due(round: usize, index: usize, rounds: usize) -> bool {
+    (round + index).is_multiple_of(rounds) || std::env::var_os("SOAK").is_some()
 }
 
 /// Mesa's software driver, by its manifest.
@@ -136,7 +137,7 @@ impl Random {
 }
 
 /// A set that asks for trouble: steps from 1e-7 rad to pi, components of 1e-30, gaps of one frame and of a thousand seconds, one and two keys, tracks
-/// that start and end at their own times.
+/// that start and end at different times.
 pub fn hostile_set(seed: u64, tracks: usize) -> TrackSet {
     let mut random = Random(seed);
     let mut set = TrackSet::new();
@@ -230,20 +231,20 @@ pub fn first_difference(a: &[Quat], b: &[Quat]) -> Option<usize> {
 
 /// Tracks of keys near each other, 100 a second, all at the same times; each key with the
 /// other sign with that probability. And 91 frames a second, from the first key to the last.
-pub fn dense_set(tracks: usize, keys: usize, turned: f64) -> (TrackSet, Frames) {
+pub fn dense_set(tracks: usize, keys: usize, negated: f64) -> (TrackSet, SampleTimes) {
     let mut random = Random(9);
     let times: Vec<f64> = (0..keys).map(|k| k as f64 * 0.01).collect();
     let mut all = Vec::new();
     for _ in 0..tracks {
         let mut rotation = random.rotation();
         for _ in 0..keys {
-            let turn = DQuat::from_axis_angle(random.direction(), random.between(0.0, 0.05));
-            let sign = if random.unit() < turned { -1.0 } else { 1.0 };
-            rotation = (rotation * turn).normalize() * sign;
+            let step = DQuat::from_axis_angle(random.direction(), random.between(0.0, 0.05));
+            let sign = if random.unit() < negated { -1.0 } else { 1.0 };
+            rotation = (rotation * step).normalize() * sign;
             all.push(rotation.as_quat());
         }
     }
     let set = TrackSet::with_shared_times(&times, &all).expect("unit keys in order");
     let end = times.last().copied().unwrap_or(0.0);
-    (set, Frames::fps(91).between(0.0, end))
+    (set, SampleTimes::fps(91).between(0.0, end))
 }

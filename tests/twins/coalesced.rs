@@ -9,37 +9,37 @@ use crate::shader::{
 use crate::time::runs::Affine;
 
 use super::kernels::Segment;
-use super::trial::{Trial, Twin, UNTOUCHED, with_globals};
+use super::trial::{Twin, TwinTrial, UNTOUCHED, with_globals};
 use crate::gpu::kernel_check::random::Random;
 
-/// The sample that an invocation takes in one of its turns.
+/// The sample that an invocation evaluates in one of its rounds.
 struct Cell {
-    place: u32,
+    slot: u32,
     row: u32,
     position: u32,
     block: u32,
     is_inside: bool,
 }
 
-/// An invocation, where its samples begin, and those of its turns.
+/// An invocation, where its samples begin, and those of its rounds.
 struct Invocation {
     group: [u32; 3],
     groups: [u32; 3],
     lane: u32,
     corner: [u32; 3],
-    turns: [Cell; SAMPLES_EACH as usize],
+    rounds: [Cell; SAMPLES_EACH as usize],
 }
 
-/// Makes up an invocation that stores at some of the first places: additions of u32 wrap, so the
+/// Makes up an invocation that stores at some of the first slots: additions of u32 wrap, so the
 /// grid may begin anywhere.
-fn invocation(random: &mut Random, trial: &mut Trial) -> Invocation {
+fn invocation(random: &mut Random, trial: &mut TwinTrial) -> Invocation {
     let group = [random.below(2), random.below(2), random.below(3)];
     let groups = [2, 2, 3];
     let tile = 2 * group[1] + group[0];
     let lane = random.below(WORKGROUP);
     let (line, within) = (lane / LINE, lane % LINE);
     let first_block = random.below(3);
-    let turns: [u32; SAMPLES_EACH as usize] = std::array::from_fn(|turn| turn as u32);
+    let rounds: [u32; SAMPLES_EACH as usize] = std::array::from_fn(|round| round as u32);
     if random.once_in(2) {
         // Track by track: the line's first index of all, and where that is stored.
         let first = (tile * WORKGROUP + line * LINE) * SAMPLES_EACH;
@@ -50,14 +50,14 @@ fn invocation(random: &mut Random, trial: &mut Trial) -> Invocation {
             "dispatch",
             [0, 1, samples, 1, first_output, first_block, shift],
         );
-        let cell = |turn: u32| {
-            let own = turn * LINE + within;
+        let cell = |round: u32| {
+            let offset = round * LINE + within;
             Cell {
-                place: position + own + shift,
+                slot: position + offset + shift,
                 row: 0,
-                position: position + own,
-                block: first_block + (first + own) / BLOCK_SAMPLES,
-                is_inside: first + own < samples,
+                position: position + offset,
+                block: first_block + (first + offset) / BLOCK_SAMPLES,
+                is_inside: first + offset < samples,
             }
         };
         return Invocation {
@@ -65,7 +65,7 @@ fn invocation(random: &mut Random, trial: &mut Trial) -> Invocation {
             groups,
             lane,
             corner: [first + within, 0, first_block + first / BLOCK_SAMPLES],
-            turns: turns.map(cell),
+            rounds: rounds.map(cell),
         };
     }
     let (stride, first_row) = (LINE + random.below(3), random.below(12));
@@ -78,14 +78,14 @@ fn invocation(random: &mut Random, trial: &mut Trial) -> Invocation {
         [0, stride, samples, rows, first_output, first_block, 0],
     );
     let before = first / BLOCK_SAMPLES * rows + first_block;
-    let cell = |turn: u32| {
-        let (sample, row) = (first + turn, first_row + turn * stride);
+    let cell = |round: u32| {
+        let (sample, row) = (first + round, first_row + round * stride);
         // Eight neighbours begin where a line does, which may be before the row.
-        let place = row / LINE * LINE + tile * LINE + within;
-        let track = place.wrapping_sub(row);
+        let slot = row / LINE * LINE + tile * LINE + within;
+        let track = slot.wrapping_sub(row);
         let block = sample / BLOCK_SAMPLES * rows + first_block;
         Cell {
-            place,
+            slot,
             row: track,
             position: sample,
             block: block.wrapping_add(track),
@@ -97,7 +97,7 @@ fn invocation(random: &mut Random, trial: &mut Trial) -> Invocation {
         groups,
         lane,
         corner: [first, tile * LINE + within, before],
-        turns: turns.map(cell),
+        rounds: rounds.map(cell),
     }
 }
 
@@ -106,9 +106,9 @@ const ITEMS: u32 = 6;
 
 fn entry<S: Segment>(kernel: &'static str, is_listed: bool) -> Twin {
     with_globals(kernel, "main", move |random, trial| {
-        let own = invocation(random, trial);
-        trial.argument((own.group, own.groups, own.lane));
-        let turns = own.turns;
+        let invocation = invocation(random, trial);
+        trial.argument((invocation.group, invocation.groups, invocation.lane));
+        let rounds = invocation.rounds;
         let segments = [S::random(random), S::random(random)];
         let constants = [random.rotation(), random.rotation()];
         trial.output("rotations");
@@ -130,7 +130,7 @@ fn entry<S: Segment>(kernel: &'static str, is_listed: bool) -> Twin {
                 (false, true) => MAY_BE_TINY,
                 (false, false) => 0,
             };
-            let output = turns[0].position.saturating_sub(random.below(20)) + random.below(4);
+            let output = rounds[0].position.saturating_sub(random.below(20)) + random.below(4);
             let first = random.below(9) as i32 - if is_listed { 0 } else { 4 };
             let (scale, offset) = (random.number() * 0.25, random.parameter());
             (
@@ -143,7 +143,7 @@ fn entry<S: Segment>(kernel: &'static str, is_listed: bool) -> Twin {
             )
         });
         trial.global("items", items);
-        let last = turns.iter().filter(|cell| cell.is_inside);
+        let last = rounds.iter().filter(|cell| cell.is_inside);
         let last = last.map(|cell| cell.block as usize).max().unwrap_or(0);
         // At most three items begin in a block.
         let mut block = || {
@@ -151,11 +151,11 @@ fn entry<S: Segment>(kernel: &'static str, is_listed: bool) -> Twin {
             (random.below(ITEMS - 3), starts)
         };
         let blocks: Vec<(u32, u32)> = (0..=last).map(|_| block()).collect();
-        let places = turns.iter().map(|cell| cell.place as usize + 1).max();
-        let mut stored = vec![None; places.unwrap_or(0)];
-        // The row of the item that was looked for last, and its place.
+        let length = rounds.iter().map(|cell| cell.slot as usize + 1).max();
+        let mut stored = vec![None; length.unwrap_or(0)];
+        // The row of the item that was looked for last, and its index.
         let mut last: Option<(u32, usize)> = None;
-        for cell in turns.iter().filter(|cell| cell.is_inside) {
+        for cell in rounds.iter().filter(|cell| cell.is_inside) {
             let has = |item: usize| {
                 let (_, output, count, ..) = items[item];
                 cell.position.wrapping_sub(output) < count & !(IS_CONSTANT | MAY_BE_TINY)
@@ -179,14 +179,14 @@ fn entry<S: Segment>(kernel: &'static str, is_listed: bool) -> Twin {
                 true => listed[first as usize + j as usize],
                 false => (first + j as i32) as f32,
             };
-            stored[cell.place as usize] = Some(match count & IS_CONSTANT {
+            stored[cell.slot as usize] = Some(match count & IS_CONSTANT {
                 0 => one(&segments[source], Affine { scale, offset }, distance),
                 _ => constants[source],
             });
         }
         trial.global("blocks", blocks);
-        for own in stored {
-            match own {
+        for value in stored {
+            match value {
                 Some(rotation) => trial.expect(rotation),
                 None => trial.expect([UNTOUCHED; 4]),
             }
@@ -198,16 +198,22 @@ pub(super) fn coalesced() -> Vec<Twin> {
     const KERNEL: &str = "arc_frames_coalesced_f32";
     vec![
         with_globals(KERNEL, "corner_of", |random, trial| {
-            let own = invocation(random, trial);
-            trial.argument((own.group, own.groups, own.lane));
-            trial.expect(own.corner);
+            let invocation = invocation(random, trial);
+            trial.argument((invocation.group, invocation.groups, invocation.lane));
+            trial.expect(invocation.corner);
         }),
         with_globals(KERNEL, "cell_of", |random, trial| {
-            let own = invocation(random, trial);
-            let turn = random.below(SAMPLES_EACH);
-            trial.argument((own.corner, turn));
-            let own = &own.turns[turn as usize];
-            trial.expect((own.place, own.row, own.position, own.block, own.is_inside));
+            let invocation = invocation(random, trial);
+            let round = random.below(SAMPLES_EACH);
+            trial.argument((invocation.corner, round));
+            let cell = &invocation.rounds[round as usize];
+            trial.expect((
+                cell.slot,
+                cell.row,
+                cell.position,
+                cell.block,
+                cell.is_inside,
+            ));
         }),
         with_globals(KERNEL, "item_of", |random, trial| {
             let blocks: [(u32, u32); 3] = std::array::from_fn(|_| (random.word(), random.word()));
@@ -229,9 +235,9 @@ pub(super) fn coalesced() -> Vec<Twin> {
         }),
         with_globals(KERNEL, "block_at", |random, trial| {
             let all: [u32; 6] = std::array::from_fn(|_| random.word());
-            let place = random.below(3);
-            trial.argument(place);
-            trial.expect(all[place as usize * 2..][..2].to_vec());
+            let slot = random.below(3);
+            trial.argument(slot);
+            trial.expect(all[slot as usize * 2..][..2].to_vec());
             trial.global("blocks", all);
         }),
         entry::<ArcSegment>(KERNEL, false),

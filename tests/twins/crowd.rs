@@ -1,18 +1,20 @@
 //! The kernels over a crowd, each function beside its twin.
 
 use crate::shader::{
-    CHANNELS, CrowdBase, CrowdChannel, CrowdClip, CrowdEntry, CrowdPlace, CrowdSpan, FORM_ARC,
+    CHANNELS, CrowdBase, CrowdChannel, CrowdClip, CrowdEntry, CrowdPosition, CrowdSpan, FORM_ARC,
     FORM_CONSTANT, FORM_CUBIC, FORM_POLYNOMIAL, ON_KEY, ROTATION, RUNS_BACKWARDS, SCALE,
     START_BIAS, TRANSLATION,
 };
-use crate::twin::crowd_layers::{Layers, cubic, laid_over, sampled, turn_added};
+use crate::twin::crowd_layers::{Layers, cubic, laid_over, rotation_added, sampled};
 use crate::twin::crowd_matrices::{
     Rows, affine_product, row_product, to_any_half, transform, transform_row,
 };
-use crate::twin::crowd_times::{in_parts, place_at, places, span_at, tick_of, wide_remainder};
+use crate::twin::crowd_times::{
+    in_parts, position_at, base_positions, span_at, tick_of, wide_remainder,
+};
 
 use super::cells::Cells;
-use super::trial::{Trial, Twin, UNTOUCHED, twin, with_globals};
+use super::trial::{Twin, TwinTrial, UNTOUCHED, twin, with_globals};
 use crate::gpu::kernel_check::random::Random;
 
 const TIMES: &str = "crowd_times";
@@ -21,17 +23,17 @@ const LOCALS: &str = "crowd_locals";
 
 impl Cells for CrowdEntry {
     fn put(&self, cells: &mut Vec<u64>) {
-        let own = [
+        let words = [
             self.clip_and_weight,
             self.speed_and_modes,
             self.start,
             self.anchor,
         ];
-        own.put(cells);
+        words.put(cells);
     }
 }
 
-impl Cells for CrowdPlace {
+impl Cells for CrowdPosition {
     fn put(&self, cells: &mut Vec<u64>) {
         (self.span, self.parameter).put(cells);
     }
@@ -68,13 +70,13 @@ fn words(value: u64) -> [u32; 2] {
 /// A number below 2^`bits`, of any magnitude.
 fn number(random: &mut Random, bits: u32) -> u64 {
     let word = u64::from(random.word()) << 32 | u64::from(random.word());
-    let own = random.below(bits + 1);
-    word.checked_shr(64 - own).unwrap_or(0)
+    let length = random.below(bits + 1);
+    word.checked_shr(64 - length).unwrap_or(0)
 }
 
 /// What comes with a dispatch.
 #[derive(Default)]
-struct Dispatch {
+struct CrowdDispatch {
     count: u32,
     first_instance: u32,
     joints: u32,
@@ -86,8 +88,8 @@ struct Dispatch {
     references: u32,
 }
 
-impl Dispatch {
-    fn put(&self, trial: &mut Trial) {
+impl CrowdDispatch {
+    fn put(&self, trial: &mut TwinTrial) {
         let [low, high] = words(self.clock);
         trial.global(
             "dispatch",
@@ -119,13 +121,13 @@ fn entry(random: &mut Random, period: u32) -> (CrowdEntry, u64) {
     let (speed, mask, additive) = (number(random, 23) as u32, random.below(3), random.below(2));
     let anchor = random.word();
     let elapsed = number(random, 40) + (u64::from(random.word()) << 40);
-    let own = CrowdEntry {
+    let result = CrowdEntry {
         clip_and_weight: random.below(2) | random.below(0x8001) << 16,
         speed_and_modes: speed | backwards | mask << 24 | wrap << 29 | additive << 31,
         start: START_BIAS + within as u32 - early,
         anchor,
     };
-    (own, (u64::from(anchor) << 8).wrapping_add(elapsed))
+    (result, (u64::from(anchor) << 8).wrapping_add(elapsed))
 }
 
 fn period(random: &mut Random) -> u32 {
@@ -176,16 +178,16 @@ pub(super) fn times() -> Vec<Twin> {
     let whole = |[low, high]: [u32; 2]| u64::from(low) | u64::from(high) << 32;
     let both = move |[a, b]: [[u32; 2]; 2]| (whole(a), whole(b));
     vec![
-        twin(TIMES, "wide_less", two, move |own| {
-            let (a, b) = both(own);
+        twin(TIMES, "wide_less", two, move |pair| {
+            let (a, b) = both(pair);
             a < b
         }),
-        twin(TIMES, "wide_sum", two, move |own| {
-            let (a, b) = both(own);
+        twin(TIMES, "wide_sum", two, move |pair| {
+            let (a, b) = both(pair);
             words(a.wrapping_add(b))
         }),
-        twin(TIMES, "wide_difference", two, move |own| {
-            let (a, b) = both(own);
+        twin(TIMES, "wide_difference", two, move |pair| {
+            let (a, b) = both(pair);
             words(a.wrapping_sub(b))
         }),
         twin(
@@ -201,8 +203,8 @@ pub(super) fn times() -> Vec<Twin> {
                 let (x, q) = (number(random, 63), 1 + number(random, 62));
                 [words(x), words(q)]
             },
-            move |own| {
-                let (x, q) = both(own);
+            move |pair| {
+                let (x, q) = both(pair);
                 words(wide_remainder(x, q))
             },
         ),
@@ -214,9 +216,9 @@ pub(super) fn times() -> Vec<Twin> {
             let (entry, clock) = entry(random, period);
             trial.argument(entry);
             trial.argument(period);
-            let dispatch = Dispatch {
+            let dispatch = CrowdDispatch {
                 clock,
-                ..Dispatch::default()
+                ..CrowdDispatch::default()
             };
             dispatch.put(trial);
             trial.expect(tick_of(&entry, period, clock));
@@ -240,53 +242,54 @@ pub(super) fn times() -> Vec<Twin> {
             let counts = [1 + random.below(BASES), 1 + random.below(BASES)];
             let (mut bases, mut spans, mut clips) = (Vec::new(), Vec::new(), Vec::new());
             for (period, count) in periods.into_iter().zip(counts) {
-                let (mut own, more) = time_bases(random, period, count);
-                own.iter_mut()
+                let (mut clip_bases, more) = time_bases(random, period, count);
+                clip_bases
+                    .iter_mut()
                     .for_each(|base| base.first += spans.len() as u32);
                 clips.push(CrowdClip {
                     period,
                     first_base: bases.len() as u32,
                     bases: count,
                 });
-                bases.extend(own);
+                bases.extend(clip_bases);
                 spans.extend(more);
             }
             let (first_instance, layers) = (random.below(2), 1 + random.below(2));
             let (layer, base) = (random.below(2), random.below(BASES));
-            let place = layer * BASES + base;
+            let index = layer * BASES + base;
             let mut entries = vec![[0u32; 4]; (first_instance * layers + layer) as usize];
-            let (mut own, clock) = entry(random, periods[0].min(periods[1]));
+            let (mut played, clock) = entry(random, periods[0].min(periods[1]));
             if random.once_in(4) {
                 // It stands at a key.
-                own.speed_and_modes &= !0x7f_ffff;
+                played.speed_and_modes &= !0x7f_ffff;
             }
             entries.push([
-                own.clip_and_weight,
-                own.speed_and_modes,
-                own.start,
-                own.anchor,
+                played.clip_and_weight,
+                played.speed_and_modes,
+                played.start,
+                played.anchor,
             ]);
-            trial.argument(place);
-            let dispatch = Dispatch {
+            trial.argument(index);
+            let dispatch = CrowdDispatch {
                 first_instance,
                 layers,
                 bases: BASES,
                 clock,
-                ..Dispatch::default()
+                ..CrowdDispatch::default()
             };
             dispatch.put(trial);
-            trial.output("places");
-            trial.expect(vec![[UNTOUCHED; 2]; place as usize]);
-            let clip = (own.clip_and_weight & 0xffff) as usize;
+            trial.output("positions");
+            trial.expect(vec![[UNTOUCHED; 2]; index as usize]);
+            let clip = (played.clip_and_weight & 0xffff) as usize;
             if base < counts[clip] {
-                let mut found = [CrowdPlace {
+                let mut found = [CrowdPosition {
                     span: 0,
                     parameter: 0.0,
                 }; BASES as usize];
-                places(&own, clock, &clips, &bases, &spans, &mut found);
+                base_positions(&played, clock, &clips, &bases, &spans, &mut found);
                 let at = &bases[(clips[clip].first_base + base) as usize];
-                let tick = tick_of(&own, clips[clip].period, clock);
-                assert_eq!(found[base as usize], place_at(at, &spans, tick));
+                let tick = tick_of(&played, clips[clip].period, clock);
+                assert_eq!(found[base as usize], position_at(at, &spans, tick));
                 trial.expect(found[base as usize]);
             } else {
                 trial.expect([UNTOUCHED; 2]);
@@ -306,11 +309,11 @@ const CLIPS: u32 = 2;
 const CELLS: u32 = 72;
 
 /// Everything that the kernels over layers read.
-struct Scene {
+struct LayerScene {
     entries: Vec<CrowdEntry>,
     channels: Vec<CrowdChannel>,
     cells: Vec<[f32; 4]>,
-    places: Vec<CrowdPlace>,
+    positions: Vec<CrowdPosition>,
     layers: u32,
     first_instance: u32,
 }
@@ -326,8 +329,8 @@ fn channel(random: &mut Random) -> CrowdChannel {
     }
 }
 
-fn place(random: &mut Random) -> CrowdPlace {
-    CrowdPlace {
+fn position(random: &mut Random) -> CrowdPosition {
+    CrowdPosition {
         span: random.below(2) | if random.once_in(4) { ON_KEY } else { 0 },
         parameter: random.parameter(),
     }
@@ -337,7 +340,7 @@ fn cells(random: &mut Random, count: u32) -> Vec<[f32; 4]> {
     (0..count).map(|_| random.rotation()).collect()
 }
 
-impl Scene {
+impl LayerScene {
     /// For two instances of a window.
     fn new(random: &mut Random) -> Self {
         let (layers, first_instance) = (1 + random.below(3), random.below(2));
@@ -357,7 +360,7 @@ impl Scene {
                 .map(|_| channel(random))
                 .collect(),
             cells: cells(random, CELLS + masks + references),
-            places: (0..2 * layers * BASES).map(|_| place(random)).collect(),
+            positions: (0..2 * layers * BASES).map(|_| position(random)).collect(),
             layers,
             first_instance,
         }
@@ -368,7 +371,7 @@ impl Scene {
             entries: &self.entries[(self.first_instance * self.layers) as usize..],
             channels: &self.channels,
             cells: &self.cells,
-            places: &self.places,
+            positions: &self.positions,
             joints: JOINTS,
             layers: self.layers,
             bases: BASES,
@@ -377,25 +380,25 @@ impl Scene {
         }
     }
 
-    fn put(&self, trial: &mut Trial) {
+    fn put(&self, trial: &mut TwinTrial) {
         trial.global("entries", self.entries.as_slice().to_cells());
         trial.global("channels", self.channels.as_slice().to_cells());
         trial.global("cells", self.cells.as_slice().to_cells());
-        trial.global("places", self.places.as_slice().to_cells());
-        let dispatch = Dispatch {
+        trial.global("positions", self.positions.as_slice().to_cells());
+        let dispatch = CrowdDispatch {
             first_instance: self.first_instance,
             joints: JOINTS,
             layers: self.layers,
             bases: BASES,
             masks: CELLS,
             references: CELLS + 3 * JOINTS,
-            ..Dispatch::default()
+            ..CrowdDispatch::default()
         };
         dispatch.put(trial);
     }
 }
 
-impl Scene {
+impl LayerScene {
     /// One layer, whose rotations are arcs and constants, and all others cubics and constants.
     fn make_plain(&mut self) {
         self.layers = 1;
@@ -409,7 +412,7 @@ impl Scene {
     }
 }
 
-/// The channel in a form, or as a constant where its keys lie at an even place.
+/// The channel in a form, or as a constant where its first key has an even index.
 fn plain(channel: CrowdChannel, form: u32) -> CrowdChannel {
     let is_constant = channel.keys.is_multiple_of(2);
     let form = if is_constant { FORM_CONSTANT } else { form };
@@ -424,12 +427,12 @@ fn plain(channel: CrowdChannel, form: u32) -> CrowdChannel {
 
 fn plain_value(function: &'static str, form: u32) -> Twin {
     with_globals("crowd_plain_locals", function, move |random, trial| {
-        let (channel, place) = (plain(channel(random), form), place(random));
+        let (channel, position) = (plain(channel(random), form), position(random));
         let mut cells = cells(random, CELLS);
         cells[0] = [0.0; 4];
         trial.argument(channel);
-        trial.argument(place);
-        trial.expect(sampled(&cells, &channel, place));
+        trial.argument(position);
+        trial.expect(sampled(&cells, &channel, position));
         trial.global("cells", cells);
     })
 }
@@ -453,38 +456,41 @@ pub(super) fn layers() -> Vec<Twin> {
             LAYERS,
             "cubic",
             move |random| (four(random), random.parameter()),
-            |(c, s)| -> [f32; 4] { std::array::from_fn(|i| cubic(c.map(|own| own[i]), s)) },
+            |(c, s)| -> [f32; 4] {
+                std::array::from_fn(|i| cubic(c.map(|component| component[i]), s))
+            },
         ),
         twin(
             LAYERS,
-            "turn_added",
+            "rotation_added",
             |random| {
-                let own = [random.rotation(), random.rotation(), random.rotation()];
-                (own, random.number())
+                let rotations = [random.rotation(), random.rotation(), random.rotation()];
+                (rotations, random.number())
             },
-            |([base, layer, reference], weight)| turn_added(base, layer, reference, weight),
+            |([base, layer, reference], weight)| rotation_added(base, layer, reference, weight),
         ),
         twin(
             LAYERS,
             "laid_over",
             |random| {
                 let kind = [ROTATION, TRANSLATION, SCALE][random.below(3) as usize];
-                let own = [random.rotation(), random.rotation(), random.rotation()];
-                (kind, random.once_in(2), own, random.number())
+                let rotations = [random.rotation(), random.rotation(), random.rotation()];
+                (kind, random.once_in(2), rotations, random.number())
             },
             |(kind, additive, [below, layer, reference], weight)| {
                 laid_over(kind, additive, below, layer, reference, weight)
             },
         ),
         with_globals(LAYERS, "sampled", |random, trial| {
-            let (channel, place, cells) = (channel(random), place(random), cells(random, CELLS));
+            let (channel, position, cells) =
+                (channel(random), position(random), cells(random, CELLS));
             trial.argument(channel);
-            trial.argument(place);
-            trial.expect(sampled(&cells, &channel, place));
+            trial.argument(position);
+            trial.expect(sampled(&cells, &channel, position));
             trial.global("cells", cells);
         }),
         with_globals(LAYERS, "layer_value", |random, trial| {
-            let scene = Scene::new(random);
+            let scene = LayerScene::new(random);
             let (joint, kind) = (random.below(JOINTS), random.below(CHANNELS));
             let layer = random.below(2 * scene.layers);
             let entry = scene.entries[0];
@@ -495,7 +501,7 @@ pub(super) fn layers() -> Vec<Twin> {
             trial.expect(scene.twin().layer_value(layer, &entry, joint, kind));
         }),
         with_globals(LAYERS, "layered", |random, trial| {
-            let scene = Scene::new(random);
+            let scene = LayerScene::new(random);
             let (instance, joint) = (random.below(2), random.below(JOINTS));
             let kind = random.below(CHANNELS);
             trial.argument((instance, joint, kind));
@@ -503,19 +509,19 @@ pub(super) fn layers() -> Vec<Twin> {
             trial.expect(scene.twin().layered(instance, joint, kind));
         }),
         with_globals(LAYERS, "crowd_work", |random, trial| {
-            let scene = Scene::new(random);
+            let scene = LayerScene::new(random);
             let (instance, joint) = (random.below(2), random.below(JOINTS));
-            let place = instance * JOINTS + joint;
-            trial.argument(place);
+            let index = instance * JOINTS + joint;
+            trial.argument(index);
             scene.put(trial);
             trial.output("rotations");
-            trial.expect(vec![[UNTOUCHED; 4]; place as usize]);
+            trial.expect(vec![[UNTOUCHED; 4]; index as usize]);
             trial.expect(scene.twin().layered(instance, joint, ROTATION));
         }),
         plain_value("arc_value", FORM_ARC),
         plain_value("cubic_value", FORM_CUBIC),
         with_globals("crowd_plain_locals", "layered", |random, trial| {
-            let mut scene = Scene::new(random);
+            let mut scene = LayerScene::new(random);
             scene.make_plain();
             let (instance, joint) = (random.below(2), random.below(JOINTS));
             let kind = random.below(CHANNELS);
@@ -524,15 +530,19 @@ pub(super) fn layers() -> Vec<Twin> {
             trial.expect(scene.twin().layered(instance, joint, kind));
         }),
         with_globals(LOCALS, "crowd_work", |random, trial| {
-            let scene = Scene::new(random);
+            let scene = LayerScene::new(random);
             let (instance, joint) = (random.below(2), random.below(JOINTS));
-            let place = instance * JOINTS + joint;
-            trial.argument(place);
+            let index = instance * JOINTS + joint;
+            trial.argument(index);
             scene.put(trial);
             trial.output("rotations");
-            trial.expect(vec![[UNTOUCHED; 12]; place as usize]);
-            let own = |kind| scene.twin().layered(instance, joint, kind);
-            trial.expect(transform(own(ROTATION), own(TRANSLATION), own(SCALE)));
+            trial.expect(vec![[UNTOUCHED; 12]; index as usize]);
+            let layered = |kind| scene.twin().layered(instance, joint, kind);
+            trial.expect(transform(
+                layered(ROTATION),
+                layered(TRANSLATION),
+                layered(SCALE),
+            ));
         }),
     ]
 }
@@ -547,7 +557,7 @@ pub(super) fn matrices() -> Vec<Twin> {
             LOCALS,
             "transform_row",
             |random| (random.vector(), random.vector(), random.number()),
-            |(turned, scale, moved)| transform_row(turned, scale, moved),
+            |(rotation, scale, moved)| transform_row(rotation, scale, moved),
         ),
         twin(
             "crowd_walk",
@@ -561,15 +571,15 @@ pub(super) fn matrices() -> Vec<Twin> {
             let mut all: Vec<Rows> = (0..2 * JOINTS).map(|_| rows(random)).collect();
             let first_link = random.below(2);
             let (joint, parent) = [(0, 1), (1, 2), (2, 0)][random.below(3) as usize];
-            let (instance, own) = (random.below(2), random.below(LEVEL));
+            let (instance, link) = (random.below(2), random.below(LEVEL));
             let mut links = vec![[9u32; 2]; (first_link + LEVEL) as usize];
-            links[(first_link + own) as usize] = [joint, parent];
-            trial.argument(instance * LEVEL + own);
-            let dispatch = Dispatch {
+            links[(first_link + link) as usize] = [joint, parent];
+            trial.argument(instance * LEVEL + link);
+            let dispatch = CrowdDispatch {
                 joints: LEVEL,
                 layers: JOINTS,
                 first_link,
-                ..Dispatch::default()
+                ..CrowdDispatch::default()
             };
             dispatch.put(trial);
             trial.global("links", links);
@@ -594,12 +604,12 @@ pub(super) fn matrices() -> Vec<Twin> {
             trial.argument([group[0], group[1], 0]);
             trial.argument([2u32, 2, 1]);
             trial.argument(lane);
-            let dispatch = Dispatch {
+            let dispatch = CrowdDispatch {
                 count: 3,
                 joints: JOINTS,
                 layers: 2,
                 first_link: JOINTS - 1,
-                ..Dispatch::default()
+                ..CrowdDispatch::default()
             };
             dispatch.put(trial);
             trial.global("links", [&links[..], &bounds].concat());
@@ -631,26 +641,27 @@ pub(super) fn matrices() -> Vec<Twin> {
             const JOINTS: u32 = 2;
             let mut all: Vec<Rows> = (0..2 * JOINTS).map(|_| rows(random)).collect();
             let bind = [rows(random), rows(random)];
-            let place = random.below(2 * JOINTS * 3);
-            trial.argument(place);
-            let dispatch = Dispatch {
+            let index = random.below(2 * JOINTS * 3);
+            trial.argument(index);
+            let dispatch = CrowdDispatch {
                 joints: JOINTS,
-                ..Dispatch::default()
+                ..CrowdDispatch::default()
             };
             dispatch.put(trial);
             trial.global("bind", bind);
             trial.global("matrices", all.as_slice().to_cells());
             trial.output("matrices");
-            let (matrix, row) = (place / 3, place % 3);
-            let own = &mut all[matrix as usize];
-            own[row as usize] = row_product(own[row as usize], &bind[(matrix % JOINTS) as usize]);
+            let (matrix, row) = (index / 3, index % 3);
+            let matrix_rows = &mut all[matrix as usize];
+            matrix_rows[row as usize] =
+                row_product(matrix_rows[row as usize], &bind[(matrix % JOINTS) as usize]);
             trial.expect(all);
         }),
         twin(
             "crowd_half",
             "to_any_half",
             |random| [0; 4].map(|_| half_of(random)),
-            |value| value.map(|own| u32::from(to_any_half(own))),
+            |value| value.map(|component| u32::from(to_any_half(component))),
         ),
         with_globals("crowd_half", "crowd_work", |random, trial| {
             trial.argument(1u32);
@@ -660,9 +671,9 @@ pub(super) fn matrices() -> Vec<Twin> {
             // The second row of workgroups, of one each.
             trial.argument([1, 1, 0]);
             trial.argument([1u32, 2, 1]);
-            let dispatch = Dispatch {
+            let dispatch = CrowdDispatch {
                 count: 66,
-                ..Dispatch::default()
+                ..CrowdDispatch::default()
             };
             dispatch.put(trial);
             half(random, trial, 65);
@@ -678,14 +689,14 @@ fn half_of(random: &mut Random) -> f32 {
     }
 }
 
-/// Rounds the values at a place.
-fn half(random: &mut Random, trial: &mut Trial, place: usize) {
-    let mut values = vec![[0.0; 4]; place];
-    let own = [0; 4].map(|_| half_of(random));
-    values.push(own);
+/// Rounds the value at an index.
+fn half(random: &mut Random, trial: &mut TwinTrial, index: usize) {
+    let mut values = vec![[0.0; 4]; index];
+    let value = [0; 4].map(|_| half_of(random));
+    values.push(value);
     trial.global("values", values);
     trial.output("halves");
-    trial.expect(vec![[UNTOUCHED; 2]; place]);
-    let [x, y, z, w] = own.map(|own| u32::from(to_any_half(own)));
+    trial.expect(vec![[UNTOUCHED; 2]; index]);
+    let [x, y, z, w] = value.map(|component| u32::from(to_any_half(component)));
     trial.expect([x | y << 16, z | w << 16]);
 }

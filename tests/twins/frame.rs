@@ -1,7 +1,7 @@
-//! A function made into steps: every expression gets a place in the function's frame, and everything
+//! A function made into steps: every expression gets its cells in the function's frame, and everything
 //! that is known before it runs is worked out once.
 //!
-//! Types and the order of evaluation are naga's own, as its validator reports them. An expression or a
+//! Types and the order of evaluation are naga's, as its validator reports them. An expression or a
 //! statement that is not known here panics with its text.
 
 use naga::valid::FunctionInfo;
@@ -10,8 +10,8 @@ use naga::{
 };
 
 use super::layout::{cells, cells_of, constant, element};
-use super::machine::{Step, pointer_to_global};
-use super::operations::{Arithmetic, Operand, Place, binary, conversion, unary};
+use super::machine::{MachineStep, pointer_to_global};
+use super::operations::{CellIndex, FloatMode, Operand, binary, conversion, unary};
 use super::program::Compiled;
 
 /// Makes a function of a module into steps; `info` is what the validator found out about it, or about
@@ -20,46 +20,46 @@ pub(super) fn compiled(
     module: &Module,
     function: &Function,
     info: &FunctionInfo,
-    arithmetic: Arithmetic,
+    arithmetic: FloatMode,
 ) -> Compiled {
-    let mut own = Frame {
+    let mut compiler = FunctionCompiler {
         module,
         function,
         info,
         arithmetic,
         start: Vec::new(),
         size: 0,
-        places: vec![None; function.expressions.len()],
+        indices: vec![None; function.expressions.len()],
         steps: Vec::new(),
     };
-    own.begin();
-    let body = own.block(&function.body);
-    let mut steps = own.steps;
+    compiler.begin();
+    let body = compiler.block(&function.body);
+    let mut steps = compiler.steps;
     steps.extend(body);
     let result = function.result.as_ref();
     Compiled {
         name: function.name.clone().unwrap_or_else(|| "main".to_owned()),
-        start: own.start,
-        size: own.size,
+        start: compiler.start,
+        size: compiler.size,
         result: result.map_or(0, |result| cells_of(module, result.ty)),
         steps,
     }
 }
 
 /// A function while it is made into steps.
-struct Frame<'a> {
+struct FunctionCompiler<'a> {
     module: &'a Module,
     function: &'a Function,
     info: &'a FunctionInfo,
-    arithmetic: Arithmetic,
+    arithmetic: FloatMode,
     start: Vec<u64>,
     size: usize,
-    /// The place of each expression, once it has been evaluated.
-    places: Vec<Option<Place>>,
-    steps: Vec<Step>,
+    /// The first cell of each expression, once it has been evaluated.
+    indices: Vec<Option<CellIndex>>,
+    steps: Vec<MachineStep>,
 }
 
-impl Frame<'_> {
+impl FunctionCompiler<'_> {
     fn ty(&self, at: Handle<Expression>) -> &TypeInner {
         self.info[at].ty.inner_with(&self.module.types)
     }
@@ -74,21 +74,21 @@ impl Frame<'_> {
             .unwrap_or_else(|| panic!("{ty:?} is no scalar or vector"))
     }
 
-    fn place(&self, at: Handle<Expression>) -> Place {
-        let place = self.places[at.index()];
-        place.unwrap_or_else(|| panic!("used first: {:?}", self.function.expressions[at]))
+    fn index_of(&self, at: Handle<Expression>) -> CellIndex {
+        let index = self.indices[at.index()];
+        index.unwrap_or_else(|| panic!("used first: {:?}", self.function.expressions[at]))
     }
 
-    /// A place for each of the cells of an expression.
-    fn each(&self, at: Handle<Expression>) -> impl Iterator<Item = Place> + use<> {
-        let first = self.place(at);
+    /// The index of each of the cells of an expression.
+    fn each(&self, at: Handle<Expression>) -> impl Iterator<Item = CellIndex> + use<> {
+        let first = self.index_of(at);
         first..first + self.cells(at)
     }
 
     fn operand(&self, at: Handle<Expression>) -> Operand {
         let step = usize::from(self.cells(at) > 1);
         Operand {
-            place: self.place(at),
+            first: self.index_of(at),
             step,
         }
     }
@@ -116,7 +116,7 @@ impl Frame<'_> {
             }
         }
         for (at, expression) in function.expressions.iter() {
-            let mut place = self.start.len();
+            let mut index = self.start.len();
             match *expression {
                 Expression::Literal(_) | Expression::Constant(_) | Expression::ZeroValue(_) => {
                     self.start
@@ -128,20 +128,20 @@ impl Frame<'_> {
                 Expression::LocalVariable(variable) => {
                     self.start.push(0);
                     let variable = variables[variable.index()];
-                    self.steps.push(Step::Local {
-                        place: variable,
-                        to: place,
+                    self.steps.push(MachineStep::Local {
+                        variable,
+                        to: index,
                     });
                 }
-                Expression::FunctionArgument(index) => place = arguments[index as usize],
+                Expression::FunctionArgument(number) => index = arguments[number as usize],
                 _ => continue,
             }
-            self.places[at.index()] = Some(place);
+            self.indices[at.index()] = Some(index);
         }
         self.size = self.start.len();
     }
 
-    fn block(&mut self, block: &Block) -> Vec<Step> {
+    fn block(&mut self, block: &Block) -> Vec<MachineStep> {
         let outer = std::mem::take(&mut self.steps);
         for statement in block {
             self.statement(statement);
@@ -166,8 +166,8 @@ impl Frame<'_> {
                 condition,
                 ref accept,
                 ref reject,
-            } => Step::If {
-                condition: self.place(condition),
+            } => MachineStep::If {
+                condition: self.index_of(condition),
                 accept: self.block(accept),
                 reject: self.block(reject),
             },
@@ -175,19 +175,19 @@ impl Frame<'_> {
                 ref body,
                 ref continuing,
                 break_if: None,
-            } => Step::Loop {
+            } => MachineStep::Loop {
                 body: self.block(body),
                 continuing: self.block(continuing),
             },
             // An invocation runs alone: what others of its workgroup would leave, trials fill in.
             Statement::ControlBarrier(_) => return,
-            Statement::Break => Step::Break,
-            Statement::Return { value } => Step::Return {
-                from: value.map_or(0, |value| self.place(value)),
+            Statement::Break => MachineStep::Break,
+            Statement::Return { value } => MachineStep::Return {
+                from: value.map_or(0, |value| self.index_of(value)),
             },
-            Statement::Store { pointer, value } => Step::Store {
-                pointer: self.place(pointer),
-                from: self.place(value),
+            Statement::Store { pointer, value } => MachineStep::Store {
+                pointer: self.index_of(pointer),
+                from: self.index_of(value),
                 count: self.cells(value),
             },
             Statement::Call {
@@ -195,12 +195,15 @@ impl Frame<'_> {
                 ref arguments,
                 result,
             } => {
-                let arguments = arguments.iter().flat_map(|&own| self.each(own)).collect();
+                let arguments = arguments
+                    .iter()
+                    .flat_map(|&argument| self.each(argument))
+                    .collect();
                 let (to, count) = match result {
-                    Some(result) => (self.new_place(result), self.cells(result)),
+                    Some(result) => (self.allocate(result), self.cells(result)),
                     None => (0, 0),
                 };
-                Step::Call {
+                MachineStep::Call {
                     function: function.index(),
                     arguments,
                     to,
@@ -212,11 +215,11 @@ impl Frame<'_> {
         self.steps.push(step);
     }
 
-    fn new_place(&mut self, at: Handle<Expression>) -> Place {
-        let place = self.size;
-        self.places[at.index()] = Some(place);
+    fn allocate(&mut self, at: Handle<Expression>) -> CellIndex {
+        let index = self.size;
+        self.indices[at.index()] = Some(index);
         self.size += self.cells(at);
-        place
+        index
     }
 
     fn expression(&mut self, at: Handle<Expression>) {
@@ -228,36 +231,38 @@ impl Frame<'_> {
             && self.ty(base).pointer_space().is_none()
         {
             let (offset, ..) = element(self.module, self.ty(base), index as usize);
-            self.places[at.index()] = Some(self.place(base) + offset);
+            self.indices[at.index()] = Some(self.index_of(base) + offset);
             return;
         }
-        let to = self.new_place(at);
+        let to = self.allocate(at);
         let step = match *expression {
-            Expression::Compose { ref components, .. } => Step::Compose {
+            Expression::Compose { ref components, .. } => MachineStep::Compose {
                 from: components
                     .iter()
                     .flat_map(|&part| self.each(part))
                     .collect(),
                 to,
             },
-            Expression::Splat { value, .. } => Step::Compose {
-                from: vec![self.place(value); count],
+            Expression::Splat { value, .. } => MachineStep::Compose {
+                from: vec![self.index_of(value); count],
                 to,
             },
             Expression::Swizzle {
                 vector, pattern, ..
             } => {
-                let first = self.place(vector);
-                let from = pattern[..count].iter().map(|&own| first + own as usize);
-                Step::Compose {
+                let first = self.index_of(vector);
+                let from = pattern[..count]
+                    .iter()
+                    .map(|&component| first + component as usize);
+                MachineStep::Compose {
                     from: from.collect(),
                     to,
                 }
             }
             Expression::AccessIndex { base, index } => {
                 let (by, ..) = element(self.module, self.pointee(base), index as usize);
-                Step::Advance {
-                    base: self.place(base),
+                MachineStep::Advance {
+                    base: self.index_of(base),
                     by,
                     to,
                 }
@@ -270,16 +275,16 @@ impl Frame<'_> {
                     self.pointee(base)
                 };
                 let (_, count, of) = element(self.module, ty, 0);
-                let (base, index) = (self.place(base), self.place(index));
+                let (base, index) = (self.index_of(base), self.index_of(index));
                 match is_value {
-                    true => Step::Element {
+                    true => MachineStep::Element {
                         base,
                         index,
                         of,
                         to,
                         count,
                     },
-                    false => Step::Point {
+                    false => MachineStep::Point {
                         base,
                         index,
                         of,
@@ -288,8 +293,8 @@ impl Frame<'_> {
                     },
                 }
             }
-            Expression::Load { pointer } => Step::Load {
-                pointer: self.place(pointer),
+            Expression::Load { pointer } => MachineStep::Load {
+                pointer: self.index_of(pointer),
                 to,
                 count,
             },
@@ -299,23 +304,23 @@ impl Frame<'_> {
                 array_index: None,
                 sample: None,
                 ..
-            } => Step::Texel {
-                buffer: self.place(image),
-                index: self.place(coordinate),
+            } => MachineStep::Texel {
+                buffer: self.index_of(image),
+                index: self.index_of(coordinate),
                 to,
             },
             Expression::Unary { op, expr } => {
                 let work = unary(op, self.scalar(expr));
-                Step::Unary {
+                MachineStep::Unary {
                     work,
-                    from: self.place(expr),
+                    from: self.index_of(expr),
                     to,
                     count,
                 }
             }
             Expression::Binary { op, left, right } => {
                 let work = binary(op, self.scalar(left), self.arithmetic);
-                Step::Binary {
+                MachineStep::Binary {
                     work,
                     operands: [self.operand(left), self.operand(right)],
                     to,
@@ -326,24 +331,24 @@ impl Frame<'_> {
                 condition,
                 accept,
                 reject,
-            } => Step::Select {
+            } => MachineStep::Select {
                 condition: self.operand(condition),
-                accept: self.place(accept),
-                reject: self.place(reject),
+                accept: self.index_of(accept),
+                reject: self.index_of(reject),
                 to,
                 count,
             },
             Expression::As { expr, convert, .. } => {
-                let from = self.place(expr);
+                let from = self.index_of(expr);
                 let work = convert.and_then(|_| conversion(self.scalar(expr), self.scalar(at)));
                 match work {
-                    Some(work) => Step::Unary {
+                    Some(work) => MachineStep::Unary {
                         work,
                         from,
                         to,
                         count,
                     },
-                    None => Step::Compose {
+                    None => MachineStep::Compose {
                         from: (from..from + count).collect(),
                         to,
                     },
@@ -353,16 +358,16 @@ impl Frame<'_> {
                 fun: MathFunction::CountOneBits,
                 arg,
                 ..
-            } => Step::Unary {
+            } => MachineStep::Unary {
                 work: |bits| (bits as u32).count_ones().into(),
-                from: self.place(arg),
+                from: self.index_of(arg),
                 to,
                 count,
             },
             Expression::ArrayLength(pointer) => {
                 let (_, stride, _) = element(self.module, self.pointee(pointer), 0);
-                Step::ArrayLength {
-                    pointer: self.place(pointer),
+                MachineStep::ArrayLength {
+                    pointer: self.index_of(pointer),
                     to,
                     stride,
                 }

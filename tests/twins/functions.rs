@@ -180,7 +180,7 @@ pub(super) fn from_keys() -> Vec<Twin> {
                 let each: [[f32; 11]; 4] = std::array::from_fn(|c| {
                     arc_component(middle[c], tangent[c], norm_squared(tangent))
                 });
-                std::array::from_fn::<_, 11, _>(|power| each.map(|own| own[power]))
+                std::array::from_fn::<_, 11, _>(|power| each.map(|powers| powers[power]))
             },
         ),
         twin(CUBICS, "cross3", two, |(a, b)| cross3(a, b)),
@@ -223,7 +223,7 @@ pub(super) fn from_keys() -> Vec<Twin> {
             },
             |(keys, first, last)| {
                 let curve = small_angle_cubic(keys, first, last);
-                (curve.powers, curve.holds)
+                (curve.powers, curve.is_valid)
             },
         ),
     ]

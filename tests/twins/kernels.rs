@@ -13,7 +13,7 @@ use crate::simd::dispatch::in_lanes;
 use crate::time::runs::Affine;
 use crate::twin::evaluate::Evaluate;
 
-use super::trial::{Trial, Twin, UNTOUCHED, with_globals};
+use super::trial::{Twin, TwinTrial, UNTOUCHED, with_globals};
 use crate::gpu::kernel_check::StoredKey;
 use crate::gpu::kernel_check::random::Random;
 
@@ -59,7 +59,7 @@ impl Segment for PolynomialSegment {
 }
 
 /// Everything that a dispatch over two segments and two constants reads but its work.
-struct Scene<S> {
+struct RunScene<S> {
     segments: [S; 2],
     constants: [[f32; 4]; 2],
     /// The one of both that the work uses, and whether it is a constant.
@@ -70,8 +70,8 @@ struct Scene<S> {
     first_item: u32,
 }
 
-impl<S: Segment> Scene<S> {
-    fn new(random: &mut Random, trial: &mut Trial) -> Self {
+impl<S: Segment> RunScene<S> {
+    fn new(random: &mut Random, trial: &mut TwinTrial) -> Self {
         let scene = Self {
             segments: [S::random(random), S::random(random)],
             constants: [random.rotation(), random.rotation()],
@@ -90,8 +90,8 @@ impl<S: Segment> Scene<S> {
         scene
     }
 
-    /// Where the item of this invocation lies among all.
-    fn place(&self) -> usize {
+    /// The index of the item of this invocation among all.
+    fn index_of_item(&self) -> usize {
         (self.first_item + self.index) as usize
     }
 
@@ -101,7 +101,7 @@ impl<S: Segment> Scene<S> {
     }
 
     /// `idle` invocations before the first do nothing.
-    fn dispatch(&self, trial: &mut Trial, stride: u32, first_output: u32, idle: u32) {
+    fn dispatch(&self, trial: &mut TwinTrial, stride: u32, first_output: u32, idle: u32) {
         let count = self.index + 1 - idle;
         let dispatch = [self.first_item, count, stride, 0, first_output, idle];
         trial.global("dispatch", dispatch);
@@ -112,7 +112,7 @@ impl<S: Segment> Scene<S> {
 fn runs<S: Segment>(is_listed: bool) -> Twin {
     let kernel = S::KERNELS[usize::from(is_listed)];
     with_globals(kernel, "main", move |random, trial| {
-        let scene = Scene::<S>::new(random, trial);
+        let scene = RunScene::<S>::new(random, trial);
         let (output, stride, count) = (random.below(2), 1 + random.below(3), 1 + random.below(4));
         let first_output = random.below(3);
         trial.samples(count);
@@ -127,7 +127,7 @@ fn runs<S: Segment>(is_listed: bool) -> Twin {
             trial.global("distances", listed);
         }
         let (source, bit) = scene.source_with_bit();
-        let mut items = vec![(0, 0, 0, 0, 0.0, 0.0); scene.place()];
+        let mut items = vec![(0, 0, 0, 0, 0.0, 0.0); scene.index_of_item()];
         items.push((
             source,
             output,
@@ -142,8 +142,8 @@ fn runs<S: Segment>(is_listed: bool) -> Twin {
         match (scene.is_constant, is_listed) {
             (true, _) => found = [scene.constants[scene.source]; 4],
             (_, true) => {
-                let own = &listed[first as usize..];
-                distances::<Vec4, S>(segment, affine, own, count as usize, &mut found);
+                let item_distances = &listed[first as usize..];
+                distances::<Vec4, S>(segment, affine, item_distances, count as usize, &mut found);
             }
             _ => frames::<Vec4, S>(segment, affine, first as f32, count as usize, &mut found),
         }
@@ -158,12 +158,12 @@ fn runs<S: Segment>(is_listed: bool) -> Twin {
 
 fn samples<S: Segment>() -> Twin {
     with_globals(S::KERNELS[2], "main", |random, trial| {
-        let scene = Scene::<S>::new(random, trial);
+        let scene = RunScene::<S>::new(random, trial);
         let first_output = random.below(2);
         scene.dispatch(trial, 0, first_output, random.below(2));
         let parameter = random.parameter();
         let (source, bit) = scene.source_with_bit();
-        let mut list = vec![(0, 0.0); scene.place()];
+        let mut list = vec![(0, 0.0); scene.index_of_item()];
         list.push((source | bit, parameter));
         trial.global("samples", list);
         trial.expect(vec![[UNTOUCHED; 4]; (first_output + scene.index) as usize]);
@@ -180,17 +180,17 @@ fn samples<S: Segment>() -> Twin {
 }
 
 /// The rows of the second invocation of its sample: those after the first ones.
-struct Rows {
+struct KeyRows {
     rows: Vec<Vec<StoredKey>>,
     is_key: bool,
     parameter: f32,
 }
 
-impl Rows {
+impl KeyRows {
     /// One row or two, each of so many keys; the sample lies after the key `before`, or is it.
     fn new(
         random: &mut Random,
-        trial: &mut Trial,
+        trial: &mut TwinTrial,
         before: u32,
         mut keys: impl FnMut(&mut Random) -> Vec<StoredKey>,
     ) -> Self {
@@ -205,18 +205,18 @@ impl Rows {
         let rows: Vec<_> = (0..count).map(|_| keys(random)).collect();
         let keys = rows[0].len();
         let (is_key, parameter) = (random.once_in(8), random.parameter());
-        let own = random.below(SAMPLES);
-        let invocation = own + ((each * SAMPLES) & line);
+        let sample = random.below(SAMPLES);
+        let invocation = sample + ((each * SAMPLES) & line);
         trial.argument([invocation, 1, 0]);
         trial.global("rows", [SAMPLES, keys as u32, each + count, each, line]);
         let mut samples = [(0, 0.0); SAMPLES as usize];
-        samples[own as usize] = (before | if is_key { IS_KEY } else { 0 }, parameter);
+        samples[sample as usize] = (before | if is_key { IS_KEY } else { 0 }, parameter);
         trial.global("samples", samples);
         let mut stored = vec![[0; 4]; each as usize * keys];
         stored.extend(rows.iter().flatten().map(|key| key.stored));
         trial.global("keys", stored);
         trial.output("rotations");
-        trial.expect(vec![[UNTOUCHED; 4]; (each * SAMPLES + own) as usize]);
+        trial.expect(vec![[UNTOUCHED; 4]; (each * SAMPLES + sample) as usize]);
         Self {
             rows,
             is_key,
@@ -225,7 +225,7 @@ impl Rows {
     }
 
     /// What the rows give, one after another, with the other sample between them.
-    fn expect(&self, trial: &mut Trial, rotations: &[[f32; 4]]) {
+    fn expect(&self, trial: &mut TwinTrial, rotations: &[[f32; 4]]) {
         for (row, rotation) in rotations[..self.rows.len()].iter().enumerate() {
             trial.expect(vec![[UNTOUCHED; 4]; usize::from(row > 0)]);
             trial.expect(*rotation);
@@ -236,10 +236,10 @@ impl Rows {
 fn from_two_keys(kernel: &'static str, form: Form) -> Twin {
     with_globals(kernel, "main", move |random, trial| {
         let before = random.below(2) as usize;
-        let rows = Rows::new(random, trial, before as u32, |random| {
-            let is_turned = random.once_in(2);
+        let rows = KeyRows::new(random, trial, before as u32, |random| {
+            let is_negated = random.once_in(2);
             let mut keys = vec![StoredKey::new(random.unit(), false)];
-            let pair = random.pair().map(|key| StoredKey::new(key, is_turned));
+            let pair = random.pair().map(|key| StoredKey::new(key, is_negated));
             keys.splice(before..before, pair);
             keys
         });
@@ -249,7 +249,7 @@ fn from_two_keys(kernel: &'static str, form: Form) -> Twin {
                 unreachable!("three keys");
             };
             (block.from[row], block.to[row]) = match rows.is_key {
-                true => (from.given, from.given),
+                true => (from.authored, from.authored),
                 false => (from.continued, to.continued),
             };
             block.parameters[row] = rows.parameter;
@@ -262,7 +262,7 @@ fn from_two_keys(kernel: &'static str, form: Form) -> Twin {
 
 fn from_four_keys() -> Twin {
     with_globals("from_keys_cubics", "main", |random, trial| {
-        let rows = Rows::new(random, trial, 1, |random| {
+        let rows = KeyRows::new(random, trial, 1, |random| {
             let keys = random.four_keys();
             keys.map(|key| StoredKey::new(key, random.once_in(2)))
                 .into()
@@ -270,16 +270,16 @@ fn from_four_keys() -> Twin {
         let weights = [0; 4].map(|_| random.weights());
         trial.global("weights", weights);
         let [_, first, last, _] = weights;
-        // A key without a neighbour takes its place.
+        // A key without a neighbour stands in for it.
         let before = usize::from(first.kind != KEY_INNER);
         let after = 3 - usize::from(last.kind != KEY_INNER);
         let mut block: CubicBlock = bytemuck::Zeroable::zeroed();
         for (row, keys) in rows.rows.iter().enumerate() {
-            for (place, key) in [before, 1, 2, after].into_iter().enumerate() {
-                block.keys[place][row] = keys[key].continued;
+            for (i, key) in [before, 1, 2, after].into_iter().enumerate() {
+                block.keys[i][row] = keys[key].continued;
             }
             if rows.is_key {
-                block.keys[1][row] = keys[1].given;
+                block.keys[1][row] = keys[1].authored;
                 block.held[row] = 1.0;
             }
             (block.weights[0][row], block.weights[1][row]) = (first, last);

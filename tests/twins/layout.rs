@@ -23,7 +23,7 @@ pub(super) fn cells(module: &Module, ty: &TypeInner) -> usize {
             size: ArraySize::Constant(count),
             ..
         } => count.get() as usize * of(base),
-        TypeInner::Struct { ref members, .. } => members.iter().map(|own| of(own.ty)).sum(),
+        TypeInner::Struct { ref members, .. } => members.iter().map(|member| of(member.ty)).sum(),
         ref other => panic!("{other:?} has no cells"),
     }
 }
@@ -45,7 +45,7 @@ pub(super) fn element(module: &Module, ty: &TypeInner, index: usize) -> (usize, 
             (index * of(base), of(base), fixed)
         }
         TypeInner::Struct { ref members, .. } => {
-            let before = members[..index].iter().map(|own| of(own.ty)).sum();
+            let before = members[..index].iter().map(|member| of(member.ty)).sum();
             (before, of(members[index].ty), members.len())
         }
         ref other => panic!("{other:?} has no elements"),
@@ -55,11 +55,11 @@ pub(super) fn element(module: &Module, ty: &TypeInner, index: usize) -> (usize, 
 /// The cells of an expression that is known without running anything.
 pub(super) fn constant(
     module: &Module,
-    own: &Arena<Expression>,
+    expressions: &Arena<Expression>,
     at: Handle<Expression>,
 ) -> Vec<u64> {
     let mut all = Vec::new();
-    match own[at] {
+    match expressions[at] {
         Expression::Literal(Literal::F32(value)) => value.put(&mut all),
         Expression::Literal(Literal::U32(value)) => value.put(&mut all),
         Expression::Literal(Literal::I32(value)) => value.put(&mut all),
@@ -76,11 +76,11 @@ pub(super) fn constant(
         Expression::Compose { ref components, .. } => {
             return components
                 .iter()
-                .flat_map(|&part| constant(module, own, part))
+                .flat_map(|&part| constant(module, expressions, part))
                 .collect();
         }
         Expression::Splat { size, value } => {
-            return constant(module, own, value).repeat(size as usize);
+            return constant(module, expressions, value).repeat(size as usize);
         }
         ref other => panic!("{other:?} is no constant"),
     }

@@ -12,8 +12,8 @@ use glam::{DQuat, DVec3, Quat};
 
 use crate::from_keys::KeyCurve;
 use crate::from_keys::dispatches::KeyJob;
-use crate::gpu::grid::{GridRows, write_blocks};
-use crate::gpu::sample_list::SampleList;
+use crate::gpu::work_list::grid::{GridRows, write_blocks};
+use crate::gpu::work_list::sample_list::SampleList;
 use crate::gpu::work_list::{Cut, GroupWork, work, write};
 use crate::method::Method;
 use crate::method::bessel_overhauser::BESSEL_OVERHAUSER;
@@ -21,17 +21,17 @@ use crate::method::interpolation::Interpolation;
 use crate::method::slerp::SLERP;
 use crate::output::rotations::Layout;
 use crate::output::window::Window;
-use crate::prepare::clip_data::{ClipData, Wanted};
-use crate::prepare::request::Request;
+use crate::prepare::clip_data::{ClipData, PrepareRequest};
+use crate::prepare::request::SetRequest;
 use crate::shader::{
     Block, Dispatch, FROM_KEYS_WORKGROUP, Form, Item, KeySample, ListedSample, TangentWeights,
     WORKGROUP,
 };
-use crate::time::frames::{Frames, Ticks, Timeline};
+use crate::time::frames::{SampleTimes, Ticks, Timeline};
 use crate::tracks::set::TrackSet;
 
 use super::machine::{Machine, Touch};
-use super::operations::Arithmetic;
+use super::operations::FloatMode;
 use super::program::{Checked, Program};
 use super::source;
 
@@ -41,21 +41,21 @@ const WORKGROUPS: u32 = 60;
 /// Invocations that a card runs together, and the bytes that it moves together.
 const CARDS: [(u32, u64); 6] = [(32, 32), (32, 64), (32, 128), (64, 32), (64, 64), (64, 128)];
 
-/// What an entry point is told about its invocation.
+/// The built-in inputs of an entry point.
 #[derive(Clone, Copy)]
-enum Told {
-    /// The workgroup, how many there are, and the invocation's place in it.
+enum Builtins {
+    /// The workgroup, how many there are, and the invocation's index in it.
     Workgroup,
-    /// The invocation's place among all, and how many workgroups there are.
+    /// The invocation's index among all, and how many workgroups there are.
     Invocation,
-    /// The invocation's place among all.
+    /// The invocation's index among all.
     InvocationAlone,
 }
 
 /// A dispatch: its kernel, and what it reads.
 struct Launch {
     kernel: String,
-    told: Told,
+    builtins: Builtins,
     workgroup: u32,
     groups: [u32; 3],
     globals: Vec<(&'static str, Vec<u64>)>,
@@ -137,7 +137,7 @@ struct Count {
 
 impl Launch {
     fn run(&self) -> Count {
-        let program = Checked::parse(source(&self.kernel)).program(Arithmetic::AsWritten);
+        let program = Checked::parse(source(&self.kernel)).program(FloatMode::AsWritten);
         let mut machine = Machine::new(&program);
         for (name, cells) in &self.globals {
             machine.globals[global(&program, name)].clone_from(cells);
@@ -145,8 +145,8 @@ impl Launch {
         let output = global(&program, "rotations");
         machine.globals[output] = vec![0; 4 * self.rotations];
         let main = program.functions.len() - 1;
-        let pushed =
-            ["dispatch", "rows"].map(|name| program.globals.iter().position(|own| own == name));
+        let pushed = ["dispatch", "rows"]
+            .map(|name| program.globals.iter().position(|global| global == name));
         let [x, y, z] = self.groups;
         let all = x * y * z;
         let mut count = Count::default();
@@ -186,30 +186,34 @@ impl Launch {
 
     fn arguments(&self, group: [u32; 3], lane: u32) -> Vec<u64> {
         let invocation = [group[0] * self.workgroup + lane, group[1], group[2]];
-        let told = match self.told {
-            Told::Workgroup => [&group[..], &self.groups, &[lane]].concat(),
-            Told::Invocation => [invocation, self.groups].concat(),
-            Told::InvocationAlone => invocation.to_vec(),
+        let builtins = match self.builtins {
+            Builtins::Workgroup => [&group[..], &self.groups, &[lane]].concat(),
+            Builtins::Invocation => [invocation, self.groups].concat(),
+            Builtins::InvocationAlone => invocation.to_vec(),
         };
-        told.into_iter().map(u64::from).collect()
+        builtins.into_iter().map(u64::from).collect()
     }
 }
 
 fn global(program: &Program, name: &str) -> usize {
-    let place = program.globals.iter().position(|own| own == name);
-    place.unwrap_or_else(|| panic!("no global {name}"))
+    let index = program.globals.iter().position(|global| global == name);
+    index.unwrap_or_else(|| panic!("no global {name}"))
 }
 
-/// Of each turn of a loop the first stores of all lanes go together, then the second ones.
+/// Of each iteration of a loop the first stores of all lanes go together, then the second ones.
 fn stores_of(wave: &[Vec<Touch>], line: u64) -> Lines {
     let mut together = BTreeMap::<(usize, usize), Vec<Range<u64>>>::new();
     for lane in wave {
-        let (mut turn, mut stores) = (0, 0);
+        let (mut iteration, mut stores) = (0, 0);
         for touch in lane.iter().filter(|touch| touch.is_store) {
-            stores = if touch.turn == turn { stores + 1 } else { 0 };
-            turn = touch.turn;
+            stores = if touch.iteration == iteration {
+                stores + 1
+            } else {
+                0
+            };
+            iteration = touch.iteration;
             together
-                .entry((turn, stores))
+                .entry((iteration, stores))
                 .or_default()
                 .push(touch.bytes());
         }
@@ -247,7 +251,7 @@ fn walk(random: &mut Rng, keys: usize, step: f64) -> Vec<Quat> {
 }
 
 /// Tracks of 26 keys at uneven times, 1200 frames.
-fn sparse(tracks: usize) -> (TrackSet, Frames) {
+fn sparse(tracks: usize) -> (TrackSet, SampleTimes) {
     let (mut random, mut set) = (Rng::with_seed(1), TrackSet::new());
     for _ in 0..tracks {
         let mut times = vec![0.0];
@@ -258,11 +262,11 @@ fn sparse(tracks: usize) -> (TrackSet, Frames) {
         times.iter_mut().for_each(|time| *time *= scale);
         set.push("", &times, &walk(&mut random, 26, 1.0)).unwrap();
     }
-    (set, Frames::fps(60).between(0.0, 1199.0 / 60.0))
+    (set, SampleTimes::fps(60).between(0.0, 1199.0 / 60.0))
 }
 
 /// Tracks of 2400 keys, 120 a second, and a frame between every second pair.
-fn dense(tracks: usize) -> (TrackSet, Frames) {
+fn dense(tracks: usize) -> (TrackSet, SampleTimes) {
     let (mut random, mut set) = (Rng::with_seed(2), TrackSet::new());
     let times: Vec<f64> = (0..2400).map(|key| f64::from(key) / 120.0).collect();
     for _ in 0..tracks {
@@ -270,36 +274,45 @@ fn dense(tracks: usize) -> (TrackSet, Frames) {
             .unwrap();
     }
     let start = 1.0 / 240.0;
-    (set, Frames::fps(60).between(start, start + 1198.0 / 60.0))
+    (
+        set,
+        SampleTimes::fps(60).between(start, start + 1198.0 / 60.0),
+    )
 }
 
 /// Two poses and one moment for each track.
-fn crowd(tracks: usize) -> (TrackSet, Frames) {
+fn crowd(tracks: usize) -> (TrackSet, SampleTimes) {
     let (mut random, mut set) = (Rng::with_seed(3), TrackSet::new());
     for _ in 0..tracks {
         set.push("", &[0.0, 1.0], &walk(&mut random, 2, 1.0))
             .unwrap();
     }
     let times = (0..tracks).map(|_| random.f64()).collect();
-    (set, Frames::at_each(times))
+    (set, SampleTimes::at_each(times))
 }
 
 /// Several times of each track, in no order: runs of a sample or two.
-fn scattered(tracks: usize) -> (TrackSet, Frames) {
+fn scattered(tracks: usize) -> (TrackSet, SampleTimes) {
     let mut random = Rng::with_seed(4);
     let times = (0..400).map(|_| 20.0 * random.f64()).collect();
-    (sparse(tracks).0, Frames::at(times))
+    (sparse(tracks).0, SampleTimes::at(times))
 }
 
 // ---------------------------------------------------------------- the dispatches
 
 /// A clip's dispatch, as a device gets it: on cards, or with an item for each invocation.
-fn of_clip(set: &TrackSet, frames: &Frames, method: Method, layout: Layout, cut: Cut) -> Launch {
-    let wanted = Wanted {
+fn of_clip(
+    set: &TrackSet,
+    frames: &SampleTimes,
+    method: Method,
+    layout: Layout,
+    cut: Cut,
+) -> Launch {
+    let request = PrepareRequest {
         group_bytes: Some(1 << 30),
-        ..Wanted::all(set)
+        ..PrepareRequest::all(set)
     };
-    let clip = ClipData::new(set, method.into(), wanted).unwrap();
+    let clip = ClipData::new(set, method.into(), request).unwrap();
     let timeline = frames.resolve(clip.track_count(), clip.time_span).unwrap();
     let window = Window::whole(clip.track_count(), timeline.len(), layout);
     let [group] = &clip.groups[..] else {
@@ -330,7 +343,7 @@ fn of_clip(set: &TrackSet, frames: &Frames, method: Method, layout: Layout, cut:
         globals.push(("dispatch", cells(bytemuck::bytes_of(&dispatch))));
         return Launch {
             kernel: format!("{form}_samples_f32"),
-            told: Told::Invocation,
+            builtins: Builtins::Invocation,
             workgroup: WORKGROUP,
             groups: [(samples.len() as u32).div_ceil(WORKGROUP), 1, 1],
             globals,
@@ -355,7 +368,7 @@ fn of_clip(set: &TrackSet, frames: &Frames, method: Method, layout: Layout, cut:
         globals.push(("dispatch", cells(bytemuck::bytes_of(&dispatch))));
         return Launch {
             kernel: format!("{form}_{listed}_f32"),
-            told: Told::Invocation,
+            builtins: Builtins::Invocation,
             workgroup: WORKGROUP,
             groups: [(count as u32).div_ceil(WORKGROUP), 1, 1],
             globals,
@@ -370,7 +383,7 @@ fn of_clip(set: &TrackSet, frames: &Frames, method: Method, layout: Layout, cut:
     globals.push(("dispatch", cells(bytemuck::bytes_of(&arguments))));
     Launch {
         kernel: format!("{form}_{listed}_coalesced_f32"),
-        told: Told::Workgroup,
+        builtins: Builtins::Workgroup,
         workgroup: WORKGROUP,
         groups: grids[0].workgroups(65_535),
         globals,
@@ -390,11 +403,11 @@ fn dispatch_of(count: usize, stride: usize) -> Dispatch {
 }
 
 /// The first dispatch of a set that is evaluated from its keys.
-fn of_keys(set: &TrackSet, frames: &Frames, method: Method) -> Launch {
+fn of_keys(set: &TrackSet, frames: &SampleTimes, method: Method) -> Launch {
     let interpolation = Interpolation::from(method);
     let timeline: Timeline = frames.resolve(set.track_count(), set.time_span()).unwrap();
     let curve = KeyCurve::of_set(set, &interpolation, &timeline).expect("fewer samples than keys");
-    let request = Request::whole(set, &interpolation, &timeline);
+    let request = SetRequest::whole(set, &interpolation, &timeline);
     let job = KeyJob {
         request: &request,
         curve,
@@ -425,7 +438,7 @@ fn of_keys(set: &TrackSet, frames: &Frames, method: Method) -> Launch {
     }
     Launch {
         kernel: kernel.to_owned(),
-        told: Told::InvocationAlone,
+        builtins: Builtins::InvocationAlone,
         workgroup: FROM_KEYS_WORKGROUP,
         groups: [
             (rows.samples + rows.line).div_ceil(FROM_KEYS_WORKGROUP),
@@ -471,15 +484,15 @@ fn cards_touch_hardly_more_lines_than_they_need() {
         for ((wave, line), [stores, loads]) in CARDS.into_iter().zip(count.of_cards) {
             let (stored, loaded) = (stores.ratio(), loads.ratio());
             ratios += &format!(" {stored:.2} {loaded:.2} |");
-            let what = format!("{name}, {wave} lanes, lines of {line}");
-            assert!(stored <= 1.1, "{what}: stores {stored}");
+            let label = format!("{name}, {wave} lanes, lines of {line}");
+            assert!(stored <= 1.1, "{label}: stores {stored}");
             // Frame by frame neighbours have items of their own, some of which lie across lines.
-            let most = if name.ends_with("FrameMajor") {
+            let limit = if name.ends_with("FrameMajor") {
                 1.4
             } else {
                 1.3
             };
-            assert!(loaded <= most, "{what}: loads {loaded}");
+            assert!(loaded <= limit, "{label}: loads {loaded}");
         }
         let each = |bytes: u64| bytes as f64 / count.rotations as f64;
         let (lanes, lines) = (count.loaded, 64 * count.of_workgroups.touched);

@@ -2,100 +2,100 @@
 
 use std::ops::Range;
 
-use super::operations::{Binary, Operand, Place, Unary};
+use super::operations::{Binary, CellIndex, Operand, Unary};
 use super::program::Program;
 
-/// One expression or statement. Each writes its result `to` a place of its own.
-pub(super) enum Step {
+/// One expression or statement. Each writes its result to its own cells, from `to` on.
+pub(super) enum MachineStep {
     /// Cells put together: vectors, arrays and structs, parts of them, and their copies.
     Compose {
-        from: Vec<Place>,
-        to: Place,
+        from: Vec<CellIndex>,
+        to: CellIndex,
     },
     Unary {
         work: Unary,
-        from: Place,
-        to: Place,
+        from: CellIndex,
+        to: CellIndex,
         count: usize,
     },
     Binary {
         work: &'static dyn Binary,
         operands: [Operand; 2],
-        to: Place,
+        to: CellIndex,
         count: usize,
     },
     Select {
         condition: Operand,
-        accept: Place,
-        reject: Place,
-        to: Place,
+        accept: CellIndex,
+        reject: CellIndex,
+        to: CellIndex,
         count: usize,
     },
     /// The element of an array or vector `of` so many that is a value, not a variable.
     Element {
-        base: Place,
-        index: Place,
+        base: CellIndex,
+        index: CellIndex,
         of: usize,
-        to: Place,
+        to: CellIndex,
         count: usize,
     },
     /// A pointer to a variable of this frame.
     Local {
-        place: Place,
-        to: Place,
+        variable: CellIndex,
+        to: CellIndex,
     },
     /// A pointer to an element, of `count` cells, of what a pointer points to.
     Point {
-        base: Place,
-        index: Place,
+        base: CellIndex,
+        index: CellIndex,
         of: usize,
-        to: Place,
+        to: CellIndex,
         count: usize,
     },
     /// A pointer to a fixed part of what a pointer points to.
     Advance {
-        base: Place,
+        base: CellIndex,
         by: usize,
-        to: Place,
+        to: CellIndex,
     },
     Load {
-        pointer: Place,
-        to: Place,
+        pointer: CellIndex,
+        to: CellIndex,
         count: usize,
     },
     Store {
-        pointer: Place,
-        from: Place,
+        pointer: CellIndex,
+        from: CellIndex,
         count: usize,
     },
     /// Four words of a texel buffer.
     Texel {
-        buffer: Place,
-        index: Place,
-        to: Place,
+        buffer: CellIndex,
+        index: CellIndex,
+        to: CellIndex,
     },
     ArrayLength {
-        pointer: Place,
-        to: Place,
+        pointer: CellIndex,
+        to: CellIndex,
         stride: usize,
     },
     If {
-        condition: Place,
-        accept: Vec<Step>,
-        reject: Vec<Step>,
+        condition: CellIndex,
+        accept: Vec<MachineStep>,
+        reject: Vec<MachineStep>,
     },
     Loop {
-        body: Vec<Step>,
-        continuing: Vec<Step>,
+        body: Vec<MachineStep>,
+        continuing: Vec<MachineStep>,
     },
     Break,
     Return {
-        from: Place,
+        from: CellIndex,
     },
     Call {
         function: usize,
-        arguments: Vec<Place>,
-        to: Place,
+        arguments: Vec<CellIndex>,
+        to: CellIndex,
         count: usize,
     },
 }
@@ -118,9 +118,9 @@ pub(super) struct Machine<'a> {
     pub(super) globals: Vec<Vec<u64>>,
     /// What was read and written of global variables, where that is asked for.
     pub(super) touches: Option<Vec<Touch>>,
-    /// Turns of loops so far.
-    turns: usize,
-    /// Whether anything was read or written outside the memory, or beyond the end of an array.
+    /// Iterations of loops so far.
+    iterations: usize,
+    /// Whether anything was read or written outside the memory, or past the end of an array.
     is_outside: bool,
 }
 
@@ -129,8 +129,8 @@ pub(super) struct Touch {
     pub(super) global: usize,
     cells: Range<usize>,
     pub(super) is_store: bool,
-    /// Turns of loops before it: invocations that run together take them together.
-    pub(super) turn: usize,
+    /// Iterations of loops before it: invocations that run together take them together.
+    pub(super) iteration: usize,
 }
 
 impl Touch {
@@ -162,7 +162,7 @@ impl<'a> Machine<'a> {
             stack: Vec::new(),
             globals: vec![Vec::new(); program.globals.len()],
             touches: None,
-            turns: 0,
+            iterations: 0,
             is_outside: false,
         }
     }
@@ -171,24 +171,30 @@ impl<'a> Machine<'a> {
     pub(super) fn call(&mut self, function: usize, arguments: &[u64]) -> Option<&[u64]> {
         self.stack.clear();
         self.stack.extend_from_slice(arguments);
-        (self.is_outside, self.turns) = (false, 0);
-        let places: Vec<Place> = (0..arguments.len()).collect();
-        let first = self.enter(function, 0, &places, arguments.len());
+        (self.is_outside, self.iterations) = (false, 0);
+        let indices: Vec<CellIndex> = (0..arguments.len()).collect();
+        let first = self.enter(function, 0, &indices, arguments.len());
         let count = self.program.functions[function].result;
         (!self.is_outside).then(|| &self.stack[first..first + count])
     }
 
     /// Runs a function with arguments from the frame at `caller`, in a frame at `base`. Returns
     /// where its result lies.
-    fn enter(&mut self, function: usize, caller: usize, arguments: &[Place], base: usize) -> usize {
+    fn enter(
+        &mut self,
+        function: usize,
+        caller: usize,
+        arguments: &[CellIndex],
+        base: usize,
+    ) -> usize {
         let function = &self.program.functions[function];
         let needed = base + function.size;
         if self.stack.len() < needed {
             self.stack.resize(needed, 0);
         }
         self.stack[base..base + function.start.len()].copy_from_slice(&function.start);
-        for (i, place) in arguments.iter().enumerate() {
-            self.stack[base + i] = self.stack[caller + place];
+        for (i, argument) in arguments.iter().enumerate() {
+            self.stack[base + i] = self.stack[caller + argument];
         }
         match self.run(&function.steps, base, needed) {
             End::Return(result) => result,
@@ -212,7 +218,7 @@ impl<'a> Machine<'a> {
                 global,
                 cells: cells.clone(),
                 is_store,
-                turn: self.turns,
+                iteration: self.iterations,
             });
         }
     }
@@ -239,16 +245,16 @@ impl<'a> Machine<'a> {
         }
     }
 
-    fn run(&mut self, steps: &[Step], base: usize, top: usize) -> End {
+    fn run(&mut self, steps: &[MachineStep], base: usize, top: usize) -> End {
         for step in steps {
             let frame = &mut self.stack[base..top];
             match *step {
-                Step::Compose { ref from, to } => {
+                MachineStep::Compose { ref from, to } => {
                     for (i, &from) in from.iter().enumerate() {
                         frame[to + i] = frame[from];
                     }
                 }
-                Step::Unary {
+                MachineStep::Unary {
                     work,
                     from,
                     to,
@@ -258,13 +264,13 @@ impl<'a> Machine<'a> {
                         frame[to + i] = work(frame[from + i]);
                     }
                 }
-                Step::Binary {
+                MachineStep::Binary {
                     work,
                     operands,
                     to,
                     count,
                 } => work.run(frame, operands, to, count),
-                Step::Select {
+                MachineStep::Select {
                     condition,
                     accept,
                     reject,
@@ -272,11 +278,11 @@ impl<'a> Machine<'a> {
                     count,
                 } => {
                     for i in 0..count {
-                        let accepts = frame[condition.place + condition.step * i] != 0;
+                        let accepts = frame[condition.first + condition.step * i] != 0;
                         frame[to + i] = frame[if accepts { accept } else { reject } + i];
                     }
                 }
-                Step::Element {
+                MachineStep::Element {
                     base,
                     index,
                     of,
@@ -287,8 +293,8 @@ impl<'a> Machine<'a> {
                     let first = base + index * count;
                     frame.copy_within(first..first + count, to);
                 }
-                Step::Local { place, to } => frame[to] = (base + place) as u64,
-                Step::Point {
+                MachineStep::Local { variable, to } => frame[to] = (base + variable) as u64,
+                MachineStep::Point {
                     base,
                     index,
                     of,
@@ -298,12 +304,12 @@ impl<'a> Machine<'a> {
                     let index = inside(frame[index], of, &mut self.is_outside);
                     frame[to] = frame[base] + (index * count) as u64;
                 }
-                Step::Advance { base, by, to } => frame[to] = frame[base] + by as u64,
-                Step::Load { pointer, to, count } => {
+                MachineStep::Advance { base, by, to } => frame[to] = frame[base] + by as u64,
+                MachineStep::Load { pointer, to, count } => {
                     let pointer = frame[pointer];
                     self.load(pointer, base + to, count);
                 }
-                Step::Store {
+                MachineStep::Store {
                     pointer,
                     from,
                     count,
@@ -311,12 +317,12 @@ impl<'a> Machine<'a> {
                     let pointer = frame[pointer];
                     self.store(pointer, base + from, count);
                 }
-                Step::Texel { buffer, index, to } => {
+                MachineStep::Texel { buffer, index, to } => {
                     let index = inside(frame[index], MANY, &mut self.is_outside);
                     let texel = frame[buffer] + 4 * index as u64;
                     self.load(texel, base + to, 4);
                 }
-                Step::ArrayLength {
+                MachineStep::ArrayLength {
                     pointer,
                     to,
                     stride,
@@ -324,22 +330,22 @@ impl<'a> Machine<'a> {
                     let global = (frame[pointer] >> 32) as usize - 1;
                     frame[to] = (self.globals[global].len() / stride) as u64;
                 }
-                Step::If {
+                MachineStep::If {
                     condition,
                     ref accept,
                     ref reject,
                 } => {
-                    let taken = if frame[condition] != 0 {
+                    let branch = if frame[condition] != 0 {
                         accept
                     } else {
                         reject
                     };
-                    match self.run(taken, base, top) {
+                    match self.run(branch, base, top) {
                         End::Whole => {}
                         end => return end,
                     }
                 }
-                Step::Loop {
+                MachineStep::Loop {
                     ref body,
                     ref continuing,
                 } => loop {
@@ -349,11 +355,11 @@ impl<'a> Machine<'a> {
                         end => return end,
                     }
                     self.run(continuing, base, top);
-                    self.turns += 1;
+                    self.iterations += 1;
                 },
-                Step::Break => return End::Break,
-                Step::Return { from } => return End::Return(base + from),
-                Step::Call {
+                MachineStep::Break => return End::Break,
+                MachineStep::Return { from } => return End::Return(base + from),
+                MachineStep::Call {
                     function,
                     ref arguments,
                     to,

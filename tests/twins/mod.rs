@@ -27,7 +27,7 @@ use std::sync::LazyLock;
 use naga::{BinaryOperator, Expression, Literal, Module};
 
 use crate::gpu::kernel_check::random::Random;
-use operations::Arithmetic;
+use operations::FloatMode;
 use program::{Checked, Program};
 use trial::Twin;
 
@@ -55,7 +55,7 @@ fn twins() -> Vec<Twin> {
     all
 }
 
-/// Functions without a twin of their own, and why.
+/// Functions without a twin, and why.
 const WITHOUT: [(&str, &str); 4] = [
     (
         "invocation_index",
@@ -92,7 +92,7 @@ fn kernels(twins: &[Twin]) -> BTreeMap<&'static str, Checked> {
 }
 
 /// The same, as they run on a device that keeps or flushes subnormals.
-fn programs(twins: &[Twin], arithmetic: Arithmetic) -> BTreeMap<&'static str, Program> {
+fn programs(twins: &[Twin], arithmetic: FloatMode) -> BTreeMap<&'static str, Program> {
     let program = |(name, checked): (_, Checked)| (name, checked.program(arithmetic));
     kernels(twins).into_iter().map(program).collect()
 }
@@ -100,7 +100,7 @@ fn programs(twins: &[Twin], arithmetic: Arithmetic) -> BTreeMap<&'static str, Pr
 #[test]
 fn every_shader_function_has_the_bits_of_its_twin() {
     let twins = twins();
-    let programs = programs(&twins, Arithmetic::AsWritten);
+    let programs = programs(&twins, FloatMode::AsWritten);
     let samples = match std::env::var_os("SOAK") {
         Some(_) => SOAKED,
         None => SAMPLES,
@@ -119,17 +119,17 @@ const RESULTS: [&str; 4] = ["main", "pose", "crowd_work", "store"];
 /// host gives them no result depends on it.
 #[test]
 fn results_are_the_same_where_subnormals_are_flushed() {
-    results_are_the_same(Arithmetic::SubnormalsFlushed);
+    results_are_the_same(FloatMode::SubnormalsFlushed);
 }
 
 /// Metal's compiler gets every product as a fused sum with +0, which has no negative zeros. No result depends
 /// on the sign of a product that is 0.
 #[test]
 fn results_are_the_same_where_products_are_fused_with_zero() {
-    results_are_the_same(Arithmetic::ProductsFused);
+    results_are_the_same(FloatMode::ProductsFused);
 }
 
-fn results_are_the_same(arithmetic: Arithmetic) {
+fn results_are_the_same(arithmetic: FloatMode) {
     let twins = twins();
     let programs = programs(&twins, arithmetic);
     // The numbers of the self-test are chosen; they are compared on devices.
@@ -153,12 +153,12 @@ fn functions_of_kernels() -> BTreeMap<(String, String), &'static str> {
             naga::front::wgsl::parse_str(text).expect("the compiler of the shaders parses it too");
         for (handle, function) in module.functions.iter() {
             let name = function.name.clone().expect("functions in WGSL have names");
-            let own = module
+            let range = module
                 .functions
                 .get_span(handle)
                 .to_range()
                 .expect("parsed from text");
-            all.insert((name, text[own].to_owned()), kernel);
+            all.insert((name, text[range].to_owned()), kernel);
         }
         let (_, entry) = text.split_once("\nfn main").expect("an entry point");
         let (entry, _) = entry.split_once("\n}").expect("it ends");
@@ -231,7 +231,7 @@ const COARSE: [(&str, &str, &str); 4] = [
     ),
 ];
 
-/// Nothing in any function is beyond the samples' reach: a mistake anywhere is found.
+/// The samples reach every part of every function: a mistake anywhere is found.
 #[test]
 fn a_mistake_anywhere_is_found() {
     let twins = twins();
@@ -241,7 +241,7 @@ fn a_mistake_anywhere_is_found() {
     let mut mistakes = BTreeMap::new();
     for twin in &twins {
         let checked = &kernels[twin.kernel];
-        let (mut program, text) = (checked.program(Arithmetic::AsWritten), source(twin.kernel));
+        let (mut program, text) = (checked.program(FloatMode::AsWritten), source(twin.kernel));
         let index = twin.index(&program);
         let (function, info) = checked.functions()[index];
         for (at, expression) in function.expressions.iter() {
@@ -254,20 +254,20 @@ fn a_mistake_anywhere_is_found() {
             let span = function.expressions.get_span(at);
             let line = span.location(text).line_number as usize;
             let line = text.lines().nth(line - 1).unwrap_or_default().to_owned();
-            let own = span.to_range().map_or("", |own| &text[own]).to_owned();
-            *mistakes.entry((line, own)).or_insert(false) |= twin
+            let range = span.to_range().map_or("", |range| &text[range]).to_owned();
+            *mistakes.entry((line, range)).or_insert(false) |= twin
                 .compare(&program, Random::new(), SAMPLES_OF_MISTAKES)
                 .is_err();
         }
     }
     assert!(mistakes.len() > 850, "only {} were tried", mistakes.len());
-    for ((line, own), is_found) in mistakes {
+    for ((line, range), is_found) in mistakes {
         let is_coarse = COARSE
             .iter()
-            .any(|(constant, part, _)| own == *constant && line.contains(part));
+            .any(|(constant, part, _)| range == *constant && line.contains(part));
         assert!(
             is_found != is_coarse,
-            "`{own}` in `{line}`: found is {is_found}"
+            "`{range}` in `{line}`: found is {is_found}"
         );
     }
 }

@@ -6,12 +6,12 @@ use naga::{BinaryOperator, Scalar, UnaryOperator};
 use super::cells::{as_f32, of_f32};
 
 /// Where the cells of a value lie in the frame of its function.
-pub(super) type Place = usize;
+pub(super) type CellIndex = usize;
 
 /// An operand of an operation on several cells; `step` is 0 where all of them use the same one.
 #[derive(Clone, Copy)]
 pub(super) struct Operand {
-    pub(super) place: Place,
+    pub(super) first: CellIndex,
     pub(super) step: usize,
 }
 
@@ -19,13 +19,13 @@ pub(super) type Unary = fn(u64) -> u64;
 
 /// An operation on two scalars, done for so many cells of a frame: one call for all of them.
 pub(super) trait Binary {
-    fn run(&self, frame: &mut [u64], operands: [Operand; 2], to: Place, count: usize);
+    fn run(&self, frame: &mut [u64], operands: [Operand; 2], to: CellIndex, count: usize);
 }
 
 impl<F: Fn(u64, u64) -> u64> Binary for F {
-    fn run(&self, frame: &mut [u64], [a, b]: [Operand; 2], to: Place, count: usize) {
+    fn run(&self, frame: &mut [u64], [a, b]: [Operand; 2], to: CellIndex, count: usize) {
         for i in 0..count {
-            frame[to + i] = self(frame[a.place + a.step * i], frame[b.place + b.step * i]);
+            frame[to + i] = self(frame[a.first + a.step * i], frame[b.first + b.step * i]);
         }
     }
 }
@@ -45,7 +45,7 @@ pub(super) fn unary(operator: UnaryOperator, of: Scalar) -> Unary {
 
 /// How a device computes with f32, where Vulkan or a translator of its shaders leaves a choice.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Arithmetic {
+pub(super) enum FloatMode {
     AsWritten,
     /// Numbers smaller than the least normal one are 0 as operands and as results.
     SubnormalsFlushed,
@@ -72,10 +72,10 @@ fn fused_product(a: f32, b: f32) -> f32 {
 pub(super) fn binary(
     operator: BinaryOperator,
     of: Scalar,
-    arithmetic: Arithmetic,
+    arithmetic: FloatMode,
 ) -> &'static dyn Binary {
     use BinaryOperator as Operator;
-    /// A closure of two cells, or of what they hold.
+    /// A closure of two cells, or of their values.
     macro_rules! on {
         ($a:ident $b:ident => $result:expr) => {
             &|$a: u64, $b: u64| $result
@@ -95,16 +95,16 @@ pub(super) fn binary(
     }
     // Comparisons are as they are where no subnormal is left.
     match (arithmetic, operator, of) {
-        (Arithmetic::SubnormalsFlushed, Operator::Add, Scalar::F32) => {
+        (FloatMode::SubnormalsFlushed, Operator::Add, Scalar::F32) => {
             return on!(flushed a b => a + b);
         }
-        (Arithmetic::SubnormalsFlushed, Operator::Subtract, Scalar::F32) => {
+        (FloatMode::SubnormalsFlushed, Operator::Subtract, Scalar::F32) => {
             return on!(flushed a b => a - b);
         }
-        (Arithmetic::SubnormalsFlushed, Operator::Multiply, Scalar::F32) => {
+        (FloatMode::SubnormalsFlushed, Operator::Multiply, Scalar::F32) => {
             return on!(flushed a b => a * b);
         }
-        (Arithmetic::ProductsFused, Operator::Multiply, Scalar::F32) => {
+        (FloatMode::ProductsFused, Operator::Multiply, Scalar::F32) => {
             return on!(f32 a b => of_f32(fused_product(a, b)));
         }
         _ => {}
@@ -157,7 +157,7 @@ pub(super) fn conversion(from: Scalar, to: Scalar) -> Option<Unary> {
 fn a_mode_changes_what_it_says() {
     let product = |arithmetic, a: f32, b: f32| {
         let mut frame = [of_f32(a), of_f32(b), 0];
-        let operand = |place| Operand { place, step: 0 };
+        let operand = |first| Operand { first, step: 0 };
         let multiply = binary(BinaryOperator::Multiply, Scalar::F32, arithmetic);
         multiply.run(&mut frame, [operand(0), operand(1)], 2, 1);
         as_f32(frame[2]).to_bits()
@@ -175,12 +175,12 @@ fn a_mode_changes_what_it_says() {
         ),
         (-3.0, 0.5, [(-1.5f32).to_bits(); 3]),
     ] {
-        assert_eq!(product(Arithmetic::AsWritten, a, b), written, "{a} {b}");
+        assert_eq!(product(FloatMode::AsWritten, a, b), written, "{a} {b}");
         assert_eq!(
-            product(Arithmetic::SubnormalsFlushed, a, b),
+            product(FloatMode::SubnormalsFlushed, a, b),
             flushed,
             "{a} {b}"
         );
-        assert_eq!(product(Arithmetic::ProductsFused, a, b), fused, "{a} {b}");
+        assert_eq!(product(FloatMode::ProductsFused, a, b), fused, "{a} {b}");
     }
 }

@@ -8,7 +8,7 @@ use crate::shader::{Link, Probe, ROOT, Reply};
 use crate::twin::self_test::reply;
 use crate::twin::{pose_add, pose_blend, pose_mix, pose_smooth, pose_steps, pose_world};
 
-use super::trial::{Trial, Twin, UNTOUCHED, twin, with_globals};
+use super::trial::{Twin, TwinTrial, UNTOUCHED, twin, with_globals};
 use crate::gpu::kernel_check::random::Random;
 
 pub(super) fn self_test() -> Twin {
@@ -31,19 +31,19 @@ fn layer(random: &mut Random) -> [f32; 4] {
     }
 }
 
-/// Mixes the rotations at `place`.
-fn mix(random: &mut Random, trial: &mut Trial, place: usize) {
+/// Mixes the rotations at `index`.
+fn mix(random: &mut Random, trial: &mut TwinTrial, index: usize) {
     let (pair, weight) = (random.pair(), random.number());
-    let [from, to] = pair.map(|own| {
-        let mut layer = vec![[0.0; 4]; place];
-        layer.push(own);
+    let [from, to] = pair.map(|key| {
+        let mut layer = vec![[0.0; 4]; index];
+        layer.push(key);
         layer
     });
     trial.global("from_layer", from);
     trial.global("to_layer", to);
     trial.global("weights", weight);
     trial.output("mixed");
-    trial.expect(vec![[UNTOUCHED; 4]; place]);
+    trial.expect(vec![[UNTOUCHED; 4]; index]);
     trial.expect(pose_mix::pose(pair[0], pair[1], weight));
 }
 
@@ -61,19 +61,19 @@ pub(super) fn poses() -> Vec<Twin> {
             mix(random, trial, 65);
         }),
         with_globals("poses_add", "pose", |random, trial| {
-            let [base, own, reference] = [0; 3].map(|_| layer(random));
+            let [base, added, reference] = [0; 3].map(|_| layer(random));
             let weight = random.number();
             trial.argument(0u32);
             trial.global("base", base);
-            trial.global("layer", own);
+            trial.global("layer", added);
             trial.global("reference", [reference, [weight, 0.0, 0.0, 0.0]]);
             trial.global("dispatch", [1u32, 0]);
             trial.output("added");
-            trial.expect(pose_add::pose(base, own, reference, weight));
+            trial.expect(pose_add::pose(base, added, reference, weight));
         }),
         with_globals("poses_blend", "pose", |random, trial| {
             const COUNT: usize = 2;
-            let (layers, place) = (1 + random.below(3), random.below(COUNT as u32));
+            let (layers, index) = (1 + random.below(3), random.below(COUNT as u32));
             let mut all = vec![[0.0; 4]; layers as usize * COUNT];
             all.fill_with(|| layer(random));
             let mut weights: Vec<f32> = (0..layers).map(|_| random.number()).collect();
@@ -82,11 +82,11 @@ pub(super) fn poses() -> Vec<Twin> {
                 all.copy_within(..COUNT, COUNT);
                 weights = vec![1.0, -1.0 + (16.0 + random.number()) / (1 << 24) as f32];
             }
-            trial.argument(place);
+            trial.argument(index);
             trial.global("dispatch", [COUNT as u32, layers]);
             trial.output("blended");
-            trial.expect(vec![[UNTOUCHED; 4]; place as usize]);
-            trial.expect(pose_blend::pose(&all, &weights, COUNT, place as usize));
+            trial.expect(vec![[UNTOUCHED; 4]; index as usize]);
+            trial.expect(pose_blend::pose(&all, &weights, COUNT, index as usize));
             trial.global("layers", all);
             trial.global("weights", weights);
         }),
@@ -97,38 +97,40 @@ pub(super) fn poses() -> Vec<Twin> {
             |[from, to]: [[f32; 4]; 2]| pose_steps::rotation_step(from, to),
         ),
         with_globals("poses_steps", "pose", |random, trial| {
-            let ([own, next], are_rotations) = (random.pair(), random.below(2));
+            let ([value, next], are_rotations) = (random.pair(), random.below(2));
             trial.argument(1u32);
             trial.global("dispatch", [2u32, are_rotations]);
-            trial.global("values", [[0.0; 4], own, next]);
+            trial.global("values", [[0.0; 4], value, next]);
             trial.output("steps");
             trial.expect([UNTOUCHED; 4]);
-            trial.expect(pose_steps::pose(own, next, are_rotations == 1));
+            trial.expect(pose_steps::pose(value, next, are_rotations == 1));
         }),
         twin(
             "poses_smooth",
             "turned",
             |random: &mut Random| {
-                // Near the longest turn there is, or anything.
+                // Near the longest rotation vector there is, or any.
                 let long = [FRAC_PI_2 + 0.0007 * random.number(), 0.0, 0.0, 0.0];
                 let any = random.vector::<4>();
-                let turn = if random.once_in(4) { long } else { any };
-                (random.rotation(), turn)
+                let vector = if random.once_in(4) { long } else { any };
+                (random.rotation(), vector)
             },
-            |(q, v)| pose_smooth::turned(q, v),
+            |(q, v)| pose_smooth::rotated_by(q, v),
         ),
         with_globals("poses_smooth", "pose", |random, trial| {
             let weights: Vec<f32> = (0..1 + random.below(3)).map(|_| random.number()).collect();
             let values = [random.rotation(), random.rotation()];
             let mut steps = vec![[0.0; 4]; 2 * weights.len() + 1];
             steps.fill_with(|| random.vector::<4>().map(|c| 0.3 * c));
-            let (place, are_rotations) = (random.below(2), random.below(2));
-            trial.argument(place);
+            let (index, are_rotations) = (random.below(2), random.below(2));
+            trial.argument(index);
             trial.global("dispatch", [2, 2 * weights.len() as u32 + are_rotations]);
             trial.output("smoothed");
-            trial.expect(vec![[UNTOUCHED; 4]; place as usize]);
-            let own = (are_rotations == 1, place as usize);
-            trial.expect(pose_smooth::pose(&values, &steps, &weights, own.0, own.1));
+            trial.expect(vec![[UNTOUCHED; 4]; index as usize]);
+            let kind_is_rotation = are_rotations == 1;
+            let smoothed =
+                pose_smooth::pose(&values, &steps, &weights, kind_is_rotation, index as usize);
+            trial.expect(smoothed);
             trial.global("values", values);
             trial.global("steps", steps);
             trial.global("weights", weights);
@@ -150,7 +152,7 @@ pub(super) fn poses() -> Vec<Twin> {
             trial.global("local", local);
             trial.global(
                 "links",
-                links.map(|own| (own.offset, own.track, own.parent)),
+                links.map(|link| (link.offset, link.track, link.parent)),
             );
             trial.global("dispatch", [2, TRACKS as u32]);
             trial.output("world");

@@ -4,8 +4,8 @@ use naga::valid::{Capabilities, FunctionInfo, ModuleInfo, ValidationFlags, Valid
 use naga::{Function, Module};
 
 use super::frame::compiled;
-use super::machine::Step;
-use super::operations::Arithmetic;
+use super::machine::MachineStep;
+use super::operations::FloatMode;
 
 /// A function that can run.
 pub(super) struct Compiled {
@@ -16,7 +16,7 @@ pub(super) struct Compiled {
     pub(super) size: usize,
     /// Cells of the result.
     pub(super) result: usize,
-    pub(super) steps: Vec<Step>,
+    pub(super) steps: Vec<MachineStep>,
 }
 
 /// All functions of a module, the entry point last, and the names of its global variables.
@@ -50,21 +50,21 @@ impl Checked {
         named.chain(entries).collect()
     }
 
-    pub(super) fn program(&self, arithmetic: Arithmetic) -> Program {
+    pub(super) fn program(&self, arithmetic: FloatMode) -> Program {
         let all = self.functions().into_iter();
         let globals = self.module.global_variables.iter();
         Program {
             functions: all
-                .map(|(own, info)| compiled(&self.module, own, info, arithmetic))
+                .map(|(function, info)| compiled(&self.module, function, info, arithmetic))
                 .collect(),
             globals: globals
-                .map(|(_, own)| own.name.clone().unwrap_or_default())
+                .map(|(_, global)| global.name.clone().unwrap_or_default())
                 .collect(),
         }
     }
 
     /// One function; `info` is that of this function, or of one with expressions of the same types.
     pub(super) fn compiled(&self, function: &Function, info: &FunctionInfo) -> Compiled {
-        compiled(&self.module, function, info, Arithmetic::AsWritten)
+        compiled(&self.module, function, info, FloatMode::AsWritten)
     }
 }

@@ -4,7 +4,7 @@ use crate::output::encoding::{Encoding, MatrixOrder};
 use crate::output::euler::EulerSequence;
 use crate::shader::{LINE, WORKGROUP};
 
-use super::trial::{Trial, Twin, UNTOUCHED, with_globals};
+use super::trial::{Twin, TwinTrial, UNTOUCHED, with_globals};
 use crate::gpu::kernel_check::StoredKey;
 use crate::gpu::kernel_check::random::Random;
 
@@ -40,15 +40,15 @@ fn store(kernel: &'static str, kind: &'static str) -> Twin {
     with_globals(kernel, "store", move |random, trial| {
         let encoding = encoding(kind, random);
         let rotation = random.rotation();
-        let place = random.below(3);
-        trial.argument((place, rotation));
+        let index = random.below(3);
+        trial.argument((index, rotation));
         trial.global("dispatch", [0, 0, 0, encoding.row().detail, 0u32]);
         trial.output("rotations");
         let cells: Vec<u64> = match kind {
             "f32_wide" => bytemuck::pod_collect_to_vec(bytemuck::bytes_of(&rotation)),
             _ => words(encoding, rotation),
         };
-        trial.expect(vec![UNTOUCHED; place as usize * cells.len()]);
+        trial.expect(vec![UNTOUCHED; index as usize * cells.len()]);
         trial.expect(cells);
     })
 }
@@ -64,9 +64,9 @@ fn reader(
     with_globals(kernel, function, move |random, trial| {
         let count = (3 * words).next_multiple_of(4);
         let all: Vec<u32> = (0..count).map(|_| random.word()).collect();
-        let place = random.below(3);
-        trial.argument(place);
-        trial.expect(all[place as usize * words..][..words].to_vec());
+        let index = random.below(3);
+        trial.argument(index);
+        trial.expect(all[index as usize * words..][..words].to_vec());
         trial.global(buffer, all);
     })
 }
@@ -107,11 +107,11 @@ pub(super) fn stores() -> Vec<Twin> {
         "arc_frames_coalesced_f32",
         "finish",
         |random, trial| {
-            let (place, is_stored) = (random.below(3), random.once_in(2));
+            let (index, is_stored) = (random.below(3), random.once_in(2));
             let rotation = random.rotation();
-            trial.argument((random.below(WORKGROUP), place, rotation, is_stored));
+            trial.argument((random.below(WORKGROUP), index, rotation, is_stored));
             trial.output("rotations");
-            trial.expect(vec![UNTOUCHED; 4 * place as usize]);
+            trial.expect(vec![UNTOUCHED; 4 * index as usize]);
             match is_stored {
                 true => trial.expect(rotation),
                 false => trial.expect([UNTOUCHED; 4]),
@@ -154,8 +154,8 @@ fn together(kernel: &'static str, kind: &'static str, size: usize) -> Twin {
         trial.expect(vec![UNTOUCHED; line as usize * words.len()]);
         for part in 0..LINE as usize * parts {
             let other = (lane - within) as usize + part / parts;
-            let is_own = part % LINE as usize == within as usize && there[other] != 0;
-            match is_own {
+            let is_inside = part % LINE as usize == within as usize && there[other] != 0;
+            match is_inside {
                 true => trial.expect(
                     tile[(lane - within) as usize * words.len() + part * size..][..size].to_vec(),
                 ),
@@ -198,7 +198,7 @@ pub(super) fn readers() -> Vec<Twin> {
             reader(crowd, "entry_at", "entries", 4),
             reader(crowd, "channel_at", "channels", 4),
             reader(crowd, "cell_at", "cells", 4),
-            reader(crowd, "place_at", "places", 2),
+            reader(crowd, "position_at", "positions", 2),
         ]);
     }
     all.push(with_globals(
@@ -225,7 +225,7 @@ pub(super) fn keys() -> Vec<Twin> {
         with_globals(
             KERNEL,
             function,
-            move |random: &mut Random, trial: &mut Trial| {
+            move |random: &mut Random, trial: &mut TwinTrial| {
                 let key = stored_key(random);
                 trial.argument(key.stored);
                 trial.expect(expected(key));
@@ -233,14 +233,14 @@ pub(super) fn keys() -> Vec<Twin> {
         )
     };
     vec![
-        key("as_given", |key| key.given),
+        key("as_stored", |key| key.authored),
         key("continued", |key| key.continued),
         with_globals(KERNEL, "continued_key_at", |random, trial| {
             let all: [StoredKey; 2] = std::array::from_fn(|_| stored_key(random));
-            let place = random.below(2);
-            trial.argument(place);
+            let index = random.below(2);
+            trial.argument(index);
             trial.global("keys", [all[0].stored, all[1].stored]);
-            trial.expect(all[place as usize].continued);
+            trial.expect(all[index as usize].continued);
         }),
     ]
 }

@@ -7,36 +7,36 @@ use crate::gpu::kernel_check::random::Random;
 
 /// One call of a function: what goes in, and what its twin makes of it.
 #[derive(Default)]
-pub(super) struct Trial {
+pub(super) struct TwinTrial {
     arguments: Vec<u64>,
     buffers: Vec<(&'static str, Vec<u64>)>,
-    /// The buffer that holds the result; without it, the function returns the result.
+    /// The buffer of the result; without it, the function returns the result.
     output: Option<&'static str>,
     expected: Vec<u64>,
     samples: usize,
 }
 
-/// What cells of an output hold before the call. A twin expects it where nothing is stored.
+/// The value of output cells before the call. A twin expects it where nothing is stored.
 pub(super) const UNTOUCHED: u64 = u64::MAX;
 
-impl Trial {
+impl TwinTrial {
     pub(super) fn argument(&mut self, value: impl Cells) {
         value.put(&mut self.arguments);
     }
 
     /// Fills a global variable: a buffer, or what comes with a dispatch.
     pub(super) fn global(&mut self, name: &'static str, value: impl Cells) {
-        let place = self.buffers.iter().position(|(own, _)| *own == name);
-        let place = place.unwrap_or_else(|| {
+        let index = self.buffers.iter().position(|(buffer, _)| *buffer == name);
+        let index = index.unwrap_or_else(|| {
             self.buffers.push((name, Vec::new()));
             self.buffers.len() - 1
         });
-        let (_, cells) = &mut self.buffers[place];
+        let (_, cells) = &mut self.buffers[index];
         cells.clear();
         value.put(cells);
     }
 
-    /// Takes the result from a buffer; all of it, if [`Trial::global`] filled it.
+    /// Takes the result from a buffer; all of it, if [`TwinTrial::global`] filled it.
     pub(super) fn output(&mut self, name: &'static str) {
         self.output = Some(name);
     }
@@ -52,13 +52,13 @@ impl Trial {
 }
 
 /// Makes up one call.
-type Fill = dyn Fn(&mut Random, &mut Trial);
+type FillTrial = dyn Fn(&mut Random, &mut TwinTrial);
 
 /// A function of a kernel beside its twin.
 pub(super) struct Twin {
     pub(super) kernel: &'static str,
     pub(super) function: &'static str,
-    trial: Box<Fill>,
+    trial: Box<FillTrial>,
 }
 
 /// A function that takes all that it needs as arguments, and the one in Rust.
@@ -79,7 +79,7 @@ pub(super) fn twin<A: Cells, R: Cells>(
 pub(super) fn with_globals(
     kernel: &'static str,
     function: &'static str,
-    trial: impl Fn(&mut Random, &mut Trial) + 'static,
+    trial: impl Fn(&mut Random, &mut TwinTrial) + 'static,
 ) -> Twin {
     Twin {
         kernel,
@@ -91,7 +91,7 @@ pub(super) fn with_globals(
 impl Twin {
     pub(super) fn index(&self, program: &Program) -> usize {
         let mut all = program.functions.iter();
-        let index = all.position(|own| own.name == self.function);
+        let index = all.position(|function| function.name == self.function);
         index.unwrap_or_else(|| panic!("{} has no function {}", self.kernel, self.function))
     }
 
@@ -103,7 +103,7 @@ impl Twin {
         samples: usize,
     ) -> Result<(), String> {
         let function = self.index(program);
-        let mut trial = Trial::default();
+        let mut trial = TwinTrial::default();
         let mut machine = Machine::new(program);
         let mut sample = 0;
         while sample < samples {
@@ -112,15 +112,15 @@ impl Twin {
             trial.expected.clear();
             (self.trial)(&mut random, &mut trial);
             let global = |name: &str| {
-                let place = program.globals.iter().position(|own| own == name);
-                place.unwrap_or_else(|| panic!("{} has no global {name}", self.kernel))
+                let index = program.globals.iter().position(|global| global == name);
+                index.unwrap_or_else(|| panic!("{} has no global {name}", self.kernel))
             };
             for (name, cells) in &trial.buffers {
                 machine.globals[global(name)].clone_from(cells);
             }
             let count = trial.expected.len();
             // A buffer that is filled is read and written.
-            let is_filled = |name| trial.buffers.iter().any(|(own, _)| *own == name);
+            let is_filled = |name| trial.buffers.iter().any(|(buffer, _)| *buffer == name);
             if let Some(name) = trial.output.filter(|&name| !is_filled(name)) {
                 let output = &mut machine.globals[global(name)];
                 output.clear();
@@ -140,12 +140,12 @@ impl Twin {
             };
             assert_eq!(found.len(), count, "{}", self.function);
             if *found != trial.expected {
-                let place = (0..count)
+                let wrong = (0..count)
                     .find(|&i| found[i] != trial.expected[i])
                     .unwrap_or(0);
-                let [found, expected] = [found, &trial.expected].map(|all| all[place]);
+                let [found, expected] = [found, &trial.expected].map(|all| all[wrong]);
                 return Err(format!(
-                    "{} of {}, sample {sample}, cell {place} of {count}: \
+                    "{} of {}, sample {sample}, cell {wrong} of {count}: \
                      {found:#x} ({:e}), but the twin has {expected:#x} ({:e})\n\
                      arguments: {:x?}\nglobals: {:x?}",
                     self.function,

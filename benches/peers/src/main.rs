@@ -3,7 +3,7 @@
 //!
 //! ```text
 //! tumble-peers write KEYS         the keys, for all contestants
-//! tumble-peers race KEYS FOLDER   a line of JSON for each way, the first row of its result in FOLDER
+//! tumble-peers race KEYS FOLDER   a line of JSON for each contestant, the first row of its result in FOLDER
 //! ```
 
 #[cfg(feature = "bevy")]
@@ -16,7 +16,9 @@ use std::{env, fs};
 
 use glam::{DQuat, DVec3, Quat};
 use rayon::prelude::*;
-use tumble::{Device, Engine, EngineOptions, Frames, Layout, Method, OutputBuffer, TrackSet, method};
+use tumble::{
+    Device, Engine, EngineOptions, Layout, Method, OutputBuffer, SampleTimes, TrackSet, method,
+};
 
 const TRACKS: usize = 4096;
 const KEYS: usize = 26;
@@ -48,7 +50,7 @@ fn main() {
 
 fn contestants(set: &TrackSet) -> Vec<Contestant<'_>> {
     let frames = &*Box::leak(Box::new(
-        Frames::fps(RATE as u32).between(0.0, (FRAMES - 1) as f64 / RATE),
+        SampleTimes::fps(RATE as u32).between(0.0, (FRAMES - 1) as f64 / RATE),
     ));
     let times: Vec<f32> = (0..FRAMES).map(|k| (k as f64 / RATE) as f32).collect();
     let times: &'static [f32] = times.leak();
@@ -63,7 +65,12 @@ fn contestants(set: &TrackSet) -> Vec<Contestant<'_>> {
             let done = engine.evaluate_into(set, method, frames, Layout::TrackMajor, output);
             done.expect("what fits");
         };
-        Contestant { name, work, threads, fill: Box::new(fill) }
+        Contestant {
+            name,
+            work,
+            threads,
+            fill: Box::new(fill),
+        }
     };
     let kept = |name, work, method: Method| {
         let clip = engine(None).upload(set, method).expect("good keys");
@@ -71,7 +78,12 @@ fn contestants(set: &TrackSet) -> Vec<Contestant<'_>> {
             let done = clip.evaluate_into(frames, Layout::TrackMajor, output);
             done.expect("what fits");
         };
-        Contestant { name, work, threads: "all", fill: Box::new(fill) }
+        Contestant {
+            name,
+            work,
+            threads: "all",
+            fill: Box::new(fill),
+        }
     };
     let of_each = |name, work, threads, row: fn(tumble::Track<'_>, &[f32], &mut [Quat])| {
         let fill = move |output: &mut [Quat]| match threads {
@@ -84,22 +96,38 @@ fn contestants(set: &TrackSet) -> Vec<Contestant<'_>> {
                 rows.for_each(|(index, output)| row(set.track(index), times, output));
             }
         };
-        Contestant { name, work, threads, fill: Box::new(fill) }
+        Contestant {
+            name,
+            work,
+            threads,
+            fill: Box::new(fill),
+        }
     };
     let write = |output: &mut [Quat]| {
         let value = std::hint::black_box(Quat::IDENTITY);
         let each = output.len().div_ceil(rayon::current_num_threads());
-        output.par_chunks_mut(each).for_each(|part| part.fill(value));
+        output
+            .par_chunks_mut(each)
+            .for_each(|part| part.fill(value));
     };
-    let write = Contestant { name: "writing memory", work: "none", threads: "all", fill: Box::new(write) };
+    let write = Contestant {
+        name: "writing memory",
+        work: "none",
+        threads: "all",
+        fill: Box::new(write),
+    };
     let mut first = TrackSet::new();
     let track = set.track(0);
-    first.push("", track.times, track.keys).expect("unit keys in order");
-    let small = engine(Some(1)).upload(&first, method::SLERP).expect("good keys");
+    first
+        .push("", track.times, track.keys)
+        .expect("unit keys in order");
+    let small = engine(Some(1))
+        .upload(&first, method::SLERP)
+        .expect("good keys");
     let one_tumble = move |output: &mut [Quat]| {
         for call in 0..CALLS {
             let at = (call * 7919 % (FRAMES - 1)) as f64 / RATE;
-            let one = Frames::fps(RATE as u32).between(at, at);
+            let one = SampleTimes::fps(RATE as u32).between(at, at);
             let done = small.evaluate_into(&one, Layout::TrackMajor, &mut output[..1]);
             done.expect("what fits");
         }
@@ -120,11 +148,31 @@ fn contestants(set: &TrackSet) -> Vec<Contestant<'_>> {
         of_each("glam Quat::slerp, by hand", "slerp", "all", naive),
         of_each("glam Quat::slerp, by hand, one thread", "slerp", "1", naive),
         of_each("ultraviolet Rotor3x8::slerp", "slerp", "all", wide::slerp),
-        tumble("Tumble, from keys", "smooth", "all", method::BESSEL_OVERHAUSER),
-        tumble("Tumble, from keys, one thread", "smooth", "1", method::BESSEL_OVERHAUSER),
+        tumble(
+            "Tumble, from keys",
+            "smooth",
+            "all",
+            method::BESSEL_OVERHAUSER,
+        ),
+        tumble(
+            "Tumble, from keys, one thread",
+            "smooth",
+            "1",
+            method::BESSEL_OVERHAUSER,
+        ),
         kept("Tumble, a kept clip", "smooth", method::BESSEL_OVERHAUSER),
-        Contestant { name: "Tumble, a kept clip", work: one, threads: "1", fill: Box::new(one_tumble) },
-        Contestant { name: "glam Quat::slerp, by hand", work: one, threads: "1", fill: Box::new(one_glam) },
+        Contestant {
+            name: "Tumble, a kept clip",
+            work: one,
+            threads: "1",
+            fill: Box::new(one_tumble),
+        },
+        Contestant {
+            name: "glam Quat::slerp, by hand",
+            work: one,
+            threads: "1",
+            fill: Box::new(one_glam),
+        },
     ];
     #[cfg(feature = "bevy")]
     let contestants = {
@@ -132,10 +180,20 @@ fn contestants(set: &TrackSet) -> Vec<Contestant<'_>> {
         let (arcs, hermite) = (bevy::arcs(set), bevy::hermite(set));
         let fill = move |output: &mut [Quat]| bevy::sample(&arcs, times, output);
         let name = "Bevy UnevenSampleAutoCurve";
-        contestants.push(Contestant { name, work: "slerp", threads: "all", fill: Box::new(fill) });
+        contestants.push(Contestant {
+            name,
+            work: "slerp",
+            threads: "all",
+            fill: Box::new(fill),
+        });
         let fill = move |output: &mut [Quat]| bevy::sample(&hermite, times, output);
         let name = "Bevy CubicRotationCurve";
-        contestants.push(Contestant { name, work: "smooth", threads: "all", fill: Box::new(fill) });
+        contestants.push(Contestant {
+            name,
+            work: "smooth",
+            threads: "all",
+            fill: Box::new(fill),
+        });
         contestants
     };
     contestants
@@ -162,7 +220,7 @@ fn one_sample(track: tumble::Track<'_>, time: f32) -> Quat {
     track.keys[i].slerp(track.keys[i + 1], t as f32)
 }
 
-/// Every contestant in turn, after a round that does not count; the median of each.
+/// All contestants one after another, after a round that does not count; the median of each.
 fn race(mut contestants: Vec<Contestant<'_>>, folder: &Path) {
     let mut output = OutputBuffer::new(TRACKS * FRAMES).expect("memory");
     output.fill(Quat::IDENTITY);
@@ -216,7 +274,10 @@ fn unpacked(bytes: &[u8]) -> TrackSet {
     let numbers = &bytes[20..];
     let (times, keys) = numbers.split_at(8 * TRACKS * KEYS);
     let mut set = TrackSet::new();
-    for (times, keys) in times.chunks_exact(8 * KEYS).zip(keys.chunks_exact(16 * KEYS)) {
+    for (times, keys) in times
+        .chunks_exact(8 * KEYS)
+        .zip(keys.chunks_exact(16 * KEYS))
+    {
         let times: Vec<f64> = bytemuck::pod_collect_to_vec(times);
         let keys: Vec<Quat> = bytemuck::pod_collect_to_vec(keys);
         set.push("", &times, &keys).expect("unit keys in order");
@@ -239,8 +300,8 @@ fn tracks() -> TrackSet {
         let mut rotation = DQuat::IDENTITY;
         let mut key = || {
             let axis = DVec3::from_array([(); 3].map(|()| between(-1.0, 1.0)));
-            let turn = DQuat::from_axis_angle(axis.normalize_or(DVec3::X), between(0.0, 1.0));
-            rotation = (rotation * turn).normalize();
+            let step = DQuat::from_axis_angle(axis.normalize_or(DVec3::X), between(0.0, 1.0));
+            rotation = (rotation * step).normalize();
             rotation.as_quat()
         };
         let keys: Vec<Quat> = times.iter().map(|_| key()).collect();

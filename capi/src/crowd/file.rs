@@ -42,8 +42,8 @@ fn tracks_by_name(motion: &Motion, clip: usize) -> Result<HashMap<String, usize>
 fn joints(file: &TumbleFile) -> Result<Vec<LibraryJoint>, Failure> {
     let mut joints: Vec<LibraryJoint> = Vec::new();
     let mut known: HashMap<String, usize> = HashMap::new();
-    for (clip, own) in file.clips.iter().enumerate() {
-        let motion = &own.motion;
+    for (clip, entry) in file.clips.iter().enumerate() {
+        let motion = &entry.motion;
         tracks_by_name(motion, clip)?;
         let names = (0..motion.set.track_count()).map(|track| name_of(motion, track));
         let names: Vec<String> = names.collect();
@@ -72,7 +72,7 @@ fn joints(file: &TumbleFile) -> Result<Vec<LibraryJoint>, Failure> {
                 joints[joint].parent = parent;
             } else if joints[joint].parent != parent {
                 return Err(refused(format!(
-                    "`{name}` hangs from another joint in clip {clip} than in the clips before; make a library for each skeleton"
+                    "`{name}` has another parent in clip {clip} than in the clips before; make a library for each skeleton"
                 )));
             }
         }
@@ -153,7 +153,7 @@ fn matched(
 }
 
 /// The one method of all rotations that move.
-fn own_method(motion: &Motion, clip: usize) -> Result<Method, Failure> {
+fn authored_method(motion: &Motion, clip: usize) -> Result<Method, Failure> {
     let moves = |&track: &usize| {
         let keys = motion
             .set
@@ -174,7 +174,7 @@ fn own_method(motion: &Motion, clip: usize) -> Result<Method, Failure> {
     }
 }
 
-fn own_vector_method(motion: &Motion, clip: usize) -> Result<VectorMethod, Failure> {
+fn authored_vector_method(motion: &Motion, clip: usize) -> Result<VectorMethod, Failure> {
     let found = ChannelMethods::AUTHORED.vector_method_of(motion);
     found.ok_or_else(|| {
         refused(format!(
@@ -207,8 +207,10 @@ pub unsafe extern "C" fn tumble_crowd_library_push_clip(
         // SAFETY: as the caller promises.
         let (interpolation, vectors) = unsafe {
             (
-                TumbleInterpolation::read_or(interpolation, || own_method(motion, clip_of_file))?,
-                vector_method(vectors, || own_vector_method(motion, clip_of_file))?,
+                TumbleInterpolation::read_or(interpolation, || {
+                    authored_method(motion, clip_of_file)
+                })?,
+                vector_method(vectors, || authored_vector_method(motion, clip_of_file))?,
             )
         };
         let set = matched(&library, motion, clip_of_file)?;

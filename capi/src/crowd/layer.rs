@@ -36,12 +36,12 @@ pub struct TumbleCrowdLayer {
 }
 
 impl TumbleCrowdLayer {
-    /// The instance, the layer, and what it is to play; `place` is for messages.
-    pub(crate) fn change(&self, place: usize) -> Result<(usize, usize, CrowdLayer), Failure> {
+    /// The instance, the layer, and what it is to play; `index` is for messages.
+    pub(crate) fn change(&self, index: usize) -> Result<(usize, usize, CrowdLayer), Failure> {
         let size = size_of::<Self>();
         if self.size != size {
             let message = format!(
-                "`layers[{place}].size` is {}, and this version's structure has {size} bytes; set it \
+                "`layers[{index}].size` is {}, and this version's structure has {size} bytes; set it \
                  to `sizeof`, with the header of the library's version",
                 self.size
             );
@@ -51,9 +51,9 @@ impl TumbleCrowdLayer {
             clip: self.clip,
             time: self.time,
             speed: self.speed,
-            wrap: constant(self.wrap, &WRAPS, &format!("layers[{place}].wrap"))?,
+            wrap: constant(self.wrap, &WRAPS, &format!("layers[{index}].wrap"))?,
             weight: self.weight,
-            additive: flag(self.additive, &format!("layers[{place}].additive"))?,
+            additive: flag(self.additive, &format!("layers[{index}].additive"))?,
             mask: self.mask.checked_sub(1),
         };
         Ok((self.instance, self.layer, plays))
@@ -70,7 +70,7 @@ impl TumbleCrowdLayer {
             time: plays.time,
             speed: plays.speed,
             weight: plays.weight,
-            wrap: wrap.map_or(0, |&(own, _)| own),
+            wrap: wrap.map_or(0, |&(code, _)| code),
             additive: plays.additive.into(),
             mask: plays.mask.map_or(0, |mask| mask + 1),
         }

@@ -15,7 +15,7 @@ use crate::set::TumbleSet;
 
 /// Clips of one skeleton, prepared for crowds. Any number of threads may use it at once.
 pub struct TumbleCrowdLibrary {
-    own: RwLock<CrowdLibrary>,
+    inner: RwLock<CrowdLibrary>,
     pub(crate) joints: Vec<LibraryJoint>,
 }
 
@@ -38,24 +38,24 @@ impl TumbleCrowdLibrary {
         let parents = joints.iter().map(|joint| joint.parent).collect();
         let offsets = joints.iter().map(|joint| joint.rest.translation).collect();
         let skeleton = Skeleton::new(parents, offsets)?;
-        let own = match ticks_per_second {
+        let library = match ticks_per_second {
             0 => CrowdLibrary::new(&skeleton)?,
             ticks => CrowdLibrary::with_ticks(&skeleton, ticks)?,
         };
-        let own = RwLock::new(own);
-        Ok(Self { own, joints })
+        let inner = RwLock::new(library);
+        Ok(Self { inner, joints })
     }
 
     pub(crate) fn read(&self) -> Result<RwLockReadGuard<'_, CrowdLibrary>, Failure> {
-        handle::locked::<Self, _>(self.own.read())
+        handle::locked::<Self, _>(self.inner.read())
     }
 
     pub(crate) fn write(&self) -> Result<RwLockWriteGuard<'_, CrowdLibrary>, Failure> {
-        handle::locked::<Self, _>(self.own.write())
+        handle::locked::<Self, _>(self.inner.write())
     }
 }
 
-/// An empty library for a skeleton of arrays. `parents` has the place of each joint's parent, -1 for a
+/// An empty library for a skeleton of arrays. `parents` has the index of each joint's parent, -1 for a
 /// root; parents may come after their children. `offsets` has three numbers for each joint: where it
 /// hangs in its parent's frame while a clip has no translations for it; null: nowhere but at the parent.
 /// `ticks_per_second`: the unit of all times, 0 for 705 600, which allows clips of 50 minutes.
@@ -73,9 +73,10 @@ pub unsafe extern "C" fn tumble_crowd_library_new(
 ) -> TumbleResult {
     code(|| {
         let out = Out::new(library, "library")?;
-        let numbers = match offsets.is_null() {
-            true => 0,
-            false => product::<f32>(joint_count, 3, "offsets")?,
+        let numbers = if offsets.is_null() {
+            0
+        } else {
+            product::<f32>(joint_count, 3, "offsets")?
         };
         // SAFETY: as the caller promises.
         let (parents, offsets) = unsafe {
@@ -86,18 +87,18 @@ pub unsafe extern "C" fn tumble_crowd_library_new(
         };
         let (offsets, _) = offsets.as_chunks::<3>();
         let joint = |(joint, &parent): (usize, &i32)| {
-            let mut own = LibraryJoint {
+            let mut library_joint = LibraryJoint {
                 parent: usize::try_from(parent).ok(),
                 ..LibraryJoint::default()
             };
-            if own.parent.is_none() && parent != -1 {
+            if library_joint.parent.is_none() && parent != -1 {
                 let message = format!("`parents[{joint}]` is {parent}; that of a root is -1");
                 return Err(Failure::argument(message));
             }
             if let Some(&offset) = offsets.get(joint) {
-                own.rest.translation = Vec3::from_array(offset);
+                library_joint.rest.translation = Vec3::from_array(offset);
             }
-            Ok(own)
+            Ok(library_joint)
         };
         let joints = parents.iter().enumerate().map(joint);
         let made = TumbleCrowdLibrary::new(joints.collect::<Result<_, _>>()?, ticks_per_second)?;
@@ -231,19 +232,19 @@ pub extern "C" fn tumble_crowd_library_set_reference(
     })
 }
 
-/// The number of joints; 0 for what is no library.
+/// The number of joints; 0 for an invalid handle.
 #[unsafe(no_mangle)]
 pub extern "C" fn tumble_crowd_library_joint_count(library: *const TumbleCrowdLibrary) -> usize {
     guarded(|| Ok(handle::get(library)?.joints.len())).unwrap_or(0)
 }
 
-/// The number of clips; 0 for what is no library.
+/// The number of clips; 0 for an invalid handle.
 #[unsafe(no_mangle)]
 pub extern "C" fn tumble_crowd_library_clip_count(library: *const TumbleCrowdLibrary) -> usize {
     guarded(|| Ok(handle::get(library)?.read()?.clips())).unwrap_or(0)
 }
 
-/// Ticks of a second; 0 for what is no library.
+/// Ticks of a second; 0 for an invalid handle.
 #[unsafe(no_mangle)]
 pub extern "C" fn tumble_crowd_library_ticks_per_second(library: *const TumbleCrowdLibrary) -> u32 {
     guarded(|| Ok(handle::get(library)?.read()?.ticks_per_second())).unwrap_or(0)
@@ -287,7 +288,7 @@ pub extern "C" fn tumble_crowd_library_joint_name(
     name.unwrap_or(std::ptr::null())
 }
 
-/// The place of each joint's parent, -1 for a root: `joint_count` numbers, exactly as many as there are
+/// The index of each joint's parent, -1 for a root: `joint_count` numbers, exactly as many as there are
 /// joints.
 ///
 /// # Safety
@@ -309,14 +310,14 @@ pub unsafe extern "C" fn tumble_crowd_library_parents(
         // SAFETY: as the caller promises.
         let parents = unsafe { list_mut(parents, joint_count, "parents")? };
         for (parent, joint) in parents.iter_mut().zip(&library.joints) {
-            // Skeletons of arrays have places of 31 bits, and files have no more joints.
+            // Indices of skeletons made of arrays have 31 bits, and files have no more joints.
             *parent = joint.parent.map_or(-1, |parent| parent as i32);
         }
         Ok(())
     })
 }
 
-/// Gives a library back; crowds that were made of it stay. Null is allowed.
+/// Frees a library; crowds that were made of it stay. Null is allowed.
 #[unsafe(no_mangle)]
 pub extern "C" fn tumble_crowd_library_free(library: *mut TumbleCrowdLibrary) -> TumbleResult {
     code(|| handle::free(library))

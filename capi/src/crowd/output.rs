@@ -7,7 +7,7 @@ use crate::crowd::player::TumbleCrowd;
 use crate::handle;
 use crate::result::{Failure, TumbleResult, code};
 
-/// What is left of every joint of every instance, in the order `[instance][joint]`.
+/// What is written for every joint of every instance, in the order `[instance][joint]`.
 #[repr(u32)]
 #[derive(Debug, Clone, Copy)]
 pub enum TumbleCrowdValues {
@@ -73,7 +73,7 @@ pub unsafe extern "C" fn tumble_crowd_output_count(
     code(|| {
         let out = Out::new(count, "count")?;
         let values = output(values, false)?;
-        let vectors = handle::get(crowd)?.lock()?.own.output_len(values);
+        let vectors = handle::get(crowd)?.lock()?.inner.output_len(values);
         // SAFETY: as the caller promises.
         unsafe { out.set(4 * vectors) };
         Ok(())
@@ -97,8 +97,8 @@ pub unsafe extern "C" fn tumble_crowd_evaluate(
         let mut state = crowd.lock()?;
         let values = self::output(values, false)?;
         // SAFETY: as the caller promises.
-        let output = unsafe { vectors(&state.own, values, output, output_count)? };
-        Ok(state.own.evaluate_into(values.values, output)?)
+        let output = unsafe { vectors(&state.inner, values, output, output_count)? };
+        Ok(state.inner.evaluate_into(values.values, output)?)
     })
 }
 
@@ -118,8 +118,8 @@ pub unsafe extern "C" fn tumble_crowd_evaluate_half(
         let mut state = crowd.lock()?;
         let values = self::output(values, true)?;
         // SAFETY: as the caller promises.
-        let output = unsafe { vectors(&state.own, values, output, output_count)? };
-        Ok(state.own.evaluate_half_into(values.values, output)?)
+        let output = unsafe { vectors(&state.inner, values, output, output_count)? };
+        Ok(state.inner.evaluate_half_into(values.values, output)?)
     })
 }
 
@@ -136,7 +136,7 @@ pub extern "C" fn tumble_crowd_submit(
     code(|| {
         let crowd = handle::get(crowd)?;
         let output = output(values, flag(half, "half")?)?;
-        Ok(crowd.lock()?.own.submit(output)?)
+        Ok(crowd.lock()?.inner.submit(output)?)
     })
 }
 
@@ -151,7 +151,7 @@ pub unsafe extern "C" fn tumble_crowd_poll(
 ) -> TumbleResult {
     code(|| {
         let out = Out::new(done, "done")?;
-        let is_done = handle::get(crowd)?.lock()?.own.poll()?;
+        let is_done = handle::get(crowd)?.lock()?.inner.poll()?;
         // SAFETY: as the caller promises.
         unsafe { out.set(is_done) };
         Ok(())
@@ -163,7 +163,7 @@ pub unsafe extern "C" fn tumble_crowd_poll(
 ///
 /// # Safety
 /// As [`list_mut`].
-unsafe fn taken<T: Number>(
+unsafe fn wait<T: Number>(
     crowd: *mut TumbleCrowd,
     is_half: bool,
     (output, count): (*mut T, usize),
@@ -171,15 +171,15 @@ unsafe fn taken<T: Number>(
 ) -> Result<(), Failure> {
     let crowd = handle::get(crowd)?;
     let mut state = crowd.lock()?;
-    let submitted = state.own.submitted();
+    let submitted = state.inner.submitted();
     let submitted = submitted.ok_or(CrowdError::NothingSubmitted)?;
     if submitted.is_half != is_half {
         let is_half = submitted.is_half;
         return Err(CrowdError::Precision { is_half }.into());
     }
     // SAFETY: the caller's promise.
-    let output = unsafe { vectors(&state.own, submitted, output, count)? };
-    Ok(take(&mut state.own, output)?)
+    let output = unsafe { vectors(&state.inner, submitted, output, count)? };
+    Ok(take(&mut state.inner, output)?)
 }
 
 /// Waits for what was submitted with `half` 0, and takes its result. If an argument is refused, the
@@ -194,7 +194,7 @@ pub unsafe extern "C" fn tumble_crowd_wait(
     output_count: usize,
 ) -> TumbleResult {
     // SAFETY: as the caller promises.
-    code(|| unsafe { taken(crowd, false, (output, output_count), Crowd::wait_into) })
+    code(|| unsafe { wait(crowd, false, (output, output_count), Crowd::wait_into) })
 }
 
 /// Waits for what was submitted with `half` 1, and takes its result. If an argument is refused, the
@@ -209,5 +209,5 @@ pub unsafe extern "C" fn tumble_crowd_wait_half(
     output_count: usize,
 ) -> TumbleResult {
     // SAFETY: as the caller promises.
-    code(|| unsafe { taken(crowd, true, (output, output_count), Crowd::wait_half_into) })
+    code(|| unsafe { wait(crowd, true, (output, output_count), Crowd::wait_half_into) })
 }

@@ -15,12 +15,12 @@ use crate::result::{Failure, TumbleResult, code};
 /// that use one crowd at once are served one after another.
 pub struct TumbleCrowd {
     state: Mutex<State>,
-    /// Whether its engine is on the application's own Vulkan device.
-    pub(crate) is_on_own_device: bool,
+    /// Whether its engine is on the application's Vulkan device.
+    pub(crate) is_on_application_device: bool,
 }
 
 pub(crate) struct State {
-    pub(crate) own: Crowd,
+    pub(crate) inner: Crowd,
     /// Memory for what is set, kept from call to call.
     changes: Vec<(usize, usize, CrowdLayer)>,
 }
@@ -53,11 +53,11 @@ pub unsafe extern "C" fn tumble_crowd_new(
         let out = Out::new(crowd, "crowd")?;
         let (engine, library) = (handle::get(engine)?, handle::get(library)?);
         let library = library.read()?;
-        let own = engine.own.crowd(&library, instances, layers)?;
+        let inner = engine.inner.crowd(&library, instances, layers)?;
         let changes = Vec::new();
         let made = TumbleCrowd {
-            state: Mutex::new(State { own, changes }),
-            is_on_own_device: engine.is_on_own_device,
+            state: Mutex::new(State { inner, changes }),
+            is_on_application_device: engine.is_on_application_device,
         };
         // SAFETY: as the caller promises.
         unsafe { out.set(handle::give(made)) };
@@ -81,12 +81,12 @@ pub unsafe extern "C" fn tumble_crowd_set(
         // SAFETY: as the caller promises.
         let layers = unsafe { list(layers, count, "layers")? };
         let mut state = crowd.lock()?;
-        let State { own, changes } = &mut *state;
+        let State { inner, changes } = &mut *state;
         changes.clear();
-        for (place, layer) in layers.iter().enumerate() {
-            changes.push(layer.change(place)?);
+        for (index, layer) in layers.iter().enumerate() {
+            changes.push(layer.change(index)?);
         }
-        Ok(own.set_all(changes)?)
+        Ok(inner.set_all(changes)?)
     })
 }
 
@@ -103,14 +103,23 @@ pub unsafe extern "C" fn tumble_crowd_get(
     code(|| {
         let crowd = handle::get(crowd)?;
         // SAFETY: as the caller promises.
-        let wanted = unsafe {
-            let size = |own: *const TumbleCrowdLayer| (&raw const (*own).size).cast();
+        let requested = unsafe {
+            let size = |pointer: *const TumbleCrowdLayer| (&raw const (*pointer).size).cast();
             needed(layer.cast_const(), size, "layer")?
         };
         let out = Out::new(layer, "layer")?;
-        let plays = crowd.lock()?.own.get(wanted.instance, wanted.layer)?;
+        let plays = crowd
+            .lock()?
+            .inner
+            .get(requested.instance, requested.layer)?;
         // SAFETY: as the caller promises.
-        unsafe { out.set(TumbleCrowdLayer::new(wanted.instance, wanted.layer, plays)) };
+        unsafe {
+            out.set(TumbleCrowdLayer::new(
+                requested.instance,
+                requested.layer,
+                plays,
+            ))
+        };
         Ok(())
     })
 }
@@ -128,7 +137,7 @@ pub unsafe extern "C" fn tumble_crowd_tick(
 ) -> TumbleResult {
     code(|| {
         let out = Out::new(tick, "tick")?;
-        let found = handle::get(crowd)?.lock()?.own.tick(instance, layer)?;
+        let found = handle::get(crowd)?.lock()?.inner.tick(instance, layer)?;
         // SAFETY: as the caller promises.
         unsafe { out.set(found) };
         Ok(())
@@ -139,13 +148,13 @@ pub unsafe extern "C" fn tumble_crowd_tick(
 /// drift, as in a film at 30000/1001 frames a second, `tumble_crowd_set_clock` to each frame's ticks.
 #[unsafe(no_mangle)]
 pub extern "C" fn tumble_crowd_advance(crowd: *mut TumbleCrowd, seconds: f64) -> TumbleResult {
-    code(|| Ok(handle::get(crowd)?.lock()?.own.advance(seconds)?))
+    code(|| Ok(handle::get(crowd)?.lock()?.inner.advance(seconds)?))
 }
 
 /// Sets the clock, ticks below 2^52; all instances move with it, forwards or backwards.
 #[unsafe(no_mangle)]
 pub extern "C" fn tumble_crowd_set_clock(crowd: *mut TumbleCrowd, ticks: u64) -> TumbleResult {
-    code(|| Ok(handle::get(crowd)?.lock()?.own.set_clock(ticks)?))
+    code(|| Ok(handle::get(crowd)?.lock()?.inner.set_clock(ticks)?))
 }
 
 /// The clock, ticks.
@@ -159,14 +168,14 @@ pub unsafe extern "C" fn tumble_crowd_clock(
 ) -> TumbleResult {
     code(|| {
         let out = Out::new(ticks, "ticks")?;
-        let clock = handle::get(crowd)?.lock()?.own.clock();
+        let clock = handle::get(crowd)?.lock()?.inner.clock();
         // SAFETY: as the caller promises.
         unsafe { out.set(clock) };
         Ok(())
     })
 }
 
-/// Gives a crowd back, which waits for what was submitted; its targets stay. Null is allowed.
+/// Frees a crowd, after waiting for what was submitted; its targets stay. Null is allowed.
 #[unsafe(no_mangle)]
 pub extern "C" fn tumble_crowd_free(crowd: *mut TumbleCrowd) -> TumbleResult {
     code(|| handle::free(crowd))

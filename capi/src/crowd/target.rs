@@ -13,7 +13,7 @@ use crate::vulkan::buffer_range;
 
 /// A range of an application's buffer that a crowd is evaluated into, with all that recording needs.
 pub struct TumbleCrowdTarget {
-    own: CrowdTarget,
+    inner: CrowdTarget,
 }
 
 impl Object for TumbleCrowdTarget {
@@ -45,11 +45,11 @@ pub unsafe extern "C" fn tumble_crowd_target_new(
         let out = Out::new(target, "target")?;
         let crowd = handle::get(crowd)?;
         let output = output::output(values, flag(half, "half")?)?;
-        let buffer = buffer_range(crowd.is_on_own_device, buffer, offset, size)?;
+        let buffer = buffer_range(crowd.is_on_application_device, buffer, offset, size)?;
         // SAFETY: as the caller promises.
-        let own = unsafe { crowd.lock()?.own.target(output, buffer)? };
+        let inner = unsafe { crowd.lock()?.inner.target(output, buffer)? };
         // SAFETY: as the caller promises.
-        unsafe { out.set(handle::give(TumbleCrowdTarget { own })) };
+        unsafe { out.set(handle::give(TumbleCrowdTarget { inner })) };
         Ok(())
     })
 }
@@ -61,7 +61,7 @@ pub unsafe extern "C" fn tumble_crowd_target_new(
 ///
 /// The command buffer is of the engine's device and of the family of its queue, in recording, outside of
 /// a render pass. What is recorded is submitted once, to the engine's queue, in the order of the calls;
-/// a frame that is thrown away is told by `tumble_crowd_forget_recorded`. The library submits to that
+/// after a frame that is thrown away, call `tumble_crowd_forget_recorded`. The library submits to that
 /// queue by itself only in `tumble_upload`, `tumble_evaluate`, `tumble_clip_evaluate`,
 /// `tumble_clip_evaluate_to_buffer`, `tumble_crowd_new`, `tumble_crowd_evaluate` and `tumble_crowd_submit` (and their `half` forms): the
 /// application keeps these calls and its own submissions from one another.
@@ -79,22 +79,22 @@ pub unsafe extern "C" fn tumble_crowd_record(
         let commands = vulkan(commands, "commands")?;
         let mut state = crowd.lock()?;
         // SAFETY: as the caller promises.
-        unsafe { state.own.record(&target.own, commands)? };
+        unsafe { state.inner.record(&target.inner, commands)? };
         Ok(())
     })
 }
 
-/// Takes back that anything was recorded: the next evaluation tells the device all that instances play.
+/// Forgets what was recorded: the next evaluation sends the device all that instances play.
 /// For an application that threw a recorded frame away.
 #[unsafe(no_mangle)]
 pub extern "C" fn tumble_crowd_forget_recorded(crowd: *mut TumbleCrowd) -> TumbleResult {
     code(|| {
-        handle::get(crowd)?.lock()?.own.forget_recorded();
+        handle::get(crowd)?.lock()?.inner.forget_recorded();
         Ok(())
     })
 }
 
-/// Gives a target back, after all work that was recorded with it has ended. Null is allowed.
+/// Frees a target, after all work that was recorded with it has ended. Null is allowed.
 ///
 /// # Safety
 /// No such work is in flight.

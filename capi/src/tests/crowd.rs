@@ -48,29 +48,34 @@ fn set(number: u32) -> TrackSet {
         let count = if joint == 3 { 2 } else { 9 };
         let times: Vec<f64> = (0..count).map(|key| 0.1 + f64::from(key) * 0.25).collect();
         let key = |key: u32| {
-            let turn = (key * (number + 1) + joint) as f32 * 0.3;
-            Quat::from_rotation_x(turn.sin()) * Quat::from_rotation_z(turn.cos() * 0.5)
+            let angle = (key * (number + 1) + joint) as f32 * 0.3;
+            Quat::from_rotation_x(angle.sin()) * Quat::from_rotation_z(angle.cos() * 0.5)
         };
         let keys: Vec<Quat> = (0..count).map(key).collect();
         set.push("", &times, &keys).unwrap();
     }
     let vectors = [[0.0, 1.0, 0.0], [0.3, 1.1, 0.2], [0.0, 1.0, 0.5]];
-    let tangents = vectors.map(|own| [Vec3::from(own), -Vec3::from(own)]);
+    let tangents = vectors.map(|vector| [Vec3::from(vector), -Vec3::from(vector)]);
     let times = [0.0, 0.7, 2.0];
     set.set_translations(1, &times, &vectors, &tangents)
         .unwrap();
-    set.set_scales(0, &times, &vectors.map(|own| own.map(|x| x + 1.0)), &[])
-        .unwrap();
+    set.set_scales(
+        0,
+        &times,
+        &vectors.map(|vector| vector.map(|x| x + 1.0)),
+        &[],
+    )
+    .unwrap();
     set
 }
 
 /// The same set, made by C's functions.
-fn c_set(own: &TrackSet) -> *mut TumbleSet {
+fn c_set(tracks: &TrackSet) -> *mut TumbleSet {
     let mut set = null_mut();
-    // SAFETY: pointers to as many numbers as are told, and places for handles.
+    // SAFETY: pointers to as many numbers as stated, and room for handles.
     unsafe {
         done(tumble_set_new(&raw mut set));
-        for track in own.tracks() {
+        for track in tracks.tracks() {
             let keys: Vec<[f32; 4]> = track.keys.iter().map(Quat::to_array).collect();
             let (times, keys) = (track.times.as_ptr(), keys.as_ptr().cast());
             done(tumble_set_push(set, null(), times, keys, track.times.len()));
@@ -80,13 +85,14 @@ fn c_set(own: &TrackSet) -> *mut TumbleSet {
             (tumble::Channel::Scale, 0, tumble_set_scales),
         ];
         for (channel, track, give) in channels {
-            let vectors = own.vector_keys(channel, track).unwrap();
+            let vectors = tracks.vector_keys(channel, track).unwrap();
             let keys: Vec<[f32; 3]> = vectors.keys.iter().map(Vec3::to_array).collect();
             let tangents: Vec<[[f32; 3]; 2]> =
                 (vectors.tangents.iter().map(|both| both.map(Vec3::into))).collect();
-            let tangents = match tangents.is_empty() {
-                true => null(),
-                false => tangents.as_ptr().cast::<f32>(),
+            let tangents = if tangents.is_empty() {
+                null()
+            } else {
+                tangents.as_ptr().cast::<f32>()
             };
             let (times, keys) = (vectors.times.as_ptr(), keys.as_ptr().cast::<f32>());
             let count = vectors.times.len();
@@ -97,8 +103,8 @@ fn c_set(own: &TrackSet) -> *mut TumbleSet {
 }
 
 fn bind(joint: usize) -> Affine3A {
-    let turned = Mat3A::from_rotation_y(0.3 * joint as f32);
-    Affine3A::from_mat3_translation(turned.into(), Vec3::new(0.5, -0.25, joint as f32))
+    let rotation = Mat3A::from_rotation_y(0.3 * joint as f32);
+    Affine3A::from_mat3_translation(rotation.into(), Vec3::new(0.5, -0.25, joint as f32))
 }
 
 pub(super) fn push(
@@ -119,10 +125,10 @@ pub(super) fn push(
 pub(super) fn libraries() -> (*mut TumbleCrowdLibrary, CrowdLibrary) {
     let parents = PARENTS.map(|parent| usize::try_from(parent).ok());
     let skeleton = Skeleton::new(parents.to_vec(), OFFSETS.map(Vec3::from).to_vec()).unwrap();
-    let mut own = CrowdLibrary::new(&skeleton).unwrap();
+    let mut rust_library = CrowdLibrary::new(&skeleton).unwrap();
     let mut library = null_mut();
     let (parents, offsets) = (PARENTS.as_ptr(), OFFSETS.as_ptr().cast());
-    // SAFETY: pointers to as many numbers as are told, and a place for the handle.
+    // SAFETY: pointers to as many numbers as stated, and room for the handle.
     done(unsafe { tumble_crowd_library_new(parents, offsets, 4, 0, &raw mut library) });
     for number in 0..3 {
         let set = set(number);
@@ -131,15 +137,15 @@ pub(super) fn libraries() -> (*mut TumbleCrowdLibrary, CrowdLibrary) {
             1 => (Some(c"gltf-cubic"), VectorMethod::GltfCubic),
             _ => (Some(c"step"), VectorMethod::Step),
         };
-        own.push(&set, method::SLERP, vectors).unwrap();
+        rust_library.push(&set, method::SLERP, vectors).unwrap();
         let set = c_set(&set);
         done(push(library, set, name));
         done(tumble_set_free(set));
     }
-    own.push_mask(&MASK).unwrap();
-    own.set_reference(2, 1, 70_560).unwrap();
+    rust_library.push_mask(&MASK).unwrap();
+    rust_library.set_reference(2, 1, 70_560).unwrap();
     let matrices = [0, 1, 2, 3].map(bind);
-    own.set_inverse_bind(&matrices).unwrap();
+    rust_library.set_inverse_bind(&matrices).unwrap();
     let rows = matrices.map(|matrix| {
         let columns = matrix.to_cols_array_2d();
         [0, 1, 2].map(|row| columns.map(|column| column[row]))
@@ -157,7 +163,7 @@ pub(super) fn libraries() -> (*mut TumbleCrowdLibrary, CrowdLibrary) {
     }
     assert_eq!(mask, 1);
     done(tumble_crowd_library_set_reference(library, 2, 1, 70_560));
-    (library, own)
+    (library, rust_library)
 }
 
 pub(super) fn c_crowd(
@@ -166,7 +172,7 @@ pub(super) fn c_crowd(
     (instances, layers): (usize, usize),
 ) -> *mut TumbleCrowd {
     let mut crowd = null_mut();
-    // SAFETY: a place for the handle.
+    // SAFETY: room for the handle.
     done(unsafe { tumble_crowd_new(engine, library, instances, layers, &raw mut crowd) });
     crowd
 }
@@ -188,47 +194,47 @@ pub(super) fn still() -> TumbleCrowdLayer {
 }
 
 pub(super) fn set_layers(crowd: *mut TumbleCrowd, layers: &[TumbleCrowdLayer]) -> TumbleResult {
-    // SAFETY: as many structures as are told.
+    // SAFETY: as many structures as stated.
     unsafe { tumble_crowd_set(crowd, layers.as_ptr(), layers.len()) }
 }
 
 /// What everybody plays in some frame, in both forms; not every layer in every frame.
 fn plays(frame: usize, (instances, layers): (usize, usize)) -> Vec<(TumbleCrowdLayer, CrowdLayer)> {
     let mut all = Vec::new();
-    for place in 0..instances * layers {
-        if frame > 0 && !(place + frame).is_multiple_of(3) {
+    for i in 0..instances * layers {
+        if frame > 0 && !(i + frame).is_multiple_of(3) {
             continue;
         }
         let wraps = [WrapMode::Hold, WrapMode::Loop, WrapMode::Mirror];
-        let own = CrowdLayer {
-            clip: (place + frame) % 3,
-            time: place as i64 * 50_000 - 200_000,
-            speed: place as f32 * 0.125 - 1.0,
-            wrap: wraps[(place + frame) % 3],
-            weight: (place % 5) as f32 * 0.25,
-            additive: place % 4 == 1,
-            mask: place.is_multiple_of(2).then_some(0),
+        let rust_layer = CrowdLayer {
+            clip: (i + frame) % 3,
+            time: i as i64 * 50_000 - 200_000,
+            speed: i as f32 * 0.125 - 1.0,
+            wrap: wraps[(i + frame) % 3],
+            weight: (i % 5) as f32 * 0.25,
+            additive: i % 4 == 1,
+            mask: i.is_multiple_of(2).then_some(0),
         };
         let layer = TumbleCrowdLayer {
-            instance: place / layers,
-            layer: place % layers,
-            clip: own.clip,
-            time: own.time,
-            speed: own.speed,
-            weight: own.weight,
-            wrap: ((place + frame) % 3) as u32,
-            additive: own.additive.into(),
-            mask: own.mask.map_or(0, |mask| mask + 1),
+            instance: i / layers,
+            layer: i % layers,
+            clip: rust_layer.clip,
+            time: rust_layer.time,
+            speed: rust_layer.speed,
+            weight: rust_layer.weight,
+            wrap: ((i + frame) % 3) as u32,
+            additive: rust_layer.additive.into(),
+            mask: rust_layer.mask.map_or(0, |mask| mask + 1),
             ..still()
         };
-        all.push((layer, own));
+        all.push((layer, rust_layer));
     }
     all
 }
 
 pub(super) fn count(crowd: *const TumbleCrowd, values: CrowdValues) -> usize {
     let mut count = 0;
-    // SAFETY: a place for the number.
+    // SAFETY: room for the number.
     done(unsafe { tumble_crowd_output_count(crowd, values as u32, &raw mut count) });
     count
 }
@@ -239,7 +245,7 @@ pub(super) fn bits(crowd: *mut TumbleCrowd, output: CrowdOutput, submits: bool) 
     let count = count(crowd, output.values);
     let (mut floats, mut halves) = (vec![f32::NAN; count], vec![0xffff_u16; count]);
     let (into, half_into) = (floats.as_mut_ptr(), halves.as_mut_ptr());
-    // SAFETY: memory of that size, and a place for the truth value.
+    // SAFETY: memory of that size, and room for the truth value.
     unsafe {
         match (submits, half) {
             (false, false) => done(tumble_crowd_evaluate(crowd, values, into, count)),
@@ -250,33 +256,32 @@ pub(super) fn bits(crowd: *mut TumbleCrowd, output: CrowdOutput, submits: bool) 
                 while !is_done {
                     done(tumble_crowd_poll(crowd, &raw mut is_done));
                 }
-                match half {
-                    false => done(tumble_crowd_wait(crowd, into, count)),
-                    true => done(tumble_crowd_wait_half(crowd, half_into, count)),
+                if half {
+                    done(tumble_crowd_wait_half(crowd, half_into, count));
+                } else {
+                    done(tumble_crowd_wait(crowd, into, count));
                 }
             }
         }
     }
-    match half {
-        false => floats.into_iter().map(f32::to_bits).collect(),
-        true => halves.into_iter().map(u32::from).collect(),
+    if half {
+        halves.into_iter().map(u32::from).collect()
+    } else {
+        floats.into_iter().map(f32::to_bits).collect()
     }
 }
 
 /// The same by the engine.
-pub(super) fn own_bits(crowd: &mut Crowd, output: CrowdOutput) -> Vec<u32> {
+pub(super) fn rust_bits(crowd: &mut Crowd, output: CrowdOutput) -> Vec<u32> {
     let len = crowd.output_len(output);
-    match output.is_half {
-        false => {
-            let mut found = vec![[f32::NAN; 4]; len];
-            crowd.evaluate_into(output.values, &mut found).unwrap();
-            found.as_flattened().iter().map(|x| x.to_bits()).collect()
-        }
-        true => {
-            let mut found = vec![[0xffff; 4]; len];
-            crowd.evaluate_half_into(output.values, &mut found).unwrap();
-            found.as_flattened().iter().map(|&x| x.into()).collect()
-        }
+    if output.is_half {
+        let mut found = vec![[0xffff; 4]; len];
+        crowd.evaluate_half_into(output.values, &mut found).unwrap();
+        found.as_flattened().iter().map(|&x| x.into()).collect()
+    } else {
+        let mut found = vec![[f32::NAN; 4]; len];
+        crowd.evaluate_into(output.values, &mut found).unwrap();
+        found.as_flattened().iter().map(|x| x.to_bits()).collect()
     }
 }
 
@@ -290,7 +295,7 @@ pub(super) fn engines() -> Vec<*mut TumbleEngine> {
     let mut engines = vec![cpu()];
     if has_vulkan {
         let mut engine = null_mut();
-        // SAFETY: text, null and a place for the handle.
+        // SAFETY: text, null and room for the handle.
         done(unsafe { tumble_engine_open(c"vulkan".as_ptr(), null(), &raw mut engine) });
         engines.push(engine);
     } else {
@@ -302,20 +307,23 @@ pub(super) fn engines() -> Vec<*mut TumbleEngine> {
 #[test]
 fn crowds_have_the_bits_of_the_engines() {
     let shape = (37, 3);
-    let (library, own) = libraries();
-    assert_eq!(tumble_crowd_library_clip_count(library), own.clips());
+    let (library, rust_library) = libraries();
+    assert_eq!(
+        tumble_crowd_library_clip_count(library),
+        rust_library.clips()
+    );
     assert_eq!(
         tumble_crowd_library_clip_ticks(library, 1),
-        own.ticks(1).unwrap()
+        rust_library.ticks(1).unwrap()
     );
     assert_eq!(tumble_crowd_library_ticks_per_second(library), 705_600);
     let outputs = ALL.map(|values| [CrowdOutput::from(values), CrowdOutput::half(values)]);
     for engine in engines() {
-        let mut expected = own_crowd(&own, shape);
+        let mut expected = rust_crowd(&rust_library, shape);
         let crowd = c_crowd(engine, library, shape);
         for frame in 0..3 {
             let both = plays(frame, shape);
-            let layers: Vec<TumbleCrowdLayer> = both.iter().map(|own| own.0).collect();
+            let layers: Vec<TumbleCrowdLayer> = both.iter().map(|pair| pair.0).collect();
             done(set_layers(crowd, &layers));
             for (layer, plays) in both {
                 expected.set(layer.instance, layer.layer, plays).unwrap();
@@ -331,41 +339,41 @@ fn crowds_have_the_bits_of_the_engines() {
                 }
             }
             for output in outputs.as_flattened() {
-                let wanted = own_bits(&mut expected, *output);
+                let expected_bits = rust_bits(&mut expected, *output);
                 for submits in [false, true] {
                     assert!(
-                        bits(crowd, *output, submits) == wanted,
+                        bits(crowd, *output, submits) == expected_bits,
                         "{output:?}, frame {frame}"
                     );
                 }
             }
         }
-        let mut told = TumbleCrowdLayer {
+        let mut reported = TumbleCrowdLayer {
             instance: 5,
             layer: 1,
             ..still()
         };
         let (mut tick, mut clock) = (0, 0);
-        // SAFETY: a structure, and places for the numbers.
+        // SAFETY: a structure, and room for the numbers.
         unsafe {
-            done(tumble_crowd_get(crowd, &raw mut told));
+            done(tumble_crowd_get(crowd, &raw mut reported));
             done(tumble_crowd_tick(crowd, 5, 1, &raw mut tick));
             done(tumble_crowd_clock(crowd, &raw mut clock));
         }
-        let plays = told.change(0).unwrap();
+        let plays = reported.change(0).unwrap();
         assert_eq!(plays, (5, 1, expected.get(5, 1).unwrap()));
         assert_eq!(tick, expected.tick(5, 1).unwrap());
         assert_eq!(clock, 1 << 40);
         // A crowd needs neither its engine nor its library.
         done(tumble_engine_free(engine));
         let output = CrowdOutput::from(CrowdValues::Model);
-        assert!(bits(crowd, output, false) == own_bits(&mut expected, output));
+        assert!(bits(crowd, output, false) == rust_bits(&mut expected, output));
         done(tumble_crowd_free(crowd));
     }
     done(tumble_crowd_library_free(library));
 }
 
-pub(super) fn own_crowd(library: &CrowdLibrary, (instances, layers): (usize, usize)) -> Crowd {
+pub(super) fn rust_crowd(library: &CrowdLibrary, (instances, layers): (usize, usize)) -> Crowd {
     let engine = Engine::new(Device::Cpu).unwrap();
     engine.crowd(library, instances, layers).unwrap()
 }
@@ -375,17 +383,17 @@ pub(super) fn own_crowd(library: &CrowdLibrary, (instances, layers): (usize, usi
 #[test]
 fn crowds_may_be_used_by_threads() {
     let shape = (64, 2);
-    let (library, own) = libraries();
+    let (library, rust_library) = libraries();
     let both = plays(0, shape);
-    let mut expected = own_crowd(&own, shape);
+    let mut expected = rust_crowd(&rust_library, shape);
     for (layer, plays) in &both {
         expected.set(layer.instance, layer.layer, *plays).unwrap();
     }
     let output = CrowdOutput::from(CrowdValues::Skinning);
-    let expected = own_bits(&mut expected, output);
+    let expected = rust_bits(&mut expected, output);
     for engine in engines() {
         let crowd = c_crowd(engine, library, shape);
-        let all: Vec<TumbleCrowdLayer> = both.iter().map(|own| own.0).collect();
+        let all: Vec<TumbleCrowdLayer> = both.iter().map(|pair| pair.0).collect();
         let shared = crowd.addr();
         let crowd_of = move || std::ptr::without_provenance_mut::<TumbleCrowd>(shared);
         std::thread::scope(|scope| {

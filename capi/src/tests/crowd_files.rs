@@ -26,14 +26,14 @@ use crate::result::*;
 fn load(path: &Path) -> *mut TumbleFile {
     let path = CString::new(path.to_str().unwrap()).unwrap();
     let mut file = null_mut();
-    // SAFETY: text, and a place for the handle.
+    // SAFETY: text, and room for the handle.
     done(unsafe { tumble_file_load(path.as_ptr(), &raw mut file) });
     file
 }
 
 fn library_of(file: *const TumbleFile) -> *mut TumbleCrowdLibrary {
     let mut library = null_mut();
-    // SAFETY: a place for the handle.
+    // SAFETY: room for the handle.
     done(unsafe { tumble_crowd_library_of_file(file, 0, &raw mut library) });
     library
 }
@@ -52,18 +52,24 @@ fn push_clip(
 
 /// The poses of both libraries' clips at many times, all values but skinning.
 #[track_caller]
-fn same(library: *mut TumbleCrowdLibrary, own: &CrowdLibrary) {
-    assert_eq!(tumble_crowd_library_clip_count(library), own.clips());
+fn same(library: *mut TumbleCrowdLibrary, rust_library: &CrowdLibrary) {
+    assert_eq!(
+        tumble_crowd_library_clip_count(library),
+        rust_library.clips()
+    );
     let engine = cpu();
-    let shape = (11 * own.clips(), 1);
-    let (crowd, mut expected) = (c_crowd(engine, library, shape), own_crowd(own, shape));
+    let shape = (11 * rust_library.clips(), 1);
+    let (crowd, mut expected) = (
+        c_crowd(engine, library, shape),
+        rust_crowd(rust_library, shape),
+    );
     for instance in 0..shape.0 {
-        let clip = instance % own.clips();
+        let clip = instance % rust_library.clips();
         assert_eq!(
             tumble_crowd_library_clip_ticks(library, clip),
-            own.ticks(clip).unwrap()
+            rust_library.ticks(clip).unwrap()
         );
-        let time = i64::from(own.ticks(clip).unwrap()) * instance as i64 / shape.0 as i64;
+        let time = i64::from(rust_library.ticks(clip).unwrap()) * instance as i64 / shape.0 as i64;
         let layer = TumbleCrowdLayer {
             instance,
             clip,
@@ -84,7 +90,7 @@ fn same(library: *mut TumbleCrowdLibrary, own: &CrowdLibrary) {
     ] {
         let output = CrowdOutput::from(values);
         assert!(
-            bits(crowd, output, false) == own_bits(&mut expected, output),
+            bits(crowd, output, false) == rust_bits(&mut expected, output),
             "{values:?}"
         );
     }
@@ -105,14 +111,19 @@ fn write(folder: &TempDir, name: &str, bytes: impl AsRef<[u8]>) -> PathBuf {
 }
 
 const HALF: f32 = std::f32::consts::FRAC_1_SQRT_2;
-const TURNS: [[f32; 4]; 2] = [[0.0, 0.0, 0.0, 1.0], [HALF, 0.0, 0.0, HALF]];
+const ROTATIONS: [[f32; 4]; 2] = [[0.0, 0.0, 0.0, 1.0], [HALF, 0.0, 0.0, HALF]];
 const MOVES: [[f32; 3]; 2] = [[0.0, -0.5, 0.0], [0.25, -0.75, 0.0]];
 
 /// A hip with a knee and a tail, and clips that move different joints; the last one by two methods.
 fn rig(folder: &TempDir) -> PathBuf {
     let mut bytes: Vec<u8> = Vec::new();
     bytes.extend([0.0_f32, 1.0].iter().flat_map(|x| x.to_le_bytes()));
-    bytes.extend(TURNS.as_flattened().iter().flat_map(|x| x.to_le_bytes()));
+    bytes.extend(
+        ROTATIONS
+            .as_flattened()
+            .iter()
+            .flat_map(|x| x.to_le_bytes()),
+    );
     bytes.extend(MOVES.as_flattened().iter().flat_map(|x| x.to_le_bytes()));
     write(folder, "rig.bin", &bytes);
     // Nodes, what of them is moved, and how.
@@ -131,9 +142,9 @@ fn rig(folder: &TempDir) -> PathBuf {
     let mut animations = String::new();
     for (name, channels) in clips {
         let (mut samplers, mut targets) = (String::new(), String::new());
-        for (place, (node, path, how)) in channels.iter().enumerate() {
+        for (i, (node, path, how)) in channels.iter().enumerate() {
             let output = if *path == "rotation" { 1 } else { 2 };
-            let comma = if place == 0 { "" } else { "," };
+            let comma = if i == 0 { "" } else { "," };
             write!(
                 samplers,
                 r#"{comma}{{"input":0,"output":{output},"interpolation":"{how}"}}"#
@@ -141,7 +152,7 @@ fn rig(folder: &TempDir) -> PathBuf {
             .unwrap();
             write!(
                 targets,
-                r#"{comma}{{"sampler":{place},"target":{{"node":{node},"path":"{path}"}}}}"#
+                r#"{comma}{{"sampler":{i},"target":{{"node":{node},"path":"{path}"}}}}"#
             )
             .unwrap();
         }
@@ -204,7 +215,7 @@ fn clips_of_a_file_that_move_different_joints_share_a_library() {
 
     let offsets = vec![Vec3::Y, Vec3::new(0.0, -0.5, 0.0), -Vec3::Z];
     let skeleton = Skeleton::new(vec![None, Some(0), Some(0)], offsets).unwrap();
-    let mut own = CrowdLibrary::new(&skeleton).unwrap();
+    let mut rust_library = CrowdLibrary::new(&skeleton).unwrap();
     let rests = [
         Quat::IDENTITY,
         Quat::IDENTITY,
@@ -217,20 +228,21 @@ fn clips_of_a_file_that_move_different_joints_share_a_library() {
     ] {
         let mut set = TrackSet::new();
         for (joint, rest) in rests.into_iter().enumerate() {
-            match turning.contains(&joint) {
-                true => set.push("", &[0.0, 1.0], &TURNS),
-                false => set.push("", &[0.0], &[rest]),
-            }
-            .unwrap();
+            let pushed = if turning.contains(&joint) {
+                set.push("", &[0.0, 1.0], &ROTATIONS)
+            } else {
+                set.push("", &[0.0], &[rest])
+            };
+            pushed.unwrap();
         }
         if let Some(joint) = moving {
             set.set_translations(joint, &[0.0, 1.0], &MOVES, &[])
                 .unwrap();
         }
         set.set_scales(2, &[0.0], &[[2.0, 1.0, 1.0]], &[]).unwrap();
-        own.push(&set, method, vectors).unwrap();
+        rust_library.push(&set, method, vectors).unwrap();
     }
-    same(library, &own);
+    same(library, &rust_library);
 
     // Another rig's clip has joints of other names, and one of an array none.
     let bvh = "HIERARCHY\nROOT pelvis\n{\nOFFSET 0 3 0\nCHANNELS 6 Xposition Yposition Zposition \
@@ -267,7 +279,7 @@ fn by_hand(path: &Path, method: tumble::Method) -> CrowdLibrary {
     let joints = &loaded.clips[0].skeleton;
     let parents = joints.iter().map(|joint| joint.parent).collect();
     let offsets = joints.iter().map(|joint| joint.rest.translation).collect();
-    let mut own = CrowdLibrary::new(&Skeleton::new(parents, offsets).unwrap()).unwrap();
+    let mut rust_library = CrowdLibrary::new(&Skeleton::new(parents, offsets).unwrap()).unwrap();
     for motion in &loaded.clips {
         assert!(
             motion
@@ -279,9 +291,9 @@ fn by_hand(path: &Path, method: tumble::Method) -> CrowdLibrary {
             "slerp" => VectorMethod::Linear,
             _ => VectorMethod::BesselOverhauser,
         };
-        own.push(&motion.set, method, vectors).unwrap();
+        rust_library.push(&motion.set, method, vectors).unwrap();
     }
-    own
+    rust_library
 }
 
 /// Khronos' fox, where it is at hand.

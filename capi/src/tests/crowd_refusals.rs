@@ -26,7 +26,7 @@ pub(super) fn small() -> *mut TumbleCrowd {
 
 fn new_library(parents: &[i32], offsets: *const f32, ticks: u32) -> TumbleResult {
     let (mut library, count) = (null_mut(), parents.len());
-    // SAFETY: pointers to as many numbers as are told, and a place for the handle.
+    // SAFETY: pointers to as many numbers as stated, and room for the handle.
     let made = unsafe {
         tumble_crowd_library_new(parents.as_ptr(), offsets, count, ticks, &raw mut library)
     };
@@ -111,7 +111,11 @@ fn libraries_refuse_what_does_not_fit() {
         argument,
         "`parents[0]` is -2",
     );
-    fails(new_library(&[1, 0], null(), 0), input, "hangs from itself");
+    fails(
+        new_library(&[1, 0], null(), 0),
+        input,
+        "is its own ancestor",
+    );
     fails(new_library(&[7], null(), 0), input, "track 7, of 1");
     fails(new_library(&[], null(), 0), input, "no joints");
     fails(
@@ -136,7 +140,7 @@ fn libraries_refuse_what_does_not_fit() {
         fails(made, argument, "no memory holds");
     }
 
-    let (library, own) = libraries();
+    let (library, rust_library) = libraries();
     let set = one_track();
     fails(
         push(library, set, None),
@@ -153,7 +157,7 @@ fn libraries_refuse_what_does_not_fit() {
         ..defaults()
     };
     let (mut parent, mut single) = ([0; 4], null_mut());
-    // SAFETY: structures, places for handles, and pointers that are refused.
+    // SAFETY: structures, room for handles, and pointers that are refused.
     unsafe {
         done(tumble_crowd_library_new(
             [-1].as_ptr(),
@@ -183,8 +187,8 @@ fn libraries_refuse_what_does_not_fit() {
         fails(bound, TumbleResult::InvalidPointer, "`matrices` is null");
         let bound = tumble_crowd_library_set_inverse_bind(single, [f32::NAN; 12].as_ptr(), 1);
         fails(bound, input, "not finite");
-        let told = tumble_crowd_library_parents(library, parent.as_mut_ptr(), 3);
-        fails(told, TumbleResult::WrongSize, "the library has 4 joints");
+        let result = tumble_crowd_library_parents(library, parent.as_mut_ptr(), 3);
+        fails(result, TumbleResult::WrongSize, "the library has 4 joints");
         done(tumble_crowd_library_parents(
             library,
             parent.as_mut_ptr(),
@@ -194,7 +198,10 @@ fn libraries_refuse_what_does_not_fit() {
     assert_eq!(parent, PARENTS);
     let referred = tumble_crowd_library_set_reference(library, 0, 9, 0);
     fails(referred, TumbleResult::OutOfRange, "no clip 9");
-    assert_eq!(tumble_crowd_library_clip_count(library), own.clips());
+    assert_eq!(
+        tumble_crowd_library_clip_count(library),
+        rust_library.clips()
+    );
     assert_eq!(tumble_crowd_library_clip_ticks(library, 3), 0);
     assert!(words().contains("no clip 3"), "{}", words());
     assert!(tumble_crowd_library_joint_name(library, 4).is_null());
@@ -207,13 +214,13 @@ fn libraries_refuse_what_does_not_fit() {
         (library, 1, 0, argument, "0 layers"),
         (library, 1, 5, argument, "5 layers"),
     ] {
-        // SAFETY: a place for the handle.
+        // SAFETY: room for the handle.
         let made = unsafe { tumble_crowd_new(engine, library, instances, layers, &raw mut crowd) };
         fails(made, code, says);
     }
-    // What is wrong with vectors of a set is told, and changes nothing.
+    // Wrong vectors of a set are refused, and change nothing.
     let (times, keys) = ([0.0, 1.0], [0.0_f32; 12]);
-    // SAFETY: pointers to as many numbers as are told, or that are refused.
+    // SAFETY: pointers to as many numbers as stated, or that are refused.
     unsafe {
         let (times, keys) = (times.as_ptr(), keys.as_ptr());
         let give = tumble_set_translations;

@@ -268,7 +268,7 @@ fn results_and_states_are_checked() {
 
     // Without inverse bind matrices there is nothing to skin with.
     let (mut library, engine, set) = (null_mut(), cpu(), one_track());
-    // SAFETY: one number, and a place for the handle.
+    // SAFETY: one number, and room for the handle.
     done(unsafe { tumble_crowd_library_new([-1].as_ptr(), null(), 1, 0, &raw mut library) });
     done(push(library, set, None));
     let crowd = c_crowd(engine, library, (1, 1));
@@ -295,7 +295,7 @@ fn targets_need_the_applications_device() {
     for engine in engines() {
         let crowd = c_crowd(engine, library, (1, 1));
         let mut target = null_mut();
-        // SAFETY: a place for the handle; the buffer is refused.
+        // SAFETY: room for the handle; the buffer is refused.
         let made = unsafe { tumble_crowd_target_new(crowd, 2, 0, 1, 0, 1 << 20, &raw mut target) };
         fails(
             made,
@@ -328,7 +328,7 @@ fn handles_of_vulkan_are_looked_at() {
         queue_user: null_mut(),
     };
     let mut engine = null_mut();
-    // SAFETY: a structure and a place for the handle; what is null or wrong is refused.
+    // SAFETY: a structure and room for the handle; what is null or wrong is refused.
     let mut open = |vulkan: *const TumbleVulkan| unsafe {
         tumble_engine_from_vulkan(vulkan, null(), &raw mut engine)
     };

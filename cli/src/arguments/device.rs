@@ -1,4 +1,4 @@
-//! `--device`: which device evaluates, and what to say when it is not there.
+//! `--device`: which device evaluates, and the error when it is not there.
 
 use std::convert::Infallible;
 use std::str::FromStr;
@@ -7,12 +7,12 @@ use ash::vk;
 use clap::Args;
 use glam::Quat;
 use tumble::{
-    Device, Engine, EngineOptions, Error, Frames, Interpolation, Layout, TrackSet, VulkanError,
+    Device, Engine, EngineOptions, Error, Interpolation, Layout, SampleTimes, TrackSet, VulkanError,
 };
 
-use crate::arguments::given::Given;
+use crate::arguments::command_line::CommandLine;
 use crate::arguments::named_device::named;
-use crate::batch::output::{Ended, Sink};
+use crate::batch::output::{ChunkSink, ResultError};
 use crate::commands::probe;
 use crate::messages::exit::{DEVICE, Failure, NO_VULKAN};
 use crate::messages::words;
@@ -27,7 +27,7 @@ pub(crate) struct DeviceArguments {
     /// or a device by its index, part of its name or uuid:UUID (`tumble devices`); the bits are the
     /// same
     #[arg(long, value_name = "DEVICE", default_value = "auto")]
-    device: Choice,
+    device: DeviceChoice,
     /// Use the device that --device names although its self-tests fail: its bits may differ from
     /// the CPU's
     #[arg(long)]
@@ -41,7 +41,7 @@ pub(crate) struct DeviceArguments {
 }
 
 #[derive(Debug, Clone, PartialEq)]
-enum Choice {
+enum DeviceChoice {
     /// The first Vulkan device that is exact, else the CPU.
     First,
     /// The one that is fastest for each job.
@@ -53,7 +53,7 @@ enum Choice {
     Named(String),
 }
 
-impl FromStr for Choice {
+impl FromStr for DeviceChoice {
     type Err = Infallible;
 
     fn from_str(text: &str) -> Result<Self, Infallible> {
@@ -68,18 +68,18 @@ impl FromStr for Choice {
 }
 
 /// An engine, and how to call its device.
-pub(crate) struct Opened {
+pub(crate) struct OpenedDevice {
     pub(crate) engine: Engine,
     pub(crate) label: String,
-    /// Another device may stand in: the bits are the same.
+    /// The device was chosen automatically: the CPU may replace it, with the same bits.
     automatic: bool,
     /// Each job goes to the device that is fastest for it.
     by_cost: Option<ByCost>,
 }
 
-/// Fewer rotations than this the CPU has done before another device is open: the rule of
-/// [`Engine::auto`], here so that small jobs load no driver.
-const FEW: usize = 1 << 20;
+/// The CPU evaluates fewer rotations than this sooner than another device opens: the rule of
+/// [`Engine::auto`], repeated here so that small jobs load no driver.
+const MIN_GPU_ROTATIONS: usize = 1 << 20;
 
 /// The devices of jobs whose size decides.
 struct ByCost {
@@ -91,7 +91,7 @@ struct ByCost {
 
 impl ByCost {
     fn engine(&mut self, rotations: usize) -> Result<Engine, Error> {
-        if rotations < FEW {
+        if rotations < MIN_GPU_ROTATIONS {
             return Ok(self.cpu.clone());
         }
         if self.large.is_none() {
@@ -121,7 +121,7 @@ impl ByCost {
 }
 
 impl DeviceArguments {
-    /// The device of that name, as `--device` takes it.
+    /// The device of that name, as in `--device`.
     pub(crate) fn of(name: &str, options: &EngineOptions) -> Self {
         let Ok(device) = name.parse();
         Self {
@@ -137,13 +137,14 @@ impl DeviceArguments {
         self.threads = threads;
     }
 
-    /// The device of a command line, which says nothing of a device that is not used.
-    pub(crate) fn open(&self) -> Result<Opened, Failure> {
-        if self.device == Choice::Cpu && self.memory.is_some() {
-            let message = "--memory is that of a Vulkan device; leave it out with --device cpu";
+    /// Opens the device of a command line; refuses options for a device that is not used.
+    pub(crate) fn open(&self) -> Result<OpenedDevice, Failure> {
+        if self.device == DeviceChoice::Cpu && self.memory.is_some() {
+            let message =
+                "--memory limits the memory of a Vulkan device; leave it out with --device cpu";
             return Err(Failure::usage(message));
         }
-        if self.allow_inexact && matches!(self.device, Choice::Cpu | Choice::Auto) {
+        if self.allow_inexact && matches!(self.device, DeviceChoice::Cpu | DeviceChoice::Auto) {
             return Err(Failure::usage(
                 "--allow-inexact is for a Vulkan device that is asked for; give it too: --device \
                  vulkan, or a name (`tumble devices`)",
@@ -152,17 +153,17 @@ impl DeviceArguments {
         self.open_any()
     }
 
-    /// Whether the CPU was asked for.
+    /// Whether `--device cpu` is set.
     pub(crate) fn is_cpu(&self) -> bool {
-        self.device == Choice::Cpu
+        self.device == DeviceChoice::Cpu
     }
 
     /// The same device for commands that compare it with the CPU: the first Vulkan device where the
     /// command line names none.
-    pub(crate) fn compared(&self, given: &Given) -> Self {
-        let device = match given.has("device") {
+    pub(crate) fn compared(&self, command_line: &CommandLine) -> Self {
+        let device = match command_line.has("device") {
             true => self.device.clone(),
-            false => Choice::First,
+            false => DeviceChoice::First,
         };
         Self {
             device,
@@ -170,35 +171,38 @@ impl DeviceArguments {
         }
     }
 
-    /// The device, whatever else is said.
-    pub(crate) fn open_any(&self) -> Result<Opened, Failure> {
+    /// Opens the device without checking the other options.
+    pub(crate) fn open_any(&self) -> Result<OpenedDevice, Failure> {
         match &self.device {
-            Choice::Cpu => self.cpu("CPU".to_owned()),
-            Choice::Auto => {
+            DeviceChoice::Cpu => self.cpu("CPU".to_owned()),
+            DeviceChoice::Auto => {
                 let opened = self.cpu("CPU".to_owned())?;
                 let by_cost = ByCost {
                     cpu: opened.engine.clone(),
                     large: None,
                     options: self.options(),
                 };
-                Ok(Opened {
+                Ok(OpenedDevice {
                     by_cost: Some(by_cost),
                     ..opened
                 })
             }
-            Choice::First => match self.first_exact() {
-                Ok(engine) => Ok(Opened {
+            DeviceChoice::First => match self.first_exact() {
+                Ok(engine) => Ok(OpenedDevice {
                     automatic: true,
-                    ..Opened::new(engine)
+                    ..OpenedDevice::new(engine)
                 }),
                 Err(error) => self.cpu(format!("CPU ({})", short_reason(&error))),
             },
-            Choice::Vulkan => self.first_exact().map(Opened::new).map_err(|e| refused(&e)),
-            Choice::Named(name) => {
+            DeviceChoice::Vulkan => self
+                .first_exact()
+                .map(OpenedDevice::new)
+                .map_err(|e| refused(&e)),
+            DeviceChoice::Named(name) => {
                 let devices = probe::devices().map_err(|error| refused(&error.into()))?;
                 let device = named(name, &devices)?;
                 self.engine(device)
-                    .map(Opened::new)
+                    .map(OpenedDevice::new)
                     .map_err(|error| refused(&error))
             }
         }
@@ -216,9 +220,9 @@ impl DeviceArguments {
         Engine::with_options(device, &self.options())
     }
 
-    fn cpu(&self, label: String) -> Result<Opened, Failure> {
+    fn cpu(&self, label: String) -> Result<OpenedDevice, Failure> {
         let engine = self.engine(Device::Cpu).map_err(|error| refused(&error))?;
-        Ok(Opened {
+        Ok(OpenedDevice {
             engine,
             label,
             automatic: false,
@@ -240,7 +244,7 @@ impl DeviceArguments {
     }
 }
 
-impl Opened {
+impl OpenedDevice {
     fn new(engine: Engine) -> Self {
         let label = engine.device_name().to_owned();
         Self {
@@ -256,7 +260,7 @@ impl Opened {
         self.engine.device_info().is_some()
     }
 
-    /// Chooses the device for so many rotations, where cost decides.
+    /// Chooses the device for `rotations`, where the size of a job decides.
     pub(crate) fn choose(&mut self, rotations: usize) -> Result<(), Error> {
         if let Some(by_cost) = &mut self.by_cost {
             self.engine = by_cost.engine(rotations)?;
@@ -266,16 +270,16 @@ impl Opened {
         Ok(())
     }
 
-    /// Evaluates into `sink`, chunk by chunk. A device that nobody named may fail: the
-    /// CPU gives the same bits, and goes on where it stopped.
+    /// Evaluates into `sink`, chunk by chunk. If a device that was chosen automatically fails, the CPU,
+    /// which gives the same bits, continues where it stopped.
     pub(crate) fn stream(
         &mut self,
         set: &TrackSet,
         interpolation: Interpolation,
-        frames: &Frames,
+        frames: &SampleTimes,
         layout: Layout,
-        sink: &mut Sink<'_>,
-    ) -> Result<(), Ended> {
+        sink: &mut ChunkSink<'_>,
+    ) -> Result<(), ResultError> {
         let row = match layout {
             Layout::TrackMajor => 1,
             Layout::FrameMajor => set.track_count(),
@@ -292,7 +296,7 @@ impl Opened {
                 sink(chunk)
             });
         match result {
-            Err(Ended::Evaluating(Error::Vulkan(error))) if self.automatic => {
+            Err(ResultError::Evaluating(Error::Vulkan(error))) if self.automatic => {
                 self.fall_back(&error)?;
                 self.engine
                     .stream(set, interpolation, frames, layout, chunk, |chunk| {
@@ -307,7 +311,7 @@ impl Opened {
         }
     }
 
-    /// Does some work on the device. One that nobody named may fail: then the CPU does it.
+    /// Does some work on the device. If a device that was chosen automatically fails, the CPU does it.
     pub(crate) fn work<T>(
         &mut self,
         mut work: impl FnMut(&Engine) -> Result<T, Error>,
@@ -321,7 +325,7 @@ impl Opened {
         }
     }
 
-    /// From now on the CPU.
+    /// Uses the CPU from now on.
     fn fall_back(&mut self, error: &VulkanError) -> Result<(), Error> {
         words::warning(&format!("{}: {error}; going on with the CPU", self.label));
         self.engine = Engine::new(Device::Cpu)?;
@@ -331,12 +335,12 @@ impl Opened {
         Ok(())
     }
 
-    /// As [`Opened::stream`], all of it.
+    /// As [`OpenedDevice::stream`], into one vector.
     pub(crate) fn collect(
         &mut self,
         set: &TrackSet,
         interpolation: Interpolation,
-        frames: &Frames,
+        frames: &SampleTimes,
         layout: Layout,
     ) -> Result<Vec<Quat>, Error> {
         let mut rotations = Vec::new();
@@ -345,29 +349,29 @@ impl Opened {
             Ok(())
         });
         match collected {
-            Ok(()) | Err(Ended::Writing(_)) => Ok(rotations), // nothing was written
-            Err(Ended::Evaluating(error)) => Err(error),
+            Ok(()) | Err(ResultError::Writing(_)) => Ok(rotations), // nothing was written
+            Err(ResultError::Evaluating(error)) => Err(error),
         }
     }
 }
 
-/// The Vulkan device of that name, as `--device` takes it, not opened; the first one where there is no name.
+/// The Vulkan device of that name, as in `--device`, not opened; the first one without a name.
 /// `None` for the CPU.
 pub(crate) fn vulkan_device(name: Option<&str>) -> Result<Option<Device>, Failure> {
-    let choice = name.map_or(Choice::First, |name| {
+    let choice = name.map_or(DeviceChoice::First, |name| {
         let Ok(choice) = name.parse();
         choice
     });
     let devices = || probe::devices().map_err(|error| refused(&error.into()));
     match choice {
-        Choice::Cpu => Ok(None),
-        Choice::First | Choice::Auto | Choice::Vulkan => {
+        DeviceChoice::Cpu => Ok(None),
+        DeviceChoice::First | DeviceChoice::Auto | DeviceChoice::Vulkan => {
             let first = devices()?.into_iter().next();
             first
                 .map(Some)
                 .ok_or_else(|| no_vulkan(&VulkanError::NoDevice))
         }
-        Choice::Named(name) => named(&name, &devices()?).map(Some),
+        DeviceChoice::Named(name) => named(&name, &devices()?).map(Some),
     }
 }
 
@@ -375,7 +379,7 @@ pub(super) fn no_vulkan(error: &VulkanError) -> Failure {
     Failure::new(NO_VULKAN, format!("no Vulkan device: {error}"))
 }
 
-/// A demanded device could not be opened.
+/// The failure of a device that the command line names and that cannot be opened.
 pub(crate) fn refused(error: &Error) -> Failure {
     match error {
         Error::Vulkan(error) if is_absence(error) => no_vulkan(error),
@@ -394,13 +398,13 @@ pub(crate) fn is_absence(error: &VulkanError) -> bool {
         | VulkanError::NoNvidiaDriver
         | VulkanError::SlowDriver { .. }
         | VulkanError::Driver { .. } => true,
-        // So say loaders whose drivers do not work.
+        // Loaders return this when no driver works.
         VulkanError::Call { result, .. } => *result == vk::Result::ERROR_INITIALIZATION_FAILED,
         _ => false,
     }
 }
 
-/// Why the CPU was taken, in a few words.
+/// Why the CPU is used, in a few words.
 fn short_reason(error: &Error) -> String {
     match error {
         Error::Vulkan(VulkanError::NoLoader { .. }) => "no Vulkan: no loader library".to_owned(),

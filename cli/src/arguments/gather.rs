@@ -14,40 +14,43 @@ use crate::messages::exit::Failure;
 use crate::messages::words;
 
 /// Files to work on, in order, each once.
-pub(crate) struct Gathered {
-    pub(crate) files: Vec<Found>,
-    /// A directory, a pattern or a list was given: there may be any number of files.
+pub(crate) struct GatheredInputs {
+    pub(crate) files: Vec<FoundInput>,
+    /// The command line has a directory, a pattern or a list: there may be any number of files.
     pub(crate) many: bool,
 }
 
-/// One file, and its place in a directory of results.
+/// One input file, and its path below a directory of results.
 #[derive(Debug, Clone)]
-pub(crate) struct Found {
+pub(crate) struct FoundInput {
     pub(crate) path: PathBuf,
-    /// Its name; below a directory that was given, the way to it.
+    /// Its name, or its path below a directory that the command line names.
     pub(crate) below: PathBuf,
-    /// It was met below a directory that was given, rather than named.
-    pub(crate) is_met: bool,
+    /// It was found below a directory, rather than named.
+    pub(crate) is_from_directory: bool,
 }
 
-impl Found {
+impl FoundInput {
     /// A file that was named.
     pub(crate) fn named(path: PathBuf, below: PathBuf) -> Self {
         Self {
             path,
             below,
-            is_met: false,
+            is_from_directory: false,
         }
     }
 
     /// The directory that it was met below.
     pub(crate) fn root(&self) -> Option<&Path> {
         let steps = self.below.components().count();
-        self.path.ancestors().nth(steps).filter(|_| self.is_met)
+        self.path
+            .ancestors()
+            .nth(steps)
+            .filter(|_| self.is_from_directory)
     }
 }
 
-impl Gathered {
+impl GatheredInputs {
     /// Files named on the command line come first, then those of the list.
     pub(crate) fn new(paths: &[PathBuf], list: Option<&Path>) -> Result<Self, Failure> {
         let mut gathered = Self {
@@ -58,13 +61,13 @@ impl Gathered {
         let mut seen = HashSet::new();
         for path in paths.iter().chain(&listed) {
             for found in gathered.expand(path) {
-                // A missing file is told about when it is opened.
+                // A missing file is reported when it is opened.
                 let identity = found.path.canonicalize();
                 if seen.insert(identity.unwrap_or_else(|_| found.path.clone())) {
                     gathered.files.push(found);
                 } else {
                     let name = input::name(&found.path);
-                    words::warning(&format!("{name}: given twice, done once"));
+                    words::warning(&format!("{name}: named twice; it is processed once"));
                 }
             }
         }
@@ -79,10 +82,10 @@ impl Gathered {
         self.files.iter().map(|found| found.path.clone()).collect()
     }
 
-    fn expand(&mut self, path: &Path) -> Vec<Found> {
+    fn expand(&mut self, path: &Path) -> Vec<FoundInput> {
         let alone = || {
             let name = path.file_name().unwrap_or(path.as_os_str());
-            Found::named(path.to_owned(), name.into())
+            FoundInput::named(path.to_owned(), name.into())
         };
         if is_standard(path) || path.is_file() {
             return vec![alone()];
@@ -93,7 +96,7 @@ impl Gathered {
             matches(path)
         };
         if found.is_empty() {
-            // Opening it says what is wrong with it.
+            // Opening it reports what is wrong.
             return vec![alone()];
         }
         self.many = true;
@@ -103,7 +106,7 @@ impl Gathered {
 
 /// Every file of a format that can be read below a directory, by name. What cannot be looked into is an input
 /// too, which fails when it is opened.
-fn below(directory: &Path) -> Vec<Found> {
+fn below(directory: &Path) -> Vec<FoundInput> {
     let walk = WalkDir::new(directory).follow_links(true);
     let mut found = Vec::new();
     for entry in walk.sort_by_file_name() {
@@ -117,10 +120,10 @@ fn below(directory: &Path) -> Vec<Found> {
             },
         };
         let below = path.strip_prefix(directory).unwrap_or(&path).to_owned();
-        found.push(Found {
+        found.push(FoundInput {
             path,
             below,
-            is_met: true,
+            is_from_directory: true,
         });
     }
     found
@@ -128,7 +131,7 @@ fn below(directory: &Path) -> Vec<Found> {
 
 /// The files that a pattern matches: shells expand patterns, but not in lists, not in
 /// quotes, and not on every system.
-fn matches(pattern: &Path) -> Vec<Found> {
+fn matches(pattern: &Path) -> Vec<FoundInput> {
     let Some(text) = pattern.to_str().filter(|text| is_pattern(text)) else {
         return Vec::new();
     };
@@ -137,7 +140,7 @@ fn matches(pattern: &Path) -> Vec<Found> {
     files
         .map(|path| {
             let below = path.file_name().unwrap_or(path.as_os_str()).into();
-            Found::named(path, below)
+            FoundInput::named(path, below)
         })
         .collect()
 }
@@ -164,7 +167,7 @@ fn read_list(list: &Path) -> Result<Vec<PathBuf>, Failure> {
     Ok(paths.map(named).collect())
 }
 
-/// The path of these bytes: names of files need be no UTF-8.
+/// The path of these bytes: names of files need be not UTF-8.
 #[cfg(unix)]
 fn named(bytes: &[u8]) -> PathBuf {
     use std::os::unix::ffi::OsStrExt;

@@ -10,14 +10,14 @@ use tumble_formats::printable::{printable, printable_path};
 use tumble_formats::times::open_times;
 use tumble_formats::{Code, Diagnostic, Format, Limits, Loaded, ReadOptions};
 
-use crate::arguments::gather::Gathered;
-use crate::arguments::reading::Reading;
-use crate::arguments::tracks::Tracks;
+use crate::arguments::gather::GatheredInputs;
+use crate::arguments::reading::ReadingArguments;
+use crate::arguments::tracks::TrackArguments;
 use crate::messages::exit::{self, Failure};
 use crate::messages::progress::busy;
 use crate::messages::words;
 
-/// The inputs of a command, and what they may be.
+/// The inputs of a command, and limits on them.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct Inputs {
     /// Keyframe files, directories of them, or patterns such as 'walks/*.dat' (`-`: standard input)
@@ -32,14 +32,14 @@ pub(crate) struct Inputs {
     /// The largest input to read
     #[arg(long, value_name = "SIZE", default_value = "16GiB", value_parser = words::parse_bytes)]
     max_size: u64,
-    /// The most memory that reading an input may take beside the input itself [default: 64 times its
-    /// length, and 64MiB]
+    /// The memory limit for reading an input, besides the input itself [default: 64 times its length
+    /// plus 64MiB]
     #[arg(long, value_name = "SIZE", value_parser = words::parse_bytes)]
     max_memory: Option<u64>,
     #[command(flatten)]
-    pub(crate) reading: Reading,
+    pub(crate) reading: ReadingArguments,
     #[command(flatten)]
-    pub(crate) tracks: Tracks,
+    pub(crate) tracks: TrackArguments,
 }
 
 /// `-` is standard input.
@@ -47,7 +47,7 @@ pub(crate) fn is_standard(path: &Path) -> bool {
     path.as_os_str() == "-"
 }
 
-/// How messages call an input.
+/// The name of an input in messages.
 pub(crate) fn name(path: &Path) -> String {
     if is_standard(path) {
         "standard input".to_owned()
@@ -59,7 +59,7 @@ pub(crate) fn name(path: &Path) -> String {
 /// `folder/walk.dat` is `walk.dat` in titles.
 pub(crate) fn file_name(path: &Path) -> String {
     match path.file_name() {
-        Some(own) if !is_standard(path) => printable_path(Path::new(own)),
+        Some(component) if !is_standard(path) => printable_path(Path::new(component)),
         _ => name(path),
     }
 }
@@ -73,26 +73,25 @@ pub(crate) fn stem(path: &Path) -> String {
 }
 
 impl Inputs {
-    /// The inputs without repetitions, each of which earns a warning. Standard
-    /// input can be taken only once.
-    pub(crate) fn gather(&self, standard_input_taken: bool) -> Result<Gathered, Failure> {
-        let taken = [
-            (standard_input_taken, "the times"),
+    /// The inputs without repetitions, each of which earns a warning. Standard input can be read only once.
+    pub(crate) fn gather(&self, times_from_stdin: bool) -> Result<GatheredInputs, Failure> {
+        let uses = [
+            (times_from_stdin, "the times"),
             (
                 self.files_from.as_deref().is_some_and(is_standard),
                 "the list of inputs",
             ),
         ];
-        let taken: Vec<&str> = taken.iter().filter(|t| t.0).map(|t| t.1).collect();
+        let readers: Vec<&str> = uses.iter().filter(|t| t.0).map(|t| t.1).collect();
         let keys = self.paths.iter().any(|path| is_standard(path));
-        if taken.len() + usize::from(keys) > 1 {
-            let all = taken.iter().copied().chain(keys.then_some("the keys"));
+        if readers.len() + usize::from(keys) > 1 {
+            let all = readers.iter().copied().chain(keys.then_some("the keys"));
             let all = all.collect::<Vec<_>>().join(" and ");
             return Err(Failure::usage(format!(
                 "standard input cannot be both {all}; put one in a file"
             )));
         }
-        let gathered = Gathered::new(&self.paths, self.files_from.as_deref())?;
+        let gathered = GatheredInputs::new(&self.paths, self.files_from.as_deref())?;
         let format = |path: PathBuf| match self.reading.from {
             Some(format) => format,
             None => Format::detected(&path),
@@ -102,10 +101,10 @@ impl Inputs {
         Ok(gathered)
     }
 
-    /// Whether the keys of an input are as many as it takes to follow its curves.
+    /// Whether an input is read with extra keys that follow its curves.
     pub(crate) fn follows_curves(&self, path: &Path) -> bool {
         let format = self.reading.from.unwrap_or_else(|| Format::detected(path));
-        format.takes(FormatOption::Keyframes) && !self.reading.takes_keyframes()
+        format.takes(FormatOption::Keyframes) && !self.reading.reads_file_keys()
     }
 
     /// The longest input that is read, bytes.
@@ -113,38 +112,38 @@ impl Inputs {
         self.max_size
     }
 
-    /// What the command line names.
-    pub(crate) fn given(&self) -> &[PathBuf] {
+    /// The paths that the command line names.
+    pub(crate) fn named_paths(&self) -> &[PathBuf] {
         &self.paths
     }
 
     /// As [`Inputs::gather`], the paths alone.
-    pub(crate) fn distinct(&self, standard_input_taken: bool) -> Result<Vec<PathBuf>, Failure> {
-        Ok(self.gather(standard_input_taken)?.paths())
+    pub(crate) fn distinct(&self, times_from_stdin: bool) -> Result<Vec<PathBuf>, Failure> {
+        Ok(self.gather(times_from_stdin)?.paths())
     }
 
     /// Reads a keyframe file; its warnings go to standard error.
     pub(crate) fn load(&self, path: &Path) -> Result<Loaded, Failure> {
         let loaded = self.load_quietly(path)?;
-        tell_warnings(&loaded);
+        print_warnings(&loaded);
         Ok(loaded)
     }
 
     /// As [`Inputs::load`], for commands that work on one clip.
     pub(crate) fn load_one(&self, path: &Path) -> Result<OnlyClip, Failure> {
         let mut loaded = self.load(path)?;
-        let rest = whole(&name(path), &loaded);
+        let rest = check_complete(&name(path), &loaded);
         match loaded.clips.pop() {
             Some(clip) if loaded.clips.is_empty() => Ok(OnlyClip { clip, rest }),
             Some(clip) => {
                 loaded.clips.push(clip);
-                Err(several(path, &loaded))
+                Err(several_clips_failure(path, &loaded))
             }
             None => Err(no_clips(path)),
         }
     }
 
-    /// As [`Inputs::load`], without a word of its warnings.
+    /// As [`Inputs::load`], without printing its warnings.
     pub(crate) fn load_quietly(&self, path: &Path) -> Result<Loaded, Failure> {
         busy(&format!("reading {}", name(path)), || self.read(path))
     }
@@ -160,7 +159,7 @@ impl Inputs {
         options.map_err(|fault| Failure::input(&fault, ""))
     }
 
-    /// As [`Inputs::load_quietly`], without a word of how far it is.
+    /// As [`Inputs::load_quietly`], without a progress display.
     pub(crate) fn read(&self, path: &Path) -> Result<Loaded, Failure> {
         let options = self.options()?;
         let refuse = |diagnostic: Diagnostic| {
@@ -190,13 +189,12 @@ impl Inputs {
 /// The clip of a file, for commands that work on one.
 pub(crate) struct OnlyClip {
     pub(crate) clip: Motion,
-    /// Fails where other animations of the file were refused: what is made of this one is not all that
-    /// was asked for.
+    /// Fails where other animations of the file were refused: the result is then incomplete.
     pub(crate) rest: Result<(), Failure>,
 }
 
 /// Fails where animations of an input were refused; the others are done by then.
-pub(crate) fn whole(name: &str, loaded: &Loaded) -> Result<(), Failure> {
+pub(crate) fn check_complete(name: &str, loaded: &Loaded) -> Result<(), Failure> {
     let refused: u64 = loaded.refused.iter().map(|fault| fault.count).sum();
     if refused == 0 {
         return Ok(());
@@ -211,15 +209,15 @@ fn no_clips(path: &Path) -> Failure {
     Failure::new(exit::ALL_INPUTS, message)
 }
 
-/// Says what is remarkable about an input.
-pub(crate) fn tell_warnings(loaded: &Loaded) {
+/// Prints the warnings of an input.
+pub(crate) fn print_warnings(loaded: &Loaded) {
     for warning in loaded.warnings.iter().chain(&loaded.refused) {
         words::note(&warning.to_string());
     }
 }
 
-/// What a command that works on one clip says of a file with several.
-pub(crate) fn several(path: &Path, loaded: &Loaded) -> Failure {
+/// The failure of a command that works on one clip for a file with several.
+pub(crate) fn several_clips_failure(path: &Path, loaded: &Loaded) -> Failure {
     let (name, names) = (name(path), clip_names(loaded));
     Failure::new(
         exit::ALL_INPUTS,
@@ -227,11 +225,11 @@ pub(crate) fn several(path: &Path, loaded: &Loaded) -> Failure {
     )
 }
 
-/// What messages call a clip of a file with several.
+/// The name in messages of a clip of a file with several.
 pub(crate) fn clip_name(clip: &Motion) -> String {
     match &clip.name {
         Some(name) => printable(name).into_owned(),
-        None => clip.place.to_string(),
+        None => clip.index.to_string(),
     }
 }
 

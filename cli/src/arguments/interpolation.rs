@@ -1,4 +1,4 @@
-//! Arguments that say how to interpolate: method, path, ends.
+//! Options for interpolation: method, signs of keys, ends.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -8,26 +8,26 @@ use clap::{Args, ValueEnum};
 use glam::DVec3;
 use tumble::method::KOCHANEK_BARTELS;
 use tumble::{
-    Ends, Interpolation, InterpolationWarning, METHODS, Method, Path, Speed, TrackSet, WrapMode,
+    Ends, Interpolation, InterpolationWarning, KeySigns, METHODS, Method, Speed, TrackSet, WrapMode,
 };
 use tumble_formats::{Code, Diagnostic};
 
 /// `--path` and `--ends`, which every method takes.
 #[derive(Debug, Clone, Copy, Args)]
-pub(crate) struct Manner {
+pub(crate) struct InterpolationArguments {
     /// What happens in the first and the last segment (default: the method's own)
     #[arg(long, value_name = "ENDS")]
     ends: Option<EndsArgument>,
-    /// Which way round between neighbouring keys
+    /// Which way to rotate between neighbouring keys
     #[arg(long, value_name = "PATH")]
     path: Option<PathArgument>,
-    /// How fast the curve is run through
+    /// The speed along the curve
     #[arg(long, value_name = "SPEED", default_value = "as-keyed")]
     speed: SpeedArgument,
-    /// What lies before the first key
+    /// The values before the first key
     #[arg(long, value_name = "OUTSIDE", default_value = "hold")]
     before: OutsideArgument,
-    /// What lies after the last key
+    /// The values after the last key
     #[arg(long, value_name = "OUTSIDE", default_value = "hold")]
     after: OutsideArgument,
     /// kochanek-bartels: 1 stands still at the keys, -1 is twice as fast
@@ -36,7 +36,7 @@ pub(crate) struct Manner {
     /// kochanek-bartels: -1 makes corners at the keys
     #[arg(long, value_name = "NUMBER", value_parser = finite, allow_negative_numbers = true)]
     continuity: Option<f64>,
-    /// kochanek-bartels: 1 follows the interval before a key, -1 that behind it
+    /// kochanek-bartels: 1 follows the interval before a key, -1 the one after it
     #[arg(long, value_name = "NUMBER", value_parser = finite, allow_negative_numbers = true)]
     bias: Option<f64>,
 }
@@ -48,11 +48,11 @@ fn finite(text: &str) -> Result<f64, String> {
     }
 }
 
-impl Manner {
+impl InterpolationArguments {
     pub(crate) fn with(self, method: Method) -> tumble::Interpolation {
         tumble::Interpolation {
             method,
-            path: method.path.or(self.path()).unwrap_or_default(),
+            signs: method.path.or(self.path()).unwrap_or_default(),
             ends: self.ends.map_or(method.ends, EndsArgument::ends),
             quantity: tumble::Quantity::Rotation,
             speed: match self.speed {
@@ -69,14 +69,14 @@ impl Manner {
         }
     }
 
-    fn path(self) -> Option<Path> {
+    fn path(self) -> Option<KeySigns> {
         Some(match self.path? {
-            PathArgument::Shortest => Path::Shortest,
-            PathArgument::AsAuthored => Path::AsAuthored,
+            PathArgument::Shortest => KeySigns::Shortest,
+            PathArgument::AsAuthored => KeySigns::AsAuthored,
         })
     }
 
-    /// The options by the names that the npm package has for them, those that were given.
+    /// The options that are set, by their names in the npm package.
     pub(crate) fn named(self) -> BTreeMap<&'static str, String> {
         fn name(value: impl ValueEnum) -> Option<String> {
             Some(value.to_possible_value()?.get_name().to_owned())
@@ -92,13 +92,13 @@ impl Manner {
             ("continuity", number(self.continuity)),
             ("bias", number(self.bias)),
         ];
-        let given = options
+        let present = options
             .into_iter()
             .filter_map(|(name, value)| Some((name, value?)));
-        given.collect()
+        present.collect()
     }
 
-    /// Refuses what says nothing to any of these methods.
+    /// Refuses options that have no effect on any of these methods.
     pub(crate) fn check(self, methods: &[Method]) -> Result<(), String> {
         let names = || {
             let names: Vec<&str> = methods.iter().map(|method| method.name).collect();
@@ -111,15 +111,15 @@ impl Manner {
             ("--bias", self.bias),
         ] {
             if value.is_some() && is_none(|method| method.name == KOCHANEK_BARTELS.name) {
-                let own = KOCHANEK_BARTELS.name;
+                let method = KOCHANEK_BARTELS.name;
                 return Err(format!(
-                    "{option} is for {own}; add -m {own}, or leave it out"
+                    "{option} is for {method}; add -m {method}, or leave it out"
                 ));
             }
         }
         if self.ends.is_some() && is_none(|method| method.uses_neighbours) {
             return Err(format!(
-                "--ends says nothing to {}, whose curves depend on the two keys that they join; \
+                "--ends has no effect on {}, whose curves depend on the two keys that they join; \
                  leave it out, or choose another method (-m)",
                 names()
             ));
@@ -128,7 +128,7 @@ impl Manner {
         let takes = |method: &Method| method.path.is_none() || method.path == path;
         if path.is_some() && !methods.iter().any(takes) {
             return Err(format!(
-                "--path: {} always takes the way that the signs of the keys say; leave it out",
+                "--path has no effect on {}, which always follows the signs of the keys; leave it out",
                 names()
             ));
         }
@@ -174,7 +174,7 @@ impl EndsArgument {
 enum SpeedArgument {
     /// as the key times say
     AsKeyed,
-    /// at one angular speed all the way
+    /// at constant angular speed
     Constant,
 }
 
@@ -182,11 +182,11 @@ enum SpeedArgument {
 enum OutsideArgument {
     /// the end value
     Hold,
-    /// the track again
+    /// the track repeats
     Loop,
-    /// the track backwards, and again
+    /// the track runs backwards and forwards in turn
     Mirror,
-    /// on, at the velocity of the end
+    /// continues at the velocity of the end
     Extrapolate,
 }
 
@@ -203,9 +203,9 @@ impl From<OutsideArgument> for WrapMode {
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum PathArgument {
-    /// the shorter way (default)
+    /// the shorter rotation (default)
     Shortest,
-    /// the way that the signs of the keys say
+    /// as the signs of the keys say
     AsAuthored,
 }
 
@@ -252,11 +252,11 @@ fn names() -> impl Iterator<Item = PossibleValue> {
         .map(|method| PossibleValue::new(method.name).help(method.summary))
 }
 
-/// A method for every channel, or each channel's own.
+/// A method for every channel, or `None` for the one that the file states for each.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Wanted(pub(crate) Option<Method>);
+pub(crate) struct MethodArgument(pub(crate) Option<Method>);
 
-impl fmt::Display for Wanted {
+impl fmt::Display for MethodArgument {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(self.name())
     }
@@ -264,43 +264,46 @@ impl fmt::Display for Wanted {
 
 const AUTHORED: &str = "authored";
 
-impl Wanted {
+impl MethodArgument {
     pub(crate) fn name(self) -> &'static str {
         self.0.map_or(AUTHORED, |method| method.name)
     }
 
     pub(crate) fn summary(self) -> &'static str {
-        let authored = "as the file says of each channel; bessel-overhauser where it says nothing";
+        let authored =
+            "as the file states for each channel; bessel-overhauser where it states none";
         self.0.map_or(authored, |method| method.summary)
     }
 
-    /// Each channel's own method, then all methods.
+    /// `authored`, then all methods.
     pub(crate) fn all() -> impl Iterator<Item = Self> {
         let methods = METHODS.into_iter().map(Some);
         std::iter::once(None).chain(methods).map(Self)
     }
 }
 
-fn wanted_names() -> impl Iterator<Item = PossibleValue> {
-    Wanted::all().map(|wanted| PossibleValue::new(wanted.name()).help(wanted.summary()))
+fn method_argument_names() -> impl Iterator<Item = PossibleValue> {
+    MethodArgument::all()
+        .map(|argument| PossibleValue::new(argument.name()).help(argument.summary()))
 }
 
-/// Parses the name of one of [`Wanted::all`]; help, errors and completions list them all.
-pub(crate) fn wanted() -> impl TypedValueParser<Value = Wanted> {
-    PossibleValuesParser::new(wanted_names()).map(|name| Wanted(Method::named(&name)))
+/// Parses the name of one of [`MethodArgument::all`]; help, errors and completions list all of them.
+pub(crate) fn method_argument() -> impl TypedValueParser<Value = MethodArgument> {
+    PossibleValuesParser::new(method_argument_names())
+        .map(|name| MethodArgument(Method::named(&name)))
 }
 
-/// One of [`Wanted::all`], or all of them.
+/// One of [`MethodArgument::all`], or all of them.
 #[derive(Debug, Clone)]
-pub(crate) struct WantedSelection(pub(crate) Vec<Wanted>);
+pub(crate) struct MethodArgumentSelection(pub(crate) Vec<MethodArgument>);
 
-/// As [`wanted`], and `all`.
-pub(crate) fn wanted_methods() -> impl TypedValueParser<Value = WantedSelection> {
+/// As [`method_argument`], and `all`.
+pub(crate) fn method_arguments() -> impl TypedValueParser<Value = MethodArgumentSelection> {
     let all = PossibleValue::new(ALL).help("every method");
-    PossibleValuesParser::new(std::iter::once(all).chain(wanted_names())).map(|name| {
-        WantedSelection(match &*name {
-            ALL => Wanted::all().collect(),
-            _ => vec![Wanted(Method::named(&name))],
+    PossibleValuesParser::new(std::iter::once(all).chain(method_argument_names())).map(|name| {
+        MethodArgumentSelection(match &*name {
+            ALL => MethodArgument::all().collect(),
+            _ => vec![MethodArgument(Method::named(&name))],
         })
     })
 }
@@ -309,22 +312,24 @@ const ALL: &str = "all";
 
 /// One method, or all of them.
 #[derive(Debug, Clone)]
-pub(crate) struct Selection(pub(crate) Vec<Method>);
+pub(crate) struct MethodSelection(pub(crate) Vec<Method>);
 
 /// Parses the name of a method, or `all`.
-pub(crate) fn methods() -> impl TypedValueParser<Value = Selection> {
+pub(crate) fn methods() -> impl TypedValueParser<Value = MethodSelection> {
     let all = PossibleValue::new(ALL).help("every method");
     PossibleValuesParser::new(std::iter::once(all).chain(names())).map(|name| {
-        Selection(Method::named(&name).map_or_else(|| METHODS.to_vec(), |method| vec![method]))
+        MethodSelection(
+            Method::named(&name).map_or_else(|| METHODS.to_vec(), |method| vec![method]),
+        )
     })
 }
 
 /// The methods of several selections, each once.
-pub(crate) fn chosen(selections: &[Selection]) -> Vec<Method> {
+pub(crate) fn chosen(selections: &[MethodSelection]) -> Vec<Method> {
     each_once(selections.iter().flat_map(|selection| &selection.0))
 }
 
-/// The first of all that are equal.
+/// The values without repetitions, in order.
 pub(crate) fn each_once<'a, T: Copy + PartialEq + 'a>(all: impl Iterator<Item = &'a T>) -> Vec<T> {
     let mut found = Vec::new();
     for one in all {

@@ -1,4 +1,4 @@
-//! Devices by name: what `--device` may call those that `tumble devices` lists.
+//! Finds the device that `--device` names among those that `tumble devices` lists.
 
 use tumble::{Device, VulkanError};
 
@@ -6,18 +6,17 @@ use crate::arguments::device::no_vulkan;
 use crate::messages::exit::Failure;
 use crate::messages::words;
 
-/// The device meant, of those that `tumble devices` lists: by index, by its whole
-/// name, by part of its name, in this order (a card may be called by a number). Behind `uuid:` it is
-/// the UUID that Vulkan tells, which other programs of the machine know the card by.
-pub(super) fn named(given: &str, devices: &[Device]) -> Result<Device, Failure> {
+/// The device of that index, else of that name, else of a name that contains the text (a card's name may
+/// be a number). After `uuid:` stands the UUID that Vulkan reports, by which other programs know the card.
+pub(super) fn named(requested: &str, devices: &[Device]) -> Result<Device, Failure> {
     if devices.is_empty() {
         return Err(no_vulkan(&VulkanError::NoDevice));
     }
-    let part = given.to_lowercase();
+    let part = requested.to_lowercase();
     if let Some(uuid) = part.strip_prefix("uuid:") {
-        return by_uuid(given, uuid, devices);
+        return by_uuid(requested, uuid, devices);
     }
-    if let Some(device) = given
+    if let Some(device) = requested
         .parse()
         .ok()
         .and_then(|index: usize| devices.get(index))
@@ -44,32 +43,36 @@ pub(super) fn named(given: &str, devices: &[Device]) -> Result<Device, Failure> 
                 .iter()
                 .map(Device::name)
                 .chain(["auto", "first", "cpu", "vulkan"]);
-            let hint = words::nearest(given, known)
+            let hint = words::nearest(requested, known)
                 .map(|near| format!("; did you mean `{near}`?"))
                 .unwrap_or_default();
-            let message = format!("there is no device `{given}`{hint}");
+            let message = format!("there is no device `{requested}`{hint}");
             Err(Failure::usage(message).with_lines(list))
         }
         _ => Err(Failure::usage(format!(
-            "`{given}` could be several devices; give more of the name, or the index"
+            "`{requested}` could be several devices; give more of the name, or the index"
         ))
         .with_lines(list)),
     }
 }
 
 /// The device of a UUID, with or without its dashes and NVIDIA's `GPU-` before it.
-fn by_uuid(given: &str, uuid: &str, devices: &[Device]) -> Result<Device, Failure> {
+fn by_uuid(requested: &str, uuid: &str, devices: &[Device]) -> Result<Device, Failure> {
     let digits = |text: &str| text.replace('-', "");
-    let wanted = digits(uuid.strip_prefix("gpu-").unwrap_or(uuid));
-    let own = |device: &&Device| device.uuid().is_some_and(|own| digits(&own) == wanted);
-    match devices.iter().find(own) {
+    let requested_digits = digits(uuid.strip_prefix("gpu-").unwrap_or(uuid));
+    let has_uuid = |device: &&Device| {
+        device
+            .uuid()
+            .is_some_and(|known| digits(&known) == requested_digits)
+    };
+    match devices.iter().find(has_uuid) {
         Some(device) => Ok(device.clone()),
         None => {
             let lines = devices.iter().map(|device| {
                 let uuid = device.uuid().unwrap_or_default();
                 format!("  uuid:{uuid}  {}", device.name())
             });
-            let message = format!("there is no device `{given}`; there are");
+            let message = format!("there is no device `{requested}`; there are");
             Err(Failure::usage(message).with_lines(lines))
         }
     }

@@ -1,4 +1,4 @@
-//! Arguments that say how bodies follow paths: those of `follow`, and of the commands that draw paths.
+//! Options for bodies that follow paths: those of `follow`, and of the commands that draw paths.
 
 use std::path::Path;
 
@@ -6,7 +6,7 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use glam::{DVec3, Mat3, Quat};
 use tumble::{
-    BodyAxis, Channel, Direction, Follow, Frame, PathSpeed, TrackError, TrackSet, Twist,
+    BodyAxis, Channel, Direction, Follow, PathFrame, PathSpeed, TrackError, TrackSet, Twist,
     VectorKeys, VectorMethod,
 };
 use tumble_formats::motion::Motion;
@@ -28,7 +28,7 @@ pub(crate) struct PathArguments {
     /// The duration of paths without times, seconds
     #[arg(long, value_name = "S", conflicts_with = "rate", value_parser = positive)]
     seconds: Option<f64>,
-    /// The way that a body covers in a second on paths without times
+    /// The distance that a body covers in a second on paths without times
     #[arg(long, value_name = "UNITS", value_parser = positive)]
     rate: Option<f64>,
     /// The curve through the points
@@ -38,9 +38,9 @@ pub(crate) struct PathArguments {
     #[arg(long, value_name = "ENDS", default_value = "parabolic")]
     path_ends: EndsArgument,
     /// Which way a body faces: tangent, ahead:DISTANCE, at:X,Y,Z or at:TRACK
-    #[arg(long, value_name = "WAY", default_value = "tangent", value_parser = Way::parse)]
-    direction: Way,
-    /// How it is turned about this direction; several stand side by side
+    #[arg(long, value_name = "DIRECTION", default_value = "tangent", value_parser = DirectionArgument::parse)]
+    direction: DirectionArgument,
+    /// The orientation about this direction; several are drawn side by side
     #[arg(
         long = "frame",
         value_name = "FRAMES",
@@ -51,31 +51,31 @@ pub(crate) struct PathArguments {
     /// The upward direction: at the start of minimal frames, everywhere of fixed ones
     #[arg(long, value_name = "X,Y,Z", default_value = "0,1,0", value_parser = vector, allow_hyphen_values = true)]
     path_up: DVec3,
-    /// Leave out the upward directions that a file has at its points (ux, uy, uz): frames other than
-    /// minimal ones have their own
+    /// Ignore the upward directions of a file (ux, uy, uz): only minimal frames use them
     #[arg(long)]
     no_ups: bool,
-    /// What becomes of the turn about the direction that a closed path leaves over
+    /// What to do with the rotation about the direction that is left over at the end of a closed path
     #[arg(long, value_name = "TWIST", default_value = "spread")]
     twist: TwistArgument,
-    /// keys, constant, or eased:A,B: growing over the part A of the time, falling over the part B
+    /// keys, constant, or eased:A,B: speeding up over the fraction A of the time, slowing down over the
+    /// fraction B
     #[arg(long, value_name = "SPEED", default_value = "keys", value_parser = speed)]
     path_speed: PathSpeed,
     /// The axis of the body that faces forward
     #[arg(long, value_name = "AXIS", default_value = "z", value_parser = axis, allow_hyphen_values = true)]
-    forward: Axis,
+    forward: BodyAxisArgument,
     /// The axis of the body that faces up
     #[arg(long, value_name = "AXIS", default_value = "y", value_parser = axis, allow_hyphen_values = true)]
-    upward: Axis,
+    upward: BodyAxisArgument,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum FrameArgument {
-    /// it never turns about its direction
+    /// no rotation about the direction (rotation-minimizing)
     Minimal,
-    /// its upward axis is as near to --up as it can be
+    /// the upward axis stays as close to --up as possible
     Fixed,
-    /// as the path's normal has it, without its half turns
+    /// the path's normal (Frenet), without its flips
     Frenet,
 }
 
@@ -94,29 +94,29 @@ impl FrameArgument {
 
     pub(crate) fn summary(self) -> &'static str {
         match self {
-            Self::Minimal => "it never turns about its direction",
-            Self::Fixed => "its upward axis is as near to upwards as it can be",
-            Self::Frenet => "as the path's normal has it, without its half turns",
+            Self::Minimal => "no rotation about the direction (rotation-minimizing)",
+            Self::Fixed => "the upward axis stays as close to up as possible",
+            Self::Frenet => "the path's normal (Frenet), without its flips",
         }
     }
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum TwistArgument {
-    /// it is spread evenly: the last pose is the first
+    /// spread evenly, so that the last pose equals the first
     Spread,
-    /// it stays
+    /// leave it
     Free,
 }
 
-/// A direction; the track that it may name is looked for in each input.
+/// `--direction`; a track that it names is looked up in each input.
 #[derive(Debug, Clone)]
-enum Way {
+enum DirectionArgument {
     Known(Direction),
     Track(String),
 }
 
-impl Way {
+impl DirectionArgument {
     fn parse(text: &str) -> Result<Self, String> {
         let number = |text: &str| {
             text.trim()
@@ -126,9 +126,9 @@ impl Way {
         match text.split_once(':') {
             None if text == "tangent" => Ok(Self::Known(Direction::Tangent)),
             Some(("ahead", distance)) => Ok(Self::Known(Direction::Ahead(number(distance)?))),
-            Some(("at", place)) => match vector(place) {
+            Some(("at", target)) => match vector(target) {
                 Ok(point) => Ok(Self::Known(Direction::Point(point))),
-                Err(_) if !place.is_empty() => Ok(Self::Track(place.to_owned())),
+                Err(_) if !target.is_empty() => Ok(Self::Track(target.to_owned())),
                 Err(error) => Err(error),
             },
             _ => Err("a body faces tangent, ahead:DISTANCE, at:X,Y,Z or at:TRACK".to_owned()),
@@ -136,26 +136,26 @@ impl Way {
     }
 
     fn of(&self, set: &TrackSet, name: &str) -> Result<Direction, Failure> {
-        let wanted = match self {
+        let track_name = match self {
             Self::Known(direction) => return Ok(*direction),
-            Self::Track(wanted) => wanted,
+            Self::Track(text) => text,
         };
         let mut tracks = 0..set.track_count();
-        let found = tracks.find(|&track| set.track_name(track) == wanted.as_str());
+        let found = tracks.find(|&track| set.track_name(track) == track_name.as_str());
         let found = found.or_else(|| {
-            wanted
+            track_name
                 .parse()
                 .ok()
                 .filter(|&track| track < set.track_count())
         });
-        found
-            .map(Direction::Track)
-            .ok_or_else(|| Failure::usage(format!("{name}: has no track `{wanted}` to look at")))
+        found.map(Direction::Track).ok_or_else(|| {
+            Failure::usage(format!("{name}: has no track `{track_name}` to look at"))
+        })
     }
 }
 
-fn wrong(text: &str, what: &str) -> String {
-    format!("`{text}` is no finite {what}")
+fn wrong(text: &str, expected: &str) -> String {
+    format!("invalid value `{text}`: expected a finite {expected}")
 }
 
 pub(crate) fn positive(text: &str) -> Result<f64, String> {
@@ -188,7 +188,7 @@ fn speed(text: &str) -> Result<PathSpeed, String> {
         ("constant", _) => Ok(PathSpeed::Constant),
         (_, Some((start, end))) => match (start.parse(), end.parse()) {
             (Ok(start), Ok(end)) => Ok(PathSpeed::Eased { start, end }),
-            _ => Err(wrong(text, "pair of parts")),
+            _ => Err(wrong(text, "pair of fractions")),
         },
         _ => Err("a speed is keys, constant or eased:A,B".to_owned()),
     }
@@ -196,20 +196,20 @@ fn speed(text: &str) -> Result<PathSpeed, String> {
 
 /// An axis of a body, and the direction that it has in the body.
 #[derive(Debug, Clone, Copy)]
-struct Axis {
+struct BodyAxisArgument {
     axis: BodyAxis,
     direction: DVec3,
 }
 
-fn axis(text: &str) -> Result<Axis, String> {
+fn axis(text: &str) -> Result<BodyAxisArgument, String> {
     let axis = text
         .parse()
         .map_err(|error: tumble::FollowError| error.to_string())?;
     let letter = text.trim_start_matches(['+', '-']);
-    let place = ["x", "y", "z"].iter().position(|own| *own == letter);
+    let index = ["x", "y", "z"].iter().position(|name| *name == letter);
     let sign = if text.starts_with('-') { -1.0 } else { 1.0 };
-    let direction = DVec3::AXES[place.unwrap_or(2)] * sign;
-    Ok(Axis { axis, direction })
+    let direction = DVec3::AXES[index.unwrap_or(2)] * sign;
+    Ok(BodyAxisArgument { axis, direction })
 }
 
 fn methods() -> impl TypedValueParser<Value = VectorMethod> {
@@ -228,9 +228,9 @@ impl PathArguments {
         each_once(self.path_frames.iter())
     }
 
-    /// Turns a body that faces along z, with y upwards, to the axes that were asked for.
-    pub(crate) fn body_turn(&self) -> Quat {
-        let [z, y] = [self.forward, self.upward].map(|own| own.direction.as_vec3());
+    /// The rotation of a body that faces along z, with y up, to `--forward` and `--upward`.
+    pub(crate) fn body_rotation(&self) -> Quat {
+        let [z, y] = [self.forward, self.upward].map(|argument| argument.direction.as_vec3());
         Quat::from_mat3(&Mat3::from_cols(y.cross(z), y, z))
     }
 
@@ -268,9 +268,9 @@ impl PathArguments {
                 direction => direction,
             },
             frame: match frame {
-                FrameArgument::Minimal => Frame::Minimal,
-                FrameArgument::Fixed => Frame::Fixed,
-                FrameArgument::Frenet => Frame::Frenet,
+                FrameArgument::Minimal => PathFrame::Minimal,
+                FrameArgument::Fixed => PathFrame::Fixed,
+                FrameArgument::Frenet => PathFrame::Frenet,
             },
             up: self.path_up,
             twist: match self.twist {

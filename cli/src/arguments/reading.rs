@@ -1,4 +1,4 @@
-//! Arguments that say how motion files are read, and what becomes of their clips.
+//! Options for reading motion files and adjusting their clips.
 
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
@@ -17,59 +17,59 @@ use tumble_formats::{Code, Diagnostic, FORMATS, Format, Limits, Loaded, ReadOpti
 use crate::arguments::input::{clip_names, name, times};
 use crate::messages::exit::{self, Failure};
 
-/// How files are read. All of it decides over results.
+/// How files are read. All of these options change results.
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = READING)]
-pub(crate) struct Reading {
+pub(crate) struct ReadingArguments {
     /// The format of the inputs [default: by their first bytes, then by their names]
     #[arg(long, value_name = "FORMAT", value_parser = format())]
     pub(crate) from: Option<&'static Format>,
-    /// The animation of a file that has several: its name, or its place, from 0
+    /// The animation of a file that has several: its name, or its index from 0
     #[arg(long, value_name = "NAME")]
     animation: Option<String>,
-    /// Leave key times as a file has them, instead of on the frames that they were rounded from
+    /// Keep key times exactly as stored, instead of moving them to the frames that they were rounded from
     #[arg(long)]
     raw_times: bool,
-    /// What stays of two different keys at one time
+    /// Which of two different keys at the same time to keep
     #[arg(long, value_enum, value_name = "WHICH")]
     duplicates: Option<DuplicatesArgument>,
-    /// The rate of the keys of files without times: where they say one, this overrules it
+    /// The frame rate of the keys of files without times; overrides a rate that the file states
     #[arg(long, value_name = "FPS")]
     source_fps: Option<FrameRate>,
-    /// The times of the keys of files without times, for KITTI: a file of seconds, a line for each pose
+    /// The key times of files without times (KITTI): a file of seconds, one line for each pose
     #[arg(long, value_name = "FILE", conflicts_with = "source_fps")]
     source_times: Option<PathBuf>,
-    /// Which array or column is what, where names do not tell: rotations=keys:wxyz,time=t
+    /// Which array or column holds what, where names do not tell: rotations=keys:wxyz,time=t
     #[arg(long, value_name = "MAP")]
     map: Option<String>,
     /// The unit of times that are whole numbers
     #[arg(long, value_enum, value_name = "UNIT")]
     time_unit: Option<TimeUnitArgument>,
-    /// Leave out keys of which a table lacks numbers (blank cells, nulls, NaN), so that the track is
-    /// interpolated from the keys beside them
+    /// Skip keys with missing numbers in a table (blank cells, nulls, NaN): the track is interpolated
+    /// from the keys beside them
     #[arg(long)]
     bridge_gaps: bool,
-    /// Of FBX the keys at the key times of the file alone, instead of as many as following its curves takes
-    /// [default: where `eval -m` names a method for them]
+    /// FBX: read only the keys at the file's key times, instead of as many as it takes to follow its
+    /// curves [default: where `eval -m` names a method]
     #[arg(long)]
     keyframes: bool,
-    /// The same, because a method is named that makes curves of them.
+    /// The same, because the command line names a method.
     #[arg(skip)]
     names_method: OnceLock<()>,
-    /// Where each joint is relative to its parent, for bodies of SMPL, whose files do not say it:
-    /// text with x y z a line, in the order of the joints
+    /// The offset of each joint from its parent, for SMPL bodies, whose files do not store it: a text
+    /// file with x y z per line, in the order of the joints
     #[arg(long, value_name = "FILE")]
     offsets: Option<PathBuf>,
-    /// A model of SMPL, SMPL-H or SMPL-X as NPZ, or a folder of them by gender: each joint is where it has it for the
-    /// shape that the motion says
+    /// A model of SMPL, SMPL-H or SMPL-X as NPZ, or a folder with one per gender: the offsets of joints
+    /// are computed from it, for the body shape of the motion
     #[arg(long, value_name = "MODEL", conflicts_with = "offsets")]
     body_model: Option<PathBuf>,
-    /// Multiply all translations, and the length of boxes, by this number; `metres`: by as much as makes metres
-    /// of the unit that an FBX file says
+    /// Multiply all translations, and the length of boxes, by this number; `metres`: convert the unit
+    /// that an FBX file states to metres
     #[arg(long, value_name = "FACTOR|metres", value_parser = scale)]
     scale: Option<ScaleArgument>,
-    /// Turn all roots so that this axis is up: from the axis that an FBX file says, and by a quarter about x where
-    /// a file says none
+    /// Convert to this up axis by rotating the roots: from the up axis that an FBX file states, else by
+    /// 90° about x
     #[arg(long, value_enum, value_name = "AXIS")]
     up: Option<UpArgument>,
 }
@@ -92,7 +92,7 @@ fn scale(text: &str) -> Result<ScaleArgument, String> {
     match text.parse::<f64>() {
         _ if text == "metres" => Ok(ScaleArgument::Metres),
         Ok(value) if value.is_finite() && value > 0.0 => Ok(ScaleArgument::Factor(value)),
-        _ => Err("not a number over 0, nor `metres`".to_owned()),
+        _ => Err("expected a number above 0, or `metres`".to_owned()),
     }
 }
 
@@ -128,23 +128,23 @@ fn format() -> impl TypedValueParser<Value = &'static Format> {
         .map(|name| Format::named(&name).expect("clap takes names of the table alone"))
 }
 
-impl Reading {
-    /// A method makes curves of the keys: they are those of the file alone.
-    pub(crate) fn take_keyframes(&self) {
+impl ReadingArguments {
+    /// The command line names a method: only the file's keys are read.
+    pub(crate) fn set_method_named(&self) {
         self.names_method.get_or_init(|| ());
     }
 
-    /// Whether the keys are those of the file alone.
-    pub(crate) fn takes_keyframes(&self) -> bool {
+    /// Whether only the file's keys are read.
+    pub(crate) fn reads_file_keys(&self) -> bool {
         self.keyframes || self.names_method.get().is_some()
     }
 
-    /// Whether one animation was asked for.
-    pub(crate) fn chooses(&self) -> bool {
+    /// Whether the command line chooses one animation.
+    pub(crate) fn chooses_animation(&self) -> bool {
         self.animation.is_some()
     }
 
-    /// Whether the command line says what other keys or times are read than the file says itself.
+    /// Whether an option changes the keys or the times that are read.
     pub(crate) fn changes_keys(&self) -> bool {
         self.duplicates.is_some()
             || self.source_fps.is_some()
@@ -157,8 +157,8 @@ impl Reading {
             || self.body_model.is_some()
     }
 
-    /// Whether the command line says anything of how files are read.
-    pub(crate) fn is_given(&self) -> bool {
+    /// Whether the command line has any of these options.
+    pub(crate) fn is_set(&self) -> bool {
         let Self {
             from,
             animation,
@@ -215,17 +215,17 @@ impl Reading {
                 TimeUnitArgument::Ns => TimeUnit::Nanoseconds,
             }),
             bridge_gaps: self.bridge_gaps,
-            keyframes: self.takes_keyframes(),
+            keyframes: self.reads_file_keys(),
             has_body_model: self.body_model.is_some(),
         })
     }
 
-    /// Refuses what says nothing to any of the inputs' formats.
+    /// Refuses options that have no effect on any of the inputs' formats.
     pub(crate) fn check<I: Iterator<Item = &'static Format>>(
         &self,
         formats: impl Fn() -> I,
     ) -> Result<(), String> {
-        for (name, is_given, option) in [
+        for (name, is_set, option) in [
             ("raw-times", self.raw_times, FormatOption::RawTimes),
             (
                 "duplicates",
@@ -251,12 +251,12 @@ impl Reading {
             ("bridge-gaps", self.bridge_gaps, FormatOption::BridgeGaps),
             ("keyframes", self.keyframes, FormatOption::Keyframes),
         ] {
-            if is_given && !formats().any(|format| format.takes(option)) {
+            if is_set && !formats().any(|format| format.takes(option)) {
                 let all = FORMATS.iter().filter(|format| format.takes(option));
                 let all: Vec<&str> = all.map(|format| format.name).collect();
-                let own = formats().next().map_or("", |format| format.name);
+                let format_name = formats().next().map_or("", |format| format.name);
                 return Err(format!(
-                    "--{name} says nothing to {own}; it is for {}; leave it out",
+                    "--{name} has no effect on {format_name}; it is for {}; leave it out",
                     all.join(", ")
                 ));
             }
@@ -264,10 +264,10 @@ impl Reading {
         Ok(())
     }
 
-    /// Leaves the clip that was asked for, in the units and axes that were asked for.
+    /// Keeps the requested clip, in the requested units and axes.
     pub(crate) fn apply(&self, loaded: &mut Loaded, path: &Path) -> Result<(), Failure> {
-        if let Some(wanted) = &self.animation {
-            choose(loaded, wanted, path)?;
+        if let Some(requested) = &self.animation {
+            choose(loaded, requested, path)?;
         }
         if let Some(file) = &self.offsets {
             let offsets = times(file)?;
@@ -293,7 +293,7 @@ impl Reading {
             }
         }
         if self.up.is_some() && loaded.box_length.is_some() {
-            let message = "boxes of a chain hang down, whatever is up; leave out --up";
+            let message = "--up has no effect on a chain of boxes; leave it out";
             return Err(Failure::usage(format!("{}: {message}", name(path))));
         }
         if self.scale.is_some() || self.up.is_some() {
@@ -302,7 +302,7 @@ impl Reading {
                 (Some(ScaleArgument::Factor(factor)), _) => factor,
                 (Some(ScaleArgument::Metres), Some(space)) => space.metres,
                 (Some(ScaleArgument::Metres), None) => {
-                    let message = "does not say its unit; give --scale as a number";
+                    let message = "does not state its unit of length; give --scale as a number";
                     return Err(Failure::usage(format!("{}: {message}", name(path))));
                 }
             };
@@ -318,30 +318,30 @@ impl Reading {
     }
 }
 
-/// Leaves the clip of that name, or at that place, alone.
-fn choose(loaded: &mut Loaded, wanted: &str, path: &Path) -> Result<(), Failure> {
-    let named = |clip: &Motion| clip.name.as_deref() == Some(wanted);
+/// Keeps only the clip of that name, or of that index.
+fn choose(loaded: &mut Loaded, requested: &str, path: &Path) -> Result<(), Failure> {
+    let named = |clip: &Motion| clip.name.as_deref() == Some(requested);
     let same: Vec<String> = (loaded.clips.iter().filter(|clip| named(clip)))
-        .map(|clip| clip.place.to_string())
+        .map(|clip| clip.index.to_string())
         .collect();
     if let [_, _, ..] = &*same {
-        let (name, places) = (name(path), same.join(" and "));
+        let (name, indices) = (name(path), same.join(" and "));
         let message = format!(
-            "{name}: has {} animations `{wanted}`, at the places {places}; give the place",
+            "{name}: has {} animations `{requested}`, at the indices {indices}; give the index",
             same.len()
         );
         return Err(Failure::new(exit::ALL_INPUTS, message));
     }
-    let place = loaded.clips.iter().position(named).or_else(|| {
-        let place = wanted.parse::<usize>().ok()?;
-        loaded.clips.iter().position(|clip| clip.place == place)
+    let found = loaded.clips.iter().position(named).or_else(|| {
+        let index = requested.parse::<usize>().ok()?;
+        loaded.clips.iter().position(|clip| clip.index == index)
     });
-    let Some(place) = place else {
+    let Some(index) = found else {
         let (name, names) = (name(path), clip_names(loaded));
-        let message = format!("{name}: has no animation `{wanted}`; it has {names}");
+        let message = format!("{name}: has no animation `{requested}`; it has {names}");
         return Err(Failure::new(exit::ALL_INPUTS, message));
     };
-    loaded.clips = vec![loaded.clips.swap_remove(place)];
+    loaded.clips = vec![loaded.clips.swap_remove(index)];
     loaded.refused.clear();
     Ok(())
 }

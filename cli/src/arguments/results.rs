@@ -1,4 +1,4 @@
-//! Arguments that say where results go and in which format, and the run over all inputs.
+//! Options for outputs and their format, and the loop over all inputs.
 
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
@@ -9,57 +9,58 @@ use tumble_formats::format::{Document, FormatOption};
 use tumble_formats::motion::Motion;
 use tumble_formats::{Code, Diagnostic, Feature, Format, Loaded};
 
-use crate::arguments::gather::Gathered;
+use crate::arguments::gather::GatheredInputs;
 use crate::arguments::input::{
-    Inputs, clip_name, is_standard, name, several, tell_warnings, whole,
+    Inputs, check_complete, clip_name, is_standard, name, print_warnings, several_clips_failure,
 };
+use crate::batch::destination::Destination;
 use crate::batch::digest::InputFile;
-use crate::batch::output::{self, Plan, Target, Wish};
-use crate::batch::place::Place;
-use crate::batch::run::{Batch, Done, Evaluated};
+use crate::batch::output::{self, OutputPlan, OutputRequest, ResultTarget};
+use crate::batch::run::{Batch, EvaluatedResult, ResultCallback};
 use crate::messages::exit::{Failure, SOME_INPUTS, for_all};
 use crate::messages::progress::busy;
 use crate::messages::words;
 
-const ONE_INPUT: &str = "--times-out is of one input, whose result is one file";
+const ONE_INPUT: &str = "--times-out needs a single input whose result is a single file";
 
 #[derive(Debug, Args)]
-pub(crate) struct Results {
+pub(crate) struct ResultArguments {
     #[arg(short, long = "out", value_name = "OUT", help = output::out_help())]
     out: Option<PathBuf>,
     /// Replace existing files
     #[arg(long)]
     overwrite: bool,
-    /// In a directory of results: skip those that are there, whole, and made from the same input
-    /// in the same way
+    /// In a directory of results: skip those that are complete and were made from the same input with
+    /// the same options
     #[arg(long)]
     resume: bool,
     /// The format of the results [default: by the name of the output, else npy]
     #[arg(long, visible_alias = "to", value_parser = output::format())]
     format: Option<&'static Format>,
-    /// KITTI, which has no times: also write those of the poses, seconds a line, into this file; of one input
+    /// KITTI, which stores no times: also write the times of the poses to this file, in seconds, one per
+    /// line; needs a single input
     #[arg(long, value_name = "FILE")]
     times_out: Option<PathBuf>,
 }
 
-impl Results {
-    /// Where a picture goes that is drawn beside the result of one input.
+impl ResultArguments {
+    /// The destination of a picture that is drawn beside the result of one input.
     pub(crate) fn picture(
         &self,
         file: &Path,
-        inputs: &Gathered,
-        plan: &Plan,
-    ) -> Result<Option<Place>, Failure> {
+        inputs: &GatheredInputs,
+        plan: &OutputPlan,
+    ) -> Result<Option<Destination>, Failure> {
         let inputs = inputs.paths();
         if inputs.len() > 1 {
-            return Err(Failure::usage("--plot is of one input"));
+            return Err(Failure::usage("--plot needs a single input"));
         }
-        let place = Place::of_picture(file, self.overwrite, &inputs)?;
+        let destination = Destination::of_picture(file, self.overwrite, &inputs)?;
         for target in &plan.targets {
-            place.refuse_same(target.path())?;
+            destination.refuse_same(target.path())?;
         }
-        place.try_out()?;
-        Ok(Some(place))
+        destination.check_writable()?;
+        Ok(Some(destination))
     }
 
     /// The directory of results, for those who evaluate shards of them.
@@ -90,12 +91,11 @@ impl Results {
         self.overwrite
     }
 
-    /// Where each input's result goes. Everything that can be refused is refused here, before any
-    /// work.
-    pub(crate) fn plan(&self, inputs: &Gathered) -> Result<Plan, Failure> {
+    /// The destination of each input's result. Everything that can be refused is refused here, before any work.
+    pub(crate) fn plan(&self, inputs: &GatheredInputs) -> Result<OutputPlan, Failure> {
         let mut plan = output::plan(
             inputs,
-            Wish {
+            OutputRequest {
                 out: self.out.as_deref(),
                 format: self.format,
                 overwrite: self.overwrite,
@@ -110,48 +110,57 @@ impl Results {
             let format = target.format();
             if !format.takes(FormatOption::TimesApart) {
                 return Err(Failure::usage(format!(
-                    "--times-out is for kitti, which has no times; {} has them, or is of frames: leave it out",
+                    "--times-out is for kitti, which stores no times; {} stores times or a frame rate: leave it out",
                     format.name
                 )));
             }
-            let place = Place::new(file, self.overwrite, &inputs.paths())?;
-            plan.targets.push(target.with_times(place)?);
+            let destination = Destination::new(file, self.overwrite, &inputs.paths())?;
+            plan.targets.push(target.with_times(destination)?);
         }
         Ok(plan)
     }
 
-    /// Makes the results of all inputs. `options` are all that decides over a result besides its
-    /// input.
+    /// Makes the results of all inputs. `options` is everything that determines a result besides its input.
     pub(crate) fn make(
         &self,
         inputs: &Inputs,
-        plan: Plan,
+        plan: OutputPlan,
         options: String,
-        work: impl FnMut(&InputFile, &Loaded, &Target, &mut Done<'_>) -> Result<(), Failure>,
+        work: impl FnMut(
+            &InputFile,
+            &Loaded,
+            &ResultTarget,
+            &mut ResultCallback<'_>,
+        ) -> Result<(), Failure>,
     ) -> Result<(), Failure> {
         let read = |path: &Path| inputs.read(path);
         self.make_of((read, inputs.max_size()), plan, options, work)
     }
 
-    /// As [`Results::make`], of inputs that `read` reads, each at most so many bytes long.
+    /// As [`Results::make`], of inputs that `read` reads, each at most `max_bytes` long.
     pub(crate) fn make_of(
         &self,
-        (read, most): (impl Fn(&Path) -> Result<Loaded, Failure> + Sync, u64),
-        plan: Plan,
+        (read, max_bytes): (impl Fn(&Path) -> Result<Loaded, Failure> + Sync, u64),
+        plan: OutputPlan,
         options: String,
-        mut work: impl FnMut(&InputFile, &Loaded, &Target, &mut Done<'_>) -> Result<(), Failure>,
+        mut work: impl FnMut(
+            &InputFile,
+            &Loaded,
+            &ResultTarget,
+            &mut ResultCallback<'_>,
+        ) -> Result<(), Failure>,
     ) -> Result<(), Failure> {
-        let Plan {
+        let OutputPlan {
             paths,
             targets,
             refused,
             manifest,
         } = plan;
-        let jobs: Vec<(PathBuf, Target)> = paths.into_iter().zip(targets).collect();
+        let jobs: Vec<(PathBuf, ResultTarget)> = paths.into_iter().zip(targets).collect();
         if let Some(mut manifest) = manifest {
             let batch = Batch {
                 read,
-                most,
+                max_bytes,
                 options,
                 resume: self.resume,
             };
@@ -162,12 +171,17 @@ impl Results {
         for_all(refused, &jobs, |(path, target)| {
             let file = InputFile::new(path);
             let loaded = busy(&format!("reading {}", name(path)), || read(path))?;
-            tell_warnings(&loaded);
-            work(&file, &loaded, target, &mut |_, evaluated: Evaluated| {
-                evaluated.written.commit()?;
-                words::note(&evaluated.told);
-                Ok(())
-            })
+            print_warnings(&loaded);
+            work(
+                &file,
+                &loaded,
+                target,
+                &mut |_, evaluated: EvaluatedResult| {
+                    evaluated.written.commit()?;
+                    words::note(&evaluated.message);
+                    Ok(())
+                },
+            )
         })
     }
 }
@@ -186,18 +200,18 @@ pub(crate) fn check_sequence(
     }
 }
 
-/// The input's own file, where the result is that file with other keys. Where it is of the same format
-/// and cannot be kept, `otherwise` says what makes a new one; then what stays behind is said.
-pub(crate) fn kept<'a>(
+/// The document to rewrite, where the result is the input file with other keys. `otherwise` is the
+/// reason for a new file of the same format, if there is one; then a note lists what is not copied.
+pub(crate) fn document_to_rewrite<'a>(
     name: &str,
     loaded: &'a Loaded,
-    target: &Target,
+    target: &ResultTarget,
     otherwise: Option<&str>,
 ) -> Option<&'a dyn Document> {
     let document = loaded.document.as_deref()?;
     if !document.writes(target.format()) {
         let is_known = |warning: &Diagnostic| warning.code == Code::ArraysNotRead;
-        let beside = document.beside();
+        let beside = document.other_contents();
         if !beside.is_empty() && !loaded.warnings.iter().any(is_known) {
             let (all, format) = (beside.join(", "), target.format().name);
             words::note(&format!(
@@ -210,10 +224,10 @@ pub(crate) fn kept<'a>(
     match otherwise.or(adjusted) {
         None => Some(document),
         Some(why) => {
-            let beside = document.beside();
+            let beside = document.other_contents();
             if !beside.is_empty() {
                 let all = beside.join(", ");
-                words::note(&format!("{name}: {why} a new file; stays behind: {all}"));
+                words::note(&format!("{name}: {why} a new file; not copied: {all}"));
             }
             None
         }
@@ -225,19 +239,19 @@ pub(crate) fn kept<'a>(
 pub(crate) fn each_file(
     name: &str,
     (path, loaded): (&Path, &Loaded),
-    target: &Target,
-    done: &mut Done<'_>,
-    mut make: impl FnMut(&str, &[&Motion], &Target) -> Result<Evaluated, Failure>,
+    target: &ResultTarget,
+    done: &mut ResultCallback<'_>,
+    mut make: impl FnMut(&str, &[&Motion], &ResultTarget) -> Result<EvaluatedResult, Failure>,
 ) -> Result<(), Failure> {
     let clips: Vec<&Motion> = loaded.clips.iter().collect();
-    if target.format().holds(Feature::SeveralClips) || clips.len() == 1 {
+    if target.format().supports(Feature::SeveralClips) || clips.len() == 1 {
         done(target.name(), make(name, &clips, target)?)?;
     } else {
         if target.name().is_empty() {
             let hint = ", or give a directory for all of them: -o RESULTS/";
-            return Err(several(path, loaded).hinted(hint));
+            return Err(several_clips_failure(path, loaded).hinted(hint));
         }
-        // One clip's trouble is no other's.
+        // A clip that fails does not stop the others.
         let jobs: Vec<(&Motion, String)> =
             clips.into_iter().zip(file_names(&loaded.clips)).collect();
         for_clips(name, &jobs, |(clip, file)| {
@@ -246,7 +260,7 @@ pub(crate) fn each_file(
             done(target.name(), made)
         })?;
     }
-    whole(name, loaded)
+    check_complete(name, loaded)
 }
 
 /// Makes something of each clip of an input. A failure is reported and the others go on, unless they
@@ -279,26 +293,26 @@ fn for_clips<T>(
     Err(Failure::new(SOME_INPUTS, message))
 }
 
-/// What the files of clips are called: by the clips' names, as far as file systems take them; names
-/// that are then the same get the clip's place in its file behind them.
+/// The names of the clips' files: the clips' names, with characters that file systems refuse replaced;
+/// names that are then equal get the clip's index appended.
 fn file_names(clips: &[Motion]) -> Vec<String> {
     let is_plain = |c: char| c.is_alphanumeric() || matches!(c, '-' | '_' | '.' | ' ');
     let plain = |clip: &Motion| -> String {
-        let name = clip.name.clone().unwrap_or_else(|| clip.place.to_string());
+        let name = clip.name.clone().unwrap_or_else(|| clip.index.to_string());
         let each = name.chars().map(|c| if is_plain(c) { c } else { '_' });
         each.collect()
     };
-    let mut taken = HashSet::new();
+    let mut used = HashSet::new();
     let names = clips.iter().map(|clip| {
         let whole = plain(clip);
         let mut name = short(&whole, "");
         let mut end = String::new();
         if name != whole {
-            end = format!(".{}", clip.place);
+            end = format!(".{}", clip.index);
             name = short(&whole, &end);
         }
-        while !taken.insert(name.to_lowercase()) {
-            end = format!("{end}.{}", clip.place);
+        while !used.insert(name.to_lowercase()) {
+            end = format!("{end}.{}", clip.index);
             name = short(&whole, &end);
         }
         name
@@ -306,15 +320,14 @@ fn file_names(clips: &[Motion]) -> Vec<String> {
     names.collect()
 }
 
-/// A clip's part of a file's name has no more bytes; the input's name and two extensions are to go
-/// beside it.
+/// The most bytes of a clip's name in a file name: the input's name and two extensions must fit too.
 const MAX_CLIP_NAME: usize = 120;
 
-/// As much of a name as has room before its end, and the end.
+/// The name, cut so that it fits with `end` into [`MAX_CLIP_NAME`] bytes, and `end`.
 fn short(name: &str, end: &str) -> String {
-    let most = MAX_CLIP_NAME.saturating_sub(end.len()).min(name.len());
-    let most = (0..=most).rfind(|&place| name.is_char_boundary(place));
-    format!("{}{end}", &name[..most.unwrap_or(0)])
+    let max_length = MAX_CLIP_NAME.saturating_sub(end.len()).min(name.len());
+    let cut = (0..=max_length).rfind(|&at| name.is_char_boundary(at));
+    format!("{}{end}", &name[..cut.unwrap_or(0)])
 }
 
 #[cfg(test)]
@@ -334,9 +347,9 @@ mod tests {
         let clips: Vec<Motion> = names
             .iter()
             .enumerate()
-            .map(|(place, name)| Motion {
+            .map(|(index, name)| Motion {
                 name: name.map(str::to_owned),
-                place,
+                index,
                 ..Motion::default()
             })
             .collect();
@@ -349,9 +362,9 @@ mod tests {
     #[test]
     fn long_names_are_cut_between_letters_and_stay_apart() {
         let long = "ä".repeat(200);
-        let clip = |place| Motion {
+        let clip = |index| Motion {
             name: Some(long.clone()),
-            place,
+            index,
             ..Motion::default()
         };
         let names = file_names(&[clip(0), clip(1)]);

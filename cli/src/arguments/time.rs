@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use tumble::{FrameRate, Frames, TrackSet};
+use tumble::{FrameRate, SampleTimes, TrackSet};
 use tumble_formats::motion::Motion;
 use tumble_formats::{Format, ReadOptions};
 
@@ -19,10 +19,10 @@ const BROADCAST: [u64; 5] = [24, 30, 48, 60, 120];
 
 /// A decimal rate this close to a broadcast rate (relative) was probably meant to
 /// be it: 23.98 is, 24 is not.
-const MEANT: f64 = 2e-4;
+const BROADCAST_TOLERANCE: f64 = 2e-4;
 
 #[derive(Debug, Clone, Args)]
-pub(crate) struct Sampling {
+pub(crate) struct SamplingArguments {
     /// Frames per second, from the first key to the last: a number or a ratio, such as 30000/1001
     #[arg(
         long,
@@ -45,8 +45,8 @@ pub(crate) struct Sampling {
     from_zero: bool,
 }
 
-/// The samples asked for, before the tracks are known.
-pub(crate) enum Samples {
+/// The requested samples, before the tracks are known.
+pub(crate) enum SampleRequest {
     Rate {
         rate: FrameRate,
         start: Option<f64>,
@@ -69,7 +69,7 @@ pub(crate) struct KeyTimes {
     in_gaps: InGaps,
 }
 
-/// What becomes of times between two keys that are too far apart.
+/// What to do with times between two keys that are too far apart.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum InGaps {
     /// leave them out
@@ -82,16 +82,16 @@ enum InGaps {
 
 /// The samples of one clip.
 pub(crate) struct ClipFrames {
-    /// When it is evaluated.
-    pub(crate) frames: Frames,
-    /// When the results are said to be, where that is another time: a key is held there.
-    pub(crate) held: Option<Frames>,
+    /// The times at which it is evaluated.
+    pub(crate) frames: SampleTimes,
+    /// The times written with the results, where those differ: a key is held there.
+    pub(crate) held: Option<SampleTimes>,
     /// How many of them were in gaps, and were left out or held.
     pub(crate) in_gaps: usize,
 }
 
-impl From<Frames> for ClipFrames {
-    fn from(frames: Frames) -> Self {
+impl From<SampleTimes> for ClipFrames {
+    fn from(frames: SampleTimes) -> Self {
         Self {
             frames,
             held: None,
@@ -101,28 +101,28 @@ impl From<Frames> for ClipFrames {
 }
 
 impl ClipFrames {
-    /// When the results are said to be.
-    pub(crate) fn said(&self) -> &Frames {
+    /// The times written with the results.
+    pub(crate) fn written_times(&self) -> &SampleTimes {
         self.held.as_ref().unwrap_or(&self.frames)
     }
 }
 
 /// `--at`, `--max-gap`: the times of another file.
 #[derive(Debug, Clone, Args)]
-pub(crate) struct AtKeys {
+pub(crate) struct AtKeysArguments {
     /// Evaluate at the key times of another motion file instead
     #[arg(long, value_name = "FILE", conflicts_with_all = ["fps", "times", "start", "end", "from_zero"])]
     at: Option<PathBuf>,
-    /// Do not interpolate between two keys that are more than so many seconds apart
+    /// Do not interpolate between two keys that are more than this many seconds apart
     #[arg(long, value_name = "SECONDS", requires = "at", value_parser = not_negative)]
     max_gap: Option<f64>,
-    /// What becomes of times there
+    /// What to do with times in such gaps
     #[arg(long, value_enum, requires = "max_gap", default_value = "leave-out")]
     in_gaps: InGaps,
 }
 
-impl AtKeys {
-    /// What becomes of times in gaps.
+impl AtKeysArguments {
+    /// What is done with times in gaps, in words.
     pub(crate) fn done_in_gaps(&self) -> &'static str {
         match self.in_gaps {
             InGaps::Hold => "held",
@@ -130,18 +130,18 @@ impl AtKeys {
         }
     }
 
-    /// The times of the file; nothing where none is named.
-    pub(crate) fn samples(&self) -> Result<Option<Samples>, Failure> {
+    /// The times of the file; `None` without `--at`.
+    pub(crate) fn samples(&self) -> Result<Option<SampleRequest>, Failure> {
         let Some(path) = &self.at else {
             return Ok(None);
         };
         let loaded = Format::open_detected(path, &ReadOptions::default())
             .map_err(|diagnostic| Failure::input(&diagnostic, ""))?;
         let [clip] = &loaded.clips[..] else {
-            let message = "--at is the file of one animation";
+            let message = "--at needs a file with a single animation";
             return Err(Failure::usage(format!("{}: {message}", input::name(path))));
         };
-        Ok(Some(Samples::Keys(KeyTimes {
+        Ok(Some(SampleRequest::Keys(KeyTimes {
             times: clip.key_times(),
             from: clip.time_offset,
             max_gap: self.max_gap,
@@ -150,16 +150,16 @@ impl AtKeys {
     }
 }
 
-impl Sampling {
+impl SamplingArguments {
     /// Whether the list of times comes from standard input.
     pub(crate) fn reads_standard_input(&self) -> bool {
         self.times.as_deref().is_some_and(input::is_standard)
     }
 
     /// Checks what can be checked without the tracks, and reads the list of times.
-    pub(crate) fn samples(&self) -> Result<Samples, Failure> {
+    pub(crate) fn samples(&self) -> Result<SampleRequest, Failure> {
         if let Some(path) = &self.times {
-            return Ok(Samples::Times(input::times(path)?));
+            return Ok(SampleRequest::Times(input::times(path)?));
         }
         check_range(self.start, self.end)?;
         if let Some(meant) = broadcast_rate(self.fps) {
@@ -168,7 +168,7 @@ impl Sampling {
                 self.fps.per_second()
             ));
         }
-        Ok(Samples::Rate {
+        Ok(SampleRequest::Rate {
             rate: self.fps,
             start: self.start,
             end: self.end,
@@ -177,8 +177,8 @@ impl Sampling {
     }
 }
 
-impl Samples {
-    /// The hash of a list of times; nothing for a rate.
+impl SampleRequest {
+    /// The hash of a list of times; empty for a rate.
     pub(crate) fn digest(&self) -> String {
         match self {
             Self::Times(times) => {
@@ -200,7 +200,7 @@ impl Samples {
         }
     }
 
-    /// The samples for one clip; says when they pass its keys, and how many are in gaps.
+    /// The samples for one clip; warns when they exceed its keys, and of those in gaps.
     ///
     /// # Errors
     /// When one is in a gap, and such are refused.
@@ -208,7 +208,7 @@ impl Samples {
         let Self::Keys(keys) = self else {
             return Ok(self.of(&clip.set, name).into());
         };
-        // Each clip counts from whole seconds of its own.
+        // Each clip has its own time offset, in whole seconds.
         let shift = (keys.from - clip.time_offset) as f64;
         let times: Vec<f64> = keys.times.iter().map(|time| time + shift).collect();
         let known = clip.key_times();
@@ -223,7 +223,7 @@ impl Samples {
         let in_gaps = held.iter().flatten().count();
         let mut samples = ClipFrames {
             in_gaps,
-            ..Frames::at(times.clone()).into()
+            ..SampleTimes::at(times.clone()).into()
         };
         if let Some(first) = held.iter().position(Option::is_some) {
             let all = words::count(times.len(), "time");
@@ -246,12 +246,12 @@ impl Samples {
                 }
                 InGaps::LeaveOut => {
                     let outside = each.filter(|(_, held)| held.is_none());
-                    samples.frames = Frames::at(outside.map(|(&time, _)| time).collect());
+                    samples.frames = SampleTimes::at(outside.map(|(&time, _)| time).collect());
                     "left out"
                 }
                 InGaps::Hold => {
                     let evaluated = each.map(|(&time, held)| held.unwrap_or(time));
-                    let evaluated = Frames::at(evaluated.collect());
+                    let evaluated = SampleTimes::at(evaluated.collect());
                     samples.held = Some(std::mem::replace(&mut samples.frames, evaluated));
                     "held at the key before"
                 }
@@ -259,13 +259,13 @@ impl Samples {
             words::warning(&format!("{found}; they are {done}"));
         }
         if let [first, .., last] = times[..] {
-            warn_beyond(first, last, &clip.set, name);
+            warn_outside_keys(first, last, &clip.set, name);
         }
         Ok(samples)
     }
 
-    /// The samples for one set; says when they pass its keys.
-    pub(crate) fn of(&self, set: &TrackSet, name: &str) -> Frames {
+    /// The samples for one set; warns when they exceed its keys.
+    pub(crate) fn of(&self, set: &TrackSet, name: &str) -> SampleTimes {
         match self {
             Self::Rate {
                 rate,
@@ -275,8 +275,8 @@ impl Samples {
             } => {
                 let (first, last) = set.time_span().unwrap_or((0.0, 0.0));
                 let end = end.unwrap_or(last);
-                warn_beyond(first, end, set, name);
-                Frames::rate(*rate).between(first.min(0.0), end)
+                warn_outside_keys(first, end, set, name);
+                SampleTimes::rate(*rate).between(first.min(0.0), end)
             }
             Self::Rate {
                 rate, start, end, ..
@@ -284,37 +284,36 @@ impl Samples {
             Self::Keys(KeyTimes { times, .. }) | Self::Times(times) => {
                 let start = times.iter().copied().fold(f64::INFINITY, f64::min);
                 let end = times.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-                warn_beyond(start, end, set, name);
-                Frames::at(times.clone())
+                warn_outside_keys(start, end, set, name);
+                SampleTimes::at(times.clone())
             }
         }
     }
 }
 
-/// Frames from a time to a time, else from the first key to the last; says when they pass
-/// the keys.
+/// Frames from `start`, or the first key, to `end`, or the last key; warns when they exceed the keys.
 pub(crate) fn in_frames(
     rate: FrameRate,
     start: Option<f64>,
     end: Option<f64>,
     set: &TrackSet,
     name: &str,
-) -> Frames {
+) -> SampleTimes {
     if (start, end) == (None, None) {
-        return Frames::rate(rate);
+        return SampleTimes::rate(rate);
     }
     let (first, last) = set.time_span().unwrap_or((0.0, 0.0));
     let (start, end) = (start.unwrap_or(first), end.unwrap_or(last));
-    warn_beyond(start, end, set, name);
-    Frames::rate(rate).between(start, end)
+    warn_outside_keys(start, end, set, name);
+    SampleTimes::rate(rate).between(start, end)
 }
 
-fn warn_beyond(start: f64, end: f64, set: &TrackSet, name: &str) {
+fn warn_outside_keys(start: f64, end: f64, set: &TrackSet, name: &str) {
     let (first, last) = set.time_span().unwrap_or((0.0, 0.0));
     if start < first || end > last {
         words::warning(&format!(
             "{name}: asked for {start} to {end} s, keys lie from {first} to {last} s; \
-             beyond them tracks are held, or as --before and --after say"
+             outside them tracks keep their end values, or follow --before and --after"
         ));
     }
 }
@@ -325,7 +324,7 @@ fn broadcast_rate(rate: FrameRate) -> Option<FrameRate> {
         .into_iter()
         .filter_map(|frames| FrameRate::new(frames * 1000, 1001).ok())
         .filter(|&exact| exact != rate)
-        .find(|exact| (rate.per_second() / exact.per_second() - 1.0).abs() < MEANT)
+        .find(|exact| (rate.per_second() / exact.per_second() - 1.0).abs() < BROADCAST_TOLERANCE)
 }
 
 /// Refuses a range that ends before it starts.
@@ -345,7 +344,7 @@ pub(crate) fn finite_seconds(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(time) if time.is_finite() => Ok(time),
         _ => Err(format!(
-            "`{text}` is no time; give a finite number of seconds"
+            "invalid time `{text}`: expected a finite number of seconds"
         )),
     }
 }

@@ -10,28 +10,28 @@ use crate::arguments::wildcard::{Wildcard, is_pattern};
 use crate::messages::exit::Failure;
 use crate::messages::words;
 
-/// Which tracks of each clip.
+/// The tracks that `--tracks` selects in each clip.
 #[derive(Debug, Clone, Default, Args)]
-pub(crate) struct Tracks {
-    /// Only these tracks: names, patterns ('*Hand*'), places from 0, and ranges of them (3..7, both
-    /// ends are of it); clips keep the joints that they hang on too
+pub(crate) struct TrackArguments {
+    /// Only these tracks: names, patterns ('*Hand*'), indices from 0, and ranges of indices (3..7, both
+    /// ends included); the parents of joints are kept as well
     #[arg(long = "tracks", value_name = "LIST", value_delimiter = ',', help_heading = READING)]
     tracks: Vec<Selector>,
 }
 
 const READING: &str = "Reading motion files";
 
-/// One entry of the list. A name counts before what it could mean else.
+/// One entry of the list. A track of that very name wins over an index, a range or a pattern.
 #[derive(Debug, Clone)]
 struct Selector {
     text: String,
-    meaning: Meaning,
+    meaning: SelectorKind,
 }
 
 #[derive(Debug, Clone)]
-enum Meaning {
+enum SelectorKind {
     Name,
-    Places(usize, usize),
+    Range(usize, usize),
     Pattern(Wildcard),
 }
 
@@ -41,17 +41,17 @@ impl FromStr for Selector {
     fn from_str(text: &str) -> Result<Self, String> {
         let (first, last) = text.split_once("..").unwrap_or((text, text));
         let meaning = match (first.parse(), last.parse()) {
-            (Ok(first), Ok(last)) if first <= last => Meaning::Places(first, last),
+            (Ok(first), Ok(last)) if first <= last => SelectorKind::Range(first, last),
             (Ok(first), Ok(last)) => {
                 return Err(format!(
                     "the range ends at {last}, before it starts at {first}"
                 ));
             }
             _ if text.is_empty() => {
-                return Err("give a name, a place, a range or a pattern".to_owned());
+                return Err("give a name, an index, a range or a pattern".to_owned());
             }
-            _ if is_pattern(text) => Meaning::Pattern(Wildcard::new(text)?),
-            _ => Meaning::Name,
+            _ if is_pattern(text) => SelectorKind::Pattern(Wildcard::new(text)?),
+            _ => SelectorKind::Name,
         };
         Ok(Self {
             text: text.to_owned(),
@@ -61,7 +61,7 @@ impl FromStr for Selector {
 }
 
 impl Selector {
-    /// The tracks that are meant, by their names.
+    /// The indices of the tracks that it selects.
     fn of(&self, names: &[String]) -> Vec<usize> {
         let all = || 0..names.len();
         let named: Vec<usize> = all().filter(|&track| names[track] == self.text).collect();
@@ -69,11 +69,11 @@ impl Selector {
             return named;
         }
         match &self.meaning {
-            Meaning::Name => Vec::new(),
+            SelectorKind::Name => Vec::new(),
             // A range that is not there as a whole is a mistake.
-            Meaning::Places(_, last) if *last >= names.len() => Vec::new(),
-            Meaning::Places(first, last) => (*first..=*last).collect(),
-            Meaning::Pattern(pattern) => all()
+            SelectorKind::Range(_, last) if *last >= names.len() => Vec::new(),
+            SelectorKind::Range(first, last) => (*first..=*last).collect(),
+            SelectorKind::Pattern(pattern) => all()
                 .filter(|&track| pattern.matches(&names[track]))
                 .collect(),
         }
@@ -81,15 +81,15 @@ impl Selector {
 }
 
 /// A message names no more tracks than this.
-const NAMED: usize = 12;
+const MAX_NAMED_TRACKS: usize = 12;
 
-impl Tracks {
-    /// Whether some are chosen.
-    pub(crate) fn is_given(&self) -> bool {
+impl TrackArguments {
+    /// Whether `--tracks` is set.
+    pub(crate) fn is_set(&self) -> bool {
         !self.tracks.is_empty()
     }
 
-    /// The tracks that are asked for, in the order of the clip; nothing where all are.
+    /// The selected tracks, in the order of the clip; `None` for all.
     pub(crate) fn of(&self, clip: &Motion, name: &str) -> Result<Option<Vec<usize>>, Failure> {
         if self.tracks.is_empty() {
             return Ok(None);
@@ -98,7 +98,7 @@ impl Tracks {
         let names: Vec<String> = (0..set.track_count())
             .map(|track| set.track_name(track))
             .collect();
-        let mut wanted = vec![false; names.len()];
+        let mut is_selected = vec![false; names.len()];
         for selector in &self.tracks {
             let found = selector.of(&names);
             if found.is_empty() {
@@ -110,25 +110,29 @@ impl Tracks {
                 let count = words::count(names.len(), "track");
                 let mut list = names
                     .iter()
-                    .take(NAMED)
+                    .take(MAX_NAMED_TRACKS)
                     .cloned()
                     .collect::<Vec<_>>()
                     .join(", ");
-                if names.len() > NAMED {
+                if names.len() > MAX_NAMED_TRACKS {
                     list += " … (`tumble info --json` names all)";
                 }
                 return Err(Failure::usage(format!(
                     "{name}: --tracks: there is no `{text}`{near}; it has {count}, {list}"
                 )));
             }
-            found.into_iter().for_each(|track| wanted[track] = true);
+            found
+                .into_iter()
+                .for_each(|track| is_selected[track] = true);
         }
         Ok(Some(
-            (0..names.len()).filter(|&track| wanted[track]).collect(),
+            (0..names.len())
+                .filter(|&track| is_selected[track])
+                .collect(),
         ))
     }
 
-    /// The clip of the tracks that are asked for alone.
+    /// The clip with the selected tracks alone.
     pub(crate) fn select<'a>(
         &self,
         clip: &'a Motion,
@@ -140,8 +144,7 @@ impl Tracks {
         })
     }
 
-    /// The clip of the tracks that are asked for and of all that they hang on: without those they
-    /// would be elsewhere.
+    /// The clip with the selected tracks and all their ancestors, which decide where they are.
     pub(crate) fn select_with_ancestors<'a>(
         &self,
         clip: &'a Motion,
@@ -158,15 +161,14 @@ impl Tracks {
                 .map(|&track| clip.set.track_name(track))
                 .collect();
             words::note(&format!(
-                "{name}: with what these tracks hang on: {}",
+                "{name}: the parents of these tracks are kept as well: {}",
                 more.join(", ")
             ));
         }
         Ok(Cow::Owned(selected(clip, &all, name)?))
     }
 
-    /// The boxes of a chain that are asked for and all before them, on which they hang; nothing
-    /// where all are.
+    /// The selected boxes of a chain and all before them, from which they hang; `None` for all.
     pub(crate) fn chain(&self, clip: &Motion, name: &str) -> Result<Option<Vec<usize>>, Failure> {
         let last = self
             .of(clip, name)?
@@ -196,7 +198,7 @@ mod tests {
             .split(',')
             .map(str::parse)
             .collect::<Result<_, String>>()?;
-        let tracks = Tracks { tracks };
+        let tracks = TrackArguments { tracks };
         tracks.of(&clip, "walk").map_err(Failure::into_message)
     }
 

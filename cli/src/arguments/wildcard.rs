@@ -12,11 +12,11 @@ use walkdir::WalkDir;
 /// A pattern of one name.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Wildcard {
-    parts: Vec<Part>,
+    parts: Vec<PatternPart>,
 }
 
 #[derive(Debug, Clone, PartialEq)]
-enum Part {
+enum PatternPart {
     Character(char),
     Any,
     Many,
@@ -40,9 +40,9 @@ impl Wildcard {
         while let Some(first) = rest.chars().next() {
             rest = &rest[first.len_utf8()..];
             match first {
-                '*' if parts.last() == Some(&Part::Many) => {}
-                '*' => parts.push(Part::Many),
-                '?' => parts.push(Part::Any),
+                '*' if parts.last() == Some(&PatternPart::Many) => {}
+                '*' => parts.push(PatternPart::Many),
+                '?' => parts.push(PatternPart::Any),
                 '[' => {
                     let (class, behind) = class(rest).ok_or_else(|| {
                         format!("the range pattern `[{rest}` in `{text}` has no end; write `[[]` for a bracket")
@@ -50,7 +50,7 @@ impl Wildcard {
                     parts.push(class);
                     rest = behind;
                 }
-                other => parts.push(Part::Character(other)),
+                other => parts.push(PatternPart::Character(other)),
             }
         }
         Ok(Self { parts })
@@ -60,15 +60,15 @@ impl Wildcard {
     pub(crate) fn matches(&self, name: &str) -> bool {
         let name: Vec<char> = name.chars().collect();
         let (mut at, mut part) = (0, 0);
-        // Behind the last star: its part, and where what it stands for ends.
+        // After the last star: the index of the next part, and the end of the text that the star matches.
         let mut star: Option<(usize, usize)> = None;
         while at < name.len() {
             match self.parts.get(part) {
-                Some(Part::Many) => {
+                Some(PatternPart::Many) => {
                     part += 1;
                     star = Some((part, at));
                 }
-                Some(own) if own.is_one(name[at]) => {
+                Some(element) if element.is_one(name[at]) => {
                     part += 1;
                     at += 1;
                 }
@@ -82,12 +82,14 @@ impl Wildcard {
                 },
             }
         }
-        self.parts[part..].iter().all(|part| *part == Part::Many)
+        self.parts[part..]
+            .iter()
+            .all(|part| *part == PatternPart::Many)
     }
 }
 
 /// The class whose `[` is read, and what follows it. A `]` right behind the `[` is one of its characters.
-fn class(text: &str) -> Option<(Part, &str)> {
+fn class(text: &str) -> Option<(PatternPart, &str)> {
     let (is_other, text) = match text.strip_prefix('!') {
         Some(text) => (true, text),
         None => (false, text),
@@ -109,13 +111,13 @@ fn class(text: &str) -> Option<(Part, &str)> {
             }
         }
     }
-    Some((Part::Class(ranges, is_other), &text[end + 1..]))
+    Some((PatternPart::Class(ranges, is_other), &text[end + 1..]))
 }
 
-impl Part {
+impl PatternPart {
     fn is_one(&self, character: char) -> bool {
         match self {
-            Self::Character(own) => *own == character,
+            Self::Character(expected) => *expected == character,
             Self::Any => true,
             Self::Many => false,
             Self::Class(ranges, is_other) => {
@@ -126,12 +128,12 @@ impl Part {
     }
 }
 
-/// The files and folders that a pattern of paths matches, by name; none where one of its parts is no
-/// pattern. What cannot be looked into matches nothing.
+/// The files and folders that a pattern of paths matches, sorted; none where a part of it is malformed.
+/// Folders that cannot be read match nothing.
 pub(crate) fn paths(pattern: &str) -> Vec<PathBuf> {
     let mut found = vec![PathBuf::new()];
     let components: Vec<Component<'_>> = Path::new(pattern).components().collect();
-    for (place, component) in components.iter().enumerate() {
+    for (index, component) in components.iter().enumerate() {
         let name = match component {
             Component::Normal(name) => name.to_str().unwrap_or_default(),
             other => {
@@ -140,8 +142,8 @@ pub(crate) fn paths(pattern: &str) -> Vec<PathBuf> {
             }
         };
         if name == "**" {
-            // The folders themselves too; where it is last, all that is in them.
-            let is_last = place + 1 == components.len();
+            // The folders themselves too; as the last part, also all files in them.
+            let is_last = index + 1 == components.len();
             found = found.iter().flat_map(|path| tree(path, is_last)).collect();
             continue;
         }
@@ -236,16 +238,16 @@ mod tests {
 
     #[test]
     fn patterns_find_files_in_folders() {
-        let place = tempfile::tempdir().unwrap();
+        let directory = tempfile::tempdir().unwrap();
         for name in ["a/1.dat", "a/2.bvh", "b/c/3.dat", "4.dat"] {
-            let file = place.path().join(name);
+            let file = directory.path().join(name);
             fs::create_dir_all(file.parent().unwrap()).unwrap();
             fs::write(file, "").unwrap();
         }
         let found = |pattern: &str| -> Vec<String> {
-            let pattern = place.path().join(pattern);
+            let pattern = directory.path().join(pattern);
             let found = paths(pattern.to_str().unwrap()).into_iter();
-            let below = found.map(|path| path.strip_prefix(place.path()).unwrap().to_owned());
+            let below = found.map(|path| path.strip_prefix(directory.path()).unwrap().to_owned());
             below
                 .map(|path| path.to_str().unwrap().to_owned())
                 .collect()

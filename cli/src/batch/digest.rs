@@ -36,11 +36,11 @@ impl Digest {
     }
 }
 
-/// An input and its hash, which is that of the bytes that are evaluated: both are read between the
-/// same two looks at the file, which must find it unchanged.
+/// An input file and its hash. The file's identity is checked before and after reading, so that the hash
+/// is that of the evaluated bytes.
 pub(crate) struct InputFile {
     path: PathBuf,
-    /// What it was at first; nothing where it cannot be read twice, as standard input and pipes.
+    /// Its identity before reading; `None` where it cannot be read twice, as standard input and pipes.
     before: Option<Identity>,
     sha256: OnceLock<Option<String>>,
 }
@@ -59,7 +59,7 @@ impl InputFile {
         &self.path
     }
 
-    /// Its hash, where it can be read twice. What cannot be read is told about when it is opened.
+    /// Its hash, if it can be read twice. A file that cannot be read is reported when it is opened.
     pub(crate) fn sha256(&self) -> Option<&str> {
         let hash = || {
             self.before.as_ref()?;
@@ -68,7 +68,7 @@ impl InputFile {
         self.sha256.get_or_init(hash).as_deref()
     }
 
-    /// Refuses an input that was replaced or written to since it was looked at.
+    /// Refuses an input that was replaced or changed since [`InputFile::new`].
     pub(crate) fn check_unchanged(&self) -> Result<(), Failure> {
         if self.before.is_none() || Identity::of(&self.path) == self.before {
             return Ok(());
@@ -79,7 +79,7 @@ impl InputFile {
     }
 }
 
-/// Which file has a name, and since when it has its bytes.
+/// Which file a path names, and when it changed last.
 #[derive(Debug, PartialEq, Eq)]
 struct Identity([i128; 6]);
 

@@ -1,8 +1,7 @@
-//! A directory of results: what each input's result is called in it, and that none of the files
-//! there is a stranger's.
+//! A directory of results: the name of each input's result in it, and the check that no file of somebody
+//! else is replaced.
 //!
-//! An input whose result has no name there, or no place, is an input that failed; the others are
-//! made.
+//! An input whose result cannot have a name or a file there has failed; the others are evaluated.
 
 use std::collections::{BTreeSet, HashMap, HashSet};
 use std::path::{Path, PathBuf};
@@ -11,45 +10,48 @@ use tumble_formats::beneath::parent_beneath;
 use tumble_formats::format::Format;
 use tumble_formats::output::remove_abandoned;
 
-use crate::arguments::gather::{Found, Gathered};
+use crate::arguments::gather::{FoundInput, GatheredInputs};
 use crate::arguments::input;
+use crate::batch::destination::{self, Destination};
 use crate::batch::manifest::{self, Manifest};
-use crate::batch::output::{Plan, Target, Wish, choose, of};
-use crate::batch::place::{self, Place};
-use crate::batch::shards::plan::{self, Stated, hash_of};
+use crate::batch::output::{OutputPlan, OutputRequest, ResultTarget, choose, of};
+use crate::batch::shards::plan::{self, RecordedPlan, hash_of};
 use crate::batch::shards::record;
 use crate::messages::exit::Failure;
 
-/// What the result of an input is called below the directory of results, or why it has no name.
-pub(crate) type Name = Result<String, Failure>;
+/// The path of an input's result below the directory of results, or why it has none.
+pub(crate) type ResultName = Result<String, Failure>;
 
-/// File systems take no longer names.
+/// The longest file name that file systems accept, in bytes.
 const MAX_NAME: usize = 255;
 
-/// A file in `folder` for each input, named after it; below it, where the input lay below
-/// a directory.
-pub(crate) fn in_folder(inputs: &Gathered, folder: &Path, wish: Wish<'_>) -> Result<Plan, Failure> {
-    let format = format(folder, wish.format)?;
+/// A file in `folder` for each input, named after it; in a subdirectory where the input is in one.
+pub(crate) fn in_folder(
+    inputs: &GatheredInputs,
+    folder: &Path,
+    request: OutputRequest<'_>,
+) -> Result<OutputPlan, Failure> {
+    let format = format(folder, request.format)?;
     let files = without_results(inputs.files.clone(), folder)?;
     let names = names(&files, folder, format);
-    let shards = Stated::read(folder)?;
-    if let Some(stated) = &shards {
-        refuse_shards(stated, &names, folder, wish)?;
+    let shards = RecordedPlan::read(folder)?;
+    if let Some(recorded) = &shards {
+        refuse_shards(recorded, &names, folder, request)?;
     }
-    place::folder(folder)?;
-    let manifest = Manifest::open(folder, shards.is_some(), wish.overwrite)?;
-    // What shards were making has no line yet.
+    destination::create_folder(folder)?;
+    let manifest = Manifest::open(folder, shards.is_some(), request.overwrite)?;
+    // Results of unfinished shards have no line yet.
     let is_known = |name: &str| shards.is_some() || manifest.knows(name);
-    let overwrites = |name: &str| wish.overwrite || wish.resume && is_known(name);
+    let overwrites = |name: &str| request.overwrite || request.resume && is_known(name);
     for name in names.iter().flatten().filter(|name| !overwrites(name)) {
         refuse_existing(folder, name, is_known(name))?;
     }
-    let mut places = Places::new(folder);
-    let mut plan = Plan::default();
+    let mut result_folder = ResultFolder::new(folder);
+    let mut plan = OutputPlan::default();
     for (found, name) in files.iter().zip(names) {
         let target = name.and_then(|name| {
-            let place = places.place(&name, overwrites(&name))?;
-            Ok(Target::new(place.hashed(), format, name))
+            let destination = result_folder.destination(&name, overwrites(&name))?;
+            Ok(ResultTarget::new(destination.hashed(), format, name))
         });
         match target {
             Ok(target) => {
@@ -59,19 +61,22 @@ pub(crate) fn in_folder(inputs: &Gathered, folder: &Path, wish: Wish<'_>) -> Res
             Err(failure) => plan.refused.push(failure),
         }
     }
-    // What is locked is being written, whoever looks.
-    places.made.extend(manifest.folders());
-    places.made.insert(folder.to_owned());
-    for folder in &places.made {
+    // Locked files are being written: they are kept.
+    result_folder.made.extend(manifest.folders());
+    result_folder.made.insert(folder.to_owned());
+    for folder in &result_folder.made {
         remove_abandoned(folder);
     }
     plan.manifest = Some(manifest);
     Ok(plan)
 }
 
-/// The inputs that are no results of an earlier batch: a directory of results may lie below the
-/// directory of their inputs, or be it.
-pub(crate) fn without_results(inputs: Vec<Found>, folder: &Path) -> Result<Vec<Found>, Failure> {
+/// The inputs that are not results of an earlier batch: a directory of results may be below the
+/// directory of inputs, or be the same.
+pub(crate) fn without_results(
+    inputs: Vec<FoundInput>,
+    folder: &Path,
+) -> Result<Vec<FoundInput>, Failure> {
     let is_below = |path: &Path, folder: &Path| {
         path.canonicalize()
             .is_ok_and(|path| path.starts_with(folder))
@@ -80,24 +85,24 @@ pub(crate) fn without_results(inputs: Vec<Found>, folder: &Path) -> Result<Vec<F
         return Ok(inputs);
     };
     let below: Vec<bool> = (inputs.iter())
-        .map(|found| found.is_met && is_below(&found.path, &real))
+        .map(|found| found.is_from_directory && is_below(&found.path, &real))
         .collect();
     let has_results = || {
         let manifest = manifest::open(folder).is_ok_and(|manifest| manifest.is_some());
-        manifest || Stated::read(folder).is_ok_and(|stated| stated.is_some())
+        manifest || RecordedPlan::read(folder).is_ok_and(|stated| stated.is_some())
     };
     if !below.contains(&true) || !has_results() {
         return Ok(inputs);
     }
     let names = record::names(folder);
-    let is_result = |found: &Found| {
-        // Where inputs and results share a directory, the manifest says which are which.
+    let is_result = |found: &FoundInput| {
+        // Where inputs and results share a directory, the manifest tells them apart.
         let is_shared = found.root().is_some_and(|root| is_below(root, &real));
         let path = found.path.canonicalize().unwrap_or_default();
         let name = path.strip_prefix(&real).ok().and_then(Path::to_str);
         !is_shared || name.is_some_and(|name| names.contains(name))
     };
-    let left: Vec<Found> = (inputs.into_iter().zip(below))
+    let left: Vec<FoundInput> = (inputs.into_iter().zip(below))
         .filter(|(found, is_below)| !(*is_below && is_result(found)))
         .map(|(found, _)| found)
         .collect();
@@ -110,8 +115,7 @@ pub(crate) fn without_results(inputs: Vec<Found>, folder: &Path) -> Result<Vec<F
     }
 }
 
-/// A file that nobody said to replace ends a batch before it begins: none of its results is made
-/// for nothing.
+/// Refuses, before any work, a batch that would replace a file without `--overwrite`.
 fn refuse_existing(folder: &Path, name: &str, is_known: bool) -> Result<(), Failure> {
     let path = folder.join(name);
     if std::fs::symlink_metadata(&path).is_err() {
@@ -125,20 +129,20 @@ fn refuse_existing(folder: &Path, name: &str, is_known: bool) -> Result<(), Fail
     })
 }
 
-/// Shards that are not merged yet are gone on with by the same inputs alone.
+/// Refuses other inputs for a directory with shards that are not merged yet.
 fn refuse_shards(
-    stated: &Stated,
-    names: &[Name],
+    recorded: &RecordedPlan,
+    names: &[ResultName],
     folder: &Path,
-    wish: Wish<'_>,
+    request: OutputRequest<'_>,
 ) -> Result<(), Failure> {
     let shown = folder.display();
-    if !wish.resume && !wish.overwrite {
+    if !request.resume && !request.overwrite {
         return Err(Failure::usage(format!(
-            "{shown}: has shards that are not merged; --resume goes on, `tumble merge {shown}` ends it"
+            "{shown}: has shards that are not merged; --resume continues them, `tumble merge {shown}` merges them"
         )));
     }
-    match stated.outputs_sha256 == hash_of(names) {
+    match recorded.outputs_sha256 == hash_of(names) {
         true => Ok(()),
         false => Err(Failure::usage(format!(
             "{shown}: has shards of other inputs that are not merged; give those inputs, or another \
@@ -150,7 +154,7 @@ fn refuse_shards(
 /// The format of the results of several inputs.
 pub(crate) fn format(
     folder: &Path,
-    wished: Option<&'static Format>,
+    requested: Option<&'static Format>,
 ) -> Result<&'static Format, Failure> {
     if !folder.is_dir() && (folder.exists() || of(folder).is_some()) {
         let shown = folder.display();
@@ -158,12 +162,12 @@ pub(crate) fn format(
             "{shown}: several inputs need a directory for their results, not one file"
         )));
     }
-    choose(Path::new("-"), wished)
+    choose(Path::new("-"), requested)
 }
 
-/// What the results are called in the directory, in the order of their inputs. Those of `walk.bvh`
-/// and `walk.tum` are called `walk.bvh.npy` and `walk.tum.npy`.
-pub(crate) fn names(inputs: &[Found], folder: &Path, format: &Format) -> Vec<Name> {
+/// The names of the results in the directory, in the order of their inputs. Those of `walk.bvh` and
+/// `walk.tum` are `walk.bvh.npy` and `walk.tum.npy`.
+pub(crate) fn names(inputs: &[FoundInput], folder: &Path, format: &Format) -> Vec<ResultName> {
     let sources: HashSet<PathBuf> = (inputs.iter())
         .filter_map(|found| found.path.canonicalize().ok())
         .collect();
@@ -223,9 +227,9 @@ pub(crate) fn names(inputs: &[Found], folder: &Path, format: &Format) -> Vec<Nam
     checked.collect()
 }
 
-/// Refuses inputs whose results would have one name: workers that have some of the inputs would not
-/// know of the others.
-pub(crate) fn refuse_shared_names(inputs: &[Found], format: &Format) -> Result<(), Failure> {
+/// Refuses inputs whose results would have the same name: a worker has only some of the inputs, and
+/// could not tell.
+pub(crate) fn refuse_shared_names(inputs: &[FoundInput], format: &Format) -> Result<(), Failure> {
     let mut owners = HashMap::new();
     for found in inputs {
         let name = name_for(format, found);
@@ -249,7 +253,7 @@ fn counts(names: &[PathBuf]) -> HashMap<&PathBuf, usize> {
     counts
 }
 
-fn below(found: &Found) -> &Path {
+fn below(found: &FoundInput) -> &Path {
     match input::is_standard(&found.path) {
         true => Path::new("stdin"),
         false => &found.below,
@@ -257,25 +261,25 @@ fn below(found: &Found) -> &Path {
 }
 
 /// `walk.dat` becomes `walk.npy`, where it lies.
-fn name_for(format: &Format, found: &Found) -> PathBuf {
+fn name_for(format: &Format, found: &FoundInput) -> PathBuf {
     below(found).with_extension(format.name)
 }
 
 /// `walk.dat` becomes `walk.dat.npy`.
-fn whole_name_for(format: &Format, found: &Found) -> PathBuf {
+fn whole_name_for(format: &Format, found: &FoundInput) -> PathBuf {
     let mut name = below(found).as_os_str().to_owned();
     name.push(format!(".{}", format.name));
     name.into()
 }
 
-/// Where results go below a directory. Their own directories are made, and none is a link.
-pub(crate) struct Places<'a> {
+/// A directory of results. It makes the subdirectories of results, and refuses links.
+pub(crate) struct ResultFolder<'a> {
     folder: &'a Path,
-    /// The directories of the results.
+    /// The subdirectories made so far.
     pub(crate) made: BTreeSet<PathBuf>,
 }
 
-impl<'a> Places<'a> {
+impl<'a> ResultFolder<'a> {
     pub(crate) fn new(folder: &'a Path) -> Self {
         Self {
             folder,
@@ -283,8 +287,12 @@ impl<'a> Places<'a> {
         }
     }
 
-    /// Where the result of that name goes.
-    pub(crate) fn place(&mut self, name: &str, overwrite: bool) -> Result<Place, Failure> {
+    /// The destination of the result of that name.
+    pub(crate) fn destination(
+        &mut self,
+        name: &str,
+        overwrite: bool,
+    ) -> Result<Destination, Failure> {
         let path = self.folder.join(name);
         let parent = path.parent().unwrap_or(self.folder);
         if !self.made.contains(parent) {
@@ -296,6 +304,6 @@ impl<'a> Places<'a> {
                 .map_err(|error| Failure::writing(&parent.display().to_string(), &error))?;
             self.made.insert(parent);
         }
-        Place::new(&path, overwrite, &[])
+        Destination::new(&path, overwrite, &[])
     }
 }

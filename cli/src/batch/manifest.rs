@@ -1,14 +1,13 @@
 //! The manifest of a directory of results: what each was made from and how, and its
 //! hash. One JSON object a line.
 //!
-//! While a batch runs, a line is added for each result before the result gets its
-//! name: whatever is there under its name, and is not what the line says, is to be
-//! made again. At the end the lines are put in order and the file is replaced whole, so
+//! While a batch runs, a line is added for each result before the result is renamed: a file that does
+//! not match its line is to be made again. At the end the lines are sorted and the file is replaced, so
 //! that a batch that was stopped and resumed ends with the bytes of one that was not.
 //!
-//! A file is a manifest if its first line is an entry; any other of its name is somebody's,
-//! and refused unless files may be replaced. Lines are added to no file but one that this
-//! batch has put there by a rename: what else leads to an older one keeps its bytes.
+//! A file is a manifest if its first line is an entry; any other file of its name is refused unless
+//! files may be replaced. Lines are added only to a file that this batch has created: hard links to an
+//! older one keep its bytes.
 
 use std::collections::BTreeMap;
 use std::fs::{File, TryLockError};
@@ -20,10 +19,10 @@ use serde::{Deserialize, Serialize};
 use tumble_formats::beneath::{is_beneath, open_beneath, parent_beneath};
 use tumble_formats::output::Output;
 
+use crate::batch::destination::WrittenFile;
 use crate::batch::digest;
-use crate::batch::place::Written;
-use crate::batch::run::Records;
-use crate::batch::shards::{plan::Stated, record};
+use crate::batch::run::ResultRecorder;
+use crate::batch::shards::{plan::RecordedPlan, record};
 use crate::messages::exit::{Failure, OUTPUT};
 use crate::messages::words;
 
@@ -32,16 +31,16 @@ pub(crate) const NAME: &str = "manifest.jsonl";
 
 /// One result.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub(crate) struct Entry {
+pub(crate) struct ManifestEntry {
     /// Below the manifest's directory.
     pub(crate) output: String,
     pub(crate) output_sha256: String,
     pub(crate) output_bytes: u64,
-    /// As it was given.
+    /// As on the command line.
     pub(crate) input: String,
-    /// Nothing where the input was standard input.
+    /// `None` for standard input.
     pub(crate) input_sha256: Option<String>,
-    /// All that decides over the result besides the input.
+    /// Everything that determines the result besides the input.
     pub(crate) options: String,
     pub(crate) kernels_sha256: String,
     /// The program's version.
@@ -54,8 +53,8 @@ pub(crate) struct Entry {
     pub(crate) one_of: Option<(String, usize)>,
 }
 
-impl Entry {
-    /// The entry in a line; nothing where the line is none, or names a result outside its directory.
+impl ManifestEntry {
+    /// The entry in a line; `None` where there is none, or where it names a result outside its directory.
     pub(crate) fn of_line(line: &[u8]) -> Option<Self> {
         let entry: Self = serde_json::from_slice(line).ok()?;
         let all = entry.one_of.as_ref().map(|(all, _)| &**all);
@@ -79,12 +78,12 @@ pub(crate) fn kernels_sha256() -> &'static str {
 }
 
 /// A manifest's lines: the last one for each output, and how many are no entries.
-pub(crate) struct Lines {
-    pub(crate) entries: BTreeMap<String, Entry>,
+pub(crate) struct ManifestLines {
+    pub(crate) entries: BTreeMap<String, ManifestEntry>,
     pub(crate) damaged: usize,
 }
 
-impl Lines {
+impl ManifestLines {
     /// A last line without its end was being written when the program was killed.
     pub(crate) fn parse(bytes: &[u8]) -> Self {
         let mut lines = Self {
@@ -92,7 +91,7 @@ impl Lines {
             damaged: 0,
         };
         for line in bytes.split_inclusive(|&byte| byte == b'\n') {
-            match Entry::of_line(line) {
+            match ManifestEntry::of_line(line) {
                 Some(entry) => {
                     lines.entries.insert(entry.output.clone(), entry);
                 }
@@ -104,10 +103,10 @@ impl Lines {
     }
 }
 
-/// Opens the manifest of a directory; nothing where there is none.
+/// Opens the manifest of a directory; `None` where there is none.
 ///
 /// # Errors
-/// When what has its name is a link, no file, or somebody else's.
+/// When it is a link, not a regular file, or not a manifest.
 pub(crate) fn open(folder: &Path) -> Result<Option<File>, Failure> {
     let path = folder.join(NAME);
     let shown = path.display();
@@ -115,10 +114,12 @@ pub(crate) fn open(folder: &Path) -> Result<Option<File>, Failure> {
     match std::fs::symlink_metadata(&path) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
         Ok(found) if found.is_symlink() => {
-            return refuse("is a link, and a manifest is a file; remove the link");
+            return refuse(
+                "is a symbolic link, and a manifest must be a regular file; remove the link",
+            );
         }
         Ok(found) if !found.is_file() => {
-            return refuse("is no file, and a manifest is one; give another directory");
+            return refuse("is not a regular file, as a manifest must be; give another directory");
         }
         Ok(_) | Err(_) => {}
     }
@@ -127,9 +128,9 @@ pub(crate) fn open(folder: &Path) -> Result<Option<File>, Failure> {
     let mut first = Vec::new();
     let mut reader = BufReader::new(file.try_clone().map_err(failed)?).take(MAX_LINE);
     reader.read_until(b'\n', &mut first).map_err(failed)?;
-    if Entry::of_line(&first).is_none() {
+    if ManifestEntry::of_line(&first).is_none() {
         return refuse(
-            "is no manifest of tumble: its first line is no result; move it, give another directory, \
+            "is not a manifest of tumble: its first line is not an entry; move it, give another directory, \
              or --overwrite to replace it",
         );
     }
@@ -137,37 +138,37 @@ pub(crate) fn open(folder: &Path) -> Result<Option<File>, Failure> {
     Ok(Some(file))
 }
 
-/// Says that lines of a directory's manifest are no results of its: they are left out of the next one.
-pub(crate) fn tell_damaged(folder: &Path, lines: usize) {
+/// Warns of lines of a directory's manifest that are not entries: they are left out of the next one.
+pub(crate) fn warn_of_damaged_lines(folder: &Path, lines: usize) {
     if lines > 0 {
         let path = folder.join(NAME);
         let lines = words::count(lines, "line");
         words::warning(&format!(
-            "{}: {lines} that name no result of the directory; left out",
+            "{}: {lines} without a result of this directory, left out",
             path.display()
         ));
     }
 }
 
-/// No line is longer.
+/// The longest line, in bytes.
 const MAX_LINE: u64 = 1 << 20;
 
 /// A directory's manifest, open for one batch.
 pub(crate) struct Manifest {
     folder: PathBuf,
-    previous: Arc<BTreeMap<String, Entry>>,
-    added: BTreeMap<String, Entry>,
-    /// Something has its name: a manifest, or what is to be replaced.
+    previous: Arc<BTreeMap<String, ManifestEntry>>,
+    added: BTreeMap<String, ManifestEntry>,
+    /// Whether there is a file of its name: a manifest, or a file to replace.
     exists: bool,
-    /// The file, to whose end lines are added; there is none before the first.
+    /// The file that lines are appended to; `None` before the first.
     journal: Option<File>,
-    /// There are shards, whose lines become part of it.
+    /// Whether there are shards, whose lines become part of it.
     has_shards: bool,
-    /// Of the directory: two batches that write into it would lose each other's lines.
+    /// Locks the directory: two batches would lose each other's lines.
     _lock: Option<File>,
 }
 
-/// Locks a directory of results; nothing where the system or the file system has no such locks.
+/// Locks a directory of results; `None` where the system or the file system has no such locks.
 pub(crate) fn lock(folder: &Path) -> Result<Option<File>, Failure> {
     let Ok(file) = File::open(folder) else {
         return Ok(None);
@@ -183,9 +184,8 @@ pub(crate) fn lock(folder: &Path) -> Result<Option<File>, Failure> {
 }
 
 impl Manifest {
-    /// Opens a directory's manifest; its file is written with the first line. `has_shards`: what
-    /// shards have made is the batch's too, and their lines become lines of the manifest.
-    /// `overwrite`: a file of its name that is none is replaced.
+    /// Opens a directory's manifest; its file is written with the first line. `has_shards`: the lines of
+    /// shards become lines of the manifest. `overwrite`: a file that is not a manifest is replaced.
     pub(crate) fn open(folder: &Path, has_shards: bool, overwrite: bool) -> Result<Self, Failure> {
         let lock = lock(folder)?;
         let mut bytes = Vec::new();
@@ -205,11 +205,11 @@ impl Manifest {
             Err(_) if overwrite && folder.join(NAME).is_file() => true,
             Err(failure) => return Err(failure),
         };
-        let Lines {
+        let ManifestLines {
             entries: mut previous,
             damaged,
-        } = Lines::parse(&bytes);
-        tell_damaged(folder, damaged);
+        } = ManifestLines::parse(&bytes);
+        warn_of_damaged_lines(folder, damaged);
         if has_shards {
             previous.extend(record::entries(folder));
         }
@@ -224,20 +224,19 @@ impl Manifest {
         })
     }
 
-    /// The directories of the results that it names, those alone that are beneath its own.
+    /// The directories of its results, if they are below its own.
     pub(crate) fn folders(&self) -> impl Iterator<Item = PathBuf> {
         let outputs = self.previous.keys();
         outputs.filter_map(|output| parent_beneath(&self.folder, Path::new(output)).ok())
     }
 
-    /// Whether the manifest names that output, or results of several clips in its place, which are
-    /// then not a stranger's.
+    /// Whether the manifest lists that output, or the results of its clips.
     pub(crate) fn knows(&self, output: &str) -> bool {
         self.previous.contains_key(output) || of_clips(&self.previous, output).next().is_some()
     }
 
     /// Adds a line, in one piece.
-    pub(crate) fn add(&mut self, entry: Entry) -> Result<(), Failure> {
+    pub(crate) fn add(&mut self, entry: ManifestEntry) -> Result<(), Failure> {
         match &mut self.journal {
             Some(journal) => {
                 let written = journal.write_all(line(&entry).as_bytes());
@@ -263,7 +262,7 @@ impl Manifest {
         // Windows replaces no file that is open.
         self.journal = None;
         if !self.is_empty() {
-            let mut entries: BTreeMap<&String, &Entry> = self.previous.iter().collect();
+            let mut entries: BTreeMap<&String, &ManifestEntry> = self.previous.iter().collect();
             entries.extend(&self.added);
             self.replace(entries.into_values())?;
         }
@@ -271,7 +270,10 @@ impl Manifest {
     }
 
     /// Replaces the file whole; gives it, open at its end.
-    fn replace<'a>(&self, lines: impl Iterator<Item = &'a Entry>) -> Result<Option<File>, Failure> {
+    fn replace<'a>(
+        &self,
+        lines: impl Iterator<Item = &'a ManifestEntry>,
+    ) -> Result<Option<File>, Failure> {
         let path = self.folder.join(NAME);
         let output = Output::create(&path, self.exists, &[]);
         let mut output = output.map_err(|error| Failure::output(&error))?;
@@ -284,10 +286,10 @@ impl Manifest {
             .map_err(|error| Failure::output(&error))
     }
 
-    /// The manifest has their lines.
+    /// Removes the record of shards: the manifest has their lines.
     fn forget_shards(&self) -> Result<(), Failure> {
         match self.has_shards {
-            true => Stated::remove(&self.folder),
+            true => RecordedPlan::remove(&self.folder),
             false => Ok(()),
         }
     }
@@ -297,19 +299,20 @@ impl Manifest {
     }
 }
 
-impl Records for Manifest {
-    fn previous(&self) -> Previous {
-        Previous {
+impl ResultRecorder for Manifest {
+    fn previous(&self) -> PreviousEntries {
+        PreviousEntries {
             folder: self.folder.clone(),
             entries: Arc::clone(&self.previous),
         }
     }
 
-    fn keep(&mut self, entry: Entry, written: Written) -> Result<(), Failure> {
+    fn keep(&mut self, entry: ManifestEntry, written: WrittenFile) -> Result<(), Failure> {
         let output = entry.output.clone();
         self.add(entry)?;
         written.commit().inspect_err(|_| {
-            // The line stays until the end; until then it says what is to be made again.
+            // The line stays in the file until the end of the batch: the result does not match it, so it
+            // is made again.
             self.added.remove(&output);
         })
     }
@@ -319,32 +322,35 @@ impl Records for Manifest {
     }
 }
 
-/// What a manifest said before the batch.
+/// The entries of a manifest before the batch.
 #[derive(Clone)]
-pub(crate) struct Previous {
+pub(crate) struct PreviousEntries {
     folder: PathBuf,
-    entries: Arc<BTreeMap<String, Entry>>,
+    entries: Arc<BTreeMap<String, ManifestEntry>>,
 }
 
-impl Previous {
-    pub(crate) fn new(folder: &Path, entries: BTreeMap<String, Entry>) -> Self {
+impl PreviousEntries {
+    pub(crate) fn new(folder: &Path, entries: BTreeMap<String, ManifestEntry>) -> Self {
         Self {
             folder: folder.to_owned(),
             entries: Arc::new(entries),
         }
     }
 
-    /// What it names in the place of an output: that, or the results of the clips that it would hold.
-    pub(crate) fn results_of<'a>(&'a self, output: &'a str) -> impl Iterator<Item = &'a Entry> {
+    /// The entry of an output, or the entries of its clips.
+    pub(crate) fn results_of<'a>(
+        &'a self,
+        output: &'a str,
+    ) -> impl Iterator<Item = &'a ManifestEntry> {
         let one = self.entries.get(output);
         let clips = of_clips(&self.entries, output).filter(move |_| one.is_none());
         one.into_iter().chain(clips.map(|(entry, _)| entry))
     }
 
-    /// Whether the output, or the outputs of all clips that it would hold, are there, whole, and
-    /// the results of the same request.
+    /// Whether the output, or the outputs of all its clips, exist, are complete, and were made by the
+    /// same request.
     pub(crate) fn is_done(&self, output: &str, input_sha256: &str, options: &str) -> bool {
-        let is_whole = |entry: &Entry| {
+        let is_whole = |entry: &ManifestEntry| {
             let (bytes, sha256) = (entry.output_bytes, &entry.output_sha256);
             entry.is_made_from(input_sha256, options)
                 && digest::is_whole(&self.folder, &entry.output, bytes, sha256)
@@ -360,23 +366,23 @@ impl Previous {
     }
 }
 
-/// The results of single clips in the place of one of all, with how many there are: `fox.Run.npy` and
-/// its like for `fox.npy`.
+/// The results of the single clips of an output, with the number of clips: `fox.Run.npy` and so on for
+/// `fox.npy`.
 fn of_clips<'a>(
-    entries: &'a BTreeMap<String, Entry>,
+    entries: &'a BTreeMap<String, ManifestEntry>,
     output: &'a str,
-) -> impl Iterator<Item = (&'a Entry, usize)> {
+) -> impl Iterator<Item = (&'a ManifestEntry, usize)> {
     let stem = output.rsplit_once('.').map_or(output, |(stem, _)| stem);
     let beside = entries.range(format!("{stem}.")..);
-    let own = beside.take_while(move |(name, _)| name.starts_with(stem));
-    own.filter_map(move |(_, entry)| {
+    let candidates = beside.take_while(move |(name, _)| name.starts_with(stem));
+    candidates.filter_map(move |(_, entry)| {
         let (all, count) = entry.one_of.as_ref()?;
         (all == output).then_some((entry, *count))
     })
 }
 
 /// An entry as a line.
-pub(crate) fn line(entry: &Entry) -> String {
+pub(crate) fn line(entry: &ManifestEntry) -> String {
     serde_json::to_string(entry).expect("strings and numbers") + "\n"
 }
 
@@ -384,9 +390,9 @@ pub(crate) fn line(entry: &Entry) -> String {
 mod tests {
     use super::*;
 
-    fn entry(output: &str, hash: &str) -> Entry {
+    fn entry(output: &str, hash: &str) -> ManifestEntry {
         let text = String::from;
-        Entry {
+        ManifestEntry {
             output: text(output),
             output_sha256: text(hash),
             output_bytes: 3,
@@ -402,17 +408,17 @@ mod tests {
 
     #[test]
     fn a_line_cut_short_is_forgotten_and_the_next_is_whole() {
-        let place = tempfile::tempdir().unwrap();
-        let mut manifest = Manifest::open(place.path(), false, false).unwrap();
+        let directory = tempfile::tempdir().unwrap();
+        let mut manifest = Manifest::open(directory.path(), false, false).unwrap();
         manifest.add(entry("b", "1")).unwrap();
         manifest.add(entry("a", "2")).unwrap();
         manifest.add(entry("b", "3")).unwrap();
         drop(manifest);
-        let path = place.path().join(NAME);
+        let path = directory.path().join(NAME);
         let mut bytes = std::fs::read(&path).unwrap();
         bytes.truncate(bytes.len() - 5);
         std::fs::write(&path, &bytes).unwrap();
-        let mut manifest = Manifest::open(place.path(), false, false).unwrap();
+        let mut manifest = Manifest::open(directory.path(), false, false).unwrap();
         assert_eq!(manifest.previous["b"].output_sha256, "1");
         manifest.add(entry("b", "4")).unwrap();
         manifest.finish().unwrap();
@@ -423,24 +429,24 @@ mod tests {
     #[cfg(unix)]
     #[test]
     fn two_batches_do_not_write_into_one_directory() {
-        let place = tempfile::tempdir().unwrap();
-        let first = Manifest::open(place.path(), false, false).unwrap();
-        assert!(Manifest::open(place.path(), false, false).is_err());
+        let directory = tempfile::tempdir().unwrap();
+        let first = Manifest::open(directory.path(), false, false).unwrap();
+        assert!(Manifest::open(directory.path(), false, false).is_err());
         drop(first);
-        assert!(Manifest::open(place.path(), false, false).is_ok());
-        assert_eq!(std::fs::read_dir(place.path()).unwrap().count(), 0);
+        assert!(Manifest::open(directory.path(), false, false).is_ok());
+        assert_eq!(std::fs::read_dir(directory.path()).unwrap().count(), 0);
     }
 
     /// Whatever leads to an older manifest keeps its bytes.
     #[test]
     fn a_manifest_is_replaced_and_never_written_into() {
-        let place = tempfile::tempdir().unwrap();
-        let mut manifest = Manifest::open(place.path(), false, false).unwrap();
+        let directory = tempfile::tempdir().unwrap();
+        let mut manifest = Manifest::open(directory.path(), false, false).unwrap();
         manifest.add(entry("a", "1")).unwrap();
         manifest.finish().unwrap();
-        let (path, other) = (place.path().join(NAME), place.path().join("copy"));
+        let (path, other) = (directory.path().join(NAME), directory.path().join("copy"));
         std::fs::hard_link(&path, &other).unwrap();
-        let mut manifest = Manifest::open(place.path(), false, false).unwrap();
+        let mut manifest = Manifest::open(directory.path(), false, false).unwrap();
         manifest.add(entry("b", "1")).unwrap();
         manifest.add(entry("c", "1")).unwrap();
         manifest.finish().unwrap();
@@ -453,34 +459,35 @@ mod tests {
     fn names_outside_are_no_entries() {
         for name in ["../a", "/a", "a/../../b", ""] {
             let bytes = line(&entry(name, "1"));
-            let lines = Lines::parse(bytes.as_bytes());
+            let lines = ManifestLines::parse(bytes.as_bytes());
             assert_eq!((lines.entries.len(), lines.damaged), (0, 1), "{name}");
         }
     }
 
     #[test]
     fn what_is_done_is_what_is_there_and_was_asked_for() {
-        let place = tempfile::tempdir().unwrap();
-        let mut manifest = Manifest::open(place.path(), false, false).unwrap();
+        let directory = tempfile::tempdir().unwrap();
+        let mut manifest = Manifest::open(directory.path(), false, false).unwrap();
         let hash = digest::of_bytes([&b"abc"[..]]);
         manifest.add(entry("a", &hash)).unwrap();
         manifest.finish().unwrap();
-        let manifest = Manifest::open(place.path(), false, false)
+        let manifest = Manifest::open(directory.path(), false, false)
             .unwrap()
             .previous();
         assert!(!manifest.is_done("a", "1", "o"), "it is not there");
-        std::fs::write(place.path().join("a"), "abc").unwrap();
+        std::fs::write(directory.path().join("a"), "abc").unwrap();
         assert!(manifest.is_done("a", "1", "o"));
         assert!(!manifest.is_done("a", "2", "o"), "another input");
         assert!(!manifest.is_done("a", "1", "p"), "other options");
-        std::fs::write(place.path().join("a"), "abd").unwrap();
+        std::fs::write(directory.path().join("a"), "abd").unwrap();
         assert!(!manifest.is_done("a", "1", "o"), "a damaged output");
     }
 
     #[test]
     fn damaged_lines_are_counted() {
         let good = line(&entry("a", "1"));
-        let lines = Lines::parse(format!("{good}{{\"output\":3}}\n{}", &good[..20]).as_bytes());
+        let lines =
+            ManifestLines::parse(format!("{good}{{\"output\":3}}\n{}", &good[..20]).as_bytes());
         assert_eq!((lines.entries.len(), lines.damaged), (1, 1));
     }
 }

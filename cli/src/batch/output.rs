@@ -1,5 +1,4 @@
-//! Results of evaluations: where they go, planned and checked before any work, and
-//! how they are written.
+//! Results of evaluations: their targets, planned and checked before any work, and how they are written.
 
 use std::collections::HashSet;
 use std::fmt;
@@ -14,77 +13,79 @@ use tumble_formats::format::{
     Format, MotionOptions, ResultShape, ResultWriter, WriteError, WriteResults,
 };
 use tumble_formats::kitti::write_frame_times;
-use tumble_formats::motion::Sampled;
+use tumble_formats::motion::SampledClip;
 
-use crate::arguments::gather::Gathered;
+use crate::arguments::gather::GatheredInputs;
 use crate::arguments::input;
+use crate::batch::destination::{Destination, WrittenFile};
 use crate::batch::folder;
 use crate::batch::manifest::Manifest;
-use crate::batch::place::{Place, Written};
 use crate::batch::room;
-use crate::batch::stream::Stream;
+use crate::batch::stream::OutputStream;
 use crate::messages::exit::Failure;
 use crate::messages::progress::Progress;
 use crate::messages::{signals, words};
 
-/// Where one result goes.
-pub(crate) struct Target {
-    place: Place,
+/// The target of one result: its destination and format.
+pub(crate) struct ResultTarget {
+    destination: Destination,
     format: &'static Format,
-    /// Below the directory of results; empty for a result in no such directory.
+    /// Its path below the directory of results; empty for a single result.
     name: String,
-    /// Where the times go, for a format that has none.
-    times: Option<Place>,
+    /// The destination of the times, for a format that stores none.
+    times: Option<Destination>,
 }
 
-/// One target for each input, and the manifest of the directory that they are in.
+/// One target for each input, and the manifest of their directory.
 #[derive(Default)]
-pub(crate) struct Plan {
+pub(crate) struct OutputPlan {
     /// The inputs that have targets.
     pub(crate) paths: Vec<PathBuf>,
-    pub(crate) targets: Vec<Target>,
-    /// Inputs that have none: they have failed.
+    pub(crate) targets: Vec<ResultTarget>,
+    /// The failures of inputs that have no target.
     pub(crate) refused: Vec<Failure>,
     pub(crate) manifest: Option<Manifest>,
 }
 
-/// What the arguments say of results' places.
+/// The options that decide where results go.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Wish<'a> {
+pub(crate) struct OutputRequest<'a> {
     pub(crate) out: Option<&'a Path>,
     pub(crate) format: Option<&'static Format>,
     pub(crate) overwrite: bool,
     pub(crate) resume: bool,
 }
 
-/// Refuses what cannot be meant, before any work: outputs that exist, that are inputs,
-/// that two inputs share.
-pub(crate) fn plan(inputs: &Gathered, wish: Wish<'_>) -> Result<Plan, Failure> {
-    if wish.out.is_none() && io::stdout().is_terminal() {
+/// Plans the targets. Refuses, before any work, outputs that exist, that are inputs, or that two inputs share.
+pub(crate) fn plan(
+    inputs: &GatheredInputs,
+    request: OutputRequest<'_>,
+) -> Result<OutputPlan, Failure> {
+    if request.out.is_none() && io::stdout().is_terminal() {
         return Err(Failure::usage(format!(
             "where should the result go? give {}, or -o - for standard output",
             extensions(|name| format!("-o OUT.{name}")).join(", ")
         )));
     }
-    let out = wish.out.unwrap_or(Path::new("-"));
+    let out = request.out.unwrap_or(Path::new("-"));
     let paths = inputs.paths();
-    // One file goes into one file, however it was found.
+    // A single input has a single output, however it was found.
     let is_file = out.is_file() || of(out).is_some() || input::is_standard(out);
     let is_folder = out.is_dir() || out.as_os_str().as_encoded_bytes().ends_with(b"/");
     let plan = match &*paths {
         [_] if is_file || !inputs.many && !is_folder => {
-            if wish.resume {
+            if request.resume {
                 let message = "--resume is for a directory of results";
                 return Err(Failure::usage(message));
             }
-            let format = choose(out, wish.format)?;
-            let place = Place::new(out, wish.overwrite, &paths)?;
+            let format = choose(out, request.format)?;
+            let destination = Destination::new(out, request.overwrite, &paths)?;
             // The surest check is to try.
-            place.try_out()?;
-            Plan {
+            destination.check_writable()?;
+            OutputPlan {
                 paths,
-                targets: vec![Target::new(place, format, String::new())],
-                ..Plan::default()
+                targets: vec![ResultTarget::new(destination, format, String::new())],
+                ..OutputPlan::default()
             }
         }
         _ if input::is_standard(out) => {
@@ -92,23 +93,23 @@ pub(crate) fn plan(inputs: &Gathered, wish: Wish<'_>) -> Result<Plan, Failure> {
                 "several inputs need a directory for their results: -o DIRECTORY",
             ));
         }
-        _ => folder::in_folder(inputs, out, wish)?,
+        _ => folder::in_folder(inputs, out, request)?,
     };
     if plan.manifest.is_some() {
-        try_out(&plan.targets)?;
+        check_writable(&plan.targets)?;
     }
     Ok(plan)
 }
 
-/// Tries a file in each directory of results; where none can be written into, no work is done.
-fn try_out(targets: &[Target]) -> Result<(), Failure> {
+/// Tries to write into a directory of results; fails if none can be written.
+fn check_writable(targets: &[ResultTarget]) -> Result<(), Failure> {
     let mut tried = HashSet::new();
     let mut failed = None;
     for target in targets {
         if !tried.insert(target.path().parent()) {
             continue;
         }
-        match target.place.try_out() {
+        match target.destination.check_writable() {
             Ok(()) => return Ok(()),
             Err(failure) => failed.get_or_insert(failure),
         };
@@ -116,7 +117,7 @@ fn try_out(targets: &[Target]) -> Result<(), Failure> {
     failed.map_or(Ok(()), Err)
 }
 
-/// The format asked for, else the one that the name says.
+/// The requested format, else that of the path's extension.
 pub(crate) fn choose(
     path: &Path,
     format: Option<&'static Format>,
@@ -135,7 +136,7 @@ pub(crate) fn choose(
     })
 }
 
-/// The format of results that a file's name tells.
+/// The format of results of a file's extension.
 pub(crate) fn of(path: &Path) -> Option<&'static Format> {
     Format::of(path).filter(|format| format.is_writable())
 }
@@ -153,7 +154,7 @@ pub(crate) fn format() -> impl TypedValueParser<Value = &'static Format> {
         .map(|name| Format::named(&name).expect("clap takes names of the table alone"))
 }
 
-/// Where a result may go, for help.
+/// The help of `--out`.
 pub(crate) fn out_help() -> String {
     format!(
         "Where to write: {}, `-` (standard output), or a directory for several inputs",
@@ -161,10 +162,10 @@ pub(crate) fn out_help() -> String {
     )
 }
 
-impl Target {
-    pub(crate) fn new(place: Place, format: &'static Format, name: String) -> Self {
+impl ResultTarget {
+    pub(crate) fn new(destination: Destination, format: &'static Format, name: String) -> Self {
         Self {
-            place,
+            destination,
             format,
             name,
             times: None,
@@ -172,10 +173,10 @@ impl Target {
     }
 
     /// The same, with a file for the times of what is written.
-    pub(crate) fn with_times(self, place: Place) -> Result<Self, Failure> {
-        place.refuse_same(self.path())?;
-        place.try_out()?;
-        let times = Some(place);
+    pub(crate) fn with_times(self, destination: Destination) -> Result<Self, Failure> {
+        destination.refuse_same(self.path())?;
+        destination.check_writable()?;
+        let times = Some(destination);
         Ok(Self { times, ..self })
     }
 
@@ -184,17 +185,17 @@ impl Target {
         self.format
     }
 
-    /// Where it goes.
+    /// The path of its destination.
     pub(crate) fn path(&self) -> &Path {
-        self.place.path()
+        self.destination.path()
     }
 
     /// Whether it is standard output.
     pub(crate) fn is_standard(&self) -> bool {
-        self.place.is_standard()
+        self.destination.is_standard()
     }
 
-    /// How messages call it, and by which of its format's endings it is called.
+    /// Its name in messages, its extension, and whether times go to a file of their own.
     pub(crate) fn motion_options(&self) -> MotionOptions {
         let ending = self.path().extension().unwrap_or_default();
         MotionOptions {
@@ -205,7 +206,7 @@ impl Target {
         }
     }
 
-    /// How its format holds rotations as they come.
+    /// The writer of plain rotations of its format.
     pub(crate) fn results(&self) -> Result<&'static WriteResults, Failure> {
         self.format.write.as_ref().ok_or_else(|| {
             let all = Format::writable().filter(|format| format.write.is_some());
@@ -218,13 +219,16 @@ impl Target {
         })
     }
 
-    /// Where the result of one of several clips of an input goes, beside the place where that of
-    /// all would: `fox.npy` becomes `fox.Run.npy`.
+    /// The target of one of several clips of an input, beside that of all: `fox.npy` becomes `fox.Run.npy`.
     pub(crate) fn of_clip(&self, clip: &str) -> Result<Self, Failure> {
         let with = |path: &Path| path.with_extension(format!("{clip}.{}", self.format.name));
         let name = with(Path::new(&self.name));
-        let place = self.place.renamed(&with(self.place.path()))?;
-        Ok(Self::new(place, self.format, name.display().to_string()))
+        let destination = self.destination.renamed(&with(self.destination.path()))?;
+        Ok(Self::new(
+            destination,
+            self.format,
+            name.display().to_string(),
+        ))
     }
 
     /// Refuses a result for which the disk has no room.
@@ -235,35 +239,35 @@ impl Target {
         samples: usize,
         encoding: Encoding,
     ) -> Result<(), Failure> {
-        if self.place.is_standard() {
+        if self.destination.is_standard() {
             return Ok(());
         }
         let bytes = tracks as f64 * samples as f64 * (self.results()?.rotation_bytes)(encoding);
-        let folder = match self.place.path().parent() {
+        let folder = match self.destination.path().parent() {
             Some(folder) if folder != Path::new("") => folder,
             _ => Path::new("."),
         };
         room::on_disk(name, (tracks, samples), bytes, folder)
     }
 
-    /// How the manifest calls it.
+    /// Its name in the manifest.
     pub(crate) fn name(&self) -> &str {
         &self.name
     }
 
-    /// Writes what `write` has to say; see [`Place::prepare`].
+    /// Writes by `write`; see [`Destination::prepare`].
     pub(crate) fn prepare(
         &self,
-        write: impl FnOnce(&mut Stream) -> io::Result<()>,
-    ) -> Result<Written, Failure> {
-        self.place.prepare(None, write)
+        write: impl FnOnce(&mut OutputStream) -> io::Result<()>,
+    ) -> Result<WrittenFile, Failure> {
+        self.destination.prepare(None, write)
     }
 
-    /// Writes a motion file, which `write` makes in memory, and says its warnings.
+    /// Writes a motion file, which `write` makes in memory, and prints its warnings.
     pub(crate) fn write_motion(
         &self,
         write: impl FnOnce(&mut Vec<u8>) -> Result<Vec<Diagnostic>, WriteError>,
-    ) -> Result<Written, Failure> {
+    ) -> Result<WrittenFile, Failure> {
         let mut bytes = Vec::new();
         let warnings = write(&mut bytes).map_err(|error| match error {
             WriteError::Io(error) => Failure::writing(&self.to_string(), &error),
@@ -275,12 +279,12 @@ impl Target {
         self.prepare(|out| out.write_all(&bytes))
     }
 
-    /// Writes the times of what was written as a motion file, where they go into a file of their own.
-    pub(crate) fn write_times(&self, sampled: &[Sampled<'_>]) -> Result<(), Failure> {
-        let (Some(place), [sampled]) = (&self.times, sampled) else {
+    /// Writes the times of a motion file, where they go to a file of their own.
+    pub(crate) fn write_times(&self, sampled: &[SampledClip<'_>]) -> Result<(), Failure> {
+        let (Some(destination), [sampled]) = (&self.times, sampled) else {
             return Ok(());
         };
-        let written = place.prepare(None, |out| write_frame_times(sampled, out))?;
+        let written = destination.prepare(None, |out| write_frame_times(sampled, out))?;
         written.commit()
     }
 
@@ -289,7 +293,7 @@ impl Target {
         &self,
         result: &ResultShape<'_>,
         rotations: &[Quat],
-    ) -> Result<Written, Failure> {
+    ) -> Result<WrittenFile, Failure> {
         let results = self.results()?;
         self.prepare(|out| {
             let mut writer = results.begin(out, result)?;
@@ -302,8 +306,8 @@ impl Target {
     pub(crate) fn write_rotations(
         &self,
         result: &ResultShape<'_>,
-        evaluate: impl FnOnce(&mut Sink<'_>) -> Result<(), Ended>,
-    ) -> Result<Written, Failure> {
+        evaluate: impl FnOnce(&mut ChunkSink<'_>) -> Result<(), ResultError>,
+    ) -> Result<WrittenFile, Failure> {
         let (tracks, samples) = (result.set.track_count(), result.timeline.len());
         let write = self.results()?;
         let (progress, measure): (_, fn(&[u8]) -> u64) = if write.is_text {
@@ -313,21 +317,21 @@ impl Target {
             (Progress::new("writing", total), length)
         };
         let mut unevaluated = None;
-        let written = self.place.prepare(Some((progress, measure)), |out| {
+        let written = self.destination.prepare(Some((progress, measure)), |out| {
             let mut writer = LateWriter {
                 results: write,
                 result: *result,
-                state: State::Waiting(out),
+                state: WriterState::NotStarted(out),
             };
             let evaluated = evaluate(&mut |chunk| {
                 writer
                     .write(bytemuck::cast_slice(chunk.rows))
-                    .map_err(Ended::Writing)
+                    .map_err(ResultError::Writing)
             });
             match evaluated {
                 Ok(()) => writer.finish(),
-                Err(Ended::Writing(error)) => Err(error),
-                Err(Ended::Evaluating(error)) => {
+                Err(ResultError::Writing(error)) => Err(error),
+                Err(ResultError::Evaluating(error)) => {
                     unevaluated = Some(error);
                     Err(io::Error::other("the rest could not be evaluated"))
                 }
@@ -350,46 +354,50 @@ fn length(bytes: &[u8]) -> u64 {
     bytes.len() as u64
 }
 
-/// What takes the chunks of a result.
-pub(crate) type Sink<'a> = dyn FnMut(Chunk<'_>) -> Result<(), Ended> + 'a;
+/// Accepts the chunks of a result.
+pub(crate) type ChunkSink<'a> = dyn FnMut(Chunk<'_>) -> Result<(), ResultError> + 'a;
 
-/// Why a result did not become whole.
+/// Why a result is incomplete.
 #[derive(Debug)]
-pub(crate) enum Ended {
+pub(crate) enum ResultError {
     Writing(io::Error),
     Evaluating(Error),
 }
 
-impl From<Error> for Ended {
+impl From<Error> for ResultError {
     fn from(error: Error) -> Self {
         Self::Evaluating(error)
     }
 }
 
-/// A writer of one format. Nothing is written before there is a first chunk: what
-/// cannot be evaluated leaves nothing behind, in a pipe neither.
+/// A writer of one format. Nothing is written before the first chunk, so that a failed evaluation leaves
+/// nothing behind, even in a pipe.
 struct LateWriter<'a> {
     results: &'static WriteResults,
     result: ResultShape<'a>,
-    state: State<'a>,
+    state: WriterState<'a>,
 }
 
-enum State<'a> {
-    Waiting(&'a mut Stream),
+enum WriterState<'a> {
+    NotStarted(&'a mut OutputStream),
     Writing(Box<dyn ResultWriter + 'a>),
     Failed,
 }
 
 impl<'a> LateWriter<'a> {
-    /// What writes, after the header.
+    /// The writer, after the header.
     fn started(&mut self) -> io::Result<&mut Box<dyn ResultWriter + 'a>> {
-        self.state = match std::mem::replace(&mut self.state, State::Failed) {
-            State::Waiting(out) => State::Writing(self.results.begin(out, &self.result)?),
+        self.state = match std::mem::replace(&mut self.state, WriterState::Failed) {
+            WriterState::NotStarted(out) => {
+                WriterState::Writing(self.results.begin(out, &self.result)?)
+            }
             started => started,
         };
         match &mut self.state {
-            State::Writing(writer) => Ok(writer),
-            State::Waiting(_) | State::Failed => Err(io::Error::other("an earlier error")),
+            WriterState::Writing(writer) => Ok(writer),
+            WriterState::NotStarted(_) | WriterState::Failed => {
+                Err(io::Error::other("an earlier error"))
+            }
         }
     }
 
@@ -400,14 +408,14 @@ impl<'a> LateWriter<'a> {
     fn finish(mut self) -> io::Result<()> {
         self.started()?;
         match self.state {
-            State::Writing(writer) => writer.finish(),
-            State::Waiting(_) | State::Failed => Ok(()),
+            WriterState::Writing(writer) => writer.finish(),
+            WriterState::NotStarted(_) | WriterState::Failed => Ok(()),
         }
     }
 }
 
-impl fmt::Display for Target {
+impl fmt::Display for ResultTarget {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.place.fmt(f)
+        self.destination.fmt(f)
     }
 }

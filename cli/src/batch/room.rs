@@ -1,10 +1,10 @@
-//! Is there room for a result? Asked before any work, so that a mistyped frame
-//! rate is refused and does not fill memory or disk first.
+//! Checks before any work that a result fits into memory or on the disk, so that a mistyped frame rate
+//! is refused.
 
 use std::path::Path;
 
 use glam::Quat;
-use tumble::{Frames, Timeline, TrackSet};
+use tumble::{SampleTimes, Timeline, TrackSet};
 
 use crate::messages::exit::{Failure, USAGE};
 use crate::messages::words;
@@ -14,7 +14,7 @@ use crate::messages::words;
 pub(crate) fn in_memory(
     name: &str,
     set: &TrackSet,
-    frames: &Frames,
+    frames: &SampleTimes,
     copies: usize,
 ) -> Result<Timeline, Failure> {
     let tracks = set.track_count();
@@ -36,13 +36,13 @@ pub(crate) fn in_memory(
 
 /// Refuses more samples than anybody waits for, or sees in a picture.
 pub(crate) fn to_draw(name: &str, samples: usize) -> Result<(), Failure> {
-    const MOST: usize = 1 << 24;
-    match samples <= MOST {
+    const MAX_DRAWN: usize = 1 << 24;
+    match samples <= MAX_DRAWN {
         true => Ok(()),
         false => Err(Failure::new(
             USAGE,
             format!(
-                "{name}: {} are more than the {MOST} that are drawn; ask for fewer (--fps, --start, \
+                "{name}: {} are more than the {MAX_DRAWN} that are drawn; ask for fewer (--fps, --start, \
                  --end)",
                 words::count(samples, "frame")
             ),
@@ -79,8 +79,7 @@ fn too_large(name: &str, tracks: usize, samples: usize, bytes: f64, limit: &str)
     )
 }
 
-/// What Linux says programs can still take; unknown elsewhere, and then only the
-/// library's own limits hold.
+/// The memory that Linux reports as available; unknown elsewhere, where only the library's limits apply.
 fn available_memory() -> Option<f64> {
     let text = std::fs::read_to_string("/proc/meminfo").ok()?;
     let line = text

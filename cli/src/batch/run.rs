@@ -1,5 +1,5 @@
-//! Many inputs into a directory of results: the next one is read while one is evaluated,
-//! and the manifest is kept.
+//! Many inputs into a directory of results: the next input is read while one is evaluated, and results
+//! are recorded in the manifest.
 
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
@@ -9,61 +9,61 @@ use std::thread;
 use tumble_formats::Loaded;
 
 use crate::arguments::input;
+use crate::batch::destination::WrittenFile;
 use crate::batch::digest::InputFile;
-use crate::batch::manifest::{Entry, Previous, kernels_sha256};
-use crate::batch::output::Target;
-use crate::batch::place::Written;
+use crate::batch::manifest::{ManifestEntry, PreviousEntries, kernels_sha256};
+use crate::batch::output::ResultTarget;
 use crate::messages::exit::{DEVICE, Failure, for_all};
 use crate::messages::{signals, words};
 
-/// How a batch is done.
+/// The options of a batch.
 pub(crate) struct Batch<R> {
     /// Reads an input.
     pub(crate) read: R,
-    /// The longest input that it reads: a longer one is refused, and not hashed before.
-    pub(crate) most: u64,
-    /// All that decides over a result besides its input.
+    /// The longest input that `read` accepts: longer ones are not hashed.
+    pub(crate) max_bytes: u64,
+    /// Everything that determines a result besides its input.
     pub(crate) options: String,
     /// Results that are done are skipped.
     pub(crate) resume: bool,
 }
 
-/// An input that was read; nothing where its result is there, and whole.
-type Input = Option<Read>;
+/// An input that was read; `None` where its result exists and is complete.
+type Input = Option<ReadInput>;
 
-struct Read {
+struct ReadInput {
     file: InputFile,
     loaded: Result<Loaded, Failure>,
 }
 
-/// A result that has yet to get its name, who computed it, and what to say of it.
-pub(crate) struct Evaluated {
-    pub(crate) written: Written,
+/// A result that still has its temporary name, the device that computed it, and the message about it.
+pub(crate) struct EvaluatedResult {
+    pub(crate) written: WrittenFile,
     pub(crate) device: String,
-    pub(crate) told: String,
+    pub(crate) message: String,
 }
 
-/// Takes each result as it is whole, with the name that the manifest gives it.
-pub(crate) type Done<'a> = dyn FnMut(&str, Evaluated) -> Result<(), Failure> + 'a;
+/// Accepts each complete result, with its name in the manifest.
+pub(crate) type ResultCallback<'a> = dyn FnMut(&str, EvaluatedResult) -> Result<(), Failure> + 'a;
 
-/// Who remembers what a batch has made.
-pub(crate) trait Records {
-    /// What was there before.
-    fn previous(&self) -> Previous;
+/// Records the results of a batch.
+pub(crate) trait ResultRecorder {
+    /// The results recorded before this batch.
+    fn previous(&self) -> PreviousEntries;
 
-    /// A result is whole and gets its name, now or with others.
-    fn keep(&mut self, entry: Entry, written: Written) -> Result<(), Failure>;
+    /// Records a complete result, which is renamed now or together with others.
+    fn keep(&mut self, entry: ManifestEntry, written: WrittenFile) -> Result<(), Failure>;
 
-    /// A result, or those of all clips in its place, are there from before.
+    /// A result, or the results of its clips, exist already.
     fn skip(&mut self, _output: &str) {}
 
-    /// An input has no result, and the batch goes on.
+    /// An input failed; the batch continues.
     fn refuse(&mut self, _path: &Path, _failure: &Failure) {}
 
-    /// Where results are listed.
+    /// The file that lists the results.
     fn list(&self) -> PathBuf;
 
-    /// Says something to people.
+    /// Prints a message.
     fn tell(&self, text: &str) {
         words::note(text);
     }
@@ -72,10 +72,15 @@ pub(crate) trait Records {
 impl<R: Fn(&Path) -> Result<Loaded, Failure> + Sync> Batch<R> {
     pub(crate) fn run(
         &self,
-        jobs: &[(PathBuf, Target)],
+        jobs: &[(PathBuf, ResultTarget)],
         refused: Vec<Failure>,
-        records: &mut impl Records,
-        mut evaluate: impl FnMut(&InputFile, &Loaded, &Target, &mut Done<'_>) -> Result<(), Failure>,
+        records: &mut impl ResultRecorder,
+        mut evaluate: impl FnMut(
+            &InputFile,
+            &Loaded,
+            &ResultTarget,
+            &mut ResultCallback<'_>,
+        ) -> Result<(), Failure>,
     ) -> Result<(), Failure> {
         let previous = records.previous();
         let mut skipped = 0;
@@ -83,7 +88,7 @@ impl<R: Fn(&Path) -> Result<Loaded, Failure> + Sync> Batch<R> {
         let inputs = failed + jobs.len();
         let mut made = HashSet::new();
         let outcome = thread::scope(|scope| {
-            // One is waiting at most: two sets are in memory.
+            // At most one input waits, so that at most two are in memory.
             let (hand_over, inputs) = sync_channel(0);
             let reader = thread::Builder::new()
                 .spawn_scoped(scope, move || self.read_all(jobs, &previous, &hand_over));
@@ -92,11 +97,13 @@ impl<R: Fn(&Path) -> Result<Loaded, Failure> + Sync> Batch<R> {
                     format!("the system refuses a thread: {error}; allow more (ulimit -u)");
                 return Err(Failure::new(DEVICE, message));
             }
-            let mut make = |path: &Path, target: &Target, records: &mut dyn Records| {
+            let mut make = |path: &Path,
+                            target: &ResultTarget,
+                            records: &mut dyn ResultRecorder| {
                 if let Some(stop) = signals::stopped() {
                     return Err(stop);
                 }
-                let Some((file, loaded)) = taken(&inputs)? else {
+                let Some((file, loaded)) = next_input(&inputs)? else {
                     skipped += 1;
                     records.skip(target.name());
                     return Ok(());
@@ -113,7 +120,7 @@ impl<R: Fn(&Path) -> Result<Loaded, Failure> + Sync> Batch<R> {
                         )));
                     }
                     let digest = evaluated.written.digest.take().unwrap_or_default();
-                    let entry = Entry {
+                    let entry = ManifestEntry {
                         output: name.to_owned(),
                         output_bytes: digest.bytes(),
                         output_sha256: digest.finish(),
@@ -126,7 +133,7 @@ impl<R: Fn(&Path) -> Result<Loaded, Failure> + Sync> Batch<R> {
                         one_of: (name != target.name()).then(|| (target.name().to_owned(), clips)),
                     };
                     records.keep(entry, evaluated.written)?;
-                    records.tell(&evaluated.told);
+                    records.tell(&evaluated.message);
                     Ok(())
                 })
             };
@@ -139,44 +146,44 @@ impl<R: Fn(&Path) -> Result<Loaded, Failure> + Sync> Batch<R> {
                 })
             })
         });
-        // The last line of many: what it came to, and where that stands.
+        // The summary of a batch of several inputs.
         if inputs > 1 || skipped > 0 {
             let list = records.list();
-            let mut told = vec![format!("{} made", words::count(made.len(), "result"))];
+            let mut parts = vec![format!("{} made", words::count(made.len(), "result"))];
             if skipped > 0 {
                 let results = words::count(skipped, "result");
-                told.push(format!("{results} skipped (done before, and whole)"));
+                parts.push(format!("{results} skipped (done before, and whole)"));
             }
             if failed > 0 {
-                told.push(format!("{} failed", words::count(failed, "input")));
+                parts.push(format!("{} failed", words::count(failed, "input")));
             }
-            let told = told.join(", ");
+            let summary = parts.join(", ");
             records.tell(&match list.exists() || !made.is_empty() {
-                true => format!("{told}; listed in {}", list.display()),
-                false => told,
+                true => format!("{summary}; listed in {}", list.display()),
+                false => summary,
             });
         }
         outcome
     }
 
-    /// Reads the inputs one by one; stops when nobody takes them any more.
+    /// Reads the inputs one by one; stops when the receiver is gone.
     fn read_all(
         &self,
-        jobs: &[(PathBuf, Target)],
-        previous: &Previous,
+        jobs: &[(PathBuf, ResultTarget)],
+        previous: &PreviousEntries,
         hand_over: &SyncSender<Input>,
     ) {
         for (path, target) in jobs {
             let file = InputFile::new(path);
             let is_done = |hash: &str| previous.is_done(target.name(), hash, &self.options);
             // The hash is of the bytes that are read next.
-            let is_read = std::fs::metadata(path).is_ok_and(|found| found.len() <= self.most);
+            let is_read = std::fs::metadata(path).is_ok_and(|found| found.len() <= self.max_bytes);
             let sha256 = is_read.then(|| file.sha256()).flatten();
             let done = self.resume && sha256.is_some_and(is_done);
             let input = (!done).then(|| {
                 let loaded = (self.read)(path);
                 let loaded = loaded.and_then(|loaded| file.check_unchanged().map(|()| loaded));
-                Read { file, loaded }
+                ReadInput { file, loaded }
             });
             if hand_over.send(input).is_err() {
                 return;
@@ -185,13 +192,13 @@ impl<R: Fn(&Path) -> Result<Loaded, Failure> + Sync> Batch<R> {
     }
 }
 
-/// The next input and its hash, when it has to be evaluated; says its warnings.
-fn taken(inputs: &Receiver<Input>) -> Result<Option<(InputFile, Loaded)>, Failure> {
+/// The next input and its hash, if it has to be evaluated; prints its warnings.
+fn next_input(inputs: &Receiver<Input>) -> Result<Option<(InputFile, Loaded)>, Failure> {
     let input = inputs.recv().expect("the reader hands over every input");
-    let Some(Read { file, loaded }) = input else {
+    let Some(ReadInput { file, loaded }) = input else {
         return Ok(None);
     };
     let loaded = loaded?;
-    input::tell_warnings(&loaded);
+    input::print_warnings(&loaded);
     Ok(Some((file, loaded)))
 }

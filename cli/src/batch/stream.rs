@@ -9,27 +9,31 @@ use crate::batch::digest::Digest;
 use crate::messages::progress::Progress;
 use crate::messages::signals;
 
-/// A progress bar, and how far some bytes move it.
-pub(crate) type Measured = (Progress, fn(&[u8]) -> u64);
+/// A progress bar, and by how much bytes advance it.
+pub(crate) type MeasuredProgress = (Progress, fn(&[u8]) -> u64);
 
-pub(crate) struct Stream {
+pub(crate) struct OutputStream {
     output: Output,
-    progress: Option<Measured>,
+    progress: Option<MeasuredProgress>,
     digest: Option<Digest>,
     /// Kept here because writers wrap the error in one of their own kind.
     broken_pipe: bool,
 }
 
-/// What a stream leaves behind.
-pub(crate) struct Ended {
+/// A stream that has ended.
+pub(crate) struct FinishedStream {
     pub(crate) output: Output,
     pub(crate) digest: Option<Digest>,
     /// Its reader went away.
     pub(crate) broken_pipe: bool,
 }
 
-impl Stream {
-    pub(crate) fn new(output: Output, progress: Option<Measured>, digest: Option<Digest>) -> Self {
+impl OutputStream {
+    pub(crate) fn new(
+        output: Output,
+        progress: Option<MeasuredProgress>,
+        digest: Option<Digest>,
+    ) -> Self {
         Self {
             output,
             progress,
@@ -38,8 +42,8 @@ impl Stream {
         }
     }
 
-    pub(crate) fn end(self) -> Ended {
-        Ended {
+    pub(crate) fn end(self) -> FinishedStream {
+        FinishedStream {
             output: self.output,
             digest: self.digest,
             broken_pipe: self.broken_pipe,
@@ -54,7 +58,7 @@ impl Stream {
     }
 }
 
-impl Write for Stream {
+impl Write for OutputStream {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         if signals::stopped().is_some() {
             // Not `Interrupted`, which would be tried again.

@@ -1,4 +1,4 @@
-//! `tumble check`: are the results of a batch still what they were?
+//! `tumble check`: have the results of a batch changed?
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -7,14 +7,14 @@ use clap::Args;
 use rayon::prelude::*;
 
 use crate::batch::digest;
-use crate::batch::manifest::{Entry, Lines, NAME};
-use crate::batch::shards::merge::Progress;
-use crate::batch::shards::plan::Stated;
+use crate::batch::manifest::{ManifestEntry, ManifestLines, NAME};
+use crate::batch::shards::merge::ShardProgress;
+use crate::batch::shards::plan::RecordedPlan;
 use crate::batch::shards::record;
 use crate::messages::exit::{ALL_INPUTS, DIFFERENCE, Failure};
 use crate::messages::progress::busy;
 use crate::messages::words;
-use crate::together::on_threads;
+use crate::threads::on_threads;
 
 /// Check results against the manifest of their directory, bit for bit
 #[derive(Debug, Args)]
@@ -39,19 +39,19 @@ enum Fault {
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let given = &arguments.manifest;
-    let path = if given.is_dir() {
-        given.join(NAME)
+    let manifest = &arguments.manifest;
+    let path = if manifest.is_dir() {
+        manifest.join(NAME)
     } else {
-        given.clone()
+        manifest.clone()
     };
     let shown = path.display();
     let folder = path.parent().unwrap_or(Path::new(""));
-    let shards = Stated::read(folder)?;
+    let shards = RecordedPlan::read(folder)?;
     // A pipe or a device may have no end.
     let read = match std::fs::metadata(&path) {
         Ok(found) if !found.is_file() => {
-            let message = format!("{shown}: is no manifest; `tumble eval` writes one, {NAME}");
+            let message = format!("{shown}: is not a manifest; `tumble eval` writes one, {NAME}");
             return Err(Failure::new(ALL_INPUTS, message));
         }
         _ => std::fs::read(&path),
@@ -65,18 +65,18 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
             )
         })?,
     };
-    let Lines {
+    let ManifestLines {
         mut entries,
         damaged,
-    } = Lines::parse(&bytes);
+    } = ManifestLines::parse(&bytes);
     if shards.is_some() {
         entries.extend(record::entries(folder));
     } else if entries.is_empty() {
-        let message = format!("{shown}: is no manifest; `tumble eval` writes one, {NAME}");
+        let message = format!("{shown}: is not a manifest; `tumble eval` writes one, {NAME}");
         return Err(Failure::new(ALL_INPUTS, message));
     }
-    let entries: Vec<Entry> = entries.into_values().collect();
-    let faults: Vec<(&Entry, Fault)> = busy("checking", || {
+    let entries: Vec<ManifestEntry> = entries.into_values().collect();
+    let faults: Vec<(&ManifestEntry, Fault)> = busy("checking", || {
         let faulty = |entry| fault(folder, entry).map(|fault| (entry, fault));
         on_threads(
             || entries.par_iter().filter_map(faulty).collect(),
@@ -87,7 +87,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         let output = folder.join(&entry.output);
         let output = output.display();
         words::error(&match fault {
-            Fault::Damaged => format!("{output}: other bits than when it was written"),
+            Fault::Damaged => format!("{output}: its bits have changed since it was written"),
             Fault::Unreadable(error) => format!("{output}: cannot be read: {error}"),
         });
     }
@@ -106,22 +106,22 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         return Err(Failure::new(DIFFERENCE, message));
     }
     words::listing(&format!("{total}, every bit as written\n"))?;
-    match shards.map(|stated| Progress::of(folder, &stated)) {
+    match shards.map(|recorded| ShardProgress::of(folder, &recorded)) {
         None => Ok(()),
         Some(progress) => Err(Failure::new(DIFFERENCE, unmerged(folder, &progress))),
     }
 }
 
 /// What is yet to do in a directory with shards.
-fn unmerged(folder: &Path, progress: &Progress) -> String {
-    let (folder, told) = (folder.display(), progress.told());
+fn unmerged(folder: &Path, progress: &ShardProgress) -> String {
+    let (folder, summary) = (folder.display(), progress.summary());
     match progress.is_done() {
-        true => format!("{folder}: {told}; `tumble merge {folder}` makes them one"),
-        false => format!("{folder}: {told}; --resume makes the others"),
+        true => format!("{folder}: {summary}; `tumble merge {folder}` makes them one"),
+        false => format!("{folder}: {summary}; --resume makes the others"),
     }
 }
 
-fn fault(folder: &Path, entry: &Entry) -> Option<Fault> {
+fn fault(folder: &Path, entry: &ManifestEntry) -> Option<Fault> {
     let (bytes, sha256) = (entry.output_bytes, &entry.output_sha256);
     match digest::is_whole(folder, &entry.output, bytes, sha256) {
         Ok(true) => None,

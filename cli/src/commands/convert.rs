@@ -7,30 +7,30 @@ use clap::Args;
 use tumble::{Device, Engine, EulerSequence};
 use tumble_formats::format::{Document, FormatOption, MotionOptions};
 use tumble_formats::keyed::keyed;
-use tumble_formats::motion::{Motion, Sampled};
+use tumble_formats::motion::{Motion, SampledClip};
 use tumble_formats::sample::Samples;
 use tumble_formats::trim::{TrimError, trim};
 use tumble_formats::{Feature, Loaded};
 
-use crate::arguments::given::Given;
+use crate::arguments::command_line::CommandLine;
 use crate::arguments::input::{self, Inputs};
-use crate::arguments::results::{Results, check_sequence, each_file, kept};
+use crate::arguments::output::{OrderArgument, sequence};
+use crate::arguments::results::{ResultArguments, check_sequence, document_to_rewrite, each_file};
 use crate::arguments::time::{check_range, finite_seconds};
-use crate::arguments::what::{OrderArgument, sequence};
-use crate::batch::output::Target;
-use crate::batch::place::Written;
-use crate::batch::run::Evaluated;
+use crate::batch::destination::WrittenFile;
+use crate::batch::output::ResultTarget;
+use crate::batch::run::EvaluatedResult;
 use crate::messages::exit::{ALL_INPUTS, Failure};
 use crate::messages::words;
 
 /// Write the keys of motion files in another format, at their own times
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Nothing is sampled: keys stay what and when they are. A file whose channels have keys at
-different times goes through `tumble eval --fps`, unless its format holds such. --start and --end
-cut: a channel that goes over a cut gets a key there, on its curve, so that steps, lines and arcs stay
-as they are; a smooth curve, which depends on keys beyond the cut too, changes beside it. A file of the
-same format keeps all else that it holds; --tracks and --animation make a new one of what they name.
+Nothing is sampled: keys keep their values and their times. If channels have keys at different times
+and the output format cannot store that, use `tumble eval --fps`. --start and --end cut: a channel
+that crosses a cut gets a key there, on its curve, so that steps, lines and arcs do not change; a smooth
+curve, which depends on keys outside the cut too, changes near it. An output of the input's format keeps
+everything else in the file; --tracks and --animation make a new file of the selection.
 
 Examples:
   tumble convert walk.bvh -o walk.glb
@@ -40,11 +40,11 @@ Examples:
   tumble convert walk.npz --up y --scale 100 -o walk.bvh")]
 pub(crate) struct Arguments {
     #[command(flatten)]
-    given: Given,
+    command_line: CommandLine,
     #[command(flatten)]
     inputs: Inputs,
     #[command(flatten)]
-    results: Results,
+    results: ResultArguments,
     /// Where to start, seconds [default: the first key]
     #[arg(long, value_name = "SECONDS", value_parser = finite_seconds, allow_hyphen_values = true)]
     start: Option<f64>,
@@ -63,14 +63,14 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     check_range(arguments.start, arguments.end)?;
     let files = arguments.inputs.gather(false)?;
     let plan = arguments.results.plan(&files)?;
-    let no_motion = |target: &&Target| !target.format().writes_clips();
+    let no_motion = |target: &&ResultTarget| !target.format().writes_clips();
     if let Some(target) = plan.targets.iter().find(no_motion) {
         let format = target.format().name;
         return Err(Failure::usage(format!(
             "{target}: {format} holds results of `tumble eval`, not keys"
         )));
     }
-    let format = plan.targets.first().map(Target::format);
+    let format = plan.targets.first().map(ResultTarget::format);
     if let Some(format) = format.filter(|format| !format.takes(FormatOption::Order))
         && arguments.order.is_some()
     {
@@ -80,7 +80,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         )));
     }
     check_sequence(arguments.sequence, format)?;
-    let options = format!("convert {}", arguments.given.options());
+    let options = format!("convert {}", arguments.command_line.options());
     let results = &arguments.results;
     results.make(
         &arguments.inputs,
@@ -88,7 +88,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         options,
         |file, loaded, target, done| {
             let path = file.path();
-            let convert = |name: &str, clips: &[&Motion], target: &Target| {
+            let convert = |name: &str, clips: &[&Motion], target: &ResultTarget| {
                 arguments.convert(name, (clips, loaded), target)
             };
             each_file(&input::name(path), (path, loaded), target, done, convert)
@@ -97,7 +97,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
 }
 
 impl Arguments {
-    /// The part of a clip that is asked for.
+    /// The requested part of a clip.
     fn part<'a>(&self, name: &str, clip: &'a Motion) -> Result<Cow<'a, Motion>, Failure> {
         let clip = self.inputs.tracks.select_with_ancestors(clip, name)?;
         let Some((first, last)) = clip.set.time_span() else {
@@ -121,10 +121,10 @@ impl Arguments {
         &self,
         name: &str,
         (clips, loaded): (&[&Motion], &Loaded),
-        target: &Target,
-    ) -> Result<Evaluated, Failure> {
+        target: &ResultTarget,
+    ) -> Result<EvaluatedResult, Failure> {
         let started = Instant::now();
-        let document = kept(name, loaded, target, self.makes_new(target));
+        let document = document_to_rewrite(name, loaded, target, self.makes_new(target));
         let parts = clips.iter().map(|&clip| self.part(name, clip));
         let parts: Vec<Cow<'_, Motion>> = parts.collect::<Result<_, Failure>>()?;
         let is_whole = (self.start, self.end) == (None, None);
@@ -141,26 +141,26 @@ impl Arguments {
             }
             None => write(name, &parts, document, options, target)?,
         };
-        let told = format!(
+        let message = format!(
             "{name}: {}, {} in {} → {target}",
             words::count(parts.len(), "clip"),
             words::count(parts.iter().map(|clip| clip.key_count()).sum(), "key"),
             words::duration(started.elapsed()),
         );
-        Ok(Evaluated {
+        Ok(EvaluatedResult {
             written,
             device: "none".to_owned(),
-            told,
+            message,
         })
     }
 
-    /// What makes a new file, where an input is not kept.
-    fn makes_new(&self, target: &Target) -> Option<&'static str> {
-        let several = target.format().holds(Feature::SeveralClips);
-        if self.inputs.tracks.is_given() {
+    /// The reason for a new file, where the input is not rewritten.
+    fn makes_new(&self, target: &ResultTarget) -> Option<&'static str> {
+        let several = target.format().supports(Feature::SeveralClips);
+        if self.inputs.tracks.is_set() {
             return Some("some tracks make");
         }
-        (self.inputs.reading.chooses() && several).then_some("one animation makes")
+        (self.inputs.reading.chooses_animation() && several).then_some("one animation makes")
     }
 }
 
@@ -170,15 +170,15 @@ fn write(
     clips: &[Cow<'_, Motion>],
     document: Option<&dyn Document>,
     options: MotionOptions,
-    target: &Target,
-) -> Result<Written, Failure> {
+    target: &ResultTarget,
+) -> Result<WrittenFile, Failure> {
     // A format that has keys of each channel at times of their own keeps them, where channels differ.
-    let has_own_keys = target.format().holds(Feature::OwnTimes);
+    let keys_per_channel = target.format().supports(Feature::TimesPerChannel);
     let mut keys: Vec<(Samples, bool)> = Vec::new();
     for clip in clips {
         let samples = match keyed(clip) {
-            Ok(samples) if document.is_none() || !has_own_keys => (samples, false),
-            Err(error) if !has_own_keys || clip.is_world => {
+            Ok(samples) if document.is_none() || !keys_per_channel => (samples, false),
+            Err(error) if !keys_per_channel || clip.is_world => {
                 return Err(Failure::new(ALL_INPUTS, format!("{name}: {error}")));
             }
             _ => {
@@ -191,24 +191,24 @@ fn write(
         keys.push(samples);
     }
     // Formats of frames need a rate; others have the times.
-    let has_times = target.format().holds(Feature::UnevenTimes);
+    let has_times = target.format().supports(Feature::UnevenTimes);
     let rate = |clip: &Motion| match has_times {
         true => clip.rate,
         false => clip.rate.or_else(|| clip.rate_of_keys()),
     };
     let notes = [("input", name.to_owned())];
-    let sampled = (clips.iter().zip(&keys)).map(|(clip, (samples, of_own_keys))| Sampled {
-        of_own_keys: *of_own_keys,
+    let sampled = (clips.iter().zip(&keys)).map(|(clip, (samples, per_channel))| SampledClip {
+        is_at_keys: *per_channel,
         ..samples.of(clip, rate(clip), &notes)
     });
     match document {
         Some(document) => {
-            let places = clips.iter().map(|clip| clip.place);
-            let clips: Vec<(usize, Sampled<'_>)> = places.zip(sampled).collect();
+            let indices = clips.iter().map(|clip| clip.index);
+            let clips: Vec<(usize, SampledClip<'_>)> = indices.zip(sampled).collect();
             target.write_motion(|out| document.write(&clips, &options, target.path(), out))
         }
         None => {
-            let clips: Vec<Sampled<'_>> = sampled.collect();
+            let clips: Vec<SampledClip<'_>> = sampled.collect();
             let written =
                 target.write_motion(|out| target.format().write_clips(&clips, &options, out))?;
             target.write_times(&clips)?;

@@ -28,27 +28,27 @@ pub(crate) struct Arguments {
 struct Listing {
     /// Why there is no Vulkan device.
     no_vulkan: Option<String>,
-    devices: Vec<Entry>,
+    devices: Vec<DeviceEntry>,
 }
 
 #[derive(Serialize)]
-struct Entry {
-    /// What `--device` takes.
+struct DeviceEntry {
+    /// Its index for `--device`.
     index: usize,
     #[serde(flatten)]
     info: DeviceInfo,
     /// It opens, and no self-test and no kernel that was checked differs.
     exact: bool,
     self_tests: Vec<SelfTestReport>,
-    kernels: Kernels,
+    kernels: KernelSummary,
     /// Why it could not be opened.
     error: Option<String>,
 }
 
-/// How many kernels there are for a device, and what is known of them.
+/// The kernels of a device: how many there are, and the results of their checks.
 #[derive(Default, Serialize)]
-struct Kernels {
-    /// Those that the device may be given.
+struct KernelSummary {
+    /// Those that may run on the device.
     all: usize,
     /// Those that have the CPU's bits on it: checked now, or known from before.
     exact: usize,
@@ -56,7 +56,7 @@ struct Kernels {
     differing: Vec<KernelCheck>,
 }
 
-impl Kernels {
+impl KernelSummary {
     fn of(engine: &Engine, check: bool) -> Result<Self, tumble::Error> {
         let checks = match check {
             true => engine.check_kernels()?,
@@ -98,7 +98,7 @@ impl Listing {
             Ok(devices) => {
                 let entries = devices.into_iter().enumerate();
                 let devices = entries
-                    .filter_map(|(i, device)| Entry::new(i, device, check))
+                    .filter_map(|(i, device)| DeviceEntry::new(i, device, check))
                     .collect();
                 Self {
                     no_vulkan: None,
@@ -125,7 +125,7 @@ impl Listing {
     }
 }
 
-impl Entry {
+impl DeviceEntry {
     /// Opens the device, exact or not.
     fn new(index: usize, device: Device, check: bool) -> Option<Self> {
         let Device::Vulkan(vulkan) = &device else {
@@ -135,12 +135,16 @@ impl Entry {
         let mut options = EngineOptions::default();
         options.allow_inexact = true;
         let opened = Engine::with_options(device, &options).and_then(|engine| {
-            let kernels = Kernels::of(&engine, check)?;
+            let kernels = KernelSummary::of(&engine, check)?;
             Ok((engine.self_tests().to_vec(), kernels))
         });
         let (self_tests, kernels, error) = match opened {
             Ok((self_tests, kernels)) => (self_tests, kernels, None),
-            Err(error) => (Vec::new(), Kernels::default(), Some(error.to_string())),
+            Err(error) => (
+                Vec::new(),
+                KernelSummary::default(),
+                Some(error.to_string()),
+            ),
         };
         let exact = error.is_none()
             && self_tests.iter().all(|check| check.differing == 0)
@@ -198,7 +202,7 @@ impl Entry {
             .collect();
         if failed.is_empty() {
             let results: usize = self.self_tests.iter().map(|check| check.total).sum();
-            let Kernels { all, exact, .. } = self.kernels;
+            let KernelSummary { all, exact, .. } = self.kernels;
             let kernels = match exact == all {
                 true => format!("all {all} kernels are exact"),
                 false => format!(

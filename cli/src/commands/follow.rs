@@ -5,27 +5,27 @@ use std::time::Instant;
 
 use clap::{ArgAction, Args};
 use glam::Vec3;
-use tumble::{Engine, Error, Follow, FollowError, Followed, Frames, Layout, TrackSet};
-use tumble_formats::motion::{Joint, Motion, Sampled, Transform};
+use tumble::{Engine, Error, Follow, FollowError, Followed, Layout, SampleTimes, TrackSet};
+use tumble_formats::motion::{Joint, Motion, SampledClip, Transform};
 use tumble_formats::poses::{Poses, WORLD};
-use tumble_formats::sample::Samples as Baked;
+use tumble_formats::sample::Samples;
 use tumble_formats::{Limits, Loaded};
 
-use crate::arguments::device::{DeviceArguments, Opened};
-use crate::arguments::gather::Gathered;
-use crate::arguments::given::Given;
+use crate::arguments::command_line::CommandLine;
+use crate::arguments::device::{DeviceArguments, OpenedDevice};
+use crate::arguments::gather::GatheredInputs;
 use crate::arguments::input;
 use crate::arguments::path::PathArguments;
-use crate::arguments::results::Results;
-use crate::arguments::time::{Samples, Sampling};
-use crate::batch::output::Target;
-use crate::batch::place::Written;
+use crate::arguments::results::ResultArguments;
+use crate::arguments::time::{SampleRequest, SamplingArguments};
+use crate::batch::destination::WrittenFile;
+use crate::batch::output::ResultTarget;
 use crate::batch::room;
-use crate::batch::run::Evaluated;
+use crate::batch::run::EvaluatedResult;
 use crate::messages::exit::{ALL_INPUTS, Failure};
 use crate::messages::words;
 
-/// Move bodies along paths: where each is at every frame, and which way it faces
+/// Move bodies along paths: the position and the orientation of each at every frame
 #[derive(Debug, Args)]
 #[command(
     mut_arg("path_method", |arg| arg.long("method").short('m')),
@@ -38,7 +38,7 @@ use crate::messages::words;
     })
 )]
 #[command(after_help = "\
-A path is CSV with the header `t,x,y,z` and, where wanted, `ux,uy,uz` (an upward direction at a
+A path is CSV with the header `t,x,y,z` and, optionally, `ux,uy,uz` (the upward direction at a
 point; it may be blank), or NPY of shape (tracks, points, 3). Without times --seconds or --rate says
 how long it takes. The result is float32 (float64 of positions far from 0, such as those of maps) of
 shape (frames, tracks, 7), x y z of the position and x y z w of the rotation, in NPY or CSV; or a clip of a motion file. CPU and Vulkan give the same bits.
@@ -52,14 +52,14 @@ Examples:
   tumble follow orbit.csv --direction at:0,1,0 --frame fixed -o camera.glb")]
 pub(crate) struct Arguments {
     #[command(flatten)]
-    given: Given,
+    command_line: CommandLine,
     /// Paths: CSV or NPY files, directories of them, or patterns (`-`: standard input)
     #[arg(required = true, value_name = "PATH")]
     paths: Vec<PathBuf>,
     #[command(flatten)]
-    results: Results,
+    results: ResultArguments,
     #[command(flatten)]
-    sampling: Sampling,
+    sampling: SamplingArguments,
     #[command(flatten)]
     path: PathArguments,
     #[command(flatten)]
@@ -67,7 +67,7 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let inputs = Gathered::new(&arguments.paths, None)?;
+    let inputs = GatheredInputs::new(&arguments.paths, None)?;
     let samples = arguments.sampling.samples()?;
     let plan = arguments.results.plan(&inputs)?;
     let mut device = arguments.device.open()?;
@@ -77,43 +77,48 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     };
     let options = arguments.options(&samples);
     let results = &arguments.results;
-    let most = Limits::default().file;
-    results.make_of((read, most), plan, options, |file, loaded, target, done| {
-        let path = file.path();
-        for clip in &loaded.clips {
-            let made = arguments.body(path, clip, &samples, target, &mut device)?;
-            done(target.name(), made)?;
-        }
-        Ok(())
-    })
+    let max_bytes = Limits::default().file;
+    results.make_of(
+        (read, max_bytes),
+        plan,
+        options,
+        |file, loaded, target, done| {
+            let path = file.path();
+            for clip in &loaded.clips {
+                let made = arguments.body(path, clip, &samples, target, &mut device)?;
+                done(target.name(), made)?;
+            }
+            Ok(())
+        },
+    )
 }
 
 impl Arguments {
     /// All that decides over the bytes of a result besides its input.
-    fn options(&self, samples: &Samples) -> String {
+    fn options(&self, samples: &SampleRequest) -> String {
         let times = samples.digest();
-        format!("follow {} times={times}", self.given.options())
+        format!("follow {} times={times}", self.command_line.options())
     }
 
-    /// The bodies on the paths of one file, written.
+    /// Evaluates and writes the bodies on the paths of one file.
     fn body(
         &self,
         path: &Path,
         paths: &Motion,
-        samples: &Samples,
-        target: &Target,
-        device: &mut Opened,
-    ) -> Result<Evaluated, Failure> {
+        samples: &SampleRequest,
+        target: &ResultTarget,
+        device: &mut OpenedDevice,
+    ) -> Result<EvaluatedResult, Failure> {
         let started = Instant::now();
         let (name, set) = (input::name(path), &paths.set);
         let [frame] = self.path.frames()[..] else {
-            return Err(Failure::usage("a body is followed in one frame at a time"));
+            return Err(Failure::usage("give a single --frame"));
         };
         let follow = self.path.follow(paths, &name, frame)?;
         let frames = samples.of(set, &name);
         let found = followed(device, &name, set, &follow, &frames)?;
         let written = write(paths, &frames, samples, &found, target, &name)?;
-        let told = format!(
+        let message = format!(
             "{name}: {} × {}, {}, on {} in {} → {target}",
             words::count(set.track_count(), "track"),
             words::count(found.rotations.samples(), "frame"),
@@ -121,21 +126,21 @@ impl Arguments {
             device.label,
             words::duration(started.elapsed()),
         );
-        Ok(Evaluated {
+        Ok(EvaluatedResult {
             written,
             device: device.label.clone(),
-            told,
+            message,
         })
     }
 }
 
-/// Where the bodies of a set are at some frames, `[frame][track]`; warnings are said.
+/// The bodies of a set at some frames, `[frame][track]`; prints warnings.
 pub(crate) fn followed(
-    device: &mut Opened,
+    device: &mut OpenedDevice,
     name: &str,
     set: &TrackSet,
     follow: &Follow,
-    frames: &Frames,
+    frames: &SampleTimes,
 ) -> Result<Followed, Failure> {
     let timeline = room::in_memory(name, set, frames, 6)?;
     let work = |engine: &Engine| engine.follow(set, follow, frames, Layout::FrameMajor);
@@ -149,7 +154,7 @@ pub(crate) fn followed(
     Ok(found)
 }
 
-/// What a path is refused for is the input's fault.
+/// A path that is refused is the fault of the input.
 fn failed(name: &str, error: &Error) -> Failure {
     match error {
         Error::Follow(error) => {
@@ -166,23 +171,23 @@ fn failed(name: &str, error: &Error) -> Failure {
 /// Writes positions and rotations: numbers, or a clip with a joint for each body.
 fn write(
     paths: &Motion,
-    frames: &Frames,
-    samples: &Samples,
+    frames: &SampleTimes,
+    samples: &SampleRequest,
     found: &Followed,
-    target: &Target,
+    target: &ResultTarget,
     name: &str,
-) -> Result<Written, Failure> {
+) -> Result<WrittenFile, Failure> {
     let set = &paths.set;
     let timeline = frames
         .resolve(set.track_count(), set.time_span())
         .map_err(|error| Failure::evaluating(name, &error.into()))?;
-    let places = found.positions.as_slice();
+    let positions = found.positions.as_slice();
     let format = target.format();
     if let Some(results) = &format.write {
-        let each = places.iter().zip(found.rotations.as_quats());
-        let numbers = each.flat_map(|(place, turn)| {
-            let [x, y, z, _] = place.to_array();
-            let [a, b, c, d] = turn.to_array();
+        let each = positions.iter().zip(found.rotations.as_quats());
+        let numbers = each.flat_map(|(position, rotation)| {
+            let [x, y, z, _] = position.to_array();
+            let [a, b, c, d] = rotation.to_array();
             [x, y, z, a, b, c, d]
         });
         let numbers: Vec<f32> = numbers.collect();
@@ -200,8 +205,8 @@ fn write(
         rest: Transform::default(),
     };
     let rate = match samples {
-        Samples::Rate { rate, .. } => Some(*rate),
-        Samples::Times(_) | Samples::Keys(_) => None,
+        SampleRequest::Rate { rate, .. } => Some(*rate),
+        SampleRequest::Times(_) | SampleRequest::Keys(_) => None,
     };
     let clip = Motion {
         set: set.clone(),
@@ -210,17 +215,17 @@ fn write(
         origins: paths.origins.clone(),
         ..Motion::default()
     };
-    let samples = Baked {
+    let samples = Samples {
         times: timeline.times(0).collect(),
         rotations: found.rotations.as_quats().to_vec(),
-        translations: places
+        translations: positions
             .iter()
-            .map(|place| Vec3::from_array([place.x, place.y, place.z]))
+            .map(|position| Vec3::from_array([position.x, position.y, position.z]))
             .collect(),
         scales: Vec::new(),
     };
     let notes = [("input", name.to_owned())];
-    let sampled: [Sampled<'_>; 1] = [samples.of(&clip, rate, &notes)];
+    let sampled: [SampledClip<'_>; 1] = [samples.of(&clip, rate, &notes)];
     let options = target.motion_options();
     target.write_motion(|out| format.write_clips(&sampled, &options, out))
 }

@@ -22,7 +22,7 @@ use crate::messages::words;
 /// rarely even to the last bit.
 const EVEN: f64 = 1e-6;
 
-/// Say what is in keyframe files: tracks, keys, times, largest rotation
+/// Show what keyframe files contain: tracks, keys, times, the largest rotation
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -36,7 +36,7 @@ pub(crate) struct Arguments {
     json: bool,
 }
 
-/// What is told of one input; also the form of the JSON.
+/// The report of one input; also the form of the JSON.
 #[derive(Serialize)]
 struct Summary {
     input: String,
@@ -47,7 +47,7 @@ struct Summary {
     /// Of each track that has one.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     names: Vec<String>,
-    /// The track that each track hangs on, for files with a skeleton.
+    /// The parent of each track, for files with a skeleton.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     parents: Vec<Option<usize>>,
     /// Of all tracks together.
@@ -96,12 +96,12 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         let loaded = arguments.inputs.load_quietly(path)?;
         let name = input::name(path);
         let several = loaded.clips.len() + loaded.refused.len() > 1;
-        for (place, clip) in loaded.clips.iter().enumerate() {
+        for (index, clip) in loaded.clips.iter().enumerate() {
             let animation = several.then(|| input::clip_name(clip));
             let clip = arguments.inputs.tracks.select(clip, &name)?;
             let mut summary = Summary::new(name.clone(), animation, &clip, &loaded);
-            // They are those of the file.
-            if place > 0 {
+            // The warnings of the file are listed once.
+            if index > 0 {
                 summary.warnings.clear();
             }
             // Keys that follow a file's curves are none that a method is asked to join.
@@ -118,7 +118,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         for refused in &loaded.refused {
             words::note(&refused.to_string());
         }
-        input::whole(&name, &loaded)
+        input::check_complete(&name, &loaded)
     });
     if arguments.json {
         words::json(&summaries)?;
@@ -137,7 +137,7 @@ pub(crate) struct Steps {
 }
 
 impl Steps {
-    /// Of all tracks; nothing where no track has two keys.
+    /// Of all tracks; `None` where no track has two keys.
     pub(crate) fn of(set: &TrackSet) -> Option<Self> {
         let steps = set.tracks().flat_map(|track| track.times.windows(2));
         let each = steps.map(|times| Self {
@@ -213,8 +213,8 @@ impl Summary {
             let _ = write!(text, ", animation {animation}");
         }
         text.push('\n');
-        let mut line = |what: &str, value: String| {
-            let _ = writeln!(text, "  {what:18} {value}");
+        let mut line = |label: &str, value: String| {
+            let _ = writeln!(text, "  {label:18} {value}");
         };
         line("tracks", self.tracks.to_string());
         line("keys", self.keys.to_string());

@@ -4,12 +4,12 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use crate::batch::shards::merge::{Merged, merge};
+use crate::batch::shards::merge::{MergeSummary, merge};
 use crate::messages::exit::{ALL_INPUTS, Failure, SOME_INPUTS};
 use crate::messages::progress::busy;
 use crate::messages::words;
 
-/// Make one manifest of the shards of a directory
+/// Merge the shards of a directory into one manifest
 #[derive(Debug, Args)]
 #[command(after_help = "\
 `tumble eval LIBRARY -o OUT --shard I/N` leaves OUT/manifest.d. When all shards are done, merging
@@ -28,7 +28,7 @@ pub(crate) struct Arguments {
 
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let folder = &arguments.folder;
-    let Merged {
+    let MergeSummary {
         results,
         shards,
         inputs,

@@ -1,4 +1,4 @@
-//! The commands: a file or a folder each, with its arguments and what it does with them.
+//! The commands: a file or a folder for each, with its arguments and its code.
 
 #[allow(clippy::disallowed_methods)] // workloads to time
 pub(crate) mod bench;

@@ -16,7 +16,7 @@ pub(crate) fn png(out: impl Write, width: u32, height: u32, pixels: &[u8]) -> io
     writer.finish().map_err(io::Error::other)
 }
 
-/// An SVG as pixels, so many for one of its units. Its letters are `DejaVu` Sans.
+/// An SVG as pixels, `scale` for one of its units. Its letters are `DejaVu` Sans.
 pub(crate) fn rasterise(svg: &str, scale: f32) -> io::Result<tiny_skia::Pixmap> {
     let svg = with_letters_as_outlines(svg)?;
     let tree = usvg::Tree::from_str(&svg, &usvg::Options::default()).map_err(io::Error::other)?;

@@ -1,4 +1,4 @@
-//! A driver may end the process that loads it. So a process of its own loads them first.
+//! A driver may end the process that loads it. So a child process loads them first.
 
 use std::ffi::OsString;
 use std::io::Read;
@@ -12,24 +12,24 @@ use tumble::{Device, VulkanError};
 use crate::host;
 use crate::messages::exit::Failure;
 
-/// Load the Vulkan drivers, and say nothing
+/// Load the Vulkan drivers, and print nothing else
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {}
 
 /// The command's name.
 const COMMAND: &str = "probe-drivers";
 
-/// What a process says that has loaded the drivers: one that a driver ended has not come so far.
+/// The output of a process that has loaded the drivers: one that a driver ended has not printed it.
 pub(crate) const LOADED: &str = "tumble: the Vulkan drivers are loaded";
 
-/// More is not read of what it says: as much as a pipe holds.
-const MOST_SAID: u64 = 1 << 16;
+/// The most output that is read from it: as much as a pipe holds.
+const MAX_OUTPUT: u64 = 1 << 16;
 
 /// Seconds that drivers have to answer. Most take tens of milliseconds; cards without the persistence
 /// daemon, and machines with eight of them, take tens of seconds.
 const PATIENCE: u64 = 60;
 
-/// The variable that says how many seconds instead.
+/// The environment variable that overrides it.
 const PATIENCE_VARIABLE: &str = "TUMBLE_DRIVER_SECONDS";
 
 fn patience() -> u64 {
@@ -61,7 +61,7 @@ pub(crate) fn drivers() -> Result<(), VulkanError> {
 /// The command of a front end whose executable is not this program.
 static OTHER_COMMAND: OnceLock<Vec<OsString>> = OnceLock::new();
 
-/// Lets that command load the drivers. What is said first counts.
+/// Sets the command that loads the drivers. Only the first call counts.
 pub(crate) fn set_command(command: Vec<OsString>) {
     let _ = OTHER_COMMAND.set(command);
 }
@@ -78,7 +78,7 @@ fn command() -> Option<Command> {
     Some(command)
 }
 
-/// What became of a process that did not come through.
+/// The error of a process that did not come through.
 fn load_elsewhere(seconds: u64) -> Option<VulkanError> {
     let mut child = command()?
         .stdin(Stdio::null())
@@ -92,9 +92,9 @@ fn load_elsewhere(seconds: u64) -> Option<VulkanError> {
             Ok(Some(status)) => {
                 let mut said = String::new();
                 // A driver may have written much beside it, or left a process that holds the pipe open.
-                let out = child.stdout.take().map(|out| out.take(MOST_SAID));
+                let out = child.stdout.take().map(|out| out.take(MAX_OUTPUT));
                 let _ = out.map(|mut out| out.read_to_string(&mut said));
-                return fate(status, said.contains(LOADED));
+                return failure_of(status, said.contains(LOADED));
             }
             Ok(None) if started.elapsed() < Duration::from_secs(seconds) => {
                 std::thread::sleep(Duration::from_millis(1));
@@ -109,7 +109,7 @@ fn load_elsewhere(seconds: u64) -> Option<VulkanError> {
 }
 
 /// `has_come_through`: a driver may end the process with any status, 0 too.
-fn fate(status: ExitStatus, has_come_through: bool) -> Option<VulkanError> {
+fn failure_of(status: ExitStatus, has_come_through: bool) -> Option<VulkanError> {
     let how = format!("the process that tried ended with {status}");
     (!status.success() || !has_come_through).then_some(VulkanError::Driver { how })
 }

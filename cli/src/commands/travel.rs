@@ -1,11 +1,11 @@
-//! Bodies on paths, sampled for pictures: of files of paths, and of clips whose joints all are roots that
-//! move, as `tumble follow` writes them.
+//! Bodies on paths, sampled for pictures: from files of paths, and from clips whose joints are all
+//! moving roots, as `tumble follow` writes them.
 
 use std::path::{Path, PathBuf};
 
 use clap::Args;
 use glam::{DQuat, DVec3, Quat, Vec3, Vec4};
-use tumble::{Channel, Engine, Error, Frames, Interpolation, Method, TrackSet};
+use tumble::{Channel, Engine, Error, Interpolation, Method, SampleTimes, TrackSet};
 use tumble_formats::motion::Motion;
 use tumble_formats::path::looks_like_paths;
 use tumble_formats::sample::ChannelMethods;
@@ -13,32 +13,32 @@ use tumble_formats::world::{WorldPose, world};
 use tumble_formats::{Code, Diagnostic};
 use tumble_routes::mesh::Mesh;
 
-use crate::arguments::device::Opened;
+use crate::arguments::device::OpenedDevice;
 use crate::arguments::input;
 use crate::arguments::path::{FrameArgument, PathArguments};
-use crate::arguments::tracks::Tracks;
+use crate::arguments::tracks::TrackArguments;
 use crate::batch::room;
 use crate::commands::follow::followed;
 use crate::commands::route::surface::Surface;
 use crate::messages::colours::{self, Colour};
 use crate::messages::exit::{ALL_INPUTS, Failure};
 
-/// A picture of a curve has so many points, and its keys.
-const FINE: usize = 600;
-/// A net of control points is drawn as so many facets along a side.
+/// How many points a picture of a curve has, besides its keys.
+const CURVE_POINTS: usize = 600;
+/// How many facets along a side a net of control points is drawn with.
 const FACETS: usize = 32;
 
 /// What is drawn beside the bodies on paths.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct Scenery {
-    /// Draw the ground and what stands on it: meshes (.obj, .ply, .glb, .gltf) or nets (.npy); bodies
-    /// stand on their paths then, instead of about them
+    /// Draw the ground and objects on it: meshes (.obj, .ply, .glb, .gltf) or nets (.npy); bodies then
+    /// stand on their paths, instead of being centred on them
     #[arg(long = "mesh", value_name = "FILES", value_delimiter = ',')]
     pub(crate) meshes: Vec<PathBuf>,
     /// The length of a body on a path [default: a tenth of the path's size]
     #[arg(long, value_name = "LENGTH", value_parser = crate::arguments::path::positive)]
     pub(crate) body: Option<f64>,
-    /// How many frames are drawn as small axes along a path
+    /// How many frames to draw as small axes along a path
     #[arg(long, value_name = "N", default_value_t = 40)]
     pub(crate) axes: usize,
 }
@@ -57,17 +57,25 @@ impl Scenery {
         self.meshes.iter().map(read).collect()
     }
 
-    /// The length of the bodies on paths through these places.
-    pub(crate) fn length(&self, places: &[Vec3]) -> f32 {
-        let low = places.iter().copied().reduce(Vec3::min).unwrap_or_default();
-        let high = places.iter().copied().reduce(Vec3::max).unwrap_or_default();
+    /// The length of the bodies on paths through these positions.
+    pub(crate) fn length(&self, positions: &[Vec3]) -> f32 {
+        let low = positions
+            .iter()
+            .copied()
+            .reduce(Vec3::min)
+            .unwrap_or_default();
+        let high = positions
+            .iter()
+            .copied()
+            .reduce(Vec3::max)
+            .unwrap_or_default();
         let tenth = (high - low).length() / 10.0;
-        let own = if tenth > 0.0 && tenth.is_finite() {
+        let default = if tenth > 0.0 && tenth.is_finite() {
             tenth
         } else {
             1.0
         };
-        self.body.map_or(own, |length| length as f32)
+        self.body.map_or(default, |length| length as f32)
     }
 }
 
@@ -80,14 +88,18 @@ pub(crate) struct Travel {
     pub(crate) tracks: usize,
     /// `[sample][track]`.
     pub(crate) rotations: Vec<Quat>,
-    /// `[sample][track]`, relative to the [origin](Source::origin) of the source.
-    pub(crate) places: Vec<Vec3>,
+    /// `[sample][track]`, relative to the [origin](TravelSource::origin) of the source.
+    pub(crate) positions: Vec<Vec3>,
 }
 
 impl Travel {
-    /// The places of one body.
+    /// The positions of one body.
     pub(crate) fn line(&self, track: usize) -> impl Iterator<Item = Vec3> {
-        self.places.iter().skip(track).step_by(self.tracks).copied()
+        self.positions
+            .iter()
+            .skip(track)
+            .step_by(self.tracks)
+            .copied()
     }
 
     /// Angular velocities in the bodies' own axes between neighbouring samples, `[sample][track]`; the last
@@ -102,10 +114,10 @@ impl Travel {
                 .get(from + 1)
                 .map_or(1.0, |next| next - self.times[from]);
             for track in 0..self.tracks {
-                let [before, after] = [from, from + 1].map(|own| {
-                    let place = own * self.tracks + track;
+                let [before, after] = [from, from + 1].map(|at| {
+                    let index = at * self.tracks + track;
                     self.rotations
-                        .get(place)
+                        .get(index)
                         .unwrap_or(&Quat::IDENTITY)
                         .as_dquat()
                 });
@@ -119,41 +131,41 @@ impl Travel {
         found
     }
 
-    /// The samples of a body that lie nearest to `count` places evenly spaced along its way.
+    /// The samples of a body that are nearest to `count` points evenly spaced along its path.
     pub(crate) fn evenly(&self, track: usize, count: usize) -> Vec<usize> {
-        let places: Vec<Vec3> = self.line(track).collect();
-        let mut way = 0.0;
-        let mut ways = vec![0.0];
-        for pair in places.windows(2) {
-            way += f64::from((pair[1] - pair[0]).length());
-            ways.push(way);
+        let positions: Vec<Vec3> = self.line(track).collect();
+        let mut length = 0.0;
+        let mut lengths = vec![0.0];
+        for pair in positions.windows(2) {
+            length += f64::from((pair[1] - pair[0]).length());
+            lengths.push(length);
         }
         let last = count.saturating_sub(1).max(1);
         let mut found: Vec<usize> = (0..count)
             .map(|i| {
-                let wanted = way * i as f64 / last as f64;
-                let after = ways.partition_point(|&own| own < wanted);
-                let after = after.min(ways.len() - 1);
+                let target = length * i as f64 / last as f64;
+                let after = lengths.partition_point(|&reached| reached < target);
+                let after = after.min(lengths.len() - 1);
                 let before = after.saturating_sub(1);
-                match ways[after] - wanted < wanted - ways[before] {
+                match lengths[after] - target < target - lengths[before] {
                     true => after,
                     false => before,
                 }
             })
             .collect();
         found.dedup();
-        found.retain(|&sample| sample < places.len());
+        found.retain(|&sample| sample < positions.len());
         found
     }
 }
 
-/// The rotation, in the first one's own axes, that leads from one to another by the shorter way.
+/// The shorter rotation from one to the other, in the axes of the first.
 fn between(before: DQuat, after: DQuat) -> DQuat {
     let step = (before.normalize().inverse() * after.normalize()).normalize();
     if step.w < 0.0 { -step } else { step }
 }
 
-/// What a picture of a clip takes off all places: the first origin that a track has.
+/// The origin of a picture of a clip, subtracted from all positions: the first that a track has.
 pub(crate) fn scene_origin(clip: &Motion) -> DVec3 {
     let mut origins = clip.origins.iter().copied();
     origins
@@ -162,17 +174,17 @@ pub(crate) fn scene_origin(clip: &Motion) -> DVec3 {
 }
 
 /// Where joints are in a picture of their clip.
-pub(crate) fn places_of(clip: &Motion, poses: &[WorldPose]) -> Vec<Vec3> {
+pub(crate) fn positions_of(clip: &Motion, poses: &[WorldPose]) -> Vec<Vec3> {
     let origin = scene_origin(clip);
-    let places = poses.iter().map(|pose| (pose.position - origin).as_vec3());
-    places.collect()
+    let positions = poses.iter().map(|pose| (pose.position - origin).as_vec3());
+    positions.collect()
 }
 
-/// Where bodies come from.
-pub(crate) enum Source {
+/// Where the bodies of a picture come from.
+pub(crate) enum TravelSource {
     /// Paths, and how they are followed.
     Paths(Box<Motion>, Box<PathArguments>),
-    /// Roots that move by themselves.
+    /// A clip of moving roots.
     Clip(Box<Motion>),
 }
 
@@ -196,7 +208,7 @@ impl Maker {
     }
 }
 
-/// Whether a file is one of paths; standard input is none.
+/// Whether a file is one of paths; standard input is not.
 pub(crate) fn is_path_file(path: &Path) -> bool {
     !input::is_standard(path) && looks_like_paths(path)
 }
@@ -212,12 +224,12 @@ pub(crate) fn is_travel(clip: &Motion) -> bool {
         && (0..clip.set.track_count()).any(moves)
 }
 
-impl Source {
+impl TravelSource {
     /// The paths of a file.
     pub(crate) fn of_paths(
         path: &Path,
         arguments: &PathArguments,
-        tracks: &Tracks,
+        tracks: &TrackArguments,
     ) -> Result<Self, Failure> {
         let paths = arguments.read(path)?;
         let paths = tracks.select(&paths, &input::name(path))?.into_owned();
@@ -231,17 +243,17 @@ impl Source {
         }
     }
 
-    /// What all places of the bodies are to be moved by.
+    /// The origin that all positions are relative to.
     pub(crate) fn origin(&self) -> DVec3 {
         match self {
             Self::Paths(clip, _) | Self::Clip(clip) => scene_origin(clip),
         }
     }
 
-    /// How a body that faces along z, with y upwards, is turned to face as the others do.
-    pub(crate) fn body_turn(&self) -> Quat {
+    /// The rotation of a body that faces along z, with y up, to the body axes of the source.
+    pub(crate) fn body_rotation(&self) -> Quat {
         match self {
-            Self::Paths(_, arguments) => arguments.body_turn(),
+            Self::Paths(_, arguments) => arguments.body_rotation(),
             Self::Clip(_) => Quat::IDENTITY,
         }
     }
@@ -260,10 +272,10 @@ impl Source {
     /// The bodies at some frames.
     pub(crate) fn sample(
         &self,
-        device: &mut Opened,
+        device: &mut OpenedDevice,
         name: &str,
         maker: Maker,
-        frames: &Frames,
+        frames: &SampleTimes,
     ) -> Result<Travel, Failure> {
         let set = self.set();
         let tracks = set.track_count();
@@ -275,13 +287,13 @@ impl Source {
             (Self::Paths(paths, arguments), Maker::Frame(frame)) => {
                 let follow = arguments.follow(paths, name, frame)?;
                 let found = followed(device, name, set, &follow, frames)?;
-                let places = found.positions.as_slice().iter();
+                let positions = found.positions.as_slice().iter();
                 Ok(Travel {
                     name: frame.name().to_owned(),
                     times,
                     tracks,
                     rotations: found.rotations.as_quats().to_vec(),
-                    places: places.map(|place| place.truncate()).collect(),
+                    positions: positions.map(|position| position.truncate()).collect(),
                 })
             }
             (Self::Clip(clip), Maker::Method(interpolation)) => {
@@ -306,7 +318,7 @@ impl Source {
                     times,
                     tracks,
                     rotations: poses.iter().map(|pose| pose.rotation).collect(),
-                    places: places_of(clip, &poses),
+                    positions: positions_of(clip, &poses),
                 })
             }
             _ => Err(Failure::usage(format!(
@@ -319,17 +331,17 @@ impl Source {
     /// corners.
     pub(crate) fn trail(
         &self,
-        device: &mut Opened,
+        device: &mut OpenedDevice,
         name: &str,
         maker: Maker,
     ) -> Result<Travel, Failure> {
         let mut times = self.key_times();
         if let (Some(&first), Some(&last)) = (times.first(), times.last()) {
-            let at = |i: usize| first + (last - first) * i as f64 / FINE as f64;
-            times.extend((1..FINE).map(at));
+            let at = |i: usize| first + (last - first) * i as f64 / CURVE_POINTS as f64;
+            times.extend((1..CURVE_POINTS).map(at));
             times.sort_by(f64::total_cmp);
             times.dedup();
         }
-        self.sample(device, name, maker, &Frames::at(times))
+        self.sample(device, name, maker, &SampleTimes::at(times))
     }
 }

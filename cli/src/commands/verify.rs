@@ -7,12 +7,14 @@ use serde::Serialize;
 use tumble::verify::{Verdict, Verification};
 use tumble::{Method, TrackSet};
 
-use crate::arguments::device::{DeviceArguments, Opened};
-use crate::arguments::given::Given;
+use crate::arguments::command_line::CommandLine;
+use crate::arguments::device::{DeviceArguments, OpenedDevice};
 use crate::arguments::input;
 use crate::arguments::input::Inputs;
-use crate::arguments::interpolation::{Manner, Selection, chosen, curve_warning, methods};
-use crate::arguments::time::{Samples, Sampling};
+use crate::arguments::interpolation::{
+    InterpolationArguments, MethodSelection, chosen, curve_warning, methods,
+};
+use crate::arguments::time::{SampleRequest, SamplingArguments};
 use crate::batch::room;
 use crate::messages::exit::{ALL_INPUTS, DIFFERENCE, Failure, NO_VULKAN, for_each};
 use crate::messages::progress::Progress;
@@ -35,7 +37,7 @@ Examples:
   tumble verify data/pendulum.dat --device llvmpipe --json")]
 pub(crate) struct Arguments {
     #[command(flatten)]
-    given: Given,
+    command_line: CommandLine,
     #[command(flatten)]
     inputs: Inputs,
     /// The methods to verify: one or several, or all
@@ -47,11 +49,11 @@ pub(crate) struct Arguments {
         default_value = "all",
         value_parser = methods()
     )]
-    methods: Vec<Selection>,
+    methods: Vec<MethodSelection>,
     #[command(flatten)]
-    sampling: Sampling,
+    sampling: SamplingArguments,
     #[command(flatten)]
-    manner: Manner,
+    interpolation: InterpolationArguments,
     #[command(flatten)]
     device: DeviceArguments,
     /// Print JSON
@@ -61,7 +63,7 @@ pub(crate) struct Arguments {
 
 /// One line of the report; also the form of the JSON.
 #[derive(Serialize)]
-struct Line {
+struct VerificationLine {
     input: String,
     #[serde(flatten)]
     found: Verification,
@@ -76,8 +78,11 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         .distinct(arguments.sampling.reads_standard_input())?;
     let samples = arguments.sampling.samples()?;
     let methods = chosen(&arguments.methods);
-    arguments.manner.check(&methods).map_err(Failure::usage)?;
-    let device = arguments.device.compared(&arguments.given).open()?;
+    arguments
+        .interpolation
+        .check(&methods)
+        .map_err(Failure::usage)?;
+    let device = arguments.device.compared(&arguments.command_line).open()?;
     let steps = (inputs.len() * methods.len()) as u64;
     let mut progress = Progress::new("verifying", steps);
     let mut lines = Vec::new();
@@ -99,10 +104,10 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
                 return Err(Failure::new(ALL_INPUTS, format!("{name}: {message}")));
             }
         }
-        input::whole(&name, &loaded)
+        input::check_complete(&name, &loaded)
     });
     drop(progress);
-    let is_failed = |line: &&Line| line.verdict == Verdict::Failed;
+    let is_failed = |line: &&VerificationLine| line.verdict == Verdict::Failed;
     let failing = lines.iter().filter(is_failed).count();
     if arguments.json {
         words::json(&lines)?;
@@ -128,24 +133,24 @@ impl Arguments {
     /// One set, by every method asked for.
     fn compare(
         &self,
-        device: &Opened,
-        samples: &Samples,
+        device: &OpenedDevice,
+        samples: &SampleRequest,
         (name, set): (&str, &TrackSet),
         methods: &[Method],
         progress: &mut Progress,
-    ) -> Result<Vec<Line>, Failure> {
+    ) -> Result<Vec<VerificationLine>, Failure> {
         let frames = progress.suspend(|| samples.of(set, name));
         // Two results are in memory at once.
         room::in_memory(name, set, &frames, 2)?;
         let mut lines = Vec::new();
         for &method in methods {
-            let interpolation = self.manner.with(method);
+            let interpolation = self.interpolation.with(method);
             if let Some(warning) = curve_warning(name, set, &interpolation) {
                 progress.suspend(|| words::note(&warning.to_string()));
             }
             let found = tumble::verify::verify(&device.engine, set, interpolation, &frames)
                 .map_err(|error| Failure::evaluating(name, &error))?;
-            lines.push(Line {
+            lines.push(VerificationLine {
                 input: name.to_owned(),
                 pass: found.passes(),
                 verdict: found.verdict(),
@@ -157,8 +162,8 @@ impl Arguments {
     }
 }
 
-/// A table, a line for each input and method, and what it comes to.
-fn report(lines: &[Line], device: &Opened) -> String {
+/// A table with a line for each input and method, and the verdict.
+fn report(lines: &[VerificationLine], device: &OpenedDevice) -> String {
     let width = lines
         .iter()
         .map(|line| line.input.chars().count())
@@ -197,7 +202,7 @@ fn report(lines: &[Line], device: &Opened) -> String {
     text
 }
 
-impl Line {
+impl VerificationLine {
     fn tell(&self, text: &mut String, width: usize) {
         let found = &self.found;
         let _ = writeln!(
@@ -233,15 +238,15 @@ impl Line {
                 output.error_bound
             );
         }
-        for (what, place) in [
+        for (label, sample) in [
             ("worst", found.worst),
             ("first difference", found.first_difference),
         ] {
-            if let Some(place) = place {
+            if let Some(position) = sample {
                 let _ = writeln!(
                     text,
-                    "{:width$}  {what}: track {}, frame {}, at {:.4} s",
-                    "", place.track, place.frame, place.time
+                    "{:width$}  {label}: track {}, frame {}, at {:.4} s",
+                    "", position.track, position.frame, position.time
                 );
             }
         }

@@ -50,8 +50,8 @@ pub(crate) const AUTHORED: Colour = [0xe7, 0x29, 0x8a];
 pub(crate) fn of_method(method: Method) -> Colour {
     common(method.name).unwrap_or_else(|| {
         let others = METHODS.iter().filter(|other| common(other.name).is_none());
-        let place = others.take_while(|&&other| other != method).count();
-        OTHERS[place % OTHERS.len()]
+        let index = others.take_while(|&&other| other != method).count();
+        OTHERS[index % OTHERS.len()]
     })
 }
 

@@ -28,7 +28,7 @@ pub(crate) struct Failure {
     message: String,
     /// Lines below it.
     more: Vec<String>,
-    /// The message says itself that it is an error.
+    /// The message has its own prefix, without `error:`.
     plain: bool,
     /// An output that cannot be written, where another one may be.
     is_of_one: bool,
@@ -49,7 +49,7 @@ impl Failure {
         Self::new(USAGE, message)
     }
 
-    /// What was to be said has been said.
+    /// A failure without a message: it has been reported.
     pub(crate) fn quiet(code: u8) -> Self {
         Self::new(code, "")
     }
@@ -60,7 +60,7 @@ impl Failure {
         self
     }
 
-    /// The same with more to say.
+    /// The same, with a hint after the message.
     pub(crate) fn hinted(mut self, hint: &str) -> Self {
         self.message.push_str(hint);
         self
@@ -72,14 +72,14 @@ impl Failure {
         self
     }
 
-    /// Data could not be written. A reader that went away knows it already.
-    pub(crate) fn writing(place: &str, error: &io::Error) -> Self {
+    /// Data could not be written. A closed pipe needs no message.
+    pub(crate) fn writing(name: &str, error: &io::Error) -> Self {
         let message = match error.kind() {
             io::ErrorKind::BrokenPipe => return Self::quiet(BROKEN_PIPE),
             io::ErrorKind::InvalidFilename => {
-                format!("{place}: cannot be written: {error}; give its input a shorter name")
+                format!("{name}: cannot be written: {error}; give its input a shorter name")
             }
-            _ => format!("{place}: cannot be written: {error}"),
+            _ => format!("{name}: cannot be written: {error}"),
         };
         Self {
             is_of_one: is_of_one(error),
@@ -87,7 +87,7 @@ impl Failure {
         }
     }
 
-    /// An input of which nothing could be read: each of its parts was refused for a reason of its own.
+    /// An input of which nothing could be read: each of its parts was refused.
     pub(crate) fn parts(refused: &[Diagnostic]) -> Self {
         let mut each = refused.iter().map(ToString::to_string);
         let first = each.next().unwrap_or_default();
@@ -98,7 +98,7 @@ impl Failure {
         }
     }
 
-    /// An input was refused; its message has a form of its own.
+    /// An input was refused; the diagnostic has its own format.
     pub(crate) fn input(diagnostic: &Diagnostic, hint: &str) -> Self {
         let message = format!("{diagnostic}{hint}");
         Self {
@@ -107,7 +107,7 @@ impl Failure {
         }
     }
 
-    /// An output was refused: it is not what can be meant, or the system says no.
+    /// An output was refused: it makes no sense, or the system refuses it.
     pub(crate) fn output(error: &OutputError) -> Self {
         match error {
             OutputError::Write { path, source } => {
@@ -124,7 +124,7 @@ impl Failure {
     /// An evaluation failed: the request, the input or the device is to blame.
     pub(crate) fn evaluating(input: &str, error: &Error) -> Self {
         let code = match error {
-            Error::Frames(_) | Error::OutOfMemory(_) => USAGE,
+            Error::SampleTimes(_) | Error::OutOfMemory(_) => USAGE,
             Error::Vulkan(
                 VulkanError::NoLoader { .. } | VulkanError::NoDevice | VulkanError::NoNvidiaDriver,
             ) => NO_VULKAN,
@@ -135,14 +135,14 @@ impl Failure {
         Self::new(code, format!("{input}: {error}"))
     }
 
-    /// What it says, as [`Failure::report`] shows it.
+    /// Its text, as [`Failure::report`] prints it.
     pub(crate) fn into_message(self) -> String {
         let lines = std::iter::once(&self.message).chain(&self.more);
         let lines: Vec<_> = lines.map(|line| printable(line)).collect();
         lines.join("\n")
     }
 
-    /// What it says.
+    /// Its message.
     pub(crate) fn message(&self) -> &str {
         &self.message
     }
@@ -166,8 +166,7 @@ impl Failure {
     }
 }
 
-/// Whether the system refuses this file, and may take another one: its name or its place is at
-/// fault, or its length.
+/// Whether the error concerns this file alone: its name, its folder or its length.
 fn is_of_one(error: &io::Error) -> bool {
     use io::ErrorKind::{
         AlreadyExists, DirectoryNotEmpty, FileTooLarge, InvalidFilename, InvalidInput,

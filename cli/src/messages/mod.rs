@@ -1,4 +1,4 @@
-//! What the program says to people, and the exit codes.
+//! Messages, and the exit codes.
 
 pub(crate) mod colours;
 pub(crate) mod exit;

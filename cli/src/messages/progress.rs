@@ -1,5 +1,5 @@
 //! A progress bar, once work has taken a second and someone is watching; a line
-//! that moves where nobody knows how far the work is.
+//! that moves where the amount of work is unknown.
 
 use std::io::IsTerminal;
 use std::sync::mpsc;
@@ -13,7 +13,7 @@ use tumble_formats::printable::printable;
 const PATIENCE: Duration = Duration::from_secs(1);
 
 pub(crate) struct Progress {
-    what: &'static str,
+    label: &'static str,
     total: u64,
     done: u64,
     started: Instant,
@@ -21,9 +21,9 @@ pub(crate) struct Progress {
 }
 
 impl Progress {
-    pub(crate) fn new(what: &'static str, total: u64) -> Self {
+    pub(crate) fn new(label: &'static str, total: u64) -> Self {
         Self {
-            what,
+            label,
             total,
             done: 0,
             started: Instant::now(),
@@ -37,7 +37,7 @@ impl Progress {
             && self.started.elapsed() > PATIENCE
             && std::io::stderr().is_terminal()
         {
-            self.bar = Some(bar(self.what, self.total));
+            self.bar = Some(bar(self.label, self.total));
         }
         if let Some(bar) = &self.bar {
             bar.set_position(self.done);
@@ -53,11 +53,13 @@ impl Progress {
     }
 }
 
-fn bar(what: &'static str, total: u64) -> ProgressBar {
+fn bar(label: &'static str, total: u64) -> ProgressBar {
     // No colours in the template, so `NO_COLOR` holds.
     let style = ProgressStyle::with_template("{msg} [{bar:30}] {percent}% {eta} left")
         .unwrap_or_else(|_| ProgressStyle::default_bar());
-    ProgressBar::new(total).with_style(style).with_message(what)
+    ProgressBar::new(total)
+        .with_style(style)
+        .with_message(label)
 }
 
 impl Drop for Progress {
@@ -69,7 +71,7 @@ impl Drop for Progress {
 }
 
 /// Runs work that is one call, and shows that it is alive.
-pub(crate) fn busy<T>(what: &str, work: impl FnOnce() -> T) -> T {
+pub(crate) fn busy<T>(label: &str, work: impl FnOnce() -> T) -> T {
     if !std::io::stderr().is_terminal() {
         return work();
     }
@@ -82,7 +84,7 @@ pub(crate) fn busy<T>(what: &str, work: impl FnOnce() -> T) -> T {
                 let style = ProgressStyle::with_template("{spinner} {msg} {elapsed}")
                     .unwrap_or_else(|_| ProgressStyle::default_spinner());
                 let spinner = ProgressBar::new_spinner().with_style(style);
-                spinner.set_message(printable(what).into_owned());
+                spinner.set_message(printable(label).into_owned());
                 spinner.enable_steady_tick(Duration::from_millis(100));
                 let _ = finished.recv();
                 spinner.finish_and_clear();

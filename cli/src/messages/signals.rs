@@ -13,19 +13,19 @@ use tumble_formats::output::remove_unfinished;
 
 use crate::messages::exit::Failure;
 
-struct State {
+struct SignalState {
     /// Output files that are being written.
     writing: usize,
     /// The signal that came.
     signal: Option<i32>,
 }
 
-static STATE: Mutex<State> = Mutex::new(State {
+static STATE: Mutex<SignalState> = Mutex::new(SignalState {
     writing: 0,
     signal: None,
 });
 
-fn state() -> std::sync::MutexGuard<'static, State> {
+fn state() -> std::sync::MutexGuard<'static, SignalState> {
     STATE
         .lock()
         .unwrap_or_else(std::sync::PoisonError::into_inner)
@@ -36,7 +36,7 @@ fn code(signal: i32) -> u8 {
 }
 
 /// Ends the program, or leaves a mark for the writer of a file.
-fn heed(signal: i32) {
+fn handle_signal(signal: i32) {
     let mut state = state();
     // A second signal means it: do not wait for the writer.
     if state.writing == 0 || state.signal.is_some() {
@@ -59,8 +59,8 @@ fn wait_for_signals() {
     use signal_hook::consts::{SIGHUP, SIGINT, SIGQUIT, SIGTERM, SIGXFSZ};
     use signal_hook::iterator::Signals;
 
-    // A file that may not grow (`ulimit -f`) is an error of its writer's, who has it to tell
-    // and a file to remove; the signal would end the program before that.
+    // A file that may not grow (`ulimit -f`) is an error that its writer reports, and then removes the
+    // file; the signal would end the program before that.
     let ignored = ignored();
     let all = [SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGXFSZ];
     let heeded = all
@@ -72,7 +72,7 @@ fn wait_for_signals() {
     };
     let wait = move || {
         for signal in signals.forever().filter(|&signal| signal != SIGXFSZ) {
-            heed(signal);
+            handle_signal(signal);
         }
     };
     let _ = std::thread::Builder::new().spawn(wait); // see `stop_on_signals`
@@ -97,23 +97,23 @@ fn ignored_in(status: &str) -> Option<u64> {
 /// Windows runs a handler on a thread of its own: it is the waiting thread.
 #[cfg(windows)]
 fn wait_for_signals() {
-    let _ = ctrlc::set_handler(|| heed(signal_hook::consts::SIGINT)); // see `stop_on_signals`
+    let _ = ctrlc::set_handler(|| handle_signal(signal_hook::consts::SIGINT)); // see `stop_on_signals`
 }
 
 #[cfg(not(any(unix, windows)))]
 fn wait_for_signals() {}
 
 /// Held while an output file is open.
-pub(crate) struct Writing(());
+pub(crate) struct WritingGuard(());
 
-impl Writing {
+impl WritingGuard {
     pub(crate) fn begin() -> Self {
         state().writing += 1;
         Self(())
     }
 }
 
-impl Drop for Writing {
+impl Drop for WritingGuard {
     fn drop(&mut self) {
         state().writing -= 1;
     }

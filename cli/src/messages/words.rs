@@ -29,11 +29,11 @@ pub(crate) fn note(message: &str) {
     let _ = writeln!(anstream::stderr(), "{}", printable(message));
 }
 
-/// Says what is wrong with the command line, or helps. clap writes words of the command line as they
-/// are, and a shell's pattern puts names of files among them.
-pub(crate) fn usage(error: &clap::Error, given: &[OsString]) {
+/// Prints an error of the command line, or help. clap prints arguments unescaped, and a shell's pattern
+/// may put names of files among them.
+pub(crate) fn usage(error: &clap::Error, arguments: &[OsString]) {
     let mut text = error.render().ansi().to_string();
-    for word in given {
+    for word in arguments {
         let word = word.to_string_lossy();
         let shown = printable(&word);
         // Also the part behind `--option=`.
@@ -75,8 +75,8 @@ pub(crate) fn json(value: &impl serde::Serialize) -> Result<(), Failure> {
     styled_listing(&format!("{}\n", json_printable(&text)))
 }
 
-/// JSON whose strings have escapes for all that a terminal would obey: what is no ASCII stands in strings
-/// alone, and serde escapes the controls below it.
+/// JSON with escapes for all characters that a terminal would obey: outside ASCII they stand in strings
+/// alone, and serde escapes the ASCII controls.
 fn json_printable(text: &str) -> String {
     let mut shown = String::with_capacity(text.len());
     for character in text.chars() {
@@ -94,26 +94,26 @@ fn json_printable(text: &str) -> String {
     shown
 }
 
-/// What a panic says, which is text unless a crate panics with something else.
+/// The message of a panic, which is text unless a crate panics with another type.
 fn reason(payload: &(dyn Any + Send)) -> &str {
     let literal = payload.downcast_ref::<&str>().copied();
     let text = literal.or_else(|| payload.downcast_ref::<String>().map(String::as_str));
     text.unwrap_or("no reason given")
 }
 
-/// A panic is a bug of ours: say so, and what to send.
+/// Reports a panic as a bug of tumble, with what to send.
 pub(crate) fn explain_panics() {
     std::panic::set_hook(Box::new(|info| {
-        let what = reason(info.payload());
+        let message = reason(info.payload());
         // A library's, on broken bytes, which becomes a message about the input.
         if is_guarded() {
             return;
         }
-        let place = info.location().map(ToString::to_string).unwrap_or_default();
+        let location = info.location().map(ToString::to_string).unwrap_or_default();
         let line: Vec<String> = std::env::args_os()
             .map(|a| a.to_string_lossy().into_owned())
             .collect();
-        error(&format!("internal error at {place}: {what}"));
+        error(&format!("internal error at {location}: {message}"));
         note(&format!(
             "  this is a bug in tumble {}; please report it with the command line and, if it can be \
              shared, the input:",
@@ -165,16 +165,16 @@ pub(crate) fn duration(duration: Duration) -> String {
 
 /// The known name nearest to a misspelt one, if any is near.
 pub(crate) fn nearest<'a>(
-    given: &str,
+    misspelt: &str,
     known: impl IntoIterator<Item = &'a str>,
 ) -> Option<&'a str> {
-    let given = given.to_lowercase();
+    let lowercase = misspelt.to_lowercase();
     // A part of a name is a name too: `llvmpipe` of `llvmpipe (LLVM 15.0.6)`.
     let score = |name: &str| {
         let name = name.to_lowercase();
         let parts = name.split_whitespace().chain([&*name]);
         parts
-            .map(|part| strsim::jaro_winkler(&given, part))
+            .map(|part| strsim::jaro_winkler(&lowercase, part))
             .fold(0.0, f64::max)
     };
     known
@@ -187,7 +187,8 @@ pub(crate) fn nearest<'a>(
 
 /// `256MiB`, `1.5 GB`, `1000000`: bytes.
 pub(crate) fn parse_bytes(text: &str) -> Result<u64, String> {
-    let refuse = || format!("`{text}` is no size; give bytes with a unit, such as 256MiB or 2GB");
+    let refuse =
+        || format!("invalid size `{text}`: expected bytes with a unit, such as 256MiB or 2GB");
     let digits = text
         .find(|c: char| !c.is_ascii_digit() && c != '.')
         .unwrap_or(text.len());

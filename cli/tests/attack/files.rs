@@ -17,9 +17,9 @@ fn with<'a>(line: &[&'a str], more: &[&'a str]) -> Vec<&'a str> {
 /// A manifest is ours only if its first line says so.
 #[test]
 fn somebodys_manifest_is_kept() {
-    let place = sample_folder();
-    let at = place.path();
-    let out = at.join("out");
+    let temporary = sample_folder();
+    let folder = temporary.path();
+    let out = folder.join("out");
     fs::create_dir(&out).unwrap();
     let path = out.join("manifest.jsonl");
     let ours = line("a.npy", "0", 1);
@@ -34,10 +34,10 @@ fn somebodys_manifest_is_kept() {
     for content in contents {
         for more in [&[][..], &["--resume"]] {
             fs::write(&path, content).unwrap();
-            let refused = run(at, &with(&BATCH, more));
+            let refused = run(folder, &with(&BATCH, more));
             assert_eq!(refused.code, 2, "{content:?}: {}", refused.words);
             assert!(
-                refused.words.contains("manifest.jsonl: is no manifest"),
+                refused.words.contains("manifest.jsonl: is not a manifest"),
                 "{}",
                 refused.words
             );
@@ -45,33 +45,33 @@ fn somebodys_manifest_is_kept() {
             assert_eq!(entries(&out).len(), 1, "{:?}", entries(&out));
         }
         // A batch of which nothing comes is no reason either.
-        run(at, &["eval", "bad.dat", "none.dat", "-o", "out"]);
+        run(folder, &["eval", "bad.dat", "none.dat", "-o", "out"]);
         assert_eq!(fs::read_to_string(&path).unwrap(), content);
     }
     // Shards and merging look at it too.
     fs::write(&path, "my notes\n").unwrap();
-    succeed(at, &with(&BATCH, &["--shard", "1/1"]));
-    let merged = run(at, &["merge", "out"]);
+    succeed(folder, &with(&BATCH, &["--shard", "1/1"]));
+    let merged = run(folder, &["merge", "out"]);
     assert_eq!(merged.code, 2, "{}", merged.words);
     assert_eq!(fs::read_to_string(&path).unwrap(), "my notes\n");
     fs::remove_file(&path).unwrap();
-    succeed(at, &["merge", "out"]);
-    succeed(at, &["check", "out"]);
+    succeed(folder, &["merge", "out"]);
+    succeed(folder, &["check", "out"]);
 
     // Who says so replaces it.
     fs::write(&path, "my notes\n").unwrap();
-    succeed(at, &with(&BATCH, &["--overwrite"]));
-    succeed(at, &["check", "out"]);
+    succeed(folder, &with(&BATCH, &["--overwrite"]));
+    succeed(folder, &["check", "out"]);
 }
 
 #[test]
 fn a_manifest_that_is_a_link_a_pipe_or_a_directory_is_refused() {
-    let place = sample_folder();
-    let at = place.path();
-    let out = at.join("out");
+    let temporary = sample_folder();
+    let folder = temporary.path();
+    let out = folder.join("out");
     fs::create_dir(&out).unwrap();
     let ours = line("a.npy", "0", 1);
-    fs::write(at.join("outside"), &ours).unwrap();
+    fs::write(folder.join("outside"), &ours).unwrap();
     let path = out.join("manifest.jsonl");
     let kinds: [(&str, &dyn Fn()); 5] = [
         ("link", &|| symlink("../outside", &path).unwrap()),
@@ -83,18 +83,18 @@ fn a_manifest_that_is_a_link_a_pipe_or_a_directory_is_refused() {
     for (kind, make) in kinds {
         make();
         for more in [&[][..], &["--resume"]] {
-            let refused = run(at, &with(&BATCH, more));
+            let refused = run(folder, &with(&BATCH, more));
             assert_eq!(refused.code, 2, "{kind}: {}", refused.words);
         }
-        assert_ne!(run(at, &["check", "out"]).code, 0, "{kind}");
-        assert!(!at.join("nothing").exists(), "{kind}");
+        assert_ne!(run(folder, &["check", "out"]).code, 0, "{kind}");
+        assert!(!folder.join("nothing").exists(), "{kind}");
         assert_eq!(entries(&out).len(), 1, "{kind}: {:?}", entries(&out));
         match kind {
             "directory" => fs::remove_dir(&path).unwrap(),
             _ => fs::remove_file(&path).unwrap(),
         }
         assert_eq!(
-            fs::read_to_string(at.join("outside")).unwrap(),
+            fs::read_to_string(folder.join("outside")).unwrap(),
             ours,
             "{kind}"
         );
@@ -104,9 +104,9 @@ fn a_manifest_that_is_a_link_a_pipe_or_a_directory_is_refused() {
 /// Whatever else is in a directory of results stays, whatever it is called.
 #[test]
 fn other_files_of_a_folder_of_results_stay() {
-    let place = sample_folder();
-    let at = place.path();
-    let out = at.join("out");
+    let temporary = sample_folder();
+    let folder = temporary.path();
+    let out = folder.join("out");
     fs::create_dir_all(out.join("manifest.d")).unwrap();
     let mine = [
         "notes.txt",
@@ -121,20 +121,20 @@ fn other_files_of_a_folder_of_results_stay() {
     }
     pipe(&out.join(".tumble-aBcDeF.part"));
     symlink("../old.npy", out.join(".tumble-GhIjKl.part")).unwrap();
-    succeed(at, &BATCH);
-    succeed(at, &with(&BATCH, &["--resume"]));
-    succeed(at, &with(&BATCH, &["--overwrite", "--shard", "1/1"]));
-    succeed(at, &["merge", "out"]);
-    succeed(at, &["check", "out"]);
+    succeed(folder, &BATCH);
+    succeed(folder, &with(&BATCH, &["--resume"]));
+    succeed(folder, &with(&BATCH, &["--overwrite", "--shard", "1/1"]));
+    succeed(folder, &["merge", "out"]);
+    succeed(folder, &["check", "out"]);
     for name in mine {
         assert_eq!(fs::read(out.join(name)).unwrap(), b"mine", "{name}");
     }
-    assert_eq!(fs::read(at.join("old.npy")).unwrap(), b"old");
+    assert_eq!(fs::read(folder.join("old.npy")).unwrap(), b"old");
     assert!(entries(&out).contains(".tumble-aBcDeF.part"));
 
     // A shard's file that no shard has written is not replaced.
     fs::write(out.join("manifest.d/00001.jsonl"), "mine").unwrap();
-    let refused = run(at, &with(&BATCH, &["--overwrite", "--shard", "1/1"]));
+    let refused = run(folder, &with(&BATCH, &["--overwrite", "--shard", "1/1"]));
     assert_eq!(refused.code, 2, "{}", refused.words);
     assert_eq!(
         fs::read(out.join("manifest.d/00001.jsonl")).unwrap(),
@@ -142,18 +142,18 @@ fn other_files_of_a_folder_of_results_stay() {
     );
 }
 
-/// What a manifest names is opened beneath its folder alone, and no pipe or device is waited for.
+/// Files that a manifest names are opened only below its folder, and no pipe or device is waited for.
 #[test]
 fn outputs_that_a_manifest_names_elsewhere_are_not_read() {
-    let place = sample_folder();
-    let at = place.path();
-    succeed(at, &BATCH);
-    let bytes = fs::read(at.join("out/a.npy")).unwrap();
-    let manifest = fs::read_to_string(at.join("out/manifest.jsonl")).unwrap();
+    let temporary = sample_folder();
+    let folder = temporary.path();
+    succeed(folder, &BATCH);
+    let bytes = fs::read(folder.join("out/a.npy")).unwrap();
+    let manifest = fs::read_to_string(folder.join("out/manifest.jsonl")).unwrap();
     let first: serde_json::Value = serde_json::from_str(manifest.lines().next().unwrap()).unwrap();
-    fs::write(at.join("outside"), &bytes).unwrap();
-    let absolute = at.join("outside");
-    let out = at.join("out");
+    fs::write(folder.join("outside"), &bytes).unwrap();
+    let absolute = folder.join("outside");
+    let out = folder.join("out");
     symlink("../outside", out.join("link")).unwrap();
     symlink("..", out.join("up")).unwrap();
     symlink("/dev/zero", out.join("zeros")).unwrap();
@@ -172,7 +172,7 @@ fn outputs_that_a_manifest_names_elsewhere_are_not_read() {
         let mut entry = first.clone();
         entry["output"] = name.into();
         fs::write(out.join("manifest.jsonl"), format!("{manifest}{entry}\n")).unwrap();
-        let check = run(at, &["check", "out"]);
+        let check = run(folder, &["check", "out"]);
         assert_eq!(check.code, 8, "{name}: {}", check.words);
     }
     // Nor does anybody take such a file for a result that is there.
@@ -186,7 +186,7 @@ fn outputs_that_a_manifest_names_elsewhere_are_not_read() {
         fs::write(out.join("manifest.jsonl"), &manifest).unwrap();
         fs::remove_file(&result).unwrap();
         make();
-        let resumed = run(at, &with(&BATCH, &["--resume"]));
+        let resumed = run(folder, &with(&BATCH, &["--resume"]));
         assert!(
             !resumed.words.contains("2 results skipped"),
             "{kind}: {}",
@@ -197,40 +197,40 @@ fn outputs_that_a_manifest_names_elsewhere_are_not_read() {
             continue;
         }
         fs::remove_file(&result).unwrap();
-        succeed(at, &with(&BATCH, &["--resume"]));
+        succeed(folder, &with(&BATCH, &["--resume"]));
     }
 }
 
-/// Merging looks for what lost workers left in the folders of its results alone.
+/// Merging looks for the leftovers of lost workers only in the folders of its results.
 #[test]
 fn merging_removes_nothing_elsewhere() {
-    let place = sample_folder();
-    let at = place.path();
-    fs::create_dir(at.join("elsewhere")).unwrap();
-    let part = at.join("elsewhere/.tumble-shard00001-aBcDeF.part");
+    let temporary = sample_folder();
+    let folder = temporary.path();
+    fs::create_dir(folder.join("elsewhere")).unwrap();
+    let part = folder.join("elsewhere/.tumble-shard00001-aBcDeF.part");
     fs::write(&part, "not ours").unwrap();
-    succeed(at, &with(&BATCH, &["--shard", "1/1"]));
-    symlink("../elsewhere", at.join("out/link")).unwrap();
-    let record = at.join("out/manifest.d/00001.jsonl");
+    succeed(folder, &with(&BATCH, &["--shard", "1/1"]));
+    symlink("../elsewhere", folder.join("out/link")).unwrap();
+    let record = folder.join("out/manifest.d/00001.jsonl");
     let mut text = fs::read_to_string(&record).unwrap();
     text += &line("link/x", "0", 1);
-    let absolute = at.join("elsewhere/x");
+    let absolute = folder.join("elsewhere/x");
     for hostile in ["../elsewhere/x", absolute.to_str().unwrap()] {
         let text = text.clone() + &line(hostile, "0", 1);
         // Also where the line about the shard has been made to fit.
         for text in [text.clone(), fitting(&text)] {
             fs::write(&record, text).unwrap();
-            let merged = run(at, &["merge", "out"]);
+            let merged = run(folder, &["merge", "out"]);
             assert_eq!(merged.code, 8, "{hostile}: {}", merged.words);
             assert!(part.exists());
         }
     }
     fs::write(&record, fitting(&text)).unwrap();
-    succeed(at, &["merge", "out"]);
+    succeed(folder, &["merge", "out"]);
     assert_eq!(fs::read(&part).unwrap(), b"not ours");
 }
 
-/// A shard's file whose first line says what the others are.
+/// A shard's file with the hash of its lines in the first one, as the program writes it.
 fn fitting(text: &str) -> String {
     use sha2::{Digest, Sha256};
 
@@ -246,29 +246,29 @@ fn fitting(text: &str) -> String {
 /// A shard that lost a line is not done; a plan of no shards is none.
 #[test]
 fn records_of_shards_are_whole_or_made_again() {
-    let place = sample_folder();
-    let at = place.path();
-    succeed(at, &BATCH);
-    let whole = tree(&at.join("out"));
-    fs::remove_dir_all(at.join("out")).unwrap();
+    let temporary = sample_folder();
+    let folder = temporary.path();
+    succeed(folder, &BATCH);
+    let whole = tree(&folder.join("out"));
+    fs::remove_dir_all(folder.join("out")).unwrap();
     let shard = with(&BATCH, &["--shard", "1/1"]);
-    succeed(at, &shard);
-    let record = at.join("out/manifest.d/00001.jsonl");
+    succeed(folder, &shard);
+    let record = folder.join("out/manifest.d/00001.jsonl");
     let text = fs::read_to_string(&record).unwrap();
     let lines: Vec<&str> = text.lines().collect();
     fs::write(&record, format!("{}\n{}\n", lines[0], lines[1])).unwrap();
-    let merged = run(at, &["merge", "out"]);
+    let merged = run(folder, &["merge", "out"]);
     assert_eq!(merged.code, 8, "{}", merged.words);
     assert!(merged.words.contains("0 of 1 shard"), "{}", merged.words);
-    succeed(at, &with(&shard, &["--resume"]));
+    succeed(folder, &with(&shard, &["--resume"]));
 
-    let plan = at.join("out/manifest.d/plan.json");
+    let plan = folder.join("out/manifest.d/plan.json");
     let stated = fs::read_to_string(&plan).unwrap();
-    let most = usize::MAX;
+    let too_many = usize::MAX;
     for (from, shards) in [
         ("0 shards", 0),
         ("more shards than inputs", 3),
-        ("too many", most),
+        ("too many", too_many),
     ] {
         let mut other: serde_json::Value = serde_json::from_str(&stated).unwrap();
         other["shards"] = shards.into();
@@ -278,38 +278,38 @@ fn records_of_shards_are_whole_or_made_again() {
             &["check", "out"],
             &with(&BATCH, &["--resume"]),
         ] {
-            let refused = run(at, line);
+            let refused = run(folder, line);
             assert_eq!(refused.code, 4, "{from}: {}", refused.words);
         }
         assert!(record.exists(), "{from}");
     }
     fs::write(&plan, &stated).unwrap();
-    succeed(at, &["merge", "out"]);
-    assert_eq!(tree(&at.join("out")), whole);
+    succeed(folder, &["merge", "out"]);
+    assert_eq!(tree(&folder.join("out")), whole);
 }
 
 /// No result is written through a link in the folder of results.
 #[test]
 fn results_do_not_leave_their_folder() {
-    let place = sample_folder();
-    let at = place.path();
-    fs::create_dir_all(at.join("walks/deep")).unwrap();
-    fs::create_dir_all(at.join("elsewhere")).unwrap();
-    fs::create_dir(at.join("out")).unwrap();
-    fs::copy(at.join("a.dat"), at.join("walks/a.dat")).unwrap();
-    fs::copy(at.join("a.dat"), at.join("walks/deep/b.dat")).unwrap();
-    symlink("../elsewhere", at.join("out/deep")).unwrap();
+    let temporary = sample_folder();
+    let folder = temporary.path();
+    fs::create_dir_all(folder.join("walks/deep")).unwrap();
+    fs::create_dir_all(folder.join("elsewhere")).unwrap();
+    fs::create_dir(folder.join("out")).unwrap();
+    fs::copy(folder.join("a.dat"), folder.join("walks/a.dat")).unwrap();
+    fs::copy(folder.join("a.dat"), folder.join("walks/deep/b.dat")).unwrap();
+    symlink("../elsewhere", folder.join("out/deep")).unwrap();
     for more in [
         &[][..],
         &["--resume"],
         &["--overwrite"],
         &["--overwrite", "--shard", "1/1"],
     ] {
-        let run = run(at, &with(&["eval", "walks", "-o", "out"], more));
+        let run = run(folder, &with(&["eval", "walks", "-o", "out"], more));
         assert_eq!(run.code, 3, "{more:?}: {}", run.words);
         assert!(run.words.contains("deep/b.npy"), "{}", run.words);
-        assert_eq!(entries(&at.join("elsewhere")).len(), 0, "{more:?}");
-        assert!(at.join("out/a.npy").exists());
+        assert_eq!(entries(&folder.join("elsewhere")).len(), 0, "{more:?}");
+        assert!(folder.join("out/a.npy").exists());
     }
 }
 
@@ -317,70 +317,70 @@ fn results_do_not_leave_their_folder() {
 /// leads out of it.
 #[test]
 fn what_a_gltf_names_does_not_leave_its_folder() {
-    let place = sample_folder();
-    let at = place.path();
+    let temporary = sample_folder();
+    let folder = temporary.path();
     let secret = b"\x89PNG\r\n\x1a\nthe secret";
-    fs::create_dir(at.join("model")).unwrap();
-    fs::write(at.join("secret.png"), secret).unwrap();
+    fs::create_dir(folder.join("model")).unwrap();
+    fs::write(folder.join("secret.png"), secret).unwrap();
     let mut model: serde_json::Value = serde_json::from_str(&two_animations()).unwrap();
-    symlink("../secret.png", at.join("model/image.png")).unwrap();
-    symlink("..", at.join("model/up")).unwrap();
-    pipe(&at.join("model/pipe.png"));
+    symlink("../secret.png", folder.join("model/image.png")).unwrap();
+    symlink("..", folder.join("model/up")).unwrap();
+    pipe(&folder.join("model/pipe.png"));
     for uri in ["image.png", "up/secret.png", "../secret.png", "pipe.png"] {
         model["images"] = serde_json::json!([{"uri": uri}]);
-        fs::write(at.join("model/m.gltf"), model.to_string()).unwrap();
+        fs::write(folder.join("model/m.gltf"), model.to_string()).unwrap();
         let line = ["eval", "model/m.gltf", "-o", "m.glb", "--overwrite"];
-        let made = succeed(at, &line);
+        let made = succeed(folder, &line);
         assert!(
             made.words.contains("the URI is kept"),
             "{uri}: {}",
             made.words
         );
-        let bytes = fs::read(at.join("m.glb")).unwrap();
+        let bytes = fs::read(folder.join("m.glb")).unwrap();
         assert!(
             !bytes.windows(secret.len()).any(|part| part == secret),
             "{uri}"
         );
     }
     // An image in the folder itself is embedded.
-    fs::copy(at.join("secret.png"), at.join("model/own.png")).unwrap();
+    fs::copy(folder.join("secret.png"), folder.join("model/own.png")).unwrap();
     model["images"] = serde_json::json!([{"uri": "own.png"}]);
-    fs::write(at.join("model/m.gltf"), model.to_string()).unwrap();
-    succeed(at, &["eval", "model/m.gltf", "-o", "own.glb"]);
-    let bytes = fs::read(at.join("own.glb")).unwrap();
+    fs::write(folder.join("model/m.gltf"), model.to_string()).unwrap();
+    succeed(folder, &["eval", "model/m.gltf", "-o", "own.glb"]);
+    let bytes = fs::read(folder.join("own.glb")).unwrap();
     assert!(bytes.windows(secret.len()).any(|part| part == secret));
 
-    fs::write(at.join("keys.bin"), [0; 40]).unwrap();
-    symlink("../keys.bin", at.join("model/keys.bin")).unwrap();
-    symlink("/dev/zero", at.join("model/zeros.bin")).unwrap();
-    pipe(&at.join("model/pipe.bin"));
+    fs::write(folder.join("keys.bin"), [0; 40]).unwrap();
+    symlink("../keys.bin", folder.join("model/keys.bin")).unwrap();
+    symlink("/dev/zero", folder.join("model/zeros.bin")).unwrap();
+    pipe(&folder.join("model/pipe.bin"));
     for uri in ["keys.bin", "up/keys.bin", "zeros.bin", "pipe.bin"] {
         model["buffers"] = serde_json::json!([{"byteLength": 40, "uri": uri}]);
-        fs::write(at.join("model/m.gltf"), model.to_string()).unwrap();
-        let refused = run(at, &["info", "model/m.gltf"]);
+        fs::write(folder.join("model/m.gltf"), model.to_string()).unwrap();
+        let refused = run(folder, &["info", "model/m.gltf"]);
         assert_eq!(refused.code, 4, "{uri}: {}", refused.words);
     }
 }
 
 #[test]
 fn tracks_of_walkers_do_not_leave_their_folder() {
-    let place = sample_folder();
-    let at = place.path();
-    succeed(at, &["generate", "--hill", "-o", "hill.obj"]);
-    fs::create_dir(at.join("walkers")).unwrap();
-    fs::write(at.join("track.csv"), "t,x,y,z\n0,1,0,1\n9,9,0,9\n").unwrap();
-    fs::copy(at.join("track.csv"), at.join("walkers/track.csv")).unwrap();
-    symlink("../track.csv", at.join("walkers/link.csv")).unwrap();
-    symlink("/dev/zero", at.join("walkers/zeros.csv")).unwrap();
-    pipe(&at.join("walkers/pipe.csv"));
+    let temporary = sample_folder();
+    let folder = temporary.path();
+    succeed(folder, &["generate", "--hill", "-o", "hill.obj"]);
+    fs::create_dir(folder.join("walkers")).unwrap();
+    fs::write(folder.join("track.csv"), "t,x,y,z\n0,1,0,1\n9,9,0,9\n").unwrap();
+    fs::copy(folder.join("track.csv"), folder.join("walkers/track.csv")).unwrap();
+    symlink("../track.csv", folder.join("walkers/link.csv")).unwrap();
+    symlink("/dev/zero", folder.join("walkers/zeros.csv")).unwrap();
+    pipe(&folder.join("walkers/pipe.csv"));
     let route = |track: &str| {
         let list = format!(
             "name,radius,speed,x,y,z,to_x,to_y,to_z,track\nann,0.1,1,2,0,2,8,0,8,\n,0.1,,,,,,,,{track}\n"
         );
-        fs::write(at.join("walkers/list.csv"), list).unwrap();
-        let _ = fs::remove_dir_all(at.join("ways"));
+        fs::write(folder.join("walkers/list.csv"), list).unwrap();
+        let _ = fs::remove_dir_all(folder.join("ways"));
         run(
-            at,
+            folder,
             &[
                 "route",
                 "hill.obj",
@@ -391,7 +391,7 @@ fn tracks_of_walkers_do_not_leave_their_folder() {
             ],
         )
     };
-    let absolute = at.join("track.csv");
+    let absolute = folder.join("track.csv");
     for track in [
         absolute.to_str().unwrap(),
         "../track.csv",
@@ -414,10 +414,10 @@ fn tracks_of_walkers_do_not_leave_their_folder() {
 /// anything is written.
 #[test]
 fn pictures_are_refused_before_anything_is_written() {
-    let place = sample_folder();
-    let at = place.path();
-    succeed(at, &["generate", "--hill", "-o", "hill.obj"]);
-    let before = entries(at);
+    let temporary = sample_folder();
+    let folder = temporary.path();
+    succeed(folder, &["generate", "--hill", "-o", "hill.obj"]);
+    let before = entries(folder);
     let route = [
         "route", "hill.obj", "--from", "1,0,1", "--to", "8,0,8", "-o", "way.csv", "--plot",
     ];
@@ -432,9 +432,9 @@ fn pictures_are_refused_before_anything_is_written() {
             ("a.dat", 2),
             ("empty", 2),
         ] {
-            let refused = run(at, &with(line, &[plot]));
+            let refused = run(folder, &with(line, &[plot]));
             assert_eq!(refused.code, code, "{line:?} {plot}: {}", refused.words);
-            assert_eq!(entries(at), before, "{line:?} {plot}");
+            assert_eq!(entries(folder), before, "{line:?} {plot}");
         }
     }
     let both = [
@@ -446,31 +446,31 @@ fn pictures_are_refused_before_anything_is_written() {
         "./x.obj",
         "--overwrite",
     ];
-    let refused = run(at, &both);
+    let refused = run(folder, &both);
     assert_eq!(refused.code, 2, "{}", refused.words);
-    assert_eq!(entries(at), before);
+    assert_eq!(entries(folder), before);
 }
 
 /// A folder of results may lie below the folder of its inputs, or be it.
 #[test]
 fn results_are_no_inputs_of_the_next_run() {
-    let place = sample_folder();
-    let at = place.path();
-    fs::create_dir_all(at.join("walks/deep")).unwrap();
-    fs::copy(at.join("a.dat"), at.join("walks/a.dat")).unwrap();
-    fs::copy(at.join("b.dat"), at.join("walks/deep/b.dat")).unwrap();
+    let temporary = sample_folder();
+    let folder = temporary.path();
+    fs::create_dir_all(folder.join("walks/deep")).unwrap();
+    fs::copy(folder.join("a.dat"), folder.join("walks/a.dat")).unwrap();
+    fs::copy(folder.join("b.dat"), folder.join("walks/deep/b.dat")).unwrap();
     for out in ["walks/out", "walks"] {
         let line = ["convert", "walks", "-o", out, "--to", "npz"];
-        succeed(at, &line);
-        let whole = tree(&at.join("walks"));
-        let resumed = succeed(at, &with(&line, &["--resume"]));
+        succeed(folder, &line);
+        let whole = tree(&folder.join("walks"));
+        let resumed = succeed(folder, &with(&line, &["--resume"]));
         assert!(
             resumed.words.contains("2 results skipped"),
             "{out}: {}",
             resumed.words
         );
-        assert_eq!(tree(&at.join("walks")), whole, "{out}");
-        let _ = fs::remove_dir_all(at.join("walks/out"));
+        assert_eq!(tree(&folder.join("walks")), whole, "{out}");
+        let _ = fs::remove_dir_all(folder.join("walks/out"));
     }
     let line = [
         "eval",
@@ -481,32 +481,36 @@ fn results_are_no_inputs_of_the_next_run() {
         "npz",
         "--shard",
     ];
-    fs::remove_file(at.join("walks/manifest.jsonl")).unwrap();
+    fs::remove_file(folder.join("walks/manifest.jsonl")).unwrap();
     for name in ["walks/a.npz", "walks/deep/b.npz"] {
-        fs::remove_file(at.join(name)).unwrap();
+        fs::remove_file(folder.join(name)).unwrap();
     }
     let bytes = ["--shard-bytes", "100"];
     for part in ["1/2", "2/2"] {
-        succeed(at, &[&line[..], &[part], &bytes].concat());
+        succeed(folder, &[&line[..], &[part], &bytes].concat());
     }
-    succeed(at, &["merge", "walks/shards"]);
-    succeed(at, &["check", "walks/shards"]);
-    assert_eq!(entries(&at.join("walks/shards")).len(), 4);
+    succeed(folder, &["merge", "walks/shards"]);
+    succeed(folder, &["check", "walks/shards"]);
+    assert_eq!(entries(&folder.join("walks/shards")).len(), 4);
 }
 
 /// Results of one directory, as somebody who copied it by hard links has them too.
 #[test]
 fn a_copy_by_links_keeps_its_manifest() {
-    let place = sample_folder();
-    let at = place.path();
-    succeed(at, &BATCH);
-    fs::create_dir(at.join("copy")).unwrap();
+    let temporary = sample_folder();
+    let folder = temporary.path();
+    succeed(folder, &BATCH);
+    fs::create_dir(folder.join("copy")).unwrap();
     for name in ["a.npy", "b.npy", "manifest.jsonl"] {
-        fs::hard_link(at.join("out").join(name), at.join("copy").join(name)).unwrap();
+        fs::hard_link(
+            folder.join("out").join(name),
+            folder.join("copy").join(name),
+        )
+        .unwrap();
     }
-    let before = tree(&at.join("copy"));
-    succeed(at, &with(&BATCH, &["--overwrite", "-m", "slerp"]));
-    assert_eq!(tree(&at.join("copy")), before);
-    assert!(Path::new(&at.join("out/a.npy")).exists());
-    assert_ne!(tree(&at.join("out")), before);
+    let before = tree(&folder.join("copy"));
+    succeed(folder, &with(&BATCH, &["--overwrite", "-m", "slerp"]));
+    assert_eq!(tree(&folder.join("copy")), before);
+    assert!(Path::new(&folder.join("out/a.npy")).exists());
+    assert_ne!(tree(&folder.join("out")), before);
 }

@@ -6,13 +6,16 @@ use std::fs;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
+use tumble_formats::FORMATS;
+
 use super::{run, times};
+use crate::cases;
 use crate::program::{Run, root, sample_folder};
 use crate::support::Random;
 
 /// A run, which must end by itself within the limit, without a bug.
-fn attempt(place: &Path, line: &[&str]) -> Run {
-    let run = run(place, line);
+fn attempt(folder: &Path, line: &[&str]) -> Run {
+    let run = run(folder, line);
     let known = [0, 2, 3, 4, 5, 7, 8];
     assert!(
         known.contains(&run.code),
@@ -50,7 +53,7 @@ fn animations(faults: [(usize, usize); 2]) -> String {
 }
 
 /// Inputs that are broken as a whole or in part, with the code of a command that works on each alone.
-fn broken(place: &Path) -> Vec<(&'static str, i32)> {
+fn broken(folder: &Path) -> Vec<(&'static str, i32)> {
     let cases = [
         ("nothing_moves.gltf", NOTHING_MOVES.to_owned(), 4),
         ("two_broken.gltf", animations([(1, 0), (0, 7)]), 4),
@@ -60,7 +63,7 @@ fn broken(place: &Path) -> Vec<(&'static str, i32)> {
         ("no_pose.tum", "# nothing\n".to_owned(), 4),
     ];
     for (name, text, _) in &cases {
-        fs::write(place.join(name), text).unwrap();
+        fs::write(folder.join(name), text).unwrap();
     }
     let mut all: Vec<_> = cases.iter().map(|&(name, _, code)| (name, code)).collect();
     all.extend([
@@ -89,8 +92,8 @@ const COMMANDS: [&[&str]; 8] = [
 fn no_input_ends_without_a_line() {
     let mut random = Random(18);
     for command in COMMANDS {
-        let place = sample_folder();
-        let all = broken(place.path());
+        let folder = sample_folder();
+        let all = broken(folder.path());
         let mut sets: Vec<Vec<(&str, i32)>> = all.iter().map(|&one| vec![one]).collect();
         for _ in 0..2 * times() {
             let mut set = all.clone();
@@ -104,12 +107,12 @@ fn no_input_ends_without_a_line() {
                 continue; // one at a time
             }
             for made in ["out", "pictures"] {
-                let _ = fs::remove_dir_all(place.path().join(made));
+                let _ = fs::remove_dir_all(folder.path().join(made));
             }
             let names: Vec<&str> = set.iter().map(|one| one.0).collect();
             let line = [command, &names[..], &["--overwrite"]].concat();
             let line = &line[..line.len() - usize::from(["info", "verify"].contains(&command[0]))];
-            let run = attempt(place.path(), line);
+            let run = attempt(folder.path(), line);
             let worst = match (
                 set.iter().all(|one| one.1 == 4),
                 set.iter().all(|one| one.1 == 0),
@@ -134,11 +137,11 @@ fn no_input_ends_without_a_line() {
 /// Every command reports each animation that is refused.
 #[test]
 fn all_broken_animations_are_told() {
-    let place = sample_folder();
-    broken(place.path());
+    let folder = sample_folder();
+    broken(folder.path());
     for command in COMMANDS {
         let line = [command, &["two_broken.gltf"]].concat();
-        let run = attempt(place.path(), &line);
+        let run = attempt(folder.path(), &line);
         assert!(
             run.words.contains("/animations/0/"),
             "{line:?}: {}",
@@ -173,8 +176,8 @@ fn no_name_reaches_a_terminal_as_it_is() {
     let json = |name: &str| serde_json::to_string(name).unwrap();
     let mut seen = 0;
     for name in NAMES {
-        let place = sample_folder();
-        let write = |file: &str, text: String| fs::write(place.path().join(file), text).unwrap();
+        let folder = sample_folder();
+        let write = |file: &str, text: String| fs::write(folder.path().join(file), text).unwrap();
         let quoted = json(name);
         let whole = animations([(0, 0), (0, 0)]);
         let named = whole.replacen(r#"{"name":"a"}"#, &format!(r#"{{"name":{quoted}}}"#), 1);
@@ -235,7 +238,7 @@ fn no_name_reaches_a_terminal_as_it_is() {
         write("word.obj", format!("v 0 0 {word}\n"));
         write("word.ply", format!("ply\nformat {word}\n"));
         write("list.txt", format!("{word}.dat\n"));
-        fs::create_dir(place.path().join("results")).unwrap();
+        fs::create_dir(folder.path().join("results")).unwrap();
         let entry = |output: &str| {
             format!(
                 "{{\"output\":{output},\"output_bytes\":1,\"output_sha256\":{quoted},\"input\":{quoted},\"input_sha256\":{quoted},\
@@ -247,7 +250,7 @@ fn no_name_reaches_a_terminal_as_it_is() {
             entry(&quoted) + &entry("\"x.npy\""),
         );
         let file = format!("{}.dat", name.replace('/', "_"));
-        let is_named = fs::copy(place.path().join("a.dat"), place.path().join(&file)).is_ok();
+        let is_named = fs::copy(folder.path().join("a.dat"), folder.path().join(&file)).is_ok();
         let mut lines: Vec<Vec<&str>> = Vec::new();
         for input in [
             "names.gltf",
@@ -344,7 +347,7 @@ fn no_name_reaches_a_terminal_as_it_is() {
             if line.contains(&&*file) && !is_named {
                 continue;
             }
-            let run = attempt(place.path(), &line);
+            let run = attempt(folder.path(), &line);
             is_quiet(&run.words, &line);
             is_quiet(&String::from_utf8_lossy(&run.out), &line);
             seen += usize::from(run.words.contains("FORGED"));
@@ -399,24 +402,24 @@ fn mutated(bytes: &[u8], random: &mut Random) -> Vec<u8> {
             3 if is_text => {
                 // A line, or an object, twice or not at all.
                 let mark = if bytes.starts_with(b"{") { b'{' } else { b'\n' };
-                let places: Vec<usize> = (0..bytes.len()).filter(|&i| bytes[i] == mark).collect();
-                if places.len() > 1 {
-                    let from = below(places.len() - 1);
-                    let part = bytes[places[from]..places[from + 1]].to_vec();
+                let marks: Vec<usize> = (0..bytes.len()).filter(|&i| bytes[i] == mark).collect();
+                if marks.len() > 1 {
+                    let from = below(marks.len() - 1);
+                    let part = bytes[marks[from]..marks[from + 1]].to_vec();
                     let twice = below(2) == 0;
-                    let to = places[from] + if twice { 0 } else { part.len() };
-                    bytes.splice(places[from]..to, if twice { part } else { Vec::new() });
+                    let to = marks[from] + if twice { 0 } else { part.len() };
+                    bytes.splice(marks[from]..to, if twice { part } else { Vec::new() });
                 }
             }
             4 if bytes.len() > 16 && !is_text => {
-                let place = below(bytes.len() - 8);
+                let offset = below(bytes.len() - 8);
                 let words = [0, 1, u32::MAX, i32::MAX as u32, 1 << 31, 0xffff, 1 << 20];
-                bytes[place..place + 4].copy_from_slice(&words[below(words.len())].to_le_bytes());
+                bytes[offset..offset + 4].copy_from_slice(&words[below(words.len())].to_le_bytes());
             }
             5 => bytes.truncate(below(bytes.len())),
             _ if !bytes.is_empty() => {
-                let place = below(bytes.len());
-                bytes[place] = below(256) as u8;
+                let offset = below(bytes.len());
+                bytes[offset] = below(256) as u8;
             }
             _ => {}
         }
@@ -428,33 +431,27 @@ fn mutated(bytes: &[u8], random: &mut Random) -> Vec<u8> {
 #[test]
 fn mutated_files_end_with_a_code() {
     let mut random = Random(38_200);
-    let folder = root().join("formats/tests/fixtures");
+    let body = root().join("formats/tests/fixtures/body");
+    let folders = FORMATS.into_iter().map(|format| cases::folder(format.name));
     let mut seeds = Vec::new();
-    for format in fs::read_dir(folder).unwrap() {
-        let Ok(files) = fs::read_dir(format.unwrap().path()) else {
-            continue; // a file beside the folders
-        };
+    for folder in folders.chain([body]) {
+        let files = fs::read_dir(folder).unwrap();
         let files = files.map(|file| file.unwrap().path());
-        seeds.extend(files.filter(|file| {
-            file.is_file()
-                && file
-                    .extension()
-                    .is_some_and(|extension| extension != "expected")
-        }));
+        seeds.extend(files.filter(|file| file.is_file()));
     }
     seeds.sort();
-    let place = sample_folder();
+    let temporary = sample_folder();
     fs::write(
-        place.path().join("flat.obj"),
+        temporary.path().join("flat.obj"),
         "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n",
     )
     .unwrap();
     fs::write(
-        place.path().join("path.csv"),
+        temporary.path().join("path.csv"),
         "t,x,y,z,ux,uy,uz\n0,0,0,0,0,1,0\n1,1,0,0,,,\n2,3,1,0,,,\n",
     )
     .unwrap();
-    seeds.extend(["flat.obj", "path.csv"].map(|name| place.path().join(name)));
+    seeds.extend(["flat.obj", "path.csv"].map(|name| temporary.path().join(name)));
     let mut refused = 0;
     let count = 120 * times() as usize;
     for round in 0..count {
@@ -462,7 +459,7 @@ fn mutated_files_end_with_a_code() {
         let bytes = mutated(&fs::read(seed).unwrap(), &mut random);
         let extension = seed.extension().unwrap().to_str().unwrap();
         let name = format!("m.{extension}");
-        fs::write(place.path().join(&name), &bytes).unwrap();
+        fs::write(temporary.path().join(&name), &bytes).unwrap();
         let line: &[&str] = match (extension, round % 5) {
             ("obj", _) => &[
                 "route",
@@ -489,7 +486,7 @@ fn mutated_files_end_with_a_code() {
                 "o.npy",
             ],
         };
-        let run = attempt(place.path(), line);
+        let run = attempt(temporary.path(), line);
         assert!(
             run.code == 0 || !run.words.trim().is_empty(),
             "{line:?} says nothing"
@@ -502,11 +499,11 @@ fn mutated_files_end_with_a_code() {
     );
 }
 
-/// What once took minutes, or for ever.
+/// Inputs that once took minutes, or never ended.
 #[test]
 fn nothing_small_takes_long() {
-    let place = sample_folder();
-    let write = |name: &str, text: &str| fs::write(place.path().join(name), text).unwrap();
+    let folder = sample_folder();
+    let write = |name: &str, text: &str| fs::write(folder.path().join(name), text).unwrap();
     write("far.dat", "# 1 1\n0 1 0 0 0\n1000000000 0 1 0 0\n");
     write(
         "long.dat",
@@ -514,7 +511,7 @@ fn nothing_small_takes_long() {
     );
     let mut nested = b"\x93NUMPY\x01\0\x80\0{'descr': ".to_vec();
     nested.extend(vec![b'['; 118]);
-    fs::write(place.path().join("nested.npy"), &nested).unwrap();
+    fs::write(folder.path().join("nested.npy"), &nested).unwrap();
     // Five thousand nodes with meshes in a chain.
     let nodes: Vec<String> = (0..5000)
         .map(|node| match node {
@@ -537,9 +534,9 @@ fn nothing_small_takes_long() {
     write("faults.gltf", &text);
     write(&"a".repeat(200), "");
     let stars = format!("{}b", "*a".repeat(40));
-    let sparse = fs::File::create(place.path().join("folder/sparse.dat")).unwrap();
+    let sparse = fs::File::create(folder.path().join("folder/sparse.dat")).unwrap();
     sparse.set_len(300 << 30).unwrap();
-    fs::create_dir_all(place.path().join("shards/manifest.d")).unwrap();
+    fs::create_dir_all(folder.path().join("shards/manifest.d")).unwrap();
     let plan = format!(
         r#"{{"plan":"{0}","shards":{1},"inputs":{1},"shard_bytes":1,"outputs_sha256":"{0}","options":"","kernels_sha256":"{0}",
         "tumble":""}}"#,
@@ -590,19 +587,19 @@ fn nothing_small_takes_long() {
         (&["eval", "a.dat", "--tracks", &stars, "-o", "t.npy"], 2),
     ] {
         let started = Instant::now();
-        let run = attempt(place.path(), line);
+        let run = attempt(folder.path(), line);
         assert_eq!(run.code, code, "{line:?}: {}", run.words);
-        let taken = started.elapsed();
-        assert!(taken < Duration::from_secs(20), "{line:?}: {taken:?}");
+        let elapsed = started.elapsed();
+        assert!(elapsed < Duration::from_secs(20), "{line:?}: {elapsed:?}");
     }
 }
 
-/// Velocities of channels with different samplers, a table that a library's decoder gives up on, and what
-/// has no code of its own elsewhere.
+/// Velocities of channels with different samplers, a table that a library's decoder refuses, and errors
+/// that no other test covers.
 #[test]
 fn faults_of_inputs_are_no_bugs() {
-    let place = sample_folder();
-    let write = |name: &str, text: &str| fs::write(place.path().join(name), text).unwrap();
+    let folder = sample_folder();
+    let write = |name: &str, text: &str| fs::write(folder.path().join(name), text).unwrap();
     let whole = animations([(0, 0), (0, 0)]);
     let mixed = whole
         .replacen(r#"{"name":"a"}"#, r#"{"name":"a"},{"name":"b"}"#, 1)
@@ -617,38 +614,38 @@ fn faults_of_inputs_are_no_bugs() {
             1,
         );
     write("mixed.gltf", &mixed);
-    for what in ["velocity", "acceleration", "rotation"] {
+    for quantity in ["velocity", "acceleration", "rotation"] {
         let line = [
             "eval",
             "mixed.gltf",
             "--animation",
             "0",
             "--output",
-            what,
+            quantity,
             "--overwrite",
             "-o",
             "v.npy",
         ];
-        let line = match what {
+        let line = match quantity {
             "rotation" => [&line[..4], &line[6..]].concat(),
             _ => line.to_vec(),
         };
-        let run = attempt(place.path(), &line);
-        assert_eq!(run.code, 0, "{what}: {}", run.words);
-        let bytes = fs::read(place.path().join("v.npy")).unwrap();
+        let run = attempt(folder.path(), &line);
+        assert_eq!(run.code, 0, "{quantity}: {}", run.words);
+        let bytes = fs::read(folder.path().join("v.npy")).unwrap();
         let file = npyz::NpyFile::new(&bytes[..]).unwrap();
-        let width = if what == "rotation" { 4 } else { 3 };
-        assert_eq!((file.shape()[0], file.shape()[2]), (2, width), "{what}");
+        let width = if quantity == "rotation" { 4 } else { 3 };
+        assert_eq!((file.shape()[0], file.shape()[2]), (2, width), "{quantity}");
         let values: Vec<f32> = file.into_vec().unwrap();
         assert!(values.iter().all(|value| value.is_finite()));
         let second = &values[values.len() / 2..];
-        if what != "rotation" {
+        if quantity != "rotation" {
             assert!(
                 second.iter().all(|&value| value == 0.0),
                 "a step stands still"
             );
         }
-        if what == "velocity" {
+        if quantity == "velocity" {
             assert!(
                 (values[2] - 1.2870).abs() < 1e-4,
                 "an arc turns by so much in a second"
@@ -666,7 +663,7 @@ fn faults_of_inputs_are_no_bugs() {
         "{'descr': '<f4', 'fortran_order': False, 'shape': (2, 2, 2), }"
     );
     let net = [&b"\x93NUMPY\x01\0\x76\0"[..], array.as_bytes(), &[0; 32]].concat();
-    fs::write(place.path().join("net.npy"), net).unwrap();
+    fs::write(folder.path().join("net.npy"), net).unwrap();
     for (line, code) in [
         (
             &[
@@ -697,7 +694,7 @@ fn faults_of_inputs_are_no_bugs() {
         ),
         (&["info", "a.dat", "--offsets", "offsets.txt"], "E614"),
     ] {
-        let run = attempt(place.path(), line);
+        let run = attempt(folder.path(), line);
         let _ = writeln!(output, "{}", run.words);
         assert_eq!(run.code, 4, "{line:?}: {}", run.words);
         assert!(

@@ -23,13 +23,13 @@ fn times() -> u64 {
 }
 
 /// Runs the program, which must end within the limit.
-fn run(place: &Path, line: &[&str]) -> Run {
-    let mut command = command(place, line);
+fn run(folder: &Path, line: &[&str]) -> Run {
+    let mut command = command(folder, line);
     ended(command.stdout(Stdio::piped()).stderr(Stdio::piped()))
 }
 
-fn succeed(place: &Path, line: &[&str]) -> Run {
-    let run = run(place, line);
+fn succeed(folder: &Path, line: &[&str]) -> Run {
+    let run = run(folder, line);
     assert_eq!(run.code, 0, "{line:?}: {}", run.words);
     run
 }
@@ -178,9 +178,12 @@ fn base64(bytes: &[u8]) -> String {
     let groups = bytes.chunks(3).map(|chunk| {
         let byte = |at: usize| u32::from(chunk.get(at).copied().unwrap_or(0));
         let word = byte(0) << 16 | byte(1) << 8 | byte(2);
-        let letter = |at: usize| match at <= chunk.len() {
-            true => char::from(LETTERS[(word >> (18 - 6 * at) & 63) as usize]),
-            false => '=',
+        let letter = |at: usize| {
+            if at <= chunk.len() {
+                char::from(LETTERS[(word >> (18 - 6 * at) & 63) as usize])
+            } else {
+                '='
+            }
         };
         [0, 1, 2, 3].map(letter).iter().collect::<String>()
     });

@@ -11,11 +11,11 @@ use crate::tree::tree;
 /// Names that are too long, no text, or strange; the others are made, and resuming ends.
 #[test]
 fn no_name_ends_a_batch() {
-    let place = sample_folder();
-    let at = place.path();
-    let walks = at.join("walks");
+    let temporary = sample_folder();
+    let folder = temporary.path();
+    let walks = folder.join("walks");
     fs::create_dir(&walks).unwrap();
-    let keys = fs::read(at.join("a.dat")).unwrap();
+    let keys = fs::read(folder.join("a.dat")).unwrap();
     // The result's name has 255 bytes, and 257: too long.
     let just = format!("{}.dat", "x".repeat(251));
     let long = format!("{}.d", "y".repeat(253));
@@ -34,9 +34,9 @@ fn no_name_ends_a_batch() {
     }
     fs::write(walks.join(&long), &keys).unwrap();
     let list: Vec<String> = vec![format!("walks/{long}"), "walks".to_owned()];
-    fs::write(at.join("list"), list.join("\n")).unwrap();
+    fs::write(folder.join("list"), list.join("\n")).unwrap();
     let line = ["eval", "--files-from", "list", "--from", "dat", "-o", "out"];
-    let first = run(at, &line);
+    let first = run(folder, &line);
     assert_eq!(first.code, 3, "{}", first.words);
     assert!(
         first.words.contains("2 of 9 inputs failed"),
@@ -49,21 +49,21 @@ fn no_name_ends_a_batch() {
         "{}",
         first.words
     );
-    let made = entries(&at.join("out"));
+    let made = entries(&folder.join("out"));
     assert_eq!(made.len(), 8, "{made:?}");
     assert!(made.contains(&format!("{}.npy", "x".repeat(251))));
-    let whole = tree(&at.join("out"));
+    let whole = tree(&folder.join("out"));
     for _ in 0..2 {
-        let resumed = run(at, &[&line[..], &["--resume"]].concat());
+        let resumed = run(folder, &[&line[..], &["--resume"]].concat());
         assert_eq!(resumed.code, 3, "{}", resumed.words);
         assert!(
             resumed.words.contains("7 results skipped"),
             "{}",
             resumed.words
         );
-        assert_eq!(tree(&at.join("out")), whole);
+        assert_eq!(tree(&folder.join("out")), whole);
     }
-    succeed(at, &["check", "out"]);
+    succeed(folder, &["check", "out"]);
 
     let line = [
         "eval",
@@ -76,18 +76,18 @@ fn no_name_ends_a_batch() {
         "--shard",
         "1/1",
     ];
-    let shard = run(at, &line);
+    let shard = run(folder, &line);
     assert_eq!(shard.code, 3, "{}", shard.words);
-    let merged = run(at, &["merge", "shards"]);
+    let merged = run(folder, &["merge", "shards"]);
     assert_eq!(merged.code, 3, "{}", merged.words);
-    assert_eq!(tree(&at.join("shards")), whole);
+    assert_eq!(tree(&folder.join("shards")), whole);
 }
 
 /// An animation may be called anything, and at any length.
 #[test]
 fn animations_of_any_name_get_files() {
-    let place = sample_folder();
-    let at = place.path();
+    let temporary = sample_folder();
+    let folder = temporary.path();
     let long = "n".repeat(250);
     let other = format!("{}x", "n".repeat(249));
     let renames = [
@@ -100,65 +100,68 @@ fn animations_of_any_name_get_files() {
         let mut model: serde_json::Value = serde_json::from_str(&two_animations()).unwrap();
         model["animations"][0]["name"] = run_name.into();
         model["animations"][1]["name"] = walk.into();
-        fs::write(at.join("m.gltf"), model.to_string()).unwrap();
+        fs::write(folder.join("m.gltf"), model.to_string()).unwrap();
         let out = format!("out{round}");
-        succeed(at, &["eval", "m.gltf", "a.dat", "-o", &out]);
-        let made = entries(&at.join(&out));
+        succeed(folder, &["eval", "m.gltf", "a.dat", "-o", &out]);
+        let made = entries(&folder.join(&out));
         assert_eq!(made.len(), 4, "{made:?}");
         assert!(
             made.iter()
                 .all(|name| !name.contains(['/', '\n', '\u{1b}'])),
             "{made:?}"
         );
-        let resumed = succeed(at, &["eval", "m.gltf", "a.dat", "-o", &out, "--resume"]);
+        let resumed = succeed(folder, &["eval", "m.gltf", "a.dat", "-o", &out, "--resume"]);
         assert!(
             resumed.words.contains("2 results skipped"),
             "{}",
             resumed.words
         );
-        succeed(at, &["check", &out]);
+        succeed(folder, &["check", &out]);
     }
 }
 
 /// One clip that cannot be written is that clip's failure.
 #[test]
 fn one_clip_that_cannot_be_written_does_not_end_the_others() {
-    let place = sample_folder();
-    let at = place.path();
-    fs::write(at.join("m.gltf"), two_animations()).unwrap();
-    fs::create_dir_all(at.join("out/m.Run.npy")).unwrap();
+    let temporary = sample_folder();
+    let folder = temporary.path();
+    fs::write(folder.join("m.gltf"), two_animations()).unwrap();
+    fs::create_dir_all(folder.join("out/m.Run.npy")).unwrap();
     let line = ["eval", "m.gltf", "a.dat", "-o", "out", "--overwrite"];
-    let made = run(at, &line);
+    let made = run(folder, &line);
     assert_eq!(made.code, 3, "{}", made.words);
     assert!(
         made.words.contains("1 of 2 animations failed"),
         "{}",
         made.words
     );
-    let there = entries(&at.join("out"));
+    let there = entries(&folder.join("out"));
     assert!(
         there.contains("m.Walk.npy") && there.contains("a.npy"),
         "{there:?}"
     );
-    succeed(at, &["check", "out"]);
-    fs::remove_dir(at.join("out/m.Run.npy")).unwrap();
-    succeed(at, &["eval", "m.gltf", "a.dat", "-o", "out", "--resume"]);
-    assert!(at.join("out/m.Run.npy").is_file());
-    succeed(at, &["check", "out"]);
+    succeed(folder, &["check", "out"]);
+    fs::remove_dir(folder.join("out/m.Run.npy")).unwrap();
+    succeed(
+        folder,
+        &["eval", "m.gltf", "a.dat", "-o", "out", "--resume"],
+    );
+    assert!(folder.join("out/m.Run.npy").is_file());
+    succeed(folder, &["check", "out"]);
 }
 
 /// Two inputs of one stem get two results; two of one name fail, and no other.
 #[test]
 fn inputs_of_one_stem_are_both_evaluated() {
-    let place = sample_folder();
-    let at = place.path();
-    fs::create_dir(at.join("walks")).unwrap();
-    let keys = fs::read(at.join("a.dat")).unwrap();
+    let temporary = sample_folder();
+    let folder = temporary.path();
+    fs::create_dir(folder.join("walks")).unwrap();
+    let keys = fs::read(folder.join("a.dat")).unwrap();
     for name in ["walks/walk.dat", "walks/walk.DAT", "walks/other.dat"] {
-        fs::write(at.join(name), &keys).unwrap();
+        fs::write(folder.join(name), &keys).unwrap();
     }
-    succeed(at, &["eval", "walks", "-o", "out"]);
-    let made = entries(&at.join("out"));
+    succeed(folder, &["eval", "walks", "-o", "out"]);
+    let made = entries(&folder.join("out"));
     let expected = [
         "manifest.jsonl",
         "other.npy",
@@ -166,18 +169,18 @@ fn inputs_of_one_stem_are_both_evaluated() {
         "walk.dat.npy",
     ];
     assert!(made.iter().eq(expected), "{made:?}");
-    let resumed = succeed(at, &["eval", "walks", "-o", "out", "--resume"]);
+    let resumed = succeed(folder, &["eval", "walks", "-o", "out", "--resume"]);
     assert!(
         resumed.words.contains("3 results skipped"),
         "{}",
         resumed.words
     );
-    succeed(at, &["eval", "walks", "-o", "shards", "--shard", "1/1"]);
-    succeed(at, &["merge", "shards"]);
-    assert_eq!(tree(&at.join("shards")), tree(&at.join("out")));
+    succeed(folder, &["eval", "walks", "-o", "shards", "--shard", "1/1"]);
+    succeed(folder, &["merge", "shards"]);
+    assert_eq!(tree(&folder.join("shards")), tree(&folder.join("out")));
 
     let shared = run(
-        at,
+        folder,
         &["eval", "a.dat", "folder/a.dat", "b.dat", "-o", "shared"],
     );
     assert_eq!(shared.code, 3, "{}", shared.words);
@@ -187,15 +190,15 @@ fn inputs_of_one_stem_are_both_evaluated() {
         shared.words
     );
     assert!(
-        entries(&at.join("shared"))
+        entries(&folder.join("shared"))
             .iter()
             .eq(["b.npy", "manifest.jsonl"])
     );
     // A directory that only shards may use, and results that are inputs.
-    fs::create_dir_all(at.join("odd/manifest.d")).unwrap();
-    fs::write(at.join("odd/manifest.d/a.dat"), &keys).unwrap();
-    fs::write(at.join("odd/b.dat"), &keys).unwrap();
-    let odd = run(at, &["eval", "odd", "-o", "odd-out"]);
+    fs::create_dir_all(folder.join("odd/manifest.d")).unwrap();
+    fs::write(folder.join("odd/manifest.d/a.dat"), &keys).unwrap();
+    fs::write(folder.join("odd/b.dat"), &keys).unwrap();
+    let odd = run(folder, &["eval", "odd", "-o", "odd-out"]);
     assert_eq!(odd.code, 3, "{}", odd.words);
     assert!(
         odd.words.contains("manifest.d is the directory of shards"),

@@ -47,29 +47,29 @@ const WRITERS: &[(&str, &str)] = &[
 ];
 
 fn folder() -> tempfile::TempDir {
-    let place = sample_folder();
-    let at = place.path();
-    fs::create_dir_all(at.join("walks/deep")).unwrap();
+    let temporary = sample_folder();
+    let folder = temporary.path();
+    fs::create_dir_all(folder.join("walks/deep")).unwrap();
     for name in ["walks/deep/a.dat", "walks/deep/b.dat"] {
-        fs::copy(at.join("a.dat"), at.join(name)).unwrap();
+        fs::copy(folder.join("a.dat"), folder.join(name)).unwrap();
     }
     fs::write(
-        at.join("path.csv"),
+        folder.join("path.csv"),
         "t,x,y,z\n0,0,0,0\n1,1,0,0\n2,1,1,0\n3,0,1,1\n",
     )
     .unwrap();
-    fs::write(at.join("m.gltf"), two_animations()).unwrap();
-    succeed(at, &["generate", "--hill", "-o", "hill.obj"]);
-    fs::create_dir(at.join("out")).unwrap();
-    place
+    fs::write(folder.join("m.gltf"), two_animations()).unwrap();
+    succeed(folder, &["generate", "--hill", "-o", "hill.obj"]);
+    fs::create_dir(folder.join("out")).unwrap();
+    temporary
 }
 
 fn words(line: &str) -> Vec<&str> {
     line.split(' ').collect()
 }
 
-fn quiet(place: &Path, line: &[&str]) -> Command {
-    let mut command = command(place, line);
+fn quiet(folder: &Path, line: &[&str]) -> Command {
+    let mut command = command(folder, line);
     command.stdout(Stdio::null()).stderr(Stdio::null());
     command
 }
@@ -78,25 +78,25 @@ fn quiet(place: &Path, line: &[&str]) -> Command {
 /// command does its work afterwards, and nothing half-written stays.
 #[test]
 fn kills_leave_whole_files_and_nothing_else() {
-    let place = folder();
-    let at = place.path();
+    let temporary = folder();
+    let folder = temporary.path();
     let mut random = Random(28);
     let (mut kills, mut left) = (0, 0);
     for (line, _) in WRITERS {
         let line = words(line);
         let started = Instant::now();
-        succeed(at, &line);
+        succeed(folder, &line);
         let longest = started.elapsed().as_micros() as u64;
-        let whole = tree(&at.join("out"));
+        let whole = tree(&folder.join("out"));
         for _ in 0..2 * times() {
-            fs::remove_dir_all(at.join("out")).unwrap();
-            fs::create_dir(at.join("out")).unwrap();
-            let mut child = quiet(at, &line).spawn().unwrap();
+            fs::remove_dir_all(folder.join("out")).unwrap();
+            fs::create_dir(folder.join("out")).unwrap();
+            let mut child = quiet(folder, &line).spawn().unwrap();
             std::thread::sleep(Duration::from_micros(random.next() % longest.max(1)));
             child.kill().unwrap();
             kills += u32::from(child.wait().unwrap().code().is_none());
-            left += parts(&at.join("out")).len();
-            for (name, bytes) in tree(&at.join("out")) {
+            left += parts(&folder.join("out")).len();
+            for (name, bytes) in tree(&folder.join("out")) {
                 let is_part = name.ends_with(".part") || name.ends_with("manifest.jsonl");
                 assert!(
                     is_part || whole[&name] == bytes,
@@ -109,12 +109,12 @@ fn kills_leave_whole_files_and_nothing_else() {
             } else {
                 "--overwrite"
             };
-            succeed(at, &[&line[..], &[again]].concat());
-            assert_eq!(parts(&at.join("out")), Vec::<String>::new(), "{line:?}");
-            assert_eq!(tree(&at.join("out")), whole, "{line:?}");
+            succeed(folder, &[&line[..], &[again]].concat());
+            assert_eq!(parts(&folder.join("out")), Vec::<String>::new(), "{line:?}");
+            assert_eq!(tree(&folder.join("out")), whole, "{line:?}");
         }
-        fs::remove_dir_all(at.join("out")).unwrap();
-        fs::create_dir(at.join("out")).unwrap();
+        fs::remove_dir_all(folder.join("out")).unwrap();
+        fs::create_dir(folder.join("out")).unwrap();
     }
     assert!(
         kills > 0,
@@ -122,21 +122,21 @@ fn kills_leave_whole_files_and_nothing_else() {
     );
 }
 
-/// What is left when all results lie in sub-folders goes too, and that of inputs that are gone.
+/// Leftovers are removed too where all results lie in sub-folders, and those of inputs that no longer exist.
 #[test]
 fn what_was_left_anywhere_below_a_folder_of_results_goes() {
-    let place = folder();
-    let at = place.path();
+    let temporary = folder();
+    let folder = temporary.path();
     let line = ["eval", "walks", "-o", "out"];
-    succeed(at, &line);
+    succeed(folder, &line);
     for name in ["out/.tumble-aBcDeF.part", "out/deep/.tumble-aBcDeF.part"] {
-        fs::write(at.join(name), "half").unwrap();
+        fs::write(folder.join(name), "half").unwrap();
     }
-    fs::remove_file(at.join("walks/deep/b.dat")).unwrap();
-    fs::copy(at.join("a.dat"), at.join("walks/c.dat")).unwrap();
-    fs::remove_file(at.join("walks/deep/a.dat")).unwrap();
-    succeed(at, &[&line[..], &["--resume"]].concat());
-    assert_eq!(parts(&at.join("out")), Vec::<String>::new());
+    fs::remove_file(folder.join("walks/deep/b.dat")).unwrap();
+    fs::copy(folder.join("a.dat"), folder.join("walks/c.dat")).unwrap();
+    fs::remove_file(folder.join("walks/deep/a.dat")).unwrap();
+    succeed(folder, &[&line[..], &["--resume"]].concat());
+    assert_eq!(parts(&folder.join("out")), Vec::<String>::new());
 }
 
 /// Some seconds of text, of which a first part is on its way.
@@ -172,11 +172,11 @@ fn send(signal: &str, child: &Child) {
 
 #[test]
 fn every_signal_that_ends_programs_leaves_no_file() {
-    let place = folder();
-    let at = place.path();
+    let temporary = folder();
+    let folder = temporary.path();
     for (signal, code) in [("INT", 130), ("TERM", 143), ("HUP", 129), ("QUIT", 131)] {
         for twice in [false, true] {
-            let mut child = writing(at, None);
+            let mut child = writing(folder, None);
             send(signal, &child);
             if twice {
                 send(signal, &child);
@@ -187,7 +187,7 @@ fn every_signal_that_ends_programs_leaves_no_file() {
                 "{signal}, twice: {twice}"
             );
             assert_eq!(
-                entries(&at.join("out")).len(),
+                entries(&folder.join("out")).len(),
                 0,
                 "{signal}, twice: {twice}"
             );
@@ -195,21 +195,21 @@ fn every_signal_that_ends_programs_leaves_no_file() {
     }
 }
 
-/// What whoever started the program has it ignore is ignored, as `nohup` has SIGHUP.
+/// Signals that were ignored when the program was started stay ignored, as SIGHUP under `nohup`.
 #[cfg(target_os = "linux")]
 #[test]
 fn ignored_signals_stay_ignored() {
-    let place = folder();
-    let at = place.path();
+    let temporary = folder();
+    let folder = temporary.path();
     for signal in ["INT", "HUP", "QUIT", "TERM"] {
-        let mut child = writing(at, Some(signal));
+        let mut child = writing(folder, Some(signal));
         send(signal, &child);
         std::thread::sleep(Duration::from_millis(100));
         assert!(child.try_wait().unwrap().is_none(), "{signal} ended it");
         let other = if signal == "TERM" { "INT" } else { "TERM" };
         send(other, &child);
         assert!(!wait(&mut child).success());
-        assert_eq!(entries(&at.join("out")).len(), 0, "{signal}");
+        assert_eq!(entries(&folder.join("out")).len(), 0, "{signal}");
     }
 }
 
@@ -217,13 +217,13 @@ fn ignored_signals_stay_ignored() {
 /// old files stay as they are, and nothing is left half-way.
 #[test]
 fn a_full_disk_leaves_what_was_there() {
-    let place = folder();
-    let at = place.path();
+    let temporary = folder();
+    let folder = temporary.path();
     let program = env!("CARGO_BIN_EXE_tumble");
     for (line, made) in WRITERS {
         let line = words(line);
-        succeed(at, &line);
-        let before = tree(&at.join("out"));
+        succeed(folder, &line);
+        let before = tree(&folder.join("out"));
         let largest = before.values().map(Vec::len).max().unwrap();
         // Of the largest file half is written; of some commands a small one is whole before.
         let blocks = (largest / 2 / 512).max(1);
@@ -232,18 +232,18 @@ fn a_full_disk_leaves_what_was_there() {
             line.join(" ")
         );
         let mut shell = Command::new("sh");
-        shell.current_dir(at).args(["-c", &script]);
+        shell.current_dir(folder).args(["-c", &script]);
         let run = ended(&mut shell);
-        let said = fs::read_to_string(at.join("words")).unwrap();
+        let said = fs::read_to_string(folder.join("words")).unwrap();
         let whole = largest <= 512;
         assert!(
             whole || matches!(run.code, 3 | 4 | 7),
             "{line:?}: {}: {said}",
             run.code
         );
-        assert_eq!(tree(&at.join("out")), before, "{line:?}: {made}");
-        fs::remove_dir_all(at.join("out")).unwrap();
-        fs::create_dir(at.join("out")).unwrap();
+        assert_eq!(tree(&folder.join("out")), before, "{line:?}: {made}");
+        fs::remove_dir_all(folder.join("out")).unwrap();
+        fs::create_dir(folder.join("out")).unwrap();
     }
 }
 
@@ -251,12 +251,12 @@ fn a_full_disk_leaves_what_was_there() {
 #[cfg(target_os = "linux")]
 #[test]
 fn a_full_file_system_ends_a_batch_and_resuming_finishes_it() {
-    let place = folder();
-    let at = place.path();
+    let temporary = folder();
+    let folder = temporary.path();
     let mount = |size: &str| {
         Command::new("mount")
             .args(["-t", "tmpfs", "-o", &format!("{size},mode=777"), "tumble"])
-            .arg(at.join("out"))
+            .arg(folder.join("out"))
             .stderr(Stdio::null())
             .status()
             .is_ok_and(|status| status.success())
@@ -265,14 +265,14 @@ fn a_full_file_system_ends_a_batch_and_resuming_finishes_it() {
         eprintln!("no file system may be mounted here: the limit on files' sizes stands for it");
         return;
     }
-    let unmounted = Unmount(at.join("out"));
+    let unmounted = Unmount(folder.join("out"));
     let line = ["eval", "walks", "--fps", "1000", "-o", "out/all"];
-    let full = run(at, &line);
+    let full = run(folder, &line);
     assert_eq!(full.code, 7, "{}", full.words);
-    assert_eq!(parts(&at.join("out")), Vec::<String>::new());
+    assert_eq!(parts(&folder.join("out")), Vec::<String>::new());
     assert!(mount("remount,size=16m"));
-    succeed(at, &[&line[..], &["--resume"]].concat());
-    succeed(at, &["check", "out/all"]);
+    succeed(folder, &[&line[..], &["--resume"]].concat());
+    succeed(folder, &["check", "out/all"]);
     drop(unmounted);
 }
 
@@ -290,19 +290,19 @@ fn a_read_only_folder_is_refused_by_every_command() {
     use std::os::unix::fs::PermissionsExt;
 
     const NOBODY: u32 = 65_534;
-    let place = folder();
-    let at = place.path();
-    let out = at.join("out");
+    let temporary = folder();
+    let folder = temporary.path();
+    let out = folder.join("out");
     fs::set_permissions(&out, fs::Permissions::from_mode(0o555)).unwrap();
     let is_root = fs::write(out.join("try"), "").is_ok();
     let _ = fs::remove_file(out.join("try"));
     if is_root {
-        fs::set_permissions(at, fs::Permissions::from_mode(0o755)).unwrap();
+        fs::set_permissions(folder, fs::Permissions::from_mode(0o755)).unwrap();
     }
     for (line, _) in WRITERS {
-        let mut command = command(at, &words(line));
+        let mut command = command(folder, &words(line));
         if is_root {
-            // Whoever may do everything has to be told otherwise.
+            // Root may write everywhere: the program runs as another user.
             command.uid(NOBODY);
         }
         let run = ended(command.stdout(Stdio::piped()).stderr(Stdio::piped()));

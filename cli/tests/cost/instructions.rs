@@ -69,7 +69,7 @@ fn generate(folder: &Path, keys: u32, motion: &[&str]) -> std::path::PathBuf {
 fn rotations_and_keys_cost_no_more_than_they_did() {
     let folder = tempfile::tempdir().unwrap();
     let random = |keys| generate(folder.path(), keys, &["--random"]);
-    let (few, many) = (random(26), random(260));
+    let (sparse, many) = (random(26), random(260));
     let has_avx2 = VectorWidth::available().contains(&VectorWidth::Avx2);
     let bounds = [
         ("baseline", [22.0, 47.0, 47.0], [2650.0, 18_000.0]),
@@ -85,7 +85,7 @@ fn rotations_and_keys_cost_no_more_than_they_did() {
         for (method, bound) in methods.into_iter().zip(a_rotation) {
             let count = |file, fps| instructions(file, method, fps, width);
             let (Some(coarse), Some(fine), Some(dense)) =
-                (count(&few, 60), count(&few, 240), count(&many, 60))
+                (count(&sparse, 60), count(&sparse, 240), count(&many, 60))
             else {
                 return;
             };
@@ -97,8 +97,8 @@ fn rotations_and_keys_cost_no_more_than_they_did() {
         }
         // What all spend on a key, as reading it, is not counted.
         let keys = (TRACKS * (260 - 26)) as f64;
-        for ((method, own), bound) in methods.into_iter().zip(&per_keys).skip(1).zip(a_key) {
-            let each = (own - per_keys[0]) / keys;
+        for ((method, cost), bound) in methods.into_iter().zip(&per_keys).skip(1).zip(a_key) {
+            let each = (cost - per_keys[0]) / keys;
             println!("{width}, {method}: {each:.0} instructions a key more than an arc");
             assert!(each < bound, "{width}, {method}: {each:.0} a key");
         }

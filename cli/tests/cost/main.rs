@@ -8,6 +8,8 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use peak_alloc::PeakAlloc;
 
 mod bombs;
+#[path = "../../../formats/tests/cases.rs"]
+mod cases;
 #[cfg(target_arch = "x86_64")]
 mod instructions;
 mod memory;

@@ -4,7 +4,7 @@
 use std::io::{BufReader, Read};
 
 use glam::Quat;
-use tumble::{Chunk, Device, Engine, EngineOptions, Error, Frames, Layout, TrackSet, method};
+use tumble::{Chunk, Device, Engine, EngineOptions, Error, Layout, SampleTimes, TrackSet, method};
 use tumble_formats::Loaded;
 use tumble_formats::ReadOptions;
 use tumble_formats::dat::read_dat;
@@ -85,12 +85,12 @@ fn a_large_file_is_read_in_bounded_extra_memory() {
         let (loaded, _) = reading(&mut input);
         let peak = resident(false) - before;
         let set = loaded.unwrap().clips.remove(0).set;
-        let own = set.key_count() * 16 + set.track(0).times.len() * 8;
-        let extra = peak.saturating_sub(own);
+        let stored = set.key_count() * 16 + set.track(0).times.len() * 8;
+        let extra = peak.saturating_sub(stored);
         println!(
             "{boxes} boxes, {} MB: {} MB of keys and times, {} MB more, {:.0} MB/s",
             input.total / 1_000_000,
-            own / 1_000_000,
+            stored / 1_000_000,
             extra / 1_000_000,
             input.total as f64 / 1e6 / started.elapsed().as_secs_f64()
         );
@@ -131,7 +131,7 @@ fn clips_and_streams_keep_to_the_memory_of_the_engine() {
         set.push("", &times, &keys).unwrap();
     }
     let of_keys = set.key_count() * size_of::<Quat>() + times.len() * size_of::<f64>();
-    let (frames, layout) = (Frames::fps(50), Layout::FrameMajor);
+    let (frames, layout) = (SampleTimes::fps(50), Layout::FrameMajor);
     let method = method::BESSEL_OVERHAUSER;
     let limit = 8 * MIB;
     for memory in [None, Some(limit as u64)] {

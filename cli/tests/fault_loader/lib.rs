@@ -1,4 +1,4 @@
-//! A Vulkan loader that fails when it is told to: it stands before the real one, at the
+//! A Vulkan loader that fails on demand: it stands before the real one, at the
 //! boundary that `ash` calls.
 //!
 //! * `FAULTS`: `CALL,RESULT,FIRST,COUNT` separated by blanks: from the FIRST call (counted
@@ -8,7 +8,7 @@
 //! * `FAULT_LOG`: a file that gets a line for every call that can fail, and for every
 //!   object that is created or destroyed, behind the number of the process.
 //! * `FAULT_DEVICES`: `none` hides every device, `no-compute` their compute queues.
-//! * `FAULT_CARD`: a card in the place of the device (`card.rs`).
+//! * `FAULT_CARD`: a card instead of the device (`card.rs`).
 //! * Other drivers' limits and habits: `odd.rs`.
 //! * `REAL_LOADER`: the path of the loader behind it.
 //!
@@ -91,11 +91,11 @@ fn log(line: &str) {
     }
 }
 
-fn hidden(what: &str) -> bool {
-    std::env::var("FAULT_DEVICES").is_ok_and(|hidden| hidden == what)
+fn hidden(kind: &str) -> bool {
+    std::env::var("FAULT_DEVICES").is_ok_and(|hidden| hidden == kind)
 }
 
-/// The result that a call is to have instead of its own.
+/// The result that a call returns instead of the real one.
 fn fault(call: &'static str) -> Option<i32> {
     let mut state = STATE.lock().unwrap();
     let count = state.calls.entry(call).or_default();
@@ -132,9 +132,10 @@ fn real_loader() -> GetInstanceProcAddr {
 /// The real function of that name.
 fn real(name: &CStr) -> Pointer {
     let is_global = name.to_bytes().starts_with(b"vkEnumerateInstance");
-    let instance = match is_global {
-        true => 0,
-        false => STATE.lock().unwrap().instance,
+    let instance = if is_global {
+        0
+    } else {
+        STATE.lock().unwrap().instance
     };
     // SAFETY: the instance is null or alive, and the name is a string.
     let found = unsafe { real_loader()(instance, name.as_ptr()) };
@@ -224,13 +225,13 @@ fallible! {
     vkCreateComputePipelines(device, cache, count, infos, allocator, out) creates;
 }
 
-/// Calls that destroy what one of the above made; nothing where they are given nothing.
+/// Calls that destroy an object that a call above made; null is passed on.
 macro_rules! destroys {
     ($($call:ident of $made:ident;)*) => {
         $(
             unsafe extern "system" fn $call(owner: Word, object: Word, allocator: Word) {
                 if object != 0 {
-                    log(concat!("gone ", stringify!($made)));
+                    log(concat!("destroyed ", stringify!($made)));
                 }
                 // SAFETY: the real function has these arguments.
                 unsafe {
@@ -297,9 +298,9 @@ unsafe extern "system" fn vkAllocateMemory(
     }
     // SAFETY: behind the type and the chain comes the size.
     let size = unsafe { (*info)[2] };
-    let taken: u64 = STATE.lock().unwrap().memory.values().sum();
+    let used: u64 = STATE.lock().unwrap().memory.values().sum();
     let there = std::env::var("FAULT_MEMORY").map_or(u64::MAX, |bytes| bytes.parse().unwrap());
-    if taken + size > there {
+    if used + size > there {
         log(&format!("short vkAllocateMemory {size}"));
         return OUT_OF_DEVICE_MEMORY;
     }
@@ -352,7 +353,7 @@ unsafe extern "system" fn vkGetQueryPoolResults(
 
 unsafe extern "system" fn vkFreeMemory(device: Word, memory: Word, allocator: Word) {
     if memory != 0 {
-        log("gone vkAllocateMemory");
+        log("destroyed vkAllocateMemory");
         STATE.lock().unwrap().memory.remove(&memory);
     }
     // SAFETY: the real function, and its arguments.
@@ -364,7 +365,7 @@ unsafe extern "system" fn vkFreeMemory(device: Word, memory: Word, allocator: Wo
 }
 
 unsafe extern "system" fn vkDestroyInstance(instance: Word, allocator: Word) {
-    log("gone vkCreateInstance");
+    log("destroyed vkCreateInstance");
     // SAFETY: the real function, and its arguments.
     unsafe {
         let real: unsafe extern "system" fn(Word, Word) =
@@ -374,7 +375,7 @@ unsafe extern "system" fn vkDestroyInstance(instance: Word, allocator: Word) {
 }
 
 unsafe extern "system" fn vkDestroyDevice(device: Word, allocator: Word) {
-    log("gone vkCreateDevice");
+    log("destroyed vkCreateDevice");
     // SAFETY: the real function, and its arguments.
     unsafe {
         let real: unsafe extern "system" fn(Word, Word) =
@@ -427,8 +428,8 @@ unsafe extern "system" fn vkGetPhysicalDeviceQueueFamilyProperties(
 unsafe extern "system" fn vkGetDeviceProcAddr(device: Word, name: *const c_char) -> Pointer {
     // SAFETY: the caller's name is a string; the real function has these arguments.
     unsafe {
-        if let Some(own) = own(CStr::from_ptr(name)) {
-            return own;
+        if let Some(function) = replacement(CStr::from_ptr(name)) {
+            return function;
         }
         let real: unsafe extern "system" fn(Word, *const c_char) -> Pointer =
             std::mem::transmute(real(c"vkGetDeviceProcAddr"));
@@ -436,7 +437,7 @@ unsafe extern "system" fn vkGetDeviceProcAddr(device: Word, name: *const c_char)
     }
 }
 
-fn own(name: &CStr) -> Option<Pointer> {
+fn replacement(name: &CStr) -> Option<Pointer> {
     if let Some(special) = card::function(name).or_else(|| odd::function(name)) {
         return Some(special);
     }
@@ -465,5 +466,5 @@ pub unsafe extern "system" fn vkGetInstanceProcAddr(
     name: *const c_char,
 ) -> Pointer {
     // SAFETY: the caller's name is a string.
-    unsafe { own(CStr::from_ptr(name)).unwrap_or_else(|| real_loader()(instance, name)) }
+    unsafe { replacement(CStr::from_ptr(name)).unwrap_or_else(|| real_loader()(instance, name)) }
 }

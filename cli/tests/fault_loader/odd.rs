@@ -1,7 +1,7 @@
 //! Drivers that are not as lavapipe is:
 //!
 //! * `FAULT_STORAGE_BUFFERS`: how many storage buffers a kernel may bind;
-//! * `FAULT_PORTABILITY`: the device has not all of Vulkan: only instances that say they know are told of
+//! * `FAULT_PORTABILITY`: the device has not all of Vulkan: only instances that ask for it see
 //!   it, and it is opened only with `VK_KHR_portability_subset`;
 //! * `FAULT_WAIT`: milliseconds until an instance is there;
 //! * `FAULT_INCOHERENT`: memory that the host caches is not coherent. The host then sees separate memory,

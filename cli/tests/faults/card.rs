@@ -14,10 +14,11 @@ use crate::support::{dense_set, first_difference, hostile_set};
 use glam::Quat;
 use rayon::prelude::*;
 use tumble::{
-    Device, DeviceKind, Encoding, Engine, EngineOptions, Frames, Layout, Mapping, Skeleton, method,
+    Device, DeviceKind, Encoding, Engine, EngineOptions, Layout, Mapping, SampleTimes, Skeleton,
+    method,
 };
 
-/// The kinds of memory that the loader tells of, by their numbers.
+/// The memory types of the loader's card, as it logs them.
 const DEVICE: &str = "memory 0";
 const HOST: &str = "memory 1";
 const BOTH: &str = "memory 2";
@@ -44,7 +45,7 @@ fn a_card_copies_beside_its_kernels_and_is_written_where_the_host_sees_it() {
     let Some(loader) = Loader::new() else { return };
     for card in ["rebar", "window", "full"] {
         let log = run(&loader, card);
-        let count = |what: &str| log.card.get(what).copied().unwrap_or_default();
+        let count = |event: &str| log.card.get(event).copied().unwrap_or_default();
         assert!(count("copies") > 20, "{card}: {log:?}");
         assert!(count("beside") > 10, "{card}: {log:?}");
         assert_eq!(count("disorder"), 0, "{card}: {log:?}");
@@ -72,18 +73,18 @@ fn card_work() {
     // More segments than a 64th of a small window holds.
     let (dense, dense_frames) = dense_set(40, 1000, 0.2);
     let requests = [
-        Frames::fps(60).between(0.0, 9.0),
-        Frames::at(vec![0.3, 0.7]),
+        SampleTimes::fps(60).between(0.0, 9.0),
+        SampleTimes::at(vec![0.3, 0.7]),
     ];
     for memory in [None, Some(300_000), Some(20_000)] {
         let mut options = EngineOptions::default();
         options.memory = memory;
         let engine = Engine::with_options(devices[0].clone(), &options).unwrap();
-        let assert_same = |expected: &[Quat], found: &[Quat], what: &str| {
+        let assert_same = |expected: &[Quat], found: &[Quat], label: &str| {
             assert_eq!(
                 first_difference(expected, found),
                 None,
-                "{what}, {memory:?}"
+                "{label}, {memory:?}"
             );
         };
         for method in [method::STEP, method::SLERP, method::C2] {
@@ -132,7 +133,7 @@ fn card_work() {
 #[test]
 fn an_application_names_the_queue_that_copies() {
     let Some(loader) = Loader::new() else { return };
-    for (name, named) in [("own_queue", false), ("two_queues", true)] {
+    for (name, named) in [("one_queue", false), ("two_queues", true)] {
         let test = format!("faults::card::{name}");
         let mut command = Command::new(std::env::current_exe().unwrap());
         command.args(["--exact", &test, "--ignored", "--nocapture"]);
@@ -144,7 +145,7 @@ fn an_application_names_the_queue_that_copies() {
     }
 }
 
-fn on_own_device(change: impl Fn(&mut Application)) {
+fn check_application_device(change: impl Fn(&mut Application)) {
     let mut application = Application::new();
     assert!(
         application.copy_queue.is_some(),
@@ -153,7 +154,7 @@ fn on_own_device(change: impl Fn(&mut Application)) {
     change(&mut application);
     let engine = application.engine(Mapping::Automatic);
     let set = hostile_set(4, 32);
-    let frames = Frames::fps(30).between(0.0, 20.0);
+    let frames = SampleTimes::fps(30).between(0.0, 20.0);
     for method in [method::SLERP, method::C2] {
         let found = engine.evaluate(&set, method, &frames).unwrap();
         let cpu = Engine::new(Device::Cpu).unwrap();
@@ -166,15 +167,15 @@ fn on_own_device(change: impl Fn(&mut Application)) {
 /// Run by the test above, in a process of its own.
 #[test]
 #[ignore = "part of an_application_names_the_queue_that_copies"]
-fn own_queue() {
-    on_own_device(|application| application.copy_queue = None);
+fn one_queue() {
+    check_application_device(|application| application.copy_queue = None);
 }
 
 /// Run by the test above, in a process of its own.
 #[test]
 #[ignore = "part of an_application_names_the_queue_that_copies"]
 fn two_queues() {
-    on_own_device(|_| {});
+    check_application_device(|_| {});
 }
 
 /// As `a_fault_anywhere_changes_no_bit_and_leaks_nothing`, on the card: the calls for a second queue,
@@ -182,13 +183,13 @@ fn two_queues() {
 #[test]
 fn a_fault_on_a_card_changes_no_bit_and_leaks_nothing() {
     let Some(loader) = Loader::new() else { return };
-    let place = sample_folder();
+    let folder = sample_folder();
     let card = ("FAULT_CARD", "rebar");
-    let (undisturbed, log) = loader.run(place.path(), &on("first"), &[card]);
+    let (undisturbed, log) = loader.run(folder.path(), &on("first"), &[card]);
     assert_eq!(undisturbed.code, 0, "{}", undisturbed.words);
     assert!(log.card.contains_key("copies"), "{log:?}");
     assert_eq!(log.left, BTreeMap::new());
-    let expected = fs::read(place.path().join("o.npy")).unwrap();
+    let expected = fs::read(folder.path().join("o.npy")).unwrap();
     let calls = [
         "vkCreateSemaphore",
         "vkCreateDevice",
@@ -207,10 +208,10 @@ fn a_fault_on_a_card_changes_no_bit_and_leaks_nothing() {
     for call in calls {
         let count = log.calls[call];
         for result in [OUT_OF_DEVICE_MEMORY, DEVICE_LOST] {
-            let mut places = vec![1, count.div_ceil(2), count - count.min(2) + 1, count];
-            places.dedup();
+            let mut occurrences = vec![1, count.div_ceil(2), count - count.min(2) + 1, count];
+            occurrences.dedup();
             faults.extend(
-                places
+                occurrences
                     .into_iter()
                     .map(|first| format!("{call},{result},{first},1")),
             );
@@ -218,10 +219,10 @@ fn a_fault_on_a_card_changes_no_bit_and_leaks_nothing() {
         }
     }
     faults.par_iter().for_each(|fault| {
-        let place = sample_folder();
-        let (run, log) = loader.run(place.path(), &on("first"), &[card, ("FAULTS", fault)]);
+        let folder = sample_folder();
+        let (run, log) = loader.run(folder.path(), &on("first"), &[card, ("FAULTS", fault)]);
         assert_eq!(run.code, 0, "{fault}: {}", run.words);
-        let output = fs::read(place.path().join("o.npy")).unwrap();
+        let output = fs::read(folder.path().join("o.npy")).unwrap();
         assert!(output == expected, "{fault}: {}", run.words);
         assert_eq!(log.left, BTreeMap::new(), "{fault}: {}", run.words);
         assert!(!log.card.contains_key("disorder"), "{fault}");

@@ -1,4 +1,4 @@
-//! The library under faults: what the program never does.
+//! The library under faults, in uses that the program has not.
 
 use std::collections::BTreeMap;
 use std::process::Command;
@@ -9,11 +9,12 @@ use crate::support::{dense_set, first_difference, hostile_set};
 use glam::{Quat, Vec3};
 use rayon::prelude::*;
 use tumble::{
-    CrowdError, CrowdLibrary, CrowdValues, Device, Encoding, Engine, EngineOptions, Error, Frames,
-    Layout, ReadBack, Skeleton, TrackSet, Transfer, Uploads, VectorMethod, VulkanError, method,
+    CrowdError, CrowdLibrary, CrowdValues, Device, Encoding, Engine, EngineOptions, Error, Layout,
+    ReadBack, SampleTimes, Skeleton, TrackSet, Transfer, Uploads, VectorMethod, VulkanError,
+    method,
 };
 
-/// What the program never does: validation, results that are staged, poses put together.
+/// Uses that the program has not: validation, staged results, poses.
 /// Each call fails at its first and at its last occurrence, with one error or the other in turn (`SOAK`: with both).
 #[test]
 fn a_fault_in_the_library_is_an_error_and_leaks_nothing() {
@@ -28,15 +29,15 @@ fn a_fault_in_the_library_is_an_error_and_leaks_nothing() {
         ]);
         command
     };
-    let (undisturbed, log) = loader.run_command(child(), &[("WANTED", "done")]);
+    let (undisturbed, log) = loader.run_command(child(), &[("MUST_SUCCEED", "done")]);
     assert_eq!(undisturbed.code, 0, "{}", undisturbed.words);
     assert_eq!(log.left, BTreeMap::new());
     let messenger = "vkCreateDebugUtilsMessengerEXT".to_owned();
     assert!(log.calls.contains_key(&messenger), "{:?}", log.calls);
     let mut faults = Vec::new();
-    for (place, (call, &count)) in log.calls.iter().enumerate() {
-        for (turn, result) in [OUT_OF_HOST_MEMORY, DEVICE_LOST].into_iter().enumerate() {
-            if !(place + turn).is_multiple_of(2) && !is_soaked() {
+    for (call_index, (call, &count)) in log.calls.iter().enumerate() {
+        for (result_index, result) in [OUT_OF_HOST_MEMORY, DEVICE_LOST].into_iter().enumerate() {
+            if !(call_index + result_index).is_multiple_of(2) && !is_soaked() {
                 continue;
             }
             faults.push(format!("{call},{result},1,1"));
@@ -86,7 +87,7 @@ fn library_work() {
         let engine = Engine::with_options(devices[0].clone(), &options)?;
         let set = hostile_set(2, 8);
         let clip = engine.upload(&set, method::C2)?;
-        let frames = Frames::fps(30).between(0.0, 5.0);
+        let frames = SampleTimes::fps(30).between(0.0, 5.0);
         let poses = clip.evaluate_as(&frames, Layout::FrameMajor)?;
         engine.blend(&[(&poses, 0.5), (&poses, 1.0)])?;
         #[cfg(target_os = "linux")]
@@ -96,7 +97,7 @@ fn library_work() {
             exported.memory_file()?;
         }
         // By segments, and straight from keys.
-        for frames in [frames, Frames::at(vec![0.3, 0.7])] {
+        for frames in [frames, SampleTimes::at(vec![0.3, 0.7])] {
             let found = engine.evaluate(&set, method::SLERP, &frames)?;
             let expected = Engine::new(Device::Cpu)?.evaluate(&set, method::SLERP, &frames)?;
             assert_eq!(
@@ -105,13 +106,13 @@ fn library_work() {
             );
         }
         let crowd = crowd_work(&engine);
-        if std::env::var_os("WANTED").is_some() {
+        if std::env::var_os("MUST_SUCCEED").is_some() {
             crowd.unwrap();
         }
         lent_work(devices[0].clone())
     };
     let outcome = work();
-    if std::env::var_os("WANTED").is_some() {
+    if std::env::var_os("MUST_SUCCEED").is_some() {
         outcome.unwrap();
     }
 }

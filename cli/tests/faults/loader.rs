@@ -11,7 +11,7 @@ use crate::support::{lavapipe, vulkan_devices};
 /// The system's loader, and a folder in which ours has its name.
 pub(super) struct Loader {
     real: PathBuf,
-    own: tempfile::TempDir,
+    folder: tempfile::TempDir,
 }
 
 /// A library that `cargo test` builds among the examples. Where only some tests were asked for it may be
@@ -44,19 +44,23 @@ impl Loader {
         let list = String::from_utf8(list.stdout).unwrap();
         let line = list.lines().find(|line| line.contains("libvulkan.so.1 "));
         let real = line.and_then(|line| line.split("=> ").nth(1)).unwrap();
-        let own = tempfile::tempdir().unwrap();
-        fs::copy(example("fault_loader"), own.path().join("libvulkan.so.1")).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        fs::copy(
+            example("fault_loader"),
+            folder.path().join("libvulkan.so.1"),
+        )
+        .unwrap();
         Some(Self {
             real: real.trim().into(),
-            own,
+            folder,
         })
     }
 
     pub(super) fn command(&self, mut command: Command) -> Command {
         command
-            .env("LD_LIBRARY_PATH", self.own.path())
+            .env("LD_LIBRARY_PATH", self.folder.path())
             .env("REAL_LOADER", &self.real);
-        // One device: what fails is then the one that is asked for.
+        // One device, so that the one that fails is the one requested.
         if let Some(lavapipe) = lavapipe() {
             command.env("VK_DRIVER_FILES", lavapipe);
             command.env_remove("VK_ADD_DRIVER_FILES");
@@ -67,11 +71,11 @@ impl Loader {
     /// A run with these faults, and what it logged.
     pub(super) fn run(
         &self,
-        place: &Path,
+        folder: &Path,
         line: &[&str],
         environment: &[(&str, &str)],
     ) -> (Run, Log) {
-        self.run_command(command(place, line), environment)
+        self.run_command(command(folder, line), environment)
     }
 
     pub(super) fn run_command(&self, command: Command, environment: &[(&str, &str)]) -> (Run, Log) {
@@ -116,15 +120,15 @@ impl Log {
                     *process.entry(name).or_default() += 1;
                 }
                 "made" => *left.entry(name).or_default() += 1,
-                "gone" => *left.entry(name).or_default() -= 1,
+                "destroyed" => *left.entry(name).or_default() -= 1,
                 "card" => *card.entry(words[2..].join(" ")).or_default() += 1,
                 _ => short += 1,
             }
         }
         left.retain(|_, count| *count != 0);
-        let most = |calls: &BTreeMap<String, usize>| calls.values().sum::<usize>();
+        let total = |calls: &BTreeMap<String, usize>| calls.values().sum::<usize>();
         Self {
-            calls: calls.into_values().max_by_key(most).unwrap_or_default(),
+            calls: calls.into_values().max_by_key(total).unwrap_or_default(),
             left,
             short,
             card,

@@ -14,8 +14,8 @@ use crate::program::{command, finish, sample_folder};
 use crate::support::{dense_set, first_difference, hostile_set};
 use glam::Quat;
 use tumble::{
-    CrowdLibrary, CrowdValues, Device, Engine, EngineOptions, Error, Frames, Layout, Mapping,
-    Reads, Skeleton, TrackSet, Transfer, VectorMethod, VulkanError, method,
+    CrowdLibrary, CrowdValues, Device, Engine, EngineOptions, Error, Layout, Mapping, Reads,
+    SampleTimes, Skeleton, TrackSet, Transfer, VectorMethod, VulkanError, method,
 };
 
 /// Catches an instance that does not ask for such devices, and a device that is opened without the word
@@ -54,8 +54,8 @@ fn four_buffers() {
     let cpu = Engine::new(Device::Cpu).unwrap();
     let set = hostile_set(2, 40);
     for frames in [
-        Frames::fps(60).between(0.0, 9.0),
-        Frames::at((0..50).map(|i| f64::from(i) * 0.1).collect()),
+        SampleTimes::fps(60).between(0.0, 9.0),
+        SampleTimes::at((0..50).map(|i| f64::from(i) * 0.1).collect()),
     ] {
         for method in [method::SLERP, method::C2] {
             let found = engine
@@ -110,7 +110,7 @@ fn memory_that_is_cached_and_not_coherent_is_made_visible() {
 fn incoherent() {
     let device = Device::list().unwrap().remove(0);
     let cpu = Engine::new(Device::Cpu).unwrap();
-    let (set, frames) = (hostile_set(2, 40), Frames::fps(60).between(0.0, 9.0));
+    let (set, frames) = (hostile_set(2, 40), SampleTimes::fps(60).between(0.0, 9.0));
     for transfer in [Transfer::InPlace, Transfer::Staged] {
         let mut options = EngineOptions::default();
         (options.transfer, options.memory) = (transfer, Some(300_000));
@@ -122,9 +122,11 @@ fn incoherent() {
             let difference = first_difference(expected.as_quats(), found.as_quats());
             assert_eq!(difference, None, "{method}, {transfer:?}");
         }
-        let (dense, few) = dense_set(40, 1000, 0.2);
-        let expected = cpu.evaluate(&dense, method::SLERP, &few).unwrap();
-        let found = engine.evaluate(&dense, method::SLERP, &few).unwrap();
+        let (dense, dense_frames) = dense_set(40, 1000, 0.2);
+        let expected = cpu.evaluate(&dense, method::SLERP, &dense_frames).unwrap();
+        let found = engine
+            .evaluate(&dense, method::SLERP, &dense_frames)
+            .unwrap();
         let difference = first_difference(expected.as_quats(), found.as_quats());
         assert_eq!(difference, None, "{transfer:?}");
         crowd_work(&engine).unwrap();
@@ -276,7 +278,7 @@ fn borrowed() {
         let engine = application.try_engine(Mapping::Automatic)?;
         let set = hostile_set(2, 40);
         let clip = engine.upload(&set, method::C2)?;
-        clip.evaluate_as(&Frames::fps(60).between(0.0, 9.0), Layout::FrameMajor)?;
+        clip.evaluate_as(&SampleTimes::fps(60).between(0.0, 9.0), Layout::FrameMajor)?;
         Ok(())
     };
     let outcome = work();
@@ -313,7 +315,7 @@ fn bounded() {
         set.push("", &times, &keys).unwrap();
     }
     let (frames, layout, method) = (
-        Frames::fps(25),
+        SampleTimes::fps(25),
         Layout::FrameMajor,
         method::BESSEL_OVERHAUSER,
     );

@@ -24,8 +24,8 @@ use glam::Quat;
 use program::finish;
 use support::vulkan_devices;
 use tumble::{
-    Chunk, Device, Engine, EngineOptions, Error, Frames, Interpolation, Layout, Method, TrackSet,
-    method,
+    Chunk, Device, Engine, EngineOptions, Error, Interpolation, Layout, Method, SampleTimes,
+    TrackSet, method,
 };
 
 /// A hash of rotations that depends on every bit and on their order, and costs less than
@@ -45,15 +45,15 @@ impl Hash {
 /// Tracks that turn to and fro, all different, `rate` keys a second.
 pub(crate) fn swinging(tracks: usize, keys: usize, rate: f64) -> TrackSet {
     let times: Vec<f64> = (0..keys).map(|i| i as f64 / rate).collect();
-    let mut own = vec![Quat::IDENTITY; keys];
+    let mut rotations = vec![Quat::IDENTITY; keys];
     let mut set = TrackSet::new();
     for track in 0..tracks {
         let phase = track as f64 * 0.618;
-        for (key, time) in own.iter_mut().zip(&times) {
+        for (key, time) in rotations.iter_mut().zip(&times) {
             let [a, b] = [phase + time * 1.7, phase * 1.3 + time * 0.9].map(f64::sin);
             *key = Quat::from_scaled_axis(glam::Vec3::new(a as f32, b as f32, (a * b) as f32));
         }
-        set.push("", &times, &own).unwrap();
+        set.push("", &times, &rotations).unwrap();
     }
     set
 }
@@ -90,10 +90,10 @@ fn forget_peak() {
 
 /// Streams a set through every engine; all give the same hash.
 fn stream_all(
-    what: &str,
+    label: &str,
     set: &TrackSet,
     method: Method,
-    frames: &Frames,
+    frames: &SampleTimes,
     options: &EngineOptions,
 ) {
     let mut hashes = Vec::new();
@@ -116,7 +116,7 @@ fn stream_all(
             )
             .unwrap();
         println!(
-            "{what}, {method}, {}: {:.1} M rotations in {:.2} s, peak {:.0} MB",
+            "{label}, {method}, {}: {:.1} M rotations in {:.2} s, peak {:.0} MB",
             engine.device_name(),
             count as f64 / 1e6,
             started.elapsed().as_secs_f64(),
@@ -126,15 +126,15 @@ fn stream_all(
     }
     assert!(
         hashes.windows(2).all(|pair| pair[0] == pair[1]),
-        "{what}: {hashes:x?}"
+        "{label}: {hashes:x?}"
     );
 }
 
 /// As [`stream_all`], an arc and a cubic.
-fn stream_both(what: &str, set: &TrackSet, fps: u32) {
+fn stream_both(label: &str, set: &TrackSet, fps: u32) {
     for method in [method::SLERP, method::BESSEL_OVERHAUSER] {
-        let frames = Frames::fps(fps);
-        stream_all(what, set, method, &frames, &EngineOptions::default());
+        let frames = SampleTimes::fps(fps);
+        stream_all(label, set, method, &frames, &EngineOptions::default());
     }
 }
 
@@ -150,7 +150,7 @@ fn seven_gigabytes_of_keys() {
 #[ignore = "some minutes"]
 fn sixteen_gigabytes_of_output() {
     let set = swinging(4096, 26, 1.0);
-    let frames = Frames::fps(9765); // 244 126 samples of each
+    let frames = SampleTimes::fps(9765); // 244 126 samples of each
     forget_peak();
     stream_all(
         "16 GB of output",
@@ -177,7 +177,7 @@ fn indices_beyond_32_bits() {
     let engine = Engine::new(Device::Cpu).unwrap();
     let interpolation = Interpolation::from(method::SLERP);
     let rate = 76_000_000u32;
-    let frames = Frames::fps(rate); // 1 444 000 001 samples of each of three tracks
+    let frames = SampleTimes::fps(rate); // 1 444 000 001 samples of each of three tracks
     let mut next = 0usize;
     let started = Instant::now();
     engine
@@ -194,9 +194,11 @@ fn indices_beyond_32_bits() {
                     // As asked for alone.
                     let (track, sample) = (chunk.tracks.start, chunk.samples.start);
                     let time = sample as f64 / f64::from(rate);
-                    let own = set.select(track..track + 1)?;
-                    let alone = Frames::rate(tumble::FrameRate::new(u64::from(rate), 1).unwrap());
-                    let alone = engine.evaluate(&own, interpolation, &alone.between(time, time))?;
+                    let selected = set.select(track..track + 1)?;
+                    let alone =
+                        SampleTimes::rate(tumble::FrameRate::new(u64::from(rate), 1).unwrap());
+                    let alone =
+                        engine.evaluate(&selected, interpolation, &alone.between(time, time))?;
                     let angle = alone.as_quats()[0].angle_between(chunk.rotations().unwrap()[0]);
                     assert!(angle < 1e-3, "track {track}, sample {sample}: {angle}");
                 }
@@ -215,7 +217,7 @@ fn indices_beyond_32_bits() {
     let mut hashes = Vec::new();
     for engine in engines(&EngineOptions::default()) {
         let clip = engine.upload(&wide, method::SLERP).unwrap();
-        let frames = Frames::fps(1_100_000); // 2 200 001 × 2048 = 4.5e9
+        let frames = SampleTimes::fps(1_100_000); // 2 200 001 × 2048 = 4.5e9
         let (mut last, mut total) = (Hash::default(), 0usize);
         let started = Instant::now();
         let stopped = clip.stream(&frames, Layout::FrameMajor, 1 << 20, |chunk: Chunk<'_>| {
@@ -263,7 +265,7 @@ fn limits_of_256_mib_give_the_same_bits() {
         "6 M keys",
         &set,
         method::BESSEL_OVERHAUSER,
-        &Frames::fps(60),
+        &SampleTimes::fps(60),
         &options,
     );
     options.memory = Some(256 << 20);
@@ -271,13 +273,13 @@ fn limits_of_256_mib_give_the_same_bits() {
         "the same in 256 MiB",
         &set,
         method::BESSEL_OVERHAUSER,
-        &Frames::fps(60),
+        &SampleTimes::fps(60),
         &options,
     );
 
     // The program, in so much address space: what it reads and what it writes.
-    let place = tempfile::tempdir().unwrap();
-    fs::write(place.path().join("a.dat"), dat(4, 2000, 1)).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("a.dat"), dat(4, 2000, 1)).unwrap();
     let eval = |limit: &str, out: &str| {
         let program = env!("CARGO_BIN_EXE_tumble");
         let line =
@@ -285,7 +287,7 @@ fn limits_of_256_mib_give_the_same_bits() {
         let mut shell = Command::new("sh");
         let run = finish(
             shell
-                .current_dir(place.path())
+                .current_dir(folder.path())
                 .args(["-c", &line])
                 .output()
                 .unwrap(),
@@ -302,11 +304,11 @@ fn limits_of_256_mib_give_the_same_bits() {
     // An allocator's arenas are address space that nobody uses.
     eval("ulimit -v 262144; MALLOC_ARENA_MAX=1", "limited.npy");
     let same = Command::new("cmp")
-        .current_dir(place.path())
+        .current_dir(folder.path())
         .args(["free.npy", "limited.npy"])
         .status();
     assert!(same.unwrap().success());
-    let bytes = fs::metadata(place.path().join("free.npy")).unwrap().len();
+    let bytes = fs::metadata(folder.path().join("free.npy")).unwrap().len();
     println!(
         "{} MB of output in 256 MiB of address space",
         bytes / 1_000_000
@@ -329,11 +331,11 @@ fn dat(boxes: usize, keys: usize, seed: usize) -> String {
 }
 
 /// Evaluates a folder with the program; seconds and peak memory.
-fn batch(place: &Path, out: &str, more: &[&str]) {
+fn batch(folder: &Path, out: &str, more: &[&str]) {
     let line = [&["eval", "in", "-o", out, "--fps", "60"], more].concat();
     let started = Instant::now();
-    let log = fs::File::create(place.join("log")).unwrap();
-    let mut child = program::command(place, &line).stderr(log).spawn().unwrap();
+    let log = fs::File::create(folder.join("log")).unwrap();
+    let mut child = program::command(folder, &line).stderr(log).spawn().unwrap();
     let status = format!("/proc/{}/status", child.id());
     let mut peak = 0.0f64;
     while child.try_wait().unwrap().is_none() {
@@ -349,9 +351,9 @@ fn batch(place: &Path, out: &str, more: &[&str]) {
     );
 }
 
-fn same_trees(place: &Path, a: &str, b: &str) {
+fn same_trees(folder: &Path, a: &str, b: &str) {
     let diff = Command::new("diff")
-        .current_dir(place)
+        .current_dir(folder)
         .args(["-rq", "--exclude=manifest.jsonl", a, b])
         .status();
     assert!(diff.unwrap().success(), "{a} and {b} differ");
@@ -360,46 +362,50 @@ fn same_trees(place: &Path, a: &str, b: &str) {
 #[test]
 #[ignore = "some minutes, 5 GB of disk"]
 fn a_motion_capture_library() {
-    let place = tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).unwrap();
-    let at = place.path();
-    fs::create_dir(at.join("in")).unwrap();
+    let temporary = tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).unwrap();
+    let folder = temporary.path();
+    fs::create_dir(folder.join("in")).unwrap();
     let (mut tracks, mut keys) = (0, 0);
     for clip in 0..2500 {
         // 44 or 45 boxes, 86 to 586 keys.
         let boxes = 44 + usize::from(clip % 5 < 3);
-        let own = 86 + (clip * 37) % 501;
+        let keys_per_track = 86 + (clip * 37) % 501;
         tracks += boxes;
-        keys += boxes * own;
-        fs::write(at.join(format!("in/{clip:04}.dat")), dat(boxes, own, clip)).unwrap();
+        keys += boxes * keys_per_track;
+        fs::write(
+            folder.join(format!("in/{clip:04}.dat")),
+            dat(boxes, keys_per_track, clip),
+        )
+        .unwrap();
     }
     println!(
         "2500 clips, {tracks} tracks, {:.1} M keys",
         keys as f64 / 1e6
     );
-    batch(at, "cpu", &["--device", "cpu"]);
-    batch(at, "first", &[]);
-    same_trees(at, "cpu", "first");
+    batch(folder, "cpu", &["--device", "cpu"]);
+    batch(folder, "first", &[]);
+    same_trees(folder, "cpu", "first");
     let check = Instant::now();
-    program::succeed(at, &["check", "cpu"]);
+    program::succeed(folder, &["check", "cpu"]);
     println!("checked in {:.1} s", check.elapsed().as_secs_f64());
-    batch(at, "cpu", &["--device", "cpu", "--resume"]);
+    batch(folder, "cpu", &["--device", "cpu", "--resume"]);
 }
 
 #[test]
 #[ignore = "some minutes"]
 fn a_hundred_thousand_small_files() {
-    let place = tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).unwrap();
-    let at = place.path();
+    let temporary = tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).unwrap();
+    let folder = temporary.path();
     for i in 0..100_000 {
-        let folder = at.join(format!("in/{:03}", i / 1000));
+        let group = folder.join(format!("in/{:03}", i / 1000));
         if i % 1000 == 0 {
-            fs::create_dir_all(&folder).unwrap();
+            fs::create_dir_all(&group).unwrap();
         }
-        fs::write(folder.join(format!("{i:06}.dat")), dat(2, 3, i)).unwrap();
+        fs::write(group.join(format!("{i:06}.dat")), dat(2, 3, i)).unwrap();
     }
-    batch(at, "cpu", &["--device", "cpu"]);
-    batch(at, "cpu", &["--device", "cpu", "--resume"]);
+    batch(folder, "cpu", &["--device", "cpu"]);
+    batch(folder, "cpu", &["--device", "cpu", "--resume"]);
     let check = Instant::now();
-    program::succeed(at, &["check", "cpu"]);
+    program::succeed(folder, &["check", "cpu"]);
     println!("checked in {:.1} s", check.elapsed().as_secs_f64());
 }

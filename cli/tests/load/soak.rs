@@ -3,7 +3,7 @@
 use std::fs;
 use std::time::{Duration, Instant};
 
-use tumble::{Device, Engine, EngineOptions, Frames, Layout, METHODS};
+use tumble::{Device, Engine, EngineOptions, Layout, METHODS, SampleTimes};
 
 use super::{Hash, engines, swinging};
 use crate::support::vulkan_devices;
@@ -28,12 +28,12 @@ fn held() -> (f64, usize) {
 fn an_hour_of_the_same_work_leaves_nothing_behind() {
     let seconds = std::env::var("SOAK_SECONDS").map_or(3600, |text| text.parse().unwrap());
     let set = swinging(64, 40, 4.0);
-    let frames = Frames::fps(500);
-    let place = tempfile::tempdir().unwrap();
+    let frames = SampleTimes::fps(500);
+    let folder = tempfile::tempdir().unwrap();
     let started = Instant::now();
     let mut expected: Option<Hash> = None;
     let mut after_a_minute = None;
-    let (mut rounds, mut most, mut told) = (0u64, (0.0f64, 0), Instant::now());
+    let (mut rounds, mut peak, mut last_report) = (0u64, (0.0f64, 0), Instant::now());
     while started.elapsed() < Duration::from_secs(seconds) {
         // Kept engines, and one opened anew.
         let mut all = engines(&EngineOptions::default());
@@ -57,15 +57,15 @@ fn an_hour_of_the_same_work_leaves_nothing_behind() {
                 "round {rounds}, {engine:?}"
             );
         }
-        let out = place.path().join("out");
+        let out = folder.path().join("out");
         let mut output = tumble_formats::output::Output::create(&out, true, &[]).unwrap();
         std::io::Write::write_all(&mut output, &[0; 4096]).unwrap();
         output.commit().unwrap();
         rounds += 1;
         let now = held();
-        most = (most.0.max(now.0), most.1.max(now.1));
+        peak = (peak.0.max(now.0), peak.1.max(now.1));
         if started.elapsed() > Duration::from_secs(60).min(Duration::from_secs(seconds) / 4) {
-            let first: &(f64, usize) = after_a_minute.get_or_insert(most);
+            let first: &(f64, usize) = after_a_minute.get_or_insert(peak);
             assert!(
                 now.0 < first.0 * 1.1 + 16.0,
                 "round {rounds}: {now:?}, it was {first:?}"
@@ -75,12 +75,12 @@ fn an_hour_of_the_same_work_leaves_nothing_behind() {
                 "round {rounds}: {now:?}, it was {first:?}"
             );
         }
-        if told.elapsed() > Duration::from_secs(300) {
+        if last_report.elapsed() > Duration::from_secs(300) {
             println!(
                 "{:.0} s, {rounds} rounds: {now:?}",
                 started.elapsed().as_secs_f64()
             );
-            told = Instant::now();
+            last_report = Instant::now();
         }
     }
     println!(

@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 use tungstenite::stream::MaybeTlsStream;
 use tungstenite::{Message, WebSocket};
 
-/// One page in a browser of its own.
+/// One page, in its own browser.
 pub(crate) struct Page {
     browser: Child,
     socket: WebSocket<MaybeTlsStream<TcpStream>>,
@@ -72,7 +72,7 @@ impl Page {
                     .map(str::to_owned)
             })
             .expect("the browser says where it listens");
-        // Whoever does not read what it says stops it.
+        // Its output must be read, or it blocks.
         std::thread::spawn(move || words.for_each(drop));
         let (socket, _) = tungstenite::connect(&address).unwrap();
         let mut page = Self {
@@ -120,23 +120,23 @@ impl Page {
     }
 
     fn notice(&mut self, event: &Value) {
-        let what = &event["params"];
+        let parameters = &event["params"];
         match event["method"].as_str() {
             Some("Network.requestWillBeSent") => {
-                let url = what["request"]["url"].as_str().unwrap_or_default();
+                let url = parameters["request"]["url"].as_str().unwrap_or_default();
                 self.requests.push(url.to_owned());
             }
             Some("Runtime.exceptionThrown") => {
-                self.errors.push(what["exceptionDetails"].to_string());
+                self.errors.push(parameters["exceptionDetails"].to_string());
             }
-            Some("Log.entryAdded") if what["entry"]["level"] == "error" => {
-                self.errors.push(what["entry"].to_string());
+            Some("Log.entryAdded") if parameters["entry"]["level"] == "error" => {
+                self.errors.push(parameters["entry"].to_string());
             }
             _ => {}
         }
     }
 
-    /// What an expression comes to; a promise, what it promises.
+    /// The value of an expression; of a promise, the value that it resolves to.
     pub(crate) fn value(&mut self, expression: &str) -> Value {
         let parameters =
             json!({"expression": expression, "awaitPromise": true, "returnByValue": true});
@@ -185,7 +185,7 @@ impl Page {
         self.click_at(x, y);
     }
 
-    /// Clicks on a place of the window.
+    /// Clicks at a position in the window.
     pub(crate) fn click_at(&mut self, x: f64, y: f64) {
         for kind in ["mousePressed", "mouseReleased"] {
             let parameters =

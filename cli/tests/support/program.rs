@@ -33,10 +33,10 @@ pub(crate) fn sample_folder() -> tempfile::TempDir {
         }
         text.push('\n');
     }
-    let place = tempfile::tempdir().expect("a temporary folder");
-    let write = |name: &str, text: &str| std::fs::write(place.path().join(name), text).unwrap();
+    let temporary = tempfile::tempdir().expect("a temporary folder");
+    let write = |name: &str, text: &str| std::fs::write(temporary.path().join(name), text).unwrap();
     for folder in ["folder", "empty"] {
-        std::fs::create_dir(place.path().join(folder)).unwrap();
+        std::fs::create_dir(temporary.path().join(folder)).unwrap();
     }
     for name in ["a.dat", "b.dat", "folder/a.dat"] {
         write(name, &text);
@@ -45,7 +45,7 @@ pub(crate) fn sample_folder() -> tempfile::TempDir {
     write("old.npy", "old");
     write("antipodal.dat", "# 1 1\n0 1 0 0 0\n1 -1 0 0 0\n");
     write("t.txt", "0\n1\n");
-    place
+    temporary
 }
 
 /// Hides every Vulkan driver from a program, as old and as new loaders know it.
@@ -55,16 +55,16 @@ pub(crate) fn no_vulkan(command: &mut Command) -> &mut Command {
         .env("VK_ICD_FILENAMES", "/nonexistent")
 }
 
-/// A run of the program in `place`.
+/// A run of the program in `folder`.
 pub(crate) struct Run {
     pub(crate) code: i32,
     pub(crate) out: Vec<u8>,
     pub(crate) words: String,
 }
 
-pub(crate) fn command(place: &Path, line: &[&str]) -> Command {
+pub(crate) fn command(folder: &Path, line: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_tumble"));
-    command.current_dir(place).args(line).stdin(Stdio::null());
+    command.current_dir(folder).args(line).stdin(Stdio::null());
     command
 }
 
@@ -88,12 +88,12 @@ pub(crate) fn finish(output: Output) -> Run {
     }
 }
 
-pub(crate) fn run(place: &Path, line: &[&str]) -> Run {
-    finish(command(place, line).output().unwrap())
+pub(crate) fn run(folder: &Path, line: &[&str]) -> Run {
+    finish(command(folder, line).output().unwrap())
 }
 
-pub(crate) fn succeed(place: &Path, line: &[&str]) -> Run {
-    let run = run(place, line);
+pub(crate) fn succeed(folder: &Path, line: &[&str]) -> Run {
+    let run = run(folder, line);
     assert_eq!(run.code, 0, "{line:?}: {}", run.words);
     run
 }

@@ -1,10 +1,10 @@
-//! What a directory has.
+//! The files of a directory.
 
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
-/// Every file below a directory, by its way there.
+/// Every file below a directory, by its relative path.
 pub(crate) fn tree(directory: &Path) -> BTreeMap<String, Vec<u8>> {
     let mut found = BTreeMap::new();
     let mut pending = vec![directory.to_owned()];

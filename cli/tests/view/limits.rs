@@ -8,15 +8,15 @@ use crate::view::{apart, evaluated, page, quat};
 /// A thousand boxes: right, and how fast (no test of speed: it is only said).
 #[test]
 fn a_thousand_boxes_are_shown() {
-    let place = sample_folder();
+    let folder = sample_folder();
     let line = "generate --boxes 1000 --keys 12 --seconds 3 --random -o many.dat";
-    succeed(place.path(), &line.split(' ').collect::<Vec<_>>());
-    let Some(mut page) = page(place.path(), &["many.dat", "-m", "slerp"]) else {
+    succeed(folder.path(), &line.split(' ').collect::<Vec<_>>());
+    let Some(mut page) = page(folder.path(), &["many.dat", "-m", "slerp"]) else {
         return;
     };
-    fs::write(place.path().join("times.txt"), "1.5").unwrap();
+    fs::write(folder.path().join("times.txt"), "1.5").unwrap();
     let (_, expected) = evaluated(
-        place.path(),
+        folder.path(),
         &["many.dat", "-m", "slerp", "--times", "times.txt"],
     );
     assert_eq!(
@@ -51,10 +51,10 @@ fn a_thousand_boxes_are_shown() {
 
 #[test]
 fn names_cannot_break_the_page() {
-    let place = sample_folder();
+    let folder = sample_folder();
     let name = "a</script><b>&$&.dat".replace('/', "");
-    fs::copy(place.path().join("a.dat"), place.path().join(&name)).unwrap();
-    let Some(mut page) = page(place.path(), &[&name, "-m", "slerp"]) else {
+    fs::copy(folder.path().join("a.dat"), folder.path().join(&name)).unwrap();
+    let Some(mut page) = page(folder.path(), &[&name, "-m", "slerp"]) else {
         return;
     };
     assert_eq!(
@@ -66,8 +66,8 @@ fn names_cannot_break_the_page() {
 
 #[test]
 fn what_cannot_be_shown_is_refused() {
-    let place = sample_folder();
-    fs::write(place.path().join("old.html"), "old").unwrap();
+    let folder = sample_folder();
+    fs::write(folder.path().join("old.html"), "old").unwrap();
     for (line, code, message) in [
         ("view a.dat", 2, "--out"),
         (
@@ -93,36 +93,36 @@ fn what_cannot_be_shown_is_refused() {
         ("view bad.dat -o x.html", 4, "bad.dat:2"),
         ("view a.dat -o x.html -m slurp", 2, "slerp"),
     ] {
-        let run = run(place.path(), &line.split(' ').collect::<Vec<_>>());
+        let run = run(folder.path(), &line.split(' ').collect::<Vec<_>>());
         assert_eq!(run.code, code, "{line}: {}", run.words);
         assert!(run.words.contains(message), "{line}: {}", run.words);
-        assert!(!place.path().join("x.html").exists(), "{line}");
+        assert!(!folder.path().join("x.html").exists(), "{line}");
     }
-    assert_eq!(fs::read(place.path().join("old.html")).unwrap(), b"old");
-    let piped = succeed(place.path(), &["view", "a.dat", "-o", "-"]);
+    assert_eq!(fs::read(folder.path().join("old.html")).unwrap(), b"old");
+    let piped = succeed(folder.path(), &["view", "a.dat", "-o", "-"]);
     assert!(piped.out.starts_with(b"<!doctype html>"));
 }
 
-/// A browser stood in for by a script that says what it was given.
+/// A script in place of the browser, which records its arguments.
 #[cfg(unix)]
 #[test]
 fn open_shows_the_page_to_the_browser() {
     use std::os::unix::fs::PermissionsExt;
 
-    let place = sample_folder();
-    let browser = place.path().join("xdg-open");
+    let folder = sample_folder();
+    let browser = folder.path().join("xdg-open");
     fs::write(
         &browser,
         "#!/bin/sh\necho \"$1\" > opened.part && mv opened.part opened\n",
     )
     .unwrap();
     fs::set_permissions(&browser, fs::Permissions::from_mode(0o755)).unwrap();
-    let path = format!("{}:/usr/bin:/bin", place.path().display());
+    let path = format!("{}:/usr/bin:/bin", folder.path().display());
     let view = |line: &[&str]| {
-        let mut command = crate::program::command(place.path(), line);
+        let mut command = crate::program::command(folder.path(), line);
         let run = crate::program::finish(command.env("PATH", &path).output().unwrap());
         assert_eq!(run.code, 0, "{}", run.words);
-        let opened = place.path().join("opened");
+        let opened = folder.path().join("opened");
         for _ in 0..100 {
             if opened.exists() {
                 break;

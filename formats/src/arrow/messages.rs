@@ -22,7 +22,7 @@ const PREFIX: usize = 8;
 
 /// Compressed files hold at most so many bytes a byte, all together: equal numbers are packed to
 /// nothing, but the times beside them differ.
-const MOST_PACKED: u64 = 1024;
+const MAX_EXPANSION: u64 = 1024;
 
 /// Bytes that a row of a column, and a byte that was packed, take: as they are decoded, in the table's
 /// columns and in the keys that they become.
@@ -37,14 +37,14 @@ pub(crate) fn is_stream(start: &[u8]) -> bool {
 }
 
 /// A message that has rows or words.
-pub(crate) struct Part<'a> {
+pub(crate) struct DataMessage<'a> {
     pub(crate) version: MetadataVersion,
-    pub(crate) body: Body<'a>,
+    pub(crate) body: MessageBody<'a>,
     /// The bytes that the message's offsets count from.
     pub(crate) data: Buffer,
 }
 
-pub(crate) enum Body<'a> {
+pub(crate) enum MessageBody<'a> {
     Dictionary(DictionaryBatch<'a>),
     Rows(RecordBatch<'a>),
 }
@@ -73,20 +73,20 @@ impl<'a> Messages<'a> {
             blocks: None,
             schema: None,
             at: 0,
-            left: (bytes.len() as u64).saturating_mul(MOST_PACKED),
+            left: (bytes.len() as u64).saturating_mul(MAX_EXPANSION),
         };
         if bytes.starts_with(MAGIC) {
             messages.read_footer()?;
         } else if !is_stream(bytes) {
-            let what =
+            let reason =
                 "the file begins neither with ARROW1 nor as a stream does; it is not Arrow IPC";
-            return Err(messages.damaged(what));
+            return Err(messages.damaged(reason));
         }
         Ok(messages)
     }
 
-    fn damaged(&self, what: &str) -> Diagnostic {
-        Diagnostic::new(self.name, Code::TableDamaged, what)
+    fn damaged(&self, reason: &str) -> Diagnostic {
+        Diagnostic::new(self.name, Code::TableDamaged, reason)
     }
 
     fn claims(&self) -> Diagnostic {
@@ -149,7 +149,7 @@ impl<'a> Messages<'a> {
     }
 
     /// The next message with rows or words.
-    pub(crate) fn next(&mut self) -> Result<Option<Part<'a>>, Diagnostic> {
+    pub(crate) fn next(&mut self) -> Result<Option<DataMessage<'a>>, Diagnostic> {
         let next = match &mut self.blocks {
             None => self.next_of_stream()?,
             Some(blocks) => match blocks.next() {
@@ -160,24 +160,24 @@ impl<'a> Messages<'a> {
         let Some((message, data)) = next else {
             return Ok(None);
         };
-        let what = "a message is neither rows nor words; the file is damaged";
+        let reason = "a message is neither rows nor words; the file is damaged";
         let body = match message.header_type() {
             MessageHeader::DictionaryBatch => {
                 let batch = message.header_as_dictionary_batch();
-                let batch = batch.ok_or_else(|| self.damaged(what))?;
-                let words = batch.data().ok_or_else(|| self.damaged(what))?;
+                let batch = batch.ok_or_else(|| self.damaged(reason))?;
+                let words = batch.data().ok_or_else(|| self.damaged(reason))?;
                 self.check(&words, &data)?;
-                Body::Dictionary(batch)
+                MessageBody::Dictionary(batch)
             }
             MessageHeader::RecordBatch => {
                 let batch = message.header_as_record_batch();
-                let batch = batch.ok_or_else(|| self.damaged(what))?;
+                let batch = batch.ok_or_else(|| self.damaged(reason))?;
                 self.check(&batch, &data)?;
-                Body::Rows(batch)
+                MessageBody::Rows(batch)
             }
-            _ => return Err(self.damaged(what)),
+            _ => return Err(self.damaged(reason)),
         };
-        Ok(Some(Part {
+        Ok(Some(DataMessage {
             version: message.version(),
             body,
             data,
@@ -192,8 +192,8 @@ impl<'a> Messages<'a> {
         body: u64,
     ) -> Result<(Message<'a>, Buffer), Diagnostic> {
         let outside = || self.damaged("a block lies outside the file; it is damaged or cut");
-        let place = |number: u64| usize::try_from(number).map_err(|_| outside());
-        let (start, head, body) = (place(offset)?, place(head)?, place(body)?);
+        let to_usize = |number: u64| usize::try_from(number).map_err(|_| outside());
+        let (start, head, body) = (to_usize(offset)?, to_usize(head)?, to_usize(body)?);
         let rest = self.bytes.as_slice().get(start..).ok_or_else(outside)?;
         let metadata = rest.get(..head).ok_or_else(outside)?;
         if body > rest.len() - head {
@@ -237,7 +237,7 @@ impl<'a> Messages<'a> {
         Ok(Some((message, self.bytes.slice_with_length(start, body))))
     }
 
-    /// Every count and every place within the data, before the crate relies on them.
+    /// Every count and every offset within the data, before the crate relies on them.
     fn check(&mut self, batch: &RecordBatch<'_>, data: &Buffer) -> Result<(), Diagnostic> {
         let wrong = || self.damaged("a message's counts cannot be; the file is damaged");
         let mut counts = vec![batch.length()];
@@ -260,18 +260,18 @@ impl<'a> Messages<'a> {
                 return Err(Diagnostic::new(self.name, Code::Compression, message));
             }
         }
-        let mut taken = 0u64;
+        let mut used = 0u64;
         for buffer in batch.buffers().into_iter().flatten() {
-            let place = |number: i64| usize::try_from(number).ok();
-            let (start, length) = place(buffer.offset())
-                .zip(place(buffer.length()))
+            let to_usize = |number: i64| usize::try_from(number).ok();
+            let (start, length) = to_usize(buffer.offset())
+                .zip(to_usize(buffer.length()))
                 .ok_or_else(wrong)?;
             let bytes = data
                 .as_slice()
                 .get(start..)
                 .and_then(|rest| rest.get(..length));
             let bytes = bytes.ok_or_else(wrong)?;
-            taken = taken.saturating_add(length as u64);
+            used = used.saturating_add(length as u64);
             if compression.is_some() && !bytes.is_empty() {
                 let prefix = bytes.first_chunk::<PREFIX>().ok_or_else(wrong)?;
                 // -1 is said of what is not packed.
@@ -279,7 +279,7 @@ impl<'a> Messages<'a> {
                 claimed = claimed.saturating_add(unpacked);
             }
         }
-        if taken > data.len() as u64 || claimed > self.left {
+        if used > data.len() as u64 || claimed > self.left {
             return Err(self.claims());
         }
         self.left -= claimed;

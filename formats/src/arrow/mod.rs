@@ -11,19 +11,19 @@ use arrow_buffer::Buffer;
 use arrow_ipc::convert::try_fb_to_schema;
 use arrow_ipc::reader::{read_dictionary, read_record_batch};
 
-use crate::arrow::messages::{Body, Messages};
+use crate::arrow::messages::{MessageBody, Messages};
 use crate::arrow::write::ArrowSink;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::feature::Feature;
 use crate::format::{Format, FormatOption, Loaded, ReadOptions, WriteResults};
-use crate::npy::ComponentOrder;
+use crate::quaternion::ComponentOrder;
 use crate::source::Source;
 use crate::table::arrays::{Gather, chosen};
 use crate::table::clips::clips;
 use crate::table::columns::Table;
 use crate::table::decoded;
 use crate::table::long::{write_motion, write_poses, write_rotations};
-use crate::table::plan::Plan;
+use crate::table::plan::TablePlan;
 
 /// Arrow IPC files, and streams.
 pub static FORMAT: Format = Format {
@@ -72,7 +72,7 @@ fn read_table(
     name: &str,
     bytes: Vec<u8>,
     options: &ReadOptions,
-) -> Result<(Table, Plan), Diagnostic> {
+) -> Result<(Table, TablePlan), Diagnostic> {
     let damaged = |error: &dyn std::fmt::Display| {
         let message = format!("{error}; the file is damaged, or written in a way that is not read");
         Diagnostic::new(name, Code::TableDamaged, message)
@@ -86,42 +86,42 @@ fn read_table(
         .iter()
         .map(|field| field.name().clone())
         .collect();
-    let mut plan = Plan::of(name, &names, options)?;
+    let mut plan = TablePlan::of(name, &names, options)?;
     let notes = schema.metadata().iter();
     plan.notes = notes
         .map(|(key, value)| (key.clone(), value.clone()))
         .collect();
     let types = plan
-        .wanted
+        .columns
         .iter()
-        .map(|wanted| (wanted, schema.field(wanted.index).data_type()));
+        .map(|column| (column, schema.field(column.index).data_type()));
     let mut gather = Gather::new(name, types)?;
-    // Only columns that are wanted are decoded, and only their dictionaries: their types are known
+    // Only requested columns are decoded, and only their dictionaries: their types are known
     // to be simple.
-    let mut projection: Vec<usize> = plan.wanted.iter().map(|wanted| wanted.index).collect();
+    let mut projection: Vec<usize> = plan.columns.iter().map(|column| column.index).collect();
     projection.sort_unstable();
     projection.dedup();
-    let dictionaries_wanted: Vec<i64> = ipc_schema
+    let requested_dictionaries: Vec<i64> = ipc_schema
         .fields()
         .into_iter()
         .flat_map(|fields| projection.iter().map(move |&index| fields.get(index)))
         .filter_map(|field| Some(field.dictionary()?.id()))
         .collect();
-    let places = plan.wanted.iter();
-    let places: Vec<usize> = places
-        .map(|wanted| projection.partition_point(|&index| index < wanted.index))
+    let indices = plan.columns.iter();
+    let indices: Vec<usize> = indices
+        .map(|column| projection.partition_point(|&index| index < column.index))
         .collect();
     let schema = Arc::new(schema);
     let mut dictionaries = HashMap::new();
     while let Some(message) = messages.next()? {
         let version = message.version;
         match message.body {
-            Body::Dictionary(batch) if dictionaries_wanted.contains(&batch.id()) => {
+            MessageBody::Dictionary(batch) if requested_dictionaries.contains(&batch.id()) => {
                 read_dictionary(&message.data, batch, &schema, &mut dictionaries, &version)
                     .map_err(|error| damaged(&error))?;
             }
-            Body::Dictionary(_) => {}
-            Body::Rows(batch) => {
+            MessageBody::Dictionary(_) => {}
+            MessageBody::Rows(batch) => {
                 let batch = read_record_batch(
                     &message.data,
                     batch,
@@ -132,7 +132,7 @@ fn read_table(
                 )
                 .map_err(|error| damaged(&error))?;
                 let columns =
-                    chosen(&batch, &places).ok_or_else(|| damaged(&"a column is not there"))?;
+                    chosen(&batch, &indices).ok_or_else(|| damaged(&"a column is not there"))?;
                 gather.push(&columns, batch.num_rows())?;
             }
         }

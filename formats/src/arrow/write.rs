@@ -7,7 +7,7 @@ use arrow_array::RecordBatch;
 use arrow_ipc::writer::FileWriter;
 use arrow_schema::{ArrowError, Schema};
 
-use crate::table::rows::{Head, Sink};
+use crate::table::rows::{Head, RowSink};
 
 /// Writes an Arrow file as rows come.
 pub(crate) struct ArrowSink<'a>(FileWriter<&'a mut dyn Write>);
@@ -21,7 +21,7 @@ impl<'a> ArrowSink<'a> {
     }
 }
 
-impl Sink for ArrowSink<'_> {
+impl RowSink for ArrowSink<'_> {
     fn write(&mut self, batch: &RecordBatch) -> io::Result<()> {
         self.0.write(batch).map_err(io_error)
     }

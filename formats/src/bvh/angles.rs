@@ -42,8 +42,8 @@ pub(super) fn nearest(q: DQuat, axes: [usize; 3], before: [f64; 3]) -> [f64; 3] 
     // Turning half round by the outer two undoes mirroring the middle one.
     let other = [angles[0] + PI, PI - second, angles[2] + PI];
     let [angles, other] = [angles, other].map(|angles| {
-        let turns = |i: usize| ((angles[i] - before[i]) / TAU).round();
-        [0, 1, 2].map(|i| angles[i] - TAU * turns(i))
+        let circles = |i: usize| ((angles[i] - before[i]) / TAU).round();
+        [0, 1, 2].map(|i| angles[i] - TAU * circles(i))
     });
     let distance = |angles: [f64; 3]| -> f64 {
         (0..3)
@@ -80,8 +80,8 @@ mod tests {
                 let t = f64::from(step) * 1e-3;
                 // The middle angle goes through both locks, and stays in one for a while.
                 let middle = (3.0 * t.sin()).clamp(-FRAC_PI_2, 2.5);
-                let given = [0.3 + 2.0 * t, middle, 0.1 - 1.3 * t];
-                let q = DQuat::from_euler(order, given[0], given[1], given[2]);
+                let expected = [0.3 + 2.0 * t, middle, 0.1 - 1.3 * t];
+                let q = DQuat::from_euler(order, expected[0], expected[1], expected[2]);
                 let found = nearest(q.as_quat().as_dquat().normalize(), axes, before);
                 let made = DQuat::from_euler(order, found[0], found[1], found[2]);
                 let off = 2.0 * (made * q.conjugate()).xyz().length();

@@ -6,7 +6,7 @@ use std::io::BufRead;
 use glam::DVec3;
 
 use crate::bvh::joint::{BvhChannel, BvhJoint};
-use crate::diagnostic::{Code, Diagnostic, Place};
+use crate::diagnostic::{Code, Diagnostic, Location};
 use crate::names::line_name;
 use crate::text::lines::Lines;
 use crate::text::number;
@@ -20,25 +20,25 @@ const AFTER_CHANNELS: [&str; 4] = ["}", "JOINT", "END", "OFFSET"];
 /// The joints of a file, parents before their children.
 #[derive(Debug, Default)]
 pub(super) struct Hierarchy {
-    pub(super) joints: Vec<Joint>,
+    pub(super) joints: Vec<HierarchyJoint>,
     /// Channels of all joints together, the numbers of a row.
     pub(super) columns: usize,
 }
 
 #[derive(Debug)]
-pub(super) struct Joint {
+pub(super) struct HierarchyJoint {
     pub(super) name: String,
     pub(super) parent: Option<usize>,
     pub(super) offset: DVec3,
-    /// The axes that the joint turns about, in this order, each with its number's place in a row.
+    /// The axes that the joint turns about, in this order, each with its number's column in a row.
     pub(super) rotations: Vec<(usize, usize)>,
-    /// The coordinates that a row has, each with its place there.
+    /// The coordinates that a row has, each with its column.
     pub(super) positions: Vec<(usize, usize)>,
     /// All of these in their order, and the End Sites.
     pub(super) written: BvhJoint,
 }
 
-/// A word of the hierarchy: its place, and the word.
+/// A word of the hierarchy: its location, and the word.
 struct Word {
     line: u64,
     column: u64,
@@ -99,7 +99,7 @@ impl Hierarchy {
         }
         while parser.statement()? {}
         if let Some(word) = parser.word_before(&[]) {
-            let message = format!("`{}` behind MOTION; begin a new line", word.text);
+            let message = format!("`{}` after MOTION; begin a new line", word.text);
             return Err(parser.refuse(&word, Code::BvhWord, message));
         }
         Ok(parser.hierarchy)
@@ -142,7 +142,7 @@ impl<R: BufRead> Parser<'_, R> {
                 {
                     "has no place here: a ROOT holds an OFFSET, CHANNELS and JOINTs, or an End Site"
                 } else {
-                    "is no word of BVH; remove it"
+                    "is not a keyword of BVH; remove it"
                 };
                 let message = format!("`{}` {message}", word.text);
                 return Err(self.refuse(&word, Code::BvhWord, message));
@@ -159,14 +159,15 @@ impl<R: BufRead> Parser<'_, R> {
         let parent = self.open.last().and_then(|block| block.joint);
         let joints = &mut self.hierarchy.joints;
         let joint = joints.len();
-        let own = line_name(&name, joint, &mut self.names);
-        if own != name && !name.is_empty() {
-            let message =
-                format!("the joint called `{name}` is read as `{own}`, by which it is told apart");
+        let unique_name = line_name(&name, joint, &mut self.names);
+        if unique_name != name && !name.is_empty() {
+            let message = format!(
+                "the joint called `{name}` is read as `{unique_name}`, so that names are unique"
+            );
             self.lines.warn(keyword.column, Code::SameName, message);
         }
-        joints.push(Joint {
-            name: own,
+        joints.push(HierarchyJoint {
+            name: unique_name,
             parent,
             offset: DVec3::ZERO,
             rotations: Vec::new(),
@@ -260,7 +261,7 @@ impl<R: BufRead> Parser<'_, R> {
         }
         if count.text.parse() != Ok(named) {
             let message = format!(
-                "`{}` channels with {named} names behind it; the number counts the names",
+                "`{}` channels with {named} names after it; the number counts the names",
                 count.text
             );
             return Err(self.refuse(&count, Code::BvhChannelCount, message));
@@ -273,7 +274,7 @@ impl<R: BufRead> Parser<'_, R> {
         for word in &names {
             let Some(channel) = BvhChannel::named(&word.text) else {
                 let message = format!(
-                    "`{}` is no channel; there are Xposition, Xrotation and those of Y and Z",
+                    "`{}` is not a channel; there are Xposition, Xrotation and those of Y and Z",
                     word.text
                 );
                 return Err(self.refuse(word, Code::BvhChannel, message));
@@ -335,7 +336,7 @@ impl<R: BufRead> Parser<'_, R> {
     fn refuse(&self, word: &Word, code: Code, message: String) -> Diagnostic {
         let (line, column) = (word.line, word.column);
         Diagnostic {
-            place: Some(Place::Text { line, column }),
+            location: Some(Location::Text { line, column }),
             ..self.lines.refuse(column, code, message)
         }
     }

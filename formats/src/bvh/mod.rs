@@ -7,7 +7,7 @@
 
 mod angles;
 mod hierarchy;
-mod joint;
+pub(crate) mod joint;
 mod motion;
 mod write;
 
@@ -16,7 +16,7 @@ use std::path::Path;
 
 use crate::bvh::hierarchy::Hierarchy;
 pub use crate::bvh::joint::{BvhChannel, BvhJoint};
-use crate::bvh::motion::Rows;
+use crate::bvh::motion::FrameKeys;
 use crate::bvh::write::write_motion;
 use crate::diagnostic::Diagnostic;
 use crate::feature::Feature;
@@ -69,7 +69,7 @@ pub fn read_bvh(
 ) -> Result<Loaded, Diagnostic> {
     let mut lines = Lines::with_names(name, reader, options.limits)?;
     let hierarchy = Hierarchy::read(&mut lines)?;
-    let rows = Rows::read(&mut lines, &hierarchy, options.raw_times)?;
+    let rows = FrameKeys::read(&mut lines, &hierarchy, options.raw_times)?;
     let clip = rows.into_clip(&lines, &hierarchy)?;
     Ok(Loaded::of(clip, lines.warnings))
 }

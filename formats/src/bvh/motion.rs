@@ -11,14 +11,14 @@ use crate::diagnostic::{Code, Diagnostic};
 use crate::motion::{Joint, Motion, Transform};
 use crate::origin::{SMALL, origin_of, relative};
 use crate::quaternion::rounded;
-use crate::rate::{Written, itself, of};
+use crate::rate::{RateSource, itself, of};
 use crate::text::blocks::Blocks;
 use crate::text::lines::{Lines, tokens};
 use crate::text::number;
 
 /// The keys of all frames, in the order `[frame][joint]`: rotations of the joints that have
 /// rotation channels, positions of those that have position channels.
-pub(super) struct Rows {
+pub(super) struct FrameKeys {
     rate: FrameRate,
     count: usize,
     rotations: Blocks<Quat>,
@@ -27,7 +27,7 @@ pub(super) struct Rows {
     remainders: Option<Blocks<Vec3>>,
 }
 
-impl Rows {
+impl FrameKeys {
     /// Reads all behind `MOTION`. With `raw_times` the frame time is taken as it is printed, not as
     /// that of a usual rate.
     pub(super) fn read<R: BufRead>(
@@ -62,7 +62,7 @@ impl Rows {
                     rows.push(hierarchy, &row);
                 } else {
                     let message =
-                        format!("a row behind the last of {frames} frames; it is left out");
+                        format!("a row after the last of {frames} frames; it is left out");
                     lines.warn(1, Code::BvhMoreRows, message);
                 }
             }
@@ -97,8 +97,8 @@ impl Rows {
             }
             if !joint.positions.is_empty() {
                 let mut position = joint.offset;
-                for &(coordinate, place) in &joint.positions {
-                    position[coordinate] = row[place];
+                for &(coordinate, column) in &joint.positions {
+                    position[coordinate] = row[column];
                 }
                 let rounded = position.as_vec3();
                 self.positions.push(rounded);
@@ -137,15 +137,15 @@ impl Rows {
         let refuse =
             |error: tumble::TrackError| lines.refuse_whole(Code::BvhRow, error.to_string());
         for (track, joint) in hierarchy.joints.iter().enumerate() {
-            let own = !joint.rotations.is_empty();
-            let keys = own
+            let has_keys = !joint.rotations.is_empty();
+            let keys = has_keys
                 .then(|| rotations.next())
                 .flatten()
                 .unwrap_or(&[Quat::IDENTITY]);
             set.push(&joint.name, &times[..keys.len()], keys)
                 .map_err(refuse)?;
-            let own = !joint.positions.is_empty();
-            if let Some(keys) = own.then(|| positions.next()).flatten() {
+            let has_keys = !joint.positions.is_empty();
+            if let Some(keys) = has_keys.then(|| positions.next()).flatten() {
                 let mut points = Cow::Borrowed(keys);
                 if let Some(remainders) = remainders.next() {
                     let whole = keys.iter().zip(remainders);
@@ -188,8 +188,8 @@ impl Rows {
 /// before it have turned.
 fn rotation(channels: &[(usize, usize)], row: &[f64]) -> Quat {
     let mut q = DQuat::IDENTITY.to_array();
-    for &(axis, place) in channels {
-        let (sine, cosine) = libm::sincos(row[place] * (std::f64::consts::PI / 360.0));
+    for &(axis, column) in channels {
+        let (sine, cosine) = libm::sincos(row[column] * (std::f64::consts::PI / 360.0));
         let (i, j, k) = (axis, (axis + 1) % 3, (axis + 2) % 3);
         let mut next = [0.0; 4];
         next[i] = q[i] * cosine + q[3] * sine;
@@ -207,7 +207,7 @@ fn read_frames<R: BufRead>(lines: &mut Lines<R>) -> Result<u64, Diagnostic> {
     let whole = field.text.parse();
     whole.map_err(|_| {
         let message = format!(
-            "`{}` is no number of frames; write a whole number",
+            "`{}` is not a number of frames; write a whole number",
             field.text
         );
         lines.refuse(field.column, Code::BvhFrames, message)
@@ -227,7 +227,7 @@ fn read_rate<R: BufRead>(lines: &mut Lines<R>, raw: bool) -> Result<FrameRate, D
         .value;
     let rate = match raw {
         true => itself(period),
-        false => of(&Written::FrameTime(&text)).map(|found| found.grid),
+        false => of(&RateSource::FrameTime(&text)).map(|found| found.grid),
     };
     rate.ok_or_else(|| {
         let message = format!("a frame time of {text} s; it is from 1e-9 to 1e9");

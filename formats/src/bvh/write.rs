@@ -10,10 +10,10 @@ use tumble::{Channel, EulerSequence, FrameRate};
 use crate::bvh::{BvhChannel, angles};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::format::{MotionOptions, WriteError};
-use crate::motion::Sampled;
+use crate::motion::SampledClip;
 use crate::names::line_name;
 use crate::origin::coordinate;
-use crate::rate::{Written, of};
+use crate::rate::{RateSource, of};
 use crate::warnings::Warnings;
 
 /// Up to here an f32 is exact to 8e-6 degrees; larger angles are written with six decimals, so that
@@ -21,7 +21,7 @@ use crate::warnings::Warnings;
 const EXACT_DEGREES: f64 = 256.0;
 
 /// A joint where it comes in the file.
-struct Node {
+struct WrittenJoint {
     track: usize,
     depth: usize,
     name: String,
@@ -50,7 +50,7 @@ const UNTURNED: f64 = 5e-7;
 /// not finite, or a sequence of angles that has an axis twice. `InvalidInput` for lists whose
 /// lengths are not those of the samples.
 pub(super) fn write_motion(
-    clips: &[Sampled<'_>],
+    clips: &[SampledClip<'_>],
     options: &MotionOptions,
     out: &mut dyn Write,
 ) -> Result<Vec<Diagnostic>, WriteError> {
@@ -90,7 +90,7 @@ pub(super) fn write_motion(
                     }
                     BvhChannel::Rotation(axis) => {
                         let mut angles = node.axes.iter().zip(&*before);
-                        let angle = angles.find(|(own, _)| *own == axis);
+                        let angle = angles.find(|(known, _)| *known == axis);
                         let angle = angle.map_or(0.0, |(_, angle)| *angle);
                         push_degrees(&mut text, angle.to_degrees());
                     }
@@ -109,7 +109,7 @@ pub(super) fn write_motion(
 fn frame_time(rate: FrameRate) -> String {
     let period = rate.time_of(1);
     let mut digits = period.to_string();
-    let read_back = of(&Written::FrameTime(&digits)).map(|found| found.grid);
+    let read_back = of(&RateSource::FrameTime(&digits)).map(|found| found.grid);
     if read_back != Some(rate) {
         digits += if digits.contains('.') { "" } else { "." };
         digits += "000000000000";
@@ -132,7 +132,7 @@ fn axes(sequence: EulerSequence) -> Result<[usize; 3], String> {
 }
 
 /// The rate of the samples, each on the frame behind the one before.
-fn check(sampled: &Sampled<'_>) -> io::Result<Result<FrameRate, String>> {
+fn check(sampled: &SampledClip<'_>) -> io::Result<Result<FrameRate, String>> {
     let (times, tracks) = (sampled.times, sampled.clip.set.track_count());
     let samples = times.len() * tracks;
     let fits = |count: usize| count == 0 || count == samples;
@@ -170,12 +170,12 @@ fn check(sampled: &Sampled<'_>) -> io::Result<Result<FrameRate, String>> {
     Ok(Ok(rate))
 }
 
-/// The joints in the file's order, each before those that hang on it.
+/// The joints in the file's order, parents before their children.
 fn nodes(
-    sampled: &Sampled<'_>,
+    sampled: &SampledClip<'_>,
     sequence: Option<[usize; 3]>,
     warnings: &mut Warnings,
-) -> Result<Vec<Node>, String> {
+) -> Result<Vec<WrittenJoint>, String> {
     let clip = sampled.clip;
     let tracks = clip.set.track_count();
     let mut children = vec![Vec::new(); tracks];
@@ -186,7 +186,11 @@ fn nodes(
             None => open.push((track, 0)),
             Some(parent) => match children.get_mut(parent) {
                 Some(children) => children.push(track),
-                None => return Err(format!("track {track} hangs on track {parent} of {tracks}")),
+                None => {
+                    return Err(format!(
+                        "track {track} has the parent {parent}, but there are {tracks} tracks"
+                    ));
+                }
             },
         }
     }
@@ -194,11 +198,11 @@ fn nodes(
     let mut nodes = Vec::with_capacity(tracks);
     while let Some((track, depth)) = open.pop() {
         open.extend(children[track].iter().map(|&child| (child, depth + 1)));
-        let given = clip.set.track(track).name.unwrap_or("");
-        let name = line_name(given, track, &mut names);
-        if name != given && !given.is_empty() {
+        let track_name = clip.set.track(track).name.unwrap_or("");
+        let name = line_name(track_name, track, &mut names);
+        if name != track_name && !track_name.is_empty() {
             warnings.warn(Code::NameChanged, || {
-                let message = format!("`{}` is called `{name}` in BVH", given.escape_debug());
+                let message = format!("`{}` is called `{name}` in BVH", track_name.escape_debug());
                 (None, message)
             });
         }
@@ -206,7 +210,7 @@ fn nodes(
         nodes.push(node(sampled, (track, depth, name), is_leaf, sequence));
     }
     if nodes.len() < tracks {
-        let message = "joints hang on each other in a circle; a skeleton has roots";
+        let message = "the joints' parents form a cycle; a skeleton has a root";
         return Err(message.to_owned());
     }
     Ok(nodes)
@@ -214,19 +218,19 @@ fn nodes(
 
 /// One joint, given its track, its depth and its name.
 fn node(
-    sampled: &Sampled<'_>,
+    sampled: &SampledClip<'_>,
     (track, depth, name): (usize, usize, String),
     is_leaf: bool,
     sequence: Option<[usize; 3]>,
-) -> Node {
+) -> WrittenJoint {
     let clip = sampled.clip;
     let written = clip.bvh.get(track).filter(|_| !clip.is_world);
     let samples = 0..sampled.times.len();
     let first = sampled.translation(0, track);
     let rest = clip.rest(Channel::Translation, track);
-    let mut channels = written.map_or_else(Vec::new, |own| own.channels.clone());
+    let mut channels = written.map_or_else(Vec::new, |joint| joint.channels.clone());
     let has_positions = |channels: &[BvhChannel]| {
-        let is_position = |own: &BvhChannel| matches!(own, BvhChannel::Position(_));
+        let is_position = |channel: &BvhChannel| matches!(channel, BvhChannel::Position(_));
         channels.iter().any(is_position)
     };
     let moves = |axis: usize| {
@@ -248,36 +252,38 @@ fn node(
     };
     let last = channels
         .iter()
-        .rposition(|own| matches!(own, BvhChannel::Position(_)));
-    let place = last.map_or(0, |last| last + 1);
+        .rposition(|channel| matches!(channel, BvhChannel::Position(_)));
+    let index = last.map_or(0, |last| last + 1);
     let missing = missing.into_iter().map(BvhChannel::Position);
-    channels.splice(place..place, missing);
-    let turned = BvhChannel::rotations(&channels);
+    channels.splice(index..index, missing);
+    let file_axes = BvhChannel::rotations(&channels);
     let mut axes = sequence.unwrap_or([2, 0, 1]);
-    if sequence.is_none() && !turned.is_empty() {
+    if sequence.is_none() && !file_axes.is_empty() {
         // The file's axes, then those that it leaves out.
-        let others = (0..3).filter(|axis| !turned.contains(axis));
-        let all = turned.iter().copied().chain(others);
-        axes.iter_mut().zip(all).for_each(|(own, axis)| *own = axis);
+        let others = (0..3).filter(|axis| !file_axes.contains(axis));
+        let all = file_axes.iter().copied().chain(others);
+        axes.iter_mut()
+            .zip(all)
+            .for_each(|(slot, axis)| *slot = axis);
     }
-    let is_partial = written.is_some() && turned.len() < 3;
-    if sequence.is_some() || !is_partial || turns_more(sampled, track, axes, &turned) {
+    let is_partial = written.is_some() && file_axes.len() < 3;
+    if sequence.is_some() || !is_partial || uses_other_axes(sampled, track, axes, &file_axes) {
         // All three, where the file's first rotation is.
-        let is_rotation = |own: &BvhChannel| matches!(own, BvhChannel::Rotation(_));
-        let place = channels.iter().position(is_rotation);
-        let is_sorted = turned == axes;
+        let is_rotation = |channel: &BvhChannel| matches!(channel, BvhChannel::Rotation(_));
+        let first_rotation = channels.iter().position(is_rotation);
+        let is_sorted = file_axes == axes;
         if !is_sorted {
-            let place = place.unwrap_or(channels.len());
-            channels.retain(|own| !is_rotation(own));
-            channels.splice(place..place, axes.map(BvhChannel::Rotation));
+            let index = first_rotation.unwrap_or(channels.len());
+            channels.retain(|channel| !is_rotation(channel));
+            channels.splice(index..index, axes.map(BvhChannel::Rotation));
         }
     }
     let end_sites = match written {
-        Some(own) => own.end_sites.clone(),
+        Some(joint) => joint.end_sites.clone(),
         None if is_leaf => vec![Vec3::ZERO],
         None => Vec::new(),
     };
-    Node {
+    WrittenJoint {
         track,
         depth,
         name,
@@ -290,7 +296,12 @@ fn node(
 }
 
 /// Whether a joint turns about axes that are not among the first ones of these.
-fn turns_more(sampled: &Sampled<'_>, track: usize, axes: [usize; 3], among: &[usize]) -> bool {
+fn uses_other_axes(
+    sampled: &SampledClip<'_>,
+    track: usize,
+    axes: [usize; 3],
+    among: &[usize],
+) -> bool {
     let tracks = sampled.clip.set.track_count();
     let mut before = [0.0; 3];
     let mut rotations = sampled.rotations.iter().skip(track).step_by(tracks);
@@ -302,9 +313,9 @@ fn turns_more(sampled: &Sampled<'_>, track: usize, axes: [usize; 3], among: &[us
 }
 
 /// All up to `MOTION`.
-fn hierarchy(nodes: &[Node]) -> String {
+fn hierarchy(nodes: &[WrittenJoint]) -> String {
     let mut text = String::from("HIERARCHY\n");
-    for (place, node) in nodes.iter().enumerate() {
+    for (index, node) in nodes.iter().enumerate() {
         let (indent, keyword) = (
             indentation(node.depth),
             if node.depth == 0 { "ROOT" } else { "JOINT" },
@@ -319,7 +330,7 @@ fn hierarchy(nodes: &[Node]) -> String {
             text += &format!(" {channel}");
         }
         text.push('\n');
-        let next = nodes.get(place + 1).map_or(0, |next| next.depth);
+        let next = nodes.get(index + 1).map_or(0, |next| next.depth);
         for &site in &node.end_sites {
             text += &format!("{indent}  End Site\n{indent}  {{\n{indent}    OFFSET ");
             push_vector(&mut text, DVec3::ZERO, site);

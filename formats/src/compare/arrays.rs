@@ -6,7 +6,7 @@ use tumble::reference::angle_between;
 
 use crate::compare::CompareError;
 use crate::compare::tally::{Spread, Tally};
-use crate::npz::Numbers;
+use crate::npz::NumberArray;
 
 /// How far the norm of what counts as a rotation may be from 1: results in 16 bits are still rotations.
 const UNIT: f64 = 1e-2;
@@ -36,7 +36,7 @@ impl ArrayDifference {
     ///
     /// # Errors
     /// When their shapes differ.
-    pub fn of(inputs: [&str; 2], [first, second]: [&Numbers; 2]) -> Result<Self, CompareError> {
+    pub fn of(inputs: [&str; 2], [first, second]: [&NumberArray; 2]) -> Result<Self, CompareError> {
         if first.shape != second.shape {
             return Err(CompareError::Shapes {
                 inputs: inputs.map(str::to_owned),
@@ -70,7 +70,7 @@ impl ArrayDifference {
 
 /// The rotations that an array holds, if it holds nothing else: four numbers each, of norm 1. The order
 /// of their components does not matter to the angle between two.
-fn rotations(array: &Numbers) -> Option<impl Iterator<Item = DQuat> + '_> {
+fn rotations(array: &NumberArray) -> Option<impl Iterator<Item = DQuat> + '_> {
     let rows = || {
         let rows = array.values.chunks_exact(4);
         rows.filter_map(|row| Some(DQuat::from_array(row.try_into().ok()?)))
@@ -100,8 +100,8 @@ fn indices(mut index: u64, shape: &[usize]) -> Vec<usize> {
 mod tests {
     use super::*;
 
-    fn numbers(shape: &[usize], values: &[f64]) -> Numbers {
-        Numbers {
+    fn numbers(shape: &[usize], values: &[f64]) -> NumberArray {
+        NumberArray {
             shape: shape.to_vec(),
             values: values.to_vec(),
         }

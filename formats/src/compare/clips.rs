@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use glam::{DVec3, Quat, Vec3};
 use serde::Serialize;
 use tumble::reference::angle_between;
-use tumble::{Channel, Engine, Frames};
+use tumble::{Channel, Engine, SampleTimes};
 
 use crate::compare::CompareError;
 use crate::compare::tally::{Spread, Tally};
@@ -114,7 +114,7 @@ impl ClipPair<'_> {
 
     /// Every key of both between these times, and the middle between neighbouring ones.
     #[must_use]
-    pub fn keys(&self, common: &CommonTimes) -> Frames {
+    pub fn keys(&self, common: &CommonTimes) -> SampleTimes {
         let (start, end) = (common.start, common.end);
         let mut times: Vec<f64> = self.clips[0].key_times();
         let others = self.clips[1].key_times();
@@ -129,7 +129,7 @@ impl ClipPair<'_> {
         times.extend(middles);
         times.sort_by(f64::total_cmp);
         times.dedup();
-        Frames::at(times)
+        SampleTimes::at(times)
     }
 
     /// Compares them at some times, seconds of the first one: joints relative to their parents, or in the world.
@@ -139,7 +139,7 @@ impl ClipPair<'_> {
     pub fn differences(
         &self,
         engine: &Engine,
-        frames: &Frames,
+        frames: &SampleTimes,
         in_world: bool,
     ) -> Result<ClipDifference, CompareError> {
         let (inputs, motions) = (self.inputs, self.clips);
@@ -151,7 +151,7 @@ impl ClipPair<'_> {
             true => frames,
             false => {
                 let times = first.times.iter().map(|time| time + shift);
-                moved = Frames::at(times.collect::<Vec<_>>());
+                moved = SampleTimes::at(times.collect::<Vec<_>>());
                 &moved
             }
         };
@@ -281,7 +281,7 @@ fn poses(
     engine: &Engine,
     input: &str,
     clip: &Motion,
-    frames: &Frames,
+    frames: &SampleTimes,
     in_world: bool,
 ) -> Result<(Samples, Vec<DVec3>), CompareError> {
     let mut samples = ChannelMethods::AUTHORED

@@ -1,7 +1,7 @@
 //! An estimated path beside its reference: errors after an alignment, at the poses of the reference.
 
 use serde::Serialize;
-use tumble::{Engine, Frames, Interpolation, method};
+use tumble::{Engine, Interpolation, SampleTimes, method};
 
 use crate::compare::CompareError;
 use crate::motion::Motion;
@@ -143,7 +143,7 @@ impl PathDifference {
             let gap = || keys[next] - keys[next - 1];
             if !is_key && (next == 0 || next == keys.len()) {
                 outside += 1;
-            } else if !is_key && measure.max_gap.is_some_and(|most| gap() > most) {
+            } else if !is_key && measure.max_gap.is_some_and(|limit| gap() > limit) {
                 in_gaps += 1;
             } else {
                 times.push(time);
@@ -157,7 +157,7 @@ impl PathDifference {
             with: &|method| Interpolation::from(method),
         };
         let poses = |input: &str, clip: &Motion, track: usize, by: &ChannelMethods<'_>, shift| {
-            let frames = Frames::at(times.iter().map(|time| time + shift).collect::<Vec<_>>());
+            let frames = SampleTimes::at(times.iter().map(|time| time + shift).collect::<Vec<_>>());
             let samples = by.sample(engine, clip, &frames);
             let samples = samples.map_err(|error| CompareError::Evaluating {
                 input: input.to_owned(),

@@ -1,10 +1,9 @@
 //! CSV: `frame,time,<track>.w,<track>.x,<track>.y,<track>.z,…`, a line a frame, or with w behind z;
-//! or the numbers of another encoding in the place of those of quaternions.
+//! or the numbers of another encoding instead of those of quaternions.
 
 mod motion;
 pub mod read;
 
-use std::borrow::Cow;
 use std::fmt::Write as _;
 use std::io::{self, Write};
 
@@ -14,7 +13,8 @@ use tumble::{Encoding, Layout, Timeline, TrackSet};
 
 use crate::feature::Feature;
 use crate::format::{Format, FormatOption, ResultShape, ResultWriter, WriteResults};
-use crate::npy::ComponentOrder;
+use crate::quaternion::ComponentOrder;
+use crate::text::cell::text_cell;
 
 /// As in `.dat` files.
 pub(crate) const ORDER: ComponentOrder = ComponentOrder::Wxyz;
@@ -141,7 +141,7 @@ impl<'a, W: Write> CsvWriter<'a, W> {
     }
 
     /// Whether w comes before the others.
-    fn is_turned(&self) -> bool {
+    fn is_w_first(&self) -> bool {
         self.encoding.is_quaternion() && self.order == ComponentOrder::Wxyz
     }
 
@@ -151,7 +151,7 @@ impl<'a, W: Write> CsvWriter<'a, W> {
         for track in 0..set.track_count() {
             let name = set.track_name(track);
             let mut components = self.encoding.components().to_vec();
-            if self.is_turned() {
+            if self.is_w_first() {
                 components.rotate_right(1);
             }
             for component in components {
@@ -169,7 +169,7 @@ impl<'a, W: Write> CsvWriter<'a, W> {
         let mut bytes = vec![0; self.encoding.bytes()];
         for q in frame {
             let mut numbers = q.to_array().to_vec();
-            if self.is_turned() {
+            if self.is_w_first() {
                 numbers.rotate_right(1);
             }
             // Quaternions are never rounded.
@@ -189,57 +189,10 @@ impl<'a, W: Write> CsvWriter<'a, W> {
     }
 }
 
-/// A text as a cell. Spreadsheets take cells that begin with `=`, `+`, `-` or `@` for formulas, which may
-/// run programs: they, and what such a cell looks like already, get a quote in front, which spreadsheets do
-/// not show. Numbers are no texts.
-pub(crate) fn text_cell(text: &str) -> Cow<'_, str> {
-    match is_formula(text.trim_start_matches(QUOTE)) {
-        true => Cow::Owned(format!("{QUOTE}{text}")),
-        false => Cow::Borrowed(text),
-    }
-}
-
-/// What a cell of text says: see [`text_cell`].
-pub(crate) fn cell_text(cell: &str) -> &str {
-    match cell.strip_prefix(QUOTE) {
-        Some(text) if is_formula(text.trim_start_matches(QUOTE)) => text,
-        _ => cell,
-    }
-}
-
-const QUOTE: char = '\'';
-
-fn is_formula(text: &str) -> bool {
-    text.starts_with(['=', '+', '-', '@', '\t', '\r'])
-}
-
 /// The conversion that the crate offers loses the kind, a broken pipe's too.
 pub(crate) fn io_error(error: ::csv::Error) -> io::Error {
     match error.into_kind() {
         ::csv::ErrorKind::Io(error) => error,
         other => io::Error::other(format!("{other:?}")),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn no_cell_of_text_is_a_formula_and_each_says_what_it_was() {
-        for (text, cell) in [
-            ("hip.x", "hip.x"),
-            ("=cmd|' /C calc'!A0.x", "'=cmd|' /C calc'!A0.x"),
-            ("-hand.w", "'-hand.w"),
-            ("@SUM(A1).y", "'@SUM(A1).y"),
-            ("+1", "'+1"),
-            ("\t=1", "'\t=1"),
-            ("'=1", "''=1"),
-            ("''-", "'''-"),
-            ("'tis", "'tis"),
-            ("", ""),
-        ] {
-            assert_eq!((&*text_cell(text), cell_text(cell)), (cell, text));
-        }
     }
 }

@@ -2,20 +2,21 @@
 
 use std::io::{self, Write};
 
-use crate::csv::{ORDER, io_error, text_cell};
+use crate::csv::{ORDER, io_error};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::format::{MotionOptions, WriteError};
-use crate::motion::Sampled;
+use crate::motion::SampledClip;
 use crate::names::distinct_names;
-use crate::npy::ComponentOrder;
 use crate::poses::{TRANSFORM, WORLD};
+use crate::quaternion::ComponentOrder;
+use crate::text::cell::text_cell;
 
 /// Writes one clip; the names of its columns are those that are read.
 ///
 /// # Errors
 /// When writing fails, or there are several clips.
 pub(crate) fn write_motion(
-    clips: &[Sampled<'_>],
+    clips: &[SampledClip<'_>],
     options: &MotionOptions,
     out: &mut dyn Write,
 ) -> Result<Vec<Diagnostic>, WriteError> {
@@ -34,8 +35,8 @@ pub(crate) fn write_motion(
     } else {
         &TRANSFORM[..3]
     };
-    let turned = options.order.unwrap_or(ORDER) == ComponentOrder::Wxyz;
-    let mut components = match turned {
+    let is_w_first = options.order.unwrap_or(ORDER) == ComponentOrder::Wxyz;
+    let mut components = match is_w_first {
         true => vec!["w", "x", "y", "z"],
         false => vec!["x", "y", "z", "w"],
     };
@@ -68,18 +69,18 @@ pub(crate) fn write_motion(
             return Err(io::Error::new(io::ErrorKind::InvalidInput, message).into());
         };
         row.push(digits);
-        for place in frame * tracks..(frame + 1) * tracks {
-            let q = sampled.rotations[place];
-            let numbers = match turned {
+        for index in frame * tracks..(frame + 1) * tracks {
+            let q = sampled.rotations[index];
+            let numbers = match is_w_first {
                 true => [q.w, q.x, q.y, q.z],
                 false => q.to_array(),
             };
             row.extend(numbers.map(|number| number.to_string()));
             if moved {
-                row.extend(sampled.coordinates(frame, place % tracks));
+                row.extend(sampled.coordinates(frame, index % tracks));
             }
             if scaled {
-                let scale = sampled.scales[place].to_array();
+                let scale = sampled.scales[index].to_array();
                 row.extend(scale.map(|number| number.to_string()));
             }
         }

@@ -6,15 +6,15 @@ use std::path::Path;
 
 use ::csv::{ByteRecord, Reader, ReaderBuilder};
 
-use crate::csv::cell_text;
 use crate::decimal::Decimal;
-use crate::diagnostic::{Code, Diagnostic, Place};
+use crate::diagnostic::{Code, Diagnostic, Location};
 use crate::format::{Loaded, ReadOptions, TimeUnit};
-use crate::rate::last_place;
+use crate::rate::last_digit_power;
 use crate::source::Source;
 use crate::table::clips::clips;
-use crate::table::columns::{Column, Numbers, Table, Values};
-use crate::table::plan::{Need, Plan};
+use crate::table::columns::{Column, ColumnNeed, ColumnNumbers, ColumnValues, Table};
+use crate::table::plan::TablePlan;
+use crate::text::cell::cell_text;
 use crate::text::number;
 use crate::warnings::Warnings;
 
@@ -51,29 +51,31 @@ pub fn read_csv(name: &str, bytes: Vec<u8>, options: &ReadOptions) -> Result<Loa
         .iter()
         .map(|cell| cell_text(String::from_utf8_lossy(cell).trim()).to_owned());
     let names: Vec<String> = names.collect();
-    let plan = Plan::of(name, &names, options)?;
-    let mut columns = Vec::with_capacity(plan.wanted.len());
-    for wanted in &plan.wanted {
-        let values = match wanted.need {
-            Need::Number => Values::Numbers(Numbers::F64(Vec::new())),
+    let plan = TablePlan::of(name, &names, options)?;
+    let mut columns = Vec::with_capacity(plan.columns.len());
+    for requested in &plan.columns {
+        let values = match requested.need {
+            ColumnNeed::Number => ColumnValues::Numbers(ColumnNumbers::F64(Vec::new())),
             // Whole until a cell is not.
-            Need::Whole | Need::Time => Values::Numbers(Numbers::Whole(Vec::new())),
-            Need::Name => Values::Words {
+            ColumnNeed::Whole | ColumnNeed::Time => {
+                ColumnValues::Numbers(ColumnNumbers::Whole(Vec::new()))
+            }
+            ColumnNeed::Name => ColumnValues::Words {
                 codes: Vec::new(),
                 words: Vec::new(),
             },
-            Need::List => {
-                let message = format!("`{}` is one number; CSV has no lists", wanted.name);
+            ColumnNeed::List => {
+                let message = format!("`{}` is one number; CSV has no lists", requested.name);
                 return Err(sheet.refuse(
-                    sheet.cell(&header, wanted.index),
+                    sheet.cell(&header, requested.index),
                     Code::ColumnType,
                     message,
                 ));
             }
         };
         columns.push(Column {
-            name: wanted.name.clone(),
-            index: wanted.index,
+            name: requested.name.clone(),
+            index: requested.index,
             values,
             null: None,
         });
@@ -84,18 +86,18 @@ pub fn read_csv(name: &str, bytes: Vec<u8>, options: &ReadOptions) -> Result<Loa
     let mut starts = Vec::new();
     while sheet.next(&mut reader, &mut record)? {
         sheet.check_width(&record, names.len())?;
-        let own = columns.iter_mut().zip(&mut known).zip(&plan.wanted);
-        for ((column, known), wanted) in own {
-            let cell = Cell {
+        let outputs = columns.iter_mut().zip(&mut known).zip(&plan.columns);
+        for ((column, known), requested) in outputs {
+            let cell = TextCell {
                 sheet: &sheet,
-                text: record.get(wanted.index).unwrap_or_default().trim_ascii(),
-                column: wanted.index,
+                text: record.get(requested.index).unwrap_or_default().trim_ascii(),
+                column: requested.index,
                 record: &record,
             };
             if cell.text.is_empty() {
                 column.null.get_or_insert(starts.len());
             }
-            cell.read(&mut column.values, wanted.need, known, &mut warnings)?;
+            cell.read(&mut column.values, requested.need, known, &mut warnings)?;
         }
         starts.push(start_of(&record));
     }
@@ -104,7 +106,7 @@ pub fn read_csv(name: &str, bytes: Vec<u8>, options: &ReadOptions) -> Result<Loa
         columns,
         rows: starts.len(),
         text: Some(Box::new(move |column, row| {
-            place(&bytes[start..], starts[row], column)
+            cell_location(&bytes[start..], starts[row], column)
         })),
     };
     let mut loaded = clips(&table, &plan, options)?;
@@ -121,12 +123,12 @@ fn check_encoding(name: &str, bytes: &[u8], warnings: &mut Warnings) -> Result<u
         return refuse("this is UTF-16; save it as UTF-8 or ASCII");
     }
     if bytes.contains(&0) {
-        return refuse("there is a NUL byte; this is no text file");
+        return refuse("there is a NUL byte; this is not a text file");
     }
     if bytes.starts_with(b"\xef\xbb\xbf") {
         warnings.warn(Code::ByteOrderMark, || {
-            let place = Place::Text { line: 1, column: 1 };
-            (Some(place), "a byte-order mark; it is skipped")
+            let location = Location::Text { line: 1, column: 1 };
+            (Some(location), "a byte-order mark; it is skipped")
         });
         return Ok(3);
     }
@@ -152,9 +154,9 @@ impl Sheet<'_> {
             .from_reader(self.bytes)
     }
 
-    fn refuse(&self, place: Place, code: Code, message: impl Into<String>) -> Diagnostic {
+    fn refuse(&self, location: Location, code: Code, message: impl Into<String>) -> Diagnostic {
         let mut refusal = Diagnostic::new(self.name, code, message);
-        refusal.place = Some(place);
+        refusal.location = Some(location);
         refusal
     }
 
@@ -174,17 +176,17 @@ impl Sheet<'_> {
         if record.len() == width {
             return Ok(());
         }
-        let place = self.cell(record, width.min(record.len()));
+        let location = self.cell(record, width.min(record.len()));
         let message = format!(
             "{} cells where the header has {width}; every row has as many as the header",
             record.len()
         );
-        Err(self.refuse(place, Code::Columns, message))
+        Err(self.refuse(location, Code::Columns, message))
     }
 
     /// Where a cell of a record begins.
-    fn cell(&self, record: &ByteRecord, column: usize) -> Place {
-        place(self.bytes, start_of(record), column)
+    fn cell(&self, record: &ByteRecord, column: usize) -> Location {
+        cell_location(self.bytes, start_of(record), column)
     }
 }
 
@@ -198,7 +200,7 @@ fn start_of(record: &ByteRecord) -> (usize, u64) {
 
 /// Where a cell of the record begins that starts there; behind the record's end, where it has no
 /// such cell.
-fn place(bytes: &[u8], (start, lines): (usize, u64), column: usize) -> Place {
+fn cell_location(bytes: &[u8], (start, lines): (usize, u64), column: usize) -> Location {
     let ends = |byte: &u8| matches!(byte, b'\r' | b'\n');
     let rest = bytes.get(start..).unwrap_or_default();
     // The record before ends there; blank lines may follow it.
@@ -221,7 +223,7 @@ fn place(bytes: &[u8], (start, lines): (usize, u64), column: usize) -> Place {
     let line_start = bytes[..at].iter().rposition(|&byte| byte == b'\n');
     let line = &bytes[line_start.map_or(0, |end| end + 1)..at];
     let is_character = |byte: &&u8| **byte & 0xc0 != 0x80;
-    Place::Text {
+    Location::Text {
         line: lines + line_ends + 1,
         column: line.iter().filter(is_character).count() as u64 + 1,
     }
@@ -235,8 +237,8 @@ fn as_text(bytes: &[u8]) -> Cow<'_, str> {
     }
 }
 
-/// One cell of a column that is wanted.
-struct Cell<'a> {
+/// One cell of a requested column.
+struct TextCell<'a> {
     sheet: &'a Sheet<'a>,
     /// Without the blanks around it.
     text: &'a [u8],
@@ -244,35 +246,35 @@ struct Cell<'a> {
     record: &'a ByteRecord,
 }
 
-impl Cell<'_> {
+impl TextCell<'_> {
     fn refuse(&self, code: Code, message: String) -> Diagnostic {
-        let place = self.sheet.cell(self.record, self.column);
-        self.sheet.refuse(place, code, message)
+        let location = self.sheet.cell(self.record, self.column);
+        self.sheet.refuse(location, code, message)
     }
 
     /// Appends what the cell says.
     fn read(
         &self,
-        values: &mut Values,
-        need: Need,
+        values: &mut ColumnValues,
+        need: ColumnNeed,
         known: &mut HashMap<String, u32>,
         warnings: &mut Warnings,
     ) -> Result<(), Diagnostic> {
-        // A cell without a value holds a place; its column is refused for it.
-        if need == Need::Number
+        // A cell without a value is stored as a placeholder; its column is refused for it.
+        if need == ColumnNeed::Number
             && self.sheet.bridges_gaps
             && (self.text.is_empty() || self.text.eq_ignore_ascii_case(b"nan"))
-            && let Values::Numbers(Numbers::F64(numbers)) = values
+            && let ColumnValues::Numbers(ColumnNumbers::F64(numbers)) = values
         {
             numbers.push(f64::NAN);
             return Ok(());
         }
         let text = match (self.text, need) {
-            (b"", Need::Number | Need::Whole | Need::Time) => b"0",
+            (b"", ColumnNeed::Number | ColumnNeed::Whole | ColumnNeed::Time) => b"0",
             (text, _) => text,
         };
         match values {
-            Values::Words { codes, words } => {
+            ColumnValues::Words { codes, words } => {
                 let word = as_text(text);
                 let code = known.get(&*word).copied().unwrap_or_else(|| {
                     words.push(word.to_string());
@@ -282,21 +284,21 @@ impl Cell<'_> {
                 });
                 codes.push(code);
             }
-            Values::Numbers(Numbers::Whole(numbers)) => {
+            ColumnValues::Numbers(ColumnNumbers::Whole(numbers)) => {
                 let plain = text
                     .iter()
                     .all(|byte| byte.is_ascii_digit() || *byte == b'-');
                 let whole = std::str::from_utf8(text).ok().filter(|_| plain);
                 match whole.and_then(|text| text.parse().ok()) {
                     Some(number) => numbers.push(number),
-                    None if need == Need::Time => {
+                    None if need == ColumnNeed::Time => {
                         let power = self.sheet.time_power;
                         let times = numbers.iter().map(|&number| Decimal::whole(number, power));
                         let times: Option<Vec<Decimal>> = times.collect();
                         let mut times = times.ok_or_else(|| self.out_of_range(text))?;
-                        let mut places = power.unsigned_abs();
-                        self.time(text, &mut times, &mut places, warnings)?;
-                        *values = Values::Decimals(times, places);
+                        let mut decimals = power.unsigned_abs();
+                        self.time(text, &mut times, &mut decimals, warnings)?;
+                        *values = ColumnValues::Decimals(times, decimals);
                     }
                     None => {
                         let text = String::from_utf8_lossy(text);
@@ -305,10 +307,16 @@ impl Cell<'_> {
                     }
                 }
             }
-            Values::Numbers(Numbers::F64(numbers)) => numbers.push(self.number(text, warnings)?),
-            Values::Decimals(times, places) => self.time(text, times, places, warnings)?,
+            ColumnValues::Numbers(ColumnNumbers::F64(numbers)) => {
+                numbers.push(self.number(text, warnings)?)
+            }
+            ColumnValues::Decimals(times, decimals) => {
+                self.time(text, times, decimals, warnings)?
+            }
             // Text has no other columns.
-            Values::Numbers(Numbers::F32(_)) | Values::Stamps(..) | Values::Lists { .. } => {}
+            ColumnValues::Numbers(ColumnNumbers::F32(_))
+            | ColumnValues::Stamps(..)
+            | ColumnValues::Lists { .. } => {}
         }
         Ok(())
     }
@@ -318,15 +326,15 @@ impl Cell<'_> {
         &self,
         text: &[u8],
         times: &mut Vec<Decimal>,
-        places: &mut u32,
+        decimals: &mut u32,
         warnings: &mut Warnings,
     ) -> Result<(), Diagnostic> {
         self.number(text, warnings)?;
         let (token, power) = (as_text(text), self.sheet.time_power);
         let time = Decimal::parse_in(&token, power).ok_or_else(|| self.out_of_range(text))?;
         times.push(time);
-        let last = last_place(&token).saturating_add(power);
-        *places = (*places).max(last.min(0).unsigned_abs());
+        let last = last_digit_power(&token).saturating_add(power);
+        *decimals = (*decimals).max(last.min(0).unsigned_abs());
         Ok(())
     }
 
@@ -349,9 +357,9 @@ impl Cell<'_> {
         })?;
         if number.vanished {
             warnings.warn(Code::Tiny, || {
-                let place = self.sheet.cell(self.record, self.column);
+                let location = self.sheet.cell(self.record, self.column);
                 (
-                    Some(place),
+                    Some(location),
                     format!("`{text}` is too small for f32; it becomes 0"),
                 )
             });

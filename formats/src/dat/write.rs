@@ -9,14 +9,14 @@ use tumble::TrackSet;
 use crate::dat::MAX_BOXES;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::format::{MotionOptions, WriteError};
-use crate::motion::Sampled;
+use crate::motion::SampledClip;
 
 /// Writes a clip's samples, and says what the format has no room for.
 ///
 /// # Errors
 /// When writing fails, or there are several clips, too many tracks, or a time that does not increase.
 pub(super) fn write_motion(
-    clips: &[Sampled<'_>],
+    clips: &[SampledClip<'_>],
     options: &MotionOptions,
     out: &mut dyn Write,
 ) -> Result<Vec<Diagnostic>, WriteError> {

@@ -20,7 +20,7 @@ const SAME: f64 = 1e-12;
 
 /// A node's transform as a sum of curves and constants:
 /// T · Roff · Rp · Rpre · R · Rpost⁻¹ · Rp⁻¹ · Soff · Sp · S · Sp⁻¹.
-pub(super) struct Direct<'a> {
+pub(super) struct DirectEvaluator<'a> {
     translation: Vector<'a>,
     rotation: Vector<'a>,
     scale: Vector<'a>,
@@ -31,7 +31,7 @@ pub(super) struct Direct<'a> {
     /// Roff + Rp, Sp, and Sp + Soff - Rp, which turns with the node.
     offset: DVec3,
     scale_pivot: DVec3,
-    turned: DVec3,
+    rotated_offset: DVec3,
 }
 
 /// Three numbers that curves move.
@@ -51,7 +51,7 @@ struct Curve<'a> {
 /// Degrees to half of radians.
 const HALF: f64 = std::f64::consts::PI / 180.0 * 0.5;
 
-impl<'a> Direct<'a> {
+impl<'a> DirectEvaluator<'a> {
     /// Nothing for a node that is more than this.
     pub(super) fn of(
         node: &'a Node,
@@ -79,9 +79,9 @@ impl<'a> Direct<'a> {
             let at = &found.value_vec4;
             (!is_odd).then(|| DVec3::new(at.x, at.y, at.z))
         };
-        let vector = |name: &str, without: f64, place: Option<usize>| -> Option<Vector<'a>> {
+        let vector = |name: &str, without: f64, index: Option<usize>| -> Option<Vector<'a>> {
             let rest = constant(name, without)?;
-            let Some(value) = place.map(&value) else {
+            let Some(value) = index.map(&value) else {
                 return Some(Vector {
                     rest,
                     curves: [None, None, None],
@@ -98,7 +98,7 @@ impl<'a> Direct<'a> {
         };
         let angles = |name: &str, order| -> Option<Option<DQuat>> {
             let angles = constant(name, 0.0)?;
-            Some((angles != DVec3::ZERO).then(|| turned(angles, order)))
+            Some((angles != DVec3::ZERO).then(|| euler_rotation(angles, order)))
         };
         let is_spaced = node.use_rotation_space;
         let space = |name: &str| match is_spaced {
@@ -122,7 +122,7 @@ impl<'a> Direct<'a> {
             behind: space("PostRotation")?.map(DQuat::conjugate),
             offset: constant("RotationOffset", 0.0)? + rotation_pivot,
             scale_pivot,
-            turned: scale_pivot + constant("ScalingOffset", 0.0)? - rotation_pivot,
+            rotated_offset: scale_pivot + constant("ScalingOffset", 0.0)? - rotation_pivot,
         })
     }
 
@@ -133,14 +133,14 @@ impl<'a> Direct<'a> {
             let (exact, ours) = (exact(time), self.at(time, TRANSLATION | ROTATION | SCALE));
             let vectors =
                 |of: &Transform| [&of.translation, &of.scale].map(|v| DVec3::new(v.x, v.y, v.z));
-            let turn = |of: &Transform| {
+            let components = |of: &Transform| {
                 let q = &of.rotation;
                 DQuat::from_xyzw(q.x, q.y, q.z, q.w)
             };
             let are_near = |(a, b): (DVec3, DVec3)| {
                 (a - b).abs().max_element() <= SAME * a.abs().max_element().max(1.0)
             };
-            let (a, b) = (turn(&exact), turn(&ours));
+            let (a, b) = (components(&exact), components(&ours));
             vectors(&exact)
                 .into_iter()
                 .zip(vectors(&ours))
@@ -152,11 +152,11 @@ impl<'a> Direct<'a> {
     /// The channels of these flags at a time; the others are at rest.
     pub(super) fn at(&self, time: f64, flags: u32) -> Transform {
         let mut found = Transform::default();
-        let turns_offset = self.turned != DVec3::ZERO || self.scale_pivot != DVec3::ZERO;
+        let rotates_offset = self.rotated_offset != DVec3::ZERO || self.scale_pivot != DVec3::ZERO;
         let moves = flags & TRANSLATION != 0;
         let mut rotation = DQuat::IDENTITY;
-        if flags & ROTATION != 0 || moves && turns_offset {
-            rotation = turned(self.rotation.at(time), self.order);
+        if flags & ROTATION != 0 || moves && rotates_offset {
+            rotation = euler_rotation(self.rotation.at(time), self.order);
             if let Some(behind) = self.behind {
                 rotation *= behind;
             }
@@ -171,14 +171,14 @@ impl<'a> Direct<'a> {
             found.rotation.w,
         ] = rotation.to_array();
         let mut scale = DVec3::ONE;
-        if flags & SCALE != 0 || moves && turns_offset {
+        if flags & SCALE != 0 || moves && rotates_offset {
             scale = self.scale.at(time);
         }
         [found.scale.x, found.scale.y, found.scale.z] = scale.to_array();
         if moves {
             let mut translation = self.translation.at(time) + self.offset;
-            if turns_offset {
-                translation += rotation * (self.turned - self.scale_pivot * scale);
+            if rotates_offset {
+                translation += rotation * (self.rotated_offset - self.scale_pivot * scale);
             }
             [
                 found.translation.x,
@@ -191,8 +191,8 @@ impl<'a> Direct<'a> {
 
     /// Whether the curves of the channels of these flags never change.
     pub(super) fn is_still(&self, flags: u32) -> bool {
-        let turns_offset = self.turned != DVec3::ZERO || self.scale_pivot != DVec3::ZERO;
-        let carried = flags & TRANSLATION != 0 && turns_offset;
+        let rotates_offset = self.rotated_offset != DVec3::ZERO || self.scale_pivot != DVec3::ZERO;
+        let carried = flags & TRANSLATION != 0 && rotates_offset;
         let has = |flag: u32| flags & flag != 0;
         (!has(TRANSLATION) || self.translation.is_still())
             && (!has(ROTATION) && !carried || self.rotation.is_still())
@@ -234,10 +234,8 @@ impl<'a> Curve<'a> {
             _ if is_outside() => return ufbx::evaluate_curve(self.curve, time, rest),
             _ => self.next(time),
         };
-        let (Some(before), Some(next)) = (
-            next.checked_sub(1).map(|place| &keys[place]),
-            keys.get(next),
-        ) else {
+        let (Some(before), Some(next)) = (next.checked_sub(1).map(|i| &keys[i]), keys.get(next))
+        else {
             // The first key or the last.
             return keys[next.min(keys.len() - 1)].value;
         };
@@ -267,13 +265,13 @@ impl<'a> Curve<'a> {
     /// The first key behind a time.
     fn next(&self, time: f64) -> usize {
         let keys = self.keys;
-        let is_it = |place: usize| {
-            let before = place.checked_sub(1).and_then(|place| keys.get(place));
+        let is_it = |index: usize| {
+            let before = index.checked_sub(1).and_then(|index| keys.get(index));
             before.is_some_and(|key| key.time <= time)
-                && keys.get(place).is_some_and(|key| time < key.time)
+                && keys.get(index).is_some_and(|key| time < key.time)
         };
         let last = self.next.get();
-        let found = match [last, last + 1].into_iter().find(|&place| is_it(place)) {
+        let found = match [last, last + 1].into_iter().find(|&index| is_it(index)) {
             Some(found) => found,
             None => keys.partition_point(|key| key.time <= time),
         };
@@ -322,7 +320,7 @@ fn bezier_parameter(p1: f64, p2: f64, x0: f64) -> f64 {
 }
 
 /// The rotation of angles in degrees.
-fn turned(angles: DVec3, order: RotationOrder) -> DQuat {
+fn euler_rotation(angles: DVec3, order: RotationOrder) -> DQuat {
     let [(sx, cx), (sy, cy), (sz, cz)] = angles.to_array().map(|angle| libm::sincos(angle * HALF));
     let [x, y, z] = [
         DQuat::from_xyzw(sx, 0.0, 0.0, cx),
@@ -377,11 +375,11 @@ mod tests {
                 };
                 for (&node, properties) in &takes.properties {
                     let node = &scene.nodes[node];
-                    let value = |place: usize| -> &AnimValue {
-                        &stack.layers[0].anim_props[place].anim_value
+                    let value = |index: usize| -> &AnimValue {
+                        &stack.layers[0].anim_props[index].anim_value
                     };
                     let exact = |time: f64| ufbx::evaluate_transform(&stack.anim, node, time);
-                    let direct = Direct::of(node, properties, value);
+                    let direct = DirectEvaluator::of(node, properties, value);
                     let Some(direct) = direct.filter(|direct| direct.is(exact, takes.span)) else {
                         asked += 1;
                         continue;

@@ -21,7 +21,7 @@ const COMPARED: [f64; 3] = [0.839, 0.487, 0.171];
 const BETWEEN: f64 = 0.414_213_56;
 
 /// How often an interval is cut in two at most.
-const MOST_CUTS: u32 = 12;
+const MAX_CUTS: u32 = 12;
 
 /// Between neighbouring keys that stand for the curve alone, a rotation is at most so far, radians: the
 /// shorter way is then the curve's.
@@ -29,69 +29,69 @@ const LONGEST_ARC: f64 = 2.1;
 
 /// What a channel is of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Kind {
+pub(super) enum ChannelKind {
     Rotation,
     Vector,
 }
 
 /// x y z w of a unit quaternion, or x y z and 0.
-pub(super) type Value = DVec4;
+pub(super) type ChannelValue = DVec4;
 
 /// A time of the file's keys: what the channel is at it, and on either side of it.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Stop {
+pub(super) struct KeyStop {
     /// Seconds as the file has them, and as the clip has them.
     pub(super) file: f64,
     pub(super) clip: f64,
-    pub(super) before: Value,
-    pub(super) at: Value,
-    pub(super) after: Value,
+    pub(super) before: ChannelValue,
+    pub(super) at: ChannelValue,
+    pub(super) after: ChannelValue,
 }
 
 /// The keys of a channel.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) enum Keys {
+pub(super) enum FollowedKeys {
     /// It rests there.
-    Rest(Value),
+    Rest(ChannelValue),
     /// Each key holds until the next one.
-    Step(Vec<(f64, Value)>),
+    Step(Vec<(f64, ChannelValue)>),
     /// Straight lines and arcs.
-    Linear(Vec<(f64, Value)>),
+    Linear(Vec<(f64, ChannelValue)>),
     /// With the tangents with which the curve arrives and leaves, a second.
-    Cubic(Vec<(f64, Value, [Value; 2])>),
+    Cubic(Vec<(f64, ChannelValue, [ChannelValue; 2])>),
 }
 
 /// How a channel is followed.
-pub(super) struct Follow<'a> {
-    pub(super) kind: Kind,
+pub(super) struct ChannelFollower<'a> {
+    pub(super) kind: ChannelKind,
     /// The channel at a time of the file.
-    pub(super) value: &'a dyn Fn(f64) -> Option<Value>,
+    pub(super) value: &'a dyn Fn(f64) -> Option<ChannelValue>,
     /// The rate of the file, on whose frames intervals are cut.
     pub(super) rate: Option<FrameRate>,
-    /// The file's keys stand for the curve: it is followed only as far as its turns want it.
+    /// The file's keys stand for the curve: keys are added only where its rotation needs them.
     pub(super) keyframes: bool,
 }
 
 /// An interval in which the channel does not jump.
 #[derive(Debug, Clone, Copy)]
-struct Piece {
+struct FollowedInterval {
     file: [f64; 2],
     clip: [f64; 2],
-    ends: [Value; 2],
-    thirds: [Value; 2],
+    ends: [ChannelValue; 2],
+    thirds: [ChannelValue; 2],
     cuts: u32,
 }
 
 /// A cubic from one end of an interval to the other.
 struct Cubic {
-    ends: [Value; 2],
+    ends: [ChannelValue; 2],
     /// A part of the interval's length, not a second.
-    tangents: [Value; 2],
+    tangents: [ChannelValue; 2],
 }
 
 impl Cubic {
     /// The one that meets a curve at its thirds.
-    fn through(ends: [Value; 2], thirds: [Value; 2]) -> Self {
+    fn through(ends: [ChannelValue; 2], thirds: [ChannelValue; 2]) -> Self {
         let ([p, q], [a, b]) = (ends, thirds);
         Self {
             ends,
@@ -102,17 +102,21 @@ impl Cubic {
         }
     }
 
-    fn at(&self, u: f64) -> Value {
+    fn at(&self, u: f64) -> ChannelValue {
         let ([p, q], [m, n]) = (self.ends, self.tangents);
         let (u2, v) = (u * u, 1.0 - u);
         p * (v * v * (1.0 + 2.0 * u)) + q * (u2 * (3.0 - 2.0 * u)) + m * (u * v * v) - n * (u2 * v)
     }
 }
 
-impl Follow<'_> {
+impl ChannelFollower<'_> {
     /// The keys for a channel with these stops, between which it was evaluated at thirds; and whether
     /// they follow it everywhere. `None` where the channel cannot be evaluated so often.
-    pub(super) fn keys(&self, stops: &[Stop], thirds: &[[Value; 2]]) -> Option<(Keys, bool)> {
+    pub(super) fn keys(
+        &self,
+        stops: &[KeyStop],
+        thirds: &[[ChannelValue; 2]],
+    ) -> Option<(FollowedKeys, bool)> {
         let first = stops[0].at;
         let each = stops
             .iter()
@@ -123,37 +127,40 @@ impl Follow<'_> {
             .fold(0.0, f64::max);
         let all = each.chain(thirds.iter().flatten().copied());
         let still = 1e-9 * largest.max(1e-9);
-        let is_still = |value: Value| (value - first).abs().max_element() <= still;
+        let is_still = |value: ChannelValue| (value - first).abs().max_element() <= still;
         if stops.len() == 1 || all.clone().all(is_still) && self.stays_between(stops)? {
-            return Some((Keys::Rest(first), true));
+            return Some((FollowedKeys::Rest(first), true));
         }
         if let Some(steps) = steps(stops, thirds)
             && self.stays_between(stops)?
         {
-            return Some((Keys::Step(steps), true));
+            return Some((FollowedKeys::Step(steps), true));
         }
         let bound = match self.kind {
-            Kind::Rotation => BOUND,
-            Kind::Vector => BOUND * largest,
+            ChannelKind::Rotation => BOUND,
+            ChannelKind::Vector => BOUND * largest,
         };
         let (stops, pieces) = self.pieces(stops, thirds);
         if self.keyframes {
-            return Some((Keys::Linear(self.few(&stops, &pieces)?), true));
+            return Some((
+                FollowedKeys::Linear(self.linear_keys(&stops, &pieces)?),
+                true,
+            ));
         }
         let mut are_lines = true;
         for piece in pieces.iter().flatten() {
             are_lines = are_lines && self.is_line(piece, bound)?;
         }
         match are_lines {
-            true => Some((Keys::Linear(stops), true)),
+            true => Some((FollowedKeys::Linear(stops), true)),
             false => self.cubics(&stops, &pieces, bound),
         }
     }
 
     /// Whether a rotation that is the same at the ends of each interval, and at its thirds, does not turn
     /// about in between.
-    fn stays_between(&self, stops: &[Stop]) -> Option<bool> {
-        if self.kind == Kind::Vector {
+    fn stays_between(&self, stops: &[KeyStop]) -> Option<bool> {
+        if self.kind == ChannelKind::Vector {
             return Some(true);
         }
         for pair in stops.windows(2) {
@@ -170,12 +177,15 @@ impl Follow<'_> {
     /// none where the channel jumps.
     fn pieces(
         &self,
-        stops: &[Stop],
-        thirds: &[[Value; 2]],
-    ) -> (Vec<(f64, Value)>, Vec<Option<Piece>>) {
-        let mut keys: Vec<(f64, Value)> = vec![(stops[0].clip, stops[0].at)];
+        stops: &[KeyStop],
+        thirds: &[[ChannelValue; 2]],
+    ) -> (Vec<(f64, ChannelValue)>, Vec<Option<FollowedInterval>>) {
+        let mut keys: Vec<(f64, ChannelValue)> = vec![(stops[0].clip, stops[0].at)];
         let mut pieces = Vec::with_capacity(thirds.len());
-        let leave = |keys: &mut Vec<(f64, Value)>, stop: &Stop, next: f64, pieces: &mut Vec<_>| {
+        let leave = |keys: &mut Vec<(f64, ChannelValue)>,
+                     stop: &KeyStop,
+                     next: f64,
+                     pieces: &mut Vec<_>| {
             let after = self.near(stop.after, keys[keys.len() - 1].1);
             let late = f64::from((stop.clip as f32).next_up());
             if stop.after != stop.at && late < next {
@@ -193,7 +203,7 @@ impl Follow<'_> {
             let jumps = next.before != next.at;
             let early = jumps.then(|| just_before(next.clip, Some(start))).flatten();
             let end = early.unwrap_or(next.clip);
-            pieces.push(Some(Piece {
+            pieces.push(Some(FollowedInterval {
                 file: [stop.file, next.file],
                 clip: [start, end],
                 ends: [p, q],
@@ -210,33 +220,33 @@ impl Follow<'_> {
     }
 
     /// Of the two quaternions of a rotation the one near to another.
-    fn near(&self, value: Value, to: Value) -> Value {
+    fn near(&self, value: ChannelValue, to: ChannelValue) -> ChannelValue {
         match self.kind {
-            Kind::Rotation if value.dot(to) < 0.0 => -value,
+            ChannelKind::Rotation if value.dot(to) < 0.0 => -value,
             _ => value,
         }
     }
 
     /// How far a value of our own is from the channel's.
-    fn off(&self, ours: Value, exact: Value) -> f64 {
+    fn off(&self, ours: ChannelValue, exact: ChannelValue) -> f64 {
         match self.kind {
-            Kind::Vector => (ours - exact).abs().max_element(),
-            Kind::Rotation => {
+            ChannelKind::Vector => (ours - exact).abs().max_element(),
+            ChannelKind::Rotation => {
                 let ours = ours.normalize_or_zero();
                 2.0 * (ours - self.near(exact, ours)).length()
             }
         }
     }
 
-    fn is_line(&self, piece: &Piece, bound: f64) -> Option<bool> {
+    fn is_line(&self, piece: &FollowedInterval, bound: f64) -> Option<bool> {
         let [p, q] = piece.ends;
         // Of half a turn an arc may go either way.
-        if self.kind == Kind::Rotation && p.dot(q) < 0.1 {
+        if self.kind == ChannelKind::Rotation && p.dot(q) < 0.1 {
             return Some(false);
         }
         let at = |u: f64| match self.kind {
-            Kind::Vector => p.lerp(q, u),
-            Kind::Rotation => {
+            ChannelKind::Vector => p.lerp(q, u),
+            ChannelKind::Rotation => {
                 // Of unit quaternions that are no half turn apart; libm's sine is the same on every system.
                 let half = libm::atan2((q - p).length(), (q + p).length());
                 let weight = |u: f64| match half < 1e-9 {
@@ -260,16 +270,16 @@ impl Follow<'_> {
     /// Keys with tangents that follow all pieces.
     fn cubics(
         &self,
-        stops: &[(f64, Value)],
-        pieces: &[Option<Piece>],
+        stops: &[(f64, ChannelValue)],
+        pieces: &[Option<FollowedInterval>],
         bound: f64,
-    ) -> Option<(Keys, bool)> {
-        let mut keys = vec![(stops[0].0, stops[0].1, [Value::ZERO; 2])];
+    ) -> Option<(FollowedKeys, bool)> {
+        let mut keys = vec![(stops[0].0, stops[0].1, [ChannelValue::ZERO; 2])];
         let mut is_whole = true;
-        let mut open: Vec<Piece> = Vec::new();
+        let mut open: Vec<FollowedInterval> = Vec::new();
         for (piece, &(end, value)) in pieces.iter().zip(&stops[1..]) {
             let Some(piece) = piece else {
-                keys.push((end, value, [Value::ZERO; 2]));
+                keys.push((end, value, [ChannelValue::ZERO; 2]));
                 continue;
             };
             open.push(*piece);
@@ -290,18 +300,22 @@ impl Follow<'_> {
                 let seconds = piece.clip[1] - piece.clip[0];
                 let [leaves, arrives] = cubic.tangents.map(|tangent| tangent / seconds);
                 keys[last].2[1] = leaves;
-                keys.push((piece.clip[1], piece.ends[1], [arrives, Value::ZERO]));
+                keys.push((piece.clip[1], piece.ends[1], [arrives, ChannelValue::ZERO]));
             }
         }
-        Some((Keys::Cubic(keys), is_whole))
+        Some((FollowedKeys::Cubic(keys), is_whole))
     }
 
     /// The stops, and as many keys between them as it takes that arcs turn as the channel does.
-    fn few(&self, stops: &[(f64, Value)], pieces: &[Option<Piece>]) -> Option<Vec<(f64, Value)>> {
+    fn linear_keys(
+        &self,
+        stops: &[(f64, ChannelValue)],
+        pieces: &[Option<FollowedInterval>],
+    ) -> Option<Vec<(f64, ChannelValue)>> {
         let mut keys = vec![stops[0]];
-        let mut open: Vec<Piece> = Vec::new();
+        let mut open: Vec<FollowedInterval> = Vec::new();
         for (piece, &stop) in pieces.iter().zip(&stops[1..]) {
-            let Some(piece) = piece.filter(|_| self.kind == Kind::Rotation) else {
+            let Some(piece) = piece.filter(|_| self.kind == ChannelKind::Rotation) else {
                 keys.push((stop.0, self.near(stop.1, keys[keys.len() - 1].1)));
                 continue;
             };
@@ -312,8 +326,8 @@ impl Follow<'_> {
                 let middle = (self.value)(piece.time(BETWEEN))?;
                 let steps = [(p, a), (a, middle), (middle, b), (b, q)];
                 let arc = |(from, to)| self.off(from, to);
-                let turned: f64 = steps.into_iter().map(arc).sum();
-                if turned > LONGEST_ARC
+                let arc_length: f64 = steps.into_iter().map(arc).sum();
+                if arc_length > LONGEST_ARC
                     && let Some(halves) = self.cut(&piece)?
                 {
                     open.extend(halves);
@@ -326,10 +340,10 @@ impl Follow<'_> {
     }
 
     /// A piece whose signs continue those of the key before it.
-    fn after(&self, piece: Piece, last: Value) -> Piece {
+    fn after(&self, piece: FollowedInterval, last: ChannelValue) -> FollowedInterval {
         let a = self.near(piece.thirds[0], last);
         let b = self.near(piece.thirds[1], a);
-        Piece {
+        FollowedInterval {
             ends: [last, self.near(piece.ends[1], b)],
             thirds: [a, b],
             ..piece
@@ -337,10 +351,10 @@ impl Follow<'_> {
     }
 
     /// Two halves, the later one first; `None` where there is no more room between them.
-    fn cut(&self, piece: &Piece) -> Option<Option<[Piece; 2]>> {
+    fn cut(&self, piece: &FollowedInterval) -> Option<Option<[FollowedInterval; 2]>> {
         let [from, to] = piece.file;
         let length = to - from;
-        if piece.cuts >= MOST_CUTS || length < 1e-7 {
+        if piece.cuts >= MAX_CUTS || length < 1e-7 {
             return Some(None);
         }
         let middle = f64::midpoint(from, to);
@@ -355,7 +369,7 @@ impl Follow<'_> {
         let value = (self.value)(time)?;
         let half = |file: [f64; 2], clip, ends| {
             let third = |u: f64| (self.value)(file[0] + u * (file[1] - file[0]));
-            Some(Piece {
+            Some(FollowedInterval {
                 file,
                 clip,
                 ends,
@@ -370,7 +384,7 @@ impl Follow<'_> {
     }
 }
 
-impl Piece {
+impl FollowedInterval {
     /// The time of the file at a part of the piece.
     fn time(&self, u: f64) -> f64 {
         self.file[0] + u * (self.file[1] - self.file[0])
@@ -378,13 +392,13 @@ impl Piece {
 }
 
 /// The keys of a channel that does nothing but jump.
-fn steps(stops: &[Stop], thirds: &[[Value; 2]]) -> Option<Vec<(f64, Value)>> {
+fn steps(stops: &[KeyStop], thirds: &[[ChannelValue; 2]]) -> Option<Vec<(f64, ChannelValue)>> {
     let intervals = stops.windows(2).zip(thirds);
-    let mut hold = intervals.map(|(pair, [a, b])| {
+    let mut are_constant = intervals.map(|(pair, [a, b])| {
         let from = pair[0].after;
         from == *a && from == *b && from == pair[1].before
     });
-    if !hold.all(|holds| holds) {
+    if !are_constant.all(|is_constant| is_constant) {
         return None;
     }
     let mut keys = Vec::with_capacity(stops.len());
@@ -405,31 +419,31 @@ mod tests {
 
     use super::*;
 
-    fn rotation(angle: f64) -> Value {
+    fn rotation(angle: f64) -> ChannelValue {
         DVec4::from(DQuat::from_rotation_x(angle))
     }
 
     /// The keys of a curve without jumps through some times.
     fn followed(
-        kind: Kind,
+        kind: ChannelKind,
         times: &[f64],
         keyframes: bool,
-        curve: &dyn Fn(f64) -> Value,
-    ) -> (Keys, bool) {
-        let stop = |&time: &f64| Stop {
+        curve: &dyn Fn(f64) -> ChannelValue,
+    ) -> (FollowedKeys, bool) {
+        let stop = |&time: &f64| KeyStop {
             file: time,
             clip: time,
             before: curve(time),
             at: curve(time),
             after: curve(time),
         };
-        let stops: Vec<Stop> = times.iter().map(stop).collect();
+        let stops: Vec<KeyStop> = times.iter().map(stop).collect();
         let third = |pair: &[f64]| {
             let length = pair[1] - pair[0];
             [pair[0] + length / 3.0, pair[0] + 2.0 * length / 3.0].map(curve)
         };
         let thirds: Vec<_> = times.windows(2).map(third).collect();
-        let follow = Follow {
+        let follow = ChannelFollower {
             kind,
             value: &|time| Some(curve(time)),
             rate: FrameRate::new(24, 1).ok(),
@@ -440,46 +454,56 @@ mod tests {
 
     #[test]
     fn what_rests_and_what_goes_straight_has_no_more_keys_than_its_file() {
-        let still = followed(Kind::Vector, &[0.0, 1.0, 2.0], false, &|_| Value::X);
-        assert_eq!(still, (Keys::Rest(Value::X), true));
-        let line = followed(Kind::Vector, &[0.0, 2.0], false, &|time| Value::X * time);
+        let still = followed(ChannelKind::Vector, &[0.0, 1.0, 2.0], false, &|_| {
+            ChannelValue::X
+        });
+        assert_eq!(still, (FollowedKeys::Rest(ChannelValue::X), true));
+        let line = followed(ChannelKind::Vector, &[0.0, 2.0], false, &|time| {
+            ChannelValue::X * time
+        });
         assert_eq!(
             line.0,
-            Keys::Linear(vec![(0.0, Value::ZERO), (2.0, Value::X * 2.0)])
+            FollowedKeys::Linear(vec![
+                (0.0, ChannelValue::ZERO),
+                (2.0, ChannelValue::X * 2.0)
+            ])
         );
-        let arc = followed(Kind::Rotation, &[0.0, 2.0], false, &rotation);
-        assert!(matches!(arc.0, Keys::Linear(keys) if keys.len() == 2));
+        let arc = followed(ChannelKind::Rotation, &[0.0, 2.0], false, &rotation);
+        assert!(matches!(arc.0, FollowedKeys::Linear(keys) if keys.len() == 2));
     }
 
     /// Turns of 360° hide between keys, at thirds and at halves.
     #[test]
     fn whole_turns_are_followed() {
-        let turn = std::f64::consts::TAU;
-        for turns in [1.0, 3.0, 6.0] {
-            let curve = |time: f64| rotation(turn * turns * time);
-            let (keys, is_whole) = followed(Kind::Rotation, &[0.0, 1.0], false, &curve);
-            let Keys::Cubic(keys) = keys else {
-                panic!("{turns}: {keys:?}");
+        let full_circle = std::f64::consts::TAU;
+        for circles in [1.0, 3.0, 6.0] {
+            let curve = |time: f64| rotation(full_circle * circles * time);
+            let (keys, is_whole) = followed(ChannelKind::Rotation, &[0.0, 1.0], false, &curve);
+            let FollowedKeys::Cubic(keys) = keys else {
+                panic!("{circles}: {keys:?}");
             };
-            assert!(is_whole && keys.len() as f64 > 6.0 * turns, "{turns}");
-            let (few, _) = followed(Kind::Rotation, &[0.0, 1.0], true, &curve);
-            let Keys::Linear(few) = few else {
-                panic!("{turns}: {few:?}");
+            assert!(is_whole && keys.len() as f64 > 6.0 * circles, "{circles}");
+            let (keys, _) = followed(ChannelKind::Rotation, &[0.0, 1.0], true, &curve);
+            let FollowedKeys::Linear(linear) = keys else {
+                panic!("{circles}: {keys:?}");
             };
-            let arcs = few.windows(2).map(|pair| {
+            let arcs = linear.windows(2).map(|pair| {
                 assert!(pair[0].1.dot(pair[1].1) > 0.0);
                 let [p, q] = [pair[0].1, pair[1].1].map(DQuat::from_vec4);
                 p.angle_between(q)
             });
-            assert!((arcs.sum::<f64>() - turn * turns).abs() < 1e-6, "{turns}");
+            assert!(
+                (arcs.sum::<f64>() - full_circle * circles).abs() < 1e-6,
+                "{circles}"
+            );
         }
     }
 
     #[test]
     fn intervals_are_cut_on_frames() {
         let curve = |time: f64| rotation((3.0 * time).sin());
-        let (keys, is_whole) = followed(Kind::Rotation, &[0.0, 1.0], false, &curve);
-        let Keys::Cubic(keys) = keys else {
+        let (keys, is_whole) = followed(ChannelKind::Rotation, &[0.0, 1.0], false, &curve);
+        let FollowedKeys::Cubic(keys) = keys else {
             panic!("{keys:?}");
         };
         assert!(is_whole && (5..=25).contains(&keys.len()), "{}", keys.len());
@@ -491,16 +515,16 @@ mod tests {
 
     #[test]
     fn steps_hold_and_jumps_have_two_keys() {
-        let stop = |time: f64, before: f64, at: f64, after: f64| Stop {
+        let stop = |time: f64, before: f64, at: f64, after: f64| KeyStop {
             file: time,
             clip: time,
-            before: Value::X * before,
-            at: Value::X * at,
-            after: Value::X * after,
+            before: ChannelValue::X * before,
+            at: ChannelValue::X * at,
+            after: ChannelValue::X * after,
         };
-        let held = |time: f64| Some(Value::X * if time < 1.0 { 1.0 } else { 2.0 });
-        let mut follow = Follow {
-            kind: Kind::Vector,
+        let held = |time: f64| Some(ChannelValue::X * if time < 1.0 { 1.0 } else { 2.0 });
+        let mut follow = ChannelFollower {
+            kind: ChannelKind::Vector,
             value: &held,
             rate: None,
             keyframes: false,
@@ -510,23 +534,27 @@ mod tests {
             stop(1.0, 1.0, 2.0, 2.0),
             stop(2.0, 2.0, 2.0, 2.0),
         ];
-        let thirds = [[Value::X; 2], [Value::X * 2.0; 2]];
-        let keys = [(0.0, 1.0), (1.0, 2.0), (2.0, 2.0)].map(|(time, x)| (time, Value::X * x));
+        let thirds = [[ChannelValue::X; 2], [ChannelValue::X * 2.0; 2]];
+        let keys =
+            [(0.0, 1.0), (1.0, 2.0), (2.0, 2.0)].map(|(time, x)| (time, ChannelValue::X * x));
         let found = follow.keys(&stops, &thirds).unwrap();
-        assert_eq!(found, (Keys::Step(keys.to_vec()), true));
+        assert_eq!(found, (FollowedKeys::Step(keys.to_vec()), true));
         // Straight up to 1, where it falls to 0, and stays.
-        let saw = |time: f64| Some(Value::X * if time < 1.0 { time } else { 0.0 });
+        let saw = |time: f64| Some(ChannelValue::X * if time < 1.0 { time } else { 0.0 });
         follow.value = &saw;
         let stops = [
             stop(0.0, 0.0, 0.0, 0.0),
             stop(1.0, 1.0, 0.0, 0.0),
             stop(2.0, 0.0, 0.0, 0.0),
         ];
-        let thirds = [[Value::X / 3.0, Value::X * (2.0 / 3.0)], [Value::ZERO; 2]];
+        let thirds = [
+            [ChannelValue::X / 3.0, ChannelValue::X * (2.0 / 3.0)],
+            [ChannelValue::ZERO; 2],
+        ];
         let before = f64::from(1f32.next_down());
         let keys = [(0.0, 0.0), (before, 1.0), (1.0, 0.0), (2.0, 0.0)];
-        let keys = keys.map(|(time, x)| (time, Value::X * x));
+        let keys = keys.map(|(time, x)| (time, ChannelValue::X * x));
         let found = follow.keys(&stops, &thirds).unwrap();
-        assert_eq!(found, (Keys::Linear(keys.to_vec()), true));
+        assert_eq!(found, (FollowedKeys::Linear(keys.to_vec()), true));
     }
 }

@@ -22,17 +22,17 @@ use ufbx::{
 };
 
 use crate::budget::{Budget, OverBudget};
-use crate::diagnostic::{Code, Diagnostic, Place};
-use crate::fbx::direct::Direct;
-use crate::fbx::follow::{Follow, Keys, Kind, Stop, Value};
-use crate::fbx::times::{NodeTimes, Takes, Times};
+use crate::diagnostic::{Code, Diagnostic, Location};
+use crate::fbx::direct::DirectEvaluator;
+use crate::fbx::follow::{ChannelFollower, ChannelKind, ChannelValue, FollowedKeys, KeyStop};
+use crate::fbx::times::{ChannelTimes, NodeTimes, Takes};
 use crate::feature::Feature;
 use crate::format::{Format, FormatOption, Loaded, ReadOptions, Space};
-use crate::motion::{self, Channels, Joint, Motion, Sampler};
-use crate::names::untaken;
+use crate::motion::{self, ChannelInterpolation, Channels, Joint, Motion};
+use crate::names::unique_name;
 use crate::origin::relative;
 use crate::quaternion::unit;
-use crate::rate::{Written, frame_time, of};
+use crate::rate::{RateSource, frame_time, of};
 use crate::source::Source;
 use crate::warnings::Warnings;
 
@@ -55,7 +55,7 @@ pub static FORMAT: Format = Format {
         Feature::Scales,
         Feature::Steps,
         Feature::SeveralClips,
-        Feature::OwnTimes,
+        Feature::TimesPerChannel,
         Feature::UnevenTimes,
         Feature::Start,
     ],
@@ -65,7 +65,7 @@ pub static FORMAT: Format = Format {
 /// The first bytes of a binary file.
 const MAGIC: &[u8] = b"Kaydara FBX Binary";
 
-/// How deep nodes hang below each other at most.
+/// The deepest nesting of nodes.
 const DEPTH: u32 = 1024;
 
 /// Half the distance on either side of a key at which a curve is asked whether it jumps there, seconds.
@@ -78,7 +78,7 @@ const EVALUATIONS: (i64, i64) = (1 << 23, 256);
 /// Bytes of a track beside its keys, of a key time while it is looked at, and of a key.
 const TRACK: usize = 600;
 const STOP: usize = 10 * size_of::<Transform>();
-const KEY: usize = 4 * (size_of::<(f64, Value, [Value; 2])>());
+const KEY: usize = 4 * (size_of::<(f64, ChannelValue, [ChannelValue; 2])>());
 
 fn is_fbx(start: &[u8]) -> bool {
     let text = start.strip_prefix(b"\xef\xbb\xbf").unwrap_or(start);
@@ -116,12 +116,12 @@ pub fn read_fbx(name: &str, bytes: &[u8], options: &ReadOptions) -> Result<Loade
     }
     let mut warnings = Warnings::new(name);
     warn_of_scene(&scene, &mut warnings);
-    let reader = Reader {
+    let reader = FbxReader {
         name,
         budget: &budget,
         scene: &scene,
-        nodes: Nodes::of(&scene),
-        rate: of(&Written::Number(scene.settings.frames_per_second)).map(|found| found.grid),
+        nodes: FbxNodes::of(&scene),
+        rate: of(&RateSource::Number(scene.settings.frames_per_second)).map(|found| found.grid),
         options,
         evaluations: AtomicI64::new(
             EVALUATIONS.0 + EVALUATIONS.1.saturating_mul(bytes.len() as i64),
@@ -175,7 +175,7 @@ fn load(name: &str, bytes: &[u8], budget: &Budget) -> Result<SceneRoot, Diagnost
             ),
             ErrorType::NodeDepthLimit => (
                 Code::FbxDepth,
-                format!("nodes hang more than {DEPTH} deep below each other; is the file damaged?"),
+                format!("nodes are nested more than {DEPTH} deep; is the file damaged?"),
             ),
             ErrorType::UnsupportedVersion => (
                 Code::FbxVersion,
@@ -259,7 +259,7 @@ fn warn_of_scene(scene: &SceneRoot, warnings: &mut Warnings) {
 }
 
 /// The nodes that are tracks: all but the root, which every file has.
-struct Nodes {
+struct FbxNodes {
     /// Their indices in the file, parents before children.
     tracks: Vec<usize>,
     /// The track of each node of the file.
@@ -267,7 +267,7 @@ struct Nodes {
     names: Vec<String>,
 }
 
-impl Nodes {
+impl FbxNodes {
     fn of(scene: &SceneRoot) -> Self {
         let is_track = |index: &usize| !scene.nodes[*index].is_root;
         let tracks: Vec<usize> = (0..scene.nodes.len()).filter(is_track).collect();
@@ -275,14 +275,14 @@ impl Nodes {
         for (track, &node) in tracks.iter().enumerate() {
             track_of[node] = Some(track);
         }
-        let mut taken = HashSet::new();
+        let mut used = HashSet::new();
         let name = |(track, &node): (usize, &usize)| {
             let name = &scene.nodes[node].element.name;
             let name = match name.is_empty() {
                 true => format!("node{track}"),
                 false => name.to_string(),
             };
-            untaken(name, track, &mut taken)
+            unique_name(name, track, &mut used)
         };
         Self {
             names: tracks.iter().enumerate().map(name).collect(),
@@ -293,11 +293,11 @@ impl Nodes {
 }
 
 /// A file that is being read.
-struct Reader<'a> {
+struct FbxReader<'a> {
     name: &'a str,
     budget: &'a Budget,
     scene: &'a SceneRoot,
-    nodes: Nodes,
+    nodes: FbxNodes,
     rate: Option<FrameRate>,
     options: &'a ReadOptions,
     /// How many are left.
@@ -307,22 +307,24 @@ struct Reader<'a> {
 /// The channels of a node as keys, where it rests, and whether all keys follow their curves.
 struct NodeKeys {
     rest: Transform,
-    translation: Keys,
-    rotation: Keys,
-    scale: Keys,
+    translation: FollowedKeys,
+    rotation: FollowedKeys,
+    scale: FollowedKeys,
     is_whole: bool,
 }
 
 impl NodeKeys {
     fn rests(&self) -> bool {
         let channels = [&self.translation, &self.rotation, &self.scale];
-        channels.iter().all(|keys| matches!(keys, Keys::Rest(_)))
+        channels
+            .iter()
+            .all(|keys| matches!(keys, FollowedKeys::Rest(_)))
     }
 }
 
 /// Why a node cannot be followed.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Fault {
+enum FollowFault {
     NotFinite { time: f64 },
     Work,
 }
@@ -334,22 +336,22 @@ const ROTATION: u32 = 0x20;
 const SCALE: u32 = 0x40;
 
 /// A channel: its flag, and the value in a transform.
-type ChannelOf = (u32, Kind, fn(&Transform) -> Value);
+type ChannelOf = (u32, ChannelKind, fn(&Transform) -> ChannelValue);
 
 const CHANNELS: [ChannelOf; 3] = [
-    (TRANSLATION, Kind::Vector, |all| {
+    (TRANSLATION, ChannelKind::Vector, |all| {
         DVec4::new(all.translation.x, all.translation.y, all.translation.z, 0.0)
     }),
-    (ROTATION, Kind::Rotation, |all| {
+    (ROTATION, ChannelKind::Rotation, |all| {
         let q = &all.rotation;
         DVec4::new(q.x, q.y, q.z, q.w)
     }),
-    (SCALE, Kind::Vector, |all| {
+    (SCALE, ChannelKind::Vector, |all| {
         DVec4::new(all.scale.x, all.scale.y, all.scale.z, 0.0)
     }),
 ];
 
-impl Reader<'_> {
+impl FbxReader<'_> {
     fn refuse(&self, stack: usize, code: Code, message: impl Into<String>) -> Diagnostic {
         let name = self.scene.anim_stacks[stack].element.name.to_string();
         Diagnostic::new(self.name, code, message).inside(name)
@@ -368,7 +370,7 @@ impl Reader<'_> {
         let mut clip = Motion {
             name: Some(scene.anim_stacks[stack].element.name.to_string())
                 .filter(|name| !name.is_empty()),
-            place: stack,
+            index: stack,
             ..Motion::default()
         };
         let mut nodes: Vec<NodeKeys> = nodes.into_iter().collect::<Result<_, _>>()?;
@@ -377,9 +379,9 @@ impl Reader<'_> {
         if start < end
             && nodes.iter().all(NodeKeys::rests)
             && let Some(NodeKeys { rotation, .. }) = nodes.first_mut()
-            && let Keys::Rest(value) = *rotation
+            && let FollowedKeys::Rest(value) = *rotation
         {
-            *rotation = Keys::Linear(vec![(start, value), (end, value)]);
+            *rotation = FollowedKeys::Linear(vec![(start, value), (end, value)]);
         }
         for (track, keys) in nodes.into_iter().enumerate() {
             if !keys.is_whole {
@@ -412,7 +414,7 @@ impl Reader<'_> {
 
     fn warn_of_takes(&self, stack: usize, takes: &Takes, warnings: &mut Warnings) {
         let name = &self.scene.anim_stacks[stack].element.name;
-        let inside = || Some(Place::Inside(name.to_string()));
+        let inside = || Some(Location::Inside(name.to_string()));
         if takes.outside > 0 {
             warnings.warn(Code::FbxOutside, || {
                 let [begin, end] = takes.span;
@@ -433,7 +435,7 @@ impl Reader<'_> {
                 (
                     inside(),
                     format!(
-                        "curves of what is no transform are left out: {}",
+                        "curves that move something other than a transform are left out: {}",
                         names.join(", ")
                     ),
                 )
@@ -455,7 +457,7 @@ impl Reader<'_> {
     }
 
     fn node(&self, stack: usize, node: usize, takes: &Takes) -> Result<NodeKeys, Diagnostic> {
-        let none = Times::default();
+        let none = ChannelTimes::default();
         let moved = takes.nodes.get(&node);
         let times = moved.map_or([&none; 3], |moved| {
             [&moved.translation, &moved.rotation, &moved.scale]
@@ -468,7 +470,7 @@ impl Reader<'_> {
                 list.truncate(1);
             }
         }
-        let mut keys: [Option<Keys>; 3] = [None, None, None];
+        let mut keys: [Option<FollowedKeys>; 3] = [None, None, None];
         let mut is_whole = true;
         for channel in 0..3 {
             if keys[channel].is_some() {
@@ -503,7 +505,7 @@ impl Reader<'_> {
         evaluator: &Evaluator<'_>,
         (times, jump): (&[f64], bool),
         group: &[usize],
-    ) -> Result<Vec<(Keys, bool)>, Diagnostic> {
+    ) -> Result<Vec<(FollowedKeys, bool)>, Diagnostic> {
         let stack = evaluator.stack;
         let memory = |error: OverBudget| self.refuse(stack, Code::Memory, error.to_string());
         let _borrowed = self.budget.borrow(times.len(), STOP).map_err(memory)?;
@@ -552,16 +554,16 @@ impl Reader<'_> {
         for &channel in group {
             let (flag, kind, part) = CHANNELS[channel];
             let one = |time: f64| Some(part(&evaluate(time, flag)?));
-            let channel_stops: Vec<Stop> = (times.iter().zip(&at))
+            let channel_stops: Vec<KeyStop> = (times.iter().zip(&at))
                 .map(|(&file, all)| {
                     stop(file, self.clip_time(file), kind, all.each_ref().map(part))
                 })
                 .collect();
-            let channel_thirds: Vec<[Value; 2]> = thirds
+            let channel_thirds: Vec<[ChannelValue; 2]> = thirds
                 .iter()
                 .map(|both| both.each_ref().map(part))
                 .collect();
-            let follow = Follow {
+            let follow = ChannelFollower {
                 kind,
                 value: &one,
                 rate: self.rate,
@@ -571,9 +573,9 @@ impl Reader<'_> {
                 .keys(&channel_stops, &channel_thirds)
                 .ok_or_else(refuse)?;
             let count = match &keys.0 {
-                Keys::Rest(_) => 1,
-                Keys::Step(keys) | Keys::Linear(keys) => keys.len(),
-                Keys::Cubic(keys) => keys.len(),
+                FollowedKeys::Rest(_) => 1,
+                FollowedKeys::Step(keys) | FollowedKeys::Linear(keys) => keys.len(),
+                FollowedKeys::Cubic(keys) => keys.len(),
             };
             self.budget.take(count, KEY).map_err(memory)?;
             found.push(keys);
@@ -593,30 +595,31 @@ impl Reader<'_> {
         let name = &self.nodes.names[track];
         let mut channels = Channels::default();
         let [translation, rotation, scale] = CHANNELS.map(|channel| (channel.2)(&keys.rest));
-        let quat = |value: Value| unit(DQuat::from_vec4(value));
+        let quat = |value: ChannelValue| unit(DQuat::from_vec4(value));
         let resting = quat(rotation);
         match keys.rotation {
-            Keys::Rest(value) => {
+            FollowedKeys::Rest(value) => {
                 let key = quat(value);
                 // Clips of one file share where their nodes rest; one that is elsewhere in this clip has a key.
                 if key != resting && key != -resting {
-                    channels.rotation = Some(Sampler::Linear);
+                    channels.rotation = Some(ChannelInterpolation::Linear);
                 }
                 clip.set.push(name, &[start], &[key])?;
             }
-            Keys::Step(keys) => {
-                channels.rotation = Some(Sampler::Step);
+            FollowedKeys::Step(keys) => {
+                channels.rotation = Some(ChannelInterpolation::Step);
                 let (times, values) = split(&keys, quat);
                 clip.set.push(name, &times, &values)?;
             }
-            Keys::Linear(keys) => {
-                channels.rotation = Some(Sampler::Linear);
+            FollowedKeys::Linear(keys) => {
+                channels.rotation = Some(ChannelInterpolation::Linear);
                 let (times, values) = split(&keys, quat);
                 clip.set.push(name, &times, &values)?;
             }
-            Keys::Cubic(keys) => {
-                channels.rotation = Some(Sampler::Cubic);
-                let plain: Vec<(f64, Value)> = keys.iter().map(|key| (key.0, key.1)).collect();
+            FollowedKeys::Cubic(keys) => {
+                channels.rotation = Some(ChannelInterpolation::Cubic);
+                let plain: Vec<(f64, ChannelValue)> =
+                    keys.iter().map(|key| (key.0, key.1)).collect();
                 let (times, values) = split(&plain, quat);
                 clip.set.push(name, &times, &values)?;
                 let tangents: Vec<[Quat; 2]> = keys
@@ -656,25 +659,25 @@ impl Reader<'_> {
 
 /// What gives the transforms of a node.
 struct Evaluator<'a> {
-    reader: &'a Reader<'a>,
+    reader: &'a FbxReader<'a>,
     stack: usize,
     node: &'a Node,
-    direct: Option<Direct<'a>>,
+    direct: Option<DirectEvaluator<'a>>,
     /// What an evaluation counts.
     cost: i64,
     /// Evaluations that the reader has granted already.
     left: Cell<i64>,
-    fault: Cell<Option<Fault>>,
+    fault: Cell<Option<FollowFault>>,
 }
 
 /// How many evaluations are granted at once: the count is shared by all threads.
 const GRANTED: i64 = 1024;
 
 impl<'a> Evaluator<'a> {
-    fn of(reader: &'a Reader<'a>, stack: usize, node: usize, takes: &Takes) -> Self {
+    fn of(reader: &'a FbxReader<'a>, stack: usize, node: usize, takes: &Takes) -> Self {
         let scene = reader.scene;
         let layers = &scene.anim_stacks[stack].layers;
-        let value = |place: usize| -> &'a AnimValue { &layers[0].anim_props[place].anim_value };
+        let value = |index: usize| -> &'a AnimValue { &layers[0].anim_props[index].anim_value };
         let mut evaluator = Self {
             reader,
             stack,
@@ -685,7 +688,8 @@ impl<'a> Evaluator<'a> {
             fault: Cell::new(None),
         };
         let direct = takes.properties.get(&node);
-        let direct = direct.and_then(|properties| Direct::of(evaluator.node, properties, value));
+        let direct =
+            direct.and_then(|properties| DirectEvaluator::of(evaluator.node, properties, value));
         evaluator.direct = direct.filter(|direct| {
             let exact = |time| evaluator.exact(time, TRANSLATION | ROTATION | SCALE);
             direct.is(exact, takes.span)
@@ -709,7 +713,7 @@ impl<'a> Evaluator<'a> {
                 .fetch_sub(granted, Ordering::Relaxed)
                 < 0
             {
-                self.fault.set(Some(Fault::Work));
+                self.fault.set(Some(FollowFault::Work));
                 return None;
             }
             self.left.set(GRANTED);
@@ -723,7 +727,7 @@ impl<'a> Evaluator<'a> {
             .iter()
             .all(|channel| (channel.2)(&found).is_finite());
         if !is_finite {
-            self.fault.set(Some(Fault::NotFinite { time }));
+            self.fault.set(Some(FollowFault::NotFinite { time }));
         }
         is_finite.then_some(found)
     }
@@ -736,7 +740,7 @@ impl<'a> Evaluator<'a> {
 
     fn refusal(&self) -> Diagnostic {
         match self.fault.get() {
-            Some(Fault::NotFinite { time }) => self.reader.refuse(
+            Some(FollowFault::NotFinite { time }) => self.reader.refuse(
                 self.stack,
                 Code::NotFinite,
                 format!(
@@ -762,17 +766,22 @@ impl Drop for Evaluator<'_> {
 }
 
 /// A stop of one channel, with one sign on all sides; sides that differ by rounding alone do not.
-fn stop(file: f64, clip: f64, kind: Kind, [before, at, after]: [Value; 3]) -> Stop {
-    let beside = |value: Value| {
+fn stop(
+    file: f64,
+    clip: f64,
+    kind: ChannelKind,
+    [before, at, after]: [ChannelValue; 3],
+) -> KeyStop {
+    let beside = |value: ChannelValue| {
         let value = match kind {
-            Kind::Rotation if value.dot(at) < 0.0 => -value,
+            ChannelKind::Rotation if value.dot(at) < 0.0 => -value,
             _ => value,
         };
         // What a curve does in 1e-10 s is no jump.
         let is_same = (value - at).abs().max_element() <= 1e-7 * at.abs().max_element().max(1e-3);
         if is_same { at } else { value }
     };
-    Stop {
+    KeyStop {
         file,
         clip,
         before: beside(before),
@@ -781,20 +790,24 @@ fn stop(file: f64, clip: f64, kind: Kind, [before, at, after]: [Value; 3]) -> St
     }
 }
 
-fn split<T>(keys: &[(f64, Value)], value: impl Fn(Value) -> T) -> (Vec<f64>, Vec<T>) {
+fn split<T>(keys: &[(f64, ChannelValue)], value: impl Fn(ChannelValue) -> T) -> (Vec<f64>, Vec<T>) {
     keys.iter().map(|key| (key.0, value(key.1))).unzip()
 }
 
 /// The keys of a translation or a scale.
 struct VectorKeys {
     times: Vec<f64>,
-    values: Vec<Value>,
+    values: Vec<ChannelValue>,
     tangents: Vec<[Vec3; 2]>,
 }
 
 /// With the sampler; none for a channel that is where its node rests.
-fn vectors(keys: Keys, rest: Value, start: f64) -> (Option<Sampler>, VectorKeys) {
-    let plain = |keys: Vec<(f64, Value)>| {
+fn vectors(
+    keys: FollowedKeys,
+    rest: ChannelValue,
+    start: f64,
+) -> (Option<ChannelInterpolation>, VectorKeys) {
+    let plain = |keys: Vec<(f64, ChannelValue)>| {
         let (times, values) = keys.into_iter().unzip();
         VectorKeys {
             times,
@@ -803,20 +816,21 @@ fn vectors(keys: Keys, rest: Value, start: f64) -> (Option<Sampler>, VectorKeys)
         }
     };
     match keys {
-        Keys::Rest(value) => {
-            let sampler = (value.as_vec4() != rest.as_vec4()).then_some(Sampler::Linear);
+        FollowedKeys::Rest(value) => {
+            let sampler =
+                (value.as_vec4() != rest.as_vec4()).then_some(ChannelInterpolation::Linear);
             (sampler, plain(vec![(start, value)]))
         }
-        Keys::Step(keys) => (Some(Sampler::Step), plain(keys)),
-        Keys::Linear(keys) => (Some(Sampler::Linear), plain(keys)),
-        Keys::Cubic(keys) => {
+        FollowedKeys::Step(keys) => (Some(ChannelInterpolation::Step), plain(keys)),
+        FollowedKeys::Linear(keys) => (Some(ChannelInterpolation::Linear), plain(keys)),
+        FollowedKeys::Cubic(keys) => {
             let tangents = keys
                 .iter()
                 .map(|key| key.2.map(|tangent| tangent.truncate().as_vec3()));
             let tangents = tangents.collect();
             let keys = keys.iter().map(|key| (key.0, key.1)).collect();
             (
-                Some(Sampler::Cubic),
+                Some(ChannelInterpolation::Cubic),
                 VectorKeys {
                     tangents,
                     ..plain(keys)

@@ -16,11 +16,11 @@ const REPEATED: f64 = 1e6;
 
 /// An angle that turns further than this between two keys, degrees, is looked at in so many parts in between.
 const LARGEST_STEP: f64 = 120.0;
-const MOST_PARTS: f64 = 4096.0;
+const MAX_PARTS: f64 = 4096.0;
 
 /// When one of a node's channels has keys.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub(super) struct Times {
+pub(super) struct ChannelTimes {
     /// Seconds, as the file has them, in any order.
     list: Vec<f64>,
     /// Whether a curve may jump at one of them.
@@ -30,9 +30,9 @@ pub(super) struct Times {
 /// The channels of a node.
 #[derive(Debug, Clone, Default)]
 pub(super) struct NodeTimes {
-    pub(super) translation: Times,
-    pub(super) rotation: Times,
-    pub(super) scale: Times,
+    pub(super) translation: ChannelTimes,
+    pub(super) rotation: ChannelTimes,
+    pub(super) scale: ChannelTimes,
 }
 
 impl NodeTimes {
@@ -71,18 +71,20 @@ pub(super) struct Takes {
 
 /// What of a node a property decides.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Part {
+enum TransformPart {
     Translation,
     Rotation,
     Scale,
 }
 
-fn part_of(property: &str) -> Option<Part> {
+fn part_of(property: &str) -> Option<TransformPart> {
     Some(match property {
         "Lcl Translation" | "RotationOffset" | "ScalingOffset" | "RotationPivot"
-        | "ScalingPivot" => Part::Translation,
-        "Lcl Rotation" | "PreRotation" | "PostRotation" | "RotationOrder" => Part::Rotation,
-        "Lcl Scaling" => Part::Scale,
+        | "ScalingPivot" => TransformPart::Translation,
+        "Lcl Rotation" | "PreRotation" | "PostRotation" | "RotationOrder" => {
+            TransformPart::Rotation
+        }
+        "Lcl Scaling" => TransformPart::Scale,
         _ => return None,
     })
 }
@@ -103,7 +105,7 @@ impl Takes {
         let mut others = HashSet::new();
         for (index, layer) in stack.layers.iter().enumerate() {
             let weight = takes.weight(layer, budget)?;
-            for (place, property) in layer.anim_props.iter().enumerate() {
+            for (position, property) in layer.anim_props.iter().enumerate() {
                 let curves = || property.anim_value.curves.iter().flatten();
                 let part = part_of(&property.prop_name);
                 let is_node = property.element.type_ == ElementType::Node;
@@ -115,10 +117,10 @@ impl Takes {
                     }
                     continue;
                 };
-                let mut times = Times::default();
+                let mut times = ChannelTimes::default();
                 for curve in curves() {
                     takes.outside +=
-                        times.add(curve, takes.span, part == Part::Rotation, budget)?;
+                        times.add(curve, takes.span, part == TransformPart::Rotation, budget)?;
                 }
                 times.append(&weight, budget)?;
                 let node = property.element.typed_id as usize;
@@ -133,14 +135,14 @@ impl Takes {
                     _ => None,
                 };
                 match known {
-                    Some(known) if index == 0 && known.is_none() => *known = Some(place),
+                    Some(known) if index == 0 && known.is_none() => *known = Some(position),
                     _ => properties.are_plain = false,
                 }
                 let moved = takes.nodes.entry(node).or_default();
                 match part {
-                    Part::Translation => moved.translation.append(&times, budget)?,
-                    Part::Rotation => moved.rotation.append(&times, budget)?,
-                    Part::Scale => moved.scale.append(&times, budget)?,
+                    TransformPart::Translation => moved.translation.append(&times, budget)?,
+                    TransformPart::Rotation => moved.rotation.append(&times, budget)?,
+                    TransformPart::Scale => moved.scale.append(&times, budget)?,
                 }
             }
         }
@@ -151,8 +153,8 @@ impl Takes {
     }
 
     /// When the weight of a layer has keys.
-    fn weight(&mut self, layer: &AnimLayer, budget: &Budget) -> Result<Times, OverBudget> {
-        let mut times = Times::default();
+    fn weight(&mut self, layer: &AnimLayer, budget: &Budget) -> Result<ChannelTimes, OverBudget> {
+        let mut times = ChannelTimes::default();
         let weights = layer.anim_props.iter().filter(|property| {
             let element = &property.element;
             &*property.prop_name == "Weight" && element.element_id == layer.element.element_id
@@ -196,7 +198,7 @@ impl Takes {
         if !inherits {
             return Ok(());
         }
-        let mut scales = Times::default();
+        let mut scales = ChannelTimes::default();
         let mut next = parent;
         while let Some(above) = next {
             let helper = above.scale_helper.as_deref().into_iter();
@@ -235,7 +237,7 @@ fn span(stack: &AnimStack) -> [f64; 2] {
     })
 }
 
-impl Times {
+impl ChannelTimes {
     /// Adds the times of a curve, as often as it is repeated within a span. Gives how many of its keys lie
     /// outside.
     fn add(
@@ -266,18 +268,18 @@ impl Times {
             self.list.extend(keys.iter().map(|key| key.time));
         }
         self.jump |= keys.windows(2).any(|pair| {
-            let holds = |key: &ufbx::Keyframe| {
+            let is_constant = |key: &ufbx::Keyframe| {
                 matches!(
                     key.interpolation,
                     Interpolation::ConstantPrev | Interpolation::ConstantNext
                 )
             };
-            holds(&pair[0]) || pair[1].time - pair[0].time < 2.0 * SAME
+            is_constant(&pair[0]) || pair[1].time - pair[0].time < 2.0 * SAME
         });
         // Whole turns between two keys would not show at a few times between them.
         for pair in keys.windows(2).filter(|_| is_angle) {
             let parts = ((pair[1].value - pair[0].value).abs() / LARGEST_STEP).ceil();
-            let parts = parts.min(MOST_PARTS) as usize;
+            let parts = parts.min(MAX_PARTS) as usize;
             budget.take(parts, size_of::<f64>())?;
             let length = pair[1].time - pair[0].time;
             let part = |index: usize| pair[0].time + length * index as f64 / parts as f64;
@@ -293,20 +295,20 @@ impl Times {
                 ExtrapolationMode::Mirror => true,
                 ExtrapolationMode::Constant | ExtrapolationMode::Slope => continue,
             };
-            let beyond = if is_before {
+            let overflow = if is_before {
                 first - span[0]
             } else {
                 span[1] - last
             };
-            if beyond <= 0.0 || duration <= SAME || extrapolation.repeat_count == 0 {
+            if overflow <= 0.0 || duration <= SAME || extrapolation.repeat_count == 0 {
                 continue;
             }
             self.jump |= extrapolation.mode == ExtrapolationMode::Repeat;
-            let most = match extrapolation.repeat_count {
+            let max_periods = match extrapolation.repeat_count {
                 count if count > 0 => f64::from(count),
                 _ => f64::INFINITY,
             };
-            let periods = (beyond / duration).ceil().min(most);
+            let periods = (overflow / duration).ceil().min(max_periods);
             let count = periods * keys.len() as f64;
             // What is refused here is refused by the number of bytes.
             let bytes = if count > REPEATED {

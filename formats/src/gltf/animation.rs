@@ -7,17 +7,17 @@ use tumble::FrameRate;
 
 use crate::diagnostic::{Code, Diagnostic};
 use crate::format::ReadOptions;
-use crate::gltf::channel::{ChannelKeys, Moved, Path, Times};
+use crate::gltf::channel::{ChannelKeys, InputTimes, MovedChannel};
 use crate::gltf::nodes::Nodes;
-use crate::gltf::reader::Reader;
-use crate::gltf::schema::{Animation, Channel, Sampler};
-use crate::grid::restore;
+use crate::gltf::reader::GltfReader;
+use crate::gltf::schema::{Animation, Channel, Sampler, TargetPath};
+use crate::motion::grid::restore;
 use crate::motion::{self, Channels, Joint, Motion};
 use crate::rate::Precision;
 
 /// What writing has to know of an animation that was read.
 #[derive(Debug)]
-pub(super) struct Read {
+pub(super) struct ReadAnimation {
     /// First and last key time: as the file has them, and as the clip has them.
     pub(super) stored_span: [f32; 2],
     pub(super) span: [f64; 2],
@@ -32,15 +32,15 @@ pub(super) struct Read {
 /// A channel that gets other keys when the file is written again.
 #[derive(Debug)]
 pub(super) struct SampledChannel {
-    /// Its place among the animation's channels, and its sampler's.
+    /// Its index among the animation's channels, and its sampler's.
     pub(super) channel: usize,
     pub(super) sampler: usize,
     /// What of which track it moves.
     pub(super) track: usize,
-    pub(super) path: Path,
+    pub(super) path: TargetPath,
 }
 
-/// Bytes of a track beside its keys: its name, its joint, its channels, and its places in the lists.
+/// Bytes of a track beside its keys: its name, its joint, its channels, and its entries in the lists.
 const TRACK: usize = 400;
 
 /// Reads the animation of that index; nothing if it moves no node.
@@ -49,10 +49,10 @@ const TRACK: usize = 400;
 /// The first fault that refuses the animation.
 pub(super) fn read(
     index: usize,
-    reader: &Reader<'_>,
+    reader: &GltfReader<'_>,
     nodes: &Nodes,
     options: &ReadOptions,
-) -> Result<Option<(Motion, Read)>, Diagnostic> {
+) -> Result<Option<(Motion, ReadAnimation)>, Diagnostic> {
     let pointer = format!("/animations/{index}");
     let animation: Animation<'_> = reader.json.entry("animations", index, &pointer)?;
     let moved = moved(reader, nodes, &animation, &pointer)?;
@@ -69,7 +69,7 @@ pub(super) fn read(
     reader.take(tracks.nodes.len(), TRACK, &pointer)?;
     let mut motion = Motion {
         name: animation.name.filter(|name| !name.is_empty()),
-        place: index,
+        index,
         rate,
         ..Motion::default()
     };
@@ -87,21 +87,21 @@ pub(super) fn read(
     let start = if start.is_finite() { start } else { 0.0 };
     let targets = moved.iter().zip(&keys);
     let targets: HashMap<_, _> = targets
-        .map(|(own, keys)| ((own.node, own.path), (own, keys)))
+        .map(|(moved, keys)| ((moved.node, moved.path), (moved, keys)))
         .collect();
     let mut origins = Vec::new();
     for &node in &tracks.nodes {
         motion.bvh.extend(nodes.bvh(node).cloned());
         let rest = rest(node, reader, nodes, &mut motion)?;
-        let own = |path| {
+        let keyed = |path| {
             let found = targets.get(&(node, path)).copied();
             found.filter(|(_, keys)| !keys.times.is_empty())
         };
-        let sampler = |path| own(path).map(|(moved, _)| moved.interpolation);
+        let sampler = |path| keyed(path).map(|(moved, _)| moved.interpolation);
         motion.channels.push(Channels {
-            rotation: sampler(Path::Rotation),
-            translation: sampler(Path::Translation),
-            scale: sampler(Path::Scale),
+            rotation: sampler(TargetPath::Rotation),
+            translation: sampler(TargetPath::Translation),
+            scale: sampler(TargetPath::Scale),
         });
         let (carrier, origin) = nodes.carrier(node);
         motion.skeleton.push(Joint {
@@ -110,7 +110,7 @@ pub(super) fn read(
         });
         origins.push(origin);
         let name = nodes.name(node);
-        match own(Path::Rotation) {
+        match keyed(TargetPath::Rotation) {
             Some((_, keys)) => keys.push(&mut motion.set, name),
             None => motion.set.push(name, &[start], &[rest.rotation]),
         }
@@ -119,8 +119,8 @@ pub(super) fn read(
                 .json
                 .refuse(&pointer, Code::NotFinite, error.to_string())
         })?;
-        for path in [Path::Translation, Path::Scale] {
-            if let Some((moved, keys)) = own(path) {
+        for path in [TargetPath::Translation, TargetPath::Scale] {
+            if let Some((moved, keys)) = keyed(path) {
                 let set = keys.set(&mut motion.set, path);
                 set.map_err(|error| {
                     reader
@@ -134,9 +134,9 @@ pub(super) fn read(
         motion.set_origin(track, origin);
     }
     let (sampled, others): (Vec<_>, Vec<_>) = moved.iter().zip(&keys).partition(|(moved, keys)| {
-        keys.times.len() > 1 && moved.interpolation != motion::Sampler::Step
+        keys.times.len() > 1 && moved.interpolation != motion::ChannelInterpolation::Step
     });
-    let channel = |(moved, _): (&Moved, _)| SampledChannel {
+    let channel = |(moved, _): (&MovedChannel, _)| SampledChannel {
         channel: moved.channel,
         sampler: moved.sampler_index,
         track: tracks.of_node(moved.node),
@@ -145,7 +145,7 @@ pub(super) fn read(
     let others = others
         .into_iter()
         .filter(|(_, keys)| !keys.times.is_empty());
-    let read = Read {
+    let read = ReadAnimation {
         stored_span: stored,
         span: motion
             .set
@@ -160,20 +160,20 @@ pub(super) fn read(
 
 /// The channels that move nodes.
 fn moved(
-    reader: &Reader<'_>,
+    reader: &GltfReader<'_>,
     nodes: &Nodes,
     animation: &Animation<'_>,
     pointer: &str,
-) -> Result<Vec<Moved>, Diagnostic> {
+) -> Result<Vec<MovedChannel>, Diagnostic> {
     let mut all = Vec::new();
     let mut targets = HashSet::new();
     for (index, raw) in animation.channels.iter().enumerate() {
-        let own = format!("{pointer}/channels/{index}");
-        let channel: Channel = reader.json.typed(raw, &own)?;
-        let Some((node, path)) = target(reader, &channel, &own) else {
+        let channel_pointer = format!("{pointer}/channels/{index}");
+        let channel: Channel = reader.json.typed(raw, &channel_pointer)?;
+        let Some((node, path)) = target(reader, &channel, &channel_pointer) else {
             continue;
         };
-        let target = format!("{own}/target");
+        let target = format!("{channel_pointer}/target");
         if node >= nodes.count() {
             return Err(reader.json.no_such("nodes", node, nodes.count(), &target));
         }
@@ -194,28 +194,35 @@ fn moved(
         }
         let Some(sampler) = animation.samplers.get(channel.sampler) else {
             let (index, count) = (channel.sampler, animation.samplers.len());
-            return Err(reader
-                .json
-                .no_such("samplers", index, count, &format!("{own}/sampler")));
+            return Err(reader.json.no_such(
+                "samplers",
+                index,
+                count,
+                &format!("{channel_pointer}/sampler"),
+            ));
         };
-        let own = format!("{pointer}/samplers/{}", channel.sampler);
-        let sampler: Sampler = reader.json.typed(sampler, &own)?;
-        all.push(Moved::new(
+        let sampler_pointer = format!("{pointer}/samplers/{}", channel.sampler);
+        let sampler: Sampler = reader.json.typed(sampler, &sampler_pointer)?;
+        all.push(MovedChannel::new(
             reader,
             (index, node, path),
             (channel.sampler, sampler),
-            &own,
+            &sampler_pointer,
         )?);
     }
     Ok(all)
 }
 
 /// The node that a channel moves, and what of it; `None` if it moves something else.
-fn target(reader: &Reader<'_>, channel: &Channel, pointer: &str) -> Option<(usize, Path)> {
+fn target(
+    reader: &GltfReader<'_>,
+    channel: &Channel,
+    pointer: &str,
+) -> Option<(usize, TargetPath)> {
     let target = &channel.target;
     let moved = target.moves();
     let is_known = ["pointer", "weights"].contains(&&*target.path);
-    if target.node.is_some() && !is_known && Path::named(&target.path).is_none() {
+    if target.node.is_some() && !is_known && TargetPath::named(&target.path).is_none() {
         reader.warn(Code::TargetPath, &format!("{pointer}/target/path"), || {
             format!(
                 "`{}` is not known; the channel is kept as it is",
@@ -227,13 +234,13 @@ fn target(reader: &Reader<'_>, channel: &Channel, pointer: &str) -> Option<(usiz
 }
 
 /// The times of channels, by the accessor that they are in.
-type TimesOf = BTreeMap<usize, Times>;
+type TimesOf = BTreeMap<usize, InputTimes>;
 
 /// The times of all channels, on the frames of one rate where they are; the first and the last of
 /// them as the file has them; and the rate.
 fn times(
-    reader: &Reader<'_>,
-    moved: &[Moved],
+    reader: &GltfReader<'_>,
+    moved: &[MovedChannel],
     options: &ReadOptions,
 ) -> Result<(TimesOf, [f32; 2], Option<FrameRate>), Diagnostic> {
     let mut stored = BTreeMap::new();
@@ -250,7 +257,7 @@ fn times(
         true => None,
         false => restore(&mut lists, Precision::F32),
     };
-    let lists = lists.into_iter().map(Times::new);
+    let lists = lists.into_iter().map(InputTimes::new);
     let times = indices.into_iter().zip(lists).collect();
     Ok((times, [first as f32, last as f32], rate))
 }
@@ -263,7 +270,7 @@ struct Tracks {
 }
 
 impl Tracks {
-    fn of(nodes: &Nodes, moved: &[Moved]) -> Self {
+    fn of(nodes: &Nodes, moved: &[MovedChannel]) -> Self {
         let mut tracks: BTreeSet<usize> = moved.iter().map(|moved| moved.node).collect();
         nodes.complete(&mut tracks);
         Self {
@@ -273,14 +280,14 @@ impl Tracks {
 
     /// The track of a node that is one.
     fn of_node(&self, node: usize) -> usize {
-        self.nodes.partition_point(|&own| own < node)
+        self.nodes.partition_point(|&listed| listed < node)
     }
 }
 
 /// Where a node rests; notes where that is more than a transform can say.
 fn rest(
     node: usize,
-    reader: &Reader<'_>,
+    reader: &GltfReader<'_>,
     nodes: &Nodes,
     motion: &mut Motion,
 ) -> Result<motion::Transform, Diagnostic> {
@@ -288,7 +295,7 @@ fn rest(
     if rest.is_sheared {
         let pointer = format!("/nodes/{node}/matrix");
         let message = format!(
-            "the matrix of `{}` shears or projects; poses in the world cannot be told",
+            "the matrix of `{}` shears or projects; poses in the world cannot be computed",
             nodes.name(node)
         );
         reader.warn(Code::Shear, &pointer, || message.clone());

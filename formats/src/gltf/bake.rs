@@ -1,26 +1,27 @@
 //! A file written again with the samples of its animations instead of their keys.
 
 use std::io::Write;
-use std::path::{Path as FilePath, PathBuf};
+use std::path::{Path, PathBuf};
 
 use serde_json::value::RawValue;
 use tumble::FrameRate;
 
+use crate::carried_mesh::CarriedMesh;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::format::{Document, Format, MotionOptions, WriteError};
 use crate::gltf::FORMAT;
-use crate::gltf::animation::Read;
+use crate::gltf::animation::ReadAnimation;
 use crate::gltf::baking::{Baking, is_cut};
-use crate::gltf::container::Container;
-use crate::gltf::data::{Data, check_length};
+use crate::gltf::container::{Container, check_length};
+use crate::gltf::data::BufferData;
 use crate::gltf::edits::Edits;
 use crate::gltf::gather;
-use crate::gltf::json::{Json, Members};
-use crate::gltf::reader::Reader;
+use crate::gltf::json::{Json, JsonMembers};
+use crate::gltf::reader::GltfReader;
 use crate::gltf::schema::{Animation, Channel};
-use crate::gltf::skins::{self, CarriedMesh};
+use crate::gltf::skins;
 use crate::gltf::uri;
-use crate::motion::{Motion, Sampled};
+use crate::motion::{Motion, SampledClip};
 use crate::rate::Precision;
 use crate::text::lines::Limits;
 use crate::warnings::Warnings;
@@ -36,7 +37,7 @@ pub(super) struct Gltf {
     /// How much of them is read.
     pub(super) limits: Limits,
     /// `None` for those that are kept as they are.
-    pub(super) animations: Vec<Option<Read>>,
+    pub(super) animations: Vec<Option<ReadAnimation>>,
 }
 
 impl Document for Gltf {
@@ -83,7 +84,7 @@ impl Document for Gltf {
         format.name == FORMAT.name
     }
 
-    fn beside(&self) -> Vec<String> {
+    fn other_contents(&self) -> Vec<String> {
         let Ok(json) = Json::parse(&self.name, &self.container.text) else {
             return Vec::new();
         };
@@ -121,25 +122,27 @@ impl Document for Gltf {
 
     fn write(
         &self,
-        clips: &[(usize, Sampled<'_>)],
+        clips: &[(usize, SampledClip<'_>)],
         options: &MotionOptions,
-        path: &FilePath,
+        path: &Path,
         out: &mut dyn Write,
     ) -> Result<Vec<Diagnostic>, WriteError> {
         let json = Json::parse(&self.name, &self.container.text)?;
         let warnings = Warnings::new(&self.name);
         let folder = self.folder.as_deref();
-        let reader = Reader::new(&json, &self.container, folder, self.limits, warnings)?;
+        let reader = GltfReader::new(&json, &self.container, folder, self.limits, warnings)?;
         let extension = path.extension().unwrap_or_default();
         let is_text = extension.eq_ignore_ascii_case("gltf");
         self.check_folder(&reader, path, is_text)?;
         let mut edits = Edits::new(&json);
         let mut data = match (self.container.is_glb(), is_text) {
-            (true, _) => Data::of_file(&json, &reader, self.container.bin().unwrap_or_default())?,
-            (false, true) => Data::in_uri(&json),
+            (true, _) => {
+                BufferData::of_file(&json, &reader, self.container.bin().unwrap_or_default())?
+            }
+            (false, true) => BufferData::in_uri(&json),
             (false, false) => gather::buffers(&reader, &mut edits)?,
         };
-        let baked = |&(place, _): &(usize, _)| self.animations.get(place).and_then(Option::as_ref);
+        let baked = |&(index, _): &(usize, _)| self.animations.get(index).and_then(Option::as_ref);
         let clips: Vec<_> = clips
             .iter()
             .filter_map(|clip| Some((baked(clip)?, clip)))
@@ -156,10 +159,10 @@ impl Document for Gltf {
         if !self.container.is_glb() && !is_text {
             gather::images(&reader, &mut edits, &mut data)?;
         }
-        for (read, (place, sampled)) in clips {
+        for (read, (index, sampled)) in clips {
             let cuts = is_cut(read, sampled);
             if cuts && read.beside > 0 {
-                reader.warn(Code::StaysWhole, &format!("/animations/{place}"), || {
+                reader.warn(Code::StaysWhole, &format!("/animations/{index}"), || {
                     let count = read.beside;
                     format!("{count} channels move other things than nodes, such as weights; they are not cut")
                 });
@@ -167,7 +170,7 @@ impl Document for Gltf {
             if !read.sampled.is_empty() || cuts {
                 let mut baking = Baking::new(
                     &json,
-                    *place,
+                    *index,
                     read,
                     (sampled, options.quantize.is_some()),
                     &edits,
@@ -189,7 +192,7 @@ impl Document for Gltf {
         drop(data);
         // Whatever else is remarkable was said when the file was read.
         let mut warnings = reader.warnings.into_inner().into_list();
-        warnings.retain(|own| [Code::StaysOutside, Code::StaysWhole].contains(&own.code));
+        warnings.retain(|warning| [Code::StaysOutside, Code::StaysWhole].contains(&warning.code));
         Ok(warnings)
     }
 }
@@ -202,8 +205,8 @@ impl Gltf {
     /// URIs of files beside are right in the file's own folder alone.
     fn check_folder(
         &self,
-        reader: &Reader<'_>,
-        path: &FilePath,
+        reader: &GltfReader<'_>,
+        path: &Path,
         is_text: bool,
     ) -> Result<(), Diagnostic> {
         if is_text && self.container.is_glb() {
@@ -214,13 +217,13 @@ impl Gltf {
         let Some((pointer, uri)) = named_file(reader.json).filter(|_| !is_gathered) else {
             return Ok(());
         };
-        let canonical = |folder: &FilePath| {
+        let canonical = |folder: &Path| {
             let here = folder.as_os_str().is_empty();
-            std::fs::canonicalize(if here { FilePath::new(".") } else { folder }).ok()
+            std::fs::canonicalize(if here { Path::new(".") } else { folder }).ok()
         };
-        let own = self.folder.as_deref().and_then(canonical);
-        let target = canonical(path.parent().unwrap_or(FilePath::new("")));
-        if own.is_some() && own == target {
+        let source_folder = self.folder.as_deref().and_then(canonical);
+        let target = canonical(path.parent().unwrap_or(Path::new("")));
+        if source_folder.is_some() && source_folder == target {
             return Ok(());
         }
         if is_text {
@@ -247,7 +250,7 @@ fn named_file(json: &Json<'_>) -> Option<(String, String)> {
             .iter()
             .enumerate()
             .find_map(|(index, raw)| {
-                let members: Members<'_> = json.typed(raw, "").ok()?;
+                let members: JsonMembers<'_> = json.typed(raw, "").ok()?;
                 let uri: String = json.typed(members.get("uri")?, "").ok()?;
                 (!uri::is_data(&uri)).then(|| (format!("/{list}/{index}/uri"), uri))
             })

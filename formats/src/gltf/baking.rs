@@ -8,15 +8,14 @@ use serde_json::value::RawValue;
 
 use crate::diagnostic::{Code, Diagnostic};
 use crate::format::WriteError;
-use crate::gltf::animation::{Read, SampledChannel};
-use crate::gltf::channel::Path;
+use crate::gltf::animation::{ReadAnimation, SampledChannel};
 use crate::gltf::edits::Edits;
-use crate::gltf::json::{Json, Members};
-use crate::gltf::own_keys::OwnKeys;
+use crate::gltf::json::{Json, JsonMembers};
 use crate::gltf::quantized::quantized;
-use crate::gltf::schema::{Animation, Channel};
+use crate::gltf::schema::{Animation, Channel, TargetPath};
 use crate::gltf::write_new::{FLOAT, SHORT};
-use crate::motion::{self, Sampled};
+use crate::gltf::written_keys::WrittenKeys;
+use crate::motion::{self, SampledClip};
 
 /// Numbers as a file has them.
 fn bytes_of(numbers: &[f32]) -> Vec<u8> {
@@ -41,8 +40,8 @@ fn shorts_of(bytes: &[u8]) -> Vec<u8> {
 pub(super) struct Baking<'a> {
     json: &'a Json<'a>,
     pointer: String,
-    read: &'a Read,
-    sampled: &'a Sampled<'a>,
+    read: &'a ReadAnimation,
+    sampled: &'a SampledClip<'a>,
     /// The values of `sampler` of the channels.
     named: Vec<&'a RawValue>,
     /// The samplers of channels that are not sampled.
@@ -59,17 +58,17 @@ pub(super) struct Baking<'a> {
 }
 
 /// A sampler that was changed or appended.
-struct Made {
-    place: usize,
+struct BakedSampler {
+    sampler: usize,
     input: usize,
     interpolation: &'static str,
     values: Range<usize>,
 }
 
 /// Whether the keys that are written are those of a part of the animation.
-pub(super) fn is_cut(read: &Read, sampled: &Sampled<'_>) -> bool {
+pub(super) fn is_cut(read: &ReadAnimation, sampled: &SampledClip<'_>) -> bool {
     let span = sampled.clip.set.time_span();
-    sampled.of_own_keys && span.is_some_and(|(first, last)| [first, last] != read.span)
+    sampled.is_at_keys && span.is_some_and(|(first, last)| [first, last] != read.span)
 }
 
 impl<'a> Baking<'a> {
@@ -77,36 +76,38 @@ impl<'a> Baking<'a> {
     /// When the samples are not those of the clip.
     pub(super) fn new(
         json: &'a Json<'a>,
-        place: usize,
-        read: &'a Read,
-        (sampled, quantize): (&'a Sampled<'a>, bool),
+        index: usize,
+        read: &'a ReadAnimation,
+        (sampled, quantize): (&'a SampledClip<'a>, bool),
         edits: &Edits<'_>,
     ) -> Result<Self, WriteError> {
-        let pointer = format!("/animations/{place}");
-        let animation: Animation<'a> = json.entry("animations", place, &pointer)?;
-        let members: Members<'a> = json.entry("animations", place, &pointer)?;
+        let pointer = format!("/animations/{index}");
+        let animation: Animation<'a> = json.entry("animations", index, &pointer)?;
+        let members: JsonMembers<'a> = json.entry("animations", index, &pointer)?;
         let is_cut = is_cut(read, sampled);
         let others = read.others.iter().filter(|_| is_cut);
         let changed = read.sampled.iter().chain(others);
-        let sampled_channels: HashSet<usize> = changed.map(|own| own.channel).collect();
+        let sampled_channels: HashSet<usize> = changed
+            .map(|sampled_channel| sampled_channel.channel)
+            .collect();
         let mut kept = HashSet::new();
         let mut named = Vec::new();
-        for (place, raw) in animation.channels.iter().enumerate() {
-            if !sampled_channels.contains(&place) {
+        for (channel_index, raw) in animation.channels.iter().enumerate() {
+            if !sampled_channels.contains(&channel_index) {
                 kept.insert(json.typed::<Channel>(raw, &pointer)?.sampler);
             }
-            let members: Members<'a> = json.typed(raw, &pointer)?;
+            let members: JsonMembers<'a> = json.typed(raw, &pointer)?;
             named.extend(members.get("sampler"));
         }
         let tracks = sampled.clip.set.track_count();
         let count = sampled.times.len() * tracks;
-        let fits = |list: usize, path: Path| {
+        let fits = |list: usize, path: TargetPath| {
             let is_moved = read.sampled.iter().any(|channel| channel.path == path);
             list == count || !is_moved
         };
-        let is_whole = fits(sampled.rotations.len(), Path::Rotation)
-            && fits(sampled.translations.len(), Path::Translation)
-            && fits(sampled.scales.len(), Path::Scale)
+        let is_whole = fits(sampled.rotations.len(), TargetPath::Rotation)
+            && fits(sampled.translations.len(), TargetPath::Translation)
+            && fits(sampled.scales.len(), TargetPath::Scale)
             && read.sampled.iter().all(|channel| channel.track < tracks);
         let samplers_array = members.get("samplers").filter(|_| is_whole && count > 0);
         let samplers_array = samplers_array.ok_or_else(|| {
@@ -131,7 +132,7 @@ impl<'a> Baking<'a> {
         })
     }
 
-    /// Puts the samples in the place of the keys of the channels that are sampled.
+    /// Replaces the keys of the channels that are sampled by the samples.
     ///
     /// # Errors
     /// When f32 cannot tell times apart.
@@ -139,27 +140,28 @@ impl<'a> Baking<'a> {
         let mut inputs = HashMap::new();
         let shared = self.input(self.sampled.times, &mut inputs, edits)?;
         // By the samplers whose keys the samples stand for.
-        let mut made: HashMap<usize, Vec<Made>> = HashMap::new();
+        let mut made: HashMap<usize, Vec<BakedSampler>> = HashMap::new();
         let read = self.read;
         let others = read.others.iter().filter(|_| self.is_cut);
         let channels: Vec<&SampledChannel> = read.sampled.iter().chain(others).collect();
         for channel in channels {
-            let own = match self.sampled.of_own_keys {
-                true => OwnKeys::of(self.sampled.clip, channel.track, channel.path),
+            let written = match self.sampled.is_at_keys {
+                true => WrittenKeys::of(self.sampled.clip, channel.track, channel.path),
                 false => None,
             };
-            let (input, interpolation) = match &own {
-                Some(own) => (
-                    self.input(&own.times, &mut inputs, edits)?,
-                    own.sampler.name(),
+            let (input, interpolation) = match &written {
+                Some(keys) => (
+                    self.input(&keys.times, &mut inputs, edits)?,
+                    keys.sampler.name(),
                 ),
                 None => (shared, "LINEAR"),
             };
-            let values = own.map_or_else(|| self.values(channel), |own| bytes_of(&own.values));
+            let values =
+                written.map_or_else(|| self.values(channel), |written| bytes_of(&written.values));
             let count = values.len() / (4 * channel.path.width());
             let is_short = self.quantize
-                && channel.path == Path::Rotation
-                && interpolation != motion::Sampler::Cubic.name();
+                && channel.path == TargetPath::Rotation
+                && interpolation != motion::ChannelInterpolation::Cubic.name();
             let values = if is_short { shorts_of(&values) } else { values };
             let made = made.entry(channel.sampler).or_default();
             let same = made.iter().find(|made| {
@@ -167,11 +169,11 @@ impl<'a> Baking<'a> {
                     && (made.input, made.interpolation) == (input, interpolation)
             });
             let sampler = match same {
-                Some(made) => made.place,
+                Some(made) => made.sampler,
                 None => {
                     let start = self.bytes.len();
                     self.bytes.extend_from_slice(&values);
-                    let kind = if channel.path == Path::Rotation {
+                    let kind = if channel.path == TargetPath::Rotation {
                         "VEC4"
                     } else {
                         "VEC3"
@@ -183,7 +185,7 @@ impl<'a> Baking<'a> {
                     let is_free = made.is_empty()
                         && !self.kept.contains(&channel.sampler)
                         && self.takes(channel.sampler, interpolation)?;
-                    let place = match is_free {
+                    let sampler = match is_free {
                         true => {
                             let keys = (input, output, interpolation);
                             self.change_sampler(channel.sampler, keys, edits)?
@@ -195,13 +197,13 @@ impl<'a> Baking<'a> {
                             edits.append(self.samplers_array, self.samplers.len(), &sampler)
                         }
                     };
-                    made.push(Made {
-                        place,
+                    made.push(BakedSampler {
+                        sampler,
                         input,
                         interpolation,
                         values: start..self.bytes.len(),
                     });
-                    place
+                    sampler
                 }
             };
             if sampler != channel.sampler {
@@ -236,9 +238,9 @@ impl<'a> Baking<'a> {
     /// Times in f32, those of the first key that the file has and of the last as the file has them.
     fn times(&self, seconds: &[f64]) -> Result<Vec<f32>, Diagnostic> {
         let mut times: Vec<f32> = seconds.iter().map(|&time| time as f32).collect();
-        for (time, &given) in times.iter_mut().zip(seconds) {
+        for (time, &second) in times.iter_mut().zip(seconds) {
             let ends = self.read.span.iter().zip(self.read.stored_span);
-            for (_, stored) in ends.filter(|&(&end, _)| end == given) {
+            for (_, stored) in ends.filter(|&(&end, _)| end == second) {
                 *time = stored;
             }
         }
@@ -264,16 +266,16 @@ impl<'a> Baking<'a> {
                 .collect()
         };
         match channel.path {
-            Path::Rotation => all(bytemuck::cast_slice(self.sampled.rotations)),
-            Path::Translation => all(bytemuck::cast_slice(self.sampled.translations)),
-            Path::Scale => all(bytemuck::cast_slice(self.sampled.scales)),
+            TargetPath::Rotation => all(bytemuck::cast_slice(self.sampled.rotations)),
+            TargetPath::Translation => all(bytemuck::cast_slice(self.sampled.translations)),
+            TargetPath::Scale => all(bytemuck::cast_slice(self.sampled.scales)),
         }
     }
 
-    /// Whether a sampler's interpolation can be changed in its place: linear need not be named.
+    /// Whether a sampler's interpolation can be changed in the JSON: linear need not be named.
     fn takes(&self, sampler: usize, interpolation: &str) -> Result<bool, Diagnostic> {
         let raw = self.samplers[sampler];
-        let members: Members<'a> = self.json.typed(raw, &self.pointer)?;
+        let members: JsonMembers<'a> = self.json.typed(raw, &self.pointer)?;
         Ok(interpolation == "LINEAR" || members.get("interpolation").is_some())
     }
 
@@ -290,7 +292,7 @@ impl<'a> Baking<'a> {
         )
     }
 
-    /// Gives a sampler other keys; its place.
+    /// Gives a sampler other keys; returns its index.
     fn change_sampler(
         &self,
         sampler: usize,
@@ -298,7 +300,7 @@ impl<'a> Baking<'a> {
         edits: &mut Edits<'_>,
     ) -> Result<usize, Diagnostic> {
         let raw = self.samplers[sampler];
-        let members: Members<'a> = self.json.typed(raw, &self.pointer)?;
+        let members: JsonMembers<'a> = self.json.typed(raw, &self.pointer)?;
         let changes = [
             ("input", input.to_string()),
             ("output", output.to_string()),

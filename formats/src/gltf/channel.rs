@@ -1,73 +1,26 @@
 //! The keys of one channel: times, values and tangents.
 
-use std::fmt;
-
 use glam::{DQuat, DVec4, Quat, Vec3};
 use tumble::{TrackError, TrackSet, UNIT_TOLERANCE};
 
-use crate::diagnostic::{Code, Diagnostic, Place};
-use crate::gltf::reader::Reader;
-use crate::gltf::schema::{Accessor, Sampler};
+use crate::diagnostic::{Code, Diagnostic, Location};
+use crate::gltf::reader::GltfReader;
+use crate::gltf::schema::{Accessor, Sampler, TargetPath};
 use crate::keys::{Duplicates, Origin, select};
 use crate::motion;
 use crate::quaternion::dot;
 use crate::warnings::Warnings;
 
-/// What of a node a channel moves.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub(super) enum Path {
-    Translation,
-    Rotation,
-    Scale,
-}
-
-impl Path {
-    pub(super) fn named(name: &str) -> Option<Self> {
-        Some(match name {
-            "translation" => Self::Translation,
-            "rotation" => Self::Rotation,
-            "scale" => Self::Scale,
-            _ => return None,
-        })
-    }
-
-    pub(super) fn name(self) -> &'static str {
-        match self {
-            Self::Translation => "translation",
-            Self::Rotation => "rotation",
-            Self::Scale => "scale",
-        }
-    }
-
-    /// Numbers of a value.
-    pub(super) fn width(self) -> usize {
-        match self {
-            Self::Rotation => 4,
-            Self::Translation | Self::Scale => 3,
-        }
-    }
-}
-
-impl fmt::Display for Path {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Translation => "translation",
-            Self::Rotation => "rotation",
-            Self::Scale => "scale",
-        })
-    }
-}
-
 /// A channel that moves a node.
-pub(super) struct Moved {
-    /// Its place among the animation's channels.
+pub(super) struct MovedChannel {
+    /// Its index among the animation's channels.
     pub(super) channel: usize,
     pub(super) node: usize,
-    pub(super) path: Path,
-    /// Its sampler's place among the animation's samplers.
+    pub(super) path: TargetPath,
+    /// Its sampler's index among the animation's samplers.
     pub(super) sampler_index: usize,
     pub(super) sampler: Sampler,
-    pub(super) interpolation: motion::Sampler,
+    pub(super) interpolation: motion::ChannelInterpolation,
     /// Pointers to what the sampler names.
     input: String,
     pub(super) output: String,
@@ -76,9 +29,9 @@ pub(super) struct Moved {
 }
 
 /// Times that several channels may share.
-pub(super) struct Times(Vec<f64>);
+pub(super) struct InputTimes(Vec<f64>);
 
-impl Times {
+impl InputTimes {
     pub(super) fn new(times: Vec<f64>) -> Self {
         Self(times)
     }
@@ -92,33 +45,33 @@ impl Times {
 pub(super) struct ChannelKeys {
     /// Seconds, strictly increasing; none for a channel that rests.
     pub(super) times: Vec<f64>,
-    values: Values,
+    values: ChannelValues,
 }
 
 /// With the tangents with which the curve arrives and leaves, if it has any.
-enum Values {
+enum ChannelValues {
     Rotations(Vec<Quat>, Vec<[Quat; 2]>),
     Vectors(Vec<Vec3>, Vec<[Vec3; 2]>),
 }
 
-impl Moved {
-    /// A channel, its node and what of it; its sampler and its place; where the sampler is.
+impl MovedChannel {
+    /// A channel, its node and target path; its sampler and the index of that; the pointer to the sampler.
     ///
     /// # Errors
     /// When the interpolation is not known, or there are not as many values as times say.
     pub(super) fn new(
-        reader: &Reader<'_>,
-        (channel, node, path): (usize, usize, Path),
+        reader: &GltfReader<'_>,
+        (channel, node, path): (usize, usize, TargetPath),
         (sampler_index, sampler): (usize, Sampler),
         pointer: &str,
     ) -> Result<Self, Diagnostic> {
         let interpolation = match sampler.interpolation.as_deref() {
-            None | Some("LINEAR") => motion::Sampler::Linear,
-            Some("STEP") => motion::Sampler::Step,
-            Some("CUBICSPLINE") => motion::Sampler::Cubic,
+            None | Some("LINEAR") => motion::ChannelInterpolation::Linear,
+            Some("STEP") => motion::ChannelInterpolation::Step,
+            Some("CUBICSPLINE") => motion::ChannelInterpolation::Cubic,
             Some(other) => {
                 let message = format!(
-                    "`{other}` is no interpolation; there are LINEAR, STEP and CUBICSPLINE"
+                    "`{other}` is not an interpolation; there are LINEAR, STEP and CUBICSPLINE"
                 );
                 let pointer = format!("{pointer}/interpolation");
                 return Err(reader.json.refuse(&pointer, Code::Interpolation, message));
@@ -128,7 +81,7 @@ impl Moved {
         let times = reader.accessor(sampler.input, &input)?;
         let values = reader.accessor(sampler.output, &output)?;
         let needed = match interpolation {
-            motion::Sampler::Cubic => times.count.saturating_mul(3),
+            motion::ChannelInterpolation::Cubic => times.count.saturating_mul(3),
             _ => times.count,
         };
         if values.count != needed {
@@ -157,7 +110,7 @@ impl Moved {
     /// Bytes of a key: its time, its value and its tangents.
     pub(super) fn key_bytes(&self) -> usize {
         let values = match self.interpolation {
-            motion::Sampler::Cubic => 3,
+            motion::ChannelInterpolation::Cubic => 3,
             _ => 1,
         };
         size_of::<f64>() + values * size_of::<Quat>()
@@ -167,7 +120,7 @@ impl Moved {
     ///
     /// # Errors
     /// When they are no floats, or missing.
-    pub(super) fn stored_times(&self, reader: &Reader<'_>) -> Result<Vec<f64>, Diagnostic> {
+    pub(super) fn stored_times(&self, reader: &GltfReader<'_>) -> Result<Vec<f64>, Diagnostic> {
         let count = usize::try_from(self.times.count).unwrap_or(usize::MAX);
         reader.take(count, 2 * size_of::<f64>(), &self.input)?;
         let times = reader.numbers(self.sampler.input, &self.times, 1, &self.input)?;
@@ -186,8 +139,8 @@ impl Moved {
     /// When values are missing or broken, or times do not increase.
     pub(super) fn keys(
         &self,
-        reader: &Reader<'_>,
-        times: &Times,
+        reader: &GltfReader<'_>,
+        times: &InputTimes,
         duplicates: Duplicates,
     ) -> Result<ChannelKeys, Diagnostic> {
         let width = self.path.width();
@@ -205,15 +158,15 @@ impl Moved {
         }
         let numbers = reader.numbers(self.sampler.output, &self.values, width, &self.output)?;
         reader.warn_of_stride(&self.values);
-        let is_cubic = self.interpolation == motion::Sampler::Cubic;
+        let is_cubic = self.interpolation == motion::ChannelInterpolation::Cubic;
         let key_width = if is_cubic { 3 * width } else { width };
         let of_key = |key: usize| &numbers[key * key_width..][..key_width];
         let warnings = &mut *reader.warnings.borrow_mut();
-        let at_input = |_: usize| Place::Inside(self.input.clone());
-        let at_output = |_: usize| Place::Inside(self.output.clone());
+        let at_input = |_: usize| Location::Inside(self.input.clone());
+        let at_output = |_: usize| Location::Inside(self.output.clone());
         let origin = Origin {
             file: reader.json.name,
-            place: &at_input,
+            location: &at_input,
             duplicates,
         };
         let kept = origin.increasing(&mut times, |i, j| of_key(i) == of_key(j), warnings)?;
@@ -221,7 +174,10 @@ impl Moved {
         let kept = kept.unwrap_or_else(|| (0..times.len()).collect());
         if is_cubic && times.len() == 1 {
             warnings.warn(Code::CubicOfOne, || {
-                (Some(at_output(0)), "CUBICSPLINE of one key; it holds")
+                (
+                    Some(at_output(0)),
+                    "CUBICSPLINE of one key; the value is constant",
+                )
             });
         }
         // A cubic's key has three values: the tangent that arrives, the value, the one that leaves.
@@ -240,15 +196,15 @@ impl Moved {
             is_used.then(|| value(key, which))
         };
         let values = match self.path {
-            Path::Rotation => {
+            TargetPath::Rotation => {
                 let stored: Vec<DQuat> =
                     keys().map(|key| DQuat::from_slice(value(key, 1))).collect();
                 let origin = Origin {
-                    place: &at_output,
+                    location: &at_output,
                     ..origin
                 };
                 let mut unit = origin.unit(stored.iter().copied(), warnings)?;
-                if self.interpolation == motion::Sampler::Linear {
+                if self.interpolation == motion::ChannelInterpolation::Linear {
                     half_turns(&mut unit, warnings, &at_output);
                 }
                 let tangents = keys().filter(|_| is_cubic).map(|key| {
@@ -260,20 +216,20 @@ impl Moved {
                         norm
                     };
                     [0, 2].map(|which| {
-                        let own = tangent(key, which).map_or(DVec4::ZERO, DVec4::from_slice);
-                        Quat::from_vec4((own / norm).as_vec4())
+                        let tangent = tangent(key, which).map_or(DVec4::ZERO, DVec4::from_slice);
+                        Quat::from_vec4((tangent / norm).as_vec4())
                     })
                 });
                 let tangents = tangents.collect();
-                Values::Rotations(unit, tangents)
+                ChannelValues::Rotations(unit, tangents)
             }
-            Path::Translation | Path::Scale => {
+            TargetPath::Translation | TargetPath::Scale => {
                 let vector = |numbers: &[f64]| glam::DVec3::from_slice(numbers).as_vec3();
                 let tangents = keys()
                     .filter(|_| is_cubic)
                     .map(|key| [0, 2].map(|which| tangent(key, which).map_or(Vec3::ZERO, vector)));
                 let tangents = tangents.collect();
-                Values::Vectors(keys().map(|key| vector(value(key, 1))).collect(), tangents)
+                ChannelValues::Vectors(keys().map(|key| vector(value(key, 1))).collect(), tangents)
             }
         };
         Ok(ChannelKeys { times, values })
@@ -281,19 +237,19 @@ impl Moved {
 }
 
 /// A dot product this close to 0 is a half turn within f32 rounding.
-const HALF_TURN: f64 = 1.0 / (1u64 << 21) as f64;
+const HALF_TURN_PRODUCT: f64 = 1.0 / (1u64 << 21) as f64;
 
 /// Where neighbours are half a turn apart, sets keep the signs that keys have: they get those whose
 /// inner product is not negative, by which glTF says which way round is the shorter.
-fn half_turns(keys: &mut [Quat], warnings: &mut Warnings, place: &dyn Fn(usize) -> Place) {
+fn half_turns(keys: &mut [Quat], warnings: &mut Warnings, location: &dyn Fn(usize) -> Location) {
     for key in 1..keys.len() {
         let product = dot(keys[key - 1].as_dquat(), keys[key].as_dquat());
-        if product.abs() > HALF_TURN {
+        if product.abs() > HALF_TURN_PRODUCT {
             continue;
         }
         warnings.warn(Code::HalfTurn, || {
             let message = format!("keys {} and {key} are half a turn apart", key - 1);
-            (Some(place(key)), message)
+            (Some(location(key)), message)
         });
         if product < 0.0 {
             keys[key] = -keys[key];
@@ -307,7 +263,7 @@ impl ChannelKeys {
     /// # Errors
     /// When a number is not finite.
     pub(super) fn push(&self, set: &mut TrackSet, name: &str) -> Result<(), TrackError> {
-        let Values::Rotations(keys, tangents) = &self.values else {
+        let ChannelValues::Rotations(keys, tangents) = &self.values else {
             return Ok(());
         };
         let track = set.track_count();
@@ -322,13 +278,13 @@ impl ChannelKeys {
     ///
     /// # Errors
     /// When a number is not finite.
-    pub(super) fn set(&self, set: &mut TrackSet, path: Path) -> Result<(), TrackError> {
-        let Values::Vectors(keys, tangents) = &self.values else {
+    pub(super) fn set(&self, set: &mut TrackSet, path: TargetPath) -> Result<(), TrackError> {
+        let ChannelValues::Vectors(keys, tangents) = &self.values else {
             return Ok(());
         };
         let track = set.track_count() - 1;
         match path {
-            Path::Scale => set.set_scales(track, &self.times, keys, tangents),
+            TargetPath::Scale => set.set_scales(track, &self.times, keys, tangents),
             _ => set.set_translations(track, &self.times, keys, tangents),
         }
     }

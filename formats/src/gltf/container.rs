@@ -4,6 +4,7 @@ use std::io::{self, Write};
 use std::ops::Range;
 
 use crate::diagnostic::{Code, Diagnostic};
+use crate::gltf::json::Json;
 use crate::warnings::Warnings;
 
 /// The first bytes of a GLB.
@@ -26,7 +27,7 @@ pub(super) struct Container {
 #[derive(Debug)]
 struct Chunks {
     bytes: Vec<u8>,
-    /// Type and place of the data, in the order of the file.
+    /// Type and byte range of the data, in the order of the file.
     list: Vec<(u32, Range<usize>)>,
 }
 
@@ -34,7 +35,7 @@ impl Container {
     /// Takes a file apart; `name` is what messages call it.
     ///
     /// # Errors
-    /// When a GLB is not whole, or the JSON is no UTF-8.
+    /// When a GLB is not whole, or the JSON is not UTF-8.
     pub(super) fn parse(
         name: &str,
         bytes: Vec<u8>,
@@ -48,7 +49,7 @@ impl Container {
         };
         let json = chunks
             .first()
-            .map_or(0..bytes.len(), |(_, place)| place.clone());
+            .map_or(0..bytes.len(), |(_, range)| range.clone());
         let mut json = &bytes[json];
         if let Some(rest) = json.strip_prefix(BYTE_ORDER_MARK) {
             json = rest;
@@ -57,8 +58,8 @@ impl Container {
             });
         }
         let text = std::str::from_utf8(json).map_err(|error| {
-            let place = error.valid_up_to();
-            let message = format!("byte {place} of the JSON is no UTF-8; save the file as UTF-8");
+            let offset = error.valid_up_to();
+            let message = format!("byte {offset} of the JSON is not UTF-8; save the file as UTF-8");
             refuse(Code::Encoding, message)
         })?;
         let text = text.to_owned();
@@ -83,8 +84,8 @@ impl Container {
     /// The data of the BIN chunk.
     pub(super) fn bin(&self) -> Option<&[u8]> {
         let glb = self.glb.as_ref()?;
-        let (_, place) = glb.list.iter().find(|(kind, _)| *kind == BIN)?;
-        Some(&glb.bytes[place.clone()])
+        let (_, range) = glb.list.iter().find(|(kind, _)| *kind == BIN)?;
+        Some(&glb.bytes[range.clone()])
     }
 
     /// Writes a GLB with this JSON and these parts of a BIN chunk, and the other chunks of the file.
@@ -105,11 +106,11 @@ impl Container {
             if self.bin().is_none() {
                 chunks.extend(bin.take().map(|parts| (BIN, parts)));
             }
-            for (kind, place) in &glb.list {
-                let own = bin.take_if(|_| *kind == BIN);
+            for (kind, range) in &glb.list {
+                let replaced = bin.take_if(|_| *kind == BIN);
                 chunks.push((
                     *kind,
-                    own.unwrap_or_else(|| vec![&glb.bytes[place.clone()]]),
+                    replaced.unwrap_or_else(|| vec![&glb.bytes[range.clone()]]),
                 ));
             }
         }
@@ -141,13 +142,13 @@ pub(super) fn padding(length: usize, with: &[u8; 3]) -> &[u8] {
     &with[..length.wrapping_neg() % 4]
 }
 
-type Fault = (Code, String);
+type ContainerFault = (Code, String);
 
 /// The chunks of a GLB; the first is the JSON.
-fn chunks(bytes: &[u8]) -> Result<Vec<(u32, Range<usize>)>, Fault> {
+fn chunks(bytes: &[u8]) -> Result<Vec<(u32, Range<usize>)>, ContainerFault> {
     let broken = |message: String| (Code::Glb, message);
-    let word = |place: usize| -> Option<u32> {
-        let four = bytes.get(place..)?.first_chunk()?;
+    let word = |at: usize| -> Option<u32> {
+        let four = bytes.get(at..)?.first_chunk()?;
         Some(u32::from_le_bytes(*four))
     };
     let (Some(version), Some(length)) = (word(4), word(8)) else {
@@ -165,16 +166,16 @@ fn chunks(bytes: &[u8]) -> Result<Vec<(u32, Range<usize>)>, Fault> {
         return Err(broken(message));
     }
     let mut chunks = Vec::new();
-    let mut place = 12;
-    while place < bytes.len() {
-        let header = word(place).zip(word(place + 4));
+    let mut offset = 12;
+    while offset < bytes.len() {
+        let header = word(offset).zip(word(offset + 4));
         let data = header.and_then(|(length, kind)| {
-            let data = place + 8..(place + 8).checked_add(length as usize)?;
+            let data = offset + 8..(offset + 8).checked_add(length as usize)?;
             (data.end <= bytes.len()).then_some((kind, data))
         });
         let Some((kind, data)) = data else {
             return Err(broken(format!(
-                "the chunk at byte {place} is cut; copy the file again"
+                "the chunk at byte {offset} is cut; copy the file again"
             )));
         };
         match (chunks.is_empty(), kind == JSON) {
@@ -185,12 +186,12 @@ fn chunks(bytes: &[u8]) -> Result<Vec<(u32, Range<usize>)>, Fault> {
             }
             (false, true) => {
                 return Err(broken(format!(
-                    "a second JSON chunk at byte {place}; export the file again"
+                    "a second JSON chunk at byte {offset}; export the file again"
                 )));
             }
             _ => {}
         }
-        place = data.end;
+        offset = data.end;
         chunks.push((kind, data));
     }
     match chunks.is_empty() {
@@ -199,4 +200,17 @@ fn chunks(bytes: &[u8]) -> Result<Vec<(u32, Range<usize>)>, Fault> {
         )),
         false => Ok(chunks),
     }
+}
+
+/// # Errors
+/// When a GLB cannot be so long.
+pub(super) fn check_length(json: &Json<'_>, length: u64) -> Result<(), Diagnostic> {
+    if length <= u64::from(u32::MAX) {
+        return Ok(());
+    }
+    let message = format!(
+        "the GLB would have {length} bytes and more, and can have {}; sample at a lower rate",
+        u32::MAX
+    );
+    Err(Diagnostic::new(json.name, Code::GlbTooLong, message))
 }

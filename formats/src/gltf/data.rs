@@ -2,48 +2,48 @@
 
 use serde_json::value::RawValue;
 
-use crate::diagnostic::{Code, Diagnostic};
+use crate::diagnostic::Diagnostic;
 use crate::gltf::container::padding;
 use crate::gltf::edits::Edits;
-use crate::gltf::gather::Gathered;
-use crate::gltf::json::{Json, Members};
-use crate::gltf::reader::Reader;
+use crate::gltf::gather::GatheredBuffers;
+use crate::gltf::json::{Json, JsonMembers};
+use crate::gltf::reader::GltfReader;
 use crate::gltf::schema::Buffer;
 use crate::gltf::uri;
 
 /// The bytes that a file gets, and the buffer that they are in.
-pub(super) struct Data<'a> {
-    home: Home<'a>,
+pub(super) struct BufferData<'a> {
+    home: BufferHome<'a>,
     buffer: usize,
     bytes: Vec<u8>,
 }
 
-enum Home<'a> {
+enum BufferHome<'a> {
     /// Behind what the BIN chunk has; the length that its buffer says, if it has one.
     Bin(&'a [u8], Option<&'a RawValue>),
     /// Behind the buffers that are gathered into a BIN chunk.
-    Gathered(Gathered),
+    Gathered(GatheredBuffers),
     /// A buffer of its own, as a data URI.
     Uri,
 }
 
-impl<'a> Data<'a> {
+impl<'a> BufferData<'a> {
     /// Behind the BIN chunk of a GLB, or in a buffer of their own where that cannot be.
     ///
     /// # Errors
     /// When the first buffer is broken.
     pub(super) fn of_file(
         json: &'a Json<'a>,
-        reader: &Reader<'a>,
+        reader: &GltfReader<'a>,
         bin: &'a [u8],
     ) -> Result<Self, Diagnostic> {
         let home = match json.entries("buffers").first() {
-            None => Home::Bin(bin, None),
+            None => BufferHome::Bin(bin, None),
             Some(raw) => {
                 let buffer: Buffer<'a> = json.typed(raw, "/buffers/0")?;
-                let members: Members<'a> = json.typed(raw, "/buffers/0")?;
+                let members: JsonMembers<'a> = json.typed(raw, "/buffers/0")?;
                 match reader.bin(0, &buffer) {
-                    Some(bin) => Home::Bin(bin, members.get("byteLength")),
+                    Some(bin) => BufferHome::Bin(bin, members.get("byteLength")),
                     None => return Ok(Self::in_uri(json)),
                 }
             }
@@ -58,16 +58,16 @@ impl<'a> Data<'a> {
     /// In a buffer of their own.
     pub(super) fn in_uri(json: &Json<'_>) -> Self {
         Self {
-            home: Home::Uri,
+            home: BufferHome::Uri,
             buffer: json.entries("buffers").len(),
             bytes: Vec::new(),
         }
     }
 
     /// Behind gathered buffers.
-    pub(super) fn gathered(gathered: Gathered, bytes: Vec<u8>) -> Self {
+    pub(super) fn gathered(gathered: GatheredBuffers, bytes: Vec<u8>) -> Self {
         Self {
-            home: Home::Gathered(gathered),
+            home: BufferHome::Gathered(gathered),
             buffer: 0,
             bytes,
         }
@@ -75,7 +75,7 @@ impl<'a> Data<'a> {
 
     fn before(&self) -> &'a [u8] {
         match self.home {
-            Home::Bin(bin, _) => bin,
+            BufferHome::Bin(bin, _) => bin,
             _ => &[],
         }
     }
@@ -91,7 +91,7 @@ impl<'a> Data<'a> {
         (self.base() + self.bytes.len()) as u64 + more
     }
 
-    /// Appends bytes, aligned to four; gives the place of their buffer view.
+    /// Appends bytes, aligned to four; returns the index of their buffer view.
     pub(super) fn append(&mut self, edits: &mut Edits<'_>, bytes: &[u8]) -> usize {
         self.bytes
             .extend_from_slice(padding(self.bytes.len(), &[0; 3]));
@@ -110,8 +110,10 @@ impl<'a> Data<'a> {
         let pad = |length: usize| padding(length, &[0; 3]);
         let length = self.length_with(0);
         match &self.home {
-            Home::Bin(bin, _) if self.bytes.is_empty() => (!bin.is_empty()).then(|| vec![*bin]),
-            Home::Bin(bin, said) => {
+            BufferHome::Bin(bin, _) if self.bytes.is_empty() => {
+                (!bin.is_empty()).then(|| vec![*bin])
+            }
+            BufferHome::Bin(bin, said) => {
                 match said {
                     Some(said) => edits.replace(said, length),
                     None => {
@@ -125,13 +127,13 @@ impl<'a> Data<'a> {
                     pad(self.bytes.len()),
                 ])
             }
-            Home::Gathered(gathered) => {
+            BufferHome::Gathered(gathered) => {
                 if let Some(buffers) = json.array("buffers") {
                     edits.replace(buffers, gathered.buffers(length));
                 }
                 Some(vec![&self.bytes, pad(self.bytes.len())])
             }
-            Home::Uri => {
+            BufferHome::Uri => {
                 if !self.bytes.is_empty() {
                     let uri = uri::of_bytes(&self.bytes);
                     edits.append_to(
@@ -143,17 +145,4 @@ impl<'a> Data<'a> {
             }
         }
     }
-}
-
-/// # Errors
-/// When a GLB cannot be so long.
-pub(super) fn check_length(json: &Json<'_>, length: u64) -> Result<(), Diagnostic> {
-    if length <= u64::from(u32::MAX) {
-        return Ok(());
-    }
-    let message = format!(
-        "the GLB would have {length} bytes and more, and can have {}; sample at a lower rate",
-        u32::MAX
-    );
-    Err(Diagnostic::new(json.name, Code::GlbTooLong, message))
 }

@@ -10,9 +10,9 @@ use crate::gltf::json::Json;
 /// Changes to come, in any order.
 pub(super) struct Edits<'a> {
     json: &'a Json<'a>,
-    /// What stands in the place of what; insertions at one place in their order.
+    /// Byte ranges and their replacements; insertions at one offset in their order.
     list: Vec<(Range<usize>, String)>,
-    /// How many entries arrays got, by the places of their ends.
+    /// How many entries arrays got, by the offsets of their ends.
     appended: BTreeMap<usize, usize>,
     /// Entries of arrays at the top that the file has not.
     missing: BTreeMap<&'static str, Vec<String>>,
@@ -39,7 +39,7 @@ impl<'a> Edits<'a> {
         self.list.push((end..end, member));
     }
 
-    /// Puts other members in the place of that whose value this is; `before` is the value of the
+    /// Replaces the member whose value this is by others; `before` is the value of the
     /// member before it in `object`.
     pub(super) fn replace_member(
         &mut self,
@@ -58,18 +58,18 @@ impl<'a> Edits<'a> {
         self.list.push((start + quote..end, with));
     }
 
-    /// Appends to an array of `count` entries; gives the place of the new one.
+    /// Appends to an array of `count` entries; returns the index of the new one.
     pub(super) fn append(&mut self, array: &RawValue, count: usize, entry: &str) -> usize {
         let end = self.json.range(array).end - 1;
         let appended = self.appended.entry(end).or_default();
-        let place = count + *appended;
+        let index = count + *appended;
         *appended += 1;
-        let comma = if place == 0 { "" } else { "," };
+        let comma = if index == 0 { "" } else { "," };
         self.list.push((end..end, format!("{comma}{entry}")));
-        place
+        index
     }
 
-    /// Appends to an array at the top; gives the place of the new entry.
+    /// Appends to an array at the top; returns the index of the new entry.
     pub(super) fn append_to(&mut self, list: &'static str, entry: String) -> usize {
         if let Some(array) = self.json.array(list) {
             return self.append(array, self.json.entries(list).len(), &entry);
@@ -99,13 +99,13 @@ impl<'a> Edits<'a> {
             let member = format!(",\"{list}\":[{}]", entries.join(","));
             self.list.push((end..end, member));
         }
-        self.list.sort_by_key(|(place, _)| place.start);
+        self.list.sort_by_key(|(range, _)| range.start);
         let mut edited = String::with_capacity(text.len());
         let mut done = 0;
-        for (place, with) in self.list {
-            edited += &text[done..place.start];
+        for (range, with) in self.list {
+            edited += &text[done..range.start];
             edited += &with;
-            done = place.end;
+            done = range.end;
         }
         edited + &text[done..]
     }

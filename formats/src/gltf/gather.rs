@@ -5,24 +5,24 @@ use std::collections::HashSet;
 
 use serde_json::value::RawValue;
 
-use crate::diagnostic::{Code, Diagnostic, Place};
-use crate::gltf::container::padding;
-use crate::gltf::data::{Data, check_length};
+use crate::diagnostic::{Code, Diagnostic, Location};
+use crate::gltf::container::{check_length, padding};
+use crate::gltf::data::BufferData;
 use crate::gltf::edits::Edits;
-use crate::gltf::json::Members;
-use crate::gltf::reader::{MESHOPT, Reader};
+use crate::gltf::json::JsonMembers;
+use crate::gltf::reader::{GltfReader, MESHOPT};
 use crate::gltf::schema::{Buffer, Texture};
 use crate::gltf::uri;
 use crate::gltf::whole::Whole;
 
 /// The buffers of a GLB: the BIN chunk, and those that could not be gathered.
-pub(super) struct Gathered {
+pub(super) struct GatheredBuffers {
     /// What the first gathered buffer says of itself beside its length and URI.
     members: String,
     kept: Vec<String>,
 }
 
-impl Gathered {
+impl GatheredBuffers {
     /// The list of buffers, for a BIN chunk of so many bytes.
     pub(super) fn buffers(&self, length: u64) -> String {
         let bin = format!("{{\"byteLength\":{length}{}}}", self.members);
@@ -37,16 +37,16 @@ impl Gathered {
 /// # Errors
 /// When a buffer or a view is broken, or all are more than a GLB can hold.
 pub(super) fn buffers<'a>(
-    reader: &Reader<'a>,
+    reader: &GltfReader<'a>,
     edits: &mut Edits<'a>,
-) -> Result<Data<'a>, Diagnostic> {
+) -> Result<BufferData<'a>, Diagnostic> {
     let json = reader.json;
     let mut bytes = Vec::new();
     let mut members = None;
     let mut kept = Vec::new();
     let mut is_first_unnamed = false;
-    // For each buffer, its new place and how far its bytes moved.
-    let mut places: Vec<(usize, usize)> = Vec::new();
+    // For each buffer, its new index and how far its bytes moved.
+    let mut moves: Vec<(usize, usize)> = Vec::new();
     for (index, raw) in json.entries("buffers").iter().enumerate() {
         let pointer = format!("/buffers/{index}");
         let buffer: Buffer<'_> = json.typed(raw, &pointer)?;
@@ -58,16 +58,16 @@ pub(super) fn buffers<'a>(
         let Some(found) = found else {
             is_first_unnamed |= index == 0 && buffer.uri.is_none();
             kept.push(raw.get().to_owned());
-            places.push((kept.len(), 0));
+            moves.push((kept.len(), 0));
             continue;
         };
         bytes.extend_from_slice(padding(bytes.len(), &[0; 3]));
         check_length(json, (bytes.len() + found.len()) as u64)?;
-        places.push((0, bytes.len()));
+        moves.push((0, bytes.len()));
         bytes.extend_from_slice(found);
         if members.is_none() {
-            let own: Members<'_> = json.typed(raw, &pointer)?;
-            members = Some(others(&own));
+            let buffer_members: JsonMembers<'_> = json.typed(raw, &pointer)?;
+            members = Some(others(&buffer_members));
         }
     }
     let members = match members {
@@ -78,30 +78,33 @@ pub(super) fn buffers<'a>(
             bytes.extend([0; 4]);
             String::new()
         }
-        None => return Ok(Data::in_uri(json)),
+        None => return Ok(BufferData::in_uri(json)),
     };
     for (index, view) in json.entries("bufferViews").iter().enumerate() {
         let pointer = format!("/bufferViews/{index}");
-        let own: Members<'a> = json.typed(view, &pointer)?;
-        move_view(reader, edits, (view, &own), &places, &pointer)?;
-        let Some(extensions) = own.get("extensions") else {
+        let members: JsonMembers<'a> = json.typed(view, &pointer)?;
+        move_view(reader, edits, (view, &members), &moves, &pointer)?;
+        let Some(extensions) = members.get("extensions") else {
             continue;
         };
-        let extensions: Members<'a> = json.typed(extensions, &pointer)?;
+        let extensions: JsonMembers<'a> = json.typed(extensions, &pointer)?;
         for compressed in MESHOPT.iter().filter_map(|name| extensions.get(name)) {
-            let own: Members<'a> = json.typed(compressed, &pointer)?;
-            move_view(reader, edits, (compressed, &own), &places, &pointer)?;
+            let members: JsonMembers<'a> = json.typed(compressed, &pointer)?;
+            move_view(reader, edits, (compressed, &members), &moves, &pointer)?;
         }
     }
-    Ok(Data::gathered(Gathered { members, kept }, bytes))
+    Ok(BufferData::gathered(
+        GatheredBuffers { members, kept },
+        bytes,
+    ))
 }
 
 /// What was found; of a fault a warning that the URI is kept.
-fn stays_outside<T>(reader: &Reader<'_>, found: Result<T, Diagnostic>) -> Option<T> {
+fn stays_outside<T>(reader: &GltfReader<'_>, found: Result<T, Diagnostic>) -> Option<T> {
     found
         .map_err(|fault| {
-            let pointer = match fault.place {
-                Some(Place::Inside(pointer)) => pointer,
+            let pointer = match fault.location {
+                Some(Location::Inside(pointer)) => pointer,
                 _ => String::new(),
             };
             reader.warn(Code::StaysOutside, &pointer, || {
@@ -112,7 +115,7 @@ fn stays_outside<T>(reader: &Reader<'_>, found: Result<T, Diagnostic>) -> Option
 }
 
 /// The members of a buffer that stay, each with a comma before it.
-fn others(members: &Members<'_>) -> String {
+fn others(members: &JsonMembers<'_>) -> String {
     let stay = members
         .0
         .iter()
@@ -129,10 +132,10 @@ fn others(members: &Members<'_>) -> String {
 
 /// Changes the buffer and the offset of a view, or of what a view is compressed as.
 fn move_view<'a>(
-    reader: &Reader<'a>,
+    reader: &GltfReader<'a>,
     edits: &mut Edits<'a>,
-    (object, members): (&RawValue, &Members<'a>),
-    places: &[(usize, usize)],
+    (object, members): (&RawValue, &JsonMembers<'a>),
+    moves: &[(usize, usize)],
     pointer: &str,
 ) -> Result<(), Diagnostic> {
     let number = |raw: Option<&'a RawValue>| -> Result<usize, Diagnostic> {
@@ -143,7 +146,7 @@ fn move_view<'a>(
     };
     let (buffer, offset) = (members.get("buffer"), members.get("byteOffset"));
     let old = number(buffer)?;
-    let (Some(buffer), Some(&(new, by))) = (buffer, places.get(old)) else {
+    let (Some(buffer), Some(&(new, by))) = (buffer, moves.get(old)) else {
         return Ok(());
     };
     if new != old {
@@ -163,21 +166,24 @@ fn move_view<'a>(
 /// # Errors
 /// When an image's entry is broken, or all are more than a GLB can hold.
 pub(super) fn images<'a>(
-    reader: &Reader<'a>,
+    reader: &GltfReader<'a>,
     edits: &mut Edits<'a>,
-    data: &mut Data<'_>,
+    data: &mut BufferData<'_>,
 ) -> Result<(), Diagnostic> {
     let json = reader.json;
     // glTF itself has PNG and JPEG; others are for textures of extensions.
     let textures: Vec<Texture> = json.optional("textures");
-    let plain: HashSet<usize> = textures.iter().filter_map(|own| own.source).collect();
+    let plain: HashSet<usize> = textures
+        .iter()
+        .filter_map(|texture| texture.source)
+        .collect();
     for (index, image) in json.entries("images").iter().enumerate() {
         let pointer = format!("/images/{index}");
-        let members: Members<'a> = json.typed(image, &pointer)?;
-        let Some(place) = members.0.iter().position(|(name, _)| name == "uri") else {
+        let members: JsonMembers<'a> = json.typed(image, &pointer)?;
+        let Some(uri_index) = members.0.iter().position(|(name, _)| name == "uri") else {
             continue;
         };
-        let value = members.0[place].1;
+        let value = members.0[uri_index].1;
         let uri: Cow<'a, str> = json.typed(value, &pointer)?;
         if uri::is_data(&uri) {
             continue;
@@ -203,7 +209,7 @@ pub(super) fn images<'a>(
             Some(_) => String::new(),
             None => format!(",\"mimeType\":\"{kind}\""),
         };
-        let before = place.checked_sub(1).map(|before| members.0[before].1);
+        let before = uri_index.checked_sub(1).map(|before| members.0[before].1);
         edits.replace_member(image, before, value, format!("\"bufferView\":{view}{kind}"));
     }
     Ok(())

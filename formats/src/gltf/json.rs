@@ -1,4 +1,4 @@
-//! The JSON of a file: values are found by their places in the text, so that what is not touched
+//! The JSON of a file: values are found by their offsets in the text, so that what is not touched
 //! comes back byte for byte, and what is read is typed, with a pointer to each fault.
 
 use std::fmt;
@@ -7,7 +7,7 @@ use std::ops::Range;
 use serde::de::{Deserialize, Deserializer, MapAccess, Visitor};
 use serde_json::value::RawValue;
 
-use crate::diagnostic::{Code, Diagnostic, Place};
+use crate::diagnostic::{Code, Diagnostic, Location};
 
 /// The arrays at the top that are read or written.
 const LISTS: [&str; 6] = [
@@ -21,9 +21,9 @@ const LISTS: [&str; 6] = [
 
 /// An object's names and values in their order; names may occur twice.
 #[derive(Default)]
-pub(super) struct Members<'a>(pub(super) Vec<(String, &'a RawValue)>);
+pub(super) struct JsonMembers<'a>(pub(super) Vec<(String, &'a RawValue)>);
 
-impl<'de: 'a, 'a> Deserialize<'de> for Members<'a> {
+impl<'de: 'a, 'a> Deserialize<'de> for JsonMembers<'a> {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         struct InOrder;
 
@@ -47,16 +47,16 @@ impl<'de: 'a, 'a> Deserialize<'de> for Members<'a> {
     }
 }
 
-impl<'a> Members<'a> {
+impl<'a> JsonMembers<'a> {
     /// The first value of that name.
     pub(super) fn get(&self, name: &str) -> Option<&'a RawValue> {
-        let found = self.0.iter().find(|(own, _)| own == name);
+        let found = self.0.iter().find(|(member, _)| member == name);
         found.map(|(_, value)| *value)
     }
 }
 
 /// One array at the top.
-struct List<'a> {
+struct TopLevelArray<'a> {
     name: &'static str,
     /// `None` where the file has no such array.
     array: Option<&'a RawValue>,
@@ -68,8 +68,8 @@ pub(super) struct Json<'a> {
     /// What messages call the file.
     pub(super) name: &'a str,
     pub(super) text: &'a str,
-    members: Members<'a>,
-    lists: Vec<List<'a>>,
+    members: JsonMembers<'a>,
+    lists: Vec<TopLevelArray<'a>>,
 }
 
 impl<'a> Json<'a> {
@@ -77,14 +77,14 @@ impl<'a> Json<'a> {
     /// What is no JSON, no object, or has something else for one of the arrays.
     pub(super) fn parse(name: &'a str, text: &'a str) -> Result<Self, Diagnostic> {
         let members = serde_json::from_str(text).map_err(|error| Diagnostic {
-            place: Some(Place::Text {
+            location: Some(Location::Text {
                 line: error.line() as u64,
                 column: error.column().max(1) as u64,
             }),
             ..Diagnostic::new(
                 name,
                 Code::Json,
-                format!("the JSON cannot be read: {}", without_place(&error)),
+                format!("the JSON cannot be read: {}", without_position(&error)),
             )
         })?;
         let mut json = Self {
@@ -106,7 +106,7 @@ impl<'a> Json<'a> {
     pub(super) fn take_apart(&mut self, name: &'static str) -> Result<(), Diagnostic> {
         let array = self.member(name)?;
         let entries = array.map(|raw| self.typed(raw, &format!("/{name}")));
-        self.lists.push(List {
+        self.lists.push(TopLevelArray {
             name,
             array,
             entries: entries.transpose()?.unwrap_or_default(),
@@ -119,7 +119,7 @@ impl<'a> Json<'a> {
     /// # Errors
     /// When the file has it twice.
     pub(super) fn member(&self, name: &str) -> Result<Option<&'a RawValue>, Diagnostic> {
-        let mut found = self.members.0.iter().filter(|(own, _)| own == name);
+        let mut found = self.members.0.iter().filter(|(member, _)| member == name);
         let first = found.next().map(|(_, value)| *value);
         match found.next() {
             Some(_) => {
@@ -139,13 +139,13 @@ impl<'a> Json<'a> {
 
     /// The entries of an array at the top; none where the file has no such array.
     pub(super) fn entries(&self, list: &str) -> &[&'a RawValue] {
-        let list = self.lists.iter().find(|own| own.name == list);
+        let list = self.lists.iter().find(|entry| entry.name == list);
         list.map_or(&[], |list| &list.entries)
     }
 
     /// The text of an array at the top.
     pub(super) fn array(&self, list: &str) -> Option<&'a RawValue> {
-        self.lists.iter().find(|own| own.name == list)?.array
+        self.lists.iter().find(|entry| entry.name == list)?.array
     }
 
     /// An entry of an array at the top that `from`, a pointer, names.
@@ -181,7 +181,7 @@ impl<'a> Json<'a> {
         pointer: &str,
     ) -> Result<T, Diagnostic> {
         serde_json::from_str(raw.get()).map_err(|error| {
-            let message = format!("is not as glTF 2.0 has it: {}", without_place(&error));
+            let message = format!("is not as glTF 2.0 has it: {}", without_position(&error));
             self.refuse(pointer, Code::Property, message)
         })
     }
@@ -197,14 +197,14 @@ impl<'a> Json<'a> {
 
     /// Where a value stands in the text.
     pub(super) fn range(&self, raw: &RawValue) -> Range<usize> {
-        // Values are borrowed from the text, so that their addresses tell their places.
+        // Values are borrowed from the text, so that their addresses give their offsets.
         let start = raw.get().as_ptr() as usize - self.text.as_ptr() as usize;
         start..start + raw.get().len()
     }
 }
 
 /// The message of an error, without line and column, which count within one value.
-fn without_place(error: &serde_json::Error) -> String {
+fn without_position(error: &serde_json::Error) -> String {
     let text = error.to_string();
     let end = text.rfind(" at line ").unwrap_or(text.len());
     text[..end].to_owned()

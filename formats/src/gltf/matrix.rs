@@ -24,7 +24,7 @@ pub(super) fn split(matrix: [f64; 16]) -> Option<(Transform, bool)> {
         let both = axes[i].zip(axes[j]);
         both.is_some_and(|(a, b)| a.dot(b).abs() > RIGHT_ANGLE)
     });
-    let last_row = [3, 7, 11, 15].map(|place| matrix[place]);
+    let last_row = [3, 7, 11, 15].map(|at| matrix[at]);
     let is_sheared = leaning || last_row != [0.0, 0.0, 0.0, 1.0];
     let [x, y, z] = at_right_angles(axes);
     let transform = Transform {
@@ -83,7 +83,7 @@ mod tests {
 
     #[test]
     fn transforms_are_found_again_mirrored_and_flat_ones_too() {
-        let turn = DQuat::from_euler(glam::EulerRot::XYZ, 0.3, -1.2, 2.9);
+        let rotation = DQuat::from_euler(glam::EulerRot::XYZ, 0.3, -1.2, 2.9);
         for scale in [
             DVec3::ONE,
             DVec3::new(2.0, 0.5, 3.0),
@@ -94,7 +94,7 @@ mod tests {
             DVec3::ZERO,
         ] {
             let at = DVec3::new(1.0, 2.0, 3.0);
-            assert_is_again(DMat4::from_scale_rotation_translation(scale, turn, at));
+            assert_is_again(DMat4::from_scale_rotation_translation(scale, rotation, at));
         }
         let quarter = [
             0.0, 2.0, 0.0, 0.0, -2.0, 0.0, 0.0, 0.0, 0.0, 0.0, 2.0, 0.0, 3.0, 4.0, 5.0, 1.0,

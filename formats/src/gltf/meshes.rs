@@ -9,7 +9,7 @@ use crate::diagnostic::{Code, Diagnostic};
 use crate::gltf::container::Container;
 use crate::gltf::json::Json;
 use crate::gltf::nodes::Nodes;
-use crate::gltf::reader::Reader;
+use crate::gltf::reader::GltfReader;
 use crate::gltf::schema::{Mesh, Node, Primitive, Scene};
 use crate::gltf::{bytes_of, check_version};
 use crate::text::lines::Limits;
@@ -53,25 +53,25 @@ pub fn triangles_of(
     json.take_apart("meshes")?;
     json.take_apart("scenes")?;
     check_version(&json)?;
-    let reader = Reader::new(&json, &container, folder, limits, warnings)?;
+    let reader = GltfReader::new(&json, &container, folder, limits, warnings)?;
     let nodes = Nodes::read(&json)?;
     let order = parents_first(&nodes);
     let is_shown = shown(&json, &nodes, &order)?;
-    let mut places = vec![DMat4::IDENTITY; nodes.count()];
+    let mut to_world = vec![DMat4::IDENTITY; nodes.count()];
     for &index in &order {
         let node: Node = json.entry("nodes", index, "/nodes")?;
-        let parent = nodes.parent(index).map(|parent| places[parent]);
-        places[index] = parent.unwrap_or(DMat4::IDENTITY) * place_in_parent(&node);
+        let parent = nodes.parent(index).map(|parent| to_world[parent]);
+        to_world[index] = parent.unwrap_or(DMat4::IDENTITY) * local_matrix(&node);
     }
     let mut all = Triangles::default();
     for index in (0..nodes.count()).filter(|&index| is_shown[index]) {
         let node: Node = json.entry("nodes", index, "/nodes")?;
         if let Some(mesh) = node.mesh {
-            let place = places[index];
+            let node_to_world = to_world[index];
             let mesh_entry: Mesh = json.entry("meshes", mesh, &format!("/nodes/{index}/mesh"))?;
-            for (own, primitive) in mesh_entry.primitives.iter().enumerate() {
-                let pointer = format!("/meshes/{mesh}/primitives/{own}");
-                add(&reader, primitive, &pointer, place, &mut all)?;
+            for (i, primitive) in mesh_entry.primitives.iter().enumerate() {
+                let pointer = format!("/meshes/{mesh}/primitives/{i}");
+                add(&reader, primitive, &pointer, node_to_world, &mut all)?;
             }
         }
     }
@@ -79,7 +79,7 @@ pub fn triangles_of(
     Ok(all)
 }
 
-/// All nodes, each behind the one that it hangs on.
+/// All nodes, parents before their children.
 pub(super) fn parents_first(nodes: &Nodes) -> Vec<usize> {
     let mut is_there = vec![false; nodes.count()];
     let mut order = Vec::with_capacity(nodes.count());
@@ -96,7 +96,7 @@ pub(super) fn parents_first(nodes: &Nodes) -> Vec<usize> {
     order
 }
 
-/// The nodes of the scene and those that hang on them.
+/// The nodes of the scene and their descendants.
 pub(super) fn shown(
     json: &Json<'_>,
     nodes: &Nodes,
@@ -118,14 +118,15 @@ pub(super) fn shown(
     Ok(is_shown)
 }
 
-/// Where a node rests in the one that it hangs on.
-pub(super) fn place_in_parent(node: &Node) -> DMat4 {
+/// The transform of a node at rest, relative to its parent.
+pub(super) fn local_matrix(node: &Node) -> DMat4 {
     match node.matrix {
         Some(matrix) => DMat4::from_cols_array(&matrix),
         None => DMat4::from_scale_rotation_translation(
             node.scale.map_or(DVec3::ONE, DVec3::from_array),
-            node.rotation
-                .map_or(DQuat::IDENTITY, |own| DQuat::from_array(own).normalize()),
+            node.rotation.map_or(DQuat::IDENTITY, |rotation| {
+                DQuat::from_array(rotation).normalize()
+            }),
             node.translation.map_or(DVec3::ZERO, DVec3::from_array),
         ),
     }
@@ -135,12 +136,12 @@ pub(super) fn place_in_parent(node: &Node) -> DMat4 {
 const VERTEX: usize = 200;
 const TRIANGLE: usize = 400;
 
-/// Adds the triangles of a primitive, moved to a place.
+/// Adds the triangles of a primitive, transformed to the world.
 pub(super) fn add(
-    reader: &Reader<'_>,
+    reader: &GltfReader<'_>,
     primitive: &Primitive<'_>,
     pointer: &str,
-    place: DMat4,
+    to_world: DMat4,
     all: &mut Triangles,
 ) -> Result<(), Diagnostic> {
     let json = reader.json;
@@ -172,7 +173,7 @@ pub(super) fn add(
     }
     let positions = numbers.chunks_exact(3).map(DVec3::from_slice);
     all.positions
-        .extend(positions.map(|own| place.transform_point3(own)));
+        .extend(positions.map(|point| to_world.transform_point3(point)));
     let indices: Vec<u32> = match primitive.indices {
         None => {
             reader.take(count, TRIANGLE, pointer)?;
@@ -191,19 +192,22 @@ pub(super) fn add(
         return Err(json.no_such("positions", *outside as usize, count, pointer));
     }
     let corner = |index: u32| first as u32 + index;
-    let mut push = |own: [u32; 3]| all.triangles.push(own.map(corner));
+    let mut push = |indices: [u32; 3]| all.triangles.push(indices.map(corner));
     match primitive.mode {
         4 => indices
             .chunks_exact(3)
-            .for_each(|own| push([own[0], own[1], own[2]])),
-        5 => indices.windows(3).enumerate().for_each(|(place, own)| {
-            let swap = place % 2;
-            push([own[0], own[1 + swap], own[2 - swap]]);
-        }),
+            .for_each(|triangle| push([triangle[0], triangle[1], triangle[2]])),
+        5 => indices
+            .windows(3)
+            .enumerate()
+            .for_each(|(triangle, strip)| {
+                let swap = triangle % 2;
+                push([strip[0], strip[1 + swap], strip[2 - swap]]);
+            }),
         _ => indices
             .windows(2)
             .skip(1)
-            .for_each(|own| push([indices[0], own[0], own[1]])),
+            .for_each(|edge| push([indices[0], edge[0], edge[1]])),
     }
     Ok(())
 }

@@ -25,7 +25,7 @@ const BLOCK_BYTES: usize = 8192;
 pub(crate) enum Filter {
     /// Nothing.
     None,
-    /// Three components and the place of the largest become four normalised i16, `x y z w`.
+    /// Three components and the index of the largest become four normalised i16, `x y z w`.
     Quaternion,
     /// A mantissa of 24 bits and an exponent of 8 become an f32.
     Exponential,
@@ -56,7 +56,7 @@ pub(crate) enum MeshoptError {
     /// Fewer bytes than the shortest stream of so many elements.
     #[error(
         "{count} elements of {stride} bytes need a meshopt stream of {needed} bytes or more, and \
-         this one has {given}; export the file again"
+         this one has {found}; export the file again"
     )]
     Short {
         /// Elements said to be there.
@@ -66,16 +66,16 @@ pub(crate) enum MeshoptError {
         /// The length of the shortest such stream.
         needed: u128,
         /// Bytes given.
-        given: usize,
+        found: usize,
     },
     /// The blocks run into the tail.
     #[error(
-        "the meshopt stream of {given} bytes ends within the block that begins with element \
+        "the meshopt stream of {found} bytes ends within the block that begins with element \
          {element}; it is cut or damaged: export the file again"
     )]
     Cut {
         /// Bytes given.
-        given: usize,
+        found: usize,
         /// The first element of the block, counted from 0.
         element: usize,
     },
@@ -155,7 +155,7 @@ pub(crate) fn decode_attributes(
             count,
             stride,
             needed,
-            given: bytes.len(),
+            found: bytes.len(),
         });
     };
     let (before, modes) = bytes[bytes.len() - stride - channels..].split_at(stride);
@@ -170,7 +170,7 @@ pub(crate) fn decode_attributes(
     for (index, block_output) in output.chunks_mut(block * stride).enumerate() {
         if decode_block(&mut body, modes, &mut before, block_output).is_none() {
             return Err(MeshoptError::Cut {
-                given: bytes.len(),
+                found: bytes.len(),
                 element: index * block,
             });
         }
@@ -219,7 +219,7 @@ fn encode_list(mut list: Vec<u8>, stream: &mut Vec<u8>) {
     let groups = list.as_chunks::<GROUP>().0;
     let header = stream.len();
     stream.resize(header + groups.len().div_ceil(4), 0);
-    for (place, group) in groups.iter().enumerate() {
+    for (i, group) in groups.iter().enumerate() {
         // Those that do not fit take a byte each behind the others; in no bits there is nothing but zeros.
         let length = |width: usize| match width {
             0 if group.iter().any(|&byte| byte != 0) => usize::MAX,
@@ -235,7 +235,7 @@ fn encode_list(mut list: Vec<u8>, stream: &mut Vec<u8>) {
         };
         let shortest = (0..WIDTHS.len()).min_by_key(|&index| length(WIDTHS[index]));
         let index = shortest.unwrap_or(3);
-        stream[header + place / 4] |= (index as u8) << (2 * (place % 4));
+        stream[header + i / 4] |= (index as u8) << (2 * (i % 4));
         match WIDTHS[index] {
             0 => {}
             8 => stream.extend_from_slice(group),
@@ -264,9 +264,9 @@ fn least_body(count: usize, stride: usize, block: usize, has_channels: bool) -> 
 
 /// The next `count` bytes, `None` where they are not there.
 fn take<'a>(body: &mut &'a [u8], count: usize) -> Option<&'a [u8]> {
-    let (taken, rest) = body.split_at_checked(count)?;
+    let (head, rest) = body.split_at_checked(count)?;
     *body = rest;
-    Some(taken)
+    Some(head)
 }
 
 /// Decodes the elements of one block. `before` is the element before the first, then the last of
@@ -287,10 +287,10 @@ fn decode_block(
             decode_list(body, control, elements, list)?;
         }
         let mode = modes.get(channel).copied().unwrap_or(0);
-        for (element, own) in output.chunks_exact_mut(stride).enumerate() {
-            let difference = lists.each_ref().map(|list| list[element]);
+        for (index, element) in output.chunks_exact_mut(stride).enumerate() {
+            let difference = lists.each_ref().map(|list| list[index]);
             *before = apply(*before, difference, mode);
-            own[4 * channel..][..4].copy_from_slice(before);
+            element[4 * channel..][..4].copy_from_slice(before);
         }
     }
     Some(())
@@ -320,8 +320,8 @@ fn decode_list(
     let groups = elements.div_ceil(GROUP);
     let header = take(body, groups.div_ceil(4))?;
     for (group, list) in list.as_chunks_mut().0.iter_mut().take(groups).enumerate() {
-        let place = header[group / 4] >> (2 * (group % 4)) & 3;
-        decode_group(body, widths[usize::from(place)], list)?;
+        let width_index = header[group / 4] >> (2 * (group % 4)) & 3;
+        decode_group(body, widths[usize::from(width_index)], list)?;
     }
     Some(())
 }
@@ -336,10 +336,10 @@ fn decode_group(body: &mut &[u8], width: usize, list: &mut [u8; GROUP]) -> Optio
         _ => {
             let all_set = (1 << width) - 1;
             let in_byte = 8 / width;
-            for (place, difference) in list.iter_mut().enumerate() {
-                let low = place % in_byte * width;
+            for (i, difference) in list.iter_mut().enumerate() {
+                let low = i % in_byte * width;
                 let shift = if width == 1 { low } else { 8 - width - low };
-                *difference = packed[place / in_byte] >> shift & all_set;
+                *difference = packed[i / in_byte] >> shift & all_set;
                 if *difference == all_set {
                     *difference = take(body, 1)?[0];
                 }
@@ -385,11 +385,11 @@ pub(super) fn quaternion(element: &mut [u8; 8]) {
     let [x, y, z, one] = [input[0], input[1], input[2], input[3] | 3].map(f32::from);
     let largest = (2.0 * (one * one) - (x * x + (y * y + z * z))).max(0.0);
     let scale = 32767.0 * FRAC_1_SQRT_2 / one;
-    let place = usize::from(element[6] & 3);
+    let largest_index = usize::from(element[6] & 3);
     for (i, component) in [largest.sqrt(), x, y, z].into_iter().enumerate() {
         // Conversions of floats to integers saturate.
         let rounded = (component * scale).round_ties_even() as i16;
-        element[(place + i) % 4 * 2..][..2].copy_from_slice(&rounded.to_le_bytes());
+        element[(largest_index + i) % 4 * 2..][..2].copy_from_slice(&rounded.to_le_bytes());
     }
 }
 

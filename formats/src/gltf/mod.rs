@@ -4,7 +4,6 @@
 //! is read is checked; what is not read may be anything, and comes back byte for byte when the file
 //! is written with other keys.
 
-mod accessor;
 mod animation;
 mod bake;
 mod baking;
@@ -19,14 +18,14 @@ mod matrix;
 pub mod meshes;
 mod meshopt;
 mod nodes;
-mod own_keys;
 pub(crate) mod quantized;
 mod reader;
 mod schema;
-pub mod skins;
+mod skins;
 mod uri;
 mod whole;
 pub mod write_new;
+mod written_keys;
 
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
@@ -34,14 +33,14 @@ use std::io::BufRead;
 use std::path::Path;
 use std::sync::Arc;
 
-use crate::diagnostic::{Code, Diagnostic, Place};
+use crate::diagnostic::{Code, Diagnostic, Location};
 use crate::feature::Feature;
 use crate::format::{Format, FormatOption, Loaded, ReadOptions};
 use crate::gltf::bake::Gltf;
 use crate::gltf::container::Container;
 use crate::gltf::json::Json;
 use crate::gltf::nodes::Nodes;
-use crate::gltf::reader::{MESHOPT, Reader};
+use crate::gltf::reader::{GltfReader, MESHOPT};
 use crate::gltf::schema::Asset;
 use crate::source::Source;
 use crate::text::lines::Limits;
@@ -67,13 +66,13 @@ pub static FORMAT: Format = Format {
         Feature::Steps,
         Feature::Bvh,
         Feature::SeveralClips,
-        Feature::OwnTimes,
+        Feature::TimesPerChannel,
         Feature::UnevenTimes,
     ],
     options: &[
         FormatOption::RawTimes,
         FormatOption::Duplicates,
-        FormatOption::OwnKeys,
+        FormatOption::AtKeys,
         FormatOption::Quantize,
     ],
 };
@@ -119,11 +118,11 @@ fn bytes_of(
     let mut source = Source::open(path, pipes)?;
     let name = source.name.clone();
     let start = source.reader.fill_buf().unwrap_or_default();
-    let most = match start.starts_with(container::MAGIC) {
+    let limit = match start.starts_with(container::MAGIC) {
         true => limits.file.min(LONGEST_GLB),
         false => limits.file,
     };
-    let bytes = source.into_bytes(most)?;
+    let bytes = source.into_bytes(limit)?;
     let folder = (path.as_os_str() != "-").then(|| path.parent().unwrap_or(Path::new("")));
     Ok((name, bytes, folder))
 }
@@ -148,10 +147,10 @@ pub fn read_gltf(
         let message = "the file has no animations; is it the right one?";
         return Err(json.refuse("/animations", Code::NoAnimations, message));
     }
-    let reader = Reader::new(&json, &container, folder, options.limits, warnings)?;
-    for (place, required) in reader.required().iter().enumerate() {
+    let reader = GltfReader::new(&json, &container, folder, options.limits, warnings)?;
+    for (at, required) in reader.required().iter().enumerate() {
         if !KNOWN.contains(&required.as_str()) {
-            reader.warn(Code::RequiredExtension, &format!("/extensionsRequired/{place}"), || {
+            reader.warn(Code::RequiredExtension, &format!("/extensionsRequired/{at}"), || {
                 format!("the extension {required} is required and not known; animations are read without it")
             });
         }
@@ -159,20 +158,20 @@ pub fn read_gltf(
     let nodes = Nodes::read(&json)?;
     let mut loaded = Loaded::default();
     let mut read = Vec::with_capacity(animations);
-    let mut faults: HashMap<(Option<Place>, String), usize> = HashMap::new();
+    let mut faults: HashMap<(Option<Location>, String), usize> = HashMap::new();
     for index in 0..animations {
         match animation::read(index, &reader, &nodes, options) {
             Ok(found) => {
-                let (clip, own) = found.unzip();
+                let (clip, channels) = found.unzip();
                 loaded.clips.extend(clip);
-                read.push(own);
+                read.push(channels);
             }
             // The others would be refused too, each after all that it names was looked at.
             Err(fault) if fault.code == Code::Memory => return Err(fault),
             Err(fault) => {
                 read.push(None);
                 // Animations that share a broken buffer have one fault.
-                match faults.entry((fault.place.clone(), fault.message.clone())) {
+                match faults.entry((fault.location.clone(), fault.message.clone())) {
                     Entry::Occupied(known) => loaded.refused[*known.get()].count += 1,
                     Entry::Vacant(new) => {
                         new.insert(loaded.refused.len());

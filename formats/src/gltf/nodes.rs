@@ -1,4 +1,4 @@
-//! The nodes of a file: what hangs on what, what each is called, and where it rests.
+//! The nodes of a file: their parents, names and rest transforms.
 
 use std::cell::OnceCell;
 use std::collections::{BTreeSet, HashMap, HashSet};
@@ -7,10 +7,10 @@ use glam::{DQuat, DVec3, Vec3};
 use serde_json::value::RawValue;
 
 use crate::bvh::BvhJoint;
-use crate::diagnostic::{Code, Diagnostic, Place};
+use crate::diagnostic::{Code, Diagnostic, Location};
 use crate::gltf::json::Json;
 use crate::gltf::matrix::split;
-use crate::gltf::reader::Reader;
+use crate::gltf::reader::GltfReader;
 use crate::gltf::schema::{Extras, Node, NodeBeside, OriginExtras, Skin};
 use crate::keys::{Duplicates, Origin};
 use crate::motion::Transform;
@@ -20,7 +20,7 @@ pub(super) struct Nodes {
     list: Vec<Node>,
     parents: Vec<Option<usize>>,
     names: Vec<String>,
-    rests: Vec<OnceCell<Result<Rest, Diagnostic>>>,
+    rests: Vec<OnceCell<Result<RestPose, Diagnostic>>>,
     /// The joints of each skin, as far as there are such nodes.
     skins: Vec<Vec<usize>>,
     /// The skins of each node that is a joint.
@@ -33,7 +33,7 @@ pub(super) struct Nodes {
 
 /// Where a node rests.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Rest {
+pub(super) struct RestPose {
     pub(super) transform: Transform,
     /// Its matrix shears or projects, which no transform does.
     pub(super) is_sheared: bool,
@@ -100,7 +100,7 @@ impl Nodes {
         &self.names[node]
     }
 
-    /// Adds the nodes that hang together with those among `nodes`: all that carry them, and all
+    /// Adds the nodes that are connected with those among `nodes`: all that carry them, and all
     /// joints of a skin that has one of them.
     pub(super) fn complete(&self, nodes: &mut BTreeSet<usize>) {
         let mut open: Vec<usize> = std::mem::take(nodes).into_iter().collect();
@@ -131,7 +131,11 @@ impl Nodes {
     ///
     /// # Errors
     /// When its numbers are too large for f32, or its rotation is none.
-    pub(super) fn rest(&self, node: usize, reader: &Reader<'_>) -> Result<Rest, Diagnostic> {
+    pub(super) fn rest(
+        &self,
+        node: usize,
+        reader: &GltfReader<'_>,
+    ) -> Result<RestPose, Diagnostic> {
         let find = || find_rest(&self.list[node], node, reader);
         self.rests[node].get_or_init(find).clone()
     }
@@ -188,14 +192,14 @@ fn origins(json: &Json<'_>, list: &[Node]) -> Vec<Option<DVec3>> {
 fn parents(json: &Json<'_>, list: &[Node]) -> Result<Vec<Option<usize>>, Diagnostic> {
     let mut parents: Vec<Option<usize>> = vec![None; list.len()];
     for (parent, node) in list.iter().enumerate() {
-        for (place, &child) in node.children.iter().enumerate() {
-            let pointer = format!("/nodes/{parent}/children/{place}");
+        for (i, &child) in node.children.iter().enumerate() {
+            let pointer = format!("/nodes/{parent}/children/{i}");
             match parents.get_mut(child) {
                 None => return Err(json.no_such("nodes", child, list.len(), &pointer)),
-                Some(own @ None) => *own = Some(parent),
+                Some(unset @ None) => *unset = Some(parent),
                 Some(Some(other)) => {
                     let message = format!(
-                        "node {child} hangs on nodes {other} and {parent}; it can hang on one alone"
+                        "node {child} is a child of nodes {other} and {parent}; a node has at most one parent"
                     );
                     return Err(json.refuse(&pointer, Code::NodeTree, message));
                 }
@@ -211,7 +215,7 @@ fn parents(json: &Json<'_>, list: &[Node]) -> Result<Vec<Option<usize>>, Diagnos
             next = parents[node];
         }
         if let Some(node) = next.filter(|&node| walks[node] == start + 1) {
-            let message = format!("node {node} hangs on itself, by way of its children");
+            let message = format!("node {node} is its own ancestor");
             return Err(json.refuse(&format!("/nodes/{node}"), Code::NodeTree, message));
         }
     }
@@ -220,11 +224,11 @@ fn parents(json: &Json<'_>, list: &[Node]) -> Result<Vec<Option<usize>>, Diagnos
 
 /// The nodes' own names; `node7` where there is none, `hand#12` where an earlier node is `hand`.
 fn names(list: &[Node]) -> Vec<String> {
-    let mut taken = HashSet::new();
+    let mut used = HashSet::new();
     let name = |(index, node): (usize, &Node)| {
-        let own = node.name.clone().filter(|name| !name.is_empty());
-        let mut name = own.unwrap_or_else(|| format!("node{index}"));
-        while !taken.insert(name.clone()) {
+        let stored_name = node.name.clone().filter(|name| !name.is_empty());
+        let mut name = stored_name.unwrap_or_else(|| format!("node{index}"));
+        while !used.insert(name.clone()) {
             name = format!("{name}#{index}");
         }
         name
@@ -232,30 +236,30 @@ fn names(list: &[Node]) -> Vec<String> {
     list.iter().enumerate().map(name).collect()
 }
 
-fn find_rest(node: &Node, index: usize, reader: &Reader<'_>) -> Result<Rest, Diagnostic> {
+fn find_rest(node: &Node, index: usize, reader: &GltfReader<'_>) -> Result<RestPose, Diagnostic> {
     let pointer = format!("/nodes/{index}");
-    let too_large = |what: &str| {
+    let too_large = |property: &str| {
         let message = "a number here passes the largest f32, 3.4e38";
         reader
             .json
-            .refuse(&format!("{pointer}/{what}"), Code::TooLarge, message)
+            .refuse(&format!("{pointer}/{property}"), Code::TooLarge, message)
     };
     if let Some(matrix) = node.matrix {
         let (transform, is_sheared) = split(matrix).ok_or_else(|| too_large("matrix"))?;
-        return Ok(Rest {
+        return Ok(RestPose {
             transform,
             is_sheared,
         });
     }
     let mut transform = Transform::default();
-    let vector = |given: Option<[f64; 3]>, what| match given {
+    let vector = |components: Option<[f64; 3]>, property| match components {
         None => Ok(None),
-        Some(given) => {
-            let vector = Vec3::from_array(given.map(|number| number as f32));
+        Some(components) => {
+            let vector = Vec3::from_array(components.map(|number| number as f32));
             vector
                 .is_finite()
                 .then_some(Some(vector))
-                .ok_or_else(|| too_large(what))
+                .ok_or_else(|| too_large(property))
         }
     };
     if let Some(translation) = vector(node.translation, "translation")? {
@@ -267,7 +271,7 @@ fn find_rest(node: &Node, index: usize, reader: &Reader<'_>) -> Result<Rest, Dia
     if let Some(rotation) = node.rotation {
         let origin = Origin {
             file: reader.json.name,
-            place: &|_| Place::Inside(format!("{pointer}/rotation")),
+            location: &|_| Location::Inside(format!("{pointer}/rotation")),
             duplicates: Duplicates::default(),
         };
         let keys = origin.unit(
@@ -276,7 +280,7 @@ fn find_rest(node: &Node, index: usize, reader: &Reader<'_>) -> Result<Rest, Dia
         )?;
         transform.rotation = keys[0];
     }
-    Ok(Rest {
+    Ok(RestPose {
         transform,
         is_sheared: false,
     })

@@ -48,15 +48,15 @@ impl Quantization {
 pub(crate) fn filtered(rotation: [f32; 4], steps: u16) -> [u8; 8] {
     let steps = steps.min(i16::MAX as u16) | 3;
     let one = f32::from(steps);
-    let largest = (1..4).fold(0, |most, i| {
-        match rotation[i].abs() > rotation[most].abs() {
+    let largest = (1..4).fold(0, |largest, i| {
+        match rotation[i].abs() > rotation[largest].abs() {
             true => i,
-            false => most,
+            false => largest,
         }
     });
     let sign = if rotation[largest] < 0.0 { -1.0 } else { 1.0 };
-    let short = |place: usize| {
-        let component = rotation[(largest + place) % 4] * std::f32::consts::SQRT_2 * sign;
+    let short = |offset: usize| {
+        let component = rotation[(largest + offset) % 4] * std::f32::consts::SQRT_2 * sign;
         (component.clamp(-1.0, 1.0) * one).round_ties_even() as i16
     };
     // What is left out is said in the two lowest bits.
@@ -93,8 +93,8 @@ mod tests {
                 let q = q.as_dquat();
                 let off = 2.0 * (found - q).length().min((found + q).length());
                 // Half a step in each of three components, and what that makes of the largest.
-                let most = 2.0 * 2.0 * 0.5 / f64::from(steps) + 1e-4;
-                assert!(off < most, "{steps} {q} {off:e}");
+                let limit = 2.0 * 2.0 * 0.5 / f64::from(steps) + 1e-4;
+                assert!(off < limit, "{steps} {q} {off:e}");
             }
         }
         assert_eq!(quantized([0.0, -1.0, 1.0, 0.5]), [0, -32767, 32767, 16384]);

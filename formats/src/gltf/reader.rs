@@ -1,12 +1,14 @@
 //! From indices to bytes: buffers, and the views of them, each found, loaded and decoded once, and
 //! only if it is needed.
 
+mod accessor;
+
 use std::borrow::Cow;
 use std::cell::{OnceCell, RefCell};
 use std::path::Path;
 
 use crate::budget::{Borrowed, Budget};
-use crate::diagnostic::{Code, Diagnostic, Place};
+use crate::diagnostic::{Code, Diagnostic, Location};
 use crate::gltf::compressed;
 use crate::gltf::container::Container;
 use crate::gltf::json::Json;
@@ -26,7 +28,7 @@ const NODE: usize = 640;
 const PADDING: u64 = 3;
 
 /// A file that is being read.
-pub(super) struct Reader<'a> {
+pub(super) struct GltfReader<'a> {
     pub(super) json: &'a Json<'a>,
     container: &'a Container,
     /// Where files beside are; there are none beside standard input.
@@ -48,7 +50,7 @@ pub(super) struct View<'a> {
     pub(super) stride: Option<usize>,
 }
 
-impl<'a> Reader<'a> {
+impl<'a> GltfReader<'a> {
     /// # Errors
     /// When the list of required extensions is none.
     pub(super) fn new(
@@ -88,10 +90,10 @@ impl<'a> Reader<'a> {
             .map_err(|error| self.json.refuse(pointer, Code::Memory, error.to_string()))
     }
 
-    /// As [`Reader::take`], until the value is dropped.
+    /// As [`GltfReader::take`], until the value is dropped.
     ///
     /// # Errors
-    /// As [`Reader::take`].
+    /// As [`GltfReader::take`].
     pub(super) fn borrow(
         &self,
         count: usize,
@@ -113,14 +115,14 @@ impl<'a> Reader<'a> {
         pointer: &str,
         message: impl FnOnce() -> M,
     ) {
-        let place = || Some(Place::Inside(pointer.to_owned()));
+        let location = || Some(Location::Inside(pointer.to_owned()));
         self.warnings
             .borrow_mut()
-            .warn(code, || (place(), message()));
+            .warn(code, || (location(), message()));
     }
 
     /// More elements than the whole file has bytes are refused where no bytes stand for them.
-    pub(super) fn holds(&self, count: u64) -> bool {
+    pub(super) fn fits(&self, count: u64) -> bool {
         let bin = self.container.bin().map_or(0, <[u8]>::len);
         count <= (self.json.text.len() + bin) as u64
     }
@@ -191,7 +193,7 @@ impl<'a> Reader<'a> {
         let path = uri::relative(uri).map_err(refuse)?;
         let Some(folder) = self.folder else {
             let message = format!(
-                "`{uri}` is a file beside, and there is none beside standard input or bytes in memory"
+                "`{uri}` is a file of its own, which is not found from standard input or bytes in memory"
             );
             return Err(refuse(message));
         };
@@ -214,11 +216,12 @@ impl<'a> Reader<'a> {
         for (name, extension) in &view.extensions.0 {
             if MESHOPT.contains(&name.as_str()) {
                 let pointer = format!("{pointer}/extensions/{name}");
-                let own: MeshoptView = self.json.typed(extension, &pointer)?;
-                let decoded = self.decoded[index].get_or_init(|| self.decode(&own, &pointer));
+                let compressed: MeshoptView = self.json.typed(extension, &pointer)?;
+                let decoded =
+                    self.decoded[index].get_or_init(|| self.decode(&compressed, &pointer));
                 return Ok(View {
                     bytes: decoded.as_deref().map_err(Clone::clone)?,
-                    stride: Some(own.byte_stride),
+                    stride: Some(compressed.byte_stride),
                 });
             }
             if self.required.contains(name) {

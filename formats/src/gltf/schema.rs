@@ -1,12 +1,12 @@
 //! The parts of glTF 2.0 that are read, by their names in its specification.
 
 use std::borrow::Cow;
+use std::fmt;
 
 use serde::Deserialize;
 use serde_json::value::RawValue;
 
-use crate::gltf::channel::Path;
-use crate::gltf::json::Members;
+use crate::gltf::json::JsonMembers;
 use crate::gltf::whole;
 
 #[derive(Deserialize)]
@@ -98,7 +98,7 @@ pub(super) struct Primitive<'a> {
     #[serde(deserialize_with = "whole::whole")]
     pub(super) mode: u32,
     #[serde(borrow, default)]
-    pub(super) extensions: Members<'a>,
+    pub(super) extensions: JsonMembers<'a>,
 }
 
 /// The mode of a primitive that says none.
@@ -135,6 +135,51 @@ pub(super) struct Channel {
     pub(super) target: Target,
 }
 
+/// What of a node a channel moves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(super) enum TargetPath {
+    Translation,
+    Rotation,
+    Scale,
+}
+
+impl TargetPath {
+    pub(super) fn named(name: &str) -> Option<Self> {
+        Some(match name {
+            "translation" => Self::Translation,
+            "rotation" => Self::Rotation,
+            "scale" => Self::Scale,
+            _ => return None,
+        })
+    }
+
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::Translation => "translation",
+            Self::Rotation => "rotation",
+            Self::Scale => "scale",
+        }
+    }
+
+    /// Numbers of a value.
+    pub(super) fn width(self) -> usize {
+        match self {
+            Self::Rotation => 4,
+            Self::Translation | Self::Scale => 3,
+        }
+    }
+}
+
+impl fmt::Display for TargetPath {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Translation => "translation",
+            Self::Rotation => "rotation",
+            Self::Scale => "scale",
+        })
+    }
+}
+
 #[derive(Deserialize)]
 pub(super) struct Target {
     #[serde(default, deserialize_with = "whole::optional")]
@@ -146,15 +191,15 @@ pub(super) struct Target {
 
 impl Target {
     /// The node that is moved, and what of it; `None` if something else is.
-    pub(super) fn moves(&self) -> Option<(usize, Path)> {
+    pub(super) fn moves(&self) -> Option<(usize, TargetPath)> {
         if self.path == "pointer" {
             let pointer = self.extensions.pointer.as_ref()?;
             let mut parts = pointer.pointer.strip_prefix("/nodes/")?.split('/');
             let node = parts.next()?.parse().ok()?;
-            let path = Path::named(parts.next()?)?;
+            let path = TargetPath::named(parts.next()?)?;
             return parts.next().is_none().then_some((node, path));
         }
-        Some((self.node?, Path::named(&self.path)?))
+        Some((self.node?, TargetPath::named(&self.path)?))
     }
 }
 
@@ -240,7 +285,7 @@ pub(super) struct BufferView<'a> {
     #[serde(default, deserialize_with = "whole::optional")]
     pub(super) byte_stride: Option<usize>,
     #[serde(borrow, default)]
-    pub(super) extensions: Members<'a>,
+    pub(super) extensions: JsonMembers<'a>,
 }
 
 /// `EXT_meshopt_compression` or `KHR_meshopt_compression` of a buffer view.
@@ -293,6 +338,6 @@ impl BufferExtensions {
         [&self.ext, &self.khr]
             .into_iter()
             .flatten()
-            .any(|own| own.fallback)
+            .any(|extension| extension.fallback)
     }
 }

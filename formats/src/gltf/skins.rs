@@ -4,45 +4,22 @@ use std::collections::HashMap;
 
 use glam::DMat4;
 
+use crate::carried_mesh::{Bone, CarriedMesh};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::gltf::bake::Gltf;
 use crate::gltf::json::Json;
-use crate::gltf::meshes::{Triangles, add, parents_first, place_in_parent, shown};
+use crate::gltf::meshes::{Triangles, add, local_matrix, parents_first, shown};
 use crate::gltf::nodes::Nodes;
-use crate::gltf::reader::Reader;
+use crate::gltf::reader::GltfReader;
 use crate::gltf::schema::{Mesh, Node, Primitive, Skin};
 use crate::motion::Motion;
 use crate::warnings::Warnings;
-
-/// Triangles that follow the tracks of a clip.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct CarriedMesh {
-    /// Of the vertices, where the mesh itself has them.
-    pub positions: Vec<[f32; 3]>,
-    /// Three vertices each.
-    pub triangles: Vec<[u32; 3]>,
-    /// The bones that each vertex follows, by their places in [`bones`](Self::bones).
-    pub bones_of: Vec<[u16; 4]>,
-    /// How much of each it follows; together 1.
-    pub weights: Vec<[f32; 4]>,
-    /// What vertices follow.
-    pub bones: Vec<Bone>,
-}
-
-/// A track that vertices follow.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Bone {
-    /// The track of the clip.
-    pub track: usize,
-    /// What takes a vertex from the mesh to the track's joint, column after column.
-    pub to_joint: [f32; 16],
-}
 
 /// Bytes of a vertex with its bones and weights, as numbers on the way.
 const VERTEX: usize = 160;
 
 /// More bones than this have no number.
-const MOST_BONES: usize = u16::MAX as usize + 1;
+const MAX_BONES: usize = u16::MAX as usize + 1;
 
 /// The meshes of the file's scene that tracks of a clip carry; nothing where there are none.
 ///
@@ -56,7 +33,7 @@ pub(super) fn carried(gltf: &Gltf, clip: &Motion) -> Result<Option<CarriedMesh>,
     }
     let warnings = Warnings::new(&gltf.name);
     let folder = gltf.folder.as_deref();
-    let reader = Reader::new(&json, &gltf.container, folder, gltf.limits, warnings)?;
+    let reader = GltfReader::new(&json, &gltf.container, folder, gltf.limits, warnings)?;
     let nodes = Nodes::read(&json)?;
     let order = parents_first(&nodes);
     let is_shown = shown(&json, &nodes, &order)?;
@@ -78,7 +55,7 @@ pub(super) fn carried(gltf: &Gltf, clip: &Motion) -> Result<Option<CarriedMesh>,
 }
 
 struct Making<'a> {
-    reader: &'a Reader<'a>,
+    reader: &'a GltfReader<'a>,
     nodes: &'a Nodes,
     /// By their names, which are those of their nodes.
     tracks: HashMap<String, usize>,
@@ -103,13 +80,13 @@ impl Making<'_> {
             },
         }
         let bones = self.mesh.bones.len();
-        if bones > MOST_BONES {
-            let message = format!("meshes follow {bones} joints, more than {MOST_BONES}");
+        if bones > MAX_BONES {
+            let message = format!("meshes follow {bones} joints, more than {MAX_BONES}");
             return Err(json.refuse(&format!("/nodes/{index}"), Code::IndexRange, message));
         }
         let entry: Mesh<'_> = json.entry("meshes", mesh, &format!("/nodes/{index}/mesh"))?;
-        for (place, primitive) in entry.primitives.iter().enumerate() {
-            let pointer = format!("/meshes/{mesh}/primitives/{place}");
+        for (i, primitive) in entry.primitives.iter().enumerate() {
+            let pointer = format!("/meshes/{mesh}/primitives/{i}");
             self.add_primitive(primitive, &pointer, first_bone, skin.is_some())?;
         }
         Ok(())
@@ -137,17 +114,17 @@ impl Making<'_> {
             );
             return Err(json.refuse(&pointer, Code::TooShort, message));
         }
-        for (place, &joint) in skin.joints.iter().enumerate() {
-            let from = format!("{pointer}/joints/{place}");
+        for (i, &joint) in skin.joints.iter().enumerate() {
+            let from = format!("{pointer}/joints/{i}");
             if joint >= self.nodes.count() {
                 return Err(json.no_such("nodes", joint, self.nodes.count(), &from));
             }
             let Some(&track) = self.tracks.get(self.nodes.name(joint)) else {
                 let name = self.nodes.name(joint);
-                let message = format!("the joint {name} of the skin is no track of the clip");
+                let message = format!("the joint {name} of the skin is not a track of the clip");
                 return Err(json.refuse(&from, Code::Property, message));
             };
-            let to_joint = match inverses.get(place) {
+            let to_joint = match inverses.get(i) {
                 Some(inverse) => DMat4::from_cols_slice(inverse),
                 None => DMat4::IDENTITY,
             };
@@ -167,7 +144,7 @@ impl Making<'_> {
                 return Ok(Some(Bone { track, to_joint }));
             }
             let entry: Node = self.reader.json.entry("nodes", node, "/nodes")?;
-            to_joint = place_in_parent(&entry) * to_joint;
+            to_joint = local_matrix(&entry) * to_joint;
             next = self.nodes.parent(node);
         }
         Ok(None)
@@ -221,11 +198,11 @@ impl Making<'_> {
         let corners = added.triangles.iter();
         let moved = corners.map(|three| three.map(|corner| corner + first as u32));
         self.mesh.triangles.extend(moved);
-        let places = added
+        let positions = added
             .positions
             .iter()
-            .map(|place| place.as_vec3().to_array());
-        self.mesh.positions.extend(places);
+            .map(|position| position.as_vec3().to_array());
+        self.mesh.positions.extend(positions);
         let bones_of = bones_of.as_chunks().0.iter();
         let numbers =
             bones_of.map(|four: &[u32; 4]| four.map(|bone| (first_bone + bone as usize) as u16));

@@ -35,7 +35,7 @@ pub(super) fn data(uri: &str) -> Result<Vec<u8>, String> {
         true => BASE64.decode(percent_decoded(data)?),
         false => BASE64.decode(data),
     };
-    decoded.map_err(|error| format!("the data URI is no base64: {error}"))
+    decoded.map_err(|error| format!("the data URI is not base64: {error}"))
 }
 
 /// A data URI of these bytes.
@@ -58,7 +58,7 @@ pub(super) fn relative(uri: &str) -> Result<PathBuf, String> {
         ));
     }
     let text = String::from_utf8(percent_decoded(uri)?)
-        .map_err(|_| format!("`{uri}` is no UTF-8 once decoded"))?;
+        .map_err(|_| format!("`{uri}` is not UTF-8 once decoded"))?;
     if text.starts_with('/') {
         return Err(format!(
             "`{uri}` is an absolute path, which is not followed; put the file beside this one"
@@ -66,7 +66,7 @@ pub(super) fn relative(uri: &str) -> Result<PathBuf, String> {
     }
     if text.contains(['\\', '\0']) || scheme(&text).is_some() {
         return Err(format!(
-            "`{uri}` is no relative path; its parts are divided by `/`"
+            "`{uri}` is not a relative path; its parts are divided by `/`"
         ));
     }
     let mut path = PathBuf::new();
@@ -110,9 +110,9 @@ fn percent_decoded(text: &str) -> Result<Vec<u8>, String> {
         }
         let digit = |at: usize| char::from(*after.get(at)?).to_digit(16);
         let (Some(high), Some(low)) = (digit(0), digit(1)) else {
-            let place = text.len() - after.len() - 1;
+            let offset = text.len() - after.len() - 1;
             return Err(format!(
-                "the `%` at byte {place} of the URI has no two hexadecimal digits"
+                "the `%` at byte {offset} of the URI has no two hexadecimal digits"
             ));
         };
         bytes.push((high * 16 + low) as u8);

@@ -16,14 +16,14 @@ use serde_json::Value;
 
 use crate::diagnostic::{Code, Diagnostic};
 use crate::format::{MotionOptions, Quantization, WriteError};
-use crate::gltf::own_keys::OwnKeys;
-use crate::gltf::write_new::binary::{Binary, Data};
+use crate::gltf::write_new::binary::{AccessorData, Binary};
 use crate::gltf::write_new::json::{
     Animation, Asset, Buffer, Channel, MESHOPT, Root, Sampler, Scene, Skin, Target,
 };
-use crate::gltf::write_new::rig::{Nodes, UniqueNames};
-use crate::gltf::write_new::samples::{Property, Samples};
-use crate::motion::{self, Sampled};
+use crate::gltf::write_new::rig::{NewNodes, UniqueNames};
+use crate::gltf::write_new::samples::{ClipSamples, Property};
+use crate::gltf::written_keys::WrittenKeys;
+use crate::motion::{self, SampledClip};
 use crate::warnings::Warnings;
 
 pub(super) use crate::gltf::write_new::json::{FLOAT, SHORT};
@@ -34,37 +34,37 @@ const HEADERS: u64 = 28;
 /// Writes clips as GLB, or where the options' `format` is `gltf`, as text with the binary data
 /// inside it; text takes memory for all of it.
 ///
-/// Joints that hang on the same joints, by name, move the same nodes in all clips, so that clips of
+/// Joints with the same parents, by name, move the same nodes in all clips, so that clips of
 /// parts of one skeleton stay clips of one skeleton; clips whose joints rest in different places get
 /// nodes of their own. Tracks of a clip without skeleton are roots without skin. Poses in the world
 /// become relative to the parents. Rotations are f32, each with the sign that continues the one
 /// before it; translations and scales are written of joints where they leave the rest pose. Steps
 /// stay steps, all else is linear; the keys of clips that are written as such
-/// ([`Sampled::of_own_keys`]) keep their samplers.
+/// ([`SampledClip::is_at_keys`]) keep their samplers.
 ///
 /// # Errors
 /// When writing fails; [`Code::NothingToAnimate`], [`Code::NotTrees`], [`Code::TimesInF32`],
 /// [`Code::TimesBelowZero`], [`Code::GlbTooLong`]; `InvalidInput` when the lists of a clip differ
 /// in length. Nothing is written then but by the system's fault.
 pub fn write_new(
-    clips: &[Sampled<'_>],
+    clips: &[SampledClip<'_>],
     options: &MotionOptions,
     out: &mut dyn Write,
 ) -> Result<Vec<Diagnostic>, WriteError> {
-    let mut nodes = Nodes::default();
+    let mut nodes = NewNodes::default();
     let parts = parts(clips, options, &mut nodes)?;
     let mut binary = Binary::default();
     let mut skins = Vec::new();
     for (joints, matrices) in nodes.skins() {
         skins.push(Skin {
-            inverse_bind_matrices: binary.push(Data::Matrices(matrices)),
+            inverse_bind_matrices: binary.push(AccessorData::Matrices(matrices)),
             skeleton: joints[0],
             joints,
         });
     }
     let mut names = UniqueNames::default();
     let mut animations = Vec::new();
-    for (place, (part, clip)) in parts.into_iter().zip(clips).enumerate() {
+    for (index, (part, clip)) in parts.into_iter().zip(clips).enumerate() {
         // Only a compressed view has a filter.
         let quantize = options.quantize.map(|bits| match bits {
             Quantization::Filtered(_) if !options.meshopt => Quantization::Components,
@@ -72,7 +72,7 @@ pub fn write_new(
         });
         let mut animation = animation(&mut binary, part, quantize);
         let name = clip.clip.name.clone();
-        animation.name = name.map(|name| names.unique(name, place));
+        animation.name = name.map(|name| names.unique(name, index));
         let notes = clip.notes.iter();
         animation.extras = notes
             .map(|(key, note)| ((*key).to_owned(), Value::from(note.as_str())))
@@ -129,7 +129,7 @@ pub fn write_new(
 }
 
 /// Says which clips count their times from whole seconds that an f32 cannot hold beside them.
-fn moved_starts(clips: &[Sampled<'_>], options: &MotionOptions) -> Vec<Diagnostic> {
+fn moved_starts(clips: &[SampledClip<'_>], options: &MotionOptions) -> Vec<Diagnostic> {
     let mut warnings = Warnings::new(&options.name);
     for offset in clips.iter().map(|clip| clip.clip.time_offset) {
         if offset != 0 {
@@ -143,8 +143,8 @@ fn moved_starts(clips: &[Sampled<'_>], options: &MotionOptions) -> Vec<Diagnosti
 }
 
 /// A clip that can be written.
-struct Part<'a> {
-    samples: Samples<'a>,
+struct WritableClip<'a> {
+    samples: ClipSamples<'a>,
     times: Vec<f32>,
     /// Keys of its channels that are written instead of the samples, each channel with its times.
     keys: Option<Vec<KeyedChannel>>,
@@ -157,19 +157,19 @@ struct KeyedChannel {
     track: usize,
     property: Property,
     times: Vec<f32>,
-    keys: OwnKeys,
+    keys: WrittenKeys,
 }
 
 /// The channels of a clip whose own keys are written; nothing where its samples are.
-fn keyed_channels(samples: Samples<'_>) -> Result<Option<Vec<KeyedChannel>>, (Code, String)> {
+fn keyed_channels(samples: ClipSamples<'_>) -> Result<Option<Vec<KeyedChannel>>, (Code, String)> {
     let clip = samples.clip();
-    if !clip.of_own_keys || clip.clip.is_world {
+    if !clip.is_at_keys || clip.clip.is_world {
         return Ok(None);
     }
     let mut channels = Vec::new();
     for track in 0..samples.tracks {
         for property in Property::ALL {
-            if let Some(keys) = OwnKeys::of(clip.clip, track, property.path()) {
+            if let Some(keys) = WrittenKeys::of(clip.clip, track, property.path()) {
                 channels.push(KeyedChannel {
                     track,
                     property,
@@ -184,18 +184,18 @@ fn keyed_channels(samples: Samples<'_>) -> Result<Option<Vec<KeyedChannel>>, (Co
 
 /// Checks all clips, and adds their nodes.
 fn parts<'a>(
-    clips: &'a [Sampled<'a>],
+    clips: &'a [SampledClip<'a>],
     options: &MotionOptions,
-    nodes: &mut Nodes,
-) -> Result<Vec<Part<'a>>, WriteError> {
+    nodes: &mut NewNodes,
+) -> Result<Vec<WritableClip<'a>>, WriteError> {
     let mut parts = Vec::new();
-    for (place, clip) in clips.iter().enumerate() {
+    for (index, clip) in clips.iter().enumerate() {
         let refuse = |(code, why): (Code, String)| {
             let name = clip.clip.name.as_deref().map(|name| format!(" ({name})"));
-            let message = format!("clip {}{}: {why}", place + 1, name.unwrap_or_default());
+            let message = format!("clip {}{}: {why}", index + 1, name.unwrap_or_default());
             Diagnostic::new(&options.name, code, message)
         };
-        let samples = Samples::of(clip)?;
+        let samples = ClipSamples::of(clip)?;
         let times = f32_times(samples, clip.times).map_err(refuse)?;
         let keys = keyed_channels(samples).map_err(refuse)?;
         if samples.has_scaled_parents_in_world() {
@@ -204,7 +204,7 @@ fn parts<'a>(
             return Err(refuse((Code::NotTrees, why.to_owned())).into());
         }
         let added = nodes.add(clip.clip);
-        parts.push(Part {
+        parts.push(WritableClip {
             samples,
             times,
             keys,
@@ -282,7 +282,7 @@ fn glb_length(json: u64, binary: u64) -> Result<u32, String> {
 }
 
 /// The times of a clip as glTF has them, or why it cannot.
-fn f32_times(samples: Samples<'_>, seconds: &[f64]) -> Result<Vec<f32>, (Code, String)> {
+fn f32_times(samples: ClipSamples<'_>, seconds: &[f64]) -> Result<Vec<f32>, (Code, String)> {
     // The sum makes -0 to 0.
     let times: Vec<f32> = seconds.iter().map(|&time| time as f32 + 0.0).collect();
     let (Some(&first), Some(&last)) = (times.first(), times.last()) else {
@@ -304,13 +304,13 @@ fn f32_times(samples: Samples<'_>, seconds: &[f64]) -> Result<Vec<f32>, (Code, S
         let why = format!("{time} s is beyond f32, in which glTF has times; sample it earlier");
         return Err((Code::TimesInF32, why));
     }
-    if let Some(place) = times.windows(2).position(|pair| pair[0] >= pair[1]) {
+    if let Some(index) = times.windows(2).position(|pair| pair[0] >= pair[1]) {
         let spacing = f64::from(last.next_up()) - f64::from(last);
         let why = format!(
             "{} s and {} s are one time in f32, in which glTF has times; there f32 has a \
              time every {spacing} s: sample at {} fps or less, or nearer to 0 s",
-            seconds[place],
-            seconds[place + 1],
+            seconds[index],
+            seconds[index + 1],
             1.0 / spacing,
         );
         return Err((Code::TimesInF32, why));
@@ -321,7 +321,7 @@ fn f32_times(samples: Samples<'_>, seconds: &[f64]) -> Result<Vec<f32>, (Code, S
 /// The animation of a clip, without name.
 fn animation<'a>(
     binary: &mut Binary<'a>,
-    part: Part<'a>,
+    part: WritableClip<'a>,
     quantize: Option<Quantization>,
 ) -> Animation {
     let samples = part.samples;
@@ -329,7 +329,7 @@ fn animation<'a>(
     if let Some(channels) = part.keys.filter(|channels| !channels.is_empty()) {
         return keyed_animation(binary, channels, &part.nodes, quantize);
     }
-    let input = binary.push(Data::Times(part.times));
+    let input = binary.push(AccessorData::Times(part.times));
     let mut channels = Vec::new();
     for track in 0..samples.tracks {
         for property in Property::ALL {
@@ -347,7 +347,7 @@ fn animation<'a>(
         animation.samplers.push(Sampler {
             input,
             output: {
-                let data = Data::Channel(samples, track, property);
+                let data = AccessorData::Channel(samples, track, property);
                 binary.push(match quantize {
                     Some(quantization) => data.quantized(quantization),
                     None => data,
@@ -377,9 +377,11 @@ fn keyed_animation(
         let bits = channel.times.iter().map(|time| time.to_bits()).collect();
         let input = *inputs
             .entry(bits)
-            .or_insert_with(|| binary.push(Data::Times(channel.times)));
-        let values = Data::Keys(channel.property, channel.keys.values);
-        let values = match quantize.filter(|_| channel.keys.sampler != motion::Sampler::Cubic) {
+            .or_insert_with(|| binary.push(AccessorData::Times(channel.times)));
+        let values = AccessorData::Keys(channel.property, channel.keys.values);
+        let values = match quantize
+            .filter(|_| channel.keys.sampler != motion::ChannelInterpolation::Cubic)
+        {
             Some(quantization) => values.quantized(quantization),
             None => values,
         };
@@ -403,10 +405,10 @@ mod tests {
 
     #[test]
     fn a_glb_has_up_to_four_gibibytes() {
-        let most = u64::from(u32::MAX) - HEADERS;
-        assert_eq!(glb_length(100, most - 103), Ok(u32::MAX - 3));
+        let limit = u64::from(u32::MAX) - HEADERS;
+        assert_eq!(glb_length(100, limit - 103), Ok(u32::MAX - 3));
         assert_eq!(glb_length(101, 4), Ok(28 + 104 + 4));
-        let error = glb_length(104, most - 103).unwrap_err();
+        let error = glb_length(104, limit - 103).unwrap_err();
         assert!(error.contains("4294967296 bytes"), "{error}");
     }
 }

@@ -9,7 +9,7 @@ pub(super) struct Cdr<'a> {
     at: usize,
     is_little: bool,
     /// The largest alignment.
-    most: usize,
+    max_alignment: usize,
 }
 
 /// Seconds and nanoseconds.
@@ -33,7 +33,7 @@ impl<'a> Cdr<'a> {
         let Some((&[zero, kind, _, _], bytes)) = bytes.split_first_chunk::<4>() else {
             return Err("is shorter than its header".to_owned());
         };
-        let (is_little, most) = match (zero, kind) {
+        let (is_little, max_alignment) = match (zero, kind) {
             (0, 0) => (false, 8),
             (0, 1) => (true, 8),
             (0, 6) => (false, 4),
@@ -48,20 +48,20 @@ impl<'a> Cdr<'a> {
             bytes,
             at: 0,
             is_little,
-            most,
+            max_alignment,
         })
     }
 
     fn take(&mut self, count: usize) -> Result<&'a [u8], String> {
-        let taken = self.bytes.get(self.at..).and_then(|rest| rest.get(..count));
-        let taken =
-            taken.ok_or_else(|| format!("ends within a value at its byte {}", self.at + 4))?;
+        let bytes = self.bytes.get(self.at..).and_then(|rest| rest.get(..count));
+        let bytes =
+            bytes.ok_or_else(|| format!("ends within a value at its byte {}", self.at + 4))?;
         self.at += count;
-        Ok(taken)
+        Ok(bytes)
     }
 
     fn number<const N: usize>(&mut self) -> Result<[u8; N], String> {
-        self.at = self.at.next_multiple_of(N.min(self.most));
+        self.at = self.at.next_multiple_of(N.min(self.max_alignment));
         let mut bytes = [0; N];
         bytes.copy_from_slice(self.take(N)?);
         if !self.is_little {
@@ -83,7 +83,8 @@ impl<'a> Cdr<'a> {
         let length = self.whole()? as usize;
         let bytes = self.take(length)?;
         let bytes = bytes.strip_suffix(&[0]).unwrap_or(bytes);
-        let text = std::str::from_utf8(bytes).map_err(|_| "has a text that is no UTF-8".to_owned());
+        let text =
+            std::str::from_utf8(bytes).map_err(|_| "has a text that is not UTF-8".to_owned());
         Ok(text?.to_owned())
     }
 
@@ -127,11 +128,17 @@ mod tests {
     /// behind the first four bytes, of version 2 on multiples of 4.
     #[test]
     fn both_versions_and_both_orders_of_bytes_are_read() {
-        for (kind, is_little, most) in [(0u8, false, 8), (1, true, 8), (6, false, 4), (7, true, 4)]
+        for (kind, is_little, max_alignment) in
+            [(0u8, false, 8), (1, true, 8), (6, false, 4), (7, true, 4)]
         {
             let mut bytes = Vec::new();
             let put = |number: &[u8], bytes: &mut Vec<u8>| {
-                bytes.resize(bytes.len().next_multiple_of(number.len().min(most)), 0);
+                bytes.resize(
+                    bytes
+                        .len()
+                        .next_multiple_of(number.len().min(max_alignment)),
+                    0,
+                );
                 match is_little {
                     true => bytes.extend(number),
                     false => bytes.extend(number.iter().rev()),

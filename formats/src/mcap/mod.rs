@@ -15,15 +15,15 @@ use tumble::{TrackError, TrackSet};
 
 use crate::budget::{Budget, OverBudget};
 use crate::decimal::Decimal;
-use crate::diagnostic::{Code, Diagnostic, Place};
+use crate::diagnostic::{Code, Diagnostic, Location};
 use crate::feature::Feature;
 use crate::format::{Format, FormatOption, Loaded, ReadOptions};
-use crate::grid::restore;
 use crate::keys::{Origin, select};
 use crate::mcap::cdr::{Cdr, Stamp};
-use crate::mcap::records::{Channel, MAGIC, Record, Records};
+use crate::mcap::records::{MAGIC, McapChannel, Record, Records};
+use crate::motion::grid::restore;
 use crate::motion::{Joint, Motion, Transform};
-use crate::names::untaken;
+use crate::names::unique_name;
 use crate::rate::Precision;
 use crate::source::Source;
 use crate::warnings::Warnings;
@@ -41,7 +41,7 @@ pub static FORMAT: Format = Format {
     features: &[
         Feature::TrackNames,
         Feature::Translations,
-        Feature::OwnTimes,
+        Feature::TimesPerChannel,
         Feature::UnevenTimes,
         Feature::Start,
     ],
@@ -49,7 +49,7 @@ pub static FORMAT: Format = Format {
 };
 
 /// Bytes of a pose on its way: as it was read, sorted, and as keys.
-const POSE: usize = 2 * size_of::<Pose>() + 64;
+const POSE: usize = 2 * size_of::<TimedPose>() + 64;
 
 /// Bytes of a track beside its keys.
 const TRACK: usize = 400;
@@ -80,7 +80,7 @@ pub fn read_mcap(name: &str, bytes: &[u8], options: &ReadOptions) -> Result<Load
         name,
         budget: &budget,
         tracks: Vec::new(),
-        places: HashMap::new(),
+        track_of: HashMap::new(),
         others: Vec::new(),
         refused: Vec::new(),
         warnings: Warnings::new(name),
@@ -100,7 +100,7 @@ pub fn read_mcap(name: &str, bytes: &[u8], options: &ReadOptions) -> Result<Load
 
 /// What a message of a known type holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Kind {
+enum MessageKind {
     PoseStamped,
     PoseWithCovarianceStamped,
     Odometry,
@@ -109,7 +109,7 @@ enum Kind {
     Path,
 }
 
-impl Kind {
+impl MessageKind {
     /// By the name of a type, with `msg/` in it or without.
     fn of(schema: &str) -> Option<Self> {
         let (package, rest) = schema.split_once('/')?;
@@ -128,7 +128,7 @@ impl Kind {
 
 /// Where a body is at a time.
 #[derive(Debug, Clone, Copy)]
-struct Pose {
+struct TimedPose {
     /// Nanoseconds.
     time: i64,
     position: DVec3,
@@ -138,21 +138,21 @@ struct Pose {
 }
 
 /// A track's name, times, positions and rotations.
-type Keys = (String, Vec<f64>, Vec<DVec3>, Vec<Quat>);
+type BodyKeys = (String, Vec<f64>, Vec<DVec3>, Vec<Quat>);
 
 /// The poses of one body.
-struct Track {
+struct BodyTrack {
     name: String,
-    poses: Vec<Pose>,
+    poses: Vec<TimedPose>,
 }
 
 /// A log that is being read.
 struct Log<'a> {
     name: &'a str,
     budget: &'a Budget,
-    tracks: Vec<Track>,
+    tracks: Vec<BodyTrack>,
     /// The track of a topic, or of two frames.
-    places: HashMap<[String; 2], usize>,
+    track_of: HashMap<[String; 2], usize>,
     /// Topics with messages of other types.
     others: Vec<String>,
     /// Topics that are refused.
@@ -168,7 +168,7 @@ impl Log<'_> {
     /// Takes the poses of a message; what cannot be read of one refuses its topic.
     fn message(
         &mut self,
-        channel: &Channel,
+        channel: &McapChannel,
         log_time: u64,
         data: &[u8],
         offset: u64,
@@ -180,7 +180,7 @@ impl Log<'_> {
         {
             return Ok(());
         }
-        let kind = Kind::of(&channel.schema).filter(|_| channel.encoding == "cdr");
+        let kind = MessageKind::of(&channel.schema).filter(|_| channel.encoding == "cdr");
         let Some(kind) = kind else {
             if !self.others.contains(&channel.topic) {
                 self.budget
@@ -194,20 +194,23 @@ impl Log<'_> {
         let read = self.poses(kind, channel, (log_time, offset), data, &mut found);
         match read {
             Ok(()) => {}
-            Err(Fault::Memory(error)) => return Err(self.over(&error)),
-            Err(Fault::Message(reason)) => {
+            Err(MessageFault::Memory(error)) => return Err(self.over(&error)),
+            Err(MessageFault::Message(reason)) => {
                 let message = format!(
                     "a message of `{}` ({}) {reason}",
                     channel.topic, channel.schema
                 );
                 let mut fault = Diagnostic::new(self.name, Code::McapMessage, message);
-                fault.place = Some(Place::Inside(format!("{} at byte {offset}", channel.topic)));
+                fault.location = Some(Location::Inside(format!(
+                    "{} at byte {offset}",
+                    channel.topic
+                )));
                 self.refused.push((channel.topic.clone(), fault));
                 return Ok(());
             }
         }
         // A path is said anew as a whole.
-        if kind == Kind::Path {
+        if kind == MessageKind::Path {
             let track = self.track([channel.topic.clone(), String::new()])?;
             self.tracks[track].poses.clear();
         }
@@ -218,10 +221,10 @@ impl Log<'_> {
         Ok(())
     }
 
-    /// The place of a track, which is made if it is new.
+    /// The index of a track, which is added if it is new.
     fn track(&mut self, key: [String; 2]) -> Result<usize, Diagnostic> {
-        if let Some(&place) = self.places.get(&key) {
-            return Ok(place);
+        if let Some(&track) = self.track_of.get(&key) {
+            return Ok(track);
         }
         let length = TRACK + 4 * (key[0].len() + key[1].len());
         self.budget
@@ -231,23 +234,23 @@ impl Log<'_> {
             [topic, none] if none.is_empty() => topic.clone(),
             [parent, child] => format!("{parent}/{child}"),
         };
-        self.tracks.push(Track {
+        self.tracks.push(BodyTrack {
             name,
             poses: Vec::new(),
         });
-        self.places.insert(key, self.tracks.len() - 1);
+        self.track_of.insert(key, self.tracks.len() - 1);
         Ok(self.tracks.len() - 1)
     }
 
     /// The poses of a message, each with the key of its track.
     fn poses(
         &self,
-        kind: Kind,
-        channel: &Channel,
+        kind: MessageKind,
+        channel: &McapChannel,
         (log_time, offset): (u64, u64),
         data: &[u8],
-        found: &mut Vec<([String; 2], Pose)>,
-    ) -> Result<(), Fault> {
+        found: &mut Vec<([String; 2], TimedPose)>,
+    ) -> Result<(), MessageFault> {
         let mut cdr = Cdr::new(data)?;
         let topic = || [channel.topic.clone(), String::new()];
         // Who fills in no stamp leaves 0, and the log then says when the message came.
@@ -255,11 +258,13 @@ impl Log<'_> {
             0 => i64::try_from(log_time).unwrap_or(i64::MAX),
             time => time,
         };
-        let take = || self.budget.take(1, POSE).map_err(Fault::Memory);
+        let take = || self.budget.take(1, POSE).map_err(MessageFault::Memory);
         match kind {
-            Kind::PoseStamped | Kind::PoseWithCovarianceStamped | Kind::Odometry => {
+            MessageKind::PoseStamped
+            | MessageKind::PoseWithCovarianceStamped
+            | MessageKind::Odometry => {
                 let (stamp, _) = cdr.header()?;
-                if kind == Kind::Odometry {
+                if kind == MessageKind::Odometry {
                     cdr.text()?;
                 }
                 let (position, rotation) = cdr.pose()?;
@@ -267,7 +272,7 @@ impl Log<'_> {
                 let time = time(stamp);
                 found.push((
                     topic(),
-                    Pose {
+                    TimedPose {
                         time,
                         position,
                         rotation,
@@ -275,9 +280,9 @@ impl Log<'_> {
                     },
                 ));
             }
-            Kind::TransformStamped | Kind::TransformList => {
+            MessageKind::TransformStamped | MessageKind::TransformList => {
                 let count = match kind {
-                    Kind::TransformList => cdr.count()?,
+                    MessageKind::TransformList => cdr.count()?,
                     _ => 1,
                 };
                 for _ in 0..count {
@@ -289,7 +294,7 @@ impl Log<'_> {
                     let time = time(stamp);
                     found.push((
                         key,
-                        Pose {
+                        TimedPose {
                             time,
                             position,
                             rotation,
@@ -298,7 +303,7 @@ impl Log<'_> {
                     ));
                 }
             }
-            Kind::Path => {
+            MessageKind::Path => {
                 cdr.header()?;
                 for _ in 0..cdr.count()? {
                     let (stamp, _) = cdr.header()?;
@@ -308,7 +313,7 @@ impl Log<'_> {
                     let time = stamp.nanoseconds();
                     found.push((
                         topic(),
-                        Pose {
+                        TimedPose {
                             time,
                             position,
                             rotation,
@@ -349,23 +354,23 @@ impl Log<'_> {
             });
         };
         let offset = first.div_euclid(1_000_000_000);
-        let mut taken = std::collections::HashSet::new();
+        let mut used = std::collections::HashSet::new();
         let mut clip = Motion {
             set: TrackSet::new(),
             time_offset: offset,
             ..Motion::default()
         };
-        let mut all: Vec<Keys> = Vec::new();
+        let mut all: Vec<BodyKeys> = Vec::new();
         for mut track in self.tracks {
             // Messages may overtake each other.
             track.poses.sort_by_key(|pose| pose.time);
-            let place = |key: usize| {
+            let location = |key: usize| {
                 let offset = track.poses[key].offset;
-                Place::Inside(format!("{} at byte {offset}", track.name))
+                Location::Inside(format!("{} at byte {offset}", track.name))
             };
             let origin = Origin {
                 file: self.name,
-                place: &place,
+                location: &location,
                 duplicates: options.duplicates,
             };
             let of_track = (|| {
@@ -376,12 +381,12 @@ impl Log<'_> {
                 let mut positions: Vec<DVec3> =
                     track.poses.iter().map(|pose| pose.position).collect();
                 if let Some(key) = positions.iter().position(|at| !at.as_vec3().is_finite()) {
-                    let message = format!("the position {} is no finite f32", positions[key]);
+                    let message = format!("the position {} is not a finite f32", positions[key]);
                     let mut fault = Diagnostic::new(self.name, Code::NotFinite, message);
-                    fault.place = Some(place(key));
+                    fault.location = Some(location(key));
                     return Err(fault);
                 }
-                let seconds = |pose: &Pose| {
+                let seconds = |pose: &TimedPose| {
                     Decimal::whole(pose.time, -9).map_or(f64::NAN, |time| time.since(offset))
                 };
                 let mut times: Vec<f64> = track.poses.iter().map(seconds).collect();
@@ -391,7 +396,7 @@ impl Log<'_> {
                 select(&mut positions, kept.as_deref());
                 select(&mut keys, kept.as_deref());
                 Ok((
-                    untaken(track.name.clone(), all.len(), &mut taken),
+                    unique_name(track.name.clone(), all.len(), &mut used),
                     times,
                     positions,
                     keys,
@@ -417,13 +422,13 @@ impl Log<'_> {
         }
         let refuse =
             |error: TrackError| Diagnostic::new(self.name, Code::McapMessage, error.to_string());
-        for (place, (name, times, positions, keys)) in all.into_iter().enumerate() {
+        for (index, (name, times, positions, keys)) in all.into_iter().enumerate() {
             clip.set.push(&name, &times, &keys).map_err(refuse)?;
             clip.skeleton.push(Joint {
                 parent: None,
                 rest: Transform::default(),
             });
-            clip.set_positions(place, &times, &positions)
+            clip.set_positions(index, &times, &positions)
                 .map_err(refuse)?;
         }
         Ok(Loaded {
@@ -434,13 +439,13 @@ impl Log<'_> {
 }
 
 /// Why a message cannot be read.
-enum Fault {
+enum MessageFault {
     Memory(OverBudget),
     /// What about it, behind its name.
     Message(String),
 }
 
-impl From<String> for Fault {
+impl From<String> for MessageFault {
     fn from(reason: String) -> Self {
         Self::Message(reason)
     }

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::io::Read;
 
 use crate::budget::{Borrowed, Budget, OverBudget};
-use crate::diagnostic::{Code, Diagnostic, Place};
+use crate::diagnostic::{Code, Diagnostic, Location};
 use crate::warnings::Warnings;
 
 /// How a file begins and ends.
@@ -19,7 +19,7 @@ const DATA_END: u8 = 15;
 
 /// What the messages of a topic are.
 #[derive(Debug, Clone)]
-pub(super) struct Channel {
+pub(super) struct McapChannel {
     pub(super) topic: String,
     /// How they are encoded.
     pub(super) encoding: String,
@@ -29,7 +29,7 @@ pub(super) struct Channel {
 
 /// A message.
 pub(super) struct Record<'a> {
-    pub(super) channel: &'a Channel,
+    pub(super) channel: &'a McapChannel,
     /// When it was logged, nanoseconds.
     pub(super) log_time: u64,
     pub(super) data: &'a [u8],
@@ -44,7 +44,7 @@ pub(super) struct Records<'a> {
     bytes: &'a [u8],
     at: usize,
     schemas: HashMap<u16, String>,
-    channels: HashMap<u16, Channel>,
+    channels: HashMap<u16, McapChannel>,
     /// The records of the chunk that is being read, where it is in the file, and how far it is read.
     chunk: Vec<u8>,
     chunk_offset: u64,
@@ -58,15 +58,15 @@ struct Fields<'a>(&'a [u8]);
 
 impl<'a> Fields<'a> {
     fn take(&mut self, count: usize) -> Option<&'a [u8]> {
-        let (taken, rest) = self.0.split_at_checked(count)?;
+        let (bytes, rest) = self.0.split_at_checked(count)?;
         self.0 = rest;
-        Some(taken)
+        Some(bytes)
     }
 
     fn number<const N: usize>(&mut self) -> Option<[u8; N]> {
-        let (taken, rest) = self.0.split_first_chunk()?;
+        let (bytes, rest) = self.0.split_first_chunk()?;
         self.0 = rest;
-        Some(*taken)
+        Some(*bytes)
     }
 
     fn u16(&mut self) -> Option<u16> {
@@ -124,7 +124,7 @@ impl<'a> Records<'a> {
 
     fn damaged(&self, offset: u64, message: String) -> Diagnostic {
         let mut fault = Diagnostic::new(self.name, Code::McapDamaged, message);
-        fault.place = Some(Place::Inside(format!("byte {offset}")));
+        fault.location = Some(Location::Inside(format!("byte {offset}")));
         fault
     }
 
@@ -157,9 +157,9 @@ impl<'a> Records<'a> {
                     );
                 }
                 warnings.warn(Code::McapCut, || {
-                    let place = Place::Inside(format!("byte {offset}"));
+                    let location = Location::Inside(format!("byte {offset}"));
                     (
-                        Some(place),
+                        Some(location),
                         "the file ends within a record; what is before it is read",
                     )
                 });
@@ -170,8 +170,8 @@ impl<'a> Records<'a> {
                 true => self.chunk_at += length,
                 false => self.at += length,
             }
-            let broken = |what: &str| {
-                format!("a record of a {what} is too short, or its texts are no UTF-8")
+            let broken = |record: &str| {
+                format!("a record of a {record} is too short, or its texts are not UTF-8")
             };
             match kind {
                 SCHEMA => {
@@ -197,7 +197,7 @@ impl<'a> Records<'a> {
                         found.ok_or_else(|| self.damaged(offset, broken("channel")))?;
                     self.keep(topic.len() + encoding.len())?;
                     let schema = self.schemas.get(&schema).cloned().unwrap_or_default();
-                    let channel = Channel {
+                    let channel = McapChannel {
                         topic,
                         encoding,
                         schema,
@@ -253,8 +253,8 @@ impl<'a> Records<'a> {
 
     /// Takes the memory of an entry with texts of so many bytes.
     fn keep(&self, length: usize) -> Result<(), Diagnostic> {
-        let taken = self.budget.take(length + 200, 1);
-        taken.map_err(|error| Diagnostic::new(self.name, Code::Memory, error.to_string()))
+        let charged = self.budget.take(length + 200, 1);
+        charged.map_err(|error| Diagnostic::new(self.name, Code::Memory, error.to_string()))
     }
 
     /// The records of a chunk.
@@ -267,7 +267,7 @@ impl<'a> Records<'a> {
             Some((size, sum, compression, fields.take(length)?))
         })();
         let Some((size, sum, compression, packed)) = head else {
-            return Err(self.damaged(offset, "a chunk is too short for what it says".to_owned()));
+            return Err(self.damaged(offset, "a chunk is shorter than its header says".to_owned()));
         };
         let size = usize::try_from(size).unwrap_or(usize::MAX);
         let over = |error: OverBudget| Diagnostic::new(self.name, Code::Memory, error.to_string());

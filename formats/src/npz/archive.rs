@@ -17,7 +17,7 @@ use zip::{CompressionMethod, ZipArchive};
 use crate::budget::Budget;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::npz::array::Array;
-use crate::npz::header::{Element, Header, LONGEST_START};
+use crate::npz::header::{ArrayHeader, Element, LONGEST_START};
 use crate::text::lines::Limits;
 
 /// An open archive, all of whose bytes are held.
@@ -36,7 +36,7 @@ pub(crate) struct Member {
     /// What its array is called: the path without `.npy`.
     pub(crate) name: String,
     /// The array's header, or why there is none.
-    pub(crate) header: Result<Header, String>,
+    pub(crate) header: Result<ArrayHeader, String>,
     pub(crate) is_deflated: bool,
     data: Range<usize>,
     size: u64,
@@ -52,7 +52,7 @@ const LARGEST_RATIO: u64 = 1032;
 impl Archive {
     /// Reads the directory of an NPZ file. All members together may be as long as a file.
     pub(crate) fn open(file: &str, bytes: Vec<u8>, limits: Limits) -> Result<Self, Diagnostic> {
-        let most = limits.file;
+        let limit = limits.file;
         let refuse = |code, message: String| Diagnostic::new(file, code, message);
         let broken = |error: ZipError| {
             let message = format!("the ZIP archive cannot be read: {error}; save the file again");
@@ -87,18 +87,18 @@ impl Archive {
                 }
             };
             let (held, size) = (entry.compressed_size(), entry.size());
-            let most_held = match is_deflated {
+            let max_size = match is_deflated {
                 true => held.saturating_mul(LARGEST_RATIO),
                 false => held,
             };
-            if size > most_held || !is_deflated && size != held {
+            if size > max_size || !is_deflated && size != held {
                 let message = format!("the member has {held} bytes, which do not unpack to {size}");
                 return Err(refuse(Code::MemberSize, message));
             }
             total = total.saturating_add(size);
-            if total > most {
+            if total > limit {
                 let message = format!(
-                    "unpacked, the input is longer than {most} bytes: this member has {size}"
+                    "unpacked, the input is longer than {limit} bytes: this member has {size}"
                 );
                 return Err(refuse(Code::FileTooLong, message));
             }
@@ -120,7 +120,7 @@ impl Archive {
                 path,
             };
             if member.path.ends_with(".npy") {
-                member.header = Header::parse(&member.start(&bytes));
+                member.header = ArrayHeader::parse(&member.start(&bytes));
             }
             members.push(member);
         }
@@ -139,7 +139,7 @@ impl Archive {
         let member = Member {
             path: String::new(),
             name: ONLY_ARRAY.to_owned(),
-            header: Header::parse(&bytes),
+            header: ArrayHeader::parse(&bytes),
             is_deflated: false,
             data: 0..bytes.len(),
             size: bytes.len() as u64,
@@ -160,7 +160,7 @@ impl Archive {
             .map_err(|error| Diagnostic::new(&self.file, Code::Memory, error.to_string()))
     }
 
-    /// The place of the array of that name.
+    /// The index of the member with that array name.
     pub(crate) fn find(&self, name: &str) -> Option<usize> {
         let mut members = self.members.iter();
         members.position(|member| member.name == name && member.path != name)
@@ -183,7 +183,7 @@ impl Archive {
 
     /// The header of a member that is an array whose bytes may be looked into, and are as many as
     /// its shape says.
-    pub(crate) fn header(&self, member: usize) -> Result<&Header, Diagnostic> {
+    pub(crate) fn header(&self, member: usize) -> Result<&ArrayHeader, Diagnostic> {
         let header = self.members[member].header.as_ref().map_err(|why| {
             let message = format!("the array's header cannot be read: {why}");
             self.refuse(member, Code::ArrayHeader, message)
@@ -205,7 +205,7 @@ impl Archive {
             None => "more than any file has".to_owned(),
         };
         let message =
-            format!("an array {header} takes {said}; there are {held} bytes behind the header");
+            format!("an array {header} takes {said}; there are {held} bytes after the header");
         Err(self.refuse(member, Code::ArraySize, message))
     }
 
@@ -267,17 +267,17 @@ impl Archive {
 
     /// All arrays with their shapes, for messages.
     pub(crate) fn listing(&self) -> String {
-        const MOST: usize = 24;
+        const MAX_LISTED: usize = 24;
         let arrays = self.members.iter().filter_map(|member| {
             let header = member.header.as_ref().ok()?;
             Some(format!("`{}` {header}", member.name))
         });
-        let mut list: Vec<String> = arrays.take(MOST + 1).collect();
+        let mut list: Vec<String> = arrays.take(MAX_LISTED + 1).collect();
         match list.len() {
             0 => "none".to_owned(),
             length => {
-                list.truncate(MOST);
-                let rest = if length > MOST { " …" } else { "" };
+                list.truncate(MAX_LISTED);
+                let rest = if length > MAX_LISTED { " …" } else { "" };
                 format!("{}{rest}", list.join(", "))
             }
         }
@@ -301,13 +301,13 @@ impl Member {
 
 /// Refuses members whose bytes are those of others too: a few bytes would unpack to any number.
 fn refuse_overlaps(file: &str, members: &[Member]) -> Result<(), Diagnostic> {
-    let mut places: Vec<(&Range<usize>, &str)> = members
+    let mut ranges: Vec<(&Range<usize>, &str)> = members
         .iter()
         .filter(|member| !member.data.is_empty())
         .map(|member| (&member.data, &*member.path))
         .collect();
-    places.sort_unstable_by_key(|(data, _)| data.start);
-    match places
+    ranges.sort_unstable_by_key(|(data, _)| data.start);
+    match ranges
         .windows(2)
         .find(|pair| pair[1].0.start < pair[0].0.end)
     {

@@ -6,11 +6,11 @@ use std::ops::Range;
 use half::f16;
 use rayon::prelude::*;
 
-use crate::npz::header::{Element, Header};
+use crate::npz::header::{ArrayHeader, Element};
 
 /// An array whose bytes are all there.
 pub(crate) struct Array<'a> {
-    pub(crate) header: &'a Header,
+    pub(crate) header: &'a ArrayHeader,
     /// With the header.
     pub(crate) bytes: Cow<'a, [u8]>,
 }
@@ -25,26 +25,8 @@ pub(crate) struct Strides {
     pub(crate) component: usize,
 }
 
-impl Header {
-    /// How many numbers apart neighbours along each axis are.
-    pub(crate) fn strides(&self) -> Vec<usize> {
-        let mut strides = vec![1; self.shape.len()];
-        let mut next = 1;
-        let mut set = |axis: usize| {
-            strides[axis] = next;
-            // Saturates only beside a length of 0, where there is no number to find.
-            next = usize::saturating_mul(next, self.shape[axis].max(1));
-        };
-        match self.is_fortran {
-            true => (0..self.shape.len()).for_each(&mut set),
-            false => (0..self.shape.len()).rev().for_each(&mut set),
-        }
-        strides
-    }
-}
-
 /// Makes a key of its numbers. A trait instead of a closure, because it is called for every key from
-/// loops for each type of number, and only methods can be told to be inlined: a call passes the
+/// loops for each type of number, and only methods can be marked for inlining: a call passes the
 /// numbers through memory, and takes longer than what it computes.
 pub(crate) trait Make<const N: usize> {
     type Key;
@@ -68,7 +50,7 @@ impl<const N: usize> Make<N> for AsStored {
 pub(crate) const TOGETHER: usize = 8;
 
 /// Fewer keys than this are read before another thread has woken up.
-pub(crate) const FEW: usize = 1 << 14;
+pub(crate) const MIN_PARALLEL_KEYS: usize = 1 << 14;
 
 /// Frames whose rows, some cache lines each, stay in the second cache from the first of those tracks
 /// to the last.
@@ -112,7 +94,7 @@ impl Array<'_> {
             lists.into_iter().map(&finish).collect::<Vec<U>>()
         };
         let starts: Vec<usize> = tracks.clone().step_by(TOGETHER).collect();
-        let at_least = FEW.div_ceil(TOGETHER * frames.max(1));
+        let at_least = MIN_PARALLEL_KEYS.div_ceil(TOGETHER * frames.max(1));
         if starts.len() <= at_least {
             return starts.iter().flat_map(block).collect();
         }
@@ -192,12 +174,12 @@ impl Array<'_> {
                         true => u32::from_be_bytes(word),
                         false => u32::from_le_bytes(word),
                     };
-                    char::from_u32(code).ok_or_else(|| format!("U+{code:X} is no character"))
+                    char::from_u32(code).ok_or_else(|| format!("U+{code:X} is not a character"))
                 };
                 words.iter().map(character).collect::<Result<String, _>>()
             }
             Element::Bytes(_) => {
-                String::from_utf8(bytes.to_vec()).map_err(|_| "a text is no UTF-8".to_owned())
+                String::from_utf8(bytes.to_vec()).map_err(|_| "a text is not UTF-8".to_owned())
             }
             _ => Err(format!("it is an array {}, no text", self.header)),
         };
@@ -212,25 +194,5 @@ impl Array<'_> {
             .chunks_exact(size)
             .map(|bytes| text(bytes).map(whole));
         Ok(self.header.in_c_order(all.collect::<Result<_, _>>()?))
-    }
-}
-
-impl Header {
-    /// Elements as they are stored, in C order.
-    pub(crate) fn in_c_order<T: Clone>(&self, stored: Vec<T>) -> Vec<T> {
-        if !self.is_fortran || self.shape.len() < 2 {
-            return stored;
-        }
-        let strides = self.strides();
-        let place = |index: usize| {
-            let axes = self.shape.iter().zip(&strides).rev();
-            let walk = axes.fold((index, 0), |(rest, place), (&length, stride)| {
-                (rest / length, place + rest % length * stride)
-            });
-            walk.1
-        };
-        (0..stored.len())
-            .map(|index| stored[place(index)].clone())
-            .collect()
     }
 }

@@ -4,23 +4,23 @@
 use tumble::Layout;
 
 use crate::diagnostic::Diagnostic;
-use crate::npy::ComponentOrder;
 use crate::npz::archive::Archive;
-use crate::npz::plan::{Part, Plan, Values};
+use crate::npz::plan::{ArchivePlan, KeyArray, KeyKind};
+use crate::quaternion::ComponentOrder;
 
 /// The plan of such a file; `None` for another.
-pub(crate) fn plan(archive: &Archive) -> Result<Option<Plan>, Diagnostic> {
-    let array = |name, values| Part::of(archive, name, values, 0, Layout::FrameMajor);
-    let quaternions = Values::Quaternion(ComponentOrder::Wxyz);
+pub(crate) fn plan(archive: &Archive) -> Result<Option<ArchivePlan>, Diagnostic> {
+    let array = |name, values| KeyArray::of(archive, name, values, 0, Layout::FrameMajor);
+    let quaternions = KeyKind::Quaternion(ComponentOrder::Wxyz);
     let Some(rotations) = array("body_rotations", quaternions)? else {
         return Ok(None);
     };
-    let mut plan = Plan {
+    let mut plan = ArchivePlan {
         is_world: true,
-        ..Plan::default()
+        ..ArchivePlan::default()
     };
     plan.add(archive, rotations)?;
-    if let Some(positions) = array("body_positions", Values::Translation)? {
+    if let Some(positions) = array("body_positions", KeyKind::Translation)? {
         plan.add(archive, positions)?;
     }
     plan.read_names(archive, "body_names")?;

@@ -63,7 +63,7 @@ pub fn body_offsets(path: &Path, clip: &Motion, limits: Limits) -> Result<Vec<f6
     let is_same = |track: usize| model.parents.get(track) == Some(&clip.skeleton[track].parent);
     if tracks > joints.len() || !(0..tracks).all(is_same) {
         let message = format!(
-            "the model has {} joints that hang together in another way than the {tracks} of the motion",
+            "the model has {} joints that have other parents than the {tracks} of the motion",
             joints.len()
         );
         return Err(Diagnostic::new(&name, Code::BodyModel, message));

@@ -5,18 +5,18 @@ use std::ops::Range;
 use glam::{DQuat, DVec3, Quat, Vec3};
 use tumble::{TrackError, TrackSet};
 
-use crate::diagnostic::{Code, Diagnostic, Place};
+use crate::diagnostic::{Code, Diagnostic, Location};
 use crate::format::ReadOptions;
 use crate::keys::{Duplicates, Origin, quiet_unit, select};
 use crate::motion::{Body, Joint, Motion, Transform};
-use crate::npy::ComponentOrder::{self, Wxyz, Xyzw};
 use crate::npz::archive::Archive;
-use crate::npz::array::{Array, AsStored, FEW, Make, TOGETHER};
+use crate::npz::array::{Array, AsStored, MIN_PARALLEL_KEYS, Make, TOGETHER};
 use crate::npz::body::shape_of;
 use crate::npz::header::Element;
-use crate::npz::plan::{Part, Plan, Values};
+use crate::npz::plan::{ArchivePlan, KeyArray, KeyKind};
 use crate::npz::rotation_vector;
 use crate::origin::relative;
+use crate::quaternion::ComponentOrder::{self, Wxyz, Xyzw};
 use crate::quaternion::rounded;
 use crate::rotation_form::RotationForm;
 use crate::signs::continue_signs;
@@ -31,7 +31,7 @@ const TRACK: usize = 400;
 /// Reads the clip. The plan then knows its rate.
 pub(crate) fn read(
     archive: &Archive,
-    plan: &mut Plan,
+    plan: &mut ArchivePlan,
     options: &ReadOptions,
     warnings: &mut Warnings,
 ) -> Result<Motion, Diagnostic> {
@@ -82,23 +82,23 @@ pub(crate) fn read(
         starts.map(move |start| (part, array, start..(start + at_once).min(part.tracks.end)))
     });
     let mut origins = Vec::new();
-    let mut push = |track: usize, values: Values, keys: Keys| match keys {
-        Keys::Rotations(mut keys) => {
+    let mut push = |track: usize, values: KeyKind, keys: TrackKeys| match keys {
+        TrackKeys::Rotations(mut keys) => {
             select(&mut keys, kept.as_deref());
             let name = plan.names.get(track).map_or("", String::as_str);
             set.push(name, &times, &keys).map_err(refuse)
         }
-        Keys::Vectors(origin, mut keys) => {
+        TrackKeys::Vectors(origin, mut keys) => {
             origins.push((track, origin));
             select(&mut keys, kept.as_deref());
             let set_keys = match values {
-                Values::Scale => TrackSet::set_scales,
+                KeyKind::Scale => TrackSet::set_scales,
                 _ => TrackSet::set_translations,
             };
             set_keys(set, track, &times, &keys, &[]).map_err(refuse)
         }
     };
-    let are_few = plan.tracks.saturating_mul(plan.frames) < FEW;
+    let is_small = plan.tracks.saturating_mul(plan.frames) < MIN_PARALLEL_KEYS;
     let mut pending = Vec::new();
     for (part, array, tracks) in jobs {
         let mut push_pending = || {
@@ -106,7 +106,7 @@ pub(crate) fn read(
             pending.try_for_each(|(track, values, keys)| push(track, values, keys))
         };
         let mut read = || read_keys(archive, part, array, tracks.clone(), plan.frames, warnings);
-        let (pushed, read) = match are_few {
+        let (pushed, read) = match is_small {
             true => (push_pending(), read()),
             false => {
                 let together =
@@ -118,7 +118,7 @@ pub(crate) fn read(
         pushed?;
         pending = tracks
             .zip(read?)
-            .map(|(track, keys)| (track, part.values, keys))
+            .map(|(track, keys)| (track, part.kind, keys))
             .collect();
     }
     pending
@@ -146,7 +146,7 @@ pub(crate) fn read(
 /// The frames that stay where times repeat: see [`Origin::increasing`].
 fn kept_frames(
     archive: &Archive,
-    plan: &Plan,
+    plan: &ArchivePlan,
     arrays: &[Array<'_>],
     times: &mut [f64],
     options: &ReadOptions,
@@ -158,7 +158,7 @@ fn kept_frames(
     };
     let origin = Origin {
         file: &archive.file,
-        place: &|frame| Place::Inside(format!("{name}[{frame}]")),
+        location: &|frame| Location::Inside(format!("{name}[{frame}]")),
         duplicates: options.duplicates,
     };
     let equal = |a: usize, b: usize| {
@@ -169,13 +169,13 @@ fn kept_frames(
 }
 
 /// The numbers of all tracks of a part at one frame.
-fn frame_of(part: &Part, array: &Array<'_>, frame: usize) -> Vec<Vec<f64>> {
+fn frame_of(part: &KeyArray, array: &Array<'_>, frame: usize) -> Vec<Vec<f64>> {
     let mut at = part.at;
     at.first += frame * at.frame;
     let tracks = 0..part.tracks.len();
-    match part.values {
-        Values::Quaternion(_) => array.tracks::<AsStored, 4, _>(at, tracks, 1, |l| l.concat()),
-        Values::Form(RotationForm::Matrix) => {
+    match part.kind {
+        KeyKind::Quaternion(_) => array.tracks::<AsStored, 4, _>(at, tracks, 1, |l| l.concat()),
+        KeyKind::Form(RotationForm::Matrix) => {
             array.tracks::<AsStored, 9, _>(at, tracks, 1, |l| l.concat())
         }
         _ => array.tracks::<AsStored, 3, _>(at, tracks, 1, |l| l.concat()),
@@ -183,7 +183,7 @@ fn frame_of(part: &Part, array: &Array<'_>, frame: usize) -> Vec<Vec<f64>> {
 }
 
 /// The keys of one track.
-enum Keys {
+enum TrackKeys {
     /// Unit quaternions.
     Rotations(Vec<Quat>),
     /// Translations or scales, and what translations are to be moved by.
@@ -193,23 +193,23 @@ enum Keys {
 /// The keys of some tracks of a part.
 fn read_keys(
     archive: &Archive,
-    part: &Part,
+    part: &KeyArray,
     array: &Array<'_>,
     tracks: Range<usize>,
     frames: usize,
     warnings: &mut Warnings,
-) -> Result<Vec<Keys>, Diagnostic> {
+) -> Result<Vec<TrackKeys>, Diagnostic> {
     let in_part = tracks.start - part.tracks.start..tracks.end - part.tracks.start;
     let at = part.at;
     let quiet = |keys: Vec<Quat>| (keys.iter().all(|key| !key.w.is_nan())).then_some(keys);
-    let lists = match part.values {
-        Values::Quaternion(Xyzw) => {
+    let lists = match part.kind {
+        KeyKind::Quaternion(Xyzw) => {
             array.tracks::<QuietXyzw, 4, _>(at, in_part.clone(), frames, quiet)
         }
-        Values::Quaternion(Wxyz) => {
+        KeyKind::Quaternion(Wxyz) => {
             array.tracks::<QuietWxyz, 4, _>(at, in_part.clone(), frames, quiet)
         }
-        Values::RotationVector => {
+        KeyKind::RotationVector => {
             // A vector that jumps to the other side of π goes on on this side.
             let finish = |mut keys: Vec<Quat>| {
                 continue_signs(&mut keys, 1);
@@ -217,7 +217,7 @@ fn read_keys(
             };
             array.tracks::<FromVector, 3, _>(at, in_part.clone(), frames, finish)
         }
-        Values::Form(form) => {
+        KeyKind::Form(form) => {
             return of_form(archive, part, array, (form, in_part), frames);
         }
         _ => return vectors(archive, part, array, in_part, frames),
@@ -226,8 +226,10 @@ fn read_keys(
         .into_iter()
         .zip(in_part)
         .map(|(keys, track)| match keys {
-            Some(keys) => Ok(Keys::Rotations(keys)),
-            None => remarkable(archive, part, array, track, frames, warnings).map(Keys::Rotations),
+            Some(keys) => Ok(TrackKeys::Rotations(keys)),
+            None => {
+                remarkable(archive, part, array, track, frames, warnings).map(TrackKeys::Rotations)
+            }
         });
     keys.collect()
 }
@@ -289,20 +291,20 @@ impl Make<3> for InF32 {
 /// The keys of a track that has some of which something is to be said.
 fn remarkable(
     archive: &Archive,
-    part: &Part,
+    part: &KeyArray,
     array: &Array<'_>,
-    own: usize,
+    part_track: usize,
     frames: usize,
     warnings: &mut Warnings,
 ) -> Result<Vec<Quat>, Diagnostic> {
-    let track = part.tracks.start + own;
+    let track = part.tracks.start + part_track;
     let origin = Origin {
         file: &archive.file,
-        place: &|frame| Place::Inside(part.place(archive, track, frame)),
+        location: &|frame| Location::Inside(part.index_text(archive, track, frame)),
         duplicates: Duplicates::Refuse,
     };
-    let one = own..own + 1;
-    let Values::Quaternion(order) = part.values else {
+    let one = part_track..part_track + 1;
+    let KeyKind::Quaternion(order) = part.kind else {
         let vectors = array.tracks::<AsStored, 3, _>(part.at, one, frames, |list| list);
         let is_bad = |vector: &[f64; 3]| !rotation_vector::exp(*vector).is_finite();
         let bad = vectors
@@ -313,7 +315,7 @@ fn remarkable(
         let (frame, vector) = bad.unwrap_or((0, &[f64::NAN; 3]));
         let message = format!("the rotation vector {vector:?} has no finite length; repair it");
         return Err(Diagnostic {
-            place: Some((origin.place)(frame)),
+            location: Some((origin.location)(frame)),
             ..Diagnostic::new(&archive.file, Code::NotFinite, message)
         });
     };
@@ -325,11 +327,11 @@ fn remarkable(
 /// The rotations of some tracks of a part that are no quaternions.
 fn of_form(
     archive: &Archive,
-    part: &Part,
+    part: &KeyArray,
     array: &Array<'_>,
     (form, tracks): (RotationForm, Range<usize>),
     frames: usize,
-) -> Result<Vec<Keys>, Diagnostic> {
+) -> Result<Vec<TrackKeys>, Diagnostic> {
     fn keys<const N: usize>(form: RotationForm, list: &[[f64; N]]) -> Result<Vec<Quat>, usize> {
         let key =
             |(frame, numbers): (usize, &[f64; N])| form.rotation(numbers).map(rounded).ok_or(frame);
@@ -347,10 +349,10 @@ fn of_form(
         _ => array.tracks::<AsStored, 3, _>(part.at, range, frames, |list| keys(form, &list)),
     };
     let check = |(track, found): (usize, Result<Vec<Quat>, usize>)| {
-        found.map(Keys::Rotations).map_err(|frame| {
-            let message = "these numbers are no rotation; repair the array, or say another form";
+        found.map(TrackKeys::Rotations).map_err(|frame| {
+            let message = "these numbers are not a rotation; repair the array, or say another form";
             let refusal = Diagnostic::new(&archive.file, Code::NoRotation, message);
-            refusal.inside(part.place(archive, part.tracks.start + track, frame))
+            refusal.inside(part.index_text(archive, part.tracks.start + track, frame))
         })
     };
     tracks.zip(lists).map(check).collect()
@@ -359,17 +361,17 @@ fn of_form(
 /// The vectors of some tracks of a part.
 fn vectors(
     archive: &Archive,
-    part: &Part,
+    part: &KeyArray,
     array: &Array<'_>,
     in_part: Range<usize>,
     frames: usize,
-) -> Result<Vec<Keys>, Diagnostic> {
+) -> Result<Vec<TrackKeys>, Diagnostic> {
     let checked = |origin, list: Vec<Vec3>| {
         let bad = list.iter().position(|vector| !vector.is_finite());
         (origin, list, bad)
     };
     // Positions in f32 have lost what an origin would keep.
-    let has_origin = part.values == Values::Translation && array.header.element == Element::F64;
+    let has_origin = part.kind == KeyKind::Translation && array.header.element == Element::F64;
     let lists = match has_origin {
         true => array.tracks::<AsStored, 3, _>(part.at, in_part.clone(), frames, |list| {
             let points: Vec<DVec3> = list.into_iter().map(DVec3::from_array).collect();
@@ -382,11 +384,11 @@ fn vectors(
     };
     let check = |(track, (origin, list, bad)): (usize, (DVec3, Vec<Vec3>, Option<usize>))| match bad
     {
-        None => Ok(Keys::Vectors(origin, list)),
+        None => Ok(TrackKeys::Vectors(origin, list)),
         Some(frame) => {
             let message = format!("the vector {} is not finite in f32", list[frame]);
             let refusal = Diagnostic::new(&archive.file, Code::NotFinite, message);
-            Err(refusal.inside(part.place(archive, part.tracks.start + track, frame)))
+            Err(refusal.inside(part.index_text(archive, part.tracks.start + track, frame)))
         }
     };
     in_part.zip(lists).map(check).collect()

@@ -5,23 +5,23 @@ use std::io::Write;
 use std::path::Path;
 
 use glam::Vec3;
-use tumble::{FrameRate, Frames, Layout};
+use tumble::{FrameRate, Layout, SampleTimes};
 
 use crate::diagnostic::{Code, Diagnostic};
 use crate::format::{Document, Format, MotionOptions, WriteError};
-use crate::motion::{Motion, Sampled};
+use crate::motion::{Motion, SampledClip};
 use crate::npz::archive::{Archive, Member};
 use crate::npz::array::{Array, AsStored};
 use crate::npz::header::Element;
-use crate::npz::plan::{Part, Plan, Values};
-use crate::npz::write::{Members, check, keys, note_name, notes, times};
-use crate::npz::{FORMAT, linear, own, smpl};
+use crate::npz::plan::{ArchivePlan, KeyArray, KeyKind};
+use crate::npz::write::{ArchiveWriter, check, keys, note_name, notes, times};
+use crate::npz::{FORMAT, linear, smpl, tumble_layout};
 use crate::warnings::Warnings;
 
 /// The archive, all of whose members are there, and what they mean.
 pub(super) struct NpzDocument {
     archive: Archive,
-    plan: Plan,
+    plan: ArchivePlan,
     /// First and last time of the clip, seconds.
     span: Option<(f64, f64)>,
 }
@@ -35,9 +35,9 @@ impl fmt::Debug for NpzDocument {
 }
 
 /// What becomes of a member.
-enum Fate<'a> {
+enum MemberOutcome<'a> {
     /// New keys.
-    Keys(&'a Part),
+    Keys(&'a KeyArray),
     Rate,
     Times,
     /// The same bytes.
@@ -51,7 +51,7 @@ enum Fate<'a> {
 }
 
 impl NpzDocument {
-    pub(super) fn new(archive: Archive, plan: Plan, clip: &Motion) -> Self {
+    pub(super) fn new(archive: Archive, plan: ArchivePlan, clip: &Motion) -> Self {
         let span = clip.set.time_span();
         Self {
             archive,
@@ -65,10 +65,10 @@ impl NpzDocument {
     }
 
     /// The arrays that hold keys: those that were read, and those that repeat parts of them.
-    fn parts(&self) -> Result<Vec<Part>, Diagnostic> {
+    fn parts(&self) -> Result<Vec<KeyArray>, Diagnostic> {
         let mut parts = self.plan.parts.clone();
-        let is_whole = |part: &&Part| {
-            part.values == Values::RotationVector && part.tracks.len() == self.plan.tracks
+        let is_whole = |part: &&KeyArray| {
+            part.kind == KeyKind::RotationVector && part.tracks.len() == self.plan.tracks
         };
         let Some(whole) = self.plan.parts.iter().find(is_whole) else {
             return Ok(parts);
@@ -77,12 +77,12 @@ impl NpzDocument {
         for (name, first) in smpl::repeated_pieces(self.plan.tracks) {
             let shape = self.archive.shape(name);
             let is_beside = shape.is_some_and(|shape| shape.first() == Some(&self.plan.frames));
-            let vectors = Values::RotationVector;
+            let vectors = KeyKind::RotationVector;
             if !is_beside || self.archive.find(name) == Some(whole.member) {
                 continue;
             }
             // One that is no such array is judged as any other.
-            let piece = Part::of(&self.archive, name, vectors, first, Layout::FrameMajor);
+            let piece = KeyArray::of(&self.archive, name, vectors, first, Layout::FrameMajor);
             let Ok(Some((piece, frames))) = piece else {
                 continue;
             };
@@ -93,9 +93,9 @@ impl NpzDocument {
             let stored = |array: &Array<'_>, at, tracks| {
                 array.tracks::<AsStored, 3, _>(at, tracks, frames, |list| list)
             };
-            let own = stored(&array, piece.at, 0..piece.tracks.len());
+            let stored_piece = stored(&array, piece.at, 0..piece.tracks.len());
             let same = stored(&poses, whole.at, piece.tracks.clone());
-            if own == same {
+            if stored_piece == same {
                 parts.push(piece);
             }
         }
@@ -103,47 +103,49 @@ impl NpzDocument {
     }
 
     /// What becomes of each member.
-    fn fates<'a>(
+    fn outcomes<'a>(
         &self,
-        parts: &'a [Part],
-        sampled: &Sampled<'_>,
+        parts: &'a [KeyArray],
+        sampled: &SampledClip<'_>,
         options: &MotionOptions,
-    ) -> Result<Vec<Fate<'a>>, WriteError> {
+    ) -> Result<Vec<MemberOutcome<'a>>, WriteError> {
         let is_same = sampled.times == self.plan.all_times;
-        let fate = |(place, member): (usize, &Member)| {
-            if let Some(part) = parts.iter().find(|part| part.member == place) {
-                return Fate::Keys(part);
+        let outcome = |(index, member): (usize, &Member)| {
+            if let Some(part) = parts.iter().find(|part| part.member == index) {
+                return MemberOutcome::Keys(part);
             }
-            if self.plan.times.is_some_and(|list| list.member == place) {
-                return Fate::Times;
+            if self.plan.times.is_some_and(|list| list.member == index) {
+                return MemberOutcome::Times;
             }
-            if self.plan.rate_member == Some(place) {
+            if self.plan.rate_member == Some(index) {
                 return if sampled.rate.is_some() {
-                    Fate::Rate
+                    MemberOutcome::Rate
                 } else {
-                    Fate::Replaced
+                    MemberOutcome::Replaced
                 };
             }
             let mut new_notes = sampled.notes.iter().map(|(note, _)| note_name(note));
-            if self.plan.is_own && new_notes.any(|note| note == member.name) {
-                return Fate::Replaced;
+            if self.plan.is_tumble_layout && new_notes.any(|note| note == member.name) {
+                return MemberOutcome::Replaced;
             }
-            match self.frame_axis(place) {
-                None => Fate::Constant,
+            match self.frame_axis(index) {
+                None => MemberOutcome::Constant,
                 // At the same times everything is the same.
-                Some(_) if is_same && !options.linear.contains(&member.name) => Fate::Constant,
-                Some(axis) if options.linear.contains(&member.name) => Fate::Linear(axis),
-                Some(_) => Fate::LeftOut,
+                Some(_) if is_same && !options.linear.contains(&member.name) => {
+                    MemberOutcome::Constant
+                }
+                Some(axis) if options.linear.contains(&member.name) => MemberOutcome::Linear(axis),
+                Some(_) => MemberOutcome::LeftOut,
             }
         };
         let members = self.archive.members.iter().enumerate();
-        let fates: Vec<Fate<'_>> = members.map(fate).collect();
+        let outcomes: Vec<MemberOutcome<'_>> = members.map(outcome).collect();
         for name in &options.linear {
             let member = self.archive.find(name);
-            let is_linear = |&member: &usize| matches!(fates[member], Fate::Linear(_));
+            let is_linear = |&member: &usize| matches!(outcomes[member], MemberOutcome::Linear(_));
             if member.filter(is_linear).is_none() {
-                let candidates = self.named(&fates, |fate| {
-                    matches!(fate, Fate::LeftOut | Fate::Linear(_))
+                let candidates = self.named(&outcomes, |outcome| {
+                    matches!(outcome, MemberOutcome::LeftOut | MemberOutcome::Linear(_))
                 });
                 let message = format!(
                     "linear names {name}: no array beside the keys has this name and an entry for \
@@ -152,13 +154,17 @@ impl NpzDocument {
                 return Err(self.refuse(Code::NotPerFrame, message));
             }
         }
-        Ok(fates)
+        Ok(outcomes)
     }
 
     /// The members of some fate, for messages.
-    fn named(&self, fates: &[Fate<'_>], is_meant: impl Fn(&Fate<'_>) -> bool) -> String {
-        let members = self.archive.members.iter().zip(fates);
-        let meant = members.filter(|(_, fate)| is_meant(fate));
+    fn named(
+        &self,
+        outcomes: &[MemberOutcome<'_>],
+        is_meant: impl Fn(&MemberOutcome<'_>) -> bool,
+    ) -> String {
+        let members = self.archive.members.iter().zip(outcomes);
+        let meant = members.filter(|(_, outcome)| is_meant(outcome));
         let names: Vec<String> = meant
             .map(|(member, _)| format!("`{}`", member.name))
             .collect();
@@ -175,7 +181,7 @@ impl NpzDocument {
             return None;
         }
         let header = self.archive.members[member].header.as_ref().ok()?;
-        let axes = if self.plan.is_own { 2 } else { 1 };
+        let axes = if self.plan.is_tumble_layout { 2 } else { 1 };
         let mut first = header.shape.iter().take(axes);
         first.rposition(|&length| length == self.plan.frames)
     }
@@ -183,27 +189,27 @@ impl NpzDocument {
     /// Writes the members, then the rate or the times where none of them says when frames are.
     fn write_members(
         &self,
-        fates: &[Fate<'_>],
-        sampled: &Sampled<'_>,
+        outcomes: &[MemberOutcome<'_>],
+        sampled: &SampledClip<'_>,
         out: &mut dyn Write,
     ) -> Result<(), WriteError> {
-        let mut members = Members::new();
+        let mut members = ArchiveWriter::new();
         let frames = sampled.times.len();
-        for (place, fate) in fates.iter().enumerate() {
-            let member = &self.archive.members[place];
+        for (index, outcome) in outcomes.iter().enumerate() {
+            let member = &self.archive.members[index];
             let (path, deflated) = (&*member.path, member.is_deflated);
-            match *fate {
-                Fate::Keys(part) => {
-                    let array = self.archive.array(place)?;
+            match *outcome {
+                MemberOutcome::Keys(part) => {
+                    let array = self.archive.array(index)?;
                     let mut shape = array.header.shape.clone();
                     shape[usize::from(part.layout == Layout::TrackMajor)] = frames;
                     let array = (&array.header.element, &*shape);
                     members.numbers(path, array, deflated, |put| {
-                        keys(part.values, part.tracks.clone(), part.layout, sampled, put)
+                        keys(part.kind, part.tracks.clone(), part.layout, sampled, put)
                     })?;
                 }
-                Fate::Rate => {
-                    let array = self.archive.array(place)?;
+                MemberOutcome::Rate => {
+                    let array = self.archive.array(index)?;
                     let shape = &*array.header.shape;
                     let element = rate_element(&array.header.element, sampled.rate);
                     members.numbers(path, (&element, shape), deflated, |put| {
@@ -213,10 +219,12 @@ impl NpzDocument {
                             .try_for_each(|rate| put(rate.per_second()))
                     })?;
                 }
-                Fate::Times => times(&mut members, sampled)?,
-                Fate::Constant => members.bytes(path, &self.archive.unpack(place)?, deflated)?,
-                Fate::Linear(axis) => {
-                    let array = self.archive.array(place)?;
+                MemberOutcome::Times => times(&mut members, sampled)?,
+                MemberOutcome::Constant => {
+                    members.bytes(path, &self.archive.unpack(index)?, deflated)?
+                }
+                MemberOutcome::Linear(axis) => {
+                    let array = self.archive.array(index)?;
                     if !array.header.element.is_float() {
                         let message = format!(
                             "linear names {}: the array is of {}; floats are interpolated",
@@ -231,7 +239,7 @@ impl NpzDocument {
                         linear::resample(&array, axis, &self.plan.all_times, sampled.times, put)
                     })?;
                 }
-                Fate::LeftOut | Fate::Replaced => {}
+                MemberOutcome::LeftOut | MemberOutcome::Replaced => {}
             }
         }
         match sampled.rate {
@@ -242,7 +250,7 @@ impl NpzDocument {
             None if self.plan.times.is_none() => times(&mut members, sampled)?,
             _ => {}
         }
-        if self.plan.is_own {
+        if self.plan.is_tumble_layout {
             notes(&mut members, sampled)?;
         }
         Ok(members.finish(out)?)
@@ -253,7 +261,7 @@ impl Document for NpzDocument {
     /// Whole frames of the rate from the first time on: arrays of frames have no room for a last
     /// one that is shorter.
     fn times(&self, _clip: usize, rate: FrameRate) -> Result<Vec<f64>, Diagnostic> {
-        let frames = Frames::rate(rate).resolve(self.plan.tracks, self.span);
+        let frames = SampleTimes::rate(rate).resolve(self.plan.tracks, self.span);
         let timeline = frames.map_err(|error| {
             Diagnostic::new(&self.archive.file, Code::Layout, error.to_string())
         })?;
@@ -265,32 +273,41 @@ impl Document for NpzDocument {
     }
 
     /// The arrays that no layout of clips has.
-    fn beside(&self) -> Vec<String> {
-        let is_key = |place: usize| self.plan.parts.iter().any(|part| part.member == place);
-        let is_time = |place: usize| self.plan.times.is_some_and(|list| list.member == place);
+    fn other_contents(&self) -> Vec<String> {
+        let is_key = |member_index: usize| {
+            self.plan
+                .parts
+                .iter()
+                .any(|part| part.member == member_index)
+        };
+        let is_time = |member_index: usize| {
+            self.plan
+                .times
+                .is_some_and(|list| list.member == member_index)
+        };
         let members = self.archive.members.iter().enumerate();
-        let others = members.filter(|&(place, member)| {
-            let is_known = self.plan.constants.contains(&place)
-                || self.plan.is_own && own::CONSTANTS.contains(&&*member.name)
+        let others = members.filter(|&(index, member)| {
+            let is_known = self.plan.constants.contains(&index)
+                || self.plan.is_tumble_layout && tumble_layout::CONSTANTS.contains(&&*member.name)
                 || self.plan.is_note(member);
-            !is_key(place) && !is_time(place) && self.plan.rate_member != Some(place) && !is_known
+            !is_key(index) && !is_time(index) && self.plan.rate_member != Some(index) && !is_known
         });
         others.map(|(_, member)| member.name.clone()).collect()
     }
 
     fn write(
         &self,
-        clips: &[(usize, Sampled<'_>)],
+        clips: &[(usize, SampledClip<'_>)],
         options: &MotionOptions,
         _: &Path,
         out: &mut dyn Write,
     ) -> Result<Vec<Diagnostic>, WriteError> {
         if clips.is_empty() {
-            let mut members = Members::new();
-            for (place, member) in self.archive.members.iter().enumerate() {
+            let mut members = ArchiveWriter::new();
+            for (index, member) in self.archive.members.iter().enumerate() {
                 members.bytes(
                     &member.path,
-                    &self.archive.unpack(place)?,
+                    &self.archive.unpack(index)?,
                     member.is_deflated,
                 )?;
             }
@@ -312,7 +329,7 @@ impl Document for NpzDocument {
         for root in roots.step_by(sampled.clip.set.track_count().max(1)) {
             *root = (root.as_dvec3() - pelvis.as_dvec3()).as_vec3();
         }
-        let sampled = &Sampled {
+        let sampled = &SampledClip {
             translations: &translations,
             ..sampled.clone()
         };
@@ -325,16 +342,21 @@ impl Document for NpzDocument {
             );
             return Err(self.refuse(Code::Layout, message));
         }
-        if sampled.rate.is_none() && self.plan.times.is_none() && !self.plan.is_own {
+        if sampled.rate.is_none() && self.plan.times.is_none() && !self.plan.is_tumble_layout {
             let message = "the layout tells times by a rate alone; give --fps, not times";
             return Err(self.refuse(Code::Layout, message.to_owned()));
         }
         let parts = self.parts()?;
-        let fates = self.fates(&parts, sampled, options)?;
-        self.write_members(&fates, sampled, out)?;
+        let outcomes = self.outcomes(&parts, sampled, options)?;
+        self.write_members(&outcomes, sampled, out)?;
         let mut warnings = Warnings::new(&self.archive.file);
-        if fates.iter().any(|fate| matches!(fate, Fate::LeftOut)) {
-            let names = self.named(&fates, |fate| matches!(fate, Fate::LeftOut));
+        if outcomes
+            .iter()
+            .any(|outcome| matches!(outcome, MemberOutcome::LeftOut))
+        {
+            let names = self.named(&outcomes, |outcome| {
+                matches!(outcome, MemberOutcome::LeftOut)
+            });
             warnings.warn(Code::LeftOut, || {
                 let message = format!(
                     "left out, because it is not known how to sample them: {names}; numbers are \

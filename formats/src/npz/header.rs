@@ -14,7 +14,7 @@ pub(crate) const LONGEST_START: usize = LONGEST + 12;
 
 /// What an array's bytes are.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Header {
+pub(crate) struct ArrayHeader {
     pub(crate) element: Element,
     /// Most significant byte first.
     pub(crate) is_big_endian: bool,
@@ -84,7 +84,7 @@ impl fmt::Display for Element {
 }
 
 /// `(4, 121, 4) f4`.
-impl fmt::Display for Header {
+impl fmt::Display for ArrayHeader {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{} {}", shape_text(&self.shape), self.element)
     }
@@ -99,7 +99,41 @@ pub(crate) fn shape_text(shape: &[usize]) -> String {
     }
 }
 
-impl Header {
+impl ArrayHeader {
+    /// How many numbers apart neighbours along each axis are.
+    pub(crate) fn strides(&self) -> Vec<usize> {
+        let mut strides = vec![1; self.shape.len()];
+        let mut next = 1;
+        let mut set = |axis: usize| {
+            strides[axis] = next;
+            // Saturates only beside a length of 0, where there is no number to find.
+            next = usize::saturating_mul(next, self.shape[axis].max(1));
+        };
+        match self.is_fortran {
+            true => (0..self.shape.len()).for_each(&mut set),
+            false => (0..self.shape.len()).rev().for_each(&mut set),
+        }
+        strides
+    }
+
+    /// Elements as they are stored, in C order.
+    pub(crate) fn in_c_order<T: Clone>(&self, stored: Vec<T>) -> Vec<T> {
+        if !self.is_fortran || self.shape.len() < 2 {
+            return stored;
+        }
+        let strides = self.strides();
+        let offset_of = |index: usize| {
+            let axes = self.shape.iter().zip(&strides).rev();
+            let walk = axes.fold((index, 0), |(rest, offset), (&length, stride)| {
+                (rest / length, offset + rest % length * stride)
+            });
+            walk.1
+        };
+        (0..stored.len())
+            .map(|index| stored[offset_of(index)].clone())
+            .collect()
+    }
+
     /// Reads the header that `bytes` begin with.
     ///
     /// # Errors
@@ -122,7 +156,7 @@ impl Header {
             ));
         }
         let text = bytes.get(at..at + length).ok_or("it is cut")?;
-        let text = std::str::from_utf8(text).map_err(|_| "it is no UTF-8")?;
+        let text = std::str::from_utf8(text).map_err(|_| "it is not UTF-8")?;
         let mut scanner = Scanner { text };
         let (mut descr, mut order, mut shape) = (None, None, None);
         scanner.expect('{')?;
@@ -140,7 +174,7 @@ impl Header {
                 break;
             }
         }
-        let missing = |what: &str| format!("`{what}` is missing");
+        let missing = |key: &str| format!("`{key}` is missing");
         let (element, is_big_endian) = descr.ok_or_else(|| missing("descr"))?;
         Ok(Self {
             element,
@@ -228,7 +262,7 @@ impl<'a> Scanner<'a> {
             let end = self.text.find(|c| !is_digit(c)).unwrap_or(self.text.len());
             let (digits, rest) = self.text.split_at(end);
             let length = digits.parse::<usize>();
-            shape.push(length.map_err(|_| format!("`{digits}` in `shape` is no length"))?);
+            shape.push(length.map_err(|_| format!("`{digits}` in `shape` is not a length"))?);
             // Python 2 wrote long integers with an L.
             self.text = rest.strip_prefix('L').unwrap_or(rest);
             if !self.take(',') {
@@ -274,7 +308,7 @@ impl<'a> Scanner<'a> {
 
 /// The type of a string such as `<f8`.
 fn element(descr: &str) -> Result<(Element, bool), String> {
-    let wrong = || format!("`{descr}` is no type");
+    let wrong = || format!("`{descr}` is not a type");
     let rest = descr.strip_prefix(['<', '>', '|', '=']).unwrap_or(descr);
     let kind = rest.chars().next().ok_or_else(wrong)?;
     let digits = &rest[kind.len_utf8()..];
@@ -298,11 +332,11 @@ fn element(descr: &str) -> Result<(Element, bool), String> {
 mod tests {
     use super::*;
 
-    fn of(text: &str) -> Result<Header, String> {
+    fn of(text: &str) -> Result<ArrayHeader, String> {
         let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
         bytes.extend((text.len() as u16).to_le_bytes());
         bytes.extend(text.bytes());
-        Header::parse(&bytes)
+        ArrayHeader::parse(&bytes)
     }
 
     #[test]
@@ -331,9 +365,9 @@ mod tests {
             (Element::Unicode(5), vec![]),
             (Element::Unsigned(1), vec![7]),
         ] {
-            let bytes = Header::write(&element, &shape);
+            let bytes = ArrayHeader::write(&element, &shape);
             assert_eq!(bytes.len() % 64, 0);
-            let header = Header::parse(&bytes).unwrap();
+            let header = ArrayHeader::parse(&bytes).unwrap();
             assert_eq!((header.element, header.shape), (element, shape));
             assert_eq!(header.start, bytes.len());
             npyz::NpyHeader::from_reader(&*bytes).unwrap();
@@ -367,16 +401,16 @@ mod tests {
             assert!(error.contains(part), "{text}: {error}");
         }
         assert!(
-            Header::parse(b"\x93NUMPY\x04\x00\0\0")
+            ArrayHeader::parse(b"\x93NUMPY\x04\x00\0\0")
                 .unwrap_err()
                 .contains("version 4")
         );
         assert!(
-            Header::parse(b"\x93NUMPY\x01\x00\x10\0{")
+            ArrayHeader::parse(b"\x93NUMPY\x01\x00\x10\0{")
                 .unwrap_err()
                 .contains("cut")
         );
-        let long = Header::parse(b"\x93NUMPY\x02\x00\0\0\0\x80").unwrap_err();
+        let long = ArrayHeader::parse(b"\x93NUMPY\x02\x00\0\0\0\x80").unwrap_err();
         assert!(long.contains("2147483648"), "{long}");
         let huge =
             of("{'descr': '<f8', 'fortran_order': False, 'shape': (9999999999, 9999999999)}");

@@ -16,9 +16,12 @@ pub(super) fn resample(
     let numbers = array.numbers().unwrap_or_default();
     let shape = &array.header.shape;
     let inner: usize = shape[axis + 1..].iter().product();
-    let places: Vec<(usize, f64)> = new_times.iter().map(|&time| place(times, time)).collect();
+    let positions: Vec<(usize, f64)> = new_times
+        .iter()
+        .map(|&time| frame_at(times, time))
+        .collect();
     for outer in numbers.chunks_exact((inner * times.len()).max(1)) {
-        for &(frame, part) in &places {
+        for &(frame, part) in &positions {
             for i in 0..inner {
                 let from = outer[frame * inner + i];
                 put(match part > 0.0 {
@@ -32,7 +35,7 @@ pub(super) fn resample(
 }
 
 /// The frame at or before a time, and how much of the way to the next one has passed.
-fn place(times: &[f64], time: f64) -> (usize, f64) {
+fn frame_at(times: &[f64], time: f64) -> (usize, f64) {
     let after = times.partition_point(|&other| other <= time);
     match (after.checked_sub(1), times.get(after)) {
         (None, _) => (0, 0.0),
@@ -43,7 +46,7 @@ fn place(times: &[f64], time: f64) -> (usize, f64) {
 
 #[cfg(test)]
 mod tests {
-    use super::place;
+    use super::frame_at;
 
     #[test]
     fn times_lie_between_frames_or_are_held() {
@@ -56,7 +59,7 @@ mod tests {
             (3.0, (2, 0.0)),
             (9.0, (2, 0.0)),
         ] {
-            assert_eq!(place(&times, time), expected);
+            assert_eq!(frame_at(&times, time), expected);
         }
     }
 }

@@ -10,7 +10,7 @@ use crate::map::{Entry, Map};
 use crate::npz::archive::Archive;
 use crate::npz::array::Strides;
 use crate::npz::header::shape_text;
-use crate::npz::plan::{Part, Plan, TimeList, Values, check_float};
+use crate::npz::plan::{ArchivePlan, KeyArray, KeyKind, TimeList, check_float};
 use crate::rotation_form::RotationForm;
 
 /// Names in a map that are no tracks.
@@ -25,8 +25,8 @@ const ROLES: [&str; 7] = [
 ];
 
 /// The plan that a map makes.
-pub(crate) fn plan(archive: &Archive, map: &Map) -> Result<Plan, Diagnostic> {
-    let mut plan = Plan::default();
+pub(crate) fn plan(archive: &Archive, map: &Map) -> Result<ArchivePlan, Diagnostic> {
+    let mut plan = ArchivePlan::default();
     if let Some(time) = map.get("time") {
         let member = source(archive, time)?;
         let columns = time.columns.clone().unwrap_or(0..1);
@@ -77,8 +77,8 @@ pub(crate) fn plan(archive: &Archive, map: &Map) -> Result<Plan, Diagnostic> {
     }
     plan.names = names;
     for (name, values) in [
-        ("translations", Values::Translation),
-        ("scales", Values::Scale),
+        ("translations", KeyKind::Translation),
+        ("scales", KeyKind::Scale),
     ] {
         if let Some(entry) = map.get(name) {
             let part = part(archive, entry, values, 0, lengths)?;
@@ -86,11 +86,17 @@ pub(crate) fn plan(archive: &Archive, map: &Map) -> Result<Plan, Diagnostic> {
         }
     }
     for (name, read) in [
-        ("names", Plan::read_names as fn(&mut _, &_, &str) -> _),
-        ("parents", Plan::read_parents),
-        ("fps", |plan: &mut Plan, archive: &Archive, name: &str| {
-            plan.read_rate(archive, &[name])
-        }),
+        (
+            "names",
+            ArchivePlan::read_names as fn(&mut _, &_, &str) -> _,
+        ),
+        ("parents", ArchivePlan::read_parents),
+        (
+            "fps",
+            |plan: &mut ArchivePlan, archive: &Archive, name: &str| {
+                plan.read_rate(archive, &[name])
+            },
+        ),
     ] {
         if let Some(entry) = map.get(name) {
             source(archive, entry)?;
@@ -101,10 +107,10 @@ pub(crate) fn plan(archive: &Archive, map: &Map) -> Result<Plan, Diagnostic> {
 }
 
 /// What the numbers of an array of rotations are.
-fn rotations(entry: &Entry) -> Values {
+fn rotations(entry: &Entry) -> KeyKind {
     match entry.form() {
-        RotationForm::Quaternion(order) => Values::Quaternion(order),
-        form => Values::Form(form),
+        RotationForm::Quaternion(order) => KeyKind::Quaternion(order),
+        form => KeyKind::Form(form),
     }
 }
 
@@ -131,20 +137,20 @@ fn shape_of(archive: &Archive, member: usize) -> Result<&[usize], Diagnostic> {
     Ok(&archive.header(member)?.shape)
 }
 
-/// An array of one track (frames, numbers), or of several, whose axes are told by their lengths.
+/// An array of one track (frames, numbers), or of several, whose axes are known by their lengths.
 fn part(
     archive: &Archive,
     entry: &Entry,
-    values: Values,
+    values: KeyKind,
     first_track: usize,
     lengths: Lengths,
-) -> Result<(Part, usize), Diagnostic> {
+) -> Result<(KeyArray, usize), Diagnostic> {
     let member = source(archive, entry)?;
     check_float(archive, member)?;
     let header = archive.header(member)?;
     let (mut shape, mut strides) = (header.shape.clone(), header.strides());
     // The rows of a matrix may be an axis apart, if one follows the other in memory.
-    if values == Values::Form(RotationForm::Matrix)
+    if values == KeyKind::Form(RotationForm::Matrix)
         && let [.., 3, 3] = shape[..]
         && let [.., rows, columns] = strides[..]
         && rows == 3 * columns
@@ -154,7 +160,7 @@ fn part(
         strides.remove(strides.len() - 2);
     }
     let shape = &*shape;
-    if values == Values::Form(RotationForm::Matrix)
+    if values == KeyKind::Form(RotationForm::Matrix)
         && let [.., 3, 3] = *shape
         && shape.len() > 2
     {
@@ -185,16 +191,16 @@ fn part(
     let layout = match (axes, entry.layout) {
         (2, _) => Layout::FrameMajor,
         (_, Some(layout)) => layout,
-        _ => told_by_lengths(shape, lengths).map_err(|(code, why)| refuse(code, why))?,
+        _ => layout_by_lengths(shape, lengths).map_err(|(code, why)| refuse(code, why))?,
     };
     let (track, frame) = match (axes, layout) {
         (2, _) => ((0, 1), (strides[0], shape[0])),
         (_, Layout::TrackMajor) => ((strides[0], shape[0]), (strides[1], shape[1])),
         (_, Layout::FrameMajor) => ((strides[1], shape[1]), (strides[0], shape[0])),
     };
-    let part = Part {
+    let part = KeyArray {
         member,
-        values,
+        kind: values,
         tracks: first_track..first_track + track.1,
         layout,
         at: Strides {
@@ -209,7 +215,7 @@ fn part(
 
 /// Which axis is that of the frames: the one that is as long as the times are, or the one beside
 /// that of the names.
-fn told_by_lengths(shape: &[usize], lengths: Lengths) -> Result<Layout, (Code, String)> {
+fn layout_by_lengths(shape: &[usize], lengths: Lengths) -> Result<Layout, (Code, String)> {
     let fits = |tracks: usize, frames: usize| {
         lengths.frames.is_none_or(|known| known == frames)
             && lengths.tracks.is_none_or(|known| known == tracks)
@@ -226,7 +232,7 @@ fn told_by_lengths(shape: &[usize], lengths: Lengths) -> Result<Layout, (Code, S
             Err((Code::Ambiguous, message))
         }
         (false, false) => {
-            let known = |what, known: Option<usize>| known.map(|n| format!("{n} {what}"));
+            let known = |axis, known: Option<usize>| known.map(|n| format!("{n} {axis}"));
             let known = [
                 known("times", lengths.frames),
                 known("names", lengths.tracks),

@@ -10,11 +10,10 @@ mod document;
 pub(crate) mod header;
 mod linear;
 mod mapped;
-mod own;
 mod plan;
-mod rate;
 mod rotation_vector;
 mod smpl;
+mod tumble_layout;
 pub mod write;
 
 use std::path::Path;
@@ -87,7 +86,7 @@ pub fn read_npz(file: &str, bytes: Vec<u8>, options: &ReadOptions) -> Result<Loa
         plan.warn_of_others(&archive, options, &mut warnings);
         return Ok(Loaded::of(clip, warnings.into_list()));
     }
-    let plan = match own::plan(&archive)? {
+    let plan = match tumble_layout::plan(&archive)? {
         Some(plan) => Some(plan),
         None => match smpl::plan(&archive, &mut warnings)? {
             Some(plan) => Some(plan),
@@ -113,7 +112,7 @@ pub fn read_npz(file: &str, bytes: Vec<u8>, options: &ReadOptions) -> Result<Loa
 
 /// The numbers of an NPY file, whatever they mean.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Numbers {
+pub struct NumberArray {
     /// The length of each axis.
     pub shape: Vec<usize>,
     /// All of them, the last axis fastest.
@@ -124,7 +123,7 @@ pub struct Numbers {
 ///
 /// # Errors
 /// The first fault that refuses it; an array of anything but numbers is one.
-pub fn open_numbers(path: &Path, options: &ReadOptions) -> Result<Numbers, Diagnostic> {
+pub fn open_numbers(path: &Path, options: &ReadOptions) -> Result<NumberArray, Diagnostic> {
     let source = Source::open(path, options.pipes)?;
     let file = source.name.clone();
     let archive = Archive::single(
@@ -137,7 +136,7 @@ pub fn open_numbers(path: &Path, options: &ReadOptions) -> Result<Numbers, Diagn
         let message = format!("holds {}, no numbers", array.header.element);
         archive.refuse(0, Code::UnknownArrays, message)
     })?;
-    Ok(Numbers {
+    Ok(NumberArray {
         shape: array.header.shape.clone(),
         values,
     })

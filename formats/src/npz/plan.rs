@@ -1,33 +1,32 @@
 //! What the arrays of a file mean: which of them hold the rotations of which tracks, and how. Every
 //! layout becomes a plan, from which clips are read, and by which files are written again.
 
+mod rate;
+mod unread;
+
 use std::ops::Range;
 
 use glam::DVec3;
 use tumble::{FrameRate, Layout};
 
-use crate::bvh::BvhJoint;
+use crate::bvh::joint::BvhJoint;
 use crate::diagnostic::{Code, Diagnostic};
-use crate::format::ReadOptions;
 use crate::motion::{Channels, Transform};
-use crate::npy::ComponentOrder;
-use crate::npz::archive::{Archive, Member};
+use crate::npz::archive::Archive;
 use crate::npz::array::Strides;
-use crate::npz::body::SHAPE;
-use crate::npz::header::{Element, Header, shape_text};
-use crate::npz::own::CONSTANTS;
+use crate::npz::header::shape_text;
+use crate::quaternion::ComponentOrder;
 use crate::rotation_form::RotationForm;
-use crate::warnings::{Warnings, listed};
 
 /// One clip, as arrays.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Plan {
+pub(crate) struct ArchivePlan {
     /// The clip's name.
     pub(crate) name: Option<String>,
     pub(crate) tracks: usize,
     pub(crate) frames: usize,
     /// The arrays that hold keys. Those of rotations come first, in the order of their tracks.
-    pub(crate) parts: Vec<Part>,
+    pub(crate) parts: Vec<KeyArray>,
     /// An entry for each track, or none.
     pub(crate) names: Vec<String>,
     /// Likewise.
@@ -48,7 +47,7 @@ pub(crate) struct Plan {
     /// Members that hold the same for all frames, whatever their shape looks like.
     pub(crate) constants: Vec<usize>,
     pub(crate) is_world: bool,
-    /// Why poses in the world cannot be told.
+    /// Why poses in the world cannot be computed.
     pub(crate) no_world: Option<String>,
     /// A body of SMPL.
     pub(crate) is_body: bool,
@@ -57,7 +56,7 @@ pub(crate) struct Plan {
     /// How BVH writes each track down, or nothing.
     pub(crate) bvh: Vec<BvhJoint>,
     /// The layout is ours: what made the samples is written beside them.
-    pub(crate) is_own: bool,
+    pub(crate) is_tumble_layout: bool,
 }
 
 /// Where the times of all frames are.
@@ -70,9 +69,9 @@ pub(crate) struct TimeList {
 
 /// An array of keys.
 #[derive(Debug, Clone)]
-pub(crate) struct Part {
+pub(crate) struct KeyArray {
     pub(crate) member: usize,
-    pub(crate) values: Values,
+    pub(crate) kind: KeyKind,
     pub(crate) tracks: Range<usize>,
     pub(crate) layout: Layout,
     pub(crate) at: Strides,
@@ -80,7 +79,7 @@ pub(crate) struct Part {
 
 /// What each key is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Values {
+pub(crate) enum KeyKind {
     /// A quaternion.
     Quaternion(ComponentOrder),
     /// An axis of rotation, as long as the angle in radians.
@@ -91,7 +90,7 @@ pub(crate) enum Values {
     Scale,
 }
 
-impl Values {
+impl KeyKind {
     pub(crate) fn is_rotation(self) -> bool {
         matches!(
             self,
@@ -109,7 +108,7 @@ impl Values {
     }
 }
 
-impl Part {
+impl KeyArray {
     /// All of an array: of shape (frames, numbers of all tracks), (frames, tracks, numbers), or,
     /// track by track, (tracks, frames, numbers). `first` is the first of its tracks. Gives the
     /// number of frames too.
@@ -119,7 +118,7 @@ impl Part {
     pub(crate) fn of(
         archive: &Archive,
         name: &str,
-        values: Values,
+        values: KeyKind,
         first: usize,
         layout: Layout,
     ) -> Result<Option<(Self, usize)>, Diagnostic> {
@@ -160,20 +159,20 @@ impl Part {
         };
         let Some((at, tracks, frames)) = found else {
             let shape = shape_text(shape);
-            let wanted = match layout {
+            let expected = match layout {
                 Layout::TrackMajor => format!("(tracks, frames, {width})"),
                 Layout::FrameMajor => {
                     format!("(frames, {width} numbers a track) or (frames, tracks, {width})")
                 }
             };
             let message = format!(
-                "the array has shape {shape}; {wanted} is read, --map tells of other arrays"
+                "the array has shape {shape}; {expected} is read, --map tells of other arrays"
             );
             return Err(archive.refuse(member, Code::Shape, message));
         };
         let part = Self {
             member,
-            values,
+            kind: values,
             tracks: first..first + tracks,
             layout,
             at,
@@ -182,19 +181,19 @@ impl Part {
     }
 
     /// Where the key of a track is, as `NumPy` would index it.
-    pub(crate) fn place(&self, archive: &Archive, track: usize, frame: usize) -> String {
+    pub(crate) fn index_text(&self, archive: &Archive, track: usize, frame: usize) -> String {
         let member = &archive.members[self.member];
-        let own = track - self.tracks.start;
+        let part_track = track - self.tracks.start;
         let axes = member
             .header
             .as_ref()
             .map_or(0, |header| header.shape.len());
-        let width = self.values.width();
+        let width = self.kind.width();
         let index = match (axes, self.layout) {
-            (3, Layout::TrackMajor) => format!("{own}, {frame}"),
-            (3, Layout::FrameMajor) => format!("{frame}, {own}"),
+            (3, Layout::TrackMajor) => format!("{part_track}, {frame}"),
+            (3, Layout::FrameMajor) => format!("{frame}, {part_track}"),
             _ => {
-                let first = self.at.first / self.at.component.max(1) + own * width;
+                let first = self.at.first / self.at.component.max(1) + part_track * width;
                 format!("{frame}, {first}:{}", first + width)
             }
         };
@@ -213,75 +212,18 @@ pub(crate) fn check_float(archive: &Archive, member: usize) -> Result<(), Diagno
     Err(archive.refuse(member, Code::ElementType, message))
 }
 
-impl Plan {
-    /// The members of which nothing is read, but for pickled objects, which have a warning of their own.
-    pub(crate) fn not_read(&self, archive: &Archive, options: &ReadOptions) -> Vec<usize> {
-        let is_read = |place: usize, member: &Member| {
-            let header = member.header.as_ref();
-            let is_shape = self.is_body && options.has_body_model;
-            self.parts.iter().any(|part| part.member == place)
-                || self.times.is_some_and(|list| list.member == place)
-                || self.rate_member == Some(place)
-                || self.compared.contains(&place)
-                || self.constants.contains(&place)
-                || self.is_own && CONSTANTS.contains(&&*member.name)
-                || is_shape && SHAPE.contains(&&*member.name)
-                || self.is_note(member)
-                || header.is_ok_and(|it| it.element == Element::Object)
-        };
-        let members = archive.members.iter().enumerate();
-        let others = members.filter(|&(place, member)| !is_read(place, member));
-        others.map(|(place, _)| place).collect()
-    }
-
-    /// Whether a member says what made our own samples: a text beside them.
-    pub(crate) fn is_note(&self, member: &Member) -> bool {
-        let header = member.header.as_ref();
-        self.is_own && header.is_ok_and(|it| it.shape.is_empty() && it.element.is_text())
-    }
-
-    /// Warns of them, and of pickled objects, which are not looked into.
-    pub(crate) fn warn_of_others(
-        &self,
-        archive: &Archive,
-        options: &ReadOptions,
-        warnings: &mut Warnings,
-    ) {
-        let name = |place: usize| &*archive.members[place].name;
-        let others = self.not_read(archive, options);
-        let quoted = others.iter().map(|&place| format!("`{}`", name(place)));
-        if let Some(names) = listed(quoted.collect()) {
-            let has_shape = others.iter().any(|&place| SHAPE.contains(&name(place)));
-            let hint = match self.is_body && has_shape {
-                true => "; --body-model brings the model that the shape is of",
-                false => "",
-            };
-            let message = format!("not read: {names}; --map says what arrays are{hint}");
-            warnings.warn(Code::ArraysNotRead, || (None, message));
-        }
-        for member in &archive.members {
-            let is_object = |header: &Header| header.element == Element::Object;
-            if member.header.as_ref().is_ok_and(is_object) {
-                let message = format!(
-                    "`{}` holds pickled objects, which are not read",
-                    member.name
-                );
-                warnings.warn(Code::ObjectsBeside, || (None, message));
-            }
-        }
-    }
-
+impl ArchivePlan {
     /// Adds the keys of an array that has as many tracks and frames as the others.
     pub(crate) fn add(
         &mut self,
         archive: &Archive,
-        (part, frames): (Part, usize),
+        (part, frames): (KeyArray, usize),
     ) -> Result<(), Diagnostic> {
         if self.parts.is_empty() {
             self.frames = frames;
         }
         let end = part.tracks.end;
-        let is_rotation = part.values.is_rotation();
+        let is_rotation = part.kind.is_rotation();
         if frames != self.frames || !is_rotation && end > self.tracks {
             let name = &archive.members[self.parts[0].member].name;
             let message = format!(
@@ -323,7 +265,7 @@ impl Plan {
             let is_track = parent >= 0.0 && parent < self.tracks as f64 && parent.fract() == 0.0;
             if !is_track && parent >= 0.0 || parent.is_nan() {
                 let message = format!(
-                    "track {track} hangs on track {parent}, of {}; roots have -1",
+                    "track {track} has the parent {parent}, but there are {} tracks; roots have -1",
                     self.tracks
                 );
                 return Err(refuse(message));
@@ -332,7 +274,7 @@ impl Plan {
         }
         match circle(&self.parents) {
             Some(track) => Err(refuse(format!(
-                "track {track} hangs on itself; roots have -1"
+                "track {track} is its own ancestor; roots have -1"
             ))),
             None => Ok(()),
         }
@@ -370,14 +312,14 @@ fn circle(parents: &[Option<usize>]) -> Option<usize> {
     for track in 0..parents.len() {
         let mut line = Vec::new();
         let mut next = Some(track);
-        while let Some(own) = next.filter(|&own| !is_done[own]) {
+        while let Some(joint) = next.filter(|&joint| !is_done[joint]) {
             if line.len() == parents.len() {
-                return Some(own);
+                return Some(joint);
             }
-            line.push(own);
-            next = parents[own];
+            line.push(joint);
+            next = parents[joint];
         }
-        line.into_iter().for_each(|own| is_done[own] = true);
+        line.into_iter().for_each(|joint| is_done[joint] = true);
     }
     None
 }

@@ -10,7 +10,7 @@ use glam::{DQuat, DVec3, Quat};
 const TERMS: usize = 12;
 
 /// Enough of them for angles up to π/2, as most joints have: the next is below 5e-13.
-const FEW_TERMS: usize = 7;
+const SHORT_TERMS: usize = 7;
 
 /// The coefficients of cos √t and of sin √t / √t, side by side so that a vector of two serves both:
 /// 1/(2k)! and 1/(2k + 1)!, signs alternating.
@@ -39,7 +39,7 @@ pub(crate) fn exp(vector: [f64; 3]) -> DQuat {
         })
     };
     let [cos, sinc] = if squared <= PI * PI / 16.0 {
-        series(&COEFFICIENTS[..FEW_TERMS])
+        series(&COEFFICIENTS[..SHORT_TERMS])
     } else if squared <= PI * PI {
         series(&COEFFICIENTS)
     } else {

@@ -4,7 +4,7 @@ use tumble::Layout;
 
 use crate::diagnostic::{Code, Diagnostic};
 use crate::npz::archive::Archive;
-use crate::npz::plan::{Part, Plan, Values};
+use crate::npz::plan::{ArchivePlan, KeyArray, KeyKind};
 use crate::warnings::Warnings;
 
 /// Joints of all SMPL bodies, with their parents.
@@ -120,17 +120,20 @@ impl Skeleton {
 
 /// The plan of a file of `poses`, or of `root_orient`, `pose_body` and perhaps more, which the models
 /// call `global_orient` and `body_pose`; `None` for another.
-pub(crate) fn plan(archive: &Archive, warnings: &mut Warnings) -> Result<Option<Plan>, Diagnostic> {
+pub(crate) fn plan(
+    archive: &Archive,
+    warnings: &mut Warnings,
+) -> Result<Option<ArchivePlan>, Diagnostic> {
     let vectors = |name: &str, first| {
-        Part::of(
+        KeyArray::of(
             archive,
             name,
-            Values::RotationVector,
+            KeyKind::RotationVector,
             first,
             Layout::FrameMajor,
         )
     };
-    let mut plan = Plan::default();
+    let mut plan = ArchivePlan::default();
     let skeleton = if let Some(poses) = vectors("poses", 0)? {
         plan.add(archive, poses)?;
         let skeleton = Skeleton::of(plan.tracks);
@@ -138,7 +141,7 @@ pub(crate) fn plan(archive: &Archive, warnings: &mut Warnings) -> Result<Option<
             let tracks = plan.tracks;
             warnings.warn(Code::UnknownBody, || {
                 let message = format!(
-                    "{tracks} joints are no known body (22, 24, 52 and 55 are); they have no names"
+                    "{tracks} joints are not those of a known body (22, 24, 52 and 55 are); they have no names"
                 );
                 (None, message)
             });
@@ -176,7 +179,7 @@ pub(crate) fn plan(archive: &Archive, warnings: &mut Warnings) -> Result<Option<
                 return Err(Diagnostic::new(&archive.file, Code::UnknownArrays, message));
             }
         }
-        let is_piece = |name: &str| pieces.iter().any(|own| own.0 == name);
+        let is_piece = |name: &str| pieces.iter().any(|piece| piece.0 == name);
         let has = |names: [&str; 2]| names.iter().any(|name| is_piece(name) && has(name));
         let has_more = has(["pose_jaw", "jaw_pose"]) || has(["pose_eye", "leye_pose"]);
         if is_smpl && !has_more && !has(["pose_hand", "left_hand_pose"]) {
@@ -208,7 +211,8 @@ pub(crate) fn plan(archive: &Archive, warnings: &mut Warnings) -> Result<Option<
     }
     let root = ROOTS.into_iter().find(|name| archive.find(name).is_some());
     if let Some(root) = root
-        && let Some(root) = Part::of(archive, root, Values::Translation, 0, Layout::FrameMajor)?
+        && let Some(root) =
+            KeyArray::of(archive, root, KeyKind::Translation, 0, Layout::FrameMajor)?
     {
         plan.add(archive, root)?;
     }

@@ -12,22 +12,22 @@ use zip::{CompressionMethod, ZipWriter};
 use crate::bvh::BvhJoint;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::format::{MotionOptions, WriteError};
-use crate::motion::{Joint, Motion, Sampled, Sampler};
-use crate::npy::ComponentOrder;
-use crate::npz::header::{Element, Header};
-use crate::npz::plan::Values;
-use crate::npz::{own, rotation_vector};
+use crate::motion::{ChannelInterpolation, Joint, Motion, SampledClip};
+use crate::npz::header::{ArrayHeader, Element};
+use crate::npz::plan::KeyKind;
+use crate::npz::{rotation_vector, tumble_layout};
+use crate::quaternion::ComponentOrder;
 
 /// An archive that is being made. It grows in memory, because a member's length and checksum come
 /// before its bytes.
-pub(super) struct Members {
+pub(super) struct ArchiveWriter {
     zip: ZipWriter<Cursor<Vec<u8>>>,
 }
 
 /// Bytes that go to the archive at once.
 const PIECE: usize = 1 << 16;
 
-impl Members {
+impl ArchiveWriter {
     pub(super) fn new() -> Self {
         Self {
             zip: ZipWriter::new(Cursor::new(Vec::new())),
@@ -61,7 +61,7 @@ impl Members {
         is_deflated: bool,
         fill: impl FnOnce(&mut dyn FnMut(f64) -> io::Result<()>) -> io::Result<()>,
     ) -> io::Result<()> {
-        let header = Header::write(element, shape);
+        let header = ArrayHeader::write(element, shape);
         let count: usize = shape.iter().product();
         let length = header.len() + count.saturating_mul(element.size().unwrap_or(8));
         self.begin(path, length, is_deflated)?;
@@ -87,7 +87,7 @@ impl Members {
     pub(super) fn texts(&mut self, path: &str, texts: &[&str], shape: &[usize]) -> io::Result<()> {
         let longest = texts.iter().map(|text| text.chars().count()).max();
         let length = longest.unwrap_or(0).max(1);
-        let mut bytes = Header::write(&Element::Unicode(length), shape);
+        let mut bytes = ArrayHeader::write(&Element::Unicode(length), shape);
         for text in texts {
             let padded = text.chars().chain(std::iter::repeat('\0')).take(length);
             bytes.extend(padded.flat_map(|character| u32::from(character).to_le_bytes()));
@@ -104,10 +104,10 @@ impl Members {
 
 /// Gives the keys of some tracks at all samples, in C order.
 pub(super) fn keys(
-    values: Values,
+    values: KeyKind,
     tracks: Range<usize>,
     layout: Layout,
-    sampled: &Sampled<'_>,
+    sampled: &SampledClip<'_>,
     put: &mut dyn FnMut(f64) -> io::Result<()>,
 ) -> io::Result<()> {
     let all = sampled.clip.set.track_count();
@@ -119,7 +119,7 @@ pub(super) fn keys(
         let vector = |list: &[Vec3], rest| list.get(at).copied().unwrap_or(rest).as_dvec3();
         let rotation = sampled.rotations[at];
         let three = match values {
-            Values::Quaternion(order) => {
+            KeyKind::Quaternion(order) => {
                 let [x, y, z, w] = rotation.to_array();
                 let numbers = match order {
                     ComponentOrder::Xyzw => [x, y, z, w],
@@ -129,19 +129,19 @@ pub(super) fn keys(
                     .into_iter()
                     .try_for_each(|number| put(number.into()));
             }
-            Values::RotationVector => {
+            KeyKind::RotationVector => {
                 let before = &mut before[track - first_track];
                 *before.insert(rotation_vector::log(rotation, *before))
             }
-            Values::Form(form) => {
+            KeyKind::Form(form) => {
                 // Archives that a map explains are not written again in their layout.
                 let message = format!("rotations are not written as {form:?}");
                 return Err(io::Error::new(io::ErrorKind::InvalidInput, message));
             }
-            Values::Translation => {
+            KeyKind::Translation => {
                 sampled.clip.origin(track) + vector(sampled.translations, Vec3::ZERO)
             }
-            Values::Scale => vector(sampled.scales, Vec3::ONE),
+            KeyKind::Scale => vector(sampled.scales, Vec3::ONE),
         };
         three.to_array().into_iter().try_for_each(&mut *put)
     };
@@ -156,7 +156,7 @@ pub(super) fn keys(
 }
 
 /// Refuses samples that are not as many as times and tracks make.
-pub(super) fn check(sampled: &Sampled<'_>, name: &str) -> Result<(), WriteError> {
+pub(super) fn check(sampled: &SampledClip<'_>, name: &str) -> Result<(), WriteError> {
     let (tracks, frames) = (sampled.clip.set.track_count(), sampled.times.len());
     let count = sampled.rotations.len();
     if tracks > 0 && frames > 0 && tracks.checked_mul(frames) == Some(count) {
@@ -171,15 +171,15 @@ const KEYS: [&str; 5] = ["rotations", "translations", "scales", "times", "fps"];
 
 /// What a note is called among the arrays.
 pub(super) fn note_name(note: &str) -> String {
-    let is_taken = KEYS.contains(&note) || own::CONSTANTS.contains(&note);
-    match is_taken {
+    let is_reserved = KEYS.contains(&note) || tumble_layout::CONSTANTS.contains(&note);
+    match is_reserved {
         true => format!("note_{note}"),
         false => note.to_owned(),
     }
 }
 
 /// Writes what made the samples, a text each.
-pub(super) fn notes(members: &mut Members, sampled: &Sampled<'_>) -> io::Result<()> {
+pub(super) fn notes(members: &mut ArchiveWriter, sampled: &SampledClip<'_>) -> io::Result<()> {
     for (note, text) in sampled.notes {
         members.texts(&format!("{}.npy", note_name(note)), &[text], &[])?;
     }
@@ -196,7 +196,7 @@ pub(super) fn notes(members: &mut Members, sampled: &Sampled<'_>) -> io::Result<
 /// # Errors
 /// When there is not one clip, or writing fails.
 pub fn write_npz(
-    clips: &[Sampled<'_>],
+    clips: &[SampledClip<'_>],
     options: &MotionOptions,
     out: &mut dyn Write,
 ) -> Result<Vec<Diagnostic>, WriteError> {
@@ -210,20 +210,20 @@ pub fn write_npz(
     check(sampled, &options.name)?;
     let clip = sampled.clip;
     let (tracks, frames) = (clip.set.track_count(), sampled.times.len());
-    let mut members = Members::new();
-    let quaternions = Values::Quaternion(ComponentOrder::Xyzw);
+    let mut members = ArchiveWriter::new();
+    let quaternions = KeyKind::Quaternion(ComponentOrder::Xyzw);
     for (path, values, is_there) in [
         ("rotations.npy", quaternions, true),
         (
             "translations.npy",
-            Values::Translation,
+            KeyKind::Translation,
             !sampled.translations.is_empty(),
         ),
-        ("scales.npy", Values::Scale, !sampled.scales.is_empty()),
+        ("scales.npy", KeyKind::Scale, !sampled.scales.is_empty()),
     ] {
         if is_there {
             let shape = [tracks, frames, values.width()];
-            let is_wide = values == Values::Translation && sampled.has_origins();
+            let is_wide = values == KeyKind::Translation && sampled.has_origins();
             let element = if is_wide { Element::F64 } else { Element::F32 };
             members.numbers(path, (&element, &shape), false, |put| {
                 keys(values, 0..tracks, Layout::TrackMajor, sampled, put)
@@ -259,7 +259,7 @@ pub fn write_npz(
 }
 
 /// Writes the times of all samples.
-pub(super) fn times(members: &mut Members, sampled: &Sampled<'_>) -> io::Result<()> {
+pub(super) fn times(members: &mut ArchiveWriter, sampled: &SampledClip<'_>) -> io::Result<()> {
     let shape = [sampled.times.len()];
     members.numbers("times.npy", (&Element::F64, &shape), false, |put| {
         let offset = sampled.clip.time_offset as f64;
@@ -271,32 +271,38 @@ pub(super) fn times(members: &mut Members, sampled: &Sampled<'_>) -> io::Result<
 }
 
 /// Writes how channels are interpolated, where the clip says it. Samples of cubics are joined by lines.
-fn samplers(members: &mut Members, clip: &Motion) -> io::Result<()> {
-    let name = |sampler: Option<Sampler>| match sampler {
+fn samplers(members: &mut ArchiveWriter, clip: &Motion) -> io::Result<()> {
+    let name = |sampler: Option<ChannelInterpolation>| match sampler {
         None => "",
-        Some(Sampler::Step) => "STEP",
-        Some(Sampler::Linear | Sampler::Cubic) => "LINEAR",
+        Some(ChannelInterpolation::Step) => "STEP",
+        Some(ChannelInterpolation::Linear | ChannelInterpolation::Cubic) => "LINEAR",
     };
     let all = clip.channels.iter();
-    let all = all.flat_map(|own| [own.rotation, own.translation, own.scale].map(name));
+    let all = all
+        .flat_map(|channels| [channels.rotation, channels.translation, channels.scale].map(name));
     let all: Vec<&str> = all.collect();
     match all.is_empty() {
         true => Ok(()),
-        false => members.texts(&format!("{}.npy", own::SAMPLERS), &all, &[all.len() / 3, 3]),
+        false => members.texts(
+            &format!("{}.npy", tumble_layout::SAMPLERS),
+            &all,
+            &[all.len() / 3, 3],
+        ),
     }
 }
 
 /// Writes how BVH has the joints.
-fn bvh(members: &mut Members, joints: &[BvhJoint]) -> io::Result<()> {
+fn bvh(members: &mut ArchiveWriter, joints: &[BvhJoint]) -> io::Result<()> {
     if joints.is_empty() {
         return Ok(());
     }
     let texts: Vec<String> = joints.iter().map(BvhJoint::channels_text).collect();
     let texts: Vec<&str> = texts.iter().map(String::as_str).collect();
-    let path = format!("{}.npy", own::BVH_CHANNELS);
+    let path = format!("{}.npy", tumble_layout::BVH_CHANNELS);
     members.texts(&path, &texts, &[texts.len()])?;
     let sites = joints.iter().enumerate();
-    let sites = sites.flat_map(|(track, own)| own.end_sites.iter().map(move |site| (track, site)));
+    let sites =
+        sites.flat_map(|(track, joint)| joint.end_sites.iter().map(move |site| (track, site)));
     let rows: Vec<[f64; 4]> = sites
         .map(|(track, site)| {
             let [x, y, z] = site.as_dvec3().to_array();
@@ -304,13 +310,16 @@ fn bvh(members: &mut Members, joints: &[BvhJoint]) -> io::Result<()> {
         })
         .collect();
     let shape = (&Element::F64, &[rows.len(), 4][..]);
-    members.numbers(&format!("{}.npy", own::END_SITES), shape, false, |put| {
-        rows.iter().flatten().try_for_each(|&number| put(number))
-    })
+    members.numbers(
+        &format!("{}.npy", tumble_layout::END_SITES),
+        shape,
+        false,
+        |put| rows.iter().flatten().try_for_each(|&number| put(number)),
+    )
 }
 
 /// Writes parents, and the rest pose if there is one.
-fn skeleton(members: &mut Members, clip: &Motion, has_origins: bool) -> io::Result<()> {
+fn skeleton(members: &mut ArchiveWriter, clip: &Motion, has_origins: bool) -> io::Result<()> {
     let joints = &clip.skeleton;
     if joints.is_empty() {
         return Ok(());

@@ -18,36 +18,35 @@ use crate::diagnostic::Diagnostic;
 use crate::parquet::pages::chunk;
 use crate::parquet::{damaged, plain};
 use crate::table::arrays::{Gather, chosen};
-use crate::table::columns::{Column, Numbers, Table, Values};
-use crate::table::plan::Wanted;
+use crate::table::columns::{Column, ColumnNumbers, ColumnValues, RequestedColumn, Table};
 
 /// Rows that are decoded at once.
 const BATCH: usize = 1 << 16;
 
 /// Fewer numbers than this are unpacked before another thread has woken up.
-const FEW: usize = 1 << 16;
+const MIN_PARALLEL_NUMBERS: usize = 1 << 16;
 
 /// A file whose pages have been checked.
-pub(super) struct File<'a> {
+pub(super) struct ParquetFile<'a> {
     pub(super) name: &'a str,
     pub(super) bytes: Bytes,
     pub(super) metadata: ArrowReaderMetadata,
 }
 
 /// A column, with its type.
-type Typed<'a> = (&'a Wanted, &'a DataType);
+type TypedColumn<'a> = (&'a RequestedColumn, &'a DataType);
 
-impl File<'_> {
+impl ParquetFile<'_> {
     /// Reads all columns, a batch of rows after the other.
     ///
     /// # Errors
     /// The first fault.
     pub(super) fn read_together(
         &self,
-        wanted: &[Typed<'_>],
+        requested: &[TypedColumn<'_>],
         mut gather: Gather,
     ) -> Result<Table, Diagnostic> {
-        let mut roots: Vec<usize> = wanted.iter().map(|(wanted, _)| wanted.index).collect();
+        let mut roots: Vec<usize> = requested.iter().map(|(column, _)| column.index).collect();
         roots.sort_unstable();
         roots.dedup();
         let damaged = |error: &dyn std::fmt::Display| damaged(self.name, error);
@@ -58,14 +57,14 @@ impl File<'_> {
             .with_batch_size(BATCH)
             .build()
             .map_err(|error| damaged(&error))?;
-        let places = wanted
+        let indices = requested
             .iter()
-            .map(|(wanted, _)| roots.partition_point(|&root| root < wanted.index));
-        let places: Vec<usize> = places.collect();
+            .map(|(column, _)| roots.partition_point(|&root| root < column.index));
+        let indices: Vec<usize> = indices.collect();
         for batch in batches {
             let batch = batch.map_err(|error| damaged(&error))?;
             let columns =
-                chosen(&batch, &places).ok_or_else(|| damaged(&"a column is not there"))?;
+                chosen(&batch, &indices).ok_or_else(|| damaged(&"a column is not there"))?;
             gather.push(&columns, batch.num_rows())?;
         }
         gather.finish()
@@ -74,24 +73,24 @@ impl File<'_> {
     /// Reads columns of plain numbers each by itself, straight into the list that it becomes, and the
     /// others together, on all threads if there are many; nothing where there is anything wrong or
     /// missing.
-    pub(super) fn read_apart(&self, wanted: &[Typed<'_>]) -> Option<Table> {
+    pub(super) fn read_apart(&self, requested: &[TypedColumn<'_>]) -> Option<Table> {
         let schema = self.metadata.parquet_schema();
         // The first leaf of each column.
         let mut leaves = vec![None; schema.root_schema().get_fields().len()];
         for leaf in 0..schema.num_columns() {
-            let own = leaves.get_mut(schema.get_column_root_idx(leaf))?;
-            own.get_or_insert(leaf);
+            let first_leaf = leaves.get_mut(schema.get_column_root_idx(leaf))?;
+            first_leaf.get_or_insert(leaf);
         }
-        let plain = |(wanted, data_type): &Typed<'_>| {
-            let leaf = leaves.get(wanted.index).copied().flatten()?;
+        let plain = |(column, data_type): &TypedColumn<'_>| {
+            let leaf = leaves.get(column.index).copied().flatten()?;
             is_plain(schema, leaf, data_type).then_some(leaf)
         };
-        let leaves: Vec<Option<usize>> = wanted.iter().map(plain).collect();
-        let others = wanted
+        let leaves: Vec<Option<usize>> = requested.iter().map(plain).collect();
+        let others = requested
             .iter()
             .zip(&leaves)
             .filter(|(_, leaf)| leaf.is_none());
-        let others: Vec<Typed<'_>> = others.map(|(wanted, _)| *wanted).collect();
+        let others: Vec<TypedColumn<'_>> = others.map(|(column, _)| *column).collect();
         let plain: Vec<usize> = leaves.iter().copied().flatten().collect();
         let read_others = || {
             let gather = Gather::new(self.name, others.iter().copied()).ok()?;
@@ -101,8 +100,9 @@ impl File<'_> {
             }
         };
         let rows = self.metadata.metadata().file_metadata().num_rows();
-        let are_few = usize::try_from(rows).ok()?.saturating_mul(wanted.len()) < FEW;
-        let (others, numbers): (_, Option<Vec<Numbers>>) = match are_few {
+        let is_small =
+            usize::try_from(rows).ok()?.saturating_mul(requested.len()) < MIN_PARALLEL_NUMBERS;
+        let (others, numbers): (_, Option<Vec<ColumnNumbers>>) = match is_small {
             true => (
                 read_others(),
                 plain.iter().map(|&leaf| self.numbers(leaf)).collect(),
@@ -118,14 +118,14 @@ impl File<'_> {
             }
         };
         let (mut others, mut numbers) = (others?.into_iter(), numbers?.into_iter());
-        let columns = wanted.iter().zip(&leaves).map(|((wanted, _), leaf)| {
+        let columns = requested.iter().zip(&leaves).map(|((column, _), leaf)| {
             if leaf.is_none() {
                 return others.next();
             }
             Some(Column {
-                name: wanted.name.clone(),
-                index: wanted.index,
-                values: Values::Numbers(numbers.next()?),
+                name: column.name.clone(),
+                index: column.index,
+                values: ColumnValues::Numbers(numbers.next()?),
                 null: None,
             })
         });
@@ -141,11 +141,11 @@ impl File<'_> {
     }
 
     /// The numbers of a column, if there is one in each row.
-    fn numbers(&self, leaf: usize) -> Option<Numbers> {
+    fn numbers(&self, leaf: usize) -> Option<ColumnNumbers> {
         match self.metadata.parquet_schema().column(leaf).physical_type() {
-            Type::FLOAT => self.values::<FloatType>(leaf).map(Numbers::F32),
-            Type::DOUBLE => self.values::<DoubleType>(leaf).map(Numbers::F64),
-            Type::INT64 => self.values::<Int64Type>(leaf).map(Numbers::Whole),
+            Type::FLOAT => self.values::<FloatType>(leaf).map(ColumnNumbers::F32),
+            Type::DOUBLE => self.values::<DoubleType>(leaf).map(ColumnNumbers::F64),
+            Type::INT64 => self.values::<Int64Type>(leaf).map(ColumnNumbers::Whole),
             _ => None,
         }
     }
@@ -164,9 +164,9 @@ impl File<'_> {
             let (column, rows) = (group.column(leaf), usize::try_from(group.num_rows()).ok()?);
             values.reserve(rows.min(BATCH));
             let (packing, before) = (column.compression(), values.len());
-            let own = &bytes[chunk(column, bytes.len())?];
+            let packed = &bytes[chunk(column, bytes.len())?];
             let may_have_nulls = descriptor.max_def_level() > 0;
-            if plain::append(own, packing, may_have_nulls, &mut values).is_some() {
+            if plain::append(packed, packing, may_have_nulls, &mut values).is_some() {
                 continue;
             }
             values.truncate(before);
@@ -210,7 +210,7 @@ mod tests {
     use parquet::file::properties::{WriterProperties, WriterPropertiesBuilder, WriterVersion};
 
     use super::*;
-    use crate::table::plan::Need;
+    use crate::table::columns::ColumnNeed;
 
     /// A file of several groups of rows and several pages each: `time`, `track`, `x` and `count`,
     /// the last two of which may be null, `x` in row `null` is.
@@ -218,7 +218,7 @@ mod tests {
         rows: usize,
         properties: WriterPropertiesBuilder,
         null: Option<usize>,
-    ) -> File<'static> {
+    ) -> ParquetFile<'static> {
         let number = |row: usize| (Some(row) != null).then_some((row as f32).sin());
         let tracks = (0..rows).map(|row| ["hip", "knee"][row % 2]);
         let columns: [(&str, ArrayRef, bool); 4] = [
@@ -259,7 +259,7 @@ mod tests {
         writer.close().unwrap();
         let bytes = Bytes::from(bytes);
         let options = ArrowReaderOptions::new();
-        File {
+        ParquetFile {
             name: "t",
             metadata: ArrowReaderMetadata::load(&bytes, options).unwrap(),
             bytes,
@@ -269,29 +269,29 @@ mod tests {
     /// What the columns hold: numbers, or the codes of words.
     fn numbers(table: &Table) -> Vec<Vec<f64>> {
         let column = |column: &Column| match &column.values {
-            Values::Numbers(numbers) => (0..table.rows).map(|row| numbers.at(row)).collect(),
-            Values::Words { codes, .. } => codes.iter().map(|&code| code.into()).collect(),
+            ColumnValues::Numbers(numbers) => (0..table.rows).map(|row| numbers.at(row)).collect(),
+            ColumnValues::Words { codes, .. } => codes.iter().map(|&code| code.into()).collect(),
             _ => Vec::new(),
         };
         table.columns.iter().map(column).collect()
     }
 
-    fn read(file: &File<'_>) -> (Option<Table>, Table) {
+    fn read(file: &ParquetFile<'_>) -> (Option<Table>, Table) {
         let needs = [
-            ("x", 2, Need::Number),
-            ("track", 1, Need::Name),
-            ("time", 0, Need::Time),
-            ("count", 3, Need::Whole),
+            ("x", 2, ColumnNeed::Number),
+            ("track", 1, ColumnNeed::Name),
+            ("time", 0, ColumnNeed::Time),
+            ("count", 3, ColumnNeed::Whole),
         ];
-        let wanted = needs.map(|(name, index, need)| Wanted {
+        let requested = needs.map(|(name, index, need)| RequestedColumn {
             name: name.to_owned(),
             index,
             need,
         });
         let fields = file.metadata.schema().fields();
-        let typed: Vec<Typed<'_>> = wanted
+        let typed: Vec<TypedColumn<'_>> = requested
             .iter()
-            .map(|wanted| (wanted, fields[wanted.index].data_type()))
+            .map(|column| (column, fields[column.index].data_type()))
             .collect();
         let gather = Gather::new("t", typed.iter().copied()).unwrap();
         (
@@ -319,19 +319,19 @@ mod tests {
             (1000, delta),
             (1000, second.set_compression(Compression::LZ4_RAW)),
             // Enough for several threads.
-            (FEW, plain.set_compression(zstd)),
+            (MIN_PARALLEL_NUMBERS, plain.set_compression(zstd)),
         ] {
             let (apart, together) = read(&file(rows, properties, None));
             let apart = apart.expect("nothing is wrong");
             assert_eq!((apart.rows, together.rows), (rows, rows));
             assert_eq!(numbers(&apart), numbers(&together));
-            let places = |table: &Table| -> Vec<(String, usize)> {
+            let indices = |table: &Table| -> Vec<(String, usize)> {
                 let columns = table.columns.iter();
                 columns
                     .map(|column| (column.name.clone(), column.index))
                     .collect()
             };
-            assert_eq!(places(&apart), places(&together));
+            assert_eq!(indices(&apart), indices(&together));
             assert_eq!(numbers(&apart)[0][999], f64::from(999f32.sin()));
         }
     }

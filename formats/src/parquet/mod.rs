@@ -16,17 +16,17 @@ use parquet::arrow::arrow_reader::{ArrowReaderMetadata, ArrowReaderOptions};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::feature::Feature;
 use crate::format::{Format, FormatOption, Loaded, ReadOptions, WriteResults};
-use crate::npy::ComponentOrder;
-use crate::parquet::columns::File;
+use crate::parquet::columns::ParquetFile;
 use crate::parquet::pages::check_pages;
 use crate::parquet::write::ParquetSink;
+use crate::quaternion::ComponentOrder;
 use crate::source::Source;
 use crate::table::arrays::Gather;
 use crate::table::clips::clips;
-use crate::table::columns::Table;
+use crate::table::columns::{ColumnNeed, RequestedColumn, Table};
 use crate::table::decoded;
 use crate::table::long::{write_motion, write_poses, write_rotations};
-use crate::table::plan::{Need, Plan, Wanted};
+use crate::table::plan::TablePlan;
 
 /// Parquet files.
 pub static FORMAT: Format = Format {
@@ -96,13 +96,13 @@ fn check_tail(name: &str, bytes: &[u8]) -> Result<(), Diagnostic> {
     if magic != *MAGIC {
         return refuse("the file does not end with PAR1; it is cut, copy it again".to_owned());
     }
-    let (length, most) = (
+    let (length, limit) = (
         u32::from_le_bytes([a, b, c, d]),
         bytes.len() - MAGIC.len() - TAIL,
     );
-    if length as usize > most {
+    if length as usize > limit {
         return refuse(format!(
-            "its metadata is said to have {length} bytes of {most}; the file is damaged"
+            "its metadata is said to have {length} bytes of {limit}; the file is damaged"
         ));
     }
     Ok(())
@@ -118,31 +118,32 @@ fn read_table(
     name: &str,
     bytes: Bytes,
     options: &ReadOptions,
-) -> Result<(Table, Plan), Diagnostic> {
+) -> Result<(Table, TablePlan), Diagnostic> {
     let damaged = |error: &dyn Display| damaged(name, error);
     // The types that Parquet itself has tell enough; a schema that a writer left beside them is one
     // more thing that may be wrong.
-    let own = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
-    let loaded = ArrowReaderMetadata::load(&bytes, own).map_err(|error| damaged(&error))?;
+    let without_arrow = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
+    let loaded =
+        ArrowReaderMetadata::load(&bytes, without_arrow).map_err(|error| damaged(&error))?;
     let fields = loaded.schema().fields();
     let names: Vec<String> = fields.iter().map(|field| field.name().clone()).collect();
-    let mut plan = Plan::of(name, &names, options)?;
+    let mut plan = TablePlan::of(name, &names, options)?;
     let notes = loaded.metadata().file_metadata().key_value_metadata();
     let notes = notes.into_iter().flatten();
     plan.notes = notes
         .filter_map(|note| Some((note.key.clone(), note.value.clone()?)))
         .collect();
-    let mut roots: Vec<usize> = plan.wanted.iter().map(|wanted| wanted.index).collect();
+    let mut roots: Vec<usize> = plan.columns.iter().map(|column| column.index).collect();
     roots.sort_unstable();
     roots.dedup();
     check_pages(name, &bytes, loaded.metadata(), &roots, options.limits)?;
 
     // Words stay in the dictionaries that they are stored in: names repeat.
     let names = plan
-        .wanted
+        .columns
         .iter()
-        .filter(|wanted| wanted.need == Need::Name);
-    let names: Vec<usize> = names.map(|wanted| wanted.index).collect();
+        .filter(|column| column.need == ColumnNeed::Name);
+    let names: Vec<usize> = names.map(|column| column.index).collect();
     let with_dictionary = |(index, field): (usize, &Arc<Field>)| match field.data_type() {
         DataType::Utf8 if names.contains(&index) => {
             let words = DataType::Dictionary(Box::new(DataType::Int32), Box::new(DataType::Utf8));
@@ -151,24 +152,24 @@ fn read_table(
         _ => Arc::clone(field),
     };
     let fields: Vec<Arc<Field>> = fields.iter().enumerate().map(with_dictionary).collect();
-    let wanted = plan.wanted.iter();
-    let wanted: Vec<(&Wanted, &DataType)> = wanted
-        .map(|wanted| (wanted, fields[wanted.index].data_type()))
+    let requested = plan.columns.iter();
+    let requested: Vec<(&RequestedColumn, &DataType)> = requested
+        .map(|column| (column, fields[column.index].data_type()))
         .collect();
     // Refuses types before anything is decoded.
-    let gather = Gather::new(name, wanted.iter().copied())?;
-    let own = ArrowReaderOptions::new().with_schema(Arc::new(Schema::new(fields.clone())));
-    let metadata = ArrowReaderMetadata::try_new(Arc::clone(loaded.metadata()), own)
+    let gather = Gather::new(name, requested.iter().copied())?;
+    let with_schema = ArrowReaderOptions::new().with_schema(Arc::new(Schema::new(fields.clone())));
+    let metadata = ArrowReaderMetadata::try_new(Arc::clone(loaded.metadata()), with_schema)
         .map_err(|error| damaged(&error))?;
-    let file = File {
+    let file = ParquetFile {
         bytes,
         metadata,
         name,
     };
     // What is wrong with a file is found by reading its columns side by side.
-    let table = match file.read_apart(&wanted) {
+    let table = match file.read_apart(&requested) {
         Some(table) => table,
-        None => file.read_together(&wanted, gather)?,
+        None => file.read_together(&requested, gather)?,
     };
     Ok((table, plan))
 }

@@ -12,13 +12,13 @@ use crate::text::lines::Limits;
 
 /// A file holds at most so many numbers a byte. Equal numbers are packed closest: a page of
 /// 2^20 of them may have 100 bytes, but the times beside them differ and take a byte each.
-const MOST_NUMBERS: u64 = 1024;
+const MAX_NUMBERS_PER_BYTE: u64 = 1024;
 
 /// A page may be this long whatever it is packed into; writers begin a new one after 1 MiB.
 const FREE_PAGE: u64 = 16 << 20;
 
 /// A longer page is at most this many times as long as what it is packed into.
-const MOST_PACKED: u64 = 64;
+const MAX_PAGE_RATIO: u64 = 64;
 
 /// Bytes that a number takes: as it is decoded, in its column, and as a part of a key.
 const NUMBER: usize = 32;
@@ -38,19 +38,19 @@ pub(crate) fn check_pages(
     let budget = Budget::of(bytes.len(), limits);
     let over = |error: OverBudget| Diagnostic::new(name, Code::Memory, error.to_string());
     let refuse = |code, message: String| Diagnostic::new(name, code, message);
-    let claims = |numbers: u64, what: &str| {
+    let claims = |numbers: u64, unit: &str| {
         let message = format!(
-            "the file has {} bytes and is said to hold {numbers} {what}; it is damaged",
+            "the file has {} bytes and is said to hold {numbers} {unit}; it is damaged",
             bytes.len()
         );
         refuse(Code::TableClaims, message)
     };
-    let most = bytes.len() as u64 * MOST_NUMBERS;
+    let limit = bytes.len() as u64 * MAX_NUMBERS_PER_BYTE;
     let schema = metadata.file_metadata().schema_descr();
     let (mut rows, mut numbers) = (0u64, 0u64);
     for group in metadata.row_groups() {
         rows = rows.saturating_add(u64::try_from(group.num_rows()).unwrap_or(u64::MAX));
-        if rows > most {
+        if rows > limit {
             return Err(claims(rows, "rows"));
         }
         for (leaf, column) in group.columns().iter().enumerate() {
@@ -69,7 +69,7 @@ pub(crate) fn check_pages(
             while !range.is_empty() {
                 let page = page(&bytes[range.clone()]).ok_or_else(outside)?;
                 let packed = page.compressed as u64;
-                if page.uncompressed > FREE_PAGE.max(packed.saturating_mul(MOST_PACKED)) {
+                if page.uncompressed > FREE_PAGE.max(packed.saturating_mul(MAX_PAGE_RATIO)) {
                     let message = format!(
                         "a page of column `{path}` is said to have {} bytes, packed into {packed}; \
                          the file is damaged",
@@ -81,7 +81,7 @@ pub(crate) fn check_pages(
                 budget.take(count(page.uncompressed), 1).map_err(over)?;
                 budget.take(count(page.values), NUMBER).map_err(over)?;
                 numbers = numbers.saturating_add(page.values);
-                if numbers > most {
+                if numbers > limit {
                     return Err(claims(numbers, "numbers"));
                 }
                 let next = range.start + page.header + page.compressed;
@@ -125,7 +125,7 @@ pub(super) fn chunk(column: &ColumnChunkMetaData, length: usize) -> Option<Range
 }
 
 /// What the header of a page says.
-pub(super) struct Page {
+pub(super) struct PageSizes {
     /// Bytes of the header, and of the page behind it.
     pub(super) header: usize,
     pub(super) compressed: usize,
@@ -139,7 +139,7 @@ pub(super) struct Page {
 /// 2 is the uncompressed and 3 the compressed length; 5, 7 and 8 are the headers of data pages,
 /// dictionaries and data pages of version 2, whose field 1 is the number of values. Fields 2 and 3 of
 /// the first are the encodings of its values, 0 for none, and of its definition levels, 3 for runs.
-pub(super) fn page(bytes: &[u8]) -> Option<Page> {
+pub(super) fn page(bytes: &[u8]) -> Option<PageSizes> {
     let mut input = Compact { bytes, at: 0 };
     let (mut uncompressed, mut compressed, mut values) = (None, None, 0);
     let (mut page_type, mut encodings) = (None, [None; 2]);
@@ -163,7 +163,7 @@ pub(super) fn page(bytes: &[u8]) -> Option<Page> {
             _ => input.skip(kind, 0)?,
         }
     }
-    Some(Page {
+    Some(PageSizes {
         header: input.at,
         compressed: usize::try_from(compressed?).ok()?,
         uncompressed: u64::try_from(uncompressed?).ok()?,

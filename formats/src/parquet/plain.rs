@@ -39,9 +39,10 @@ pub(super) fn append<T: Pod>(
         if may_have_nulls {
             let mut unpacked = vec![0; length];
             unpack(compression, packed, &mut unpacked)?;
-            let own = behind_levels(&unpacked, page.values).filter(|own| own.len() == bytes)?;
+            let numbers =
+                behind_levels(&unpacked, page.values).filter(|numbers| numbers.len() == bytes)?;
             values.resize(start + count, T::zeroed());
-            bytemuck::cast_slice_mut(&mut values[start..]).copy_from_slice(own);
+            bytemuck::cast_slice_mut(&mut values[start..]).copy_from_slice(numbers);
         } else if length == bytes {
             values.resize(start + count, T::zeroed());
             unpack(

@@ -10,7 +10,7 @@ use parquet::file::metadata::KeyValue;
 use parquet::file::properties::{EnabledStatistics, WriterProperties};
 use parquet::schema::types::ColumnPath;
 
-use crate::table::rows::{Head, Sink};
+use crate::table::rows::{Head, RowSink};
 
 /// Rows of a group, which is packed in memory before it is written: up to 30 MB of rotations.
 const GROUP: usize = 1 << 20;
@@ -55,7 +55,7 @@ impl<'a> ParquetSink<'a> {
     }
 }
 
-impl Sink for ParquetSink<'_> {
+impl RowSink for ParquetSink<'_> {
     fn write(&mut self, batch: &RecordBatch) -> io::Result<()> {
         self.writer.write(batch).map_err(io_error)?;
         self.drain()

@@ -19,8 +19,8 @@ fn rows() -> Vec<[&'static str; 3]> {
     cells.collect()
 }
 
-fn shown(found: Option<Found>) -> String {
-    let rate = found.and_then(Found::rate);
+fn shown(found: Option<FrameGrid>) -> String {
+    let rate = found.and_then(FrameGrid::rate);
     rate.map_or("none".to_owned(), |rate| rate.to_string())
 }
 
@@ -33,9 +33,9 @@ fn kept(times: impl Iterator<Item = f64>, kept_as: &str) -> (Vec<f64>, Precision
         ),
         "f64" => (times.collect(), Precision::F64),
         _ => {
-            let places: usize = kept_as.strip_suffix(" decimals").unwrap().parse().unwrap();
-            let text = times.map(|time| format!("{time:.places$}").parse().unwrap());
-            (text.collect(), Precision::Decimals(places as u32))
+            let decimals: usize = kept_as.strip_suffix(" decimals").unwrap().parse().unwrap();
+            let text = times.map(|time| format!("{time:.decimals$}").parse().unwrap());
+            (text.collect(), Precision::Decimals(decimals as u32))
         }
     }
 }
@@ -69,11 +69,11 @@ fn the_table_of_the_documents_holds() {
     for row in &rows {
         let [written, kept_as, rate] = *row;
         if let Some(digits) = written.strip_prefix("Frame Time: ") {
-            check(row, shown(of(&Written::FrameTime(digits))), rate);
+            check(row, shown(of(&RateSource::FrameTime(digits))), rate);
         } else if let Some(number) = written.strip_prefix("fps = ") {
             check(
                 row,
-                shown(of(&Written::Number(number.parse().unwrap()))),
+                shown(of(&RateSource::Number(number.parse().unwrap()))),
                 rate,
             );
         } else if written.contains('k') {
@@ -88,7 +88,7 @@ fn the_table_of_the_documents_holds() {
             };
             for meant in all {
                 let (times, precision) = keys(written, meant, kept_as);
-                let found = shown(of(&Written::Times(&[times], precision)));
+                let found = shown(of(&RateSource::Times(&[times], precision)));
                 let meant = meant.to_string();
                 check(row, found, if rate == "the same" { &meant } else { rate });
             }
@@ -97,12 +97,17 @@ fn the_table_of_the_documents_holds() {
             let times = tokens().map(|token| token.parse::<f64>().unwrap());
             let (times, precision) = match kept_as {
                 "text" => {
-                    let places = tokens().map(|token| last_place(token).min(0).unsigned_abs());
-                    (times.collect(), Precision::Decimals(places.max().unwrap()))
+                    let decimals =
+                        tokens().map(|token| last_digit_power(token).min(0).unsigned_abs());
+                    (times.collect(), Precision::Decimals(decimals.max().unwrap()))
                 }
                 _ => kept(times, kept_as),
             };
-            check(row, shown(of(&Written::Times(&[times], precision))), rate);
+            check(
+                row,
+                shown(of(&RateSource::Times(&[times], precision))),
+                rate,
+            );
         }
     }
     assert!(
@@ -126,7 +131,7 @@ fn rounded_times_become_the_frames_of_any_rate() {
             let (times, precision) = keys(formula, rate, kept_as);
             let mut lists = [times];
             assert_eq!(
-                crate::grid::restore(&mut lists, precision),
+                crate::motion::grid::restore(&mut lists, precision),
                 Some(rate),
                 "{formula}, {kept_as}"
             );
@@ -144,22 +149,22 @@ fn rates_come_back_from_the_shortest_digits_of_their_period() {
     for (frames, seconds) in ratios {
         let rate = FrameRate::new(frames, seconds).unwrap();
         let digits = (seconds as f64 / frames as f64).to_string();
-        let found = of(&Written::FrameTime(&digits)).and_then(Found::rate);
+        let found = of(&RateSource::FrameTime(&digits)).and_then(FrameGrid::rate);
         assert_eq!(found, Some(rate), "{rate}");
         if frames < 1000 && rate.per_second().fract() != 0.0 && seconds != 1001 {
-            let number = of(&Written::Number(rate.per_second())).and_then(Found::rate);
+            let number = of(&RateSource::Number(rate.per_second())).and_then(FrameGrid::rate);
             assert_eq!(number, Some(rate), "{rate}");
         }
     }
     // A BVH file's frame time of 0.133333 s, as the number of an NPZ file.
     let written = FrameRate::new(1_000_000, 133_333).unwrap();
-    let found = of(&Written::Number(written.per_second())).and_then(Found::rate);
+    let found = of(&RateSource::Number(written.per_second())).and_then(FrameGrid::rate);
     assert_eq!(found, Some(written));
     for digits in ["1e10", "9e-10", "1e-30"] {
-        assert_eq!(of(&Written::FrameTime(digits)), None, "{digits}");
+        assert_eq!(of(&RateSource::FrameTime(digits)), None, "{digits}");
     }
     for number in [0.0, -30.0, f64::NAN, f64::INFINITY, 1e300, 1e-12] {
-        assert_eq!(of(&Written::Number(number)), None, "{number}");
+        assert_eq!(of(&RateSource::Number(number)), None, "{number}");
     }
 }
 
@@ -168,7 +173,7 @@ fn rates_come_back_from_the_shortest_digits_of_their_period() {
 fn a_period_is_as_exact_as_its_last_frame_is_far() {
     let times = [0.125, 0.158_333_333_33, 100_000.191_666_666_67];
     let mut lists = [times.to_vec()];
-    crate::grid::restore(&mut lists, Precision::Decimals(11));
+    crate::motion::grid::restore(&mut lists, Precision::Decimals(11));
     for (found, written) in lists[0].iter().zip(times) {
         assert!((found - written).abs() < 1e-11, "{found} {written}");
     }
@@ -180,7 +185,7 @@ fn whole_seconds_show_no_rate() {
     let times = [0.0, 413.0, 1_699_999_830.191_7];
     let mut lists = [times.to_vec()];
     assert_eq!(
-        crate::grid::restore(&mut lists, Precision::Decimals(9)),
+        crate::motion::grid::restore(&mut lists, Precision::Decimals(9)),
         None
     );
     assert_eq!(lists, [times]);
@@ -192,7 +197,7 @@ fn tenths_in_one_decimal_are_at_ten_a_second_however_many() {
     for count in [2u32, 150, 199, 200, 1999, 36_000] {
         let times = (0..count).map(|frame| f64::from(frame) / 10.0);
         let (times, precision) = kept(times, "1 decimals");
-        let found = of(&Written::Times(&[times], precision));
+        let found = of(&RateSource::Times(&[times], precision));
         assert_eq!(shown(found), "10", "{count}");
         assert_eq!(found.unwrap().phase, 0.0);
     }

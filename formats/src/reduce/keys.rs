@@ -4,9 +4,9 @@ use glam::{DQuat, DVec3, Quat, Vec3};
 use tumble::reduce::{
     ReduceError, ReducedCurve, ReducedKeys, reduce_rotations, reduce_together, reduce_vectors,
 };
-use tumble::{Channel, Frames, Layout, TrackError, TrackSet};
+use tumble::{Channel, Layout, SampleTimes, TrackError, TrackSet};
 
-use crate::motion::{Channels, Motion, Sampler};
+use crate::motion::{ChannelInterpolation, Channels, Motion};
 use crate::reduce::{ReduceMotionError, Reduction, Tolerances};
 use crate::sample::ChannelMethods;
 
@@ -37,13 +37,13 @@ impl Reduction<'_> {
         for (joint, keys) in rotations.into_iter().enumerate() {
             self.push(&mut reduced, joint, &keys)?;
             for channel in CHANNELS {
-                let Some((wanted, tolerance)) = self.vectors(channel, joint, tolerances) else {
+                let Some((samples, tolerance)) = self.vectors(channel, joint, tolerances) else {
                     continue;
                 };
                 let sampler = self.sampler(joint).of(channel);
                 let keys = match sampler {
-                    Some(Sampler::Step) => steps(&wanted),
-                    _ => reduce_vectors(&self.times, &wanted, tolerance, self.options.curve)?,
+                    Some(ChannelInterpolation::Step) => steps(&samples),
+                    _ => reduce_vectors(&self.times, &samples, tolerance, self.options.curve)?,
                 };
                 self.push_vectors(&mut reduced, joint, channel, &keys)?;
             }
@@ -60,12 +60,13 @@ impl Reduction<'_> {
             ..self.clip.without_tracks()
         };
         let every: Vec<usize> = (0..self.times.len()).collect();
-        let is_step = |sampler: Option<Sampler>| sampler == Some(Sampler::Step);
+        let is_step =
+            |sampler: Option<ChannelInterpolation>| sampler == Some(ChannelInterpolation::Step);
         for joint in 0..joints {
             let samples = self.local(joint);
             let mut keys = steps(&samples);
-            if keys.places.len() > 1 && !is_step(self.sampler(joint).rotation) {
-                (keys.places, keys.keys) = (every.clone(), samples);
+            if keys.indices.len() > 1 && !is_step(self.sampler(joint).rotation) {
+                (keys.indices, keys.keys) = (every.clone(), samples);
             }
             if self.order.first() == Some(&joint) {
                 lengthen(&mut keys, self.times.len().saturating_sub(1));
@@ -92,8 +93,8 @@ impl Reduction<'_> {
                 };
                 let samples: Vec<DVec3> = samples.iter().map(rounded).collect();
                 let mut keys = steps(&samples);
-                if keys.places.len() > 1 && !is_step(self.sampler(joint).of(channel)) {
-                    (keys.places, keys.keys) = (every.clone(), samples);
+                if keys.indices.len() > 1 && !is_step(self.sampler(joint).of(channel)) {
+                    (keys.indices, keys.keys) = (every.clone(), samples);
                 }
                 self.push_vectors(&mut all, joint, channel, &keys)?;
             }
@@ -109,33 +110,33 @@ impl Reduction<'_> {
         let joints = self.parents.len();
         let mut rotations = vec![ReducedKeys::default(); joints];
         // How each joint is turned in the world after the reduction, `[joint][sample]`.
-        let mut turned: Vec<Vec<DQuat>> = vec![Vec::new(); joints];
+        let mut in_world: Vec<Vec<DQuat>> = vec![Vec::new(); joints];
         for &joint in &self.order {
             let parent = self.parents[joint];
             let sampler = self.sampler(joint).rotation;
             // What steps or rests stays as it is; all else makes up for what its parent has become.
-            let wanted: Vec<DQuat> = match parent {
-                Some(parent) if !matches!(sampler, None | Some(Sampler::Step)) => {
-                    let own = self.poses.iter().skip(joint).step_by(joints);
-                    let pairs = turned[parent].iter().zip(own);
+            let target: Vec<DQuat> = match parent {
+                Some(parent) if !matches!(sampler, None | Some(ChannelInterpolation::Step)) => {
+                    let poses = self.poses.iter().skip(joint).step_by(joints);
+                    let pairs = in_world[parent].iter().zip(poses);
                     pairs
-                        .map(|(above, own)| above.conjugate() * own.rotation.as_dquat())
+                        .map(|(above, pose)| above.conjugate() * pose.rotation.as_dquat())
                         .collect()
                 }
                 _ => self.local(joint),
             };
             let tolerance = tolerances.angle(joint);
-            let keys = self.rotation_keys(joint, &wanted, tolerance)?;
+            let keys = self.rotation_keys(joint, &target, tolerance)?;
             let local = match sampler {
-                None => wanted,
+                None => target,
                 Some(_) => self.evaluated(&keys, sampler)?,
             };
-            turned[joint] = match parent {
+            in_world[joint] = match parent {
                 None => local,
                 Some(parent) => {
-                    let pairs = turned[parent].iter().zip(local);
+                    let pairs = in_world[parent].iter().zip(local);
                     pairs
-                        .map(|(above, own)| (*above * own).normalize())
+                        .map(|(above, rotation)| (*above * rotation).normalize())
                         .collect()
                 }
             };
@@ -152,7 +153,10 @@ impl Reduction<'_> {
     ) -> Result<(), ReduceMotionError> {
         let joints = self.parents.len();
         let samplers = (0..joints).map(|joint| self.sampler(joint));
-        if let Some(joint) = samplers.into_iter().position(|own| own.has(Sampler::Step)) {
+        if let Some(joint) = samplers
+            .into_iter()
+            .position(|channels| channels.has(ChannelInterpolation::Step))
+        {
             let name = self.clip.set.track_name(joint);
             return Err(ReduceMotionError::Steps { joint, name });
         }
@@ -167,9 +171,9 @@ impl Reduction<'_> {
         let mut vectors = Vec::new();
         for joint in 0..joints {
             for channel in CHANNELS {
-                if let Some(own) = self.vectors(channel, joint, tolerances) {
+                if let Some(samples) = self.vectors(channel, joint, tolerances) {
                     moved.push((joint, channel));
-                    vectors.push(own);
+                    vectors.push(samples);
                 }
             }
         }
@@ -181,11 +185,11 @@ impl Reduction<'_> {
         }
         let mut keys = found.rotations.into_iter();
         for joint in 0..joints {
-            let own = match keyed.contains(&joint) {
+            let joint_keys = match keyed.contains(&joint) {
                 true => keys.next().unwrap_or_default(),
                 false => ReducedKeys::default(),
             };
-            self.push(reduced, joint, &own)?;
+            self.push(reduced, joint, &joint_keys)?;
         }
         for ((joint, channel), keys) in moved.into_iter().zip(&found.vectors) {
             self.push_vectors(reduced, joint, channel, keys)?;
@@ -195,8 +199,11 @@ impl Reduction<'_> {
 
     /// A joint's rotations relative to its parent.
     fn local(&self, joint: usize) -> Vec<DQuat> {
-        let own = self.of_joint(&self.samples.rotations, joint);
-        own.iter().map(|own| own.as_dquat()).collect()
+        let rotations = self.of_joint(&self.samples.rotations, joint);
+        rotations
+            .iter()
+            .map(|rotation| rotation.as_dquat())
+            .collect()
     }
 
     /// The samples of a channel that has keys, and how near its curve has to be.
@@ -209,24 +216,27 @@ impl Reduction<'_> {
         self.clip.set.vector_keys(channel, joint)?;
         let (samples, tolerance) = match channel {
             Channel::Translation => (&self.samples.translations, tolerances.distances[joint]),
-            // A scale moves what hangs on the joint as far as an angle of that size would.
+            // A scale moves the children of the joint as far as an angle of that size would.
             Channel::Scale => (&self.samples.scales, tolerances.angles[joint]),
         };
-        let wanted = self.of_joint(samples, joint);
-        let wanted: Vec<DVec3> = wanted.iter().map(|own| own.as_dvec3()).collect();
-        let size = wanted.iter().map(|own| own.length()).fold(0.0, f64::max);
-        (!wanted.is_empty()).then_some((wanted, (tolerance - size * VECTOR_ROUNDING).max(0.0)))
+        let stored = self.of_joint(samples, joint);
+        let vectors: Vec<DVec3> = stored.iter().map(|vector| vector.as_dvec3()).collect();
+        let size = vectors
+            .iter()
+            .map(|vector| vector.length())
+            .fold(0.0, f64::max);
+        (!vectors.is_empty()).then_some((vectors, (tolerance - size * VECTOR_ROUNDING).max(0.0)))
     }
 
     fn rotation_keys(
         &self,
         joint: usize,
-        wanted: &[DQuat],
+        samples: &[DQuat],
         tolerance: f64,
     ) -> Result<ReducedKeys<DQuat>, ReduceError> {
         let keys = match self.sampler(joint).rotation {
-            Some(Sampler::Step) => steps(wanted),
-            _ => reduce_rotations(&self.times, wanted, tolerance, self.options.curve)?,
+            Some(ChannelInterpolation::Step) => steps(samples),
+            _ => reduce_rotations(&self.times, samples, tolerance, self.options.curve)?,
         };
         // A clip lasts as long as its keys: one joint at least has a key at its end.
         let is_keyed = |joint: &&usize| self.sampler(**joint).rotation.is_some();
@@ -241,7 +251,7 @@ impl Reduction<'_> {
     fn evaluated(
         &self,
         keys: &ReducedKeys<DQuat>,
-        sampler: Option<Sampler>,
+        sampler: Option<ChannelInterpolation>,
     ) -> Result<Vec<DQuat>, ReduceMotionError> {
         let mut one = Motion::default();
         push_rotations(&mut one.set, "", &self.times, keys)?;
@@ -253,7 +263,7 @@ impl Reduction<'_> {
         let method = ChannelMethods::AUTHORED
             .method_of(&one)
             .unwrap_or(tumble::method::SLERP);
-        let frames = Frames::at(self.times.clone());
+        let frames = SampleTimes::at(self.times.clone());
         let found = self
             .engine
             .evaluate_as(&one.set, method, &frames, Layout::TrackMajor)?;
@@ -267,12 +277,12 @@ impl Reduction<'_> {
             self.clip
                 .set
                 .vector_keys(channel, joint)
-                .map(|_| Sampler::Linear)
+                .map(|_| ChannelInterpolation::Linear)
         };
         match self.clip.channels.get(joint) {
-            Some(&own) => own,
+            Some(&channels) => channels,
             None => Channels {
-                rotation: Some(Sampler::Linear),
+                rotation: Some(ChannelInterpolation::Linear),
                 translation: keyed(Channel::Translation),
                 scale: keyed(Channel::Scale),
             },
@@ -280,21 +290,21 @@ impl Reduction<'_> {
     }
 
     /// The sampler of a channel with few keys; nothing for a curve that no file names.
-    fn reduced(&self, sampler: Option<Sampler>) -> Option<Sampler> {
+    fn reduced(&self, sampler: Option<ChannelInterpolation>) -> Option<ChannelInterpolation> {
         match (sampler?, self.options.curve) {
-            (Sampler::Step, _) => Some(Sampler::Step),
-            (_, ReducedCurve::Linear) => Some(Sampler::Linear),
-            (_, ReducedCurve::GltfCubic) => Some(Sampler::Cubic),
+            (ChannelInterpolation::Step, _) => Some(ChannelInterpolation::Step),
+            (_, ReducedCurve::Linear) => Some(ChannelInterpolation::Linear),
+            (_, ReducedCurve::GltfCubic) => Some(ChannelInterpolation::Cubic),
             _ => None,
         }
     }
 
     fn new_sampler(&self, joint: usize) -> Channels {
-        let own = self.sampler(joint);
+        let channels = self.sampler(joint);
         Channels {
-            rotation: self.reduced(own.rotation),
-            translation: self.reduced(own.translation),
-            scale: self.reduced(own.scale),
+            rotation: self.reduced(channels.rotation),
+            translation: self.reduced(channels.translation),
+            scale: self.reduced(channels.scale),
         }
     }
 
@@ -304,13 +314,14 @@ impl Reduction<'_> {
         joint: usize,
         keys: &ReducedKeys<DQuat>,
     ) -> Result<(), TrackError> {
-        let own = self.clip.set.get(joint);
-        let name = own.and_then(|track| track.name).unwrap_or_default();
+        let track = self.clip.set.get(joint);
+        let name = track.and_then(|track| track.name).unwrap_or_default();
         match self.sampler(joint).rotation {
             Some(_) => push_rotations(&mut reduced.set, name, &self.times, keys),
             // It rests, at its one key.
             None => {
-                let (times, keys) = own.map_or((&[][..], &[][..]), |own| (own.times, own.keys));
+                let (times, keys) =
+                    track.map_or((&[][..], &[][..]), |track| (track.times, track.keys));
                 reduced.set.push(name, times, keys)
             }
         }
@@ -323,8 +334,12 @@ impl Reduction<'_> {
         channel: Channel,
         keys: &ReducedKeys<DVec3>,
     ) -> Result<(), TrackError> {
-        let times: Vec<f64> = keys.places.iter().map(|&place| self.times[place]).collect();
-        let values: Vec<Vec3> = keys.keys.iter().map(|own| own.as_vec3()).collect();
+        let times: Vec<f64> = keys
+            .indices
+            .iter()
+            .map(|&index| self.times[index])
+            .collect();
+        let values: Vec<Vec3> = keys.keys.iter().map(|vector| vector.as_vec3()).collect();
         let tangents = keys.tangents.iter().map(|pair| pair.map(DVec3::as_vec3));
         let tangents: Vec<[Vec3; 2]> = tangents.collect();
         let set = &mut reduced.set;
@@ -347,10 +362,10 @@ const CHANNELS: [Channel; 2] = [Channel::Translation, Channel::Scale];
 
 /// Gives a channel that stands still a key at the last sample too.
 fn lengthen(keys: &mut ReducedKeys<DQuat>, last: usize) {
-    if let ([only], &[value]) = (&keys.places[..], &keys.keys[..])
+    if let ([only], &[value]) = (&keys.indices[..], &keys.keys[..])
         && *only < last
     {
-        keys.places.push(last);
+        keys.indices.push(last);
         keys.keys.push(value);
         keys.tangents = keys.tangents.repeat(2);
     }
@@ -358,10 +373,10 @@ fn lengthen(keys: &mut ReducedKeys<DQuat>, last: usize) {
 
 /// The keys of a channel that holds each until the next one: where the value changes.
 fn steps<T: Copy + PartialEq + Default>(samples: &[T]) -> ReducedKeys<T> {
-    let changes = |&place: &usize| place == 0 || samples[place] != samples[place - 1];
+    let changes = |&sample: &usize| sample == 0 || samples[sample] != samples[sample - 1];
     let mut keys = ReducedKeys::default();
-    keys.places = (0..samples.len()).filter(changes).collect();
-    keys.keys = keys.places.iter().map(|&place| samples[place]).collect();
+    keys.indices = (0..samples.len()).filter(changes).collect();
+    keys.keys = keys.indices.iter().map(|&sample| samples[sample]).collect();
     keys
 }
 
@@ -371,9 +386,13 @@ fn push_rotations(
     times: &[f64],
     keys: &ReducedKeys<DQuat>,
 ) -> Result<(), TrackError> {
-    let own: Vec<f64> = keys.places.iter().map(|&place| times[place]).collect();
-    let quats: Vec<Quat> = keys.keys.iter().map(|own| own.as_quat()).collect();
-    set.push(name, &own, &quats)?;
+    let key_times: Vec<f64> = keys.indices.iter().map(|&index| times[index]).collect();
+    let quats: Vec<Quat> = keys
+        .keys
+        .iter()
+        .map(|rotation| rotation.as_quat())
+        .collect();
+    set.push(name, &key_times, &quats)?;
     if keys.tangents.is_empty() {
         return Ok(());
     }

@@ -1,7 +1,7 @@
 //! Clips with few keys, whose poses stay near those of dense samples: at every sample each joint is
 //! within an angle and a distance, in the world where the clip has a skeleton.
 //!
-//! Joints are reduced from the root on. What a joint is to be is told relative to its parent as that
+//! Joints are reduced from the root on. The target of a joint is relative to its parent as that
 //! has become, so that angles do not add up along a chain. Distances do: where one is beyond its bound,
 //! the tolerances of the joints above it shrink, and all is done again. Whether the bounds hold is found
 //! by evaluating the keys as `eval` does.
@@ -13,10 +13,10 @@ use std::f64::consts::PI;
 use glam::{DVec3, Quat};
 use tumble::reduce::{ReduceError, ReducedCurve};
 use tumble::reference::angle_between;
-use tumble::{Channel, Engine, Error, Frames, TrackError};
+use tumble::{Channel, Engine, Error, SampleTimes, TrackError};
 
 use crate::format::Quantization;
-use crate::motion::{Motion, Sampler};
+use crate::motion::{ChannelInterpolation, Motion};
 use crate::sample::{ChannelMethods, Samples};
 use crate::world::{HierarchyError, WorldPose, parents_first, world};
 
@@ -115,7 +115,7 @@ pub fn reduce(
     options: &ReduceOptions,
 ) -> Result<Reduced, ReduceMotionError> {
     for tolerance in [Some(options.angle), options.distance, Some(options.shell)] {
-        if let Some(tolerance) = tolerance.filter(|own| !(own.is_finite() && *own >= 0.0)) {
+        if let Some(tolerance) = tolerance.filter(|limit| !(limit.is_finite() && *limit >= 0.0)) {
             return Err(ReduceError::Tolerance { tolerance }.into());
         }
     }
@@ -144,13 +144,13 @@ pub fn reduce(
 ///
 /// # Errors
 /// As [`reduce`].
-pub fn all_in_few_bits(
+pub fn quantize_all(
     clip: &Motion,
     engine: &Engine,
     options: &ReduceOptions,
 ) -> Result<Option<(Reduced, Quantization)>, ReduceMotionError> {
-    let attempt = |place: u32| -> Result<Option<(Reduced, Quantization)>, ReduceMotionError> {
-        let quantization = filtered(place);
+    let attempt = |level: u32| -> Result<Option<(Reduced, Quantization)>, ReduceMotionError> {
+        let quantization = filtered(level);
         let options = ReduceOptions {
             quantize: Some(quantization),
             ..*options
@@ -163,8 +163,8 @@ pub fn all_in_few_bits(
             angles: vec![0.0; joints],
             distances: vec![0.0; joints],
         };
-        let is_beyond = reduction.tighten(&found, &mut tolerances);
-        Ok((!is_beyond).then(|| (found.into_reduced(&reduction, all), quantization)))
+        let is_exceeded = reduction.tighten(&found, &mut tolerances);
+        Ok((!is_exceeded).then(|| (found.into_reduced(&reduction, all), quantization)))
     };
     let Some(mut best) = attempt(FINEST)? else {
         return Ok(None);
@@ -184,8 +184,8 @@ pub fn all_in_few_bits(
 const FINEST: u32 = 10;
 
 /// Each is of a bit more than the one before, from 6 on.
-fn filtered(place: u32) -> Quantization {
-    Quantization::Filtered((1 << (5 + place.min(FINEST))) - 1)
+fn filtered(level: u32) -> Quantization {
+    Quantization::Filtered((1 << (5 + level.min(FINEST))) - 1)
 }
 
 /// How far the curve of each joint may be from what it is to be.
@@ -211,7 +211,7 @@ struct Reduction<'a> {
 }
 
 /// How far each joint of a reduced clip is away at most, and each sample.
-struct Measured {
+struct MeasuredErrors {
     /// By joint: angle and distance.
     joints: Vec<[f64; 2]>,
     /// By sample.
@@ -226,9 +226,10 @@ impl<'a> Reduction<'a> {
         options: &'a ReduceOptions,
     ) -> Result<Self, ReduceMotionError> {
         let times = clip.key_times();
-        let samples = ChannelMethods::AUTHORED.sample(engine, clip, &Frames::at(times.clone()))?;
+        let samples =
+            ChannelMethods::AUTHORED.sample(engine, clip, &SampleTimes::at(times.clone()))?;
         let joints = clip.set.track_count();
-        // Where poses in the world cannot be told, each track is what it is relative to its parent.
+        // Where poses in the world cannot be computed, each track is what it is relative to its parent.
         let hangs = clip.no_world.is_none() && !clip.is_world;
         let parents: Vec<Option<usize>> = (0..joints)
             .map(|joint| clip.skeleton.get(joint)?.parent.filter(|_| hangs))
@@ -259,31 +260,32 @@ impl<'a> Reduction<'a> {
         let mut lengths = vec![0.0f64; self.parents.len()];
         for &joint in &self.order {
             if let Some(parent) = self.parents[joint] {
-                let own = self.samples.translations.get(joint).copied();
-                let own = own.unwrap_or_else(|| self.clip.rest(Channel::Translation, joint));
-                lengths[joint] = lengths[parent] + f64::from(own.length());
+                let translation = self.samples.translations.get(joint).copied();
+                let translation =
+                    translation.unwrap_or_else(|| self.clip.rest(Channel::Translation, joint));
+                lengths[joint] = lengths[parent] + f64::from(translation.length());
             }
         }
         lengths.into_iter().fold(0.0, f64::max)
     }
 
     /// How far a clip is from the samples, as `eval` evaluates it.
-    fn measure(&self, reduced: &Motion) -> Result<Measured, ReduceMotionError> {
-        let frames = Frames::at(self.times.clone());
+    fn measure(&self, reduced: &Motion) -> Result<MeasuredErrors, ReduceMotionError> {
+        let frames = SampleTimes::at(self.times.clone());
         let quantized = self.options.quantize.map(|bits| quantized(reduced, bits));
         let quantized = quantized.transpose()?;
         let reduced = quantized.as_ref().unwrap_or(reduced);
         let samples = ChannelMethods::AUTHORED.sample(self.engine, reduced, &frames)?;
         let poses = poses(reduced, &samples)?;
         let joints = self.parents.len();
-        let mut measured = Measured {
+        let mut measured = MeasuredErrors {
             joints: vec![[0.0; 2]; joints],
             samples: vec![[0.0; 2]; self.times.len()],
             worst: [(0, 0); 2],
         };
         let mut largest = [-1.0; 2];
-        for (place, (expected, found)) in self.poses.iter().zip(&poses).enumerate() {
-            let (sample, joint) = (place / joints, place % joints);
+        for (index, (expected, found)) in self.poses.iter().zip(&poses).enumerate() {
+            let (sample, joint) = (index / joints, index % joints);
             let [a, b] = [expected, found].map(|pose| pose.rotation.as_dquat());
             let angle = angle_between(a, b);
             let moved = found.position - expected.position;
@@ -310,7 +312,7 @@ impl<'a> Reduction<'a> {
     }
 
     /// Shrinks the tolerances where bounds do not hold; whether any does not.
-    fn tighten(&self, found: &Measured, tolerances: &mut Tolerances) -> bool {
+    fn tighten(&self, found: &MeasuredErrors, tolerances: &mut Tolerances) -> bool {
         let mut factors = vec![1.0f64; self.parents.len()];
         for (joint, &[angle, distance]) in found.joints.iter().enumerate() {
             // To what would have been enough, and a little less; never to next to nothing at once.
@@ -321,9 +323,9 @@ impl<'a> Reduction<'a> {
             if distance > self.distance {
                 let part = part(self.distance, distance);
                 let mut above = Some(joint);
-                while let Some(own) = above {
-                    factors[own] = factors[own].min(part);
-                    above = self.parents[own];
+                while let Some(ancestor) = above {
+                    factors[ancestor] = factors[ancestor].min(part);
+                    above = self.parents[ancestor];
                 }
             }
         }
@@ -335,7 +337,7 @@ impl<'a> Reduction<'a> {
     }
 }
 
-impl Measured {
+impl MeasuredErrors {
     fn into_reduced(self, reduction: &Reduction<'_>, clip: Motion) -> Reduced {
         Reduced {
             keys: [reduction.clip, &clip].map(Motion::key_count),
@@ -348,7 +350,12 @@ impl Measured {
     }
 
     fn too_small(&self, reduction: &Reduction<'_>) -> ReduceMotionError {
-        let largest = |kind: usize| self.joints.iter().map(|own| own[kind]).fold(0.0, f64::max);
+        let largest = |kind: usize| {
+            self.joints
+                .iter()
+                .map(|largest| largest[kind])
+                .fold(0.0, f64::max)
+        };
         let bound = reduction.options.angle;
         let kept = match reduction.options.quantize {
             Some(_) => "of 16 bits",
@@ -377,7 +384,7 @@ fn quantized(clip: &Motion, quantization: Quantization) -> Result<Motion, TrackE
     for (index, track) in clip.set.tracks().enumerate() {
         let keys: Vec<Quat> = match clip.channels.get(index).map(|channels| channels.rotation) {
             // A node's rest pose is f32, and tangents may be longer than 16 bits take.
-            Some(None | Some(Sampler::Cubic)) => track.keys.to_vec(),
+            Some(None | Some(ChannelInterpolation::Cubic)) => track.keys.to_vec(),
             _ => {
                 let keys = track.keys.iter();
                 keys.map(|&key| quantization.read_back(key)).collect()
@@ -401,17 +408,17 @@ fn quantized(clip: &Motion, quantization: Quantization) -> Result<Motion, TrackE
     Ok(short)
 }
 
-/// Poses in the world, or relative to the parents where those cannot be told.
+/// Poses in the world, or relative to the parents where those cannot be computed.
 fn poses(clip: &Motion, samples: &Samples) -> Result<Vec<WorldPose>, HierarchyError> {
     if clip.no_world.is_none() {
         return world(clip, samples);
     }
     let each = samples.rotations.iter().enumerate();
     Ok(each
-        .map(|(place, &rotation)| WorldPose {
+        .map(|(index, &rotation)| WorldPose {
             position: samples
                 .translations
-                .get(place)
+                .get(index)
                 .copied()
                 .unwrap_or_default()
                 .as_dvec3(),

@@ -15,48 +15,49 @@ use arrow_schema::{DataType, TimeUnit as ArrowUnit};
 
 use crate::diagnostic::{Code, Diagnostic};
 use crate::format::TimeUnit;
-use crate::table::columns::{Column, Numbers, Table, Values, wrong_type};
-use crate::table::plan::{Need, Wanted};
+use crate::table::columns::{
+    Column, ColumnNeed, ColumnNumbers, ColumnValues, RequestedColumn, Table, wrong_type,
+};
 
 /// Takes the rows of a table as they come.
 pub(crate) struct Gather {
     table: Table,
-    known: Vec<Known>,
+    known: Vec<KnownWords>,
 }
 
 /// The words of a column that were met before.
 #[derive(Default)]
-struct Known {
+struct KnownWords {
     codes: HashMap<String, u32>,
     /// The last dictionary and the codes of its words: batches mostly share one.
     last: Option<(ArrayRef, Vec<u32>)>,
 }
 
 impl Gather {
-    /// For columns that are wanted, each with its type.
+    /// For the requested columns, each with its type.
     ///
     /// # Errors
     /// When a type is not what its column needs.
     pub(crate) fn new<'a>(
         file: &str,
-        wanted: impl IntoIterator<Item = (&'a Wanted, &'a DataType)>,
+        requested: impl IntoIterator<Item = (&'a RequestedColumn, &'a DataType)>,
     ) -> Result<Self, Diagnostic> {
-        let column = |(wanted, data_type): (&Wanted, &DataType)| {
-            let Some(values) = values(data_type, wanted.need) else {
+        let column = |(column, data_type): (&RequestedColumn, &DataType)| {
+            let Some(values) = values(data_type, column.need) else {
                 let found = data_type.to_string();
-                return Err(wrong_type(file, &wanted.name, &found, wanted.need));
+                return Err(wrong_type(file, &column.name, &found, column.need));
             };
             Ok(Column {
-                name: wanted.name.clone(),
-                index: wanted.index,
+                name: column.name.clone(),
+                index: column.index,
                 values,
                 null: None,
             })
         };
-        let columns: Result<Vec<_>, _> = wanted.into_iter().map(column).collect();
+        let columns: Result<Vec<_>, _> = requested.into_iter().map(column).collect();
         let columns = columns?;
         Ok(Self {
-            known: columns.iter().map(|_| Known::default()).collect(),
+            known: columns.iter().map(|_| KnownWords::default()).collect(),
             table: Table {
                 file: file.to_owned(),
                 columns,
@@ -66,7 +67,7 @@ impl Gather {
         })
     }
 
-    /// Appends the rows of a batch with the columns that are wanted, in their order.
+    /// Appends the rows of a batch with the requested columns, in their order.
     ///
     /// # Errors
     /// When a column is of another type than was said, or a number does not fit.
@@ -98,10 +99,10 @@ impl Gather {
             // What stands in memory for a null may be any number.
             let nulls = (0..rows).filter(|&row| array.null_count() > 0 && array.is_null(row));
             match &mut column.values {
-                Values::Numbers(Numbers::F32(list)) => {
+                ColumnValues::Numbers(ColumnNumbers::F32(list)) => {
                     nulls.for_each(|row| list[before + row] = f32::NAN);
                 }
-                Values::Numbers(Numbers::F64(list)) => {
+                ColumnValues::Numbers(ColumnNumbers::F64(list)) => {
                     nulls.for_each(|row| list[before + row] = f64::NAN);
                 }
                 _ => {}
@@ -130,60 +131,62 @@ impl Gather {
     }
 }
 
-/// The columns of a batch at these places.
-pub(crate) fn chosen<'a>(batch: &'a RecordBatch, places: &[usize]) -> Option<Vec<&'a dyn Array>> {
+/// The columns of a batch at these indices.
+pub(crate) fn chosen<'a>(batch: &'a RecordBatch, indices: &[usize]) -> Option<Vec<&'a dyn Array>> {
     let columns = batch.columns();
-    places
+    indices
         .iter()
-        .map(|&place| Some(&**columns.get(place)?))
+        .map(|&index| Some(&**columns.get(index)?))
         .collect()
 }
 
 /// An empty column for a type; nothing if the type does not serve.
-fn values(data_type: &DataType, need: Need) -> Option<Values> {
+fn values(data_type: &DataType, need: ColumnNeed) -> Option<ColumnValues> {
     let numbers = numbers(data_type);
     match (need, data_type) {
-        (Need::Number, _) => numbers.map(Values::Numbers),
-        (Need::Whole, _) => whole(numbers),
-        (Need::Name, data_type) if is_text(data_type) => Some(Values::Words {
+        (ColumnNeed::Number, _) => numbers.map(ColumnValues::Numbers),
+        (ColumnNeed::Whole, _) => whole(numbers),
+        (ColumnNeed::Name, data_type) if is_text(data_type) => Some(ColumnValues::Words {
             codes: Vec::new(),
             words: Vec::new(),
         }),
-        (Need::Name, _) => whole(numbers),
-        (Need::Time, DataType::Timestamp(unit, _) | DataType::Duration(unit)) => {
+        (ColumnNeed::Name, _) => whole(numbers),
+        (ColumnNeed::Time, DataType::Timestamp(unit, _) | DataType::Duration(unit)) => {
             let unit = match unit {
                 ArrowUnit::Second => TimeUnit::Seconds,
                 ArrowUnit::Millisecond => TimeUnit::Milliseconds,
                 ArrowUnit::Microsecond => TimeUnit::Microseconds,
                 ArrowUnit::Nanosecond => TimeUnit::Nanoseconds,
             };
-            Some(Values::Stamps(Vec::new(), unit))
+            Some(ColumnValues::Stamps(Vec::new(), unit))
         }
-        (Need::Time, _) => numbers.map(Values::Numbers),
-        (Need::List, DataType::List(item) | DataType::LargeList(item)) => Some(Values::Lists {
-            ends: Vec::new(),
-            numbers: self::numbers(item.data_type())?,
-        }),
-        (Need::List, DataType::FixedSizeList(item, length)) if *length >= 0 => {
-            Some(Values::Lists {
+        (ColumnNeed::Time, _) => numbers.map(ColumnValues::Numbers),
+        (ColumnNeed::List, DataType::List(item) | DataType::LargeList(item)) => {
+            Some(ColumnValues::Lists {
                 ends: Vec::new(),
                 numbers: self::numbers(item.data_type())?,
             })
         }
-        (Need::List, _) => None,
+        (ColumnNeed::List, DataType::FixedSizeList(item, length)) if *length >= 0 => {
+            Some(ColumnValues::Lists {
+                ends: Vec::new(),
+                numbers: self::numbers(item.data_type())?,
+            })
+        }
+        (ColumnNeed::List, _) => None,
     }
 }
 
-fn whole(numbers: Option<Numbers>) -> Option<Values> {
-    let numbers = numbers.filter(|numbers| matches!(numbers, Numbers::Whole(_)));
-    numbers.map(Values::Numbers)
+fn whole(numbers: Option<ColumnNumbers>) -> Option<ColumnValues> {
+    let numbers = numbers.filter(|numbers| matches!(numbers, ColumnNumbers::Whole(_)));
+    numbers.map(ColumnValues::Numbers)
 }
 
-fn numbers(data_type: &DataType) -> Option<Numbers> {
+fn numbers(data_type: &DataType) -> Option<ColumnNumbers> {
     match data_type {
-        DataType::Float16 | DataType::Float32 => Some(Numbers::F32(Vec::new())),
-        DataType::Float64 => Some(Numbers::F64(Vec::new())),
-        other if other.is_integer() => Some(Numbers::Whole(Vec::new())),
+        DataType::Float16 | DataType::Float32 => Some(ColumnNumbers::F32(Vec::new())),
+        DataType::Float64 => Some(ColumnNumbers::F64(Vec::new())),
+        other if other.is_integer() => Some(ColumnNumbers::Whole(Vec::new())),
         _ => None,
     }
 }
@@ -203,31 +206,31 @@ fn is_text(data_type: &DataType) -> bool {
 
 /// Appends an array to what is of its type; nothing if it is of another.
 fn append(
-    values: &mut Values,
-    known: &mut Known,
+    values: &mut ColumnValues,
+    known: &mut KnownWords,
     array: &dyn Array,
     null: &mut Option<usize>,
 ) -> Option<()> {
     match values {
-        Values::Numbers(numbers) => append_numbers(numbers, array),
-        Values::Stamps(stamps, _) => append_stamps(stamps, array),
-        Values::Words { codes, words } => append_words(codes, words, known, array, null),
-        Values::Lists { ends, numbers } => append_lists(ends, numbers, array, null),
+        ColumnValues::Numbers(numbers) => append_numbers(numbers, array),
+        ColumnValues::Stamps(stamps, _) => append_stamps(stamps, array),
+        ColumnValues::Words { codes, words } => append_words(codes, words, known, array, null),
+        ColumnValues::Lists { ends, numbers } => append_lists(ends, numbers, array, null),
         // Only text has such.
-        Values::Decimals(..) => None,
+        ColumnValues::Decimals(..) => None,
     }
 }
 
-fn append_numbers(numbers: &mut Numbers, array: &dyn Array) -> Option<()> {
+fn append_numbers(numbers: &mut ColumnNumbers, array: &dyn Array) -> Option<()> {
     match numbers {
-        Numbers::F32(list) => match array.as_primitive_opt::<Float16Type>() {
+        ColumnNumbers::F32(list) => match array.as_primitive_opt::<Float16Type>() {
             Some(halves) => list.extend(halves.values().iter().map(|half| half.to_f32())),
             None => list.extend_from_slice(array.as_primitive_opt::<Float32Type>()?.values()),
         },
-        Numbers::F64(list) => {
+        ColumnNumbers::F64(list) => {
             list.extend_from_slice(array.as_primitive_opt::<Float64Type>()?.values());
         }
-        Numbers::Whole(list) => match array.data_type() {
+        ColumnNumbers::Whole(list) => match array.data_type() {
             DataType::Int8 => extend::<Int8Type>(list, array)?,
             DataType::Int16 => extend::<Int16Type>(list, array)?,
             DataType::Int32 => extend::<Int32Type>(list, array)?,
@@ -274,7 +277,7 @@ fn append_stamps(stamps: &mut Vec<i64>, array: &dyn Array) -> Option<()> {
 }
 
 /// The code of a word, a new one if need be.
-fn code(words: &mut Vec<String>, known: &mut Known, word: &str) -> u32 {
+fn code(words: &mut Vec<String>, known: &mut KnownWords, word: &str) -> u32 {
     if let Some(&code) = known.codes.get(word) {
         return code;
     }
@@ -288,7 +291,7 @@ fn code(words: &mut Vec<String>, known: &mut Known, word: &str) -> u32 {
 fn append_words(
     codes: &mut Vec<u32>,
     words: &mut Vec<String>,
-    known: &mut Known,
+    known: &mut KnownWords,
     array: &dyn Array,
     null: &mut Option<usize>,
 ) -> Option<()> {
@@ -310,35 +313,35 @@ fn append_words(
         }
         return Some(());
     };
-    let own = dictionary.values();
-    if own.is_empty() {
+    let values = dictionary.values();
+    if values.is_empty() {
         // Every row is a null then.
         let none = code(words, known, "");
         codes.resize(start + array.len(), none);
         return Some(());
     }
     let code_of = match known.last.take() {
-        Some((last, code_of)) if last.to_data().ptr_eq(&own.to_data()) => code_of,
-        _ => (0..own.len())
-            .map(|place| {
-                let word = if own.is_null(place) {
+        Some((last, code_of)) if last.to_data().ptr_eq(&values.to_data()) => code_of,
+        _ => (0..values.len())
+            .map(|i| {
+                let word = if values.is_null(i) {
                     ""
                 } else {
-                    text(own, place)?
+                    text(values, i)?
                 };
                 Some(code(words, known, word))
             })
             .collect::<Option<Vec<u32>>>()?,
     };
     let keys = dictionary.normalized_keys();
-    if own.null_count() > 0 && null.is_none() {
+    if values.null_count() > 0 && null.is_none() {
         *null = keys
             .iter()
-            .position(|&key| own.is_null(key))
+            .position(|&key| values.is_null(key))
             .map(|row| start + row);
     }
     codes.extend(keys.iter().map(|&key| code_of[key]));
-    known.last = Some((Arc::clone(own), code_of));
+    known.last = Some((Arc::clone(values), code_of));
     Some(())
 }
 
@@ -353,12 +356,12 @@ fn text(array: &dyn Array, row: usize) -> Option<&str> {
 
 fn append_lists(
     ends: &mut Vec<usize>,
-    numbers: &mut Numbers,
+    numbers: &mut ColumnNumbers,
     array: &dyn Array,
     null: &mut Option<usize>,
 ) -> Option<()> {
     let start = ends.len();
-    let (own_ends, items): (Vec<usize>, _) = if let Some(list) = array.as_list_opt::<i32>() {
+    let (list_ends, items): (Vec<usize>, _) = if let Some(list) = array.as_list_opt::<i32>() {
         let ends = list.value_offsets().iter().map(|&end| end as usize);
         (ends.collect(), list.values())
     } else if let Some(list) = array.as_list_opt::<i64>() {
@@ -373,14 +376,14 @@ fn append_lists(
         )
     };
     // A slice of a longer array begins behind the first number.
-    let (first, last) = (*own_ends.first()?, *own_ends.last()?);
+    let (first, last) = (*list_ends.first()?, *list_ends.last()?);
     let items = items.slice(first, last.checked_sub(first)?);
     if items.null_count() > 0 && null.is_none() {
         let item = (0..items.len()).find(|&item| items.is_null(item));
-        *null = item.map(|item| start + own_ends.partition_point(|&end| end - first <= item) - 1);
+        *null = item.map(|item| start + list_ends.partition_point(|&end| end - first <= item) - 1);
     }
     let before = numbers.len();
     append_numbers(numbers, &items)?;
-    ends.extend(own_ends[1..].iter().map(|&end| before + end - first));
+    ends.extend(list_ends[1..].iter().map(|&end| before + end - first));
     Some(())
 }

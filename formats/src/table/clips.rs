@@ -1,6 +1,8 @@
 //! From columns to clips: rows are shared out to clips and tracks, keys become unit quaternions at
 //! increasing times.
 
+mod keys;
+
 use std::borrow::Cow;
 use std::ops::Range;
 
@@ -8,17 +10,17 @@ use glam::DVec3;
 
 use crate::diagnostic::{Code, Diagnostic};
 use crate::format::{Loaded, ReadOptions};
-use crate::grid::restore;
 use crate::keys::Origin;
 use crate::motion::Motion;
+use crate::motion::grid::restore;
 use crate::printable::printable;
+use crate::table::clips::keys::RowKeys;
 use crate::table::columns::Table;
-use crate::table::groups::{labels, numbered, share_out};
-use crate::table::keys::Keys;
-use crate::table::plan::{Parts, Plan, Rows};
+use crate::table::groups::{labels, numbered, rows_by_code};
+use crate::table::plan::{Parts, RowLayout, TablePlan};
 #[cfg(feature = "parquet")]
 use crate::table::skeleton;
-use crate::table::times::{Times, times};
+use crate::table::times::{RowTimes, times};
 use crate::warnings::Warnings;
 
 /// Makes clips of a table that holds what its plan wants.
@@ -27,7 +29,7 @@ use crate::warnings::Warnings;
 /// The first fault, if the table is of one clip; in one of several it refuses that clip alone.
 pub(crate) fn clips(
     table: &Table,
-    plan: &Plan,
+    plan: &TablePlan,
     options: &ReadOptions,
 ) -> Result<Loaded, Diagnostic> {
     if table.rows == 0 {
@@ -42,7 +44,7 @@ pub(crate) fn clips(
     if let Some(columns) = plan.left_out(table) {
         warnings.warn(Code::ColumnsLeftOut, || {
             let message = format!(
-                "left out, because nothing says that they are keys: {columns}; --map names what is"
+                "left out, because nothing says that they are keys: {columns}; name the keys with --map"
             );
             (None, message)
         });
@@ -52,7 +54,7 @@ pub(crate) fn clips(
     let groups = match plan.clip {
         Some((column, prefix)) => {
             let (codes, names) = labels(table, column);
-            let (rows, ranges) = share_out(&codes, names.len());
+            let (rows, ranges) = rows_by_code(&codes, names.len());
             let named = names
                 .into_iter()
                 .map(|name| Some(format!("{prefix}{name}")));
@@ -64,14 +66,14 @@ pub(crate) fn clips(
         None => vec![(None, None)],
     };
     let tracks = match plan.rows {
-        Rows::Keys {
+        RowLayout::Keys {
             track: Some(track), ..
         } => Some(labels(table, track)),
         _ => None,
     };
     let alone = groups.len() == 1;
-    for (place, (name, rows)) in groups.into_iter().enumerate() {
-        let clip = Clip {
+    for (index, (name, rows)) in groups.into_iter().enumerate() {
+        let clip = TableClip {
             table,
             times: &times,
             rows: rows.as_deref(),
@@ -81,8 +83,8 @@ pub(crate) fn clips(
         match clip.read(plan, name, &mut warnings) {
             Ok(mut motion) => {
                 #[cfg(feature = "parquet")]
-                skeleton::hang(&mut motion, place, &plan.notes);
-                motion.place = place;
+                skeleton::attach_skeleton(&mut motion, index, &plan.notes);
+                motion.index = index;
                 loaded.clips.push(motion);
             }
             Err(refusal) if alone => return Err(refusal),
@@ -94,9 +96,9 @@ pub(crate) fn clips(
 }
 
 /// One clip of a table: some of its rows, or all.
-pub(crate) struct Clip<'a> {
+pub(crate) struct TableClip<'a> {
     pub(crate) table: &'a Table,
-    times: &'a Times,
+    times: &'a RowTimes,
     rows: Option<&'a [u32]>,
     /// The track of each row of the table, and the names of the tracks; none in a table of one.
     tracks: Option<&'a (Vec<u32>, Vec<String>)>,
@@ -104,8 +106,8 @@ pub(crate) struct Clip<'a> {
 }
 
 /// What becomes of a clip's rows.
-pub(crate) struct Shared<'a> {
-    pub(crate) tracks: Vec<Track<'a>>,
+pub(crate) struct SharedRows<'a> {
+    pub(crate) tracks: Vec<TableTrack<'a>>,
     /// Places of rows among those of the clip; tracks have parts of this list.
     order: Vec<u32>,
     /// The times of tracks.
@@ -113,43 +115,43 @@ pub(crate) struct Shared<'a> {
 }
 
 /// Where the keys of one track come from.
-pub(crate) struct Track<'a> {
+pub(crate) struct TableTrack<'a> {
     name: String,
     pub(crate) parts: &'a Parts,
-    places: Range<usize>,
+    range: Range<usize>,
     /// Which of the lists of times is its own.
     list: usize,
 }
 
-impl Shared<'_> {
-    /// The places of a track's rows, by increasing time.
-    pub(crate) fn places(&self, track: &Track<'_>) -> &[u32] {
-        &self.order[track.places.clone()]
+impl SharedRows<'_> {
+    /// The positions of a track's rows in the clip, by increasing time.
+    pub(crate) fn positions(&self, track: &TableTrack<'_>) -> &[u32] {
+        &self.order[track.range.clone()]
     }
 }
 
-impl Clip<'_> {
+impl TableClip<'_> {
     pub(crate) fn len(&self) -> usize {
         self.rows.map_or(self.table.rows, <[u32]>::len)
     }
 
-    /// The row of the table at a place in the clip.
+    /// The row of the table at a position in the clip.
     #[inline]
-    pub(crate) fn row(&self, place: usize) -> usize {
-        self.rows.map_or(place, |rows| rows[place] as usize)
+    pub(crate) fn row(&self, position: usize) -> usize {
+        self.rows.map_or(position, |rows| rows[position] as usize)
     }
 
     fn read(
         &self,
-        plan: &Plan,
+        plan: &TablePlan,
         name: Option<String>,
         warnings: &mut Warnings,
     ) -> Result<Motion, Diagnostic> {
         let (mut shared, is_world) = match &plan.rows {
-            Rows::Keys {
+            RowLayout::Keys {
                 parts, is_world, ..
             } => (self.share_out(parts), *is_world),
-            Rows::Times { tracks, is_world } => (self.share_all(tracks), *is_world),
+            RowLayout::Times { tracks, is_world } => (self.share_all(tracks), *is_world),
         };
         if self.options.bridge_gaps {
             self.leave_out_gaps(plan, &mut shared, warnings)?;
@@ -175,17 +177,17 @@ impl Clip<'_> {
             keys.iter().map(|keys| keys.rotations.len()).sum(),
         );
         let origins: Vec<DVec3> = keys.iter().map(|keys| keys.origin).collect();
-        for (place, (track, keys)) in shared.tracks.into_iter().zip(keys).enumerate() {
+        for (index, (track, keys)) in shared.tracks.into_iter().zip(keys).enumerate() {
             let times = &shared.lists[track.list];
             let pushed = set
                 .push(track.name, times, &keys.rotations)
                 .and_then(|()| match keys.translations[..] {
                     [] => Ok(()),
-                    _ => set.set_translations(place, times, &keys.translations, &[]),
+                    _ => set.set_translations(index, times, &keys.translations, &[]),
                 })
                 .and_then(|()| match keys.scales[..] {
                     [] => Ok(()),
-                    _ => set.set_scales(place, times, &keys.scales, &[]),
+                    _ => set.set_scales(index, times, &keys.scales, &[]),
                 });
             pushed.map_err(|error| self.table.refuse(Code::Norm, error.to_string()))?;
         }
@@ -196,15 +198,15 @@ impl Clip<'_> {
     }
 
     /// Every row to every track: those of a wide table.
-    fn share_all<'a>(&self, tracks: &'a [(String, Parts)]) -> Shared<'a> {
-        let track = |(name, parts): &'a (String, Parts)| Track {
+    fn share_all<'a>(&self, tracks: &'a [(String, Parts)]) -> SharedRows<'a> {
+        let track = |(name, parts): &'a (String, Parts)| TableTrack {
             name: name.clone(),
             parts,
-            places: 0..self.len(),
+            range: 0..self.len(),
             list: 0,
         };
         let order: Vec<u32> = (0..self.len() as u32).collect();
-        Shared {
+        SharedRows {
             tracks: tracks.iter().map(track).collect(),
             lists: vec![self.times_of(&order)],
             order,
@@ -214,8 +216,8 @@ impl Clip<'_> {
     /// Takes from each track the rows in which a number of it is missing.
     fn leave_out_gaps(
         &self,
-        plan: &Plan,
-        shared: &mut Shared<'_>,
+        plan: &TablePlan,
+        shared: &mut SharedRows<'_>,
         warnings: &mut Warnings,
     ) -> Result<(), Diagnostic> {
         let mut known: Option<(&Parts, Option<Vec<bool>>)> = None;
@@ -230,9 +232,10 @@ impl Clip<'_> {
             let Some((_, Some(gaps))) = &known else {
                 continue;
             };
-            let places = shared.places(&shared.tracks[track]).to_vec();
-            let (missing, there): (Vec<u32>, Vec<u32>) =
-                places.into_iter().partition(|&place| gaps[place as usize]);
+            let positions = shared.positions(&shared.tracks[track]).to_vec();
+            let (missing, there): (Vec<u32>, Vec<u32>) = positions
+                .into_iter()
+                .partition(|&position| gaps[position as usize]);
             if missing.is_empty() {
                 continue;
             }
@@ -248,7 +251,7 @@ impl Clip<'_> {
                         missing.len()
                     );
                     let row = self.row(key as usize);
-                    (Some(self.table.place(plan.time, row)), message)
+                    (Some(self.table.location(plan.time, row)), message)
                 });
             }
             let times = self.times_of(&there);
@@ -256,66 +259,69 @@ impl Clip<'_> {
             shared.order.extend(there);
             shared.lists.push(times);
             let changed = &mut shared.tracks[track];
-            (changed.places, changed.list) = (start..shared.order.len(), shared.lists.len() - 1);
+            (changed.range, changed.list) = (start..shared.order.len(), shared.lists.len() - 1);
         }
         Ok(())
     }
 
     /// Each row to the track that a column names.
-    fn share_out<'a>(&self, parts: &'a Parts) -> Shared<'a> {
+    fn share_out<'a>(&self, parts: &'a Parts) -> SharedRows<'a> {
         let (codes, names) = match (self.tracks, self.rows) {
             (None, _) => (Cow::Owned(vec![0; self.len()]), vec![String::new()]),
             (Some((codes, names)), None) => (Cow::Borrowed(&**codes), names.clone()),
             (Some((codes, names)), Some(rows)) => {
-                let own = rows.iter().map(|&row| codes[row as usize]);
-                let (codes, own) = numbered(own, |code| code as usize);
-                let names = own.iter().map(|&code| names[code as usize].clone());
+                let group_codes = rows.iter().map(|&row| codes[row as usize]);
+                let (codes, distinct) = numbered(group_codes, |code| code as usize);
+                let names = distinct.iter().map(|&code| names[code as usize].clone());
                 (Cow::Owned(codes), names.collect())
             }
         };
-        let (mut order, ranges) = share_out(&codes, names.len());
+        let (mut order, ranges) = rows_by_code(&codes, names.len());
         let mut tracks = Vec::with_capacity(names.len());
         let mut lists: Vec<Vec<f64>> = Vec::new();
         for (name, range) in names.into_iter().zip(ranges) {
-            let own = &mut order[range.clone()];
-            let mut times = self.times_of(own);
+            let positions = &mut order[range.clone()];
+            let mut times = self.times_of(positions);
             // Rows of a long table may come in any order.
             if !times.is_sorted() {
-                own.sort_by(|&a, &b| self.time(a).total_cmp(&self.time(b)));
-                times = self.times_of(own);
+                positions.sort_by(|&a, &b| self.time(a).total_cmp(&self.time(b)));
+                times = self.times_of(positions);
             }
             // Tracks mostly have the times of the track before.
             if lists.last() != Some(&times) {
                 lists.push(times);
             }
-            tracks.push(Track {
+            tracks.push(TableTrack {
                 name,
                 parts,
-                places: range,
+                range,
                 list: lists.len() - 1,
             });
         }
-        Shared {
+        SharedRows {
             tracks,
             order,
             lists,
         }
     }
 
-    fn time(&self, place: u32) -> f64 {
-        self.times.seconds[self.row(place as usize)]
+    fn time(&self, position: u32) -> f64 {
+        self.times.seconds[self.row(position as usize)]
     }
 
-    fn times_of(&self, places: &[u32]) -> Vec<f64> {
-        places.iter().map(|&place| self.time(place)).collect()
+    fn times_of(&self, positions: &[u32]) -> Vec<f64> {
+        positions
+            .iter()
+            .map(|&position| self.time(position))
+            .collect()
     }
 
     /// Drops keys that are given twice; refuses times that decrease.
     fn increasing(
         &self,
-        plan: &Plan,
-        shared: &mut Shared<'_>,
-        keys: &mut [Keys],
+        plan: &TablePlan,
+        shared: &mut SharedRows<'_>,
+        keys: &mut [RowKeys],
         warnings: &mut Warnings,
     ) -> Result<(), Diagnostic> {
         // The list whose times were found to increase.
@@ -325,11 +331,14 @@ impl Clip<'_> {
             if increases == Some(list) {
                 continue;
             }
-            let places = shared.places(&shared.tracks[track]);
-            let place = |key: usize| self.table.place(plan.time, self.row(places[key] as usize));
+            let positions = shared.positions(&shared.tracks[track]);
+            let location = |key: usize| {
+                self.table
+                    .location(plan.time, self.row(positions[key] as usize))
+            };
             let origin = Origin {
                 file: &self.table.file,
-                place: &place,
+                location: &location,
                 duplicates: self.options.duplicates,
             };
             let mut times = shared.lists[list].clone();

@@ -1,9 +1,29 @@
 //! The columns of a table, whatever file they came from, and where a fault in them is.
 
 use crate::decimal::Decimal;
-use crate::diagnostic::{Code, Diagnostic, Place};
+use crate::diagnostic::{Code, Diagnostic, Location};
 use crate::format::TimeUnit;
-use crate::table::plan::Need;
+
+/// What a column has to hold.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(crate) enum ColumnNeed {
+    Number,
+    Whole,
+    /// Text, or whole numbers that serve as names.
+    Name,
+    Time,
+    List,
+}
+
+/// A column that is to be read.
+#[derive(Debug)]
+pub(crate) struct RequestedColumn {
+    /// What the file calls it.
+    pub(crate) name: String,
+    /// Its index among all columns of the file.
+    pub(crate) index: usize,
+    pub(crate) need: ColumnNeed,
+}
 
 /// Columns of one length.
 pub(crate) struct Table {
@@ -12,23 +32,23 @@ pub(crate) struct Table {
     /// As many as the plan wants, in its order.
     pub(crate) columns: Vec<Column>,
     pub(crate) rows: usize,
-    /// The text, where the table was one: for places by line and column.
+    /// The text, where the table was one: for locations by line and column.
     pub(crate) text: Option<Text>,
 }
 
 /// One column.
 pub(crate) struct Column {
     pub(crate) name: String,
-    /// Its place among all columns of the file.
+    /// Its index among all columns of the file.
     pub(crate) index: usize,
-    pub(crate) values: Values,
+    pub(crate) values: ColumnValues,
     /// The first row without a value.
     pub(crate) null: Option<usize>,
 }
 
 /// What a column holds.
-pub(crate) enum Values {
-    Numbers(Numbers),
+pub(crate) enum ColumnValues {
+    Numbers(ColumnNumbers),
     /// Times as text has them, in seconds, and the most decimals that one of them has.
     Decimals(Vec<Decimal>, u32),
     /// Points in time, counted from a day of their own.
@@ -41,18 +61,18 @@ pub(crate) enum Values {
     /// Row `i` ends before number `ends[i]`.
     Lists {
         ends: Vec<usize>,
-        numbers: Numbers,
+        numbers: ColumnNumbers,
     },
 }
 
 /// Numbers of the type that the file has them in.
-pub(crate) enum Numbers {
+pub(crate) enum ColumnNumbers {
     F32(Vec<f32>),
     F64(Vec<f64>),
     Whole(Vec<i64>),
 }
 
-impl Numbers {
+impl ColumnNumbers {
     pub(crate) fn len(&self) -> usize {
         match self {
             Self::F32(numbers) => numbers.len(),
@@ -61,18 +81,18 @@ impl Numbers {
         }
     }
 
-    /// The number at a place below [`Numbers::len`].
-    pub(crate) fn at(&self, place: usize) -> f64 {
+    /// The number at an index below [`ColumnNumbers::len`].
+    pub(crate) fn at(&self, index: usize) -> f64 {
         match self {
-            Self::F32(numbers) => f64::from(numbers[place]),
-            Self::F64(numbers) => numbers[place],
-            Self::Whole(numbers) => numbers[place] as f64,
+            Self::F32(numbers) => f64::from(numbers[index]),
+            Self::F64(numbers) => numbers[index],
+            Self::Whole(numbers) => numbers[index] as f64,
         }
     }
 }
 
 /// What finds the line and the column of a cell again.
-pub(crate) type Text = Box<dyn Fn(usize, usize) -> Place + Sync>;
+pub(crate) type Text = Box<dyn Fn(usize, usize) -> Location + Sync>;
 
 impl Table {
     pub(crate) fn refuse(&self, code: Code, message: impl Into<String>) -> Diagnostic {
@@ -82,17 +102,17 @@ impl Table {
     /// How many numbers the list of the first row has, of a column of lists.
     pub(crate) fn list_length(&self, column: usize) -> Option<usize> {
         match &self.columns.get(column)?.values {
-            Values::Lists { ends, .. } => ends.first().copied(),
+            ColumnValues::Lists { ends, .. } => ends.first().copied(),
             _ => None,
         }
     }
 
     /// Where a cell is.
-    pub(crate) fn place(&self, column: usize, row: usize) -> Place {
+    pub(crate) fn location(&self, column: usize, row: usize) -> Location {
         let column = &self.columns[column];
         match &self.text {
             Some(text) => text(column.index, row),
-            None => Place::Inside(format!("column {}, row {row}", column.name)),
+            None => Location::Inside(format!("column {}, row {row}", column.name)),
         }
     }
 
@@ -105,7 +125,7 @@ impl Table {
         message: impl Into<String>,
     ) -> Diagnostic {
         let mut refusal = self.refuse(code, message);
-        refusal.place = Some(self.place(column, row));
+        refusal.location = Some(self.location(column, row));
         refusal
     }
 
@@ -114,11 +134,11 @@ impl Table {
         let is_float = |column: &Column| {
             matches!(
                 column.values,
-                Values::Numbers(Numbers::F32(_) | Numbers::F64(_))
+                ColumnValues::Numbers(ColumnNumbers::F32(_) | ColumnNumbers::F64(_))
             )
         };
         let checked = self.columns.iter().enumerate();
-        for (place, column) in checked.filter(|(_, column)| !(bridges_gaps && is_float(column))) {
+        for (index, column) in checked.filter(|(_, column)| !(bridges_gaps && is_float(column))) {
             if let Some(row) = column.null {
                 let remedy = match is_float(column) {
                     true => "fill it in, remove the row, or leave the key out with --bridge-gaps",
@@ -128,7 +148,7 @@ impl Table {
                     "column `{}` has no value in row {row}; {remedy}",
                     column.name
                 );
-                return Err(self.refuse_at(place, row, Code::Null, message));
+                return Err(self.refuse_at(index, row, Code::Null, message));
             }
         }
         Ok(())
@@ -139,38 +159,38 @@ impl Column {
     /// The number of rows.
     pub(crate) fn len(&self) -> usize {
         match &self.values {
-            Values::Numbers(numbers) => numbers.len(),
-            Values::Decimals(times, _) => times.len(),
-            Values::Stamps(stamps, _) => stamps.len(),
-            Values::Words { codes, .. } => codes.len(),
-            Values::Lists { ends, .. } => ends.len(),
+            ColumnValues::Numbers(numbers) => numbers.len(),
+            ColumnValues::Decimals(times, _) => times.len(),
+            ColumnValues::Stamps(stamps, _) => stamps.len(),
+            ColumnValues::Words { codes, .. } => codes.len(),
+            ColumnValues::Lists { ends, .. } => ends.len(),
         }
     }
 }
 
 /// Reads one number of each row.
 #[derive(Clone, Copy)]
-pub(crate) struct Reader<'a> {
-    pub(crate) numbers: &'a Numbers,
+pub(crate) struct CellReader<'a> {
+    pub(crate) numbers: &'a ColumnNumbers,
     /// Where the lists of the rows end, in a column of lists.
     pub(crate) ends: Option<&'a [usize]>,
-    /// The place of the number in each list.
-    pub(crate) place: usize,
+    /// The index of the number in each list.
+    pub(crate) item: usize,
 }
 
-impl Reader<'_> {
+impl CellReader<'_> {
     /// Reads nothing.
     pub(crate) const NONE: Self = Self {
-        numbers: &Numbers::Whole(Vec::new()),
+        numbers: &ColumnNumbers::Whole(Vec::new()),
         ends: None,
-        place: 0,
+        item: 0,
     };
 
     pub(crate) fn at(&self, row: usize) -> f64 {
         match self.ends {
             None => self.numbers.at(row),
-            Some(_) if row == 0 => self.numbers.at(self.place),
-            Some(ends) => self.numbers.at(ends[row - 1] + self.place),
+            Some(_) if row == 0 => self.numbers.at(self.item),
+            Some(ends) => self.numbers.at(ends[row - 1] + self.item),
         }
     }
 }
@@ -179,17 +199,17 @@ impl Reader<'_> {
 pub(crate) enum Cells<'a, const N: usize> {
     F32([&'a [f32]; N]),
     F64([&'a [f64]; N]),
-    Other([Reader<'a>; N]),
+    Other([CellReader<'a>; N]),
 }
 
 impl<'a, const N: usize> Cells<'a, N> {
-    pub(crate) fn of(readers: [Reader<'a>; N]) -> Self {
-        let f32s = |numbers: &'a Numbers| match numbers {
-            Numbers::F32(list) => Some(&**list),
+    pub(crate) fn of(readers: [CellReader<'a>; N]) -> Self {
+        let f32s = |numbers: &'a ColumnNumbers| match numbers {
+            ColumnNumbers::F32(list) => Some(&**list),
             _ => None,
         };
-        let f64s = |numbers: &'a Numbers| match numbers {
-            Numbers::F64(list) => Some(&**list),
+        let f64s = |numbers: &'a ColumnNumbers| match numbers {
+            ColumnNumbers::F64(list) => Some(&**list),
             _ => None,
         };
         if let Some(lists) = slices(&readers, f32s) {
@@ -203,8 +223,8 @@ impl<'a, const N: usize> Cells<'a, N> {
 }
 
 fn slices<'a, T, const N: usize>(
-    readers: &[Reader<'a>; N],
-    list: impl Fn(&'a Numbers) -> Option<&'a [T]>,
+    readers: &[CellReader<'a>; N],
+    list: impl Fn(&'a ColumnNumbers) -> Option<&'a [T]>,
 ) -> Option<[&'a [T]; N]> {
     let mut lists = [&[][..]; N];
     for (slot, reader) in lists.iter_mut().zip(readers) {
@@ -214,14 +234,14 @@ fn slices<'a, T, const N: usize>(
 }
 
 /// The refusal of a column whose type does not serve.
-pub(crate) fn wrong_type(file: &str, column: &str, found: &str, need: Need) -> Diagnostic {
-    let wanted = match need {
-        Need::Number => "numbers",
-        Need::Whole => "whole numbers",
-        Need::Name => "text or whole numbers",
-        Need::Time => "numbers or timestamps",
-        Need::List => "lists of numbers",
+pub(crate) fn wrong_type(file: &str, column: &str, found: &str, need: ColumnNeed) -> Diagnostic {
+    let expected = match need {
+        ColumnNeed::Number => "numbers",
+        ColumnNeed::Whole => "whole numbers",
+        ColumnNeed::Name => "text or whole numbers",
+        ColumnNeed::Time => "numbers or timestamps",
+        ColumnNeed::List => "lists of numbers",
     };
-    let message = format!("column `{column}` is of type {found}; {wanted} are expected");
+    let message = format!("column `{column}` is of type {found}; {expected} are expected");
     Diagnostic::new(file, Code::ColumnType, message).inside(format!("column {column}, row 0"))
 }

@@ -9,15 +9,15 @@ use glam::Quat;
 use tumble::{Encoding, Layout, Timeline};
 
 use crate::format::{ResultShape, ResultWriter, WriteError};
-use crate::motion::Sampled;
+use crate::motion::SampledClip;
 use crate::names::distinct_names;
-use crate::npy::ComponentOrder;
 use crate::poses::{Poses, TRANSFORM, WORLD};
-use crate::table::rows::{Batch, Component, Head, Sink, invalid, names};
+use crate::quaternion::ComponentOrder;
+use crate::table::rows::{Batch, ComponentColumn, Head, RowSink, invalid, names};
 use crate::table::skeleton;
 
 /// Begins a table of a result's rotations.
-pub(crate) fn write_rotations<'a, S: Sink + 'a>(
+pub(crate) fn write_rotations<'a, S: RowSink + 'a>(
     result: &ResultShape<'a>,
     begin: impl FnOnce(Head) -> io::Result<S>,
 ) -> io::Result<Box<dyn ResultWriter + 'a>> {
@@ -26,13 +26,13 @@ pub(crate) fn write_rotations<'a, S: Sink + 'a>(
         Encoding::F32 | Encoding::F16 | Encoding::Snorm16
     );
     let mut components = result.encoding.components().to_vec();
-    let turned = is_quaternion && result.order == Some(ComponentOrder::Wxyz);
-    if turned {
+    let is_w_first = is_quaternion && result.order == Some(ComponentOrder::Wxyz);
+    if is_w_first {
         components.rotate_right(1);
     }
     let columns = components
         .into_iter()
-        .map(|name| (name.to_owned(), Component::of(result.encoding)));
+        .map(|name| (name.to_owned(), ComponentColumn::of(result.encoding)));
     let batch = Batch::new(columns, names(result.set), None)?;
     let notes = result
         .notes
@@ -48,7 +48,7 @@ pub(crate) fn write_rotations<'a, S: Sink + 'a>(
         timeline: result.timeline,
         layout: result.layout,
         encoding: result.encoding,
-        turned,
+        is_w_first,
         tracks: result.set.track_count(),
         written: 0,
     }))
@@ -62,18 +62,18 @@ struct Rotations<'a, S> {
     layout: Layout,
     encoding: Encoding,
     /// Quaternions are to have w first.
-    turned: bool,
+    is_w_first: bool,
     tracks: usize,
     written: usize,
 }
 
-impl<S: Sink> Rotations<'_, S> {
+impl<S: RowSink> Rotations<'_, S> {
     fn all(&self) -> usize {
         self.tracks.saturating_mul(self.timeline.len())
     }
 }
 
-impl<S: Sink> ResultWriter for Rotations<'_, S> {
+impl<S: RowSink> ResultWriter for Rotations<'_, S> {
     fn write(&mut self, rotations: &[Quat]) -> io::Result<()> {
         if rotations.len() > self.all() - self.written {
             return Err(invalid("more rotations than the shape has"));
@@ -91,7 +91,7 @@ impl<S: Sink> ResultWriter for Rotations<'_, S> {
             let time = self.timeline.time(track, frame).unwrap_or(f64::NAN);
             self.batch.row(frame, time, track);
             let mut numbers = q.to_array();
-            if self.turned {
+            if self.is_w_first {
                 numbers.rotate_right(1);
             }
             let stored = self.encoding.encode(&[numbers], &mut encoded);
@@ -120,7 +120,7 @@ impl<S: Sink> ResultWriter for Rotations<'_, S> {
 }
 
 /// Writes poses, whose numbers are f32; positions that count from an origin are f64.
-pub(crate) fn write_poses<S: Sink>(
+pub(crate) fn write_poses<S: RowSink>(
     poses: &Poses<'_>,
     begin: impl FnOnce(Head) -> io::Result<S>,
 ) -> io::Result<()> {
@@ -128,7 +128,7 @@ pub(crate) fn write_poses<S: Sink>(
     let components = poses.components.iter();
     let columns = components.enumerate().map(|(index, name)| {
         let is_wide = index < 3 && poses.has_origins();
-        ((*name).to_owned(), Component::of_positions(is_wide))
+        ((*name).to_owned(), ComponentColumn::of_positions(is_wide))
     });
     let mut batch = Batch::new(columns, names(poses.set), None)?;
     let mut sink = begin(Head {
@@ -136,12 +136,12 @@ pub(crate) fn write_poses<S: Sink>(
         notes: Vec::new(),
     })?;
     let tracks = poses.set.track_count().max(1);
-    for (place, pose) in poses
+    for (index, pose) in poses
         .numbers
         .chunks(poses.components.len().max(1))
         .enumerate()
     {
-        let (frame, track) = (place / tracks, place % tracks);
+        let (frame, track) = (index / tracks, index % tracks);
         let time = poses.timeline.time(track, frame).unwrap_or(f64::NAN);
         batch.row(frame, time, track);
         let origin = poses.origin(track);
@@ -162,12 +162,12 @@ pub(crate) fn write_poses<S: Sink>(
 ///
 /// # Errors
 /// When writing fails, or a clip's lists are not of one length.
-pub(crate) fn write_motion<S: Sink>(
-    clips: &[Sampled<'_>],
+pub(crate) fn write_motion<S: RowSink>(
+    clips: &[SampledClip<'_>],
     order: Option<ComponentOrder>,
     begin: impl FnOnce(Head) -> io::Result<S>,
 ) -> Result<(), WriteError> {
-    let has = |part: fn(&Sampled<'_>) -> bool| clips.iter().any(part);
+    let has = |part: fn(&SampledClip<'_>) -> bool| clips.iter().any(part);
     let (moved, scaled) = (
         has(|clip| !clip.translations.is_empty()),
         has(|clip| !clip.scales.is_empty()),
@@ -178,8 +178,8 @@ pub(crate) fn write_motion<S: Sink>(
     } else {
         &TRANSFORM[..3]
     };
-    let turned = order == Some(ComponentOrder::Wxyz);
-    let mut components: Vec<&str> = match turned {
+    let is_w_first = order == Some(ComponentOrder::Wxyz);
+    let mut components: Vec<&str> = match is_w_first {
         true => vec!["w", "x", "y", "z"],
         false => vec!["x", "y", "z", "w"],
     };
@@ -195,24 +195,24 @@ pub(crate) fn write_motion<S: Sink>(
         });
     let clip_names: ArrayRef = Arc::new(StringArray::from_iter_values(clip_names));
     let (track_names, codes) = track_names(clips);
-    let has_origins = clips.iter().any(Sampled::has_origins);
+    let has_origins = clips.iter().any(SampledClip::has_origins);
     let columns = components.iter().map(|&name| {
         let is_wide = has_origins && translation.contains(&name);
-        (name.to_owned(), Component::of_positions(is_wide))
+        (name.to_owned(), ComponentColumn::of_positions(is_wide))
     });
     let mut batch = Batch::new(columns, track_names, named.then_some((0, clip_names)))?;
     let mut sink = begin(Head {
         schema: Arc::clone(&batch.schema),
         notes: notes(clips),
     })?;
-    for (place, (sampled, codes)) in clips.iter().zip(&codes).enumerate() {
+    for (index, (sampled, codes)) in clips.iter().zip(&codes).enumerate() {
         if let Some((clip, _)) = &mut batch.clip {
-            *clip = place as i32;
+            *clip = index as i32;
         }
         write_clip(
             sampled,
             codes,
-            [turned, moved, scaled],
+            [is_w_first, moved, scaled],
             &mut batch,
             &mut sink,
         )?;
@@ -223,39 +223,39 @@ pub(crate) fn write_motion<S: Sink>(
 }
 
 /// The names of the tracks of all clips, each once, and which each track has.
-fn track_names(clips: &[Sampled<'_>]) -> (ArrayRef, Vec<Vec<usize>>) {
-    let mut place = HashMap::new();
+fn track_names(clips: &[SampledClip<'_>]) -> (ArrayRef, Vec<Vec<usize>>) {
+    let mut code_of = HashMap::new();
     let mut all = Vec::new();
     let mut codes = Vec::new();
     for sampled in clips {
-        let own = distinct_names(&sampled.clip.set).into_iter().map(|name| {
-            *place.entry(name.clone()).or_insert_with(|| {
+        let clip_codes = distinct_names(&sampled.clip.set).into_iter().map(|name| {
+            *code_of.entry(name.clone()).or_insert_with(|| {
                 all.push(name);
                 all.len() - 1
             })
         });
-        codes.push(own.collect());
+        codes.push(clip_codes.collect());
     }
     (Arc::new(StringArray::from_iter_values(all)), codes)
 }
 
 /// What is said of the clips; of each apart where there are several that differ.
-fn notes(clips: &[Sampled<'_>]) -> Vec<(String, String)> {
+fn notes(clips: &[SampledClip<'_>]) -> Vec<(String, String)> {
     let mut notes: Vec<(String, String)> = Vec::new();
-    for (place, sampled) in clips.iter().enumerate() {
+    for (index, sampled) in clips.iter().enumerate() {
         let rate = sampled.rate.map(|rate| ("rate", rate.to_string()));
         let skeleton = skeleton::note_of(sampled);
-        let own = sampled
+        let clip_notes = sampled
             .notes
             .iter()
             .map(|(key, value)| (*key, value.clone()))
             .chain(rate)
             .chain(skeleton);
-        for (key, value) in own {
+        for (key, value) in clip_notes {
             match notes.iter().find(|(known, _)| known == key) {
                 None => notes.push((key.to_owned(), value)),
                 Some((_, known)) if *known == value => {}
-                Some(_) => notes.push((format!("{key}.{place}"), value)),
+                Some(_) => notes.push((format!("{key}.{index}"), value)),
             }
         }
     }
@@ -263,11 +263,11 @@ fn notes(clips: &[Sampled<'_>]) -> Vec<(String, String)> {
 }
 
 fn write_clip(
-    sampled: &Sampled<'_>,
+    sampled: &SampledClip<'_>,
     codes: &[usize],
-    [turned, moved, scaled]: [bool; 3],
+    [is_w_first, moved, scaled]: [bool; 3],
     batch: &mut Batch,
-    sink: &mut impl Sink,
+    sink: &mut impl RowSink,
 ) -> io::Result<()> {
     let tracks = sampled.clip.set.track_count();
     let all = sampled.times.len().saturating_mul(tracks);
@@ -280,20 +280,20 @@ fn write_clip(
             "a clip's samples are not as many as its times and tracks",
         ));
     }
-    for (place, q) in sampled.rotations.iter().enumerate() {
-        let (frame, track) = (place / tracks, place % tracks);
+    for (index, q) in sampled.rotations.iter().enumerate() {
+        let (frame, track) = (index / tracks, index % tracks);
         let time = sampled.times[frame] + sampled.clip.time_offset as f64;
         batch.row(frame, time, codes[track]);
         let mut numbers = q.to_array().map(f64::from).to_vec();
-        if turned {
+        if is_w_first {
             numbers.rotate_right(1);
         }
         if moved {
-            let relative = sampled.translations.get(place).copied().unwrap_or_default();
+            let relative = sampled.translations.get(index).copied().unwrap_or_default();
             numbers.extend((sampled.clip.origin(track) + relative.as_dvec3()).to_array());
         }
         if scaled {
-            let scale = sampled.scales.get(place);
+            let scale = sampled.scales.get(index);
             let scale = scale.copied().unwrap_or(glam::Vec3::ONE);
             numbers.extend(scale.to_array().map(f64::from));
         }

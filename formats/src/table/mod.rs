@@ -12,7 +12,6 @@ pub(crate) mod clips;
 )]
 pub(crate) mod columns;
 pub(crate) mod groups;
-pub(crate) mod keys;
 #[cfg(feature = "parquet")]
 pub(crate) mod long;
 pub(crate) mod plan;

@@ -6,9 +6,9 @@ use std::ops::Range;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::format::ReadOptions;
 use crate::map::{Entry, Map};
-use crate::npy::ComponentOrder;
+use crate::quaternion::ComponentOrder;
 use crate::rotation_form::RotationForm;
-use crate::table::columns::Table;
+use crate::table::columns::{ColumnNeed, RequestedColumn, Table};
 use crate::warnings::listed;
 
 /// Columns that tell the tracks of long tables apart.
@@ -20,38 +20,17 @@ const CLIP: [&str; 3] = ["clip", "clip_id", "motion_id"];
 /// Columns that count rows.
 const COUNTED: [&str; 3] = ["frame", "frame_index", "index"];
 
-/// What a column has to hold.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub(crate) enum Need {
-    Number,
-    Whole,
-    /// Text, or whole numbers that serve as names.
-    Name,
-    Time,
-    List,
-}
-
-/// A column that is to be read.
+/// The columns that are read, and what becomes of them. Columns are given by their indices in
+/// `columns`.
 #[derive(Debug)]
-pub(crate) struct Wanted {
-    /// What the file calls it.
-    pub(crate) name: String,
-    /// Its place among all columns of the file.
-    pub(crate) index: usize,
-    pub(crate) need: Need,
-}
-
-/// The columns that are read, and what becomes of them. Columns are given by their places in
-/// `wanted`.
-#[derive(Debug)]
-pub(crate) struct Plan {
-    pub(crate) wanted: Vec<Wanted>,
+pub(crate) struct TablePlan {
+    pub(crate) columns: Vec<RequestedColumn>,
     /// The times; of frames where `is_frames`.
     pub(crate) time: usize,
     pub(crate) is_frames: bool,
     /// What tells clips apart, and what goes before its values in their names.
     pub(crate) clip: Option<(usize, &'static str)>,
-    pub(crate) rows: Rows,
+    pub(crate) rows: RowLayout,
     /// The names of the columns that are not read.
     pub(crate) left_out: Vec<String>,
     /// What the file says of itself beside its rows.
@@ -61,7 +40,7 @@ pub(crate) struct Plan {
 
 /// What a row is.
 #[derive(Debug)]
-pub(crate) enum Rows {
+pub(crate) enum RowLayout {
     /// A key of the track that a column names.
     Keys {
         track: Option<usize>,
@@ -79,21 +58,21 @@ pub(crate) enum Rows {
 #[derive(Debug)]
 pub(crate) struct Parts {
     pub(crate) rotation: RotationCells,
-    pub(crate) translation: Option<[Cell; 3]>,
-    pub(crate) scale: Option<[Cell; 3]>,
+    pub(crate) translation: Option<[CellSource; 3]>,
+    pub(crate) scale: Option<[CellSource; 3]>,
 }
 
 /// Where the numbers of rotations are.
 #[derive(Debug)]
 pub(crate) enum RotationCells {
     /// Of quaternions, x y z w.
-    Quaternion([Cell; 4]),
+    Quaternion([CellSource; 4]),
     /// Of rotations in another form, as many as it takes.
-    Other(RotationForm, Vec<Cell>),
+    Other(RotationForm, Vec<CellSource>),
 }
 
 impl RotationCells {
-    pub(crate) fn all(&self) -> &[Cell] {
+    pub(crate) fn all(&self) -> &[CellSource] {
         match self {
             Self::Quaternion(cells) => cells,
             Self::Other(_, cells) => cells,
@@ -101,44 +80,48 @@ impl RotationCells {
     }
 }
 
-/// A number of a row: a column, or a place in the list of a column.
+/// Where a number of a row is: a column, or an item in the list of a column.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Cell {
+pub(crate) struct CellSource {
     pub(crate) column: usize,
-    pub(crate) place: Option<usize>,
+    pub(crate) item: Option<usize>,
     /// How many numbers the list must have, where it is taken as a whole.
     pub(crate) whole: Option<usize>,
 }
 
 /// The names of a file's columns, after `--map` has given some of them other names.
-struct Names<'a> {
+struct ColumnNames<'a> {
     file: &'a str,
     /// The columns of each name; a second one makes the name useless.
     seen: HashMap<String, Vec<usize>>,
-    own: &'a [String],
-    wanted: Vec<Wanted>,
-    taken: HashMap<(usize, Need), usize>,
+    file_columns: &'a [String],
+    requested: Vec<RequestedColumn>,
+    requested_indices: HashMap<(usize, ColumnNeed), usize>,
 }
 
-impl Names<'_> {
+impl ColumnNames<'_> {
     fn refuse(&self, code: Code, message: String) -> Diagnostic {
         Diagnostic::new(self.file, code, message)
     }
 
     /// The names of the file's columns, for messages.
     fn list(&self) -> String {
-        const MOST: usize = 12;
+        const MAX_SHOWN: usize = 12;
         let shown: Vec<String> = self
-            .own
+            .file_columns
             .iter()
-            .take(MOST)
+            .take(MAX_SHOWN)
             .map(|n| format!("`{n}`"))
             .collect();
-        let more = if self.own.len() > MOST { ", …" } else { "" };
+        let more = if self.file_columns.len() > MAX_SHOWN {
+            ", …"
+        } else {
+            ""
+        };
         format!("{}{more}", shown.join(", "))
     }
 
-    /// The place of a column of the file.
+    /// The index of a column of the file.
     fn find(&self, name: &str) -> Result<Option<usize>, Diagnostic> {
         match self.seen.get(name).map_or(&[][..], Vec::as_slice) {
             [] => Ok(None),
@@ -150,25 +133,28 @@ impl Names<'_> {
         }
     }
 
-    fn want(&mut self, index: usize, need: Need) -> usize {
-        *self.taken.entry((index, need)).or_insert_with(|| {
-            self.wanted.push(Wanted {
-                name: self.own[index].clone(),
-                index,
-                need,
-            });
-            self.wanted.len() - 1
-        })
+    fn request(&mut self, index: usize, need: ColumnNeed) -> usize {
+        *self
+            .requested_indices
+            .entry((index, need))
+            .or_insert_with(|| {
+                self.requested.push(RequestedColumn {
+                    name: self.file_columns[index].clone(),
+                    index,
+                    need,
+                });
+                self.requested.len() - 1
+            })
     }
 
-    fn take(&mut self, name: &str, need: Need) -> Result<Option<usize>, Diagnostic> {
-        Ok(self.find(name)?.map(|index| self.want(index, need)))
+    fn take(&mut self, name: &str, need: ColumnNeed) -> Result<Option<usize>, Diagnostic> {
+        Ok(self.find(name)?.map(|index| self.request(index, need)))
     }
 
     /// The first column that has one of these names.
     fn first_of(&mut self, all: &[&str]) -> Result<Option<usize>, Diagnostic> {
         for name in all {
-            if let Some(found) = self.take(name, Need::Name)? {
+            if let Some(found) = self.take(name, ColumnNeed::Name)? {
                 return Ok(Some(found));
             }
         }
@@ -180,7 +166,7 @@ impl Names<'_> {
         &mut self,
         prefix: &str,
         parts: [&str; N],
-    ) -> Result<Option<[Cell; N]>, Diagnostic> {
+    ) -> Result<Option<[CellSource; N]>, Diagnostic> {
         let names = parts.map(|part| format!("{prefix}{part}"));
         let mut found = [None; N];
         for (found, name) in found.iter_mut().zip(&names) {
@@ -189,9 +175,9 @@ impl Names<'_> {
         if found.iter().all(Option::is_none) {
             return Ok(None);
         }
-        let mut cells = [Cell {
+        let mut cells = [CellSource {
             column: 0,
-            place: None,
+            item: None,
             whole: None,
         }; N];
         for ((cell, found), name) in cells.iter_mut().zip(found).zip(&names) {
@@ -203,7 +189,7 @@ impl Names<'_> {
                 );
                 return Err(self.refuse(Code::ColumnMissing, message));
             };
-            cell.column = self.want(index, Need::Number);
+            cell.column = self.request(index, ColumnNeed::Number);
         }
         Ok(Some(cells))
     }
@@ -238,7 +224,7 @@ impl Names<'_> {
     }
 }
 
-impl Plan {
+impl TablePlan {
     /// What is not read: columns, and parts of the lists of others.
     pub(crate) fn left_out(&self, table: &Table) -> Option<String> {
         let mut all: Vec<String> = self
@@ -246,13 +232,13 @@ impl Plan {
             .iter()
             .map(|name| format!("`{name}`"))
             .collect();
-        for (column, named) in self.wanted.iter().enumerate() {
+        for (column, named) in self.columns.iter().enumerate() {
             let Some(length) = table.list_length(column) else {
                 continue;
             };
             let mut is_read = vec![false; length];
             for cell in self.cells().filter(|cell| cell.column == column) {
-                if let Some(known) = cell.place.and_then(|place| is_read.get_mut(place)) {
+                if let Some(known) = cell.item.and_then(|item| is_read.get_mut(item)) {
                     *known = true;
                 }
             }
@@ -269,10 +255,10 @@ impl Plan {
     }
 
     /// Where the numbers of all tracks are.
-    fn cells(&self) -> impl Iterator<Item = &Cell> {
+    fn cells(&self) -> impl Iterator<Item = &CellSource> {
         let parts: Vec<&Parts> = match &self.rows {
-            Rows::Keys { parts, .. } => vec![parts],
-            Rows::Times { tracks, .. } => tracks.iter().map(|(_, parts)| parts).collect(),
+            RowLayout::Keys { parts, .. } => vec![parts],
+            RowLayout::Times { tracks, .. } => tracks.iter().map(|(_, parts)| parts).collect(),
         };
         parts.into_iter().flat_map(|parts| {
             let vectors = parts.translation.iter().chain(&parts.scale).flatten();
@@ -286,19 +272,19 @@ impl Plan {
     /// When times or rotations are not among them, or `--map` names others.
     pub(crate) fn of(
         file: &str,
-        own: &[String],
+        file_columns: &[String],
         options: &ReadOptions,
     ) -> Result<Self, Diagnostic> {
         let mut seen: HashMap<String, Vec<usize>> = HashMap::new();
-        for (index, name) in own.iter().enumerate() {
+        for (index, name) in file_columns.iter().enumerate() {
             seen.entry(name.clone()).or_default().push(index);
         }
-        let mut names = Names {
+        let mut names = ColumnNames {
             file,
             seen,
-            own,
-            wanted: Vec::new(),
-            taken: HashMap::new(),
+            file_columns,
+            requested: Vec::new(),
+            requested_indices: HashMap::new(),
         };
         let lists = match &options.map {
             Some(map) => rename(&mut names, map)?,
@@ -308,14 +294,14 @@ impl Plan {
         let clip = match names.first_of(&CLIP)? {
             Some(clip) => Some((clip, "")),
             None => names
-                .take("episode_index", Need::Whole)?
+                .take("episode_index", ColumnNeed::Whole)?
                 .map(|at| (at, "episode_")),
         };
         let rows = if !lists.is_empty() {
             list_rows(&mut names, &lists)?
         } else if names.find("w")?.is_some() || names.find("qw")?.is_some() {
             let (parts, is_world) = names.parts("")?;
-            Rows::Keys {
+            RowLayout::Keys {
                 track: names.first_of(&TRACK)?,
                 parts: Box::new(parts),
                 is_world,
@@ -323,15 +309,20 @@ impl Plan {
         } else {
             wide_rows(&mut names)?
         };
-        let is_read = |index: usize| names.wanted.iter().any(|wanted| wanted.index == index);
+        let is_read = |index: usize| {
+            names
+                .requested
+                .iter()
+                .any(|requested| requested.index == index)
+        };
         // Beside times, frames say nothing more.
         let is_known = |name: &str| COUNTED.contains(&name);
-        let left_out = (own.iter().enumerate())
+        let left_out = (file_columns.iter().enumerate())
             .filter(|(index, name)| !is_read(*index) && !is_known(name))
             .map(|(_, name)| name.clone());
         Ok(Self {
             left_out: left_out.collect(),
-            wanted: names.wanted,
+            columns: names.requested,
             time,
             is_frames,
             clip,
@@ -343,7 +334,7 @@ impl Plan {
 }
 
 /// Gives columns the names that `--map` has for them; gives the entries that are lists' parts.
-fn rename(names: &mut Names<'_>, map: &str) -> Result<Vec<Entry>, Diagnostic> {
+fn rename(names: &mut ColumnNames<'_>, map: &str) -> Result<Vec<Entry>, Diagnostic> {
     let parsed: Result<Map, _> = map.parse();
     let map = parsed.map_err(|error| names.refuse(Code::Map, error.to_string()))?;
     let mut lists = Vec::new();
@@ -352,8 +343,11 @@ fn rename(names: &mut Names<'_>, map: &str) -> Result<Vec<Entry>, Diagnostic> {
             lists.push(entry);
             continue;
         }
-        let own = names.own.iter().position(|name| *name == entry.source);
-        let Some(index) = own else {
+        let found = names
+            .file_columns
+            .iter()
+            .position(|name| *name == entry.source);
+        let Some(index) = found else {
             let message = format!(
                 "there is no column `{}`; there are {}",
                 entry.source,
@@ -366,8 +360,8 @@ fn rename(names: &mut Names<'_>, map: &str) -> Result<Vec<Entry>, Diagnostic> {
             lists.push(entry);
             continue;
         }
-        if let Some(own) = names.seen.get_mut(&entry.source) {
-            own.retain(|&at| at != index);
+        if let Some(indices) = names.seen.get_mut(&entry.source) {
+            indices.retain(|&at| at != index);
         }
         names.seen.insert(entry.name, vec![index]);
     }
@@ -386,9 +380,12 @@ fn is_column(target: &str) -> bool {
     WHOLE.contains(&target) || tells_apart || target == "episode_index" || NUMBERS.contains(&last)
 }
 
-fn time_column(names: &mut Names<'_>, options: &ReadOptions) -> Result<(usize, bool), Diagnostic> {
+fn time_column(
+    names: &mut ColumnNames<'_>,
+    options: &ReadOptions,
+) -> Result<(usize, bool), Diagnostic> {
     for name in ["time", "timestamp", "t"] {
-        if let Some(time) = names.take(name, Need::Time)? {
+        if let Some(time) = names.take(name, ColumnNeed::Time)? {
             return Ok((time, false));
         }
     }
@@ -397,10 +394,10 @@ fn time_column(names: &mut Names<'_>, options: &ReadOptions) -> Result<(usize, b
         None => names.find("frame")?,
     };
     let message = match (frames, options.source_rate) {
-        (Some(frames), Some(_)) => return Ok((names.want(frames, Need::Whole), true)),
+        (Some(frames), Some(_)) => return Ok((names.request(frames, ColumnNeed::Whole), true)),
         (Some(frames), None) => format!(
             "times are frames, in the column `{}`; --source-fps says how many a second has",
-            names.own[frames]
+            names.file_columns[frames]
         ),
         (None, _) => format!(
             "no column is `time`, `timestamp`, `t` or `frame_index`; there are {}; --map time=NAME",
@@ -411,7 +408,7 @@ fn time_column(names: &mut Names<'_>, options: &ReadOptions) -> Result<(usize, b
 }
 
 /// Tracks in columns: `knee.x`, `knee.y`, `knee.z`, `knee.w`.
-fn wide_rows(names: &mut Names<'_>) -> Result<Rows, Diagnostic> {
+fn wide_rows(names: &mut ColumnNames<'_>) -> Result<RowLayout, Diagnostic> {
     let mut prefixes: Vec<(String, usize)> = names
         .seen
         .iter()
@@ -438,18 +435,21 @@ fn wide_rows(names: &mut Names<'_>) -> Result<Rows, Diagnostic> {
         is_world |= world;
         tracks.push((track, parts));
     }
-    Ok(Rows::Times { tracks, is_world })
+    Ok(RowLayout::Times { tracks, is_world })
 }
 
 /// Tracks in parts of lists; `hand.translation` and `hand.scale` belong to the track `hand`.
-fn list_rows(names: &mut Names<'_>, lists: &[Entry]) -> Result<Rows, Diagnostic> {
+fn list_rows(names: &mut ColumnNames<'_>, lists: &[Entry]) -> Result<RowLayout, Diagnostic> {
     const VECTORS: [&str; 2] = [".translation", ".scale"];
-    let own = |target: &str| {
+    let vector_of = |target: &str| {
         let ending = VECTORS.iter().position(|ending| target.ends_with(ending));
         ending.map(|at| (target[..target.len() - VECTORS[at].len()].to_owned(), at))
     };
     let mut tracks: Vec<(String, Parts)> = Vec::new();
-    for entry in lists.iter().filter(|entry| own(&entry.name).is_none()) {
+    for entry in lists
+        .iter()
+        .filter(|entry| vector_of(&entry.name).is_none())
+    {
         let form = entry.form();
         let cells = cells(names, entry, form.width())?;
         let rotation = match (form, &*cells) {
@@ -467,7 +467,7 @@ fn list_rows(names: &mut Names<'_>, lists: &[Entry]) -> Result<Rows, Diagnostic>
         tracks.push((entry.name.clone(), parts));
     }
     for entry in lists {
-        let Some((track, vector)) = own(&entry.name) else {
+        let Some((track, vector)) = vector_of(&entry.name) else {
             continue;
         };
         let cells = cells(names, entry, 3)?;
@@ -484,15 +484,20 @@ fn list_rows(names: &mut Names<'_>, lists: &[Entry]) -> Result<Rows, Diagnostic>
             _ => parts.scale = Some(cells),
         }
     }
-    Ok(Rows::Times {
+    Ok(RowLayout::Times {
         tracks,
         is_world: false,
     })
 }
 
 /// The columns from one name to another, `first..last`, where no column is called so.
-fn column_range(names: &Names<'_>, source: &str) -> Option<Range<usize>> {
-    let index = |column: &str| names.own.iter().position(|name| name == column.trim());
+fn column_range(names: &ColumnNames<'_>, source: &str) -> Option<Range<usize>> {
+    let index = |column: &str| {
+        names
+            .file_columns
+            .iter()
+            .position(|name| name == column.trim())
+    };
     if index(source).is_some() {
         return None;
     }
@@ -500,9 +505,13 @@ fn column_range(names: &Names<'_>, source: &str) -> Option<Range<usize>> {
     Some(index(first)?..index(last)? + 1)
 }
 
-/// The places of the numbers that an entry takes from a list: the first of it, or its part; or of
+/// The cells of the numbers that an entry takes from a list: the first of it, or its part; or of
 /// neighbouring columns.
-fn cells(names: &mut Names<'_>, entry: &Entry, count: usize) -> Result<Vec<Cell>, Diagnostic> {
+fn cells(
+    names: &mut ColumnNames<'_>,
+    entry: &Entry,
+    count: usize,
+) -> Result<Vec<CellSource>, Diagnostic> {
     if let Some(columns) = column_range(names, &entry.source) {
         if columns.len() != count {
             let message = format!(
@@ -513,9 +522,9 @@ fn cells(names: &mut Names<'_>, entry: &Entry, count: usize) -> Result<Vec<Cell>
             );
             return Err(names.refuse(Code::ListLength, message));
         }
-        let cell = |index| Cell {
-            column: names.want(index, Need::Number),
-            place: None,
+        let cell = |index| CellSource {
+            column: names.request(index, ColumnNeed::Number),
+            item: None,
             whole: None,
         };
         return Ok(columns.map(cell).collect());
@@ -532,11 +541,14 @@ fn cells(names: &mut Names<'_>, entry: &Entry, count: usize) -> Result<Vec<Cell>
         );
         return Err(names.refuse(Code::ListLength, message));
     }
-    let index = names.own.iter().position(|name| *name == entry.source);
-    let column = names.want(index.unwrap_or_default(), Need::List);
-    let cell = |place| Cell {
+    let index = names
+        .file_columns
+        .iter()
+        .position(|name| *name == entry.source);
+    let column = names.request(index.unwrap_or_default(), ColumnNeed::List);
+    let cell = |item| CellSource {
         column,
-        place: Some(place),
+        item: Some(item),
         whole: entry.columns.is_none().then_some(count),
     };
     Ok(range.map(cell).collect())

@@ -28,7 +28,7 @@ pub(crate) struct Head {
 }
 
 /// A format that takes the rows of a table.
-pub(crate) trait Sink {
+pub(crate) trait RowSink {
     fn write(&mut self, batch: &RecordBatch) -> io::Result<()>;
 
     /// Ends a part of the table that may be read by itself.
@@ -43,7 +43,7 @@ pub(crate) struct Batch {
     frames: Vec<i64>,
     times: Vec<f64>,
     tracks: Vec<i32>,
-    pub(crate) numbers: Vec<Component>,
+    pub(crate) numbers: Vec<ComponentColumn>,
     /// The names of all tracks, the same for every batch.
     track_names: ArrayRef,
     /// The clip of the rows that come, and the names of all clips.
@@ -51,14 +51,14 @@ pub(crate) struct Batch {
 }
 
 /// The numbers of one component of all rows.
-pub(crate) enum Component {
+pub(crate) enum ComponentColumn {
     F64(Vec<f64>),
     F32(Vec<f32>),
     F16(Vec<f16>),
     I16(Vec<i16>),
 }
 
-impl Component {
+impl ComponentColumn {
     pub(crate) fn of(encoding: Encoding) -> Self {
         match encoding {
             Encoding::F16 => Self::F16(Vec::new()),
@@ -134,7 +134,7 @@ fn dictionary(codes: Vec<i32>, names: &ArrayRef) -> io::Result<ArrayRef> {
 impl Batch {
     /// For a table whose numbers are called so.
     pub(crate) fn new(
-        components: impl IntoIterator<Item = (String, Component)>,
+        components: impl IntoIterator<Item = (String, ComponentColumn)>,
         track_names: ArrayRef,
         clip: Option<(i32, ArrayRef)>,
     ) -> io::Result<Self> {
@@ -179,7 +179,7 @@ impl Batch {
     }
 
     /// Hands on the rows that there are.
-    pub(crate) fn flush(&mut self, sink: &mut impl Sink) -> io::Result<()> {
+    pub(crate) fn flush(&mut self, sink: &mut impl RowSink) -> io::Result<()> {
         if self.frames.is_empty() {
             return Ok(());
         }
@@ -192,7 +192,7 @@ impl Batch {
         if let Some((clip, names)) = &self.clip {
             columns.push(dictionary(vec![*clip; rows], names)?);
         }
-        columns.extend(self.numbers.iter_mut().map(Component::take));
+        columns.extend(self.numbers.iter_mut().map(ComponentColumn::take));
         let batch = RecordBatch::try_new(Arc::clone(&self.schema), columns);
         sink.write(&batch.map_err(io::Error::other)?)
     }

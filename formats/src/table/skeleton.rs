@@ -1,9 +1,9 @@
-//! Which joint hangs on which, beside the rows of a table: as JSON in the metadata of Parquet and Arrow.
+//! The parents of joints, beside the rows of a table: as JSON in the metadata of Parquet and Arrow.
 
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-use crate::motion::{Joint, Motion, Sampled, Transform};
+use crate::motion::{Joint, Motion, SampledClip, Transform};
 use crate::names::distinct_names;
 
 /// The key of the metadata; that of one clip of several may have its number behind it, `skeleton.1`.
@@ -11,25 +11,25 @@ pub(crate) const KEY: &str = "skeleton";
 
 /// The skeleton of a clip, by the names of its tracks in the table.
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
-struct Hierarchy {
+struct SkeletonNote {
     tracks: Vec<String>,
-    /// For each track the index of the one that it hangs on; none for a root.
+    /// For each track the index of its parent; none for a root.
     parents: Vec<Option<usize>>,
     /// Where each rests in its parent's frame.
     offsets: Vec<[f64; 3]>,
 }
 
-/// What the metadata says of a clip's skeleton; nothing where no joint hangs on another, and all rest at 0.
-pub(crate) fn note_of(sampled: &Sampled<'_>) -> Option<(&'static str, String)> {
+/// What the metadata says of a clip's skeleton; nothing where no joint has a parent, and all rest at 0.
+pub(crate) fn note_of(sampled: &SampledClip<'_>) -> Option<(&'static str, String)> {
     let clip = sampled.clip;
-    if !clip.hangs_together() {
+    if !clip.has_hierarchy() {
         return None;
     }
     let joints = || clip.skeleton.iter().enumerate();
     let offset = |(track, joint): (usize, &Joint)| {
         (clip.origin(track) + joint.rest.translation.as_dvec3()).to_array()
     };
-    let hierarchy = Hierarchy {
+    let hierarchy = SkeletonNote {
         tracks: distinct_names(&clip.set),
         parents: joints().map(|(_, joint)| joint.parent).collect(),
         offsets: joints().map(offset).collect(),
@@ -39,13 +39,13 @@ pub(crate) fn note_of(sampled: &Sampled<'_>) -> Option<(&'static str, String)> {
     Some((KEY, text))
 }
 
-/// Gives the clip at a place of a table the skeleton that the metadata says, if it is of these tracks.
-pub(crate) fn hang(motion: &mut Motion, index: usize, notes: &[(String, String)]) {
+/// Gives the clip of this index the skeleton that the metadata says, if it is of these tracks.
+pub(crate) fn attach_skeleton(motion: &mut Motion, index: usize, notes: &[(String, String)]) {
     let find = |key: &str| notes.iter().find(|(known, _)| known == key);
     let note = find(&format!("{KEY}.{index}")).or_else(|| find(KEY));
     // What others call a skeleton is none of this form.
-    let hierarchy = note.and_then(|(_, text)| serde_json::from_str::<Hierarchy>(text).ok());
-    let Some(Hierarchy {
+    let hierarchy = note.and_then(|(_, text)| serde_json::from_str::<SkeletonNote>(text).ok());
+    let Some(SkeletonNote {
         tracks,
         parents,
         offsets,
@@ -59,12 +59,12 @@ pub(crate) fn hang(motion: &mut Motion, index: usize, notes: &[(String, String)]
     }
     let by_name = |name: &String| (0..count).find(|&track| motion.set.track_name(track) == *name);
     // Rows of a table may bring its tracks in another order.
-    let Some(places) = tracks.iter().map(by_name).collect::<Option<Vec<usize>>>() else {
+    let Some(indices) = tracks.iter().map(by_name).collect::<Option<Vec<usize>>>() else {
         return;
     };
     let mut skeleton: Vec<Option<Joint>> = vec![None; count];
-    for ((&track, parent), offset) in places.iter().zip(parents).zip(offsets) {
-        let parent = match parent.map(|parent| places.get(parent).copied()) {
+    for ((&track, parent), offset) in indices.iter().zip(parents).zip(offsets) {
+        let parent = match parent.map(|parent| indices.get(parent).copied()) {
             None => None,
             Some(Some(parent)) if parent != track => Some(parent),
             Some(_) => return,
@@ -118,7 +118,7 @@ mod tests {
         let (key, text) = note_of(&samples.of(&written, None, &[])).unwrap();
         let notes = [(key.to_owned(), text)];
         let mut read = clip(["knee", "hip"]);
-        hang(&mut read, 0, &notes);
+        attach_skeleton(&mut read, 0, &notes);
         let expected = [
             joint(Some(1), Vec3::new(0.1, -0.4, 0.0)),
             joint(None, Vec3::Y),
@@ -132,7 +132,7 @@ mod tests {
             r#"{"tracks":["hip","knee"],"parents":[null,1],"offsets":[[0,0,0],[0,0,0]]}"#,
         ] {
             let mut read = clip(["hip", "knee"]);
-            hang(&mut read, 0, &[(KEY.to_owned(), text.to_owned())]);
+            attach_skeleton(&mut read, 0, &[(KEY.to_owned(), text.to_owned())]);
             assert_eq!(read.skeleton, [], "{text}");
         }
     }

@@ -3,11 +3,11 @@
 use crate::diagnostic::{Code, Diagnostic};
 use crate::format::{ReadOptions, TimeUnit};
 use crate::rate::Precision;
-use crate::table::columns::{Numbers, Table, Values};
-use crate::table::plan::Plan;
+use crate::table::columns::{ColumnNumbers, ColumnValues, Table};
+use crate::table::plan::TablePlan;
 
 /// Times of all rows.
-pub(crate) struct Times {
+pub(crate) struct RowTimes {
     pub(crate) seconds: Vec<f64>,
     /// The type that the file has them in; `None` if they are exact as they are.
     pub(crate) precision: Option<Precision>,
@@ -16,11 +16,11 @@ pub(crate) struct Times {
 }
 
 /// Whole numbers this far from 0 are no seconds: the year 5138 as a Unix time.
-const MOST_SECONDS: u64 = 100_000_000_000;
+const MAX_SECONDS: u64 = 100_000_000_000;
 
 /// Stamps that begin this many seconds from 0 are counted from the whole second of the first:
 /// an f64 of Unix seconds is 0.2 µs wide, one that starts at 0 keeps nanoseconds for 104 days.
-const FAR: u64 = 1_000_000;
+const OFFSET_LIMIT: u64 = 1_000_000;
 
 /// The times of a table's rows.
 ///
@@ -28,12 +28,12 @@ const FAR: u64 = 1_000_000;
 /// When they are whole numbers of a unit that nobody says, or frames before the first.
 pub(crate) fn times(
     table: &Table,
-    plan: &Plan,
+    plan: &TablePlan,
     options: &ReadOptions,
-) -> Result<Times, Diagnostic> {
+) -> Result<RowTimes, Diagnostic> {
     let column = &table.columns[plan.time];
     let exact = |seconds, precision| {
-        Ok(Times {
+        Ok(RowTimes {
             seconds,
             precision,
             offset: 0,
@@ -51,7 +51,7 @@ pub(crate) fn times(
         .time_unit
         .map_or(1.0, |unit| unit.per_second() as f64);
     match (&column.values, options.source_rate) {
-        (Values::Numbers(Numbers::Whole(frames)), Some(rate)) if plan.is_frames => {
+        (ColumnValues::Numbers(ColumnNumbers::Whole(frames)), Some(rate)) if plan.is_frames => {
             if let Some(row) = frames.iter().position(|&frame| frame < 0) {
                 let message = format!("frame {} comes before the first, 0", frames[row]);
                 return Err(table.refuse_at(plan.time, row, Code::Time, message));
@@ -61,39 +61,43 @@ pub(crate) fn times(
                 .map(|&frame| rate.time_of(frame.unsigned_abs()));
             exact(seconds.collect(), None)
         }
-        (Values::Numbers(Numbers::F32(times)), _) => {
+        (ColumnValues::Numbers(ColumnNumbers::F32(times)), _) => {
             let seconds = times.iter().map(|&time| f64::from(time) / per_second);
             exact(seconds.collect(), Some(Precision::F32))
         }
-        (Values::Numbers(Numbers::F64(times)), _) => {
+        (ColumnValues::Numbers(ColumnNumbers::F64(times)), _) => {
             let seconds = times.iter().map(|&time| time / per_second);
             Ok(doubles(seconds.collect()))
         }
-        (Values::Decimals(times, places), _) => {
+        (ColumnValues::Decimals(times, decimals), _) => {
             let first = times.iter().min().map_or(0, |first| first.whole_seconds());
-            let offset = if first.unsigned_abs() < FAR { 0 } else { first };
-            Ok(Times {
+            let offset = if first.unsigned_abs() < OFFSET_LIMIT {
+                0
+            } else {
+                first
+            };
+            Ok(RowTimes {
                 seconds: times.iter().map(|time| time.since(offset)).collect(),
-                precision: Some(Precision::Decimals(*places)),
+                precision: Some(Precision::Decimals(*decimals)),
                 offset,
             })
         }
-        (Values::Numbers(Numbers::Whole(times)), _) => {
+        (ColumnValues::Numbers(ColumnNumbers::Whole(times)), _) => {
             // Text does not tell 2 from 2.0: small whole numbers are seconds there.
-            let small = times.iter().all(|time| time.unsigned_abs() < MOST_SECONDS);
+            let small = times.iter().all(|time| time.unsigned_abs() < MAX_SECONDS);
             let guessed = (small && table.text.is_some()).then_some(TimeUnit::Seconds);
             let Some(unit) = options.time_unit.or(guessed) else {
                 let first = times.first().copied().unwrap_or_default();
                 let message = format!(
-                    "`{}` has whole numbers, {first} first; --time-unit s, ms, us or ns says of what",
+                    "`{}` has whole numbers, {first} first; give their unit with --time-unit s, ms, us or ns",
                     column.name
                 );
                 return Err(table.refuse_at(plan.time, 0, Code::WholeTimes, message));
             };
             Ok(stamps(times, unit))
         }
-        (Values::Stamps(times, unit), _) => Ok(stamps(times, *unit)),
-        (Values::Words { .. } | Values::Lists { .. }, _) => {
+        (ColumnValues::Stamps(times, unit), _) => Ok(stamps(times, *unit)),
+        (ColumnValues::Words { .. } | ColumnValues::Lists { .. }, _) => {
             let message = format!("`{}` holds no times", column.name);
             Err(table.refuse_at(plan.time, 0, Code::ColumnType, message))
         }
@@ -101,15 +105,15 @@ pub(crate) fn times(
 }
 
 /// Times in f64. Those that begin far from 0 were rounded there: 1.7e9 s to a quarter of a microsecond.
-fn doubles(mut seconds: Vec<f64>) -> Times {
+fn doubles(mut seconds: Vec<f64>) -> RowTimes {
     let first = seconds
         .iter()
         .copied()
         .fold(f64::INFINITY, f64::min)
         .floor();
-    let is_far = first.abs() >= FAR as f64 && first.abs() <= MOST_SECONDS as f64;
-    if !is_far {
-        return Times {
+    let needs_offset = first.abs() >= OFFSET_LIMIT as f64 && first.abs() <= MAX_SECONDS as f64;
+    if !needs_offset {
+        return RowTimes {
             seconds,
             precision: Some(Precision::F64),
             offset: 0,
@@ -117,24 +121,28 @@ fn doubles(mut seconds: Vec<f64>) -> Times {
     }
     let step = Precision::F64.ulp(first);
     seconds.iter_mut().for_each(|time| *time -= first);
-    Times {
+    RowTimes {
         seconds,
         precision: Some(Precision::Decimals(-libm::log10(step).ceil() as u32)),
         offset: first as i64,
     }
 }
 
-fn stamps(times: &[i64], unit: TimeUnit) -> Times {
+fn stamps(times: &[i64], unit: TimeUnit) -> RowTimes {
     let per_second = i128::from(unit.per_second());
     let first = times.iter().min().copied().map_or(0, i128::from);
     let whole = first.div_euclid(per_second) as i64;
-    let offset = if whole.unsigned_abs() < FAR { 0 } else { whole };
+    let offset = if whole.unsigned_abs() < OFFSET_LIMIT {
+        0
+    } else {
+        whole
+    };
     let start = i128::from(offset) * per_second;
     let seconds = times
         .iter()
         .map(|&time| (i128::from(time) - start) as f64 / per_second as f64)
         .collect();
-    Times {
+    RowTimes {
         seconds,
         precision: Some(Precision::Decimals(unit.power().unsigned_abs())),
         offset,

@@ -60,10 +60,10 @@ impl<T: Copy + Zeroable> Blocks<T> {
         for block in self.blocks {
             let there = block.len() / self.width;
             for index in 0..self.width {
-                let own = &mut columns[index * rows + row..][..there];
+                let rows_of_block = &mut columns[index * rows + row..][..there];
                 let column = block.iter().skip(index).step_by(self.width);
-                for (place, value) in own.iter_mut().zip(column) {
-                    *place = *value;
+                for (slot, value) in rows_of_block.iter_mut().zip(column) {
+                    *slot = *value;
                 }
             }
             row += there;

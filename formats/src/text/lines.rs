@@ -2,7 +2,7 @@
 
 use std::io::{BufRead, Read};
 
-use crate::diagnostic::{Code, Diagnostic, Place};
+use crate::diagnostic::{Code, Diagnostic, Location};
 use crate::source::MAX_BYTES;
 
 /// Lines of one input, with their numbers; what is remarkable about them collects
@@ -152,9 +152,9 @@ impl<R: BufRead> Lines<R> {
     /// Appends bytes to the buffer, up to the end of a line or one more than a line may
     /// have; how many. The buffer grows by quarters: a long line is not held twice.
     fn read_line(&mut self) -> std::io::Result<u64> {
-        let most = self.limits.line + 1;
+        let limit = self.limits.line + 1;
         let mut count = 0;
-        while count < most && self.buffer.last() != Some(&b'\n') {
+        while count < limit && self.buffer.last() != Some(&b'\n') {
             let room = self.buffer.capacity() - self.buffer.len();
             if room == 0 {
                 self.buffer.reserve_exact((self.buffer.len() / 4).max(256));
@@ -163,7 +163,7 @@ impl<R: BufRead> Lines<R> {
             let mut limited = self
                 .reader
                 .by_ref()
-                .take(room.min((most - count) as usize) as u64);
+                .take(room.min((limit - count) as usize) as u64);
             match limited.read_until(b'\n', &mut self.buffer)? {
                 0 => break,
                 read => count += read as u64,
@@ -176,7 +176,7 @@ impl<R: BufRead> Lines<R> {
     pub(crate) fn refuse(&self, column: u64, code: Code, message: String) -> Diagnostic {
         Diagnostic {
             file: self.file.clone(),
-            place: Some(Place::Text {
+            location: Some(Location::Text {
                 line: self.number,
                 column,
             }),
@@ -189,7 +189,7 @@ impl<R: BufRead> Lines<R> {
     /// A refusal of the input as a whole.
     pub(crate) fn refuse_whole(&self, code: Code, message: String) -> Diagnostic {
         Diagnostic {
-            place: None,
+            location: None,
             ..self.refuse(1, code, message)
         }
     }
@@ -197,13 +197,13 @@ impl<R: BufRead> Lines<R> {
     /// A refusal at the end of the input: on the last line, unless that has ended.
     pub(crate) fn refuse_end(&self, code: Code, message: String) -> Diagnostic {
         let mut refusal = self.refuse(1, code, message);
-        if let Some(Place::Text { line, .. }) = &mut refusal.place {
+        if let Some(Location::Text { line, .. }) = &mut refusal.location {
             *line -= u64::from(!self.ended);
         }
         refusal
     }
 
-    /// Counts a warning; the first of each code keeps its place and words.
+    /// Counts a warning; the first of each code keeps its location and message.
     pub(crate) fn warn(&mut self, column: u64, code: Code, message: impl Into<String>) {
         match self.warnings.iter_mut().find(|w| w.code == code) {
             Some(known) => known.count += 1,
@@ -257,16 +257,16 @@ impl<R: BufRead> Lines<R> {
             Ok(byte) if c.is_ascii() => !is_plain(byte),
             _ => c.is_control() || c.is_whitespace(),
         });
-        odd.next().map(|(place, _)| first + place).or(valid)
+        odd.next().map(|(index, _)| first + index).or(valid)
     }
 
     fn check_characters(&self) -> Result<(), Diagnostic> {
-        let Some(place) = self.first_odd() else {
+        let Some(offset) = self.first_odd() else {
             return Ok(());
         };
-        let before = String::from_utf8_lossy(&self.buffer[..place]);
+        let before = String::from_utf8_lossy(&self.buffer[..offset]);
         let column = before.chars().count() as u64 + 1;
-        let rest = &self.buffer[place..];
+        let rest = &self.buffer[offset..];
         let character = match std::str::from_utf8(&rest[..rest.len().min(4)]) {
             Ok(text) => text.chars().next(),
             Err(error) => std::str::from_utf8(&rest[..error.valid_up_to()])
@@ -277,7 +277,7 @@ impl<R: BufRead> Lines<R> {
         let (code, message) = match character {
             Some('\0') => (
                 Code::Encoding,
-                "a NUL byte; this is no text file".to_owned(),
+                "a NUL byte; this is not a text file".to_owned(),
             ),
             Some('\r') => {
                 let message = "a carriage return inside the line; end lines with LF or CR LF";
@@ -293,7 +293,7 @@ impl<R: BufRead> Lines<R> {
                 (Code::Character, message)
             }
             None => {
-                let message = format!("byte 0x{:02x} is no UTF-8; save the file as text", rest[0]);
+                let message = format!("byte 0x{:02x} is not UTF-8; save the file as text", rest[0]);
                 (Code::Encoding, message)
             }
         };

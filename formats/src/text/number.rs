@@ -30,7 +30,7 @@ pub(crate) fn parse(token: &str) -> Result<Number, Refusal> {
         return Err((Code::TokenTooLong, message));
     }
     let decimal = decimal(token).ok_or_else(|| refuse(token))?;
-    let Decimal { digits, zero, .. } = decimal;
+    let DecimalParts { digits, zero, .. } = decimal;
     if let Some(value) = decimal.exact_quotient() {
         let value = if token.starts_with('-') {
             -value
@@ -61,7 +61,7 @@ pub(crate) fn parse(token: &str) -> Result<Number, Refusal> {
 
 /// What a decimal number is made of.
 #[derive(Clone, Copy)]
-struct Decimal {
+struct DecimalParts {
     /// All of them, the exponent's too.
     digits: usize,
     /// No digit of the mantissa is another than 0.
@@ -80,7 +80,7 @@ const POWERS: [f64; 23] = [
     1e17, 1e18, 1e19, 1e20, 1e21, 1e22,
 ];
 
-impl Decimal {
+impl DecimalParts {
     /// The number's magnitude, where one division gives it: with both sides exact in f64 the
     /// quotient is the correctly rounded number (Clinger, *How to Read Floating Point Numbers
     /// Accurately*, 1990). Takes a third of the time of a parser for all numbers.
@@ -93,7 +93,7 @@ impl Decimal {
 
 /// `[+-] digits [. digits] [e [+-] digits]`, with a digit on either side of the
 /// point; nothing for what is no such number.
-fn decimal(token: &str) -> Option<Decimal> {
+fn decimal(token: &str) -> Option<DecimalParts> {
     let signed = |bytes: &[u8], at: usize| usize::from(matches!(bytes.get(at), Some(b'+' | b'-')));
     let bytes = token.as_bytes();
     let mut at = signed(bytes, 0);
@@ -129,7 +129,7 @@ fn decimal(token: &str) -> Option<Decimal> {
         at = bytes.len();
         is_long = true;
     }
-    (at == bytes.len()).then_some(Decimal {
+    (at == bytes.len()).then_some(DecimalParts {
         digits,
         zero,
         mantissa,

@@ -4,9 +4,9 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use glam::{DAffine3, DMat4, Quat, Vec3};
 use serde_json::{Value, json};
-use tumble_formats::motion::{Channels, Joint, Motion, Sampler, Transform};
+use tumble_formats::motion::{ChannelInterpolation, Channels, Joint, Motion, Transform};
 
-use crate::gltf_new::{Clip, cameras, channels, glb, leg, numbers, place, rest, set, written};
+use crate::gltf_new::{Clip, cameras, channels, glb, integer, leg, numbers, rest, set, written};
 use crate::validator::validate;
 
 #[test]
@@ -94,7 +94,7 @@ fn a_clip_comes_back_as_nodes_a_skin_and_an_animation() {
         (&animation["name"], &animation["extras"]),
         (&json!("Kick"), &json!({"method": "slerp"}))
     );
-    let input = &json["accessors"][place(&animation["samplers"][0]["input"])];
+    let input = &json["accessors"][integer(&animation["samplers"][0]["input"])];
     let bounds = ["min", "max"].map(|bound| input[bound][0].as_f64().unwrap() as f32);
     assert_eq!(bounds, [0.25, 1.1]);
     let channels = channels(&json, &binary, 0);
@@ -121,8 +121,14 @@ fn a_clip_comes_back_as_nodes_a_skin_and_an_animation() {
                 match path {
                     // The sign of the second sample is that of the first.
                     "rotation" => {
-                        let own = clip.rotations[at];
-                        (if own.w < 0.0 { -own } else { own }).to_array().to_vec()
+                        let rotation = clip.rotations[at];
+                        (if rotation.w < 0.0 {
+                            -rotation
+                        } else {
+                            rotation
+                        })
+                        .to_array()
+                        .to_vec()
                     }
                     "translation" => clip.translations[at].to_array().to_vec(),
                     _ => clip.scales[at].to_array().to_vec(),
@@ -149,16 +155,16 @@ fn clips_share_nodes_where_their_skeletons_are_equal() {
         .iter()
         .map(|node| &node["name"])
         .collect();
-    let wanted = [
+    let expected = [
         "knee", "hip", "foot", "camera", "lens", "camera#5", "knee#6", "hip#7", "foot#8",
     ];
-    assert_eq!(names, wanted);
+    assert_eq!(names, expected);
     assert_eq!(json["scenes"][0]["nodes"], json!([1, 3, 4, 5, 7]));
     // What has no skeleton has no skin.
     assert_eq!(json["skins"][0]["joints"], json!([1, 0, 2]));
     assert_eq!(json["skins"][1]["joints"], json!([7, 6, 8]));
     assert_eq!(json["skins"].as_array().unwrap().len(), 2);
-    let names = [0, 1, 2, 3].map(|place| &json["animations"][place]["name"]);
+    let names = [0, 1, 2, 3].map(|i| &json["animations"][i]["name"]);
     assert_eq!(
         names,
         [
@@ -230,10 +236,10 @@ fn poses_in_the_world_become_relative_to_the_parents() {
     let (json, binary) = glb(&written(&[clip.sampled()], "glb"));
     let channels = channels(&json, &binary, 0);
     let of = |node: usize, path: &str| {
-        let own = channels
+        let found = channels
             .iter()
             .find(|channel| (channel.node, channel.path) == (node, path));
-        &own.unwrap().values
+        &found.unwrap().values
     };
     for sample in 0..3 {
         let mut world = DAffine3::IDENTITY;
@@ -262,7 +268,7 @@ fn steps_stay_steps_and_what_rests_keeps_its_length() {
     let only = channels(&json, &binary, 0);
     assert_eq!((only.len(), only[0].node, only[0].path), (1, 0, "rotation"));
     assert_eq!(only[0].times, [0.25, 0.7, 1.1]);
-    clip.motion.channels[1].translation = Some(Sampler::Step);
+    clip.motion.channels[1].translation = Some(ChannelInterpolation::Step);
     let (json, binary) = glb(&written(&[clip.sampled()], "glb"));
     let only = channels(&json, &binary, 0);
     assert_eq!(
@@ -334,10 +340,10 @@ fn khronos_finds_no_error_in_new_files() {
         &[&trees],
     ];
     let mut files = Vec::new();
-    for (place, clips) in sets.into_iter().enumerate() {
+    for (i, clips) in sets.into_iter().enumerate() {
         let sampled: Vec<_> = clips.iter().map(|clip| clip.sampled()).collect();
         for format in ["glb", "gltf"] {
-            let file = folder.path().join(format!("{place}.{format}"));
+            let file = folder.path().join(format!("{i}.{format}"));
             std::fs::write(&file, written(&sampled, format)).unwrap();
             files.push(file);
         }

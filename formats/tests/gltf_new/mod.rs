@@ -8,9 +8,11 @@ use serde_json::{Value, json};
 use tumble::TrackSet;
 use tumble_formats::format::MotionOptions;
 use tumble_formats::gltf::write_new::write_new;
-use tumble_formats::motion::{Channels, Joint, Motion, Sampled, Sampler, Transform};
+use tumble_formats::motion::{
+    ChannelInterpolation, Channels, Joint, Motion, SampledClip, Transform,
+};
 
-/// A clip with lists of its own.
+/// A clip that owns its lists.
 #[derive(Clone, Default)]
 struct Clip {
     motion: Motion,
@@ -21,8 +23,8 @@ struct Clip {
 }
 
 impl Clip {
-    fn sampled(&self) -> Sampled<'_> {
-        Sampled {
+    fn sampled(&self) -> SampledClip<'_> {
+        SampledClip {
             clip: &self.motion,
             times: &self.times,
             rate: None,
@@ -30,7 +32,7 @@ impl Clip {
             translations: &self.translations,
             scales: &self.scales,
             notes: &[],
-            of_own_keys: false,
+            is_at_keys: false,
         }
     }
 }
@@ -56,12 +58,12 @@ fn set(names: &[&str]) -> TrackSet {
 /// the hip's translation move, the foot rests. One rotation has the other sign.
 fn leg() -> Clip {
     let joint = |parent, rest| Joint { parent, rest };
-    let turn = Quat::from_rotation_z(0.5);
-    let hip = rest([0.0, 1.0, 0.25], turn, 1.0);
+    let rotation = Quat::from_rotation_z(0.5);
+    let hip = rest([0.0, 1.0, 0.25], rotation, 1.0);
     let knee = rest([0.1, -0.5, 0.0], Quat::from_rotation_x(-0.25), 2.0);
     let foot = rest([0.0, -0.4, 0.0], Quat::IDENTITY, 1.0);
     let skeleton = vec![joint(Some(1), knee), joint(None, hip), joint(Some(0), foot)];
-    let all = Some(Sampler::Linear);
+    let all = Some(ChannelInterpolation::Linear);
     let moved = Channels {
         rotation: all,
         translation: all,
@@ -122,7 +124,7 @@ fn options(format: &str) -> MotionOptions {
     }
 }
 
-fn written(clips: &[Sampled<'_>], format: &str) -> Vec<u8> {
+fn written(clips: &[SampledClip<'_>], format: &str) -> Vec<u8> {
     let mut bytes = Vec::new();
     let warnings = write_new(clips, &options(format), &mut bytes).unwrap();
     assert_eq!(warnings, []);
@@ -144,14 +146,14 @@ fn glb(bytes: &[u8]) -> (Value, Vec<u8>) {
     (json, bytes[end + 8..].to_vec())
 }
 
-fn place(value: &Value) -> usize {
+fn integer(value: &Value) -> usize {
     value.as_u64().unwrap() as usize
 }
 
 /// The numbers of an accessor, which is f32, in a view without stride and without target.
 fn numbers(json: &Value, binary: &[u8], accessor: &Value) -> Vec<f32> {
-    let accessor = &json["accessors"][place(accessor)];
-    let view = &json["bufferViews"][place(&accessor["bufferView"])];
+    let accessor = &json["accessors"][integer(accessor)];
+    let view = &json["bufferViews"][integer(&accessor["bufferView"])];
     assert!(view.get("byteStride").is_none() && view.get("target").is_none());
     assert_eq!(
         (&accessor["componentType"], &view["buffer"]),
@@ -164,10 +166,10 @@ fn numbers(json: &Value, binary: &[u8], accessor: &Value) -> Vec<f32> {
         "MAT4" => 16,
         other => panic!("{other}"),
     };
-    let [view_start, start] = [view, accessor].map(|of| of.get("byteOffset").map_or(0, place));
-    let length = 4 * width * place(&accessor["count"]);
+    let [view_start, start] = [view, accessor].map(|of| of.get("byteOffset").map_or(0, integer));
+    let length = 4 * width * integer(&accessor["count"]);
     assert_eq!((view_start % 4, start % 4), (0, 0));
-    assert!(start + length <= place(&view["byteLength"]));
+    assert!(start + length <= integer(&view["byteLength"]));
     let bytes = &binary[view_start + start..][..length];
     let words = bytes.chunks_exact(4);
     words
@@ -188,9 +190,9 @@ fn channels<'a>(json: &'a Value, binary: &[u8], animation: usize) -> Vec<Channel
     let animation = &json["animations"][animation];
     let channels = animation["channels"].as_array().unwrap().iter();
     let read = channels.map(|channel| {
-        let sampler = &animation["samplers"][place(&channel["sampler"])];
+        let sampler = &animation["samplers"][integer(&channel["sampler"])];
         Channel {
-            node: place(&channel["target"]["node"]),
+            node: integer(&channel["target"]["node"]),
             path: channel["target"]["path"].as_str().unwrap(),
             interpolation: sampler["interpolation"].as_str().unwrap_or("LINEAR"),
             times: numbers(json, binary, &sampler["input"]),

@@ -6,12 +6,12 @@ use glam::Vec3;
 use tumble_formats::Code;
 use tumble_formats::format::WriteError;
 use tumble_formats::gltf::write_new::write_new;
-use tumble_formats::motion::Sampled;
+use tumble_formats::motion::SampledClip;
 
 use crate::gltf_new::{Clip, glb, leg, options, written};
 
 /// Refused, with that code and these words, before a byte is written.
-fn assert_refused(clips: &[Sampled<'_>], code: Code, words: &[&str]) {
+fn assert_refused(clips: &[SampledClip<'_>], code: Code, words: &[&str]) {
     let mut bytes = Vec::new();
     let error = write_new(clips, &options("glb"), &mut bytes).unwrap_err();
     let WriteError::Refused(diagnostic) = error else {
@@ -49,7 +49,11 @@ fn what_gltf_cannot_hold_is_refused() {
 
     let mut circle = leg();
     circle.motion.skeleton[1].parent = Some(2);
-    assert_refused(&[circle.sampled()], Code::NotTrees, &["hangs from itself"]);
+    assert_refused(
+        &[circle.sampled()],
+        Code::NotTrees,
+        &["is its own ancestor"],
+    );
     circle.motion.skeleton[1].parent = Some(7);
     assert_refused(&[circle.sampled()], Code::NotTrees, &["track 7"]);
     let mut broken = leg();

@@ -49,9 +49,9 @@ proptest! {
         map in prop::sample::select(vec!["", "rotations=poses,time=fps", "a=arr_0:frame"]),
     ) {
         let mut bytes = fixture(WHOLE[file]);
-        for (place, byte) in changes {
-            let place = place.index(bytes.len());
-            bytes[place] = byte;
+        for (index, byte) in changes {
+            let offset = index.index(bytes.len());
+            bytes[offset] = byte;
         }
         if let Some(cut) = cut {
             bytes.truncate(cut.index(bytes.len()));

@@ -66,7 +66,7 @@ fn smpl_h_is_read_with_names_parents_rate_and_root() {
     assert_eq!(clip.skeleton[37].parent, Some(21));
     let (joints, frames, rotations) = expected();
     assert_eq!(rotations.len(), 4 * joints.len() * frames.len());
-    let mut places = rotations.chunks_exact(4);
+    let mut expected_keys = rotations.chunks_exact(4);
     let mut worst: f64 = 0.0;
     // The list is by frame or by joint: the first frame's second joint decides, and each is checked.
     let by_frame = apart(clip.set.track(joints[1]).keys[frames[0]], &rotations[4..8]) < 1e-3;
@@ -78,7 +78,7 @@ fn smpl_h_is_read_with_names_parents_rate_and_root() {
                 (inner, outer)
             };
             let key = clip.set.track(joints[j]).keys[frames[f]];
-            worst = worst.max(apart(key, places.next().unwrap()));
+            worst = worst.max(apart(key, expected_keys.next().unwrap()));
         }
     }
     assert!(worst < 1e-7, "{worst:e}");
@@ -102,9 +102,13 @@ fn smpl_x_has_the_joints_of_smpl_h_and_a_face() {
     let [h, x] = [h, x].map(|path| open(&path).clips.swap_remove(0));
     assert_eq!(x.rate, FrameRate::new(120, 1).ok(), "120.00004577 is 120");
     assert_eq!(x.set.track_count(), 55);
-    for own in h.set.tracks() {
-        let other = x.set.tracks().find(|track| track.name == own.name).unwrap();
-        assert_eq!((own.keys, own.times), (other.keys, other.times));
+    for track in h.set.tracks() {
+        let other = x
+            .set
+            .tracks()
+            .find(|track| track.name == track.name)
+            .unwrap();
+        assert_eq!((track.keys, track.times), (other.keys, other.times));
     }
     let jaw = x
         .set
@@ -130,14 +134,14 @@ fn bodies_are_in_the_world() {
     assert_eq!(names, ["pelvis", "torso", "head", "hand"]);
     // The samples are the first joints of the other file.
     for track in 0..4 {
-        for (own, other) in bodies
+        for (key, other) in bodies
             .set
             .track(track)
             .keys
             .iter()
             .zip(h.set.track(track).keys)
         {
-            assert!(apart(*own, &other.as_dquat().to_array()) < 2e-7);
+            assert!(apart(*key, &other.as_dquat().to_array()) < 2e-7);
         }
     }
 }
@@ -174,9 +178,9 @@ fn element_types_orders_and_packings_do_not_matter() {
     ] {
         let found = clip(name);
         assert_eq!(found.rate, expected.rate);
-        for (own, other) in found.set.tracks().zip(expected.set.tracks()) {
-            for (own, other) in own.keys.iter().zip(other.keys) {
-                assert!(apart(*own, &other.as_dquat().to_array()) <= bound, "{name}");
+        for (track, other) in found.set.tracks().zip(expected.set.tracks()) {
+            for (key, other) in track.keys.iter().zip(other.keys) {
+                assert!(apart(*key, &other.as_dquat().to_array()) <= bound, "{name}");
             }
         }
     }

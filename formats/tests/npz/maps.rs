@@ -1,4 +1,4 @@
-//! Arrays whose meaning a map tells, and arrays alone.
+//! Arrays whose meaning a map gives, and single arrays.
 
 use glam::Quat;
 use tumble::{FrameRate, Layout, TrackSet};
@@ -38,9 +38,9 @@ fn numbers(order: [(usize, usize); 6]) -> Vec<f64> {
 
 fn check(set: &TrackSet) {
     assert_eq!((set.track_count(), set.key_count()), (2, 6));
-    for (track, own) in set.tracks().enumerate() {
-        let expected: Vec<Quat> = (0..3).map(|frame| key(track, frame)).collect();
-        assert_eq!(own.keys, expected, "{track}");
+    for (index, track) in set.tracks().enumerate() {
+        let expected: Vec<Quat> = (0..3).map(|frame| key(index, frame)).collect();
+        assert_eq!(track.keys, expected, "{index}");
     }
 }
 
@@ -75,7 +75,8 @@ fn results_are_read_back_when_it_is_said_which_axis_comes_first() {
 #[test]
 fn our_own_results_are_read_back_bit_for_bit() {
     use tumble::Encoding;
-    use tumble_formats::npy::{ComponentOrder, NpyWriter};
+    use tumble_formats::npy::NpyWriter;
+    use tumble_formats::quaternion::ComponentOrder;
     for (order, word) in [
         (ComponentOrder::Xyzw, "xyzw"),
         (ComponentOrder::Wxyz, "wxyz"),
@@ -158,8 +159,8 @@ fn arrays_of_any_names_are_told_by_a_map() {
     assert!((first.times[0] - 0.067_073_58).abs() < 5e-9);
     let bodies = std::fs::read(sample("bodies_like.npz").unwrap()).unwrap();
     let bodies = read_npz("b", bodies, &ReadOptions::default()).unwrap();
-    for (own, other) in clip.set.tracks().zip(bodies.clips[0].set.tracks()) {
-        assert_eq!(own.keys, other.keys);
+    for (track, other) in clip.set.tracks().zip(bodies.clips[0].set.tracks()) {
+        assert_eq!(track.keys, other.keys);
     }
     // Without the map the arrays are named.
     let error = read_npz("own_names.npz", bytes, &ReadOptions::default()).unwrap_err();
@@ -174,7 +175,7 @@ fn lengths_tell_the_axes() {
     let error = read(square.clone(), Some("rotations=arr_0"), 30).unwrap_err();
     assert_eq!(error.code, Code::Ambiguous);
     assert!(read(square, Some("rotations=arr_0:frame"), 30).is_ok());
-    let own = fixture("npz/own.npz");
+    let bytes = fixture("npz/own.npz");
     for (map, code) in [
         ("rotations=rotations,time=times", None),
         (
@@ -187,7 +188,7 @@ fn lengths_tell_the_axes() {
             Some(Code::Shape),
         ),
     ] {
-        let found = read_npz("t", own.clone(), &mapped(map));
+        let found = read_npz("t", bytes.clone(), &mapped(map));
         assert_eq!(found.err().map(|error| error.code), code, "{map}");
     }
     assert_eq!(

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::process::Command;
 
 use tumble_formats::format::MotionOptions;
-use tumble_formats::motion::Sampled;
+use tumble_formats::motion::SampledClip;
 use tumble_formats::npz::write::write_npz;
 
 use super::{Picked, read, sample};
@@ -26,15 +26,15 @@ fn numpy_and_scipy_agree() {
         let loaded = read(std::fs::read(path.with_file_name(name)).unwrap()).unwrap();
         let clip = &loaded.clips[0];
         let picked = Picked::of(clip, 1);
-        let sampled = Sampled {
+        let sampled = SampledClip {
             rate: clip.rate,
             ..picked.sampled(clip)
         };
-        let (mut own, mut kept) = (Vec::new(), Vec::new());
+        let (mut rebuilt, mut kept) = (Vec::new(), Vec::new());
         write_npz(
             std::slice::from_ref(&sampled),
             &MotionOptions::default(),
-            &mut own,
+            &mut rebuilt,
         )
         .unwrap();
         let document = loaded.document.as_ref().unwrap();
@@ -42,7 +42,7 @@ fn numpy_and_scipy_agree() {
         document
             .write(&[(0, sampled)], &options, Path::new("kept.npz"), &mut kept)
             .unwrap();
-        std::fs::write(folder.path().join(format!("own_{name}")), own).unwrap();
+        std::fs::write(folder.path().join(format!("own_{name}")), rebuilt).unwrap();
         std::fs::write(folder.path().join(format!("kept_{name}")), kept).unwrap();
     }
     let script = root.join("formats/tests/npz/peers.py");

@@ -5,7 +5,7 @@ use std::path::Path;
 use tumble::{FrameRate, TrackSet};
 use tumble_formats::diagnostic::Code;
 use tumble_formats::format::{MotionOptions, WriteError};
-use tumble_formats::motion::{Joint, Motion, Sampled, Transform};
+use tumble_formats::motion::{Joint, Motion, SampledClip, Transform};
 use tumble_formats::npz::read_npz;
 use tumble_formats::npz::write::write_npz;
 use tumble_formats::{Loaded, ReadOptions};
@@ -51,7 +51,7 @@ fn clip() -> (Motion, Vec<Quat>, Vec<Vec3>) {
 #[test]
 fn our_layout_reads_back_as_written() {
     let (clip, rotations, vectors) = clip();
-    let sampled = Sampled {
+    let sampled = SampledClip {
         clip: &clip,
         times: clip.set.track(0).times,
         rate: None,
@@ -59,7 +59,7 @@ fn our_layout_reads_back_as_written() {
         translations: &vectors,
         scales: &vectors,
         notes: &[("method", "slerp".to_owned()), ("names", "odd".to_owned())],
-        of_own_keys: false,
+        is_at_keys: false,
     };
     let mut bytes = Vec::new();
     let warnings = write_npz(
@@ -78,7 +78,7 @@ fn our_layout_reads_back_as_written() {
         (&clip.name, None, false)
     );
     // Written once more from what was read, as it is: the same file, but for the notes.
-    let again = Sampled {
+    let again = SampledClip {
         clip: found,
         ..sampled.clone()
     };
@@ -91,7 +91,7 @@ fn our_layout_reads_back_as_written() {
         let error = write_npz(clips, &MotionOptions::default(), &mut Vec::new()).unwrap_err();
         assert_refused(error, code);
     }
-    let short = Sampled {
+    let short = SampledClip {
         rotations: &rotations[1..],
         ..sampled
     };
@@ -120,7 +120,7 @@ fn worlds_and_rates_are_kept() {
         translations: Vec::new(),
     };
     let rate = FrameRate::new(30_000, 1001).ok();
-    let sampled = Sampled {
+    let sampled = SampledClip {
         rate,
         ..picked.sampled(&clip)
     };
@@ -138,7 +138,7 @@ fn halved(loaded: &Loaded, linear: &[&str]) -> (Vec<u8>, Loaded, Vec<String>) {
     let document = loaded.document.as_ref().unwrap();
     let picked = Picked::of(clip, 2);
     assert_eq!(document.times(0, rate).unwrap(), picked.times);
-    let sampled = Sampled {
+    let sampled = SampledClip {
         rate: Some(rate),
         ..picked.sampled(clip)
     };
@@ -154,11 +154,11 @@ fn halved(loaded: &Loaded, linear: &[&str]) -> (Vec<u8>, Loaded, Vec<String>) {
     let again = read(bytes.clone()).unwrap();
     assert_eq!(again.clips[0].rate, Some(rate));
     assert_eq!(again.clips[0].skeleton, clip.skeleton);
-    for (own, other) in again.clips[0].set.tracks().zip(clip.set.tracks()) {
-        assert_eq!(own.name, other.name);
-        for (frame, key) in own.keys.iter().enumerate() {
+    for (track, other) in again.clips[0].set.tracks().zip(clip.set.tracks()) {
+        assert_eq!(track.name, other.name);
+        for (frame, key) in track.keys.iter().enumerate() {
             let apart = (*key - other.keys[2 * frame]).length();
-            assert!(apart < 3e-7, "{:?}, frame {frame}: {apart}", own.name);
+            assert!(apart < 3e-7, "{:?}, frame {frame}: {apart}", track.name);
         }
     }
     (bytes, again, warnings)
@@ -261,11 +261,11 @@ fn what_does_not_fit_the_layout_is_refused() {
     let clip = &loaded.clips[0];
     let document = loaded.document.as_ref().unwrap();
     let picked = Picked::of(clip, 1);
-    let rated = Sampled {
+    let rated = SampledClip {
         rate: clip.rate,
         ..picked.sampled(clip)
     };
-    let write = |clips: &[(usize, Sampled<'_>)], linear: &str| {
+    let write = |clips: &[(usize, SampledClip<'_>)], linear: &str| {
         let linear = linear.split_whitespace().map(str::to_owned).collect();
         let options = MotionOptions {
             linear,
@@ -284,7 +284,7 @@ fn what_does_not_fit_the_layout_is_refused() {
         ..Motion::default()
     };
     let single = Picked::of(&other, 1);
-    let sampled = Sampled {
+    let sampled = SampledClip {
         rate: clip.rate,
         ..single.sampled(&other)
     };

@@ -1,4 +1,4 @@
-//! How each vertex is reached, and which vertices ways may bend at.
+//! How each vertex is reached, and at which vertices paths may bend.
 
 use std::f64::consts::TAU;
 
@@ -10,7 +10,7 @@ use crate::mesh::surface::Surface;
 /// whether a flat one has less.
 const SLACK: f64 = 1e-9;
 
-/// How the best way so far comes to a vertex.
+/// How the best path so far comes to a vertex.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Arrival {
     /// Along the edge from this vertex; from none at the start.
@@ -20,7 +20,7 @@ pub(super) enum Arrival {
         trail: u32,
         /// By which the window entered the face.
         half_edge: u32,
-        /// At the vertex, from the face's left edge to where the way comes from.
+        /// At the vertex, from the face's left edge to where the path comes from.
         angle: f64,
         /// The vertex is within the window, which went on at both sides.
         is_inside: bool,
@@ -28,31 +28,31 @@ pub(super) enum Arrival {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Kind {
-    /// Less than a full angle: no shortest way passes.
+enum VertexKind {
+    /// Less than a full angle: no shortest path passes.
     Convex,
-    /// A full angle: ways pass straight on.
+    /// A full angle: paths pass straight on.
     Flat,
-    /// More than that, or on a boundary, or where surfaces meet: ways bend.
+    /// More than that, or on a boundary, or where surfaces meet: paths bend.
     Source,
 }
 
-/// The best way to each vertex so far.
+/// The best path to each vertex so far.
 pub(super) struct Arrivals {
     lengths: Vec<f64>,
     arrivals: Vec<Arrival>,
-    kinds: Vec<Kind>,
+    kinds: Vec<VertexKind>,
 }
 
 impl Arrivals {
-    /// At first the ways along edges.
+    /// At first the paths along edges.
     pub(super) fn new(surface: &Surface, lengths: Vec<f64>, before: &[u32]) -> Self {
         let kind = |vertex| {
             let fan = Fan::about(surface, vertex);
             match fan.is_closed() {
-                true if fan.total() < TAU - SLACK => Kind::Convex,
-                true if fan.total() <= TAU + SLACK => Kind::Flat,
-                _ => Kind::Source,
+                true if fan.total() < TAU - SLACK => VertexKind::Convex,
+                true if fan.total() <= TAU + SLACK => VertexKind::Flat,
+                _ => VertexKind::Source,
             }
         };
         Self {
@@ -75,12 +75,12 @@ impl Arrivals {
         self.arrivals[vertex as usize] = arrival;
     }
 
-    /// Whether ways leave the vertex that do not pass it within a window.
+    /// Whether paths leave the vertex that do not pass it within a window.
     pub(super) fn is_source(&self, vertex: u32) -> bool {
         match self.kinds[vertex as usize] {
-            Kind::Convex => false,
-            Kind::Source => true,
-            Kind::Flat => match self.arrivals[vertex as usize] {
+            VertexKind::Convex => false,
+            VertexKind::Source => true,
+            VertexKind::Flat => match self.arrivals[vertex as usize] {
                 Arrival::Edge(before) => before != NONE,
                 Arrival::Window { is_inside, .. } => !is_inside,
             },

@@ -7,14 +7,14 @@ use crate::exact::window::Shape;
 use crate::mesh::links::{MANY, NONE, at, next, previous};
 use crate::mesh::surface::Surface;
 
-/// Ways may turn so much less than half a turn, rad: rounding must leave no gap.
+/// Paths may turn by so much less than 180°, rad: rounding must leave no gap.
 const SLACK: f64 = 1e-8;
 
-/// The faces about a vertex in their order round it.
+/// The faces about a vertex, in order.
 pub(super) struct Fan {
     wedges: Vec<Wedge>,
     is_closed: bool,
-    /// They are one round, or one part of it, and every edge has at most two faces.
+    /// The faces are one fan, closed or open, and every edge has at most two faces.
     is_simple: bool,
 }
 
@@ -29,7 +29,7 @@ struct Wedge {
     to: f64,
 }
 
-/// The directions in which ways leave a vertex.
+/// The directions in which paths leave a vertex.
 pub(super) enum Sector {
     All,
     Empty,
@@ -60,11 +60,11 @@ impl Fan {
             if twin == NONE || twin == MANY {
                 return None;
             }
-            let own = [twin, next(twin)]
+            let found = [twin, next(twin)]
                 .into_iter()
-                .find(|&own| at(faces, own) == vertex)?;
-            let ends = [at(faces, next(own)), at(faces, previous(own))];
-            Some((own, if ends[0] == end { ends[1] } else { ends[0] }))
+                .find(|&half_edge| at(faces, half_edge) == vertex)?;
+            let ends = [at(faces, next(found)), at(faces, previous(found))];
+            Some((found, if ends[0] == end { ends[1] } else { ends[0] }))
         };
         // Back to where the fan begins, which is anywhere if it goes all round.
         let (mut corner, mut first) = (any, at(faces, next(any)));
@@ -103,7 +103,7 @@ impl Fan {
         fan
     }
 
-    /// Whether the faces go all round the vertex, and are all that there are.
+    /// Whether the fan is closed and contains all faces of the vertex.
     pub(super) fn is_closed(&self) -> bool {
         self.is_closed && self.is_simple
     }
@@ -113,7 +113,7 @@ impl Fan {
         self.wedges.last().map_or(0.0, |wedge| wedge.to)
     }
 
-    /// The directions that leave at least half a turn on either side of where a way comes from.
+    /// The directions with at least 180° on either side of where a path comes from.
     pub(super) fn sector(&self, surface: &Surface, arrival: Arrival) -> Sector {
         if !self.is_simple {
             return Sector::All;
@@ -136,7 +136,7 @@ impl Fan {
         ])
     }
 
-    /// The angle at which a way arrives.
+    /// The angle at which a path arrives.
     fn direction(&self, surface: &Surface, arrival: Arrival) -> Option<f64> {
         let faces = &surface.faces;
         match arrival {
@@ -190,9 +190,13 @@ impl Fan {
         let angle = wedge.to - wedge.from;
         // The half-edge begins at the next corner.
         let is_forward = wedge.first == at(&surface.faces, next(corner));
-        let along = |turned: f64| {
-            let turned = if is_forward { turned } else { angle - turned };
-            shape.met_by(turned, angle)
+        let along = |rotation: f64| {
+            let from_start = if is_forward {
+                rotation
+            } else {
+                angle - rotation
+            };
+            shape.met_by(from_start, angle)
         };
         let mut parts = Vec::new();
         for &(low, high) in directions {

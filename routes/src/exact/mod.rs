@@ -1,12 +1,12 @@
-//! The shortest way over the surface.
+//! The shortest path over the surface.
 //!
-//! A shortest way is straight within the triangles that it crosses once they are unfolded into a
+//! A shortest path is straight within the triangles that it crosses once they are unfolded into a
 //! plane, and bends only at vertices with more than a full angle about them, or on the boundary
 //! (Mitchell, Mount and Papadimitriou, 1987). So *windows* are carried over the surface: all straight
-//! ways from one such vertex through one sequence of edges, which end on one interval of the last
-//! edge. Of the windows that hold the corner opposite, one may go on through both other edges (Chen
+//! paths from one such vertex through one sequence of edges, which end on one interval of the last
+//! edge. Of the windows that contain the corner opposite, one may go on through both other edges (Chen
 //! and Han, 1996); windows behind which another vertex is a nearer source are dropped (Xin and Wang,
-//! 2009), and the others leave a heap by the least length that a way through them to the goal can
+//! 2009), and the others leave a heap by the least length that a path through them to the goal can
 //! have.
 
 mod arrivals;
@@ -18,6 +18,7 @@ use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 use crate::edges::{Distance, distances};
+use crate::endpoints::Task;
 use crate::error::RouteError;
 use crate::exact::arrivals::{Arrival, Arrivals};
 use crate::exact::fan::{Fan, Sector};
@@ -25,37 +26,36 @@ use crate::exact::trace::Trail;
 use crate::exact::window::{Shape, Window, hypotenuse};
 use crate::mesh::links::{MANY, NONE, at, next, previous};
 use crate::mesh::surface::{Spot, Surface};
-use crate::places::Task;
 
-/// Windows that are kept at most, to trace the way back: 8 bytes each, and 80 for each of the few
-/// that wait; together with the mesh less than 1 GiB.
-pub(crate) const MOST_WINDOWS: usize = 1 << 26;
+/// Windows that are kept at most, to trace the path back: 8 bytes each, and 80 for each that
+/// waits in the heap; together with the mesh less than 1 GiB.
+pub(crate) const MAX_WINDOWS: usize = 1 << 26;
 /// Windows that wait at most.
-const MOST_WAITING: usize = 4_000_000;
+const MAX_WAITING: usize = 4_000_000;
 
 /// Corners are taken to be within a window that ends so near to them, in parts of the edge; and
 /// lengths that differ by less, in parts of the whole, are equal.
 const TOLERANCE: f64 = 1e-12;
 
-/// What waits in the heap: a window by its place, or a vertex.
+/// An event in the heap: a window by its index, or a vertex.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Event {
     Vertex(u32),
     Window(u32),
 }
 
-/// The shortest way from start to goal, which lie on one piece.
+/// The shortest path from start to goal, which lie on one piece.
 ///
 /// # Errors
 /// When it would take more windows than may be kept.
-pub(crate) fn way(task: &Task<'_>) -> Result<Vec<Spot>, RouteError> {
-    way_within(task, MOST_WINDOWS)
+pub(crate) fn find_path(task: &Task<'_>) -> Result<Vec<Spot>, RouteError> {
+    find_path_within(task, MAX_WINDOWS)
 }
 
-fn way_within(task: &Task<'_>, most: usize) -> Result<Vec<Spot>, RouteError> {
+fn find_path_within(task: &Task<'_>, max_windows: usize) -> Result<Vec<Spot>, RouteError> {
     let mut search = Search::new(task);
-    search.run(most)?;
-    Ok(trace::way(
+    search.run(max_windows)?;
+    Ok(trace::trace_path(
         search.surface,
         task.start,
         task.goal,
@@ -64,7 +64,7 @@ fn way_within(task: &Task<'_>, most: usize) -> Result<Vec<Spot>, RouteError> {
     ))
 }
 
-/// Of the windows that enter through a half-edge and hold the corner opposite, the shortest there.
+/// Of the windows that enter through a half-edge and contain the corner opposite, the shortest there.
 #[derive(Debug, Clone, Copy)]
 struct Occupant {
     /// From the start to the corner.
@@ -93,7 +93,7 @@ impl<'a> Search<'a> {
         let surface = &*task.surface;
         let half_edges = 3 * surface.faces.len();
         let shapes = (0..half_edges as u32)
-            .map(|own| Shape::of(surface, own))
+            .map(|half_edge| Shape::of(surface, half_edge))
             .collect();
         let (lengths, before) = distances(surface, task.start);
         let same = TOLERANCE * lengths[task.goal as usize];
@@ -116,7 +116,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    fn run(&mut self, most: usize) -> Result<(), RouteError> {
+    fn run(&mut self, max_windows: usize) -> Result<(), RouteError> {
         for vertex in 0..self.surface.positions.len() as u32 {
             if vertex == self.start || self.arrivals.is_source(vertex) {
                 self.push_vertex(vertex);
@@ -133,24 +133,24 @@ impl<'a> Search<'a> {
                         self.leave_vertex(vertex);
                     }
                 }
-                Event::Window(place) => {
-                    let window = self.windows[place as usize];
-                    self.free.push(place);
+                Event::Window(index) => {
+                    let window = self.windows[index as usize];
+                    self.free.push(index);
                     self.propagate(&window);
                 }
             }
             let waiting = self.windows.len() - self.free.len();
-            if self.trail.len() > most || waiting > MOST_WAITING {
+            if self.trail.len() > max_windows || waiting > MAX_WAITING {
                 return Err(RouteError::TooLarge {
                     triangles: self.surface.faces.len(),
-                    most,
+                    max: max_windows,
                 });
             }
         }
         Ok(())
     }
 
-    /// The least length of a way to the goal through this vertex.
+    /// The least length of a path to the goal through this vertex.
     fn bound_at(&self, vertex: u32) -> f64 {
         self.arrivals.length(vertex) + self.surface.distance(vertex, self.goal)
     }
@@ -173,7 +173,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// All ways that go on from a vertex.
+    /// All paths that go on from a vertex.
     fn leave_vertex(&mut self, vertex: u32) {
         let length = self.arrivals.length(vertex);
         let arrival = self.arrivals.arrival(vertex);
@@ -247,26 +247,26 @@ impl<'a> Search<'a> {
         // left, and left of those that leave to the right; the window's end far from it counts.
         if goes_left && let Some(child) = window.through_left(&shape, entry, parent) {
             let length = self.shapes[previous(half_edge) as usize].length;
-            let far = child.length + child.distance(child.low) - self.same;
+            let limit = child.length + child.distance(child.low) - self.same;
             let is_behind = child.is_behind(lengths[0], lengths[2], length, self.same)
-                || lengths[1] + shape.right_corner_to(child.low, length) < far;
+                || lengths[1] + shape.right_corner_to(child.low, length) < limit;
             if !is_behind {
                 self.cross(child);
             }
         }
         if goes_right && let Some(child) = window.through_right(&shape, entry, parent) {
             let length = self.shapes[next(half_edge) as usize].length;
-            let far = child.length + child.distance(child.high) - self.same;
+            let limit = child.length + child.distance(child.high) - self.same;
             let is_behind = child.is_behind(lengths[2], lengths[1], length, self.same)
-                || lengths[0] + shape.left_corner_to(child.high, length) < far;
+                || lengths[0] + shape.left_corner_to(child.high, length) < limit;
             if !is_behind {
                 self.cross(child);
             }
         }
     }
 
-    /// Of two windows that enter through one edge and hold the corner opposite, the one that is
-    /// longer there goes on to one side only: on the other side of the shorter one's ray its ways
+    /// Of two windows that enter through one edge and contain the corner opposite, the one that is
+    /// longer there goes on to one side only: on the other side of the shorter one's ray its paths
     /// would have to cross that ray, and be longer behind it (Chen and Han, 1996).
     fn occupy(&mut self, half_edge: u32, length: f64, entry: f64, near: f64) -> (bool, bool) {
         let occupant = &mut self.occupants[half_edge as usize];
@@ -281,7 +281,7 @@ impl<'a> Search<'a> {
     }
 
     /// Hands a window on to the faces beyond its edge. Its half-edge is that of the face which it
-    /// comes from; it is measured from the end that is the start of a twin which runs the other way.
+    /// comes from; it is measured from the end that is the start of a twin which runs in the opposite direction.
     fn cross(&mut self, window: Window) {
         let bound = self.bound(&window);
         if bound.is_nan() || bound > self.arrivals.length(self.goal) {
@@ -304,30 +304,30 @@ impl<'a> Search<'a> {
     fn wait(&mut self, window: &Window, twin: u32, bound: f64) {
         let faces = &self.surface.faces;
         let length = self.shapes[twin as usize].length;
-        let same_way = at(faces, twin) == at(faces, window.half_edge);
-        let own = match same_way {
+        let same_direction = at(faces, twin) == at(faces, window.half_edge);
+        let oriented = match same_direction {
             true => window.mirrored(length),
             false => *window,
         };
-        let own = Window {
+        let entering = Window {
             half_edge: twin,
-            ..own
+            ..oriented
         };
-        let place = match self.free.pop() {
-            Some(place) => {
-                self.windows[place as usize] = own;
-                place
+        let index = match self.free.pop() {
+            Some(index) => {
+                self.windows[index as usize] = entering;
+                index
             }
             None => {
-                self.windows.push(own);
+                self.windows.push(entering);
                 self.windows.len() as u32 - 1
             }
         };
         self.heap
-            .push(Reverse((Distance(bound), Event::Window(place))));
+            .push(Reverse((Distance(bound), Event::Window(index))));
     }
 
-    /// The least length that a way through the window to the goal can have: the goal is turned
+    /// The least length that a path through the window to the goal can have: the goal is rotated
     /// about the edge into the plane of the window.
     fn bound(&self, window: &Window) -> f64 {
         let from = self.surface.corner(next(window.half_edge));
@@ -343,8 +343,8 @@ mod tests {
     use glam::dvec3;
 
     use super::*;
+    use crate::endpoints::locate_endpoints;
     use crate::mesh::Mesh;
-    use crate::places::place;
 
     #[test]
     fn too_many_windows_are_an_error_that_names_the_edges() {
@@ -355,11 +355,11 @@ mod tests {
         let positions: Vec<_> = (0..12).map(rim).collect();
         let faces: Vec<[u32; 3]> = (0..10).map(|i| [i, i + 1, i + 2]).collect();
         let mesh = Mesh::new(&positions, &faces).unwrap();
-        let task = place(&mesh, rim(0), rim(11)).unwrap();
-        let error = way_within(&task, 3).unwrap_err();
+        let task = locate_endpoints(&mesh, rim(0), rim(11)).unwrap();
+        let error = find_path_within(&task, 3).unwrap_err();
         let triangles = 10;
-        assert_eq!(error, RouteError::TooLarge { triangles, most: 3 });
+        assert_eq!(error, RouteError::TooLarge { triangles, max: 3 });
         assert!(error.to_string().contains("--by edges"), "{error}");
-        assert!(way_within(&task, 1000).is_ok());
+        assert!(find_path_within(&task, 1000).is_ok());
     }
 }

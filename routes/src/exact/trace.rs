@@ -33,25 +33,25 @@ impl Trail {
     /// The source of a window, and the half-edges from there to it.
     fn back(&self, window: u32) -> (u32, Vec<u32>) {
         let mut half_edges = Vec::new();
-        let (mut parent, mut own) = self.links[window as usize];
+        let (mut parent, mut item) = self.links[window as usize];
         while parent != NONE {
-            half_edges.push(own);
-            (parent, own) = self.links[parent as usize];
+            half_edges.push(item);
+            (parent, item) = self.links[parent as usize];
         }
         half_edges.reverse();
-        (own, half_edges)
+        (item, half_edges)
     }
 }
 
-/// The way from start to goal.
-pub(super) fn way(
+/// The path from start to goal.
+pub(super) fn trace_path(
     surface: &Surface,
     start: u32,
     goal: u32,
     arrivals: &Arrivals,
     trail: &Trail,
 ) -> Vec<Spot> {
-    let mut way = vec![Spot::vertex(goal)];
+    let mut path = vec![Spot::vertex(goal)];
     let mut vertex = goal;
     while vertex != start {
         vertex = match arrivals.arrival(vertex) {
@@ -61,14 +61,14 @@ pub(super) fn way(
             Arrival::Window { trail: window, .. } => {
                 let (source, half_edges) = trail.back(window);
                 let spots = straight(surface, source, &half_edges);
-                way.extend(spots.into_iter().rev());
+                path.extend(spots.into_iter().rev());
                 source
             }
         };
-        way.push(Spot::vertex(vertex));
+        path.push(Spot::vertex(vertex));
     }
-    way.reverse();
-    way
+    path.reverse();
+    path
 }
 
 /// Where the straight line from a source to the corner opposite the last half-edge crosses the
@@ -90,9 +90,9 @@ fn straight(surface: &Surface, source: u32, half_edges: &[u32]) -> Vec<Spot> {
     for (index, &half_edge) in half_edges.iter().enumerate() {
         // The edge's left end comes first; the half-edge may begin at either.
         edges.push(known);
-        let is_turned = known[0].0 != at(faces, half_edge);
+        let is_reversed = known[0].0 != at(faces, half_edge);
         let shape = Shape::of(surface, half_edge);
-        let x = if is_turned {
+        let x = if is_reversed {
             shape.length - shape.x
         } else {
             shape.x
@@ -100,8 +100,8 @@ fn straight(surface: &Surface, source: u32, half_edges: &[u32]) -> Vec<Spot> {
         let along = (known[1].1 - known[0].1) / shape.length;
         target = known[0].1 + x * along + shape.y * along.perp();
         let opposite = (at(faces, previous(half_edge)), target);
-        if let Some(&beyond) = half_edges.get(index + 1) {
-            let ends = [at(faces, beyond), at(faces, next(beyond))];
+        if let Some(&following) = half_edges.get(index + 1) {
+            let ends = [at(faces, following), at(faces, next(following))];
             let is_left = ends.contains(&known[0].0) && ends.contains(&opposite.0);
             known[usize::from(is_left)] = opposite;
         }

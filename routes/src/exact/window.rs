@@ -1,4 +1,4 @@
-//! Windows: the straight ways from one source through one sequence of edges.
+//! Windows: the straight paths from one source through one sequence of edges.
 
 use glam::DVec2;
 
@@ -33,11 +33,12 @@ impl Shape {
         }
     }
 
-    /// Where a ray from the corner opposite meets the edge, which turned by `turned` of the face's
+    /// Where a ray from the corner opposite meets the edge, rotated by `from_start` of the face's
     /// `angle` there from the start of the edge to its end, rad.
-    pub(super) fn met_by(&self, turned: f64, angle: f64) -> f64 {
-        let start = hypotenuse(self.x, self.y) * libm::sin(turned.max(0.0));
-        let end = hypotenuse(self.length - self.x, self.y) * libm::sin((angle - turned).max(0.0));
+    pub(super) fn met_by(&self, from_start: f64, angle: f64) -> f64 {
+        let start = hypotenuse(self.x, self.y) * libm::sin(from_start.max(0.0));
+        let end =
+            hypotenuse(self.length - self.x, self.y) * libm::sin((angle - from_start).max(0.0));
         self.length * start / (start + end)
     }
 
@@ -65,7 +66,7 @@ impl Shape {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Window {
     pub(super) half_edge: u32,
-    /// Its place in the trail is that of the window that it comes from.
+    /// Its index in the trail is that of the window that it comes from.
     pub(super) parent: u32,
     pub(super) low: f64,
     pub(super) high: f64,
@@ -98,15 +99,15 @@ impl Window {
             || right + edge - self.low < self.length + self.distance(self.low) - same
     }
 
-    /// Between the left edge of the face and the way to the source, at the corner opposite.
+    /// Between the left edge of the face and the path to the source, at the corner opposite.
     pub(super) fn angle_at_corner(&self, shape: &Shape) -> f64 {
         let corner = DVec2::new(shape.x, shape.y);
         let source = DVec2::new(self.x, -self.y);
-        let (way, edge) = (source - corner, -corner);
-        libm::atan2(way.perp_dot(edge), way.dot(edge)).abs()
+        let (to_source, edge) = (source - corner, -corner);
+        libm::atan2(to_source.perp_dot(edge), to_source.dot(edge)).abs()
     }
 
-    /// What reaches the left edge, measured from the left corner. The half-edge is that of this
+    /// The part that reaches the left edge, measured from the left corner. The half-edge is that of this
     /// face.
     pub(super) fn through_left(&self, shape: &Shape, entry: f64, parent: u32) -> Option<Self> {
         let length = hypotenuse(shape.x, shape.y);
@@ -133,7 +134,7 @@ impl Window {
         })
     }
 
-    /// What reaches the right edge, measured from the corner opposite. The half-edge is that of this
+    /// The part that reaches the right edge, measured from the corner opposite. The half-edge is that of this
     /// face.
     pub(super) fn through_right(&self, shape: &Shape, entry: f64, parent: u32) -> Option<Self> {
         let corner = DVec2::new(shape.x, shape.y);

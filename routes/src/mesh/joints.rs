@@ -1,5 +1,5 @@
 //! Corners that lie on the side of another face, as where a large face lies beside two small ones: the
-//! side is cut there, so that ways lead over it.
+//! side is cut there, so that routes can cross it.
 
 use std::ops::Range;
 
@@ -18,7 +18,7 @@ pub(super) fn on_open_sides(
     tolerance: f64,
 ) -> Vec<(usize, usize, Vec<u32>)> {
     let open = open_sides(positions.len(), faces);
-    let tree = Tree::new(positions, corners_of(faces, &open));
+    let tree = CornerTree::new(positions, corners_of(faces, &open));
     let mut found = Vec::new();
     for (face, side) in open {
         let [from, to] = ends(faces, face, side);
@@ -54,7 +54,7 @@ pub(super) fn on_open_sides(
 /// How many corners on open sides lie within `distance` of an open side that they do not belong to.
 pub(super) fn near_open_sides(positions: &[DVec3], faces: &[[u32; 3]], distance: f64) -> usize {
     let open = open_sides(positions.len(), faces);
-    let tree = Tree::new(positions, corners_of(faces, &open));
+    let tree = CornerTree::new(positions, corners_of(faces, &open));
     let mut all: Vec<u32> = Vec::new();
     for (face, side) in open {
         let both = ends(faces, face, side);
@@ -101,12 +101,12 @@ fn ends(faces: &[[u32; 3]], face: usize, side: usize) -> [u32; 2] {
 }
 
 /// Boxes about halves of the corners, halved again.
-struct Tree {
+struct CornerTree {
     corners: Vec<u32>,
     boxes: Vec<(DVec3, DVec3)>,
 }
 
-impl Tree {
+impl CornerTree {
     fn new(positions: &[DVec3], corners: Vec<u32>) -> Self {
         let mut depth = 0;
         while (LEAF << depth) < corners.len() {

@@ -1,4 +1,4 @@
-//! What lies beside what: the other side of each edge, and the corners at each vertex.
+//! Adjacency: the other side of each edge, and the corners at each vertex.
 
 /// There is nothing: an edge is on the boundary.
 pub(crate) const NONE: u32 = u32::MAX;
@@ -56,7 +56,7 @@ fn twins(faces: &[[u32; 3]]) -> Vec<u32> {
         match *edge {
             [_] => {}
             [a, b] => (twins[a as usize], twins[b as usize]) = (b, a),
-            _ => edge.iter().for_each(|&own| twins[own as usize] = MANY),
+            _ => edge.iter().for_each(|&one| twins[one as usize] = MANY),
         }
     }
     twins

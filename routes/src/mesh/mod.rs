@@ -1,4 +1,4 @@
-//! Meshes: what is read is checked, welded, cut into triangles and wound alike.
+//! Meshes: the input is checked, welded, cut into triangles and wound alike.
 
 mod cut;
 mod joints;
@@ -15,11 +15,11 @@ use glam::DVec3;
 use crate::error::{MeshError, MeshWarning};
 use crate::mesh::links::Links;
 use crate::mesh::surface::Surface;
-use crate::mesh::tree::Tree;
+use crate::mesh::tree::FaceTree;
 use crate::mesh::weld::Welded;
 
 /// The most triangles of a mesh: corners are counted in 32 bits.
-pub const MOST_TRIANGLES: usize = (u32::MAX / 3 - 8) as usize;
+pub const MAX_TRIANGLES: usize = (u32::MAX / 3 - 8) as usize;
 
 /// A surface of triangles, on which routes are found.
 ///
@@ -29,7 +29,7 @@ pub const MOST_TRIANGLES: usize = (u32::MAX / 3 - 8) as usize;
 #[derive(Debug, Clone)]
 pub struct Mesh {
     pub(crate) surface: Surface,
-    pub(crate) tree: Tree,
+    pub(crate) tree: FaceTree,
     /// The largest extent along an axis.
     pub(crate) size: f64,
     pub(crate) has_branches: bool,
@@ -76,25 +76,25 @@ impl Mesh {
             mut faces,
             mut warnings,
         } = weld::weld(positions, polygons, distance)?;
-        let turned = windings::turn_alike(positions.len(), &mut faces);
-        if turned.count > 0 {
-            let count = turned.count;
-            warnings.push(MeshWarning::Turned { count });
+        let rewinding = windings::wind_alike(positions.len(), &mut faces);
+        if rewinding.count > 0 {
+            let count = rewinding.count;
+            warnings.push(MeshWarning::Rewound { count });
         }
-        if turned.is_one_sided {
+        if rewinding.is_one_sided {
             warnings.push(MeshWarning::OneSided);
         }
         let links = Links::new(positions.len(), &faces);
         let has_branches = links.twins().contains(&links::MANY);
         let (pieces, piece_sizes) = pieces(positions.len(), &faces);
-        let normals = (!turned.is_one_sided).then(|| normals(&positions, &faces));
+        let normals = (!rewinding.is_one_sided).then(|| normals(&positions, &faces));
         let mut surface = Surface {
             positions,
             faces,
             normals,
             links,
         };
-        let tree = Tree::new(&surface);
+        let tree = FaceTree::new(&surface);
         let size = tree.extent();
         surface.positions.shrink_to_fit();
         Ok(Self {
@@ -108,7 +108,7 @@ impl Mesh {
         })
     }
 
-    /// What was odd with the input.
+    /// Warnings about the input.
     #[must_use]
     pub fn warnings(&self) -> &[MeshWarning] {
         &self.warnings

@@ -26,7 +26,7 @@ pub enum ReadError {
         /// What is wrong, and in which line where that is known.
         reason: String,
     },
-    /// The file can be read, and what it has is no mesh.
+    /// The file can be read, but does not make a valid mesh.
     #[error(transparent)]
     Mesh(#[from] MeshError),
 }
@@ -61,7 +61,7 @@ impl Mesh {
     /// Of the text of an OBJ file: the faces of all its objects and groups.
     ///
     /// # Errors
-    /// When the text has a fault, or what it has is no mesh.
+    /// When the text has a fault, or does not make a valid mesh.
     pub fn of_obj(text: &[u8]) -> Result<Self, ReadError> {
         Ok(obj(text)?.mesh()?)
     }
@@ -70,7 +70,7 @@ impl Mesh {
     /// `vertex_indices` (or `vertex_index`) of its faces.
     ///
     /// # Errors
-    /// When the bytes have a fault, or what they have is no mesh.
+    /// When the bytes have a fault, or do not make a valid mesh.
     pub fn of_ply(bytes: &[u8]) -> Result<Self, ReadError> {
         Ok(ply(bytes)?.mesh()?)
     }
@@ -148,12 +148,12 @@ pub fn obj(text: &[u8]) -> Result<Polygons, ReadError> {
 }
 
 /// A row of a PLY file: a vertex, a face, or something else.
-struct Row {
+struct PlyRow {
     position: DVec3,
     indices: Option<Vec<i64>>,
 }
 
-impl PropertyAccess for Row {
+impl PropertyAccess for PlyRow {
     fn new() -> Self {
         Self {
             position: DVec3::NAN,
@@ -208,7 +208,7 @@ fn indices(property: &Property) -> Option<Vec<i64>> {
 /// When the bytes have a fault.
 pub fn ply(bytes: &[u8]) -> Result<Polygons, ReadError> {
     let refuse = |reason: String| ReadError::Ply { reason };
-    let parser = Parser::<Row>::new();
+    let parser = Parser::<PlyRow>::new();
     let mut reader = Reader::new(Cursor::new(bytes));
     let header = parser
         .read_header(&mut reader)
@@ -235,7 +235,8 @@ pub fn ply(bytes: &[u8]) -> Result<Polygons, ReadError> {
                 "face {face} (from 0) has no `vertex_indices`"
             )));
         };
-        let polygon: Result<Vec<u32>, _> = indices.iter().map(|&own| u32::try_from(own)).collect();
+        let polygon: Result<Vec<u32>, _> =
+            indices.iter().map(|&index| u32::try_from(index)).collect();
         polygons.push(polygon.map_err(|_| {
             refuse(format!(
                 "face {face} (from 0) names a vertex below 0: {indices:?}"

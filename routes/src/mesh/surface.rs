@@ -1,10 +1,10 @@
-//! Triangles with their neighbourhood: what the ways of finding a route work on.
+//! Triangles with their neighbourhood: the data that all route searches work on.
 
 use glam::DVec3;
 
 use crate::mesh::links::{Links, at};
 
-/// A mesh that was checked, perhaps with start and goal as vertices of their own.
+/// A mesh that was checked, perhaps with start and goal added as vertices.
 #[derive(Debug, Clone)]
 pub(crate) struct Surface {
     pub(crate) positions: Vec<DVec3>,
@@ -15,7 +15,7 @@ pub(crate) struct Surface {
     pub(crate) links: Links,
 }
 
-/// A point on an edge: the fraction of the way from one vertex to the other; a vertex itself where
+/// A point on an edge: the fraction of the distance from one vertex to the other; a vertex itself where
 /// the two are the same.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Spot {

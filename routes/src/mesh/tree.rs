@@ -10,7 +10,7 @@ const LEAF: usize = 4;
 
 /// Boxes about halves of the triangles, halved again.
 #[derive(Debug, Clone)]
-pub(crate) struct Tree {
+pub(crate) struct FaceTree {
     /// A complete binary tree: the halves of box `i` are `2i + 1` and `2i + 2`.
     boxes: Vec<(DVec3, DVec3)>,
     /// The faces in the order of the leaves.
@@ -26,7 +26,7 @@ pub(crate) struct Nearest {
     pub(crate) distance: f64,
 }
 
-impl Tree {
+impl FaceTree {
     pub(crate) fn new(surface: &Surface) -> Self {
         let count = surface.faces.len();
         let mut tree = Self {
@@ -44,7 +44,7 @@ impl Tree {
         tree
     }
 
-    fn build(&mut self, surface: &Surface, place: usize, faces: &mut [u32]) {
+    fn build(&mut self, surface: &Surface, index: usize, faces: &mut [u32]) {
         let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         for corner in faces
             .iter()
@@ -52,8 +52,8 @@ impl Tree {
         {
             (low, high) = (low.min(corner), high.max(corner));
         }
-        self.boxes[place] = (low, high);
-        if 2 * place + 1 >= self.boxes.len() {
+        self.boxes[index] = (low, high);
+        if 2 * index + 1 >= self.boxes.len() {
             return;
         }
         let axis = (high - low).max_position();
@@ -66,8 +66,8 @@ impl Tree {
             faces.select_nth_unstable_by(half, |a, b| middle(a).total_cmp(&middle(b)));
         }
         let (one, other) = faces.split_at_mut(half);
-        self.build(surface, 2 * place + 1, one);
-        self.build(surface, 2 * place + 2, other);
+        self.build(surface, 2 * index + 1, one);
+        self.build(surface, 2 * index + 2, other);
     }
 
     /// The largest extent of all along an axis.
@@ -93,14 +93,14 @@ impl Tree {
         &self,
         surface: &Surface,
         point: DVec3,
-        (place, start, end): (usize, usize, usize),
+        (index, start, end): (usize, usize, usize),
         best: &mut Nearest,
     ) {
-        if self.distance(place, point) > best.distance {
+        if self.distance(index, point) > best.distance {
             return;
         }
         let middle = start + (end - start) / 2;
-        let halves = [(2 * place + 1, start, middle), (2 * place + 2, middle, end)];
+        let halves = [(2 * index + 1, start, middle), (2 * index + 2, middle, end)];
         if halves[0].0 < self.boxes.len() {
             let swap = self.distance(halves[1].0, point) < self.distance(halves[0].0, point);
             self.search(surface, point, halves[usize::from(swap)], best);
@@ -108,15 +108,15 @@ impl Tree {
             return;
         }
         for &face in &self.order[start..end] {
-            let own = nearest_on(surface, face as usize, point);
-            if (own.distance, own.face) < (best.distance, best.face) {
-                *best = own;
+            let candidate = nearest_on(surface, face as usize, point);
+            if (candidate.distance, candidate.face) < (best.distance, best.face) {
+                *best = candidate;
             }
         }
     }
 
-    fn distance(&self, place: usize, point: DVec3) -> f64 {
-        let (low, high) = self.boxes[place];
+    fn distance(&self, index: usize, point: DVec3) -> f64 {
+        let (low, high) = self.boxes[index];
         (low - point).max(point - high).max(DVec3::ZERO).length()
     }
 }

@@ -6,8 +6,8 @@ use std::collections::{HashMap, HashSet};
 use glam::DVec3;
 
 use crate::error::{MeshError, MeshWarning};
-use crate::mesh::MOST_TRIANGLES;
-use crate::mesh::cut::{MOST_CORNERS, Uncut, cut};
+use crate::mesh::MAX_TRIANGLES;
+use crate::mesh::cut::{MAX_CORNERS, Uncut, cut};
 use crate::mesh::joints::{near_open_sides, on_open_sides};
 
 /// Triangles between different points, all of which are used.
@@ -43,11 +43,11 @@ impl Count {
 
 /// Positions nearer to each other than `tolerance` become the first of them.
 pub(super) fn weld<'a>(
-    given: &[DVec3],
+    input: &[DVec3],
     polygons: impl IntoIterator<Item = &'a [u32]>,
     tolerance: f64,
 ) -> Result<Welded, MeshError> {
-    for (vertex, &position) in given.iter().enumerate() {
+    for (vertex, &position) in input.iter().enumerate() {
         if !position.is_finite() || position.abs().max_element() > LARGEST {
             return Err(MeshError::NotFinite { vertex, position });
         }
@@ -55,7 +55,7 @@ pub(super) fn weld<'a>(
     if !(0.0..=LARGEST).contains(&tolerance) {
         return Err(MeshError::Weld { tolerance });
     }
-    let mut welding = Welding::new(given, tolerance);
+    let mut welding = Welding::new(input, tolerance);
     let (mut dropped, mut uneven, mut doubled) = <(Count, Count, Count)>::default();
     for (face, polygon) in polygons.into_iter().enumerate() {
         if polygon.len() < 3 {
@@ -64,12 +64,12 @@ pub(super) fn weld<'a>(
         }
         let outside = polygon
             .iter()
-            .find(|&&vertex| vertex as usize >= given.len());
+            .find(|&&vertex| vertex as usize >= input.len());
         if let Some(&vertex) = outside {
             return Err(MeshError::Index {
                 face,
                 vertex: u64::from(vertex),
-                count: given.len(),
+                count: input.len(),
             });
         }
         // Equal neighbours are one corner.
@@ -90,18 +90,18 @@ pub(super) fn weld<'a>(
             doubled.add(corners.len() - 2, face);
             continue;
         }
-        let places: Vec<DVec3> = corners
+        let points: Vec<DVec3> = corners
             .iter()
-            .map(|&vertex| given[vertex as usize])
+            .map(|&vertex| input[vertex as usize])
             .collect();
-        let made = match cut(&places) {
+        let made = match cut(&points) {
             Ok(made) => made,
             Err(Uncut::Flat) if tolerance > 0.0 => {
                 dropped.add(corners.len() - 2, face);
                 continue;
             }
             Err(Uncut::Flat) => {
-                let corners = [places[0], places[1], places[2]];
+                let corners = [points[0], points[1], points[2]];
                 return Err(MeshError::Flat { face, corners });
             }
             Err(Uncut::Crosses) => return Err(MeshError::Crosses { face }),
@@ -109,7 +109,7 @@ pub(super) fn weld<'a>(
                 return Err(MeshError::TooManyCorners {
                     face,
                     corners: corners.len(),
-                    most: MOST_CORNERS,
+                    max: MAX_CORNERS,
                 });
             }
         };
@@ -130,10 +130,10 @@ pub(super) fn weld<'a>(
                 welding.faces.push(face);
             }
         }
-        if welding.faces.len() > MOST_TRIANGLES {
+        if welding.faces.len() > MAX_TRIANGLES {
             return Err(MeshError::TooMany {
                 triangles: welding.faces.len(),
-                most: MOST_TRIANGLES,
+                max: MAX_TRIANGLES,
             });
         }
     }
@@ -210,12 +210,12 @@ fn cut_sides(positions: &[DVec3], faces: &mut Vec<[u32; 3]>, tolerance: f64) -> 
             .chain([c])
             .chain(on_sides[2].iter().copied())
             .collect();
-        let places: Vec<DVec3> = corners
+        let points: Vec<DVec3> = corners
             .iter()
             .map(|&vertex| positions[vertex as usize])
             .collect();
         // A face so thin that it cannot be cut stays.
-        let Ok(made) = cut(&places) else { continue };
+        let Ok(made) = cut(&points) else { continue };
         count += corners.len() - 3;
         let mut triangles = made
             .triangles
@@ -234,7 +234,7 @@ fn sorted(mut triangle: [u32; 3]) -> [u32; 3] {
     triangle
 }
 
-/// The same list for the same polygon, wherever it begins and whichever way it goes round.
+/// The same list for the same polygon, wherever it begins and in either direction.
 fn canonical(corners: &[u32]) -> Vec<u32> {
     let count = corners.len();
     let from =
@@ -249,19 +249,19 @@ fn canonical(corners: &[u32]) -> Vec<u32> {
         .unwrap_or_default()
 }
 
-/// Vertices that are met on the way.
+/// The vertices, positions and faces so far.
 struct Welding<'a> {
-    given: &'a [DVec3],
+    input: &'a [DVec3],
     tolerance: f64,
     /// For cells of the tolerance's size, or exact positions, the first vertices there.
     cells: HashMap<[u64; 3], Vec<u32>>,
-    /// For each given vertex the first at its position.
+    /// For each input vertex the first at its position.
     firsts: Vec<u32>,
     /// For each of these its number among those that triangles use.
     numbers: HashMap<u32, u32>,
     positions: Vec<DVec3>,
     faces: Vec<[u32; 3]>,
-    /// What there is already.
+    /// The triangles and polygons so far, to drop doubles.
     triangles: HashSet<[u32; 3]>,
     polygons: HashSet<Vec<u32>>,
 }
@@ -269,12 +269,12 @@ struct Welding<'a> {
 const UNKNOWN: u32 = u32::MAX;
 
 impl<'a> Welding<'a> {
-    fn new(given: &'a [DVec3], tolerance: f64) -> Self {
+    fn new(input: &'a [DVec3], tolerance: f64) -> Self {
         Self {
-            given,
+            input,
             tolerance,
             cells: HashMap::new(),
-            firsts: vec![UNKNOWN; given.len()],
+            firsts: vec![UNKNOWN; input.len()],
             numbers: HashMap::new(),
             positions: Vec::new(),
             faces: Vec::new(),
@@ -289,7 +289,7 @@ impl<'a> Welding<'a> {
         if known != UNKNOWN {
             return known;
         }
-        let position = self.given[vertex as usize];
+        let position = self.input[vertex as usize];
         // Adding 0 makes 0 of -0.
         let key = |cell: DVec3| (cell + DVec3::ZERO).to_array().map(f64::to_bits);
         let cell = (position / self.tolerance).floor();
@@ -311,7 +311,7 @@ impl<'a> Welding<'a> {
                     .get(&key(cell + step))
                     .map_or(&[][..], Vec::as_slice);
                 let near = there.iter().copied().filter(|&other| {
-                    self.given[other as usize].distance(position) <= self.tolerance
+                    self.input[other as usize].distance(position) <= self.tolerance
                 });
                 found = found.into_iter().chain(near).min();
             }
@@ -331,7 +331,7 @@ impl<'a> Welding<'a> {
 
     /// The number of a first vertex among those that triangles use.
     fn vertex(&mut self, vertex: u32) -> u32 {
-        let position = self.given[vertex as usize];
+        let position = self.input[vertex as usize];
         *self.numbers.entry(vertex).or_insert_with(|| {
             self.positions.push(position + DVec3::ZERO);
             self.positions.len() as u32 - 1

@@ -1,4 +1,4 @@
-//! Bernstein's polynomials, and what follows from them at a point of a surface.
+//! Bernstein's polynomials, and the derivatives of a surface at a point.
 
 use glam::{DVec2, DVec3};
 
@@ -23,11 +23,11 @@ fn polynomials(count: usize, t: f64) -> Vec<[f64; 3]> {
         let factor = degree as f64;
         for i in (0..=degree).rev() {
             let [lower, lower_1, _] = if i > 0 { values[i - 1] } else { [0.0; 3] };
-            let [own, own_1, _] = if i < degree { values[i] } else { [0.0; 3] };
+            let [current, current_1, _] = if i < degree { values[i] } else { [0.0; 3] };
             values[i] = [
-                (1.0 - t) * own + t * lower,
-                factor * (lower - own),
-                factor * (lower_1 - own_1),
+                (1.0 - t) * current + t * lower,
+                factor * (lower - current),
+                factor * (lower_1 - current_1),
             ];
         }
     }

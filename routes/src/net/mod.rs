@@ -12,9 +12,9 @@ use crate::net::bernstein::Derivatives;
 use crate::route::{By, Route};
 
 /// Control points along one side at most: polynomials of higher degree lose their digits.
-pub const MOST_POINTS: usize = 32;
+pub const MAX_POINTS: usize = 32;
 /// Facets along one side at most.
-pub const MOST_FACETS: usize = 10_000;
+pub const MAX_FACETS: usize = 10_000;
 /// Points of a line in (u, v), without the first.
 const LINE_STEPS: usize = 256;
 
@@ -32,7 +32,7 @@ pub struct Net {
 #[non_exhaustive]
 pub enum NetError {
     /// Too few control points, or too many.
-    #[error("the net has {rows} x {columns} control points; each side has 2 to {MOST_POINTS}")]
+    #[error("the net has {rows} x {columns} control points; each side has 2 to {MAX_POINTS}")]
     Shape {
         /// Along u.
         rows: usize,
@@ -60,13 +60,13 @@ pub enum NetError {
         point: DVec3,
     },
     /// No facets, or too many.
-    #[error("{facets} facets along a side; give 1 to {MOST_FACETS}")]
+    #[error("{facets} facets along a side are out of range; give 1 to {MAX_FACETS}")]
     Facets {
         /// How many were asked for.
         facets: usize,
     },
     /// The facets are no mesh.
-    #[error("the facets of the net are no mesh: {0}")]
+    #[error("the facets of the net do not make a valid mesh: {0}")]
     Mesh(#[from] MeshError),
     /// There is no route on the facets.
     #[error(transparent)]
@@ -76,9 +76,9 @@ pub enum NetError {
 /// How a route on a surface is found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum NetBy {
-    /// The straight line in (u, v), carried over to the surface; not the shortest way.
+    /// The straight line in (u, v), carried over to the surface; not the shortest path.
     Line,
-    /// The shortest way on so many by so many squares of two triangles each. They lie below the
+    /// The shortest path on so many by so many squares of two triangles each. They lie below the
     /// surface or above it by an error that falls with the square of their number.
     Facets(usize),
 }
@@ -100,7 +100,7 @@ impl Net {
     /// # Errors
     /// When there are too few or too many, or one is no point.
     pub fn new(rows: usize, columns: usize, points: Vec<DVec3>) -> Result<Self, NetError> {
-        let sides = 2..=MOST_POINTS;
+        let sides = 2..=MAX_POINTS;
         if !sides.contains(&rows) || !sides.contains(&columns) {
             return Err(NetError::Shape { rows, columns });
         }
@@ -113,11 +113,11 @@ impl Net {
             });
         }
         let is_bad = |point: &DVec3| !point.is_finite() || point.abs().max_element() > 1e75;
-        if let Some(place) = points.iter().position(is_bad) {
+        if let Some(index) = points.iter().position(is_bad) {
             return Err(NetError::NotFinite {
-                row: place / columns,
-                column: place % columns,
-                point: points[place],
+                row: index / columns,
+                column: index % columns,
+                point: points[index],
             });
         }
         Ok(Self {
@@ -134,7 +134,7 @@ impl Net {
     }
 
     /// The unit normal at (u, v), in the direction of the derivative by u × that by v. At a side
-    /// that is collapsed to a point it is that of a place beside it.
+    /// that is collapsed to a point it is that of a point beside it.
     #[must_use]
     pub fn normal(&self, uv: DVec2) -> DVec3 {
         let at = |uv| {
@@ -175,7 +175,7 @@ impl Net {
     /// # Errors
     /// When there are none or too many, or they are no mesh.
     pub fn facets(&self, facets: usize) -> Result<Mesh, NetError> {
-        if !(1..=MOST_FACETS).contains(&facets) {
+        if !(1..=MAX_FACETS).contains(&facets) {
             return Err(NetError::Facets { facets });
         }
         let part = |i: usize| i as f64 / facets as f64;

@@ -10,14 +10,14 @@ use crate::net::bernstein::Derivatives;
 use crate::net::{Net, OnNet};
 
 /// Parts that are looked at, at most: about the centre of a sphere none can be dropped.
-const MOST_PARTS: usize = 2000;
+const MAX_PARTS: usize = 2000;
 /// Parts are not halved any more when they are so small in u and v.
 const SMALLEST: f64 = 1.0 / 256.0;
 /// Steps of Newton's method, which doubles the digits each time, and of halving a step.
 const STEPS: usize = 60;
 
 /// A part of the surface, with control points of its own.
-struct Part {
+struct NetPart {
     net: Net,
     low: DVec2,
     high: DVec2,
@@ -29,15 +29,15 @@ pub(super) fn nearest(net: &Net, point: DVec3) -> OnNet {
         point,
         distance: f64::INFINITY,
     };
-    let mut parts = vec![Part {
+    let mut parts = vec![NetPart {
         net: net.clone(),
         low: DVec2::ZERO,
         high: DVec2::ONE,
     }];
     let mut heap = BinaryHeap::from([Reverse((Distance(0.0), 0))]);
     while let Some(Reverse((Distance(least), index))) = heap.pop() {
-        // The box of its control points holds the part.
-        if least >= best.distance || parts.len() > MOST_PARTS {
+        // The part lies within the box of its control points.
+        if least >= best.distance || parts.len() > MAX_PARTS {
             break;
         }
         let (low, high) = (parts[index].low, parts[index].high);
@@ -76,23 +76,23 @@ impl Net {
 }
 
 /// Both halves along the longer side, by de Casteljau's means.
-fn halves(part: &Part) -> [Part; 2] {
-    let Part { net, low, high } = part;
+fn halves(part: &NetPart) -> [NetPart; 2] {
+    let NetPart { net, low, high } = part;
     let along_u = high.x - low.x >= high.y - low.y;
     let (count, lines) = match along_u {
         true => (net.rows, net.columns),
         false => (net.columns, net.rows),
     };
-    let place = |line: usize, i: usize| match along_u {
+    let index = |line: usize, i: usize| match along_u {
         true => i * net.columns + line,
         false => line * net.columns + i,
     };
     let (mut first, mut second) = (net.clone(), net.clone());
     for line in 0..lines {
-        let mut means: Vec<DVec3> = (0..count).map(|i| net.points[place(line, i)]).collect();
+        let mut means: Vec<DVec3> = (0..count).map(|i| net.points[index(line, i)]).collect();
         for i in 0..count {
-            first.points[place(line, i)] = means[0];
-            second.points[place(line, count - 1 - i)] = means[count - 1 - i];
+            first.points[index(line, i)] = means[0];
+            second.points[index(line, count - 1 - i)] = means[count - 1 - i];
             for k in 0..count - 1 - i {
                 means[k] = DVec3::midpoint(means[k], means[k + 1]);
             }
@@ -106,12 +106,12 @@ fn halves(part: &Part) -> [Part; 2] {
         (end.y, begin.y) = (middle.y, middle.y);
     }
     [
-        Part {
+        NetPart {
             net: first,
             low: *low,
             high: end,
         },
-        Part {
+        NetPart {
             net: second,
             low: begin,
             high: *high,
@@ -119,7 +119,7 @@ fn halves(part: &Part) -> [Part; 2] {
     ]
 }
 
-/// From a place in the square to the nearest one at which no direction within the square leads
+/// From a point in the square to the nearest one at which no direction within the square leads
 /// nearer to the point.
 fn newton(net: &Net, point: DVec3, start: DVec2) -> OnNet {
     let mut uv = start;
@@ -144,7 +144,7 @@ fn newton(net: &Net, point: DVec3, start: DVec2) -> OnNet {
         match next {
             Some(next) => (uv, here) = next,
             None => {
-                // The distance is flat to its last digit: the derivatives still tell the place.
+                // The distance is flat to its last digit: the derivatives still locate the minimum.
                 let last = (uv + step).clamp(DVec2::ZERO, DVec2::ONE);
                 if (last - uv).length() < 1e-7 {
                     uv = last;
@@ -168,7 +168,7 @@ fn step(here: &Derivatives, point: DVec3, uv: DVec2) -> Option<DVec2> {
     let slope = DVec2::new(away.dot(here.u), away.dot(here.v));
     let is_held =
         |value: f64, slope: f64| value <= 0.0 && slope > 0.0 || value >= 1.0 && slope < 0.0;
-    let (hold_u, hold_v) = (is_held(uv.x, slope.x), is_held(uv.y, slope.y));
+    let (fixed_u, fixed_v) = (is_held(uv.x, slope.x), is_held(uv.y, slope.y));
     let (gauss_uu, gauss_vv) = (here.u.length_squared(), here.v.length_squared());
     let gauss_uv = here.u.dot(here.v);
     let uu = gauss_uu + away.dot(here.uu);
@@ -179,7 +179,7 @@ fn step(here: &Derivatives, point: DVec3, uv: DVec2) -> Option<DVec2> {
         let by = if full > 0.0 { full } else { gauss };
         if by > 0.0 { -slope / by } else { 0.0 }
     };
-    let step = match (hold_u, hold_v) {
+    let step = match (fixed_u, fixed_v) {
         (true, true) => return None,
         (true, false) => DVec2::new(0.0, one(vv, gauss_vv, slope.y)),
         (false, true) => DVec2::new(one(uu, gauss_uu, slope.x), 0.0),

@@ -2,7 +2,7 @@
 
 use glam::DVec2;
 
-use crate::walkers::region::{Line, Region};
+use crate::walkers::region::{Region, StraightMotion};
 use crate::walkers::{Mover, Plan, Walker, WalkerError};
 
 /// What a mover does after its last time.
@@ -12,8 +12,8 @@ pub(super) enum Stay {
     Remains,
 }
 
-/// Between places where the obstacles change the way is cut into so many steps; one waits at their
-/// ends alone.
+/// Between distances where the obstacles change, the route is cut into so many steps; walkers wait at
+/// the ends of steps only.
 const STEPS: usize = 16;
 /// Delays nearer than this part to each other are the same: regions that touch leave no gap.
 const SAME: f64 = 1e-10;
@@ -23,70 +23,70 @@ type Interval = (f64, f64);
 
 pub(super) fn plan(walker: &Walker, others: &[(Mover, Stay)]) -> Result<Plan, WalkerError> {
     let points = &walker.route.points;
-    let mut gone = 0.0;
+    let mut length = 0.0;
     let mut stops = vec![0.0];
     for pair in points.windows(2) {
-        gone += pair[0].distance(pair[1]);
-        stops.push(gone);
+        length += pair[0].distance(pair[1]);
+        stops.push(length);
     }
     let regions = regions(walker, &stops, others);
-    let places = places(&stops, &regions);
-    // The delays with which one can come to each place.
+    let wait_points = wait_points(&stops, &regions);
+    // The delays with which the walker can come to each wait point.
     let mut reached: Vec<Vec<Interval>> = vec![vec![(0.0, 0.0)]];
-    for (index, &place) in places.iter().enumerate() {
-        let mut from = raised(&reached[index], &blocked(&regions, place, place));
+    for (index, &distance) in wait_points.iter().enumerate() {
+        let mut from = raised(&reached[index], &blocked(&regions, distance, distance));
         if index == 0 {
             // Until it sets out it stands where it is.
-            from.retain_mut(|own| {
-                own.0 = own.0.max(walker.start);
-                own.0 <= own.1
+            from.retain_mut(|interval| {
+                interval.0 = interval.0.max(walker.start);
+                interval.0 <= interval.1
             });
         }
-        let Some(&next) = places.get(index + 1) else {
+        let Some(&next) = wait_points.get(index + 1) else {
             reached.push(from);
             break;
         };
-        let on = without(&from, &blocked(&regions, place, next));
+        let on = without(&from, &blocked(&regions, distance, next));
         if on.is_empty() {
             return Err(WalkerError::Blocked);
         }
         reached.push(on);
     }
-    let delay = |index: usize, most: f64| {
+    let delay = |index: usize, limit: f64| {
         let gaps = raised(
             &reached[index],
-            &blocked(&regions, places[index], places[index]),
+            &blocked(&regions, wait_points[index], wait_points[index]),
         );
         let gap = gaps
             .into_iter()
             .rev()
-            .find(|own| own.0 <= most + same(most));
-        gap.map_or(most, |own| own.0.min(most))
+            .find(|interval| interval.0 <= limit + same(limit));
+        gap.map_or(limit, |found| found.0.min(limit))
     };
-    let last = places.len() - 1;
-    let arriving = reached[last].first().map(|own| own.0);
+    let last = wait_points.len() - 1;
+    let arriving = reached[last].first().map(|first| first.0);
     let Some(arriving) = arriving.filter(|_| !reached[last + 1].is_empty()) else {
         return Err(WalkerError::Blocked);
     };
     // Alone on one point there is nothing to walk.
     let arriving = if last == 0 { walker.start } else { arriving };
     // From the goal back: with each delay one has come from the least in its gap.
-    let mut delays = vec![(arriving, arriving); places.len()];
-    let mut own = arriving;
+    let mut delays = vec![(arriving, arriving); wait_points.len()];
+    let mut current = arriving;
     for index in (0..=last).rev() {
         let before = if index == 0 {
             0.0
         } else {
-            delay(index, own).min(own)
+            delay(index, current).min(current)
         };
-        let before = if index == last { own } else { before };
-        delays[index] = (before, own);
-        own = before;
+        let before = if index == last { current } else { before };
+        delays[index] = (before, current);
+        current = before;
     }
     if last == 0 {
         delays[0] = (0.0, arriving);
     }
-    Ok(timed(walker, &stops, &places, &delays))
+    Ok(timed(walker, &stops, &wait_points, &delays))
 }
 
 fn same(delay: f64) -> f64 {
@@ -99,23 +99,30 @@ fn regions(
     others: &[(Mover, Stay)],
 ) -> Vec<(DVec2, DVec2, Region)> {
     let points = &walker.route.points;
-    let stretch = |k: usize| Line::between((stops[k], points[k]), (stops[k + 1], points[k + 1]));
-    let mut ways: Vec<Line> = (0..points.len() - 1).map(stretch).collect();
-    if ways.is_empty() {
-        ways.push(Line::standing(0.0, 0.0, points[0]));
+    let stretch =
+        |k: usize| StraightMotion::between((stops[k], points[k]), (stops[k + 1], points[k + 1]));
+    let mut segments: Vec<StraightMotion> = (0..points.len() - 1).map(stretch).collect();
+    if segments.is_empty() {
+        segments.push(StraightMotion::standing(0.0, 0.0, points[0]));
     }
     let mut regions = Vec::new();
     for (other, stay) in others {
         let pairs = other.track.windows(2);
-        let mut lines: Vec<Line> = pairs.map(|pair| Line::between(pair[0], pair[1])).collect();
-        if let (Some(&(time, place)), Stay::Remains) = (other.track.last(), stay) {
-            lines.push(Line::standing(time, f64::INFINITY, place));
+        let mut lines: Vec<StraightMotion> = pairs
+            .map(|pair| StraightMotion::between(pair[0], pair[1]))
+            .collect();
+        if let (Some(&(time, position)), Stay::Remains) = (other.track.last(), stay) {
+            lines.push(StraightMotion::standing(time, f64::INFINITY, position));
         }
         for &line in &lines {
-            for &way in &ways {
-                let region =
-                    Region::new(way, line, 1.0 / walker.speed, walker.radius + other.radius);
-                if let Some((low, high)) = region.extent(way.from, way.to)
+            for &segment in &segments {
+                let region = Region::new(
+                    segment,
+                    line,
+                    1.0 / walker.speed,
+                    walker.radius + other.radius,
+                );
+                if let Some((low, high)) = region.extent(segment.from, segment.to)
                     && high.y >= 0.0
                 {
                     regions.push((low, high, region));
@@ -126,16 +133,17 @@ fn regions(
     regions
 }
 
-/// Where one may wait: at the points of the way, where obstacles begin and end, and between.
-fn places(stops: &[f64], regions: &[(DVec2, DVec2, Region)]) -> Vec<f64> {
+/// The distances at which the walker may wait: at the points of the route, where obstacles begin and
+/// end, and between.
+fn wait_points(stops: &[f64], regions: &[(DVec2, DVec2, Region)]) -> Vec<f64> {
     let end = stops[stops.len() - 1];
     let ends = regions.iter().flat_map(|(low, high, _)| [low.x, high.x]);
     let mut marks: Vec<f64> = stops.iter().copied().chain(ends).collect();
     marks.sort_by(f64::total_cmp);
-    let mut places = vec![0.0];
+    let mut distances = vec![0.0];
     for mark in marks {
         let mark = mark.clamp(0.0, end);
-        let before = places[places.len() - 1];
+        let before = distances[distances.len() - 1];
         if mark - before <= 1e-12 * end {
             continue;
         }
@@ -146,29 +154,29 @@ fn places(stops: &[f64], regions: &[(DVec2, DVec2, Region)]) -> Vec<f64> {
             1
         };
         let part = (mark - before) / steps as f64;
-        places.extend((1..steps).map(|step| before + step as f64 * part));
-        places.push(mark);
+        distances.extend((1..steps).map(|step| before + step as f64 * part));
+        distances.push(mark);
     }
-    if let Some(last) = places.last_mut().filter(|_| end > 0.0) {
+    if let Some(last) = distances.last_mut().filter(|_| end > 0.0) {
         *last = end;
     }
-    places
+    distances
 }
 
-/// The open intervals of delays that some region holds between two places, apart and in order.
+/// The open intervals of delays that some region blocks between two distances, apart and in order.
 fn blocked(regions: &[(DVec2, DVec2, Region)], from: f64, to: f64) -> Vec<Interval> {
     let near = regions
         .iter()
         .filter(|(low, high, _)| low.x <= to && high.x >= from);
     let extents = near.filter_map(|(_, _, region)| region.extent(from, to));
     let mut all: Vec<Interval> = extents.map(|(low, high)| (low.y, high.y)).collect();
-    all.retain(|own| own.1 - own.0 > same(own.0));
+    all.retain(|interval| interval.1 - interval.0 > same(interval.0));
     all.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut apart: Vec<Interval> = Vec::with_capacity(all.len());
-    for own in all {
+    for interval in all {
         match apart.last_mut() {
-            Some(last) if own.0 <= last.1 + same(last.1) => last.1 = last.1.max(own.1),
-            _ => apart.push(own),
+            Some(last) if interval.0 <= last.1 + same(last.1) => last.1 = last.1.max(interval.1),
+            _ => apart.push(interval),
         }
     }
     apart
@@ -193,7 +201,8 @@ fn gaps(blocked: &[Interval]) -> Vec<Interval> {
 /// By waiting: in each gap all from the least that is reached.
 fn raised(reached: &[Interval], blocked: &[Interval]) -> Vec<Interval> {
     let raise = |(low, high): Interval| {
-        let within = |own: &&Interval| own.1 >= low - same(low) && own.0 <= high + same(high);
+        let within =
+            |interval: &&Interval| interval.1 >= low - same(low) && interval.0 <= high + same(high);
         let least = reached.iter().find(within)?.0;
         Some((least.clamp(low, high), high))
     };
@@ -221,33 +230,33 @@ fn without(reached: &[Interval], blocked: &[Interval]) -> Vec<Interval> {
     left
 }
 
-/// When one is where.
-fn timed(walker: &Walker, stops: &[f64], places: &[f64], delays: &[(f64, f64)]) -> Plan {
+/// When the walker is where.
+fn timed(walker: &Walker, stops: &[f64], wait_points: &[f64], delays: &[(f64, f64)]) -> Plan {
     let points = &walker.route.points;
-    let at = |place: f64| {
+    let at = |distance: f64| {
         let next = stops
-            .partition_point(|&stop| stop < place)
+            .partition_point(|&stop| stop < distance)
             .clamp(1, stops.len().max(2) - 1);
         match (points.get(next - 1), points.get(next)) {
             (Some(&one), Some(&other)) => {
-                let part = (place - stops[next - 1]) / (stops[next] - stops[next - 1]);
+                let part = (distance - stops[next - 1]) / (stops[next] - stops[next - 1]);
                 one.lerp(other, part.clamp(0.0, 1.0))
             }
             _ => points[0],
         }
     };
     let mut times: Vec<(f64, f64, glam::DVec3)> = Vec::new();
-    for (index, (&place, &(before, behind))) in places.iter().zip(delays).enumerate() {
-        let walked = place / walker.speed;
+    for (index, (&distance, &(before, behind))) in wait_points.iter().zip(delays).enumerate() {
+        let walked = distance / walker.speed;
         let waits = behind - before > same(before);
         let is_stop = stops
-            .binary_search_by(|stop| stop.total_cmp(&place))
+            .binary_search_by(|stop| stop.total_cmp(&distance))
             .is_ok();
-        if waits || is_stop || index == 0 || index + 1 == places.len() {
-            times.push((before + walked, place, at(place)));
+        if waits || is_stop || index == 0 || index + 1 == wait_points.len() {
+            times.push((before + walked, distance, at(distance)));
         }
         if waits {
-            times.push((behind + walked, place, at(place)));
+            times.push((behind + walked, distance, at(distance)));
         }
     }
     let arrival = times.last().map_or(0.0, |last| last.0);

@@ -1,11 +1,11 @@
-//! Where two bodies on straight stretches touch, in the way gone and the delay.
+//! Where two bodies on straight stretches touch, in terms of the distance walked and the delay.
 
 use glam::{DVec2, DVec3, Vec2Swizzles};
 
 /// Distances within this part of the sum of radii are equal to it: bodies may touch.
 const TOUCH: f64 = 1e-12;
 
-/// The obstacle of one stretch of another body on one stretch of a way: all (s, w) at which the
+/// The obstacle of one stretch of another body on one stretch of a route: all (s, w) at which the
 /// distance is below `reach`, a convex region.
 #[derive(Debug, Clone)]
 pub(super) struct Region {
@@ -17,16 +17,16 @@ pub(super) struct Region {
     /// Of the other's stretch, seconds.
     from: f64,
     to: f64,
-    /// Seconds for each unit of the way.
+    /// Seconds for each unit of distance.
     slowness: f64,
-    /// The ends of the way's stretch.
+    /// The ends of the route's stretch.
     pub(super) start: f64,
     pub(super) end: f64,
 }
 
 /// A body on a straight stretch: where it is at a parameter, and how that changes with it.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Line {
+pub(super) struct StraightMotion {
     pub(super) from: f64,
     pub(super) to: f64,
     /// At the parameter 0.
@@ -34,7 +34,7 @@ pub(super) struct Line {
     pub(super) rate: DVec3,
 }
 
-impl Line {
+impl StraightMotion {
     pub(super) fn between((from, one): (f64, DVec3), (to, other): (f64, DVec3)) -> Self {
         let rate = (other - one) / (to - from);
         let rate = if rate.is_finite() { rate } else { DVec3::ZERO };
@@ -57,25 +57,30 @@ impl Line {
 }
 
 impl Region {
-    /// Of a stretch of the way, which is walked at 1 / `slowness`, and one of another body.
-    pub(super) fn new(way: Line, other: Line, slowness: f64, reach: f64) -> Self {
+    /// Of a stretch of the route, which is walked at 1 / `slowness`, and one of another body.
+    pub(super) fn new(
+        segment: StraightMotion,
+        other: StraightMotion,
+        slowness: f64,
+        reach: f64,
+    ) -> Self {
         Self {
-            offset: way.origin - other.origin,
-            along: way.rate - slowness * other.rate,
+            offset: segment.origin - other.origin,
+            along: segment.rate - slowness * other.rate,
             by_delay: -other.rate,
             reach: reach * (1.0 - TOUCH),
             from: other.from,
             to: other.to,
             slowness,
-            start: way.from,
-            end: way.to,
+            start: segment.from,
+            end: segment.to,
         }
     }
 
-    /// The least and the largest s and w of the region between two places of the way; `None` where
+    /// The least and the largest s and w of the region between two distances on the route; `None` where
     /// it is empty there.
     ///
-    /// A linear function is extreme on a convex region where its boundary turns that way, or in one
+    /// A linear function is extreme on a convex region where its boundary turns in that direction, or in one
     /// of its corners: the curve's with the lines that bound it, or those with each other.
     pub(super) fn extent(&self, start: f64, end: f64) -> Option<(DVec2, DVec2)> {
         let (start, end) = (start.max(self.start), end.min(self.end));
@@ -84,7 +89,7 @@ impl Region {
         }
         let slack = TOUCH * (self.reach + self.offset.length() + self.along.length() * end.abs());
         let mut found: Option<(DVec2, DVec2)> = None;
-        let mut take = |point: DVec2| {
+        let mut include = |point: DVec2| {
             let time = point.y + self.slowness * point.x;
             let is_within = point.is_finite()
                 && point.x >= start - TOUCH * (1.0 + start.abs())
@@ -99,35 +104,35 @@ impl Region {
         };
         let (a, b, c) = (self.along, self.by_delay, self.offset);
         // Where the boundary turns: the gradient by the one coordinate is 0.
-        for (own, other, swap) in [(a, b, false), (b, a, true)] {
-            if own.length_squared() > 0.0 {
-                // own-coordinate = p + q * other-coordinate
-                let p = -own.dot(c) / own.length_squared();
-                let q = -own.dot(other) / own.length_squared();
-                for value in self.roots(c + p * own, other + q * own) {
+        for (main, other, swap) in [(a, b, false), (b, a, true)] {
+            if main.length_squared() > 0.0 {
+                // main coordinate = p + q * other coordinate
+                let p = -main.dot(c) / main.length_squared();
+                let q = -main.dot(other) / main.length_squared();
+                for value in self.roots(c + p * main, other + q * main) {
                     let point = DVec2::new(p + q * value, value);
-                    take(if swap { point.yx() } else { point });
+                    include(if swap { point.yx() } else { point });
                 }
             }
         }
-        // On the bounds of the way, and on those of time: w = time - slowness * s.
+        // On the bounds of the route, and on those of time: w = time - slowness * s.
         let times = [self.from, self.to]
             .into_iter()
             .filter(|time| time.is_finite());
         for s in [start, end] {
             for w in self.roots(c + s * a, b) {
-                take(DVec2::new(s, w));
+                include(DVec2::new(s, w));
             }
             for time in times.clone() {
-                take(DVec2::new(s, time - self.slowness * s));
+                include(DVec2::new(s, time - self.slowness * s));
             }
         }
         for time in times {
             for s in self.roots(c + time * b, a - self.slowness * b) {
-                take(DVec2::new(s, time - self.slowness * s));
+                include(DVec2::new(s, time - self.slowness * s));
             }
         }
-        // Who stays for ever blocks all delays from some one on.
+        // A body that stays for ever blocks all delays from one on.
         let (low, mut high) = found?;
         if self.to == f64::INFINITY {
             high.y = f64::INFINITY;

@@ -1,4 +1,4 @@
-//! Meshes whose shortest ways are known.
+//! Meshes whose shortest routes are known.
 
 use glam::{DVec3, dvec3};
 use tumble_routes::mesh::Mesh;
@@ -34,7 +34,7 @@ pub(crate) fn squares(corners: impl IntoIterator<Item = (i32, i32)>) -> Mesh {
         for (dx, dy) in [(0, 0), (1, 0), (1, 1), (0, 1)] {
             positions.push(dvec3(f64::from(x + dx), f64::from(y + dy), 0.0));
         }
-        triangles.extend([[0, 1, 2], [0, 2, 3]].map(|own| own.map(|k: u32| first + k)));
+        triangles.extend([[0, 1, 2], [0, 2, 3]].map(|triangle| triangle.map(|k: u32| first + k)));
     }
     Mesh::new(&positions, &triangles).unwrap()
 }
@@ -42,8 +42,8 @@ pub(crate) fn squares(corners: impl IntoIterator<Item = (i32, i32)>) -> Mesh {
 /// `width` × `width` vertices above the integers, with diagonals from (x, y) to (x+1, y+1).
 pub(crate) fn heights(width: u32, height: impl Fn(u32, u32) -> f64) -> (Vec<DVec3>, Vec<[u32; 3]>) {
     let all = (0..width).flat_map(|y| (0..width).map(move |x| (x, y)));
-    let place = |(x, y)| dvec3(f64::from(x), f64::from(y), height(x, y));
-    let positions = all.clone().map(place).collect();
+    let position = |(x, y)| dvec3(f64::from(x), f64::from(y), height(x, y));
+    let positions = all.clone().map(position).collect();
     let inner = all.filter(|&(x, y)| x + 1 < width && y + 1 < width);
     let cut = |(x, y): (u32, u32)| {
         let at = |dx, dy| (y + dy) * width + x + dx;

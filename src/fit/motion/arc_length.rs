@@ -1,6 +1,6 @@
 //! Arc length of curves, by which they are traversed at constant speed.
 
-use crate::fit::double::curve::Curve;
+use crate::fit::exact::curve::IntervalCurve;
 use crate::math::dual::Dual;
 use crate::math::quadrature::{gauss, integral};
 use crate::math::quaternion::{length, step};
@@ -21,19 +21,19 @@ const FARTHEST_OUTSIDE: f64 = 0.25;
 
 /// How far a curve has turned at each eighth of its parameter, radians.
 #[derive(Debug)]
-pub(crate) struct Pace {
+pub(crate) struct ArcLengths {
     lengths: [f64; PARTS + 1],
     /// The fractions of the length at which the curve is when its interval starts and ends: 0 and 1, but
     /// far from the time 0, where the exact start and end lie between two times of f64.
     ends: [f64; 2],
 }
 
-impl Pace {
-    pub(crate) fn new(curve: &Curve) -> Self {
+impl ArcLengths {
+    pub(crate) fn new(curve: &IntervalCurve) -> Self {
         let mut lengths = [0.0; PARTS + 1];
         for part in 0..PARTS {
             let [from, to] = [part, part + 1].map(|part| part as f64 / PARTS as f64);
-            lengths[part + 1] = lengths[part] + turned(curve, from, to);
+            lengths[part + 1] = lengths[part] + arc_length_between(curve, from, to);
         }
         Self {
             lengths,
@@ -53,9 +53,9 @@ impl Pace {
 
     /// The curve's own parameter at `t`, which runs from 0 to 1 over the interval, with the first two
     /// derivatives by `t`.
-    pub(crate) fn parameter(&self, curve: &Curve, t: f64) -> Dual {
+    pub(crate) fn parameter(&self, curve: &IntervalCurve, t: f64) -> Dual {
         let [from, to] = self.ends;
-        let mut u = self.place(curve, (from + (to - from) * t) * self.total());
+        let mut u = self.parameter_at(curve, (from + (to - from) * t) * self.total());
         let (mut velocity, mut acceleration) = rates(curve, u);
         if length(velocity) < SLOW * self.total() {
             // A curve at rest has no direction; it has one a little way into the interval.
@@ -71,7 +71,7 @@ impl Pace {
 
     /// The parameter where the curve has turned by `target` radians: Newton's method, or bisection
     /// where that leaves the part which contains it.
-    fn place(&self, curve: &Curve, target: f64) -> f64 {
+    fn parameter_at(&self, curve: &IntervalCurve, target: f64) -> f64 {
         let part = self.lengths.partition_point(|&length| length <= target);
         let part = part.saturating_sub(1).min(PARTS - 1);
         let [mut low, mut high] = [part, part + 1].map(|part| part as f64 / PARTS as f64);
@@ -86,7 +86,7 @@ impl Pace {
         } else if rest > whole {
             high += FARTHEST_OUTSIDE;
         }
-        let mut excess = turned(curve, from, u) - rest;
+        let mut excess = arc_length_between(curve, from, u) - rest;
         for _ in 0..40 {
             if excess > 0.0 {
                 high = u;
@@ -108,7 +108,7 @@ impl Pace {
             excess += if step.abs() < 1e-3 {
                 gauss(&speed(curve), u, next)
             } else {
-                turned(curve, u, next)
+                arc_length_between(curve, u, next)
             };
             u = next;
         }
@@ -117,7 +117,7 @@ impl Pace {
 }
 
 /// The arc length between two parameters, radians.
-fn turned(curve: &Curve, from: f64, to: f64) -> f64 {
+fn arc_length_between(curve: &IntervalCurve, from: f64, to: f64) -> f64 {
     let differ = |whole: f64, sum: f64| {
         let agree = (sum - whole).abs() <= 1e-13 * (1.0 + sum);
         !agree
@@ -129,12 +129,12 @@ fn turned(curve: &Curve, from: f64, to: f64) -> f64 {
 const FINEST: u32 = 8;
 
 /// The angular speed by the parameter.
-fn speed(curve: &Curve) -> impl Fn(f64) -> f64 {
+fn speed(curve: &IntervalCurve) -> impl Fn(f64) -> f64 {
     move |u| length(rates(curve, u).0)
 }
 
 /// Angular velocity and acceleration at `u`, per unit of the parameter.
-fn rates(curve: &Curve, u: f64) -> ([f64; 3], [f64; 3]) {
+fn rates(curve: &IntervalCurve, u: f64) -> ([f64; 3], [f64; 3]) {
     let rotation = curve.moving(Dual::parameter(u));
     let at = rotation.map(|dual| dual.value);
     let twice = |derivative: [f64; 4]| {

@@ -2,15 +2,15 @@
 //! second order, and the results are fitted like the rotations themselves.
 
 use crate::curve::options::{Axes, Quantity};
-use crate::fit::double::fit::{FitBlock, MOST, Samples};
-use crate::fit::double::intervals::{LANES, load, put};
-use crate::fit::double::shape::Sampling;
-use crate::fit::nodes::Nodes;
+use crate::fit::block::{LANES, load, put};
+use crate::fit::exact::fit::FitBlock;
+use crate::fit::exact::shape::Sampling;
+use crate::fit::nodes::{NodeSamples, Nodes};
 use crate::math::canonical::power_of_two;
 use crate::math::dual::Dual;
 use crate::math::quaternion::{Quaternion, rotated, step};
 use crate::shader::{POWERS, PolynomialSegment};
-use crate::simd::lanes::{Doubles as _, Lanes};
+use crate::simd::lanes::{Doubles as _, Lanes, MAX_LANES};
 
 /// The quantity asked for, from a rotation and its derivatives by the parameter; `rate` is the
 /// parameter's change per second. The result is a quaternion, or a vector with 0 in the place of w.
@@ -46,15 +46,15 @@ impl Sampling for Motion {
     ) {
         let mut scales = [1.0; LANES];
         for lane in (0..block.whole()).step_by(L::COUNT) {
-            let mut found = [[[0.0; MOST]; 4]; POWERS];
-            let mut units = [1.0; MOST];
-            for own in lane..block.count.min(lane + L::COUNT) {
-                let unit = sample(block, own, nodes, own - lane, &mut found);
-                (units[own - lane], scales[own]) = (unit, unit as f32);
+            let mut found = [[[0.0; MAX_LANES]; 4]; POWERS];
+            let mut units = [1.0; MAX_LANES];
+            for curve_lane in lane..block.count.min(lane + L::COUNT) {
+                let unit = sample(block, curve_lane, nodes, curve_lane - lane, &mut found);
+                (units[curve_lane - lane], scales[curve_lane]) = (unit, unit as f32);
             }
             let unit = L::Doubles::load(&units);
             let middle = load(&found[0], 0);
-            let mut samples = Samples::all(L::all(0.0));
+            let mut samples = NodeSamples::all(L::all(0.0));
             for c in 0..4 {
                 samples.middle[c] = L::rounded(middle[c] / unit);
                 for k in 0..PAIRS {
@@ -78,7 +78,7 @@ fn sample<const PAIRS: usize>(
     lane: usize,
     nodes: &Nodes<PAIRS>,
     j: usize,
-    found: &mut [[[f64; MOST]; 4]],
+    found: &mut [[[f64; MAX_LANES]; 4]],
 ) -> f64 {
     let curve = block.curve(lane);
     let (at, width) = (block.middles[lane], block.widths[lane]);

@@ -1,13 +1,13 @@
 //! Trials of the kernels over a crowd.
 
 use crate::shader::{
-    CHANNELS, CrowdBase, CrowdChannel, CrowdClip, CrowdDispatch, CrowdEntry, CrowdLink, CrowdPlace,
-    CrowdSpan, FORM_ARC, FORM_CONSTANT, FORM_CUBIC, FORM_POLYNOMIAL, Kernel, ON_KEY, ROTATION,
-    RUNS_BACKWARDS, SCALE, SPEED_MAGNITUDE, START_BIAS, TRANSLATION,
+    CHANNELS, CrowdBase, CrowdChannel, CrowdClip, CrowdDispatch, CrowdEntry, CrowdLink,
+    CrowdPosition, CrowdSpan, FORM_ARC, FORM_CONSTANT, FORM_CUBIC, FORM_POLYNOMIAL, Kernel, ON_KEY,
+    ROTATION, RUNS_BACKWARDS, SCALE, SPEED_MAGNITUDE, START_BIAS, TRANSLATION,
 };
 use crate::twin::crowd_layers::Layers;
 use crate::twin::crowd_matrices::{Rows, affine_product, row_product, to_any_half, transform};
-use crate::twin::crowd_times::{place_at, tick_of};
+use crate::twin::crowd_times::{position_at, tick_of};
 
 use bytemuck::Zeroable as _;
 
@@ -42,8 +42,8 @@ pub(super) fn trials(kernel: Kernel) -> Vec<Trial> {
 /// A number below 2^`bits`, of any magnitude.
 fn number(random: &mut Random, bits: u32) -> u64 {
     let word = u64::from(random.word()) << 32 | u64::from(random.word());
-    let own = random.below(bits + 1);
-    word.checked_shr(64 - own).unwrap_or(0)
+    let random_bits = random.below(bits + 1);
+    word.checked_shr(64 - random_bits).unwrap_or(0)
 }
 
 /// An entry that may stand anywhere in a clip of a period, when the clock stands at a time.
@@ -73,18 +73,18 @@ fn entry(random: &mut Random, clip: u32, period: u32, clock: u64) -> CrowdEntry 
 
 fn times(random: &mut Random) -> Trial {
     const LAYERS: u32 = 2;
-    const MOST: u32 = 3;
+    const MAX_BASES: u32 = 3;
     const CLOCK: u64 = 0x00ab_cdef_0123_4567;
     let (mut clips, mut bases, mut spans) = (Vec::new(), Vec::new(), Vec::new());
     for clip in 0..CLIPS {
         let period = 1 + number(random, 30) as u32;
-        let own = 1 + clip % MOST;
+        let base_count = 1 + clip % MAX_BASES;
         clips.push(CrowdClip {
             period,
             first_base: bases.len() as u32,
-            bases: own,
+            bases: base_count,
         });
-        for _ in 0..own {
+        for _ in 0..base_count {
             let count = 1 + random.below(9);
             let mut starts: Vec<u32> = (1..count)
                 .map(|_| (number(random, 31) % u64::from(period + 1)) as u32)
@@ -112,21 +112,21 @@ fn times(random: &mut Random) -> Trial {
     let mut entries = Vec::new();
     for _ in 0..(BEFORE + 4 * INSTANCES) * LAYERS {
         let clip = random.below(CLIPS);
-        let mut own = entry(random, clip, clips[clip as usize].period, CLOCK);
+        let mut entry = entry(random, clip, clips[clip as usize].period, CLOCK);
         let clip = &clips[clip as usize];
-        if own.speed_and_modes & SPEED_MAGNITUDE == 0 {
+        if entry.speed_and_modes & SPEED_MAGNITUDE == 0 {
             let base = &bases[(clip.first_base + random.below(clip.bases)) as usize];
             let span = &spans[(base.first + random.below(base.count)) as usize];
-            own.start = START_BIAS + (span.start & !ON_KEY);
+            entry.start = START_BIAS + (span.start & !ON_KEY);
         }
-        entries.push(own);
+        entries.push(entry);
     }
-    let count = 4 * INSTANCES * LAYERS * MOST;
+    let count = 4 * INSTANCES * LAYERS * MAX_BASES;
     let dispatch = CrowdDispatch {
         count,
         first_instance: BEFORE,
         layers: LAYERS,
-        bases: MOST,
+        bases: MAX_BASES,
         clock_low: CLOCK as u32,
         clock_high: (CLOCK >> 32) as u32,
         ..CrowdDispatch::zeroed()
@@ -138,9 +138,9 @@ fn times(random: &mut Random) -> Trial {
         let clip = &clips[(entry.clip_and_weight & 0xffff) as usize];
         let tick = tick_of(entry, clip.period, CLOCK);
         for base in 0..clip.bases {
-            let own = &bases[(clip.first_base + base) as usize];
-            let place = layer * MOST as usize + base as usize;
-            trial.expect(place, &place_at(own, &spans, tick));
+            let base_entry = &bases[(clip.first_base + base) as usize];
+            let index = layer * MAX_BASES as usize + base as usize;
+            trial.expect(index, &position_at(base_entry, &spans, tick));
         }
     }
     trial
@@ -159,8 +159,8 @@ fn channel(random: &mut Random) -> CrowdChannel {
 
 /// A channel of one form, or a constant one, for the kernels without branches.
 fn plain(random: &mut Random, form: u32) -> CrowdChannel {
-    let own = channel(random);
-    let (first, base) = (own.first + 1, own.form_and_base & 0x00ff_ffff);
+    let channel = channel(random);
+    let (first, base) = (channel.first + 1, channel.form_and_base & 0x00ff_ffff);
     match random.once_in(3) {
         true => CrowdChannel {
             first,
@@ -171,7 +171,7 @@ fn plain(random: &mut Random, form: u32) -> CrowdChannel {
         false => CrowdChannel {
             first,
             form_and_base: form << 24 | base,
-            ..own
+            ..channel
         },
     }
 }
@@ -197,8 +197,8 @@ fn joints(random: &mut Random, layers: u32, is_plain: bool, are_locals: bool) ->
     if is_plain {
         cells[0] = [0.0; 4];
     }
-    let places: Vec<_> = (0..INSTANCES * layers * BASES)
-        .map(|_| CrowdPlace {
+    let positions: Vec<_> = (0..INSTANCES * layers * BASES)
+        .map(|_| CrowdPosition {
             span: random.below(2) | if random.once_in(4) { ON_KEY } else { 0 },
             parameter: random.parameter(),
         })
@@ -218,29 +218,29 @@ fn joints(random: &mut Random, layers: u32, is_plain: bool, are_locals: bool) ->
         bytes(&entries),
         bytes(&channels),
         bytes(&cells),
-        bytes(&places),
+        bytes(&positions),
     ];
     let mut trial = Trial::new(inputs, &dispatch, groups(count as usize, !are_locals));
     let twin = Layers {
         entries: &entries[(BEFORE * layers) as usize..],
         channels: &channels,
         cells: &cells,
-        places: &places,
+        positions: &positions,
         joints: JOINTS,
         layers,
         bases: BASES,
         masks,
         references,
     };
-    for place in 0..count {
-        let (instance, joint) = (place / JOINTS, place % JOINTS);
-        let own = |kind| twin.layered(instance, joint, kind);
+    for index in 0..count {
+        let (instance, joint) = (index / JOINTS, index % JOINTS);
+        let layered = |kind| twin.layered(instance, joint, kind);
         match are_locals {
             true => {
-                let rows = transform(own(ROTATION), own(TRANSLATION), own(SCALE));
-                trial.expect(place as usize, &rows);
+                let rows = transform(layered(ROTATION), layered(TRANSLATION), layered(SCALE));
+                trial.expect(index as usize, &rows);
             }
-            false => trial.expect(place as usize, &own(ROTATION)),
+            false => trial.expect(index as usize, &layered(ROTATION)),
         }
     }
     trial
@@ -326,8 +326,8 @@ fn skin(random: &mut Random) -> Trial {
         ..CrowdDispatch::zeroed()
     };
     let mut after = before.clone();
-    for (matrix, own) in after.iter_mut().enumerate() {
-        *own = own.map(|row| row_product(row, &bind[matrix % JOINTS as usize]));
+    for (matrix, rows) in after.iter_mut().enumerate() {
+        *rows = rows.map(|row| row_product(row, &bind[matrix % JOINTS as usize]));
     }
     let trial = Trial::new([bytes(&bind)], &dispatch, groups(count, false));
     over(trial, &before, &after)

@@ -8,7 +8,7 @@ use crate::math::canonical::canonical;
 use crate::math::quaternion::dot;
 use crate::shader::{
     FROM_KEYS_WORKGROUP, Form, IS_KEY, KEY_AT_END, KEY_INNER, Kernel, KeySample,
-    ROWS_PER_INVOCATION, RowShape, SIGN_TURNED, TangentWeights,
+    ROWS_PER_INVOCATION, RowShape, SIGN_NEGATED, TangentWeights,
 };
 use crate::simd::dispatch::in_lanes;
 
@@ -20,21 +20,21 @@ use super::{Trial, bytes};
 #[derive(Clone, Copy)]
 pub(crate) struct StoredKey {
     pub(crate) stored: [u32; 4],
-    pub(crate) given: [f32; 4],
+    pub(crate) authored: [f32; 4],
     pub(crate) continued: [f32; 4],
 }
 
 impl StoredKey {
-    pub(crate) fn new(given: [f32; 4], is_turned: bool) -> Self {
-        let mut stored = given.map(f32::to_bits);
-        let sign = if is_turned { -1.0 } else { 1.0 };
-        if is_turned {
-            stored[0] |= SIGN_TURNED;
+    pub(crate) fn new(authored: [f32; 4], is_negated: bool) -> Self {
+        let mut stored = authored.map(f32::to_bits);
+        let sign = if is_negated { -1.0 } else { 1.0 };
+        if is_negated {
+            stored[0] |= SIGN_NEGATED;
         }
         Self {
             stored,
-            given,
-            continued: given.map(|c| c * sign),
+            authored,
+            continued: authored.map(|c| c * sign),
         }
     }
 }
@@ -45,33 +45,33 @@ const SAMPLES: usize = 75;
 const ROWS: usize = ROWS_PER_INVOCATION as usize + 1;
 
 /// Some rows of keys, and samples of all of them.
-struct Rows {
+struct KeyRows {
     keys: Vec<StoredKey>,
     samples: Vec<KeySample>,
     weights: Vec<TangentWeights>,
 }
 
 pub(super) fn trials(kernel: Kernel) -> Vec<Trial> {
-    let rows = Rows::new(&mut Random::canonical(), kernel == Kernel::FromKeysCubics);
+    let rows = KeyRows::new(&mut Random::canonical(), kernel == Kernel::FromKeysCubics);
     // All rows of an invocation, or one each that begins where a line of memory does.
     [(ROWS_PER_INVOCATION, 0), (1, 7)]
         .map(|(each, line)| rows.trial(kernel, each, line))
         .into()
 }
 
-impl Rows {
+impl KeyRows {
     fn new(random: &mut Random, are_cubics: bool) -> Self {
         let mut keys = Vec::new();
         for _ in 0..ROWS {
             let mut key = random.unit();
             for _ in 0..KEYS {
-                let is_turned = random.once_in(3);
-                let given = if is_turned {
+                let is_negated = random.once_in(3);
+                let authored = if is_negated {
                     key.map(|c| canonical(-c))
                 } else {
                     key
                 };
-                keys.push(StoredKey::new(given, is_turned));
+                keys.push(StoredKey::new(authored, is_negated));
                 key = match are_cubics || random.once_in(2) {
                     true => {
                         let step = random.step();
@@ -146,19 +146,19 @@ impl Rows {
     }
 
     fn cubic(&self, keys: &[StoredKey], sample: &KeySample) -> [f32; 4] {
-        let (is_key, own) = (sample.key & IS_KEY != 0, (sample.key & !IS_KEY) as usize);
+        let (is_key, key) = (sample.key & IS_KEY != 0, (sample.key & !IS_KEY) as usize);
         let mut block = CubicBlock::zeroed();
         (block.count, block.parameters[0]) = (1, sample.parameter);
         if is_key {
             block.held[0] = 1.0;
-            block.keys[1][0] = keys[own].given;
+            block.keys[1][0] = keys[key].authored;
         } else {
-            let (first, last) = (self.weights[own], self.weights[own + 1]);
-            // A key without a neighbour takes its place.
-            let before = own - usize::from(first.kind == KEY_INNER);
-            let after = own + 1 + usize::from(last.kind == KEY_INNER);
-            for (place, key) in [before, own, own + 1, after].into_iter().enumerate() {
-                block.keys[place][0] = keys[key].continued;
+            let (first, last) = (self.weights[key], self.weights[key + 1]);
+            // At an end the key itself stands in for the missing neighbour.
+            let before = key - usize::from(first.kind == KEY_INNER);
+            let after = key + 1 + usize::from(last.kind == KEY_INNER);
+            for (i, key) in [before, key, key + 1, after].into_iter().enumerate() {
+                block.keys[i][0] = keys[key].continued;
             }
             (block.weights[0][0], block.weights[1][0]) = (first, last);
         }
@@ -170,11 +170,11 @@ impl Rows {
 }
 
 fn two_keys(form: Form, keys: &[StoredKey], sample: &KeySample) -> [f32; 4] {
-    let own = (sample.key & !IS_KEY) as usize;
+    let key = (sample.key & !IS_KEY) as usize;
     let mut block = TwoKeyBlock::new(form);
     (block.from[0], block.to[0]) = match sample.key & IS_KEY {
-        0 => (keys[own].continued, keys[own + 1].continued),
-        _ => (keys[own].given, keys[own].given),
+        0 => (keys[key].continued, keys[key + 1].continued),
+        _ => (keys[key].authored, keys[key].authored),
     };
     (block.count, block.parameters[0]) = (1, sample.parameter);
     in_lanes(&mut block);

@@ -52,10 +52,10 @@ impl Trial {
         }
     }
 
-    /// Expects a value as the `place`th of its type.
-    pub(super) fn expect<T: NoUninit>(&mut self, place: usize, value: &T) {
+    /// Expects a value as the `index`th of its type.
+    pub(super) fn expect<T: NoUninit>(&mut self, index: usize, value: &T) {
         let words: Vec<u32> = bytemuck::pod_collect_to_vec(bytemuck::bytes_of(value));
-        self.expect_words(place * words.len(), &words);
+        self.expect_words(index * words.len(), &words);
     }
 
     fn expect_words(&mut self, first: usize, words: &[u32]) {

@@ -18,16 +18,16 @@ const FILE: &str = "kernel-checks";
 const MARK: &str = "exact 1";
 
 /// The most that is read of it, bytes.
-const MOST_BYTES: usize = 1 << 20;
+const MAX_BYTES: usize = 1 << 20;
 
 /// The most lines that are written.
-const MOST_LINES: usize = 4096;
+const MAX_LINES: usize = 4096;
 
 /// A kernel that passed on a device.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) struct Pass(String);
+pub(crate) struct KernelPass(String);
 
-impl Pass {
+impl KernelPass {
     /// Of code by its hash ([`Pipeline::code_hash`](crate::gpu::pipeline::Pipeline::code_hash)).
     pub(crate) fn new(physical: &PhysicalDevice, code: u64) -> Self {
         Self::of(&of_device(physical, env::vars_os()), code)
@@ -115,7 +115,7 @@ fn of_device(
         .collect();
     variables.sort_unstable();
     settings.extend(variables);
-    let setting = settings.iter().flat_map(|own| own.bytes().chain([0]));
+    let setting = settings.iter().flat_map(|text| text.bytes().chain([0]));
     let setting = setting.fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| {
         (hash ^ u64::from(byte)).wrapping_mul(0x100_0000_01b3)
     });
@@ -125,10 +125,10 @@ fn of_device(
     )
 }
 
-/// What has passed so far, in this process and before.
+/// The kernels that have passed so far, in this process and before.
 pub(crate) struct Passes {
     cache: Cache,
-    known: Mutex<BTreeSet<Pass>>,
+    known: Mutex<BTreeSet<KernelPass>>,
 }
 
 impl Passes {
@@ -142,11 +142,11 @@ impl Passes {
         Self { cache, known }
     }
 
-    pub(crate) fn has(&self, pass: &Pass) -> bool {
+    pub(crate) fn has(&self, pass: &KernelPass) -> bool {
         lock(&self.known).contains(pass)
     }
 
-    pub(crate) fn remember(&self, passed: impl IntoIterator<Item = Pass>) {
+    pub(crate) fn remember(&self, passed: impl IntoIterator<Item = KernelPass>) {
         let mut known = lock(&self.known);
         let before = known.len();
         known.extend(passed);
@@ -156,23 +156,23 @@ impl Passes {
         // Other processes may have written meanwhile.
         let mut all = read(&self.cache);
         all.extend(known.iter().cloned());
-        if all.len() > MOST_LINES {
+        if all.len() > MAX_LINES {
             all.clone_from(&known);
         }
         drop(known);
         let lines: String = all
             .iter()
-            .flat_map(|Pass(line)| [line.as_str(), "\n"])
+            .flat_map(|KernelPass(line)| [line.as_str(), "\n"])
             .collect();
         self.cache.write(FILE, lines.as_bytes());
     }
 }
 
-/// What the file says, as far as it can be understood.
-fn read(cache: &Cache) -> BTreeSet<Pass> {
-    let bytes = cache.read(FILE, MOST_BYTES).unwrap_or_default();
+/// The lines of the file that can be read.
+fn read(cache: &Cache) -> BTreeSet<KernelPass> {
+    let bytes = cache.read(FILE, MAX_BYTES).unwrap_or_default();
     let text = String::from_utf8_lossy(&bytes);
-    text.lines().filter_map(Pass::parse).collect()
+    text.lines().filter_map(KernelPass::parse).collect()
 }
 
 #[cfg(test)]
@@ -185,7 +185,7 @@ mod tests {
     fn what_passed_is_known_to_the_next_process() {
         let folder = tempfile::tempdir().unwrap();
         let cache = Cache::within(folder.path());
-        let (one, two) = (Pass::of(DEVICE, 1), Pass::of(DEVICE, 2));
+        let (one, two) = (KernelPass::of(DEVICE, 1), KernelPass::of(DEVICE, 2));
         let passes = Passes::of(cache.clone());
         assert!(!passes.has(&one));
         passes.remember([one.clone()]);
@@ -193,10 +193,10 @@ mod tests {
         // Two processes that began at the same time.
         let other = Passes::of(cache.clone());
         passes.remember([two.clone()]);
-        let three = Pass::of(DEVICE, 3);
+        let three = KernelPass::of(DEVICE, 3);
         other.remember([three.clone()]);
         let next = Passes::of(cache);
-        assert!([&one, &two, &three].into_iter().all(|own| next.has(own)));
+        assert!([&one, &two, &three].into_iter().all(|pass| next.has(pass)));
     }
 
     /// Whoever wrote the file: what is no line of ours means nothing, and the others count.
@@ -204,8 +204,8 @@ mod tests {
     fn a_line_of_another_kind_means_nothing() {
         let folder = tempfile::tempdir().unwrap();
         let cache = Cache::within(folder.path());
-        let sound = Pass::of(DEVICE, 7);
-        let Pass(line) = &sound;
+        let sound = KernelPass::of(DEVICE, 7);
+        let KernelPass(line) = &sound;
         let foreign = [
             "",
             "exact",
@@ -220,20 +220,20 @@ mod tests {
             "\u{fffd}\0",
         ];
         for other in foreign {
-            assert_eq!(Pass::parse(other), None, "{other}");
+            assert_eq!(KernelPass::parse(other), None, "{other}");
         }
         let file = format!("{}\n{line}\n{}", foreign.join("\n"), &line[..20]);
         assert!(cache.write(FILE, &[file.as_bytes(), &[0xff, 0xfe]].concat()));
         assert_eq!(read(&cache), BTreeSet::from([sound]));
         // More than anybody has devices: what this process knows stays.
-        let many: String = (0..MOST_LINES as u64)
-            .map(|code| Pass::of(DEVICE, code).0 + "\n")
+        let many: String = (0..MAX_LINES as u64)
+            .map(|code| KernelPass::of(DEVICE, code).0 + "\n")
             .collect();
         assert!(cache.write(FILE, many.as_bytes()));
         let passes = Passes::of(Cache::within(&folder.path().join("other")));
         let passes = Passes { cache, ..passes };
-        let own = Pass::of(DEVICE, u64::MAX);
-        passes.remember([own.clone()]);
-        assert_eq!(read(&passes.cache), BTreeSet::from([own]));
+        let newest = KernelPass::of(DEVICE, u64::MAX);
+        passes.remember([newest.clone()]);
+        assert_eq!(read(&passes.cache), BTreeSet::from([newest]));
     }
 }

@@ -20,11 +20,11 @@ fn dispatch(count: usize, detail: usize) -> PoseDispatch {
 
 /// Rotations of a layer, some of them the identity.
 fn layer(random: &mut Random) -> Vec<[f32; 4]> {
-    let own = |random: &mut Random| match random.once_in(4) {
+    let rotation = |random: &mut Random| match random.once_in(4) {
         true => IDENTITY,
         false => random.rotation(),
     };
-    (0..COUNT).map(|_| own(random)).collect()
+    (0..COUNT).map(|_| rotation(random)).collect()
 }
 
 pub(super) fn trials(kernel: Kernel) -> Vec<Trial> {
@@ -43,12 +43,12 @@ pub(super) fn trials(kernel: Kernel) -> Vec<Trial> {
 }
 
 fn add(random: &mut Random, weight: f32) -> Trial {
-    let [base, own, mut reference] = [0; 3].map(|_| layer(random));
+    let [base, added, mut reference] = [0; 3].map(|_| layer(random));
     reference.push([weight, 0.0, 0.0, 0.0]);
-    let inputs = [bytes(&base), bytes(&own), bytes(&reference)];
+    let inputs = [bytes(&base), bytes(&added), bytes(&reference)];
     let mut trial = Trial::new(inputs, &dispatch(COUNT, 0), groups(COUNT, true));
     for i in 0..COUNT {
-        trial.expect(i, &pose_add::pose(base[i], own[i], reference[i], weight));
+        trial.expect(i, &pose_add::pose(base[i], added[i], reference[i], weight));
     }
     trial
 }

@@ -15,7 +15,7 @@ use crate::shader::{
 const ORDINARY_STEP: f32 = 0.02;
 
 /// The largest number that the host is taken to give to kernels.
-const LARGEST_GIVEN: f32 = 1.0e12;
+const LARGEST_CANONICAL: f32 = 1.0e12;
 
 pub(crate) struct Random {
     rng: Rng,
@@ -72,12 +72,12 @@ impl Random {
         let exponent = (1023 + self.rng.i32(powers)) as u64;
         let magnitude = (1.0 + self.rng.f64()) * f64::from_bits(exponent << 52);
         let number = self.signed(magnitude as f32);
-        self.given(number)
+        self.allowed(number)
     }
 
-    fn given(&mut self, number: f32) -> f32 {
+    fn allowed(&mut self, number: f32) -> f32 {
         match self.are_canonical {
-            true if number.abs() > LARGEST_GIVEN => self.uniform(),
+            true if number.abs() > LARGEST_CANONICAL => self.uniform(),
             true => canonical(number),
             false => number,
         }
@@ -100,7 +100,7 @@ impl Random {
         let near = [border.next_down(), border, border.next_up()];
         let near = near[self.rng.usize(..3)];
         let near = self.signed(near);
-        self.given(near)
+        self.allowed(near)
     }
 
     /// From -1 to 1, or hostile: near a border, tiny or subnormal.
@@ -234,20 +234,20 @@ impl Random {
         let mut key = self.unit();
         let same = self.once_in(2).then(|| self.step());
         [0; 4].map(|_| {
-            let own = key;
+            let current = key;
             let step = same.unwrap_or_else(|| self.step());
             key = self.near(key, step);
-            own
+            current
         })
     }
 
     /// The weight of a step in a tangent; one in four makes an [`ORDINARY_STEP`] as long as the
     /// small-angle series allows.
     fn weight(&mut self) -> f32 {
-        let most = LONGEST_TANGENT_PART.sqrt() / ORDINARY_STEP;
+        let limit = LONGEST_TANGENT_PART.sqrt() / ORDINARY_STEP;
         match self.rng.u32(..4) {
-            0 => most * (1.0 + 1e-3 * self.uniform()),
-            1 => 2.0 * most * self.uniform(),
+            0 => limit * (1.0 + 1e-3 * self.uniform()),
+            1 => 2.0 * limit * self.uniform(),
             _ => self.uniform(),
         }
     }
@@ -257,11 +257,11 @@ impl Random {
         let kinds = [KEY_INNER, KEY_INNER, KEY_INNER, KEY_AT_END, KEY_UNKNOWN];
         // Steps between keys at even times count alike.
         let even = self.once_in(4).then_some(0.5);
-        let most = if self.once_in(2) { 0.33 } else { 0.05 };
+        let limit = if self.once_in(2) { 0.33 } else { 0.05 };
         TangentWeights {
             before: even.unwrap_or_else(|| self.weight()),
             after: even.unwrap_or_else(|| self.weight()),
-            outgoing: most * self.rng.f32(),
+            outgoing: limit * self.rng.f32(),
             kind: kinds[self.rng.usize(..kinds.len())],
         }
     }

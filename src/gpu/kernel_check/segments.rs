@@ -89,7 +89,7 @@ fn of_form<S: Segment>(list: List, store: Store) -> Vec<Trial> {
     // Two shapes of a dispatch, and every encoding at least once.
     (0..encodings.len().max(2))
         .map(|i| {
-            let scene = Scene::<S>::new(random, store, encodings[i % encodings.len()]);
+            let scene = SegmentInputs::<S>::new(random, store, encodings[i % encodings.len()]);
             let first = i % 2 == 0;
             match list {
                 List::Frames => scene.runs(random, false, first),
@@ -105,7 +105,7 @@ fn of_form<S: Segment>(list: List, store: Store) -> Vec<Trial> {
 }
 
 /// What all work of a dispatch is made of.
-struct Scene<S> {
+struct SegmentInputs<S> {
     encoding: Encoding,
     segments: Vec<S>,
     constants: Vec<[f32; 4]>,
@@ -115,7 +115,7 @@ struct Scene<S> {
     stored: Vec<(usize, [f32; 4])>,
 }
 
-impl<S: Segment> Scene<S> {
+impl<S: Segment> SegmentInputs<S> {
     fn new(random: &mut Random, store: Store, encoding: Encoding) -> Self {
         // Other stores take rotations alone.
         let takes_any = matches!(store, Store::F32 | Store::Vector);
@@ -133,15 +133,15 @@ impl<S: Segment> Scene<S> {
         }
     }
 
-    /// Makes up an item, and stores what it evaluates; `places` are those of its samples.
+    /// Makes up an item, and stores what it evaluates; `outputs` are the offsets of its samples.
     fn item(
         &mut self,
         random: &mut Random,
         is_listed: bool,
         output: u32,
-        places: impl ExactSizeIterator<Item = usize>,
+        outputs: impl ExactSizeIterator<Item = usize>,
     ) {
-        let count = places.len() as u32;
+        let count = outputs.len() as u32;
         let (source, bit) = Self::source(random);
         // Frames about the middle of a short run, or those at one end of a very long one.
         let (frame, scale) = match random.once_in(6) {
@@ -159,7 +159,7 @@ impl<S: Segment> Scene<S> {
             true => self.distances.len() as i32,
             false => frame,
         };
-        for (j, place) in places.enumerate() {
+        for (j, stored_at) in outputs.enumerate() {
             let distance = match is_listed {
                 true => {
                     self.distances.push(random.number() * 4.0);
@@ -171,7 +171,7 @@ impl<S: Segment> Scene<S> {
                 0 => one(&self.segments[source as usize], affine, distance),
                 _ => self.constants[source as usize],
             };
-            self.stored.push((place, rotation));
+            self.stored.push((stored_at, rotation));
         }
         self.items.push(Item {
             source,
@@ -202,10 +202,10 @@ impl<S: Segment> Scene<S> {
             expected: Vec::new(),
         };
         let mut encoded = vec![0; self.encoding.bytes()];
-        for (place, rotation) in self.stored {
+        for (index, rotation) in self.stored {
             self.encoding.encode_all(&[rotation], &mut encoded);
             let words: Vec<u32> = bytemuck::pod_collect_to_vec(&encoded);
-            trial.expect_words(place * words.len(), &words);
+            trial.expect_words(index * words.len(), &words);
         }
         trial
     }
@@ -258,7 +258,7 @@ impl<S: Segment> Scene<S> {
         const SAMPLES: usize = 203;
         const BEFORE: usize = 5;
         let mut samples = Vec::new();
-        let place = 4;
+        let first_output = 4;
         for i in 0..SAMPLES + BEFORE {
             let ((source, bit), parameter) = (Self::source(random), random.parameter());
             samples.push(ListedSample {
@@ -275,7 +275,7 @@ impl<S: Segment> Scene<S> {
                 _ => self.constants[source as usize],
             };
             if i >= BEFORE {
-                self.stored.push((place + i - BEFORE, rotation));
+                self.stored.push((first_output + i - BEFORE, rotation));
             }
         }
         let idle = if in_row { 3 } else { 0 };
@@ -284,7 +284,7 @@ impl<S: Segment> Scene<S> {
             item_count: SAMPLES as u32,
             stride: 0,
             detail: self.detail(),
-            first_output: place as u32 - idle,
+            first_output: first_output as u32 - idle,
             idle,
         };
         let groups = groups(SAMPLES + idle as usize, in_row);
@@ -293,20 +293,20 @@ impl<S: Segment> Scene<S> {
     }
 
     /// One row of items for a grid, from position `first` to `end`; between some of them there are samples of no
-    /// item. `place` is where a position is stored.
+    /// item. `output_at` is the offset at which a position is stored.
     fn row(
         &mut self,
         random: &mut Random,
         is_listed: bool,
         [first, end]: [u32; 2],
-        place: impl Fn(u32) -> usize,
+        output_at: impl Fn(u32) -> usize,
     ) {
         let mut position = first;
         while position < end {
             let length = (1 + random.below(40)).min(end - position);
             let count = length - random.below(3).min(length - 1);
-            let places: Vec<_> = (position..position + count).map(&place).collect();
-            self.item(random, is_listed, position, places.into_iter());
+            let outputs: Vec<_> = (position..position + count).map(&output_at).collect();
+            self.item(random, is_listed, position, outputs.into_iter());
             // As on the CPU, every segment that may give a tiny component says so; others may.
             let Some(item) = self.items.last_mut() else {
                 unreachable!("it was just added");
@@ -383,8 +383,8 @@ impl<S: Segment> Scene<S> {
         let mut of_rows = Vec::new();
         for row in 0..ROWS {
             let first_item = self.items.len();
-            let place = |sample: u32| (FIRST + row + sample * STRIDE) as usize;
-            self.row(random, is_listed, [0, SAMPLES], place);
+            let output_at = |sample: u32| (FIRST + row + sample * STRIDE) as usize;
+            self.row(random, is_listed, [0, SAMPLES], output_at);
             of_rows.push(self.blocks(first_item, [0, SAMPLES]));
         }
         // [block of samples][row]
@@ -400,7 +400,7 @@ impl<S: Segment> Scene<S> {
             first_block: 0,
             shift: 0,
         };
-        // A row may begin at any place of a line.
+        // A row may begin anywhere in a line.
         let tiles = (LINE - 1 + ROWS).div_ceil(LINE);
         let layers = SAMPLES.div_ceil(WORKGROUP / LINE * SAMPLES_EACH);
         self.grid(&blocks, grid, [2, tiles.div_ceil(2), layers], is_listed)

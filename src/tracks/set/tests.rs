@@ -48,9 +48,9 @@ fn a_nearly_unit_key_is_normalised_and_a_unit_key_is_kept() {
 
 #[test]
 fn a_set_knows_which_keys_the_one_before_turns() {
-    let [near, far] = [1.0, 3.0].map(Quat::from_rotation_x);
+    let [near, distant] = [1.0, 3.0].map(Quat::from_rotation_x);
     let tracks = |second: Quat| [Quat::IDENTITY, near, near, second];
-    for (second, is_turned) in [(far, false), (-far, true), (-near, true)] {
+    for (second, is_negated) in [(distant, false), (-distant, true), (-near, true)] {
         let times = [0.0, 1.0];
         let shared = TrackSet::with_shared_times(&times, &tracks(second)).unwrap();
         let mut pushed = TrackSet::new();
@@ -65,17 +65,17 @@ fn a_set_knows_which_keys_the_one_before_turns() {
             pushed.push("", &times, keys).unwrap();
         }
         for set in [&shared, &pushed, &pushed.select(0..2).unwrap()] {
-            assert_eq!(set.signs(1).is_turned(1), is_turned, "{second}");
-            assert_eq!(set.arcs_are_short(), !is_turned);
+            assert_eq!(set.signs(1).is_negated(1), is_negated, "{second}");
+            assert_eq!(set.arcs_are_short(), !is_negated);
             assert!(!set.signs(0).any());
         }
         assert_eq!(
-            pushed.select(1..2).unwrap().signs(0).is_turned(1),
-            is_turned
+            pushed.select(1..2).unwrap().signs(0).is_negated(1),
+            is_negated
         );
     }
     // Signs are not continued from one track to the next.
-    let apart = [Quat::IDENTITY, near, -near, -far];
+    let apart = [Quat::IDENTITY, near, -near, -distant];
     let set = TrackSet::with_shared_times(&[0.0, 1.0], &apart).unwrap();
     assert!(set.arcs_are_short());
 }

@@ -1,4 +1,4 @@
-//! All shards of a directory become its manifest, as one process would have written it.
+//! Merges the shards of a directory into the manifest that one process would have written.
 
 use std::collections::{BTreeSet, HashMap};
 use std::io::{BufRead, BufReader, Read, Write};
@@ -8,48 +8,48 @@ use std::path::{Path, PathBuf};
 use tumble_formats::beneath::parent_beneath;
 use tumble_formats::output::{Output, remove_abandoned, remove_marked};
 
-use crate::batch::manifest::{self, Entry, NAME};
-use crate::batch::shards::plan::Stated;
-use crate::batch::shards::record::{self, MARK, Refusal};
+use crate::batch::manifest::{self, ManifestEntry, NAME};
+use crate::batch::shards::plan::RecordedPlan;
+use crate::batch::shards::record::{self, MARK, RefusedInput};
 use crate::messages::exit::{ALL_INPUTS, DIFFERENCE, Failure};
 use crate::messages::words;
 
-/// So many shards' files are in memory at once; neighbouring results are mostly of one shard.
-const KEPT: usize = 16;
+/// How many shards' files are in memory at once; neighbouring results are mostly of one shard.
+const MAX_CACHED_FILES: usize = 16;
 
-/// What merging came to.
+/// The outcome of merging.
 #[derive(Debug)]
-pub(crate) struct Merged {
+pub(crate) struct MergeSummary {
     /// Lines of the manifest.
     pub(crate) results: usize,
     pub(crate) shards: usize,
     pub(crate) inputs: usize,
-    pub(crate) failed: Vec<Refusal>,
+    pub(crate) failed: Vec<RefusedInput>,
 }
 
-/// How far the shards of a directory are.
-pub(crate) struct Progress {
+/// How many shards of a directory are done.
+pub(crate) struct ShardProgress {
     done: usize,
     all: usize,
     first_missing: Option<usize>,
 }
 
-/// A line of the manifest to be: whose it is, and where it stands. File 0 is the manifest before,
-/// any other that of the shard of this number.
-struct Line {
+/// A line of the new manifest: its result, and where the line is. File 0 is the previous manifest, any
+/// other the file of the shard of this number.
+struct ManifestLine {
     output: String,
     file: usize,
     at: Range<usize>,
 }
 
-impl Progress {
-    /// Looks at the files that are there, however many shards there are to be.
-    pub(crate) fn of(folder: &Path, stated: &Stated) -> Self {
-        let all = stated.shards;
+impl ShardProgress {
+    /// Reads the files that exist; their number, not that of the plan's shards, decides the time.
+    pub(crate) fn of(folder: &Path, recorded: &RecordedPlan) -> Self {
+        let all = recorded.shards;
         let numbers = record::numbers(folder).into_iter();
         let numbers = numbers.filter(|shard| (1..=all).contains(shard));
         let done: Vec<usize> = numbers
-            .filter(|&shard| read(folder, stated, shard).is_some())
+            .filter(|&shard| read(folder, recorded, shard).is_some())
             .collect();
         let gap = (1..).zip(&done).find(|(number, shard)| number != *shard);
         let first = gap.map_or(done.len() + 1, |(number, _)| number);
@@ -65,7 +65,7 @@ impl Progress {
     }
 
     /// `3 of 79 shards are done; the first that is not is shard 4`.
-    pub(crate) fn told(&self) -> String {
+    pub(crate) fn summary(&self) -> String {
         let all = words::count(self.all, "shard");
         let first = self.first_missing;
         let first = first.map(|first| format!("; the first that is not is shard {first}"));
@@ -77,36 +77,40 @@ impl Progress {
     }
 }
 
-/// A shard's file, where it is of the plan and whole, with its refusals and the start of its lines.
-fn read(folder: &Path, stated: &Stated, shard: usize) -> Option<(Vec<u8>, Vec<Refusal>, usize)> {
+/// A shard's file, if it is complete and of the plan, with its refusals and the start of its lines.
+fn read(
+    folder: &Path,
+    recorded: &RecordedPlan,
+    shard: usize,
+) -> Option<(Vec<u8>, Vec<RefusedInput>, usize)> {
     let bytes = record::bytes(folder, shard).ok()?;
     let (header, start) = record::whole(&bytes)?;
-    let is_own = header.plan == stated.plan && header.shard == shard;
-    is_own.then_some((bytes, header.failed, start))
+    let matches_plan = header.plan == recorded.plan && header.shard == shard;
+    matches_plan.then_some((bytes, header.failed, start))
 }
 
-/// Writes the manifest of a directory whose shards are all done, and removes `manifest.d` and what
-/// lost workers left half-way.
-pub(crate) fn merge(folder: &Path) -> Result<Merged, Failure> {
+/// Writes the manifest of a directory whose shards are all done, and removes `manifest.d` and the
+/// temporary files of lost workers.
+pub(crate) fn merge(folder: &Path) -> Result<MergeSummary, Failure> {
     let shown = folder.display();
-    let Some(stated) = Stated::read(folder)? else {
+    let Some(recorded) = RecordedPlan::read(folder)? else {
         let message =
             format!("{shown}: has no shards to merge; `tumble eval … --shard` makes them");
         return Err(Failure::new(ALL_INPUTS, message));
     };
-    // Two who merge at once would remove what the other reads.
+    // Two processes that merge at once would remove each other's files.
     let _lock = manifest::lock(folder)?;
-    let progress = Progress::of(folder, &stated);
+    let progress = ShardProgress::of(folder, &recorded);
     if !progress.is_done() {
-        let message = format!("{shown}: {}; make them with --resume", progress.told());
+        let message = format!("{shown}: {}; make them with --resume", progress.summary());
         return Err(Failure::new(DIFFERENCE, message));
     }
     let mut lines = Vec::new();
     let path = folder.join(NAME);
     list_before(folder, &path, &mut lines)?;
     let mut failed = Vec::new();
-    for shard in 1..=stated.shards {
-        let (bytes, refused, start) = read(folder, &stated, shard).ok_or_else(|| {
+    for shard in 1..=recorded.shards {
+        let (bytes, refused, start) = read(folder, &recorded, shard).ok_or_else(|| {
             let message = format!("{shown}: shard {shard} went away while it was merged");
             Failure::new(DIFFERENCE, message)
         })?;
@@ -124,18 +128,17 @@ pub(crate) fn merge(folder: &Path) -> Result<Merged, Failure> {
         remove_marked(parent, MARK);
         remove_abandoned(parent);
     }
-    Stated::remove(folder)?;
-    Ok(Merged {
+    RecordedPlan::remove(folder)?;
+    Ok(MergeSummary {
         results: lines.len(),
-        shards: stated.shards,
-        inputs: stated.inputs,
+        shards: recorded.shards,
+        inputs: recorded.inputs,
         failed,
     })
 }
 
-/// Lists the lines of the manifest before, which may be of a million results: one is in memory at a
-/// time.
-fn list_before(folder: &Path, path: &Path, lines: &mut Vec<Line>) -> Result<(), Failure> {
+/// Lists the lines of the previous manifest, which may have a million: one is in memory at a time.
+fn list_before(folder: &Path, path: &Path, lines: &mut Vec<ManifestLine>) -> Result<(), Failure> {
     let Some(file) = manifest::open(folder)? else {
         return Ok(()); // mostly there is none
     };
@@ -149,13 +152,13 @@ fn list_before(folder: &Path, path: &Path, lines: &mut Vec<Line>) -> Result<(), 
             Failure::new(ALL_INPUTS, message)
         })?;
         if length == 0 {
-            manifest::tell_damaged(folder, damaged);
+            manifest::warn_of_damaged_lines(folder, damaged);
             return Ok(());
         }
-        let mut own = Vec::new();
-        list(&line, 0, 0, &mut own);
-        damaged += usize::from(own.is_empty());
-        lines.extend(own.pop().map(|Line { output, .. }| Line {
+        let mut found = Vec::new();
+        list(&line, 0, 0, &mut found);
+        damaged += usize::from(found.is_empty());
+        lines.extend(found.pop().map(|ManifestLine { output, .. }| ManifestLine {
             output,
             file: 0,
             at: start..start + length,
@@ -165,7 +168,7 @@ fn list_before(folder: &Path, path: &Path, lines: &mut Vec<Line>) -> Result<(), 
 }
 
 /// Lists the lines of a file that are entries.
-fn list(bytes: &[u8], start: usize, file: usize, lines: &mut Vec<Line>) {
+fn list(bytes: &[u8], start: usize, file: usize, lines: &mut Vec<ManifestLine>) {
     let mut at = start;
     for line in bytes[start..].split_inclusive(|&byte| byte == b'\n') {
         let end = at + line.len();
@@ -173,20 +176,20 @@ fn list(bytes: &[u8], start: usize, file: usize, lines: &mut Vec<Line>) {
             && let Some((output, _)) = record::owner(line)
         {
             let at = at..end;
-            lines.push(Line { output, file, at });
+            lines.push(ManifestLine { output, file, at });
         }
         at = end;
     }
 }
 
-/// One line for each output, in order; of the manifest before and a shard the shard's.
-fn one_each(mut lines: Vec<Line>) -> Result<Vec<Line>, Failure> {
+/// One line for each output, in order; a shard's replaces the previous manifest's.
+fn one_each(mut lines: Vec<ManifestLine>) -> Result<Vec<ManifestLine>, Failure> {
     lines.sort_by(|one, other| {
         one.output
             .cmp(&other.output)
             .then(one.file.cmp(&other.file))
     });
-    let mut kept: Vec<Line> = Vec::with_capacity(lines.len());
+    let mut kept: Vec<ManifestLine> = Vec::with_capacity(lines.len());
     for line in lines {
         match kept.last_mut() {
             Some(last) if last.output == line.output && last.file == 0 => *last = line,
@@ -204,9 +207,9 @@ fn one_each(mut lines: Vec<Line>) -> Result<Vec<Line>, Failure> {
     Ok(kept)
 }
 
-/// Writes the lines where they belong. Few files are in memory: the index of a million results is
-/// 130 MB, their lines are 500.
-fn write(folder: &Path, path: &Path, lines: &[Line]) -> Result<(), Failure> {
+/// Writes the lines. Few files are in memory at once: the index of a million results takes 130 MB, their
+/// lines 500 MB.
+fn write(folder: &Path, path: &Path, lines: &[ManifestLine]) -> Result<(), Failure> {
     let failed = |error| Failure::writing(&path.display().to_string(), &error);
     let mut output = Output::create(path, true, &[]).map_err(|error| Failure::output(&error))?;
     let mut kept: HashMap<usize, Vec<u8>> = HashMap::new();
@@ -218,7 +221,7 @@ fn write(folder: &Path, path: &Path, lines: &[Line]) -> Result<(), Failure> {
     for line in lines {
         let text = match (line.file, &mut before) {
             (0, Some(before)) => {
-                // Mostly it is the next one, which the reader has already.
+                // Mostly it is the next line, which the reader has buffered.
                 let step = line.at.start as i64 - at;
                 before.seek_relative(step).map_err(failed)?;
                 one.resize(line.at.len(), 0);
@@ -228,7 +231,7 @@ fn write(folder: &Path, path: &Path, lines: &[Line]) -> Result<(), Failure> {
             }
             (shard, _) => {
                 if !kept.contains_key(&shard) {
-                    if kept.len() == KEPT {
+                    if kept.len() == MAX_CACHED_FILES {
                         kept.clear();
                     }
                     let bytes = record::bytes(folder, shard).map_err(failed)?;
@@ -237,8 +240,9 @@ fn write(folder: &Path, path: &Path, lines: &[Line]) -> Result<(), Failure> {
                 kept[&shard].get(line.at.clone()).unwrap_or_default()
             }
         };
-        // What was replaced meanwhile by another attempt has the same entries, maybe at other places.
-        let is_whole = Entry::of_line(text).is_some_and(|entry| entry.output == line.output);
+        // A file that was replaced meanwhile has the same entries, maybe at other offsets.
+        let is_whole =
+            ManifestEntry::of_line(text).is_some_and(|entry| entry.output == line.output);
         if !is_whole {
             let message = format!(
                 "{}: changed while it was merged; try again",

@@ -1,8 +1,8 @@
 //! A library in shards: cut once, by its list and sizes alone, evaluated shard by shard by any number
 //! of processes on any machines, and merged into what one process would have written.
 //!
-//! `manifest.d` in the directory of results says what the shards are of (`plan.json`) and which are
-//! done: each leaves its lines of the manifest in a file of its own, whole, after its results have
+//! `manifest.d` in the directory of results records the plan (`plan.json`) and which shards are done:
+//! each writes its lines of the manifest to its own file, completely, after its results have
 //! their names. Whoever evaluates a shard writes the same bytes, so that two who do so at once do no
 //! harm, and nobody locks anything.
 

@@ -1,4 +1,4 @@
-//! Which inputs a shard has, and what a directory's shards are of.
+//! Which inputs each shard has, and the record of this in the directory of results.
 
 use std::collections::HashSet;
 use std::io::{self, Read, Write};
@@ -10,49 +10,49 @@ use tumble_formats::beneath::{open_beneath, parent_beneath};
 use tumble_formats::format::Format;
 use tumble_formats::output::{Output, remove_abandoned};
 
-use crate::arguments::gather::Found;
+use crate::arguments::gather::FoundInput;
 use crate::arguments::input;
+use crate::batch::destination;
 use crate::batch::digest::Digest;
-use crate::batch::folder::{self, Name};
+use crate::batch::folder::{self, ResultName};
 use crate::batch::manifest::kernels_sha256;
-use crate::batch::place;
 use crate::batch::shards::record;
 use crate::messages::exit::{ALL_INPUTS, Failure};
 
-/// The directory in that of results.
+/// The subdirectory of shards in a directory of results.
 pub(crate) const FOLDER: &str = "manifest.d";
 
-/// What the shards are of.
-const STATED: &str = "plan.json";
+/// The file that records the plan.
+const PLAN_FILE: &str = "plan.json";
 
-/// No shard has more inputs: what a lost worker had done of one is done again.
-const MOST_INPUTS: usize = 256;
+/// The most inputs of a shard: if a worker is lost, its shard is evaluated again.
+const MAX_INPUTS: usize = 256;
 
-/// Shards of a list, at most: whoever merges them looks for each.
-const MOST_SHARDS: usize = 1 << 20;
+/// The most shards of a plan: merging looks for each.
+const MAX_SHARDS: usize = 1 << 20;
 
-/// A longer file says nothing of shards.
-const LONGEST: u64 = 1 << 20;
+/// The longest plan that is read, in bytes.
+const MAX_PLAN_BYTES: u64 = 1 << 20;
 
 /// All inputs of a request, cut into shards.
-pub(crate) struct Plan {
-    pub(crate) inputs: Vec<Found>,
-    /// Of the results, in the order of their inputs.
-    pub(crate) names: Vec<Name>,
+pub(crate) struct ShardPlan {
+    pub(crate) inputs: Vec<FoundInput>,
+    /// The names of the results, in the order of their inputs.
+    pub(crate) names: Vec<ResultName>,
     /// The inputs of each shard.
     pub(crate) cuts: Vec<Range<usize>>,
     pub(crate) format: &'static Format,
-    pub(crate) stated: Stated,
+    pub(crate) recorded: RecordedPlan,
 }
 
-/// What a directory says of its shards. Two of one plan are equal, wherever they were made.
+/// The record of a plan in a directory of results. Two records of one plan are equal, wherever they were made.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub(crate) struct Stated {
-    /// The hash of all that decides which shard has which inputs, and how they are evaluated.
+pub(crate) struct RecordedPlan {
+    /// The hash of everything that determines the shards and how they are evaluated.
     pub(crate) plan: String,
     pub(crate) shards: usize,
     pub(crate) inputs: usize,
-    /// Of input in a shard, at most; one input may be larger.
+    /// The most bytes of input in a shard; a single input may be larger.
     pub(crate) shard_bytes: u64,
     /// The hash of the names of all results.
     pub(crate) outputs_sha256: String,
@@ -61,16 +61,16 @@ pub(crate) struct Stated {
     pub(crate) tumble: String,
 }
 
-/// The inputs of shards: in their order, until there are `MOST_INPUTS`, or would be more than
-/// `most_bytes`.
-pub(crate) fn cut(sizes: &[u64], most_bytes: u64) -> Vec<Range<usize>> {
+/// The inputs of each shard: in their order, at most `MAX_INPUTS`, and at most `max_bytes` unless one
+/// input is larger.
+pub(crate) fn cut(sizes: &[u64], max_bytes: u64) -> Vec<Range<usize>> {
     let mut cuts = Vec::new();
     let (mut first, mut bytes) = (0, 0_u128);
-    for (place, size) in sizes.iter().map(|&size| u128::from(size)).enumerate() {
-        let is_full = place - first == MOST_INPUTS || bytes + size > u128::from(most_bytes);
-        if is_full && place > first {
-            cuts.push(first..place);
-            (first, bytes) = (place, 0);
+    for (index, size) in sizes.iter().map(|&size| u128::from(size)).enumerate() {
+        let is_full = index - first == MAX_INPUTS || bytes + size > u128::from(max_bytes);
+        if is_full && index > first {
+            cuts.push(first..index);
+            (first, bytes) = (index, 0);
         }
         bytes += size;
     }
@@ -80,8 +80,8 @@ pub(crate) fn cut(sizes: &[u64], most_bytes: u64) -> Vec<Range<usize>> {
     cuts
 }
 
-/// The hash of a list of names; an input without one has none there.
-pub(crate) fn hash_of(names: &[Name]) -> String {
+/// The hash of the names in a list.
+pub(crate) fn hash_of(names: &[ResultName]) -> String {
     let mut digest = Digest::default();
     for name in names.iter().flatten() {
         digest.update(name.as_bytes());
@@ -90,10 +90,10 @@ pub(crate) fn hash_of(names: &[Name]) -> String {
     digest.finish()
 }
 
-impl Plan {
+impl ShardPlan {
     /// Cuts inputs, of those sizes, into shards.
     pub(crate) fn new(
-        inputs: Vec<Found>,
+        inputs: Vec<FoundInput>,
         sizes: &[u64],
         folder: &Path,
         format: Option<&'static Format>,
@@ -121,7 +121,7 @@ impl Plan {
             say(name.as_deref().unwrap_or_default());
             say(&size.to_string());
         }
-        let stated = Stated {
+        let recorded = RecordedPlan {
             plan: digest.finish(),
             shards: cuts.len(),
             inputs: inputs.len(),
@@ -136,21 +136,21 @@ impl Plan {
             names,
             cuts,
             format,
-            stated,
+            recorded,
         })
     }
 
-    /// Says in the directory what its shards are of, before any result gets its name: from then on
-    /// the results of the plan are no stranger's. Any number of processes may do so at once.
+    /// Records the plan in the directory before any result is renamed: from then on files with the names
+    /// of its results may be replaced. Any number of processes may do so at once.
     pub(crate) fn claim(
         &self,
         folder: &Path,
         resume: bool,
         overwrite: bool,
     ) -> Result<(), Failure> {
-        place::folder(folder)?;
-        let found = Stated::read(folder)?;
-        if found.as_ref() == Some(&self.stated) {
+        destination::create_folder(folder)?;
+        let found = RecordedPlan::read(folder)?;
+        if found.as_ref() == Some(&self.recorded) {
             return Ok(());
         }
         if found.is_some() && !resume && !overwrite {
@@ -160,18 +160,19 @@ impl Plan {
                  what is the same, --overwrite makes all again"
             )));
         }
-        if let (false, Some(failure)) = (overwrite, self.stranger(folder, resume)) {
-            // Another process of the same plan may have been quicker.
-            return match Stated::read(folder)?.as_ref() == Some(&self.stated) {
+        if let (false, Some(failure)) = (overwrite, self.existing_file(folder, resume)) {
+            // Another process may have recorded the same plan meanwhile.
+            return match RecordedPlan::read(folder)?.as_ref() == Some(&self.recorded) {
                 true => Ok(()),
                 false => Err(failure),
             };
         }
-        self.stated.write(folder)
+        self.recorded.write(folder)
     }
 
-    /// A file under the name of a result, which no manifest names or nobody asked to go on with.
-    fn stranger(&self, folder: &Path, resume: bool) -> Option<Failure> {
+    /// The failure for a file with the name of a result that no manifest lists, or that exists without
+    /// `resume`.
+    fn existing_file(&self, folder: &Path, resume: bool) -> Option<Failure> {
         let known: HashSet<String> = match resume {
             true => record::names(folder),
             false => HashSet::new(),
@@ -188,17 +189,17 @@ impl Plan {
     }
 }
 
-impl Stated {
+impl RecordedPlan {
     /// Below the directory of results.
     fn name() -> PathBuf {
-        Path::new(FOLDER).join(STATED)
+        Path::new(FOLDER).join(PLAN_FILE)
     }
 
     fn path(folder: &Path) -> PathBuf {
         folder.join(Self::name())
     }
 
-    /// What a directory says; nothing where it has no shards.
+    /// Reads the record of a directory; `None` where it has no shards.
     pub(crate) fn read(folder: &Path) -> Result<Option<Self>, Failure> {
         let path = Self::path(folder);
         let refuse = |why: &dyn std::fmt::Display| {
@@ -207,10 +208,10 @@ impl Stated {
         };
         let mut bytes = Vec::new();
         let mut open = || {
-            // What is in it is to be written and removed: it is no link.
+            // Files in it are written and removed: it must not be a link.
             parent_beneath(folder, &Self::name())?;
             open_beneath(folder, &Self::name())?
-                .take(LONGEST)
+                .take(MAX_PLAN_BYTES)
                 .read_to_end(&mut bytes)
         };
         match open() {
@@ -219,21 +220,21 @@ impl Stated {
             Err(error) if error.kind() == io::ErrorKind::NotADirectory => return Ok(None),
             Err(error) => return Err(refuse(&error)),
         }
-        let stated: Self = serde_json::from_slice(&bytes).map_err(|error| refuse(&error))?;
-        let Self { shards, inputs, .. } = stated;
-        match (1..=inputs.min(MOST_SHARDS)).contains(&shards) {
-            true => Ok(Some(stated)),
+        let recorded: Self = serde_json::from_slice(&bytes).map_err(|error| refuse(&error))?;
+        let Self { shards, inputs, .. } = recorded;
+        match (1..=inputs.min(MAX_SHARDS)).contains(&shards) {
+            true => Ok(Some(recorded)),
             false => Err(refuse(&format!(
                 "it says {shards} shards of {inputs} inputs; each has one at least, and there are \
-                 {MOST_SHARDS} at most; remove it"
+                 {MAX_SHARDS} at most; remove it"
             ))),
         }
     }
 
-    /// Written whole, over what another process writes at the same time.
+    /// Writes the record completely; it may replace the same one of another process.
     fn write(&self, folder: &Path) -> Result<(), Failure> {
         let path = Self::path(folder);
-        place::folder(&folder.join(FOLDER))?;
+        destination::create_folder(&folder.join(FOLDER))?;
         let text = serde_json::to_string(self).expect("strings and numbers") + "\n";
         let output = Output::create(&path, true, &[]);
         let mut output = output.map_err(|error| Failure::output(&error))?;
@@ -242,31 +243,31 @@ impl Stated {
         output.commit().map_err(|error| Failure::output(&error))
     }
 
-    /// The shards are merged: nothing is said of them any more. What is left when this is stopped
-    /// half-way says nothing without the plan, which goes first. Files that no shard has written stay.
+    /// Removes the record and the files of merged shards. The record goes first: without it what an
+    /// interruption leaves is ignored. Files that no shard has written stay.
     pub(crate) fn remove(folder: &Path) -> Result<(), Failure> {
         let failed = |error: io::Error| {
             let folder = folder.join(FOLDER);
             Failure::writing(&folder.display().to_string(), &error)
         };
-        let gone = |removed: io::Result<()>| match removed {
+        let ignore_missing = |removed: io::Result<()>| match removed {
             Err(error) if error.kind() != io::ErrorKind::NotFound => Err(failed(error)),
             _ => Ok(()),
         };
         if Self::read(folder)?.is_none() {
             return Ok(());
         }
-        gone(std::fs::remove_file(Self::path(folder)))?;
+        ignore_missing(std::fs::remove_file(Self::path(folder)))?;
         for shard in record::numbers(folder) {
             let bytes = record::bytes(folder, shard).unwrap_or_default();
             if record::header(&bytes).is_some() {
-                gone(std::fs::remove_file(record::path(folder, shard)))?;
+                ignore_missing(std::fs::remove_file(record::path(folder, shard)))?;
             }
         }
         remove_abandoned(&folder.join(FOLDER));
         match std::fs::remove_dir(folder.join(FOLDER)) {
             Err(error) if error.kind() == io::ErrorKind::DirectoryNotEmpty => Ok(()),
-            removed => gone(removed),
+            removed => ignore_missing(removed),
         }
     }
 }

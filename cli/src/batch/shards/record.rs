@@ -1,4 +1,4 @@
-//! What a shard leaves when it is done: its lines of the manifest, behind a line about itself.
+//! The file of a shard that is done: a header line, then its lines of the manifest.
 
 use std::collections::{BTreeMap, HashSet};
 use std::io::{BufRead, BufReader, Read};
@@ -8,12 +8,12 @@ use serde::{Deserialize, Serialize};
 use tumble_formats::beneath::{is_beneath, open_beneath};
 
 use crate::batch::digest;
-use crate::batch::manifest::{self, Entry, Lines};
+use crate::batch::manifest::{self, ManifestEntry, ManifestLines};
 use crate::batch::shards::plan::FOLDER;
 
 /// The first line of a shard's file.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub(crate) struct Header {
+pub(crate) struct ShardHeader {
     /// From 1.
     pub(crate) shard: usize,
     pub(crate) of: usize,
@@ -21,9 +21,8 @@ pub(crate) struct Header {
     pub(crate) plan: String,
     pub(crate) inputs: usize,
     /// Inputs without a result.
-    pub(crate) failed: Vec<Refusal>,
-    /// The lines behind this one, and their hash: a file that has lost one, or has another, is that
-    /// of a shard that is not done.
+    pub(crate) failed: Vec<RefusedInput>,
+    /// How many lines follow this one, and their hash: a file that differs belongs to a shard that is not done.
     #[serde(default)]
     pub(crate) results: usize,
     #[serde(default)]
@@ -32,7 +31,7 @@ pub(crate) struct Header {
 
 /// An input that was refused.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub(crate) struct Refusal {
+pub(crate) struct RefusedInput {
     pub(crate) input: String,
     /// The exit code of a command that has this input alone.
     pub(crate) code: u8,
@@ -72,18 +71,21 @@ pub(crate) fn bytes(folder: &Path, shard: usize) -> std::io::Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// What the temporary files of a shard's results are called by.
+/// The start of the names of the temporary files of a shard's results.
 pub(crate) fn mark(shard: usize) -> String {
     format!("{MARK}{shard:05}-")
 }
 
-/// What the temporary files of all shards' results are called by.
+/// The start of the names of the temporary files of all shards' results.
 pub(crate) const MARK: &str = "shard";
 
 /// A shard's file as text.
-pub(crate) fn text<'a>(header: &Header, entries: impl IntoIterator<Item = &'a Entry>) -> String {
+pub(crate) fn text<'a>(
+    header: &ShardHeader,
+    entries: impl IntoIterator<Item = &'a ManifestEntry>,
+) -> String {
     let lines: Vec<String> = entries.into_iter().map(manifest::line).collect();
-    let header = Header {
+    let header = ShardHeader {
         results: lines.len(),
         results_sha256: digest::of_bytes(lines.iter().map(String::as_bytes)),
         ..header.clone()
@@ -92,15 +94,15 @@ pub(crate) fn text<'a>(header: &Header, entries: impl IntoIterator<Item = &'a En
     first + &lines.concat()
 }
 
-/// The line about a shard, and how long it is; nothing where the file is no shard's.
-pub(crate) fn header(bytes: &[u8]) -> Option<(Header, usize)> {
+/// The header of a shard's file, and its length; `None` where the file is not a shard's.
+pub(crate) fn header(bytes: &[u8]) -> Option<(ShardHeader, usize)> {
     let end = bytes.iter().position(|&byte| byte == b'\n')? + 1;
     let header = serde_json::from_slice(&bytes[..end]).ok()?;
     Some((header, end))
 }
 
-/// As [`header`], of a file that has all its lines as they were written.
-pub(crate) fn whole(bytes: &[u8]) -> Option<(Header, usize)> {
+/// As [`header`], of a file whose lines are complete and unchanged.
+pub(crate) fn whole(bytes: &[u8]) -> Option<(ShardHeader, usize)> {
     let (header, start) = header(bytes)?;
     let lines = &bytes[start..];
     let count = lines.split_inclusive(|&byte| byte == b'\n').count();
@@ -113,18 +115,18 @@ pub(crate) fn whole(bytes: &[u8]) -> Option<(Header, usize)> {
 }
 
 /// All results that done shards of a directory have made.
-pub(crate) fn entries(folder: &Path) -> BTreeMap<String, Entry> {
+pub(crate) fn entries(folder: &Path) -> BTreeMap<String, ManifestEntry> {
     let mut all = BTreeMap::new();
     for shard in numbers(folder) {
         let bytes = bytes(folder, shard).unwrap_or_default();
         if let Some((_, start)) = header(&bytes) {
-            all.extend(Lines::parse(&bytes[start..]).entries);
+            all.extend(ManifestLines::parse(&bytes[start..]).entries);
         }
     }
     all
 }
 
-/// As much of a line as says whose it is.
+/// The part of a line that names its result.
 #[derive(Deserialize)]
 struct Owner {
     output: String,
@@ -132,7 +134,8 @@ struct Owner {
     one_of: Option<(String, usize)>,
 }
 
-/// The owner of a line; nothing where it is no entry, or names a result outside its directory.
+/// The result that a line names, and that of all clips; `None` where the line is not an entry, or names
+/// a result outside its directory.
 pub(crate) fn owner(line: &[u8]) -> Option<(String, Option<String>)> {
     let Owner { output, one_of } = serde_json::from_slice(line).ok()?;
     let all = one_of.map(|(all, _)| all);
@@ -147,7 +150,7 @@ pub(crate) fn names(folder: &Path) -> HashSet<String> {
     let shards = shards.filter_map(|shard| open_beneath(folder, &name(shard)).ok());
     let mut known = HashSet::new();
     for file in shards.chain(manifest::open(folder).ok().flatten()) {
-        // A line that is no entry, such as that about the shard itself, has no output.
+        // A line that is not an entry, such as a shard's header, has no output.
         for line in BufReader::new(file).split(b'\n').map_while(Result::ok) {
             if let Some((output, all)) = owner(&line) {
                 known.insert(output);
@@ -158,10 +161,14 @@ pub(crate) fn names(folder: &Path) -> HashSet<String> {
     known
 }
 
-/// What manifests say of the results of one shard: the directory's, and the shard's own from an
-/// earlier time, which is the later word.
-pub(crate) fn previous(folder: &Path, shard: usize, names: &[&str]) -> BTreeMap<String, Entry> {
-    let own: HashSet<&str> = names.iter().copied().collect();
+/// The entries for the results of one shard: those of the directory's manifest, replaced by those of the
+/// shard's file.
+pub(crate) fn previous(
+    folder: &Path,
+    shard: usize,
+    names: &[&str],
+) -> BTreeMap<String, ManifestEntry> {
+    let shard_names: HashSet<&str> = names.iter().copied().collect();
     let mut found = BTreeMap::new();
     if let Ok(Some(file)) = manifest::open(folder) {
         // The directory's may be of a million results: one line is in memory at a time.
@@ -169,15 +176,16 @@ pub(crate) fn previous(folder: &Path, shard: usize, names: &[&str]) -> BTreeMap<
             let Some((output, all)) = owner(&line) else {
                 continue;
             };
-            let is_own = own.contains(&*output) || all.is_some_and(|all| own.contains(&*all));
-            if is_own && let Some(entry) = Entry::of_line(&line) {
+            let is_of_shard = shard_names.contains(&*output)
+                || all.is_some_and(|all| shard_names.contains(&*all));
+            if is_of_shard && let Some(entry) = ManifestEntry::of_line(&line) {
                 found.insert(output, entry);
             }
         }
     }
     let bytes = bytes(folder, shard).unwrap_or_default();
     if let Some((_, start)) = header(&bytes) {
-        found.extend(Lines::parse(&bytes[start..]).entries);
+        found.extend(ManifestLines::parse(&bytes[start..]).entries);
     }
     found
 }
@@ -188,7 +196,7 @@ mod tests {
 
     #[test]
     fn a_file_that_lost_a_line_is_not_whole() {
-        let entry = |name: &str| Entry {
+        let entry = |name: &str| ManifestEntry {
             output: name.to_owned(),
             output_sha256: String::new(),
             output_bytes: 1,
@@ -201,14 +209,14 @@ mod tests {
             one_of: None,
         };
         let entries = [entry("a"), entry("b"), entry("c")];
-        let all = text(&Header::default(), &entries);
+        let all = text(&ShardHeader::default(), &entries);
         assert!(whole(all.as_bytes()).is_some());
-        for gone in 1..4 {
+        for removed in 1..4 {
             let left: String = (all.lines().enumerate())
-                .filter(|(at, _)| *at != gone)
+                .filter(|(at, _)| *at != removed)
                 .map(|(_, line)| format!("{line}\n"))
                 .collect();
-            assert!(whole(left.as_bytes()).is_none(), "without line {gone}");
+            assert!(whole(left.as_bytes()).is_none(), "without line {removed}");
         }
         assert!(whole(all.trim_end().as_bytes()).is_none());
         assert!(whole(all.replace("\"b\"", "\"d\"").as_bytes()).is_none());

@@ -1,44 +1,43 @@
-//! One shard on its way: its results wait for each other, get their names together, and then the
-//! shard's file says that they are there.
+//! Evaluates one shard: its results are renamed together, then the shard's file lists them.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use tumble_formats::output::{Output, remove_marked};
 
-use crate::batch::folder::{Name, Places};
-use crate::batch::manifest::{Entry, Previous};
-use crate::batch::output::Target;
-use crate::batch::place::Written;
-use crate::batch::run::Records;
-use crate::batch::shards::record::{self, Header, Refusal};
+use crate::batch::destination::WrittenFile;
+use crate::batch::folder::{ResultFolder, ResultName};
+use crate::batch::manifest::{ManifestEntry, PreviousEntries};
+use crate::batch::output::ResultTarget;
+use crate::batch::run::ResultRecorder;
+use crate::batch::shards::record::{self, RefusedInput, ShardHeader};
 use crate::messages::exit::Failure;
 use crate::messages::words;
 use tumble_formats::format::Format;
 
-/// So many files wait for each other at most: a process may have a thousand open.
-const TOGETHER: usize = 128;
+/// The most files that wait to be renamed: a process may have about a thousand open.
+const MAX_WAITING: usize = 128;
 
-/// So many files are synced at once. One by one they cost up to 7 ms each; a file system writes its
+/// How many files are synced at once. One by one they cost up to 7 ms each; a file system writes its
 /// journal once for all that wait.
-const AT_ONCE: usize = 16;
+const SYNCED_AT_ONCE: usize = 16;
 
 /// A shard that is being evaluated.
 pub(crate) struct Shard<'a> {
     pub(crate) folder: &'a Path,
-    pub(crate) header: Header,
-    /// Nothing is said of results as they are made.
+    pub(crate) header: ShardHeader,
+    /// Whether messages about results are left out.
     pub(crate) quiet: bool,
     pub(crate) made: usize,
     pub(crate) skipped: usize,
-    previous: Previous,
-    entries: Vec<Entry>,
-    waiting: Vec<Written>,
+    previous: PreviousEntries,
+    entries: Vec<ManifestEntry>,
+    waiting: Vec<WrittenFile>,
 }
 
 impl<'a> Shard<'a> {
-    /// A shard with results of those names.
-    pub(crate) fn new(folder: &'a Path, header: Header, names: &[&str], resume: bool) -> Self {
+    /// A shard with results of these names.
+    pub(crate) fn new(folder: &'a Path, header: ShardHeader, names: &[&str], resume: bool) -> Self {
         let previous = match resume {
             true => record::previous(folder, header.shard, names),
             false => Default::default(),
@@ -49,35 +48,39 @@ impl<'a> Shard<'a> {
             quiet: false,
             made: 0,
             skipped: 0,
-            previous: Previous::new(folder, previous),
+            previous: PreviousEntries::new(folder, previous),
             entries: Vec::new(),
             waiting: Vec::new(),
         }
     }
 
-    /// Whether its file says that it is done, by the same plan.
+    /// Whether its file is complete and of the same plan.
     pub(crate) fn is_done(&self) -> bool {
         let bytes = record::bytes(self.folder, self.header.shard);
         let header = bytes.ok().and_then(|bytes| record::whole(&bytes));
         header.is_some_and(|(header, _)| header.plan == self.header.plan)
     }
 
-    /// What is to be done: each input, and where its result goes. Inputs whose results have no name or
-    /// no place have failed. What an earlier attempt left half-way is removed.
+    /// The work: each input with its target. Inputs whose results cannot have a file are recorded as
+    /// failed. Temporary files of an earlier attempt are removed.
     pub(crate) fn jobs(
         &mut self,
         paths: impl Iterator<Item = PathBuf>,
-        names: &[Name],
+        names: &[ResultName],
         format: &'static Format,
-    ) -> Vec<(PathBuf, Target)> {
+    ) -> Vec<(PathBuf, ResultTarget)> {
         let mark = record::mark(self.header.shard);
-        let mut places = Places::new(self.folder);
+        let mut result_folder = ResultFolder::new(self.folder);
         let mut jobs = Vec::new();
         for (path, name) in paths.zip(names) {
             let target = name.clone().and_then(|name| {
-                // The plan has claimed its results.
-                let place = places.place(&name, true)?;
-                Ok(Target::new(place.hashed().marked(&mark), format, name))
+                // The plan has claimed the names of its results.
+                let destination = result_folder.destination(&name, true)?;
+                Ok(ResultTarget::new(
+                    destination.hashed().marked(&mark),
+                    format,
+                    name,
+                ))
             });
             match target {
                 Ok(target) => jobs.push((path, target)),
@@ -89,13 +92,13 @@ impl<'a> Shard<'a> {
                 }
             }
         }
-        for folder in &places.made {
+        for folder in &result_folder.made {
             remove_marked(folder, &mark);
         }
         jobs
     }
 
-    /// Gives the results their names, and says so in the shard's file.
+    /// Renames the results, and writes the shard's file.
     pub(crate) fn finish(&mut self) -> Result<(), Failure> {
         self.commit()?;
         let path = record::path(self.folder, self.header.shard);
@@ -104,7 +107,8 @@ impl<'a> Shard<'a> {
             Ok(before) if before == text.as_bytes() => return Ok(()),
             Ok(before) if record::header(&before).is_none() => {
                 let path = path.display();
-                let message = "is not the file of a shard: its first line is none; move it";
+                let message =
+                    "is not the file of a shard: its first line is not a shard's; move it";
                 return Err(Failure::usage(format!("{path}: {message}")));
             }
             Ok(_) | Err(_) => {}
@@ -116,7 +120,7 @@ impl<'a> Shard<'a> {
         output.commit().map_err(|error| Failure::output(&error))
     }
 
-    /// As [`Shard::finish`], without the file: what it would hold.
+    /// As [`Shard::finish`], but returns the text of the file.
     pub(crate) fn finish_elsewhere(&mut self) -> Result<String, Failure> {
         self.commit()?;
         Ok(self.text())
@@ -126,18 +130,18 @@ impl<'a> Shard<'a> {
         record::text(&self.header, &self.entries)
     }
 
-    /// Gives those that wait their names.
+    /// Renames the files that wait.
     fn commit(&mut self) -> Result<(), Failure> {
-        let mut waiting: Vec<Option<Written>> = self.waiting.drain(..).map(Some).collect();
-        let each = waiting.len().div_ceil(AT_ONCE).max(1);
+        let mut waiting: Vec<Option<WrittenFile>> = self.waiting.drain(..).map(Some).collect();
+        let each = waiting.len().div_ceil(SYNCED_AT_ONCE).max(1);
         std::thread::scope(|scope| {
             let threads = waiting.chunks_mut(each).map(|files| {
                 scope.spawn(|| {
                     let mut files = files.iter_mut().filter_map(Option::take);
-                    files.try_for_each(Written::commit)
+                    files.try_for_each(WrittenFile::commit)
                 })
             });
-            // All are begun before the first is waited for.
+            // All threads are started before the first is joined.
             let threads: Vec<_> = threads.collect();
             let ended = threads.into_iter().map(|thread| {
                 let ended = thread.join();
@@ -148,17 +152,17 @@ impl<'a> Shard<'a> {
     }
 }
 
-impl Records for Shard<'_> {
-    fn previous(&self) -> Previous {
+impl ResultRecorder for Shard<'_> {
+    fn previous(&self) -> PreviousEntries {
         self.previous.clone()
     }
 
-    fn keep(&mut self, entry: Entry, written: Written) -> Result<(), Failure> {
+    fn keep(&mut self, entry: ManifestEntry, written: WrittenFile) -> Result<(), Failure> {
         self.made += 1;
         self.entries.push(entry);
-        self.waiting.push(written.settle()?);
+        self.waiting.push(written.free_buffer()?);
         match self.waiting.len() {
-            TOGETHER.. => self.commit(),
+            MAX_WAITING.. => self.commit(),
             _ => Ok(()),
         }
     }
@@ -170,7 +174,7 @@ impl Records for Shard<'_> {
     }
 
     fn refuse(&mut self, path: &Path, failure: &Failure) {
-        self.header.failed.push(Refusal {
+        self.header.failed.push(RefusedInput {
             input: path.display().to_string(),
             code: failure.code,
             message: failure.message().to_owned(),

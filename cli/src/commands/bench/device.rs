@@ -1,4 +1,4 @@
-//! The Vulkan devices of a run: what they are, what the engine chose for them, and how fast they write into
+//! The Vulkan devices of a run: their names, the engine's choices for them, and how fast they write into
 //! their own memory, by their own clocks.
 
 use std::fmt::Write;
@@ -13,7 +13,7 @@ pub(crate) struct BenchDevice {
     pub(crate) report: DeviceReport,
 }
 
-/// What the report says of it; also the form of the JSON.
+/// Its part of the report; also the form of the JSON.
 #[derive(Clone, Serialize)]
 pub(crate) struct DeviceReport {
     name: String,
@@ -22,7 +22,7 @@ pub(crate) struct DeviceReport {
     driver_version: Option<u32>,
     uuid: String,
     choices: Option<EngineChoices>,
-    /// Bytes a second into the device's own memory; none where it has no clock.
+    /// Bytes a second into the device's own memory; `None` where it has no clock.
     write_rates: Option<WriteRates>,
 }
 
@@ -56,7 +56,7 @@ impl BenchDevice {
         info.is_some_and(|info| !matches!(info.kind, DeviceKind::Integrated | DeviceKind::Cpu))
     }
 
-    /// Bytes a second that nothing exceeds for long; 0 where that is unknchoices.
+    /// Bytes a second that nothing exceeds for long; 0 where that is unknown.
     pub(crate) fn write_limit(&self) -> f64 {
         self.report.write_rates.map_or(0.0, |rates| rates.limit())
     }

@@ -8,15 +8,15 @@ use std::thread;
 
 use fastrand::Rng;
 use glam::{Quat, Vec3};
-use tumble::{Device, Engine, FrameRate, Frames, TrackSet};
+use tumble::{Device, Engine, FrameRate, SampleTimes, TrackSet};
 use tumble_formats::format::{MotionOptions, ReadOptions, WriteError};
-use tumble_formats::motion::{Channels, Joint, Motion, Sampler, Transform};
+use tumble_formats::motion::{ChannelInterpolation, Channels, Joint, Motion, Transform};
 use tumble_formats::sample::{ChannelMethods, Samples};
 use tumble_formats::{FORMATS, Format, Loaded};
 
 use crate::commands::bench::report::Section;
 use crate::commands::bench::workload::{RATE, walk};
-use crate::commands::bench::{Contestant, Part, Turns, race};
+use crate::commands::bench::{Contestant, Repetitions, TimeShare, race};
 use crate::messages::exit::{ALL_INPUTS, Failure};
 
 /// Clips of the library, joints of its skeleton, and frames of a clip: a small human's walk of
@@ -29,7 +29,7 @@ const FRAMES: usize = 240;
 const SOURCE_RATE: u32 = 30;
 
 /// One section for each format that holds clips of several joints, of the same clips.
-pub(crate) fn measure(shrink: usize, turns: Turns) -> Result<Vec<Section>, Failure> {
+pub(crate) fn measure(shrink: usize, repetitions: Repetitions) -> Result<Vec<Section>, Failure> {
     let clips = (CLIPS / shrink).max(1);
     let mut random = Rng::with_seed(4);
     let keys = || walk(&mut random, FRAMES + clips - 1, 0.05);
@@ -38,7 +38,7 @@ pub(crate) fn measure(shrink: usize, turns: Turns) -> Result<Vec<Section>, Failu
         let folder = tempfile::tempdir().map_err(|error| Failure::writing("a folder", &error))?;
         let paths = library(format, &joints, clips, folder.path())?;
         paths
-            .map(|paths| of_format(format, &paths, turns))
+            .map(|paths| of_format(format, &paths, repetitions))
             .transpose()
     };
     let sections = FORMATS.iter().map(|&format| section(format));
@@ -67,11 +67,11 @@ fn library(
         };
         let frames = first..first + FRAMES;
         let joints = |frame: usize| walk.iter().map(move |keys| keys[frame]);
-        let places = |frame: usize| (0..JOINTS).map(move |joint| place(joint, frame));
+        let positions = |frame: usize| (0..JOINTS).map(move |joint| joint_position(joint, frame));
         let samples = Samples {
             times: times.clone(),
             rotations: frames.clone().flat_map(joints).collect(),
-            translations: frames.flat_map(places).collect(),
+            translations: frames.flat_map(positions).collect(),
             scales: Vec::new(),
         };
         let mut bytes = Vec::new();
@@ -101,22 +101,22 @@ fn skeleton(walk: &[Vec<Quat>]) -> Motion {
         set.push(&name, &times, rotations)
             .expect("unit keys in order");
     }
-    let places: Vec<Vec3> = (0..keys).map(|frame| place(0, frame)).collect();
-    set.set_translations(0, &times, &places, &[])
+    let positions: Vec<Vec3> = (0..keys).map(|frame| joint_position(0, frame)).collect();
+    set.set_translations(0, &times, &positions, &[])
         .expect("a key for each time");
     let joint = |joint: usize| Joint {
         parent: joint.checked_sub(1),
         rest: Transform {
-            translation: place(joint, 0),
+            translation: joint_position(joint, 0),
             ..Transform::default()
         },
     };
     let channels = Channels {
-        rotation: Some(Sampler::Linear),
+        rotation: Some(ChannelInterpolation::Linear),
         ..Channels::default()
     };
     let mut channels = vec![channels; walk.len()];
-    channels[0].translation = Some(Sampler::Linear);
+    channels[0].translation = Some(ChannelInterpolation::Linear);
     Motion {
         skeleton: (0..walk.len()).map(joint).collect(),
         channels,
@@ -126,14 +126,18 @@ fn skeleton(walk: &[Vec<Quat>]) -> Motion {
 }
 
 /// Where a joint is, relative to its parent.
-fn place(joint: usize, frame: usize) -> Vec3 {
+fn joint_position(joint: usize, frame: usize) -> Vec3 {
     match joint {
         0 => Vec3::new((frame as f32 * 0.07).sin(), 1.0, frame as f32 * 0.03),
         _ => Vec3::new(0.0, 0.5, 0.0),
     }
 }
 
-fn of_format(format: &'static Format, paths: &[PathBuf], turns: Turns) -> Result<Section, Failure> {
+fn of_format(
+    format: &'static Format,
+    paths: &[PathBuf],
+    repetitions: Repetitions,
+) -> Result<Section, Failure> {
     let options = ReadOptions::default();
     let engine = Engine::new(Device::Cpu).map_err(|error| refused(&error))?;
     let methods = ChannelMethods::AUTHORED;
@@ -144,7 +148,7 @@ fn of_format(format: &'static Format, paths: &[PathBuf], turns: Turns) -> Result
     };
     let sample = |loaded: &Loaded| -> Result<(), Failure> {
         for clip in &loaded.clips {
-            let samples = methods.sample(&engine, clip, &Frames::fps(RATE as u32));
+            let samples = methods.sample(&engine, clip, &SampleTimes::fps(RATE as u32));
             black_box(samples.map_err(|error| refused(&error))?);
         }
         Ok(())
@@ -194,7 +198,7 @@ fn of_format(format: &'static Format, paths: &[PathBuf], turns: Turns) -> Result
             },
         ));
     }
-    let rows = race(contestants, &mut [], turns)?;
+    let rows = race(contestants, &mut [], repetitions)?;
     let bytes = paths.iter().filter_map(|path| path.metadata().ok());
     let frames = (FRAMES - 1) * RATE as usize / SOURCE_RATE as usize + 1;
     let rotations = paths.len() * JOINTS * frames;
@@ -202,7 +206,7 @@ fn of_format(format: &'static Format, paths: &[PathBuf], turns: Turns) -> Result
     Ok(Section::of_files(format.name, rotations, bytes, rows))
 }
 
-fn read_bytes(paths: &[PathBuf]) -> Result<Vec<Part>, Failure> {
+fn read_bytes(paths: &[PathBuf]) -> Result<Vec<TimeShare>, Failure> {
     for path in paths {
         let bytes = std::fs::read(path);
         let failure = |error| Failure::new(ALL_INPUTS, format!("{}: {error}", path.display()));
@@ -211,7 +215,7 @@ fn read_bytes(paths: &[PathBuf]) -> Result<Vec<Part>, Failure> {
     Ok(Vec::new())
 }
 
-/// Asks the system to drop what it keeps of the files in memory.
+/// Asks the system to drop the cached pages of the files.
 #[cfg(target_os = "linux")]
 fn forget(paths: &[PathBuf]) {
     use rustix::fs::{Advice, fadvise};

@@ -3,12 +3,12 @@
 
 use glam::{DVec3, Mat3, Quat, Vec3};
 use rayon::prelude::*;
-use tumble::{Channel, Device, Engine, Follow, Frames, Layout, Method, TrackSet};
+use tumble::{Channel, Device, Engine, Follow, Layout, Method, SampleTimes, TrackSet};
 
 use crate::commands::bench::device::BenchDevice;
 use crate::commands::bench::report::Section;
-use crate::commands::bench::workload::{Kind, Workload};
-use crate::commands::bench::{Contestant, Turns, race};
+use crate::commands::bench::workload::{Workload, WorkloadKind};
+use crate::commands::bench::{Contestant, Repetitions, race};
 
 /// Samples of each path.
 const SAMPLES: usize = 60;
@@ -19,12 +19,12 @@ pub(crate) fn workload(tracks: usize) -> Workload {
     let mut set = TrackSet::new();
     let times: Vec<f64> = (0..6).map(f64::from).collect();
     for _ in 0..tracks {
-        let (mut place, mut way) = (DVec3::ZERO, DVec3::X);
+        let (mut position, mut direction) = (DVec3::ZERO, DVec3::X);
         let mut next = || {
             let aside = DVec3::from_array([(); 3].map(|()| random.f64() - 0.5));
-            way = (way + aside).normalize_or(DVec3::X);
-            place += way;
-            place.as_vec3()
+            direction = (direction + aside).normalize_or(DVec3::X);
+            position += direction;
+            position.as_vec3()
         };
         let points: Vec<Vec3> = times.iter().map(|_| next()).collect();
         set.push_path("", &times, &points, &[])
@@ -33,7 +33,7 @@ pub(crate) fn workload(tracks: usize) -> Workload {
     let times = (0..SAMPLES).map(|k| k as f64 / 12.0).collect();
     Workload {
         set,
-        frames: Frames::fps(12).between(0.0, (SAMPLES - 1) as f64 / 12.0),
+        frames: SampleTimes::fps(12).between(0.0, (SAMPLES - 1) as f64 / 12.0),
         times,
         per_track: false,
     }
@@ -43,7 +43,7 @@ pub(crate) fn measure(
     workload: &Workload,
     method: Method,
     devices: &[BenchDevice],
-    turns: Turns,
+    repetitions: Repetitions,
 ) -> Result<Section, tumble::Error> {
     let count = workload.set.track_count() * workload.times.len();
     let mut output = vec![Quat::IDENTITY; count];
@@ -73,8 +73,8 @@ pub(crate) fn measure(
             Ok(Vec::new())
         }));
     }
-    let rows = race(contestants, &mut output, turns)?;
-    Ok(Section::new(Kind::Follow, method, count, rows))
+    let rows = race(contestants, &mut output, repetitions)?;
+    Ok(Section::new(WorkloadKind::Follow, method, count, rows))
 }
 
 /// Frames of one path, each from the one before by two reflections.
@@ -92,32 +92,32 @@ fn double_reflection(workload: &Workload, track: usize, row: &mut [Quat]) {
         i => inner(i),
     };
     let mut before: Option<(Vec3, Vec3, Vec3)> = None;
-    for (own, &time) in row.iter_mut().zip(&workload.times) {
+    for (rotation, &time) in row.iter_mut().zip(&workload.times) {
         let i = (time as usize).min(last - 1);
         let t = (time - i as f64) as f32;
         let (p0, p1, m0, m1) = (keys[i], keys[i + 1], slope(i), slope(i + 1));
         let (t2, t3) = (t * t, t * t * t);
-        let place = p0 * (2.0 * t3 - 3.0 * t2 + 1.0)
+        let position = p0 * (2.0 * t3 - 3.0 * t2 + 1.0)
             + m0 * (t3 - 2.0 * t2 + t)
             + p1 * (3.0 * t2 - 2.0 * t3)
             + m1 * (t3 - t2);
-        let way = (p1 - p0) * (6.0 * t - 6.0 * t2)
+        let velocity = (p1 - p0) * (6.0 * t - 6.0 * t2)
             + m0 * (3.0 * t2 - 4.0 * t + 1.0)
             + m1 * (3.0 * t2 - 2.0 * t);
-        let way = way.normalize_or(Vec3::Z);
+        let tangent = velocity.normalize_or(Vec3::Z);
         let up = match before {
-            None => way.cross(Vec3::Y.cross(way)).normalize_or(Vec3::X),
+            None => tangent.cross(Vec3::Y.cross(tangent)).normalize_or(Vec3::X),
             Some((from, direction, up)) => {
-                let chord = place - from;
+                let chord = position - from;
                 let square = chord.length_squared().max(f32::MIN_POSITIVE);
                 let up = up - chord * (2.0 / square * chord.dot(up));
                 let direction = direction - chord * (2.0 / square * chord.dot(direction));
-                let second = way - direction;
+                let second = tangent - direction;
                 let square = second.length_squared().max(f32::MIN_POSITIVE);
                 up - second * (2.0 / square * second.dot(up))
             }
         };
-        *own = Quat::from_mat3(&Mat3::from_cols(up.cross(way), up, way));
-        before = Some((place, way, up));
+        *rotation = Quat::from_mat3(&Mat3::from_cols(up.cross(tangent), up, tangent));
+        before = Some((position, tangent, up));
     }
 }

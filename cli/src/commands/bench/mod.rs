@@ -23,8 +23,8 @@ use tumble::{
 };
 
 use crate::commands::bench::device::BenchDevice;
-use crate::commands::bench::report::{Report, Row, Section};
-use crate::commands::bench::workload::{Kind, Workload};
+use crate::commands::bench::report::{BenchReport, BenchRow, Section};
+use crate::commands::bench::workload::{Workload, WorkloadKind};
 use crate::commands::probe;
 use crate::messages::exit::{DEVICE, Failure};
 use crate::messages::words;
@@ -34,8 +34,8 @@ use crate::messages::words;
 pub(crate) struct Arguments {
     /// What to measure
     #[arg(value_enum, default_values = ["sparse", "small"])]
-    workloads: Vec<Kind>,
-    /// Times that each is measured, after one that does not count; the median is told
+    workloads: Vec<WorkloadKind>,
+    /// How often each is measured, after a warm-up; the median is reported
     #[arg(long, default_value_t = 7, value_parser = clap::value_parser!(u32).range(1..=1000))]
     rounds: u32,
     /// Make every workload smaller by this factor, to try it out
@@ -68,46 +68,46 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     for &kind in &arguments.workloads {
         let Some(workload) = kind.workload(arguments.shrink as usize) else {
             words::note(&format!("measuring {kind:?} …").to_lowercase());
-            let turns = Turns {
+            let repetitions = Repetitions {
                 rounds: arguments.rounds,
                 calls: 1,
             };
             let shrink = arguments.shrink as usize;
             sections.extend(match kind {
-                Kind::Smooth => smooth::measure(shrink, turns)?,
-                _ => files::measure(shrink, turns)?,
+                WorkloadKind::Smooth => smooth::measure(shrink, repetitions)?,
+                _ => files::measure(shrink, repetitions)?,
             });
             continue;
         };
         for method in [method::SLERP, method::BESSEL_OVERHAUSER] {
             // Paths are curves of one method.
-            if kind == Kind::Follow && method == method::SLERP {
+            if kind == WorkloadKind::Follow && method == method::SLERP {
                 continue;
             }
             words::note(&format!("measuring {kind:?}, {method} …").to_lowercase());
             // A short call is repeated, so that the clock can see it.
             let calls = match kind {
-                Kind::Small => (10_000 / arguments.rounds / arguments.shrink).max(1),
+                WorkloadKind::Small => (10_000 / arguments.rounds / arguments.shrink).max(1),
                 _ => 1,
             };
-            let turns = Turns {
+            let repetitions = Repetitions {
                 rounds: arguments.rounds,
                 calls,
             };
-            let section = if kind == Kind::Stream {
-                stream::measure(&workload, method, turns)?
-            } else if kind == Kind::Follow {
-                follow::measure(&workload, method, &devices, turns)
+            let section = if kind == WorkloadKind::Stream {
+                stream::measure(&workload, method, repetitions)?
+            } else if kind == WorkloadKind::Follow {
+                follow::measure(&workload, method, &devices, repetitions)
                     .map_err(|error| crate::arguments::device::refused(&error))?
             } else {
-                measure(kind, &workload, method, &devices, turns)
+                measure(kind, &workload, method, &devices, repetitions)
                     .map_err(|error| crate::arguments::device::refused(&error))?
             };
             sections.push(section);
         }
     }
     let devices = devices.into_iter().map(|device| device.report).collect();
-    let report = Report::new(arguments.rounds, devices, sections);
+    let report = BenchReport::new(arguments.rounds, devices, sections);
     if arguments.json {
         words::json(&report)
     } else {
@@ -115,18 +115,18 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
 }
 
-/// One way to do the work; what it returns are times besides that of the whole.
-type Action<'a, E> = Box<dyn FnMut(&mut [Quat]) -> Result<Vec<Part>, E> + 'a>;
+/// The work of a contestant; returns times of parts of it.
+type Action<'a, E> = Box<dyn FnMut(&mut [Quat]) -> Result<Vec<TimeShare>, E> + 'a>;
 
-/// How often each is measured, and how many calls one measurement takes.
+/// How often each contestant is measured, and how many calls one measurement has.
 #[derive(Clone, Copy)]
-pub(crate) struct Turns {
+pub(crate) struct Repetitions {
     rounds: u32,
     calls: u32,
 }
 
-/// A share of an action's time.
-struct Part {
+/// A named part of an action's time.
+struct TimeShare {
     name: &'static str,
     time: Duration,
 }
@@ -142,7 +142,7 @@ struct Contestant<'a, E> {
 impl<'a, E> Contestant<'a, E> {
     fn new(
         name: impl Into<String>,
-        action: impl FnMut(&mut [Quat]) -> Result<Vec<Part>, E> + 'a,
+        action: impl FnMut(&mut [Quat]) -> Result<Vec<TimeShare>, E> + 'a,
     ) -> Self {
         Self {
             name: name.into(),
@@ -153,11 +153,11 @@ impl<'a, E> Contestant<'a, E> {
 }
 
 fn measure(
-    kind: Kind,
+    kind: WorkloadKind,
     workload: &Workload,
     method: Method,
     devices: &[BenchDevice],
-    turns: Turns,
+    repetitions: Repetitions,
 ) -> Result<Section, tumble::Error> {
     let engine = Engine::new(Device::Cpu)?;
     let clip = engine.upload(&workload.set, method)?;
@@ -175,7 +175,7 @@ fn measure(
     };
     // Segments of dense keys take gigabytes: there is room for them once.
     let clips = match kind {
-        Kind::Dense => Vec::new(),
+        WorkloadKind::Dense => Vec::new(),
         _ => (devices.iter())
             .map(|device| device.engine.upload(&workload.set, method))
             .collect::<Result<_, _>>()?,
@@ -204,7 +204,7 @@ fn measure(
         })
     };
     contestants.push(evaluate("CPU, evaluation alone".into(), clip));
-    if kind != Kind::Dense {
+    if kind != WorkloadKind::Dense {
         let one = cpu_clip(&|options| options.threads = Some(1))?;
         contestants.push(evaluate("CPU, one thread".into(), one));
         for width in VectorWidth::available() {
@@ -240,7 +240,7 @@ fn measure(
             },
         ));
     }
-    let mut rows = race(contestants, &mut output, turns)?;
+    let mut rows = race(contestants, &mut output, repetitions)?;
     // The limit is the faster of plain and streaming stores: on Intel's processors streaming
     // stores write long results twice as fast, on others they bring little.
     let [plain, streaming] = [0, 1].map(|i| rows[i].milliseconds);
@@ -262,7 +262,7 @@ fn resident<'a>(
     let mut contestant = Contestant::new(name, move |_: &mut [Quat]| {
         let took = room.evaluate()?;
         let parts = [("device clock", took.on_device), ("host", took.on_host)];
-        Ok(parts.map(|(name, time)| Part { name, time }).into())
+        Ok(parts.map(|(name, time)| TimeShare { name, time }).into())
     });
     contestant.on_device = on_device;
     Ok(Some(contestant))
@@ -272,10 +272,10 @@ fn resident<'a>(
 fn into_host_memory<'a>(
     clip: &'a Clip,
     workload: &'a Workload,
-) -> impl FnMut(&mut [Quat]) -> Result<Vec<Part>, tumble::Error> + 'a {
+) -> impl FnMut(&mut [Quat]) -> Result<Vec<TimeShare>, tumble::Error> + 'a {
     move |output| {
         clip.evaluate_into(&workload.frames, Layout::TrackMajor, output)?;
-        Ok(taken(clip))
+        Ok(device_time_shares(clip))
     }
 }
 
@@ -283,15 +283,15 @@ fn into_host_memory<'a>(
 fn on_device<'a>(
     clip: &'a Clip,
     workload: &'a Workload,
-) -> impl FnMut(&mut [Quat]) -> Result<Vec<Part>, tumble::Error> + 'a {
+) -> impl FnMut(&mut [Quat]) -> Result<Vec<TimeShare>, tumble::Error> + 'a {
     move |_| {
         std::hint::black_box(clip.evaluate(&workload.frames)?);
-        Ok(taken(clip))
+        Ok(device_time_shares(clip))
     }
 }
 
-/// Where a device's time went.
-fn taken(clip: &Clip) -> Vec<Part> {
+/// The parts of a device's time.
+fn device_time_shares(clip: &Clip) -> Vec<TimeShare> {
     let timings = clip.engine().take_timings();
     let parts = [
         ("work lists", timings.work_lists),
@@ -299,35 +299,35 @@ fn taken(clip: &Clip) -> Vec<Part> {
         ("device clock", timings.on_device),
         ("read back", timings.read_back),
     ];
-    parts.map(|(name, time)| Part { name, time }).into()
+    parts.map(|(name, time)| TimeShare { name, time }).into()
 }
 
-/// Every contestant in turn, round after round; the first round does not count.
+/// Measures every contestant in turn, round after round; the first round does not count.
 fn race<E>(
     mut contestants: Vec<Contestant<'_, E>>,
     output: &mut [Quat],
-    Turns { rounds, calls }: Turns,
-) -> Result<Vec<Row>, E> {
+    Repetitions { rounds, calls }: Repetitions,
+) -> Result<Vec<BenchRow>, E> {
     let mut times = vec![Vec::new(); contestants.len()];
     let mut parts: Vec<Vec<(&str, Vec<Duration>)>> = vec![Vec::new(); contestants.len()];
     for round in 0..=rounds {
         for (i, contestant) in contestants.iter_mut().enumerate() {
-            let mut own = Vec::new();
+            let mut shares = Vec::new();
             let started = Instant::now();
             for _ in 0..calls {
-                own = (contestant.action)(output)?;
+                shares = (contestant.action)(output)?;
             }
             let mut time = started.elapsed() / calls;
-            if let (Some(_), Some(device)) = (contestant.on_device, own.first()) {
+            if let (Some(_), Some(device)) = (contestant.on_device, shares.first()) {
                 time = device.time;
             }
             std::hint::black_box(&mut *output);
             if round == 0 {
-                parts[i] = own.iter().map(|part| (part.name, Vec::new())).collect();
+                parts[i] = shares.iter().map(|part| (part.name, Vec::new())).collect();
                 continue;
             }
             times[i].push(time);
-            for (of_part, part) in parts[i].iter_mut().zip(own) {
+            for (of_part, part) in parts[i].iter_mut().zip(shares) {
                 of_part.1.push(part.time);
             }
         }
@@ -336,7 +336,7 @@ fn race<E>(
     Ok(rows
         .map(|((contestant, times), parts)| {
             let parts = parts.into_iter().map(|(name, times)| (name, median(times)));
-            let mut row = Row::new(contestant.name, median(times), parts.collect());
+            let mut row = BenchRow::new(contestant.name, median(times), parts.collect());
             row.share_of_device(contestant.on_device);
             row
         })

@@ -8,12 +8,12 @@ use serde::Serialize;
 use tumble::{Method, VectorWidth};
 
 use crate::commands::bench::device::DeviceReport;
-use crate::commands::bench::workload::Kind;
+use crate::commands::bench::workload::WorkloadKind;
 use crate::messages::words;
 
 /// A whole run; also the form of the JSON.
 #[derive(Serialize)]
-pub(crate) struct Report {
+pub(crate) struct BenchReport {
     version: &'static str,
     threads: usize,
     /// Vector instructions of the CPU, the widest of which is used.
@@ -26,7 +26,7 @@ pub(crate) struct Report {
 /// One workload and method.
 #[derive(Serialize)]
 pub(crate) struct Section {
-    workload: Kind,
+    workload: WorkloadKind,
     method: String,
     rotations: usize,
     /// Of the files, where files are read.
@@ -37,7 +37,7 @@ pub(crate) struct Section {
     peak_memory_bytes: Option<u64>,
     #[serde(skip)]
     ratios: &'static [Ratio],
-    rows: Vec<Row>,
+    rows: Vec<BenchRow>,
 }
 
 /// A ratio's name in JSON, and its heading in the table.
@@ -56,7 +56,7 @@ const READING: [Ratio; 2] = [
 
 /// One contestant. Times are medians.
 #[derive(Serialize)]
-pub(crate) struct Row {
+pub(crate) struct BenchRow {
     name: String,
     pub(crate) milliseconds: f64,
     million_rotations_per_second: f64,
@@ -71,7 +71,7 @@ pub(crate) struct Row {
     parts: Vec<(&'static str, f64)>,
 }
 
-impl Report {
+impl BenchReport {
     pub(crate) fn new(rounds: u32, devices: Vec<DeviceReport>, sections: Vec<Section>) -> Self {
         let widths = VectorWidth::available();
         Self {
@@ -104,13 +104,20 @@ impl Report {
 
 impl Section {
     /// `rows`: the write rate first, then the naive peer where there is one.
-    pub(crate) fn new(workload: Kind, method: Method, rotations: usize, rows: Vec<Row>) -> Self {
+    pub(crate) fn new(
+        workload: WorkloadKind,
+        method: Method,
+        rotations: usize,
+        rows: Vec<BenchRow>,
+    ) -> Self {
         let ratios = match workload {
-            Kind::Stream => &WRITING[..1],
+            WorkloadKind::Stream => &WRITING[..1],
             _ => &WRITING,
         };
         Self {
-            peak_memory_bytes: (workload == Kind::Stream).then(peak_memory).flatten(),
+            peak_memory_bytes: (workload == WorkloadKind::Stream)
+                .then(peak_memory)
+                .flatten(),
             ..Self::with(workload, method.name, rotations, rows, ratios)
         }
     }
@@ -120,25 +127,25 @@ impl Section {
         format: &'static str,
         rotations: usize,
         file_bytes: u64,
-        rows: Vec<Row>,
+        rows: Vec<BenchRow>,
     ) -> Self {
         Self {
             file_bytes: Some(file_bytes),
             peak_memory_bytes: peak_memory(),
-            ..Self::with(Kind::Files, format, rotations, rows, &READING)
+            ..Self::with(WorkloadKind::Files, format, rotations, rows, &READING)
         }
     }
 
     /// `rows`: copying first.
-    pub(crate) fn of_smoothing(kernel: String, samples: usize, rows: Vec<Row>) -> Self {
-        Self::with(Kind::Smooth, kernel, samples, rows, &COPYING)
+    pub(crate) fn of_smoothing(kernel: String, samples: usize, rows: Vec<BenchRow>) -> Self {
+        Self::with(WorkloadKind::Smooth, kernel, samples, rows, &COPYING)
     }
 
     fn with(
-        workload: Kind,
+        workload: WorkloadKind,
         method: impl Into<String>,
         rotations: usize,
-        mut rows: Vec<Row>,
+        mut rows: Vec<BenchRow>,
         ratios: &'static [Ratio],
     ) -> Self {
         let firsts: Vec<f64> = rows.iter().take(2).map(|row| row.milliseconds).collect();
@@ -215,7 +222,7 @@ fn peak_memory() -> Option<u64> {
     Some(kibibytes * 1024)
 }
 
-impl Row {
+impl BenchRow {
     /// Of the bytes that a device writes, and those that it can write in a second.
     pub(crate) fn share_of_device(&mut self, on_device: Option<(u64, f64)>) {
         let known = on_device.filter(|&(_, limit)| limit > 0.0 && self.milliseconds > 0.0);

@@ -9,7 +9,7 @@ use tumble::{
 use crate::arguments::device::refused;
 use crate::commands::bench::report::Section;
 use crate::commands::bench::workload::walk;
-use crate::commands::bench::{Contestant, Turns, race};
+use crate::commands::bench::{Contestant, Repetitions, race};
 use crate::messages::exit::{self, Failure};
 
 /// How many tracks.
@@ -18,7 +18,7 @@ const TRACKS: usize = 64;
 /// Samples of each track: noise about a motion.
 const SAMPLES: usize = 1_000_000;
 
-pub(crate) fn measure(shrink: usize, turns: Turns) -> Result<Vec<Section>, Failure> {
+pub(crate) fn measure(shrink: usize, repetitions: Repetitions) -> Result<Vec<Section>, Failure> {
     let samples = (SAMPLES / shrink).max(2);
     let count = TRACKS * samples;
     // One motion for all tracks: how long smoothing takes does not depend on it.
@@ -28,9 +28,9 @@ pub(crate) fn measure(shrink: usize, turns: Turns) -> Result<Vec<Section>, Failu
         track.copy_from_slice(&motion);
     }
     let rotations = Rotations::of(&rotations, TRACKS, Layout::TrackMajor).map_err(no_memory)?;
-    let places: Vec<Vec3> = rotations.as_quats().iter().map(|q| q.xyz()).collect();
-    let vectors = Vectors::of(&places, TRACKS, Layout::TrackMajor).map_err(no_memory)?;
-    drop(places);
+    let positions: Vec<Vec3> = rotations.as_quats().iter().map(|q| q.xyz()).collect();
+    let vectors = Vectors::of(&positions, TRACKS, Layout::TrackMajor).map_err(no_memory)?;
+    drop(positions);
 
     let engine = Engine::new(Device::Cpu).map_err(|error| refused(&error))?;
     let kernels = [SmoothingKernel::Linear, SmoothingKernel::Gaussian(2.0)];
@@ -55,7 +55,7 @@ pub(crate) fn measure(shrink: usize, turns: Turns) -> Result<Vec<Section>, Failu
                 Ok(Vec::new())
             }),
         ];
-        let rows = race(contestants, &mut [], turns).map_err(|error| refused(&error))?;
+        let rows = race(contestants, &mut [], repetitions).map_err(|error| refused(&error))?;
         Ok(Section::of_smoothing(kernel.to_string(), count, rows))
     };
     kernels.into_iter().map(one).collect()

@@ -7,8 +7,8 @@ use glam::Quat;
 use tumble::{Device, Engine, Error, Layout, Method};
 
 use crate::commands::bench::report::Section;
-use crate::commands::bench::workload::{Kind, Workload};
-use crate::commands::bench::{Contestant, Turns, race};
+use crate::commands::bench::workload::{Workload, WorkloadKind};
+use crate::commands::bench::{Contestant, Repetitions, race};
 use crate::messages::exit::{Failure, OUTPUT};
 
 /// Rotations of a chunk: 16 MB.
@@ -16,53 +16,53 @@ const CHUNK: usize = 1 << 20;
 
 /// What a stream can end with.
 #[derive(Debug)]
-enum Ended {
+enum StreamError {
     Writing(std::io::Error),
     Evaluating(Error),
 }
 
-impl From<Error> for Ended {
+impl From<Error> for StreamError {
     fn from(error: Error) -> Self {
         Self::Evaluating(error)
     }
 }
 
 /// A file on the disk, written anew each time.
-struct Sink(File);
+struct TemporaryFile(File);
 
-impl Sink {
-    fn write(&mut self, rotations: &[Quat]) -> Result<(), Ended> {
+impl TemporaryFile {
+    fn write(&mut self, rotations: &[Quat]) -> Result<(), StreamError> {
         let written = self.0.write_all(bytemuck::cast_slice(rotations));
-        written.map_err(Ended::Writing)
+        written.map_err(StreamError::Writing)
     }
 
     /// Waits until all of it is on the disk, and forgets it.
-    fn finish(&mut self) -> Result<(), Ended> {
+    fn finish(&mut self) -> Result<(), StreamError> {
         let mut finish = || {
             self.0.sync_data()?;
             self.0.rewind()?;
             self.0.set_len(0)
         };
-        finish().map_err(Ended::Writing)
+        finish().map_err(StreamError::Writing)
     }
 }
 
 pub(crate) fn measure(
     workload: &Workload,
     method: Method,
-    turns: Turns,
+    repetitions: Repetitions,
 ) -> Result<Section, Failure> {
     let (set, frames) = (&workload.set, &workload.frames);
     let count = set.track_count() * workload.times.len();
     let engine =
         Engine::new(Device::Cpu).map_err(|error| crate::arguments::device::refused(&error))?;
-    let sink = || -> Result<Sink, Failure> {
+    let sink = || -> Result<TemporaryFile, Failure> {
         let file = tempfile::tempfile().map_err(|error| Failure::writing("a file", &error))?;
-        Ok(Sink(file))
+        Ok(TemporaryFile(file))
     };
-    let stream = |take: &mut dyn FnMut(&[Quat]) -> Result<(), Ended>| {
+    let stream = |emit: &mut dyn FnMut(&[Quat]) -> Result<(), StreamError>| {
         engine.stream(set, method, frames, Layout::TrackMajor, CHUNK, |chunk| {
-            take(chunk.rotations().unwrap_or_default())
+            emit(chunk.rotations().unwrap_or_default())
         })
     };
     let (mut alone, mut with) = (sink()?, sink()?);
@@ -88,9 +88,9 @@ pub(crate) fn measure(
             Ok(Vec::new())
         }),
     ];
-    let rows = race(contestants, &mut [], turns).map_err(|ended| match ended {
-        Ended::Writing(error) => Failure::new(OUTPUT, format!("a temporary file: {error}")),
-        Ended::Evaluating(error) => crate::arguments::device::refused(&error),
+    let rows = race(contestants, &mut [], repetitions).map_err(|ended| match ended {
+        StreamError::Writing(error) => Failure::new(OUTPUT, format!("a temporary file: {error}")),
+        StreamError::Evaluating(error) => crate::arguments::device::refused(&error),
     })?;
-    Ok(Section::new(Kind::Stream, method, count, rows))
+    Ok(Section::new(WorkloadKind::Stream, method, count, rows))
 }

@@ -3,14 +3,14 @@
 
 use fastrand::Rng;
 use glam::{DQuat, DVec3, Quat};
-use tumble::{Frames, TrackSet};
+use tumble::{SampleTimes, TrackSet};
 
 use crate::commands::bench::follow;
 
 /// A set, and the samples to evaluate.
 pub(crate) struct Workload {
     pub(crate) set: TrackSet,
-    pub(crate) frames: Frames,
+    pub(crate) frames: SampleTimes,
     /// The time of each sample, seconds; of each track's only sample where
     /// `per_track`.
     pub(crate) times: Vec<f64>,
@@ -20,7 +20,7 @@ pub(crate) struct Workload {
 /// The workloads that there are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub(crate) enum Kind {
+pub(crate) enum WorkloadKind {
     /// 4096 tracks of 26 uneven keys, 1200 frames
     Sparse,
     /// 4096 tracks of 2400 keys at 120 Hz, 1200 frames between them
@@ -44,26 +44,26 @@ pub(crate) enum Kind {
 /// Frames per second, in every workload.
 pub(crate) const RATE: f64 = 60.0;
 
-impl Kind {
+impl WorkloadKind {
     /// Makes the workload with one `shrink`th of its tracks, or of its keys where
     /// there is one track; none for files and for smoothing.
     pub(crate) fn workload(self, shrink: usize) -> Option<Workload> {
-        let few = |count: usize| (count / shrink).max(1);
+        let scaled = |count: usize| (count / shrink).max(1);
         Some(match self {
-            Self::Sparse => frames(uneven(few(4096), 26, 1200.0 / RATE), 0.0, 1200),
+            Self::Sparse => frames(uneven(scaled(4096), 26, 1200.0 / RATE), 0.0, 1200),
             Self::Small => frames(uneven(4, 26, 500.0 / RATE), 0.0, 500),
             // Half way between keys: on them there would be nothing to evaluate.
-            Self::Dense => frames(even(few(4096), 2400), 1.0 / 240.0, 1199),
+            Self::Dense => frames(even(scaled(4096), 2400), 1.0 / 240.0, 1199),
             Self::Long => {
-                let keys = few(10_000_000).max(4);
+                let keys = scaled(10_000_000).max(4);
                 frames(even(1, keys), 1.0 / 240.0, keys / 2 - 1)
             }
             Self::Stream => {
-                let count = few(1 << 17);
+                let count = scaled(1 << 17);
                 frames(uneven(4096, 26, count as f64 / RATE), 0.0, count)
             }
-            Self::Crowd => crowd(few(1_000_000)),
-            Self::Follow => follow::workload(few(100_000)),
+            Self::Crowd => crowd(scaled(1_000_000)),
+            Self::Follow => follow::workload(scaled(100_000)),
             Self::Files | Self::Smooth => return None,
         })
     }
@@ -73,7 +73,7 @@ fn frames(set: TrackSet, start: f64, count: usize) -> Workload {
     let end = start + (count - 1) as f64 / RATE;
     Workload {
         set,
-        frames: Frames::fps(RATE as u32).between(start, end),
+        frames: SampleTimes::fps(RATE as u32).between(start, end),
         times: (0..count).map(|k| start + k as f64 / RATE).collect(),
         per_track: false,
     }
@@ -118,7 +118,7 @@ fn crowd(tracks: usize) -> Workload {
         .collect();
     Workload {
         set,
-        frames: Frames::at_each(times.clone()),
+        frames: SampleTimes::at_each(times.clone()),
         times,
         per_track: true,
     }

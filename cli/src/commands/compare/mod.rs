@@ -6,7 +6,7 @@ use std::path::Path;
 
 use clap::{Args, ValueEnum};
 use serde::Serialize;
-use tumble::{Device, Engine, FrameRate, Frames};
+use tumble::{Device, Engine, FrameRate, SampleTimes};
 use tumble_formats::compare::{
     ArrayDifference, ClipDifference, ClipPair, CompareError, PathDifference, PathMeasure,
 };
@@ -26,8 +26,8 @@ use crate::messages::words;
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Motions are sampled as their files say (`eval --method authored`), at every key of both and halfway
-between neighbouring keys, or at the frames of --fps; tracks belong together by their names, or by
-their places where the names differ. Two NPY files are compared number by number, and by angles
+between neighbouring keys, or at the frames of --fps; tracks are matched by name, or by index
+where the names differ. Two NPY files are compared number by number, and by angles
 where they hold rotations. Exit code 8 where a difference is over --tolerance or --distance, or
 where one of two motions that have one of these lacks a track of the other.
 
@@ -45,7 +45,7 @@ pub(crate) struct Arguments {
     /// Two keyframe files, or two results of `tumble eval`
     #[command(flatten)]
     inputs: Inputs,
-    /// Compare at so many frames per second [default: at the keys, and halfway between them]
+    /// Compare at this many frames per second [default: at the keys, and halfway between them]
     #[arg(long, value_name = "FPS")]
     fps: Option<FrameRate>,
     /// Where to start, seconds [default: the first time that both have]
@@ -64,16 +64,16 @@ pub(crate) struct Arguments {
     /// The largest distance of two translations that passes
     #[arg(long, value_name = "LENGTH", value_parser = not_negative, allow_hyphen_values = true)]
     distance: Option<f64>,
-    /// Lay the second path over the first by least squares, with what is free in it
+    /// Align the second path to the first by least squares; the value says what may change
     #[arg(long, value_enum, value_name = "FREEDOM", help_heading = TRAJECTORIES)]
     align: Option<AlignArgument>,
     /// Absolute errors: pose by pose
     #[arg(long, help_heading = TRAJECTORIES)]
     ape: bool,
-    /// Relative errors: over steps of so many seconds, or so many units of length along the second
+    /// Relative errors: over steps of this many seconds, or units of length along the second path
     #[arg(long, value_name = "1s|1m", value_parser = step, help_heading = TRAJECTORIES)]
     rpe: Option<Step>,
-    /// Leave out poses between two of the second that are more than so many seconds apart
+    /// Leave out poses between two of the second that are more than this many seconds apart
     #[arg(long, value_name = "SECONDS", value_parser = not_negative, help_heading = TRAJECTORIES)]
     max_gap: Option<f64>,
     /// Print JSON
@@ -119,13 +119,13 @@ fn refused(error: CompareError) -> Failure {
     }
 }
 
-/// The heading of what is about paths in help.
+/// The heading of the options for trajectories in help.
 const TRAJECTORIES: &str = "Trajectories";
 
 /// What was found, as JSON has it.
 #[derive(Serialize)]
 #[serde(rename_all = "lowercase")]
-enum Report {
+enum ComparisonReport {
     Clips(Vec<ClipDifference>),
     Array(ArrayDifference),
     Trajectory(Box<PathDifference>),
@@ -147,22 +147,22 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let (report, rest) = match arguments.are_arrays(paths)? {
         _ if arguments.is_of_trajectories() => {
             let (found, rest) = arguments.trajectory(paths)?;
-            (Report::Trajectory(Box::new(found)), rest)
+            (ComparisonReport::Trajectory(Box::new(found)), rest)
         }
         true => {
             let found = arguments.arrays(paths)?;
-            (Report::Array(found), Ok(()))
+            (ComparisonReport::Array(found), Ok(()))
         }
         false => {
             let (found, rest) = arguments.clips(paths)?;
-            (Report::Clips(found), rest)
+            (ComparisonReport::Clips(found), rest)
         }
     };
     match (&report, arguments.json) {
         (report, true) => words::json(report)?,
-        (Report::Array(found), false) => words::listing(&text::of_arrays(found))?,
-        (Report::Trajectory(found), false) => words::listing(&text::of_paths(found))?,
-        (Report::Clips(found), false) => {
+        (ComparisonReport::Array(found), false) => words::listing(&text::of_arrays(found))?,
+        (ComparisonReport::Trajectory(found), false) => words::listing(&text::of_paths(found))?,
+        (ComparisonReport::Clips(found), false) => {
             let lines: String = found.iter().map(text::of_clips).collect();
             words::listing(&lines)?;
         }
@@ -199,7 +199,7 @@ impl Arguments {
                 );
                 return Err(Failure::new(ALL_INPUTS, message));
             };
-            // Where it is depends on all that it hangs on.
+            // Its position depends on all its ancestors.
             let all = clip.set.tracks();
             let index = all.enumerate().find(|(_, other)| other.name == track.name);
             Ok(index.map_or(0, |(index, _)| index))
@@ -236,12 +236,12 @@ impl Arguments {
         found.map_err(refused)
     }
 
-    /// Whether both are arrays whose meaning nobody needs to know.
+    /// Whether both are arrays that are compared number by number.
     fn are_arrays(&self, paths: [&Path; 2]) -> Result<bool, Failure> {
         let is_array = |path: &Path| Format::detected(path).name == "npy";
-        let own = self.inputs.tracks.is_given() || self.inputs.reading.is_given();
+        let has_options = self.inputs.tracks.is_set() || self.inputs.reading.is_set();
         let all = paths.iter().all(|path| is_array(path));
-        if !all || own {
+        if !all || has_options {
             return Ok(false);
         }
         if self.fps.is_some() || self.world || self.distance.is_some() {
@@ -260,7 +260,7 @@ impl Arguments {
     ) -> Result<(Vec<ClipDifference>, Result<(), Failure>), Failure> {
         let loaded = [self.inputs.load(paths[0])?, self.inputs.load(paths[1])?];
         let rest = (paths.iter().zip(&loaded))
-            .try_for_each(|(path, loaded)| input::whole(&input::name(path), loaded));
+            .try_for_each(|(path, loaded)| input::check_complete(&input::name(path), loaded));
         let counts = [0, 1].map(|side| loaded[side].clips.len());
         if counts[0] != counts[1] {
             return Err(Failure::new(
@@ -277,11 +277,11 @@ impl Arguments {
         let engine = Engine::new(Device::Cpu)
             .map_err(|error| Failure::evaluating(&input::name(paths[0]), &error))?;
         let mut found = Vec::new();
-        for (place, first) in loaded[0].clips.iter().enumerate() {
-            // Of the same name, else at the same place.
+        for (index, first) in loaded[0].clips.iter().enumerate() {
+            // Of the same name, else of the same index.
             let same = |clip: &&Motion| first.name.is_some() && clip.name == first.name;
             let second = loaded[1].clips.iter().find(same);
-            let second = second.unwrap_or(&loaded[1].clips[place]);
+            let second = second.unwrap_or(&loaded[1].clips[index]);
             let names =
                 [(paths[0], first), (paths[1], second)].map(|(path, clip)| match counts[0] {
                     1 => input::name(path),
@@ -313,7 +313,7 @@ impl Arguments {
             self.end.unwrap_or(common.end),
         );
         let frames = match self.fps {
-            Some(rate) => Frames::rate(rate).between(start, end),
+            Some(rate) => SampleTimes::rate(rate).between(start, end),
             None => pair.keys(&common),
         };
         for (name, clip) in pair.inputs.into_iter().zip(pair.clips) {
@@ -324,18 +324,20 @@ impl Arguments {
     }
 
     /// Fails where a difference is over its bound.
-    fn judge(&self, report: &Report) -> Result<(), Failure> {
-        let over = |what: &str, largest: f64, bound: Option<f64>, unit: &str| {
+    fn judge(&self, report: &ComparisonReport) -> Result<(), Failure> {
+        let over = |quantity: &str, largest: f64, bound: Option<f64>, unit: &str| {
             let bound = bound.filter(|&bound| largest > bound)?;
-            Some(format!("{what} of {largest:.3e}{unit} over {bound}{unit}"))
+            Some(format!(
+                "{quantity} of {largest:.3e}{unit} over {bound}{unit}"
+            ))
         };
         let mut faults = Vec::new();
         match report {
-            Report::Array(found) => faults.extend(match &found.rotation {
-                Some(turn) => over("angle", turn.largest, self.tolerance, "°"),
+            ComparisonReport::Array(found) => faults.extend(match &found.rotation {
+                Some(rotation) => over("angle", rotation.largest, self.tolerance, "°"),
                 None => over("difference", found.difference.largest, self.tolerance, ""),
             }),
-            Report::Trajectory(found) => {
+            ComparisonReport::Trajectory(found) => {
                 if let Some(absolute) = &found.ape {
                     faults.extend(over("angle", absolute.rotation.max, self.tolerance, "°"));
                     faults.extend(over(
@@ -346,13 +348,13 @@ impl Arguments {
                     ));
                 }
             }
-            Report::Clips(all) => {
+            ComparisonReport::Clips(all) => {
                 for found in all {
                     let angle = found.rotation.spread.largest;
                     faults.extend(over("angle", angle, self.tolerance, "°"));
                     if let Some(moved) = &found.translation {
-                        let way = moved.spread.largest;
-                        faults.extend(over("distance", way, self.distance, ""));
+                        let distance = moved.spread.largest;
+                        faults.extend(over("distance", distance, self.distance, ""));
                     }
                     let missing: usize = found.missing.iter().map(Vec::len).sum();
                     if missing > 0 && (self.tolerance.is_some() || self.distance.is_some()) {

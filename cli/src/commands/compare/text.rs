@@ -19,24 +19,24 @@ pub(super) fn of_clips(difference: &ClipDifference) -> String {
         difference.span[0],
         difference.span[1]
     );
-    let mut line = |what: &str, unit: &str, found: &ChannelDifference| {
+    let mut line = |label: &str, unit: &str, found: &ChannelDifference| {
         let Spread { mean, rms, largest } = found.spread;
-        let place = match largest > 0.0 {
+        let position = match largest > 0.0 {
             true => format!(" at {}, {:.4} s", printable(&found.track), found.time),
             false => String::new(),
         };
         text += &format!(
-            "  {what:<12} mean {mean:.3e}{unit}, rms {rms:.3e}{unit}, largest \
-                 {largest:.3e}{unit}{place}\n"
+            "  {label:<12} mean {mean:.3e}{unit}, rms {rms:.3e}{unit}, largest \
+                 {largest:.3e}{unit}{position}\n"
         );
     };
     line("rotation", "°", &difference.rotation);
-    for (what, found) in [
+    for (label, found) in [
         ("translation", &difference.translation),
         ("scale", &difference.scale),
     ] {
         if let Some(found) = found {
-            line(what, "", found);
+            line(label, "", found);
         }
     }
     text += &format!(
@@ -107,7 +107,7 @@ pub(super) fn of_paths(found: &PathDifference) -> String {
             "\n  aligned      by {by}: scale {scale:.6}, turned {degrees:.4}°, moved {x:.6} {y:.6} {z:.6}"
         );
     }
-    for (what, found) in [("absolute", &found.ape), ("relative", &found.rpe)] {
+    for (label, found) in [("absolute", &found.ape), ("relative", &found.rpe)] {
         let Some(found) = found else { continue };
         for (of, unit, numbers) in [
             ("translation", "", &found.translation),
@@ -123,7 +123,7 @@ pub(super) fn of_paths(found: &PathDifference) -> String {
                 ..
             } = numbers;
             text += &format!(
-                "\n  {what:<8} {of:<11} rmse {rmse:.6}{unit}, mean {mean:.6}{unit}, median {median:.6}{unit}, \
+                "\n  {label:<8} {of:<11} rmse {rmse:.6}{unit}, mean {mean:.6}{unit}, median {median:.6}{unit}, \
                      std {std:.6}{unit}, min {min:.6}{unit}, max {max:.6}{unit} ({})",
                 found.count
             );

@@ -1,5 +1,5 @@
-//! What each option says to each kind of result: an option that says nothing to it is refused, with
-//! what to do, and never ignored.
+//! Which options apply to which kind of result. An option that has no effect is refused, with a remedy,
+//! and never ignored.
 
 use tumble::{Encoding, Layout};
 use tumble_formats::format::{Format, FormatOption};
@@ -7,9 +7,9 @@ use tumble_formats::format::{Format, FormatOption};
 use crate::commands::eval::{Arguments, LayoutArgument};
 use crate::messages::exit::Failure;
 
-/// What a result is.
+/// The kind of a result.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Kind {
+pub(super) enum ResultKind {
     /// The numbers of rotations as they come.
     Rotations,
     /// Whole poses.
@@ -21,20 +21,20 @@ pub(super) enum Kind {
 }
 
 impl Arguments {
-    /// Refuses, before any work, options that say nothing to whatever kind the results may be of.
+    /// Refuses, before any work, options that have no effect on any kind that the results may have.
     pub(super) fn check_before(&self, format: &Format) -> Result<(), Failure> {
         let mut kinds = Vec::new();
-        if self.what.is_rotations() {
+        if self.output.is_rotations() {
             if format.write.is_some() {
-                kinds.push(Kind::Rotations);
+                kinds.push(ResultKind::Rotations);
             }
             if format.writes_clips() {
-                kinds.extend([Kind::Motion, Kind::Baked]);
+                kinds.extend([ResultKind::Motion, ResultKind::Baked]);
             }
         } else {
-            kinds.push(match self.what.poses() {
-                Some(_) => Kind::Poses,
-                None => Kind::Rotations,
+            kinds.push(match self.output.poses() {
+                Some(_) => ResultKind::Poses,
+                None => ResultKind::Rotations,
             });
         }
         let mut refusals = kinds.into_iter().map(|kind| self.refusal(kind, format));
@@ -45,74 +45,74 @@ impl Arguments {
         }
     }
 
-    /// Refuses options that say nothing to a result of this kind.
-    pub(super) fn check(&self, kind: Kind, format: &Format) -> Result<(), Failure> {
+    /// Refuses options that have no effect on a result of this kind.
+    pub(super) fn check(&self, kind: ResultKind, format: &Format) -> Result<(), Failure> {
         self.refusal(kind, format)
             .map_or(Ok(()), |message| Err(Failure::usage(message)))
     }
 
-    fn refusal(&self, kind: Kind, format: &Format) -> Option<String> {
-        let is_clip = matches!(kind, Kind::Motion | Kind::Baked);
+    fn refusal(&self, kind: ResultKind, format: &Format) -> Option<String> {
+        let is_clip = matches!(kind, ResultKind::Motion | ResultKind::Baked);
         let is_angles = is_clip && format.takes(FormatOption::Sequence);
-        let (what, name) = (self.what.name(), format.name);
+        let (output, name) = (self.output.name(), format.name);
         if !is_clip && format.write.is_none() {
             let all = Format::writable().filter(|format| format.write.is_some());
             let names: Vec<&str> = all.map(|format| format.name).collect();
             return Some(format!(
-                "{name} holds whole clips; for --output {what} write {}",
+                "{name} holds whole clips; for --output {output} write {}",
                 names.join(" or ")
             ));
         }
-        if let Err(message) = self.what.check(&self.given, is_angles) {
+        if let Err(message) = self.output.check(&self.command_line, is_angles) {
             return Some(message);
         }
         self.order_refusal(kind, format)
             .or_else(|| self.layout_refusal(kind, format))
             .or_else(|| self.encoding_refusal(kind, format))
             .or_else(|| {
-                let takes = kind == Kind::Baked && format.takes(FormatOption::Linear);
-                (self.given.has("linear") && !takes).then(|| {
+                let takes = kind == ResultKind::Baked && format.takes(FormatOption::Linear);
+                (self.command_line.has("linear") && !takes).then(|| {
                     "--linear is for NPZ that is written again as NPZ; leave it out".to_owned()
                 })
             })
             .or_else(|| {
-                let given = ["scale", "offsets"]
+                let option = ["scale", "offsets"]
                     .into_iter()
-                    .find(|it| self.given.has(it))?;
-                (kind == Kind::Rotations).then(|| {
+                    .find(|it| self.command_line.has(it))?;
+                (kind == ResultKind::Rotations).then(|| {
                     format!(
-                        "--{given} says nothing to rotations alone; leave it out, or write \
+                        "--{option} has no effect on rotations alone; leave it out, or write \
                          --output world or transform, or a clip (-o OUT.glb)"
                     )
                 })
             })
     }
 
-    fn order_refusal(&self, kind: Kind, format: &Format) -> Option<String> {
+    fn order_refusal(&self, kind: ResultKind, format: &Format) -> Option<String> {
         self.order?;
-        let (what, name) = (self.what.name(), format.name);
+        let (output, name) = (self.output.name(), format.name);
         match kind {
-            Kind::Rotations if !self.what.is_rotations() => Some(format!(
-                "--order is for quaternions, and --output {what} holds none; leave it out"
+            ResultKind::Rotations if !self.output.is_rotations() => Some(format!(
+                "--order is for quaternions, and --output {output} holds none; leave it out"
             )),
-            Kind::Motion if format.takes(FormatOption::Order) => None,
-            Kind::Motion | Kind::Baked => Some(format!(
+            ResultKind::Motion if format.takes(FormatOption::Order) => None,
+            ResultKind::Motion | ResultKind::Baked => Some(format!(
                 "{name} has an order of its own for the components of quaternions; leave out \
                  --order"
             )),
-            Kind::Rotations | Kind::Poses => None,
+            ResultKind::Rotations | ResultKind::Poses => None,
         }
     }
 
-    fn layout_refusal(&self, kind: Kind, format: &Format) -> Option<String> {
-        if !self.given.has("layout") {
+    fn layout_refusal(&self, kind: ResultKind, format: &Format) -> Option<String> {
+        if !self.command_line.has("layout") {
             return None;
         }
         let name = format.name;
         let only = match kind {
-            Kind::Rotations => format.write.as_ref()?.layout,
-            Kind::Poses => Some(Layout::FrameMajor),
-            Kind::Motion | Kind::Baked => {
+            ResultKind::Rotations => format.write.as_ref()?.layout,
+            ResultKind::Poses => Some(Layout::FrameMajor),
+            ResultKind::Motion | ResultKind::Baked => {
                 return Some(format!(
                     "{name} has a layout of its own for clips; leave out --layout"
                 ));
@@ -122,7 +122,7 @@ impl Arguments {
             (Some(Layout::FrameMajor), LayoutArgument::Track) => Some(format!(
                 "{} come frame by frame; leave out --layout track",
                 match kind {
-                    Kind::Poses => "poses".to_owned(),
+                    ResultKind::Poses => "poses".to_owned(),
                     _ => format!("rows of {name}"),
                 }
             )),
@@ -130,21 +130,21 @@ impl Arguments {
         }
     }
 
-    fn encoding_refusal(&self, kind: Kind, format: &Format) -> Option<String> {
+    fn encoding_refusal(&self, kind: ResultKind, format: &Format) -> Option<String> {
         if self.encoding == Encoding::F32 {
             return None;
         }
         let is_text = format.write.as_ref().is_some_and(|write| write.is_text);
         match kind {
-            Kind::Rotations if is_text => {
+            ResultKind::Rotations if is_text => {
                 Some("--encoding is for binary results (NPY); text holds every digit".to_owned())
             }
-            Kind::Rotations if self.what.is_rotations() => None,
-            Kind::Rotations | Kind::Poses => Some(format!(
+            ResultKind::Rotations if self.output.is_rotations() => None,
+            ResultKind::Rotations | ResultKind::Poses => Some(format!(
                 "--encoding is for quaternions, and --output {} is written as f32; leave it out",
-                self.what.name()
+                self.output.name()
             )),
-            Kind::Motion | Kind::Baked => Some(format!(
+            ResultKind::Motion | ResultKind::Baked => Some(format!(
                 "--encoding is for rotations as they come (NPY); {} has its own; leave it out",
                 format.name
             )),

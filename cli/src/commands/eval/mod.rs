@@ -11,36 +11,38 @@ use std::time::Instant;
 
 use clap::{Args, ValueEnum};
 use serde::Serialize;
-use tumble::{Encoding, Engine, Error, Frames, Interpolation, Layout, Method};
+use tumble::{Encoding, Engine, Error, Interpolation, Layout, Method, SampleTimes};
 use tumble_formats::Loaded;
 use tumble_formats::motion::Motion;
-use tumble_formats::npy::ComponentOrder;
+use tumble_formats::quaternion::ComponentOrder;
 use tumble_formats::sample::ChannelMethods;
 
-use crate::arguments::device::{DeviceArguments, Opened};
-use crate::arguments::given::Given;
+use crate::arguments::command_line::CommandLine;
+use crate::arguments::device::{DeviceArguments, OpenedDevice};
 use crate::arguments::input;
 use crate::arguments::input::Inputs;
-use crate::arguments::interpolation::{Manner, Wanted, curve_warning, wanted};
-use crate::arguments::results::{Results, each_file, kept};
-use crate::arguments::time::{AtKeys, Samples, Sampling};
-use crate::arguments::what::{OrderArgument, What, quaternions};
+use crate::arguments::interpolation::{
+    InterpolationArguments, MethodArgument, curve_warning, method_argument,
+};
+use crate::arguments::output::{OrderArgument, OutputArguments, quaternions};
+use crate::arguments::results::{ResultArguments, document_to_rewrite, each_file};
+use crate::arguments::time::{AtKeysArguments, SampleRequest, SamplingArguments};
+use crate::batch::destination::WrittenFile;
 use crate::batch::digest::InputFile;
-use crate::batch::output::Target;
-use crate::batch::place::Written;
-use crate::batch::run::{Done, Evaluated};
-use crate::commands::eval::applies::Kind;
-use crate::commands::eval::shards::Part;
+use crate::batch::output::ResultTarget;
+use crate::batch::run::{EvaluatedResult, ResultCallback};
+use crate::commands::eval::applies::ResultKind;
+use crate::commands::eval::shards::ShardSelection;
 use crate::messages::exit::Failure;
 use crate::messages::words;
 
 /// Evaluate keyframe tracks at every frame
 #[derive(Debug, Args)]
 #[command(after_help = "\
-The result is float32 of shape (tracks, frames, 4) in NPY, x y z w (or as --output, --layout
-and --order say), or CSV with a row for each frame, whose header names the columns, w x y z where
---order says nothing. An option that says nothing to a result is refused. CPU and Vulkan give the
-same bits.
+The result is float32 of shape (tracks, frames, 4) in NPY, x y z w (unless --output, --layout or
+--order change that), or CSV with a row for each frame, whose header names the columns, w x y z
+without --order. An option that has no effect on a result is refused. CPU and Vulkan give the same
+bits.
 
 Examples:
   tumble eval data/pendulum.dat -o out.npy
@@ -57,27 +59,27 @@ Examples:
     'import io, sys, numpy; print(numpy.load(io.BytesIO(sys.stdin.buffer.read())).shape)'")]
 pub(crate) struct Arguments {
     #[command(flatten)]
-    given: Given,
+    command_line: CommandLine,
     #[command(flatten)]
     pub(crate) inputs: Inputs,
     #[command(flatten)]
-    pub(crate) results: Results,
-    /// How to interpolate (`tumble methods`); channels that hold each key until the next one stay
-    /// as they are
+    pub(crate) results: ResultArguments,
+    /// How to interpolate (`tumble methods`); stepped channels, which keep each key until the next
+    /// one, stay stepped
     #[arg(
         short,
         long,
         value_name = "METHOD",
         default_value = "authored",
-        value_parser = wanted()
+        value_parser = method_argument()
     )]
-    method: Wanted,
+    method: MethodArgument,
     #[command(flatten)]
-    sampling: Sampling,
+    sampling: SamplingArguments,
     #[command(flatten)]
-    at_keys: AtKeys,
+    at_keys: AtKeysArguments,
     #[command(flatten)]
-    manner: Manner,
+    interpolation: InterpolationArguments,
     #[command(flatten)]
     pub(crate) device: DeviceArguments,
     /// The order of results: (tracks, frames, 4) or (frames, tracks, 4); poses and CSV come frame by
@@ -87,23 +89,23 @@ pub(crate) struct Arguments {
     /// The order of a quaternion's components [default: xyzw; CSV of rotations: wxyz]
     #[arg(long, value_enum)]
     order: Option<OrderArgument>,
-    /// What a component of NPY results is stored as
+    /// How components are stored in NPY results
     #[arg(long, value_name = "ENCODING", default_value = "f32", value_parser = quaternions())]
     encoding: Encoding,
     #[command(flatten)]
-    what: What,
-    /// NPZ in and out: arrays with a number for each frame that are interpolated linearly, instead
-    /// of being left out
+    output: OutputArguments,
+    /// NPZ to NPZ: interpolate these arrays, which have a number for each frame, linearly instead of
+    /// leaving them out
     #[arg(long, value_name = "ARRAYS", value_delimiter = ',')]
     linear: Vec<String>,
-    /// Also say which way each input takes to its rotations; all ways give the same bits
+    /// Also print how each input is evaluated (its route); all routes give the same bits
     #[arg(long)]
     explain_route: bool,
     /// Evaluate one part of several into a directory that other processes fill too, then `tumble
     /// merge` it: I/N, such as 3/64, or one shard by its number
     #[arg(long, value_name = "I/N")]
-    shard: Option<Part>,
-    /// The input of a shard, at most; shards have 256 inputs at most, and depend on nothing else
+    shard: Option<ShardSelection>,
+    /// The size of a shard's inputs, at most; shards also have at most 256 inputs, and depend on nothing else
     #[arg(
         long,
         value_name = "SIZE",
@@ -125,9 +127,9 @@ enum LayoutArgument {
     Frame,
 }
 
-/// What is told of one result with `--json`.
+/// The report of one result with `--json`.
 #[derive(Debug, Clone, Serialize)]
-pub(crate) struct Told {
+pub(crate) struct EvaluationReport {
     /// The input, and its animation where it has several.
     input: String,
     /// Where the result is; `-` is standard output.
@@ -135,23 +137,24 @@ pub(crate) struct Told {
     format: &'static str,
     tracks: usize,
     frames: usize,
-    /// Of the first and the last frame, seconds; nothing where there are none.
+    /// Of the first and the last frame, seconds; null where there are none.
     first_time: Option<f64>,
     last_time: Option<f64>,
     /// Times between keys that are too far apart, which were left out or held; nothing without `--max-gap`.
     #[serde(skip_serializing_if = "Option::is_none")]
     in_gaps: Option<usize>,
-    /// What was written of each rotation.
-    what: &'static str,
-    /// The components of a quaternion as they are written; nothing where none are, or where the
-    /// format has an order of its own.
+    /// What was written for each rotation.
+    #[serde(rename = "what")]
+    output_kind: &'static str,
+    /// The order of a quaternion's components as written; null where none are written, or where the
+    /// format fixes the order.
     order: Option<&'static str>,
     method: String,
     device: String,
     seconds: f64,
 }
 
-impl Told {
+impl EvaluationReport {
     /// How many were evaluated.
     pub(crate) fn rotations(&self) -> u64 {
         self.tracks as u64 * self.frames as u64
@@ -172,22 +175,22 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     if let Some(target) = plan.targets.first() {
         arguments.check_before(target.format())?;
     }
-    if arguments.json && plan.targets.iter().any(Target::is_standard) {
+    if arguments.json && plan.targets.iter().any(ResultTarget::is_standard) {
         return Err(Failure::usage(
             "--json and the result cannot both go to standard output; give -o FILE",
         ));
     }
-    arguments.take_keys();
+    arguments.choose_keys();
     let mut device = arguments.device.open()?;
     let options = arguments.options(&samples);
     let results = &arguments.results;
-    let mut told = Vec::new();
+    let mut reports = Vec::new();
     let outcome = results.make(
         &arguments.inputs,
         plan,
         options,
         |file, loaded, target, done| {
-            let job = Job {
+            let job = EvaluationJob {
                 arguments,
                 device: &mut device,
                 samples: &samples,
@@ -196,20 +199,20 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
                 started: Instant::now(),
                 in_gaps: 0,
             };
-            job.run(target, done, &mut told)
+            job.run(target, done, &mut reports)
         },
     );
     if arguments.json {
-        words::json(&told)?;
+        words::json(&reports)?;
     }
     outcome
 }
 
 impl Arguments {
-    /// The samples, once the method takes what is said of it.
-    fn checked_samples(&self) -> Result<Samples, Failure> {
+    /// The samples, after a check that the options apply to the method.
+    fn checked_samples(&self) -> Result<SampleRequest, Failure> {
         if let Some(method) = self.method.0 {
-            let checked = self.manner.check(&[method]);
+            let checked = self.interpolation.check(&[method]);
             checked.map_err(Failure::usage)?;
         }
         match self.at_keys.samples()? {
@@ -218,17 +221,17 @@ impl Arguments {
         }
     }
 
-    /// Says which keys are read.
-    fn take_keys(&self) {
+    /// Reads only the file's keys where a method is named.
+    fn choose_keys(&self) {
         if self.method.0.is_some() {
-            self.inputs.reading.take_keyframes();
+            self.inputs.reading.set_method_named();
         }
     }
 
-    /// All that decides over the bytes of a result besides its input.
-    fn options(&self, samples: &Samples) -> String {
-        let mut options = self.given.options();
-        if let Samples::Times(_) | Samples::Keys(_) = samples {
+    /// Everything that determines the bytes of a result besides its input.
+    fn options(&self, samples: &SampleRequest) -> String {
+        let mut options = self.command_line.options();
+        if let SampleRequest::Times(_) | SampleRequest::Keys(_) = samples {
             options += &format!(" times={}", samples.digest());
         }
         options
@@ -239,11 +242,11 @@ impl Arguments {
     }
 }
 
-/// What the results of one input are made with.
-struct Job<'a> {
+/// The evaluation of one input.
+struct EvaluationJob<'a> {
     arguments: &'a Arguments,
-    device: &'a mut Opened,
-    samples: &'a Samples,
+    device: &'a mut OpenedDevice,
+    samples: &'a SampleRequest,
     file: &'a InputFile,
     loaded: &'a Loaded,
     started: Instant,
@@ -251,26 +254,26 @@ struct Job<'a> {
     in_gaps: usize,
 }
 
-impl Job<'_> {
-    /// All clips of the input; `told` gets what is to be said of each result that is done.
+impl EvaluationJob<'_> {
+    /// Evaluates all clips of the input; `reports` gets a report of each result.
     fn run(
         mut self,
-        target: &Target,
-        done: &mut Done<'_>,
-        told: &mut Vec<Told>,
+        target: &ResultTarget,
+        done: &mut ResultCallback<'_>,
+        reports: &mut Vec<EvaluationReport>,
     ) -> Result<(), Failure> {
         let path = self.file.path();
         let name = input::name(path);
         let file = (path, self.loaded);
         let latest = RefCell::new(None);
-        let mut done = |name: &str, evaluated: Evaluated| {
+        let mut done = |name: &str, evaluated: EvaluatedResult| {
             done(name, evaluated)?;
-            told.extend(latest.take());
+            reports.extend(latest.take());
             Ok(())
         };
         each_file(&name, file, target, &mut done, |name, clips, target| {
-            let (evaluated, own) = self.evaluate(name, clips, target)?;
-            latest.replace(Some(own));
+            let (evaluated, report) = self.evaluate(name, clips, target)?;
+            latest.replace(Some(report));
             Ok(evaluated)
         })
     }
@@ -280,31 +283,31 @@ impl Job<'_> {
         &mut self,
         name: &str,
         clips: &[&Motion],
-        target: &Target,
-    ) -> Result<(Evaluated, Told), Failure> {
+        target: &ResultTarget,
+    ) -> Result<(EvaluatedResult, EvaluationReport), Failure> {
         for clip in clips {
-            self.check_manner(name, clip)?;
+            self.check_interpolation(name, clip)?;
             self.note_curves(name, clip)?;
         }
-        let what = &self.arguments.what;
-        let kind = match what.poses() {
-            _ if self.is_baked(target) => Kind::Baked,
-            _ if self.is_motion(clips, target) => Kind::Motion,
-            Some(_) => Kind::Poses,
-            None => Kind::Rotations,
+        let output = &self.arguments.output;
+        let kind = match output.poses() {
+            _ if self.is_baked(target) => ResultKind::Baked,
+            _ if self.is_motion(clips, target) => ResultKind::Motion,
+            Some(_) => ResultKind::Poses,
+            None => ResultKind::Rotations,
         };
         let refused = |failure: Failure| failure.of(name);
         self.arguments
             .check(kind, target.format())
             .map_err(refused)?;
-        if kind == Kind::Baked {
+        if kind == ResultKind::Baked {
             return self.bake(name, clips, target);
         }
         let tracks = &self.arguments.inputs.tracks;
-        if kind == Kind::Motion {
-            let some = self.arguments.given.has("tracks");
+        if kind == ResultKind::Motion {
+            let some = self.arguments.command_line.has("tracks");
             let some = some.then_some("some tracks make");
-            kept(name, self.loaded, target, some);
+            document_to_rewrite(name, self.loaded, target, some);
             let selected = clips
                 .iter()
                 .map(|&clip| tracks.select_with_ancestors(clip, name));
@@ -313,18 +316,17 @@ impl Job<'_> {
             return self.motion(name, &clips, target);
         }
         let [clip] = clips else {
-            let message = format!(
-                "{name}: --output and its like are of one animation; choose one with --animation"
-            );
+            let message =
+                format!("{name}: --output needs a single animation; choose one with --animation");
             return Err(Failure::usage(message));
         };
-        if let (Kind::Poses, Some(poses)) = (kind, what.poses()) {
+        if let (ResultKind::Poses, Some(poses)) = (kind, output.poses()) {
             return self.poses(name, clip, poses, target);
         }
         self.rotations(name, &*tracks.select(clip, name)?, target)
     }
 
-    /// Says where the curves of the tracks that are evaluated are less smooth than their method promises.
+    /// Warns where the evaluated curves are less smooth than their method promises.
     fn note_curves(&self, name: &str, clip: &Motion) -> Result<(), Failure> {
         let (Some(method), with) = self.methods() else {
             return Ok(()); // No file asks for such a method.
@@ -336,28 +338,28 @@ impl Job<'_> {
         Ok(())
     }
 
-    /// Refuses what says nothing to the methods of a clip's channels, and units of what has none.
-    fn check_manner(&self, name: &str, clip: &Motion) -> Result<(), Failure> {
+    /// Refuses options that have no effect on the methods of a clip's channels.
+    fn check_interpolation(&self, name: &str, clip: &Motion) -> Result<(), Failure> {
         let (method, with) = self.methods();
         let methods = ChannelMethods {
             method,
             with: &with,
         };
-        let own: Vec<Method> = methods
+        let used_methods: Vec<Method> = methods
             .groups_of(clip)
             .iter()
             .map(|group| group.0)
             .collect();
-        let checked = self.arguments.manner.check(&own);
+        let checked = self.arguments.interpolation.check(&used_methods);
         checked.map_err(|message| Failure::usage(format!("{name}: {message}")))
     }
 
-    /// Says which way a clip's rotations take, where that is asked for.
+    /// With `--explain-route`, prints the route by which a clip's rotations are evaluated.
     fn explain(
         &mut self,
         name: &str,
         clip: &Motion,
-        frames: &Frames,
+        frames: &SampleTimes,
         layout: Layout,
     ) -> Result<(), Failure> {
         if !self.arguments.explain_route {
@@ -395,7 +397,7 @@ impl Job<'_> {
         Ok(())
     }
 
-    /// What made a result, for formats that have room for it.
+    /// How a result was made, for formats that store it.
     fn notes(&self, name: &str) -> Result<Vec<(&'static str, String)>, Failure> {
         let mut notes = vec![
             ("method", self.arguments.method.to_string()),
@@ -408,13 +410,13 @@ impl Job<'_> {
         Ok(notes)
     }
 
-    /// Which method interpolates each channel.
+    /// The method of all channels, if there is one, and the interpolation by a method.
     fn methods(&self) -> (Option<Method>, impl Fn(Method) -> Interpolation + use<>) {
-        let quantity = self.arguments.what.quantity();
-        let manner = self.arguments.manner;
+        let quantity = self.arguments.output.quantity();
+        let interpolation = self.arguments.interpolation;
         let with = move |method| Interpolation {
             quantity,
-            ..manner.with(method)
+            ..interpolation.with(method)
         };
         (self.arguments.method.0, with)
     }
@@ -424,12 +426,12 @@ impl Job<'_> {
         name: &str,
         (tracks, frames, span): (usize, usize, Option<(f64, f64)>),
         method: &str,
-        written: Written,
-        target: &Target,
+        written: WrittenFile,
+        target: &ResultTarget,
         order: Option<ComponentOrder>,
-    ) -> (Evaluated, Told) {
+    ) -> (EvaluatedResult, EvaluationReport) {
         let elapsed = self.started.elapsed();
-        let told = format!(
+        let message = format!(
             "{name}: {} × {}{}, {method}, on {} in {} → {target}",
             words::count(tracks, "track"),
             words::count(frames, "frame"),
@@ -444,26 +446,30 @@ impl Job<'_> {
             self.device.label,
             words::duration(elapsed),
         );
-        let own = Told {
+        let report = EvaluationReport {
             input: name.to_owned(),
             output: target.path().display().to_string(),
             format: target.format().name,
             tracks,
             frames,
             first_time: span.map(|span| span.0),
-            in_gaps: self.arguments.given.has("max_gap").then_some(self.in_gaps),
+            in_gaps: self
+                .arguments
+                .command_line
+                .has("max_gap")
+                .then_some(self.in_gaps),
             last_time: span.map(|span| span.1),
-            what: self.arguments.what.name(),
+            output_kind: self.arguments.output.name(),
             order: order.map(ComponentOrder::name),
             method: method.to_owned(),
             device: self.device.label.clone(),
             seconds: elapsed.as_secs_f64(),
         };
-        let evaluated = Evaluated {
+        let evaluated = EvaluatedResult {
             written,
             device: self.device.label.clone(),
-            told,
+            message,
         };
-        (evaluated, own)
+        (evaluated, report)
     }
 }

@@ -1,30 +1,30 @@
 //! Results that are motion files themselves: clips with their skeletons, sampled.
 
 use glam::Vec3;
-use tumble::{FrameRate, Frames, Layout};
+use tumble::{FrameRate, Layout, SampleTimes};
 
 use tumble_formats::format::{FormatOption, MotionOptions, WriteError};
-use tumble_formats::motion::{Motion, Sampled};
+use tumble_formats::motion::{Motion, SampledClip};
 use tumble_formats::{Diagnostic, sample};
 
-use crate::arguments::time::{ClipFrames, Samples};
-use crate::batch::output::Target;
+use crate::arguments::time::{ClipFrames, SampleRequest};
+use crate::batch::output::ResultTarget;
 use crate::batch::room;
-use crate::batch::run::Evaluated;
-use crate::commands::eval::{Job, Told};
+use crate::batch::run::EvaluatedResult;
+use crate::commands::eval::{EvaluationJob, EvaluationReport};
 use crate::messages::exit::Failure;
 
-impl Job<'_> {
+impl EvaluationJob<'_> {
     /// Whether the result is the input's own file with other keys.
-    pub(super) fn is_baked(&self, target: &Target) -> bool {
+    pub(super) fn is_baked(&self, target: &ResultTarget) -> bool {
         // Some tracks alone are another file.
-        self.arguments.what.is_rotations()
-            && !self.arguments.given.has("tracks")
+        self.arguments.output.is_rotations()
+            && !self.arguments.command_line.has("tracks")
             && self.keeps(target)
     }
 
     /// Whether the input's own file can be written again.
-    pub(super) fn keeps(&self, target: &Target) -> bool {
+    pub(super) fn keeps(&self, target: &ResultTarget) -> bool {
         let document = self.loaded.document.as_ref();
         !self.loaded.is_adjusted
             && document.is_some_and(|document| document.writes(target.format()))
@@ -32,8 +32,8 @@ impl Job<'_> {
 
     /// Whether the result is a motion file: of a format that holds nothing else, or of a clip that
     /// is more than rotations.
-    pub(super) fn is_motion(&self, clips: &[&Motion], target: &Target) -> bool {
-        self.arguments.what.is_rotations() && target.format().takes_motion(clips)
+    pub(super) fn is_motion(&self, clips: &[&Motion], target: &ResultTarget) -> bool {
+        self.arguments.output.is_rotations() && target.format().takes_motion(clips)
     }
 
     /// Clips as a file of their own.
@@ -41,16 +41,16 @@ impl Job<'_> {
         &mut self,
         name: &str,
         clips: &[&Motion],
-        target: &Target,
-    ) -> Result<(Evaluated, Told), Failure> {
+        target: &ResultTarget,
+    ) -> Result<(EvaluatedResult, EvaluationReport), Failure> {
         let times: Vec<ClipFrames> = clips
             .iter()
             .map(|clip| self.samples.of_clip(clip, name))
             .collect::<Result<_, _>>()?;
         self.in_gaps = times.iter().map(|of_clip| of_clip.in_gaps).sum();
         let rate = match self.samples {
-            Samples::Rate { rate, .. } => Some(*rate),
-            Samples::Times(_) | Samples::Keys(_) => None,
+            SampleRequest::Rate { rate, .. } => Some(*rate),
+            SampleRequest::Times(_) | SampleRequest::Keys(_) => None,
         };
         let format = target.format();
         let options = self.options(target);
@@ -64,11 +64,11 @@ impl Job<'_> {
         &mut self,
         name: &str,
         clips: &[&Motion],
-        target: &Target,
-    ) -> Result<(Evaluated, Told), Failure> {
+        target: &ResultTarget,
+    ) -> Result<(EvaluatedResult, EvaluationReport), Failure> {
         let (
             Some(document),
-            &Samples::Rate {
+            &SampleRequest::Rate {
                 rate,
                 start: None,
                 end: None,
@@ -83,15 +83,15 @@ impl Job<'_> {
             )));
         };
         let at = |clip: &&Motion| {
-            let times = document.times(clip.place, rate);
-            times.map(|times| Frames::at(times).into())
+            let times = document.times(clip.index, rate);
+            times.map(|times| SampleTimes::at(times).into())
         };
         let times: Result<Vec<ClipFrames>, _> = clips.iter().map(at).collect();
         let times = times.map_err(|diagnostic| Failure::input(&diagnostic, ""))?;
         let options = self.options(target);
-        let places: Vec<usize> = clips.iter().map(|clip| clip.place).collect();
+        let indices: Vec<usize> = clips.iter().map(|clip| clip.index).collect();
         self.written(name, clips, &times, Some(rate), target, |sampled, out| {
-            let clips: Vec<(usize, Sampled<'_>)> = places
+            let clips: Vec<(usize, SampledClip<'_>)> = indices
                 .iter()
                 .copied()
                 .zip(sampled.iter().cloned())
@@ -100,9 +100,9 @@ impl Job<'_> {
         })
     }
 
-    fn options(&self, target: &Target) -> MotionOptions {
+    fn options(&self, target: &ResultTarget) -> MotionOptions {
         MotionOptions {
-            sequence: self.arguments.what.sequence(),
+            sequence: self.arguments.output.sequence(),
             linear: self.arguments.linear.clone(),
             order: self.arguments.order(),
             box_length: self.loaded.box_length,
@@ -117,15 +117,15 @@ impl Job<'_> {
         clips: &[&Motion],
         frames: &[ClipFrames],
         rate: Option<FrameRate>,
-        target: &Target,
-        write: impl FnOnce(&[Sampled<'_>], &mut Vec<u8>) -> Result<Vec<Diagnostic>, WriteError>,
-    ) -> Result<(Evaluated, Told), Failure> {
+        target: &ResultTarget,
+        write: impl FnOnce(&[SampledClip<'_>], &mut Vec<u8>) -> Result<Vec<Diagnostic>, WriteError>,
+    ) -> Result<(EvaluatedResult, EvaluationReport), Failure> {
         let mut all: Vec<sample::Samples> = Vec::new();
         for (clip, samples) in clips.iter().zip(frames) {
             let frames = &samples.frames;
             let boxes = target.format().takes(FormatOption::BoxLength);
             self.check_scale(name, clip, boxes)?;
-            // Rotations, translations, scales, and what they are written as.
+            // Rotations, translations, scales, and the same as written.
             room::in_memory(name, &clip.set, frames, 6)?;
             self.explain(name, clip, frames, Layout::FrameMajor)?;
             let mut found = self.sample(name, clip, frames)?;
@@ -138,7 +138,7 @@ impl Job<'_> {
         }
         let method = self.arguments.method.to_string();
         let notes = self.notes(name)?;
-        let sampled: Vec<Sampled<'_>> = (clips.iter().zip(&all))
+        let sampled: Vec<SampledClip<'_>> = (clips.iter().zip(&all))
             .map(|(clip, samples)| samples.of(clip, rate, &notes))
             .collect();
         let written = target.write_motion(|out| write(&sampled, out))?;
@@ -148,11 +148,11 @@ impl Job<'_> {
         let times = || all.iter().flat_map(|samples| &samples.times).copied();
         let span = times().reduce(f64::min).zip(times().reduce(f64::max));
         let format = target.format();
-        let own = format
+        let writer = format
             .takes(FormatOption::Order)
             .then_some(format.write.as_ref())
             .flatten();
-        let order = own.map(|write| self.arguments.order().unwrap_or(write.order));
+        let order = writer.map(|write| self.arguments.order().unwrap_or(write.order));
         let size = (tracks.unwrap_or(0), samples, span);
         Ok(self.evaluated(name, size, &method, written, target, order))
     }
@@ -170,9 +170,9 @@ impl Job<'_> {
                 .iter()
                 .any(|joint| joint.rest.translation != Vec3::ZERO)
             || boxes && self.loaded.box_length.is_some();
-        if self.arguments.given.has("scale") && !is_placed {
+        if self.arguments.command_line.has("scale") && !is_placed {
             return Err(Failure::usage(format!(
-                "{name}: --scale says nothing to a clip without translations; leave it out"
+                "{name}: --scale has no effect on a clip without translations; leave it out"
             )));
         }
         Ok(())

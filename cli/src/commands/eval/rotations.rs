@@ -2,52 +2,52 @@
 
 use glam::{DVec3, Quat, Vec3};
 use tumble::method::SLERP;
-use tumble::{Engine, Error, Frames, Layout, Quantity, Timeline};
+use tumble::{Engine, Error, Layout, Quantity, SampleTimes, Timeline};
 use tumble_formats::format::ResultShape;
 use tumble_formats::motion::Motion;
-use tumble_formats::npy::ComponentOrder;
 use tumble_formats::origin::origin_of;
 use tumble_formats::poses::{Poses, TRANSFORM, WORLD};
+use tumble_formats::quaternion::ComponentOrder;
 use tumble_formats::sample::{ChannelMethods, Samples};
 use tumble_formats::world::{HierarchyError, world};
 
+use crate::arguments::output::PoseKind;
 use crate::arguments::time;
-use crate::arguments::what::PoseKind;
-use crate::batch::output::Target;
+use crate::batch::output::ResultTarget;
 use crate::batch::room;
-use crate::batch::run::Evaluated;
-use crate::commands::eval::{Job, LayoutArgument, Told};
+use crate::batch::run::EvaluatedResult;
+use crate::commands::eval::{EvaluationJob, EvaluationReport, LayoutArgument};
 use crate::messages::exit::{ALL_INPUTS, Failure};
 
-impl Job<'_> {
-    /// One clip's rotations, or what is made of them.
+impl EvaluationJob<'_> {
+    /// The rotations of one clip, or values derived from them.
     pub(super) fn rotations(
         &mut self,
         name: &str,
         clip: &Motion,
-        target: &Target,
-    ) -> Result<(Evaluated, Told), Failure> {
+        target: &ResultTarget,
+    ) -> Result<(EvaluatedResult, EvaluationReport), Failure> {
         let (arguments, set) = (self.arguments, &clip.set);
         let samples = self.samples.of_clip(clip, name)?;
         self.in_gaps = samples.in_gaps;
-        if samples.held.is_some() && arguments.what.quantity() != Quantity::Rotation {
+        if samples.held.is_some() && arguments.output.quantity() != Quantity::Rotation {
             return Err(Failure::usage(format!(
-                "{name}: what is held does not turn; leave times in gaps out (--in-gaps leave-out)"
+                "{name}: a rotation that is held has no velocity; leave times in gaps out (--in-gaps leave-out)"
             )));
         }
         let frames = &samples.frames;
         let timeline = samples
-            .said()
+            .written_times()
             .resolve(set.track_count(), set.time_span())
             .map_err(|error| Failure::evaluating(name, &error.into()))?;
-        let encoding = arguments.what.encoding(arguments.encoding);
+        let encoding = arguments.output.encoding(arguments.encoding);
         target.has_room(name, set.track_count(), timeline.len(), encoding)?;
-        let wished = match arguments.layout {
+        let requested = match arguments.layout {
             LayoutArgument::Track => Layout::TrackMajor,
             LayoutArgument::Frame => Layout::FrameMajor,
         };
         let mut notes = self.notes(name)?;
-        if let time::Samples::Rate { rate, .. } = self.samples {
+        if let time::SampleRequest::Rate { rate, .. } = self.samples {
             notes.push(("rate", rate.to_string()));
         }
         let format = target.results()?;
@@ -58,7 +58,7 @@ impl Job<'_> {
             name,
             set,
             timeline: &timeline,
-            layout: format.layout.unwrap_or(wished),
+            layout: format.layout.unwrap_or(requested),
             order,
             encoding,
             notes: &notes,
@@ -70,7 +70,7 @@ impl Job<'_> {
             with: &with,
         };
         let size = (set.track_count(), timeline.len());
-        let told = (size.0, size.1, span(&timeline));
+        let extent = (size.0, size.1, span(&timeline));
         let Some(method) = methods.method_of(clip) else {
             // Tracks of different samplers are evaluated apart, and put together in memory.
             room::in_memory(name, set, frames, 2)?;
@@ -79,7 +79,7 @@ impl Job<'_> {
                 .choose(size.0 * size.1)
                 .and_then(|()| {
                     let layout = result.layout;
-                    let work = |engine: &Engine| match arguments.what.quantity() {
+                    let work = |engine: &Engine| match arguments.output.quantity() {
                         Quantity::Rotation => methods.rotations(engine, clip, frames, layout),
                         // Velocities are rows of four numbers too.
                         _ => {
@@ -92,32 +92,32 @@ impl Job<'_> {
                 .map_err(|error| Failure::evaluating(name, &error))?;
             let written = target.write_whole(&result, &found)?;
             let method = "each channel's own method";
-            return Ok(self.evaluated(name, told, method, written, target, order));
+            return Ok(self.evaluated(name, extent, method, written, target, order));
         };
         let interpolation = with(method);
         let written = target.write_rotations(&result, |sink| {
             self.device
                 .stream(set, interpolation, frames, result.layout, sink)
         })?;
-        Ok(self.evaluated(name, told, method.name, written, target, order))
+        Ok(self.evaluated(name, extent, method.name, written, target, order))
     }
 
-    /// Whole poses, `[frame][track]`: along the clip's skeleton, or of the boxes of a chain, each
-    /// of which hangs at the end of the one before it. All tracks are evaluated, those that are
-    /// asked for are written: where a joint is depends on all that it hangs on.
+    /// Whole poses, `[frame][track]`: along the clip's skeleton, or of the boxes of a chain, each of
+    /// which hangs at the end of the one before it. All tracks are evaluated, since the position of a
+    /// joint depends on its ancestors; the selected ones are written.
     pub(super) fn poses(
         &mut self,
         name: &str,
         clip: &Motion,
         kind: PoseKind,
-        target: &Target,
-    ) -> Result<(Evaluated, Told), Failure> {
+        target: &ResultTarget,
+    ) -> Result<(EvaluatedResult, EvaluationReport), Failure> {
         let set = &clip.set;
         let samples = self.samples.of_clip(clip, name)?;
         self.in_gaps = samples.in_gaps;
         let frames = &samples.frames;
         let timeline = samples
-            .said()
+            .written_times()
             .resolve(set.track_count(), set.time_span())
             .map_err(|error| Failure::evaluating(name, &error.into()))?;
         // The rotations, and twice what becomes of them.
@@ -127,8 +127,8 @@ impl Job<'_> {
         let (mut numbers, mut origins) = if clip.skeleton.is_empty() && !clip.has_vectors() {
             (self.chain(name, clip, frames, kind)?, Vec::new())
         } else {
-            if self.arguments.what.has_parents() {
-                let message = "has a skeleton, or places, of its own; leave out --parents";
+            if self.arguments.output.has_parents() {
+                let message = "has a skeleton or positions already; leave out --parents";
                 return Err(Failure::usage(format!("{name}: {message}")));
             }
             let samples = self.sample(name, clip, frames)?;
@@ -141,27 +141,27 @@ impl Job<'_> {
         };
         let width = components.len();
         let order = self.arguments.order().unwrap_or_default();
-        if let Some(place) = components.iter().position(|name| *name == "x")
+        if let Some(index) = components.iter().position(|name| *name == "x")
             && order == ComponentOrder::Wxyz
         {
-            components[place..place + 4].rotate_right(1);
+            components[index..index + 4].rotate_right(1);
             let poses = numbers.chunks_exact_mut(width);
-            poses.for_each(|pose| pose[place..place + 4].rotate_right(1));
+            poses.for_each(|pose| pose[index..index + 4].rotate_right(1));
         }
         let selected = self.arguments.inputs.tracks.of(clip, name)?;
         if let Some(tracks) = &selected {
             let frames = numbers.chunks_exact(width * set.track_count());
             let pose = |frame: &[f32], track: usize| frame[track * width..][..width].to_vec();
-            let own =
+            let of_tracks =
                 frames.flat_map(|frame| tracks.iter().flat_map(move |&track| pose(frame, track)));
-            numbers = own.collect();
+            numbers = of_tracks.collect();
             if !origins.is_empty() {
                 origins = tracks.iter().map(|&track| origins[track]).collect();
             }
         }
-        let own = selected.map(|tracks| set.select(tracks)).transpose();
-        let own = own.map_err(|error| Failure::evaluating(name, &error.into()))?;
-        let set = own.as_ref().unwrap_or(set);
+        let selection = selected.map(|tracks| set.select(tracks)).transpose();
+        let subset = selection.map_err(|error| Failure::evaluating(name, &error.into()))?;
+        let set = subset.as_ref().unwrap_or(set);
         let size = (set.track_count(), timeline.len(), span(&timeline));
         let poses = Poses {
             set,
@@ -181,14 +181,14 @@ impl Job<'_> {
         &mut self,
         name: &str,
         clip: &Motion,
-        frames: &Frames,
+        frames: &SampleTimes,
         kind: PoseKind,
     ) -> Result<Vec<f32>, Failure> {
         let set = &clip.set;
         let (tracks, length) = (set.track_count(), self.loaded.box_length.unwrap_or(1.0));
         let (skeleton, offsets) = self
             .arguments
-            .what
+            .output
             .skeleton(tracks, length)
             .map_err(|message| Failure::usage(format!("{name}: {message}")))?;
         let (method, with) = self.methods();
@@ -229,7 +229,7 @@ impl Job<'_> {
         &mut self,
         name: &str,
         clip: &Motion,
-        frames: &Frames,
+        frames: &SampleTimes,
     ) -> Result<Samples, Failure> {
         let (method, with) = self.methods();
         let methods = ChannelMethods {
@@ -253,8 +253,8 @@ fn span(timeline: &Timeline) -> Option<(f64, f64)> {
     Some((timeline.time(0, 0)?, timeline.time(0, last)?))
 }
 
-/// The numbers of the poses of a clip with a skeleton, or with translations or scales, and what the
-/// positions of each track are to be moved by.
+/// The numbers of the poses of a clip with a skeleton, or with translations or scales, and the origin of
+/// each track.
 fn numbers_of(
     clip: &Motion,
     samples: &Samples,
@@ -279,16 +279,16 @@ fn numbers_of(
             (numbers.collect(), origins)
         }
         PoseKind::Transform => {
-            let at = |list: &[Vec3], place: usize| list.get(place).copied();
+            let at = |list: &[Vec3], index: usize| list.get(index).copied();
             let numbers = samples
                 .rotations
                 .iter()
                 .enumerate()
-                .flat_map(|(place, rotation)| {
-                    let [tx, ty, tz] = at(&samples.translations, place)
+                .flat_map(|(index, rotation)| {
+                    let [tx, ty, tz] = at(&samples.translations, index)
                         .unwrap_or(Vec3::ZERO)
                         .to_array();
-                    let [sx, sy, sz] = at(&samples.scales, place).unwrap_or(Vec3::ONE).to_array();
+                    let [sx, sy, sz] = at(&samples.scales, index).unwrap_or(Vec3::ONE).to_array();
                     let [x, y, z, w] = rotation.to_array();
                     [tx, ty, tz, x, y, z, w, sx, sy, sz]
                 });

@@ -4,44 +4,44 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::time::Instant;
 
-use crate::arguments::device::Opened;
-use crate::arguments::gather::Found;
-use crate::arguments::time::Samples;
+use crate::arguments::device::OpenedDevice;
+use crate::arguments::gather::FoundInput;
+use crate::arguments::time::SampleRequest;
 use crate::batch::folder;
-use crate::batch::output::Target;
+use crate::batch::output::ResultTarget;
 use crate::batch::run::Batch;
-use crate::batch::shards::plan::Plan;
-use crate::batch::shards::record::Header;
+use crate::batch::shards::plan::ShardPlan;
+use crate::batch::shards::record::ShardHeader;
 use crate::batch::shards::run::Shard;
-use crate::commands::eval::{Arguments, Job, Told};
+use crate::commands::eval::{Arguments, EvaluationJob, EvaluationReport};
 use crate::messages::exit::{ALL_INPUTS, Failure, SOME_INPUTS};
 use crate::messages::words;
 
 /// Which shards of a plan.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Part {
+pub(crate) enum ShardSelection {
     /// That one.
     One(usize),
     /// The shards of one process of several, both from 1.
     Of(usize, usize),
 }
 
-impl FromStr for Part {
+impl FromStr for ShardSelection {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, Self::Err> {
         let number = |text: &str| text.parse().ok().filter(|&number: &usize| number > 0);
         let part = match text.split_once('/') {
             None => number(text).map(Self::One),
-            Some((own, all)) => (number(own).zip(number(all)))
-                .filter(|(own, all)| own <= all)
-                .map(|(own, all)| Self::Of(own, all)),
+            Some((index, all)) => (number(index).zip(number(all)))
+                .filter(|(index, all)| index <= all)
+                .map(|(index, all)| Self::Of(index, all)),
         };
         part.ok_or_else(|| "give I/N, from 1/N to N/N, or the number of a shard, from 1".to_owned())
     }
 }
 
-impl Part {
+impl ShardSelection {
     /// The numbers of its shards, from 1. Parts differ by one shard at most.
     fn shards(self, all: usize) -> Result<std::ops::RangeInclusive<usize>, Failure> {
         let share = |part: usize, of: usize| (all as u128 * part as u128 / of as u128) as usize;
@@ -52,13 +52,13 @@ impl Part {
                 Err(Failure::usage(message))
             }
             Self::One(one) => Ok(one..=one),
-            Self::Of(own, of) => Ok(share(own - 1, of) + 1..=share(own, of)),
+            Self::Of(index, of) => Ok(share(index - 1, of) + 1..=share(index, of)),
         }
     }
 }
 
 /// Runs the shards of a part.
-pub(crate) fn run(arguments: &Arguments, part: Part) -> Result<(), Failure> {
+pub(crate) fn run(arguments: &Arguments, part: ShardSelection) -> Result<(), Failure> {
     let mut evaluator = Evaluator::new(arguments)?;
     let (folder, resume) = (arguments.results.folder()?, arguments.results.is_resumed());
     let gathered = arguments.inputs.gather(false)?;
@@ -70,18 +70,18 @@ pub(crate) fn run(arguments: &Arguments, part: Part) -> Result<(), Failure> {
     let shards = part.shards(plan.cuts.len())?;
     plan.claim(folder, resume, arguments.results.overwrites())?;
     let (mut failed, mut inputs) = (0, 0);
-    let mut told = Vec::new();
+    let mut reports = Vec::new();
     for number in shards {
-        let own = plan.cuts[number - 1].clone();
-        inputs += own.len();
-        let header = Header {
+        let range = plan.cuts[number - 1].clone();
+        inputs += range.len();
+        let header = ShardHeader {
             shard: number,
             of: plan.cuts.len(),
-            plan: plan.stated.plan.clone(),
-            inputs: own.len(),
-            ..Header::default()
+            plan: plan.recorded.plan.clone(),
+            inputs: range.len(),
+            ..ShardHeader::default()
         };
-        let names = plan.names[own.clone()].iter().flatten();
+        let names = plan.names[range.clone()].iter().flatten();
         let names: Vec<&str> = names.map(|name| &**name).collect();
         let mut shard = Shard::new(folder, header, &names, resume);
         if shard.is_done() && !resume && !arguments.results.overwrites() {
@@ -89,16 +89,16 @@ pub(crate) fn run(arguments: &Arguments, part: Part) -> Result<(), Failure> {
                 "shard {number} is done; --resume skips what is done, --overwrite makes it again"
             )));
         }
-        let paths = plan.inputs[own.clone()]
+        let paths = plan.inputs[range.clone()]
             .iter()
             .map(|found| found.path.clone());
-        let jobs = shard.jobs(paths, &plan.names[own], plan.format);
-        evaluator.evaluate(arguments, &jobs, &mut shard, &mut told)?;
+        let jobs = shard.jobs(paths, &plan.names[range], plan.format);
+        evaluator.evaluate(arguments, &jobs, &mut shard, &mut reports)?;
         shard.finish()?;
         failed += shard.header.failed.len();
     }
     if arguments.json {
-        words::json(&told)?;
+        words::json(&reports)?;
     }
     match failed {
         0 => Ok(()),
@@ -113,19 +113,19 @@ pub(crate) fn run(arguments: &Arguments, part: Part) -> Result<(), Failure> {
     }
 }
 
-/// Of a file; what cannot be read is told about when it is opened.
-pub(crate) fn size(found: &Found) -> u64 {
+/// The size of a file; 0 where it cannot be read, which is reported when it is opened.
+pub(crate) fn size(found: &FoundInput) -> u64 {
     std::fs::metadata(&found.path).map_or(0, |file| file.len())
 }
 
-/// What a command line asks for, checked.
-pub(crate) struct Request {
-    samples: Samples,
-    /// All that decides over results besides their inputs.
+/// The checked options of an evaluation.
+pub(crate) struct EvaluationRequest {
+    samples: SampleRequest,
+    /// Everything that determines results besides their inputs.
     pub(crate) options: String,
 }
 
-impl Request {
+impl EvaluationRequest {
     /// Refuses everything that can be refused before the inputs are known.
     pub(crate) fn new(arguments: &Arguments) -> Result<Self, Failure> {
         if arguments.sampling.reads_standard_input() {
@@ -143,53 +143,53 @@ impl Request {
     pub(crate) fn plan(
         &self,
         arguments: &Arguments,
-        inputs: Vec<Found>,
+        inputs: Vec<FoundInput>,
         sizes: &[u64],
         folder: &Path,
         shard_bytes: u64,
-    ) -> Result<Plan, Failure> {
+    ) -> Result<ShardPlan, Failure> {
         let format = arguments.results.format();
         let options = self.options.clone();
-        let plan = Plan::new(inputs, sizes, folder, format, options, shard_bytes)?;
+        let plan = ShardPlan::new(inputs, sizes, folder, format, options, shard_bytes)?;
         arguments.check_before(plan.format)?;
         Ok(plan)
     }
 }
 
-/// A request, and the device that does it: kept for shard after shard.
+/// A request and an open device, kept for shard after shard.
 pub(crate) struct Evaluator {
-    pub(crate) request: Request,
-    pub(crate) device: Opened,
+    pub(crate) request: EvaluationRequest,
+    pub(crate) device: OpenedDevice,
 }
 
 impl Evaluator {
     /// Opens the device.
     pub(crate) fn new(arguments: &Arguments) -> Result<Self, Failure> {
         Ok(Self {
-            request: Request::new(arguments)?,
+            request: EvaluationRequest::new(arguments)?,
             device: arguments.device.open()?,
         })
     }
 
-    /// Evaluates the inputs of a shard; `told` gets what is to be said of each result. Inputs that
+    /// Evaluates the inputs of a shard; `reports` gets a report of each result. Inputs that
     /// are refused are in the shard's header, and no failure.
     pub(crate) fn evaluate(
         &mut self,
         arguments: &Arguments,
-        jobs: &[(PathBuf, Target)],
+        jobs: &[(PathBuf, ResultTarget)],
         shard: &mut Shard<'_>,
-        told: &mut Vec<Told>,
+        reports: &mut Vec<EvaluationReport>,
     ) -> Result<(), Failure> {
-        arguments.take_keys();
+        arguments.choose_keys();
         let batch = Batch {
             read: |path: &Path| arguments.inputs.read(path),
-            most: arguments.inputs.max_size(),
+            max_bytes: arguments.inputs.max_size(),
             options: self.request.options.clone(),
             resume: arguments.results.is_resumed(),
         };
         let refused = shard.header.failed.len();
         let outcome = batch.run(jobs, Vec::new(), shard, |file, loaded, target, done| {
-            let job = Job {
+            let job = EvaluationJob {
                 arguments,
                 device: &mut self.device,
                 samples: &self.request.samples,
@@ -198,12 +198,12 @@ impl Evaluator {
                 started: Instant::now(),
                 in_gaps: 0,
             };
-            job.run(target, done, told)
+            job.run(target, done, reports)
         });
         match outcome {
             Err(failure) if failure.is_final() => Err(failure),
             Err(failure) => {
-                // A single input's failure has been told to nobody yet.
+                // The failure of a single input has not been reported yet.
                 if jobs.len() == 1 && shard.header.failed.len() > refused && !shard.quiet {
                     failure.report();
                 }
@@ -221,18 +221,19 @@ mod tests {
     #[test]
     fn parts_have_every_shard_once() {
         for (all, of) in [(0, 3), (1, 64), (79, 64), (79, 2), (3, 3)] {
-            let parts = (1..=of).flat_map(|own| Part::Of(own, of).shards(all).unwrap());
+            let parts =
+                (1..=of).flat_map(|index| ShardSelection::Of(index, of).shards(all).unwrap());
             assert!(parts.eq(1..=all), "{all} in {of}");
         }
-        assert!(Part::One(4).shards(3).is_err());
+        assert!(ShardSelection::One(4).shards(3).is_err());
     }
 
     #[test]
     fn parts_are_counted_from_one() {
-        assert_eq!("3/64".parse(), Ok(Part::Of(3, 64)));
-        assert_eq!("17".parse(), Ok(Part::One(17)));
+        assert_eq!("3/64".parse(), Ok(ShardSelection::Of(3, 64)));
+        assert_eq!("17".parse(), Ok(ShardSelection::One(17)));
         for text in ["0", "0/4", "5/4", "1/0", "-1/4", "1/", "/", "", "1.5"] {
-            assert!(text.parse::<Part>().is_err(), "{text}");
+            assert!(text.parse::<ShardSelection>().is_err(), "{text}");
         }
     }
 }

@@ -1,4 +1,4 @@
-//! A hill with rocks on it, to find ways over.
+//! A hill with rocks on it, to find routes over.
 
 use std::io::{self, Write};
 
@@ -12,7 +12,7 @@ const SQUARES: usize = 60;
 /// Heights of the large bump and of the small ones.
 const HEIGHT: f64 = 2.2;
 const BUMPS: usize = 14;
-/// Rocks, and how far they stay from each other and from the two corners that ways lead between.
+/// Rocks, and their distance from each other and from the two corners that routes join.
 const ROCKS: usize = 16;
 const APART: f64 = 0.9;
 const FREE: f64 = 1.8;
@@ -26,8 +26,8 @@ pub(super) struct Landscape {
     seed: u64,
 }
 
-/// Triangles through places, which count from 0.
-type Mesh = (Vec<DVec3>, Vec<[usize; 3]>);
+/// Positions, and triangles of their indices from 0.
+type TriangleMesh = (Vec<DVec3>, Vec<[usize; 3]>);
 
 fn within(random: &mut Rng, low: f64, high: f64) -> f64 {
     low + (high - low) * random.f64()
@@ -40,8 +40,8 @@ impl Landscape {
         let mut bumps = vec![(DVec2::splat(SIZE / 2.0), SIZE / 2.0, HEIGHT)];
         for _ in 0..BUMPS {
             let radius = within(&mut random, 1.0, 2.4);
-            let mut place = || within(&mut random, radius, SIZE - radius);
-            let middle = DVec2::new(place(), place());
+            let mut coordinate = || within(&mut random, radius, SIZE - radius);
+            let middle = DVec2::new(coordinate(), coordinate());
             bumps.push((middle, radius, within(&mut random, -0.35, 0.45)));
         }
         let mut rocks: Vec<(DVec2, f64)> = Vec::new();
@@ -50,10 +50,11 @@ impl Landscape {
                 break;
             }
             let radius = within(&mut random, 0.35, 0.75);
-            let mut place = || within(&mut random, 0.9, SIZE - 0.9);
-            let middle = DVec2::new(place(), place());
-            let clear =
-                |&(other, own): &(DVec2, f64)| middle.distance(other) > radius + own + APART;
+            let mut coordinate = || within(&mut random, 0.9, SIZE - 0.9);
+            let middle = DVec2::new(coordinate(), coordinate());
+            let clear = |&(other, other_radius): &(DVec2, f64)| {
+                middle.distance(other) > radius + other_radius + APART
+            };
             let ends = [DVec2::ZERO, DVec2::splat(SIZE)];
             if rocks.iter().all(clear) && ends.iter().all(|end| middle.distance(*end) > FREE) {
                 rocks.push((middle, radius));
@@ -71,10 +72,10 @@ impl Landscape {
         self.bumps.iter().map(bump).sum()
     }
 
-    fn hill(&self) -> Mesh {
+    fn hill(&self) -> TriangleMesh {
         let at = |i: usize| i as f64 * SIZE / SQUARES as f64;
         let rows = 0..=SQUARES;
-        let places = rows.clone().flat_map(|row| {
+        let positions = rows.clone().flat_map(|row| {
             rows.clone().map(move |column| {
                 let flat = DVec2::new(at(column), at(row));
                 DVec3::new(flat.x, self.height(flat), flat.y)
@@ -86,25 +87,25 @@ impl Landscape {
             let (b, c, d) = (a + 1, a + SQUARES + 1, a + SQUARES + 2);
             [[a, c, d], [a, d, b]]
         });
-        (places.collect(), triangles.collect())
+        (positions.collect(), triangles.collect())
     }
 
     /// Dented balls, a part of each in the ground.
-    fn rocks(&self) -> Mesh {
+    fn rocks(&self) -> TriangleMesh {
         let mut random = Rng::with_seed(self.seed ^ 1);
         let (ball, faces) = ball();
-        let (mut places, mut triangles) = (Vec::new(), Vec::new());
+        let (mut positions, mut triangles) = (Vec::new(), Vec::new());
         for &(middle, radius) in &self.rocks {
-            let first = places.len();
+            let first = positions.len();
             let foot = DVec3::new(middle.x, self.height(middle) + radius * 0.25, middle.y);
             let shape = DVec3::new(1.0, within(&mut random, 0.7, 1.0), 1.0);
             for &direction in &ball {
                 let dent = within(&mut random, 0.82, 1.0);
-                places.push(foot + direction * shape * dent * radius);
+                positions.push(foot + direction * shape * dent * radius);
             }
             triangles.extend(faces.iter().map(|face| face.map(|corner| first + corner)));
         }
-        (places, triangles)
+        (positions, triangles)
     }
 
     pub(super) fn write_hill(&self, out: &mut impl Write) -> io::Result<()> {
@@ -117,9 +118,9 @@ impl Landscape {
 }
 
 /// An octahedron whose edges are halved twice, on the unit sphere.
-fn ball() -> Mesh {
+fn ball() -> TriangleMesh {
     let [x, y, z] = DVec3::AXES;
-    let mut places = vec![x, y, z, -x, -y, -z];
+    let mut positions = vec![x, y, z, -x, -y, -z];
     let mut faces = Vec::new();
     for (a, b, c) in [(0, 1, 2), (1, 3, 2), (3, 4, 2), (4, 0, 2)] {
         // Each upper face, and the one that z mirrors it to.
@@ -129,24 +130,30 @@ fn ball() -> Mesh {
         let mut halved = Vec::new();
         for [a, b, c] in faces {
             let [ab, bc, ca] = [(a, b), (b, c), (c, a)].map(|(one, other)| {
-                let middle = (places[one] + places[other]).normalize();
-                let known = places.iter().position(|own| own.abs_diff_eq(middle, 1e-9));
+                let middle = (positions[one] + positions[other]).normalize();
+                let known = positions
+                    .iter()
+                    .position(|position| position.abs_diff_eq(middle, 1e-9));
                 known.unwrap_or_else(|| {
-                    places.push(middle);
-                    places.len() - 1
+                    positions.push(middle);
+                    positions.len() - 1
                 })
             });
             halved.extend([[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]);
         }
         faces = halved;
     }
-    (places, faces)
+    (positions, faces)
 }
 
 /// As OBJ, whose vertices count from 1.
-fn write((places, triangles): &Mesh, out: &mut impl Write) -> io::Result<()> {
-    for place in places {
-        writeln!(out, "v {:.6} {:.6} {:.6}", place.x, place.y, place.z)?;
+fn write((positions, triangles): &TriangleMesh, out: &mut impl Write) -> io::Result<()> {
+    for position in positions {
+        writeln!(
+            out,
+            "v {:.6} {:.6} {:.6}",
+            position.x, position.y, position.z
+        )?;
     }
     for [a, b, c] in triangles {
         writeln!(out, "f {} {} {}", a + 1, b + 1, c + 1)?;
@@ -159,16 +166,17 @@ mod tests {
     use super::*;
 
     /// The six volumes that a closed mesh has with the origin add up to its own: outwards is positive.
-    fn volume((places, triangles): &Mesh) -> f64 {
-        let own = |&[a, b, c]: &[usize; 3]| places[a].dot(places[b].cross(places[c])) / 6.0;
-        triangles.iter().map(own).sum()
+    fn volume((positions, triangles): &TriangleMesh) -> f64 {
+        let tetrahedron =
+            |&[a, b, c]: &[usize; 3]| positions[a].dot(positions[b].cross(positions[c])) / 6.0;
+        triangles.iter().map(tetrahedron).sum()
     }
 
     #[test]
     fn a_ball_is_closed_and_faces_outwards() {
-        let (places, faces) = ball();
-        assert_eq!((places.len(), faces.len()), (66, 128));
-        let found = volume(&(places, faces));
+        let (positions, faces) = ball();
+        assert_eq!((positions.len(), faces.len()), (66, 128));
+        let found = volume(&(positions, faces));
         assert!((3.8..4.19).contains(&found), "{found}");
     }
 
@@ -176,13 +184,13 @@ mod tests {
     fn the_rim_is_level_and_rocks_stand_apart() {
         for seed in 0..20 {
             let landscape = Landscape::new(seed);
-            let (places, triangles) = landscape.hill();
-            let rim = |own: f64| own == 0.0 || (own - SIZE).abs() < 1e-9;
-            let level = places.iter().filter(|at| rim(at.x) || rim(at.z));
+            let (positions, triangles) = landscape.hill();
+            let rim = |coordinate: f64| coordinate == 0.0 || (coordinate - SIZE).abs() < 1e-9;
+            let level = positions.iter().filter(|at| rim(at.x) || rim(at.z));
             assert!(level.clone().count() == 4 * SQUARES && level.clone().all(|at| at.y == 0.0));
-            assert!(places.iter().any(|at| at.y > 1.5));
+            assert!(positions.iter().any(|at| at.y > 1.5));
             let up = |&[a, b, c]: &[usize; 3]| {
-                let (a, b, c) = (places[a], places[b], places[c]);
+                let (a, b, c) = (positions[a], positions[b], positions[c]);
                 (b - a).cross(c - a).y > 0.0
             };
             assert!(triangles.iter().all(up));
@@ -192,9 +200,9 @@ mod tests {
                 landscape.rocks.len()
             );
             assert!(volume(&landscape.rocks()) > 0.0);
-            for (place, (middle, radius)) in landscape.rocks.iter().enumerate() {
-                for (other, own) in &landscape.rocks[..place] {
-                    assert!(middle.distance(*other) > radius + own + APART);
+            for (index, (middle, radius)) in landscape.rocks.iter().enumerate() {
+                for (other, other_radius) in &landscape.rocks[..index] {
+                    assert!(middle.distance(*other) > radius + other_radius + APART);
                 }
             }
         }

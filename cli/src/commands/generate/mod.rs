@@ -5,9 +5,9 @@ mod landscape;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use tumble_formats::generate::{Generate, Steps};
+use tumble_formats::generate::{Generate, KeySpacing};
 
-use crate::batch::place::Place;
+use crate::batch::destination::Destination;
 use crate::commands::generate::landscape::{Landscape, SIZE};
 use crate::messages::exit::Failure;
 use crate::messages::words;
@@ -57,16 +57,16 @@ pub(crate) struct Arguments {
 
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     if arguments.hill {
-        return land(arguments);
+        return write_landscape(arguments);
     }
     let generate = Generate {
         boxes: arguments.boxes as usize,
         keys: arguments.keys as usize,
         seconds: arguments.seconds,
-        steps: if arguments.random {
-            Steps::Random
+        spacing: if arguments.random {
+            KeySpacing::Random
         } else {
-            Steps::Uniform
+            KeySpacing::Uniform
         },
         length: arguments.length,
         seed: arguments.seed,
@@ -74,10 +74,10 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     generate
         .check()
         .map_err(|error| Failure::usage(error.to_string()))?;
-    let place = Place::new(&arguments.out, arguments.overwrite, &[])?;
-    place.write(None, |out| generate.write(out))?;
+    let destination = Destination::new(&arguments.out, arguments.overwrite, &[])?;
+    destination.write(None, |out| generate.write(out))?;
     words::note(&format!(
-        "{} × {}, {} s, seed {} → {place}",
+        "{} × {}, {} s, seed {} → {destination}",
         words::boxes(arguments.boxes as usize),
         words::count(arguments.keys as usize, "key"),
         arguments.seconds,
@@ -87,14 +87,14 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
 }
 
 /// Writes the hill and its rocks.
-fn land(arguments: &Arguments) -> Result<(), Failure> {
+fn write_landscape(arguments: &Arguments) -> Result<(), Failure> {
     let landscape = Landscape::new(arguments.seed);
-    let place = |path: &Path| Place::new(path, arguments.overwrite, &[]);
-    let rocks = arguments.rocks.as_deref().map(place).transpose()?;
-    let hill = place(&arguments.out)?;
+    let destination = |path: &Path| Destination::new(path, arguments.overwrite, &[]);
+    let rocks = arguments.rocks.as_deref().map(destination).transpose()?;
+    let hill = destination(&arguments.out)?;
     if let Some(rocks) = &rocks {
         rocks.refuse_same(&arguments.out)?;
-        rocks.try_out()?;
+        rocks.check_writable()?;
     }
     hill.write(None, |out| landscape.write_hill(out))?;
     if let Some(rocks) = rocks {
@@ -110,6 +110,6 @@ fn land(arguments: &Arguments) -> Result<(), Failure> {
 fn positive(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if value.is_finite() && value > 0.0 => Ok(value),
-        _ => Err(format!("`{text}` is not a positive number")),
+        _ => Err(format!("invalid value `{text}`: expected a number above 0")),
     }
 }

@@ -7,9 +7,9 @@ use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
-use crate::batch::place::Place;
+use crate::batch::destination::Destination;
 use crate::commands::picture;
-use crate::commands::plot::figure::{Axes, Axis, Entry, Figure, Mark, Panel};
+use crate::commands::plot::figure::{Figure, LegendEntry, Mark, Panel, PanelAxes, PlotAxis};
 use crate::messages::colours::{AXIS, Colour, GRID, INK, PALE};
 use crate::messages::exit::Failure;
 
@@ -25,9 +25,9 @@ const FINER: u32 = 10;
 const MARGIN: f64 = 16.0;
 
 /// Draws into a file, which ends in .svg or .png.
-pub(crate) fn write(figure: &Figure, place: &Place) -> Result<(), Failure> {
-    let name = place.to_string();
-    let extension = place.path().extension().unwrap_or_default();
+pub(crate) fn write(figure: &Figure, destination: &Destination) -> Result<(), Failure> {
+    let name = destination.to_string();
+    let extension = destination.path().extension().unwrap_or_default();
     let drawn = match extension.to_string_lossy().to_lowercase().as_str() {
         "svg" => svg(figure).map(String::into_bytes),
         "png" => png(figure),
@@ -37,7 +37,7 @@ pub(crate) fn write(figure: &Figure, place: &Place) -> Result<(), Failure> {
         }
     };
     let bytes = drawn.map_err(|error| Failure::writing(&name, &error))?;
-    place.write(None, |out| out.write_all(&bytes))
+    destination.write(None, |out| out.write_all(&bytes))
 }
 
 /// A figure as the text of an SVG file.
@@ -87,7 +87,7 @@ fn size(figure: &Figure) -> (u32, u32) {
     let sphere = figure
         .panels
         .iter()
-        .any(|panel| matches!(panel.axes, Axes::Sphere));
+        .any(|panel| matches!(panel.axes, PanelAxes::Sphere));
     let (width, height) = match (columns, sphere) {
         (1, false) => (800, if rows == 1 { 380 } else { 240 }),
         (1, true) => (640, 600),
@@ -118,7 +118,7 @@ const LEGEND_TEXT: f64 = 13.0;
 const LEGEND_GAP: f64 = 22.0;
 
 /// How wide an entry of the legend is, with the gap after it.
-fn entry_width(entry: &Entry) -> f64 {
+fn entry_width(entry: &LegendEntry) -> f64 {
     let font = FontDesc::new(FontFamily::SansSerif, 100.0, FontStyle::Normal);
     let text = font
         .box_size(&entry.label)
@@ -127,24 +127,24 @@ fn entry_width(entry: &Entry) -> f64 {
 }
 
 fn legend_lines(figure: &Figure, width: f64) -> usize {
-    places(figure, width)
+    legend_positions(figure, width)
         .last()
         .map_or(0, |&(_, line)| line + 1)
 }
 
-/// Where each entry of the legend lies: from the left, and in which line.
-fn places(figure: &Figure, width: f64) -> Vec<(f64, usize)> {
+/// The position of each entry of the legend: its distance from the left, and its line.
+fn legend_positions(figure: &Figure, width: f64) -> Vec<(f64, usize)> {
     let (mut left, mut line) = (MARGIN, 0);
-    let place = |entry: &Entry| {
-        let own = entry_width(entry);
-        if left + own > width && left > MARGIN {
+    let position_of = |entry: &LegendEntry| {
+        let needed = entry_width(entry);
+        if left + needed > width && left > MARGIN {
             (left, line) = (MARGIN, line + 1);
         }
-        let place = (left, line);
-        left += own;
-        place
+        let position = (left, line);
+        left += needed;
+        position
     };
-    figure.legend.iter().map(place).collect()
+    figure.legend.iter().map(position_of).collect()
 }
 
 fn rgb([r, g, b]: Colour) -> RGBColor {
@@ -187,7 +187,7 @@ impl Brush {
         canvas.draw_text(&figure.subtitle, &subtitle, (left, self.px(34.0)))?;
         let (width, height) = canvas.dim_in_pixel();
         let nominal = f64::from(width) / self.scale;
-        for (entry, (left, line)) in figure.legend.iter().zip(places(figure, nominal)) {
+        for (entry, (left, line)) in figure.legend.iter().zip(legend_positions(figure, nominal)) {
             self.entry(canvas, entry, left, 70.0 + 22.0 * line as f64)?;
         }
         let top = self.px(header(legend_lines(figure, nominal)));
@@ -198,8 +198,8 @@ impl Brush {
         let areas = body.split_evenly((rows, columns));
         for (panel, area) in figure.panels.iter().zip(&areas) {
             match &panel.axes {
-                Axes::Plane { x, y } => self.plane(area, panel, x, y)?,
-                Axes::Sphere => self.sphere(area, panel)?,
+                PanelAxes::Plane { x, y } => self.plane(area, panel, x, y)?,
+                PanelAxes::Sphere => self.sphere(area, panel)?,
             }
         }
         Ok(())
@@ -209,7 +209,7 @@ impl Brush {
     fn entry<DB: DrawingBackend>(
         &self,
         canvas: &Area<'_, DB>,
-        entry: &Entry,
+        entry: &LegendEntry,
         left: f64,
         height: f64,
     ) -> Result<(), DrawingAreaErrorKind<DB::ErrorType>> {
@@ -240,8 +240,8 @@ impl Brush {
         &self,
         area: &Area<'_, DB>,
         panel: &Panel,
-        x: &Axis,
-        y: &Axis,
+        x: &PlotAxis,
+        y: &PlotAxis,
     ) -> Result<(), DrawingAreaErrorKind<DB::ErrorType>> {
         let mut chart = ChartBuilder::on(area)
             .caption(&panel.title, self.text(13.0, FontStyle::Bold, INK))
@@ -270,8 +270,8 @@ impl Brush {
             .x_desc(&*x.label)
             .y_desc(&*y.label)
             .draw()?;
-        for &place in &panel.uprights {
-            let line = vec![(place, y.range.start), (place, y.range.end)];
+        for &position in &panel.uprights {
+            let line = vec![(position, y.range.start), (position, y.range.end)];
             chart.draw_series([PathElement::new(line, self.line(AXIS, 0.5))])?;
         }
         if let Some(level) = panel.level {
@@ -322,7 +322,7 @@ impl Brush {
 }
 
 /// A tick's label: no more digits than it has; of powers of ten, whole ones only.
-fn label(axis: &Axis, value: f64) -> String {
+fn label(axis: &PlotAxis, value: f64) -> String {
     if axis.powers {
         let whole = (value - value.round()).abs() < 1e-6;
         return if whole {

@@ -9,14 +9,14 @@ use crate::messages::colours::Colour;
 pub(crate) struct Figure {
     pub(crate) title: String,
     pub(crate) subtitle: String,
-    pub(crate) legend: Vec<Entry>,
+    pub(crate) legend: Vec<LegendEntry>,
     pub(crate) columns: usize,
     pub(crate) panels: Vec<Panel>,
 }
 
 /// A line of the legend.
 #[derive(Debug, Clone)]
-pub(crate) struct Entry {
+pub(crate) struct LegendEntry {
     pub(crate) label: String,
     pub(crate) colour: Colour,
     pub(crate) mark: Mark,
@@ -33,8 +33,8 @@ pub(crate) enum Mark {
 #[derive(Debug, Clone)]
 pub(crate) struct Panel {
     pub(crate) title: String,
-    pub(crate) axes: Axes,
-    pub(crate) curves: Vec<Curve>,
+    pub(crate) axes: PanelAxes,
+    pub(crate) curves: Vec<PlotCurve>,
     pub(crate) dots: Vec<Dots>,
     /// Where upright lines stand: keys.
     pub(crate) uprights: Vec<f64>,
@@ -43,17 +43,17 @@ pub(crate) struct Panel {
 }
 
 #[derive(Debug, Clone)]
-pub(crate) enum Axes {
+pub(crate) enum PanelAxes {
     Plane {
-        x: Axis,
-        y: Axis,
+        x: PlotAxis,
+        y: PlotAxis,
     },
     /// A ball seen from afar, of radius 1 about the origin; depth is left out.
     Sphere,
 }
 
 #[derive(Debug, Clone)]
-pub(crate) struct Axis {
+pub(crate) struct PlotAxis {
     pub(crate) label: String,
     pub(crate) range: Range<f64>,
     /// The values are powers of ten.
@@ -62,7 +62,7 @@ pub(crate) struct Axis {
 
 /// A line through points, in pieces where it is interrupted.
 #[derive(Debug, Clone)]
-pub(crate) struct Curve {
+pub(crate) struct PlotCurve {
     pub(crate) colour: Colour,
     pub(crate) width: f64,
     /// From 0, not there, to 1.
@@ -103,15 +103,15 @@ pub(crate) fn thinned(points: &[(f64, f64)], columns: usize) -> Vec<(f64, f64)> 
     for column in points.chunks(points.len().div_ceil(columns)) {
         let lowest = (0..column.len()).min_by(|&a, &b| column[a].1.total_cmp(&column[b].1));
         let highest = (0..column.len()).max_by(|&a, &b| column[a].1.total_cmp(&column[b].1));
-        let mut places = vec![
+        let mut indices = vec![
             0,
             lowest.unwrap_or(0),
             highest.unwrap_or(0),
             column.len() - 1,
         ];
-        places.sort_unstable();
-        places.dedup();
-        kept.extend(places.into_iter().map(|place| column[place]));
+        indices.sort_unstable();
+        indices.dedup();
+        kept.extend(indices.into_iter().map(|index| column[index]));
     }
     kept
 }

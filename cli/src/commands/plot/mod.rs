@@ -1,6 +1,5 @@
 //! `tumble plot`: pictures of what interpolation makes of keys, and of bodies on paths.
 
-pub(crate) mod curves;
 pub(crate) mod draw;
 pub(crate) mod figure;
 mod path;
@@ -17,15 +16,17 @@ use clap::{Args, ValueEnum};
 use glam::Vec3;
 use tumble::{Interpolation, Method, TrackSet, method};
 
-use crate::arguments::device::{DeviceArguments, Opened};
+use crate::arguments::device::{DeviceArguments, OpenedDevice};
 use crate::arguments::input::{self, Inputs};
-use crate::arguments::interpolation::{Manner, Selection, chosen, curve_warning, methods};
+use crate::arguments::interpolation::{
+    InterpolationArguments, MethodSelection, chosen, curve_warning, methods,
+};
 use crate::arguments::path::{PATHS, PathArguments};
-use crate::arguments::time::Sampling;
-use crate::batch::place::{self, Place};
-use crate::commands::plot::curves::Subject;
+use crate::arguments::time::SamplingArguments;
+use crate::batch::destination::{self, Destination};
 use crate::commands::plot::figure::Figure;
-use crate::commands::plot::source::Source;
+use crate::commands::plot::source::PlotSource;
+use crate::commands::plot::source::curves::PlotSubject;
 use crate::commands::plot::subjects::{Subjects, together};
 use crate::commands::travel::{self, Maker, is_path_file, is_travel};
 use crate::messages::exit::{Failure, for_each};
@@ -59,10 +60,10 @@ pub(crate) struct Arguments {
     /// How to interpolate: one method or several, or all [default: bessel-overhauser; for a
     /// report slerp,catmull-rom,bessel-overhauser]
     #[arg(short, long = "method", value_name = "METHODS", value_delimiter = ',', value_parser = methods())]
-    methods: Vec<Selection>,
+    methods: Vec<MethodSelection>,
     /// What to draw [default: components; of files of paths, path]
     #[arg(long, value_enum, value_name = "WHAT")]
-    show: Option<Show>,
+    show: Option<PlotQuantity>,
     /// Only this dimension, counted from 1 (may be repeated)
     #[arg(
         long = "dimension",
@@ -89,17 +90,17 @@ pub(crate) struct Arguments {
     #[arg(long, value_enum)]
     format: Option<PictureFormat>,
     #[command(flatten)]
-    sampling: Sampling,
+    sampling: SamplingArguments,
     #[command(flatten, next_help_heading = PATHS)]
     path: PathArguments,
     #[command(flatten)]
-    manner: Manner,
+    interpolation: InterpolationArguments,
     #[command(flatten)]
     device: DeviceArguments,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Show {
+enum PlotQuantity {
     /// w x y z over frames
     Components,
     /// angular speed over frames, rad/s
@@ -163,11 +164,11 @@ impl PictureFormat {
     }
 }
 
-/// Bodies on paths, what makes them, and the failure of animations that were refused.
-type Bodies = (travel::Source, Vec<Maker>, Result<(), Failure>);
+/// Bodies on paths, their makers, and the failure of animations that were refused.
+type Bodies = (travel::TravelSource, Vec<Maker>, Result<(), Failure>);
 
-/// Where pictures go.
-enum Out {
+/// The output of pictures.
+enum PlotOutput {
     One(PathBuf),
     Folder(PathBuf),
 }
@@ -188,51 +189,54 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         .distinct(arguments.sampling.reads_standard_input())?;
     let samples = arguments.sampling.samples()?;
     refuse_shared_names(&inputs)?;
-    let out = arguments.place(&inputs)?;
+    let out = arguments.output(&inputs)?;
     let methods = arguments.methods();
-    arguments.manner.check(&methods).map_err(Failure::usage)?;
+    arguments
+        .interpolation
+        .check(&methods)
+        .map_err(Failure::usage)?;
     let interpolations: Vec<Interpolation> = methods
         .iter()
-        .map(|&method| arguments.manner.with(method))
+        .map(|&method| arguments.interpolation.with(method))
         .collect();
-    let mut studio = Studio {
+    let mut writer = FigureWriter {
         device: arguments.device.open()?,
         format: arguments.format(),
         overwrite: arguments.overwrite,
         inputs: inputs.clone(),
         drawn: 0,
     };
-    if let (true, Out::Folder(folder)) = (arguments.report, &out) {
-        return report::write(arguments, &mut studio, &interpolations, &samples, folder);
+    if let (true, PlotOutput::Folder(folder)) = (arguments.report, &out) {
+        return report::write(arguments, &mut writer, &interpolations, &samples, folder);
     }
     let outcome = for_each(&inputs, |path| {
         let name = input::name(path);
         let stem = input::stem(path);
         if let Some((source, makers, rest)) = arguments.bodies(path, &interpolations)? {
             let title = (&*name, input::file_name(path));
-            let figure = path::figure(&mut studio.device, title, &source, &makers)?;
+            let figure = path::figure(&mut writer.device, title, &source, &makers)?;
             let file = match &out {
-                Out::One(file) => file.clone(),
-                Out::Folder(folder) => {
-                    folder.join(format!("{stem}-path.{}", studio.format.extension()))
+                PlotOutput::One(file) => file.clone(),
+                PlotOutput::Folder(folder) => {
+                    folder.join(format!("{stem}-path.{}", writer.format.extension()))
                 }
             };
-            return studio.draw(&figure, &file).and(rest);
+            return writer.draw(&figure, &file).and(rest);
         }
         let input::OnlyClip { clip, rest } = arguments.inputs.load_one(path)?;
         let tracks = arguments.inputs.tracks.of(&clip, &name)?;
         let set = clip.set;
         note_curves(&name, &set, &interpolations);
-        let source = Source::new(input::file_name(path), &set, &interpolations, &samples)?;
+        let source = PlotSource::new(input::file_name(path), &set, &interpolations, &samples)?;
         let subjects = arguments.subjects(&set, tracks, &name)?;
         let pictures = match &out {
-            Out::One(file) => vec![(
+            PlotOutput::One(file) => vec![(
                 file.clone(),
                 together(&subjects, interpolations.len(), &name)?,
             )],
-            Out::Folder(folder) => {
-                let file = |(label, subject): (String, Subject)| {
-                    let name = format!("{stem}-{label}.{}", studio.format.extension());
+            PlotOutput::Folder(folder) => {
+                let file = |(label, subject): (String, PlotSubject)| {
+                    let name = format!("{stem}-{label}.{}", writer.format.extension());
                     (folder.join(name), subject)
                 };
                 subjects.each().into_iter().map(file).collect()
@@ -240,20 +244,20 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         };
         let mut progress = Progress::new("drawing", pictures.len() as u64);
         for (file, subject) in pictures {
-            let figure = source.figure(&mut studio.device, &subject)?;
-            studio.draw(&figure, &file)?;
+            let figure = source.figure(&mut writer.device, &subject)?;
+            writer.draw(&figure, &file)?;
             progress.advance(1);
         }
         rest
     });
-    if studio.drawn == 0 {
+    if writer.drawn == 0 {
         return outcome;
     }
     words::note(&format!(
         "{} of {}, on {} → {}",
-        words::count(studio.drawn, "picture"),
+        words::count(writer.drawn, "picture"),
         words::count(inputs.len(), "input"),
-        studio.device.label,
+        writer.device.label,
         arguments.out.display()
     ));
     outcome
@@ -273,11 +277,11 @@ impl Arguments {
         }
     }
 
-    fn show(&self) -> Show {
-        self.show.unwrap_or(Show::Components)
+    fn show(&self) -> PlotQuantity {
+        self.show.unwrap_or(PlotQuantity::Components)
     }
 
-    /// The bodies on the paths of a file, if these are to be drawn, what makes them, and the failure of
+    /// The bodies on the paths of a file, if these are to be drawn, their makers, and the failure of
     /// animations that were refused.
     fn bodies(
         &self,
@@ -286,24 +290,25 @@ impl Arguments {
     ) -> Result<Option<Bodies>, Failure> {
         let name = input::name(path);
         match self.show {
-            None | Some(Show::Path) if is_path_file(path) => {
+            None | Some(PlotQuantity::Path) if is_path_file(path) => {
                 let frames = self.path.frames().into_iter().map(Maker::Frame);
-                let source = travel::Source::of_paths(path, &self.path, &self.inputs.tracks)?;
+                let source = travel::TravelSource::of_paths(path, &self.path, &self.inputs.tracks)?;
                 Ok(Some((source, frames.collect(), Ok(()))))
             }
-            Some(Show::Path) => {
+            Some(PlotQuantity::Path) => {
                 let input::OnlyClip { clip, rest } = self.inputs.load_one(path)?;
                 if !is_travel(&clip) {
-                    let message = "is no file of paths, nor of joints without parents that move";
+                    let message =
+                        "is neither a file of paths nor one of moving joints without parents";
                     return Err(Failure::usage(format!("{name}: {message}")));
                 }
                 let methods = interpolations.iter().copied().map(Maker::Method);
                 let clip = self.inputs.tracks.select(&clip, &name)?.into_owned();
-                let source = travel::Source::Clip(Box::new(clip));
+                let source = travel::TravelSource::Clip(Box::new(clip));
                 Ok(Some((source, methods.collect(), rest)))
             }
             Some(_) if is_path_file(path) => Err(Failure::usage(format!(
-                "{name}: of paths --show path is drawn; for rotations follow them into a file first"
+                "{name}: paths are drawn by --show path; to draw rotations, write them by `tumble follow` first"
             ))),
             _ => Ok(None),
         }
@@ -315,7 +320,7 @@ impl Arguments {
     }
 
     /// Checks the output before any work; makes the directory.
-    fn place(&self, inputs: &[PathBuf]) -> Result<Out, Failure> {
+    fn output(&self, inputs: &[PathBuf]) -> Result<PlotOutput, Failure> {
         let out = &self.out;
         let shown = out.display();
         let is_file =
@@ -326,8 +331,8 @@ impl Arguments {
                     "{shown}: end the picture in .svg or .png, or give a directory"
                 )));
             }
-            place::folder(out)?;
-            return Ok(Out::Folder(out.clone()));
+            destination::create_folder(out)?;
+            return Ok(PlotOutput::Folder(out.clone()));
         }
         if self.report {
             return Err(Failure::usage(format!(
@@ -339,11 +344,11 @@ impl Arguments {
                 "{shown}: several inputs need a directory for their pictures, not one file"
             )));
         }
-        Place::new(out, self.overwrite, inputs)?.try_out()?;
-        Ok(Out::One(out.clone()))
+        Destination::new(out, self.overwrite, inputs)?.check_writable()?;
+        Ok(PlotOutput::One(out.clone()))
     }
 
-    /// What to draw of a set; refuses what is not there.
+    /// The subjects to draw of a set; refuses boxes and dimensions that do not exist.
     fn subjects(
         &self,
         set: &TrackSet,
@@ -351,9 +356,9 @@ impl Arguments {
         name: &str,
     ) -> Result<Subjects, Failure> {
         let boxes = set.track_count();
-        if !self.dimensions.is_empty() && self.show() != Show::Components {
+        if !self.dimensions.is_empty() && self.show() != PlotQuantity::Components {
             return Err(Failure::usage(
-                "--dimension is for components; the others have boxes (--box)",
+                "--dimension needs --show components; choose boxes for the others (--box)",
             ));
         }
         let there = format!(
@@ -361,22 +366,27 @@ impl Arguments {
             words::boxes(boxes),
             4 * boxes
         );
-        let chosen = |what: &str, given: &[usize], all: Range<usize>| {
-            let wrong = given.iter().find(|&&place| place == 0 || place > all.end);
+        let chosen = |label: &str, requested: &[usize], all: Range<usize>| {
+            let wrong = requested
+                .iter()
+                .find(|&&number| number == 0 || number > all.end);
             match wrong {
-                Some(place) => Err(Failure::usage(format!(
-                    "there is no {what} {place}: {there}"
+                Some(number) => Err(Failure::usage(format!(
+                    "there is no {label} {number}: {there}"
                 ))),
-                None => Ok(given.iter().map(|place| place - 1).collect::<Vec<_>>()),
+                None => Ok(requested
+                    .iter()
+                    .map(|number| number - 1)
+                    .collect::<Vec<_>>()),
             }
         };
         let dimensions = chosen("dimension", &self.dimensions, 0..4 * boxes)?;
-        let mut own = chosen("box", &self.boxes, 0..boxes)?;
-        if own.is_empty() {
-            own = tracks.unwrap_or_else(|| (0..boxes).collect());
+        let mut selected = chosen("box", &self.boxes, 0..boxes)?;
+        if selected.is_empty() {
+            selected = tracks.unwrap_or_else(|| (0..boxes).collect());
         }
         Ok(Subjects {
-            boxes: own,
+            boxes: selected,
             dimensions,
             show: self.show(),
             axis: self.axis.into(),
@@ -386,9 +396,9 @@ impl Arguments {
 
 /// Pictures are named after their inputs, so no two of those may have the same name.
 fn refuse_shared_names(inputs: &[PathBuf]) -> Result<(), Failure> {
-    for (place, path) in inputs.iter().enumerate() {
+    for (index, path) in inputs.iter().enumerate() {
         let same = |other: &&PathBuf| input::stem(other) == input::stem(path);
-        if let Some(other) = inputs[..place].iter().find(same) {
+        if let Some(other) = inputs[..index].iter().find(same) {
             return Err(Failure::usage(format!(
                 "{} and {} would share the pictures' names; draw them into different directories",
                 input::name(other),
@@ -400,23 +410,23 @@ fn refuse_shared_names(inputs: &[PathBuf]) -> Result<(), Failure> {
 }
 
 /// Draws figures into files.
-pub(crate) struct Studio {
-    device: Opened,
+pub(crate) struct FigureWriter {
+    device: OpenedDevice,
     format: PictureFormat,
     overwrite: bool,
     inputs: Vec<PathBuf>,
     drawn: usize,
 }
 
-impl Studio {
+impl FigureWriter {
     fn draw(&mut self, figure: &Figure, file: &Path) -> Result<(), Failure> {
         let drawn = match self.format {
             PictureFormat::Svg => draw::svg(figure).map(String::into_bytes),
             PictureFormat::Png => draw::png(figure),
         };
         let bytes = drawn.map_err(|error| Failure::writing(&file.display().to_string(), &error))?;
-        let place = Place::new(file, self.overwrite, &self.inputs)?;
-        place.write(None, |out| out.write_all(&bytes))?;
+        let destination = Destination::new(file, self.overwrite, &self.inputs)?;
+        destination.write(None, |out| out.write_all(&bytes))?;
         self.drawn += 1;
         Ok(())
     }

@@ -1,11 +1,13 @@
 //! What is drawn of bodies on paths: how fast they go, how fast they turn, and how far they have rolled.
 
 use glam::Vec3;
-use tumble::Frames;
+use tumble::SampleTimes;
 
-use crate::arguments::device::Opened;
-use crate::commands::plot::figure::{Axes, Axis, Curve, Entry, Figure, Mark, Panel, range_of};
-use crate::commands::travel::{Maker, Source, Travel};
+use crate::arguments::device::OpenedDevice;
+use crate::commands::plot::figure::{
+    Figure, LegendEntry, Mark, Panel, PanelAxes, PlotAxis, PlotCurve, range_of,
+};
+use crate::commands::travel::{Maker, Travel, TravelSource};
 use crate::messages::colours::Colour;
 use crate::messages::exit::Failure;
 use crate::messages::words;
@@ -18,7 +20,7 @@ const UPRIGHTS: usize = 200;
 
 /// What a panel shows of a body, between two samples.
 #[derive(Clone, Copy)]
-enum Show {
+enum PathQuantity {
     /// Units a second.
     Speed,
     /// Of its direction, rad/s.
@@ -27,24 +29,28 @@ enum Show {
     Roll,
 }
 
-const ALL: [(Show, &str, &str); 3] = [
-    (Show::Speed, "speed along the path", "units/s"),
-    (Show::Turning, "turning rate of the direction", "rad/s"),
-    (Show::Roll, "turned about the direction", "degrees"),
+const ALL: [(PathQuantity, &str, &str); 3] = [
+    (PathQuantity::Speed, "speed along the path", "units/s"),
+    (
+        PathQuantity::Turning,
+        "turning rate of the direction",
+        "rad/s",
+    ),
+    (PathQuantity::Roll, "turned about the direction", "degrees"),
 ];
 
 /// Three panels for each path, with a curve for each frame or method.
 pub(super) fn figure(
-    device: &mut Opened,
+    device: &mut OpenedDevice,
     (name, title): (&str, String),
-    source: &Source,
+    source: &TravelSource,
     makers: &[Maker],
 ) -> Result<Figure, Failure> {
     let set = source.set();
     let (first, last) = set.time_span().unwrap_or((0.0, 0.0));
     let at = |i: usize| first + (last - first) * i as f64 / STEPS as f64;
     let frames = match first < last {
-        true => Frames::at((0..=STEPS).map(at).collect()),
+        true => SampleTimes::at((0..=STEPS).map(at).collect()),
         false => return Err(Failure::usage(format!("{name}: has no time to plot"))),
     };
     let travels: Vec<Travel> = makers
@@ -52,19 +58,19 @@ pub(super) fn figure(
         .map(|&maker| source.sample(device, name, maker, &frames))
         .collect::<Result<_, _>>()?;
     let colours: Vec<Colour> = makers.iter().map(|maker| maker.colour()).collect();
-    let forward = source.body_turn() * Vec3::Z;
+    let forward = source.body_rotation() * Vec3::Z;
     let keys = source.key_times();
     let uprights = if keys.len() > UPRIGHTS { vec![] } else { keys };
     let tracks = set.track_count();
     let panels = (0..tracks).flat_map(|track| ALL.map(|show| (track, show)));
-    let panels = panels.map(|(track, (show, what, unit))| {
-        let curve = |(order, (travel, &colour)): (usize, (&Travel, &Colour))| Curve {
+    let panels = panels.map(|(track, (show, caption, unit))| {
+        let curve = |(order, (travel, &colour)): (usize, (&Travel, &Colour))| PlotCurve {
             colour,
             width: 1.6 + 1.4 * (travels.len() - 1 - order).min(3) as f64,
             opacity: 1.0,
             pieces: vec![points(travel, track, show, forward)],
         };
-        let curves: Vec<Curve> = travels
+        let curves: Vec<PlotCurve> = travels
             .iter()
             .zip(&colours)
             .enumerate()
@@ -76,23 +82,23 @@ pub(super) fn figure(
                 .flat_map(|curve| curve.pieces.iter().flatten())
         };
         // A body that never rolls does so by its rounding alone, which is not to fill the panel.
-        let least = if matches!(show, Show::Roll) {
+        let least = if matches!(show, PathQuantity::Roll) {
             [-1.0, 1.0]
         } else {
             [0.0, 0.0]
         };
         let range = range_of(all().map(|point| point.1).chain(least));
-        let axis = |label: &str, range| Axis {
+        let axis = |label: &str, range| PlotAxis {
             label: label.to_owned(),
             range,
             powers: false,
         };
         Panel {
             title: match tracks {
-                1 => what.to_owned(),
-                _ => format!("{}: {what}", set.track_name(track)),
+                1 => caption.to_owned(),
+                _ => format!("{}: {caption}", set.track_name(track)),
             },
-            axes: Axes::Plane {
+            axes: PanelAxes::Plane {
                 x: axis("time, s", range_of([first, last])),
                 y: axis(unit, range),
             },
@@ -102,7 +108,7 @@ pub(super) fn figure(
             level: None,
         }
     });
-    let entry = |(travel, &colour): (&Travel, &Colour)| Entry {
+    let entry = |(travel, &colour): (&Travel, &Colour)| LegendEntry {
         label: travel.name.clone(),
         colour,
         mark: Mark::Line,
@@ -121,9 +127,9 @@ pub(super) fn figure(
 }
 
 /// The curve of one body, a point in the middle of each step.
-fn points(travel: &Travel, track: usize, show: Show, forward: Vec3) -> Vec<(f64, f64)> {
+fn points(travel: &Travel, track: usize, show: PathQuantity, forward: Vec3) -> Vec<(f64, f64)> {
     let velocities = travel.velocities();
-    let places: Vec<Vec3> = travel.line(track).collect();
+    let positions: Vec<Vec3> = travel.line(track).collect();
     let mut rolled = 0.0;
     let steps = travel.times.windows(2).enumerate();
     let point = |(sample, pair): (usize, &[f64])| {
@@ -132,9 +138,11 @@ fn points(travel: &Travel, track: usize, show: Show, forward: Vec3) -> Vec<(f64,
         let roll = turning.dot(forward);
         rolled += f64::from(roll) * seconds;
         let value = match show {
-            Show::Speed => f64::from((places[sample + 1] - places[sample]).length()) / seconds,
-            Show::Turning => f64::from((turning - forward * roll).length()),
-            Show::Roll => rolled.to_degrees(),
+            PathQuantity::Speed => {
+                f64::from((positions[sample + 1] - positions[sample]).length()) / seconds
+            }
+            PathQuantity::Turning => f64::from((turning - forward * roll).length()),
+            PathQuantity::Roll => rolled.to_degrees(),
         };
         ((pair[0] + pair[1]) / 2.0, value)
     };
@@ -161,16 +169,16 @@ mod tests {
                 })
                 .collect(),
             // Faces along z at first, and goes round y.
-            places: (times.iter())
+            positions: (times.iter())
                 .map(|time| Vec3::new(-angle(time).cos(), 0.0, angle(time).sin()) * 4.0)
                 .collect(),
             times,
         };
         let last = |show| *points(&travel, 0, show, Vec3::Z).last().unwrap();
         for (show, value, bound) in [
-            (Show::Speed, 3.0, 2e-3),
-            (Show::Turning, 0.75, 1e-3),
-            (Show::Roll, 720.0, 0.1),
+            (PathQuantity::Speed, 3.0, 2e-3),
+            (PathQuantity::Turning, 0.75, 1e-3),
+            (PathQuantity::Roll, 720.0, 0.1),
         ] {
             let (at, found) = last(show);
             assert!(

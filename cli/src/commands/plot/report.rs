@@ -9,13 +9,13 @@ use glam::Vec3;
 use tumble::{Interpolation, TrackSet};
 
 use crate::arguments::input;
-use crate::arguments::time::Samples;
-use crate::batch::place::Place;
+use crate::arguments::time::SampleRequest;
+use crate::batch::destination::Destination;
 use crate::commands::info::Steps;
-use crate::commands::plot::curves::{NAMES, Subject};
-use crate::commands::plot::source::Source;
+use crate::commands::plot::source::PlotSource;
+use crate::commands::plot::source::curves::{NAMES, PlotSubject};
 use crate::commands::plot::subjects::PANELS;
-use crate::commands::plot::{Arguments, Studio, note_curves};
+use crate::commands::plot::{Arguments, FigureWriter, note_curves};
 use crate::messages::exit::{Failure, for_each};
 use crate::messages::progress::Progress;
 use crate::messages::words;
@@ -24,28 +24,28 @@ use crate::messages::words;
 const DIMENSIONS: [usize; 2] = [2, 16];
 
 /// One figure of the page.
-struct Shown {
+struct ReportFigure {
     file: String,
     caption: String,
 }
 
-/// What the page says of one input.
+/// The section of one input.
 struct Chapter {
     title: String,
     facts: String,
-    figures: Vec<Shown>,
+    figures: Vec<ReportFigure>,
 }
 
 pub(crate) fn write(
     arguments: &Arguments,
-    studio: &mut Studio,
+    writer: &mut FigureWriter,
     interpolations: &[Interpolation],
-    samples: &Samples,
+    samples: &SampleRequest,
     folder: &Path,
 ) -> Result<(), Failure> {
-    let inputs = studio.inputs.clone();
-    let page = Place::new(&folder.join("index.html"), arguments.overwrite, &inputs)?;
-    page.try_out()?;
+    let inputs = writer.inputs.clone();
+    let page = Destination::new(&folder.join("index.html"), arguments.overwrite, &inputs)?;
+    page.check_writable()?;
     let each = figures_of_one(interpolations.len());
     let mut progress = Progress::new("drawing", (inputs.len() * each) as u64);
     let mut chapters = Vec::new();
@@ -57,7 +57,7 @@ pub(crate) fn write(
             title: input::file_name(path),
             facts: facts(&set),
             figures: figures(
-                studio,
+                writer,
                 (path, &set),
                 interpolations,
                 samples,
@@ -72,12 +72,12 @@ pub(crate) fn write(
     if chapters.is_empty() {
         return outcome;
     }
-    let text = html(&chapters, &studio.device.label);
+    let text = html(&chapters, &writer.device.label);
     page.write(None, |out| out.write_all(text.as_bytes()))?;
     words::note(&format!(
         "{} and a page, on {} → {page}",
-        words::count(studio.drawn, "picture"),
-        studio.device.label
+        words::count(writer.drawn, "picture"),
+        writer.device.label
     ));
     outcome
 }
@@ -88,46 +88,47 @@ fn figures_of_one(methods: usize) -> usize {
 
 /// Draws all figures of one input.
 fn figures(
-    studio: &mut Studio,
+    writer: &mut FigureWriter,
     (path, set): (&PathBuf, &TrackSet),
     interpolations: &[Interpolation],
-    samples: &Samples,
+    samples: &SampleRequest,
     folder: &Path,
     progress: &mut Progress,
-) -> Result<Vec<Shown>, Failure> {
+) -> Result<Vec<ReportFigure>, Failure> {
     let name = input::file_name(path);
     let mut shown = Vec::new();
-    let mut draw = |studio: &mut Studio, methods, label: &str, caption, subject: &Subject| {
-        let source = Source::new(name.clone(), set, methods, samples)?;
-        let figure = source.figure(&mut studio.device, subject)?;
-        let file = format!(
-            "{}-{label}.{}",
-            input::stem(path),
-            studio.format.extension()
-        );
-        studio.draw(&figure, &folder.join(&file))?;
-        shown.push(Shown { file, caption });
-        progress.advance(1);
-        Ok::<(), Failure>(())
-    };
+    let mut draw =
+        |writer: &mut FigureWriter, methods, label: &str, caption, subject: &PlotSubject| {
+            let source = PlotSource::new(name.clone(), set, methods, samples)?;
+            let figure = source.figure(&mut writer.device, subject)?;
+            let file = format!(
+                "{}-{label}.{}",
+                input::stem(path),
+                writer.format.extension()
+            );
+            writer.draw(&figure, &folder.join(&file))?;
+            shown.push(ReportFigure { file, caption });
+            progress.advance(1);
+            Ok::<(), Failure>(())
+        };
     // Those of the original's report; of a smaller set, its last instead.
     let mut dimensions = DIMENSIONS
-        .map(|place| place.min(4 * set.track_count()))
+        .map(|dimension| dimension.min(4 * set.track_count()))
         .to_vec();
     dimensions.dedup();
-    for place in dimensions {
-        let subject = Subject::Dimensions(vec![place - 1]);
-        let (component, index) = (NAMES[(place - 1) % 4], (place - 1) / 4 + 1);
-        let about = format!("dimension {place}, {component} of box {index}");
+    for dimension in dimensions {
+        let subject = PlotSubject::Dimensions(vec![dimension - 1]);
+        let (component, index) = (NAMES[(dimension - 1) % 4], (dimension - 1) / 4 + 1);
+        let about = format!("dimension {dimension}, {component} of box {index}");
         for one in interpolations.chunks(1) {
             let method = one[0].method;
-            let label = format!("{method}-dimension-{place}");
-            draw(studio, one, &label, format!("{method}: {about}"), &subject)?;
+            let label = format!("{method}-dimension-{dimension}");
+            draw(writer, one, &label, format!("{method}: {about}"), &subject)?;
         }
         if interpolations.len() > 1 {
-            let label = format!("all-dimension-{place}");
+            let label = format!("all-dimension-{dimension}");
             let caption = format!("all together: {about}");
-            draw(studio, interpolations, &label, caption, &subject)?;
+            draw(writer, interpolations, &label, caption, &subject)?;
         }
     }
     let boxes: Vec<usize> = (0..set.track_count().min(PANELS)).collect();
@@ -135,20 +136,20 @@ fn figures(
         (
             "speed",
             "angular speed: where slerp has corners and splines have none",
-            Subject::Speed(boxes.clone()),
+            PlotSubject::Speed(boxes.clone()),
         ),
         (
             "error",
             "the angle to a textbook implementation in f64",
-            Subject::Error(boxes.clone()),
+            PlotSubject::Error(boxes.clone()),
         ),
         (
             "sphere",
             "where each box points, seen from the one it hangs from",
-            Subject::Sphere(boxes, Vec3::NEG_Y),
+            PlotSubject::Sphere(boxes, Vec3::NEG_Y),
         ),
     ] {
-        draw(studio, interpolations, label, caption.to_owned(), &subject)?;
+        draw(writer, interpolations, label, caption.to_owned(), &subject)?;
     }
     Ok(shown)
 }

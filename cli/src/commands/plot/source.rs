@@ -1,12 +1,14 @@
 //! One input, sampled: what curves are made of.
 
-use glam::Quat;
-use tumble::{Frames, Interpolation, Layout, Timeline, TrackSet, Vectors};
+pub(crate) mod curves;
 
-use crate::arguments::device::Opened;
-use crate::arguments::time::Samples;
+use glam::Quat;
+use tumble::{Interpolation, Layout, SampleTimes, Timeline, TrackSet, Vectors};
+
+use crate::arguments::device::OpenedDevice;
+use crate::arguments::time::SampleRequest;
 use crate::batch::room;
-use crate::commands::plot::figure::{Axis, range_of};
+use crate::commands::plot::figure::{PlotAxis, range_of};
 use crate::messages::exit::Failure;
 use crate::messages::words;
 
@@ -14,27 +16,27 @@ use crate::messages::words;
 const UPRIGHTS: usize = 200;
 
 /// One input, and how to evaluate it.
-pub(crate) struct Source<'a> {
+pub(crate) struct PlotSource<'a> {
     pub(crate) name: String,
     pub(crate) set: &'a TrackSet,
     pub(crate) interpolations: &'a [Interpolation],
-    pub(crate) frames: Frames,
+    pub(crate) frames: SampleTimes,
     pub(crate) timeline: Timeline,
-    pub(crate) x: Axis,
+    pub(crate) x: PlotAxis,
     /// Where a time lies on that axis.
     pub(crate) x_of: Box<dyn Fn(f64) -> f64>,
     pub(crate) about: String,
 }
 
-impl<'a> Source<'a> {
+impl<'a> PlotSource<'a> {
     pub(crate) fn new(
         name: String,
         set: &'a TrackSet,
         interpolations: &'a [Interpolation],
-        samples: &Samples,
+        samples: &SampleRequest,
     ) -> Result<Self, Failure> {
         let mut frames = samples.of(set, &name);
-        if let Samples::Rate { .. } = samples
+        if let SampleRequest::Rate { .. } = samples
             && let Some(span) = set.time_span()
         {
             // A box alone has the frames of the whole set.
@@ -52,7 +54,7 @@ impl<'a> Source<'a> {
         let start = timeline.time(0, 0).unwrap_or_default();
         let count = words::count(timeline.len(), "frame");
         let (label, x_of, about): (_, Box<dyn Fn(f64) -> f64>, _) = match samples {
-            Samples::Rate { rate, .. } => {
+            SampleRequest::Rate { rate, .. } => {
                 let per_second = rate.per_second();
                 (
                     format!("frame ({rate} per second)"),
@@ -60,14 +62,14 @@ impl<'a> Source<'a> {
                     format!("{count}, {rate} per second"),
                 )
             }
-            Samples::Times(_) | Samples::Keys(_) => (
+            SampleRequest::Times(_) | SampleRequest::Keys(_) => (
                 "time, s".to_owned(),
                 Box::new(|time| time),
                 words::count(timeline.len(), "time"),
             ),
         };
         let range = range_of(timeline.times(0).map(&x_of));
-        let x = Axis {
+        let x = PlotAxis {
             label,
             range,
             powers: false,
@@ -88,14 +90,14 @@ impl<'a> Source<'a> {
     /// quaternion and its negative are the same rotation, and a curve does not jump.
     pub(crate) fn rotations(
         &self,
-        device: &mut Opened,
+        device: &mut OpenedDevice,
         index: usize,
         interpolation: Interpolation,
     ) -> Result<Vec<Quat>, Failure> {
         let mut rotations = self.evaluate(device, index, interpolation)?;
-        for place in 1..rotations.len() {
-            if rotations[place].dot(rotations[place - 1]) < 0.0 {
-                rotations[place] = -rotations[place];
+        for i in 1..rotations.len() {
+            if rotations[i].dot(rotations[i - 1]) < 0.0 {
+                rotations[i] = -rotations[i];
             }
         }
         Ok(rotations)
@@ -103,7 +105,7 @@ impl<'a> Source<'a> {
 
     pub(crate) fn evaluate(
         &self,
-        device: &mut Opened,
+        device: &mut OpenedDevice,
         index: usize,
         interpolation: Interpolation,
     ) -> Result<Vec<Quat>, Failure> {
@@ -116,7 +118,7 @@ impl<'a> Source<'a> {
     /// The velocities or accelerations of one box.
     pub(crate) fn rates(
         &self,
-        device: &mut Opened,
+        device: &mut OpenedDevice,
         index: usize,
         interpolation: Interpolation,
     ) -> Result<Vectors, Failure> {
@@ -129,8 +131,8 @@ impl<'a> Source<'a> {
             .map_err(|error| Failure::evaluating(&self.name, &error))
     }
 
-    /// The track of one box, of which there is room for the samples, the points of a curve and what is
-    /// drawn of them.
+    /// The track of one box, after a check that its samples, the points of its curve and the drawing fit
+    /// into memory.
     fn one(&self, index: usize) -> Result<TrackSet, Failure> {
         let one = (self.set.select([index]))
             .map_err(|error| Failure::evaluating(&self.name, &error.into()))?;
@@ -164,12 +166,12 @@ impl<'a> Source<'a> {
         placed.collect()
     }
 
-    pub(crate) fn key_places(&self, index: usize) -> Vec<f64> {
+    pub(crate) fn key_positions(&self, index: usize) -> Vec<f64> {
         let times = self.set.track(index).times;
         if times.len() > UPRIGHTS {
             return Vec::new();
         }
-        let places = times.iter().map(|&time| (self.x_of)(time));
-        places.filter(|x| self.x.range.contains(x)).collect()
+        let positions = times.iter().map(|&time| (self.x_of)(time));
+        positions.filter(|x| self.x.range.contains(x)).collect()
     }
 }

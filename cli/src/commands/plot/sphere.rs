@@ -2,16 +2,16 @@
 
 use glam::{DQuat, DVec3, Quat, Vec3};
 
-use crate::commands::plot::figure::Curve;
+use crate::commands::plot::figure::PlotCurve;
 use crate::messages::colours::GRID;
 
-/// Where a turned axis points, for an eye that looks from the right and from above: x to
+/// The direction of a rotated axis, seen from the right and from above: x to
 /// the right, y up, z towards the eye.
 pub(crate) fn seen(rotation: Quat, axis: Vec3) -> DVec3 {
-    turned((rotation * axis).as_dvec3())
+    to_view((rotation * axis).as_dvec3())
 }
 
-fn turned(direction: DVec3) -> DVec3 {
+fn to_view(direction: DVec3) -> DVec3 {
     const RIGHT: f64 = 0.6;
     const ABOVE: f64 = 0.4;
     DQuat::from_rotation_x(ABOVE) * (DQuat::from_rotation_y(-RIGHT) * direction)
@@ -38,14 +38,14 @@ pub(crate) fn side(path: &[DVec3], front: bool) -> Vec<Vec<(f64, f64)>> {
 }
 
 /// The rim of the ball, and its circles of latitude and longitude, 30° apart.
-pub(crate) fn graticule() -> Vec<Curve> {
+pub(crate) fn graticule() -> Vec<PlotCurve> {
     let circle = |point: &dyn Fn(f64) -> DVec3| -> Vec<DVec3> {
         let steps = (0..=120).map(|step| point(f64::from(step).to_radians() * 3.0));
         steps.collect()
     };
     let mut curves = Vec::new();
     let mut draw = |pieces, width| {
-        curves.push(Curve {
+        curves.push(PlotCurve {
             colour: GRID,
             width,
             opacity: 1.0,
@@ -54,12 +54,12 @@ pub(crate) fn graticule() -> Vec<Curve> {
     };
     for degrees in (-60..=60).step_by(30) {
         let (height, radius) = f64::from(degrees).to_radians().sin_cos();
-        let parallel = circle(&|a| turned(DVec3::new(radius * a.cos(), height, radius * a.sin())));
+        let parallel = circle(&|a| to_view(DVec3::new(radius * a.cos(), height, radius * a.sin())));
         draw(side(&parallel, true), 1.0);
     }
     for degrees in (0..180).step_by(30) {
         let (sine, cosine) = f64::from(degrees).to_radians().sin_cos();
-        let meridian = circle(&|a| turned(DVec3::new(cosine * a.cos(), a.sin(), sine * a.cos())));
+        let meridian = circle(&|a| to_view(DVec3::new(cosine * a.cos(), a.sin(), sine * a.cos())));
         draw(side(&meridian, true), 1.0);
     }
     let rim = circle(&|a| DVec3::new(a.cos(), a.sin(), 0.0));

@@ -3,8 +3,8 @@
 use clap::ValueEnum;
 use glam::Vec3;
 
-use crate::commands::plot::Show;
-use crate::commands::plot::curves::Subject;
+use crate::commands::plot::PlotQuantity;
+use crate::commands::plot::source::curves::PlotSubject;
 use crate::messages::exit::Failure;
 
 /// A picture with more panels than this cannot be read.
@@ -14,41 +14,41 @@ pub(super) const PANELS: usize = 64;
 pub(super) struct Subjects {
     pub(super) boxes: Vec<usize>,
     pub(super) dimensions: Vec<usize>,
-    pub(super) show: Show,
+    pub(super) show: PlotQuantity,
     pub(super) axis: Vec3,
 }
 
 impl Subjects {
-    pub(super) fn of(&self, boxes: Vec<usize>) -> Subject {
+    pub(super) fn of(&self, boxes: Vec<usize>) -> PlotSubject {
         match self.show {
-            Show::Components => Subject::Components(boxes),
-            Show::Speed => Subject::Speed(boxes),
-            Show::Error => Subject::Error(boxes),
-            Show::Sphere | Show::Path => Subject::Sphere(boxes, self.axis),
+            PlotQuantity::Components => PlotSubject::Components(boxes),
+            PlotQuantity::Speed => PlotSubject::Speed(boxes),
+            PlotQuantity::Error => PlotSubject::Error(boxes),
+            PlotQuantity::Sphere | PlotQuantity::Path => PlotSubject::Sphere(boxes, self.axis),
         }
     }
 
     pub(super) fn panels(&self, methods: usize) -> usize {
         match (self.dimensions.len(), self.show) {
-            (0, Show::Components) if methods > 1 => 4 * self.boxes.len(),
+            (0, PlotQuantity::Components) if methods > 1 => 4 * self.boxes.len(),
             (0, _) => self.boxes.len(),
             (dimensions, _) => dimensions,
         }
     }
 
-    pub(super) fn one(&self) -> Subject {
+    pub(super) fn one(&self) -> PlotSubject {
         if self.dimensions.is_empty() {
             self.of(self.boxes.clone())
         } else {
-            Subject::Dimensions(self.dimensions.clone())
+            PlotSubject::Dimensions(self.dimensions.clone())
         }
     }
 
-    /// A picture for each dimension, or for each box; and what its file is called.
-    pub(super) fn each(&self) -> Vec<(String, Subject)> {
-        let dimension = |&place: &usize| {
-            let name = format!("dimension-{}", place + 1);
-            (name, Subject::Dimensions(vec![place]))
+    /// A picture for each dimension, or for each box, with the name of its file.
+    pub(super) fn each(&self) -> Vec<(String, PlotSubject)> {
+        let dimension = |&index: &usize| {
+            let name = format!("dimension-{}", index + 1);
+            (name, PlotSubject::Dimensions(vec![index]))
         };
         let show = self.show.to_possible_value();
         let show = show.as_ref().map_or("", |value| value.get_name());
@@ -66,7 +66,7 @@ pub(super) fn together(
     subjects: &Subjects,
     methods: usize,
     name: &str,
-) -> Result<Subject, Failure> {
+) -> Result<PlotSubject, Failure> {
     let panels = subjects.panels(methods);
     if panels > PANELS {
         return Err(Failure::usage(format!(

@@ -16,22 +16,22 @@ const MAX_BYTES: u64 = 64 << 20;
 
 /// What was found; also the form of the JSON.
 #[derive(Debug, Serialize)]
-pub(crate) struct Comparison {
+pub(crate) struct ProofComparison {
     /// Whether both prove their device.
     pub(crate) both_proved: bool,
     /// Whether both evaluated by the same kernels, and compared with the same recorded results.
     pub(crate) same_kernels: bool,
     pub(crate) same_golden_table: bool,
-    /// Rounds of random sets that both evaluated from the same seed; nothing where seeds differ.
+    /// Rounds of random sets that both evaluated from the same seed; `None` where seeds differ.
     pub(crate) rounds_in_common: Option<u64>,
     /// Whether the CPUs of both made the same bits of these.
     pub(crate) same_random_bits: Option<bool>,
-    pub(crate) figures: Vec<Pair>,
+    pub(crate) figures: Vec<FigurePair>,
 }
 
 /// A figure of both.
 #[derive(Debug, Serialize)]
-pub(crate) struct Pair {
+pub(crate) struct FigurePair {
     pub(crate) name: String,
     pub(crate) unit: &'static str,
     pub(crate) values: [f64; 2],
@@ -40,12 +40,12 @@ pub(crate) struct Pair {
 }
 
 /// A proof that was read.
-struct Read {
+struct SavedProof {
     name: String,
     value: Value,
 }
 
-impl Read {
+impl SavedProof {
     fn new(path: &Path) -> Result<Self, Failure> {
         let name = path.display().to_string();
         let refuse = |why: String| Failure::new(ALL_INPUTS, format!("{name}: {why}"));
@@ -55,10 +55,10 @@ impl Read {
         }
         let text = std::fs::read_to_string(path).map_err(|error| refuse(error.to_string()))?;
         let value: Value = serde_json::from_str(&text)
-            .map_err(|error| refuse(format!("it is no JSON: {error}")))?;
+            .map_err(|error| refuse(format!("it is not JSON: {error}")))?;
         if value["format"] != FORMAT {
             return Err(refuse(
-                "it is no proof; `tumble prove -o FILE` writes one".to_owned(),
+                "it is not a proof; `tumble prove -o FILE` writes one".to_owned(),
             ));
         }
         if value["format_version"] != FORMAT_VERSION {
@@ -108,7 +108,8 @@ impl Read {
             .pointer("/figures/cases")
             .and_then(Value::as_array);
         for case in cases.into_iter().flatten() {
-            let name = [&case["case"], &case["name"]].map(|own| own.as_str().unwrap_or_default());
+            let name =
+                [&case["case"], &case["name"]].map(|field| field.as_str().unwrap_or_default());
             let seconds = case["seconds"].as_f64();
             all.extend(seconds.map(|seconds| (name.join(" "), "s", seconds)));
         }
@@ -116,13 +117,13 @@ impl Read {
     }
 }
 
-fn compared(one: &Read, two: &Read) -> Comparison {
+fn compared(one: &SavedProof, two: &SavedProof) -> ProofComparison {
     let same = |pointer| one.text(pointer) == two.text(pointer);
-    let seed = |own: &Read| own.value.pointer("/random/seed").and_then(Value::as_u64);
+    let seed = |proof: &SavedProof| proof.value.pointer("/random/seed").and_then(Value::as_u64);
     let in_common = (seed(one).is_some() && seed(one) == seed(two))
         .then(|| {
             let pairs = (one.digests()).filter_map(|(rounds, hash)| {
-                let (_, other) = two.digests().find(|(own, _)| *own == rounds)?;
+                let (_, other) = two.digests().find(|(number, _)| *number == rounds)?;
                 Some((rounds, hash == other))
             });
             pairs.max_by_key(|(rounds, _)| *rounds)
@@ -130,18 +131,20 @@ fn compared(one: &Read, two: &Read) -> Comparison {
         .flatten();
     let others = two.figures();
     let figures = one.figures().into_iter().filter_map(|(name, unit, value)| {
-        let (_, _, other) = others.iter().find(|(own, _, _)| *own == name)?;
-        Some(Pair {
+        let (_, _, other) = others
+            .iter()
+            .find(|(other_name, _, _)| *other_name == name)?;
+        Some(FigurePair {
             ratio: if value > 0.0 { other / value } else { 0.0 },
             values: [value, *other],
             name,
             unit,
         })
     });
-    Comparison {
+    ProofComparison {
         both_proved: [one, two]
             .iter()
-            .all(|own| own.text("/verdict") == "proved"),
+            .all(|proof| proof.text("/verdict") == "proved"),
         same_kernels: same("/program/kernels"),
         same_golden_table: same("/program/golden_table"),
         rounds_in_common: in_common.map(|(rounds, _)| rounds),
@@ -150,18 +153,18 @@ fn compared(one: &Read, two: &Read) -> Comparison {
     }
 }
 
-fn page(one: &Read, two: &Read, found: &Comparison) -> String {
+fn page(one: &SavedProof, two: &SavedProof, found: &ProofComparison) -> String {
     let mut text = String::new();
-    for own in [one, two] {
+    for proof in [one, two] {
         let _ = writeln!(
             text,
             "{}: {}, {}; tumble {}, commit {}; {}",
-            own.name,
-            own.text("/device/name"),
-            own.text("/device/driver"),
-            own.text("/program/version"),
-            own.text("/program/commit"),
-            own.text("/verdict").replace('_', " ")
+            proof.name,
+            proof.text("/device/name"),
+            proof.text("/device/driver"),
+            proof.text("/program/version"),
+            proof.text("/program/commit"),
+            proof.text("/verdict").replace('_', " ")
         );
     }
     let same = |is_same| if is_same { "the same" } else { "DIFFERENT" };
@@ -185,7 +188,7 @@ fn page(one: &Read, two: &Read, found: &Comparison) -> String {
         .max()
         .unwrap_or(0);
     text.push('\n');
-    for Pair {
+    for FigurePair {
         name,
         unit,
         values: [one, two],
@@ -201,7 +204,7 @@ fn page(one: &Read, two: &Read, found: &Comparison) -> String {
 }
 
 pub(crate) fn run([one, two]: [&PathBuf; 2], json: bool) -> Result<(), Failure> {
-    let (one, two) = (Read::new(one)?, Read::new(two)?);
+    let (one, two) = (SavedProof::new(one)?, SavedProof::new(two)?);
     let found = compared(&one, &two);
     if json {
         words::json(&found)?;

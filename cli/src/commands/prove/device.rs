@@ -24,7 +24,7 @@ pub(crate) fn program() -> Program {
     }
     Program {
         version: env!("CARGO_PKG_VERSION"),
-        // Told by who builds what is given away (`scripts/card.sh`): a build that asked for it itself would
+        // Set by the script that builds releases (`scripts/card.sh`): a build that asked for it itself would
         // compile the program again after every commit.
         commit: option_env!("TUMBLE_COMMIT").unwrap_or("unknown"),
         kernels: hexadecimal(&kernels.finalize()),

@@ -1,5 +1,4 @@
-//! `tumble prove`: one program that shows on any device what the engine promises, and says what it could not
-//! show.
+//! `tumble prove`: checks the engine's promises on any device, and reports what could not be checked.
 
 pub(crate) mod compare;
 pub(crate) mod compile;
@@ -14,11 +13,11 @@ use clap::Args;
 
 use crate::arguments::device::vulkan_device;
 use crate::commands::prove::report::Verdict;
-use crate::commands::prove::steps::Request;
+use crate::commands::prove::steps::ProofRequest;
 use crate::messages::exit::{DEVICE, DIFFERENCE, Failure};
 use crate::messages::words;
 
-/// Show that a device keeps what is promised: every kernel, recorded results, random ones, speed
+/// Show that a device gives the promised bits: every kernel, recorded and random results; and measure speed
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Every kernel runs beside its twin on the CPU, recorded results of every method, output and crowd are
@@ -41,7 +40,7 @@ pub(crate) struct Arguments {
     /// Vulkan device
     #[arg(long, value_name = "DEVICE")]
     device: Option<String>,
-    /// How long it may take; what has to run at least runs first
+    /// The time limit; what a proof needs runs first
     #[arg(
         long,
         value_name = "SECONDS",
@@ -49,19 +48,19 @@ pub(crate) struct Arguments {
         value_parser = clap::value_parser!(u64).range(1..=86_400)
     )]
     seconds: u64,
-    /// Run only what a proof cannot do without: no more random rounds, nothing in every setting
+    /// Run only what a proof needs: no additional random rounds, and no repetition in every configuration
     #[arg(long)]
     quick: bool,
-    /// Where random sets and crowds begin: the same seed gives the same ones on every machine
+    /// The seed of the random sets and crowds: the same seed gives the same ones on every machine
     #[arg(long, value_name = "NUMBER", default_value_t = 1)]
     seed: u64,
-    /// Do it again under the Khronos validation layer; any message is a failure
+    /// Run everything again under the Khronos validation layer; any message is a failure
     #[arg(long)]
     validate: bool,
     /// Write the proof to a file, as JSON
     #[arg(short, long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Replace the file where it is there
+    /// Replace an existing file
     #[arg(long, requires = "out")]
     overwrite: bool,
     /// Print JSON
@@ -99,7 +98,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     if let Some(path) = out {
         report::check_output(path, arguments.overwrite)?;
     }
-    let proof = steps::prove(&Request {
+    let proof = steps::prove(&ProofRequest {
         device,
         seconds: arguments.seconds,
         quick: arguments.quick,

@@ -1,23 +1,28 @@
-//! What was found, and what it proves. It is also the form of the JSON, which `docs/proof.schema.json`
-//! describes.
+//! The results of a run, and the verdict. Also the form of the JSON, which `docs/proof.schema.json` describes.
 
 use std::io::Write as _;
 use std::path::Path;
 
 use serde::Serialize;
+use sha2::{Digest as _, Sha256};
 use tumble::verify::figures::Figures;
+use tumble::verify::random::RandomRound;
 use tumble::verify::renderer::{RendererCheck, RendererReport};
 use tumble::{DeviceDetails, DeviceInfo, EngineChoices, SelfTestReport};
 
+use crate::commands::prove::device;
 use crate::messages::exit::Failure;
 
-/// What `format` says in the JSON.
+/// The value of `format` in the JSON.
 pub(crate) const FORMAT: &str = "tumble-proof";
 
 /// The form of the JSON; another number where names or meanings change.
 pub(crate) const FORMAT_VERSION: u64 = 1;
 
-/// What it comes to.
+/// Differences that are described; all are counted.
+pub(crate) const MAX_DESCRIBED: usize = 20;
+
+/// The verdict.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum Verdict {
@@ -47,7 +52,7 @@ pub(crate) struct Proof {
     pub(crate) device: DeviceSection,
     /// The single expressions and kernels that are tested whenever the device is opened.
     pub(crate) self_tests: Vec<SelfTestReport>,
-    pub(crate) kernels: Kernels,
+    pub(crate) kernels: KernelSection,
     pub(crate) negative_control: NegativeControl,
     pub(crate) golden: GoldenSection,
     pub(crate) random: RandomSection,
@@ -64,7 +69,7 @@ pub(crate) struct Proof {
 #[derive(Debug, Serialize)]
 pub(crate) struct Program {
     pub(crate) version: &'static str,
-    /// `unknown` where the build was not told.
+    /// `unknown` where the build did not set it.
     pub(crate) commit: &'static str,
     /// SHA-256 of the names and the SPIR-V of all kernels.
     pub(crate) kernels: String,
@@ -106,7 +111,7 @@ pub(crate) struct Bus {
 
 /// Every kernel against its twin.
 #[derive(Debug, Default, Serialize)]
-pub(crate) struct Kernels {
+pub(crate) struct KernelSection {
     /// How many there are.
     pub(crate) count: usize,
     /// How many ran and were compared.
@@ -114,14 +119,14 @@ pub(crate) struct Kernels {
     /// Values compared.
     pub(crate) values: u64,
     /// Those whose bits differ.
-    pub(crate) differing: Vec<Differing>,
+    pub(crate) differing: Vec<DifferingValues>,
     /// Those that did not run.
     pub(crate) missing: Vec<String>,
 }
 
 /// Something whose bits differ.
 #[derive(Debug, Clone, Serialize)]
-pub(crate) struct Differing {
+pub(crate) struct DifferingValues {
     pub(crate) name: String,
     pub(crate) values: u64,
     pub(crate) differing: u64,
@@ -137,7 +142,7 @@ pub(crate) struct NegativeControl {
     pub(crate) values: u64,
     pub(crate) differing: u64,
     /// The expressions that differ.
-    pub(crate) expressions: Vec<Differing>,
+    pub(crate) expressions: Vec<DifferingValues>,
 }
 
 /// Recorded results.
@@ -147,7 +152,7 @@ pub(crate) struct GoldenSection {
     pub(crate) cases: usize,
     /// Cases that were evaluated in one setting at least.
     pub(crate) cases_compared: usize,
-    /// How many ways there are to use the device.
+    /// How many configurations of the device there are.
     pub(crate) settings: usize,
     /// Those in which some were evaluated.
     pub(crate) by_setting: Vec<GoldenSetting>,
@@ -155,7 +160,7 @@ pub(crate) struct GoldenSection {
     pub(crate) differing: Vec<String>,
 }
 
-/// Recorded results in one way to use the device.
+/// Recorded results in one configuration of the device.
 #[derive(Debug, Serialize)]
 pub(crate) struct GoldenSetting {
     /// How kernels read and share samples, how results and uploads are moved, and the memory budget.
@@ -179,15 +184,53 @@ pub(crate) struct RandomSection {
     /// The rounds that differ: the first ones.
     pub(crate) differing: Vec<String>,
     /// What the CPU made of the first 1, 2, 4, 8 … rounds, as a hash: the same on every machine.
-    pub(crate) digests: Vec<Digest>,
+    pub(crate) digests: Vec<RoundsDigest>,
     /// The hash of all rounds so far.
     #[serde(skip)]
     pub(crate) chained: [u8; 32],
 }
 
+impl RandomSection {
+    /// Adds a round.
+    pub(crate) fn add(&mut self, found: &RandomRound) {
+        let number = self.rounds;
+        self.rounds += 1;
+        self.values += found.values;
+        self.bytes += found.bytes;
+        self.rounds_refused += u64::from(found.values == 0);
+        self.crowds += u64::from(found.description.starts_with("crowd") && found.values > 0);
+        self.values_differing += found.differing;
+        if found.differing > 0 && self.differing.len() < MAX_DESCRIBED {
+            let first = found.first_difference.unwrap_or_default();
+            self.differing.push(format!(
+                "round {number} of seed {}: {} of {} values, the first at {first}: {}",
+                self.seed, found.differing, found.values, found.description
+            ));
+        }
+        self.chain(&found.hash);
+    }
+
+    /// Extends the hash of all rounds, and stores it where their number is a power of two. The last of
+    /// `digests` covers all rounds until then.
+    fn chain(&mut self, hash: &[u8; 32]) {
+        let before = self.chained;
+        self.chained = Sha256::new()
+            .chain_update(before)
+            .chain_update(hash)
+            .finalize()
+            .into();
+        if self.rounds.is_power_of_two() {
+            self.digests.push(RoundsDigest {
+                rounds: self.rounds,
+                hash: device::hexadecimal(&self.chained[..8]),
+            });
+        }
+    }
+}
+
 /// A hash of the first rounds.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub(crate) struct Digest {
+pub(crate) struct RoundsDigest {
     pub(crate) rounds: u64,
     pub(crate) hash: String,
 }
@@ -222,10 +265,10 @@ pub(crate) struct CompileTime {
 }
 
 impl Proof {
-    /// Works out what it comes to.
+    /// Sets the verdict and its reasons.
     pub(crate) fn judge(&mut self) {
         let differing = self.bits_that_differ();
-        let missing = self.what_is_missing();
+        let missing = self.missing_parts();
         self.verdict = match (differing.is_empty(), missing.is_empty()) {
             (false, _) => Verdict::BitsDiffer,
             (true, false) => Verdict::NotProved,
@@ -243,7 +286,7 @@ impl Proof {
             ));
         }
         for kernel in &self.kernels.differing {
-            let Differing {
+            let DifferingValues {
                 name,
                 values,
                 differing,
@@ -280,7 +323,11 @@ impl Proof {
                 "on a renderer's device, {name}: {differing} differ beside {values} values"
             ));
         }
-        if let Some(validation) = self.validation.as_ref().filter(|own| own.differing > 0) {
+        if let Some(validation) = self
+            .validation
+            .as_ref()
+            .filter(|validation| validation.differing > 0)
+        {
             let differing = validation.differing;
             reasons.push(format!(
                 "{differing} values differ under the validation layer"
@@ -289,10 +336,10 @@ impl Proof {
         reasons
     }
 
-    fn what_is_missing(&self) -> Vec<String> {
+    fn missing_parts(&self) -> Vec<String> {
         let mut reasons = self.failures.clone();
-        let mut unless = |holds: bool, reason: String| {
-            if !holds {
+        let mut unless = |condition: bool, reason: String| {
+            if !condition {
                 reasons.push(reason);
             }
         };
@@ -300,7 +347,7 @@ impl Proof {
             self.self_tests.iter().any(|test| test.total > 0),
             "no expression was compared".to_owned(),
         );
-        let Kernels { count, ran, .. } = self.kernels;
+        let KernelSection { count, ran, .. } = self.kernels;
         unless(
             count > 0 && ran == count,
             format!(
@@ -404,10 +451,12 @@ pub(crate) fn check_output(path: &Path, overwrite: bool) -> Result<(), Failure> 
     if path.exists() && !overwrite {
         let name = path.display();
         return Err(Failure::usage(format!(
-            "{name} is there already; --overwrite replaces it"
+            "{name} exists already; --overwrite replaces it"
         )));
     }
-    let folder = path.parent().filter(|own| !own.as_os_str().is_empty());
+    let folder = path
+        .parent()
+        .filter(|parent| !parent.as_os_str().is_empty());
     match folder.filter(|folder| !folder.is_dir()) {
         Some(folder) => Err(Failure::usage(format!(
             "{}: there is no folder {}; make it first",

@@ -1,40 +1,37 @@
-//! What is run, in which order, and for how long. What a proof cannot do without runs first; what is left of
-//! the time is shared among the ways to use the device and random rounds.
+//! What is run, in which order, and for how long. What a proof needs runs first; the remaining time is
+//! shared among the configurations of the device and random rounds.
 
 use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
 
-use sha2::{Digest as _, Sha256};
 use tumble::verify::figures::figures;
 use tumble::verify::golden::Golden;
-use tumble::verify::random::{RandomRound, round};
+use tumble::verify::random::round;
 use tumble::verify::renderer::renderer;
 use tumble::{
     Device, Engine, EngineOptions, Mapping, ReadBack, Reads, Transfer, Uploads, VulkanDevice,
 };
 
 use crate::commands::prove::report::{
-    CompileTimes, DeviceSection, Differing, Digest, FORMAT, FORMAT_VERSION, GoldenSection,
-    GoldenSetting, Kernels, NegativeControl, Proof, RandomSection, ValidationSection, Verdict,
+    CompileTimes, DeviceSection, DifferingValues, FORMAT, FORMAT_VERSION, GoldenSection,
+    GoldenSetting, KernelSection, MAX_DESCRIBED, NegativeControl, Proof, RandomSection,
+    ValidationSection, Verdict,
 };
 use crate::commands::prove::{compile, device};
 use crate::messages::words;
 
-/// What is asked for.
-pub(crate) struct Request {
+/// The options of a run.
+pub(crate) struct ProofRequest {
     pub(crate) device: Device,
     pub(crate) seconds: u64,
-    /// Only what a proof cannot do without.
+    /// Run only what a proof needs.
     pub(crate) quick: bool,
     pub(crate) seed: u64,
     pub(crate) validate: bool,
 }
 
-/// Differences that are described; all are counted.
-const DESCRIBED: usize = 20;
-
-/// Seconds of a random round that is worth a word.
-const LONG: u64 = 5;
+/// A random round of so many seconds is reported.
+const LONG_ROUND_SECONDS: u64 = 5;
 
 /// Shares of the time that is allowed, by the end of which a step starts nothing more.
 const COMPILED_BY: f64 = 0.2;
@@ -44,30 +41,30 @@ const RECORDED_BY: f64 = 0.85;
 const ENDED_BY: f64 = 0.99;
 
 /// Why a step ended early, in words.
-struct Stopped(String);
+struct StepError(String);
 
-impl<E: std::error::Error> From<E> for Stopped {
+impl<E: std::error::Error> From<E> for StepError {
     fn from(error: E) -> Self {
         Self(error.to_string())
     }
 }
 
-/// A way to use the device.
+/// One configuration of the device.
 #[derive(Clone)]
-struct Setting {
+struct DeviceSetting {
     name: String,
     options: EngineOptions,
 }
 
 /// How kernels read and what an invocation takes; how results and uploads are moved; a memory budget.
-type Ways = (
+type SettingParts = (
     (Reads, Mapping, &'static str),
     (Transfer, Uploads, ReadBack, &'static str),
     Option<u64>,
 );
 
-impl Setting {
-    fn new((reading, moving, memory): Ways) -> Self {
+impl DeviceSetting {
+    fn new((reading, moving, memory): SettingParts) -> Self {
         let mut options = EngineOptions::default();
         options.allow_inexact = true;
         (options.reads, options.mapping) = (reading.0, reading.1);
@@ -83,8 +80,8 @@ impl Setting {
         }
     }
 
-    /// Every way to read with every way to move results and both budgets. The first four have each of all
-    /// of these once at least.
+    /// Every way to read with every way to move results and both budgets. The first four have each of
+    /// them at least once.
     fn all() -> Vec<Self> {
         let reading = [
             (Reads::StorageBuffers, Mapping::Samples, "samples"),
@@ -112,7 +109,9 @@ impl Setting {
         let diagonal = (0..4).map(|index| (index % 3, index, index % 2));
         let whole = (0..24).map(|index| (index % 3, index / 3 % 4, index / 12));
         let mut known = BTreeSet::new();
-        let ordered = diagonal.chain(whole).filter(|place| known.insert(*place));
+        let ordered = diagonal
+            .chain(whole)
+            .filter(|combination| known.insert(*combination));
         ordered
             .map(|(r, m, b)| Self::new((reading[r], moving[m], budgets[b])))
             .collect()
@@ -123,20 +122,20 @@ impl Setting {
 const FIRST_SETTINGS: usize = 4;
 
 /// A run in progress.
-struct Run<'a> {
-    request: &'a Request,
+struct ProofRun<'a> {
+    request: &'a ProofRequest,
     vulkan: &'a VulkanDevice,
     started: Instant,
     cpu: Engine,
     golden: Golden,
-    settings: Vec<Setting>,
+    settings: Vec<DeviceSetting>,
     /// The first engines, kept for random rounds.
     engines: Vec<Engine>,
     proof: Proof,
 }
 
 /// Runs everything on a Vulkan device.
-pub(crate) fn prove(request: &Request) -> Proof {
+pub(crate) fn prove(request: &ProofRequest) -> Proof {
     let started = Instant::now();
     let Device::Vulkan(vulkan) = &request.device else {
         unreachable!("the CPU is refused before")
@@ -144,13 +143,13 @@ pub(crate) fn prove(request: &Request) -> Proof {
     let mut proof = empty(request, vulkan);
     match Engine::new(Device::Cpu) {
         Ok(cpu) => {
-            let mut run = Run {
+            let mut run = ProofRun {
                 request,
                 vulkan,
                 started,
                 cpu,
                 golden: Golden::new(),
-                settings: Setting::all(),
+                settings: DeviceSetting::all(),
                 engines: Vec::new(),
                 proof,
             };
@@ -165,7 +164,7 @@ pub(crate) fn prove(request: &Request) -> Proof {
 }
 
 /// A proof of nothing.
-fn empty(request: &Request, vulkan: &VulkanDevice) -> Proof {
+fn empty(request: &ProofRequest, vulkan: &VulkanDevice) -> Proof {
     let info = vulkan.info().clone();
     Proof {
         format: FORMAT,
@@ -186,7 +185,7 @@ fn empty(request: &Request, vulkan: &VulkanDevice) -> Proof {
             opened_in: [0.0; 2],
         },
         self_tests: Vec::new(),
-        kernels: Kernels::default(),
+        kernels: KernelSection::default(),
         golden: GoldenSection::default(),
         random: RandomSection {
             seed: request.seed,
@@ -200,7 +199,7 @@ fn empty(request: &Request, vulkan: &VulkanDevice) -> Proof {
     }
 }
 
-impl Run<'_> {
+impl ProofRun<'_> {
     fn all(&mut self) {
         self.step("opening the device", Self::open);
         if self.engines.len() < FIRST_SETTINGS {
@@ -225,8 +224,8 @@ impl Run<'_> {
         self.step_if_time(more, ENDED_BY, Self::random_to_the_end);
     }
 
-    /// Runs a step without which nothing is proved. An error of it is told, and the others run all the same.
-    fn step(&mut self, name: &str, work: fn(&mut Self) -> Result<(), Stopped>) {
+    /// Runs a step that a proof needs. Its error is recorded, and the other steps still run.
+    fn step(&mut self, name: &str, work: fn(&mut Self) -> Result<(), StepError>) {
         let elapsed = self.started.elapsed().as_secs();
         if self.is_past(1.0) {
             let allowed = self.request.seconds;
@@ -235,13 +234,18 @@ impl Run<'_> {
             return;
         }
         words::note(&format!("{elapsed:>4} s  {name} …"));
-        if let Err(Stopped(reason)) = work(self) {
+        if let Err(StepError(reason)) = work(self) {
             self.proof.failures.push(format!("{name}: {reason}"));
         }
     }
 
     /// Runs a step where that share of the time is not over.
-    fn step_if_time(&mut self, name: &str, share: f64, work: fn(&mut Self) -> Result<(), Stopped>) {
+    fn step_if_time(
+        &mut self,
+        name: &str,
+        share: f64,
+        work: fn(&mut Self) -> Result<(), StepError>,
+    ) {
         if !self.is_past(share) {
             self.step(name, work);
         }
@@ -257,7 +261,7 @@ impl Run<'_> {
         end.saturating_sub(self.started.elapsed())
     }
 
-    fn open(&mut self) -> Result<(), Stopped> {
+    fn open(&mut self) -> Result<(), StepError> {
         let mut options = EngineOptions::default();
         options.allow_inexact = true;
         let mut opened_in = [0.0; 2];
@@ -275,7 +279,7 @@ impl Run<'_> {
         let address = device
             .details
             .as_ref()
-            .and_then(|own| own.pci_address.clone());
+            .and_then(|details| details.pci_address.clone());
         device.bus = address.and_then(|address| device::bus(&address));
         for setting in &self.settings[..FIRST_SETTINGS] {
             let engine = Engine::with_options(self.request.device.clone(), &setting.options)?;
@@ -286,14 +290,14 @@ impl Run<'_> {
 
     /// Every kernel beside its twin: in engines that read by storage buffers and, where the device can, by
     /// texel buffers, for which most kernels have a form of their own.
-    fn kernels(&mut self) -> Result<(), Stopped> {
+    fn kernels(&mut self) -> Result<(), StepError> {
         let allowed = Duration::from_secs(self.request.seconds);
         let mut ran = BTreeSet::new();
         let mut expected: BTreeSet<&str> = BTreeSet::new();
-        // Engines that stay: what they compile here serves the recorded results.
+        // The engines are kept: kernels compiled here are used again for the recorded results.
         for (setting, engine) in self.settings.iter().zip(&self.engines) {
             let reads = setting.options.reads;
-            let texels = engine.choices().map(|own| own.reads) == Some("texel-buffers");
+            let texels = engine.choices().map(|choices| choices.reads) == Some("texel-buffers");
             let all = tumble::kernels().map(|(name, _)| name);
             let known = expected.len();
             expected.extend(all.filter(|name| name.ends_with("_texels") == texels));
@@ -306,7 +310,7 @@ impl Run<'_> {
                 if ran.insert(check.name) {
                     kernels.values += check.total as u64;
                     if check.differing > 0 {
-                        kernels.differing.push(Differing {
+                        kernels.differing.push(DifferingValues {
                             name: check.name.to_owned(),
                             values: check.total as u64,
                             differing: check.differing as u64,
@@ -325,14 +329,14 @@ impl Run<'_> {
             .collect();
         match kernels.missing.is_empty() || !self.is_past(1.0) {
             true => Ok(()),
-            false => Err(Stopped(format!(
+            false => Err(StepError(format!(
                 "the {} s were over after {} of {} (--seconds)",
                 self.request.seconds, self.proof.kernels.ran, self.proof.kernels.count
             ))),
         }
     }
 
-    fn negative_control(&mut self) -> Result<(), Stopped> {
+    fn negative_control(&mut self) -> Result<(), StepError> {
         let engine = &self.engines[0];
         let Some(found) = engine.negative_control()? else {
             return Ok(());
@@ -344,7 +348,7 @@ impl Run<'_> {
             control.values += expression.total as u64;
             control.differing += expression.differing as u64;
             if expression.differing > 0 {
-                control.expressions.push(Differing {
+                control.expressions.push(DifferingValues {
                     name: expression.name.to_owned(),
                     values: expression.total as u64,
                     differing: expression.differing as u64,
@@ -361,11 +365,11 @@ impl Run<'_> {
         setting: usize,
         engine: &Engine,
         compared: &mut BTreeSet<usize>,
-    ) -> Result<(), Stopped> {
+    ) -> Result<(), StepError> {
         let name = self.golden.name(case);
         let setting = &self.settings[setting].name;
         let found = self.golden.evaluate(case, engine);
-        let found = found.map_err(|error| Stopped(format!("{name} ({setting}): {error}")))?;
+        let found = found.map_err(|error| StepError(format!("{name} ({setting}): {error}")))?;
         let is_same = Golden::recorded(name) == Some(&found.hash);
         let section = &mut self.proof.golden;
         section.bytes += found.bytes;
@@ -373,7 +377,7 @@ impl Run<'_> {
         let known = section
             .by_setting
             .iter()
-            .position(|own| own.setting == *setting);
+            .position(|other| other.setting == *setting);
         let known = known.unwrap_or_else(|| {
             section.by_setting.push(GoldenSetting {
                 setting: setting.clone(),
@@ -386,14 +390,14 @@ impl Run<'_> {
         by_setting.cases += 1;
         if !is_same {
             by_setting.differing += 1;
-            let what = format!("{name} ({setting})");
-            section.differing.push(what);
+            let description = format!("{name} ({setting})");
+            section.differing.push(description);
         }
         Ok(())
     }
 
     /// Each recorded result once, shared out among the first settings.
-    fn recorded_once(&mut self) -> Result<(), Stopped> {
+    fn recorded_once(&mut self) -> Result<(), StepError> {
         let cases = self.golden.count();
         self.proof.golden.cases = Golden::recorded_count().max(cases);
         self.proof.golden.settings = self.settings.len();
@@ -416,7 +420,7 @@ impl Run<'_> {
     }
 
     /// All recorded results in one setting after the other, beginning with those that have had a part.
-    fn recorded_everywhere(&mut self) -> Result<(), Stopped> {
+    fn recorded_everywhere(&mut self) -> Result<(), StepError> {
         let mut compared = BTreeSet::new();
         for index in 0..self.settings.len() {
             if self.is_past(RECORDED_BY) {
@@ -441,39 +445,41 @@ impl Run<'_> {
         Ok(())
     }
 
-    fn renderer(&mut self) -> Result<(), Stopped> {
+    fn renderer(&mut self) -> Result<(), StepError> {
         self.proof.renderer = Some(renderer(self.vulkan, false, self.request.seed)?);
         Ok(())
     }
 
     /// One round after the other, with the next of the engines each.
-    fn random_rounds(&mut self, mut goes_on: impl FnMut(&Self) -> bool) -> Result<(), Stopped> {
+    fn random_rounds(&mut self, mut goes_on: impl FnMut(&Self) -> bool) -> Result<(), StepError> {
         while goes_on(self) {
             let number = self.proof.random.rounds;
             let engine = &self.engines[number as usize % self.engines.len()];
             let started = Instant::now();
             let found = round(engine, &self.cpu, self.request.seed, number)?;
             let seconds = started.elapsed().as_secs();
-            if seconds >= LONG {
-                let what = &found.description;
-                words::note(&format!("        round {number} took {seconds} s: {what}"));
+            if seconds >= LONG_ROUND_SECONDS {
+                let description = &found.description;
+                words::note(&format!(
+                    "        round {number} took {seconds} s: {description}"
+                ));
             }
             self.proof.random.add(&found);
         }
         Ok(())
     }
 
-    fn random_once(&mut self) -> Result<(), Stopped> {
+    fn random_once(&mut self) -> Result<(), StepError> {
         self.random_rounds(|run| run.proof.random.rounds < 8 && !run.is_past(1.0))
     }
 
-    fn random_to_the_end(&mut self) -> Result<(), Stopped> {
+    fn random_to_the_end(&mut self) -> Result<(), StepError> {
         self.random_rounds(|run| !run.is_past(ENDED_BY))
     }
 
-    fn compile(&mut self) -> Result<(), Stopped> {
+    fn compile(&mut self) -> Result<(), StepError> {
         let limit = self.left_until(COMPILED_BY);
-        // A figure, without which the bits are what they are.
+        // A figure that does not affect the verdict.
         match compile::measure(&self.vulkan.info().uuid, limit) {
             Ok(times) => self.proof.compile_times = times,
             Err(reason) => words::warning(&reason),
@@ -481,14 +487,14 @@ impl Run<'_> {
         Ok(())
     }
 
-    fn measure(&mut self) -> Result<(), Stopped> {
+    fn measure(&mut self) -> Result<(), StepError> {
         let budget = self.left_until(MEASURED_BY);
         self.proof.figures = Some(figures(self.vulkan, budget)?);
         Ok(())
     }
 
     /// Expressions, recorded results, random rounds and a renderer's device under the validation layer.
-    fn validate(&mut self) -> Result<(), Stopped> {
+    fn validate(&mut self) -> Result<(), StepError> {
         let uuid = self.vulkan.info().uuid.clone();
         let devices = Device::list_with(true)?;
         let same = |device: &Device| device.uuid().as_ref() == Some(&uuid);
@@ -523,48 +529,11 @@ impl Run<'_> {
         let mut messages = engine.validation_messages();
         messages.extend(renderer.validation_messages);
         found.message_count = messages.len();
-        messages.truncate(DESCRIBED);
+        messages.truncate(MAX_DESCRIBED);
         found.messages = messages;
         found.has_run = true;
         self.proof.validation = Some(found);
         Ok(())
-    }
-}
-
-impl RandomSection {
-    fn add(&mut self, found: &RandomRound) {
-        let number = self.rounds;
-        self.rounds += 1;
-        self.values += found.values;
-        self.bytes += found.bytes;
-        self.rounds_refused += u64::from(found.values == 0);
-        self.crowds += u64::from(found.description.starts_with("crowd") && found.values > 0);
-        self.values_differing += found.differing;
-        if found.differing > 0 && self.differing.len() < DESCRIBED {
-            let first = found.first_difference.unwrap_or_default();
-            self.differing.push(format!(
-                "round {number} of seed {}: {} of {} values, the first at {first}: {}",
-                self.seed, found.differing, found.values, found.description
-            ));
-        }
-        self.chain(&found.hash);
-    }
-
-    /// Goes on with the hash of all rounds, and keeps it where their number is a power of two. The last of
-    /// `digests` stands for all rounds until then.
-    fn chain(&mut self, hash: &[u8; 32]) {
-        let before = self.chained;
-        self.chained = Sha256::new()
-            .chain_update(before)
-            .chain_update(hash)
-            .finalize()
-            .into();
-        if self.rounds.is_power_of_two() {
-            self.digests.push(Digest {
-                rounds: self.rounds,
-                hash: device::hexadecimal(&self.chained[..8]),
-            });
-        }
     }
 }
 
@@ -575,22 +544,25 @@ mod tests {
     /// Each way to read, to move results and each budget is in the first settings, and no two are alike.
     #[test]
     fn settings_are_all_there_are_and_the_first_have_each_way_once() {
-        let all = Setting::all();
+        let all = DeviceSetting::all();
         assert_eq!(all.len(), 24);
-        let names: BTreeSet<&str> = all.iter().map(|own| own.name.as_str()).collect();
+        let names: BTreeSet<&str> = all.iter().map(|setting| setting.name.as_str()).collect();
         assert_eq!(names.len(), 24);
         let first = &all[..FIRST_SETTINGS];
         let count =
-            |of: fn(&Setting) -> String| first.iter().map(of).collect::<BTreeSet<_>>().len();
+            |of: fn(&DeviceSetting) -> String| first.iter().map(of).collect::<BTreeSet<_>>().len();
         assert_eq!(
-            count(|own| format!("{:?} {:?}", own.options.reads, own.options.mapping)),
+            count(|setting| format!("{:?} {:?}", setting.options.reads, setting.options.mapping)),
             3
         );
         assert_eq!(
-            count(|own| format!("{:?} {:?}", own.options.transfer, own.options.uploads)),
+            count(|setting| format!(
+                "{:?} {:?}",
+                setting.options.transfer, setting.options.uploads
+            )),
             4
         );
-        assert_eq!(count(|own| format!("{:?}", own.options.memory)), 2);
-        assert!(all.iter().all(|own| own.options.allow_inexact));
+        assert_eq!(count(|setting| format!("{:?}", setting.options.memory)), 2);
+        assert!(all.iter().all(|setting| setting.options.allow_inexact));
     }
 }

@@ -9,8 +9,8 @@ use crate::messages::words;
 pub(crate) fn grouped(number: u64) -> String {
     let digits = number.to_string();
     let mut text = String::new();
-    for (place, digit) in digits.chars().enumerate() {
-        if place > 0 && (digits.len() - place).is_multiple_of(3) {
+    for (index, digit) in digits.chars().enumerate() {
+        if index > 0 && (digits.len() - index).is_multiple_of(3) {
             text.push(' ');
         }
         text.push(digit);
@@ -93,7 +93,7 @@ fn who(proof: &Proof, text: &mut String) {
         );
     }
     if let Some(bus) = &device.bus {
-        let known = |own: &Option<String>| own.clone().unwrap_or_else(|| "unknown".to_owned());
+        let known = |value: &Option<String>| value.clone().unwrap_or_else(|| "unknown".to_owned());
         let _ = writeln!(
             text,
             "  bus        {} × {} of at most {} × {}",
@@ -143,7 +143,7 @@ fn bits(proof: &Proof, text: &mut String) {
         ),
     };
     let golden = &proof.golden;
-    let compared: usize = golden.by_setting.iter().map(|own| own.cases).sum();
+    let compared: usize = golden.by_setting.iter().map(|setting| setting.cases).sum();
     let _ = writeln!(
         text,
         "  recorded results  {} of {} compared, {compared} times in {} of {} settings, {}, {} differ",
@@ -188,16 +188,18 @@ fn bits(proof: &Proof, text: &mut String) {
     }
     match &proof.validation {
         None => text.push_str("  validation        not asked for (--validate)\n"),
-        Some(own) if !own.has_run => text.push_str("  validation        did not run\n"),
-        Some(own) => {
+        Some(validation) if !validation.has_run => {
+            text.push_str("  validation        did not run\n")
+        }
+        Some(validation) => {
             let _ = writeln!(
                 text,
                 "  validation        {} recorded results, {} random rounds, {} values of a renderer: \
                  {} messages",
-                own.golden_cases,
-                own.random_rounds,
-                grouped(own.renderer_values),
-                own.message_count
+                validation.golden_cases,
+                validation.random_rounds,
+                grouped(validation.renderer_values),
+                validation.message_count
             );
         }
     }
@@ -208,7 +210,7 @@ fn speed(proof: &Proof, text: &mut String) {
     if !compile.kernels.is_empty() {
         let slowest = (compile.kernels.iter())
             .max_by(|a, b| a.milliseconds.total_cmp(&b.milliseconds))
-            .map(|own| format!("{} {:.1} ms", own.kernel, own.milliseconds))
+            .map(|kernel| format!("{} {:.1} ms", kernel.kernel, kernel.milliseconds))
             .unwrap_or_default();
         let _ = writeln!(
             text,
@@ -270,7 +272,7 @@ fn speed(proof: &Proof, text: &mut String) {
 fn verdict(proof: &Proof, text: &mut String) {
     let (seconds, allowed) = (proof.seconds, proof.seconds_allowed);
     let _ = writeln!(text, "\n{seconds:.0} s of {allowed} s");
-    let checks = proof.renderer.iter().flat_map(|own| &own.checks);
+    let checks = proof.renderer.iter().flat_map(|renderer| &renderer.checks);
     let on_renderer: u64 = checks.map(|check| check.values).sum();
     let values = proof.random.values + proof.kernels.values + on_renderer;
     let _ = match proof.verdict {

@@ -9,33 +9,33 @@ use std::time::Instant;
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 use tumble::reduce::ReducedCurve;
-use tumble::{Device, Engine, EulerSequence, FrameRate, Frames};
+use tumble::{Device, Engine, EulerSequence, FrameRate, SampleTimes};
 use tumble_formats::format::{FormatOption, MotionOptions, Quantization};
 use tumble_formats::keyed::keyed;
-use tumble_formats::motion::{Motion, Sampled, Sampler};
-use tumble_formats::reduce::{ReduceMotionError, ReduceOptions, Reduced, all_in_few_bits, reduce};
+use tumble_formats::motion::{ChannelInterpolation, Motion, SampledClip};
+use tumble_formats::reduce::{ReduceMotionError, ReduceOptions, Reduced, quantize_all, reduce};
 use tumble_formats::{Feature, Format, Loaded};
 
-use crate::arguments::given::Given;
+use crate::arguments::command_line::CommandLine;
 use crate::arguments::input::{self, Inputs};
-use crate::arguments::results::{Results, check_sequence, each_file, kept};
+use crate::arguments::output::sequence;
+use crate::arguments::results::{ResultArguments, check_sequence, document_to_rewrite, each_file};
 use crate::arguments::tolerance::{degrees, not_negative};
-use crate::arguments::what::sequence;
-use crate::batch::output::Target;
-use crate::batch::place::{Place, Written};
+use crate::batch::destination::{Destination, WrittenFile};
+use crate::batch::output::ResultTarget;
 use crate::batch::room;
-use crate::batch::run::Evaluated;
+use crate::batch::run::EvaluatedResult;
 use crate::messages::exit::{ALL_INPUTS, Failure};
 use crate::messages::words;
 
-/// Take keys out of motion: the fewest whose curves stay near all samples
+/// Remove keys from motion: keep few whose curves stay near all samples
 #[derive(Debug, Args)]
 #[command(after_help = "\
 The keys of the input are the samples (or the frames of --fps). At each of them every joint stays
 within the angle of --tolerance and the distance of --distance: in the world where the input has a
-skeleton, else each track for itself. That it does is found by evaluating the keys that stay. glTF
-holds keys of each channel at times of their own; other formats hold all joints at the same times,
-which are more keys. A GLB or glTF that is written as one keeps all else that it holds.
+skeleton, else each track by itself. This is checked by evaluating the remaining keys. glTF stores
+separate key times for each channel; other formats store all joints at the same times, which takes
+more keys. A GLB or glTF that is written as one keeps everything else in the file.
 
 Examples:
   tumble reduce walk.bvh --tolerance 0.1deg -o walk.glb
@@ -44,11 +44,11 @@ Examples:
   tumble reduce takes -o small --to glb --resume")]
 pub(crate) struct Arguments {
     #[command(flatten)]
-    given: Given,
+    command_line: CommandLine,
     #[command(flatten)]
     inputs: Inputs,
     #[command(flatten)]
-    results: Results,
+    results: ResultArguments,
     /// The largest angle: 0.1deg or 0.002rad, degrees without a unit
     #[arg(long, value_name = "ANGLE", default_value = "0.1deg", value_parser = degrees, allow_hyphen_values = true)]
     tolerance: f64,
@@ -56,18 +56,19 @@ pub(crate) struct Arguments {
     /// end of the longest chain of joints]
     #[arg(long, value_name = "LENGTH", value_parser = not_negative, allow_hyphen_values = true)]
     distance: Option<f64>,
-    /// Points so far from each joint, along its axes, stay within the distance too: the skin about the
-    /// joints
+    /// Points at this distance from each joint, along its axes, stay within --distance too, as a
+    /// stand-in for the skin
     #[arg(long, value_name = "LENGTH", default_value = "0", value_parser = not_negative, allow_hyphen_values = true)]
     shell: f64,
     /// The curve that joins the keys
     #[arg(long, value_name = "CURVE", default_value = "linear")]
     curve: CurveArgument,
-    /// glTF: rotations of 16 bits a component instead of f32. The errors are those of what is read of them
+    /// glTF: store rotations with 16 bits per component instead of f32. The errors are those of the file
+    /// as it is read back
     #[arg(long)]
     quantize: bool,
-    /// glTF: a new file, compressed by meshopt; players need `EXT_meshopt_compression`. With --quantize all samples
-    /// are keys, of as few bits as the bounds allow, where that is smaller
+    /// glTF: write a new file, compressed by meshopt; players need `EXT_meshopt_compression`. With
+    /// --quantize, all samples become keys with as few bits as the bounds allow, where that is smaller
     #[arg(long)]
     meshopt: bool,
     /// Sample at this rate first [default: the keys are the samples]
@@ -76,7 +77,7 @@ pub(crate) struct Arguments {
     /// The axes of the angles of BVH, three different ones [default: those of the input, else ZXY]
     #[arg(long, value_name = "AXES", value_parser = sequence)]
     sequence: Option<EulerSequence>,
-    /// Also draw, as .svg or .png, how far the joints are away over time; of one input
+    /// Also draw the errors of the joints over time, as .svg or .png; needs a single input
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
     /// Print JSON about the results on standard output
@@ -104,9 +105,9 @@ impl CurveArgument {
     }
 }
 
-/// What is told of one clip.
+/// The report of one clip.
 #[derive(Debug, Clone, Serialize)]
-struct Told {
+struct ReductionReport {
     /// The input, and its animation where it has several.
     input: String,
     output: String,
@@ -114,15 +115,15 @@ struct Told {
     keys_after: usize,
     samples: usize,
     /// Degrees.
-    angle: Worst,
+    angle: LargestError,
     /// In the input's unit of length.
-    distance: Worst,
+    distance: LargestError,
     seconds: f64,
 }
 
 /// The largest error of a kind.
 #[derive(Debug, Clone, Serialize)]
-struct Worst {
+struct LargestError {
     largest: f64,
     bound: f64,
     track: String,
@@ -130,11 +131,15 @@ struct Worst {
     time: f64,
 }
 
-impl Worst {
+impl LargestError {
     fn of(reduced: &Reduced, kind: usize, factor: f64) -> Self {
         let (joint, sample) = reduced.worst[kind];
         Self {
-            largest: reduced.errors.get(sample).map_or(0.0, |own| own[kind]) * factor,
+            largest: reduced
+                .errors
+                .get(sample)
+                .map_or(0.0, |errors| errors[kind])
+                * factor,
             bound: reduced.bounds[kind] * factor,
             track: reduced.clip.set.track_name(joint),
             time: reduced.times.get(sample).copied().unwrap_or(0.0),
@@ -149,10 +154,10 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         Some(file) => arguments.results.picture(file, &files, &plan)?,
         None => None,
     };
-    let format = plan.targets.first().map(Target::format);
+    let format = plan.targets.first().map(ResultTarget::format);
     check_sequence(arguments.sequence, format)?;
     let is_bessel = matches!(arguments.curve, CurveArgument::BesselOverhauser);
-    if is_bessel && format.is_some_and(|format| format.takes(FormatOption::OwnKeys)) {
+    if is_bessel && format.is_some_and(|format| format.takes(FormatOption::AtKeys)) {
         return Err(Failure::usage(
             "glTF has no bessel-overhauser; choose --curve linear or cubic, or write .npz",
         ));
@@ -160,7 +165,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     arguments.check_quantized(format)?;
     let engine =
         Engine::new(Device::Cpu).map_err(|error| Failure::evaluating("the CPU", &error))?;
-    let options = format!("reduce {}", arguments.given.options());
+    let options = format!("reduce {}", arguments.command_line.options());
     let mut all = Vec::new();
     let outcome = arguments.results.make(
         &arguments.inputs,
@@ -169,11 +174,11 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         |file, loaded, target, done| {
             let path = file.path();
             let name = input::name(path);
-            let mut make = |name: &str, clips: &[&Motion], target: &Target| {
+            let mut make = |name: &str, clips: &[&Motion], target: &ResultTarget| {
                 let one = (path, loaded);
-                let (evaluated, told) =
+                let (evaluated, reports) =
                     arguments.make(&engine, one, (name, clips), target, plot.as_ref())?;
-                all.extend(told);
+                all.extend(reports);
                 Ok(evaluated)
             };
             each_file(&name, (path, loaded), target, done, &mut make)
@@ -186,7 +191,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
 }
 
 impl Arguments {
-    /// Refuses what takes no keys of few bits.
+    /// Refuses `--quantize` and `--meshopt` where they do not apply.
     fn check_quantized(&self, format: Option<&Format>) -> Result<(), Failure> {
         let option = match (self.quantize, self.meshopt) {
             (true, _) => "quantize",
@@ -196,7 +201,7 @@ impl Arguments {
         if let Some(format) = format.filter(|format| !format.takes(FormatOption::Quantize)) {
             let name = format.name;
             return Err(Failure::usage(format!(
-                "--{option} is for glTF, and says nothing to {name}; leave it out"
+                "--{option} is for glTF and has no effect on {name}; leave it out"
             )));
         }
         if self.quantize && matches!(self.curve, CurveArgument::Cubic) {
@@ -213,50 +218,50 @@ impl Arguments {
         engine: &Engine,
         (path, loaded): (&Path, &Loaded),
         (name, clips): (&str, &[&Motion]),
-        target: &Target,
-        plot: Option<&Place>,
-    ) -> Result<(Evaluated, Vec<Told>), Failure> {
+        target: &ResultTarget,
+        plot: Option<&Destination>,
+    ) -> Result<(EvaluatedResult, Vec<ReductionReport>), Failure> {
         let started = Instant::now();
-        let own = |clip: &&Motion| match clips.len() {
+        let name_of = |clip: &&Motion| match clips.len() {
             1 => name.to_owned(),
             _ => format!("{name} {}", input::clip_name(clip)),
         };
-        let names: Vec<String> = clips.iter().map(own).collect();
+        let names: Vec<String> = clips.iter().map(name_of).collect();
         let mut all = Vec::new();
         for (clip, name) in clips.iter().zip(&names) {
-            let together = clip.is_world || !target.format().takes(FormatOption::OwnKeys);
+            let together = clip.is_world || !target.format().takes(FormatOption::AtKeys);
             all.push(self.reduced(engine, (name, clip), together)?);
         }
         let all = self.smaller(engine, &names, all)?;
         let quantize = all.first().and_then(|pair| pair.1);
         let all: Vec<Reduced> = all.into_iter().map(|pair| pair.0).collect();
-        if let (Some(place), [reduced]) = (plot, &*all) {
-            picture::draw(&input::file_name(path), reduced, place)?;
+        if let (Some(destination), [reduced]) = (plot, &*all) {
+            picture::draw(&input::file_name(path), reduced, destination)?;
         }
         let written = self.write(engine, (name, clips), (&all, quantize), loaded, target)?;
-        let mut told = Vec::new();
+        let mut reports = Vec::new();
         let mut lines = Vec::new();
         for (reduced, input) in all.iter().zip(names) {
-            let own = Told {
+            let report = ReductionReport {
                 input,
                 output: target.to_string(),
                 keys_before: reduced.keys[0],
                 keys_after: reduced.keys[1],
                 samples: reduced.times.len(),
-                angle: Worst::of(reduced, 0, 1f64.to_degrees()),
-                distance: Worst::of(reduced, 1, 1.0),
+                angle: LargestError::of(reduced, 0, 1f64.to_degrees()),
+                distance: LargestError::of(reduced, 1, 1.0),
                 seconds: started.elapsed().as_secs_f64(),
             };
-            lines.push(own.line(reduced));
-            told.push(own);
+            lines.push(report.line(reduced));
+            reports.push(report);
         }
         let spent = words::duration(started.elapsed());
-        let evaluated = Evaluated {
+        let evaluated = EvaluatedResult {
             written,
             device: engine.device_name().to_owned(),
-            told: format!("{} in {spent} → {target}", lines.join("; ")),
+            message: format!("{} in {spent} → {target}", lines.join("; ")),
         };
-        Ok((evaluated, told))
+        Ok((evaluated, reports))
     }
 
     fn reduced(
@@ -272,12 +277,16 @@ impl Arguments {
         };
         let clip = match self.fps {
             Some(rate) => {
-                let frames = Frames::rate(rate);
+                let frames = SampleTimes::rate(rate);
                 room::in_memory(name, &clip.set, &frames, 7)?;
                 let sampled = clip.sampled(engine, &frames);
                 Cow::Owned(sampled.map_err(|error| Failure::evaluating(name, &error))?)
             }
-            None if clip.channels.iter().any(|own| own.has(Sampler::Cubic)) => {
+            None if clip
+                .channels
+                .iter()
+                .any(|channel| channel.has(ChannelInterpolation::Cubic)) =>
+            {
                 return Err(Failure::usage(format!(
                     "{name}: its keys are joined by cubics with tangents, so they are not its \
                      samples; give --fps"
@@ -285,7 +294,7 @@ impl Arguments {
             }
             None => clip,
         };
-        let times = Frames::at(clip.key_times());
+        let times = SampleTimes::at(clip.key_times());
         // The samples and the poses, of the input and of what becomes of it.
         room::in_memory(name, &clip.set, &times, 14)?;
         let options = ReduceOptions {
@@ -299,14 +308,15 @@ impl Arguments {
                 false => Quantization::Components,
             }),
         };
-        let few = reduce(&clip, engine, &options).map_err(failed)?;
+        let sparse = reduce(&clip, engine, &options).map_err(failed)?;
         let is_packed = self.quantize && self.meshopt;
-        let all = is_packed.then(|| all_in_few_bits(&clip, engine, &options));
+        let all = is_packed.then(|| quantize_all(&clip, engine, &options));
         let all = all.transpose().map_err(failed)?.flatten();
-        Ok((few, all))
+        Ok((sparse, all))
     }
 
-    /// Writes clips as new files with few keys and with all of few bits; gives those of which the file is smaller.
+    /// Writes clips as new files with few keys and with all of few bits; gives those of which the file
+    /// is smaller.
     fn smaller(
         &self,
         engine: &Engine,
@@ -326,8 +336,8 @@ impl Arguments {
                 meshopt: true,
                 ..MotionOptions::default()
             };
-            let sampled = [Sampled {
-                of_own_keys: true,
+            let sampled = [SampledClip {
+                is_at_keys: true,
                 ..ends.of(&reduced.clip, None, &[])
             }];
             let mut bytes = Vec::new();
@@ -341,20 +351,20 @@ impl Arguments {
         let mut each = reduced.iter().map(|(_, all)| all.as_ref().map(|all| all.1));
         let first = each.next().flatten();
         let same = first.filter(|&first| each.all(|bits| bits == Some(first)));
-        let (mut few, mut all) = (0usize, 0usize);
-        for (few_keys, other) in &reduced {
-            few = few.saturating_add(size(few_keys, sixteen)?);
+        let (mut sparse_size, mut all) = (0usize, 0usize);
+        for (sparse, other) in &reduced {
+            sparse_size = sparse_size.saturating_add(size(sparse, sixteen)?);
             all = match other {
                 Some((other, _)) => all.saturating_add(size(other, same)?),
                 None => usize::MAX,
             };
         }
-        let takes_all = same.filter(|_| all < few);
+        let takes_all = same.filter(|_| all < sparse_size);
         let chosen = reduced
             .into_iter()
-            .map(|(few_keys, other)| match (takes_all, other) {
+            .map(|(sparse, other)| match (takes_all, other) {
                 (Some(bits), Some((other, _))) => (other, Some(bits)),
-                _ => (few_keys, sixteen),
+                _ => (sparse, sixteen),
             });
         Ok(chosen.collect())
     }
@@ -367,13 +377,13 @@ impl Arguments {
         (name, clips): (&str, &[&Motion]),
         (reduced, quantize): (&[Reduced], Option<Quantization>),
         loaded: &Loaded,
-        target: &Target,
-    ) -> Result<Written, Failure> {
+        target: &ResultTarget,
+    ) -> Result<WrittenFile, Failure> {
         let format = target.format();
-        let has_own_keys = format.takes(FormatOption::OwnKeys);
+        let keys_per_channel = format.takes(FormatOption::AtKeys);
         let mut samples = Vec::new();
         for reduced in reduced {
-            samples.push(match has_own_keys && !reduced.clip.is_world {
+            samples.push(match keys_per_channel && !reduced.clip.is_world {
                 true => reduced
                     .clip
                     .ends(engine)
@@ -387,12 +397,12 @@ impl Arguments {
             ("tolerance", format!("{}°", self.tolerance)),
         ];
         // Formats of frames take the keys where every frame has one.
-        let has_times = format.holds(Feature::UnevenTimes);
+        let has_times = format.supports(Feature::UnevenTimes);
         let rate = |clip: &Motion| clip.rate.filter(|_| !has_times);
         let both = reduced.iter().zip(&samples);
-        let sampled: Vec<Sampled<'_>> = both
-            .map(|(reduced, samples)| Sampled {
-                of_own_keys: has_own_keys,
+        let sampled: Vec<SampledClip<'_>> = both
+            .map(|(reduced, samples)| SampledClip {
+                is_at_keys: keys_per_channel,
                 ..samples.of(&reduced.clip, rate(&reduced.clip), &notes)
             })
             .collect();
@@ -403,21 +413,21 @@ impl Arguments {
             meshopt: self.meshopt,
             ..target.motion_options()
         };
-        let otherwise = match has_own_keys {
+        let otherwise = match keys_per_channel {
             // A file that is kept keeps the bytes of its old keys too.
             true if self.meshopt => Some("compression makes"),
-            true => self.inputs.tracks.is_given().then_some("some tracks make"),
+            true => self.inputs.tracks.is_set().then_some("some tracks make"),
             false => Some("keys at uneven times make"),
         };
-        let document = kept(name, loaded, target, otherwise);
+        let document = document_to_rewrite(name, loaded, target, otherwise);
         if !format.writes_clips() {
             let message = format!("{target}: {} holds results, not keys", format.name);
             return Err(Failure::usage(message));
         }
         let written = target.write_motion(|out| match document {
             Some(document) => {
-                let places = clips.iter().map(|clip| clip.place);
-                let clips: Vec<_> = places.zip(sampled.iter().cloned()).collect();
+                let indices = clips.iter().map(|clip| clip.index);
+                let clips: Vec<_> = indices.zip(sampled.iter().cloned()).collect();
                 document.write(&clips, &options, target.path(), out)
             }
             None => format.write_clips(&sampled, &options, out),
@@ -427,7 +437,7 @@ impl Arguments {
     }
 }
 
-impl Told {
+impl ReductionReport {
     fn line(&self, reduced: &Reduced) -> String {
         format!(
             "{}: {} → {} keys ({:.1} times fewer), at most {:.4}° ({}, {:.3} s) and {:.3e} ({}, {:.3} \

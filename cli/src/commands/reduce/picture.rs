@@ -2,27 +2,33 @@
 
 use tumble_formats::reduce::Reduced;
 
-use crate::batch::place::Place;
+use crate::batch::destination::Destination;
 use crate::commands::plot::draw;
-use crate::commands::plot::figure::{Axes, Axis, Curve, Figure, Panel, range_of, thinned};
+use crate::commands::plot::figure::{
+    Figure, Panel, PanelAxes, PlotAxis, PlotCurve, range_of, thinned,
+};
 use crate::messages::colours::BOXES;
 use crate::messages::exit::Failure;
 
-/// Points that a curve is drawn of are at most four for each of so many columns.
+/// A curve is drawn with at most four points for each of this many columns.
 const COLUMNS: usize = 2000;
 
 /// Draws into a file, which ends in .svg or .png.
-pub(super) fn draw(title: &str, reduced: &Reduced, place: &Place) -> Result<(), Failure> {
+pub(super) fn draw(
+    title: &str,
+    reduced: &Reduced,
+    destination: &Destination,
+) -> Result<(), Failure> {
     let panels = [
         ("largest angle of all joints", "degrees", 1f64.to_degrees()),
         ("largest distance of all joints", "units", 1.0),
     ];
     let panels = panels.into_iter().enumerate();
     let panels = panels.map(|(kind, (title, unit, factor))| {
-        let values = reduced.errors.iter().map(|own| own[kind] * factor);
+        let values = reduced.errors.iter().map(|error| error[kind] * factor);
         let points: Vec<(f64, f64)> = reduced.times.iter().copied().zip(values).collect();
         let bound = reduced.bounds[kind] * factor;
-        let axis = |label: &str, range| Axis {
+        let axis = |label: &str, range| PlotAxis {
             label: label.to_owned(),
             range,
             powers: false,
@@ -30,11 +36,11 @@ pub(super) fn draw(title: &str, reduced: &Reduced, place: &Place) -> Result<(), 
         let heights = points.iter().map(|point| point.1).chain([0.0, bound]);
         Panel {
             title: title.to_owned(),
-            axes: Axes::Plane {
+            axes: PanelAxes::Plane {
                 x: axis("time, s", range_of(points.iter().map(|point| point.0))),
                 y: axis(unit, 0.0..range_of(heights).end),
             },
-            curves: vec![Curve {
+            curves: vec![PlotCurve {
                 colour: BOXES[0],
                 width: 1.6,
                 opacity: 1.0,
@@ -53,5 +59,5 @@ pub(super) fn draw(title: &str, reduced: &Reduced, place: &Place) -> Result<(), 
         columns: 1,
         panels: panels.collect(),
     };
-    draw::write(&figure, place)
+    draw::write(&figure, destination)
 }

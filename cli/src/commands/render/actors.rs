@@ -1,28 +1,28 @@
 //! What stands in a picture: chains of boxes, or bodies on paths.
 
 use glam::Vec3;
-use tumble::{Frames, Interpolation, Layout, Skeleton, TrackSet};
+use tumble::{Interpolation, Layout, SampleTimes, Skeleton, TrackSet};
 use tumble_routes::mesh::Mesh;
 
-use crate::arguments::device::Opened;
+use crate::arguments::device::OpenedDevice;
 use crate::commands::render::scene::{Actor, Surroundings};
 use crate::commands::render::solids::{Body, meshes, trails};
-use crate::commands::travel::{Maker, Scenery, Source};
+use crate::commands::travel::{Maker, Scenery, TravelSource};
 use crate::messages::colours::Colour;
 use crate::messages::exit::Failure;
 
 /// Of a box that is 1 long.
 const BREADTH: f32 = 0.28;
-/// So many samples tell where a chain gets.
+/// How many samples determine the extent of a chain.
 const REACHES: usize = 200;
 
 /// The boxes of a set as a chain, by one method.
 pub(super) fn chain(
-    device: &mut Opened,
+    device: &mut OpenedDevice,
     name: &str,
     set: &TrackSet,
     interpolation: Interpolation,
-    frames: &Frames,
+    frames: &SampleTimes,
 ) -> Result<Actor, Failure> {
     // A picture has no scale: boxes are 1 long, however long they are.
     let timeline = frames
@@ -44,7 +44,7 @@ pub(super) fn chain(
         rotations: all()
             .filter_map(|(track, sample)| poses.rotation(track, sample))
             .collect(),
-        places: all()
+        positions: all()
             .filter_map(|(track, sample)| poses.position(track, sample))
             .collect(),
         body: Body::hanging(BREADTH),
@@ -52,9 +52,9 @@ pub(super) fn chain(
         reach: Vec::new(),
     };
     for sample in (0..samples).step_by(samples.div_ceil(REACHES).max(1)) {
-        for place in sample * tracks..(sample + 1) * tracks {
-            let (turn, hung) = (actor.rotations[place], actor.places[place]);
-            actor.reach.extend([hung, hung + turn * Vec3::NEG_Y]);
+        for index in sample * tracks..(sample + 1) * tracks {
+            let (rotation, hung) = (actor.rotations[index], actor.positions[index]);
+            actor.reach.extend([hung, hung + rotation * Vec3::NEG_Y]);
         }
     }
     Ok(actor)
@@ -73,11 +73,11 @@ pub(super) fn around_chains() -> Surroundings {
 /// The bodies of a source, an actor for each maker, with their curves in the colour of ink, and what
 /// is around them.
 pub(super) fn travellers(
-    device: &mut Opened,
+    device: &mut OpenedDevice,
     name: &str,
-    (source, makers): (&Source, &[Maker]),
+    (source, makers): (&TravelSource, &[Maker]),
     scenery: &Scenery,
-    frames: &Frames,
+    frames: &SampleTimes,
     ink: Colour,
 ) -> Result<(Vec<Actor>, Surroundings), Failure> {
     let ground: Vec<Mesh> = scenery.read()?;
@@ -85,16 +85,17 @@ pub(super) fn travellers(
     let mut length = None;
     for &maker in makers {
         let trail = source.trail(device, name, maker)?;
-        let length = *length.get_or_insert_with(|| scenery.length(&trail.places));
-        let body = Body::going(length, !ground.is_empty(), source.body_turn());
+        let length = *length.get_or_insert_with(|| scenery.length(&trail.positions));
+        let body = Body::going(length, !ground.is_empty(), source.body_rotation());
         let bodies = source.sample(device, name, maker, frames)?;
-        let poses = trail.places.iter().zip(&trail.rotations);
-        let corners = poses.flat_map(|(&at, &turn)| body.corners(turn).map(|corner| at + corner));
+        let poses = trail.positions.iter().zip(&trail.rotations);
+        let corners =
+            poses.flat_map(|(&at, &rotation)| body.corners(rotation).map(|corner| at + corner));
         actors.push(Actor {
             name: bodies.name,
             tracks: bodies.tracks,
             rotations: bodies.rotations,
-            places: bodies.places,
+            positions: bodies.positions,
             body,
             trails: trails(&trail, scenery.axes, length, ink),
             reach: corners.collect(),

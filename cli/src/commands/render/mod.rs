@@ -9,28 +9,28 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use tumble::{Frames, Method, Timeline};
+use tumble::{Method, SampleTimes, Timeline};
 
-use crate::arguments::device::{DeviceArguments, Opened};
+use crate::arguments::device::{DeviceArguments, OpenedDevice};
 use crate::arguments::input::{self, Inputs};
-use crate::arguments::interpolation::{Manner, Selection, chosen, methods};
+use crate::arguments::interpolation::{InterpolationArguments, MethodSelection, chosen, methods};
 use crate::arguments::path::{PATHS, PathArguments};
-use crate::arguments::time::Sampling;
+use crate::arguments::time::SamplingArguments;
 use crate::arguments::tracks::selected;
-use crate::batch::place::{self, Place};
+use crate::batch::destination::{self, Destination};
 use crate::batch::room;
 use crate::commands::picture;
 use crate::commands::render::film::Picture;
 use crate::commands::render::film::apng::Apng;
 use crate::commands::render::film::gif::Gif;
-use crate::commands::render::scene::{Actor, Scene, Style, Surroundings, Theme, View};
-use crate::commands::travel::{Maker, Scenery, Source, is_path_file, is_travel};
+use crate::commands::render::scene::{Actor, CameraView, Scene, Style, Surroundings, Theme};
+use crate::commands::travel::{Maker, Scenery, TravelSource, is_path_file, is_travel};
 use crate::messages::exit::Failure;
 use crate::messages::progress::Progress;
 use crate::messages::{signals, words};
 
 /// Chains side by side in one picture.
-const MOST: usize = 4;
+const MAX_METHODS: usize = 4;
 
 /// What browsers show a frame of a GIF for at least, seconds; less some rounding.
 const SHORTEST_IN_GIF: f64 = 0.02 - 1e-9;
@@ -68,14 +68,14 @@ pub(crate) struct Arguments {
         default_value = "bessel-overhauser",
         value_parser = methods()
     )]
-    methods: Vec<Selection>,
+    methods: Vec<MethodSelection>,
     /// Width and height of a picture, pixels
     #[arg(long, value_name = "WxH", default_value = "640x480", value_parser = size)]
     size: (u32, u32),
-    /// From where to look: degrees about the upright axis, and above the floor
+    /// The camera's direction: degrees about the vertical axis, and above the floor
     #[arg(long, value_name = "AROUND,ABOVE", default_value = "23,17", value_parser = view, allow_hyphen_values = true)]
-    view: View,
-    /// The colours of ground and floor
+    view: CameraView,
+    /// The colours of background and floor
     #[arg(long, value_enum, default_value = "light")]
     theme: ThemeArgument,
     #[command(flatten, next_help_heading = PATHS)]
@@ -83,9 +83,9 @@ pub(crate) struct Arguments {
     #[command(flatten, next_help_heading = PATHS)]
     path: PathArguments,
     #[command(flatten)]
-    sampling: Sampling,
+    sampling: SamplingArguments,
     #[command(flatten)]
-    manner: Manner,
+    interpolation: InterpolationArguments,
     #[command(flatten)]
     device: DeviceArguments,
 }
@@ -112,12 +112,12 @@ fn size(text: &str) -> Result<(u32, u32), String> {
     match parsed {
         Some((width @ 16..=4096, height @ 16..=4096)) => Ok((width, height)),
         _ => Err(format!(
-            "`{text}` is no size; give 640x480, each side 16 to 4096 pixels"
+            "invalid size `{text}`: expected WIDTHxHEIGHT in pixels, such as 640x480, each from 16 to 4096"
         )),
     }
 }
 
-fn view(text: &str) -> Result<View, String> {
+fn view(text: &str) -> Result<CameraView, String> {
     let angles = text.split_once(',');
     let parsed = angles.and_then(|(around, above)| {
         Some((
@@ -127,24 +127,24 @@ fn view(text: &str) -> Result<View, String> {
     });
     match parsed {
         Some((around, above)) if around.is_finite() && (-89.0..=89.0).contains(&above) => {
-            Ok(View { around, above })
+            Ok(CameraView { around, above })
         }
         _ => Err(format!(
-            "`{text}` is no view; give two angles in degrees, such as 23,17, the second -89 to 89"
+            "invalid view `{text}`: expected two angles in degrees, such as 23,17, the second from -89 to 89"
         )),
     }
 }
 
 /// What comes out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Kind {
+enum RenderOutput {
     Gif,
     Apng,
     Still,
     Folder,
 }
 
-impl Kind {
+impl RenderOutput {
     fn of(path: &Path) -> Result<Self, Failure> {
         let extension = path.extension().and_then(|extension| extension.to_str());
         match extension.map(str::to_lowercase).as_deref() {
@@ -166,20 +166,23 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         .inputs
         .distinct(arguments.sampling.reads_standard_input())?;
     let [path] = &inputs[..] else {
-        return Err(Failure::usage("one input at a time is rendered"));
+        return Err(Failure::usage("`render` takes a single input"));
     };
     let samples = arguments.sampling.samples()?;
     let methods = chosen(&arguments.methods);
-    if methods.len() > MOST {
+    if methods.len() > MAX_METHODS {
         return Err(Failure::usage(format!(
-            "{} side by side cannot be seen, at most {MOST}; choose some (-m)",
+            "{} are too many for one picture, at most {MAX_METHODS}; choose some (-m)",
             words::count(methods.len(), "method")
         )));
     }
-    arguments.manner.check(&methods).map_err(Failure::usage)?;
-    let kind = Kind::of(&arguments.out)?;
-    if kind != Kind::Folder {
-        Place::new(&arguments.out, arguments.overwrite, &inputs)?.try_out()?;
+    arguments
+        .interpolation
+        .check(&methods)
+        .map_err(Failure::usage)?;
+    let kind = RenderOutput::of(&arguments.out)?;
+    if kind != RenderOutput::Folder {
+        Destination::new(&arguments.out, arguments.overwrite, &inputs)?.check_writable()?;
     }
     let name = input::name(path);
     let (source, rest) = arguments.source(path, &name)?;
@@ -193,8 +196,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
             "{name}: there are no frames to render"
         )));
     }
-    if kind == Kind::Still {
-        frames = Frames::at(timeline.times(0).take(1).collect());
+    if kind == RenderOutput::Still {
+        frames = SampleTimes::at(timeline.times(0).take(1).collect());
         timeline = frames
             .resolve(set.track_count(), set.time_span())
             .map_err(|error| Failure::evaluating(&name, &error.into()))?;
@@ -211,7 +214,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         arguments.actors(&mut device, &name, &source, &methods, &frames, style)?;
     let scene = Scene::new(actors, &surroundings, style)
         .map_err(|error| Failure::writing(&arguments.out.display().to_string(), &error))?;
-    arguments.shoot(kind, &scene, &timeline, &inputs)?;
+    arguments.render_frames(kind, &scene, &timeline, &inputs)?;
     words::note(&format!(
         "{name}: {}, {}, on {} → {}",
         words::count(timeline.len(), "frame"),
@@ -226,40 +229,48 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
 }
 
 impl Arguments {
-    /// The paths or the clip of a file: of clips whose boxes hang on each other also what carries the
-    /// tracks that are asked for. And the failure of animations that were refused.
-    fn source(&self, path: &Path, name: &str) -> Result<(Source, Result<(), Failure>), Failure> {
+    /// The paths or the clip of a file, for chains of boxes with the ancestors of the selected tracks;
+    /// and the failure of animations that were refused.
+    fn source(
+        &self,
+        path: &Path,
+        name: &str,
+    ) -> Result<(TravelSource, Result<(), Failure>), Failure> {
         let tracks = &self.inputs.tracks;
         if is_path_file(path) {
-            return Ok((Source::of_paths(path, &self.path, tracks)?, Ok(())));
+            return Ok((TravelSource::of_paths(path, &self.path, tracks)?, Ok(())));
         }
         let input::OnlyClip { clip, rest } = self.inputs.load_one(path)?;
-        let wanted = match is_travel(&clip) {
+        let requested = match is_travel(&clip) {
             true => tracks.of(&clip, name)?,
             false => tracks.chain(&clip, name)?,
         };
-        let clip = match wanted {
-            Some(wanted) => selected(&clip, &wanted, name)?,
+        let clip = match requested {
+            Some(requested) => selected(&clip, &requested, name)?,
             None => clip,
         };
-        Ok((Source::Clip(Box::new(clip)), rest))
+        Ok((TravelSource::Clip(Box::new(clip)), rest))
     }
 
     /// What is drawn: bodies where there are paths, else a chain, by each frame or method.
     fn actors(
         &self,
-        device: &mut Opened,
+        device: &mut OpenedDevice,
         name: &str,
-        source: &Source,
+        source: &TravelSource,
         methods: &[Method],
-        frames: &Frames,
+        frames: &SampleTimes,
         style: Style,
     ) -> Result<(Vec<Actor>, Surroundings), Failure> {
-        let by_method = || methods.iter().map(|&method| self.manner.with(method));
+        let by_method = || {
+            methods
+                .iter()
+                .map(|&method| self.interpolation.with(method))
+        };
         let makers: Vec<Maker> = match source {
-            Source::Paths(..) => self.path.frames().into_iter().map(Maker::Frame).collect(),
-            Source::Clip(clip) if is_travel(clip) => by_method().map(Maker::Method).collect(),
-            Source::Clip(clip) => {
+            TravelSource::Paths(..) => self.path.frames().into_iter().map(Maker::Frame).collect(),
+            TravelSource::Clip(clip) if is_travel(clip) => by_method().map(Maker::Method).collect(),
+            TravelSource::Clip(clip) => {
                 let chain = |by| actors::chain(device, name, &clip.set, by, frames);
                 let chains = by_method().map(chain).collect::<Result<_, _>>()?;
                 return Ok((chains, actors::around_chains()));
@@ -270,9 +281,9 @@ impl Arguments {
     }
 
     /// Draws every frame and writes it.
-    fn shoot(
+    fn render_frames(
         &self,
-        kind: Kind,
+        kind: RenderOutput,
         scene: &Scene,
         timeline: &Timeline,
         inputs: &[PathBuf],
@@ -283,31 +294,31 @@ impl Arguments {
         let too_fast = times
             .windows(2)
             .any(|pair| pair[1] - pair[0] < SHORTEST_IN_GIF);
-        if kind == Kind::Gif && too_fast {
+        if kind == RenderOutput::Gif && too_fast {
             words::warning(
                 "GIF shows no frame for less than 0.02 s, so the film is slower than its keys; \
                  give --fps 50 or less, or write .apng",
             );
         }
-        if kind == Kind::Folder {
-            place::folder(&self.out)?;
+        if kind == RenderOutput::Folder {
+            destination::create_folder(&self.out)?;
             let digits = (times.len() - 1).to_string().len().max(5);
-            let place = |frame: usize| {
+            let destination = |frame: usize| {
                 let file = self.out.join(format!("{frame:0digits$}.png"));
-                Place::new(&file, self.overwrite, inputs)
+                Destination::new(&file, self.overwrite, inputs)
             };
             // All that can be refused is, before there are any.
-            (0..times.len()).try_for_each(|frame| place(frame).map(drop))?;
+            (0..times.len()).try_for_each(|frame| destination(frame).map(drop))?;
             return scene.each_frame(|frame, pixels| {
                 if let Some(stopped) = signals::stopped() {
                     return Err(stopped);
                 }
-                place(frame)?.write(None, |out| picture::png(out, width, height, pixels))?;
+                destination(frame)?.write(None, |out| picture::png(out, width, height, pixels))?;
                 progress.advance(1);
                 Ok(())
             });
         }
-        let file = Place::new(&self.out, self.overwrite, inputs)?;
+        let file = Destination::new(&self.out, self.overwrite, inputs)?;
         file.write(None, |out| {
             let mut draw = |film: &mut dyn Picture| {
                 scene.each_frame(|_, pixels| {
@@ -319,16 +330,16 @@ impl Arguments {
                 })
             };
             match kind {
-                Kind::Gif => {
+                RenderOutput::Gif => {
                     let mut film = Gif::new(out, self.size, &times, scene.sample_colours())?;
                     draw(&mut film)
                 }
-                Kind::Apng => {
+                RenderOutput::Apng => {
                     let mut film = Apng::new(out, self.size, &times)?;
                     draw(&mut film)?;
                     film.finish()
                 }
-                Kind::Still | Kind::Folder => {
+                RenderOutput::Still | RenderOutput::Folder => {
                     scene.each_frame(|_, pixels| picture::png(&mut *out, width, height, pixels))
                 }
             }

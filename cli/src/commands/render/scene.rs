@@ -14,9 +14,9 @@ use crate::commands::picture::halved;
 use crate::commands::render::film::overlay;
 use crate::commands::render::solids::{Body, Face};
 use crate::messages::colours::Colour;
-use crate::together::on_threads;
+use crate::threads::on_threads;
 
-/// How many times finer a picture is drawn than it becomes, to be smooth.
+/// The supersampling factor along each side, for smooth edges.
 const FINER: u32 = 2;
 /// Height of the picture's cone of sight, degrees.
 const SIGHT: f32 = 38.0;
@@ -27,12 +27,12 @@ const AT_ONCE: usize = 32;
 
 /// From where to look, degrees.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct View {
+pub(crate) struct CameraView {
     pub(crate) around: f32,
     pub(crate) above: f32,
 }
 
-/// The colours of ground and floor.
+/// The colours of background and floor.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Theme {
     ground: Colour,
@@ -56,14 +56,14 @@ impl Theme {
     };
 }
 
-/// Bodies, and what is beside them on every frame.
+/// Bodies, with what is drawn beside them on every frame.
 pub(crate) struct Actor {
     pub(crate) name: String,
     pub(crate) tracks: usize,
     /// `[frame][track]`.
     pub(crate) rotations: Vec<Quat>,
     /// `[frame][track]`.
-    pub(crate) places: Vec<Vec3>,
+    pub(crate) positions: Vec<Vec3>,
     pub(crate) body: Body,
     /// What casts a shadow on the floor: the curves that bodies go along.
     pub(crate) trails: Vec<Face>,
@@ -77,7 +77,7 @@ pub(crate) struct Surroundings {
     pub(crate) ground: Vec<Face>,
     /// The length of a body.
     pub(crate) length: f32,
-    /// How far beyond the places that count bodies reach.
+    /// How far bodies extend beyond the positions in `reach`.
     pub(crate) margin: f32,
     /// Whether bodies throw shadows on the floor.
     pub(crate) shadows: bool,
@@ -87,7 +87,7 @@ pub(crate) struct Surroundings {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Style {
     pub(crate) size: (u32, u32),
-    pub(crate) view: View,
+    pub(crate) view: CameraView,
     pub(crate) theme: Theme,
 }
 
@@ -114,7 +114,7 @@ struct Camera {
 
 type Solid<'a> = Triangles<'a, Buffer2d<f32>, BackfaceCullingEnabled>;
 
-/// Draws flat colours at places that the camera has seen already.
+/// Draws flat colours at positions that are projected already.
 struct Flat;
 
 impl Pipeline for Flat {
@@ -122,8 +122,8 @@ impl Pipeline for Flat {
     type VsOut = Shade;
     type Pixel = Colour;
 
-    fn vert(&self, (place, colour): &Self::Vertex) -> ([f32; 4], Shade) {
-        (place.to_array(), Shade(*colour))
+    fn vert(&self, (position, colour): &Self::Vertex) -> ([f32; 4], Shade) {
+        (position.to_array(), Shade(*colour))
     }
 
     fn frag(&self, shade: &Shade) -> Colour {
@@ -163,9 +163,9 @@ impl Scene {
             style.view.around.to_radians(),
             style.view.above.to_radians(),
         );
-        let turn = Quat::from_euler(EulerRot::YXZ, around, -above, 0.0);
+        let orientation = Quat::from_euler(EulerRot::YXZ, around, -above, 0.0);
         // Actors stand beside each other as they are seen.
-        let right = turn * Vec3::X;
+        let right = orientation * Vec3::X;
         let sides = reach().chain(ground()).map(|end| end.dot(right));
         let (left_end, right_end) = sides.fold((f32::MAX, f32::MIN), |(left, right), side| {
             (left.min(side), right.max(side))
@@ -182,7 +182,7 @@ impl Scene {
         let mut distance = length;
         for end in reach().chain(ground()) {
             for shift in &shifts {
-                let seen = turn.inverse() * (end - centre + *shift);
+                let seen = orientation.inverse() * (end - centre + *shift);
                 let margin = surroundings.margin;
                 let across = Vec2::new((seen.x.abs() + margin) / aspect, seen.y.abs() + margin);
                 let across = across / upright;
@@ -190,7 +190,7 @@ impl Scene {
             }
         }
         let radius = (high - low).length() / 2.0 + shifts[0].length();
-        let eye = centre + turn * Vec3::Z * distance;
+        let eye = centre + orientation * Vec3::Z * distance;
         let near = distance / 50.0;
         let matrix =
             directx::perspective(SIGHT.to_radians(), aspect, near, distance + radius * 40.0)
@@ -226,13 +226,13 @@ impl Scene {
             }
         }
         Flat.draw::<Solid<'_>, _>(&corners, &mut colour, Some(&mut depth));
-        let place = |shift: &Vec3| {
+        let label_position = |shift: &Vec3| {
             let at = matrix * (centre + *shift).extend(1.0);
             (at.x / at.w + 1.0) / 2.0
         };
         let names = actors.iter().map(|actor| &*actor.name);
-        let places = shifts.iter().map(place);
-        let labels = overlay::Labels::new(names.zip(places), style.size, theme.ink)?;
+        let label_positions = shifts.iter().map(label_position);
+        let labels = overlay::Labels::new(names.zip(label_positions), style.size, theme.ink)?;
         Ok(Self {
             actors,
             shifts,
@@ -247,13 +247,13 @@ impl Scene {
 
     fn frames(&self) -> usize {
         let first = self.actors.first();
-        first.map_or(0, |actor| actor.places.len() / actor.tracks.max(1))
+        first.map_or(0, |actor| actor.positions.len() / actor.tracks.max(1))
     }
 
     /// Draws every frame, several at once, and hands them over in order.
     pub(crate) fn each_frame<E: Send>(
         &self,
-        mut take: impl FnMut(usize, &[u8]) -> Result<(), E>,
+        mut emit: impl FnMut(usize, &[u8]) -> Result<(), E>,
     ) -> Result<(), E> {
         let frames: Vec<usize> = (0..self.frames()).collect();
         for some in frames.chunks(AT_ONCE) {
@@ -263,7 +263,7 @@ impl Scene {
                 || some.iter().map(pixels).collect(),
             );
             for (&frame, pixels) in some.iter().zip(&drawn) {
-                take(frame, pixels)?;
+                emit(frame, pixels)?;
             }
         }
         Ok(())
@@ -287,9 +287,9 @@ impl Scene {
         let mut corners = Vec::new();
         for (actor, &shift) in self.actors.iter().zip(&self.shifts) {
             for track in 0..actor.tracks {
-                let place = frame * actor.tracks + track;
-                let (turn, at) = (actor.rotations[place], actor.places[place]);
-                for face in actor.body.faces(turn, at, track) {
+                let index = frame * actor.tracks + track;
+                let (rotation, at) = (actor.rotations[index], actor.positions[index]);
+                for face in actor.body.faces(rotation, at, track) {
                     self.camera.add(&mut corners, &face, shift, 0.0);
                     if let Some(floor) = self.shadowed {
                         let shadow = face.shadow(floor, self.style.theme.shadow);
@@ -337,8 +337,8 @@ fn grid(camera: Mat4, middle: Vec3, radius: f32, unit: f32) -> Vec<[Vec3; 2]> {
     let half = (radius * 3.0 / step).ceil().clamp(4.0, 64.0) as i32;
     let reach = half as f32 * step;
     let mut lines = Vec::new();
-    for place in -half..=half {
-        let aside = place as f32 * step;
+    for offset in -half..=half {
+        let aside = offset as f32 * step;
         for (along, across) in [(Vec3::X, Vec3::Z), (Vec3::Z, Vec3::X)] {
             let through = middle + across * aside;
             lines.extend(visible(

@@ -13,7 +13,7 @@ pub(crate) const SUN: Vec3 = Vec3::new(0.371_390_68, 0.742_781_35, 0.557_086);
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Face {
     pub(crate) corners: [Vec3; 3],
-    /// What light it gets; none where its colour is shown as it is.
+    /// The normal for lighting; `None` where the colour is used unchanged.
     pub(crate) normal: Option<Vec3>,
     pub(crate) colour: Colour,
     /// Whether it is seen from behind too.
@@ -21,7 +21,7 @@ pub(crate) struct Face {
 }
 
 impl Face {
-    /// Its colour in the light of the sky from above, what is thrown back from below, and the sun.
+    /// Its colour in the light of the sky from above, the light reflected from below, and the sun.
     pub(crate) fn shade(&self) -> Colour {
         let Some(normal) = self.normal else {
             return self.colour;
@@ -72,58 +72,63 @@ const SIDES: [([Vec3; 4], Vec3); 6] = {
     ]
 };
 
-/// A box about the place that it moves with.
+/// A box, relative to the position that it moves with.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Body {
     centre: Vec3,
     half: Vec3,
-    /// From the box's own axes to those that rotations turn.
-    turn: Quat,
-    /// Whether its ends can be told apart: a light roof, a dark floor.
+    /// From the box's axes to those that rotations apply to.
+    rotation: Quat,
+    /// Whether its top and bottom are distinguished: a light roof, a dark floor.
     is_marked: bool,
 }
 
 impl Body {
-    /// Of a box of a chain, of length 1, that hangs from its place.
+    /// A box of a chain, of length 1, that hangs from its position.
     pub(crate) fn hanging(breadth: f32) -> Self {
         Self {
             centre: Vec3::new(0.0, -0.48, 0.0),
             half: Vec3::new(breadth, 0.96, breadth) / 2.0,
-            turn: Quat::IDENTITY,
+            rotation: Quat::IDENTITY,
             is_marked: false,
         }
     }
 
-    /// Of a box that goes along z with y upwards, before `turn`.
-    pub(crate) fn going(length: f32, stands: bool, turn: Quat) -> Self {
+    /// A box that moves along z with y up, before `rotation`.
+    pub(crate) fn going(length: f32, stands: bool, rotation: Quat) -> Self {
         let half = Vec3::new(0.3, 0.2, 0.5) * length;
         Self {
             centre: if stands { Vec3::Y * half.y } else { Vec3::ZERO },
             half,
-            turn,
+            rotation,
             is_marked: true,
         }
     }
 
-    /// Its corners about the place.
-    pub(crate) fn corners(&self, turn: Quat) -> [Vec3; 8] {
+    /// Its corners relative to its position.
+    pub(crate) fn corners(&self, rotation: Quat) -> [Vec3; 8] {
         let signs =
             |i: usize| Vec3::from_array([4, 2, 1].map(|bit| if i & bit == 0 { -1.0 } else { 1.0 }));
-        std::array::from_fn(|i| turn * (self.turn * (self.centre + self.half * signs(i))))
+        std::array::from_fn(|i| rotation * (self.rotation * (self.centre + self.half * signs(i))))
     }
 
-    /// Its sides at a place, in the colour of a track.
-    pub(crate) fn faces(&self, turn: Quat, at: Vec3, track: usize) -> impl Iterator<Item = Face> {
-        let (own, turn) = (*self, turn * self.turn);
+    /// Its sides at a position, in the colour of a track.
+    pub(crate) fn faces(
+        &self,
+        rotation: Quat,
+        at: Vec3,
+        track: usize,
+    ) -> impl Iterator<Item = Face> {
+        let (body, orientation) = (*self, rotation * self.rotation);
         let colour = BOXES[track % BOXES.len()];
         SIDES.into_iter().flat_map(move |(side, normal)| {
-            let [a, b, c, d] = side.map(|sign| at + turn * (own.centre + own.half * sign));
-            let colour = match own.is_marked {
+            let [a, b, c, d] = side.map(|sign| at + orientation * (body.centre + body.half * sign));
+            let colour = match body.is_marked {
                 true if normal == Vec3::Y => mixed(colour, [255; 3], 0.62),
                 true if normal == Vec3::NEG_Y => mixed(colour, [0; 3], 0.6),
                 _ => colour,
             };
-            let normal = Some(turn * normal);
+            let normal = Some(orientation * normal);
             [[a, b, c], [a, c, d]].map(|corners| Face {
                 corners,
                 normal,
@@ -134,13 +139,13 @@ impl Body {
     }
 }
 
-/// A part of the way from one colour to another.
+/// A mix of two colours; `part` 0 is the first.
 fn mixed(from: Colour, to: Colour, part: f32) -> Colour {
     let mix = |(a, b): (u8, u8)| f32::from(a) + (f32::from(b) - f32::from(a)) * part;
     std::array::from_fn(|channel| mix((from[channel], to[channel])) as u8)
 }
 
-/// A straight bar between two places, with four sides and no ends.
+/// A straight bar between two points, with four sides and no ends.
 fn bar(from: Vec3, to: Vec3, radius: f32, colour: Colour) -> impl Iterator<Item = Face> {
     let along = (to - from).normalize_or(Vec3::Z);
     let aside = along.any_orthonormal_vector() * radius;
@@ -161,19 +166,19 @@ fn bar(from: Vec3, to: Vec3, radius: f32, colour: Colour) -> impl Iterator<Item 
     })
 }
 
-/// The curves that bodies of this length go along, and so many frames as small axes on each.
+/// The curves that bodies of this length move along, with `axes` frames as small axes on each.
 pub(crate) fn trails(travel: &Travel, axes: usize, length: f32, ink: Colour) -> Vec<Face> {
     let mut faces = Vec::new();
-    for track in 0..travel.tracks.min(MOST_TRAILS) {
-        let places: Vec<Vec3> = travel.line(track).collect();
-        for pair in places.windows(2).filter(|pair| pair[0] != pair[1]) {
+    for track in 0..travel.tracks.min(MAX_TRAILS) {
+        let positions: Vec<Vec3> = travel.line(track).collect();
+        for pair in positions.windows(2).filter(|pair| pair[0] != pair[1]) {
             faces.extend(bar(pair[0], pair[1], length * 0.03, ink));
         }
         for sample in travel.evenly(track, axes) {
-            let turn = travel.rotations[sample * travel.tracks + track];
+            let rotation = travel.rotations[sample * travel.tracks + track];
             for (axis, colour) in Vec3::AXES.into_iter().zip(AXES) {
-                let end = places[sample] + turn * axis * length * 0.55;
-                faces.extend(bar(places[sample], end, length * 0.022, colour));
+                let end = positions[sample] + rotation * axis * length * 0.55;
+                faces.extend(bar(positions[sample], end, length * 0.022, colour));
             }
         }
     }
@@ -181,7 +186,7 @@ pub(crate) fn trails(travel: &Travel, axes: usize, length: f32, ink: Colour) -> 
 }
 
 /// Curves of more bodies than this hide each other.
-const MOST_TRAILS: usize = 256;
+const MAX_TRAILS: usize = 256;
 
 /// Of the first mesh, which is the ground, and of what stands on it.
 const GROUND: Colour = [0xa9, 0xc2, 0x8f];
@@ -190,8 +195,8 @@ const OTHERS: Colour = [0x9c, 0x96, 0x90];
 /// The triangles of meshes relative to an origin: the ground, and what stands on it.
 pub(crate) fn meshes(meshes: &[Mesh], origin: DVec3) -> Vec<Face> {
     let mut faces = Vec::new();
-    for (place, mesh) in meshes.iter().enumerate() {
-        let colour = if place == 0 { GROUND } else { OTHERS };
+    for (index, mesh) in meshes.iter().enumerate() {
+        let colour = if index == 0 { GROUND } else { OTHERS };
         for triangle in mesh.triangles() {
             let corners = triangle.map(|vertex| {
                 let corner = mesh.positions()[vertex as usize];
@@ -218,8 +223,8 @@ mod tests {
     fn sides_turn_counterclockwise_about_their_normals() {
         for ([a, b, c, d], normal) in SIDES {
             for (from, over, to) in [(a, b, c), (a, c, d)] {
-                let turned = (over - from).cross(to - over);
-                assert!(turned.dot(normal) > 0.0, "{normal}");
+                let winding = (over - from).cross(to - over);
+                assert!(winding.dot(normal) > 0.0, "{normal}");
             }
             assert!(((a + b + c + d) / 4.0).dot(normal) > 0.0, "{normal}");
         }
@@ -237,9 +242,11 @@ mod tests {
         let drawn = body
             .faces(Quat::IDENTITY, Vec3::X, 0)
             .flat_map(|face| face.corners);
-        let (least, most) = drawn.fold((Vec3::MAX, Vec3::MIN), |(least, most), corner| {
-            (least.min(corner), most.max(corner))
+        let (lowest, highest) = drawn.fold((Vec3::MAX, Vec3::MIN), |(lowest, highest), corner| {
+            (lowest.min(corner), highest.max(corner))
         });
-        assert!(least.abs_diff_eq(low + Vec3::X, 1e-6) && most.abs_diff_eq(high + Vec3::X, 1e-6));
+        assert!(
+            lowest.abs_diff_eq(low + Vec3::X, 1e-6) && highest.abs_diff_eq(high + Vec3::X, 1e-6)
+        );
     }
 }

@@ -7,14 +7,14 @@ use glam::DVec3;
 use tumble_routes::net::NetBy;
 use tumble_routes::route::By;
 
-use crate::commands::route::tables::{Party, read_pairs, read_walkers};
+use crate::commands::route::tables::{Participants, read_pairs, read_walkers};
 use crate::messages::exit::Failure;
 
-/// Find ways over a mesh or a surface: the shortest one, or others
+/// Find routes over a mesh or a surface: shortest ones, or approximations
 #[derive(Debug, Args)]
 #[command(after_help = "\
 The surface is a mesh (.obj, .ply, .glb, .gltf) or a net of Bézier control points (.npy of
-shape m, n, 3). A way is written as CSV with the header x,y,z,ux,uy,uz: points and the normals
+shape m, n, 3). A route is written as CSV with the header x,y,z,ux,uy,uz: points and the normals
 of the surface there, for `tumble follow`. A list of pairs has six numbers a line, separated by
 commas or blanks. Walkers are CSV with the columns name, radius, speed, start, x, y, z, to_x,
 to_y, to_z; a row whose column track names a CSV of t,x,y,z moves on that instead.
@@ -29,29 +29,29 @@ Examples:
 pub(crate) struct Arguments {
     /// A mesh, or a net of control points
     pub(crate) surface: PathBuf,
-    /// Where the way begins
+    /// The start of the route
     #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true, requires = "to")]
     from: Option<DVec3>,
-    /// Where it ends
+    /// The end of the route
     #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true, requires = "from")]
     to: Option<DVec3>,
     /// A file of pairs: from x y z, to x y z on each line
     #[arg(long, value_name = "FILE", conflicts_with_all = ["from", "walkers"])]
     pairs: Option<PathBuf>,
     /// Meshes: exact, plane, greedy or edges; nets: line or facets:N
-    #[arg(long, value_name = "WAY", value_parser = manner)]
-    by: Option<Manner>,
-    /// Vertices of a mesh that are within this distance of each other are one, so that ways cross
-    /// seams whose sides differ by rounding
+    #[arg(long, value_name = "METHOD", value_parser = parse_method)]
+    by: Option<RouteMethod>,
+    /// Vertices of a mesh that are within this distance of each other are merged, so that routes can
+    /// cross seams whose sides differ by rounding
     #[arg(long, value_name = "DISTANCE", value_parser = not_negative, allow_hyphen_values = true, default_value = "0", hide_default_value = true)]
     pub(crate) weld: f64,
     /// A mesh of obstacles that stand still
     #[arg(long, value_name = "FILE", requires = "clearance")]
     pub(crate) avoid: Option<PathBuf>,
-    /// How far ways stay from obstacles
+    /// The distance that routes keep from obstacles
     #[arg(long, value_name = "R", value_parser = not_negative, allow_hyphen_values = true, requires = "avoid")]
     pub(crate) clearance: Option<f64>,
-    /// The longest edge at the rim of what is closed [default: a hundredth of the mesh's size]
+    /// The longest edge along the boundary of closed areas [default: a hundredth of the mesh's size]
     #[arg(long, value_name = "E", value_parser = positive, allow_hyphen_values = true)]
     pub(crate) finest: Option<f64>,
     /// The steepest slope that is walked, in degrees
@@ -60,13 +60,13 @@ pub(crate) struct Arguments {
     /// The direction upwards, for slopes and pictures
     #[arg(long, value_name = "X,Y,Z", default_value = "0,1,0", value_parser = direction, allow_hyphen_values = true)]
     pub(crate) up: DVec3,
-    /// A file of walkers, who wait for each other on their ways
+    /// A file of walkers, who wait for each other on their routes
     #[arg(long, value_name = "FILE", conflicts_with = "from")]
     walkers: Option<PathBuf>,
     /// Where to write: a CSV (`-`: standard output), or a directory for pairs and walkers
     #[arg(short, long = "out", value_name = "OUT")]
     pub(crate) out: PathBuf,
-    /// Also draw the mesh from above with its ways, as .svg or .png
+    /// Also draw the mesh from above with the routes, as .svg or .png
     #[arg(long, value_name = "FILE")]
     pub(crate) plot: Option<PathBuf>,
     /// Replace existing files
@@ -77,22 +77,22 @@ pub(crate) struct Arguments {
     pub(crate) json: bool,
 }
 
-/// How ways are found.
+/// `--by`: how routes are found.
 #[derive(Debug, Clone, Copy)]
-pub(crate) enum Manner {
+pub(crate) enum RouteMethod {
     Mesh(By),
     Net(NetBy),
 }
 
 impl Arguments {
-    /// Who goes from where to where.
-    pub(crate) fn party(&self) -> Result<Party, Failure> {
+    /// The start and the goal of each route.
+    pub(crate) fn participants(&self) -> Result<Participants, Failure> {
         if self.json && crate::arguments::input::is_standard(&self.out) {
             let message = "--json and -o - both write to standard output; give a file";
             return Err(Failure::usage(message));
         }
         match (self.from, self.to, &self.pairs, &self.walkers) {
-            (Some(from), Some(to), None, None) => Ok(Party::of_pair([from, to])),
+            (Some(from), Some(to), None, None) => Ok(Participants::of_pair([from, to])),
             (None, None, Some(file), None) => read_pairs(file),
             (None, None, None, Some(file)) => read_walkers(file),
             _ => Err(Failure::usage(
@@ -101,23 +101,23 @@ impl Arguments {
         }
     }
 
-    pub(crate) fn manner(&self) -> Result<Manner, Failure> {
-        Ok(self.by.unwrap_or(Manner::Mesh(By::Exact)))
+    pub(crate) fn method(&self) -> Result<RouteMethod, Failure> {
+        Ok(self.by.unwrap_or(RouteMethod::Mesh(By::Exact)))
     }
 
-    /// Whether ways keep to a part of the mesh.
+    /// Whether routes are restricted to a part of the mesh.
     pub(crate) fn wants_ground(&self) -> bool {
         self.avoid.is_some() || self.max_slope.is_some()
     }
 }
 
-fn manner(text: &str) -> Result<Manner, String> {
+fn parse_method(text: &str) -> Result<RouteMethod, String> {
     if let Ok(by) = text.parse() {
-        return Ok(Manner::Mesh(by));
+        return Ok(RouteMethod::Mesh(by));
     }
     match (text, text.strip_prefix("facets:").map(str::parse)) {
-        ("line", _) => Ok(Manner::Net(NetBy::Line)),
-        (_, Some(Ok(facets))) => Ok(Manner::Net(NetBy::Facets(facets))),
+        ("line", _) => Ok(RouteMethod::Net(NetBy::Line)),
+        (_, Some(Ok(facets))) => Ok(RouteMethod::Net(NetBy::Facets(facets))),
         _ => {
             Err("give exact, plane, greedy or edges for a mesh, line or facets:N for a net".into())
         }
@@ -128,38 +128,42 @@ fn manner(text: &str) -> Result<Manner, String> {
 pub(crate) fn point(text: &str) -> Result<DVec3, String> {
     let numbers: Result<Vec<f64>, _> = text.split(',').map(|part| part.trim().parse()).collect();
     match numbers.as_deref() {
-        Ok(&[x, y, z]) if [x, y, z].iter().all(|own: &f64| own.is_finite()) => {
+        Ok(&[x, y, z])
+            if [x, y, z]
+                .iter()
+                .all(|component: &f64| component.is_finite()) =>
+        {
             Ok(DVec3::new(x, y, z))
         }
         _ => Err(format!(
-            "`{text}` is no point; give three numbers, such as 1,2.5,-3"
+            "invalid point `{text}`: expected three numbers, such as 1,2.5,-3"
         )),
     }
 }
 
 fn direction(text: &str) -> Result<DVec3, String> {
-    let given = point(text)?;
-    match given.try_normalize() {
+    let vector = point(text)?;
+    match vector.try_normalize() {
         Some(unit) => Ok(unit),
-        None => Err(format!("`{text}` is no direction; it has no length")),
+        None => Err(format!("invalid direction `{text}`: its length is 0")),
     }
 }
 
 fn number(text: &str) -> Option<f64> {
-    text.parse().ok().filter(|own: &f64| own.is_finite())
+    text.parse().ok().filter(|value: &f64| value.is_finite())
 }
 
 fn positive(text: &str) -> Result<f64, String> {
-    let found = number(text).filter(|&own| own > 0.0);
-    found.ok_or_else(|| format!("`{text}` is not a number over 0"))
+    let found = number(text).filter(|&value| value > 0.0);
+    found.ok_or_else(|| format!("invalid value `{text}`: expected a number above 0"))
 }
 
 fn not_negative(text: &str) -> Result<f64, String> {
-    let found = number(text).filter(|&own| own >= 0.0);
-    found.ok_or_else(|| format!("`{text}` is not a number of 0 or more"))
+    let found = number(text).filter(|&value| value >= 0.0);
+    found.ok_or_else(|| format!("invalid value `{text}`: expected a number of 0 or more"))
 }
 
 fn slope(text: &str) -> Result<f64, String> {
-    let found = number(text).filter(|own| (0.0..=90.0).contains(own));
-    found.ok_or_else(|| format!("`{text}` is no slope; give degrees from 0 to 90"))
+    let found = number(text).filter(|value| (0.0..=90.0).contains(value));
+    found.ok_or_else(|| format!("invalid slope `{text}`: expected degrees from 0 to 90"))
 }

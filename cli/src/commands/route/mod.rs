@@ -1,4 +1,4 @@
-//! `tumble route`: ways over meshes and surfaces, between obstacles.
+//! `tumble route`: routes over meshes and surfaces, around obstacles.
 
 mod arguments;
 mod picture;
@@ -18,25 +18,25 @@ use tumble_routes::route::Route;
 use tumble_routes::walkers::{self, Walker};
 
 pub(crate) use crate::commands::route::arguments::Arguments;
-use crate::commands::route::arguments::Manner;
-use crate::commands::route::results::{Results, Row};
+use crate::commands::route::arguments::RouteMethod;
+use crate::commands::route::results::{RoutePoint, RouteResults};
 use crate::commands::route::surface::Surface;
-use crate::commands::route::tables::Party;
+use crate::commands::route::tables::Participants;
 use crate::messages::exit::{ALL_INPUTS, Failure, SOME_INPUTS};
 use crate::messages::progress::busy;
 use crate::messages::words;
-use crate::together::on_threads;
+use crate::threads::on_threads;
 
-/// What becomes of one route.
-struct Outcome {
+/// The outcome of one route.
+struct RouteOutcome {
     name: String,
     ends: [DVec3; 2],
-    found: Result<(Route, Vec<Row>), String>,
+    found: Result<(Route, Vec<RoutePoint>), String>,
 }
 
 /// A line of `--json`.
 #[derive(Serialize)]
-struct Line<'a> {
+struct RouteReport<'a> {
     name: &'a str,
     from: [f64; 3],
     to: [f64; 3],
@@ -44,46 +44,52 @@ struct Line<'a> {
     points: Option<usize>,
     /// Seconds.
     arrival: Option<f64>,
-    /// From the surface to what was asked for.
+    /// The distances of the requested ends from the surface.
     off: Option<[f64; 2]>,
     error: Option<&'a str>,
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let started = Instant::now();
-    let party = arguments.party()?;
-    let results = Results::new(arguments, &party)?;
+    let participants = arguments.participants()?;
+    let results = RouteResults::new(arguments, &participants)?;
     let surface = Surface::read(&arguments.surface, arguments.weld)?;
     let avoided = match &arguments.avoid {
         Some(path) => match Surface::read(path, arguments.weld)? {
             Surface::Mesh(mesh) => Some(mesh),
             Surface::Net(_) => {
-                let message = format!("{}: obstacles are a mesh", path.display());
+                let message = format!("{}: obstacles must be a mesh", path.display());
                 return Err(Failure::usage(message));
             }
         },
         None => None,
     };
     let found = busy("finding ways", || {
-        find(arguments, &surface, avoided.as_deref(), &party)
+        find(arguments, &surface, avoided.as_deref(), &participants)
     })?;
-    let outcomes = scheduled(found, &party);
+    let outcomes = scheduled(found, &participants);
     for outcome in &outcomes {
-        warn_off(outcome, surface.size());
+        warn_of_moved_ends(outcome, surface.size());
     }
     // Drawn before anything is written: what cannot be drawn leaves nothing.
     let picture = match results.plot() {
         None => None,
-        Some(place) => {
-            let picture = picture::draw(arguments, place, &surface, avoided.as_deref(), &outcomes)?;
-            Some((place, picture))
+        Some(destination) => {
+            let picture = picture::draw(
+                arguments,
+                destination,
+                &surface,
+                avoided.as_deref(),
+                &outcomes,
+            )?;
+            Some((destination, picture))
         }
     };
     results.write(&outcomes)?;
-    if let Some((place, picture)) = picture {
-        place.write(None, |out| out.write_all(&picture))?;
+    if let Some((destination, picture)) = picture {
+        destination.write(None, |out| out.write_all(&picture))?;
     }
-    told(arguments, &outcomes, &results, started)
+    report(arguments, &outcomes, &results, started)
 }
 
 /// The routes of all pairs, apart from time.
@@ -91,12 +97,12 @@ fn find(
     arguments: &Arguments,
     surface: &Surface,
     avoided: Option<&Mesh>,
-    party: &Party,
+    participants: &Participants,
 ) -> Result<Vec<Result<Route, String>>, Failure> {
     let words = |error: &dyn std::fmt::Display| error.to_string();
     let name = arguments.surface.display();
-    Ok(match (surface, arguments.manner()?) {
-        (Surface::Mesh(mesh), Manner::Mesh(by)) if arguments.wants_ground() => {
+    Ok(match (surface, arguments.method()?) {
+        (Surface::Mesh(mesh), RouteMethod::Mesh(by)) if arguments.wants_ground() => {
             let clear = Clear {
                 obstacles: avoided,
                 clearance: arguments.clearance.unwrap_or(0.0),
@@ -107,15 +113,15 @@ fn find(
             let ground = Ground::new(mesh, clear);
             let ground =
                 ground.map_err(|error| Failure::new(ALL_INPUTS, format!("{name}: {error}")))?;
-            let routes = ground.routes(&party.pairs, by).into_iter();
+            let routes = ground.routes(&participants.pairs, by).into_iter();
             routes
-                .map(|own| own.map_err(|error| words(&error)))
+                .map(|result| result.map_err(|error| words(&error)))
                 .collect()
         }
-        (Surface::Mesh(mesh), Manner::Mesh(by)) => {
-            let routes = mesh.routes(&party.pairs, by).into_iter();
+        (Surface::Mesh(mesh), RouteMethod::Mesh(by)) => {
+            let routes = mesh.routes(&participants.pairs, by).into_iter();
             routes
-                .map(|own| own.map_err(|error| words(&error)))
+                .map(|result| result.map_err(|error| words(&error)))
                 .collect()
         }
         (Surface::Net(_), _) if arguments.wants_ground() => {
@@ -123,23 +129,23 @@ fn find(
                 "{name}: --avoid and --max-slope are for meshes, and this is a net of control points"
             )));
         }
-        (Surface::Net(net), Manner::Net(by)) => {
+        (Surface::Net(net), RouteMethod::Net(by)) => {
             let route = |&[from, to]: &[DVec3; 2]| net.route(from, to, by);
             let routes: Vec<_> = on_threads(
-                || party.pairs.par_iter().map(route).collect(),
-                || party.pairs.iter().map(route).collect(),
+                || participants.pairs.par_iter().map(route).collect(),
+                || participants.pairs.iter().map(route).collect(),
             );
             let routes = routes.into_iter();
             routes
-                .map(|own| own.map_err(|error| words(&error)))
+                .map(|result| result.map_err(|error| words(&error)))
                 .collect()
         }
-        (Surface::Mesh(_), Manner::Net(_)) => {
+        (Surface::Mesh(_), RouteMethod::Net(_)) => {
             return Err(Failure::usage(format!(
                 "{name}: is a mesh; --by line and --by facets:N are for nets (.npy)"
             )));
         }
-        (Surface::Net(_), Manner::Mesh(_)) => {
+        (Surface::Net(_), RouteMethod::Mesh(_)) => {
             return Err(Failure::usage(format!(
                 "{name}: is a net of control points; give --by line or --by facets:N"
             )));
@@ -148,18 +154,21 @@ fn find(
 }
 
 /// The routes with the times at which they are walked, if they are.
-fn scheduled(found: Vec<Result<Route, String>>, party: &Party) -> Vec<Outcome> {
-    let mut outcomes: Vec<Outcome> = (found.into_iter().zip(&party.pairs).zip(&party.names))
-        .map(|((route, &ends), name)| Outcome {
-            name: name.clone(),
-            ends,
-            found: route.map(|route| {
-                let rows = Row::of_route(&route);
-                (route, rows)
-            }),
-        })
-        .collect();
-    let Some(paces) = &party.paces else {
+fn scheduled(found: Vec<Result<Route, String>>, participants: &Participants) -> Vec<RouteOutcome> {
+    let mut outcomes: Vec<RouteOutcome> = (found
+        .into_iter()
+        .zip(&participants.pairs)
+        .zip(&participants.names))
+    .map(|((route, &ends), name)| RouteOutcome {
+        name: name.clone(),
+        ends,
+        found: route.map(|route| {
+            let rows = RoutePoint::of_route(&route);
+            (route, rows)
+        }),
+    })
+    .collect();
+    let Some(paces) = &participants.paces else {
         return outcomes;
     };
     let walking: Vec<(usize, Walker)> = (outcomes.iter().zip(paces).enumerate())
@@ -175,13 +184,13 @@ fn scheduled(found: Vec<Result<Route, String>>, party: &Party) -> Vec<Outcome> {
         })
         .collect();
     let (indices, walking): (Vec<usize>, Vec<Walker>) = walking.into_iter().unzip();
-    let plans = walkers::plan(&walking, &party.movers);
+    let plans = walkers::plan(&walking, &participants.movers);
     for (index, plan) in indices.into_iter().zip(plans) {
         let outcome = &mut outcomes[index];
         match plan {
             Ok(plan) => {
                 if let Ok((route, rows)) = &mut outcome.found {
-                    *rows = Row::of_plan(route, &plan);
+                    *rows = RoutePoint::of_plan(route, &plan);
                 }
             }
             Err(error) => outcome.found = Err(error.to_string()),
@@ -190,32 +199,32 @@ fn scheduled(found: Vec<Result<Route, String>>, party: &Party) -> Vec<Outcome> {
     outcomes
 }
 
-/// Points that were not on the surface are moved onto it, with a word.
-fn warn_off(outcome: &Outcome, size: f64) {
+/// Warns of ends that were moved onto the surface.
+fn warn_of_moved_ends(outcome: &RouteOutcome, size: f64) {
     let Ok((route, _)) = &outcome.found else {
         return;
     };
-    for (what, off) in ["start", "goal"].into_iter().zip(route.off) {
+    for (end, off) in ["start", "goal"].into_iter().zip(route.off) {
         if off > 1e-6 * size {
             words::warning(&format!(
-                "{}: the {what} is {off} off the surface; its nearest point is taken",
+                "{}: the {end} is {off} away from the surface; the nearest point of the surface is used",
                 outcome.name
             ));
         }
     }
     if route.normals.is_none() {
         words::warning(&format!(
-            "{}: the surface has one side only, so the way has no normals",
+            "{}: the surface is one-sided, so the route has no normals",
             outcome.name
         ));
     }
 }
 
-/// Says what was found, and what was not.
-fn told(
+/// Prints the results, and the failures.
+fn report(
     arguments: &Arguments,
-    outcomes: &[Outcome],
-    results: &Results,
+    outcomes: &[RouteOutcome],
+    results: &RouteResults,
     started: Instant,
 ) -> Result<(), Failure> {
     let mut failed = 0;
@@ -226,7 +235,7 @@ fn told(
         }
     }
     if arguments.json {
-        let lines: Vec<Line<'_>> = outcomes.iter().map(line).collect();
+        let lines: Vec<RouteReport<'_>> = outcomes.iter().map(line).collect();
         words::json(&lines)?;
     }
     let name = arguments.surface.display();
@@ -261,9 +270,9 @@ fn told(
     }
 }
 
-fn line(outcome: &Outcome) -> Line<'_> {
+fn line(outcome: &RouteOutcome) -> RouteReport<'_> {
     let found = outcome.found.as_ref().ok();
-    Line {
+    RouteReport {
         name: &outcome.name,
         from: outcome.ends[0].to_array(),
         to: outcome.ends[1].to_array(),

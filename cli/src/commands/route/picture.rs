@@ -1,4 +1,4 @@
-//! The mesh from above, with its ways.
+//! The mesh from above, with the routes.
 
 use std::collections::HashSet;
 use std::fmt::Write as _;
@@ -6,9 +6,9 @@ use std::fmt::Write as _;
 use glam::{DVec2, DVec3};
 use tumble_routes::mesh::Mesh;
 
-use crate::batch::place::Place;
+use crate::batch::destination::Destination;
 use crate::commands::picture;
-use crate::commands::route::Outcome;
+use crate::commands::route::RouteOutcome;
 use crate::commands::route::arguments::Arguments;
 use crate::commands::route::surface::Surface;
 use crate::messages::exit::Failure;
@@ -16,22 +16,22 @@ use crate::messages::exit::Failure;
 /// The longer side, in pixels, and the margin.
 const SIZE: f64 = 800.0;
 const MARGIN: f64 = 20.0;
-/// A net is drawn as so many facets along a side.
+/// How many facets along a side a net is drawn with.
 const FACETS: usize = 24;
-/// Of more triangles the edges are no picture; only so many of them are drawn.
-const MOST_EDGES: usize = 60_000;
-/// Of the ways, one after another: blue, orange, green, red, purple (after Okabe and Ito).
+/// The most edges that are drawn.
+const MAX_EDGES: usize = 60_000;
+/// The colours of the routes, one after another: blue, orange, green, red, purple (after Okabe and Ito).
 const COLOURS: [&str; 5] = ["#0072b2", "#e69f00", "#009e73", "#d55e00", "#cc79a7"];
 
 /// The picture as its file has it.
 pub(super) fn draw(
     arguments: &Arguments,
-    place: &Place,
+    destination: &Destination,
     surface: &Surface,
     avoided: Option<&Mesh>,
-    outcomes: &[Outcome],
+    outcomes: &[RouteOutcome],
 ) -> Result<Vec<u8>, Failure> {
-    let name = place.to_string();
+    let name = destination.to_string();
     let faceted;
     let mesh = match surface {
         Surface::Mesh(mesh) => mesh,
@@ -43,28 +43,28 @@ pub(super) fn draw(
         }
     };
     let svg = svg(arguments.up, mesh, avoided, outcomes);
-    let extension = place.path().extension().unwrap_or_default();
+    let extension = destination.path().extension().unwrap_or_default();
     match extension.eq_ignore_ascii_case("png") {
         true => png(&svg).map_err(|error| Failure::writing(&name, &error)),
         false => Ok(svg.into_bytes()),
     }
 }
 
-/// How places are seen from above.
-struct View {
+/// The projection from above.
+struct TopView {
     right: DVec3,
     down: DVec3,
     corner: DVec2,
     scale: f64,
 }
 
-impl View {
+impl TopView {
     fn new(up: DVec3, mesh: &Mesh) -> Self {
         // With z upwards x runs to the right and y away; with y upwards z runs towards the eye.
         let other = if up.x.abs() < 0.9 { DVec3::X } else { DVec3::Y };
         let right = (other - other.dot(up) * up).normalize_or(DVec3::X);
         let down = right.cross(up);
-        let flat = |place: &DVec3| DVec2::new(place.dot(right), place.dot(down));
+        let flat = |position: &DVec3| DVec2::new(position.dot(right), position.dot(down));
         let all = mesh.positions().iter().map(flat);
         let low = all.clone().fold(DVec2::INFINITY, DVec2::min);
         let high = all.fold(DVec2::NEG_INFINITY, DVec2::max);
@@ -77,14 +77,14 @@ impl View {
         }
     }
 
-    fn at(&self, place: DVec3) -> DVec2 {
-        let flat = DVec2::new(place.dot(self.right), place.dot(self.down));
+    fn at(&self, position: DVec3) -> DVec2 {
+        let flat = DVec2::new(position.dot(self.right), position.dot(self.down));
         (flat - self.corner) * self.scale + MARGIN
     }
 }
 
-fn svg(up: DVec3, mesh: &Mesh, avoided: Option<&Mesh>, outcomes: &[Outcome]) -> String {
-    let view = View::new(up, mesh);
+fn svg(up: DVec3, mesh: &Mesh, avoided: Option<&Mesh>, outcomes: &[RouteOutcome]) -> String {
+    let view = TopView::new(up, mesh);
     let mut svg = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{SIZE}\" height=\"{SIZE}\" \
          viewBox=\"0 0 {SIZE} {SIZE}\">\n<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n"
@@ -96,8 +96,9 @@ fn svg(up: DVec3, mesh: &Mesh, avoided: Option<&Mesh>, outcomes: &[Outcome]) -> 
     );
     if let Some(rocks) = avoided {
         let mut filled = String::new();
-        for own in rocks.triangles() {
-            let [a, mut b, mut c] = own.map(|vertex| view.at(rocks.positions()[vertex as usize]));
+        for triangle in rocks.triangles() {
+            let [a, mut b, mut c] =
+                triangle.map(|vertex| view.at(rocks.positions()[vertex as usize]));
             // All the same way round, or the lower side would leave the upper one unfilled.
             if (b - a).perp_dot(c - a) < 0.0 {
                 (b, c) = (c, b);
@@ -141,13 +142,13 @@ fn svg(up: DVec3, mesh: &Mesh, avoided: Option<&Mesh>, outcomes: &[Outcome]) -> 
 }
 
 /// Every edge once; of large meshes every so many.
-fn edges(view: &View, mesh: &Mesh) -> String {
+fn edges(view: &TopView, mesh: &Mesh) -> String {
     let mut known = HashSet::new();
     let mut path = String::new();
-    let every = (3 * mesh.triangles().len() / 2).div_ceil(MOST_EDGES).max(1);
-    for own in mesh.triangles() {
+    let every = (3 * mesh.triangles().len() / 2).div_ceil(MAX_EDGES).max(1);
+    for triangle in mesh.triangles() {
         for k in 0..3 {
-            let (one, other) = (own[k], own[(k + 1) % 3]);
+            let (one, other) = (triangle[k], triangle[(k + 1) % 3]);
             if known.insert((one.min(other), one.max(other))) && known.len().is_multiple_of(every) {
                 let [a, b] = [one, other].map(|vertex| view.at(mesh.positions()[vertex as usize]));
                 let _ = write!(path, "M{:.2} {:.2}L{:.2} {:.2}", a.x, a.y, b.x, b.y);

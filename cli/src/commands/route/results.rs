@@ -1,4 +1,4 @@
-//! Ways as files: CSV that `tumble follow` reads.
+//! Routes as files: CSV that `tumble follow` reads.
 
 use std::fmt;
 use std::io::{self, Write};
@@ -8,62 +8,62 @@ use glam::DVec3;
 use tumble_routes::route::Route;
 use tumble_routes::walkers::Plan;
 
-use crate::batch::place::{self, Place};
-use crate::commands::route::Outcome;
+use crate::batch::destination::{self, Destination};
+use crate::commands::route::RouteOutcome;
 use crate::commands::route::arguments::Arguments;
-use crate::commands::route::tables::Party;
+use crate::commands::route::tables::Participants;
 use crate::messages::exit::Failure;
 
-/// A point of a way.
-pub(super) struct Row {
+/// A point of a route.
+pub(super) struct RoutePoint {
     /// Seconds, where time counts.
     pub(super) time: Option<f64>,
-    pub(super) place: DVec3,
+    pub(super) position: DVec3,
     /// Of the surface; none where that has one side, or its normals cancel out.
     pub(super) normal: Option<DVec3>,
 }
 
-impl Row {
+impl RoutePoint {
     pub(super) fn of_route(route: &Route) -> Vec<Self> {
-        let row = |(index, &place): (usize, &DVec3)| Self {
+        let row = |(index, &position): (usize, &DVec3)| Self {
             time: None,
-            place,
+            position,
             normal: (route.normals.as_ref().map(|all| all[index]))
-                .filter(|own| *own != DVec3::ZERO),
+                .filter(|normal| *normal != DVec3::ZERO),
         };
         route.points.iter().enumerate().map(row).collect()
     }
 
     pub(super) fn of_plan(route: &Route, plan: &Plan) -> Vec<Self> {
-        let row = |&(time, gone, place): &(f64, f64, DVec3)| Self {
+        let row = |&(time, distance, position): &(f64, f64, DVec3)| Self {
             time: Some(time),
-            place,
-            normal: route.at(gone).1.filter(|own| *own != DVec3::ZERO),
+            position,
+            normal: route.at(distance).1.filter(|normal| *normal != DVec3::ZERO),
         };
         plan.times.iter().map(row).collect()
     }
 }
 
-/// Where ways go: checked before any work.
-pub(super) struct Results {
-    place: String,
-    places: Vec<Place>,
+/// The destinations of routes, checked before any work.
+pub(super) struct RouteResults {
+    label: String,
+    destinations: Vec<Destination>,
     /// Of the picture.
-    plot: Option<Place>,
+    plot: Option<Destination>,
 }
 
-impl Results {
-    pub(super) fn new(arguments: &Arguments, party: &Party) -> Result<Self, Failure> {
+impl RouteResults {
+    pub(super) fn new(arguments: &Arguments, participants: &Participants) -> Result<Self, Failure> {
         let mut inputs = vec![arguments.surface.clone()];
         inputs.extend(arguments.avoid.clone());
         let out = &arguments.out;
-        let new = |path: &Path| Place::new(path, arguments.overwrite, &inputs);
-        let places = if party.is_single {
+        let new = |path: &Path| Destination::new(path, arguments.overwrite, &inputs);
+        let destinations = if participants.is_single {
             vec![new(out)?]
         } else {
-            place::folder(out)?;
+            destination::create_folder(out)?;
             let path = |name: &String| out.join(format!("{name}.csv"));
-            party
+            participants
                 .names
                 .iter()
                 .map(|name| new(&path(name)))
@@ -72,48 +72,48 @@ impl Results {
         let plot = match &arguments.plot {
             None => None,
             Some(plot) => {
-                let plot = Place::of_picture(plot, arguments.overwrite, &inputs)?;
-                for place in &places {
-                    plot.refuse_same(place.path())?;
+                let plot = Destination::of_picture(plot, arguments.overwrite, &inputs)?;
+                for destination in &destinations {
+                    plot.refuse_same(destination.path())?;
                 }
-                plot.try_out()?;
+                plot.check_writable()?;
                 Some(plot)
             }
         };
-        let place = match &places[..] {
-            [place] if party.is_single => place.to_string(),
+        let label = match &destinations[..] {
+            [destination] if participants.is_single => destination.to_string(),
             _ => out.display().to_string(),
         };
         Ok(Self {
-            place,
-            places,
+            label,
+            destinations,
             plot,
         })
     }
 
     /// Where the picture goes, if one is drawn.
-    pub(super) fn plot(&self) -> Option<&Place> {
+    pub(super) fn plot(&self) -> Option<&Destination> {
         self.plot.as_ref()
     }
 
     /// Writes what was found, each file whole or not at all.
-    pub(super) fn write(&self, outcomes: &[Outcome]) -> Result<(), Failure> {
-        for (outcome, place) in outcomes.iter().zip(&self.places) {
+    pub(super) fn write(&self, outcomes: &[RouteOutcome]) -> Result<(), Failure> {
+        for (outcome, destination) in outcomes.iter().zip(&self.destinations) {
             if let Ok((_, rows)) = &outcome.found {
-                place.write(None, |out| write(rows, out))?;
+                destination.write(None, |out| write(rows, out))?;
             }
         }
         Ok(())
     }
 }
 
-impl fmt::Display for Results {
+impl fmt::Display for RouteResults {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.place)
+        f.write_str(&self.label)
     }
 }
 
-fn write(rows: &[Row], out: &mut impl Write) -> io::Result<()> {
+fn write(rows: &[RoutePoint], out: &mut impl Write) -> io::Result<()> {
     let has_times = rows.iter().any(|row| row.time.is_some());
     let has_normals = rows.iter().any(|row| row.normal.is_some());
     let times = if has_times { "t," } else { "" };
@@ -123,7 +123,7 @@ fn write(rows: &[Row], out: &mut impl Write) -> io::Result<()> {
         if let Some(time) = row.time {
             write!(out, "{time},")?;
         }
-        let DVec3 { x, y, z } = row.place;
+        let DVec3 { x, y, z } = row.position;
         write!(out, "{x},{y},{z}")?;
         match row.normal {
             Some(DVec3 { x, y, z }) => write!(out, ",{x},{y},{z}")?,

@@ -1,4 +1,4 @@
-//! What ways lead over, read from a file.
+//! The surfaces that routes lie on, read from files.
 
 use std::fs::File;
 use std::io::{self, Read};
@@ -17,7 +17,7 @@ use crate::messages::exit::Failure;
 use crate::messages::words;
 
 /// The largest file that is read.
-const MOST_BYTES: u64 = 4 << 30;
+const MAX_BYTES: u64 = 4 << 30;
 
 pub(crate) enum Surface {
     Mesh(Box<Mesh>),
@@ -35,7 +35,7 @@ impl Surface {
         let refuse = |error: &dyn std::fmt::Display| refused(Code::Mesh, error);
         let extension = path
             .extension()
-            .and_then(|own| own.to_str())
+            .and_then(|raw| raw.to_str())
             .unwrap_or_default();
         let mesh = match extension.to_lowercase().as_str() {
             "obj" => {
@@ -116,10 +116,10 @@ fn read(path: &Path, file: io::Result<File>) -> Result<Vec<u8>, Failure> {
     let refuse = |error: io::Error| refused(Code::Open, format!("cannot be read: {error}"));
     let mut bytes = Vec::new();
     let file = file.map_err(refuse)?;
-    file.take(MOST_BYTES + 1)
+    file.take(MAX_BYTES + 1)
         .read_to_end(&mut bytes)
         .map_err(refuse)?;
-    match bytes.len() as u64 <= MOST_BYTES {
+    match bytes.len() as u64 <= MAX_BYTES {
         true => Ok(bytes),
         false => {
             let message = "is longer than 4 GiB; simplify it";

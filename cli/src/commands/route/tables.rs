@@ -4,32 +4,32 @@ use std::path::Path;
 
 use glam::DVec3;
 use serde::Deserialize;
-use tumble_formats::{Code, Diagnostic, Place};
+use tumble_formats::{Code, Diagnostic, Location};
 use tumble_routes::walkers::Mover;
 
 use crate::commands::route::surface::{bytes, bytes_beneath};
 use crate::messages::exit::Failure;
 
-/// Who goes from where to where.
-pub(crate) struct Party {
+/// The start and the goal of each route.
+pub(crate) struct Participants {
     pub(super) pairs: Vec<[DVec3; 2]>,
-    /// What messages and files call each.
+    /// Their names in messages and files.
     pub(super) names: Vec<String>,
     /// How each walks, where time counts.
-    pub(super) paces: Option<Vec<Pace>>,
-    /// What moves on tracks of its own.
+    pub(super) paces: Option<Vec<WalkingPace>>,
+    /// Moving obstacles, each on its track.
     pub(super) movers: Vec<Mover>,
     /// Whether there is one route, for one file.
     pub(super) is_single: bool,
 }
 
-pub(super) struct Pace {
+pub(super) struct WalkingPace {
     pub(super) radius: f64,
     pub(super) speed: f64,
     pub(super) start: f64,
 }
 
-impl Party {
+impl Participants {
     pub(super) fn of_pair(pair: [DVec3; 2]) -> Self {
         Self {
             pairs: vec![pair],
@@ -48,17 +48,17 @@ fn whole(path: &Path, code: Code, message: &str) -> Failure {
 
 fn refuse(path: &Path, line: u64, code: Code, message: &str) -> Failure {
     let mut fault = Diagnostic::new(path.display().to_string(), code, message);
-    fault.place = Some(Place::Text { line, column: 1 });
+    fault.location = Some(Location::Text { line, column: 1 });
     Failure::input(&fault, "")
 }
 
 fn text(path: &Path, bytes: Vec<u8>) -> Result<String, Failure> {
     let text = String::from_utf8(bytes);
-    text.map_err(|_| whole(path, Code::Encoding, "is no UTF-8 text; save it as UTF-8"))
+    text.map_err(|_| whole(path, Code::Encoding, "is not UTF-8 text; save it as UTF-8"))
 }
 
 /// Six numbers a line; lines with `#` in front and empty ones are skipped.
-pub(super) fn read_pairs(path: &Path) -> Result<Party, Failure> {
+pub(super) fn read_pairs(path: &Path) -> Result<Participants, Failure> {
     let mut pairs = Vec::new();
     for (number, line) in (1..).zip(text(path, bytes(path)?)?.lines()) {
         let line = line.trim();
@@ -73,8 +73,9 @@ pub(super) fn read_pairs(path: &Path) -> Result<Party, Failure> {
         match numbers.as_deref() {
             Ok(&[a, b, c, d, e, f]) => pairs.push([DVec3::new(a, b, c), DVec3::new(d, e, f)]),
             _ => {
-                let message =
-                    format!("`{line}` is no pair; give x y z of the start and of the goal");
+                let message = format!(
+                    "invalid pair `{line}`: expected x y z of the start, then x y z of the goal"
+                );
                 return Err(refuse(path, number, Code::Pairs, &message));
             }
         }
@@ -83,7 +84,7 @@ pub(super) fn read_pairs(path: &Path) -> Result<Party, Failure> {
         return Err(whole(path, Code::Pairs, "has no pairs"));
     }
     let digits = pairs.len().to_string().len();
-    Ok(Party {
+    Ok(Participants {
         names: (1..=pairs.len())
             .map(|number| format!("route-{number:0digits$}"))
             .collect(),
@@ -150,8 +151,8 @@ fn rows<T: for<'de> Deserialize<'de>>(
     Ok(rows)
 }
 
-pub(super) fn read_walkers(path: &Path) -> Result<Party, Failure> {
-    let mut party = Party {
+pub(super) fn read_walkers(path: &Path) -> Result<Participants, Failure> {
+    let mut participants = Participants {
         pairs: Vec::new(),
         names: Vec::new(),
         paces: Some(Vec::new()),
@@ -159,7 +160,7 @@ pub(super) fn read_walkers(path: &Path) -> Result<Party, Failure> {
         is_single: false,
     };
     for (line, row) in rows::<WalkerRow>(path, bytes(path)?)? {
-        if let Some(track) = row.track.filter(|own| !own.is_empty()) {
+        if let Some(track) = row.track.filter(|track| !track.is_empty()) {
             if !(row.radius >= 0.0 && row.radius.is_finite()) {
                 let message = "a radius is a number of 0 or more";
                 return Err(refuse(path, line, Code::Walkers, message));
@@ -168,7 +169,7 @@ pub(super) fn read_walkers(path: &Path) -> Result<Party, Failure> {
             let file = folder.join(&track);
             let bytes = bytes_beneath(folder, Path::new(&track))
                 .map_err(|failure| refuse(path, line, Code::Walkers, failure.message()))?;
-            party.movers.push(Mover {
+            participants.movers.push(Mover {
                 track: read_track(&file, bytes)?,
                 radius: row.radius,
             });
@@ -185,42 +186,44 @@ pub(super) fn read_walkers(path: &Path) -> Result<Party, Failure> {
             Some(speed),
         ] = all
         else {
-            let message = "a walker has speed, x, y, z, to_x, to_y and to_z; what moves on a \
-                           track of its own has track";
+            let message = "a walker needs speed, x, y, z, to_x, to_y and to_z; something that moves on a given track needs track";
             return Err(refuse(path, line, Code::Walkers, message));
         };
-        party
+        participants
             .pairs
             .push([DVec3::new(x, y, z), DVec3::new(to_x, to_y, to_z)]);
-        let name = row.name.filter(|own| !own.is_empty());
-        let name = name.unwrap_or_else(|| format!("walker-{}", party.pairs.len()));
+        let name = row.name.filter(|name| !name.is_empty());
+        let name = name.unwrap_or_else(|| format!("walker-{}", participants.pairs.len()));
         let is_plain = |c: char| c.is_alphanumeric() || matches!(c, '-' | '_' | '.' | ' ');
-        if !name.chars().all(is_plain) || name.starts_with('.') || party.names.contains(&name) {
+        if !name.chars().all(is_plain)
+            || name.starts_with('.')
+            || participants.names.contains(&name)
+        {
             let message =
-                format!("`{name}` names a file: give each walker a plain name of its own");
+                format!("`{name}` cannot name a file: give each walker a different, plain name");
             return Err(refuse(path, line, Code::Walkers, &message));
         }
-        party.names.push(name);
-        let pace = Pace {
+        participants.names.push(name);
+        let pace = WalkingPace {
             radius: row.radius,
             speed,
             start: row.start.unwrap_or(0.0),
         };
-        party.paces.get_or_insert_default().push(pace);
+        participants.paces.get_or_insert_default().push(pace);
     }
-    match party.pairs.is_empty() {
+    match participants.pairs.is_empty() {
         true => Err(whole(path, Code::Walkers, "has no walkers")),
-        false => Ok(party),
+        false => Ok(participants),
     }
 }
 
-/// Times and places: `t,x,y,z`, times increasing.
+/// Times and positions: `t,x,y,z`, times increasing.
 fn read_track(path: &Path, bytes: Vec<u8>) -> Result<Vec<(f64, DVec3)>, Failure> {
     let mut track: Vec<(f64, DVec3)> = Vec::new();
     for (line, row) in rows::<TrackRow>(path, bytes)? {
-        let place = DVec3::new(row.x, row.y, row.z);
-        if !(place.is_finite() && row.t.is_finite()) {
-            let message = "times and places are finite numbers";
+        let position = DVec3::new(row.x, row.y, row.z);
+        if !(position.is_finite() && row.t.is_finite()) {
+            let message = "times and positions must be finite numbers";
             return Err(refuse(path, line, Code::Walkers, message));
         }
         if track.last().is_some_and(|last| last.0 >= row.t) {
@@ -228,13 +231,13 @@ fn read_track(path: &Path, bytes: Vec<u8>) -> Result<Vec<(f64, DVec3)>, Failure>
                 path,
                 line,
                 Code::Walkers,
-                &format!("times increase, and {} does not", row.t),
+                &format!("times must increase, and {} does not", row.t),
             ));
         }
-        track.push((row.t, place));
+        track.push((row.t, position));
     }
     match track.is_empty() {
-        true => Err(whole(path, Code::Walkers, "has no places")),
+        true => Err(whole(path, Code::Walkers, "has no positions")),
         false => Ok(track),
     }
 }

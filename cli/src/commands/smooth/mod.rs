@@ -9,35 +9,35 @@ use std::time::Instant;
 
 use clap::{Args, ValueEnum};
 use tumble::{
-    Engine, Error, EulerSequence, FrameRate, Frames, Layout, Rotations, Smoothing, SmoothingEnds,
-    SmoothingError, SmoothingKernel, Vectors,
+    Engine, Error, EulerSequence, FrameRate, Layout, Rotations, SampleTimes, Smoothing,
+    SmoothingEnds, SmoothingError, SmoothingKernel, Vectors,
 };
 use tumble_formats::format::{Document, MotionOptions, ResultShape};
-use tumble_formats::motion::{Motion, Sampled};
+use tumble_formats::motion::{Motion, SampledClip};
 use tumble_formats::sample::{ChannelMethods, Samples};
 
-use crate::arguments::device::{DeviceArguments, Opened};
-use crate::arguments::given::Given;
+use crate::arguments::command_line::CommandLine;
+use crate::arguments::device::{DeviceArguments, OpenedDevice};
 use crate::arguments::input::{self, Inputs};
-use crate::arguments::results::{Results, check_sequence, each_file, kept};
-use crate::arguments::what::sequence;
-use crate::batch::output::Target;
-use crate::batch::place::Written;
+use crate::arguments::output::sequence;
+use crate::arguments::results::{ResultArguments, check_sequence, document_to_rewrite, each_file};
+use crate::batch::destination::WrittenFile;
+use crate::batch::output::ResultTarget;
 use crate::batch::room;
-use crate::batch::run::Evaluated;
-use crate::commands::smooth::picture::Subject;
+use crate::batch::run::EvaluatedResult;
+use crate::commands::smooth::picture::SmoothingSubject;
 use crate::messages::exit::{ALL_INPUTS, Failure};
 use crate::messages::words;
 
 /// Smooth rotations and translations by a kernel over samples
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Kernels act on the steps from sample to sample, so that still tracks keep their bits and even
-motion stays: linear, cubic, box:S and tent:S (S samples to either side), gaussian:S (standard
+Kernels act on the steps from sample to sample, so that still tracks keep their bits and uniform
+motion does not change: linear, cubic, box:S and tent:S (S samples to either side), gaussian:S (standard
 deviation), savitzky-golay:RADIUS:ORDER. --low-pass HZ is the bell that halves the power of motion at
 that frequency, whatever the rate of the samples. Samples are the keys where these are evenly spaced, else
---fps says how to sample. NPY and CSV hold the rotations, motion files everything. A file of the same
-format keeps all else that it holds; steps stay steps there.
+--fps sets the rate. NPY and CSV store the rotations, motion files everything. An output of the input's
+format keeps everything else in the file; stepped channels stay stepped.
 
 Examples:
   tumble smooth walk.dat --kernel gaussian:2 -o out.npy
@@ -46,32 +46,31 @@ Examples:
   tumble smooth takes -o smooth --to glb --fps 60 --kernel linear --passes 3")]
 pub(crate) struct Arguments {
     #[command(flatten)]
-    given: Given,
+    command_line: CommandLine,
     #[command(flatten)]
     inputs: Inputs,
     #[command(flatten)]
-    results: Results,
+    results: ResultArguments,
     /// The weights: linear, cubic, box:S, tent:S, gaussian:S or savitzky-golay:RADIUS:ORDER
     #[arg(short, long, value_name = "KERNEL", default_value = "gaussian:2")]
     kernel: SmoothingKernel,
-    /// Instead of a kernel: keep what is slower than this frequency; motion at it keeps 71 % of its size
+    /// Instead of a kernel: keep motion below this frequency; motion at the frequency keeps 71 % of its size
     /// (-3 dB), motion at twice of it 25 %
     #[arg(long, value_name = "HZ", conflicts_with_all = ["kernel", "passes"], value_parser = frequency)]
     low_pass: Option<f64>,
-    /// How often
+    /// The number of passes
     #[arg(long, value_name = "N", default_value_t = 1)]
     passes: u32,
-    /// What lies beyond the first and the last sample
+    /// How samples continue beyond the first and the last one
     #[arg(long, value_name = "ENDS", default_value = "keep")]
-    ends: EndsArgument,
+    ends: SmoothingEndsArgument,
     /// Sample at this rate first [default: the keys themselves]
     #[arg(long, value_name = "FPS")]
     fps: Option<FrameRate>,
     /// The axes of the angles of BVH, three different ones [default: those of the input, else ZXY]
     #[arg(long, value_name = "AXES", value_parser = sequence)]
     sequence: Option<EulerSequence>,
-    /// Also draw, as .svg or .png, how fast the joint turns and moves that had the most noise, before
-    /// and after; of one input
+    /// Also draw the speeds of the noisiest joint before and after, as .svg or .png; needs a single input
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
     #[command(flatten)]
@@ -79,7 +78,7 @@ pub(crate) struct Arguments {
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
-enum EndsArgument {
+enum SmoothingEndsArgument {
     /// the end samples stay
     Keep,
     /// cubic: the end samples go to the parabola through the next three
@@ -92,7 +91,7 @@ fn frequency(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(hz) if hz.is_finite() && hz > 0.0 => Ok(hz),
         _ => Err(format!(
-            "`{text}` is no frequency; give a number of Hz over 0"
+            "invalid frequency `{text}`: expected a number of Hz above 0"
         )),
     }
 }
@@ -122,9 +121,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let smoothing = Smoothing {
         kernel: arguments.kernel,
         ends: match arguments.ends {
-            EndsArgument::Keep => SmoothingEnds::Keep,
-            EndsArgument::Parabolic => SmoothingEnds::Parabolic,
-            EndsArgument::Loop => SmoothingEnds::Loop,
+            SmoothingEndsArgument::Keep => SmoothingEnds::Keep,
+            SmoothingEndsArgument::Parabolic => SmoothingEnds::Parabolic,
+            SmoothingEndsArgument::Loop => SmoothingEnds::Loop,
         },
         passes: arguments.passes,
     };
@@ -137,23 +136,26 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         Some(file) => arguments.results.picture(file, &files, &plan)?,
         None => None,
     };
-    check_sequence(arguments.sequence, plan.targets.first().map(Target::format))?;
+    check_sequence(
+        arguments.sequence,
+        plan.targets.first().map(ResultTarget::format),
+    )?;
     let mut device = arguments.device.open()?;
-    let options = format!("smooth {}", arguments.given.options());
+    let options = format!("smooth {}", arguments.command_line.options());
     arguments.results.make(
         &arguments.inputs,
         plan,
         options,
         |file, loaded, target, done| {
             let path = file.path();
-            let mut make = |name: &str, clips: &[&Motion], target: &Target| {
+            let mut make = |name: &str, clips: &[&Motion], target: &ResultTarget| {
                 let started = Instant::now();
                 let tracks = &arguments.inputs.tracks;
-                let own = |clip| match target.format().takes_motion(&[clip]) {
+                let select = |clip| match target.format().takes_motion(&[clip]) {
                     true => tracks.select_with_ancestors(clip, name),
                     false => tracks.select(clip, name),
                 };
-                let clips = clips.iter().map(|&clip| own(clip));
+                let clips = clips.iter().map(|&clip| select(clip));
                 let clips: Vec<Cow<'_, Motion>> = clips.collect::<Result<_, Failure>>()?;
                 let clips: Vec<&Motion> = clips.iter().map(|clip| &**clip).collect();
                 let samples = clips
@@ -163,46 +165,51 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
                         smoothed(&mut device, name, clip, &smoothing, rate)
                     })
                     .collect::<Result<Vec<_>, Failure>>()?;
-                if let ([clip], [own], Some(place)) = (&*clips, &*samples, &plot) {
+                if let ([clip], [smoothed_clip], Some(destination)) = (&*clips, &*samples, &plot) {
                     let names = (0..clip.set.track_count()).map(|track| clip.set.track_name(track));
                     let names: Vec<String> = names.collect();
-                    let subject = Subject {
+                    let subject = SmoothingSubject {
                         title: input::file_name(path),
                         about: match (arguments.low_pass, smoothing.passes) {
-                            (Some(hz), _) => format!("low-pass at {hz} Hz, {}", own.kernel),
-                            (None, 1) => own.kernel.to_string(),
-                            (None, passes) => format!("{}, {passes} times", own.kernel),
+                            (Some(hz), _) => {
+                                format!("low-pass at {hz} Hz, {}", smoothed_clip.kernel)
+                            }
+                            (None, 1) => smoothed_clip.kernel.to_string(),
+                            (None, passes) => format!("{}, {passes} times", smoothed_clip.kernel),
                         },
                         names: &names,
-                        before: &own.before,
-                        after: &own.after,
+                        before: &smoothed_clip.before,
+                        after: &smoothed_clip.after,
                     };
-                    picture::draw(&subject, place)?;
+                    picture::draw(&subject, destination)?;
                 }
                 let options = MotionOptions {
                     sequence: arguments.sequence,
                     box_length: loaded.box_length,
                     ..target.motion_options()
                 };
-                let some = tracks.is_given().then_some("some tracks make");
-                let document = kept(name, loaded, target, some);
+                let some = tracks.is_set().then_some("some tracks make");
+                let document = document_to_rewrite(name, loaded, target, some);
                 let result = (target, options, document);
                 let written = write(name, &clips, &samples, result)?;
-                let kernels = samples.iter().map(|own| own.kernel.to_string());
+                let kernels = samples.iter().map(|smoothed| smoothed.kernel.to_string());
                 let mut kernels: Vec<String> = kernels.collect();
                 kernels.dedup();
-                let times = samples.iter().map(|own| own.after.times.len()).sum();
-                let told = format!(
+                let times = samples
+                    .iter()
+                    .map(|smoothed| smoothed.after.times.len())
+                    .sum();
+                let message = format!(
                     "{name}: {}, {}, on {} in {} → {target}",
                     words::count(times, "sample"),
                     kernels.join(", "),
                     device.label,
                     words::duration(started.elapsed()),
                 );
-                Ok(Evaluated {
+                Ok(EvaluatedResult {
                     written,
                     device: device.label.clone(),
-                    told,
+                    message,
                 })
             };
             each_file(&input::name(path), (path, loaded), target, done, &mut make)
@@ -225,31 +232,31 @@ const EVEN: f64 = 1e-3;
 fn even_times(clip: &Motion) -> Option<Vec<f64>> {
     let longest = clip.set.tracks().max_by_key(|track| track.times.len())?;
     let times = longest.times;
-    let fits = |own: &[f64]| own == times || own.len() == 1;
+    let fits = |track_times: &[f64]| track_times == times || track_times.len() == 1;
     let channels = [tumble::Channel::Translation, tumble::Channel::Scale];
     let vectors = (0..clip.set.track_count())
         .flat_map(|track| channels.map(|channel| clip.set.vector_keys(channel, track)));
     let all = clip.set.tracks().all(|track| fits(track.times))
         && vectors.flatten().all(|keys| fits(keys.times));
     let steps = || times.windows(2).map(|pair| pair[1] - pair[0]);
-    let (least, most) = (
+    let (least, largest) = (
         steps().fold(f64::INFINITY, f64::min),
         steps().fold(0.0, f64::max),
     );
-    (all && (times.len() < 2 || most - least <= EVEN * most)).then(|| times.to_vec())
+    (all && (times.len() < 2 || largest - least <= EVEN * largest)).then(|| times.to_vec())
 }
 
 fn smoothed(
-    device: &mut Opened,
+    device: &mut OpenedDevice,
     name: &str,
     clip: &Motion,
     smoothing: &Smoothing,
     (fps, low_pass): (Option<FrameRate>, Option<f64>),
 ) -> Result<Smoothed, Failure> {
     let (frames, rate) = match fps {
-        Some(rate) => (Frames::rate(rate), Some(rate)),
+        Some(rate) => (SampleTimes::rate(rate), Some(rate)),
         None => match even_times(clip) {
-            Some(times) => (Frames::at(times), clip.rate),
+            Some(times) => (SampleTimes::at(times), clip.rate),
             None => {
                 let message = format!(
                     "{name}: the keys are not evenly spaced, or not at the same times in all tracks; give --fps"
@@ -269,11 +276,11 @@ fn smoothed(
         let before = methods.sample(engine, clip, &frames)?;
         let mut samples = before.clone();
         let layout = Layout::FrameMajor;
-        if let Ok(own) = Rotations::of(&samples.rotations, tracks, layout) {
-            samples.rotations = engine.smooth(&own, &smoothing)?.as_quats().to_vec();
+        if let Ok(input) = Rotations::of(&samples.rotations, tracks, layout) {
+            samples.rotations = engine.smooth(&input, &smoothing)?.as_quats().to_vec();
         }
-        if let Ok(own) = Vectors::of(&samples.translations, tracks, layout) {
-            let moved = engine.smooth_vectors(&own, &smoothing)?;
+        if let Ok(input) = Vectors::of(&samples.translations, tracks, layout) {
+            let moved = engine.smooth_vectors(&input, &smoothing)?;
             samples.translations = moved.as_slice().iter().map(|v| v.truncate()).collect();
         }
         Ok::<_, Error>((before, samples))
@@ -295,21 +302,21 @@ fn write(
     name: &str,
     clips: &[&Motion],
     samples: &[Smoothed],
-    (target, options, document): (&Target, MotionOptions, Option<&dyn Document>),
-) -> Result<Written, Failure> {
+    (target, options, document): (&ResultTarget, MotionOptions, Option<&dyn Document>),
+) -> Result<WrittenFile, Failure> {
     let notes = [
         (
             "kernel",
             samples
                 .first()
-                .map_or_else(String::new, |own| own.kernel.to_string()),
+                .map_or_else(String::new, |smoothed| smoothed.kernel.to_string()),
         ),
         ("input", name.to_owned()),
     ];
     let format = target.format();
-    if let ([clip], [Smoothed { after: own, .. }], Some(_)) = (clips, samples, &format.write) {
+    if let ([clip], [Smoothed { after, .. }], Some(_)) = (clips, samples, &format.write) {
         let tracks = clip.set.track_count();
-        let timeline = Frames::at(own.times.clone())
+        let timeline = SampleTimes::at(after.times.clone())
             .resolve(tracks, None)
             .map_err(|error| Failure::evaluating(name, &error.into()))?;
         let shape = ResultShape {
@@ -322,22 +329,22 @@ fn write(
             notes: &notes,
         };
         let layout = target.results()?.layout.unwrap_or(Layout::TrackMajor);
-        let count = own.times.len();
-        let from = |place: usize| match layout {
-            Layout::FrameMajor => place,
-            Layout::TrackMajor => (place % count) * tracks + place / count,
+        let count = after.times.len();
+        let from = |index: usize| match layout {
+            Layout::FrameMajor => index,
+            Layout::TrackMajor => (index % count) * tracks + index / count,
         };
-        let rotations: Vec<_> = (0..own.rotations.len())
-            .map(|place| own.rotations[from(place)])
+        let rotations: Vec<_> = (0..after.rotations.len())
+            .map(|index| after.rotations[from(index)])
             .collect();
         return target.write_whole(&ResultShape { layout, ..shape }, &rotations);
     }
-    let sampled: Vec<Sampled<'_>> = (clips.iter().zip(samples))
-        .map(|(clip, own)| own.after.of(clip, own.rate, &notes))
+    let sampled: Vec<SampledClip<'_>> = (clips.iter().zip(samples))
+        .map(|(clip, smoothed)| smoothed.after.of(clip, smoothed.rate, &notes))
         .collect();
     if let Some(document) = document {
-        let places = clips.iter().map(|clip| clip.place);
-        let clips: Vec<(usize, Sampled<'_>)> = places.zip(sampled).collect();
+        let indices = clips.iter().map(|clip| clip.index);
+        let clips: Vec<(usize, SampledClip<'_>)> = indices.zip(sampled).collect();
         return target.write_motion(|out| document.write(&clips, &options, target.path(), out));
     }
     if !format.writes_clips() {

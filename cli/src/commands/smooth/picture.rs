@@ -3,10 +3,10 @@
 use glam::{Quat, Vec3};
 use tumble_formats::sample::Samples;
 
-use crate::batch::place::Place;
+use crate::batch::destination::Destination;
 use crate::commands::plot::draw;
 use crate::commands::plot::figure::{
-    Axes, Axis, Curve, Entry, Figure, Mark, Panel, range_of, thinned,
+    Figure, LegendEntry, Mark, Panel, PanelAxes, PlotAxis, PlotCurve, range_of, thinned,
 };
 use crate::commands::travel::Travel;
 use crate::messages::colours::{AXIS, BOXES, Colour};
@@ -15,11 +15,11 @@ use crate::messages::exit::Failure;
 /// Before and after.
 const COLOURS: [Colour; 2] = [AXIS, BOXES[0]];
 const WIDTHS: [f64; 2] = [1.0, 2.2];
-/// Points that a curve is drawn of are at most four for each of so many columns.
+/// A curve is drawn with at most four points for each of this many columns.
 const COLUMNS: usize = 2000;
 
 /// What the picture is of.
-pub(super) struct Subject<'a> {
+pub(super) struct SmoothingSubject<'a> {
     pub(super) title: String,
     /// The kernel and how often.
     pub(super) about: String,
@@ -30,29 +30,33 @@ pub(super) struct Subject<'a> {
 }
 
 /// Draws into a file, which ends in .svg or .png.
-pub(super) fn draw(subject: &Subject<'_>, place: &Place) -> Result<(), Failure> {
-    draw::write(&figure(subject), place)
+pub(super) fn draw(
+    subject: &SmoothingSubject<'_>,
+    destination: &Destination,
+) -> Result<(), Failure> {
+    draw::write(&figure(subject), destination)
 }
 
-fn figure(subject: &Subject<'_>) -> Figure {
+fn figure(subject: &SmoothingSubject<'_>) -> Figure {
     let tracks = subject.names.len();
     let samples = [subject.before, subject.after];
-    let travels = samples.map(|own| Travel {
+    let travels = samples.map(|source| Travel {
         name: String::new(),
-        times: own.times.clone(),
+        times: source.times.clone(),
         tracks,
-        rotations: own.rotations.clone(),
-        places: own.translations.clone(),
+        rotations: source.rotations.clone(),
+        positions: source.translations.clone(),
     });
     let turning = |travel: &Travel, track: usize| -> Vec<f64> {
         let velocities = travel.velocities();
-        let own = velocities.iter().skip(track).step_by(tracks);
-        own.map(|velocity| f64::from(velocity.truncate().length()))
+        let of_track = velocities.iter().skip(track).step_by(tracks);
+        of_track
+            .map(|velocity| f64::from(velocity.truncate().length()))
             .collect()
     };
     let moving = |travel: &Travel, track: usize| -> Vec<f64> {
-        let places: Vec<Vec3> = travel.line(track).collect();
-        let steps = places.windows(2).zip(travel.times.windows(2));
+        let positions: Vec<Vec3> = travel.line(track).collect();
+        let steps = positions.windows(2).zip(travel.times.windows(2));
         steps
             .map(|(pair, times)| f64::from((pair[1] - pair[0]).length()) / (times[1] - times[0]))
             .collect()
@@ -62,14 +66,18 @@ fn figure(subject: &Subject<'_>) -> Figure {
     let angles = |a: &Quat, b: &Quat| f64::from(1.0 - a.dot(*b).abs());
     if let Some(track) = noisiest(&before.rotations, &after.rotations, tracks, angles) {
         let title = format!("{}: angular speed", subject.names[track]);
-        panels.push(panel(title, "rad/s", &travels, |own| turning(own, track)));
+        panels.push(panel(title, "rad/s", &travels, |travel| {
+            turning(travel, track)
+        }));
     }
     let distances = |a: &Vec3, b: &Vec3| f64::from(a.distance_squared(*b));
     if let Some(track) = noisiest(&before.translations, &after.translations, tracks, distances) {
         let title = format!("{}: speed", subject.names[track]);
-        panels.push(panel(title, "units/s", &travels, |own| moving(own, track)));
+        panels.push(panel(title, "units/s", &travels, |travel| {
+            moving(travel, track)
+        }));
     }
-    let entry = |(label, colour): (&str, Colour)| Entry {
+    let entry = |(label, colour): (&str, Colour)| LegendEntry {
         label: label.to_owned(),
         colour,
         mark: Mark::Line,
@@ -87,7 +95,7 @@ fn figure(subject: &Subject<'_>) -> Figure {
     }
 }
 
-/// The track whose samples smoothing has changed most; none where it has changed nothing.
+/// The track whose samples smoothing has changed most; `None` where nothing changed.
 fn noisiest<T>(
     before: &[T],
     after: &[T],
@@ -95,11 +103,11 @@ fn noisiest<T>(
     change: impl Fn(&T, &T) -> f64,
 ) -> Option<usize> {
     let mut changes = vec![0.0; tracks];
-    for (place, (a, b)) in before.iter().zip(after).enumerate() {
-        changes[place % tracks] += change(a, b);
+    for (index, (a, b)) in before.iter().zip(after).enumerate() {
+        changes[index % tracks] += change(a, b);
     }
-    let most = (0..tracks).max_by(|&a, &b| changes[a].total_cmp(&changes[b]))?;
-    (changes[most] > 0.0).then_some(most)
+    let track = (0..tracks).max_by(|&a, &b| changes[a].total_cmp(&changes[b]))?;
+    (changes[track] > 0.0).then_some(track)
 }
 
 fn panel(
@@ -114,20 +122,20 @@ fn panel(
         .zip(WIDTHS)
         .map(|((travel, colour), width)| {
             let points = travel.times.iter().copied().zip(values(travel));
-            Curve {
+            PlotCurve {
                 colour,
                 width,
                 opacity: 1.0,
                 pieces: vec![thinned(&points.collect::<Vec<_>>(), COLUMNS)],
             }
         });
-    let curves: Vec<Curve> = curves.collect();
+    let curves: Vec<PlotCurve> = curves.collect();
     let all = || {
         curves
             .iter()
             .flat_map(|curve| curve.pieces.iter().flatten())
     };
-    let axis = |label: &str, range| Axis {
+    let axis = |label: &str, range| PlotAxis {
         label: label.to_owned(),
         range,
         powers: false,
@@ -141,7 +149,7 @@ fn panel(
     );
     Panel {
         title,
-        axes: Axes::Plane { x, y },
+        axes: PanelAxes::Plane { x, y },
         curves,
         dots: Vec::new(),
         uprights: Vec::new(),

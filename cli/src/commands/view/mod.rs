@@ -11,27 +11,29 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use tumble::{FrameRate, Method};
-use tumble_formats::gltf::skins::CarriedMesh;
+use tumble_formats::carried_mesh::CarriedMesh;
 use tumble_formats::motion::Motion;
 
-use crate::arguments::device::{DeviceArguments, Opened};
+use crate::arguments::device::{DeviceArguments, OpenedDevice};
 use crate::arguments::input::{self, Inputs};
-use crate::arguments::interpolation::{Manner, Wanted, WantedSelection, each_once, wanted_methods};
+use crate::arguments::interpolation::{
+    InterpolationArguments, MethodArgument, MethodArgumentSelection, each_once, method_arguments,
+};
 use crate::arguments::path::{PATHS, PathArguments};
 use crate::arguments::time::{finite_seconds, in_frames};
 use crate::arguments::tracks::selected;
-use crate::batch::place::Place;
-use crate::commands::travel::{Scenery, Source, is_path_file};
+use crate::batch::destination::Destination;
+use crate::commands::travel::{Scenery, TravelSource, is_path_file};
 use crate::commands::view::page::{Page, StoredSet};
-use crate::commands::view::shown::{Choice, Shown};
+use crate::commands::view::shown::{ResultChoice, ShownClip};
 use crate::messages::exit::{Failure, OUTPUT, SOME_INPUTS};
 use crate::messages::progress::Progress;
 use crate::messages::words;
 
 /// Bytes of rotations, speeds and positions that a page may hold, before they are packed.
-const LARGEST: f64 = 256e6;
-/// With no more than this, every method is shown where none is named.
-const SMALL: f64 = 24e6;
+const MAX_PAGE_BYTES: f64 = 256e6;
+/// Up to this size, every method is shown where none is named.
+const SMALL_PAGE_BYTES: f64 = 24e6;
 
 /// Write a page that shows boxes turning, skeletons moving and bodies on paths: one HTML file
 #[derive(Debug, Args)]
@@ -67,8 +69,8 @@ pub(crate) struct Arguments {
     open: bool,
     /// The methods to choose from, or all; the first is shown first [default: all where the
     /// page stays small, else authored,bessel-overhauser,slerp,catmull-rom,b-spline]
-    #[arg(short, long = "method", value_name = "METHODS", value_delimiter = ',', value_parser = wanted_methods())]
-    methods: Vec<WantedSelection>,
+    #[arg(short, long = "method", value_name = "METHODS", value_delimiter = ',', value_parser = method_arguments())]
+    methods: Vec<MethodArgumentSelection>,
     /// Frames per second, from the first key to the last: a number or a ratio
     #[arg(
         long,
@@ -83,8 +85,8 @@ pub(crate) struct Arguments {
     /// Where to end, seconds [default: the last key]
     #[arg(long, value_name = "SECONDS", value_parser = finite_seconds, allow_hyphen_values = true)]
     end: Option<f64>,
-    /// Leave the engine and the keys in full out of the page: a smaller one, which shows the methods and the
-    /// frames that are asked for and no others
+    /// Leave the engine and the full keys out of the page: it is smaller, and shows only the requested
+    /// methods and frames
     #[arg(long)]
     frames_only: bool,
     #[command(flatten, next_help_heading = PATHS)]
@@ -92,23 +94,23 @@ pub(crate) struct Arguments {
     #[command(flatten, next_help_heading = PATHS)]
     path: PathArguments,
     #[command(flatten)]
-    manner: Manner,
+    interpolation: InterpolationArguments,
     #[command(flatten)]
     device: DeviceArguments,
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let inputs = arguments.inputs.distinct(false)?;
-    let place = arguments.place(&inputs)?;
-    if !place.is_standard() {
-        place.try_out()?;
+    let destination = arguments.destination(&inputs)?;
+    if !destination.is_standard() {
+        destination.check_writable()?;
     }
     let mut shown = Vec::new();
     let mut refused = 0;
     for path in &inputs {
         if is_path_file(path) {
-            let source = Source::of_paths(path, &arguments.path, &arguments.inputs.tracks)?;
-            shown.push(arguments.sampled(Shown::of_paths(path, source))?);
+            let source = TravelSource::of_paths(path, &arguments.path, &arguments.inputs.tracks)?;
+            shown.push(arguments.sampled(ShownClip::of_paths(path, source))?);
             continue;
         }
         let loaded = arguments.inputs.load(path)?;
@@ -116,8 +118,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         let several = loaded.clips.len() + loaded.refused.len() > 1;
         let document = loaded.document.filter(|_| !loaded.is_adjusted);
         for clip in loaded.clips {
-            let clip = arguments.own_tracks(clip, path)?;
-            let mut one = Shown::new(path, clip, loaded.box_length, several);
+            let clip = arguments.select_tracks(clip, path)?;
+            let mut one = ShownClip::new(path, clip, loaded.box_length, several);
             if one.clip.set.is_empty() {
                 words::note(&format!("{}: nothing moves; it is left out", one.name));
                 continue;
@@ -143,17 +145,18 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         "Animation"
     };
     let text = arguments.page(&mut shown, &methods, menu, &mut device)?;
-    place.write(None, |out| out.write_all(text.as_bytes()))?;
+    destination.write(None, |out| out.write_all(text.as_bytes()))?;
     words::note(&format!(
-        "{}, {}, on {}, {} → {place}",
+        "{}, {}, on {}, {} → {destination}",
         words::count(inputs.len(), "input"),
         words::count(each_once(methods.iter().flatten()).len(), "method"),
         device.label,
         words::bytes(text.len() as f64),
     ));
     if arguments.open {
-        open::that_detached(place.path()).map_err(|error| {
-            let message = format!("{place}: no browser could be started: {error}; open the file");
+        open::that_detached(destination.path()).map_err(|error| {
+            let message =
+                format!("{destination}: no browser could be started: {error}; open the file");
             Failure::new(OUTPUT, message)
         })?;
     }
@@ -168,9 +171,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
 }
 
 impl Arguments {
-    /// The tracks of a clip that are asked for, and what they hang on: joints, or the boxes of a
-    /// chain before them.
-    fn own_tracks(&self, clip: Motion, path: &Path) -> Result<Motion, Failure> {
+    /// The clip with the selected tracks and their ancestors: joints, or the boxes of a chain before them.
+    fn select_tracks(&self, clip: Motion, path: &Path) -> Result<Motion, Failure> {
         let (name, tracks) = (input::name(path), &self.inputs.tracks);
         if clip.skeleton.is_empty() && !clip.has_vectors() {
             return match tracks.chain(&clip, &name)? {
@@ -189,9 +191,9 @@ impl Arguments {
         box_length: Option<f64>,
     ) -> Result<String, Failure> {
         let several = clips.len() > 1;
-        let shown: Result<Vec<Shown>, Failure> = clips
+        let shown: Result<Vec<ShownClip>, Failure> = clips
             .into_iter()
-            .map(|clip| Shown::new(path, clip, box_length, several))
+            .map(|clip| ShownClip::new(path, clip, box_length, several))
             .filter(|one| !one.clip.set.is_empty())
             .map(|one| self.sampled(one))
             .collect();
@@ -200,51 +202,52 @@ impl Arguments {
         self.page(&mut shown, &methods, "Animation", &mut self.device.open()?)
     }
 
-    fn place(&self, inputs: &[PathBuf]) -> Result<Place, Failure> {
+    fn destination(&self, inputs: &[PathBuf]) -> Result<Destination, Failure> {
         let Some(out) = &self.out else {
-            // A name of its own, under which nobody has a file, left there for the browser.
+            // A unique name; the file stays for the browser.
             let name = format!("tumble-view-{:016x}.html", fastrand::u64(..));
-            return Place::new(&std::env::temp_dir().join(name), false, inputs);
+            return Destination::new(&std::env::temp_dir().join(name), false, inputs);
         };
         if input::is_standard(out) && self.open {
             return Err(Failure::usage(
                 "standard output cannot be opened in a browser",
             ));
         }
-        Place::new(out, self.overwrite, inputs)
+        Destination::new(out, self.overwrite, inputs)
     }
 
     /// The methods of each clip: those asked for; else all, or the common ones where all would make
     /// a large page.
-    fn methods(&self, shown: &[Shown]) -> Result<Vec<Vec<Choice>>, Failure> {
+    fn methods(&self, shown: &[ShownClip]) -> Result<Vec<Vec<ResultChoice>>, Failure> {
         if shown.is_empty() {
             return Err(Failure::usage("there is nothing to show: nothing moves"));
         }
-        let own = |methods: &[Wanted]| -> Vec<Vec<Choice>> {
+        let choices_by = |methods: &[MethodArgument]| -> Vec<Vec<ResultChoice>> {
             shown.iter().map(|one| one.methods(methods)).collect()
         };
         let asked = each_once(self.methods.iter().flat_map(|selection| &selection.0));
         if asked.is_empty() {
             let common = ["bessel-overhauser", "slerp", "catmull-rom", "b-spline"];
-            let mut first = vec![Wanted(None)];
-            first.extend(common.map(|name| Wanted(Method::named(name))));
-            let all: Vec<Wanted> = first.iter().copied().chain(Wanted::all()).collect();
-            let all = own(&each_once(all.iter()));
-            return match bytes(shown, &all) <= SMALL {
+            let mut first = vec![MethodArgument(None)];
+            first.extend(common.map(|name| MethodArgument(Method::named(name))));
+            let all: Vec<MethodArgument> =
+                first.iter().copied().chain(MethodArgument::all()).collect();
+            let all = choices_by(&each_once(all.iter()));
+            return match bytes(shown, &all) <= SMALL_PAGE_BYTES {
                 true => Ok(all),
-                false => fitting(shown, own(&first)),
+                false => fitting(shown, choices_by(&first)),
             };
         }
-        fitting(shown, own(&asked))
+        fitting(shown, choices_by(&asked))
     }
 
     /// The frames, and the keys between them where those are not many more: a key is
     /// shown as it is.
-    fn sampled(&self, one: Shown) -> Result<Shown, Failure> {
+    fn sampled(&self, one: ShownClip) -> Result<ShownClip, Failure> {
         let name = &one.name;
         let frames = in_frames(self.fps, self.start, self.end, &one.clip.set, name);
         let timeline = one.timeline(&frames)?;
-        if one.bytes(timeline.len()) > LARGEST {
+        if one.bytes(timeline.len()) > MAX_PAGE_BYTES {
             return Err(Failure::usage(format!(
                 "{name}: {} × {} are more than a page can hold; ask for fewer frames (--fps, \
                  --start, --end)",
@@ -267,27 +270,27 @@ impl Arguments {
             times.sort_by(f64::total_cmp);
             times.dedup();
         }
-        Ok(Shown { times, ..one })
+        Ok(ShownClip { times, ..one })
     }
 
-    /// The page of all clips, each by its methods. `menu`: what the choice of clips is called.
+    /// The page of all clips, each by its methods. `menu`: the label of the menu of clips.
     fn page(
         &self,
-        shown: &mut [Shown],
-        methods: &[Vec<Choice>],
+        shown: &mut [ShownClip],
+        methods: &[Vec<ResultChoice>],
         menu: &'static str,
-        device: &mut Opened,
+        device: &mut OpenedDevice,
     ) -> Result<String, Failure> {
         let results: usize = methods.iter().map(Vec::len).sum();
         let mut progress = Progress::new("evaluating", results as u64);
         let mut sets = Vec::new();
-        for (one, own) in shown.iter_mut().zip(methods) {
+        for (one, choices) in shown.iter_mut().zip(methods) {
             let mut results = Vec::new();
-            for &choice in own {
-                results.push(one.result(choice, self.manner, device)?);
+            for &choice in choices {
+                results.push(one.result(choice, self.interpolation, device)?);
                 progress.advance(1);
             }
-            if let Some(&first) = own.first() {
+            if let Some(&first) = choices.first() {
                 one.give_keys(first, device)?;
             }
             sets.push(StoredSet::new(
@@ -318,7 +321,7 @@ impl Arguments {
             &skins,
             menu,
             &device.label,
-            self.manner,
+            self.interpolation,
         );
         Ok(page.html())
     }
@@ -328,26 +331,29 @@ impl Arguments {
 fn is_small(mesh: &CarriedMesh, name: &str) -> bool {
     let vertices = mesh.positions.len();
     let bytes = vertices * 28 + mesh.triangles.len() * 12;
-    if bytes as f64 > SMALL {
+    if bytes as f64 > SMALL_PAGE_BYTES {
         words::note(&format!(
             "{name}: {vertices} vertices are more than a page shows well; bones are shown without meshes"
         ));
     }
-    bytes as f64 <= SMALL
+    bytes as f64 <= SMALL_PAGE_BYTES
 }
 
 /// Bytes of all results before they are packed.
-fn bytes(shown: &[Shown], methods: &[Vec<Choice>]) -> f64 {
+fn bytes(shown: &[ShownClip], methods: &[Vec<ResultChoice>]) -> f64 {
     let of_each = shown.iter().zip(methods);
     of_each
-        .map(|(one, own)| own.len() as f64 * one.bytes(one.times.len()))
+        .map(|(one, choices)| choices.len() as f64 * one.bytes(one.times.len()))
         .sum()
 }
 
 /// The methods of each clip, if a page can hold the results.
-fn fitting(shown: &[Shown], methods: Vec<Vec<Choice>>) -> Result<Vec<Vec<Choice>>, Failure> {
+fn fitting(
+    shown: &[ShownClip],
+    methods: Vec<Vec<ResultChoice>>,
+) -> Result<Vec<Vec<ResultChoice>>, Failure> {
     let bytes = bytes(shown, &methods);
-    if bytes <= LARGEST {
+    if bytes <= MAX_PAGE_BYTES {
         return Ok(methods);
     }
     let rotations: f64 = shown.iter().map(|one| one.rotations(one.times.len())).sum();
@@ -357,6 +363,6 @@ fn fitting(shown: &[Shown], methods: Vec<Vec<Choice>>) -> Result<Vec<Vec<Choice>
         words::count(rotations as usize, "rotation"),
         words::count(each_once(methods.iter().flatten()).len(), "method"),
         words::bytes(bytes),
-        words::bytes(LARGEST),
+        words::bytes(MAX_PAGE_BYTES),
     )))
 }

@@ -41,7 +41,7 @@ pub(crate) fn text(packed: &[u8]) -> String {
 /// small where those are a component of neighbouring samples; all low bytes first, then
 /// all high bytes, which are mostly alike.
 pub(crate) fn differences(values: &[u16], stride: usize) -> String {
-    let difference = |(place, value): (usize, &u16)| match place.checked_sub(stride) {
+    let difference = |(index, value): (usize, &u16)| match index.checked_sub(stride) {
         Some(before) => value.wrapping_sub(values[before]),
         None => *value,
     };

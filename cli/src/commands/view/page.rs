@@ -5,19 +5,19 @@ use std::collections::BTreeMap;
 use glam::{DVec3, Quat, Vec3, Vec4};
 use serde::Serialize;
 use tumble::{Channel, Encoding};
-use tumble_formats::gltf::skins::CarriedMesh;
+use tumble_formats::carried_mesh::CarriedMesh;
 use tumble_formats::packed;
 use tumble_routes::mesh::Mesh;
 
-use crate::arguments::interpolation::{Manner, Wanted};
+use crate::arguments::interpolation::{InterpolationArguments, MethodArgument};
 use crate::commands::travel::{Scenery, scene_origin};
 use crate::commands::view::pack::{bytes, differences, doubles, shorts, text, words};
-use crate::commands::view::shown::{Choice, Shown};
+use crate::commands::view::shown::{ResultChoice, ShownClip};
 use crate::messages::colours::{BOXES, Colour};
 
-/// Built from `web/src` by `npm run build` in `web/`; it lies here so that the package has all that it is built of.
+/// Built from `web/src` by `npm run build` in `web/`; it is stored here so that the package is complete.
 const HTML: &str = include_str!("page.html");
-const PLACE: &str = "/* DATA */";
+const PLACEHOLDER: &str = "/* DATA */";
 
 /// The module of the npm package, packed by gzip: `scripts/npm.sh --page` puts it here.
 const ENGINE: &[u8] = include_bytes!("tumble.wasm.gz");
@@ -28,7 +28,7 @@ const ENGINE: &[u8] = include_bytes!("tumble.wasm.gz");
 pub(crate) struct Page<'a> {
     version: &'static str,
     device: &'a str,
-    /// What the choice of sets is called.
+    /// The label of the menu of sets.
     menu: &'static str,
     box_colours: Vec<String>,
     methods: Vec<StoredMethod>,
@@ -46,16 +46,17 @@ pub(crate) struct Page<'a> {
 #[derive(Serialize)]
 struct StoredMesh {
     /// x y z of each vertex, f32.
-    places: String,
+    #[serde(rename = "places")]
+    positions: String,
     /// Three vertices each, u32.
     triangles: String,
 }
 
 impl StoredMesh {
     fn new(mesh: &Mesh) -> Self {
-        let places = mesh.positions().iter().flat_map(DVec3::to_array);
+        let coordinates = mesh.positions().iter().flat_map(DVec3::to_array);
         Self {
-            places: words(places.map(|number| (number as f32).to_bits())),
+            positions: words(coordinates.map(|number| (number as f32).to_bits())),
             triangles: words(mesh.triangles().iter().flatten().copied()),
         }
     }
@@ -66,7 +67,8 @@ impl StoredMesh {
 #[serde(rename_all = "camelCase")]
 struct StoredSkin {
     /// x y z of each vertex, f32.
-    places: String,
+    #[serde(rename = "places")]
+    positions: String,
     /// Three vertices each, u32.
     triangles: String,
     /// Four bones of each vertex, u16.
@@ -75,7 +77,7 @@ struct StoredSkin {
     weights: String,
     /// The joint of each bone.
     joints: Vec<usize>,
-    /// What takes vertices to each bone's joint, 16 f32, column after column.
+    /// The matrix from vertices to each bone's joint, 16 f32, column-major.
     to_joints: String,
 }
 
@@ -85,7 +87,7 @@ impl StoredSkin {
         let weights = mesh.weights.as_flattened().iter();
         let to_joints: Vec<f32> = mesh.bones.iter().flat_map(|bone| bone.to_joint).collect();
         Self {
-            places: bits(mesh.positions.as_flattened()),
+            positions: bits(mesh.positions.as_flattened()),
             triangles: words(mesh.triangles.as_flattened().iter().copied()),
             bones_of: shorts(mesh.bones_of.as_flattened().iter().copied()),
             weights: shorts(weights.map(|weight| (weight * 65535.0).round() as u16)),
@@ -108,30 +110,35 @@ struct StoredClip {
 
 impl StoredClip {
     /// Nothing for paths, and for clips whose keys would make a large page.
-    fn new(shown: &Shown) -> Option<Self> {
+    fn new(shown: &ShownClip) -> Option<Self> {
         let keys = packed::to_bytes(&shown.clip);
-        if shown.path.is_some() || keys.len() > MOST_KEYS {
+        if shown.path.is_some() || keys.len() > MAX_KEY_BYTES {
             return None;
         }
-        let all: Vec<Wanted> = Wanted::all().collect();
+        let all: Vec<MethodArgument> = MethodArgument::all().collect();
         Some(Self {
             bytes: bytes(&keys),
-            methods: shown.methods(&all).into_iter().map(Choice::name).collect(),
+            methods: shown
+                .methods(&all)
+                .into_iter()
+                .map(ResultChoice::name)
+                .collect(),
             origin: scene_origin(&shown.clip).to_array(),
         })
     }
 }
 
 /// Bytes of a clip's keys that the page carries for its engine, before they are packed.
-const MOST_KEYS: usize = 32_000_000;
+const MAX_KEY_BYTES: usize = 32_000_000;
 
 /// How bodies on paths are drawn.
 #[derive(Serialize)]
 struct StoredBodies {
-    /// Of a body, along z before `turn`.
+    /// Of a body, along z before `rotation`.
     length: f32,
     /// `x y z w`.
-    turn: [f32; 4],
+    #[serde(rename = "turn")]
+    rotation: [f32; 4],
     /// Whether they stand on their paths, instead of about them.
     stand: bool,
     /// How many frames are drawn as axes along each path.
@@ -152,7 +159,7 @@ pub(crate) struct StoredSet {
     name: String,
     boxes: usize,
     length: f64,
-    /// What each joint hangs on, -1 for roots; empty where tracks are the boxes of a chain.
+    /// The parent of each joint, -1 for roots; empty where tracks are the boxes of a chain.
     parents: Vec<i64>,
     /// Of the joints.
     names: Vec<String>,
@@ -174,7 +181,7 @@ pub(crate) struct StoredSet {
     clip: Option<StoredClip>,
     /// Whether joints have scales: what follows them is drawn by the engine's matrices alone then.
     has_scales: bool,
-    /// What the joints carry, by its place among the page's.
+    /// The index of the skin that its joints move, among the page's.
     pub(crate) skin: Option<usize>,
 }
 
@@ -207,7 +214,7 @@ struct StoredPositions {
 impl StoredResult {
     /// Rotations and angular velocities, `[sample][box]`.
     pub(crate) fn new(
-        method: Choice,
+        method: ResultChoice,
         boxes: usize,
         rotations: &[Quat],
         velocities: &[Vec4],
@@ -232,9 +239,9 @@ impl StoredResult {
         }
     }
 
-    /// With the places of joints, `[sample][joint]`; `None` if one is not finite.
-    pub(crate) fn at(self, places: &[Vec3]) -> Option<Self> {
-        let positions = || places.iter().map(|place| place.as_dvec3());
+    /// With the positions of joints, `[sample][joint]`; `None` if one is not finite.
+    pub(crate) fn at(self, joints: &[Vec3]) -> Option<Self> {
+        let positions = || joints.iter().map(|joint| joint.as_dvec3());
         let low = positions().reduce(DVec3::min).unwrap_or_default();
         let size = positions().reduce(DVec3::max).unwrap_or_default() - low;
         if !positions().all(DVec3::is_finite) {
@@ -274,13 +281,13 @@ fn short(rotations: &[Quat]) -> Vec<u16> {
 
 impl StoredSet {
     pub(crate) fn new(
-        shown: &Shown,
+        shown: &ShownClip,
         results: Vec<StoredResult>,
         scenery: &Scenery,
         has_engine: bool,
     ) -> Self {
         let (set, skeleton) = (&shown.clip.set, &shown.clip.skeleton);
-        let joints = if shown.has_places() {
+        let joints = if shown.has_positions() {
             set.track_count()
         } else {
             0
@@ -300,8 +307,8 @@ impl StoredSet {
             .flat_map(|track| track.keys.iter().copied())
             .collect();
         let bodies = shown.is_travel().then(|| StoredBodies {
-            length: scenery.length(&shown.places()),
-            turn: shown.body_turn().to_array(),
+            length: scenery.length(&shown.key_positions()),
+            rotation: shown.body_rotation().to_array(),
             stand: !scenery.meshes.is_empty(),
             axes: scenery.axes,
         });
@@ -340,24 +347,25 @@ impl StoredSet {
 impl<'a> Page<'a> {
     /// Of clips by these methods.
     pub(crate) fn new(
-        methods: &[Choice],
+        methods: &[ResultChoice],
         sets: Vec<StoredSet>,
         meshes: &[Mesh],
         skins: &[&CarriedMesh],
         menu: &'static str,
         device: &'a str,
-        manner: Manner,
+        interpolation: InterpolationArguments,
     ) -> Self {
         let live: Vec<&str> = (sets.iter().filter_map(|set| set.clip.as_ref()))
             .flat_map(|clip| clip.methods.iter().copied())
             .collect();
-        let stored = |method: Choice| StoredMethod {
+        let stored = |method: ResultChoice| StoredMethod {
             name: method.name(),
             summary: method.summary(),
             colour: css(method.colour()),
         };
-        let is_shown = |choice: &Choice| methods.contains(choice) || live.contains(&choice.name());
-        let all = Choice::all().filter(is_shown);
+        let is_shown =
+            |choice: &ResultChoice| methods.contains(choice) || live.contains(&choice.name());
+        let all = ResultChoice::all().filter(is_shown);
         Self {
             version: env!("CARGO_PKG_VERSION"),
             device,
@@ -367,7 +375,7 @@ impl<'a> Page<'a> {
             meshes: meshes.iter().map(StoredMesh::new).collect(),
             skins: skins.iter().map(|skin| StoredSkin::new(skin)).collect(),
             engine: (!live.is_empty()).then(|| text(ENGINE)),
-            options: manner.named(),
+            options: interpolation.named(),
             sets,
         }
     }
@@ -375,7 +383,7 @@ impl<'a> Page<'a> {
     pub(crate) fn html(&self) -> String {
         let data = serde_json::to_string(self).expect("names are strings and numbers are numbers");
         // Nothing in it may end the element that holds it.
-        HTML.replacen(PLACE, &data.replace('<', "\\u003c"), 1)
+        HTML.replacen(PLACEHOLDER, &data.replace('<', "\\u003c"), 1)
     }
 }
 

@@ -6,27 +6,27 @@ use clap::Parser;
 use glam::{DVec3, EulerRot, Quat, Vec3};
 use serde_json::Value;
 use tumble::method::{C2, SLERP};
-use tumble::{Device, Engine, Frames, TrackSet};
-use tumble_formats::motion::{Channels, Joint, Motion, Sampler, Transform};
+use tumble::{Device, Engine, SampleTimes, TrackSet};
+use tumble_formats::motion::{ChannelInterpolation, Channels, Joint, Motion, Transform};
 use tumble_formats::sample::ChannelMethods;
 use tumble_formats::world::{WorldPose, world};
 
-use crate::arguments::interpolation::Wanted;
-use crate::commands::view::shown::{Choice, Shown};
+use crate::arguments::interpolation::MethodArgument;
+use crate::commands::view::shown::{ResultChoice, ShownClip};
 
 #[path = "../../../tests/support/browser.rs"]
 #[allow(dead_code)] // the tests of boxes use the rest of it
 mod browser;
 
 #[derive(Parser)]
-struct Line {
+struct ViewCommandLine {
     #[command(flatten)]
     arguments: super::Arguments,
 }
 
 fn arguments(line: &str) -> super::Arguments {
     let start = ["view", "fox.glb", "-o", "view.html", "--device", "cpu"];
-    Line::parse_from(start.into_iter().chain(line.split_whitespace())).arguments
+    ViewCommandLine::parse_from(start.into_iter().chain(line.split_whitespace())).arguments
 }
 
 /// A walk of a body with two legs: the root moves and grows, and a child comes before its parent.
@@ -44,8 +44,8 @@ fn walk(name: &str, pace: f32) -> Motion {
         .collect();
     let keys = |joint: usize| -> Vec<Quat> {
         let angle = |key: usize| pace * ((key * (joint + 2)) as f32).sin();
-        let turned = |key| Quat::from_euler(EulerRot::XYZ, angle(key), angle(key) * 0.5, 0.1);
-        (0..times.len()).map(turned).collect()
+        let rotation = |key| Quat::from_euler(EulerRot::XYZ, angle(key), angle(key) * 0.5, 0.1);
+        (0..times.len()).map(rotation).collect()
     };
     let mut set = TrackSet::new();
     let mut clip = Motion {
@@ -60,7 +60,7 @@ fn walk(name: &str, pace: f32) -> Motion {
         };
         clip.skeleton.push(Joint { parent, rest });
         clip.channels.push(Channels {
-            rotation: Some(Sampler::Linear),
+            rotation: Some(ChannelInterpolation::Linear),
             ..Channels::default()
         });
     }
@@ -71,8 +71,8 @@ fn walk(name: &str, pace: f32) -> Motion {
     set.set_translations(1, &times, &steps, &[]).unwrap();
     set.set_scales(1, &[0.5, 1.0], &[Vec3::ONE, Vec3::splat(1.5)], &[])
         .unwrap();
-    clip.channels[1].translation = Some(Sampler::Linear);
-    clip.channels[1].scale = Some(Sampler::Step);
+    clip.channels[1].translation = Some(ChannelInterpolation::Linear);
+    clip.channels[1].scale = Some(ChannelInterpolation::Step);
     clip.set = set;
     clip
 }
@@ -82,27 +82,27 @@ fn trajectory() -> Motion {
     let times = [0.0, 1.0, 2.0];
     let mut set = TrackSet::new();
     set.push("camera", &times, &[Quat::IDENTITY; 3]).unwrap();
-    let places = [
+    let positions = [
         Vec3::ZERO,
         Vec3::new(0.0, 0.25, 1.0),
         Vec3::new(0.5, 0.0, 2.0),
     ];
-    set.set_translations(0, &times, &places, &[]).unwrap();
+    set.set_translations(0, &times, &positions, &[]).unwrap();
     Motion {
         set,
         ..Motion::default()
     }
 }
 
-fn expected(shown: &Shown, wanted: Wanted) -> Vec<WorldPose> {
-    let manner = arguments("").manner;
-    let with = |method| manner.with(method);
+fn expected(shown: &ShownClip, argument: MethodArgument) -> Vec<WorldPose> {
+    let interpolation = arguments("").interpolation;
+    let with = |method| interpolation.with(method);
     let methods = ChannelMethods {
-        method: wanted.0,
+        method: argument.0,
         with: &with,
     };
     let engine = Engine::new(Device::Cpu).unwrap();
-    let frames = Frames::at(shown.times.clone());
+    let frames = SampleTimes::at(shown.times.clone());
     let samples = methods.sample(&engine, &shown.clip, &frames).unwrap();
     world(&shown.clip, &samples).unwrap()
 }
@@ -113,10 +113,10 @@ fn point(value: &Value) -> DVec3 {
 }
 
 /// The clips as the program shows them, in a browser; nothing where there is none.
-fn opened(clips: Vec<Motion>, folder: &Path) -> (Vec<Shown>, Option<browser::Page>) {
+fn opened(clips: Vec<Motion>, folder: &Path) -> (Vec<ShownClip>, Option<browser::Page>) {
     let arguments = arguments("--fps 10");
-    let one = |clip| Shown::new(Path::new("clips/fox.glb"), clip, None, false);
-    let shown: Result<Vec<Shown>, _> = clips
+    let one = |clip| ShownClip::new(Path::new("clips/fox.glb"), clip, None, false);
+    let shown: Result<Vec<ShownClip>, _> = clips
         .into_iter()
         .map(|clip| arguments.sampled(one(clip)))
         .collect();
@@ -143,11 +143,11 @@ fn joints_are_drawn_where_the_engine_puts_them() {
     assert_eq!(menu, "fox.glb: Walk|fox.glb: Run|fox.glb");
     assert_eq!(page.value(&texts("#set-label")), "Animation");
     let mut largest = 0.0f64;
-    for (place, one) in shown.iter().enumerate() {
-        page.choose("#set", &place.to_string());
+    for (index, one) in shown.iter().enumerate() {
+        page.choose("#set", &index.to_string());
         page.value("tumble.loaded().then(() => true)");
         let methods = page.value(&texts("#method option"));
-        let authored = Wanted(None);
+        let authored = MethodArgument(None);
         let has_channels = !one.clip.channels.is_empty();
         // Where `authored` was shown before and means nothing, the first method is shown instead.
         let first = match has_channels {
@@ -157,18 +157,18 @@ fn joints_are_drawn_where_the_engine_puts_them() {
         assert_eq!(page.value("tumble.state.method"), first);
         let starts = methods.as_str().unwrap().starts_with("authored|");
         assert_eq!(starts, has_channels, "{methods}");
-        let mut shown_by = vec![Wanted(Some(SLERP)), Wanted(Some(C2))];
+        let mut shown_by = vec![MethodArgument(Some(SLERP)), MethodArgument(Some(C2))];
         shown_by.extend(has_channels.then_some(authored));
-        for wanted in shown_by {
-            page.choose("#method", wanted.name());
+        for argument in shown_by {
+            page.choose("#method", argument.name());
             page.value("tumble.loaded().then(() => true)");
             let joints = one.clip.set.track_count();
-            let expected = expected(one, wanted);
+            let expected = expected(one, argument);
             let positions = || expected.iter().map(|pose| pose.position);
             let size =
                 positions().reduce(DVec3::max).unwrap() - positions().reduce(DVec3::min).unwrap();
             // Half a step of 16 bits, and the rounding of f32, in which matrices are.
-            let most = size.max_element() / 65535.0 / 2.0 + 1e-5;
+            let tolerance = size.max_element() / 65535.0 / 2.0 + 1e-5;
             let drawn = page.value(&format!(
                 "Array.from(tumble.state.input.times, (time) => {{ tumble.seek(time); \
                  return Array.from({{length: {joints}}}, (_, joint) => tumble.ends(joint)) }})"
@@ -177,7 +177,7 @@ fn joints_are_drawn_where_the_engine_puts_them() {
                 let (sample, joint) = (at / joints, at % joints);
                 let ends = &drawn[sample][joint];
                 let off = (point(&ends[0]) - pose.position).abs().max_element();
-                assert!(off <= most, "{}, sample {sample}: {off}", one.title);
+                assert!(off <= tolerance, "{}, sample {sample}: {off}", one.title);
                 largest = largest.max(off);
                 let parent = one.clip.skeleton.get(joint).and_then(|joint| joint.parent);
                 let Some(parent) = parent else {
@@ -186,7 +186,11 @@ fn joints_are_drawn_where_the_engine_puts_them() {
                 };
                 let parent = expected[sample * joints + parent].position;
                 let off = (point(&ends[1]) - parent).abs().max_element();
-                assert!(off <= 2.0 * most, "{}, parent, {sample}: {off}", one.title);
+                assert!(
+                    off <= 2.0 * tolerance,
+                    "{}, parent, {sample}: {off}",
+                    one.title
+                );
             }
         }
     }
@@ -222,77 +226,88 @@ fn joints_have_names_and_a_click_chooses_one() {
     let light_blue = |[r, g, b]: [u8; 3]| r > 25 && b / 2 > r && g > r + r / 2;
     let inside = (2 * width + 2..pixels.len() - 2 * width - 2).find(|&at| {
         let round = [at, at - 2, at + 2, at - 2 * width, at + 2 * width];
-        round.iter().all(|&place| light_blue(pixels[place]))
+        round.iter().all(|&near| light_blue(pixels[near]))
     });
     let at = inside.expect("the right shin is seen");
     let area = page.value("(() => { const r = document.querySelector('#stage').getBoundingClientRect(); return [r.x, r.y] })()");
     let (x, y) = ((at % width) as f64, (at / width) as f64);
     page.click_at(area[0].as_f64().unwrap() + x, area[1].as_f64().unwrap() + y);
     page.wait(&format!("tumble.state.picked && {name} === 'shin.r'"));
-    // What is told of it is its own rotation.
-    let told = page.value(
+    // The values shown are those of its own rotation.
+    let text = page.value(
         "tumble.seek(0.5), document.querySelector('#box-values').textContent.replaceAll('−', '-')",
     );
-    let numbers: Vec<f32> = told
+    let numbers: Vec<f32> = text
         .as_str()
         .unwrap()
         .split_whitespace()
         .filter_map(|word| word.trim_end_matches(',').parse().ok())
         .collect();
-    let own = walk("Walk", 0.4).set.track(4).keys[2];
-    assert_eq!(numbers.len(), 7, "w x y z and a place: {told}");
-    let told = Quat::from_xyzw(numbers[1], numbers[2], numbers[3], numbers[0]);
-    assert!(told.dot(own).abs() > 1.0 - 1e-6, "{told} is not {own}");
+    let expected = walk("Walk", 0.4).set.track(4).keys[2];
+    assert_eq!(numbers.len(), 7, "w x y z and a place: {text}");
+    let displayed = Quat::from_xyzw(numbers[1], numbers[2], numbers[3], numbers[0]);
+    assert!(
+        displayed.dot(expected).abs() > 1.0 - 1e-6,
+        "{displayed} is not {expected}"
+    );
 }
 
 #[test]
 fn files_without_a_word_of_channels_show_bessel_overhauser_once() {
-    let one = Shown::new(Path::new("a.tum"), trajectory(), None, false);
-    let named = |names: &[&str]| -> Vec<Wanted> {
+    let one = ShownClip::new(Path::new("a.tum"), trajectory(), None, false);
+    let named = |names: &[&str]| -> Vec<MethodArgument> {
         names
             .iter()
-            .map(|name| Wanted(tumble::Method::named(name)))
+            .map(|name| MethodArgument(tumble::Method::named(name)))
             .collect()
     };
-    let own = |names: &[&str]| -> Vec<&str> {
+    let names_shown = |names: &[&str]| -> Vec<&str> {
         one.methods(&named(names))
             .iter()
-            .map(|own| own.name())
+            .map(|choice| choice.name())
             .collect()
     };
-    assert_eq!(own(&["authored", "slerp"]), ["bessel-overhauser", "slerp"]);
+    assert_eq!(
+        names_shown(&["authored", "slerp"]),
+        ["bessel-overhauser", "slerp"]
+    );
     let both = ["authored", "slerp", "bessel-overhauser"];
-    assert_eq!(own(&both), ["slerp", "bessel-overhauser"]);
+    assert_eq!(names_shown(&both), ["slerp", "bessel-overhauser"]);
 }
 
 #[test]
 fn what_has_no_place_or_no_room_is_refused() {
     let arguments = arguments("--fps 10");
     let mut device = arguments.device.open().unwrap();
-    let mut far = walk("Far", 0.4);
+    let mut distant = walk("Far", 0.4);
     let times = [0.3, 2.0];
     for joint in [1, 2] {
-        let places = [Vec3::X, Vec3::splat(9e29)];
-        far.set
-            .set_translations(joint, &times, &places, &[])
+        let positions = [Vec3::X, Vec3::splat(9e29)];
+        distant
+            .set
+            .set_translations(joint, &times, &positions, &[])
             .unwrap();
     }
     let sizes = [Vec3::ONE, Vec3::splat(9e29)];
-    far.set.set_scales(1, &times, &sizes, &[]).unwrap();
+    distant.set.set_scales(1, &times, &sizes, &[]).unwrap();
     let mut circle = walk("Circle", 0.4);
     circle.skeleton[1].parent = Some(0);
     for (clip, message) in [
-        (far, "fox.glb Far: a joint is farther away than numbers go"),
-        (circle, "fox.glb Circle: joint 0 hangs on itself"),
+        (distant, "fox.glb Far: a position is too large for f32"),
+        (circle, "fox.glb Circle: joint 0 is its own ancestor"),
     ] {
-        let one = Shown::new(Path::new("fox.glb"), clip, None, true);
+        let one = ShownClip::new(Path::new("fox.glb"), clip, None, true);
         let one = arguments.sampled(one).unwrap();
-        let result = one.result(Choice::By(Wanted(None)), arguments.manner, &mut device);
+        let result = one.result(
+            ResultChoice::By(MethodArgument(None)),
+            arguments.interpolation,
+            &mut device,
+        );
         let found = format!("{:?}", result.err());
         assert!(found.contains(message), "{found}");
     }
     // Positions count: 16 bytes a joint instead of the 10 of a box.
-    let one = Shown::new(Path::new("fox.glb"), walk("Walk", 0.4), None, true);
+    let one = ShownClip::new(Path::new("fox.glb"), walk("Walk", 0.4), None, true);
     assert!((one.bytes(100) - 6.0 * 100.0 * 16.0).abs() < 1e-9);
     let shown = [arguments.sampled(one).unwrap()];
     assert!(arguments.methods(&[]).is_err(), "nothing to show");

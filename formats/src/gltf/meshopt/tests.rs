@@ -187,9 +187,9 @@ fn what_is_no_such_stream_is_refused() {
     assert!(matches!(error, Err(Stride { stride: 16, .. })));
     assert_eq!(decode(&[]), Err(Version(0)));
     assert_eq!(decode(&[0xa2; 100]), Err(Version(0xa2)));
-    for (stream, most) in STREAMS.into_iter().zip([64, 1024]) {
+    for (stream, per_byte) in STREAMS.into_iter().zip([64, 1024]) {
         // More elements than so many bytes can be the streams of, and more than memory.
-        for count in [most * stream.len() / STRIDE + 1, usize::MAX] {
+        for count in [per_byte * stream.len() / STRIDE + 1, usize::MAX] {
             let error = decode_attributes(stream, count, STRIDE, Filter::None);
             assert!(matches!(error, Err(Short { .. })), "{error:?}");
         }
@@ -268,9 +268,9 @@ proptest! {
         filter in any::<bool>(),
     ) {
         let mut stream = STREAMS[version].to_vec();
-        for (place, byte) in damage {
-            let place = place % stream.len();
-            stream[place] = byte;
+        for (offset, byte) in damage {
+            let offset = offset % stream.len();
+            stream[offset] = byte;
         }
         let filter = if filter { Filter::Exponential } else { Filter::None };
         let whole = decode_attributes(&stream, COUNT, STRIDE, filter);
@@ -285,10 +285,10 @@ proptest! {
 
     /// Quaternions of any bits stay finite numbers, and those of the format are unit.
     #[test]
-    fn decoded_quaternions_are_unit(input in prop::array::uniform3(-2047i16..2048), place in 0i16..4) {
+    fn decoded_quaternions_are_unit(input in prop::array::uniform3(-2047i16..2048), largest in 0i16..4) {
         let kept = input.map(f32::from).iter().map(|v| v * v).sum::<f32>() <= 2.0 * 2047.0 * 2047.0;
         let mut bytes = [0; 8];
-        for (i, v) in input.into_iter().chain([2044 | place]).enumerate() {
+        for (i, v) in input.into_iter().chain([2044 | largest]).enumerate() {
             bytes[2 * i..][..2].copy_from_slice(&v.to_le_bytes());
         }
         quaternion(&mut bytes);

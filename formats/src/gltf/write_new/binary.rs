@@ -8,16 +8,16 @@ use crate::gltf::write_new::json::{
     Accessor, Buffer, BufferExtensions, BufferView, FLOAT, Fallback, MeshoptView, SHORT,
     ViewExtensions,
 };
-use crate::gltf::write_new::samples::{Property, Samples};
+use crate::gltf::write_new::samples::{ClipSamples, Property};
 
 /// What an accessor gives.
-pub(super) enum Data<'a> {
+pub(super) enum AccessorData<'a> {
     /// Inverse bind matrices.
     Matrices(Vec<[f32; 16]>),
     /// Times of samples, increasing.
     Times(Vec<f32>),
     /// The samples of a channel.
-    Channel(Samples<'a>, usize, Property),
+    Channel(ClipSamples<'a>, usize, Property),
     /// The keys of a channel.
     Keys(Property, Vec<f32>),
     /// Rotations of 16 bits a component.
@@ -26,7 +26,7 @@ pub(super) enum Data<'a> {
     Filtered(Vec<[u8; 8]>),
 }
 
-impl Data<'_> {
+impl AccessorData<'_> {
     /// The type of the values, bytes of each, and their number.
     fn shape(&self) -> (&'static str, u64, usize) {
         match self {
@@ -92,7 +92,7 @@ fn bytes_of<const N: usize>(values: impl Iterator<Item = [f32; N]>) -> Vec<u8> {
 /// aligned to 4 bytes.
 #[derive(Default)]
 pub(super) struct Binary<'a> {
-    data: Vec<Data<'a>>,
+    data: Vec<AccessorData<'a>>,
     pub(super) accessors: Vec<Accessor>,
     pub(super) views: Vec<BufferView>,
 }
@@ -114,8 +114,8 @@ impl<'a> Binary<'a> {
         });
     }
 
-    /// Puts data into the last view; gives the place of its accessor.
-    pub(super) fn push(&mut self, data: Data<'a>) -> usize {
+    /// Puts data into the last view; returns the index of its accessor.
+    pub(super) fn push(&mut self, data: AccessorData<'a>) -> usize {
         if self.views.is_empty() {
             self.begin_view();
         }
@@ -123,7 +123,7 @@ impl<'a> Binary<'a> {
         let view = &mut self.views[buffer_view];
         let (shape, bytes, count) = data.shape();
         let [min, max] = match &data {
-            Data::Times(times) => {
+            AccessorData::Times(times) => {
                 [times.first(), times.last()].map(|time| time.map(|&time| [time.into()]))
             }
             _ => [None; 2],
@@ -132,10 +132,10 @@ impl<'a> Binary<'a> {
             buffer_view,
             byte_offset: view.byte_length,
             component_type: match data {
-                Data::Quantized(_) | Data::Filtered(_) => SHORT,
+                AccessorData::Quantized(_) | AccessorData::Filtered(_) => SHORT,
                 _ => FLOAT,
             },
-            normalized: matches!(data, Data::Quantized(_) | Data::Filtered(_)),
+            normalized: matches!(data, AccessorData::Quantized(_) | AccessorData::Filtered(_)),
             count,
             shape,
             min,
@@ -149,7 +149,8 @@ impl<'a> Binary<'a> {
     /// Everything compressed by meshopt: a view for all data of one length of elements and one filter, which the accessors then
     /// lie in. Gives the bytes, and the buffers: that of the bytes, and that which stands for what they decode to.
     pub(super) fn compress(&mut self) -> (Vec<u8>, [Buffer; 2]) {
-        let kind = |data: &Data<'_>| (data.shape().1, matches!(data, Data::Filtered(_)));
+        let kind =
+            |data: &AccessorData<'_>| (data.shape().1, matches!(data, AccessorData::Filtered(_)));
         let mut kinds: Vec<(u64, bool)> = self.data.iter().map(kind).collect();
         kinds.sort_unstable();
         kinds.dedup();

@@ -1,4 +1,4 @@
-//! The JSON of a new glTF file, as far as animations need it. Numbers that name something are places
+//! The JSON of a new glTF file, as far as animations need it. Numbers that name something are indices
 //! in the list of such things.
 
 use serde::Serialize;

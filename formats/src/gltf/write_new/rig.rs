@@ -11,7 +11,7 @@ use crate::motion::{Motion, Transform};
 
 /// The nodes of all skeletons of a file.
 #[derive(Default)]
-pub(super) struct Nodes {
+pub(super) struct NewNodes {
     pub(super) list: Vec<Node>,
     pub(super) roots: Vec<usize>,
     /// Where each node rests, and what its translations are to be moved by.
@@ -22,10 +22,10 @@ pub(super) struct Nodes {
     children_until: usize,
 }
 
-/// The joints of clips that are parts of one skeleton, or tracks that hang on nothing.
+/// The joints of clips that are parts of one skeleton, or tracks without parents.
 struct Rig {
     has_skeleton: bool,
-    /// The node of each joint, by the node that it hangs on and its name, and which of the joints of
+    /// The node of each joint, by its parent node and its name, and which of the joints of
     /// that name it is.
     nodes: HashMap<(Option<usize>, String, usize), usize>,
     roots: Vec<usize>,
@@ -34,8 +34,8 @@ struct Rig {
 /// The joints of a skin, the root first, and their inverse bind matrices.
 pub(super) type SkinOf = (Vec<usize>, Vec<[f32; 16]>);
 
-impl Nodes {
-    /// The node of each track of a clip. Joints that hang on the same joints by the same names and
+impl NewNodes {
+    /// The node of each track of a clip. Joints of the same names and parents and
     /// rest in the same places are the same nodes in all clips, unless another joint of the two clips
     /// rests elsewhere in one than in the other.
     ///
@@ -72,12 +72,12 @@ impl Nodes {
             .map(|track| clip.set.track_name(track))
             .collect();
         let has_skeleton = !clip.skeleton.is_empty();
-        let fitting = self.rigs.iter().enumerate().find_map(|(place, rig)| {
+        let fitting = self.rigs.iter().enumerate().find_map(|(index, rig)| {
             let both = |track| (rest(track), origin(track));
             let found = self.shared(rig, (&order, &parents, &names), &both)?;
-            (rig.has_skeleton == has_skeleton).then_some((place, found))
+            (rig.has_skeleton == has_skeleton).then_some((index, found))
         });
-        let (place, found) = fitting.unwrap_or_else(|| {
+        let (index, found) = fitting.unwrap_or_else(|| {
             self.rigs.push(Rig {
                 has_skeleton,
                 nodes: HashMap::new(),
@@ -103,7 +103,7 @@ impl Nodes {
                 node
             }));
         }
-        let rig = &mut self.rigs[place];
+        let rig = &mut self.rigs[index];
         let mut seen = HashMap::new();
         for track in order {
             let (parent, node) = (parents[track].map(|parent| nodes[parent]), nodes[track]);
@@ -116,7 +116,7 @@ impl Nodes {
             }
         }
         for (track, parent) in parents.iter().enumerate() {
-            // Nodes that are shared hang on theirs already.
+            // Nodes that are shared have their parents already.
             if nodes[track] >= self.children_until {
                 let child = self.below_origin(nodes[track]);
                 match parent.map(|parent| nodes[parent]) {
@@ -170,7 +170,7 @@ impl Nodes {
             let parent = match parents[track] {
                 None => None,
                 Some(parent) => match found[parent] {
-                    // Whatever hangs on a new node is new.
+                    // Every child of a new node is new.
                     None => continue,
                     some => some,
                 },
@@ -210,7 +210,7 @@ impl Nodes {
     }
 }
 
-/// The joints of trees, each after the one that it hangs on.
+/// The joints of trees, parents before their children.
 fn parents_first(parents: &[Option<usize>]) -> Vec<usize> {
     let mut children = vec![Vec::new(); parents.len()];
     let mut open = Vec::new();
@@ -283,12 +283,12 @@ fn inverse(world: DAffine3) -> [f32; 16] {
 pub(super) struct UniqueNames(HashSet<String>);
 
 impl UniqueNames {
-    /// `name`, or where another has it, `name#place`.
-    pub(super) fn unique(&mut self, name: String, place: usize) -> String {
-        let mut own = name;
-        while !self.0.insert(own.clone()) {
-            own = format!("{own}#{place}");
+    /// `name`, or where another has it, `name#index`.
+    pub(super) fn unique(&mut self, name: String, index: usize) -> String {
+        let mut unique = name;
+        while !self.0.insert(unique.clone()) {
+            unique = format!("{unique}#{index}");
         }
-        own
+        unique
     }
 }

@@ -7,8 +7,8 @@ use glam::{DQuat, Quat, Vec3};
 
 use tumble::signs_differ;
 
-use crate::gltf::channel::Path;
-use crate::motion::{Channels, Sampled, Sampler, Transform};
+use crate::gltf::schema::TargetPath;
+use crate::motion::{ChannelInterpolation, Channels, SampledClip, Transform};
 
 /// What a channel moves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -22,26 +22,26 @@ impl Property {
     pub(super) const ALL: [Self; 3] = [Self::Rotation, Self::Translation, Self::Scale];
 
     /// The path of a channel's target.
-    pub(super) fn path(self) -> Path {
+    pub(super) fn path(self) -> TargetPath {
         match self {
-            Self::Rotation => Path::Rotation,
-            Self::Translation => Path::Translation,
-            Self::Scale => Path::Scale,
+            Self::Rotation => TargetPath::Rotation,
+            Self::Translation => TargetPath::Translation,
+            Self::Scale => TargetPath::Scale,
         }
     }
 }
 
 /// A clip whose lists have the lengths that they must have.
 #[derive(Clone, Copy)]
-pub(super) struct Samples<'a> {
-    clip: &'a Sampled<'a>,
+pub(super) struct ClipSamples<'a> {
+    clip: &'a SampledClip<'a>,
     pub(super) tracks: usize,
 }
 
-impl<'a> Samples<'a> {
+impl<'a> ClipSamples<'a> {
     /// # Errors
     /// `InvalidInput` when a list is too short or too long.
-    pub(super) fn of(clip: &'a Sampled<'a>) -> io::Result<Self> {
+    pub(super) fn of(clip: &'a SampledClip<'a>) -> io::Result<Self> {
         let tracks = clip.clip.set.track_count();
         let all = tracks.saturating_mul(clip.times.len());
         let lists = [
@@ -51,17 +51,17 @@ impl<'a> Samples<'a> {
             ("joints", clip.clip.skeleton.len(), tracks, true),
             ("channels", clip.clip.channels.len(), tracks, true),
         ];
-        for (name, length, wanted, may_be_empty) in lists {
-            if length != wanted && !(may_be_empty && length == 0) {
+        for (name, length, expected, may_be_empty) in lists {
+            if length != expected && !(may_be_empty && length == 0) {
                 let message =
-                    format!("a clip of {tracks} tracks has {length} {name}, not {wanted}");
+                    format!("a clip of {tracks} tracks has {length} {name}, not {expected}");
                 return Err(io::Error::new(io::ErrorKind::InvalidInput, message));
             }
         }
         Ok(Self { clip, tracks })
     }
 
-    pub(super) fn clip(self) -> &'a Sampled<'a> {
+    pub(super) fn clip(self) -> &'a SampledClip<'a> {
         self.clip
     }
 
@@ -85,9 +85,9 @@ impl<'a> Samples<'a> {
     /// rotations of tracks without keys, translations and scales that never leave the rest pose.
     pub(super) fn interpolation(self, track: usize, property: Property) -> Option<&'static str> {
         const ALL: Channels = Channels {
-            rotation: Some(Sampler::Linear),
-            translation: Some(Sampler::Linear),
-            scale: Some(Sampler::Linear),
+            rotation: Some(ChannelInterpolation::Linear),
+            translation: Some(ChannelInterpolation::Linear),
+            scale: Some(ChannelInterpolation::Linear),
         };
         let channels = self.clip.clip.channels.get(track).unwrap_or(&ALL);
         let rest = self.rest(track);
@@ -95,18 +95,23 @@ impl<'a> Samples<'a> {
             Property::Rotation => (channels.rotation, true),
             Property::Translation => {
                 let rest = rest.translation.to_array();
-                let moves = self.translations(track).any(|own| own != rest);
+                let moves = self
+                    .translations(track)
+                    .any(|translation| translation != rest);
                 (channels.translation, moves)
             }
             Property::Scale => {
                 let rest = rest.scale.to_array();
-                (channels.scale, self.scales(track).any(|own| own != rest))
+                (
+                    channels.scale,
+                    self.scales(track).any(|sampled| sampled != rest),
+                )
             }
         };
         match sampler? {
             _ if !moves => None,
-            Sampler::Step => Some("STEP"),
-            Sampler::Linear | Sampler::Cubic => Some("LINEAR"),
+            ChannelInterpolation::Step => Some("STEP"),
+            ChannelInterpolation::Linear | ChannelInterpolation::Cubic => Some("LINEAR"),
         }
     }
 
@@ -115,9 +120,9 @@ impl<'a> Samples<'a> {
         let mut before = None;
         (0..self.len()).map(move |sample| {
             let rotation = self.rotation(sample, track);
-            let turns = before.is_some_and(|before: Quat| signs_differ(before, rotation));
+            let is_negated = before.is_some_and(|before: Quat| signs_differ(before, rotation));
             before
-                .insert(if turns { -rotation } else { rotation })
+                .insert(if is_negated { -rotation } else { rotation })
                 .to_array()
         })
     }
@@ -130,8 +135,11 @@ impl<'a> Samples<'a> {
 
     /// Scales of a track; none where the clip has none.
     pub(super) fn scales(self, track: usize) -> impl Iterator<Item = [f32; 3]> + use<'a> {
-        let own = self.clip.scales.get(track..).unwrap_or_default();
-        own.iter().step_by(self.tracks.max(1)).map(Vec3::to_array)
+        let scales = self.clip.scales.get(track..).unwrap_or_default();
+        scales
+            .iter()
+            .step_by(self.tracks.max(1))
+            .map(Vec3::to_array)
     }
 
     fn rest(self, track: usize) -> Transform {
@@ -146,10 +154,10 @@ impl<'a> Samples<'a> {
     }
 
     fn rotation(self, sample: usize, track: usize) -> Quat {
-        let own = self.clip.rotations[sample * self.tracks + track];
+        let in_world = self.clip.rotations[sample * self.tracks + track];
         match self.parent_in_world(track) {
-            None => own,
-            Some(parent) => (self.turned_back(sample, parent) * own.as_dquat()).as_quat(),
+            None => in_world,
+            Some(parent) => (self.inverse_rotation(sample, parent) * in_world.as_dquat()).as_quat(),
         }
     }
 
@@ -158,14 +166,14 @@ impl<'a> Samples<'a> {
             None => self.clip.translation(sample, track),
             Some(parent) => {
                 let arm = self.clip.position(sample, track) - self.clip.position(sample, parent);
-                (self.turned_back(sample, parent) * arm).as_vec3()
+                (self.inverse_rotation(sample, parent) * arm).as_vec3()
             }
         }
     }
 
     /// The inverse of a track's rotation.
-    fn turned_back(self, sample: usize, track: usize) -> DQuat {
-        let own = self.clip.rotations[sample * self.tracks + track];
-        own.as_dquat().normalize().conjugate()
+    fn inverse_rotation(self, sample: usize, track: usize) -> DQuat {
+        let rotation = self.clip.rotations[sample * self.tracks + track];
+        rotation.as_dquat().normalize().conjugate()
     }
 }

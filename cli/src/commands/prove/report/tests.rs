@@ -6,7 +6,7 @@ use tumble::{Device, SelfTestReport};
 use super::*;
 use crate::commands::prove::text;
 
-/// A proof with all that it must have. `None` where no device tells its limits.
+/// A complete proof. `None` where no device reports its limits.
 fn whole() -> Option<Proof> {
     let devices = Device::list().unwrap_or_default();
     assert!(
@@ -40,11 +40,11 @@ fn whole() -> Option<Proof> {
             total: 10,
             differing: 0,
         }],
-        kernels: Kernels {
+        kernels: KernelSection {
             count: 3,
             ran: 3,
             values: 30,
-            ..Kernels::default()
+            ..KernelSection::default()
         },
         negative_control: NegativeControl {
             has_run: true,
@@ -92,7 +92,7 @@ fn whole() -> Option<Proof> {
 
 type Change = (&'static str, fn(&mut Proof));
 
-/// The verdict after each change, and that its reason is told on the page.
+/// The verdict after each change, and its reason on the page.
 fn expect(verdict: Verdict, changes: &[Change]) {
     for (reason, change) in changes {
         let Some(mut proof) = whole() else { return };
@@ -101,8 +101,8 @@ fn expect(verdict: Verdict, changes: &[Change]) {
         change(&mut proof);
         proof.judge();
         assert_eq!(proof.verdict, verdict, "{reason}: {:?}", proof.reasons);
-        let told = proof.reasons.iter().any(|own| own.contains(reason));
-        assert!(told, "{reason}: {:?}", proof.reasons);
+        let is_reported = proof.reasons.iter().any(|text| text.contains(reason));
+        assert!(is_reported, "{reason}: {:?}", proof.reasons);
         let page = text::page(&proof);
         assert!(
             page.contains(reason) && !page.contains("\nPROVED"),
@@ -121,7 +121,7 @@ fn what_did_not_run_or_was_not_compared_is_not_proved() {
                 proof.kernels.missing.push("poses_mix".to_owned());
             }),
             ("0 of 0 kernels ran", |proof| {
-                proof.kernels = Kernels::default();
+                proof.kernels = KernelSection::default();
             }),
             ("no value of a kernel", |proof| proof.kernels.values = 0),
             ("no expression", |proof| proof.self_tests.clear()),
@@ -165,7 +165,7 @@ fn a_bit_that_differs_anywhere_is_told_before_all_else() {
             }),
             ("kernel `arc`: 2 of 9", |proof| {
                 proof.kernels.ran = 0;
-                proof.kernels.differing.push(Differing {
+                proof.kernels.differing.push(DifferingValues {
                     name: "arc".to_owned(),
                     values: 9,
                     differing: 2,

@@ -25,7 +25,7 @@ impl Patch {
     /// The smallest that holds every pixel that differs; one pixel where none does.
     fn of(before: &[u8], now: &[u8], width: usize) -> Self {
         let row = width * 3;
-        let differs = |place: usize| before[place..place + 3] != now[place..place + 3];
+        let differs = |offset: usize| before[offset..offset + 3] != now[offset..offset + 3];
         let rows = now.len() / row;
         let changed = |y: &usize| before[y * row..(y + 1) * row] != now[y * row..(y + 1) * row];
         let Some(top) = (0..rows).find(changed) else {
@@ -39,10 +39,10 @@ impl Patch {
         let bottom = (top..rows).rev().find(changed).unwrap_or(top);
         let (mut left, mut right) = (width, 0);
         for y in top..=bottom {
-            let own = (0..left).find(|x| differs(y * row + x * 3));
-            left = own.unwrap_or(left);
-            let own = (right..width).rev().find(|x| differs(y * row + x * 3));
-            right = own.unwrap_or(right);
+            let first = (0..left).find(|x| differs(y * row + x * 3));
+            left = first.unwrap_or(left);
+            let last = (right..width).rev().find(|x| differs(y * row + x * 3));
+            right = last.unwrap_or(right);
         }
         Self {
             left,
@@ -71,15 +71,13 @@ impl Patch {
     }
 }
 
-/// How long each frame is shown, in parts of a second; what rounding takes from one frame
-/// it gives to the next. The last is shown as long as the one before it.
+/// How long each frame is shown, in parts of a second; rounding errors are carried to the next frame.
+/// The last is shown as long as the one before it.
 fn delays(times: &[f64], parts: f64, shortest: u16) -> Vec<u16> {
-    let place = |time: f64| ((time - times[0]) * parts).round();
+    let tick = |time: f64| ((time - times[0]) * parts).round();
     let mut delays: Vec<u16> = times
         .windows(2)
-        .map(|pair| {
-            (place(pair[1]) - place(pair[0])).clamp(shortest.into(), u16::MAX.into()) as u16
-        })
+        .map(|pair| (tick(pair[1]) - tick(pair[0])).clamp(shortest.into(), u16::MAX.into()) as u16)
         .collect();
     delays.push(delays.last().copied().unwrap_or(shortest));
     delays

@@ -12,15 +12,15 @@ pub(crate) struct Labels {
 }
 
 impl Labels {
-    /// Names, each about a place from 0, the left edge, to 1.
+    /// Names, each centred at a position from 0, the left edge, to 1.
     pub(crate) fn new<'a>(
         names: impl Iterator<Item = (&'a str, f32)>,
         (width, height): (u32, u32),
         ink: Colour,
     ) -> io::Result<Self> {
         let size = (height as f32 / 26.0).clamp(9.0, 40.0);
-        let text = |(name, place): (&str, f32)| {
-            let (x, y) = (place * width as f32, height as f32 - size);
+        let text = |(name, position): (&str, f32)| {
+            let (x, y) = (position * width as f32, height as f32 - size);
             format!("<text x=\"{x}\" y=\"{y}\">{name}</text>")
         };
         let texts: String = names.map(text).collect();
@@ -41,9 +41,9 @@ impl Labels {
         let covered = pixels.chunks_exact_mut(3).zip(&self.cover);
         for (pixel, &cover) in covered.filter(|(_, cover)| **cover > 0) {
             for (channel, ink) in pixel.iter_mut().zip(self.ink) {
-                let (own, letter) = (u16::from(*channel), u16::from(ink));
+                let (ground, letter) = (u16::from(*channel), u16::from(ink));
                 let cover = u16::from(cover);
-                *channel = ((own * (255 - cover) + letter * cover) / 255) as u8;
+                *channel = ((ground * (255 - cover) + letter * cover) / 255) as u8;
             }
         }
     }

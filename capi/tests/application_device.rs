@@ -1,0 +1,562 @@
+//! Crowds on an application's own Vulkan device, through the functions that C has.
+#![allow(unsafe_code)] // the device, the buffers and the commands are the application's
+
+use std::ffi::{CStr, c_void};
+use std::process::Command;
+use std::ptr::{null, null_mut};
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use ash::vk::{self, Handle};
+use tumble_capi::clip::*;
+use tumble_capi::crowd::layer::TumbleCrowdLayer;
+use tumble_capi::crowd::library::*;
+use tumble_capi::crowd::output::*;
+use tumble_capi::crowd::player::*;
+use tumble_capi::crowd::target::*;
+use tumble_capi::engine::*;
+use tumble_capi::result::*;
+use tumble_capi::samples::*;
+use tumble_capi::set::*;
+use tumble_capi::vulkan::*;
+
+use crate::application::{Application, Commands};
+use crate::layer::Layer;
+use crate::support::vulkan_devices;
+
+const JOINTS: usize = 3;
+const INSTANCES: usize = 33;
+const FRAMES: usize = 3;
+
+fn words() -> String {
+    // SAFETY: text that ends with a zero.
+    let words = unsafe { CStr::from_ptr(tumble_last_error()) };
+    words.to_string_lossy().into_owned()
+}
+
+#[track_caller]
+fn done(result: TumbleResult) {
+    assert_eq!(result, TumbleResult::Ok, "{}", words());
+}
+
+#[track_caller]
+fn fails(result: TumbleResult, code: TumbleResult, says: &str) {
+    assert_eq!(result, code, "{}", words());
+    assert!(words().contains(says), "{}", words());
+}
+
+/// What an application in C would fill in.
+fn handles(application: &Application) -> TumbleVulkan {
+    let get = application.entry.static_fn().get_instance_proc_addr;
+    TumbleVulkan {
+        size: size_of::<TumbleVulkan>(),
+        get_instance_proc_addr: Some(function(get)),
+        instance: pointer(application.instance.handle()),
+        physical_device: pointer(application.physical_device),
+        device: pointer(application.device.handle()),
+        queue: pointer(application.queue),
+        queue_family: 0,
+        api_version: vk::API_VERSION_1_1,
+        shader_float_controls: 0,
+        shader_int64: application.shader_int64.into(),
+        copy_queue: (application.copy_queue).map_or(null_mut(), |queue| pointer(queue.queue)),
+        copy_queue_family: application.copy_queue.map_or(0, |queue| queue.family),
+        lock_queue: None,
+        unlock_queue: None,
+        queue_user: null_mut(),
+    }
+}
+
+/// How often a queue was locked, and unlocked.
+#[derive(Default)]
+struct Uses([AtomicUsize; 2]);
+
+unsafe extern "C" fn lock_queue(user: *mut c_void) {
+    // SAFETY: what the application gave with the function.
+    let Uses([locked, unlocked]) = unsafe { &*user.cast() };
+    let before = locked.fetch_add(1, Ordering::SeqCst);
+    assert_eq!(
+        before,
+        unlocked.load(Ordering::SeqCst),
+        "it is locked already"
+    );
+}
+
+unsafe extern "C" fn unlock_queue(user: *mut c_void) {
+    // SAFETY: as above.
+    let Uses([_, unlocked]) = unsafe { &*user.cast() };
+    unlocked.fetch_add(1, Ordering::SeqCst);
+}
+
+fn pointer(handle: impl Handle) -> *mut c_void {
+    std::ptr::with_exposed_provenance_mut(handle.as_raw() as usize)
+}
+
+fn function(function: vk::PFN_vkGetInstanceProcAddr) -> unsafe extern "C" fn() {
+    // SAFETY: pointers to functions have one size, and this one is cast back before it is called.
+    unsafe { std::mem::transmute(function) }
+}
+
+fn open(vulkan: &TumbleVulkan, engine: &mut *mut TumbleEngine) -> TumbleResult {
+    // SAFETY: a structure, and room for the handle.
+    unsafe { tumble_engine_from_vulkan(vulkan, null(), engine) }
+}
+
+/// A library of one clip for a chain of joints.
+fn library() -> *mut TumbleCrowdLibrary {
+    let (mut library, mut set) = (null_mut(), null_mut());
+    let (parents, offsets) = ([-1, 0, 1], [[0.0_f32, 1.0, 0.0]; JOINTS]);
+    let times = [0.0, 0.5, 1.5];
+    let keys: [[f32; 4]; 3] = [
+        [0.0, 0.0, 0.0, 1.0],
+        [0.6, 0.0, 0.0, 0.8],
+        [0.0, 0.8, 0.0, 0.6],
+    ];
+    // SAFETY: as many numbers as stated, and room for handles.
+    unsafe {
+        let (parents, offsets) = (parents.as_ptr(), offsets.as_ptr().cast());
+        done(tumble_crowd_library_new(
+            parents,
+            offsets,
+            JOINTS,
+            0,
+            &raw mut library,
+        ));
+        done(tumble_set_new(&raw mut set));
+        for _ in 0..JOINTS {
+            done(tumble_set_push(
+                set,
+                null(),
+                times.as_ptr(),
+                keys.as_ptr().cast(),
+                3,
+            ));
+        }
+        done(tumble_crowd_library_push(
+            library,
+            set,
+            null(),
+            null(),
+            null_mut(),
+        ));
+    }
+    done(tumble_set_free(set));
+    library
+}
+
+fn crowd(engine: *const TumbleEngine, library: *const TumbleCrowdLibrary) -> *mut TumbleCrowd {
+    let mut crowd = null_mut();
+    // SAFETY: room for the handle.
+    done(unsafe { tumble_crowd_new(engine, library, INSTANCES, 1, &raw mut crowd) });
+    crowd
+}
+
+/// Goes on to a frame, in which some do something new.
+fn go_on(crowd: *mut TumbleCrowd, frame: usize) {
+    let layers: Vec<TumbleCrowdLayer> = (0..INSTANCES)
+        .filter(|instance| frame == 0 || instance.is_multiple_of(frame + 4))
+        .map(|instance| TumbleCrowdLayer {
+            size: size_of::<TumbleCrowdLayer>(),
+            instance,
+            layer: 0,
+            clip: 0,
+            time: instance as i64 * 40_000,
+            speed: 0.5 + instance as f32 * 0.125,
+            weight: 1.0,
+            wrap: 1,
+            additive: 0,
+            mask: 0,
+        })
+        .collect();
+    // SAFETY: as many structures as stated.
+    done(unsafe { tumble_crowd_set(crowd, layers.as_ptr(), layers.len()) });
+    done(tumble_crowd_advance(crowd, 1.0 / 60.0));
+}
+
+/// The bytes of a result in the caller's memory.
+fn evaluated(crowd: *mut TumbleCrowd, values: u32, half: bool) -> Vec<u8> {
+    let mut count = 0;
+    // SAFETY: room for the number, and memory of that size.
+    unsafe {
+        done(tumble_crowd_output_count(crowd, values, &raw mut count));
+        if half {
+            let mut found = vec![u16::MAX; count];
+            done(tumble_crowd_evaluate_half(
+                crowd,
+                values,
+                found.as_mut_ptr(),
+                count,
+            ));
+            bytemuck::cast_slice(&found).to_vec()
+        } else {
+            let mut found = vec![f32::NAN; count];
+            done(tumble_crowd_evaluate(
+                crowd,
+                values,
+                found.as_mut_ptr(),
+                count,
+            ));
+            bytemuck::cast_slice(&found).to_vec()
+        }
+    }
+}
+
+fn target(
+    crowd: *const TumbleCrowd,
+    (values, half): (u32, bool),
+    buffer: vk::Buffer,
+    (offset, size): (u64, u64),
+    target: &mut *mut TumbleCrowdTarget,
+) -> TumbleResult {
+    let buffer = buffer.as_raw();
+    // SAFETY: the buffer is the application's, which frees the target first; room for the handle.
+    unsafe { tumble_crowd_target_new(crowd, values, half.into(), buffer, offset, size, target) }
+}
+
+fn free_target(target: *mut TumbleCrowdTarget) -> TumbleResult {
+    // SAFETY: nothing is in flight.
+    unsafe { tumble_crowd_target_free(target) }
+}
+
+/// Several frames in flight, each into a buffer of its own: the bytes that the CPU gives.
+#[test]
+fn frames_are_recorded_into_an_applications_commands() {
+    if vulkan_devices().is_empty() {
+        return;
+    }
+    let application = Application::new();
+    let library = library();
+    let (mut engine, mut cpu) = (null_mut(), null_mut());
+    done(open(&handles(&application), &mut engine));
+    // SAFETY: text, null and room for the handle.
+    done(unsafe { tumble_engine_open(c"cpu".as_ptr(), null(), &raw mut cpu) });
+    for output in [(0, false), (2, false), (2, true)] {
+        let (recorded, expected) = (crowd(engine, library), crowd(cpu, library));
+        let size = evaluated(expected, output.0, output.1).len() as u64;
+        let commands = Commands::new(&application);
+        let buffers = [0; FRAMES].map(|_| application.buffer(256 + size));
+        let mut targets = [null_mut(); FRAMES];
+        for (slot, &(buffer, _)) in targets.iter_mut().zip(&buffers) {
+            for wrong in [(16, size), (256, size - 1)] {
+                let made = target(recorded, output, buffer, wrong, slot);
+                fails(made, TumbleResult::WrongSize, "does not fit");
+            }
+            done(target(recorded, output, buffer, (256, size), slot));
+        }
+        let (mut frames, mut expected_bits) = (Vec::new(), Vec::new());
+        for (frame, &target) in targets.iter().enumerate() {
+            go_on(recorded, frame);
+            go_on(expected, frame);
+            frames.push(commands.recorded(|commands| {
+                // SAFETY: the commands are in recording, and submitted below in this order.
+                done(unsafe { tumble_crowd_record(recorded, target, pointer(commands)) });
+            }));
+            expected_bits.push(evaluated(expected, output.0, output.1));
+        }
+        commands.run(&frames);
+        for (&(_, memory), expected_frame) in buffers.iter().zip(&expected_bits) {
+            let found = application.bytes(memory, 256 + size);
+            assert!(found[256..] == *expected_frame, "{output:?}");
+        }
+        // The engine works into the host's memory too.
+        assert!(evaluated(recorded, output.0, output.1) == expected_bits[FRAMES - 1]);
+        // A frame that is thrown away is reported to the crowd.
+        let last = FRAMES;
+        go_on(recorded, last);
+        go_on(expected, last);
+        // SAFETY: thrown away; then submitted below.
+        unsafe {
+            let record =
+                |commands| done(tumble_crowd_record(recorded, targets[0], pointer(commands)));
+            commands.recorded(record);
+            done(tumble_crowd_forget_recorded(recorded));
+            commands.run(&[commands.recorded(record)]);
+        }
+        let found = application.bytes(buffers[0].1, 256 + size);
+        assert!(
+            found[256..] == evaluated(expected, output.0, output.1),
+            "{output:?}"
+        );
+
+        // Another crowd's target, and no commands, are refused; so is a target that was freed.
+        let other = crowd(engine, library);
+        // SAFETY: nothing is recorded.
+        unsafe {
+            let commands = pointer(frames[0]);
+            let refused = tumble_crowd_record(other, targets[0], commands);
+            fails(
+                refused,
+                TumbleResult::InvalidArgument,
+                "crowd was not made by an engine on",
+            );
+            let refused = tumble_crowd_record(recorded, targets[0], null_mut());
+            fails(refused, TumbleResult::InvalidPointer, "`commands` is null");
+            done(free_target(targets[0]));
+            let refused = tumble_crowd_record(recorded, targets[0], commands);
+            fails(
+                refused,
+                TumbleResult::InvalidHandle,
+                "this crowd target was freed",
+            );
+        }
+        fails(
+            free_target(targets[0]),
+            TumbleResult::InvalidHandle,
+            "was freed",
+        );
+        let mut none = null_mut();
+        let made = target(recorded, output, vk::Buffer::null(), (256, size), &mut none);
+        fails(made, TumbleResult::InvalidPointer, "VK_NULL_HANDLE");
+        for &target in &targets[1..] {
+            done(free_target(target));
+        }
+        for crowd in [recorded, expected, other] {
+            done(tumble_crowd_free(crowd));
+        }
+        for (buffer, memory) in buffers {
+            // SAFETY: nothing is in flight.
+            unsafe {
+                application.device.destroy_buffer(buffer, None);
+                application.device.free_memory(memory, None);
+            }
+        }
+    }
+    done(tumble_crowd_library_free(library));
+    done(tumble_engine_free(cpu));
+    done(tumble_engine_free(engine));
+}
+
+/// A clip's rotations stay on the device.
+#[test]
+fn clips_are_evaluated_into_an_applications_buffer() {
+    if vulkan_devices().is_empty() {
+        return;
+    }
+    let application = Application::new();
+    let (mut set, times) = (null_mut(), [0.0, 1.0]);
+    let keys = [[0.0_f32, 0.0, 0.0, 1.0], [0.0, 0.6, 0.0, 0.8]];
+    let samples = TumbleSamples {
+        size: size_of::<TumbleSamples>(),
+        sampling: TumbleSampling::Keys as u32,
+        rate_frames: 60,
+        rate_seconds: 1,
+        start: 0.0,
+        end: 0.0,
+        times: null(),
+        time_count: 0,
+    };
+    const SIZE: u64 = 61 * 16;
+    let mut engines = [null_mut(); 2];
+    let mut clips = [null_mut(); 2];
+    done(open(&handles(&application), &mut engines[0]));
+    let mut expected = [f32::NAN; 61 * 4];
+    // SAFETY: as many numbers as stated, text, null, a structure, and room for handles.
+    unsafe {
+        done(tumble_engine_open(
+            c"cpu".as_ptr(),
+            null(),
+            &raw mut engines[1],
+        ));
+        let (times, keys) = (times.as_ptr(), keys.as_ptr().cast());
+        done(tumble_set_with_shared_times(
+            times,
+            2,
+            keys,
+            1,
+            &raw mut set,
+        ));
+        for (engine, clip) in engines.iter().zip(&mut clips) {
+            done(tumble_upload(*engine, set, null(), clip));
+        }
+        let (into, count) = (expected.as_mut_ptr(), expected.len());
+        done(tumble_clip_evaluate(
+            clips[1],
+            &raw const samples,
+            0,
+            into,
+            count,
+        ));
+    }
+    let (buffer, memory) = application.buffer(16 + SIZE);
+    let evaluate = |clip, buffer: u64, offset, size| {
+        let samples = &raw const samples;
+        // SAFETY: the buffer is the application's, or is refused.
+        unsafe { tumble_clip_evaluate_to_buffer(clip, samples, 0, buffer, offset, size) }
+    };
+    let raw = buffer.as_raw();
+    let argument = TumbleResult::InvalidArgument;
+    fails(
+        evaluate(clips[1], raw, 16, SIZE),
+        argument,
+        "tumble_engine_from_vulkan",
+    );
+    fails(
+        evaluate(clips[0], 0, 16, SIZE),
+        TumbleResult::InvalidPointer,
+        "VK_NULL_HANDLE",
+    );
+    for (offset, size) in [(8, SIZE), (16, SIZE - 1)] {
+        let refused = evaluate(clips[0], raw, offset, size);
+        fails(refused, TumbleResult::WrongSize, "the result has 976 bytes");
+    }
+    done(evaluate(clips[0], raw, 16, SIZE));
+    let found = application.bytes(memory, 16 + SIZE);
+    assert!(found[16..] == *bytemuck::cast_slice::<_, u8>(&expected));
+    for (engine, clip) in engines.into_iter().zip(clips) {
+        done(tumble_clip_free(clip));
+        done(tumble_engine_free(engine));
+    }
+    done(tumble_set_free(set));
+    // SAFETY: nothing is in flight.
+    unsafe {
+        application.device.destroy_buffer(buffer, None);
+        application.device.free_memory(memory, None);
+    }
+}
+
+/// What the loader and the instance can tell of handles is asked of them.
+#[test]
+fn handles_that_do_not_belong_together_are_refused() {
+    if vulkan_devices().is_empty() {
+        return;
+    }
+    let application = Application::new();
+    let good = handles(&application);
+    let mut engine = null_mut();
+    unsafe extern "system" fn knows_none(
+        _: vk::Instance,
+        _: *const std::ffi::c_char,
+    ) -> vk::PFN_vkVoidFunction {
+        None
+    }
+    let argument = TumbleResult::InvalidArgument;
+    let pointer = TumbleResult::InvalidPointer;
+    let none = null_mut();
+    let family = TumbleVulkan {
+        queue_family: 99,
+        ..good
+    };
+    let copies = TumbleVulkan {
+        copy_queue: good.queue,
+        copy_queue_family: 98,
+        ..good
+    };
+    let device = TumbleVulkan {
+        physical_device: std::ptr::without_provenance_mut(16),
+        ..good
+    };
+    let version = TumbleVulkan {
+        api_version: vk::API_VERSION_1_0,
+        ..good
+    };
+    let functions = TumbleVulkan {
+        get_instance_proc_addr: Some(function(knows_none)),
+        ..good
+    };
+    let truth = TumbleVulkan {
+        shader_int64: 2,
+        ..good
+    };
+    let controls = TumbleVulkan {
+        shader_float_controls: 7,
+        ..good
+    };
+    for (wrong, code, says) in [
+        (
+            family,
+            argument,
+            "`vulkan->queue_family` is 99; the device has",
+        ),
+        (copies, argument, "`vulkan->copy_queue_family` is 98"),
+        (device, argument, "is none of the"),
+        (
+            version,
+            argument,
+            "Vulkan 1.0; the instance must be made for 1.1",
+        ),
+        (
+            functions,
+            argument,
+            "does not know vkEnumeratePhysicalDevices",
+        ),
+        (truth, argument, "`vulkan->shader_int64` is 2"),
+        (
+            TumbleVulkan {
+                lock_queue: Some(lock_queue),
+                ..good
+            },
+            argument,
+            "`vulkan->lock_queue` and `vulkan->unlock_queue` belong together",
+        ),
+        (
+            TumbleVulkan {
+                copy_queue: good.queue,
+                copy_queue_family: good.queue_family,
+                ..good
+            },
+            argument,
+            "the queue for copies is the one that computes",
+        ),
+        (controls, argument, "`vulkan->shader_float_controls` is 7"),
+        (
+            TumbleVulkan {
+                instance: none,
+                ..good
+            },
+            pointer,
+            "`vulkan->instance` is null",
+        ),
+        (
+            TumbleVulkan {
+                device: none,
+                ..good
+            },
+            pointer,
+            "`vulkan->device` is null",
+        ),
+        (
+            TumbleVulkan {
+                queue: none,
+                ..good
+            },
+            pointer,
+            "`vulkan->queue` is null",
+        ),
+        (
+            TumbleVulkan { size: 8, ..good },
+            argument,
+            "set it to `sizeof`",
+        ),
+    ] {
+        fails(open(&wrong, &mut engine), code, says);
+        assert!(engine.is_null());
+    }
+    done(open(&good, &mut engine));
+    done(tumble_engine_free(engine));
+    let uses = Uses::default();
+    let locked = TumbleVulkan {
+        lock_queue: Some(lock_queue),
+        unlock_queue: Some(unlock_queue),
+        queue_user: (&raw const uses).cast_mut().cast(),
+        ..good
+    };
+    done(open(&locked, &mut engine));
+    done(tumble_engine_free(engine));
+    let [locked, unlocked] = uses.0.map(AtomicUsize::into_inner);
+    assert!(locked > 0 && locked == unlocked, "{locked}, {unlocked}");
+}
+
+/// The tests of this file once more, under the validation layers.
+#[test]
+fn no_layer_has_anything_to_say() {
+    for layer in Layer::all() {
+        let mut command = Command::new(std::env::current_exe().unwrap());
+        command.args([
+            "application_device::",
+            "--nocapture",
+            "--skip",
+            "no_layer_has",
+        ]);
+        let messages = layer.messages(&mut command);
+        assert_eq!(messages, Vec::<String>::new(), "{}", layer.name);
+    }
+}

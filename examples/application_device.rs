@@ -1,0 +1,294 @@
+//! Poses on an application's Vulkan device.
+//!
+//! A renderer has its device and its queues already. This program makes such a device, gives the engine
+//! a queue of it, and lets it write the poses of every frame into a buffer of the renderer's, from
+//! which another queue family, where there is one, copies them. At the end the bits are compared with
+//! the CPU's.
+#![allow(clippy::disallowed_methods)] // poses to look at
+#![allow(unsafe_code)] // Vulkan's handles are the application's to promise
+
+use std::error::Error;
+
+use ash::vk;
+use glam::Quat;
+use tumble::{
+    Clip, Device, Engine, EngineOptions, Layout, SampleTimes, TrackSet, VulkanBuffer,
+    VulkanHandles, ash, glam, method,
+};
+
+const TRACKS: u64 = 60;
+/// Bytes of the poses of one frame.
+const SIZE: u64 = TRACKS * 16;
+
+/// What a renderer has: a device, a queue for the engine, and one for drawing.
+struct Renderer {
+    entry: ash::Entry,
+    instance: ash::Instance,
+    physical_device: vk::PhysicalDevice,
+    device: ash::Device,
+    has_int64: bool,
+    /// For the engine alone: it submits to this queue, and nobody else may at the same time.
+    compute: (vk::Queue, u32),
+    /// The renderer's. The same one where the device has no other: then they alternate.
+    graphics: (vk::Queue, u32),
+}
+
+impl Renderer {
+    fn new() -> Result<Self, Box<dyn Error>> {
+        // SAFETY: plain creation, with structures that are alive; `close` destroys it all.
+        unsafe {
+            // On macOS, Homebrew's libraries are not where the system looks.
+            let homebrew = || ash::Entry::load_from("/opt/homebrew/lib/libvulkan.1.dylib");
+            let entry = ash::Entry::load().or_else(|error| homebrew().map_err(|_| error))?;
+            let application = vk::ApplicationInfo::default().api_version(vk::API_VERSION_1_1);
+            // Drivers that have not all of Vulkan (MoltenVK) are for those who say they know.
+            let portability = ash::khr::portability_enumeration::NAME;
+            let offered = entry.enumerate_instance_extension_properties(None)?;
+            let is_offered = (offered.iter())
+                .any(|offered| offered.extension_name_as_c_str() == Ok(portability));
+            let (names, flags) = match is_offered {
+                true => (
+                    vec![portability.as_ptr()],
+                    vk::InstanceCreateFlags::ENUMERATE_PORTABILITY_KHR,
+                ),
+                false => (Vec::new(), vk::InstanceCreateFlags::empty()),
+            };
+            let info = vk::InstanceCreateInfo::default()
+                .application_info(&application)
+                .enabled_extension_names(&names)
+                .flags(flags);
+            let instance = entry.create_instance(&info, None)?;
+            let all = instance.enumerate_physical_devices()?;
+            let physical_device = *all.first().ok_or("there is no Vulkan device")?;
+            let families = instance.get_physical_device_queue_family_properties(physical_device);
+            let with = |flags: vk::QueueFlags, other: Option<u32>| {
+                let all = (0..).zip(&families);
+                let mut found = all.filter(|(_, family)| family.queue_flags.intersects(flags));
+                found.find(|(family, _)| Some(*family) != other)
+            };
+            let compute = with(vk::QueueFlags::COMPUTE, None)
+                .ok_or("no queue computes")?
+                .0;
+            let graphics =
+                with(vk::QueueFlags::GRAPHICS, Some(compute)).map_or(compute, |found| found.0);
+            let mut used = vec![compute, graphics];
+            used.dedup();
+            let queues: Vec<_> = used
+                .iter()
+                .map(|&family| {
+                    vk::DeviceQueueCreateInfo::default()
+                        .queue_family_index(family)
+                        .queue_priorities(&[1.0])
+                })
+                .collect();
+            let has = instance.get_physical_device_features(physical_device);
+            let has_int64 = has.shader_int64 == vk::TRUE;
+            let features = vk::PhysicalDeviceFeatures::default().shader_int64(has_int64);
+            let subset = ash::khr::portability_subset::NAME;
+            let offered = instance.enumerate_device_extension_properties(physical_device)?;
+            let names: Vec<_> = (offered.iter())
+                .any(|offered| offered.extension_name_as_c_str() == Ok(subset))
+                .then_some(subset.as_ptr())
+                .into_iter()
+                .collect();
+            let info = vk::DeviceCreateInfo::default()
+                .queue_create_infos(&queues)
+                .enabled_extension_names(&names)
+                .enabled_features(&features);
+            let device = instance.create_device(physical_device, &info, None)?;
+            let queue = |family| (device.get_device_queue(family, 0), family);
+            let (compute, graphics) = (queue(compute), queue(graphics));
+            Ok(Self {
+                entry,
+                instance,
+                physical_device,
+                device,
+                has_int64,
+                compute,
+                graphics,
+            })
+        }
+    }
+
+    fn engine(&self) -> Result<Engine, tumble::Error> {
+        let handles = VulkanHandles {
+            entry: self.entry.clone(),
+            instance: self.instance.clone(),
+            api_version: vk::API_VERSION_1_1,
+            physical_device: self.physical_device,
+            device: self.device.clone(),
+            shader_float_controls: false,
+            shader_int64: self.has_int64,
+            queue: self.compute.0,
+            queue_family: self.compute.1,
+            copy_queue: None,
+            queue_lock: None,
+        };
+        // SAFETY: the handles belong together, and `main` closes the engine before them.
+        unsafe { Engine::from_vulkan(handles, &EngineOptions::default()) }
+    }
+
+    /// A buffer that both queue families may use, so that nobody needs to hand it over.
+    fn buffer(
+        &self,
+        usage: vk::BufferUsageFlags,
+        memory: vk::MemoryPropertyFlags,
+    ) -> Result<(vk::Buffer, vk::DeviceMemory), Box<dyn Error>> {
+        let families = [self.compute.1, self.graphics.1];
+        let info = vk::BufferCreateInfo::default().size(SIZE).usage(usage);
+        let info = match families[0] == families[1] {
+            true => info,
+            false => info
+                .sharing_mode(vk::SharingMode::CONCURRENT)
+                .queue_family_indices(&families),
+        };
+        // SAFETY: plain creation on a device that is alive.
+        unsafe {
+            let buffer = self.device.create_buffer(&info, None)?;
+            let needs = self.device.get_buffer_memory_requirements(buffer);
+            let types = self
+                .instance
+                .get_physical_device_memory_properties(self.physical_device);
+            let index = (0..types.memory_type_count).find(|&index| {
+                let flags = types.memory_types[index as usize].property_flags;
+                needs.memory_type_bits & 1 << index != 0 && flags.contains(memory)
+            });
+            let info = vk::MemoryAllocateInfo::default()
+                .allocation_size(needs.size)
+                .memory_type_index(index.ok_or("no such memory")?);
+            let memory = self.device.allocate_memory(&info, None)?;
+            self.device.bind_buffer_memory(buffer, memory, 0)?;
+            Ok((buffer, memory))
+        }
+    }
+
+    /// What a renderer does with the poses: here its queue copies them to memory that the host reads.
+    fn draw(&self, from: vk::Buffer, to: vk::Buffer) -> Result<(), vk::Result> {
+        // SAFETY: the buffers are alive and as long as the copy; the fence is waited for before anything
+        // is freed.
+        unsafe {
+            let info = vk::CommandPoolCreateInfo::default().queue_family_index(self.graphics.1);
+            let pool = self.device.create_command_pool(&info, None)?;
+            let info = vk::CommandBufferAllocateInfo::default()
+                .command_pool(pool)
+                .command_buffer_count(1);
+            let commands = self.device.allocate_command_buffers(&info)?;
+            let info = vk::CommandBufferBeginInfo::default();
+            self.device.begin_command_buffer(commands[0], &info)?;
+            let region = vk::BufferCopy::default().size(SIZE);
+            self.device
+                .cmd_copy_buffer(commands[0], from, to, &[region]);
+            self.device.end_command_buffer(commands[0])?;
+            let fence = self
+                .device
+                .create_fence(&vk::FenceCreateInfo::default(), None)?;
+            let submit = vk::SubmitInfo::default().command_buffers(&commands);
+            self.device
+                .queue_submit(self.graphics.0, &[submit], fence)?;
+            self.device.wait_for_fences(&[fence], true, u64::MAX)?;
+            self.device.destroy_fence(fence, None);
+            self.device.destroy_command_pool(pool, None);
+        }
+        Ok(())
+    }
+
+    fn close(self, buffers: [(vk::Buffer, vk::DeviceMemory); 2]) {
+        // SAFETY: the engine is dropped, and nothing is in flight.
+        unsafe {
+            for (buffer, memory) in buffers {
+                self.device.destroy_buffer(buffer, None);
+                self.device.free_memory(memory, None);
+            }
+            self.device.destroy_device(None);
+            self.instance.destroy_instance(None);
+        }
+    }
+}
+
+/// A clip of a minute, with a key a second.
+fn clip() -> Result<TrackSet, Box<dyn Error>> {
+    let times: Vec<f64> = (0..=60).map(f64::from).collect();
+    let mut set = TrackSet::new();
+    for track in 0..TRACKS {
+        let keys: Vec<Quat> = (0..=60u8)
+            .map(|key| Quat::from_rotation_y((track as f32 * 0.1 + f32::from(key) * 0.7).sin()))
+            .collect();
+        set.push(format!("joint{track}"), &times, &keys)?;
+    }
+    Ok(set)
+}
+
+/// Writes the poses of one moment into the renderer's buffer.
+fn pose(clip: &Clip, time: f64, buffer: vk::Buffer) -> Result<(), tumble::Error> {
+    let range = VulkanBuffer {
+        buffer,
+        offset: 0,
+        size: SIZE,
+    };
+    let frames = SampleTimes::at(vec![time]);
+    // SAFETY: the buffer is the device's, has memory and these usages, and nothing else uses it until
+    // this returns: `draw` waits for its fence.
+    unsafe {
+        clip.request(&frames)
+            .layout(Layout::FrameMajor)
+            .to_buffer(range)
+    }
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let renderer = Renderer::new()?;
+    let pose_buffer = renderer.buffer(
+        vk::BufferUsageFlags::STORAGE_BUFFER
+            | vk::BufferUsageFlags::TRANSFER_DST
+            | vk::BufferUsageFlags::TRANSFER_SRC,
+        vk::MemoryPropertyFlags::DEVICE_LOCAL,
+    )?;
+    let seen = renderer.buffer(
+        vk::BufferUsageFlags::TRANSFER_DST,
+        vk::MemoryPropertyFlags::HOST_VISIBLE | vk::MemoryPropertyFlags::HOST_COHERENT,
+    )?;
+    let set = clip()?;
+    // Both are kept for all frames: an upload prepares the keys, and costs as much as many frames.
+    let engine = renderer.engine()?;
+    let clip = engine.upload(&set, method::BESSEL_OVERHAUSER)?;
+    // The first call of a method compiles its kernel, up to a quarter of a second: while a level loads.
+    pose(&clip, 0.0, pose_buffer.0)?;
+
+    let mut drawn = Vec::new();
+    let times: Vec<f64> = (0..120).map(|frame| f64::from(frame) / 60.0).collect();
+    for &time in &times {
+        pose(&clip, time, pose_buffer.0)?;
+        renderer.draw(pose_buffer.0, seen.0)?;
+        // SAFETY: the copy has ended, and the memory is as long as what is read.
+        drawn.extend(unsafe {
+            let flags = vk::MemoryMapFlags::empty();
+            let pointer = renderer.device.map_memory(seen.1, 0, SIZE, flags)?;
+            let poses = std::slice::from_raw_parts(pointer.cast::<[f32; 4]>(), TRACKS as usize);
+            let poses = poses.to_vec();
+            renderer.device.unmap_memory(seen.1);
+            poses
+        });
+    }
+    let name = engine.device_name().to_owned();
+    drop((clip, engine));
+    renderer.close([pose_buffer, seen]);
+
+    let cpu = Engine::new(Device::Cpu)?;
+    let expected = cpu.evaluate_as(
+        &set,
+        method::BESSEL_OVERHAUSER,
+        &SampleTimes::at(times),
+        Layout::FrameMajor,
+    )?;
+    let bits = |q: &[f32; 4]| q.map(f32::to_bits);
+    let pairs = drawn.iter().zip(expected.as_arrays());
+    let differing = pairs.filter(|(a, b)| bits(a) != bits(b)).count();
+    println!(
+        "{} rotations on {name}, {differing} differ from the CPU's",
+        drawn.len()
+    );
+    if differing > 0 {
+        return Err("bits differ".into());
+    }
+    Ok(())
+}

@@ -1,0 +1,179 @@
+//! The table of file formats. Help, the choice by a file's name, directory walks, shell
+//! completions and errors walk it: a format is its own file and one line in [`FORMATS`].
+
+use std::path::Path;
+
+use crate::diagnostic::Diagnostic;
+#[cfg(feature = "fbx")]
+use crate::fbx;
+use crate::format::{Format, Loaded, ReadOptions};
+#[cfg(feature = "mcap")]
+use crate::mcap;
+use crate::source::{START, Source};
+#[cfg(feature = "parquet")]
+use crate::{arrow, parquet};
+use crate::{bvh, csv, dat, euroc, gltf, kitti, npy, npz, tum};
+
+/// Every format. All of them are read. Inputs are known by their first bytes, then by the ending of
+/// their name; the first format is that of inputs which tell neither way, the first of
+/// [`Format::writable`] that of such outputs.
+pub static FORMATS: [&Format; COUNT] = [
+    &dat::FORMAT,
+    &gltf::FORMAT,
+    &bvh::FORMAT,
+    #[cfg(feature = "fbx")]
+    &fbx::FORMAT,
+    &npz::FORMAT,
+    &npy::FORMAT,
+    #[cfg(feature = "parquet")]
+    &parquet::FORMAT,
+    #[cfg(feature = "parquet")]
+    &arrow::FORMAT,
+    &csv::FORMAT,
+    &tum::FORMAT,
+    &euroc::FORMAT,
+    &kitti::FORMAT,
+    #[cfg(feature = "mcap")]
+    &mcap::FORMAT,
+];
+
+const COUNT: usize = 9
+    + 2 * cfg!(feature = "parquet") as usize
+    + cfg!(feature = "fbx") as usize
+    + cfg!(feature = "mcap") as usize;
+
+impl Format {
+    /// The format with that name, in any case.
+    #[must_use]
+    pub fn named(name: &str) -> Option<&'static Self> {
+        let has_name = |format: &&Self| {
+            let mut names = [format.name]
+                .into_iter()
+                .chain(format.extensions.iter().copied());
+            names.any(|known| known.eq_ignore_ascii_case(name))
+        };
+        FORMATS.into_iter().find(has_name)
+    }
+
+    /// The format that the extension of a file tells.
+    #[must_use]
+    pub fn of(path: &Path) -> Option<&'static Self> {
+        Self::named(path.extension()?.to_str()?)
+    }
+
+    /// The formats that results are written in, those that hold them as they come first.
+    pub fn writable() -> impl Iterator<Item = &'static Self> {
+        let as_they_come = FORMATS.into_iter().filter(|format| format.write.is_some());
+        let whole = |format: &&Self| format.write.is_none() && format.write_motion.is_some();
+        as_they_come.chain(FORMATS.into_iter().filter(whole))
+    }
+
+    /// The format of a file that begins with these bytes; by its name where they tell nothing, by how
+    /// many numbers its lines have where that tells nothing either, and else the first of the table.
+    #[must_use]
+    pub fn detect(path: &Path, start: &[u8]) -> &'static Self {
+        let probed = FORMATS.into_iter().find(|format| (format.probe)(start));
+        // Trajectories are mostly called `.txt`, and few say what they are.
+        let by_numbers = || match table_width(start)? {
+            8 => Some(&tum::FORMAT),
+            12 => Some(&kitti::FORMAT),
+            _ => None,
+        };
+        probed
+            .or_else(|| Self::of(path))
+            .or_else(by_numbers)
+            .unwrap_or(FORMATS[0])
+    }
+
+    /// Reads a file in the format that it is in: see [`Format::detect`].
+    ///
+    /// # Errors
+    /// The first fault that refuses the file.
+    pub fn open_detected(path: &Path, options: &ReadOptions) -> Result<Loaded, Diagnostic> {
+        Self::detected(path).open(path, options)
+    }
+
+    /// Reads the bytes of a file in the format that they are in: see [`Format::detect`]. Files that it names
+    /// beside itself are not read.
+    ///
+    /// # Errors
+    /// The first fault that refuses the file.
+    pub fn read_detected(
+        name: &str,
+        bytes: Vec<u8>,
+        options: &ReadOptions,
+    ) -> Result<Loaded, Diagnostic> {
+        let start = &bytes[..bytes.len().min(START)];
+        (Self::detect(Path::new(name), start).read_bytes)(name, bytes, options)
+    }
+
+    /// The format that a file is in: see [`Format::detect`]. Nothing is known of one that cannot be
+    /// read; that is reported when it is opened.
+    #[must_use]
+    pub fn detected(path: &Path) -> &'static Self {
+        Self::detect(path, &Source::start(path))
+    }
+}
+
+/// How many numbers the first line of text has that is no comment; nothing if it has anything else, or
+/// if the first line is the header of a `.dat` file.
+fn table_width(start: &[u8]) -> Option<usize> {
+    let start = start.strip_prefix(b"\xef\xbb\xbf").unwrap_or(start);
+    // The last line may be cut.
+    let whole = start.iter().rposition(|&byte| byte == b'\n')?;
+    let text = std::str::from_utf8(&start[..whole]).ok()?;
+    let header = text.lines().next()?.trim_start().strip_prefix('#');
+    let mut header = header.into_iter().flat_map(str::split_ascii_whitespace);
+    let boxes = header
+        .next()
+        .is_some_and(|word| word.parse::<usize>().is_ok());
+    if boxes
+        && header
+            .next()
+            .is_some_and(|word| word.parse::<f64>().is_ok())
+    {
+        return None;
+    }
+    let content = |line: &str| line.split('#').next().unwrap_or_default().replace(',', " ");
+    let line = text
+        .lines()
+        .map(content)
+        .find(|line| !line.trim().is_empty())?;
+    let mut words = line.split_ascii_whitespace();
+    let is_number = |word: &str| word.parse::<f64>().is_ok();
+    words.clone().all(is_number).then(|| words.by_ref().count())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_found_again() {
+        for format in FORMATS {
+            assert!(std::ptr::eq(Format::named(format.name).unwrap(), format));
+            let shouted = format!("a.b.{}", format.name.to_uppercase());
+            assert!(std::ptr::eq(
+                Format::of(Path::new(&shouted)).unwrap(),
+                format
+            ));
+        }
+        assert!(Format::of(Path::new("walk")).is_none());
+        assert_eq!(Format::detect(Path::new("walk"), b"# 4 3.0\n").name, "dat");
+        assert_eq!(Format::detect(Path::new("walk"), b"\x93NUMPY").name, "npy");
+        for (text, name) in [
+            ("1311868164.36 0 0 0 0 0 0 1\n", "tum"),
+            ("# a remark\n\n1,0,0,0,0,0,0,1 # here\n2,0", "tum"),
+            ("1 0 0 0 0 1 0 0 0 0 1 0\n", "kitti"),
+            ("# 2 1.0\n0 1 0 0 0 1 0 0\n", "dat"),
+            ("0 1 0 0 0\n", "dat"),
+            ("a 0 0 0 0 0 0 1\n", "dat"),
+            ("0 0 0 0 0 0 0 1", "dat"),
+        ] {
+            let found = Format::detect(Path::new("poses.txt"), text.as_bytes());
+            assert_eq!(found.name, name, "{text}");
+        }
+        let named = Format::detect(Path::new("a.dat"), b"1 0 0 0 0 0 0 1\n");
+        assert_eq!(named.name, "dat");
+    }
+}

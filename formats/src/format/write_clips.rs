@@ -1,0 +1,162 @@
+//! Clips are written with the signs of their rotations continued, and with a warning of what the format
+//! has no room for.
+
+use std::io::{self, Write};
+
+use glam::{Quat, Vec3};
+
+use crate::diagnostic::{Code, Diagnostic};
+use crate::feature::Feature;
+use crate::format::{Format, MotionOptions, WriteError};
+use crate::motion::{ChannelInterpolation, SampledClip};
+use crate::names::distinct_names;
+use crate::signs::{continue_signs, signs_jump};
+use crate::tum;
+
+/// Scales this close to 1 are 1: what rounding leaves of them.
+const UNSCALED: f32 = 1e-5;
+
+impl Format {
+    /// Writes sampled clips, each rotation with the sign that continues the one before it. Gives
+    /// warnings of what is left out, because the format has no room for it, or becomes another thing.
+    ///
+    /// # Errors
+    /// When writing fails, or the format cannot hold the clips; results alone ([`Format::writes_clips`])
+    /// are written by [`WriteResults`](crate::format::WriteResults).
+    pub fn write_clips(
+        &self,
+        clips: &[SampledClip<'_>],
+        options: &MotionOptions,
+        out: &mut dyn Write,
+    ) -> Result<Vec<Diagnostic>, WriteError> {
+        let Some(write) = self.write_motion else {
+            let message = format!("{} holds results, not clips", self.name);
+            return Err(io::Error::new(io::ErrorKind::Unsupported, message).into());
+        };
+        let mut warnings = warnings(self, clips, options);
+        let continued: Vec<Vec<Quat>> = clips
+            .iter()
+            .map(|clip| {
+                let tracks = clip.clip.set.track_count();
+                let mut rotations = Vec::new();
+                if signs_jump(clip.rotations, tracks) {
+                    rotations = clip.rotations.to_vec();
+                    continue_signs(&mut rotations, tracks);
+                }
+                rotations
+            })
+            .collect();
+        let clips: Vec<SampledClip<'_>> = clips
+            .iter()
+            .zip(&continued)
+            .map(|(clip, continued)| {
+                let mut clip = clip.clone();
+                if !continued.is_empty() {
+                    clip.rotations = continued;
+                }
+                clip
+            })
+            .collect();
+        warnings.extend(write(&clips, options, out)?);
+        Ok(warnings)
+    }
+}
+
+/// Says what of some clips a format has no room for, and which names it changes.
+fn warnings(
+    format: &Format,
+    clips: &[SampledClip<'_>],
+    options: &MotionOptions,
+) -> Vec<Diagnostic> {
+    let left_out = no_room(format, clips, options);
+    // BVH says itself what becomes of names, and in NPZ two tracks may have one.
+    let keeps_names =
+        ["bvh", "npz"].contains(&format.name) || !format.supports(Feature::TrackNames);
+    let changed = clips.iter().filter(|_| !keeps_names).find_map(|clip| {
+        let set = &clip.clip.set;
+        let mut names = distinct_names(set).into_iter().enumerate();
+        let (track, name) = names.find(|(track, name)| *name != set.track_name(*track))?;
+        let message = format!(
+            "a second track is called `{}`; it is written as `{name}`",
+            set.track_name(track)
+        );
+        Some(Diagnostic::new(&options.name, Code::NameChanged, message))
+    });
+    left_out.into_iter().chain(changed).collect()
+}
+
+fn no_room(
+    format: &Format,
+    clips: &[SampledClip<'_>],
+    options: &MotionOptions,
+) -> Option<Diagnostic> {
+    let missing = Feature::ALL.into_iter();
+    let missing = missing.filter(|feature| !format.features.contains(feature));
+    let left_out: Vec<&str> = missing
+        .filter_map(|feature| {
+            let mut each = clips.iter();
+            each.find_map(|clip| loss(feature, clip, options))
+        })
+        .collect();
+    let (last, others) = left_out.split_last()?;
+    let all = match others {
+        [] => (*last).to_owned(),
+        others => format!("{} and {last}", others.join(", ")),
+    };
+    let name = format.name.to_uppercase();
+    let message = format!("{name} has no room for it, left out: {all}");
+    Some(Diagnostic::new(&options.name, Code::NoRoom, message))
+}
+
+/// What is lost of a feature where the format has no room for it; nothing if the clip does not have it, or
+/// if its absence is refused or warned of elsewhere.
+fn loss(
+    feature: Feature,
+    sampled: &SampledClip<'_>,
+    options: &MotionOptions,
+) -> Option<&'static str> {
+    let clip = sampled.clip;
+    let joints = || clip.skeleton.iter();
+    let (has_it, loss) = match feature {
+        Feature::TrackNames => {
+            // What a trajectory is called when it is read is no name that it had.
+            let named =
+                |name: Option<&str>| name.is_some_and(|name| !name.is_empty() && name != tum::BODY);
+            let has_names = clip.set.tracks().any(|track| named(track.name));
+            (has_names, "the names of the tracks")
+        }
+        Feature::ClipName => (clip.name.is_some(), "the name of the clip"),
+        Feature::Skeleton => (clip.has_hierarchy(), "the skeleton"),
+        Feature::RestRotations => (
+            joints().any(|it| it.rest.rotation != Quat::IDENTITY),
+            "the rotations in which joints rest",
+        ),
+        Feature::Translations => (
+            sampled.translations.iter().any(|it| *it != Vec3::ZERO),
+            "the translations",
+        ),
+        Feature::Scales => {
+            let is_scaled = |scale: &Vec3| !scale.abs_diff_eq(Vec3::ONE, UNSCALED);
+            (sampled.scales.iter().any(is_scaled), "the scales")
+        }
+        Feature::Steps => (
+            clip.channels
+                .iter()
+                .any(|channels| channels.has(ChannelInterpolation::Step)),
+            "that channels hold each key until the next one",
+        ),
+        Feature::Bvh => (
+            !clip.bvh.is_empty() && !clip.is_world,
+            "the order of the channels and the End Sites",
+        ),
+        Feature::BoxLength => (options.box_length.is_some(), "the length of the boxes"),
+        Feature::World
+        | Feature::SeveralClips
+        | Feature::TimesPerChannel
+        | Feature::UnevenTimes
+        | Feature::Start => {
+            return None;
+        }
+    };
+    has_it.then_some(loss)
+}

@@ -1,0 +1,308 @@
+//! Accessors: bytes as numbers.
+
+use crate::diagnostic::{Code, Diagnostic};
+use crate::gltf::reader::GltfReader;
+use crate::gltf::schema::{Accessor, Sparse};
+
+/// The type of a stored number, by its OpenGL constant.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum ComponentType {
+    I8,
+    U8,
+    I16,
+    U16,
+    U32,
+    F32,
+}
+
+impl ComponentType {
+    fn of(constant: u32) -> Option<Self> {
+        Some(match constant {
+            5120 => Self::I8,
+            5121 => Self::U8,
+            5122 => Self::I16,
+            5123 => Self::U16,
+            5125 => Self::U32,
+            5126 => Self::F32,
+            _ => return None,
+        })
+    }
+
+    fn size(self) -> usize {
+        match self {
+            Self::I8 | Self::U8 => 1,
+            Self::I16 | Self::U16 => 2,
+            Self::U32 | Self::F32 => 4,
+        }
+    }
+
+    /// The number that begins with these bytes, of which there are enough.
+    fn number(self, bytes: &[u8]) -> f64 {
+        fn first<const N: usize>(bytes: &[u8]) -> [u8; N] {
+            bytes.first_chunk().copied().unwrap_or([0; N])
+        }
+        match self {
+            Self::I8 => f64::from(i8::from_le_bytes(first(bytes))),
+            Self::U8 => f64::from(u8::from_le_bytes(first(bytes))),
+            Self::I16 => f64::from(i16::from_le_bytes(first(bytes))),
+            Self::U16 => f64::from(u16::from_le_bytes(first(bytes))),
+            Self::U32 => f64::from(u32::from_le_bytes(first(bytes))),
+            Self::F32 => f64::from(f32::from_le_bytes(first(bytes))),
+        }
+    }
+
+    /// The fraction that a normalised integer stands for (glTF 2.0, 3.11).
+    fn fraction(self, number: f64) -> f64 {
+        match self {
+            Self::I8 => (number / 127.0).max(-1.0),
+            Self::U8 => number / 255.0,
+            Self::I16 => (number / 32_767.0).max(-1.0),
+            Self::U16 => number / 65_535.0,
+            Self::U32 | Self::F32 => number,
+        }
+    }
+}
+
+/// Bytes of elements of one type.
+struct Elements<'a> {
+    bytes: &'a [u8],
+    stride: usize,
+    count: usize,
+    component: ComponentType,
+    width: usize,
+}
+
+impl Elements<'_> {
+    fn numbers(&self) -> impl Iterator<Item = f64> {
+        (0..self.count).flat_map(move |element| {
+            let bytes = &self.bytes[element * self.stride..];
+            (0..self.width).map(move |i| self.component.number(&bytes[i * self.component.size()..]))
+        })
+    }
+}
+
+/// What glTF calls elements of so many components.
+fn kind(width: usize) -> &'static str {
+    match width {
+        1 => "SCALAR",
+        2 => "VEC2",
+        3 => "VEC3",
+        4 => "VEC4",
+        _ => "MAT4",
+    }
+}
+
+impl<'a> GltfReader<'a> {
+    /// An accessor that `from`, a pointer, names.
+    ///
+    /// # Errors
+    /// When there is no such accessor, or it lacks something.
+    pub(in crate::gltf) fn accessor(
+        &self,
+        index: usize,
+        from: &str,
+    ) -> Result<Accessor, Diagnostic> {
+        self.json.entry("accessors", index, from)
+    }
+
+    /// The numbers of an accessor whose elements have `width` components, one element after
+    /// another; `from` points at what names it.
+    ///
+    /// # Errors
+    /// When it is of another type, its bytes are missing, or it is sparse at elements that it does
+    /// not have.
+    pub(in crate::gltf) fn numbers(
+        &self,
+        index: usize,
+        accessor: &Accessor,
+        width: usize,
+        from: &str,
+    ) -> Result<Vec<f64>, Diagnostic> {
+        let kind = kind(width);
+        let component = ComponentType::of(accessor.component_type).filter(|component| {
+            let is_fraction = accessor.normalized && component.size() < 4 && width > 1;
+            *component == ComponentType::F32 || is_fraction
+        });
+        let Some(component) = component.filter(|_| accessor.kind == kind) else {
+            let normalized = if accessor.normalized {
+                ", normalized"
+            } else {
+                ""
+            };
+            let or = if width > 1 {
+                " or normalized integers"
+            } else {
+                ""
+            };
+            let message = format!(
+                "accessor {index} has {} of component type {}{normalized}; this needs {kind} of \
+                 floats (5126){or}",
+                accessor.kind, accessor.component_type
+            );
+            return Err(self.json.refuse(from, Code::AccessorType, message));
+        };
+        let pointer = format!("/accessors/{index}");
+        let mut numbers: Vec<f64> = match accessor.buffer_view {
+            Some(view) => {
+                let named = format!("{pointer}/bufferView");
+                let range = (view, accessor.byte_offset, accessor.count);
+                let elements = self.elements(range, (component, width), (&pointer, &named))?;
+                elements.numbers().collect()
+            }
+            None if self.fits(accessor.count) => vec![0.0; accessor.count as usize * width],
+            None => {
+                let message = format!(
+                    "{} elements and no buffer view; the file is shorter than that",
+                    accessor.count
+                );
+                return Err(self.json.refuse(&pointer, Code::TooShort, message));
+            }
+        };
+        if let Some(sparse) = &accessor.sparse {
+            self.replace(&mut numbers, sparse, (component, width), &pointer)?;
+        }
+        if accessor.normalized {
+            for number in &mut numbers {
+                *number = component.fraction(*number);
+            }
+        }
+        Ok(numbers)
+    }
+
+    /// The indices of an accessor of unsigned integers, without sparse ones.
+    ///
+    /// # Errors
+    /// When it is of another type, or its bytes are missing.
+    pub(in crate::gltf) fn indices(
+        &self,
+        index: usize,
+        accessor: &Accessor,
+        from: &str,
+    ) -> Result<Vec<u32>, Diagnostic> {
+        self.whole_numbers(index, accessor, 1, from)
+    }
+
+    /// As [`GltfReader::indices`], of elements that have `width` of them.
+    ///
+    /// # Errors
+    /// As there.
+    pub(in crate::gltf) fn whole_numbers(
+        &self,
+        index: usize,
+        accessor: &Accessor,
+        width: usize,
+        from: &str,
+    ) -> Result<Vec<u32>, Diagnostic> {
+        let component = ComponentType::of(accessor.component_type).filter(|listed| {
+            let is_index = matches!(
+                listed,
+                ComponentType::U8 | ComponentType::U16 | ComponentType::U32
+            );
+            is_index && accessor.kind == kind(width) && accessor.sparse.is_none()
+        });
+        let (Some(component), Some(view)) = (component, accessor.buffer_view) else {
+            let message = format!(
+                "accessor {index} has {} of component type {}; indices are unsigned integers in a \
+                 buffer view",
+                accessor.kind, accessor.component_type
+            );
+            return Err(self.json.refuse(from, Code::AccessorType, message));
+        };
+        let pointer = format!("/accessors/{index}");
+        let named = format!("{pointer}/bufferView");
+        let range = (view, accessor.byte_offset, accessor.count);
+        let elements = self.elements(range, (component, width), (&pointer, &named))?;
+        Ok(elements.numbers().map(|number| number as u32).collect())
+    }
+
+    /// Overwrites values by those of a sparse accessor.
+    fn replace(
+        &self,
+        numbers: &mut [f64],
+        sparse: &Sparse,
+        (component, width): (ComponentType, usize),
+        accessor: &str,
+    ) -> Result<(), Diagnostic> {
+        let pointer = format!("{accessor}/sparse/indices");
+        let refuse = |message| self.json.refuse(&pointer, Code::Sparse, message);
+        let indices = &sparse.indices;
+        let unsigned = ComponentType::of(indices.component_type).filter(|component| {
+            matches!(
+                component,
+                ComponentType::U8 | ComponentType::U16 | ComponentType::U32
+            )
+        });
+        let Some(unsigned) = unsigned else {
+            let message = format!(
+                "indices of component type {}; they are unsigned integers",
+                indices.component_type
+            );
+            return Err(refuse(message));
+        };
+        let named = format!("{pointer}/bufferView");
+        let range = (indices.buffer_view, indices.byte_offset, sparse.count);
+        let indices = self.elements(range, (unsigned, 1), (&pointer, &named))?;
+        let values = format!("{accessor}/sparse/values");
+        let named = format!("{values}/bufferView");
+        let values_range = (
+            sparse.values.buffer_view,
+            sparse.values.byte_offset,
+            sparse.count,
+        );
+        let values: Vec<f64> = self
+            .elements(values_range, (component, width), (&values, &named))?
+            .numbers()
+            .collect();
+        let mut before = None;
+        for (index, value) in indices.numbers().zip(values.chunks_exact(width)) {
+            let index = index as usize;
+            let count = numbers.len() / width;
+            if index >= count || before.is_some_and(|before| index <= before) {
+                let message =
+                    format!("index {index} of {count} elements; they increase and lie below that");
+                return Err(refuse(message));
+            }
+            numbers[index * width..][..width].copy_from_slice(value);
+            before = Some(index);
+        }
+        Ok(())
+    }
+
+    /// Elements of a buffer view: the view, the offset of the first and how many; their type; where
+    /// they are described, and where the view is named.
+    fn elements(
+        &self,
+        (view, offset, count): (usize, u64, u64),
+        (component, width): (ComponentType, usize),
+        (pointer, named): (&str, &str),
+    ) -> Result<Elements<'_>, Diagnostic> {
+        let found = self.view(view, named)?;
+        let size = component.size() * width;
+        let stride = found.stride.unwrap_or(size);
+        if stride < size {
+            let message = format!("elements of {size} bytes, and from one to the next {stride}");
+            return Err(self
+                .json
+                .refuse(&format!("/bufferViews/{view}"), Code::Property, message));
+        }
+        let needed = match count.checked_sub(1) {
+            Some(before) => u128::from(offset) + u128::from(before) * stride as u128 + size as u128,
+            None => 0,
+        };
+        if needed > found.bytes.len() as u128 {
+            let message = format!(
+                "{count} elements of {size} bytes from byte {offset} on need {needed} bytes of \
+                 buffer view {view}, which has {}",
+                found.bytes.len()
+            );
+            return Err(self.json.refuse(pointer, Code::TooShort, message));
+        }
+        Ok(Elements {
+            bytes: &found.bytes[(offset as usize).min(found.bytes.len())..],
+            stride,
+            count: count as usize,
+            component,
+            width,
+        })
+    }
+}

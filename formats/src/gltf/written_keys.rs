@@ -1,0 +1,116 @@
+//! The keys of one channel as a file has them: at times of their own, with their own sampler.
+
+use glam::Quat;
+use tumble::Channel;
+
+use crate::gltf::schema::TargetPath;
+use crate::motion::{ChannelInterpolation, Motion};
+use crate::signs::continue_signs;
+
+/// The keys of a channel of a clip.
+pub(super) struct WrittenKeys {
+    /// Seconds.
+    pub(super) times: Vec<f64>,
+    /// A value for each time; of cubics the arriving tangent, the value and the leaving tangent.
+    pub(super) values: Vec<f32>,
+    pub(super) sampler: ChannelInterpolation,
+}
+
+impl WrittenKeys {
+    /// The keys with which a clip moves a track; nothing where it rests.
+    pub(super) fn of(clip: &Motion, track: usize, path: TargetPath) -> Option<Self> {
+        let samplers = clip.channels.get(track);
+        match path {
+            TargetPath::Rotation => {
+                Self::of_rotations(clip, track, samplers.map(|channels| channels.rotation))
+            }
+            TargetPath::Translation => {
+                let sampler = samplers.map(|channels| channels.translation);
+                Self::of_vectors(clip, track, Channel::Translation, sampler)
+            }
+            TargetPath::Scale => {
+                let sampler = samplers.map(|channels| channels.scale);
+                Self::of_vectors(clip, track, Channel::Scale, sampler)
+            }
+        }
+    }
+
+    /// `sampler` is nothing where the clip says nothing of its tracks, and nothing inside where the
+    /// track rests.
+    fn of_rotations(
+        clip: &Motion,
+        track: usize,
+        sampler: Option<Option<ChannelInterpolation>>,
+    ) -> Option<Self> {
+        let rotations = clip.set.get(track)?;
+        let sampler = lasting(
+            sampler.unwrap_or(Some(ChannelInterpolation::Linear))?,
+            rotations.times,
+        );
+        let mut values = Vec::new();
+        let mut keys = rotations.keys.to_vec();
+        // The signs of cubics are part of their curves.
+        if sampler != ChannelInterpolation::Cubic {
+            continue_signs(&mut keys, 1);
+        }
+        for (index, &key) in keys.iter().enumerate() {
+            if sampler == ChannelInterpolation::Cubic {
+                let none = [Quat::from_array([0.0; 4]); 2];
+                let [arriving, leaving] = rotations.tangents.get(index).copied().unwrap_or(none);
+                values.extend(
+                    [arriving, key, leaving]
+                        .map(|q| q.to_array())
+                        .as_flattened(),
+                );
+                continue;
+            }
+            values.extend(key.to_array());
+        }
+        Some(Self {
+            times: rotations.times.to_vec(),
+            values,
+            sampler,
+        })
+    }
+
+    fn of_vectors(
+        clip: &Motion,
+        track: usize,
+        channel: Channel,
+        sampler: Option<Option<ChannelInterpolation>>,
+    ) -> Option<Self> {
+        let vectors = clip.set.vector_keys(channel, track)?;
+        let sampler = lasting(
+            sampler.unwrap_or(Some(ChannelInterpolation::Linear))?,
+            vectors.times,
+        );
+        let mut values = Vec::new();
+        for (index, key) in vectors.keys.iter().enumerate() {
+            match sampler {
+                ChannelInterpolation::Cubic => {
+                    let tangents = vectors.tangents.get(index).copied().unwrap_or_default();
+                    let [arriving, leaving] = tangents;
+                    values.extend(
+                        [arriving, *key, leaving]
+                            .map(|v| v.to_array())
+                            .as_flattened(),
+                    );
+                }
+                _ => values.extend(key.to_array()),
+            }
+        }
+        Some(Self {
+            times: vectors.times.to_vec(),
+            values,
+            sampler,
+        })
+    }
+}
+
+/// glTF's cubics have two keys at least; one key lasts, whatever joins keys.
+fn lasting(sampler: ChannelInterpolation, times: &[f64]) -> ChannelInterpolation {
+    match (sampler, times.len()) {
+        (ChannelInterpolation::Cubic, 0 | 1) => ChannelInterpolation::Linear,
+        _ => sampler,
+    }
+}

@@ -1,0 +1,101 @@
+//! The keys of a clip as times and numbers, and clips whose keys are samples.
+
+use glam::{Quat, Vec3};
+use tumble::{Channel, Engine, Error, SampleTimes, TrackSet};
+
+use crate::motion::{ChannelInterpolation, Channels, Motion};
+use crate::sample::{ChannelMethods, Samples};
+
+impl Motion {
+    /// The times of all keys of all channels, in order, each once.
+    #[must_use]
+    pub fn key_times(&self) -> Vec<f64> {
+        let mut times: Vec<f64> = Vec::new();
+        let mut last: Option<&[f64]> = None;
+        for list in self.key_lists() {
+            // Tracks mostly share their times.
+            if last != Some(list) {
+                times.extend_from_slice(list);
+                last = Some(list);
+            }
+        }
+        times.sort_by(f64::total_cmp);
+        times.dedup();
+        times
+    }
+
+    /// The clip with its samples at some frames as keys, joined by straight lines and arcs; steps stay
+    /// steps.
+    ///
+    /// # Errors
+    /// As [`Engine::evaluate`].
+    pub fn sampled(&self, engine: &Engine, frames: &SampleTimes) -> Result<Self, Error> {
+        let methods = ChannelMethods::AUTHORED;
+        let samples = methods.sample(engine, self, frames)?;
+        let tracks = self.set.track_count();
+        let mut set = TrackSet::new();
+        for track in 0..tracks {
+            let of_track = |all: &[Vec3]| -> Vec<Vec3> {
+                all.iter().skip(track).step_by(tracks).copied().collect()
+            };
+            let name = self.set.get(track).and_then(|track| track.name);
+            let keys: Vec<Quat> = (samples.rotations.iter())
+                .skip(track)
+                .step_by(tracks)
+                .copied()
+                .collect();
+            set.push(name.unwrap_or_default(), &samples.times, &keys)?;
+            if self.set.vector_keys(Channel::Translation, track).is_some() {
+                set.set_translations(track, &samples.times, &of_track(&samples.translations), &[])?;
+            }
+            if self.set.vector_keys(Channel::Scale, track).is_some() {
+                set.set_scales(track, &samples.times, &of_track(&samples.scales), &[])?;
+            }
+        }
+        let line = |sampler| match sampler {
+            Some(ChannelInterpolation::Cubic) => Some(ChannelInterpolation::Linear),
+            other => other,
+        };
+        let channels = self.channels.iter().map(|channels| Channels {
+            rotation: line(channels.rotation),
+            translation: line(channels.translation),
+            scale: line(channels.scale),
+        });
+        Ok(Self {
+            set,
+            channels: channels.collect(),
+            rate: None,
+            ..self.without_tracks()
+        })
+    }
+
+    /// The samples at the first and the last key alone, for formats that write the clip's own keys
+    /// ([`SampledClip::is_at_keys`](crate::motion::SampledClip::is_at_keys)) in their place.
+    ///
+    /// # Errors
+    /// As [`Engine::evaluate`].
+    pub fn ends(&self, engine: &Engine) -> Result<Samples, Error> {
+        let (first, last) = self.set.time_span().unwrap_or_default();
+        let mut times = vec![first, last];
+        times.dedup();
+        let methods = ChannelMethods::AUTHORED;
+        methods.sample(engine, self, &SampleTimes::at(times))
+    }
+
+    /// The keys of all channels.
+    #[must_use]
+    pub fn key_count(&self) -> usize {
+        self.key_lists().map(<[f64]>::len).sum()
+    }
+
+    /// The key times of each channel that has keys.
+    fn key_lists(&self) -> impl Iterator<Item = &[f64]> {
+        let channels = [Channel::Translation, Channel::Scale];
+        (0..self.set.track_count()).flat_map(move |track| {
+            let vectors = channels.map(|channel| self.set.vector_keys(channel, track));
+            let rotations = self.set.get(track).map(|track| track.times);
+            let vectors = vectors.into_iter().flatten().map(|keys| keys.times);
+            rotations.into_iter().chain(vectors)
+        })
+    }
+}

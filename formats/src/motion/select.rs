@@ -1,0 +1,110 @@
+//! Some tracks of a clip as a clip of their own.
+
+use tumble::TrackError;
+
+use crate::motion::Motion;
+
+impl Motion {
+    /// The clip of these tracks, in that order. A joint whose parent is not among them is a root.
+    ///
+    /// # Errors
+    /// When there is no such track.
+    pub fn select(&self, tracks: &[usize]) -> Result<Self, TrackError> {
+        let set = self.set.select(tracks.iter().copied())?;
+        let mut new_index = vec![None; self.set.track_count()];
+        for (index, &track) in tracks.iter().enumerate() {
+            new_index[track] = Some(index);
+        }
+        let mut skeleton = self.skeleton.clone();
+        for joint in &mut skeleton {
+            joint.parent = joint
+                .parent
+                .and_then(|parent| new_index.get(parent).copied().flatten());
+        }
+        let skeleton = tracks
+            .iter()
+            .filter_map(|&track| skeleton.get(track).copied());
+        let channels = tracks
+            .iter()
+            .filter_map(|&track| self.channels.get(track).copied());
+        let bvh = tracks
+            .iter()
+            .filter_map(|&track| self.bvh.get(track).cloned());
+        let origins = match self.origins.is_empty() {
+            true => Vec::new(),
+            false => tracks.iter().map(|&track| self.origin(track)).collect(),
+        };
+        Ok(Self {
+            set,
+            origins,
+            skeleton: skeleton.collect(),
+            channels: channels.collect(),
+            bvh: bvh.collect(),
+            ..self.without_tracks()
+        })
+    }
+
+    /// These tracks and all of their ancestors, in the order of the clip.
+    #[must_use]
+    pub fn with_ancestors(&self, tracks: &[usize]) -> Vec<usize> {
+        let mut is_selected = vec![false; self.set.track_count()];
+        for &track in tracks {
+            let mut next = Some(track);
+            // Where it has been before there is nothing new, in a circle neither.
+            while let Some(track) = next.filter(|&track| is_selected.get(track) == Some(&false)) {
+                is_selected[track] = true;
+                next = self.skeleton.get(track).and_then(|joint| joint.parent);
+            }
+        }
+        (0..is_selected.len())
+            .filter(|&track| is_selected[track])
+            .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::{Quat, Vec3};
+    use tumble::Channel;
+
+    use super::*;
+    use crate::motion::{Joint, Transform};
+
+    #[test]
+    fn joints_keep_their_parents_and_their_keys() {
+        let mut clip = Motion::default();
+        // A hand before the arm, its parent.
+        for (track, (name, parent)) in [
+            ("hand", Some(1)),
+            ("arm", Some(3)),
+            ("leg", Some(3)),
+            ("hip", None),
+        ]
+        .into_iter()
+        .enumerate()
+        {
+            let keys = [Quat::from_rotation_x(track as f32)];
+            clip.set.push(name, &[0.5], &keys).unwrap();
+            clip.set
+                .set_translations(track, &[0.5], &[Vec3::X * track as f32], &[])
+                .unwrap();
+            clip.skeleton.push(Joint {
+                parent,
+                rest: Transform::default(),
+            });
+        }
+        assert_eq!(clip.with_ancestors(&[0]), [0, 1, 3]);
+        let selected = clip.select(&[0, 1, 3]).unwrap();
+        let parents: Vec<_> = selected.skeleton.iter().map(|joint| joint.parent).collect();
+        assert_eq!(parents, [Some(1), Some(2), None]);
+        assert_eq!(selected.set.track_name(2), "hip");
+        let moved = selected.set.vector_keys(Channel::Translation, 2).unwrap();
+        assert_eq!(
+            (moved.times, moved.keys),
+            (&[0.5][..], &[Vec3::X * 3.0][..])
+        );
+        assert_eq!(clip.select(&[0]).unwrap().skeleton[0].parent, None);
+        clip.skeleton[3].parent = Some(0);
+        assert_eq!(clip.with_ancestors(&[1]), [0, 1, 3]);
+    }
+}

@@ -1,0 +1,160 @@
+//! Frame rates as files have them: numbers that were rounded, perhaps more than once.
+
+use crate::diagnostic::{Code, Diagnostic};
+use crate::format::ReadOptions;
+use crate::motion::grid;
+use crate::npz::archive::Archive;
+use crate::npz::header::Element;
+use crate::npz::plan::{ArchivePlan, read_numbers};
+use crate::rate::{Precision, RateSource, of, on_frames};
+
+impl ArchivePlan {
+    /// The rate in the first of these arrays that there is.
+    ///
+    /// # Errors
+    /// When it is no one number, or no rate.
+    pub(crate) fn read_rate(
+        &mut self,
+        archive: &Archive,
+        names: &[&str],
+    ) -> Result<(), Diagnostic> {
+        let mut before = "";
+        for (name, member) in names
+            .iter()
+            .filter_map(|&name| Some((name, archive.find(name)?)))
+        {
+            let numbers = read_numbers(archive, member)?;
+            self.compared.push(member);
+            let rate = match *numbers {
+                [number] => {
+                    let found = of(&RateSource::Number(number)).map(|found| found.grid);
+                    found.ok_or_else(|| number.to_string())
+                }
+                _ => Err(format!("{} numbers", numbers.len())),
+            };
+            let rate = rate.map_err(|found| {
+                let message = format!("{found} is not a frame rate; it is one number over 0");
+                archive.refuse(member, Code::FrameRate, message)
+            })?;
+            match self.rate {
+                None => (self.rate, self.rate_member, before) = (Some(rate), Some(member), name),
+                Some(first) if first != rate => {
+                    self.two_rates = Some(format!(
+                        "`{before}` says {first} frames a second, `{name}` {rate}; the first is taken, \
+                         --source-fps says another"
+                    ));
+                }
+                Some(_) => {}
+            }
+        }
+        Ok(())
+    }
+
+    /// Says where a file's length, in seconds, contradicts its rate: a rate that is twice or half of what the motion
+    /// was recorded at. Lengths are counted with the last frame and without, and a part may have been cut off.
+    pub(crate) fn compare_length(&mut self, archive: &Archive, name: &str) {
+        const LEAST_FACTOR: f64 = 1.5;
+        let Some(rate) = self.rate else {
+            return;
+        };
+        // What is not a length says nothing.
+        let member = archive.find(name);
+        self.compared.extend(member);
+        let numbers = member.and_then(|member| read_numbers(archive, member).ok());
+        let Some(&[seconds]) = numbers.as_deref() else {
+            return;
+        };
+        let by_length = self.frames as f64 / seconds;
+        let factor = by_length / rate.per_second();
+        let is_alike = factor < LEAST_FACTOR && factor > 1.0 / LEAST_FACTOR;
+        if self.frames < 8 || !by_length.is_finite() || by_length <= 0.0 || is_alike {
+            return;
+        }
+        self.two_rates.get_or_insert_with(|| {
+            format!(
+                "the file says {rate} frames a second, and `{name}` that {} frames last {seconds} s, which is \
+                 {by_length:.3} a second; the first is taken, --source-fps says another",
+                self.frames
+            )
+        });
+    }
+
+    /// The times of all frames, in seconds; the plan's rate becomes that on whose frames they lie.
+    ///
+    /// # Errors
+    /// When neither times nor a rate are known, or there are not as many times as frames.
+    pub(crate) fn read_times(
+        &mut self,
+        archive: &Archive,
+        options: &ReadOptions,
+    ) -> Result<Vec<f64>, Diagnostic> {
+        let Some(list) = self.times else {
+            let rate = options.source_rate.or(self.rate).ok_or_else(|| {
+                let message =
+                    "the file says neither times nor a frame rate; --source-fps gives one";
+                Diagnostic::new(&archive.file, Code::NoRate, message)
+            })?;
+            self.rate = Some(rate);
+            if options.source_rate.is_some() {
+                self.two_rates = None;
+            }
+            return Ok((0..self.frames as u64)
+                .map(|frame| rate.time_of(frame))
+                .collect());
+        };
+        if let Some(rate) = options.source_rate {
+            let message = format!(
+                "the file has the time of every frame; --source-fps {rate} would be another, leave it out"
+            );
+            return Err(archive.refuse(list.member, Code::RateBesideTimes, message));
+        }
+        let array = archive.array(list.member)?;
+        let columns = match array.header.shape[..] {
+            [_, columns] => columns,
+            _ => 1,
+        };
+        let numbers = read_numbers(archive, list.member)?;
+        let column = numbers
+            .into_iter()
+            .skip(list.column)
+            .step_by(columns.max(1));
+        let mut times: Vec<f64> = column.collect();
+        if times.len() != self.frames {
+            let message = format!("{} times for {} frames", times.len(), self.frames);
+            return Err(archive.refuse(list.member, Code::Shape, message));
+        }
+        if !array.header.element.is_float() && options.time_unit.is_none() {
+            let message =
+                "the times are whole numbers; give their unit with --time-unit (s, ms, us, ns)";
+            return Err(archive.refuse(list.member, Code::NoRate, message.to_owned()));
+        }
+        if let Some(unit) = options.time_unit {
+            times
+                .iter_mut()
+                .for_each(|time| *time /= unit.per_second() as f64);
+        }
+        let is_f32 = array.header.element == Element::F32;
+        let precision = if is_f32 {
+            Precision::F32
+        } else {
+            Precision::F64
+        };
+        let said = self
+            .rate
+            .filter(|&rate| on_frames(times.iter().copied(), rate, 0.0, precision));
+        // Times in f64, as we write them, were not rounded, and are read back as they are.
+        let found = if is_f32 && !options.raw_times {
+            grid::restore(std::slice::from_mut(&mut times), precision)
+        } else {
+            let times = RateSource::Times(std::slice::from_ref(&times), precision);
+            of(&times).and_then(crate::rate::FrameGrid::rate)
+        };
+        if let (Some(first), None, Some(found)) = (self.rate, said, found) {
+            self.two_rates = Some(format!(
+                "the file says {first} frames a second, and its times lie at {found}; the times are taken"
+            ));
+        }
+        self.rate = said.or(found);
+        Ok(times)
+    }
+}

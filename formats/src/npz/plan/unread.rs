@@ -1,0 +1,69 @@
+//! The members of an archive that no plan reads, and the warnings about them.
+
+use crate::diagnostic::Code;
+use crate::format::ReadOptions;
+use crate::npz::archive::{Archive, Member};
+use crate::npz::body::SHAPE;
+use crate::npz::header::{ArrayHeader, Element};
+use crate::npz::plan::ArchivePlan;
+use crate::npz::tumble_layout::CONSTANTS;
+use crate::warnings::{Warnings, listed};
+
+impl ArchivePlan {
+    /// The members of which nothing is read, but for pickled objects, which have a warning of their own.
+    pub(crate) fn not_read(&self, archive: &Archive, options: &ReadOptions) -> Vec<usize> {
+        let is_read = |index: usize, member: &Member| {
+            let header = member.header.as_ref();
+            let is_shape = self.is_body && options.has_body_model;
+            self.parts.iter().any(|part| part.member == index)
+                || self.times.is_some_and(|list| list.member == index)
+                || self.rate_member == Some(index)
+                || self.compared.contains(&index)
+                || self.constants.contains(&index)
+                || self.is_tumble_layout && CONSTANTS.contains(&&*member.name)
+                || is_shape && SHAPE.contains(&&*member.name)
+                || self.is_note(member)
+                || header.is_ok_and(|it| it.element == Element::Object)
+        };
+        let members = archive.members.iter().enumerate();
+        let others = members.filter(|&(index, member)| !is_read(index, member));
+        others.map(|(index, _)| index).collect()
+    }
+
+    /// Whether a member says what made our own samples: a text beside them.
+    pub(crate) fn is_note(&self, member: &Member) -> bool {
+        let header = member.header.as_ref();
+        self.is_tumble_layout && header.is_ok_and(|it| it.shape.is_empty() && it.element.is_text())
+    }
+
+    /// Warns of the members that are not read, and of pickled objects, which are not looked into.
+    pub(crate) fn warn_of_others(
+        &self,
+        archive: &Archive,
+        options: &ReadOptions,
+        warnings: &mut Warnings,
+    ) {
+        let name = |index: usize| &*archive.members[index].name;
+        let others = self.not_read(archive, options);
+        let quoted = others.iter().map(|&index| format!("`{}`", name(index)));
+        if let Some(names) = listed(quoted.collect()) {
+            let has_shape = others.iter().any(|&index| SHAPE.contains(&name(index)));
+            let hint = match self.is_body && has_shape {
+                true => "; --body-model brings the model that the shape is of",
+                false => "",
+            };
+            let message = format!("not read: {names}; say what arrays are with --map{hint}");
+            warnings.warn(Code::ArraysNotRead, || (None, message));
+        }
+        for member in &archive.members {
+            let is_object = |header: &ArrayHeader| header.element == Element::Object;
+            if member.header.as_ref().is_ok_and(is_object) {
+                let message = format!(
+                    "`{}` holds pickled objects, which are not read",
+                    member.name
+                );
+                warnings.warn(Code::ObjectsBeside, || (None, message));
+            }
+        }
+    }
+}

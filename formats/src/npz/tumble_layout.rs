@@ -1,0 +1,193 @@
+//! Our own layout: `rotations` (tracks, frames, x y z w) and what belongs to it.
+
+use glam::{DQuat, DVec3};
+use tumble::Layout;
+
+use crate::bvh::BvhJoint;
+use crate::diagnostic::{Code, Diagnostic};
+use crate::motion::{ChannelInterpolation, Channels, Transform};
+use crate::npz::archive::Archive;
+use crate::npz::plan::{ArchivePlan, KeyArray, KeyKind, TimeList, read_numbers};
+use crate::quaternion::ComponentOrder;
+
+/// Arrays of the layout that are no keys: what the clip is, in all frames.
+pub(crate) const CONSTANTS: [&str; 8] = [
+    "name",
+    "names",
+    "parents",
+    "rest",
+    "is_world",
+    SAMPLERS,
+    BVH_CHANNELS,
+    END_SITES,
+];
+
+/// How the rotation, the translation and the scale of each track are interpolated: `STEP`, `LINEAR`,
+/// or nothing for what rests.
+pub(crate) const SAMPLERS: &str = "samplers";
+
+/// The channels of each track in BVH: `Zrotation Xrotation Yrotation`.
+pub(crate) const BVH_CHANNELS: &str = "bvh_channels";
+
+/// The End Sites of BVH: the track that each belongs to, and x y z.
+pub(crate) const END_SITES: &str = "end_sites";
+
+/// The plan of such a file; `None` for another.
+pub(crate) fn plan(archive: &Archive) -> Result<Option<ArchivePlan>, Diagnostic> {
+    let array = |name, values| KeyArray::of(archive, name, values, 0, Layout::TrackMajor);
+    let quaternions = KeyKind::Quaternion(ComponentOrder::Xyzw);
+    let Some(rotations) = array("rotations", quaternions)? else {
+        return Ok(None);
+    };
+    let mut plan = ArchivePlan {
+        is_tumble_layout: true,
+        ..ArchivePlan::default()
+    };
+    plan.add(archive, rotations)?;
+    for (name, values) in [
+        ("translations", KeyKind::Translation),
+        ("scales", KeyKind::Scale),
+    ] {
+        if let Some(vectors) = array(name, values)? {
+            plan.add(archive, vectors)?;
+        }
+    }
+    plan.times = archive
+        .find("times")
+        .map(|member| TimeList { member, column: 0 });
+    plan.read_names(archive, "names")?;
+    plan.read_parents(archive, "parents")?;
+    plan.read_rate(archive, &["fps"])?;
+    if let Some(member) = archive.find("rest") {
+        plan.rest = read_rest(archive, member, plan.tracks)?;
+        plan.constants.push(member);
+    }
+    read_samplers(archive, &mut plan)?;
+    read_bvh(archive, &mut plan)?;
+    if let Some(member) = archive.find("is_world") {
+        plan.is_world = read_numbers(archive, member)? == [1.0];
+    }
+    if let Some(array) = archive.array_named("name")? {
+        plan.name = array
+            .texts()
+            .ok()
+            .and_then(|texts| texts.into_iter().next());
+    }
+    Ok(Some(plan))
+}
+
+/// The texts of an array of so many, `None` where there is no such array.
+fn texts(
+    archive: &Archive,
+    plan: &mut ArchivePlan,
+    name: &str,
+    each: usize,
+) -> Result<Option<Vec<String>>, Diagnostic> {
+    let Some(member) = archive.find(name) else {
+        return Ok(None);
+    };
+    let texts = archive.array(member)?.texts();
+    let texts = texts.map_err(|why| archive.refuse(member, Code::ElementType, why))?;
+    if texts.len() != each * plan.tracks {
+        let (found, tracks) = (texts.len(), plan.tracks);
+        let message =
+            format!("the array has {found} texts; {each} are read for each of {tracks} tracks");
+        return Err(archive.refuse(member, Code::Shape, message));
+    }
+    plan.constants.push(member);
+    Ok(Some(texts))
+}
+
+fn read_samplers(archive: &Archive, plan: &mut ArchivePlan) -> Result<(), Diagnostic> {
+    let Some(texts) = texts(archive, plan, SAMPLERS, 3)? else {
+        return Ok(());
+    };
+    let sampler = |text: &String| match text.as_str() {
+        "" => Ok(None),
+        "STEP" => Ok(Some(ChannelInterpolation::Step)),
+        "LINEAR" => Ok(Some(ChannelInterpolation::Linear)),
+        other => {
+            let message =
+                format!("`{SAMPLERS}` has `{other}`; STEP, LINEAR and an empty text are read");
+            Err(Diagnostic::new(&archive.file, Code::Shape, message))
+        }
+    };
+    let all: Vec<Option<ChannelInterpolation>> =
+        texts.iter().map(sampler).collect::<Result<_, _>>()?;
+    let of_track = |three: &[Option<ChannelInterpolation>; 3]| Channels {
+        rotation: three[0],
+        translation: three[1],
+        scale: three[2],
+    };
+    plan.channels = all.as_chunks().0.iter().map(of_track).collect();
+    Ok(())
+}
+
+fn read_bvh(archive: &Archive, plan: &mut ArchivePlan) -> Result<(), Diagnostic> {
+    let Some(texts) = texts(archive, plan, BVH_CHANNELS, 1)? else {
+        return Ok(());
+    };
+    for text in &texts {
+        let Some(channels) = BvhJoint::channels_of(text) else {
+            let message = format!("`{BVH_CHANNELS}` has `{text}`, no channels of BVH");
+            return Err(Diagnostic::new(&archive.file, Code::BvhChannel, message));
+        };
+        plan.bvh.push(BvhJoint {
+            channels,
+            end_sites: Vec::new(),
+        });
+    }
+    let Some(member) = archive.find(END_SITES) else {
+        return Ok(());
+    };
+    plan.constants.push(member);
+    let numbers = read_numbers(archive, member)?;
+    let (rows, rest) = numbers.as_chunks::<4>();
+    for &[track, x, y, z] in rows {
+        let site = DVec3::new(x, y, z).as_vec3();
+        let joint = (track >= 0.0 && track.fract() == 0.0).then_some(track as usize);
+        let joint = joint.and_then(|joint| plan.bvh.get_mut(joint));
+        match joint.filter(|_| site.is_finite() && rest.is_empty()) {
+            Some(joint) => joint.end_sites.push(site),
+            None => {
+                let message = "rows are a track and three finite numbers";
+                return Err(archive.refuse(member, Code::Shape, message.to_owned()));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Rest poses: for each track tx ty tz, x y z w, sx sy sz.
+fn read_rest(
+    archive: &Archive,
+    member: usize,
+    tracks: usize,
+) -> Result<Vec<(Transform, DVec3)>, Diagnostic> {
+    let numbers = read_numbers(archive, member)?;
+    if numbers.len() != 10 * tracks {
+        let message = format!(
+            "the array has {} numbers; (tracks, 10) is read, for {tracks} tracks",
+            numbers.len()
+        );
+        return Err(archive.refuse(member, Code::Shape, message));
+    }
+    if let Some(bad) = numbers
+        .iter()
+        .position(|&number| !(number as f32).is_finite())
+    {
+        let message = format!("number {bad} of the array is {}, not finite", numbers[bad]);
+        return Err(archive.refuse(member, Code::NotFinite, message));
+    }
+    let (rows, _) = numbers.as_chunks::<10>();
+    let rest = |&[tx, ty, tz, x, y, z, w, sx, sy, sz]: &[f64; 10]| {
+        let position = DVec3::new(tx, ty, tz);
+        let rest = Transform {
+            translation: position.as_vec3(),
+            rotation: DQuat::from_xyzw(x, y, z, w).as_quat(),
+            scale: DVec3::new(sx, sy, sz).as_vec3(),
+        };
+        (rest, position)
+    };
+    Ok(rows.iter().map(rest).collect())
+}

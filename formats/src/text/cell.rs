@@ -1,0 +1,50 @@
+//! Texts as cells of a table.
+
+use std::borrow::Cow;
+
+/// A text as a cell. Spreadsheets take cells that begin with `=`, `+`, `-` or `@` for formulas, which may
+/// run programs: they, and what such a cell looks like already, get a quote in front, which spreadsheets do
+/// not show. Numbers are no texts.
+pub(crate) fn text_cell(text: &str) -> Cow<'_, str> {
+    match is_formula(text.trim_start_matches(QUOTE)) {
+        true => Cow::Owned(format!("{QUOTE}{text}")),
+        false => Cow::Borrowed(text),
+    }
+}
+
+/// What a cell of text says: see [`text_cell`].
+pub(crate) fn cell_text(cell: &str) -> &str {
+    match cell.strip_prefix(QUOTE) {
+        Some(text) if is_formula(text.trim_start_matches(QUOTE)) => text,
+        _ => cell,
+    }
+}
+
+const QUOTE: char = '\'';
+
+fn is_formula(text: &str) -> bool {
+    text.starts_with(['=', '+', '-', '@', '\t', '\r'])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_cell_of_text_is_a_formula_and_each_says_what_it_was() {
+        for (text, cell) in [
+            ("hip.x", "hip.x"),
+            ("=cmd|' /C calc'!A0.x", "'=cmd|' /C calc'!A0.x"),
+            ("-hand.w", "'-hand.w"),
+            ("@SUM(A1).y", "'@SUM(A1).y"),
+            ("+1", "'+1"),
+            ("\t=1", "'\t=1"),
+            ("'=1", "''=1"),
+            ("''-", "'''-"),
+            ("'tis", "'tis"),
+            ("", ""),
+        ] {
+            assert_eq!((&*text_cell(text), cell_text(cell)), (cell, text));
+        }
+    }
+}

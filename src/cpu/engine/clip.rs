@@ -1,0 +1,361 @@
+//! Clips on the CPU: windows of a result, cut into tasks for the threads. Where a window has a few explicit times of
+//! each of many tracks, such as the poses of a crowd, each lane evaluates one sample, and no runs are listed.
+
+use bytemuck::Zeroable;
+use glam::Quat;
+use rayon::prelude::*;
+
+use crate::cpu::engine::{CpuEngine, TASK};
+use crate::cpu::evaluate::{SAMPLES_ONE_BY_ONE, one};
+use crate::cpu::streaming::{RowOutput, Stage};
+use crate::output::encoding::Encoding;
+use crate::output::rotations::Layout;
+use crate::output::window::Window;
+use crate::prepare::clip_data::{ClipData, PartRef};
+use crate::prepare::error::SetError;
+use crate::shader::{ArcSegment, Form};
+use crate::simd::dispatch::{InLanes, in_lanes_of};
+use crate::simd::lanes::{Lanes, canonical};
+use crate::threads::{self, stop};
+use crate::time::frames::{SampleTimesError, Ticks, Timeline};
+use crate::time::runs::RunSource;
+use crate::time::wrap::TrackCopy;
+use crate::twin::evaluate_arc::{norm_squared, on_arc};
+
+/// Tracks whose rows are evaluated before they are transposed into frames: their rotations at one
+/// frame fill four cache lines.
+const TILE: usize = 16;
+
+/// Frames of one task of a frame-major window: a task with fewer takes hardly less time.
+const TASK_FRAMES: usize = 256;
+
+impl CpuEngine {
+    /// Fills `output` with a window of the clip's result.
+    pub(crate) fn evaluate(
+        &self,
+        clip: &ClipData,
+        timeline: &Timeline,
+        window: &Window,
+        output: &mut [Quat],
+    ) -> Result<(), SetError> {
+        let output: &mut [[f32; 4]] = bytemuck::cast_slice_mut(output);
+        if output.is_empty() {
+            return Ok(());
+        }
+        let stop = stop::current();
+        // Waking a thread costs more than a task's worth of work.
+        if output.len() <= TASK {
+            return Ok(self.window(clip, timeline, window, Some(output.len()), output)?);
+        }
+        if window.layout == Layout::FrameMajor {
+            let tasks = frame_tasks(window, output).into_par_iter();
+            return self.on_threads(|| {
+                tasks.try_for_each(|(window, frames)| {
+                    stop::check_of(stop.as_ref())?;
+                    Ok::<_, SetError>(self.frames(clip, timeline, &window, frames)?)
+                })
+            })?;
+        }
+        let rotations = Some(output.len());
+        self.on_threads(|| {
+            let tasks = tasks(window, 1, output).into_par_iter();
+            tasks.try_for_each(|(window, part)| {
+                stop::check_of(stop.as_ref())?;
+                Ok::<_, SetError>(self.window(clip, timeline, &window, rotations, part)?)
+            })
+        })?
+    }
+
+    /// As [`CpuEngine::evaluate`], encoded: a task's rotations are converted while they
+    /// are in the cache.
+    pub(crate) fn evaluate_encoded(
+        &self,
+        clip: &ClipData,
+        timeline: &Timeline,
+        window: &Window,
+        encoding: Encoding,
+        output: &mut [u8],
+    ) -> Result<(), SetError> {
+        let stop = stop::current();
+        let task = |rotations: &mut Vec<[f32; 4]>, window: &Window, output: &mut [u8]| {
+            stop::check_of(stop.as_ref())?;
+            rotations.resize(window.len(), [0.0; 4]);
+            self.window(clip, timeline, window, None, rotations)?;
+            encoding.encode_all(rotations, output);
+            Ok::<_, SetError>(())
+        };
+        if window.len() <= TASK {
+            return match output {
+                [] => Ok(()),
+                _ => Ok(task(&mut Vec::new(), window, output)?),
+            };
+        }
+        self.on_threads(|| {
+            let tasks = tasks(window, encoding.bytes(), output).into_par_iter();
+            tasks.try_for_each_init(Vec::new, |rotations, (window, output)| {
+                task(rotations, &window, output)
+            })
+        })?
+    }
+
+    /// Evaluates a window on this thread; the whole result has `rotations` rotations, or is read again
+    /// at once.
+    fn window(
+        &self,
+        clip: &ClipData,
+        timeline: &Timeline,
+        window: &Window,
+        rotations: Option<usize>,
+        output: &mut [[f32; 4]],
+    ) -> Result<(), SampleTimesError> {
+        let (samples, tracks) = (window.samples.len(), window.tracks.len());
+        let in_rows = window.layout == Layout::TrackMajor || samples == 1;
+        if let Ticks::Times { times, stride } = &timeline.ticks
+            && samples <= SAMPLES_ONE_BY_ONE
+            && in_rows
+            && !clip.interpolation.wrap().repeats()
+        {
+            let mut sparse = SparseTimes {
+                clip,
+                times,
+                stride: *stride,
+                window,
+                output,
+                others: Vec::new(),
+            };
+            in_lanes_of(self.width, &mut sparse);
+            return sparse.others.into_iter().try_for_each(|row_index| {
+                let row = &mut output[row_index * samples..][..samples];
+                let track = window.tracks.start + row_index;
+                let first = window.samples.start;
+                self.row(clip, track, timeline, first, &mut RowOutput::Here(row))
+            });
+        }
+        match window.layout {
+            Layout::TrackMajor => {
+                let of_a_run = || clip.samples_of_a_run(timeline);
+                let streams = rotations.map_or(Some(false), |_| self.streaming_stores);
+                let rotations = rotations.unwrap_or_default();
+                let mut stage =
+                    Stage::new(self.width, streams, rotations, samples, of_a_run, output);
+                for track in window.tracks.clone() {
+                    stage.row(samples, |samples, output| {
+                        let first = window.samples.start + samples.start;
+                        self.row(clip, track, timeline, first, output)
+                    })?;
+                }
+                stage.finish();
+                Ok(())
+            }
+            Layout::FrameMajor => {
+                let frames = output.chunks_mut(tracks).collect();
+                self.frames(clip, timeline, window, frames)
+            }
+        }
+    }
+
+    /// Evaluates a frame-major window on this thread: each of `frames` receives the window's
+    /// tracks at one sample.
+    fn frames(
+        &self,
+        clip: &ClipData,
+        timeline: &Timeline,
+        window: &Window,
+        mut frames: Vec<&mut [[f32; 4]]>,
+    ) -> Result<(), SampleTimesError> {
+        let (samples, tracks) = (window.samples.len(), window.tracks.len());
+        let mut rows = vec![[0.0; 4]; samples * TILE.min(tracks)];
+        for first in (0..tracks).step_by(TILE) {
+            let tile = first..(first + TILE).min(tracks);
+            for (row, row_index) in rows.chunks_mut(samples).zip(tile.clone()) {
+                let track = window.tracks.start + row_index;
+                let first = window.samples.start;
+                self.row(clip, track, timeline, first, &mut RowOutput::Here(row))?;
+            }
+            for (sample, frame) in frames.iter_mut().enumerate() {
+                let column = rows[sample..].iter().step_by(samples);
+                for (value, rotation) in frame[tile.clone()].iter_mut().zip(column) {
+                    *value = *rotation;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Evaluates the samples of one track from `first` on.
+    fn row(
+        &self,
+        clip: &ClipData,
+        track: usize,
+        timeline: &Timeline,
+        first: usize,
+        output: &mut RowOutput<'_, '_>,
+    ) -> Result<(), SampleTimesError> {
+        let samples = first..first + output.samples().len();
+        if !clip.interpolation.wrap().repeats() {
+            let copy = TrackCopy::of_track(samples.clone());
+            return clip
+                .parts_of(track, timeline, samples)
+                .try_for_each(|part| self.part(part, timeline, &copy, output));
+        }
+        for copy in clip.copies(track, timeline, samples) {
+            let range = copy.samples.start - first..copy.samples.end - first;
+            let values = &mut RowOutput::Here(&mut output.samples()[range]);
+            clip.parts_in(track, &copy)
+                .try_for_each(|part| self.part(part, timeline, &copy, values))?;
+        }
+        Ok(())
+    }
+}
+
+/// Cuts a frame-major window into tasks of some frames of some tracks, each with its slices of the
+/// output.
+fn frame_tasks<'a>(
+    window: &Window,
+    output: &'a mut [[f32; 4]],
+) -> Vec<(Window, Vec<&'a mut [[f32; 4]]>)> {
+    let tracks = window.tracks.len();
+    let frames_each = TASK_FRAMES.min(window.samples.len());
+    let tracks_each = (TASK / frames_each).max(TILE);
+    let mut all = Vec::new();
+    let blocks = output.chunks_mut(frames_each * tracks);
+    for (block, first) in blocks.zip(window.samples.clone().step_by(frames_each)) {
+        let samples = first..first + block.len() / tracks;
+        let starts = window.tracks.clone().step_by(tracks_each);
+        let of_block = all.len();
+        all.extend(starts.map(|start| {
+            let tracks = start..(start + tracks_each).min(window.tracks.end);
+            let window = Window::of(tracks, samples.clone(), Layout::FrameMajor);
+            (window, Vec::with_capacity(samples.len()))
+        }));
+        for frame in block.chunks_mut(tracks) {
+            let rows = frame.chunks_mut(tracks_each);
+            for ((_, frames), row) in all[of_block..].iter_mut().zip(rows) {
+                frames.push(row);
+            }
+        }
+    }
+    all
+}
+
+/// Cuts a window into tasks, each with its own part of the output, which has `each` elements for a
+/// rotation.
+fn tasks<'a, T>(
+    window: &Window,
+    each: usize,
+    mut output: &'a mut [T],
+) -> Vec<(Window, &'a mut [T])> {
+    let with_output = |window: Window| {
+        let values = output.split_off_mut(..window.len() * each);
+        (window, values.unwrap_or_default())
+    };
+    let limit = match window.layout {
+        Layout::TrackMajor => TASK,
+        Layout::FrameMajor => {
+            let share = window.samples.len() / (4 * threads::count());
+            TASK.max(share.min(TASK_FRAMES / 4) * window.tracks.len())
+        }
+    };
+    window.cut(limit).map(with_output).collect()
+}
+
+/// Samples that are evaluated together.
+const LANES: usize = 64;
+
+/// A window of a clip at sparse times, evaluated by one lookup for each sample.
+pub(crate) struct SparseTimes<'a> {
+    pub(crate) clip: &'a ClipData,
+    /// Sample `k` of track `t` lies at `times[t × stride + k]`.
+    pub(crate) times: &'a [f64],
+    pub(crate) stride: usize,
+    pub(crate) window: &'a Window,
+    /// `[track][sample]`.
+    pub(crate) output: &'a mut [[f32; 4]],
+    /// Tracks with a sample that takes more than a lookup, outside the keys or on a curve that is
+    /// evaluated in f64, by their index in the window: the caller evaluates their rows.
+    pub(crate) others: Vec<usize>,
+}
+
+/// Samples on arcs, gathered until the block is full.
+#[derive(Zeroable)]
+struct ArcLanes {
+    middles: [[f32; 4]; LANES],
+    tangents: [[f32; 4]; LANES],
+    parameters: [f32; LANES],
+    /// Where each sample is stored in the output.
+    outputs: [usize; LANES],
+    count: usize,
+}
+
+impl InLanes for SparseTimes<'_> {
+    #[inline(always)]
+    fn run<L: Lanes>(&mut self) {
+        let samples = self.window.samples.clone();
+        let mut block = ArcLanes::zeroed();
+        for (i, track) in self.window.tracks.clone().enumerate() {
+            let Some(PartRef { prepared, part }) = self.clip.only_part(track) else {
+                self.others.push(i);
+                continue;
+            };
+            let times = &self.times[track * self.stride..][samples.clone()];
+            for (k, &time) in times.iter().enumerate() {
+                let output_index = i * samples.len() + k;
+                let (index, distance, affine) = match prepared.spans.source_at(part, time) {
+                    Some(RunSource::Constant(index)) => {
+                        self.output[output_index] = prepared.constants[index as usize];
+                        continue;
+                    }
+                    Some(RunSource::Segment(index, distance, affine)) => {
+                        (index as usize, distance.of(0, || time), affine)
+                    }
+                    _ => {
+                        self.others.push(i);
+                        break;
+                    }
+                };
+                let segments = &prepared.segments;
+                match segments.form {
+                    Form::Arc => {
+                        let parameter = distance * affine.scale + affine.offset;
+                        block.push(&segments.arcs[index], parameter, output_index);
+                        if block.count == LANES {
+                            block.flush::<L>(self.output);
+                        }
+                    }
+                    Form::Polynomial => {
+                        let segment = &segments.polynomials[index];
+                        self.output[output_index] = one(segment, affine, distance);
+                    }
+                }
+            }
+        }
+        block.flush::<L>(self.output);
+    }
+}
+
+impl ArcLanes {
+    #[inline(always)]
+    fn push(&mut self, segment: &ArcSegment, parameter: f32, output: usize) {
+        self.middles[self.count] = segment.middle;
+        self.tangents[self.count] = segment.tangent;
+        self.parameters[self.count] = parameter;
+        self.outputs[self.count] = output;
+        self.count += 1;
+    }
+
+    #[inline(always)]
+    fn flush<L: Lanes>(&mut self, output: &mut [[f32; 4]]) {
+        let mut rotations = [[0.0; 4]; LANES];
+        for j in (0..self.count).step_by(L::COUNT) {
+            let middle = L::load_rotations(&self.middles[j..]);
+            let tangent = L::load_rotations(&self.tangents[j..]);
+            let parameter = L::load(&self.parameters[j..]);
+            let found = on_arc(middle, tangent, norm_squared(tangent), parameter);
+            L::store_rotations(canonical(found), &mut rotations[j..j + L::COUNT]);
+        }
+        for (&index, rotation) in self.outputs[..self.count].iter().zip(rotations) {
+            output[index] = rotation;
+        }
+        self.count = 0;
+    }
+}

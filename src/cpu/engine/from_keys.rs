@@ -1,0 +1,182 @@
+//! Sets with fewer samples than keys: straight from the keys. A sample whose curve turns too far for the
+//! small-angle series is left `UNRESOLVED`; then the intervals of such samples alone are prepared, and the samples
+//! are overwritten.
+
+use glam::Quat;
+use rayon::prelude::*;
+
+use crate::cpu::engine::batches::tasks;
+use crate::cpu::engine::sparse_samples::Group;
+use crate::cpu::engine::{CpuEngine, TASK};
+use crate::cpu::streaming::RowOutput;
+use crate::from_keys::evaluate::KeyEvaluator;
+use crate::from_keys::{KeyCurve, UNRESOLVED};
+use crate::prepare::batch::{Batch, BatchSize, PART_INTERVALS, batches};
+use crate::prepare::error::SetError;
+use crate::prepare::request::SetRequest;
+use crate::threads::stop;
+use crate::time::frame_clock::FrameClock;
+use crate::time::frames::Ticks;
+use crate::time::wrap::TrackCopy;
+
+/// Keys of one task.
+const TASK_KEYS: usize = 16 * 1024;
+
+impl CpuEngine {
+    /// Evaluates some tracks, `[track][sample]`.
+    pub(crate) fn evaluate_from_keys<'a>(
+        &self,
+        request: &'a SetRequest<'a>,
+        curve: KeyCurve,
+        output: &mut [Quat],
+    ) -> Result<(), SetError> {
+        let (set, timeline) = (request.set, request.timeline);
+        let output: &mut [[f32; 4]] = bytemuck::cast_slice_mut(output);
+        let in_order = matches!(timeline.ticks, Ticks::Frames { .. });
+        let size = BatchSize {
+            keys: TASK_KEYS,
+            tracks: TASK / timeline.len(),
+            cut: in_order.then_some(TASK_KEYS),
+        };
+        let stop = stop::current();
+        let new = || KeyEvaluator::new(request.interpolation, curve);
+        let task = |evaluator: &mut KeyEvaluator<'a>, batch: &Batch, output: &mut [[f32; 4]]| {
+            stop::check_of(stop.as_ref())?;
+            let window = batch.samples(set, timeline, false);
+            let is_resolved = evaluator.evaluate(set, batch, timeline, &window, output)?;
+            if is_resolved || window.is_empty() {
+                return Ok(());
+            }
+            let rows = output.chunks_mut(window.len());
+            batch
+                .intervals(set)
+                .zip(rows)
+                .try_for_each(|((track, intervals), output)| {
+                    self.resolve(request, track, (window.start, intervals.start), output)
+                })
+        };
+        let batches: Vec<Batch> = batches(set, Batch::Tracks(request.tracks.clone()), size);
+        if let [batch] = &*batches {
+            return task(&mut new(), batch, output);
+        }
+        let tasks = tasks(set, timeline, &batches, 1, false, output);
+        self.on_threads(|| {
+            (tasks.into_par_iter()).try_for_each_init(new, |evaluator, (batch, output)| {
+                task(evaluator, &batch[0], output)
+            })
+        })?
+    }
+}
+
+/// Two unresolved intervals with at most this many others between them are prepared together.
+pub(crate) const APART: usize = 2;
+
+/// What is prepared together, with the samples of each group in the result.
+type FallbackBatch<'o> = Vec<(Group, &'o mut [[f32; 4]])>;
+
+impl CpuEngine {
+    /// Evaluates the unresolved ones of a track's consecutive samples from `first` on, by way of
+    /// segments. Resolved samples between them are evaluated again, to the same bits. `key` is the index
+    /// of a key at or before all of the samples between keys.
+    pub(crate) fn resolve(
+        &self,
+        request: &SetRequest<'_>,
+        track: usize,
+        (first, key): (usize, usize),
+        mut output: &mut [[f32; 4]],
+    ) -> Result<(), SetError> {
+        if let Ticks::Times { .. } = request.timeline.ticks {
+            // In any order, and all samples of the track.
+            if output.contains(&UNRESOLVED) {
+                let tracks = track..track + 1;
+                let request = SetRequest {
+                    tracks,
+                    ..request.clone()
+                };
+                self.evaluate_sparse(&request, output)?;
+            }
+            return Ok(());
+        }
+        let all = unresolved(request, track, (first, key), output);
+        let mut from = first;
+        let mut batches: Vec<FallbackBatch<'_>> = Vec::new();
+        let mut intervals = PART_INTERVALS;
+        for one in all {
+            let others = &mut output[one.samples.start - from..];
+            let (values, others) = others.split_at_mut(one.samples.len());
+            (from, output) = (one.samples.end, others);
+            if intervals >= PART_INTERVALS {
+                batches.push(Vec::new());
+                intervals = 0;
+            }
+            intervals += one.intervals.len();
+            if let Some(batch) = batches.last_mut() {
+                batch.push((one, values));
+            }
+        }
+        let resolve = |batch: FallbackBatch<'_>| -> Result<(), SetError> {
+            let mut memory = self.scratch_pool.take(request);
+            let intervals = (batch.iter()).map(|(one, _)| (track, one.intervals.clone()));
+            memory.prepare(request.set, intervals)?;
+            for (part, (one, values)) in memory.parts().zip(batch) {
+                let (copy, values) = (
+                    TrackCopy::of_track(one.samples),
+                    &mut RowOutput::Here(values),
+                );
+                self.part(part, request.timeline, &copy, values)?;
+            }
+            self.scratch_pool.give_back(memory);
+            Ok(())
+        };
+        if batches.len() <= 1 {
+            return batches.into_iter().try_for_each(resolve);
+        }
+        self.on_threads(|| batches.into_par_iter().try_for_each(resolve))?
+    }
+}
+
+/// The unresolved ones of some samples; the arguments are those of [`CpuEngine::resolve`].
+fn unresolved(
+    request: &SetRequest<'_>,
+    track: usize,
+    (first, key): (usize, usize),
+    output: &[[f32; 4]],
+) -> Vec<Group> {
+    let samples = (first..).zip(output);
+    let samples = samples.filter(|(_, rotation)| **rotation == UNRESOLVED);
+    intervals_of_frames(request, track, key, samples.map(|(sample, _)| sample))
+}
+
+/// The intervals of a track in which frames at a rate lie, which increase. `key` is the index of a key at or
+/// before all of those between keys.
+pub(crate) fn intervals_of_frames(
+    request: &SetRequest<'_>,
+    track: usize,
+    key: usize,
+    samples: impl Iterator<Item = usize>,
+) -> Vec<Group> {
+    let (times, _) = request.set.times_and_keys(track);
+    let last = times.len() - 1;
+    let mut all = Vec::new();
+    let Ticks::Frames { rate, start } = request.timeline.ticks else {
+        return all; // explicit times have groups of their own
+    };
+    let clock = FrameClock::new(rate, start, request.interpolation.steps());
+    for sample in samples {
+        let time = request.timeline.time_at(track, sample);
+        let after = times.partition_point(|&key| key <= time);
+        let last_interval = last.saturating_sub(1);
+        let mut interval = after
+            .saturating_sub(1)
+            .clamp(key.min(last_interval), last_interval);
+        // A sample within rounding of a key is that key.
+        while interval + 1 < last && clock.first_frame(times[interval + 1]) <= sample as f64 {
+            interval += 1;
+        }
+        while interval > key && clock.first_frame(times[interval]) > sample as f64 {
+            interval -= 1;
+        }
+        Group::put(&mut all, interval, last, sample);
+    }
+    all
+}

@@ -1,0 +1,181 @@
+//! Sparse samples of long tracks: only the key intervals that have a sample are prepared.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use rayon::prelude::*;
+
+use crate::cpu::engine::CpuEngine;
+use crate::cpu::engine::from_keys::{APART, intervals_of_frames};
+use crate::cpu::streaming::RowOutput;
+use crate::prepare::batch::PART_INTERVALS;
+use crate::prepare::error::SetError;
+use crate::prepare::preparation::Preparation;
+use crate::prepare::request::SetRequest;
+use crate::threads::stop;
+use crate::time::frames::{Ticks, Timeline};
+use crate::time::times::interval_at;
+use crate::time::wrap::TrackCopy;
+
+/// Samples of one task: enough to fill the blocks of intervals that are prepared in lanes.
+const TASK_SAMPLES: usize = 512;
+
+/// Consecutive samples, and the key intervals of a track in which they lie.
+pub(crate) struct Group {
+    pub(crate) intervals: Range<usize>,
+    pub(crate) samples: Range<usize>,
+}
+
+/// The samples of a track in order of time, and the groups that they form.
+struct Sorted {
+    timeline: Timeline,
+    /// Which sample of the request each of them is; `None` where they are these.
+    request_indices: Option<Vec<u32>>,
+    groups: Vec<Group>,
+}
+
+impl CpuEngine {
+    /// Evaluates some tracks, `[track][sample]`. Frames at a rate must not lie in copies of a track.
+    pub(crate) fn evaluate_sparse(
+        &self,
+        request: &SetRequest<'_>,
+        output: &mut [[f32; 4]],
+    ) -> Result<(), SetError> {
+        let samples = request.timeline.len();
+        if output.is_empty() {
+            return Ok(());
+        }
+        let each = (TASK_SAMPLES / samples).max(1);
+        let first = request.tracks.start;
+        let stop = stop::current();
+        let task = |(chunk, output): (usize, &mut [[f32; 4]])| {
+            stop::during(stop.clone(), || {
+                self.evaluate_sparse_tracks(request, first + chunk * each, output)
+            })
+        };
+        if output.len() <= each * samples {
+            return task((0, output));
+        }
+        self.on_threads(|| {
+            let tasks = output.par_chunks_mut(each * samples).enumerate();
+            tasks.try_for_each(task)
+        })?
+    }
+
+    /// Evaluates the samples of consecutive tracks from `first` on.
+    fn evaluate_sparse_tracks(
+        &self,
+        request: &SetRequest<'_>,
+        first: usize,
+        output: &mut [[f32; 4]],
+    ) -> Result<(), SetError> {
+        stop::check()?;
+        let samples = request.timeline.len();
+        let tracks = first..first + output.len() / samples;
+        // Tracks that share key times and sample times share their groups too.
+        let mut sorted: Vec<(usize, Sorted)> = Vec::new();
+        let shares = !matches!(request.timeline.ticks, Ticks::Times { stride: 1.., .. });
+        let mut of_track = Vec::with_capacity(tracks.len());
+        for track in tracks.clone() {
+            let (times, keys) = request.set.times_and_keys(track);
+            // Keys that nobody samples are refused too, as on every other route.
+            Preparation::check_track(request.interpolation, keys, track)?;
+            let is_known = |(known, _): &(usize, Sorted)| {
+                let (others, _) = request.set.times_and_keys(*known);
+                shares && std::ptr::eq(times, others)
+            };
+            if !sorted.last().is_some_and(is_known) {
+                sorted.push((track, Sorted::new(request, track)?));
+            }
+            of_track.push(sorted.len() - 1);
+        }
+        let mut memory = self.scratch_pool.take(request);
+        let groups_of = |row: usize| sorted[of_track[row]].1.groups.iter();
+        let intervals = tracks.clone().enumerate().flat_map(|(row, track)| {
+            groups_of(row).map(move |group| (track, group.intervals.clone()))
+        });
+        memory.prepare(request.set, intervals)?;
+        let mut parts = memory.parts();
+        let mut in_order = vec![[0.0; 4]; samples];
+        for (i, output) in output.chunks_exact_mut(samples).enumerate() {
+            let sorted = &sorted[of_track[i]].1;
+            let row: &mut [[f32; 4]] = match sorted.request_indices {
+                Some(_) => &mut in_order,
+                None => &mut *output,
+            };
+            for (group, part) in sorted.groups.iter().zip(parts.by_ref()) {
+                let copy = TrackCopy::of_track(group.samples.clone());
+                let values = &mut RowOutput::Here(&mut row[group.samples.clone()]);
+                self.part(part, &sorted.timeline, &copy, values)?;
+            }
+            if let Some(indices) = &sorted.request_indices {
+                for (&index, &value) in indices.iter().zip(&in_order) {
+                    output[index as usize] = value;
+                }
+            }
+        }
+        drop(parts);
+        self.scratch_pool.give_back(memory);
+        Ok(())
+    }
+}
+
+impl Sorted {
+    fn new(request: &SetRequest<'_>, track: usize) -> Result<Self, SetError> {
+        let timeline = request.timeline;
+        let samples = 0..timeline.len();
+        let Ticks::Times { .. } = timeline.ticks else {
+            return Ok(Self {
+                groups: intervals_of_frames(request, track, 0, samples),
+                timeline: timeline.clone(),
+                request_indices: None,
+            });
+        };
+        let (times, _) = request.set.times_and_keys(track);
+        let last = times.len() - 1;
+        let wrap = request.interpolation.wrap();
+        let time_of = |sample: usize| {
+            let time = timeline.time_at(track, sample);
+            match wrap.repeats() {
+                true => wrap.folded((times[0], times[last]), time),
+                false => time,
+            }
+        };
+        let mut order: Vec<(f64, u32)> = samples
+            .map(|sample| (time_of(sample), sample as u32))
+            .collect();
+        order.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+        let mut groups: Vec<Group> = Vec::new();
+        let mut near = 0;
+        for (sample, &(time, _)) in order.iter().enumerate() {
+            near = interval_at(times, time, near);
+            let interval = near.min(last.saturating_sub(1));
+            Group::put(&mut groups, interval, last, sample);
+        }
+        let sorted = Arc::new(order.iter().map(|&(time, _)| time).collect());
+        Ok(Self {
+            timeline: Timeline::at(sorted),
+            request_indices: Some(order.into_iter().map(|(_, sample)| sample).collect()),
+            groups,
+        })
+    }
+}
+
+impl Group {
+    /// Adds the next sample, which lies in an interval of a track whose last key is `last`, to the last
+    /// group, or as a new one.
+    pub(crate) fn put(groups: &mut Vec<Self>, interval: usize, last: usize, sample: usize) {
+        match groups.last_mut() {
+            Some(Self { intervals, samples })
+                if interval <= intervals.end + APART && intervals.len() < PART_INTERVALS =>
+            {
+                intervals.end = (interval + 1).clamp(intervals.end, last);
+                samples.end = sample + 1;
+            }
+            _ => groups.push(Self {
+                intervals: interval..(interval + 1).min(last),
+                samples: sample..sample + 1,
+            }),
+        }
+    }
+}

@@ -1,0 +1,88 @@
+//! Crowds on an application's own Vulkan device, recorded into its own command buffers. These
+//! functions are unsafe, because the compiler cannot check what the application promises.
+#![allow(unsafe_code)]
+
+use std::sync::Arc;
+
+use ash::vk;
+
+use crate::crowd::player::Crowd;
+use crate::crowd_error::{CrowdError, OFFSET_STEP};
+use crate::gpu::crowd::CrowdTarget;
+use crate::gpu::handles::VulkanBuffer;
+use crate::gpu::submission::Commands;
+use crate::output::crowd::CrowdOutput;
+
+impl Crowd {
+    /// Makes ready what it takes to evaluate into a range of a buffer of the application's own, on the
+    /// device that the engine was made from ([`Engine::from_vulkan`](crate::engine::Engine::from_vulkan)):
+    /// kernels are compiled and memory is allocated here, once, and not when a frame is recorded.
+    ///
+    /// # Errors
+    /// When the engine is the CPU, the range does not start at a multiple of 256 bytes or is too short,
+    /// there are no inverse bind matrices for skinning matrices, or the device fails.
+    ///
+    /// # Safety
+    /// The buffer must belong to the engine's device, have memory, be made for use as
+    /// `STORAGE_BUFFER`, contain the range, and live as long as the target. The target must be
+    /// dropped after all work that was recorded with it has ended, and before the device.
+    pub unsafe fn target(
+        &self,
+        output: impl Into<CrowdOutput>,
+        buffer: VulkanBuffer,
+    ) -> Result<CrowdTarget, CrowdError> {
+        let output = output.into();
+        // No application has a buffer on a device that the engine opened.
+        let device = self.device.as_ref();
+        let device = device.filter(|device| !device.engine.device.owned);
+        let device = device.ok_or(CrowdError::OtherDevice)?;
+        self.check(output)?;
+        let (offset, size) = (buffer.offset, buffer.size);
+        let needed = device.bytes(output);
+        if !offset.is_multiple_of(OFFSET_STEP) || size < needed {
+            return Err(CrowdError::Buffer {
+                offset,
+                size,
+                needed,
+            });
+        }
+        Ok(CrowdTarget::new(device, output, buffer.buffer, offset)?)
+    }
+
+    /// Records an evaluation at the clock's time into the application's command buffer: 16 bytes for
+    /// each layer that changed since the last evaluation, and the dispatches. Nothing is waited for and
+    /// nothing allocated. What is recorded behind it, or submitted to the same queue later, sees the
+    /// result; it waits for all that was recorded before it.
+    ///
+    /// # Errors
+    /// When the target is another crowd's; then nothing is recorded.
+    ///
+    /// # Safety
+    /// The command buffer must be of the engine's device, in recording, outside of a render pass, and
+    /// of the family of the engine's queue. Everything that is recorded must be submitted once to the
+    /// engine's queue, in the order of the calls: the device keeps what instances play, and a frame
+    /// that is thrown away would keep from it what changed. Whoever submits keeps the engine from
+    /// submitting meanwhile. Several targets may alternate; two evaluations with one target are in order on
+    /// the queue.
+    pub unsafe fn record(
+        &mut self,
+        target: &CrowdTarget,
+        commands: vk::CommandBuffer,
+    ) -> Result<(), CrowdError> {
+        let device = self.device.as_ref();
+        let Some(device) = device.filter(|device| Arc::ptr_eq(device, &target.crowd)) else {
+            return Err(CrowdError::OtherDevice);
+        };
+        // SAFETY: promised by the caller.
+        let commands = unsafe { Commands::new(&device.engine.device, commands) };
+        let clock = self.instances.clock;
+        target.record(commands, clock, self.instances.take_changes());
+        Ok(())
+    }
+
+    /// Takes back that anything was recorded since the instances were last known to be on the device:
+    /// the next evaluation writes all of them. For an application that threw a recorded frame away.
+    pub fn forget_recorded(&mut self) {
+        self.instances.forget();
+    }
+}

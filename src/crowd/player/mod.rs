@@ -1,0 +1,475 @@
+//! Crowds: instances that play a library's clips.
+
+#[cfg(feature = "vulkan")]
+mod application_device;
+
+use std::sync::Arc;
+
+use bytemuck::Pod;
+
+use crate::crowd::instances::Instances;
+use crate::crowd::layer::{CrowdLayer, tick};
+use crate::crowd::library::CrowdLibrary;
+use crate::crowd::on_cpu::{self, CrowdScene};
+use crate::crowd_error::{CrowdError, MAX_INSTANCES, MAX_LAYERS};
+use crate::engine::Engine;
+use crate::evaluate::backend::Backend;
+use crate::gpu::crowd::{CrowdReader, CrowdTables, DeviceCrowd};
+use crate::memory::zeroed;
+use crate::output::crowd::{CrowdOutput, CrowdValues};
+use crate::shader::{CrowdDispatch, CrowdEntry, CrowdLink};
+use crate::threads::OutOfThreads;
+use crate::twin::crowd_layers::Layers;
+use crate::twin::crowd_matrices::to_any_half;
+
+/// The farthest that a clock goes, ticks: whole numbers of f64.
+const FARTHEST: f64 = (1u64 << 52) as f64;
+
+/// Many instances of a library's skeleton, each of which plays clips at its own time and speed.
+///
+/// All of them follow one clock, which counts whole ticks: where an instance stands is a function of
+/// whole numbers, so that a clip in a loop gives the same bits in the first second and a day later.
+/// What an instance plays is [set](Crowd::set) when it changes, and costs nothing while it goes on.
+///
+/// The CPU and every Vulkan device give the same bits.
+pub struct Crowd {
+    engine: Engine,
+    pub(crate) library: CrowdLibrary,
+    cells: Vec<[f32; 4]>,
+    pub(crate) instances: Instances,
+    /// The push constants that all dispatches share.
+    arguments: CrowdDispatch,
+    pub(crate) device: Option<Arc<DeviceCrowd>>,
+    /// A submission that was not taken yet. On the CPU it has its values already.
+    submitted: Option<(CrowdOutput, Option<Vec<[f32; 4]>>)>,
+    /// What evaluates on the device for the host, for the output that was asked for last.
+    reader: Option<CrowdReader>,
+}
+
+impl Engine {
+    /// A crowd of instances, 1 to 1 000 000, with 1 to 4 layers each. All of them stand still at the
+    /// start of the library's first clip until they are [set](Crowd::set). The library is copied, to the
+    /// device too.
+    ///
+    /// # Errors
+    /// When the library has no clips, there are too many instances or layers, or there is not the
+    /// memory.
+    pub fn crowd(
+        &self,
+        library: &CrowdLibrary,
+        instances: usize,
+        layers: usize,
+    ) -> Result<Crowd, CrowdError> {
+        if library.clips() == 0 {
+            return Err(CrowdError::NoClips);
+        }
+        if !(1..=MAX_INSTANCES).contains(&instances) {
+            return Err(CrowdError::Instances {
+                requested: instances,
+            });
+        }
+        if !(1..=MAX_LAYERS).contains(&layers) {
+            return Err(CrowdError::Layers { requested: layers });
+        }
+        let cells = library.cells()?;
+        let still = CrowdLayer {
+            speed: 0.0,
+            ..CrowdLayer::new(0)
+        };
+        let still = still.packed(&library.tables.clips, 0, 0)?;
+        let mut crowd = Crowd {
+            engine: self.clone(),
+            library: library.clone(),
+            instances: Instances::new(instances, layers, still)?,
+            arguments: library.arguments(layers),
+            device: None,
+            submitted: None,
+            reader: None,
+            cells,
+        };
+        crowd.device = crowd.uploaded()?;
+        Ok(crowd)
+    }
+}
+
+impl Crowd {
+    /// The tables on the engine's device; `None` on the CPU.
+    fn uploaded(&self) -> Result<Option<Arc<DeviceCrowd>>, CrowdError> {
+        let Backend::Vulkan(opened) = &*self.engine.backend else {
+            return Ok(None);
+        };
+        let (engine, library) = (opened.engine(), &self.library);
+        let clip_tables = &library.tables;
+        // Behind the links, where each level begins and ends.
+        let mut links = library.links.clone();
+        links.extend(library.levels.windows(2).map(|level| CrowdLink {
+            joint: level[0],
+            parent: level[1],
+        }));
+        let tables = CrowdTables {
+            instances: self.instances() as u32,
+            levels: library.levels.clone(),
+            only_arcs: clip_tables.has_only_arcs(),
+            arguments: self.arguments,
+            clips: engine.crowd_table("tumble crowd clips", &clip_tables.clips)?,
+            bases: engine.crowd_table("tumble crowd time bases", &clip_tables.bases)?,
+            spans: engine.crowd_table("tumble crowd spans", &clip_tables.spans)?,
+            channels: engine.crowd_table("tumble crowd channels", &clip_tables.channels)?,
+            cells: engine.crowd_table("tumble crowd cells", &self.cells)?,
+            links: engine.crowd_table("tumble crowd links", &links)?,
+            bind: engine.crowd_table("tumble crowd inverse bind", &library.bind)?,
+        };
+        Ok(Some(Arc::new(DeviceCrowd::new(engine, tables)?)))
+    }
+
+    /// Number of instances.
+    #[must_use]
+    pub fn instances(&self) -> usize {
+        self.instances.entries.len() / self.layers()
+    }
+
+    /// Layers of an instance.
+    #[must_use]
+    pub fn layers(&self) -> usize {
+        self.arguments.layers as usize
+    }
+
+    /// The library that it was made of.
+    #[must_use]
+    pub fn library(&self) -> &CrowdLibrary {
+        &self.library
+    }
+
+    /// Sets what a layer of an instance plays from now on: 16 bytes that reach the device with the next
+    /// evaluation.
+    ///
+    /// # Errors
+    /// When there is no such instance, layer, clip or mask, or a number is out of range; then
+    /// everything stays.
+    pub fn set(
+        &mut self,
+        instance: usize,
+        layer: usize,
+        plays: CrowdLayer,
+    ) -> Result<(), CrowdError> {
+        let (index, entry) = self.packed(instance, layer, plays)?;
+        self.instances.set(index, entry);
+        Ok(())
+    }
+
+    /// Sets what many layers play, an instance, a layer and what it plays each; of two changes of
+    /// one layer the later one counts.
+    ///
+    /// # Errors
+    /// As [`Crowd::set`], with the index of the first change that is refused; then everything stays.
+    pub fn set_all(&mut self, changes: &[(usize, usize, CrowdLayer)]) -> Result<(), CrowdError> {
+        for (change, &(instance, layer, plays)) in changes.iter().enumerate() {
+            if let Err(reason) = self.packed(instance, layer, plays) {
+                let reason = Box::new(reason);
+                return Err(CrowdError::Change { change, reason });
+            }
+        }
+        for &(instance, layer, plays) in changes {
+            self.set(instance, layer, plays)?;
+        }
+        Ok(())
+    }
+
+    /// The index of a layer's entry, and the entry for what it is to play.
+    fn packed(
+        &self,
+        instance: usize,
+        layer: usize,
+        plays: CrowdLayer,
+    ) -> Result<(usize, CrowdEntry), CrowdError> {
+        let index = self.entry_index(instance, layer)?;
+        let (clips, masks) = (&self.library.tables.clips, self.library.masks());
+        let weight = if layer == 0 { 1.0 } else { plays.weight };
+        let entry = CrowdLayer { weight, ..plays }.packed(clips, masks, self.clock())?;
+        Ok((index, entry))
+    }
+
+    /// What a layer of an instance plays, and where it stands now. Speed and weight are as they were
+    /// rounded.
+    ///
+    /// # Errors
+    /// When there is no such instance or layer.
+    pub fn get(&self, instance: usize, layer: usize) -> Result<CrowdLayer, CrowdError> {
+        let entry = &self.instances.entries[self.entry_index(instance, layer)?];
+        let (clips, clock) = (&self.library.tables.clips, self.clock());
+        Ok(CrowdLayer::moved(entry, clips, clock, clock))
+    }
+
+    /// The tick of its clip at which a layer of an instance is evaluated now, from 0 to the clip's
+    /// length.
+    ///
+    /// # Errors
+    /// When there is no such instance or layer.
+    pub fn tick(&self, instance: usize, layer: usize) -> Result<u32, CrowdError> {
+        let entry = &self.instances.entries[self.entry_index(instance, layer)?];
+        Ok(tick(entry, &self.library.tables.clips, self.clock()))
+    }
+
+    fn entry_index(&self, instance: usize, layer: usize) -> Result<usize, CrowdError> {
+        for (subject, index, count) in [
+            ("instance", instance, self.instances()),
+            ("layer", layer, self.layers()),
+        ] {
+            if index >= count {
+                return Err(CrowdError::Missing {
+                    subject,
+                    index,
+                    count,
+                });
+            }
+        }
+        Ok(instance * self.layers() + layer)
+    }
+
+    /// Vectors of four numbers of a result, `[instance][joint]`.
+    #[must_use]
+    pub fn output_len(&self, output: impl Into<CrowdOutput>) -> usize {
+        self.instances() * self.library.joints() * output.into().vectors()
+    }
+
+    /// Evaluates all instances at the clock's time, `[instance][joint]`: a rotation, or the three rows
+    /// of a matrix. Waits until it is done.
+    ///
+    /// # Errors
+    /// When `output` is not exactly as long as the result, skinning matrices are asked for and the
+    /// library has no inverse bind matrices, a submission is in flight, or the device fails.
+    pub fn evaluate_into(
+        &mut self,
+        values: CrowdValues,
+        output: &mut [[f32; 4]],
+    ) -> Result<(), CrowdError> {
+        self.check_len(output.len(), values.into())?;
+        if self.device.is_some() {
+            self.submit(values)?;
+            return self.wait_into(output);
+        }
+        self.check_idle(values.into())?;
+        Ok(self.on_cpu(values, output)?)
+    }
+
+    /// As [`Crowd::evaluate_into`], in 16 bits: `[u16; 4]` are the bits of four halves.
+    ///
+    /// # Errors
+    /// As [`Crowd::evaluate_into`].
+    pub fn evaluate_half_into(
+        &mut self,
+        values: CrowdValues,
+        output: &mut [[u16; 4]],
+    ) -> Result<(), CrowdError> {
+        self.check_len(output.len(), values.into())?;
+        self.submit(CrowdOutput::half(values))?;
+        self.wait_half_into(output)
+    }
+
+    /// Starts an evaluation at the clock's time and returns at once; a Vulkan device works on it
+    /// while instances and the clock are changed for the next one. The CPU evaluates before this
+    /// returns.
+    ///
+    /// # Errors
+    /// As [`Crowd::evaluate_into`], and when the result of the submission before was not taken.
+    pub fn submit(&mut self, output: impl Into<CrowdOutput>) -> Result<(), CrowdError> {
+        let output = output.into();
+        self.check_idle(output)?;
+        let Some(device) = &self.device else {
+            let mut found = zeroed(self.output_len(output), "a crowd's poses")?;
+            self.on_cpu(output.values, &mut found)?;
+            self.submitted = Some((output, Some(found)));
+            return Ok(());
+        };
+        let kept = self.reader.take();
+        let kept = kept.filter(|reader| reader.target.output() == output);
+        let reader = kept.map_or_else(|| CrowdReader::new(device, output), Ok)?;
+        let reader = self.reader.insert(reader);
+        let clock = self.instances.clock;
+        if let Err(error) = reader.submit(clock, self.instances.take_changes()) {
+            // What was recorded may never have reached the device.
+            self.instances.forget();
+            self.reader = None;
+            return Err(error.into());
+        }
+        self.submitted = Some((output, None));
+        Ok(())
+    }
+
+    /// What was submitted and not taken yet.
+    #[must_use]
+    pub fn submitted(&self) -> Option<CrowdOutput> {
+        self.submitted.as_ref().map(|(output, _)| *output)
+    }
+
+    /// Whether what was submitted is done, so that [`Crowd::wait_into`] does not wait.
+    ///
+    /// # Errors
+    /// When nothing was submitted, or the device fails.
+    pub fn poll(&self) -> Result<bool, CrowdError> {
+        match (&self.submitted, &self.reader) {
+            (Some((_, Some(_))), _) => Ok(true),
+            (Some((_, None)), Some(reader)) => Ok(reader.results.is_done()?),
+            _ => Err(CrowdError::NothingSubmitted),
+        }
+    }
+
+    /// Waits for what was submitted, and takes its result.
+    ///
+    /// # Errors
+    /// When nothing was submitted, it was in 16 bits, `output` is not as long as the result, or the
+    /// device fails.
+    pub fn wait_into(&mut self, output: &mut [[f32; 4]]) -> Result<(), CrowdError> {
+        self.take_into(false, output, |value| value)
+    }
+
+    /// Waits for what was submitted in 16 bits, and takes its result.
+    ///
+    /// # Errors
+    /// As [`Crowd::wait_into`].
+    pub fn wait_half_into(&mut self, output: &mut [[u16; 4]]) -> Result<(), CrowdError> {
+        self.take_into(true, output, |value| value.map(to_any_half))
+    }
+
+    /// Takes what was submitted; `stored` makes of the CPU's values what a device would leave.
+    fn take_into<T: Pod>(
+        &mut self,
+        is_half: bool,
+        output: &mut [T],
+        stored: impl Fn([f32; 4]) -> T,
+    ) -> Result<(), CrowdError> {
+        let submitted = self.submitted().ok_or(CrowdError::NothingSubmitted)?;
+        if submitted.is_half != is_half {
+            let is_half = submitted.is_half;
+            return Err(CrowdError::Precision { is_half });
+        }
+        self.check_len(output.len(), submitted)?;
+        if let Some((_, Some(found))) = self.submitted.take() {
+            for (stored_value, value) in output.iter_mut().zip(found) {
+                *stored_value = stored(value);
+            }
+            return Ok(());
+        }
+        let Some(reader) = &mut self.reader else {
+            return Err(CrowdError::NothingSubmitted);
+        };
+        let read = reader.wait_into(bytemuck::cast_slice_mut(output));
+        if read.is_err() {
+            self.instances.forget();
+            self.reader = None;
+        }
+        Ok(read?)
+    }
+
+    fn check_len(&self, length: usize, output: CrowdOutput) -> Result<(), CrowdError> {
+        let needed = self.output_len(output);
+        match length == needed {
+            true => Ok(()),
+            false => Err(CrowdError::OutputLength { length, needed }),
+        }
+    }
+
+    pub(crate) fn check(&self, output: CrowdOutput) -> Result<(), CrowdError> {
+        match output.values == CrowdValues::Skinning && self.library.bind.is_empty() {
+            true => Err(CrowdError::NoInverseBind),
+            false => Ok(()),
+        }
+    }
+
+    /// Whether an evaluation can start.
+    fn check_idle(&self, output: CrowdOutput) -> Result<(), CrowdError> {
+        self.check(output)?;
+        match self.submitted {
+            Some(_) => Err(CrowdError::StillSubmitted),
+            None => Ok(()),
+        }
+    }
+
+    fn on_cpu(&self, values: CrowdValues, output: &mut [[f32; 4]]) -> Result<(), OutOfThreads> {
+        let arguments = &self.arguments;
+        let scene = CrowdScene {
+            library: &self.library,
+            values,
+            clock: self.clock(),
+            context: Layers {
+                entries: &self.instances.entries,
+                channels: &self.library.tables.channels,
+                cells: &self.cells,
+                positions: &[],
+                joints: arguments.joints,
+                layers: arguments.layers,
+                bases: arguments.bases,
+                masks: arguments.masks,
+                references: arguments.references,
+            },
+        };
+        match &*self.engine.backend {
+            Backend::Cpu(engine) => on_cpu::evaluate(scene, engine, output),
+            Backend::Vulkan(_) => Ok(()), // its crowds are on the device
+        }
+    }
+
+    /// The clock, ticks.
+    #[must_use]
+    pub fn clock(&self) -> u64 {
+        self.instances.clock
+    }
+
+    /// Sets the clock, ticks; all instances move with it, forwards or backwards.
+    ///
+    /// # Errors
+    /// From 2^52 ticks on, which is two centuries at 705 600 ticks a second.
+    pub fn set_clock(&mut self, ticks: u64) -> Result<(), CrowdError> {
+        let rounded_ticks = ticks as f64;
+        if rounded_ticks >= FARTHEST {
+            let seconds = rounded_ticks / f64::from(self.library.ticks_per_second());
+            return Err(CrowdError::Seconds { seconds });
+        }
+        let (clips, masks) = (&self.library.tables.clips, self.library.masks());
+        self.instances.set_clock(ticks, clips, masks);
+        Ok(())
+    }
+
+    /// Moves the clock on by some ticks.
+    ///
+    /// # Errors
+    /// As [`Crowd::set_clock`].
+    pub fn advance_ticks(&mut self, ticks: u64) -> Result<(), CrowdError> {
+        self.set_clock(self.clock().saturating_add(ticks))
+    }
+
+    /// Moves the clock on by the ticks nearest to some seconds. Where the sum must not drift, as in a
+    /// film at 30000/1001 frames a second, [`Crowd::set_clock`] to the ticks of each frame's time.
+    ///
+    /// # Errors
+    /// When the seconds are negative or no number, and as [`Crowd::set_clock`].
+    pub fn advance(&mut self, seconds: f64) -> Result<(), CrowdError> {
+        match u64::try_from(self.ticks_of(seconds)?) {
+            Ok(ticks) => self.advance_ticks(ticks),
+            Err(_) => Err(CrowdError::Seconds { seconds }),
+        }
+    }
+
+    /// The ticks nearest to a time in seconds, for [`CrowdLayer::time`](crate::crowd::layer::CrowdLayer::time).
+    ///
+    /// # Errors
+    /// When it is no number, or out of reach.
+    pub fn ticks_of(&self, seconds: f64) -> Result<i64, CrowdError> {
+        let ticks = (seconds * f64::from(self.library.ticks_per_second())).round();
+        match ticks.abs() < FARTHEST {
+            true => Ok(ticks as i64),
+            false => Err(CrowdError::Seconds { seconds }),
+        }
+    }
+}
+
+impl std::fmt::Debug for Crowd {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Crowd")
+            .field("engine", &self.engine)
+            .field("instances", &self.instances())
+            .field("layers", &self.layers())
+            .field("clock", &self.clock())
+            .finish_non_exhaustive()
+    }
+}

@@ -1,0 +1,150 @@
+//! The choice of a device by measured time.
+
+use std::collections::HashSet;
+use std::time::{Duration, Instant};
+
+use glam::Quat;
+
+use crate::device::Device;
+use crate::engine::Engine;
+use crate::error::Error;
+use crate::gpu::cache::{self, Cache};
+use crate::method::slerp::SLERP;
+use crate::output::buffer::OutputBuffer;
+use crate::output::rotations::Layout;
+use crate::time::frames::SampleTimes;
+use crate::tracks::set::TrackSet;
+
+/// Fewer rotations than this the CPU evaluates in 1 to 3 ms, while opening a device alone takes 50
+/// ms; see [`Engine::auto`].
+const MIN_ROTATIONS_FOR_DEVICE: usize = 1 << 20;
+
+const PROBE_TRACKS: usize = 512;
+const PROBE_FRAMES: usize = 1024;
+
+/// A workload that measures how fast a device is: 2^19 rotations.
+#[allow(clippy::disallowed_methods)] // nobody sees the results
+fn probe() -> Result<TrackSet, Error> {
+    let last = (PROBE_FRAMES - 1) as f64;
+    let times = (0..18u8).map(|i| last * f64::from(i) / 17.0).collect();
+    let keys = (0..18u8).map(|i| Quat::from_rotation_y(f32::from(i) * 0.7));
+    let keys = keys.collect::<Vec<_>>().repeat(PROBE_TRACKS);
+    Ok(TrackSet::from_shared_times(times, keys)?)
+}
+
+/// Under what the probe of a device's model is remembered: it is another with another driver, or another
+/// version of the engine.
+fn model(device: &Device) -> Option<String> {
+    let Device::Vulkan(device) = device else {
+        return None;
+    };
+    let info = device.info();
+    let (vendor, number) = (info.vendor_id, info.device_id);
+    let software = format!(
+        "{} {} {}",
+        info.driver,
+        info.api_version,
+        env!("CARGO_PKG_VERSION")
+    );
+    let software = cache::sum("probe", software.as_bytes());
+    Some(format!("probe-{vendor:x}-{number:x}-{software:016x}"))
+}
+
+/// How long a model took, if that is known.
+fn remembered(cache: &Cache, model: &str) -> Option<Duration> {
+    let nanoseconds = cache.read(model, size_of::<u64>())?.try_into().ok()?;
+    Some(Duration::from_nanos(u64::from_le_bytes(nanoseconds)))
+}
+
+impl Engine {
+    /// The device that evaluates large results fastest: the default where nothing speaks for a
+    /// certain device. It is [`Engine::auto_for`] with more rotations than any result has.
+    ///
+    /// ```
+    /// let engine = tumble::Engine::auto()?;
+    /// println!("evaluating on {}", engine.device_name());
+    /// # Ok::<(), tumble::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// When the system refuses what the CPU needs.
+    pub fn auto() -> Result<Self, Error> {
+        Self::auto_for(usize::MAX)
+    }
+
+    /// The device that evaluates calls of `rotations` rotations each fastest, into the host's
+    /// memory. All devices give the same bits, so the choice shows in nothing but the time. The
+    /// rule:
+    ///
+    /// * fewer than 2^20 rotations: the CPU. It has done them before a device is even open.
+    /// * Software devices (drivers such as Mesa's lavapipe and `SwiftShader`) never: they compute on
+    ///   the CPU too, and slower.
+    /// * Else every device that is exact, and the CPU, evaluate a probe of 2^19 rotations; what
+    ///   counts is the shortest of three times. That of a model of card with its driver is remembered
+    ///   in the user's cache directory (`TUMBLE_CACHE_DIR`, else the system's; empty: nothing is
+    ///   remembered), so that later processes open the fastest alone.
+    ///
+    /// # Errors
+    /// When the system refuses what the CPU needs.
+    pub fn auto_for(rotations: usize) -> Result<Self, Error> {
+        let cpu = Self::new(Device::Cpu)?;
+        if rotations < MIN_ROTATIONS_FOR_DEVICE {
+            return Ok(cpu);
+        }
+        let cache = Cache::of_user();
+        let (mut models, mut timed) = (HashSet::new(), Vec::new());
+        for device in Device::list().unwrap_or_default() {
+            // Of several cards of one model the first serves as well as any.
+            let Some(model) = model(&device).filter(|_| !device.is_software()) else {
+                continue;
+            };
+            if models.contains(&model) {
+                continue;
+            }
+            if let Some(time) = remembered(&cache, &model) {
+                timed.push((time, device, None));
+            } else if let Ok(engine) = Self::new(device.clone())
+                && let Ok(time) = engine.probe_time()
+            {
+                cache.write(&model, &(time.as_nanos() as u64).to_le_bytes());
+                timed.push((time, device, Some(engine)));
+            } else {
+                continue; // one that fails is not chosen
+            }
+            models.insert(model);
+        }
+        if timed.is_empty() {
+            return Ok(cpu);
+        }
+        let of_cpu = cpu.probe_time()?;
+        timed.retain(|(time, ..)| *time < of_cpu);
+        timed.sort_by_key(|(time, ..)| *time);
+        let mut engines = timed
+            .into_iter()
+            .filter_map(|(_, device, open)| match open {
+                Some(engine) => Some(engine),
+                None => Self::new(device).ok(),
+            });
+        Ok(engines.next().unwrap_or(cpu))
+    }
+
+    /// How long this engine takes to evaluate a probe of 2^19 rotations: the shortest of three
+    /// times, after one that does not count. Making and uploading the probe is not timed.
+    /// [`Engine::auto_for`] compares devices by it. The four evaluations count in
+    /// [`Engine::take_timings`].
+    ///
+    /// # Errors
+    /// When the device fails, or there is no memory for the probe.
+    pub fn probe_time(&self) -> Result<Duration, Error> {
+        let clip = self.upload(&probe()?, SLERP)?;
+        let mut output = OutputBuffer::new(PROBE_TRACKS * PROBE_FRAMES)?;
+        let mut time = || {
+            let started = Instant::now();
+            clip.evaluate_into(&SampleTimes::fps(1), Layout::TrackMajor, &mut output)?;
+            Ok::<_, Error>(started.elapsed())
+        };
+        // The first time does not count: caches are cold, and some drivers compile then.
+        time()?;
+        Ok(time()?.min(time()?).min(time()?))
+    }
+}

@@ -1,0 +1,83 @@
+//! What an engine reports of itself: what it chose for its device, and how long its kernels take to compile.
+
+use std::time::{Duration, Instant};
+
+use crate::gpu::device::{LogicalDevice, QueueLane};
+use crate::gpu::engine::VulkanEngine;
+use crate::gpu::error::VulkanError;
+use crate::gpu::pipeline::{Exactness, Pipeline};
+
+/// What the engine chose for a device, where options left it the choice.
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+#[non_exhaustive]
+pub struct EngineChoices {
+    /// `samples` or `runs`: what neighbouring invocations take ([`Mapping`](crate::gpu::options::Mapping)).
+    pub mapping: &'static str,
+    /// `texel-buffers` or `storage-buffers`: how kernels read.
+    pub reads: &'static str,
+    /// `in-place` or `staged`: how results reach the host.
+    pub transfer: &'static str,
+    /// `same-queue`, `apart` or `copy-queue`: how staged results are copied.
+    pub read_back: &'static str,
+    /// `direct`, `small-direct` or `host`: how uploads come to the device by default.
+    pub uploads: &'static str,
+    /// Whether the caller's memory is imported.
+    pub imports_memory: bool,
+    /// Windows in flight.
+    pub windows_in_flight: usize,
+    /// Rotations of a window, at most.
+    pub window: usize,
+    /// The queue family that computes.
+    pub queue_family: u32,
+    /// The queue family that copies.
+    pub copy_queue_family: u32,
+}
+
+impl VulkanEngine {
+    /// Compiles every kernel, and says how long each took.
+    pub(crate) fn compile_kernels(
+        &self,
+        each: &mut dyn FnMut(&'static str, Duration) -> bool,
+    ) -> Result<(), VulkanError> {
+        for code in self.bindable() {
+            let started = Instant::now();
+            let pipeline = Pipeline::new(&self.device, code.kernel, Exactness::Demanded)?;
+            if !each(pipeline.name, started.elapsed()) {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// What was chosen for its device.
+    pub(crate) fn choices(&self) -> EngineChoices {
+        let device: &LogicalDevice = &self.device;
+        let queues = [QueueLane::Kernels, QueueLane::Copies].map(|lane| device.family(lane));
+        EngineChoices {
+            mapping: if self.maps_samples { "samples" } else { "runs" },
+            reads: match device.reads_texels {
+                true => "texel-buffers",
+                false => "storage-buffers",
+            },
+            transfer: match device.placing.in_place {
+                true => "in-place",
+                false => "staged",
+            },
+            read_back: match (device.copies_apart, device.has_copy_queue()) {
+                (false, _) => "same-queue",
+                (true, false) => "apart",
+                (true, true) => "copy-queue",
+            },
+            uploads: match device.placing.direct {
+                Some(direct) if direct.largest == u64::MAX => "direct",
+                Some(_) => "small-direct",
+                None => "host",
+            },
+            imports_memory: self.imports && device.borrows.is_some(),
+            windows_in_flight: self.in_flight_count,
+            window: self.window(),
+            queue_family: queues[0],
+            copy_queue_family: queues[1],
+        }
+    }
+}

@@ -1,0 +1,555 @@
+//! Evaluation on a Vulkan device.
+
+#[cfg(feature = "prove")]
+pub(crate) mod choices;
+pub(crate) mod from_keys;
+pub(crate) mod run;
+#[cfg(feature = "prove")]
+pub(crate) mod write_rates;
+
+use std::mem::take;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use ash::vk;
+use bytemuck::NoUninit;
+use glam::Quat;
+
+use crate::gpu::buffer::{Buffer, Residence};
+use crate::gpu::device::{LogicalDevice, QueueLane};
+use crate::gpu::engine::from_keys::KeyUploads;
+use crate::gpu::error::{EvaluateError, VulkanError};
+use crate::gpu::exclusive::Exclusive;
+use crate::gpu::handles::VulkanHandles;
+use crate::gpu::in_flight::{InFlight, Target, copy};
+use crate::gpu::instance::Instance;
+use crate::gpu::kept_lists::ListCache;
+use crate::gpu::kernel_check::passes::{KernelPass, Passes};
+use crate::gpu::kernel_check::{self, KernelCheck};
+use crate::gpu::options::{EngineOptions, Timings, Transfer};
+use crate::gpu::physical::PhysicalDevice;
+use crate::gpu::pipeline::{Exactness, Pipeline};
+use crate::gpu::submission::{Access, Binding, Submission};
+use crate::gpu::upload::{KernelReads, writable};
+use crate::gpu::work_list::{GroupItems, WorkLists};
+use crate::output::buffer::OutputBuffer;
+use crate::output::encoding::Encoding;
+use crate::output::rotations::{Layout, Storage};
+use crate::output::window::Window;
+use crate::prepare::clip_data::ClipData;
+use crate::shader::spirv::FloatControls;
+use crate::shader::{Item, KERNELS, Kernel, KernelCode, List, PoseDispatch};
+use crate::time::frames::Timeline;
+
+/// Rotations of one window, 32 MiB, unless the device's limits, the memory budget or the device's
+/// speed demand fewer.
+const WINDOW: u64 = 1 << 21;
+
+/// Rotations down to which windows are halved when memory is short or the device slow: 1 MiB.
+const SMALLEST_WINDOW: usize = 1 << 16;
+
+/// Windows in flight: the host fills one while the device works on another.
+const IN_FLIGHT: usize = 2;
+
+/// The same where a second queue copies: one is filled, one evaluated, and one on its way back.
+const IN_FLIGHT_WITH_COPIES: usize = 3;
+
+/// A Vulkan device with its kernels.
+pub(crate) struct VulkanEngine {
+    pub(crate) device: Arc<LogicalDevice>,
+    /// Made when they are first needed.
+    pipelines: Mutex<[Option<Arc<Pipeline>>; KERNELS.len()]>,
+    pub(crate) in_flight: Exclusive<Vec<InFlight<WorkLists>>>,
+    pub(crate) keys_in_flight: Exclusive<Vec<InFlight<KeyUploads>>>,
+    pub(crate) in_flight_count: usize,
+    /// Whether neighbouring invocations take neighbouring samples; else each takes a run of them.
+    pub(crate) maps_samples: bool,
+    /// Whether the caller's memory is imported where the device can.
+    pub(crate) imports: bool,
+    /// Rotations of one window.
+    pub(crate) window: AtomicUsize,
+    /// Bytes that the segments of one buffer may take.
+    pub(crate) group_bytes: usize,
+    /// Bytes that the segments of one clip may take on the device; `None` without a memory budget.
+    pub(crate) clip_bytes: Option<usize>,
+    /// Whether kernels that differ from the CPU are used all the same.
+    allow_inexact: bool,
+    free: FreeBuffers,
+    pub(crate) timings: Mutex<Timings>,
+}
+
+/// Locks what a thread that panicked cannot have left half changed.
+pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// The segments and constants of a clip, on the device.
+pub(crate) struct ClipBuffers {
+    device: Arc<LogicalDevice>,
+    /// The segments of each group, and its constants.
+    pub(crate) groups: Vec<(Buffer, Buffer)>,
+}
+
+/// What is to be evaluated, and how stored.
+#[derive(Clone, Copy)]
+pub(crate) struct Job<'a> {
+    pub(crate) clip: &'a ClipData,
+    pub(crate) buffers: &'a Arc<ClipBuffers>,
+    pub(crate) timeline: &'a Timeline,
+    pub(crate) encoding: Encoding,
+    /// The lists that the clip keeps on the device.
+    pub(crate) lists: &'a ListCache,
+}
+
+impl Job<'_> {
+    /// The kernel that evaluates what is listed.
+    pub(crate) fn kernel(&self, list: List) -> Kernel {
+        let form = self.clip.interpolation.form();
+        Kernel::over_segments(form, list, self.encoding.row().store)
+    }
+
+    /// What it binds for a group.
+    pub(crate) fn bindings(
+        &self,
+        group: &GroupItems,
+        listed: &[Binding],
+        result: Binding,
+    ) -> Vec<Binding> {
+        let (segments, constants) = &self.buffers.groups[group.group];
+        let mut all = vec![Binding::whole(segments), Binding::whole(constants)];
+        all.extend(listed);
+        all.push(result);
+        all
+    }
+
+    /// All of the result.
+    pub(crate) fn whole(&self, layout: Layout) -> Window {
+        Window::whole(self.clip.track_count(), self.timeline.len(), layout)
+    }
+}
+
+impl VulkanEngine {
+    /// An engine on a device that is open, whose exactness is still to be tested.
+    pub(crate) fn new(device: Arc<LogicalDevice>, options: &EngineOptions) -> Self {
+        let info = &device.physical.info;
+        let in_flight_count = match device.copies_apart {
+            true => IN_FLIGHT_WITH_COPIES,
+            false => IN_FLIGHT,
+        };
+        let largest = info
+            .max_storage_buffer_range
+            .min(info.max_memory_allocation_size);
+        // A window may need as many items as it has rotations.
+        let mut window = WINDOW.min(largest / size_of::<Item>() as u64 / 2);
+        let half = options.memory.map(|budget| budget / 2);
+        if let Some(half) = half {
+            let each = (size_of::<Item>() + 2 * Encoding::F32.bytes()) as u64;
+            window = window.min(half / in_flight_count as u64 / each);
+        }
+        // Windows start at aligned offsets where their length allows.
+        let window = (window / 64 * 64).max(64) as usize;
+        let bytes = |bytes| usize::try_from(bytes).unwrap_or(usize::MAX);
+        Self {
+            pipelines: Mutex::new([const { None }; KERNELS.len()]),
+            in_flight: Exclusive::default(),
+            keys_in_flight: Exclusive::default(),
+            in_flight_count,
+            maps_samples: device.physical.maps_samples(options.mapping),
+            imports: options.transfer == Transfer::Automatic,
+            window: AtomicUsize::new(window),
+            group_bytes: bytes(half.map_or(largest, |half| half.min(largest))),
+            clip_bytes: half.map(bytes),
+            allow_inexact: options.allow_inexact,
+            free: Arc::default(),
+            timings: Mutex::default(),
+            device,
+        }
+    }
+
+    /// The kinds of lists that its kernels over segments work on. What binds more storage buffers than the
+    /// device can is left out.
+    pub(crate) fn lists(&self) -> Vec<List> {
+        let mut all = vec![List::Samples, List::Frames];
+        let has_room = self.device.reads_texels || self.device.physical.storage_buffers > 4;
+        all.extend(has_room.then_some(List::Times));
+        if self.maps_samples {
+            all.extend([List::FramesCoalesced, List::TimesCoalesced]);
+        }
+        all
+    }
+
+    /// The pipeline of a kernel, made when it is first needed, and checked then unless this kernel is known to be
+    /// exact on this device.
+    pub(crate) fn pipeline(&self, kernel: Kernel) -> Result<Arc<Pipeline>, VulkanError> {
+        let kept = || lock(&self.pipelines)[kernel as usize].clone();
+        if let Some(pipeline) = kept() {
+            return Ok(pipeline);
+        }
+        // Drivers take up to seconds for it. Nobody who wants another waits meanwhile; of several callers
+        // who make this one, the first one's is kept.
+        let made = Arc::new(Pipeline::new(&self.device, kernel, Exactness::Demanded)?);
+        self.trust(kernel, &made)?;
+        let mut all = lock(&self.pipelines);
+        Ok(Arc::clone(all[kernel as usize].get_or_insert(made)))
+    }
+
+    /// Refuses a kernel that differs from the CPU, unless inexact devices are allowed.
+    fn trust(&self, kernel: Kernel, pipeline: &Pipeline) -> Result<(), VulkanError> {
+        let passes = Passes::of_user();
+        let pass = KernelPass::new(&self.device.physical, pipeline.code_hash);
+        if passes.has(&pass) {
+            return Ok(());
+        }
+        let check = kernel_check::check(kernel, pipeline)?;
+        if check.differing == 0 {
+            passes.remember([pass]);
+        } else if !self.allow_inexact {
+            return Err(VulkanError::InexactKernel {
+                device: self.device.physical.info.name.clone(),
+                kernel: check.name,
+                differing: check.differing,
+                total: check.total,
+            });
+        }
+        Ok(())
+    }
+
+    /// Checks every kernel, while `each` returns true; with `only_unknown` those alone that are not known to
+    /// pass.
+    pub(crate) fn check_kernels(
+        &self,
+        only_unknown: bool,
+        each: &mut dyn FnMut(KernelCheck) -> bool,
+    ) -> Result<(), VulkanError> {
+        let (passes, physical) = (Passes::of_user(), &self.device.physical);
+        let mut passed = Vec::new();
+        let mut check = |code: &KernelCode| {
+            let pass = KernelPass::new(physical, Pipeline::code_hash(&self.device, code.kernel));
+            if only_unknown && passes.has(&pass) {
+                return Ok(self.known_kernel(code));
+            }
+            let kept = lock(&self.pipelines)[code.kernel as usize].clone();
+            let pipeline = match kept {
+                Some(pipeline) => pipeline,
+                None => {
+                    let (device, kernel) = (&self.device, code.kernel);
+                    Arc::new(Pipeline::new(device, kernel, Exactness::Demanded)?)
+                }
+            };
+            let check = kernel_check::check(code.kernel, &pipeline)?;
+            if check.differing == 0 {
+                passed.push(pass);
+                lock(&self.pipelines)[code.kernel as usize].get_or_insert(pipeline);
+            }
+            Ok(check)
+        };
+        let mut outcome = Ok(());
+        for code in self.bindable() {
+            let goes_on = match check(code) {
+                Ok(check) => each(check),
+                Err(error) => {
+                    outcome = Err(error);
+                    false
+                }
+            };
+            if !goes_on {
+                break;
+            }
+        }
+        passes.remember(passed);
+        outcome
+    }
+
+    /// What is known of each kernel.
+    pub(crate) fn known_kernels(&self) -> Vec<KernelCheck> {
+        self.bindable()
+            .map(|code| self.known_kernel(code))
+            .collect()
+    }
+
+    /// The kernels that the device may be given: those that bind no more storage buffers than it allows.
+    pub(crate) fn bindable(&self) -> impl Iterator<Item = &'static KernelCode> {
+        let limit = self.device.physical.storage_buffers;
+        let needed = |code: &KernelCode| Pipeline::storage_buffers(&self.device, code.kernel);
+        KERNELS.iter().filter(move |code| needed(code) <= limit)
+    }
+
+    fn known_kernel(&self, code: &KernelCode) -> KernelCheck {
+        let (name, ..) = code.kernel.code(self.device.reads_texels);
+        let hash = Pipeline::code_hash(&self.device, code.kernel);
+        KernelCheck {
+            name,
+            total: 0,
+            differing: 0,
+            remembered: Passes::of_user().has(&KernelPass::new(&self.device.physical, hash)),
+        }
+    }
+
+    /// Copies a clip's segments to the device. The buffers of `spare`, which are no longer needed,
+    /// are used again where they are large enough.
+    pub(crate) fn upload(
+        &self,
+        clip: &ClipData,
+        spare: Option<ClipBuffers>,
+    ) -> Result<ClipBuffers, VulkanError> {
+        // Under a memory budget the old buffers are freed before new ones are allocated.
+        let spare = spare.filter(|old| self.clip_bytes.is_none() && self.owns(old));
+        let spare = spare.into_iter().flat_map(|buffers| buffers.groups);
+        let (mut segments_of, mut constants_of): (Vec<Buffer>, Vec<Buffer>) = spare.unzip();
+        let groups = clip
+            .groups
+            .iter()
+            .map(|group| {
+                let segments = group.segments.as_bytes();
+                let constants = bytemuck::cast_slice(&group.constants);
+                self.check_size("segments", segments)?;
+                self.check_size("keys", constants)?;
+                Ok((
+                    self.resident("tumble segments", segments, &mut segments_of)?,
+                    self.resident("tumble constants", constants, &mut constants_of)?,
+                ))
+            })
+            .collect::<Result<_, _>>()?;
+        let device = Arc::clone(&self.device);
+        Ok(ClipBuffers { device, groups })
+    }
+
+    /// Refuses what is longer than a kernel can bind.
+    pub(crate) fn check_size(
+        &self,
+        subject: &'static str,
+        bytes: &[u8],
+    ) -> Result<(), VulkanError> {
+        (self.device.physical).check_range(subject, bytes.len() as u64)
+    }
+
+    /// Whether buffers belong to this device; those from before it was opened again do not.
+    pub(crate) fn owns(&self, buffers: &ClipBuffers) -> bool {
+        Arc::ptr_eq(&self.device, &buffers.device)
+    }
+
+    pub(crate) fn window(&self) -> usize {
+        self.window.load(Ordering::Relaxed)
+    }
+
+    /// Halves the size of later windows; false when it is at its minimum already.
+    pub(crate) fn halve_windows(&self) -> bool {
+        let half = self.window() / 2;
+        let smaller = half >= SMALLEST_WINDOW;
+        if smaller {
+            self.window.store(half, Ordering::Relaxed);
+        }
+        smaller
+    }
+
+    /// Frees the buffers that are kept for the next evaluation and not in use by another; false when
+    /// there are none.
+    pub(crate) fn give_back(&self) -> bool {
+        let in_flight = self.in_flight.idle().map_or(0, |kept| kept.len());
+        let keys_in_flight = self.keys_in_flight.idle().map_or(0, |kept| kept.len());
+        let free = take(&mut *lock(&self.free)).len();
+        in_flight + keys_in_flight + free > 0
+    }
+
+    /// A buffer with these bytes, in the memory that kernels read fastest.
+    pub(crate) fn resident(
+        &self,
+        name: &str,
+        bytes: &[u8],
+        spare: &mut Vec<Buffer>,
+    ) -> Result<Buffer, VulkanError> {
+        let size = bytes.len() as u64;
+        // Of spare ones the host writes those that kernels have read in place.
+        let fits = |buffer: &Buffer| buffer.is_mapped() && buffer.size >= size;
+        let (mut upload, is_staged) = match spare.iter().position(fits) {
+            Some(index) => (spare.swap_remove(index), false),
+            None => writable(&self.device, name, size, KernelReads::Often)?,
+        };
+        copy(upload.bytes_mut(0..bytes.len()), bytes);
+        if !is_staged {
+            return Ok(upload);
+        }
+        let resident = Buffer::new(&self.device, name, size, Residence::Device)?;
+        let mut submission = Submission::new(&self.device, QueueLane::Kernels)?;
+        submission.begin(0)?;
+        (submission.commands()).copy(&upload, &resident, upload.size);
+        (submission.commands()).barrier(Access::Copy, Access::Kernel);
+        submission.submit()?;
+        submission.wait()?;
+        Ok(resident)
+    }
+
+    /// Evaluates in f32 into memory of the engine's choice: the device's own, mapped, where
+    /// it writes in place and one allocation can hold the result; from the second time on that the same is
+    /// asked for, memory that a card's copies go to.
+    pub(crate) fn evaluate(
+        &self,
+        job: Job<'_>,
+        layout: Layout,
+    ) -> Result<Box<dyn Storage>, EvaluateError> {
+        let encoding = Encoding::F32;
+        let job = Job { encoding, ..job };
+        let whole = job.whole(layout);
+        let bytes = (whole.len() * encoding.bytes()) as u64;
+        let fits = bytes <= self.device.physical.info.max_memory_allocation_size;
+        let in_place = self.device.placing.in_place;
+        // Memory that a card copies into is dear to make: only for what is asked for again.
+        let kept = self.kept(job, &whole)?;
+        let pays = in_place || kept.is_some();
+        let residence = match in_place {
+            true => Residence::InPlace,
+            false => Residence::Readback,
+        };
+        let buffer = match fits && pays {
+            true => match self.output_buffer(bytes, residence) {
+                // Window by window the result may still be made.
+                Err(error) if error.is_out_of_memory() => None,
+                // The host changes some rotations (`patches`). Where it must show that, it would show
+                // with them what lies beside, into which the device may be writing the next window.
+                Ok(buffer) if !buffer.is_coherent() => None,
+                buffer => Some(buffer?),
+            },
+            false => None,
+        };
+        let Some(mut buffer) = buffer else {
+            let mut quats = OutputBuffer::new(whole.len())?;
+            let output = bytemuck::cast_slice_mut(&mut quats);
+            let target = Target::of(&self.device, self.imports, output, encoding.bytes());
+            self.run(job, &whole, target, kept.as_deref())?;
+            return Ok(Box::new(quats));
+        };
+        let target = match in_place {
+            true => Target::Buffer(&mut buffer),
+            false => Target::Staged(&mut buffer),
+        };
+        self.run(job, &whole, target, kept.as_deref())?;
+        Ok(Box::new(MappedQuats {
+            buffer: Some(buffer),
+            count: whole.len(),
+            free: Arc::clone(&self.free),
+        }))
+    }
+
+    /// Evaluates a window into the caller's memory.
+    pub(crate) fn evaluate_into(
+        &self,
+        job: Job<'_>,
+        window: &Window,
+        output: &mut [u8],
+    ) -> Result<(), EvaluateError> {
+        let each = job.encoding.bytes();
+        let kept = self.kept(job, window)?;
+        let target = Target::of(&self.device, self.imports, output, each);
+        self.run(job, window, target, kept.as_deref())
+    }
+
+    /// A buffer that was given back, when one fits closely, else a new one.
+    fn output_buffer(&self, bytes: u64, residence: Residence) -> Result<Buffer, VulkanError> {
+        let mut free = lock(&self.free);
+        let fits = |buffer: &Buffer| (bytes..=bytes.max(1 << 16) * 2).contains(&buffer.size);
+        if let Some(i) = free.iter().position(fits) {
+            return Ok(free.swap_remove(i));
+        }
+        drop(free);
+        Buffer::new(&self.device, "tumble rotations", bytes, residence)
+    }
+
+    /// A pass over poses: runs a kernel with these inputs, of at most as many values of 16 bytes as a
+    /// window has rotations. It has `count` invocations; `detail` is passed to the kernel.
+    pub(crate) fn pass(
+        &self,
+        kernel: Kernel,
+        inputs: &[&[u8]],
+        [count, detail]: [usize; 2],
+        output: &mut [[f32; 4]],
+    ) -> Result<(), VulkanError> {
+        let output = bytemuck::cast_slice_mut(output);
+        for bytes in inputs.iter().copied().chain([&*output]) {
+            self.check_size("poses", bytes)?;
+        }
+        let [count, detail] = [count as u32, detail as u32];
+        let (pipeline, groups) = (self.pipeline(kernel)?, self.workgroups(count));
+        let pass = PoseDispatch { count, detail };
+        pipeline.run_once(inputs, bytemuck::bytes_of(&pass), groups, output)
+    }
+
+    /// Copies a table of a crowd's library to the device.
+    pub(crate) fn crowd_table<T: NoUninit>(
+        &self,
+        name: &str,
+        table: &[T],
+    ) -> Result<Buffer, VulkanError> {
+        let bytes: &[u8] = bytemuck::cast_slice(table);
+        self.check_size("a crowd's library", bytes)?;
+        self.resident(name, bytes, &mut Vec::new())
+    }
+
+    /// # Safety
+    /// As [`Engine::from_vulkan`](crate::engine::Engine::from_vulkan) says.
+    pub(crate) unsafe fn from_handles(
+        handles: VulkanHandles,
+        options: &EngineOptions,
+    ) -> Result<Self, VulkanError> {
+        use vk::QueueFlags as Flags;
+        let instance = Instance::borrowed(handles.entry, handles.instance);
+        let mut physical = PhysicalDevice::new(&instance, handles.physical_device)?
+            .ok_or(VulkanError::NoDevice)?;
+        physical.queue_family = handles.queue_family;
+        physical.check_family(handles.queue_family, Flags::COMPUTE, "compute")?;
+        if let Some(copies) = &handles.copy_queue {
+            // Whoever computes or draws can copy.
+            let can_copy = Flags::TRANSFER | Flags::COMPUTE | Flags::GRAPHICS;
+            physical.check_family(copies.family, can_copy, "copy")?;
+            if copies.queue == handles.queue {
+                return Err(VulkanError::SameQueue);
+            }
+        }
+        if handles.api_version < vk::API_VERSION_1_2 && !handles.shader_float_controls {
+            // The application did not enable what the device offers.
+            physical.float_controls = FloatControls::default();
+        }
+        physical.has_int64 &= handles.shader_int64;
+        let device = LogicalDevice::borrowed(
+            physical,
+            handles.device,
+            handles.queue,
+            handles.copy_queue,
+            handles.queue_lock,
+            options,
+        );
+        Ok(Self::new(Arc::new(device), options))
+    }
+}
+
+/// Output buffers of dropped results, to use again: the first touch of fresh memory costs more
+/// than evaluating.
+type FreeBuffers = Arc<Mutex<Vec<Buffer>>>;
+
+/// A result in mapped memory. When it is dropped, the buffer goes back to its engine.
+struct MappedQuats {
+    /// There until it is dropped.
+    buffer: Option<Buffer>,
+    count: usize,
+    free: FreeBuffers,
+}
+
+impl Storage for MappedQuats {
+    fn quats(&self) -> &[Quat] {
+        let all = 0..self.count * size_of::<Quat>();
+        let bytes = self.buffer.as_ref().map(|buffer| buffer.bytes(all));
+        bytemuck::cast_slice(bytes.unwrap_or_default())
+    }
+}
+
+/// The most output buffers that are kept for later evaluations.
+const KEPT: usize = 4;
+
+impl Drop for MappedQuats {
+    fn drop(&mut self) {
+        let mut free = lock(&self.free);
+        if free.len() == KEPT {
+            free.remove(0);
+        }
+        free.extend(self.buffer.take());
+    }
+}

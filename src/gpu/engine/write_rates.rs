@@ -1,0 +1,146 @@
+//! How fast a device writes into its own memory, by its own time stamps.
+
+use std::time::Duration;
+
+use bytemuck::Zeroable as _;
+
+use crate::gpu::buffer::{Buffer, Residence};
+use crate::gpu::device::QueueLane;
+use crate::gpu::engine::VulkanEngine;
+use crate::gpu::error::VulkanError;
+use crate::gpu::physical::DeviceKind;
+use crate::gpu::submission::{Binding, Submission};
+use crate::shader::{
+    BLOCK_SAMPLES, Block, Dispatch, Grid, IS_CONSTANT, ITEM_SAMPLES, Item, Kernel, SAMPLES_EACH,
+    WORKGROUP,
+};
+
+/// Bytes a second that a device writes into its own memory: medians of several runs, by its own clock.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct WriteRates {
+    /// By the kernel that the engine uses on the device, over one constant: on cards neighbouring invocations store
+    /// neighbouring rotations.
+    pub store: f64,
+    /// By `vkCmdFillBuffer`.
+    pub fill: f64,
+    /// Bytes that were written at once.
+    pub bytes: u64,
+}
+
+impl WriteRates {
+    /// The faster of both: what no kernel exceeds for long.
+    #[must_use]
+    pub fn limit(&self) -> f64 {
+        self.store.max(self.fill)
+    }
+}
+
+/// More than caches hold.
+const CARD_BYTES: u64 = 512 << 20;
+const SOFTWARE_BYTES: u64 = 16 << 20;
+const LEAST_BYTES: u64 = 1 << 20;
+
+/// Runs that count, behind one that does not.
+const RUNS: usize = 7;
+
+impl VulkanEngine {
+    /// `None` on a device without a clock.
+    pub(crate) fn write_rates(&self) -> Result<Option<WriteRates>, VulkanError> {
+        let physical = &self.device.physical;
+        if physical.timestamp_bits() == 0 {
+            return Ok(None);
+        }
+        let info = &physical.info;
+        let limit = match info.kind {
+            DeviceKind::Cpu | DeviceKind::Other => SOFTWARE_BYTES,
+            _ => CARD_BYTES,
+        };
+        let limit = limit.min(info.max_storage_buffer_range);
+        let mut bytes = limit.min(info.max_memory_allocation_size) / LEAST_BYTES * LEAST_BYTES;
+        let buffer = loop {
+            let name = "tumble write rate";
+            match Buffer::new(&self.device, name, bytes, Residence::Results) {
+                Err(error) if error.is_out_of_memory() && bytes > LEAST_BYTES => bytes /= 2,
+                buffer => break buffer?,
+            }
+        };
+        Ok(Some(WriteRates {
+            store: self.store_rate(&buffer, bytes)?,
+            fill: self.rate(bytes, |submission| {
+                submission.commands().fill(&buffer, bytes, 0x3f80_0000);
+                Ok(())
+            })?,
+            bytes,
+        }))
+    }
+
+    /// By the kernel that the device's mapping takes, over one constant.
+    fn store_rate(&self, buffer: &Buffer, bytes: u64) -> Result<f64, VulkanError> {
+        let samples = (bytes / size_of::<[f32; 4]>() as u64) as u32;
+        let upload = |bytes: &[u8]| self.resident("tumble write rate", bytes, &mut Vec::new());
+        // No segment is read but the first.
+        let constants = upload(bytemuck::cast_slice(&[[0.0_f32, 0.0, 0.0, 1.0]; 2]))?;
+        if !self.maps_samples {
+            let items: Vec<Item> = (0..samples / ITEM_SAMPLES)
+                .map(|item| Item {
+                    output: item * ITEM_SAMPLES,
+                    count: ITEM_SAMPLES | IS_CONSTANT,
+                    ..Item::zeroed()
+                })
+                .collect();
+            let dispatch = Dispatch {
+                item_count: items.len() as u32,
+                stride: 1,
+                ..Dispatch::zeroed()
+            };
+            let items = upload(bytemuck::cast_slice(&items))?;
+            let bindings = [&constants, &constants, &items, buffer].map(Binding::whole);
+            let pipeline = self.pipeline(Kernel::ArcFramesF32)?;
+            let groups = self.workgroups(dispatch.item_count);
+            return self.rate(bytes, |submission| {
+                submission.dispatch(&pipeline, &bindings, bytemuck::bytes_of(&dispatch), groups)
+            });
+        }
+        let item = Item {
+            count: samples | IS_CONSTANT,
+            ..Item::zeroed()
+        };
+        let grid = Grid {
+            stride: 1,
+            samples,
+            rows: 1,
+            ..Grid::zeroed()
+        };
+        let blocks = vec![Block::zeroed(); samples.div_ceil(BLOCK_SAMPLES) as usize];
+        let items = upload(bytemuck::bytes_of(&item))?;
+        let blocks = upload(bytemuck::cast_slice(&blocks))?;
+        let bindings = [&constants, &constants, &items, &blocks, buffer].map(Binding::whole);
+        let pipeline = self.pipeline(Kernel::ArcFramesCoalescedF32)?;
+        let tiles = samples.div_ceil(WORKGROUP * SAMPLES_EACH);
+        let x = tiles.min(self.device.physical.info.max_compute_work_group_count[0]);
+        let groups = [x, tiles.div_ceil(x), 1];
+        self.rate(bytes, |submission| {
+            submission.dispatch(&pipeline, &bindings, bytemuck::bytes_of(&grid), groups)
+        })
+    }
+
+    /// Bytes a second of what is recorded, the median of some runs.
+    fn rate(
+        &self,
+        bytes: u64,
+        record: impl Fn(&mut Submission) -> Result<(), VulkanError>,
+    ) -> Result<f64, VulkanError> {
+        let mut submission = Submission::new(&self.device, QueueLane::Kernels)?;
+        let mut times: Vec<Duration> = Vec::new();
+        for run in 0..=RUNS {
+            submission.begin(1)?;
+            record(&mut submission)?;
+            submission.submit()?;
+            let spent = submission.wait()?;
+            times.extend(spent.filter(|_| run > 0).map(|spent| spent.on_device));
+        }
+        times.sort_unstable();
+        let median = times.get(times.len() / 2).copied().unwrap_or_default();
+        Ok(bytes as f64 / median.as_secs_f64().max(1e-9))
+    }
+}

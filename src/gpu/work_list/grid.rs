@@ -1,0 +1,282 @@
+//! The grid of a window, for devices on which neighbouring invocations take neighbouring samples:
+//! blocks of samples say which item each of them belongs to, so that nothing is searched.
+
+use std::ops::Range;
+
+use crate::gpu::work_list::GroupWork;
+use crate::output::window::Window;
+use crate::shader::{
+    BLOCK_SAMPLES, Block, Grid, IS_CONSTANT, Item, LINE, MAY_BE_TINY, SAMPLES_EACH, WORKGROUP,
+};
+
+/// The rows of a window: one where it is stored track by track, else one for each track.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct GridRows {
+    /// Distance in the result between neighbouring samples of a track.
+    stride: u32,
+    /// Samples of each track.
+    samples: u32,
+}
+
+impl GridRows {
+    /// `None` for a window that items suit better: frame by frame, with fewer tracks than a line of
+    /// memory has rotations.
+    pub(crate) fn new(window: &Window) -> Option<Self> {
+        let stride = window.stride() as u32;
+        (stride == 1 || stride >= LINE).then_some(Self {
+            stride,
+            samples: window.samples.len() as u32,
+        })
+    }
+
+    /// The row and the position in it of an offset in the output.
+    pub(crate) fn cell(self, offset: u32) -> (u32, u32) {
+        match self.stride {
+            1 => (0, offset),
+            stride => (offset % stride, offset / stride),
+        }
+    }
+
+    /// The grids of all groups, whose blocks follow each other. `None` as in
+    /// [`GridRows::of_group`].
+    pub(crate) fn of_groups(self, lists: &[GroupWork]) -> Option<Vec<GroupGrid>> {
+        let mut first_block = 0;
+        let grids = lists.iter().map(|list| {
+            let grid = self.of_group(list, first_block)?;
+            first_block += grid.blocks();
+            Some(grid)
+        });
+        grids.collect()
+    }
+
+    /// Rows and positions of a group, in which its blocks begin at the `first_block`th of all.
+    /// `None` where items overlap, or do not lie in the order of their rows and positions.
+    fn of_group(self, list: &GroupWork, first_block: u32) -> Option<GroupGrid> {
+        let (mut first, mut row, mut end) = (None, 0, 0);
+        for item in items(list) {
+            let (item_row, position) = self.cell(item.output);
+            let is_next = item_row > row || (item_row == row && position >= end);
+            if count(item) == 0 || (first.is_some() && !is_next) {
+                return None;
+            }
+            first.get_or_insert((item_row, position));
+            (row, end) = (item_row, position + count(item));
+        }
+        let (first_row, first) = first.unwrap_or_default();
+        let (rows, samples, first_output) = match self.stride {
+            1 => {
+                let first = first - first % BLOCK_SAMPLES;
+                (1, end - first, first)
+            }
+            _ => (row - first_row + 1, self.samples, first_row),
+        };
+        Some(GroupGrid {
+            all: self,
+            first_row,
+            arguments: Grid {
+                detail: 0,
+                stride: self.stride,
+                samples,
+                rows,
+                first_output,
+                first_block,
+                shift: 0,
+            },
+        })
+    }
+}
+
+/// Writes the blocks of all groups; `nothing` is the index of an item without samples, which follows
+/// the items of all.
+pub(crate) fn write_blocks(
+    lists: &[GroupWork],
+    grids: &[GroupGrid],
+    nothing: u32,
+    mut blocks: &mut [Block],
+) {
+    let mut first_item = 0;
+    for (list, grid) in lists.iter().zip(grids) {
+        let (group_blocks, others) = blocks.split_at_mut(grid.blocks() as usize);
+        blocks = others;
+        grid.write(list, first_item, nothing, group_blocks);
+        first_item += list.item_count() as u32;
+    }
+}
+
+fn items(list: &GroupWork) -> impl Iterator<Item = &Item> {
+    list.chunks.iter().flat_map(|chunk| &chunk.items)
+}
+
+fn count(item: &Item) -> u32 {
+    item.count & !(IS_CONSTANT | MAY_BE_TINY)
+}
+
+/// The rows of a group's samples.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct GroupGrid {
+    all: GridRows,
+    /// The window's row that is the group's first.
+    first_row: u32,
+    /// What comes with its dispatch, without the detail.
+    pub(crate) arguments: Grid,
+}
+
+impl GroupGrid {
+    pub(crate) fn blocks(&self) -> u32 {
+        self.arguments.samples.div_ceil(BLOCK_SAMPLES) * self.arguments.rows
+    }
+
+    /// Writes its blocks; `first_item` is the index of its first item in the list of all, and
+    /// `nothing` that of an item without samples.
+    fn write(&self, list: &GroupWork, first_item: u32, nothing: u32, blocks: &mut [Block]) {
+        blocks.fill(Block {
+            first: nothing,
+            starts: 0,
+        });
+        let base = match self.all.stride {
+            1 => self.arguments.first_output,
+            _ => 0,
+        };
+        let end = self.arguments.samples.div_ceil(BLOCK_SAMPLES);
+        // The row, the first of its blocks that is not written, and the last item that began in it.
+        let (mut row, mut next, mut last) = (0, 0, nothing);
+        for (index, item) in (first_item..).zip(items(list)) {
+            let (item_row, position) = self.all.cell(item.output);
+            let (item_row, position) = (item_row - self.first_row, position - base);
+            if item_row != row || index == first_item {
+                self.go_on(row, next..end, last, blocks);
+                // Positions before the row's first item belong to it and lie before it.
+                (row, next, last) = (item_row, 0, index);
+            }
+            let block = position / BLOCK_SAMPLES;
+            self.go_on(row, next..block + 1, last, blocks);
+            next = block + 1;
+            let found = &mut blocks[self.block_index(row, block)];
+            match position % BLOCK_SAMPLES {
+                0 => found.first = index,
+                _ if index == last => {}
+                within => found.starts |= 1 << within,
+            }
+            last = index;
+        }
+        self.go_on(row, next..end, last, blocks);
+    }
+
+    /// Blocks of a row in which an item from before goes on.
+    fn go_on(&self, row: u32, written_blocks: Range<u32>, item: u32, blocks: &mut [Block]) {
+        for block in written_blocks {
+            blocks[self.block_index(row, block)].first = item;
+        }
+    }
+
+    /// Where a block of a row lies among all.
+    fn block_index(&self, row: u32, block: u32) -> usize {
+        (block * self.arguments.rows + row) as usize
+    }
+
+    /// The workgroups of its dispatch; `most` is the limit along x.
+    pub(crate) fn workgroups(&self, max_x: u32) -> [u32; 3] {
+        let samples = WORKGROUP * SAMPLES_EACH;
+        let (tiles, z) = match self.all.stride {
+            1 => (self.arguments.samples.div_ceil(samples), 1),
+            // Rows of neighbours begin up to a line less one before the first track.
+            _ => {
+                let tiles = (self.arguments.rows + LINE - 1).div_ceil(LINE);
+                (tiles, self.arguments.samples.div_ceil(samples / LINE))
+            }
+        };
+        let x = tiles.clamp(1, max_x);
+        [x, tiles.div_ceil(x), z]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use bytemuck::Zeroable as _;
+
+    use super::*;
+    use crate::gpu::work_list::WorkChunk;
+    use crate::output::rotations::Layout;
+
+    /// Items with gaps between them, in two chunks, as (row, position, samples).
+    fn listed(rows: GridRows, tracks: u32) -> GroupWork {
+        let mut chunks = [WorkChunk::default(), WorkChunk::default()];
+        let mut random = fastrand::Rng::with_seed(u64::from(rows.stride + tracks));
+        // The first tracks and one in between have nothing.
+        for track in (2..tracks).filter(|track| *track != 5) {
+            let mut sample = random.u32(..40);
+            while sample < rows.samples {
+                let count = random.u32(1..50).min(rows.samples - sample);
+                let output = match rows.stride {
+                    1 => track * rows.samples + sample,
+                    stride => sample * stride + track,
+                };
+                let mut item = Item::zeroed();
+                (item.output, item.count) = (output, count);
+                let flags = [0, IS_CONSTANT, MAY_BE_TINY];
+                item.count |= flags[random.usize(..3)];
+                chunks[usize::from(track > 4)].items.push(item);
+                sample += count + random.u32(..3) * random.u32(..60);
+            }
+        }
+        let chunks = chunks.into();
+        GroupWork { group: 0, chunks }
+    }
+
+    /// The item that blocks name for each sample is the one that has it, if any has.
+    #[test]
+    fn blocks_tell_the_item_of_every_sample() {
+        for layout in [Layout::TrackMajor, Layout::FrameMajor] {
+            for (tracks, samples) in [(9, 300), (8, 1), (40, 65), (11, 32)] {
+                let window = Window::whole(tracks as usize, samples as usize, layout);
+                let rows = GridRows::new(&window).unwrap();
+                let list = listed(rows, tracks);
+                let grid = rows.of_group(&list, 0).unwrap();
+                let mut blocks = vec![Block::zeroed(); grid.blocks() as usize];
+                let nothing = list.item_count() as u32 + 3;
+                grid.write(&list, 3, nothing, &mut blocks);
+                let all: Vec<Item> = items(&list).copied().collect();
+                let mut found = 0;
+                for row in 0..grid.arguments.rows {
+                    for position in 0..grid.arguments.samples {
+                        let block = blocks[grid.block_index(row, position / BLOCK_SAMPLES)];
+                        let begun = block.starts << (!position & (BLOCK_SAMPLES - 1));
+                        let index = block.first + begun.count_ones();
+                        let offset = match rows.stride {
+                            1 => grid.arguments.first_output + position,
+                            stride => position * stride + grid.arguments.first_output + row,
+                        };
+                        let has = |item: &Item| {
+                            let (item_row, at) = rows.cell(item.output);
+                            let (row, position) = rows.cell(offset);
+                            item_row == row && (at..at + count(item)).contains(&position)
+                        };
+                        let found_item = all.get((index - 3) as usize).filter(|item| has(item));
+                        assert_eq!(
+                            found_item,
+                            all.iter().find(|item| has(item)),
+                            "{layout:?}, {offset}"
+                        );
+                        found += u32::from(found_item.is_some());
+                    }
+                }
+                assert_eq!(found, all.iter().map(count).sum::<u32>());
+            }
+        }
+    }
+
+    #[test]
+    fn items_in_another_order_have_no_grid() {
+        let window = Window::whole(9, 300, Layout::TrackMajor);
+        let rows = GridRows::new(&window).unwrap();
+        let mut list = listed(rows, 9);
+        list.chunks.reverse();
+        assert!(rows.of_group(&list, 0).is_none());
+        list.chunks.reverse();
+        let overlap = list.chunks[0].items[0].output + count(&list.chunks[0].items[0]);
+        list.chunks[0].items[1].output = overlap - 1;
+        assert!(rows.of_group(&list, 0).is_none());
+        let narrow = Window::whole(7, 300, Layout::FrameMajor);
+        assert!(GridRows::new(&narrow).is_none());
+    }
+}

@@ -1,0 +1,430 @@
+//! The work list of one window of the output: items, each some consecutive samples of one segment.
+
+pub(crate) mod grid;
+pub(crate) mod sample_list;
+
+use ash::vk;
+use bytemuck::Zeroable as _;
+use rayon::prelude::*;
+
+use crate::gpu::engine::VulkanEngine;
+use crate::gpu::error::EvaluateError;
+use crate::gpu::in_flight::copy;
+use crate::gpu::submission::{Access, Commands};
+use crate::gpu::upload::{KernelReads, Upload};
+use crate::gpu::work_list::grid::{GridRows, GroupGrid, write_blocks};
+use crate::gpu::work_list::sample_list::SampleList;
+use crate::output::encoding::Encoding;
+use crate::output::window::Window;
+use crate::prepare::clip_data::ClipData;
+use crate::prepare::prepared::Prepared;
+use crate::shader::{Block, IS_CONSTANT, ITEM_SAMPLES, Item, List, ListedSample, MAY_BE_TINY};
+use crate::simd::dispatch::{InLanes, in_lanes};
+use crate::simd::lanes::Lanes;
+use crate::time::frames::{SampleTimesError, Ticks, Timeline};
+use crate::time::runs::{Distance, Emit, Run, RunSource};
+use crate::time::spans::TrackPart;
+
+/// What the device and the host have to do in a window.
+pub(crate) struct Work {
+    pub(crate) list: List,
+    /// The groups, in the order in which their items lie in the list.
+    pub(crate) groups: Vec<GroupItems>,
+    /// Rotations that the host computed.
+    pub(crate) patches: Vec<Patch>,
+}
+
+impl Work {
+    /// The groups that the device has anything to do for.
+    pub(crate) fn dispatched(&self) -> impl Iterator<Item = &GroupItems> {
+        self.groups.iter().filter(|group| group.items > 0)
+    }
+
+    /// Records what the host computed, behind the kernels, into a window that begins at `start` of a buffer.
+    pub(crate) fn patch(
+        &self,
+        commands: Commands<'_>,
+        buffer: vk::Buffer,
+        start: u64,
+        encoding: Encoding,
+    ) {
+        if self.patches.is_empty() {
+            return;
+        }
+        commands.barrier(Access::Kernel, Access::Copy);
+        let bytes = encoding.bytes();
+        let mut encoded = [0; PATCHED_BYTES];
+        // Neighbours go together.
+        let are_neighbours = |one: &Patch, next: &Patch| next.0 == one.0 + 1;
+        let per_command = PATCHED_BYTES / bytes;
+        let rows = self.patches.chunk_by(are_neighbours);
+        for patches in rows.flat_map(|row| row.chunks(per_command)) {
+            let values = &mut encoded[..patches.len() * bytes];
+            for ((_, value), into) in patches.iter().zip(values.chunks_exact_mut(bytes)) {
+                encoding.encode_all(&[*value], into);
+            }
+            let offset = start + (patches[0].0 * bytes) as u64;
+            commands.update(buffer, offset, values);
+        }
+        commands.barrier(Access::Copy, Access::Any);
+    }
+}
+
+/// Bytes that are patched by one command, at most; it is a whole number of values of any encoding, and Vulkan allows
+/// 65 536.
+const PATCHED_BYTES: usize = 48 * 48;
+
+/// How much the device has to do for one group of a clip.
+pub(crate) struct GroupItems {
+    pub(crate) group: usize,
+    /// Where they begin in the list.
+    pub(crate) first_item: u32,
+    /// How many items, or samples of a sample list.
+    pub(crate) items: u32,
+    /// Where the first sample of a sample list is stored.
+    pub(crate) first_output: u32,
+    /// The samples of the group, where neighbouring invocations take neighbours.
+    pub(crate) grid: Option<GroupGrid>,
+}
+
+/// An offset in the window, and the rotation there.
+pub(crate) type Patch = (usize, [f32; 4]);
+
+/// What one group of a clip has to do in a window.
+pub(crate) struct GroupWork {
+    pub(crate) group: usize,
+    pub(crate) chunks: Vec<WorkChunk>,
+}
+
+/// A chunk of a work list, made by one thread. Where items take their distances from `distances`,
+/// their `first` is an index into those of the chunk.
+#[derive(Default)]
+pub(crate) struct WorkChunk {
+    pub(crate) items: Vec<Item>,
+    pub(crate) distances: Vec<f32>,
+    pub(crate) patches: Vec<Patch>,
+}
+
+impl GroupWork {
+    pub(crate) fn item_count(&self) -> usize {
+        self.chunks.iter().map(|chunk| chunk.items.len()).sum()
+    }
+}
+
+/// The lists of a window on their way to the device, in memory that is kept for the next window.
+#[derive(Default)]
+pub(crate) struct WorkLists {
+    /// Items, or the samples of a sample list.
+    items: Upload,
+    distances: Upload,
+    /// The blocks of a grid.
+    blocks: Upload,
+    /// Emptied work lists.
+    spare: Vec<WorkChunk>,
+    /// Blocks before they are uploaded.
+    listed_blocks: Vec<Block>,
+}
+
+impl WorkLists {
+    /// Writes the work list of a window into its buffers, one group after another. Where the engine
+    /// maps samples, neighbouring invocations take neighbouring samples if that can be. Called on one of
+    /// the engine's threads.
+    pub(crate) fn list(
+        &mut self,
+        engine: &VulkanEngine,
+        clip: &ClipData,
+        timeline: &Timeline,
+        window: &Window,
+    ) -> Result<Work, EvaluateError> {
+        let (device, often) = (&engine.device, KernelReads::Often);
+        if let Some(list) = SampleList::new(clip, timeline, window) {
+            let bytes = window.len() * size_of::<ListedSample>();
+            let room = self.items.room(device, "tumble items", often, bytes)?;
+            return Ok(list.write(bytemuck::cast_slice_mut(room))?);
+        }
+        let mut rows = GridRows::new(window).filter(|_| engine.maps_samples);
+        let (mut lists, mut grids) = (Vec::new(), Vec::new());
+        if let Some(rows) = rows {
+            lists = work(clip, timeline, window, Cut::Whole, &mut self.spare)?;
+            grids = rows.of_groups(&lists).unwrap_or_default();
+        }
+        if grids.is_empty() {
+            rows = None;
+            self.take_back(lists);
+            lists = work(clip, timeline, window, Cut::Short, &mut self.spare)?;
+        }
+
+        let chunks = lists.iter().flat_map(|list| &list.chunks);
+        let item_count: usize = lists.iter().map(GroupWork::item_count).sum();
+        let distance_count: usize = chunks.map(|chunk| chunk.distances.len()).sum();
+        // A grid has one item without samples after all others.
+        let item_bytes = (item_count + usize::from(rows.is_some())) * size_of::<Item>();
+        let items = (self.items).room(device, "tumble items", often, item_bytes)?;
+        let bytes = distance_count * size_of::<f32>();
+        let distances = (self.distances).room(device, "tumble distances", often, bytes)?;
+        let (items, nothing) = bytemuck::cast_slice_mut(items).split_at_mut(item_count);
+        nothing.fill(Item::zeroed());
+        write(&lists, rows, items, bytemuck::cast_slice_mut(distances));
+        if rows.is_some() {
+            let blocks = grids.iter().map(GroupGrid::blocks).sum::<u32>() as usize;
+            // They are written out of order, and read meanwhile.
+            self.listed_blocks.resize(blocks, Block::zeroed());
+            write_blocks(&lists, &grids, item_count as u32, &mut self.listed_blocks);
+            let bytes: &[u8] = bytemuck::cast_slice(&self.listed_blocks);
+            let room = (self.blocks).room(device, "tumble blocks", often, bytes.len())?;
+            copy(room, bytes);
+        }
+
+        let is_timed = matches!(timeline.ticks, Ticks::Times { .. });
+        let mut first_item = 0;
+        let groups = lists.iter().enumerate().map(|(i, list)| {
+            let items = list.item_count() as u32;
+            let group = GroupItems {
+                group: list.group,
+                first_item,
+                items,
+                first_output: 0,
+                grid: grids.get(i).copied(),
+            };
+            first_item += items;
+            group
+        });
+        Ok(Work {
+            list: match (rows.is_some(), is_timed) {
+                (false, false) => List::Frames,
+                (false, true) => List::Times,
+                (true, false) => List::FramesCoalesced,
+                (true, true) => List::TimesCoalesced,
+            },
+            groups: groups.collect(),
+            patches: self.take_back(lists),
+        })
+    }
+
+    /// Keeps the memory of lists for the next ones; returns what they leave to the host.
+    fn take_back(&mut self, lists: Vec<GroupWork>) -> Vec<Patch> {
+        let mut patches = Vec::new();
+        for mut chunk in lists.into_iter().flat_map(|list| list.chunks) {
+            patches.append(&mut chunk.patches);
+            chunk.items.clear();
+            chunk.distances.clear();
+            self.spare.push(chunk);
+        }
+        patches
+    }
+
+    /// Frees what only the next list would use.
+    pub(crate) fn forget_spare(&mut self) {
+        self.spare = Vec::new();
+        self.listed_blocks = Vec::new();
+    }
+
+    /// Frees what was written for the device to copy, when it has copied it.
+    pub(crate) fn forget_written(&mut self) {
+        for upload in [&mut self.items, &mut self.distances, &mut self.blocks] {
+            upload.forget_written();
+        }
+    }
+
+    /// What kernels read of a list, in the order of their bindings.
+    pub(crate) fn uploads(&self, list: List) -> Vec<&Upload> {
+        let (items, blocks, distances) = (&self.items, &self.blocks, &self.distances);
+        match list {
+            List::Samples | List::Frames => vec![items],
+            List::Times => vec![items, distances],
+            List::FramesCoalesced => vec![items, blocks],
+            List::TimesCoalesced => vec![items, blocks, distances],
+        }
+    }
+}
+
+/// Parts of a group that one thread turns into items: at least this many, and more while they have
+/// fewer samples than `SAMPLES_PER_CHUNK`.
+const PARTS_PER_CHUNK: usize = 64;
+const SAMPLES_PER_CHUNK: usize = 4096;
+
+pub(crate) fn parts_per_chunk(window: &Window) -> usize {
+    (SAMPLES_PER_CHUNK / window.samples.len().max(1)).max(PARTS_PER_CHUNK)
+}
+
+/// The parts of a group that belong to a window's tracks.
+pub(crate) fn parts_in<'a>(prepared: &'a Prepared, window: &Window) -> &'a [TrackPart] {
+    let from = |track: usize| {
+        let is_before = |part: &TrackPart| (part.track as usize) < track;
+        prepared.parts.partition_point(is_before)
+    };
+    &prepared.parts[from(window.tracks.start)..from(window.tracks.end)]
+}
+
+/// How runs become items.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Cut {
+    /// An item for each invocation: at most `ITEM_SAMPLES` samples.
+    Short,
+    /// A whole run, for a grid, with the bit `MAY_BE_TINY` where the run needs it.
+    Whole,
+}
+
+/// The work lists of a window: one for each group that has any of its tracks. `spare` are emptied chunks to use again: fresh memory would cost
+/// more than listing.
+pub(crate) fn work(
+    clip: &ClipData,
+    timeline: &Timeline,
+    window: &Window,
+    cut: Cut,
+    spare: &mut Vec<WorkChunk>,
+) -> Result<Vec<GroupWork>, SampleTimesError> {
+    let mut all = Vec::new();
+    for (group, prepared) in clip.groups.iter().enumerate() {
+        let parts = parts_in(prepared, window);
+        let listings: Vec<_> = parts
+            .chunks(parts_per_chunk(window))
+            .map(|parts| PartsList {
+                prepared,
+                parts,
+                timeline,
+                window,
+                cut,
+                track: 0,
+                chunk: spare.pop().unwrap_or_default(),
+                listed: Ok(()),
+            })
+            .collect();
+        let chunks: Vec<WorkChunk> = listings
+            .into_par_iter()
+            .map(|mut listing| {
+                in_lanes(&mut listing);
+                listing.listed.map(|()| listing.chunk)
+            })
+            .collect::<Result<_, SampleTimesError>>()?;
+        if !parts.is_empty() {
+            all.push(GroupWork { group, chunks });
+        }
+    }
+    Ok(all)
+}
+
+/// Lists the work of some parts of a group.
+struct PartsList<'a> {
+    prepared: &'a Prepared,
+    parts: &'a [TrackPart],
+    timeline: &'a Timeline,
+    window: &'a Window,
+    cut: Cut,
+    /// The track whose runs are met.
+    track: usize,
+    chunk: WorkChunk,
+    listed: Result<(), SampleTimesError>,
+}
+
+impl InLanes for PartsList<'_> {
+    #[inline(always)]
+    fn run<L: Lanes>(&mut self) {
+        let (prepared, timeline) = (self.prepared, self.timeline);
+        for part in self.parts {
+            self.track = part.track as usize;
+            let samples = self.window.samples.clone();
+            for copy in prepared.copies(part, timeline, samples) {
+                let listed = prepared.spans.runs(part, timeline, &copy, self);
+                if listed.is_err() {
+                    self.listed = listed;
+                    return;
+                }
+            }
+        }
+    }
+}
+
+impl Emit for PartsList<'_> {
+    /// Turns a run into items, and what the host evaluates into patches.
+    #[inline(always)]
+    fn run(&mut self, run: Run) {
+        let (prepared, timeline, window) = (self.prepared, self.timeline, self.window);
+        let (track, chunk) = (self.track, &mut self.chunk);
+        let samples = run.sample..run.sample + run.count;
+        let mut whole = Item::zeroed();
+        let mut flags = 0;
+        match run.source {
+            RunSource::Constant(constant) => {
+                whole.source = constant;
+                flags = IS_CONSTANT;
+            }
+            RunSource::Segment(index, distance, affine) => {
+                whole.source = index;
+                (whole.scale, whole.offset) = (affine.scale, affine.offset);
+                whole.first = match distance {
+                    Distance::Near { first } => first as i32,
+                    Distance::Frames { first } => first,
+                    Distance::Seconds { .. } => {
+                        let first_distance = chunk.distances.len() as i32;
+                        let from_middle =
+                            |sample| distance.of(0, || timeline.time_at(track, sample));
+                        chunk.distances.extend(samples.map(from_middle));
+                        first_distance
+                    }
+                };
+                if self.cut == Cut::Whole && prepared.segments.may_be_tiny(index) {
+                    flags = MAY_BE_TINY;
+                }
+            }
+            RunSource::Exact { index, parameter } => {
+                chunk.patches.extend(samples.map(|sample| {
+                    let value = prepared.exact(index, parameter, timeline, track, sample);
+                    (window.offset(track, sample), value)
+                }));
+                return;
+            }
+        }
+        let max_samples = match self.cut {
+            Cut::Short => ITEM_SAMPLES as usize,
+            Cut::Whole => usize::MAX,
+        };
+        let mut done = 0;
+        while done < run.count {
+            let count = max_samples.min(run.count - done);
+            chunk.items.push(Item {
+                output: window.offset(track, run.sample + done) as u32,
+                count: count as u32 | flags,
+                first: whole.first.wrapping_add(done as i32),
+                ..whole
+            });
+            done += count;
+        }
+    }
+}
+
+/// Writes the work lists of all groups, one after another; in `rows` of a grid, the position of an
+/// item replaces the offset at which it is stored. Each element is written once, in order, and none is
+/// read again: what is written to may be slow to read.
+pub(crate) fn write(
+    lists: &[GroupWork],
+    rows: Option<GridRows>,
+    mut items: &mut [Item],
+    mut distances: &mut [f32],
+) {
+    let mut next_distance = 0;
+    let mut destinations = Vec::new();
+    for chunk in lists.iter().flat_map(|list| &list.chunks) {
+        let (chunk_items, other_items) = items.split_at_mut(chunk.items.len());
+        let (chunk_distances, others) = distances.split_at_mut(chunk.distances.len());
+        (items, distances) = (other_items, others);
+        destinations.push((chunk, chunk_items, chunk_distances, next_distance));
+        next_distance += chunk.distances.len() as i32;
+    }
+    destinations
+        .into_par_iter()
+        .for_each(|(chunk, items, distances, first)| {
+            distances.copy_from_slice(&chunk.distances);
+            let first = if distances.is_empty() { 0 } else { first };
+            if first == 0 && rows.is_none() {
+                return items.copy_from_slice(&chunk.items);
+            }
+            for (to, item) in items.iter_mut().zip(&chunk.items) {
+                *to = Item {
+                    first: item.first.wrapping_add(first),
+                    output: rows.map_or(item.output, |rows| rows.cell(item.output).1),
+                    ..*item
+                };
+            }
+        });
+}

@@ -1,0 +1,76 @@
+//! Curves that follow from two keys alone, with their tangents and velocities.
+
+use glam::DQuat;
+
+use crate::curve::options::Ends;
+use crate::reference::curve::Definition;
+use crate::reference::handles::cumulative;
+use crate::reference::segment::Segment;
+use crate::reference::track::ReferenceTrack;
+
+/// Steps: the key before.
+pub(crate) const STEP: Definition =
+    Definition::new(|track, _| each(track, |i| Segment::Constant(track.keys[i])));
+
+/// Straight lines between keys, normalised.
+pub(crate) const NLERP: Definition =
+    Definition::new(|track, _| each(track, |i| Segment::Line(track.keys[i], track.keys[i + 1])));
+
+/// Great arcs between keys.
+pub(crate) const SLERP: Definition =
+    Definition::new(|track, _| each(track, |i| Segment::Arc(track.keys[i], track.keys[i + 1])));
+
+/// A cumulative cubic with the keys' velocities.
+pub(crate) const HERMITE: Definition = Definition::new(|track, _| {
+    each(track, |i| {
+        let handle = |key: usize| {
+            let velocity = track.velocities.get(key).copied().unwrap_or_default();
+            velocity / 2.0 * track.step(i) / 3.0
+        };
+        cumulative(track, i, handle(i), handle(i + 1))
+    })
+});
+
+/// Cubics in the components, with the keys' tangents, normalised.
+pub(crate) const GLTF_CUBIC: Definition = Definition::new(|track, _| {
+    each(track, |i| {
+        let tangent = |key: usize, side: usize| match track.tangents.get(key) {
+            Some(both) => both[side].as_dquat() * track.step(i),
+            None => DQuat::from_xyzw(0.0, 0.0, 0.0, 0.0),
+        };
+        let (from, to) = (track.keys[i], track.keys[i + 1]);
+        Segment::Cubic([from, tangent(i, 1), tangent(i + 1, 0), to])
+    })
+});
+
+/// The curves of all intervals.
+pub(crate) fn each(track: &ReferenceTrack, curve: impl Fn(usize) -> Segment) -> Vec<Segment> {
+    (0..track.last()).map(curve).collect()
+}
+
+/// The curves of all intervals, where [`Ends::Frozen`] makes the first and the last constant.
+pub(crate) fn with_frozen_ends(
+    track: &ReferenceTrack,
+    ends: Ends,
+    curve: impl Fn(usize) -> Segment,
+) -> Vec<Segment> {
+    each(track, |i| {
+        let last = track.last() - 1;
+        if ends == Ends::Frozen && last > 0 && (i == 0 || i == last) {
+            return Segment::Constant(track.keys[i]);
+        }
+        curve(i)
+    })
+}
+
+/// As [`with_frozen_ends`]; two keys that are alone are joined by an arc.
+pub(crate) fn smooth(
+    track: &ReferenceTrack,
+    ends: Ends,
+    curve: impl Fn(usize) -> Segment,
+) -> Vec<Segment> {
+    with_frozen_ends(track, ends, |i| match track.last() {
+        1 => Segment::Arc(track.keys[0], track.keys[1]),
+        _ => curve(i),
+    })
+}
