@@ -28,8 +28,8 @@ pub(crate) struct Budget {
 /// More than the budget has.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error(
-    "reading it takes {needed} bytes of memory at least, and an input of this length gets {limit}; it says more \
-     than it has"
+    "reading it takes {needed} bytes of memory at least, and an input of this length gets {limit}; it claims more \
+     than it contains"
 )]
 pub(crate) struct OverBudget {
     needed: u64,

@@ -150,7 +150,7 @@ codes! {
     SecondHeader = "E016", "a second header", "Two sets in one file? Split it: one header, then keys.";
     Columns = "E020", "the wrong number of columns", "A key line has a time and four numbers for each box: `time w x y z w x y z …`.";
     Number = "E021", "not a number", "Numbers are decimal, with a point, and may have an exponent: `-1.25e-3`.";
-    NotFinite = "E022", "not finite", "NaN and infinity are not a rotation and no time.";
+    NotFinite = "E022", "not finite", "NaN and infinity are neither rotations nor times.";
     TooLarge = "E023", "too large for f32", "Keys are kept in f32, whose largest value is 3.4e38.";
     TokenTooLong = "E024", "a number is too long", "No number needs more than 64 characters.";
     Norm = "E025", "not a unit quaternion", "A rotation is a quaternion of norm 1. Norms within 0.1 of it are normalised; others are more likely a mistake, such as a missing column.";
@@ -159,7 +159,7 @@ codes! {
     EqualTimes = "E028", "two keys at one time", "The values differ: --duplicates first or last keeps one of the keys, both keeps a jump.";
     Time = "E030", "not a list of times", "A list of times has finite numbers of seconds, separated by blanks, commas or line ends.";
     Map = "E032", "not a map of arrays or columns", "`--map` says what a file's arrays or columns are: entries `name=source[3:7]:order`, separated by commas, whose sources are in the file.";
-    Memory = "E034", "more memory than an input of its length may take", "An input gets 64 times its length and 64 MiB (`--max-memory`); this one says that it holds more, by counts, by data that is packed or by parts that name one part many times.";
+    Memory = "E034", "more memory than an input of its length may take", "An input gets 64 times its length and 64 MiB (`--max-memory`); this one claims to hold more, by counts, by data that is packed or by parts that name one part many times.";
     // E1xx and W1xx: glTF.
     Glb = "E100", "not a whole GLB", "A GLB has a header that says its length, a JSON chunk, and whole chunks after it.";
     GltfVersion = "E101", "not glTF 2.0", "Only version 2.0 is read; every exporter of today writes it.";
@@ -169,7 +169,7 @@ codes! {
     IndexRange = "E105", "an index of nothing", "Parts of a glTF file name each other by number; there is nothing of this number.";
     NodeTree = "E106", "nodes that make no tree", "A node has one parent at most, and is never its own ancestor.";
     Uri = "E107", "a URI that is not followed", "Data is read from the file itself and from files in its folder and below, named by relative URIs; nothing is fetched from a network.";
-    TooShort = "E108", "fewer bytes than needed", "A buffer, a view of it or an accessor says more than is there; the file may be cut.";
+    TooShort = "E108", "fewer bytes than needed", "A buffer, a view of it or an accessor claims more bytes than there are; the file may be cut.";
     AccessorType = "E109", "an accessor of the wrong type", "Times are floats; rotations are four, translations and scales three floats or normalized integers.";
     Sparse = "E110", "a sparse accessor that does not fit", "Its indices are unsigned integers, increase, and lie within the accessor.";
     OutputCount = "E111", "not as many values as times", "LINEAR and STEP have a value for each time, CUBICSPLINE three: tangent, value, tangent.";
@@ -249,12 +249,12 @@ codes! {
     Walkers = "E613", "not a walker", "A walker has radius, speed, x, y, z, to_x, to_y and to_z, and a plain name; what moves on a track of its own has radius and track, whose rows are t, x, y, z with increasing times.";
     Offsets = "E614", "offsets that do not fit", "There are three numbers for each joint: where it is in its parent, in the order of the joints.";
     // E7xx and W7xx: FBX.
-    FbxDamaged = "E701", "an FBX file that cannot be read", "It is cut or damaged, or no FBX file at all; the reason is that of the library that reads it, which tells no place.";
+    FbxDamaged = "E701", "an FBX file that cannot be read", "It is cut, damaged, or not an FBX file; the reason is that of the library that reads it, which gives no location.";
     FbxVersion = "E702", "an unknown version of FBX", "Versions 3.0 to 7.7 are read, as text and as binary.";
     FbxDepth = "E703", "nodes too deep below each other", "No skeleton is a thousand joints deep.";
     FbxWork = "E704", "curves that take too much work", "Curves are evaluated as often as following them takes, and a file gets a number of evaluations by its length; one that takes more is damaged, or made to.";
     // E8xx and W8xx: MCAP.
-    McapDamaged = "E801", "an MCAP file that cannot be read", "It is damaged, or no MCAP file at all; the place is that of the record in the file.";
+    McapDamaged = "E801", "an MCAP file that cannot be read", "It is damaged, or not an MCAP file; the location is that of the record in the file.";
     McapMessage = "E802", "a message that cannot be read", "It is not as its type says; the topic is refused, and the others are read.";
     McapEmpty = "E803", "no poses in the log", "Topics of the types PoseStamped, PoseWithCovarianceStamped, Odometry, TransformStamped, TFMessage and Path, encoded in CDR, are read.";
     ByteOrderMark = "W001", "a byte-order mark", "It is skipped; save the file without one.";
@@ -276,7 +276,7 @@ codes! {
     EmptySampler = "W102", "a sampler without keys", "Its target stays at rest.";
     NothingMoved = "W103", "an animation that moves no node", "It has no channels, or only those of weights and other properties; it is kept as it is.";
     NodeMatrix = "W104", "a moved node with a matrix", "glTF has moved nodes give translation, rotation and scale; the matrix is split into these.";
-    Shear = "W105", "a matrix that shears", "No translation, rotation and scale say the same; the nearest are taken, and poses in the world are refused.";
+    Shear = "W105", "a matrix that shears", "No translation, rotation and scale are equal to it; the nearest are taken, and poses in the world are refused.";
     NegativeTime = "W106", "a negative time", "glTF has times from 0 on; players may not show what comes before.";
     ByteStride = "W107", "a stride in animation data", "glTF has strides for vertices alone; it is honoured.";
     BufferLong = "W108", "a buffer longer than it says", "What is after the length that it says is not read.";

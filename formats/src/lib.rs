@@ -2,6 +2,17 @@
 //! ([`FORMATS`]); what is wrong with an input ([`Diagnostic`]); clips of motion files
 //! ([`Motion`](motion::Motion)), and how they are sampled ([`sample`]); and sets of any size to play
 //! with ([`generate`](mod@generate)).
+//!
+//! From the bottom to the top, where code uses what lies below it:
+//!
+//! - inputs and their faults: [`diagnostic`], [`budget`], [`beneath`], and the private modules `source` and `text`;
+//! - what files hold: [`motion`], [`feature`], [`carried_mesh`], [`poses`];
+//! - [`format`](mod@format): what a format is, and the options of reading and writing;
+//! - the formats: [`dat`], [`bvh`], [`gltf`] and the others; CSV, Parquet and Arrow share the private module `table`;
+//! - [`format::registry`]: the list of all formats, and which of them a file is in.
+//!
+//! Beside them stands what is made of clips: [`sample`], [`reduce`](mod@reduce), [`trim`](mod@trim),
+//! [`adjust`](mod@adjust), [`compare`].
 
 // Tests may use what systems round differently (clippy.toml).
 #![cfg_attr(test, allow(clippy::disallowed_methods))]

@@ -155,7 +155,7 @@ fn the_page_of_codes_is_up_to_date() {
     let messages: Vec<String> = fixtures().iter().map(|path| verdict(path)).collect();
     let mut page = String::from(
         "# Codes\n\nWhat `tumble` says of its inputs, as `FILE:LINE:COLUMN: error[CODE]: …`. \
-         Codes with `E` refuse an\ninput, those with `W` are warnings, told once for each file. \
+         Codes with `E` refuse an\ninput, those with `W` are warnings, reported once for each file. \
          `tumble explain CODE` says the same.\n",
     );
     for &code in Code::ALL {

@@ -167,7 +167,7 @@ impl Ends {
     }
 }
 
-/// Why a track cannot be interpolated as asked. Places count from 0.
+/// Why a track cannot be interpolated as asked. Indices count from 0.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum InterpolationError {
@@ -218,7 +218,7 @@ pub enum InterpolationError {
     },
 }
 
-/// What is unusual about a track that is interpolated all the same. Places count from 0.
+/// A warning about a track that is interpolated all the same. Indices count from 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum InterpolationWarning {

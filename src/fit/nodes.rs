@@ -279,9 +279,12 @@ mod tests {
             let mut samples = NodeSamples::all(Vec4::ZERO);
             for (k, &s) in nodes.at.iter().enumerate() {
                 let comes_again = k > 0 && nodes.at[k - 1] == s;
-                let value = |s: f32| match comes_again {
-                    true => slope(s),
-                    false => chebyshev(s.into()) - chebyshev(0.0),
+                let value = |s: f32| {
+                    if comes_again {
+                        slope(s)
+                    } else {
+                        chebyshev(s.into()) - chebyshev(0.0)
+                    }
                 };
                 let of_components = |value: f64| {
                     [1.0, 2.0, 3.0, 4.0].map(|times| Vec4::splat((times * value) as f32))

@@ -89,13 +89,19 @@ fn curves(intervals: &mut Intervals, stretches: &[TrackStretch], ends: Ends) {
         // Two keys turn at constant velocity. With frozen ends the outer intervals stand still, and
         // any continuation will do.
         let repeats_interval = stretch.all == 1 || matches!(ends, Ends::Frozen);
-        let before = |lane| match repeats_interval {
-            true => (lane - 1, at(&intervals.logs, lane)),
-            false => (lane - 1, before_first(intervals, lane, start)),
+        let before = |lane| {
+            if repeats_interval {
+                (lane - 1, at(&intervals.logs, lane))
+            } else {
+                (lane - 1, before_first(intervals, lane, start))
+            }
         };
-        let after = |lane| match repeats_interval {
-            true => (lane + 1, at(&intervals.logs, lane)),
-            false => (lane + 1, after_last(intervals, lane, end)),
+        let after = |lane| {
+            if repeats_interval {
+                (lane + 1, at(&intervals.logs, lane))
+            } else {
+                (lane + 1, after_last(intervals, lane, end))
+            }
         };
         let (before, after) = (stretch.first().map(before), stretch.last().map(after));
         for (lane, log) in [before, after].into_iter().flatten() {

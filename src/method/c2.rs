@@ -105,7 +105,7 @@ fn velocities(
         let (first_solved, solved) = solve(track, signs, from..to, interpolation);
         keys.map(move |key| solved[(key as isize - first_solved) as usize].to_array())
     };
-    // Whoever prepares looks again when this is done.
+    // The caller asks again whether it was stopped.
     let windows = windows.take_while(|_| !stop::is_stopped());
     windows.flat_map(in_window).collect()
 }
@@ -343,7 +343,7 @@ impl KeyEquation {
         }
     }
 
-    /// Of an inner key: [`Equation::between`], unless a step beside it is too long; then the velocity is the
+    /// Of an inner key: [`KeyEquation::between`], unless a step beside it is too long; then the velocity is the
     /// mean of the secants, as Bessel's parabola has it.
     fn inner(before: &Step, after: &Step) -> Self {
         if before.is_long() || after.is_long() {

@@ -51,9 +51,10 @@ fn set_handles<R: HandleRule>(intervals: &mut Intervals, stretches: &[TrackStret
             let Some(lane) = lane else { continue };
             let (log, step) = (at(&intervals.logs, lane), at(&intervals.steps, lane));
             // The handle of the interval's inner key.
-            let other = match is_first {
-                true => at(&intervals.incoming, lane + 1),
-                false => at(&intervals.outgoing, lane),
+            let other = if is_first {
+                at(&intervals.incoming, lane + 1)
+            } else {
+                at(&intervals.outgoing, lane)
             };
             let handle = match end {
                 EndCondition::Parabolic => EndHandle::Parabolic,
@@ -68,9 +69,10 @@ fn set_handles<R: HandleRule>(intervals: &mut Intervals, stretches: &[TrackStret
                 }
             };
             let handle = R::end(log, other, handle);
-            match is_first {
-                true => put(&mut intervals.outgoing, lane, handle),
-                false => put(&mut intervals.incoming, lane + 1, handle),
+            if is_first {
+                put(&mut intervals.outgoing, lane, handle);
+            } else {
+                put(&mut intervals.incoming, lane + 1, handle);
             }
         }
     }

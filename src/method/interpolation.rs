@@ -73,8 +73,8 @@ impl Interpolation {
         }
     }
 
-    /// Refuses numbers with which no curve can be made. Whoever evaluates calls it; it is here for those
-    /// who want to know before.
+    /// Refuses numbers with which no curve can be made. Every evaluation calls it; call it to know
+    /// before.
     ///
     /// # Errors
     /// When an end velocity, a tension, a continuity or a bias is not finite, or too large.
@@ -96,7 +96,7 @@ impl Interpolation {
         self.ends.check_loop(keys, index)
     }
 
-    /// What is unusual about the curves of a set that are evaluated all the same: keys at which the angular
+    /// Warnings about the curves of a set, which are evaluated all the same: keys at which the angular
     /// acceleration of [`C2`](crate::method::C2) jumps, as its curve is. It
     /// costs as much as preparing the tracks; other methods have no warnings.
     ///
@@ -144,7 +144,7 @@ impl Interpolation {
         on_threads(together).unwrap_or_else(|_| tracks.clone().filter_map(of_track).collect())
     }
 
-    /// The smooth curves as keyed on the shortest path, if these are what is asked for.
+    /// The smooth curves as keyed on the shortest path, if the options ask for these.
     pub(crate) fn plain(&self) -> Option<SmoothCurves> {
         let is_plain = self.signs == KeySigns::Shortest
             && self.quantity == Quantity::Rotation

@@ -88,9 +88,10 @@ impl<'a> VectorCurves<'a> {
         if !is_held && self.method == VectorMethod::BSpline && self.track.keys.len() > 2 {
             return self.b_spline(i);
         }
-        let [leaving, arriving] = match is_held {
-            true => [DVec3::ZERO; 2],
-            false => self.slopes_of(i),
+        let [leaving, arriving] = if is_held {
+            [DVec3::ZERO; 2]
+        } else {
+            self.slopes_of(i)
         };
         VectorCubic {
             start: self.key(i),

@@ -1,6 +1,6 @@
-//! What a crowd's evaluation leaves, and how large it is.
+//! What a crowd's evaluation stores, and how large it is.
 
-/// What is left of every joint of every instance, `[instance][joint]`.
+/// What is stored of every joint of every instance, `[instance][joint]`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum CrowdValues {
     /// The rotation in the parent's frame, `x y z w`.
@@ -14,10 +14,10 @@ pub enum CrowdValues {
     Skinning,
 }
 
-/// What a crowd's evaluation leaves, and in which precision.
+/// What a crowd's evaluation stores, and in which precision.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct CrowdOutput {
-    /// What is left of every joint.
+    /// What is stored of every joint.
     pub values: CrowdValues,
     /// Whether numbers are of 16 bits, rounded to nearest from f32, not of 32.
     pub is_half: bool,

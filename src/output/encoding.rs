@@ -397,13 +397,14 @@ impl Encoding {
 
     fn check_length(self, rotations: usize, bytes: usize) -> Result<(), EncodingLength> {
         let needed = rotations.saturating_mul(self.bytes());
-        match bytes == needed {
-            true => Ok(()),
-            false => Err(EncodingLength {
+        if bytes == needed {
+            Ok(())
+        } else {
+            Err(EncodingLength {
                 rotations,
                 bytes,
                 needed,
-            }),
+            })
         }
     }
 

@@ -148,9 +148,10 @@ mod tests {
             let angle = f64::from(degrees[i]).to_radians();
             DQuat::from_axis_angle(AXES[sequence.axes()[i]], angle)
         });
-        match sequence.is_intrinsic() {
-            true => rotations[0] * rotations[1] * rotations[2],
-            false => rotations[2] * rotations[1] * rotations[0],
+        if sequence.is_intrinsic() {
+            rotations[0] * rotations[1] * rotations[2]
+        } else {
+            rotations[2] * rotations[1] * rotations[0]
         }
     }
 

@@ -5,7 +5,7 @@ use glam::Vec3;
 use crate::memory::OutOfMemory;
 use crate::output::rotations::Layout;
 
-/// Why poses cannot be put together as asked. Places count from 0.
+/// Why poses cannot be put together as asked. Indices count from 0.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PoseError {
@@ -85,7 +85,7 @@ pub(crate) const LARGEST_WEIGHT: f32 = 1e9;
 /// The most tracks of a skeleton.
 pub(crate) const MAX_TRACKS: usize = u32::MAX as usize;
 
-/// Why parents make no skeleton. Places count from 0.
+/// Why parents make no skeleton. Indices count from 0.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SkeletonError {

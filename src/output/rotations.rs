@@ -50,7 +50,7 @@ impl Layout {
         inside.then(|| self.offset(track, sample, tracks, samples))
     }
 
-    /// Where a sample that there is lies.
+    /// As [`Layout::index`], for a sample that is in range.
     #[inline]
     pub(crate) fn offset(
         self,

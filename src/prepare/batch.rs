@@ -10,7 +10,7 @@ use crate::tracks::set::TrackSet;
 /// Key intervals of a long track that are prepared as one part.
 pub(crate) const PART_INTERVALS: usize = 4096;
 
-/// What is prepared together.
+/// The key intervals that are prepared together.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Batch {
     /// All of some tracks.
@@ -72,9 +72,10 @@ impl Batch {
             0 => 0,
             start => first_sample(times[start], timeline, steps),
         };
-        let to = match intervals.end + 1 == times.len() {
-            true => timeline.len(),
-            false => first_sample(times[intervals.end], timeline, steps),
+        let to = if intervals.end + 1 == times.len() {
+            timeline.len()
+        } else {
+            first_sample(times[intervals.end], timeline, steps)
         };
         from..to.max(from)
     }

@@ -48,7 +48,7 @@ fn retime_track(
     let (start, first_key) = (intervals[0].start, intervals[0].key);
     let paced = |interval: &mut PendingInterval| {
         if stop::is_stopped() {
-            return None; // whoever prepares looks again when this is done
+            return None; // the caller asks again whether it was stopped
         }
         let curve = interval.curve.take()?;
         let pace = ArcLengths::new(&curve);
@@ -91,18 +91,20 @@ fn retime_track(
         let exact_from = seconds * (done / total);
         done += pace.total();
         let is_last = i + 1 == count;
-        let exact_to = match is_last {
-            true => seconds,
-            false => seconds * (done / total),
+        let exact_to = if is_last {
+            seconds
+        } else {
+            seconds * (done / total)
         };
         let from = reached(exact_from);
         let to = if is_last { end } else { reached(exact_to) };
         let missed = [(from, exact_from, 0.0), (to, exact_to, 1.0)];
         let ends = missed.map(|(time, exact, fraction)| {
             let missed = ((time - start) - exact) / (exact_to - exact_from);
-            match missed.abs() > INDISTINCT {
-                true => fraction + missed,
-                false => fraction,
+            if missed.abs() > INDISTINCT {
+                fraction + missed
+            } else {
+                fraction
             }
         });
         pace.set_ends(ends);

@@ -42,7 +42,7 @@ impl Fitting {
         }
     }
 
-    /// Queues the curve in a lane of `curves`, whose span and segment are there already.
+    /// Queues the curve in a lane of `curves`, which has its span and its segment.
     /// The lane is read later, by [`Fitting::copy_queued`], which comes before the lanes of `curves` change.
     #[inline]
     pub(crate) fn queue(&mut self, curves: &Intervals, lane: usize, slot: CurveSlot) {

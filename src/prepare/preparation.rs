@@ -65,9 +65,10 @@ impl Preparation {
         track: usize,
     ) -> Result<(), InterpolationError> {
         interpolation.check_track(keys, track)?;
-        match Self::has_path(interpolation) {
-            true => (interpolation.signs).check(keys, 0..keys.len() - 1, track),
-            false => Ok(()),
+        if Self::has_path(interpolation) {
+            (interpolation.signs).check(keys, 0..keys.len() - 1, track)
+        } else {
+            Ok(())
         }
     }
 

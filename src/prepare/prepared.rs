@@ -242,9 +242,10 @@ impl Prepared {
                 }
                 next = span + 1;
                 let (start, key) = (uncut.starts[span], uncut.keys[span]);
-                let end = match next < spans.end {
-                    true => uncut.starts[next],
-                    false => self.parts[part].end,
+                let end = if next < spans.end {
+                    uncut.starts[next]
+                } else {
+                    self.parts[part].end
                 };
                 let count = cut.partition_point(|subcurve| subcurve.span <= span);
                 let (pieces, others) = cut.split_at(count);

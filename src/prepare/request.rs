@@ -1,4 +1,4 @@
-//! What is asked of a set.
+//! What is evaluated of a set.
 
 use std::ops::Range;
 
@@ -6,7 +6,7 @@ use crate::method::interpolation::Interpolation;
 use crate::time::frames::Timeline;
 use crate::tracks::set::TrackSet;
 
-/// What is asked of a set: some of its tracks, by a method, at the samples of a timeline, which is
+/// What is evaluated of a set: some of its tracks, by a method, at the samples of a timeline, which is
 /// that of the whole set.
 #[derive(Clone)]
 pub(crate) struct SetRequest<'a> {

@@ -117,7 +117,7 @@ impl SmoothPreparation {
             _ => Vec::new(),
         };
         let mut from = intervals.start;
-        // Whoever prepares looks again when this is done.
+        // The caller asks again whether it was stopped.
         while from < intervals.end && !stop::is_stopped() {
             if self.intervals.count + context >= LANES {
                 self.flush(prepared);
@@ -234,7 +234,7 @@ impl SmoothPreparation {
         self.stretches.clear();
     }
 
-    /// Computes the curves of the intervals that wait. Returns whether they are there in f64.
+    /// Computes the curves of the intervals that wait. Returns whether they were computed in f64.
     fn find_curves(&mut self) -> bool {
         if let Some(direct) = &mut self.direct {
             direct.find_curves(&self.intervals, &self.stretches);
@@ -351,7 +351,7 @@ impl SmoothPreparation {
 
     /// Adds what lies at a track's ends, where a stretch reaches them, and outside: the curves that
     /// extrapolate the track at the angular velocity of its ends, where the wrap mode asks for it,
-    /// and what is held for a curve that does not pass through its keys instead of them: its end
+    /// and the constants that are held there if the curve does not pass through its keys: its end
     /// values for rotations, 0 for velocities and accelerations.
     fn add_ends(&self, prepared: &mut Prepared, stretch: &TrackStretch) {
         let Interpolation { before, after, .. } = self.interpolation;
@@ -373,12 +373,12 @@ impl SmoothPreparation {
             }
             let end_value = || round_quat(self.curve(lane).value(end as f64));
             if !is_extrapolated {
-                let held = match of_rotations {
-                    true if self.is_frozen() => {
-                        prepared.constants[stretch.still as usize + (lane - stretch.lane) + end]
-                    }
-                    true => end_value(),
-                    false => STILL,
+                let held = if of_rotations && self.is_frozen() {
+                    prepared.constants[stretch.still as usize + (lane - stretch.lane) + end]
+                } else if of_rotations {
+                    end_value()
+                } else {
+                    STILL
                 };
                 let held = prepared.constant(held);
                 let part = &mut prepared.parts[stretch.part];

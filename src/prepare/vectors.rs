@@ -43,9 +43,10 @@ pub(crate) fn thinned<'t>(
     let mut near = Vec::with_capacity(samples.len() + 2);
     near.extend([0, count - 1]);
     near.extend(samples.map(|time| {
-        let time = match wrap.repeats() {
-            true => wrap.folded(span, time),
-            false => time,
+        let time = if wrap.repeats() {
+            wrap.folded(span, time)
+        } else {
+            time
         };
         track.times.partition_point(|&key| key <= time)
     }));

@@ -61,8 +61,8 @@ const CLIP: f64 = 64.0;
 /// By how much the rounding of times of this magnitude may have moved a key, in seconds: times are often
 /// sums or products, so a few steps
 /// of f64. From two days on that would be longer than [`RESOLUTION`], and there a curve is evaluated where
-/// its frame lies. Only where keys are `held` until the next one, and which of two is shown hangs on the
-/// rounding, is a key moved by up to a step of its f64.
+/// its frame lies. Only where keys are `held` until the next one, and the rounding decides which of two is shown,
+/// is a key moved by up to a step of its f64.
 #[inline(always)]
 pub(crate) fn rounding(magnitude: f64, held: bool) -> f64 {
     let rounded_steps = 4.0 * f64::EPSILON * magnitude;

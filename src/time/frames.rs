@@ -131,7 +131,7 @@ impl SampleTimes {
     }
 
     /// The same rate from `start` to `end`, seconds. Explicit times have no range: they are refused
-    /// ([`FramesError::TimesInRange`]) when they are resolved against a set.
+    /// ([`SampleTimesError::TimesInRange`]) when they are resolved against a set.
     #[must_use]
     pub fn between(mut self, from: f64, to: f64) -> Self {
         match &mut self.0 {
@@ -170,7 +170,7 @@ impl SampleTimes {
     /// The samples of a set with `tracks` tracks whose keys span `span` seconds.
     ///
     /// # Errors
-    /// A [`FramesError`] when the request does not fit the set.
+    /// A [`SampleTimesError`] when the request does not fit the set.
     pub fn resolve(
         &self,
         tracks: usize,
@@ -353,7 +353,7 @@ impl Timeline {
         (0..count).map(move |sample| self.time_at(track, sample))
     }
 
-    /// The exact time of a sample that there is.
+    /// The exact time of a sample within [`Timeline::len`].
     pub(crate) fn moment_at(&self, track: usize, sample: usize) -> Moment {
         match &self.ticks {
             Ticks::Frames { rate, start } => Moment::of_frame(start.seconds, *rate, sample as u64),
@@ -361,7 +361,7 @@ impl Timeline {
         }
     }
 
-    /// The time of a sample that there is, in seconds.
+    /// The time of a sample within [`Timeline::len`], in seconds.
     #[inline]
     pub(crate) fn time_at(&self, track: usize, sample: usize) -> f64 {
         match &self.ticks {

@@ -202,9 +202,10 @@ impl Period {
 
     /// The track's time at a position in a copy.
     pub(crate) fn time_in_track(&self, into: Moment, backwards: bool) -> Moment {
-        let from_first = match backwards {
-            true => self.length.minus(into),
-            false => into,
+        let from_first = if backwards {
+            self.length.minus(into)
+        } else {
+            into
         };
         from_first.plus(Moment::new(self.first))
     }

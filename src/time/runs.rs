@@ -86,7 +86,7 @@ pub(crate) enum Distance {
     /// each sample after it. f32 holds all of them exactly, also those that fill the run's last
     /// vector.
     Near { first: f32 },
-    /// The same where f32 may not hold them exactly.
+    /// The same where f32 may not have them exactly.
     Frames { first: i32 },
     /// Seconds from the middle, which is `half` a length after `start`, to a sample's explicit time.
     Seconds { start: f64, half: f64 },

@@ -210,9 +210,10 @@ impl Spans {
         emit: &mut impl Emit,
     ) -> Result<(), SampleTimesError> {
         let (starts, samples) = (&self.starts[part.spans.clone()], &copy.samples);
-        let [first, at_end, last] = match copy.is_track() {
-            true => self.runs_outside(part, clock, samples),
-            false => self.runs_at_ends(part, clock, samples),
+        let [first, at_end, last] = if copy.is_track() {
+            self.runs_outside(part, clock, samples)
+        } else {
+            self.runs_at_ends(part, clock, samples)
         };
         if let Some(run) = first {
             emit.run(run);
@@ -313,9 +314,10 @@ impl Spans {
         let at_start = is_first.then(|| self.at_start(part));
         let at_end = is_last.then(|| self.at_end(part));
         let (begin, end) = (clock.boundary(begin), clock.boundary(part.end));
-        let [(first, from), (last, to)] = match clock.is_reversed() {
-            true => [(at_end, end.first), (at_start, begin.first)],
-            false => [(at_start, begin.first), (at_end, end.first)],
+        let [(first, from), (last, to)] = if clock.is_reversed() {
+            [(at_end, end.first), (at_start, begin.first)]
+        } else {
+            [(at_start, begin.first), (at_end, end.first)]
         };
         [
             run_among(samples, 0..from as usize, first),
@@ -338,7 +340,7 @@ impl Spans {
         self.at_bound([at_end, part.after], part.spans.clone().last(), 0.5, 1.0)
     }
 
-    /// The first of two constants that there is, or else a span's value at this parameter; `t` is that of
+    /// The first of two constants that is not [`NONE`], or else a span's value at this parameter; `t` is that of
     /// a curve in f64.
     fn at_bound(
         &self,

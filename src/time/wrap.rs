@@ -127,9 +127,10 @@ impl Wrap {
     /// where end values are held or extrapolated.
     fn copy_at(self, period: &Period, time: Moment, rounding: f64) -> Option<(InCopy, bool)> {
         let found = period.find(time, rounding);
-        let mode = match found.is_before {
-            true => self.before,
-            false => self.after,
+        let mode = if found.is_before {
+            self.before
+        } else {
+            self.after
         };
         match mode {
             _ if found.number == Some(0.0) => None,
@@ -231,9 +232,10 @@ fn first_outside(from: usize, end: usize, is_in: impl Fn(usize) -> bool) -> usiz
     let (mut from, mut end) = (from, end);
     while from < end {
         let middle = from + (end - from) / 2;
-        match is_in(middle) {
-            true => from = middle + 1,
-            false => end = middle,
+        if is_in(middle) {
+            from = middle + 1;
+        } else {
+            end = middle;
         }
     }
     from

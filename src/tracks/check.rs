@@ -64,14 +64,15 @@ pub(crate) fn check_length(
     keys: usize,
     values: usize,
 ) -> Result<(), TrackError> {
-    match values == keys {
-        true => Ok(()),
-        false => Err(TrackError::DataLength {
+    if values == keys {
+        Ok(())
+    } else {
+        Err(TrackError::DataLength {
             track,
             quantity,
             keys,
             values,
-        }),
+        })
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::tracks::check::{LATEST, NORM_TOLERANCE};
 
-/// Why keys were refused. Places count from 0.
+/// Why keys were refused. Indices count from 0.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum TrackError {

@@ -17,7 +17,7 @@ impl Rotation for [f32; 4] {}
 
 pub(crate) mod sealed {
     /// Types of which it is known how their four numbers lie in memory. Keys come in as some of
-    /// them, and [`Row`](crate::Row)s of results lie in any.
+    /// them, and [`OutputValue`](crate::OutputValue)s of results lie in any.
     pub trait Sealed {}
 
     impl Sealed for glam::Quat {}

@@ -199,12 +199,13 @@ impl TrackSet {
         self.tracks.is_empty()
     }
 
-    /// Refuses a track that there is not.
+    /// Refuses an index that no track has.
     pub(crate) fn check_track(&self, track: usize) -> Result<(), TrackError> {
         let tracks = self.track_count();
-        match track < tracks {
-            true => Ok(()),
-            false => Err(TrackError::NoSuchTrack { track, tracks }),
+        if track < tracks {
+            Ok(())
+        } else {
+            Err(TrackError::NoSuchTrack { track, tracks })
         }
     }
 

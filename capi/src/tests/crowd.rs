@@ -117,7 +117,7 @@ pub(super) fn push(
         ..defaults()
     };
     let vectors: *const c_char = vectors.map_or(null(), CStr::as_ptr);
-    // SAFETY: a structure and text; the number is not wanted.
+    // SAFETY: a structure and text; the number is not asked for.
     unsafe { tumble_crowd_library_push(library, set, &raw const slerp, vectors, null_mut()) }
 }
 

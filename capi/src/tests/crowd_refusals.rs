@@ -1,4 +1,4 @@
-//! What C may do wrong with crowds, and what it is told then.
+//! Wrong uses of crowds from C, and the errors that they get.
 
 use std::ptr::{dangling, dangling_mut, null, null_mut};
 

@@ -20,7 +20,7 @@ pub(crate) struct InterpolationArguments {
     ends: Option<EndsArgument>,
     /// Which way to rotate between neighbouring keys
     #[arg(long, value_name = "PATH")]
-    path: Option<PathArgument>,
+    path: Option<KeySignsArgument>,
     /// The speed along the curve
     #[arg(long, value_name = "SPEED", default_value = "as-keyed")]
     speed: SpeedArgument,
@@ -52,7 +52,7 @@ impl InterpolationArguments {
     pub(crate) fn with(self, method: Method) -> tumble::Interpolation {
         tumble::Interpolation {
             method,
-            signs: method.path.or(self.path()).unwrap_or_default(),
+            signs: method.path.or(self.key_signs()).unwrap_or_default(),
             ends: self.ends.map_or(method.ends, EndsArgument::ends),
             quantity: tumble::Quantity::Rotation,
             speed: match self.speed {
@@ -69,10 +69,10 @@ impl InterpolationArguments {
         }
     }
 
-    fn path(self) -> Option<KeySigns> {
+    fn key_signs(self) -> Option<KeySigns> {
         Some(match self.path? {
-            PathArgument::Shortest => KeySigns::Shortest,
-            PathArgument::AsAuthored => KeySigns::AsAuthored,
+            KeySignsArgument::Shortest => KeySigns::Shortest,
+            KeySignsArgument::AsAuthored => KeySigns::AsAuthored,
         })
     }
 
@@ -124,7 +124,7 @@ impl InterpolationArguments {
                 names()
             ));
         }
-        let path = self.path();
+        let path = self.key_signs();
         let takes = |method: &Method| method.path.is_none() || method.path == path;
         if path.is_some() && !methods.iter().any(takes) {
             return Err(format!(
@@ -202,7 +202,7 @@ impl From<OutsideArgument> for WrapMode {
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
-enum PathArgument {
+enum KeySignsArgument {
     /// the shorter rotation (default)
     Shortest,
     /// as the signs of the keys say

@@ -240,7 +240,7 @@ impl SampleRequest {
                         second => format!(" (from second {second} on)"),
                     };
                     let message = format!(
-                        "{found}, the first at {time} s{from}; --in-gaps leave-out or hold goes on"
+                        "{found}, the first at {time} s{from}; continue with --in-gaps leave-out or hold"
                     );
                     return Err(Failure::new(ALL_INPUTS, message));
                 }

@@ -212,7 +212,7 @@ impl ResultTarget {
             let all = Format::writable().filter(|format| format.write.is_some());
             let names: Vec<&str> = all.map(|format| format.name).collect();
             Failure::usage(format!(
-                "{self}: {} holds whole clips; for rotations or poses alone give {}",
+                "{self}: {} stores whole clips; for rotations or poses alone use {}",
                 self.format.name,
                 names.join(" or ")
             ))

@@ -75,7 +75,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         && arguments.order.is_some()
     {
         return Err(Failure::usage(format!(
-            "{} has an order of its own for the components of quaternions; leave out --order",
+            "{} has a fixed order of quaternion components; leave out --order",
             format.name
         )));
     }

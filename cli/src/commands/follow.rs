@@ -33,7 +33,7 @@ use crate::messages::words;
     mut_arg("path_up", |arg| arg.long("up")),
     mut_arg("path_speed", |arg| arg.long("speed")),
     mut_arg("path_frames", |arg| {
-        let arg = arg.value_name("FRAME").help("How it is turned about this direction");
+        let arg = arg.value_name("FRAME").help("The orientation about this direction");
         arg.action(ArgAction::Set).value_delimiter(None::<char>)
     })
 )]

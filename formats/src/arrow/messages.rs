@@ -239,7 +239,7 @@ impl<'a> Messages<'a> {
 
     /// Every count and every offset within the data, before the crate relies on them.
     fn check(&mut self, batch: &RecordBatch<'_>, data: &Buffer) -> Result<(), Diagnostic> {
-        let wrong = || self.damaged("a message's counts cannot be; the file is damaged");
+        let wrong = || self.damaged("a message has impossible counts; the file is damaged");
         let mut counts = vec![batch.length()];
         for node in batch.nodes().into_iter().flatten() {
             let (length, nulls) = (node.length(), node.null_count());

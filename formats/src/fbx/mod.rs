@@ -744,7 +744,7 @@ impl<'a> Evaluator<'a> {
                 self.stack,
                 Code::NotFinite,
                 format!(
-                    "`{}` is nowhere at {time} s: a number is not finite",
+                    "`{}` has no finite transform at {time} s",
                     &*self.node.element.name
                 ),
             ),

@@ -1,258 +1,316 @@
-//! A file written again with the samples of its animations instead of their keys.
+//! The keys of one animation, replaced in its file by samples or by the keys of a cut clip.
 
-use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::collections::{HashMap, HashSet};
+use std::io;
+use std::ops::Range;
 
 use serde_json::value::RawValue;
-use tumble::FrameRate;
 
-use crate::carried_mesh::CarriedMesh;
 use crate::diagnostic::{Code, Diagnostic};
-use crate::format::{Document, Format, MotionOptions, WriteError};
-use crate::gltf::FORMAT;
-use crate::gltf::animation::ReadAnimation;
-use crate::gltf::baking::{Baking, is_cut};
-use crate::gltf::container::{Container, check_length};
-use crate::gltf::data::BufferData;
+use crate::format::WriteError;
+use crate::gltf::animation::{ReadAnimation, SampledChannel};
 use crate::gltf::edits::Edits;
-use crate::gltf::gather;
 use crate::gltf::json::{Json, JsonMembers};
-use crate::gltf::reader::GltfReader;
-use crate::gltf::schema::{Animation, Channel};
-use crate::gltf::skins;
-use crate::gltf::uri;
-use crate::motion::{Motion, SampledClip};
-use crate::rate::Precision;
-use crate::text::lines::Limits;
-use crate::warnings::Warnings;
+use crate::gltf::quantized::quantized;
+use crate::gltf::schema::{Animation, Channel, TargetPath};
+use crate::gltf::write_new::{FLOAT, SHORT};
+use crate::gltf::written_keys::WrittenKeys;
+use crate::motion::{self, SampledClip};
 
-/// A file that was read.
-#[derive(Debug)]
-pub(super) struct Gltf {
-    /// What messages call it.
-    pub(super) name: String,
-    pub(super) container: Container,
-    /// Where the files are that it names.
-    pub(super) folder: Option<PathBuf>,
-    /// How much of them is read.
-    pub(super) limits: Limits,
-    /// `None` for those that are kept as they are.
-    pub(super) animations: Vec<Option<ReadAnimation>>,
+/// Numbers as a file has them.
+fn bytes_of(numbers: &[f32]) -> Vec<u8> {
+    let each = numbers.iter().flat_map(|number| number.to_le_bytes());
+    each.collect()
 }
 
-impl Document for Gltf {
-    fn times(&self, clip: usize, rate: FrameRate) -> Result<Vec<f64>, Diagnostic> {
-        let Some(read) = self.animations.get(clip).and_then(Option::as_ref) else {
-            return Ok(Vec::new());
-        };
-        let [first, last] = read.span;
-        let spacing = Precision::F32.ulp(first.abs().max(last.abs()));
-        if spacing * rate.per_second() > 1.0 {
-            let fits = 1.0 / spacing;
-            let fits = if fits >= 1.0 { fits.floor() } else { fits };
-            let message = format!(
-                "at {last} s, times in f32 are {spacing} s apart, and frames at {rate} fps {} s; \
-                 {fits} fps fits",
-                1.0 / rate.per_second()
-            );
-            return Err(self.refuse(clip, Code::TimesInF32, message));
-        }
-        let start = (first * rate.per_second()).floor() as i64;
-        let end = (last * rate.per_second()).ceil() as i64;
-        let time = |frame: i64| rate.time_of(frame.unsigned_abs()) * frame.signum() as f64;
-        // The ends are given as they are, and stand for the frames that they were rounded from:
-        // within an ulp, where frames are much longer (see `grid`).
-        let near = if spacing * rate.per_second() < 0.01 {
-            1.0
-        } else {
-            0.5
-        };
-        let is_end = |time: f64| {
-            let near = near * Precision::F32.ulp(time);
-            (time - first).abs() <= near || (time - last).abs() <= near
-        };
-        let within = (start..=end)
-            .map(time)
-            .filter(|&time| first < time && time < last && !is_end(time));
-        let mut times = vec![first];
-        times.extend(within);
-        times.extend((last > first).then_some(last));
-        Ok(times)
-    }
-
-    fn writes(&self, format: &Format) -> bool {
-        format.name == FORMAT.name
-    }
-
-    fn other_contents(&self) -> Vec<String> {
-        let Ok(json) = Json::parse(&self.name, &self.container.text) else {
-            return Vec::new();
-        };
-        let lists = [
-            "meshes",
-            "materials",
-            "textures",
-            "images",
-            "cameras",
-            "extensionsUsed",
-        ];
-        let has = |list: &&str| !json.optional::<&RawValue>(list).is_empty();
-        let lists = lists.into_iter().filter(has).map(str::to_owned);
-        let animations: Vec<Animation<'_>> = json.optional("animations");
-        let channels = animations.iter().flat_map(|animation| &animation.channels);
-        let mut others: Vec<String> = channels
-            .filter_map(|channel| {
-                let channel: Channel = serde_json::from_str(channel.get()).ok()?;
-                channel
-                    .target
-                    .moves()
-                    .is_none()
-                    .then_some(channel.target.path)
-            })
-            .map(|path| format!("channels of `{path}`"))
-            .collect();
-        others.sort();
-        others.dedup();
-        lists.chain(others).collect()
-    }
-
-    fn carried_mesh(&self, clip: &Motion) -> Result<Option<CarriedMesh>, Diagnostic> {
-        skins::carried(self, clip)
-    }
-
-    fn write(
-        &self,
-        clips: &[(usize, SampledClip<'_>)],
-        options: &MotionOptions,
-        path: &Path,
-        out: &mut dyn Write,
-    ) -> Result<Vec<Diagnostic>, WriteError> {
-        let json = Json::parse(&self.name, &self.container.text)?;
-        let warnings = Warnings::new(&self.name);
-        let folder = self.folder.as_deref();
-        let reader = GltfReader::new(&json, &self.container, folder, self.limits, warnings)?;
-        let extension = path.extension().unwrap_or_default();
-        let is_text = extension.eq_ignore_ascii_case("gltf");
-        self.check_folder(&reader, path, is_text)?;
-        let mut edits = Edits::new(&json);
-        let mut data = match (self.container.is_glb(), is_text) {
-            (true, _) => {
-                BufferData::of_file(&json, &reader, self.container.bin().unwrap_or_default())?
-            }
-            (false, true) => BufferData::in_uri(&json),
-            (false, false) => gather::buffers(&reader, &mut edits)?,
-        };
-        let baked = |&(index, _): &(usize, _)| self.animations.get(index).and_then(Option::as_ref);
-        let clips: Vec<_> = clips
-            .iter()
-            .filter_map(|clip| Some((baked(clip)?, clip)))
-            .collect();
-        let more = clips.iter().map(|(read, (_, sampled))| {
-            let numbers = 1 + read
-                .sampled
-                .iter()
-                .map(|channel| channel.path.width())
-                .sum::<usize>();
-            4 * numbers as u64 * sampled.times.len() as u64
-        });
-        check_length(&json, data.length_with(more.sum()))?;
-        if !self.container.is_glb() && !is_text {
-            gather::images(&reader, &mut edits, &mut data)?;
-        }
-        for (read, (index, sampled)) in clips {
-            let cuts = is_cut(read, sampled);
-            if cuts && read.beside > 0 {
-                reader.warn(Code::StaysWhole, &format!("/animations/{index}"), || {
-                    let count = read.beside;
-                    format!("{count} channels move other things than nodes, such as weights; they are not cut")
-                });
-            }
-            if !read.sampled.is_empty() || cuts {
-                let mut baking = Baking::new(
-                    &json,
-                    *index,
-                    read,
-                    (sampled, options.quantize.is_some()),
-                    &edits,
-                )?;
-                baking.bake(&mut edits)?;
-                data.append(&mut edits, &baking.bytes);
-            }
-        }
-        let bin = data.finish(&json, &mut edits);
-        let text = edits.finish();
-        if is_text {
-            out.write_all(text.as_bytes())?;
-        } else {
-            let length = |part: &&[u8]| part.len() as u64;
-            let bytes = text.len() as u64 + bin.iter().flatten().map(length).sum::<u64>();
-            check_length(&json, bytes)?;
-            self.container.write_glb(&text, bin.as_deref(), out)?;
-        }
-        drop(data);
-        // Whatever else is remarkable was said when the file was read.
-        let mut warnings = reader.warnings.into_inner().into_list();
-        warnings.retain(|warning| [Code::StaysOutside, Code::StaysWhole].contains(&warning.code));
-        Ok(warnings)
-    }
+/// Rotations in f32 as those of 16 bits a component.
+fn shorts_of(bytes: &[u8]) -> Vec<u8> {
+    let numbers = bytes.as_chunks::<4>().0.iter();
+    let numbers: Vec<f32> = numbers.map(|&bytes| f32::from_le_bytes(bytes)).collect();
+    let each = numbers
+        .as_chunks::<4>()
+        .0
+        .iter()
+        .copied()
+        .flat_map(quantized);
+    each.flat_map(i16::to_le_bytes).collect()
 }
 
-impl Gltf {
-    fn refuse(&self, animation: usize, code: Code, message: String) -> Diagnostic {
-        Diagnostic::new(&self.name, code, message).inside(format!("/animations/{animation}"))
-    }
+/// One animation on its way into the file.
+pub(super) struct AnimationBaker<'a> {
+    json: &'a Json<'a>,
+    pointer: String,
+    read: &'a ReadAnimation,
+    sampled: &'a SampledClip<'a>,
+    /// The values of `sampler` of the channels.
+    named: Vec<&'a RawValue>,
+    /// The samplers of channels that are not sampled.
+    kept: HashSet<usize>,
+    samplers: Vec<&'a RawValue>,
+    samplers_array: &'a RawValue,
+    /// The clip was cut: all its channels get other keys.
+    is_cut: bool,
+    /// Rotations have 16 bits a component.
+    quantize: bool,
+    /// The buffer view that the bytes will be.
+    view: usize,
+    pub(super) bytes: Vec<u8>,
+}
 
-    /// URIs of files beside are right in the file's own folder alone.
-    fn check_folder(
-        &self,
-        reader: &GltfReader<'_>,
-        path: &Path,
-        is_text: bool,
-    ) -> Result<(), Diagnostic> {
-        if is_text && self.container.is_glb() {
-            let message = "a GLB is written as a GLB; name the output .glb";
-            return Err(Diagnostic::new(&self.name, Code::GltfFolder, message));
+/// A sampler that was changed or appended.
+struct BakedSampler {
+    sampler: usize,
+    input: usize,
+    interpolation: &'static str,
+    values: Range<usize>,
+}
+
+/// Whether the keys that are written are those of a part of the animation.
+pub(super) fn is_cut(read: &ReadAnimation, sampled: &SampledClip<'_>) -> bool {
+    let span = sampled.clip.set.time_span();
+    sampled.is_at_keys && span.is_some_and(|(first, last)| [first, last] != read.span)
+}
+
+impl<'a> AnimationBaker<'a> {
+    /// # Errors
+    /// When the samples are not those of the clip.
+    pub(super) fn new(
+        json: &'a Json<'a>,
+        index: usize,
+        read: &'a ReadAnimation,
+        (sampled, quantize): (&'a SampledClip<'a>, bool),
+        edits: &Edits<'_>,
+    ) -> Result<Self, WriteError> {
+        let pointer = format!("/animations/{index}");
+        let animation: Animation<'a> = json.entry("animations", index, &pointer)?;
+        let members: JsonMembers<'a> = json.entry("animations", index, &pointer)?;
+        let is_cut = is_cut(read, sampled);
+        let others = read.others.iter().filter(|_| is_cut);
+        let changed = read.sampled.iter().chain(others);
+        let sampled_channels: HashSet<usize> = changed
+            .map(|sampled_channel| sampled_channel.channel)
+            .collect();
+        let mut kept = HashSet::new();
+        let mut named = Vec::new();
+        for (channel_index, raw) in animation.channels.iter().enumerate() {
+            if !sampled_channels.contains(&channel_index) {
+                kept.insert(json.typed::<Channel>(raw, &pointer)?.sampler);
+            }
+            let members: JsonMembers<'a> = json.typed(raw, &pointer)?;
+            named.extend(members.get("sampler"));
         }
-        let is_gathered = !is_text && !self.container.is_glb();
-        let Some((pointer, uri)) = named_file(reader.json).filter(|_| !is_gathered) else {
-            return Ok(());
+        let tracks = sampled.clip.set.track_count();
+        let count = sampled.times.len() * tracks;
+        let fits = |list: usize, path: TargetPath| {
+            let is_moved = read.sampled.iter().any(|channel| channel.path == path);
+            list == count || !is_moved
         };
-        let canonical = |folder: &Path| {
-            let here = folder.as_os_str().is_empty();
-            std::fs::canonicalize(if here { Path::new(".") } else { folder }).ok()
-        };
-        let source_folder = self.folder.as_deref().and_then(canonical);
-        let target = canonical(path.parent().unwrap_or(Path::new("")));
-        if source_folder.is_some() && source_folder == target {
-            return Ok(());
-        }
-        if is_text {
-            let message = format!(
-                "`{uri}` would not be found from {}; write beside the input, or name the output .glb",
-                path.display()
-            );
-            return Err(reader.json.refuse(&pointer, Code::GltfFolder, message));
-        }
-        reader.warn(Code::StaysOutside, &pointer, || {
-            format!(
-                "`{uri}` is not found from {}; copy it there",
-                path.display()
+        let is_whole = fits(sampled.rotations.len(), TargetPath::Rotation)
+            && fits(sampled.translations.len(), TargetPath::Translation)
+            && fits(sampled.scales.len(), TargetPath::Scale)
+            && read.sampled.iter().all(|channel| channel.track < tracks);
+        let samplers_array = members.get("samplers").filter(|_| is_whole && count > 0);
+        let samplers_array = samplers_array.ok_or_else(|| {
+            io::Error::new(
+                io::ErrorKind::InvalidInput,
+                "the samples are not those of this clip",
             )
-        });
+        })?;
+        Ok(Self {
+            json,
+            pointer,
+            read,
+            sampled,
+            named,
+            kept,
+            samplers: animation.samplers,
+            samplers_array,
+            is_cut,
+            quantize,
+            view: edits.count("bufferViews"),
+            bytes: Vec::new(),
+        })
+    }
+
+    /// Replaces the keys of the channels that are sampled by the samples.
+    ///
+    /// # Errors
+    /// When f32 cannot tell times apart.
+    pub(super) fn bake(&mut self, edits: &mut Edits<'_>) -> Result<(), WriteError> {
+        let mut inputs = HashMap::new();
+        let shared = self.input(self.sampled.times, &mut inputs, edits)?;
+        // By the samplers whose keys the samples stand for.
+        let mut made: HashMap<usize, Vec<BakedSampler>> = HashMap::new();
+        let read = self.read;
+        let others = read.others.iter().filter(|_| self.is_cut);
+        let channels: Vec<&SampledChannel> = read.sampled.iter().chain(others).collect();
+        for channel in channels {
+            let written = match self.sampled.is_at_keys {
+                true => WrittenKeys::of(self.sampled.clip, channel.track, channel.path),
+                false => None,
+            };
+            let (input, interpolation) = match &written {
+                Some(keys) => (
+                    self.input(&keys.times, &mut inputs, edits)?,
+                    keys.sampler.name(),
+                ),
+                None => (shared, "LINEAR"),
+            };
+            let values =
+                written.map_or_else(|| self.values(channel), |written| bytes_of(&written.values));
+            let count = values.len() / (4 * channel.path.width());
+            let is_short = self.quantize
+                && channel.path == TargetPath::Rotation
+                && interpolation != motion::ChannelInterpolation::Cubic.name();
+            let values = if is_short { shorts_of(&values) } else { values };
+            let made = made.entry(channel.sampler).or_default();
+            let same = made.iter().find(|made| {
+                self.bytes[made.values.clone()] == values
+                    && (made.input, made.interpolation) == (input, interpolation)
+            });
+            let sampler = match same {
+                Some(made) => made.sampler,
+                None => {
+                    let start = self.bytes.len();
+                    self.bytes.extend_from_slice(&values);
+                    let kind = if channel.path == TargetPath::Rotation {
+                        "VEC4"
+                    } else {
+                        "VEC3"
+                    };
+                    let shorts = (SHORT, ",\"normalized\":true");
+                    let (component, more) = if is_short { shorts } else { (FLOAT, "") };
+                    let accessor = self.accessor(start, (count, component, kind), more);
+                    let output = edits.append_to("accessors", accessor);
+                    let is_free = made.is_empty()
+                        && !self.kept.contains(&channel.sampler)
+                        && self.takes(channel.sampler, interpolation)?;
+                    let sampler = match is_free {
+                        true => {
+                            let keys = (input, output, interpolation);
+                            self.change_sampler(channel.sampler, keys, edits)?
+                        }
+                        false => {
+                            let sampler = format!(
+                                "{{\"input\":{input},\"output\":{output},\"interpolation\":\"{interpolation}\"}}"
+                            );
+                            edits.append(self.samplers_array, self.samplers.len(), &sampler)
+                        }
+                    };
+                    made.push(BakedSampler {
+                        sampler,
+                        input,
+                        interpolation,
+                        values: start..self.bytes.len(),
+                    });
+                    sampler
+                }
+            };
+            if sampler != channel.sampler {
+                edits.replace(self.named[channel.channel], sampler);
+            }
+        }
         Ok(())
     }
-}
 
-/// The first buffer or image that is a file beside: its pointer and its URI.
-fn named_file(json: &Json<'_>) -> Option<(String, String)> {
-    ["buffers", "images"].iter().find_map(|list| {
-        json.entries(list)
-            .iter()
-            .enumerate()
-            .find_map(|(index, raw)| {
-                let members: JsonMembers<'_> = json.typed(raw, "").ok()?;
-                let uri: String = json.typed(members.get("uri")?, "").ok()?;
-                (!uri::is_data(&uri)).then(|| (format!("/{list}/{index}/uri"), uri))
-            })
-    })
+    /// The accessor of times, one for equal ones.
+    fn input(
+        &mut self,
+        seconds: &[f64],
+        known: &mut HashMap<Vec<u32>, usize>,
+        edits: &mut Edits<'_>,
+    ) -> Result<usize, Diagnostic> {
+        let times = self.times(seconds)?;
+        let bits: Vec<u32> = times.iter().map(|time| time.to_bits()).collect();
+        if let Some(&input) = known.get(&bits) {
+            return Ok(input);
+        }
+        let [first, last] = [times[0], times[times.len() - 1]].map(f64::from);
+        let range = format!(",\"min\":[{first:?}],\"max\":[{last:?}]");
+        let start = self.bytes.len();
+        self.bytes.extend(bytes_of(&times));
+        let accessor = self.accessor(start, (times.len(), FLOAT, "SCALAR"), &range);
+        let input = edits.append_to("accessors", accessor);
+        known.insert(bits, input);
+        Ok(input)
+    }
+
+    /// Times in f32, those of the first key that the file has and of the last as the file has them.
+    fn times(&self, seconds: &[f64]) -> Result<Vec<f32>, Diagnostic> {
+        let mut times: Vec<f32> = seconds.iter().map(|&time| time as f32).collect();
+        for (time, &second) in times.iter_mut().zip(seconds) {
+            let ends = self.read.span.iter().zip(self.read.stored_span);
+            for (_, stored) in ends.filter(|&(&end, _)| end == second) {
+                *time = stored;
+            }
+        }
+        match times.windows(2).find(|pair| pair[0] >= pair[1]) {
+            None => Ok(times),
+            Some(pair) => {
+                let [one, next] = [pair[0], pair[1]];
+                let message =
+                    format!("f32 has no time between {one} and {next}; sample at a lower rate");
+                Err(self.json.refuse(&self.pointer, Code::TimesInF32, message))
+            }
+        }
+    }
+
+    /// The samples of a channel, as the file holds them.
+    fn values(&self, channel: &SampledChannel) -> Vec<u8> {
+        let tracks = self.sampled.clip.set.track_count();
+        let all = |list: &[f32]| -> Vec<u8> {
+            let width = channel.path.width();
+            let rows = list.chunks_exact(width * tracks);
+            rows.flat_map(|row| row[channel.track * width..][..width].iter())
+                .flat_map(|number| number.to_le_bytes())
+                .collect()
+        };
+        match channel.path {
+            TargetPath::Rotation => all(bytemuck::cast_slice(self.sampled.rotations)),
+            TargetPath::Translation => all(bytemuck::cast_slice(self.sampled.translations)),
+            TargetPath::Scale => all(bytemuck::cast_slice(self.sampled.scales)),
+        }
+    }
+
+    /// Whether a sampler's interpolation can be changed in the JSON: linear need not be named.
+    fn takes(&self, sampler: usize, interpolation: &str) -> Result<bool, Diagnostic> {
+        let raw = self.samplers[sampler];
+        let members: JsonMembers<'a> = self.json.typed(raw, &self.pointer)?;
+        Ok(interpolation == "LINEAR" || members.get("interpolation").is_some())
+    }
+
+    fn accessor(
+        &self,
+        offset: usize,
+        (count, component, kind): (usize, u32, &str),
+        more: &str,
+    ) -> String {
+        format!(
+            "{{\"bufferView\":{},\"byteOffset\":{offset},\"componentType\":{component},\
+             \"count\":{count},\"type\":\"{kind}\"{more}}}",
+            self.view
+        )
+    }
+
+    /// Gives a sampler other keys; returns its index.
+    fn change_sampler(
+        &self,
+        sampler: usize,
+        (input, output, interpolation): (usize, usize, &str),
+        edits: &mut Edits<'_>,
+    ) -> Result<usize, Diagnostic> {
+        let raw = self.samplers[sampler];
+        let members: JsonMembers<'a> = self.json.typed(raw, &self.pointer)?;
+        let changes = [
+            ("input", input.to_string()),
+            ("output", output.to_string()),
+            ("interpolation", format!("\"{interpolation}\"")),
+        ];
+        for (name, value) in changes {
+            if let Some(old) = members.get(name) {
+                edits.replace(old, value);
+            }
+        }
+        Ok(sampler)
+    }
 }

@@ -3,14 +3,21 @@
 //! A clip for each animation, a track for each node that it moves or that carries such a node. What
 //! is read is checked; what is not read may be anything, and comes back byte for byte when the file
 //! is written with other keys.
+//!
+//! Reading: `container` splits a GLB into its chunks, `json` finds values in the text without copying them,
+//! `reader` gives the bytes of views and the numbers of accessors, each loaded and decoded once, `nodes` has the
+//! hierarchy, `channel` the keys of one channel, and `animation` makes a clip of one animation.
+//! Writing the same file again: `document` keeps it, `bake` replaces the keys of one animation by `edits` of the
+//! text and by bytes that `data` appends, and `gather` takes the files beside a `.gltf` into a GLB.
+//! Writing a new file of clips of any format: `write_new`.
 
 mod animation;
 mod bake;
-mod baking;
 mod channel;
 mod compressed;
 mod container;
 mod data;
+mod document;
 mod edits;
 mod gather;
 mod json;
@@ -36,8 +43,8 @@ use std::sync::Arc;
 use crate::diagnostic::{Code, Diagnostic, Location};
 use crate::feature::Feature;
 use crate::format::{Format, FormatOption, Loaded, ReadOptions};
-use crate::gltf::bake::Gltf;
 use crate::gltf::container::Container;
+use crate::gltf::document::GltfDocument;
 use crate::gltf::json::Json;
 use crate::gltf::nodes::Nodes;
 use crate::gltf::reader::{GltfReader, MESHOPT};
@@ -191,7 +198,7 @@ pub fn read_gltf(
         return Err(json.refuse("/animations", Code::NoAnimations, message));
     }
     loaded.warnings = reader.warnings.into_inner().into_list();
-    loaded.document = Some(Arc::new(Gltf {
+    loaded.document = Some(Arc::new(GltfDocument {
         name: name.to_owned(),
         container,
         folder: folder.map(Path::to_owned),

@@ -6,7 +6,7 @@ use glam::DMat4;
 
 use crate::carried_mesh::{Bone, CarriedMesh};
 use crate::diagnostic::{Code, Diagnostic};
-use crate::gltf::bake::Gltf;
+use crate::gltf::document::GltfDocument;
 use crate::gltf::json::Json;
 use crate::gltf::meshes::{Triangles, add, local_matrix, parents_first, shown};
 use crate::gltf::nodes::Nodes;
@@ -26,7 +26,10 @@ const MAX_BONES: usize = u16::MAX as usize + 1;
 /// # Errors
 /// When a mesh or a skin is broken or compressed in a way that is not known, or a joint of a skin is no track
 /// of the clip.
-pub(super) fn carried(gltf: &Gltf, clip: &Motion) -> Result<Option<CarriedMesh>, Diagnostic> {
+pub(super) fn carried(
+    gltf: &GltfDocument,
+    clip: &Motion,
+) -> Result<Option<CarriedMesh>, Diagnostic> {
     let mut json = Json::parse(&gltf.name, &gltf.container.text)?;
     for list in ["meshes", "scenes", "skins"] {
         json.take_apart(list)?;
@@ -38,7 +41,7 @@ pub(super) fn carried(gltf: &Gltf, clip: &Motion) -> Result<Option<CarriedMesh>,
     let order = parents_first(&nodes);
     let is_shown = shown(&json, &nodes, &order)?;
     let tracks = (0..clip.set.track_count()).map(|track| (clip.set.track_name(track), track));
-    let mut making = Making {
+    let mut making = CarriedMeshBuilder {
         reader: &reader,
         nodes: &nodes,
         tracks: tracks.collect(),
@@ -54,7 +57,7 @@ pub(super) fn carried(gltf: &Gltf, clip: &Motion) -> Result<Option<CarriedMesh>,
     Ok((!found.triangles.is_empty()).then_some(found))
 }
 
-struct Making<'a> {
+struct CarriedMeshBuilder<'a> {
     reader: &'a GltfReader<'a>,
     nodes: &'a Nodes,
     /// By their names, which are those of their nodes.
@@ -62,7 +65,7 @@ struct Making<'a> {
     mesh: CarriedMesh,
 }
 
-impl Making<'_> {
+impl CarriedMeshBuilder<'_> {
     fn add_node(
         &mut self,
         index: usize,

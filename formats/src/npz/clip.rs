@@ -11,7 +11,7 @@ use crate::keys::{Duplicates, Origin, quiet_unit, select};
 use crate::motion::{Body, Joint, Motion, Transform};
 use crate::npz::archive::Archive;
 use crate::npz::array::{Array, AsStored, MIN_PARALLEL_KEYS, Make, TOGETHER};
-use crate::npz::body::shape_of;
+use crate::npz::body_model::shape_of;
 use crate::npz::header::Element;
 use crate::npz::plan::{ArchivePlan, KeyArray, KeyKind};
 use crate::npz::rotation_vector;

@@ -1,10 +1,13 @@
 //! NPZ, `NumPy`'s archives of arrays, and arrays alone (NPY): motion of SMPL bodies, of bodies in the
-//! world, our own layout, and whatever else a person tells the meaning of.
+//! world, our own layout, and arrays whose meaning `--map` says.
+//!
+//! `archive` lists the arrays without unpacking them. `tumble_layout`, `smpl`, `world_bodies` or `mapped` recognises
+//! what they mean and makes a `plan` of it; `clip` reads the arrays of a plan as a clip. `document` keeps archive
+//! and plan, so that the file can be written again in its layout; `write` writes clips of other formats.
 
 mod archive;
 pub(crate) mod array;
-mod bodies;
-mod body;
+mod body_model;
 mod clip;
 mod document;
 pub(crate) mod header;
@@ -14,6 +17,7 @@ mod plan;
 mod rotation_vector;
 mod smpl;
 mod tumble_layout;
+mod world_bodies;
 pub mod write;
 
 use std::path::Path;
@@ -24,7 +28,7 @@ use crate::feature::Feature;
 use crate::format::{Format, FormatOption, Loaded, ReadOptions};
 use crate::map::Map;
 use crate::npz::archive::{Archive, ONLY_ARRAY};
-pub use crate::npz::body::body_offsets;
+pub use crate::npz::body_model::body_offsets;
 use crate::npz::document::NpzDocument;
 use crate::source::Source;
 use crate::warnings::Warnings;
@@ -90,7 +94,7 @@ pub fn read_npz(file: &str, bytes: Vec<u8>, options: &ReadOptions) -> Result<Loa
         Some(plan) => Some(plan),
         None => match smpl::plan(&archive, &mut warnings)? {
             Some(plan) => Some(plan),
-            None => bodies::plan(&archive)?,
+            None => world_bodies::plan(&archive)?,
         },
     };
     let mut plan = plan.ok_or_else(|| {

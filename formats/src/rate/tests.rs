@@ -99,7 +99,10 @@ fn the_table_of_the_documents_holds() {
                 "text" => {
                     let decimals =
                         tokens().map(|token| last_digit_power(token).min(0).unsigned_abs());
-                    (times.collect(), Precision::Decimals(decimals.max().unwrap()))
+                    (
+                        times.collect(),
+                        Precision::Decimals(decimals.max().unwrap()),
+                    )
                 }
                 _ => kept(times, kept_as),
             };

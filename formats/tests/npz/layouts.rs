@@ -106,7 +106,7 @@ fn smpl_x_has_the_joints_of_smpl_h_and_a_face() {
         let other = x
             .set
             .tracks()
-            .find(|track| track.name == track.name)
+            .find(|other| other.name == track.name)
             .unwrap();
         assert_eq!((track.keys, track.times), (other.keys, other.times));
     }

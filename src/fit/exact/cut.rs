@@ -92,7 +92,7 @@ impl Cutter {
         segments: &mut Vec<PolynomialSegment>,
     ) {
         let mut done = 0;
-        // Whoever prepares looks again when this is done.
+        // The caller asks again whether it was stopped.
         while done < self.waiting.len() && !stop::is_stopped() {
             let new = || Box::new(FitBlock::new(shape, quantity, Tier::Piece));
             let block = self.block.get_or_insert_with(new);

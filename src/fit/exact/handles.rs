@@ -95,7 +95,7 @@ impl InLanes for FindFrames<'_> {
     }
 }
 
-/// What a [`HandleRule`] knows of a key interval, or of the intervals in a vector's lanes.
+/// What a [`HandleRule`] gets of a key interval, or of the intervals in a vector's lanes.
 #[derive(Clone, Copy)]
 pub(crate) struct KeyInterval<R> {
     /// Seconds.
@@ -139,9 +139,10 @@ pub(crate) trait HandleRule {
             // The tangent of a parabola changes at a constant rate.
             EndHandle::Parabolic => {
                 let handle = sum(scaled(log, Self::HANDLE_SHARE), scaled(other, -1.0));
-                match !Self::IS_CUMULATIVE && is_opposite(handle) {
-                    true => log,
-                    false => handle,
+                if !Self::IS_CUMULATIVE && is_opposite(handle) {
+                    log
+                } else {
+                    handle
                 }
             }
             // No acceleration: the control rotation lies halfway to the other one.

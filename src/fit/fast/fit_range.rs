@@ -4,7 +4,7 @@
 use crate::fit::nodes::{DEGREE_8_END_NODES, END_NODES, HALF_END_NODES, Nodes};
 
 /// The squared extents (sums of the three half-rotation vectors' squares) up to which
-/// [`FEW_POWERS`] and [`WHOLE`] fit curves with a truncation error of at most 7e-8 in a component.
+/// [`WHOLE_DEGREE_8`] and [`WHOLE`] fit curves with a truncation error of at most 7e-8 in a component.
 /// A fit in two halves has a smaller one for every longer curve that comes straight from keys.
 pub(crate) const LONGEST_DEGREE_8: f64 = 0.01;
 pub(crate) const LONGEST_WHOLE: f64 = 0.16;

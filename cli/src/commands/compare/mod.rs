@@ -358,7 +358,9 @@ impl Arguments {
                     }
                     let missing: usize = found.missing.iter().map(Vec::len).sum();
                     if missing > 0 && (self.tolerance.is_some() || self.distance.is_some()) {
-                        faults.push(words::count(missing, "track") + " of one alone (--tracks)");
+                        faults.push(
+                            words::count(missing, "track") + " in only one of the files (--tracks)",
+                        );
                     }
                 }
             }

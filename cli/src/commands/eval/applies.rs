@@ -59,7 +59,7 @@ impl Arguments {
             let all = Format::writable().filter(|format| format.write.is_some());
             let names: Vec<&str> = all.map(|format| format.name).collect();
             return Some(format!(
-                "{name} holds whole clips; for --output {output} write {}",
+                "{name} stores whole clips; for --output {output} write {}",
                 names.join(" or ")
             ));
         }
@@ -93,12 +93,11 @@ impl Arguments {
         let (output, name) = (self.output.name(), format.name);
         match kind {
             ResultKind::Rotations if !self.output.is_rotations() => Some(format!(
-                "--order is for quaternions, and --output {output} holds none; leave it out"
+                "--order is for quaternions, and --output {output} has none; leave it out"
             )),
             ResultKind::Motion if format.takes(FormatOption::Order) => None,
             ResultKind::Motion | ResultKind::Baked => Some(format!(
-                "{name} has an order of its own for the components of quaternions; leave out \
-                 --order"
+                "{name} has a fixed order of quaternion components; leave out --order"
             )),
             ResultKind::Rotations | ResultKind::Poses => None,
         }
@@ -114,7 +113,7 @@ impl Arguments {
             ResultKind::Poses => Some(Layout::FrameMajor),
             ResultKind::Motion | ResultKind::Baked => {
                 return Some(format!(
-                    "{name} has a layout of its own for clips; leave out --layout"
+                    "{name} has a fixed layout for clips; leave out --layout"
                 ));
             }
         };

@@ -88,7 +88,7 @@ pub(crate) fn measure(uuid: &str, limit: Duration) -> Result<CompileTimes, Strin
     let _ = child.kill(); // it may have ended
     let _ = child.wait();
     match times.kernels.is_empty() {
-        true => Err("no kernel was compiled in a process of its own".to_owned()),
+        true => Err("no kernel was compiled in a child process".to_owned()),
         false => Ok(times),
     }
 }

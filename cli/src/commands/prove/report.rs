@@ -459,7 +459,7 @@ pub(crate) fn check_output(path: &Path, overwrite: bool) -> Result<(), Failure> 
         .filter(|parent| !parent.as_os_str().is_empty());
     match folder.filter(|folder| !folder.is_dir()) {
         Some(folder) => Err(Failure::usage(format!(
-            "{}: there is no folder {}; make it first",
+            "{}: folder {} does not exist; create it first",
             path.display(),
             folder.display()
         ))),

@@ -64,7 +64,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         },
         None => None,
     };
-    let found = busy("finding ways", || {
+    let found = busy("finding routes", || {
         find(arguments, &surface, avoided.as_deref(), &participants)
     })?;
     let outcomes = scheduled(found, &participants);

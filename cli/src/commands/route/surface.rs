@@ -98,7 +98,7 @@ impl Surface {
 pub(super) fn bytes(path: &Path) -> Result<Vec<u8>, Failure> {
     let open = || match std::fs::metadata(path)?.is_file() {
         true => File::open(path),
-        false => Err(io::Error::other("is no file; give one")),
+        false => Err(io::Error::other("is not a regular file")),
     };
     read(path, open())
 }

@@ -3,7 +3,7 @@
 use crate::diagnostic::Code;
 use crate::format::ReadOptions;
 use crate::npz::archive::{Archive, Member};
-use crate::npz::body::SHAPE;
+use crate::npz::body_model::SHAPE;
 use crate::npz::header::{ArrayHeader, Element};
 use crate::npz::plan::ArchivePlan;
 use crate::npz::tumble_layout::CONSTANTS;

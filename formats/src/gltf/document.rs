@@ -1,0 +1,258 @@
+//! A file that is kept as it was read, and written again with the samples of its animations instead of their keys.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use serde_json::value::RawValue;
+use tumble::FrameRate;
+
+use crate::carried_mesh::CarriedMesh;
+use crate::diagnostic::{Code, Diagnostic};
+use crate::format::{Document, Format, MotionOptions, WriteError};
+use crate::gltf::FORMAT;
+use crate::gltf::animation::ReadAnimation;
+use crate::gltf::bake::{AnimationBaker, is_cut};
+use crate::gltf::container::{Container, check_length};
+use crate::gltf::data::BufferData;
+use crate::gltf::edits::Edits;
+use crate::gltf::gather;
+use crate::gltf::json::{Json, JsonMembers};
+use crate::gltf::reader::GltfReader;
+use crate::gltf::schema::{Animation, Channel};
+use crate::gltf::skins;
+use crate::gltf::uri;
+use crate::motion::{Motion, SampledClip};
+use crate::rate::Precision;
+use crate::text::lines::Limits;
+use crate::warnings::Warnings;
+
+/// A file that was read.
+#[derive(Debug)]
+pub(super) struct GltfDocument {
+    /// What messages call it.
+    pub(super) name: String,
+    pub(super) container: Container,
+    /// Where the files are that it names.
+    pub(super) folder: Option<PathBuf>,
+    /// How much of them is read.
+    pub(super) limits: Limits,
+    /// `None` for those that are kept as they are.
+    pub(super) animations: Vec<Option<ReadAnimation>>,
+}
+
+impl Document for GltfDocument {
+    fn times(&self, clip: usize, rate: FrameRate) -> Result<Vec<f64>, Diagnostic> {
+        let Some(read) = self.animations.get(clip).and_then(Option::as_ref) else {
+            return Ok(Vec::new());
+        };
+        let [first, last] = read.span;
+        let spacing = Precision::F32.ulp(first.abs().max(last.abs()));
+        if spacing * rate.per_second() > 1.0 {
+            let fits = 1.0 / spacing;
+            let fits = if fits >= 1.0 { fits.floor() } else { fits };
+            let message = format!(
+                "at {last} s, times in f32 are {spacing} s apart, and frames at {rate} fps {} s; \
+                 {fits} fps fits",
+                1.0 / rate.per_second()
+            );
+            return Err(self.refuse(clip, Code::TimesInF32, message));
+        }
+        let start = (first * rate.per_second()).floor() as i64;
+        let end = (last * rate.per_second()).ceil() as i64;
+        let time = |frame: i64| rate.time_of(frame.unsigned_abs()) * frame.signum() as f64;
+        // The ends are given as they are, and stand for the frames that they were rounded from:
+        // within an ulp, where frames are much longer (see `grid`).
+        let near = if spacing * rate.per_second() < 0.01 {
+            1.0
+        } else {
+            0.5
+        };
+        let is_end = |time: f64| {
+            let near = near * Precision::F32.ulp(time);
+            (time - first).abs() <= near || (time - last).abs() <= near
+        };
+        let within = (start..=end)
+            .map(time)
+            .filter(|&time| first < time && time < last && !is_end(time));
+        let mut times = vec![first];
+        times.extend(within);
+        times.extend((last > first).then_some(last));
+        Ok(times)
+    }
+
+    fn writes(&self, format: &Format) -> bool {
+        format.name == FORMAT.name
+    }
+
+    fn other_contents(&self) -> Vec<String> {
+        let Ok(json) = Json::parse(&self.name, &self.container.text) else {
+            return Vec::new();
+        };
+        let lists = [
+            "meshes",
+            "materials",
+            "textures",
+            "images",
+            "cameras",
+            "extensionsUsed",
+        ];
+        let has = |list: &&str| !json.optional::<&RawValue>(list).is_empty();
+        let lists = lists.into_iter().filter(has).map(str::to_owned);
+        let animations: Vec<Animation<'_>> = json.optional("animations");
+        let channels = animations.iter().flat_map(|animation| &animation.channels);
+        let mut others: Vec<String> = channels
+            .filter_map(|channel| {
+                let channel: Channel = serde_json::from_str(channel.get()).ok()?;
+                channel
+                    .target
+                    .moves()
+                    .is_none()
+                    .then_some(channel.target.path)
+            })
+            .map(|path| format!("channels of `{path}`"))
+            .collect();
+        others.sort();
+        others.dedup();
+        lists.chain(others).collect()
+    }
+
+    fn carried_mesh(&self, clip: &Motion) -> Result<Option<CarriedMesh>, Diagnostic> {
+        skins::carried(self, clip)
+    }
+
+    fn write(
+        &self,
+        clips: &[(usize, SampledClip<'_>)],
+        options: &MotionOptions,
+        path: &Path,
+        out: &mut dyn Write,
+    ) -> Result<Vec<Diagnostic>, WriteError> {
+        let json = Json::parse(&self.name, &self.container.text)?;
+        let warnings = Warnings::new(&self.name);
+        let folder = self.folder.as_deref();
+        let reader = GltfReader::new(&json, &self.container, folder, self.limits, warnings)?;
+        let extension = path.extension().unwrap_or_default();
+        let is_text = extension.eq_ignore_ascii_case("gltf");
+        self.check_folder(&reader, path, is_text)?;
+        let mut edits = Edits::new(&json);
+        let mut data = match (self.container.is_glb(), is_text) {
+            (true, _) => {
+                BufferData::of_file(&json, &reader, self.container.bin().unwrap_or_default())?
+            }
+            (false, true) => BufferData::in_uri(&json),
+            (false, false) => gather::buffers(&reader, &mut edits)?,
+        };
+        let baked = |&(index, _): &(usize, _)| self.animations.get(index).and_then(Option::as_ref);
+        let clips: Vec<_> = clips
+            .iter()
+            .filter_map(|clip| Some((baked(clip)?, clip)))
+            .collect();
+        let more = clips.iter().map(|(read, (_, sampled))| {
+            let numbers = 1 + read
+                .sampled
+                .iter()
+                .map(|channel| channel.path.width())
+                .sum::<usize>();
+            4 * numbers as u64 * sampled.times.len() as u64
+        });
+        check_length(&json, data.length_with(more.sum()))?;
+        if !self.container.is_glb() && !is_text {
+            gather::images(&reader, &mut edits, &mut data)?;
+        }
+        for (read, (index, sampled)) in clips {
+            let cuts = is_cut(read, sampled);
+            if cuts && read.beside > 0 {
+                reader.warn(Code::StaysWhole, &format!("/animations/{index}"), || {
+                    let count = read.beside;
+                    format!("{count} channels move other things than nodes, such as weights; they are not cut")
+                });
+            }
+            if !read.sampled.is_empty() || cuts {
+                let mut baking = AnimationBaker::new(
+                    &json,
+                    *index,
+                    read,
+                    (sampled, options.quantize.is_some()),
+                    &edits,
+                )?;
+                baking.bake(&mut edits)?;
+                data.append(&mut edits, &baking.bytes);
+            }
+        }
+        let bin = data.finish(&json, &mut edits);
+        let text = edits.finish();
+        if is_text {
+            out.write_all(text.as_bytes())?;
+        } else {
+            let length = |part: &&[u8]| part.len() as u64;
+            let bytes = text.len() as u64 + bin.iter().flatten().map(length).sum::<u64>();
+            check_length(&json, bytes)?;
+            self.container.write_glb(&text, bin.as_deref(), out)?;
+        }
+        drop(data);
+        // Whatever else is remarkable was said when the file was read.
+        let mut warnings = reader.warnings.into_inner().into_list();
+        warnings.retain(|warning| [Code::StaysOutside, Code::StaysWhole].contains(&warning.code));
+        Ok(warnings)
+    }
+}
+
+impl GltfDocument {
+    fn refuse(&self, animation: usize, code: Code, message: String) -> Diagnostic {
+        Diagnostic::new(&self.name, code, message).inside(format!("/animations/{animation}"))
+    }
+
+    /// URIs of files beside are right in the file's own folder alone.
+    fn check_folder(
+        &self,
+        reader: &GltfReader<'_>,
+        path: &Path,
+        is_text: bool,
+    ) -> Result<(), Diagnostic> {
+        if is_text && self.container.is_glb() {
+            let message = "a GLB is written as a GLB; name the output .glb";
+            return Err(Diagnostic::new(&self.name, Code::GltfFolder, message));
+        }
+        let is_gathered = !is_text && !self.container.is_glb();
+        let Some((pointer, uri)) = named_file(reader.json).filter(|_| !is_gathered) else {
+            return Ok(());
+        };
+        let canonical = |folder: &Path| {
+            let here = folder.as_os_str().is_empty();
+            std::fs::canonicalize(if here { Path::new(".") } else { folder }).ok()
+        };
+        let source_folder = self.folder.as_deref().and_then(canonical);
+        let target = canonical(path.parent().unwrap_or(Path::new("")));
+        if source_folder.is_some() && source_folder == target {
+            return Ok(());
+        }
+        if is_text {
+            let message = format!(
+                "`{uri}` would not be found from {}; write beside the input, or name the output .glb",
+                path.display()
+            );
+            return Err(reader.json.refuse(&pointer, Code::GltfFolder, message));
+        }
+        reader.warn(Code::StaysOutside, &pointer, || {
+            format!(
+                "`{uri}` is not found from {}; copy it there",
+                path.display()
+            )
+        });
+        Ok(())
+    }
+}
+
+/// The first buffer or image that is a file beside: its pointer and its URI.
+fn named_file(json: &Json<'_>) -> Option<(String, String)> {
+    ["buffers", "images"].iter().find_map(|list| {
+        json.entries(list)
+            .iter()
+            .enumerate()
+            .find_map(|(index, raw)| {
+                let members: JsonMembers<'_> = json.typed(raw, "").ok()?;
+                let uri: String = json.typed(members.get("uri")?, "").ok()?;
+                (!uri::is_data(&uri)).then(|| (format!("/{list}/{index}/uri"), uri))
+            })
+    })
+}
