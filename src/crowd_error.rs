@@ -177,8 +177,12 @@ pub enum CrowdError {
         /// Values of the result.
         needed: usize,
     },
-    /// The output is of another precision than what was asked for.
-    #[error("the result is of half precision: {is_half}; use the function for it")]
+    /// The output is of another precision than the submitted result.
+    #[error(
+        "the submitted result has numbers of {} bits; take it with {}",
+        if *is_half { "16" } else { "32" },
+        if *is_half { "wait_half_into" } else { "wait_into" }
+    )]
     Precision {
         /// Whether the result is in 16 bits.
         is_half: bool,

@@ -428,10 +428,10 @@ mod tests {
         let clip = clip();
         let found = from_bytes(&to_bytes(&clip)).unwrap();
         let all = |clip: &Motion| {
-            let tracks = 0..clip.set.track_count();
+            let indices = 0..clip.set.track_count();
             let channels = [Channel::Translation, Channel::Scale];
             let vectors =
-                tracks.map(|track| channels.map(|channel| clip.set.vector_keys(channel, track)));
+                indices.map(|track| channels.map(|channel| clip.set.vector_keys(channel, track)));
             let tracks: Vec<Track<'_>> = clip.set.tracks().collect();
             let beside = Motion {
                 set: TrackSet::new(),

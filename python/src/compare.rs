@@ -335,9 +335,8 @@ fn of_clips(
     let mut warning = common.warning.clone();
     let frames = match samples {
         None => pair.keys(&common),
-        Some(Samples::Rate(rate, start, end)) => {
-            SampleTimes::rate(rate).between(start.unwrap_or(common.start), end.unwrap_or(common.end))
-        }
+        Some(Samples::Rate(rate, start, end)) => SampleTimes::rate(rate)
+            .between(start.unwrap_or(common.start), end.unwrap_or(common.end)),
         Some(Samples::Shared { times, .. }) => {
             // The times are known, whatever the clips have.
             warning = None;

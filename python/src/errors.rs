@@ -9,7 +9,7 @@ use pyo3::exceptions::{PyKeyboardInterrupt, PyRuntimeError};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyDict, PyType};
-use tumble::{Error, SampleTimesError, InterpolationError, TrackError};
+use tumble::{Error, InterpolationError, SampleTimesError, TrackError};
 use tumble_formats::diagnostic::{Code, Diagnostic, Location, Severity};
 use tumble_formats::format::WriteError;
 use tumble_formats::output::OutputError;
@@ -215,11 +215,16 @@ pub(crate) fn of_track(error: &TrackError) -> PyErr {
             input_at(&message, Code::NotFinite, at("keys", track, key))
         }
         TrackError::DataTooLarge {
-            track, key, quantity: what, ..
+            track,
+            key,
+            quantity: what,
+            ..
         } => input_at(&message, Code::TooLarge, at(what, track, key)),
-        TrackError::DataNotFinite { track, key, quantity: what } => {
-            input_at(&message, Code::NotFinite, at(what, track, key))
-        }
+        TrackError::DataNotFinite {
+            track,
+            key,
+            quantity: what,
+        } => input_at(&message, Code::NotFinite, at(what, track, key)),
         _ => input(message),
     }
 }

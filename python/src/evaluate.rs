@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyList, PySlice};
 use tumble::method::{C2, SLERP};
 use tumble::{
-    ComponentType, Encoding, Engine, SampleTimes, Interpolation, Layout, Method, Quantity, TrackSet,
+    ComponentType, Encoding, Engine, Interpolation, Layout, Method, Quantity, SampleTimes, TrackSet,
 };
 use tumble_cli::host;
 use tumble_formats::Diagnostic;

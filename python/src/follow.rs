@@ -6,7 +6,7 @@ use numpy::PyArrayMethods;
 use pyo3::prelude::*;
 use pyo3::types::{PyString, PyTuple};
 use tumble::{
-    BodyAxis, Direction, Follow, FollowError, PathFrame, Layout, PathSpeed, Twist, VectorMethod,
+    BodyAxis, Direction, Follow, FollowError, Layout, PathFrame, PathSpeed, Twist, VectorMethod,
 };
 use tumble_formats::path::{Pace, PathPoints, paths_of};
 

@@ -8,8 +8,8 @@ use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString};
 use tumble::{
-    Ends, FrameRate, SampleTimes, Interpolation, METHODS, Method, KeySigns, Quantity, Speed, Tcb, TrackSet,
-    WrapMode,
+    Ends, FrameRate, Interpolation, KeySigns, METHODS, Method, Quantity, SampleTimes, Speed, Tcb,
+    TrackSet, WrapMode,
 };
 
 use crate::arrays;

@@ -9,7 +9,9 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 use tumble::{Channel, Tcb, Track, TrackError, TrackSet};
 use tumble_formats::bvh::{BvhChannel, BvhJoint};
-use tumble_formats::motion::{Body, Channels, Joint, Motion, ChannelInterpolation, Shape, Transform};
+use tumble_formats::motion::{
+    Body, ChannelInterpolation, Channels, Joint, Motion, Shape, Transform,
+};
 
 use crate::clip::{Clip, Source};
 use crate::errors::{guarded, input, of_track};
@@ -18,7 +20,11 @@ use crate::errors::{guarded, input, of_track};
 const VECTORS: [Channel; 2] = [Channel::Translation, Channel::Scale];
 
 /// The samplers, as they are numbered in a pickle, from 1; 0 is none.
-const SAMPLERS: [ChannelInterpolation; 3] = [ChannelInterpolation::Step, ChannelInterpolation::Linear, ChannelInterpolation::Cubic];
+const SAMPLERS: [ChannelInterpolation; 3] = [
+    ChannelInterpolation::Step,
+    ChannelInterpolation::Linear,
+    ChannelInterpolation::Cubic,
+];
 
 /// An array of rows with so many numbers each.
 fn rows<T: numpy::Element>(

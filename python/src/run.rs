@@ -7,7 +7,7 @@ use std::time::Duration;
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use tumble::{
-    Encoding, Engine, ExportedResult, SampleTimes, Interpolation, Layout, Speed, Stop, TrackSet,
+    Encoding, Engine, ExportedResult, Interpolation, Layout, SampleTimes, Speed, Stop, TrackSet,
 };
 
 use crate::errors::{guarded, of_engine};

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use tumble::{Encoding, Engine, Error, FrameRate, SampleTimes, Layout, Quantity, Stop};
+use tumble::{Encoding, Engine, Error, FrameRate, Layout, Quantity, SampleTimes, Stop};
 use tumble_formats::Diagnostic;
 use tumble_formats::diagnostic::Code;
 use tumble_formats::format::{
@@ -16,8 +16,8 @@ use tumble_formats::format::{
 use tumble_formats::keyed::keyed;
 use tumble_formats::kitti::write_frame_times;
 use tumble_formats::motion::{Motion, SampledClip};
-use tumble_formats::quaternion::ComponentOrder;
 use tumble_formats::output::Output;
+use tumble_formats::quaternion::ComponentOrder;
 use tumble_formats::sample::{ChannelMethods, Samples};
 
 use crate::arrays::Order;
@@ -336,7 +336,8 @@ impl Save {
         let frames = frames.map_err(|error| of_write(&error.into()))?;
         self.written(clips, &frames, Some(rate), |sampled| {
             let places = clips.iter().map(|clip| clip.index);
-            let clips: Vec<(usize, SampledClip<'_>)> = places.zip(sampled.iter().cloned()).collect();
+            let clips: Vec<(usize, SampledClip<'_>)> =
+                places.zip(sampled.iter().cloned()).collect();
             document.write(&clips, &self.motion, &self.path, out)
         })
     }

@@ -65,7 +65,8 @@ impl Plan {
     ) -> PyResult<Self> {
         py.detach(|| {
             guarded(|| {
-                let own = shards::LibraryPlan::new(&line, &library, listed, &folder, shard_bytes, into);
+                let own =
+                    shards::LibraryPlan::new(&line, &library, listed, &folder, shard_bytes, into);
                 Ok(Self {
                     own: own.map_err(refuse)?,
                 })

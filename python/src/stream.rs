@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use numpy::{PyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PySlice;
-use tumble::{Encoding, Engine, SampleTimes, Interpolation, Layout, Quantity};
+use tumble::{Encoding, Engine, Interpolation, Layout, Quantity, SampleTimes};
 use tumble_formats::motion::Motion;
 
 use crate::arrays::Order;

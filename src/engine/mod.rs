@@ -20,7 +20,6 @@ use crate::evaluate::backend::Backend;
 use crate::evaluate::uploaded::Uploaded;
 #[cfg(feature = "prove")]
 use crate::gpu::engine::choices::EngineChoices;
-use crate::gpu::engine::lock;
 use crate::gpu::options::{EngineOptions, Timings};
 #[cfg(feature = "prove")]
 use crate::gpu::physical::details::DeviceDetails;
@@ -35,6 +34,7 @@ use crate::output::value::OutputValue;
 use crate::prepare::clip_data::PrepareRequest;
 use crate::prepare::request::SetRequest;
 use crate::simd::dispatch::VectorWidth;
+use crate::threads::lock;
 use crate::time::frames::SampleTimes;
 use crate::tracks::set::TrackSet;
 

@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::evaluate::backend::Backend;
 use crate::evaluate::pieces::{SetPieces, segment_bytes};
-use crate::gpu::engine::{ClipBuffers, Job, VulkanEngine, lock};
+use crate::gpu::engine::{ClipBuffers, Job, VulkanEngine};
 use crate::gpu::error::{EvaluateError, VulkanError};
 use crate::gpu::exclusive::Exclusive;
 use crate::gpu::kept_lists::ListCache;
@@ -18,6 +18,7 @@ use crate::output::rotations::{Layout, Storage};
 use crate::output::window::Window;
 use crate::prepare::clip_data::{ClipData, PrepareRequest};
 use crate::prepare::prepared::{Prepared, SEGMENTS};
+use crate::threads::lock;
 use crate::time::frames::Timeline;
 use crate::tracks::set::TrackSet;
 

@@ -22,10 +22,10 @@ use crate::tracks::signs::Signs;
 pub(crate) const LANES: usize = 128;
 
 /// The length of a block's arrays: passes read one lane further and end on whole vectors.
-pub(crate) const ROOM: usize = LANES + 8;
+pub(crate) const ROW_LEN: usize = LANES + 8;
 
 /// One number for each interval.
-pub(crate) type RowF64 = [f64; ROOM];
+pub(crate) type RowF64 = [f64; ROW_LEN];
 
 /// Some consecutive intervals of a track in a block.
 #[derive(Debug, Clone)]
@@ -36,17 +36,17 @@ pub(crate) struct TrackStretch {
     /// The intervals' indices in the track.
     pub(crate) intervals: Range<usize>,
     /// The number of intervals of the whole track.
-    pub(crate) all: usize,
+    pub(crate) track_intervals: usize,
     /// When the whole track starts and ends, seconds.
     pub(crate) span: (f64, f64),
     /// Its index among the prepared parts.
     pub(crate) part: usize,
     /// The index of its first key among the constants; [`NONE`] if the curve does not pass through
     /// its keys.
-    pub(crate) key: u32,
+    pub(crate) first_key: u32,
     /// The index of its first key among the constants if the track's first and last interval stand
     /// still, else [`NONE`]; set even if the curve does not pass through its keys.
-    pub(crate) still: u32,
+    pub(crate) first_still_key: u32,
 }
 
 impl TrackStretch {
@@ -57,7 +57,7 @@ impl TrackStretch {
 
     /// The index of the constant at the start of its `i`th interval.
     pub(crate) fn key_at(&self, i: usize) -> u32 {
-        match self.key {
+        match self.first_key {
             NONE => NONE,
             first => first + i as u32,
         }
@@ -70,15 +70,15 @@ impl TrackStretch {
 
     /// The lane of the track's last interval, if the stretch contains it.
     pub(crate) fn last(&self) -> Option<usize> {
-        (self.intervals.end == self.all).then_some(self.lane + self.intervals.len() - 1)
+        (self.intervals.end == self.track_intervals).then_some(self.lane + self.intervals.len() - 1)
     }
 }
 
 /// A block of intervals.
 pub(crate) struct Intervals {
     /// The keys at both ends, after sign continuation.
-    pub(crate) from: [[f32; 4]; ROOM],
-    pub(crate) to: [[f32; 4]; ROOM],
+    pub(crate) from: [[f32; 4]; ROW_LEN],
+    pub(crate) to: [[f32; 4]; ROW_LEN],
     /// Start, end and duration of each interval, in seconds.
     pub(crate) starts: RowF64,
     pub(crate) ends: RowF64,
@@ -105,14 +105,14 @@ pub(crate) struct Intervals {
 impl Intervals {
     /// An empty block, for curves whose formula takes this many numbers that differ from curve to curve.
     pub(crate) fn new(numbers: usize) -> Self {
-        let lane = [0.0; ROOM];
+        let lane = [0.0; ROW_LEN];
         let identity = [0.0, 0.0, 0.0, 1.0];
         Self {
-            from: [identity; ROOM],
-            to: [identity; ROOM],
+            from: [identity; ROW_LEN],
+            to: [identity; ROW_LEN],
             starts: lane,
             ends: lane,
-            durations: [1.0; ROOM],
+            durations: [1.0; ROW_LEN],
             count: 0,
             steps: [lane; 4],
             logs: [lane; 3],
@@ -205,15 +205,15 @@ impl Intervals {
     }
 
     /// The number of lanes to compute, rounded up to vectors of eight. A wider vector writes past
-    /// them, for which there is [`ROOM`].
+    /// them, for which there is [`ROW_LEN`].
     #[inline(always)]
-    pub(crate) fn whole(&self) -> usize {
+    pub(crate) fn padded_count(&self) -> usize {
         self.count.next_multiple_of(8).min(LANES)
     }
 
-    /// As [`Intervals::whole`], for vectors of up to 16 f32.
+    /// As [`Intervals::padded_count`], for vectors of up to 16 f32.
     #[inline(always)]
-    pub(crate) fn whole32(&self) -> usize {
+    pub(crate) fn padded_count_f32(&self) -> usize {
         self.count.next_multiple_of(16).min(LANES)
     }
 }

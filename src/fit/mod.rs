@@ -43,7 +43,7 @@
 //!
 //! # Memory
 //!
-//! A block has a row for each number of an interval, [`block::ROOM`] lanes long, so that a vector is one
+//! A block has a row for each number of an interval, [`block::ROW_LEN`] lanes long, so that a vector is one
 //! load whatever its width. On either side of a stretch lies the neighbouring interval as context: passes
 //! read a lane before and after their own, and none asks where a track ends. All rows take about 50 KB.
 //!

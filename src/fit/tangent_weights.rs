@@ -3,7 +3,7 @@
 //! in f64.
 
 use crate::curve::options::Ends;
-use crate::fit::block::{Intervals, ROOM, TrackStretch};
+use crate::fit::block::{Intervals, ROW_LEN, TrackStretch};
 use crate::shader::{KEY_AT_END, KEY_INNER, KEY_UNKNOWN, TangentWeights};
 use crate::simd::dispatch::{InLanes, in_lanes};
 use crate::simd::lanes::Lanes;
@@ -67,7 +67,7 @@ impl WeightRule {
 pub(crate) struct KeyWeights {
     rule: WeightRule,
     ends: Ends,
-    pub(crate) keys: [TangentWeights; ROOM],
+    pub(crate) keys: [TangentWeights; ROW_LEN],
 }
 
 impl KeyWeights {
@@ -75,7 +75,7 @@ impl KeyWeights {
         Self {
             rule,
             ends,
-            keys: [UNKNOWN; ROOM],
+            keys: [UNKNOWN; ROW_LEN],
         }
     }
 
@@ -96,7 +96,7 @@ impl KeyWeights {
         });
         for stretch in stretches {
             // A track of two keys has no neighbouring intervals, not even in a loop.
-            let end = match (stretch.all, self.ends) {
+            let end = match (stretch.track_intervals, self.ends) {
                 (1, _) => UNKNOWN,
                 (_, Ends::Loop) => continue,
                 (_, ends) => WeightRule::end(ends),

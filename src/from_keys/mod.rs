@@ -53,7 +53,7 @@ impl KeyCurve {
                 interpolation.is_steady_alone().then_some(Self::TwoKeys)
             }
             Form::Polynomial => {
-                let weights = interpolation.plain()?.direct?.weights;
+                let weights = interpolation.plain()?.fast?.weights;
                 has_small_steps(set).then_some(Self::Cubics(weights))
             }
         }

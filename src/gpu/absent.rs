@@ -42,7 +42,7 @@ pub(crate) mod kept_lists {
 }
 
 pub(crate) mod engine {
-    use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+    use std::sync::{Arc, Mutex};
 
     use bytemuck::NoUninit;
 
@@ -58,10 +58,6 @@ pub(crate) mod engine {
     use crate::prepare::clip_data::ClipData;
     use crate::shader::Kernel;
     use crate::time::frames::Timeline;
-
-    pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-        mutex.lock().unwrap_or_else(PoisonError::into_inner)
-    }
 
     pub(crate) struct ClipBuffers {
         pub(crate) never: Never,

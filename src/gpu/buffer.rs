@@ -7,10 +7,10 @@ use std::sync::{Arc, Mutex};
 use ash::vk;
 
 use crate::gpu::device::{LogicalDevice, QueueLane};
-use crate::gpu::engine::lock;
 use crate::gpu::error::{Named, VulkanError};
 use crate::gpu::physical::PhysicalDevice;
 use crate::shader::PolynomialSegment;
+use crate::threads::lock;
 
 /// Where a buffer lives and who touches it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

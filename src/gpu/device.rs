@@ -9,7 +9,6 @@ use ash::{ext, khr, vk};
 
 use crate::gpu::buffer::SharedMemory;
 use crate::gpu::buffer::{may_be_exported, may_be_imported};
-use crate::gpu::engine::lock;
 use crate::gpu::error::{Named, VulkanError};
 use crate::gpu::exported::timelines_may_be_exported;
 use crate::gpu::handles::{QueueLock, VulkanQueue};
@@ -18,6 +17,7 @@ use crate::gpu::physical::queues::{Copies, QueueIndex};
 use crate::gpu::physical::{DeviceKind, PhysicalDevice};
 use crate::gpu::pipeline::PipelineCache;
 use crate::gpu::upload::{Placing, direct};
+use crate::threads::lock;
 
 /// What a submission is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -237,12 +237,7 @@ impl LogicalDevice {
     }
 
     /// Nobody else uses any queue of a device that the engine opened meanwhile.
-    fn all_queues(
-        &self,
-    ) -> (
-        MutexGuard<'_, vk::Queue>,
-        Option<MutexGuard<'_, vk::Queue>>,
-    ) {
+    fn all_queues(&self) -> (MutexGuard<'_, vk::Queue>, Option<MutexGuard<'_, vk::Queue>>) {
         let kernels = lock(&self.queue.raw);
         (
             kernels,

@@ -5,8 +5,7 @@ use std::ops::{Deref, DerefMut};
 use std::sync::{Condvar, Mutex, PoisonError};
 use std::thread;
 
-use crate::gpu::engine::lock;
-use crate::threads;
+use crate::threads::{self, lock};
 
 /// A value that callers take out, one after another, and put back. Whoever waits for it sleeps, and
 /// takes up no other work (`threads`): so whoever has it can always go on.

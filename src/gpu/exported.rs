@@ -9,11 +9,11 @@ use crate::gpu::buffer::Buffer;
 #[cfg(unix)]
 use crate::gpu::buffer::FILE;
 use crate::gpu::device::LogicalDevice;
-use crate::gpu::engine::lock;
 use crate::gpu::error::{Named, VulkanError};
 use crate::gpu::physical::PhysicalDevice;
 use crate::gpu::submission::Point;
 use crate::gpu::submission::Semaphore;
+use crate::threads::lock;
 
 /// The handle type of exported semaphores: a file of the driver's own.
 const SEMAPHORE_FILE: vk::ExternalSemaphoreHandleTypeFlags =

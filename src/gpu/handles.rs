@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex};
 
 use ash::vk;
 
-use crate::gpu::engine::lock;
+use crate::threads::lock;
 
 /// An application's instance, device and queue, to evaluate on
 /// ([`Engine::from_vulkan`](crate::engine::Engine::from_vulkan)).

@@ -6,8 +6,8 @@ use std::sync::{Arc, Mutex, OnceLock};
 
 use ash::{ext, khr, vk};
 
-use crate::gpu::engine::lock;
 use crate::gpu::error::{Named, VulkanError};
+use crate::threads::lock;
 
 const VALIDATION: &CStr = c"VK_LAYER_KHRONOS_validation";
 

@@ -4,13 +4,13 @@
 use std::sync::{Arc, Mutex};
 
 use crate::gpu::device::{LogicalDevice, QueueLane};
-use crate::gpu::engine::{Job, VulkanEngine, lock};
+use crate::gpu::engine::{Job, VulkanEngine};
 use crate::gpu::error::EvaluateError;
 use crate::gpu::submission::{Binding, Submission};
 use crate::gpu::upload::Upload;
 use crate::gpu::work_list::{Work, WorkLists};
 use crate::output::window::Window;
-use crate::threads::on_threads;
+use crate::threads::{lock, on_threads};
 use crate::time::frames::{Ticks, Timeline};
 
 /// The lists of a result, window by window, in the memory of a device.

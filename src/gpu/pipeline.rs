@@ -8,12 +8,12 @@ use ash::vk;
 use crate::gpu::buffer::{Buffer, Residence};
 use crate::gpu::cache::{Cache, sum};
 use crate::gpu::device::{LogicalDevice, QueueLane};
-use crate::gpu::engine::lock;
 use crate::gpu::error::{Named, VulkanError};
 use crate::gpu::physical::PhysicalDevice;
 use crate::gpu::submission::{Access, Binding, Submission};
 use crate::gpu::upload::{KernelReads, Upload};
 use crate::shader::{CrowdDispatch, Dispatch, Grid, Kernel, PoseDispatch, RowShape, spirv};
+use crate::threads::lock;
 
 /// Bytes that come with a dispatch, at most; Vulkan allows at least 128.
 const PUSHED: u32 = {

@@ -5,7 +5,7 @@ use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
 
 use crate::gpu::device::LogicalDevice;
-use crate::gpu::engine::{ClipBuffers, VulkanEngine, lock};
+use crate::gpu::engine::{ClipBuffers, VulkanEngine};
 use crate::gpu::error::{EvaluateError, VulkanError};
 use crate::gpu::exclusive::Exclusive;
 use crate::gpu::options::EngineOptions;
@@ -14,6 +14,7 @@ use crate::gpu::self_test::{self, SelfTestReport};
 use crate::output::encoding::Encoding;
 use crate::prepare::clip_data::ClipData;
 use crate::shader::{Form, Kernel};
+use crate::threads::lock;
 
 /// How often a lost device is opened again for one call.
 const REOPENINGS: usize = 3;

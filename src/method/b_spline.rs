@@ -83,12 +83,12 @@ pub(crate) fn basis([before_that, before, after, after_that]: [f64; 4]) -> [[f64
 fn curves(intervals: &mut Intervals, stretches: &[TrackStretch], ends: Ends) {
     let [start, end] = EndCondition::both(ends);
     for stretch in stretches {
-        if matches!(ends, Ends::Loop) && stretch.all > 1 {
+        if matches!(ends, Ends::Loop) && stretch.track_intervals > 1 {
             continue; // the context already has the neighbours across the seam
         }
         // Two keys turn at constant velocity. With frozen ends the outer intervals stand still, and
         // any continuation will do.
-        let repeats_interval = stretch.all == 1 || matches!(ends, Ends::Frozen);
+        let repeats_interval = stretch.track_intervals == 1 || matches!(ends, Ends::Frozen);
         let before = |lane| {
             if repeats_interval {
                 (lane - 1, at(&intervals.logs, lane))

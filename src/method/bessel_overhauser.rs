@@ -27,7 +27,7 @@ pub const BESSEL_OVERHAUSER: Method = Method {
 
 static CURVES: CurveKind = CurveKind::Smooth(
     SmoothCurves::new(Shape::BERNSTEIN, ends::curves::<BesselOverhauserRule>)
-        .direct::<BesselOverhauserRule>(WeightRule::ByTime),
+        .fast::<BesselOverhauserRule>(WeightRule::ByTime),
 );
 
 struct BesselOverhauserRule;

@@ -49,8 +49,10 @@ pub const C2: Method = Method {
 };
 
 static CURVES: CurveKind = CurveKind::Smooth(
-    SmoothCurves::new(Shape::ROTATION_VECTOR, curves)
-        .with(MethodInput::Velocities(velocities, jumps)),
+    SmoothCurves::new(Shape::ROTATION_VECTOR, curves).with(MethodInput::Velocities {
+        solve: velocities,
+        jumps,
+    }),
 );
 
 fn curves(intervals: &mut Intervals, stretches: &[TrackStretch], _: Ends) {

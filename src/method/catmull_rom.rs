@@ -26,7 +26,7 @@ pub const CATMULL_ROM: Method = Method {
 
 static CURVES: CurveKind = CurveKind::Smooth(
     SmoothCurves::new(Shape::BERNSTEIN, ends::curves::<CatmullRomRule>)
-        .direct::<CatmullRomRule>(WeightRule::Alike),
+        .fast::<CatmullRomRule>(WeightRule::Alike),
 );
 
 struct CatmullRomRule;

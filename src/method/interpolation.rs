@@ -114,7 +114,7 @@ impl Interpolation {
         let (CurveKind::Smooth(smooth) | CurveKind::Arcs(smooth)) = *self.method.curves else {
             return Vec::new();
         };
-        let MethodInput::Velocities(_, jumps) = smooth.input else {
+        let MethodInput::Velocities { jumps, .. } = smooth.input else {
             return Vec::new();
         };
         let path = self.method.path.unwrap_or(self.signs);

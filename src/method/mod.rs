@@ -168,12 +168,12 @@ pub(crate) struct SmoothCurves {
     /// Whether a track of two keys turns at constant velocity, whatever the ends.
     pub(crate) steady_alone: bool,
     /// How curves follow in f32 straight from keys, for methods that allow it.
-    pub(crate) direct: Option<FromKeys>,
+    pub(crate) fast: Option<FastCurves>,
 }
 
 /// How curves follow straight from keys, without numbers that a method has beside them.
 #[derive(Clone, Copy)]
-pub(crate) struct FromKeys {
+pub(crate) struct FastCurves {
     /// The rule for the tangent weights.
     pub(crate) weights: WeightRule,
     /// Sets, in f64, the handles of keys whose tangents are too long for f32's formulas.
@@ -186,15 +186,14 @@ pub(crate) enum MethodInput {
     Nothing,
     /// Numbers for the key at the interval's start, and for the key at its end.
     Numbers(fn(Track, usize, &Interpolation) -> [[f64; 4]; 2]),
-    /// The angular velocity at every key of some intervals (rad/s, body frame); each depends on
-    /// all keys of the track.
-    ///
-    /// And the keys of a track at which these velocities do not make the curve as smooth as the method
-    /// is.
-    Velocities(
-        fn(Track, Signs<'_>, Range<usize>, &Interpolation) -> Vec<Vector>,
-        fn(Track, Signs<'_>, &Interpolation) -> Vec<usize>,
-    ),
+    Velocities {
+        /// The angular velocity at every key of some intervals (rad/s, body frame); each depends on
+        /// all keys of the track.
+        solve: fn(Track, Signs<'_>, Range<usize>, &Interpolation) -> Vec<Vector>,
+        /// The keys of a track at which these velocities do not make the curve as smooth as the
+        /// method is.
+        jumps: fn(Track, Signs<'_>, &Interpolation) -> Vec<usize>,
+    },
 }
 
 impl Method {
@@ -202,7 +201,7 @@ impl Method {
     pub(crate) fn is_solved(&self) -> bool {
         match self.curves {
             CurveKind::Smooth(smooth) | CurveKind::Arcs(smooth) => {
-                matches!(smooth.input, MethodInput::Velocities(..))
+                matches!(smooth.input, MethodInput::Velocities { .. })
             }
             CurveKind::Steps => false,
         }
@@ -216,15 +215,15 @@ impl SmoothCurves {
             curves,
             input: MethodInput::Nothing,
             steady_alone: false,
-            direct: None,
+            fast: None,
         }
     }
 
     /// Allows curves straight from keys; tracks of two keys then turn at constant velocity.
-    const fn direct<R: HandleRule>(self, weights: WeightRule) -> Self {
+    const fn fast<R: HandleRule>(self, weights: WeightRule) -> Self {
         Self {
             steady_alone: true,
-            direct: Some(FromKeys {
+            fast: Some(FastCurves {
                 weights,
                 set_long: set_long::<R>,
             }),

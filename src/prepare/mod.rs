@@ -17,7 +17,7 @@
 //! | [`preparation::Preparation`] | applies an interpolation to a batch, by one of three strategies |
 //! | [`arcs::ArcPreparation`] | the strategy for slerp: up to 64 arcs at once |
 //! | [`smooth::SmoothPreparation`] | the strategy for all other curves: blocks of 128 intervals |
-//! | [`direct::Direct`] | its fast way, in f32 straight from four keys |
+//! | [`fast::FastPreparation`] | its fast way, in f32 straight from four keys |
 //! | [`fitting::Fitting`] | its exact way: queues of curves that wait for a full block, and the cutter |
 //! | [`constant_speed::PendingInterval`] | a curve at constant speed, until its whole track is there |
 //! | [`prepared::Prepared`] | what comes of a batch |
@@ -28,13 +28,13 @@
 //! ```text
 //! TrackSet ─► Batch ─► Preparation ─┬─ steps ──────────────────────────────► constants
 //!                                   ├─ arcs: block of 64 ──────────────────► segments
-//!                                   └─ smooth: block of 128 ─┬─ Direct ────► segments
-//!                                                            └─ Fitting ─┬─► segments
+//!                                   └─ smooth: block of 128 ─┬─ fast ──────► segments
+//!                                                            └─ exact ───┬─► segments
 //!                                                                        └─► exact (f64)
 //! ```
 //!
-//! Each interval has a span at once, in order of time, and a place for its segment; a block that is fitted
-//! later writes the segment there. A curve that had to be cut has its span replaced by several at the end.
+//! Each interval has a span at once, in order of time, and an empty segment; the block that is fitted later
+//! fills the segment. A curve that had to be cut has its span replaced by several at the end.
 //!
 //! # Memory
 //!
@@ -55,8 +55,8 @@ pub(crate) mod arcs;
 pub(crate) mod batch;
 pub(crate) mod clip_data;
 pub(crate) mod constant_speed;
-pub(crate) mod direct;
 pub(crate) mod error;
+pub(crate) mod fast;
 pub(crate) mod fitting;
 pub(crate) mod preparation;
 pub(crate) mod prepared;

@@ -15,7 +15,7 @@ use crate::math::quaternion::Vector;
 use crate::method::interpolation::Interpolation;
 use crate::method::{MethodInput, SmoothCurves};
 use crate::prepare::constant_speed::{PendingInterval, retime};
-use crate::prepare::direct::Direct;
+use crate::prepare::fast::FastPreparation;
 use crate::prepare::fitting::Fitting;
 use crate::prepare::prepared::Prepared;
 use crate::shader::PolynomialSegment;
@@ -42,7 +42,7 @@ pub(crate) struct SmoothPreparation {
     stretches: Vec<TrackStretch>,
     fitting: Fitting,
     /// Prepares curves straight from keys in f32, if method and options allow it.
-    direct: Option<Box<Direct>>,
+    fast: Option<Box<FastPreparation>>,
     /// Curves that are traversed at constant speed, until their whole track is there.
     waiting: Vec<PendingInterval>,
     /// The frames' rate and start, if only intervals that contain a frame are prepared.
@@ -53,9 +53,9 @@ impl SmoothPreparation {
     pub(crate) fn new(interpolation: &Interpolation, smooth: SmoothCurves) -> Self {
         let suits =
             interpolation.quantity == Quantity::Rotation && interpolation.speed == Speed::AsKeyed;
-        let direct = smooth.direct.filter(|_| suits);
+        let fast = smooth.fast.filter(|_| suits);
         Self {
-            direct: direct.map(|how| Box::new(Direct::new(how, smooth, interpolation.ends))),
+            fast: fast.map(|fast| Box::new(FastPreparation::new(fast, smooth, interpolation.ends))),
             interpolation: *interpolation,
             smooth,
             intervals: Intervals::new(smooth.shape.per_curve),
@@ -111,7 +111,7 @@ impl SmoothPreparation {
         let alone = all == 1 && self.interpolation.method.interpolates;
         let context = if alone { 0 } else { CONTEXT };
         let velocities = match self.smooth.input {
-            MethodInput::Velocities(solve, _) => {
+            MethodInput::Velocities { solve, .. } => {
                 solve(track, signs, intervals.clone(), &self.interpolation)
             }
             _ => Vec::new(),
@@ -131,11 +131,11 @@ impl SmoothPreparation {
             self.stretches.push(TrackStretch {
                 lane: self.intervals.count,
                 intervals: from..to,
-                all,
+                track_intervals: all,
                 span: (track.times[0], track.times[all]),
                 part,
-                key: if meets_keys { stretch_key } else { NONE },
-                still: if self.is_frozen() { stretch_key } else { NONE },
+                first_key: if meets_keys { stretch_key } else { NONE },
+                first_still_key: if self.is_frozen() { stretch_key } else { NONE },
             });
             let stretch_velocities = velocities.get(from - intervals.start..);
             self.push(
@@ -154,8 +154,8 @@ impl SmoothPreparation {
     /// Finishes the segments of all intervals that were added.
     pub(crate) fn finish(&mut self, prepared: &mut Prepared) {
         self.flush(prepared);
-        if let Some(direct) = &mut self.direct {
-            direct.finish(prepared, &mut self.fitting);
+        if let Some(fast) = &mut self.fast {
+            fast.finish(prepared, &mut self.fitting);
         }
         retime(prepared, &mut self.waiting, &mut self.fitting);
         self.waiting.clear();
@@ -202,7 +202,7 @@ impl SmoothPreparation {
         for (i, interval) in intervals.enumerate() {
             let [outward, inward] = match (self.smooth.input, velocities.get(i..i + 2)) {
                 (MethodInput::Numbers(numbers), _) => numbers(track, interval, &self.interpolation),
-                (MethodInput::Velocities(..), Some(both)) => {
+                (MethodInput::Velocities { .. }, Some(both)) => {
                     [both[0], both[1]].map(|[x, y, z]| [x, y, z, 0.0])
                 }
                 _ => break, // the method has no numbers of its own for any interval
@@ -224,9 +224,9 @@ impl SmoothPreparation {
                 self.push_spans(prepared, stretch);
             }
         }
-        if let Some(direct) = &mut self.direct {
+        if let Some(fast) = &mut self.fast {
             let (intervals, fitting) = (&self.intervals, &mut self.fitting);
-            direct.fit(prepared, intervals, &stretches, is_exact, fitting);
+            fast.fit(prepared, intervals, &stretches, is_exact, fitting);
         }
         self.fitting.copy_queued(prepared, &self.intervals);
         self.intervals.count = 0;
@@ -236,8 +236,8 @@ impl SmoothPreparation {
 
     /// Computes the curves of the intervals that wait. Returns whether they were computed in f64.
     fn find_curves(&mut self) -> bool {
-        if let Some(direct) = &mut self.direct {
-            direct.find_curves(&self.intervals, &self.stretches);
+        if let Some(fast) = &mut self.fast {
+            fast.find_curves(&self.intervals, &self.stretches);
             // Extrapolation needs the derivatives at the ends.
             let Interpolation { before, after, .. } = self.interpolation;
             if !self.extrapolates(before) && !self.extrapolates(after) {
@@ -271,7 +271,7 @@ impl SmoothPreparation {
     /// Makes the intervals of a stretch into spans.
     fn push_spans(&mut self, prepared: &mut Prepared, stretch: &TrackStretch) {
         let first_span = prepared.spans.len();
-        let is_steady = stretch.all == 1 && self.interpolation.is_steady_alone();
+        let is_steady = stretch.track_intervals == 1 && self.interpolation.is_steady_alone();
         let mut has_frame = [true; LANES];
         if let Some((rate, start)) = self.frames {
             let mut frames = FindFrames {
@@ -300,7 +300,7 @@ impl SmoothPreparation {
                 prepared.push_span(start, SpanSource::Constant(NONE), NONE);
             } else if self.is_still(stretch, lane) {
                 let constant = match self.interpolation.quantity {
-                    Quantity::Rotation => stretch.still + i as u32,
+                    Quantity::Rotation => stretch.first_still_key + i as u32,
                     _ => prepared.constant(STILL),
                 };
                 prepared.push_span(start, SpanSource::Constant(constant), NONE);
@@ -321,8 +321,8 @@ impl SmoothPreparation {
     /// Queues the curves in some lanes to be fitted: they become the next spans. `key` is the
     /// constant at the start of the first.
     fn queue(&mut self, prepared: &mut Prepared, lanes: Range<usize>, key: u32) {
-        if let Some(direct) = &mut self.direct {
-            return direct.queue(prepared, &self.intervals, lanes, key);
+        if let Some(fast) = &mut self.fast {
+            return fast.queue(prepared, &self.intervals, lanes, key);
         }
         for (i, lane) in lanes.enumerate() {
             let (start, segment) = (self.intervals.starts[lane], PolynomialSegment::zeroed());
@@ -335,7 +335,7 @@ impl SmoothPreparation {
     /// Whether an interval stands still.
     fn is_still(&self, stretch: &TrackStretch, lane: usize) -> bool {
         let at_end = || stretch.first() == Some(lane) || stretch.last() == Some(lane);
-        self.is_frozen() && stretch.all > 1 && at_end()
+        self.is_frozen() && stretch.track_intervals > 1 && at_end()
     }
 
     /// Whether tracks are extrapolated on a side with this wrap mode. A track that stands still in
@@ -368,13 +368,14 @@ impl SmoothPreparation {
                 let extension = prepared.parts[stretch.part].extension_mut(stretch.span);
                 *[&mut extension.from_before, &mut extension.from_after][end] = index;
             }
-            if stretch.key != NONE {
+            if stretch.first_key != NONE {
                 continue;
             }
             let end_value = || round_quat(self.curve(lane).value(end as f64));
             if !is_extrapolated {
                 let held = if of_rotations && self.is_frozen() {
-                    prepared.constants[stretch.still as usize + (lane - stretch.lane) + end]
+                    prepared.constants
+                        [stretch.first_still_key as usize + (lane - stretch.lane) + end]
                 } else if of_rotations {
                     end_value()
                 } else {

@@ -11,7 +11,7 @@ use std::cell::Cell;
 use std::io;
 use std::panic::resume_unwind;
 use std::process;
-use std::sync::{Arc, Mutex, OnceLock, PoisonError, mpsc};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError, mpsc};
 use std::thread;
 
 /// The system refused worker threads.
@@ -33,6 +33,11 @@ impl OutOfThreads {
         let (count, reason) = (1, error.to_string());
         Self { count, reason }
     }
+}
+
+/// Locks what a thread that panicked cannot have left half changed.
+pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 thread_local! {
@@ -156,7 +161,7 @@ impl Threads {
             return Ok(Arc::clone(&first.threads));
         }
         // Nobody works while this is locked: threads are started, and not waited for.
-        let mut forked = self.forked.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut forked = lock(&self.forked);
         let there = of_first().or(forked.as_ref().filter(|pool| pool.process == process));
         if let Some(pool) = there {
             return Ok(Arc::clone(&pool.threads));

@@ -10,7 +10,7 @@ use crate::twin::crowd_matrices::{
     Rows, affine_product, row_product, to_any_half, transform, transform_row,
 };
 use crate::twin::crowd_times::{
-    in_parts, position_at, base_positions, span_at, tick_of, wide_remainder,
+    base_positions, in_parts, position_at, span_at, tick_of, wide_remainder,
 };
 
 use super::cells::Cells;

@@ -105,8 +105,8 @@ pub(super) fn shown(
     let Some(raw) = json.member("scene")? else {
         return Ok(vec![true; nodes.count()]);
     };
-    let scene: usize = json.typed(raw, "/scene")?;
-    let scene: Scene = json.entry("scenes", scene, "/scene")?;
+    let scene_index: usize = json.typed(raw, "/scene")?;
+    let scene: Scene = json.entry("scenes", scene_index, "/scene")?;
     let roots: HashSet<usize> = scene.nodes.into_iter().collect();
     let mut is_shown = vec![false; nodes.count()];
     for &node in order {

@@ -232,10 +232,10 @@ fn layout_by_lengths(shape: &[usize], lengths: Lengths) -> Result<Layout, (Code,
             Err((Code::Ambiguous, message))
         }
         (false, false) => {
-            let known = |axis, known: Option<usize>| known.map(|n| format!("{n} {axis}"));
+            let describe = |axis, known: Option<usize>| known.map(|n| format!("{n} {axis}"));
             let known = [
-                known("times", lengths.frames),
-                known("names", lengths.tracks),
+                describe("times", lengths.frames),
+                describe("names", lengths.tracks),
             ];
             let known: Vec<String> = known.into_iter().flatten().collect();
             let message = format!("shape {text} does not go with {}", known.join(" and "));

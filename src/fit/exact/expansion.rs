@@ -41,7 +41,7 @@ fn fit<L: Lanes, const PAIRS: usize, const PER_CURVE_BASIS: bool, const WHOLE: b
     nodes: &Nodes<PAIRS>,
     segments: &mut [PolynomialSegment],
 ) {
-    for lane in (0..block.whole()).step_by(L::COUNT) {
+    for lane in (0..block.padded_count()).step_by(L::COUNT) {
         let first = Factor::<L>::new::<PER_CURVE_BASIS, WHOLE>(block, lane, 0);
         let second = Factor::<L>::new::<PER_CURVE_BASIS, WHOLE>(block, lane, 1);
         let third = Factor::<L>::new::<PER_CURVE_BASIS, WHOLE>(block, lane, 2);

@@ -117,7 +117,7 @@ impl FitBlock {
 
     /// The number of lanes to compute, rounded up to whole vectors of eight.
     #[inline(always)]
-    pub(crate) fn whole(&self) -> usize {
+    pub(crate) fn padded_count(&self) -> usize {
         self.count.next_multiple_of(8).min(LANES)
     }
 

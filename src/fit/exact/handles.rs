@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use crate::curve::formula::Product;
 use crate::fit::block::{
-    Intervals, LANES, ROOM, RowF64, TrackStretch, at, load, put, squared_extent, store, widened,
+    Intervals, LANES, ROW_LEN, RowF64, TrackStretch, at, load, put, squared_extent, store, widened,
 };
 use crate::math::quaternion::{self, Real, Vector, normalised, product, scaled, sum};
 use crate::math::ranges::{Algebra, FullRange, PrincipalRange};
@@ -20,7 +20,7 @@ impl InLanes for ExactSteps<'_> {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
         let intervals = &mut *self.0;
-        for lane in (0..intervals.whole()).step_by(L::COUNT) {
+        for lane in (0..intervals.padded_count()).step_by(L::COUNT) {
             let (from, to) = (
                 units::<L>(&intervals.from, lane),
                 units::<L>(&intervals.to, lane),
@@ -70,7 +70,7 @@ fn redo_lanes<S: ?Sized>(
 
 /// Keys in f64, normalised.
 #[inline(always)]
-fn units<L: Lanes>(keys: &[[f32; 4]; ROOM], lane: usize) -> [L::Doubles; 4] {
+fn units<L: Lanes>(keys: &[[f32; 4]; ROW_LEN], lane: usize) -> [L::Doubles; 4] {
     normalised(widened(L::load_rotations(&keys[lane..])))
 }
 
@@ -179,7 +179,7 @@ pub(crate) struct KeyHandles<'a, R> {
 impl<R: HandleRule> InLanes for KeyHandles<'_, R> {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
-        for lane in (0..self.intervals.whole()).step_by(L::COUNT) {
+        for lane in (0..self.intervals.padded_count()).step_by(L::COUNT) {
             let mut near = PrincipalRange::<L::Doubles>::new();
             find_handles::<R, _>(self.intervals, &mut near, lane + 1);
             redo(near.doubt, lane + 1..self.intervals.count, self, Self::find);
@@ -235,7 +235,7 @@ impl InLanes for BetweenHandles<'_> {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
         let intervals = &mut *self.0;
-        for lane in (0..intervals.whole()).step_by(L::COUNT) {
+        for lane in (0..intervals.padded_count()).step_by(L::COUNT) {
             let base = units::<L>(&intervals.from, lane);
             store_base(intervals, lane, base);
             let mut near = PrincipalRange::<L::Doubles>::new();
@@ -311,7 +311,7 @@ impl InLanes for ControlRotations<'_> {
 
 #[inline(always)]
 fn control_lanes(intervals: &Intervals, controls: &mut [RowF64; 16], squared_extents: &mut RowF64) {
-    for j in 0..intervals.whole() {
+    for j in 0..intervals.padded_count() {
         let (first, last) = (at(&intervals.outgoing, j), at(&intervals.incoming, j + 1));
         let start = intervals.key(j);
         let end = product(start, at(&intervals.steps, j));
@@ -334,7 +334,7 @@ impl InLanes for BetweenNeighbours<'_> {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
         let intervals = &mut *self.0;
-        for lane in (0..intervals.whole()).step_by(L::COUNT) {
+        for lane in (0..intervals.padded_count()).step_by(L::COUNT) {
             let mut near = PrincipalRange::<L::Doubles>::new();
             let start = units::<L>(&intervals.from, lane + 1);
             find_base(intervals, &mut near, lane + 1, start);

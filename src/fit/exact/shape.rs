@@ -126,7 +126,7 @@ impl<F: Formula> Sampling for Directly<F> {
         segments: &mut [PolynomialSegment],
     ) {
         let zero = L::Doubles::all(0.0);
-        for lane in (0..block.whole()).step_by(L::COUNT) {
+        for lane in (0..block.padded_count()).step_by(L::COUNT) {
             let mut numbers = [zero; NUMBERS];
             for (number, lanes) in numbers.iter_mut().zip(&block.numbers) {
                 *number = L::Doubles::load(&lanes[lane..]);

@@ -1,6 +1,6 @@
 //! Exponentials and logarithms in f32 vector lanes, and rows of f32 numbers.
 
-use crate::fit::block::{ROOM, widened};
+use crate::fit::block::{ROW_LEN, widened};
 use crate::math::quaternion::{Real as _, exp_by, scaled, square, sum};
 use crate::math::ranges::MEDIUM_WAVES;
 use crate::simd::lanes::{Lanes, Number};
@@ -8,7 +8,7 @@ use crate::twin::sine_cosine::{sine_cosm1, sine_cosm1_quarter};
 use crate::twin::small_angle::FromIdentity;
 
 /// One f32 for each lane of a block.
-pub(crate) type RowF32 = [f32; ROOM];
+pub(crate) type RowF32 = [f32; ROW_LEN];
 
 /// The coefficients of `(x / sin(x) - 1) / u` in powers of u = 1 - cos(x): [`LOG`] for u up to
 /// 1/2, [`LONG_LOG`] up to 1. From Chebyshev nodes, within 3.5e-8.

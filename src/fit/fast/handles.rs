@@ -8,7 +8,7 @@
 
 use bytemuck::Zeroable;
 
-use crate::fit::block::{Intervals, ROOM, rounded, squared_extent, widened};
+use crate::fit::block::{Intervals, ROW_LEN, rounded, squared_extent, widened};
 use crate::fit::fast::exp_log::{LOG, LONG_LOG, RowF32, load3, log, long_exp, medium_exp, store};
 use crate::fit::fast::long_tangents::AT_ONCE;
 use crate::fit::tangent_weights::KeyWeights;
@@ -57,7 +57,7 @@ const LONGEST_TANGENT_PART: f32 = 1.5 * 1.5;
 pub(crate) const SPARE_LANES: usize = 3 * MAX_LANES;
 
 /// The first key of each curve, its three half-rotation vectors, and its last key.
-pub(crate) type CurveNumbers = [[[f32; 4]; ROOM + SPARE_LANES]; 5];
+pub(crate) type CurveNumbers = [[[f32; 4]; ROW_LEN + SPARE_LANES]; 5];
 
 /// The steps, handles and curves of a block's intervals, in f32.
 #[derive(Zeroable)]
@@ -81,7 +81,7 @@ pub(crate) struct HandlesF32 {
 impl HandlesF32 {
     pub(crate) fn new() -> Self {
         Self {
-            squared_extents: [f32::INFINITY; ROOM],
+            squared_extents: [f32::INFINITY; ROW_LEN],
             ..Self::zeroed()
         }
     }
@@ -98,7 +98,7 @@ impl InLanes for FindSteps<'_> {
     fn run<L: Lanes>(&mut self) {
         let Intervals { from, to, .. } = self.intervals;
         let lanes = &mut *self.lanes;
-        for lane in (0..self.intervals.whole32()).step_by(L::COUNT) {
+        for lane in (0..self.intervals.padded_count_f32()).step_by(L::COUNT) {
             let start = L::load_rotations(&from[lane..]);
             let chord = chord_of(start, L::load_rotations(&to[lane..]));
             let chord_square = dot(chord, chord);
@@ -118,7 +118,7 @@ pub(crate) struct FindCurves<'a> {
     pub(crate) weights: &'a KeyWeights,
     pub(crate) intervals: &'a Intervals,
     /// Whether a lane has its curve already.
-    pub(crate) known: &'a [bool; ROOM],
+    pub(crate) known: &'a [bool; ROW_LEN],
     /// Sets the handles for which the range of f32's formulas is too short, in f64:
     /// [`set_long`](crate::fit::fast::long_tangents::set_long).
     pub(crate) set_long: fn(&mut HandlesF32, &[usize], &Intervals),
@@ -137,8 +137,8 @@ impl FindCurves<'_> {
     fn handles<L: Lanes>(&mut self) {
         let (weights, intervals) = (self.weights, self.intervals);
         let lanes = &mut *self.lanes;
-        let (mut long_tangents, mut long_count) = ([0; ROOM], 0);
-        for lane in (0..intervals.whole32()).step_by(L::COUNT) {
+        let (mut long_tangents, mut long_count) = ([0; ROW_LEN], 0);
+        for lane in (0..intervals.padded_count_f32()).step_by(L::COUNT) {
             let key = lane + 1;
             if !self.known[lane..key + L::COUNT].contains(&false) {
                 continue;
@@ -175,7 +175,7 @@ impl FindCurves<'_> {
     fn curves<L: Lanes>(&mut self) {
         let (weights, intervals) = (self.weights, self.intervals);
         let whole = &mut *self.lanes;
-        for lane in (0..intervals.whole32()).step_by(L::COUNT) {
+        for lane in (0..intervals.padded_count_f32()).step_by(L::COUNT) {
             let (this, next) = (lane + 1, lane + 2);
             if !self.known[this..this + L::COUNT].contains(&false) {
                 continue;

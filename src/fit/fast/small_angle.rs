@@ -5,7 +5,7 @@
 
 use bytemuck::Zeroable;
 
-use crate::fit::block::{Intervals, LANES, ROOM, TrackStretch};
+use crate::fit::block::{Intervals, LANES, ROW_LEN, TrackStretch};
 use crate::fit::tangent_weights::KeyWeights;
 use crate::shader::{KEY_INNER, LONGEST_STEP, PolynomialSegment};
 use crate::simd::dispatch::{InLanes, in_lanes};
@@ -18,10 +18,10 @@ const CURVES_ONE_BY_ONE: usize = 6;
 /// The small-angle curves of a block's intervals.
 #[derive(Zeroable)]
 pub(crate) struct SmallAngleLanes {
-    powers: [[[f32; 4]; ROOM]; 7],
+    powers: [[[f32; 4]; ROW_LEN]; 7],
     /// Whether a lane's curve turns through small angles only, so that `powers` are its
     /// coefficients.
-    pub(crate) is_valid: [bool; ROOM],
+    pub(crate) is_valid: [bool; ROW_LEN],
 }
 
 impl SmallAngleLanes {
@@ -29,18 +29,18 @@ impl SmallAngleLanes {
     /// most [`LONGEST_STEP`].
     pub(crate) fn find(
         &mut self,
-        chords: &[f32; ROOM],
+        chords: &[f32; ROW_LEN],
         intervals: &Intervals,
         weights: &KeyWeights,
         stretches: &[TrackStretch],
     ) {
-        let mut near = [false; ROOM];
+        let mut near = [false; ROW_LEN];
         for j in 1..LANES {
             near[j] = (chords[j - 1] <= LONGEST_STEP)
                 & (chords[j] <= LONGEST_STEP)
                 & (chords[j + 1] <= LONGEST_STEP);
         }
-        self.is_valid = [false; ROOM];
+        self.is_valid = [false; ROW_LEN];
         if !near.contains(&true) {
             return;
         }
@@ -111,8 +111,8 @@ impl SmallAnglePass<'_> {
 impl InLanes for SmallAnglePass<'_> {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
-        let mut powers = [[[0.0; ROOM]; 4]; 7];
-        let mut is_valid = [false; ROOM];
+        let mut powers = [[[0.0; ROW_LEN]; 4]; 7];
+        let mut is_valid = [false; ROW_LEN];
         // Lane 0 is context, or a track's only interval, which has no such curve: the first curve is in
         // lane 1.
         let count = self.count.min(LANES);
@@ -134,7 +134,7 @@ impl InLanes for SmallAnglePass<'_> {
         self.lanes.is_valid = is_valid;
         for power in 0..7 {
             let [x, y, z, w] = &powers[power];
-            for j in 0..ROOM {
+            for j in 0..ROW_LEN {
                 self.lanes.powers[power][j] = [x[j], y[j], z[j], w[j]];
             }
         }

@@ -45,7 +45,7 @@ impl Sampling for Motion {
         segments: &mut [PolynomialSegment],
     ) {
         let mut scales = [1.0; LANES];
-        for lane in (0..block.whole()).step_by(L::COUNT) {
+        for lane in (0..block.padded_count()).step_by(L::COUNT) {
             let mut found = [[[0.0; MAX_LANES]; 4]; POWERS];
             let mut units = [1.0; MAX_LANES];
             for curve_lane in lane..block.count.min(lane + L::COUNT) {

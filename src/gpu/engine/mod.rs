@@ -9,7 +9,7 @@ pub(crate) mod write_rates;
 
 use std::mem::take;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 
 use ash::vk;
 use bytemuck::NoUninit;
@@ -39,6 +39,7 @@ use crate::output::window::Window;
 use crate::prepare::clip_data::ClipData;
 use crate::shader::spirv::FloatControls;
 use crate::shader::{Item, KERNELS, Kernel, KernelCode, List, PoseDispatch};
+use crate::threads::lock;
 use crate::time::frames::Timeline;
 
 /// Rotations of one window, 32 MiB, unless the device's limits, the memory budget or the device's
@@ -76,11 +77,6 @@ pub(crate) struct VulkanEngine {
     allow_inexact: bool,
     free: FreeBuffers,
     pub(crate) timings: Mutex<Timings>,
-}
-
-/// Locks what a thread that panicked cannot have left half changed.
-pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// The segments and constants of a clip, on the device.

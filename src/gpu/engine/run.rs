@@ -7,7 +7,7 @@ use std::sync::atomic::Ordering;
 use std::time::Instant;
 
 use crate::gpu::device::QueueLane;
-use crate::gpu::engine::{Job, VulkanEngine, lock};
+use crate::gpu::engine::{Job, VulkanEngine};
 use crate::gpu::error::{EvaluateError, VulkanError};
 use crate::gpu::exclusive::Exclusive;
 use crate::gpu::handles::VulkanBuffer;
@@ -20,7 +20,7 @@ use crate::output::encoding::Encoding;
 use crate::output::window::Window;
 use crate::prepare::error::SetError;
 use crate::shader::{Dispatch, Grid, Item, LINE, List, WORKGROUP};
-use crate::threads::{on_threads, stop};
+use crate::threads::{lock, on_threads, stop};
 
 /// Bytes of the lines in which a card's memory is written, at most.
 const LINE_BYTES: u64 = 128;

@@ -7,9 +7,9 @@ use std::env;
 use std::sync::{Mutex, OnceLock};
 
 use crate::gpu::cache::Cache;
-use crate::gpu::engine::lock;
 use crate::gpu::physical::{DeviceKind, PhysicalDevice};
 use crate::simd::dispatch::VectorWidth;
+use crate::threads::lock;
 
 /// The file's name.
 const FILE: &str = "kernel-checks";

@@ -242,15 +242,15 @@ impl<'a> GltfReader<'a> {
         let named = format!("{pointer}/bufferView");
         let range = (indices.buffer_view, indices.byte_offset, sparse.count);
         let indices = self.elements(range, (unsigned, 1), (&pointer, &named))?;
-        let values = format!("{accessor}/sparse/values");
-        let named = format!("{values}/bufferView");
+        let values_pointer = format!("{accessor}/sparse/values");
+        let named = format!("{values_pointer}/bufferView");
         let values_range = (
             sparse.values.buffer_view,
             sparse.values.byte_offset,
             sparse.count,
         );
         let values: Vec<f64> = self
-            .elements(values_range, (component, width), (&values, &named))?
+            .elements(values_range, (component, width), (&values_pointer, &named))?
             .numbers()
             .collect();
         let mut before = None;

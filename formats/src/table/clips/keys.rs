@@ -90,18 +90,19 @@ impl TableClip<'_> {
         shared: &SharedRows<'_>,
         warnings: &mut Warnings,
     ) -> Result<Vec<RowKeys>, Diagnostic> {
-        let quiet = |track: &TableTrack<'_>| self.quiet_keys(track.parts, shared.positions(track));
+        let quiet_keys =
+            |track: &TableTrack<'_>| self.quiet_keys(track.parts, shared.positions(track));
         let rows = shared
             .tracks
             .first()
             .map_or(0, |track| shared.positions(track).len());
         let at_least = MIN_PARALLEL_ROWS.div_ceil(rows.max(1));
-        let alone = || shared.tracks.iter().map(quiet).collect();
+        let alone = || shared.tracks.iter().map(quiet_keys).collect();
         let quiet: Vec<Option<RowKeys>> = match shared.tracks.len() <= at_least {
             true => alone(),
             false => tumble::on_threads(|| {
                 let tracks = shared.tracks.par_iter().with_min_len(at_least);
-                tracks.map(quiet).collect()
+                tracks.map(quiet_keys).collect()
             })
             // Where the system refuses threads this one does it all.
             .unwrap_or_else(|_| alone()),

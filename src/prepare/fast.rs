@@ -7,7 +7,7 @@ use std::ops::Range;
 use bytemuck::Zeroable;
 
 use crate::curve::options::Ends;
-use crate::fit::block::{Intervals, LANES, ROOM, TrackStretch};
+use crate::fit::block::{Intervals, LANES, ROW_LEN, TrackStretch};
 use crate::fit::exact::curve::INDISTINCT;
 use crate::fit::fast::fit_range::{LONGEST_DEGREE_8, LONGEST_WHOLE, WHOLE, WHOLE_DEGREE_8};
 use crate::fit::fast::handles::{
@@ -17,7 +17,7 @@ use crate::fit::fast::hermite_fit::{BetweenKeys, Halves, KeyFit};
 use crate::fit::fast::small_angle::SmallAngleLanes;
 use crate::fit::nodes::NodeSamples;
 use crate::fit::tangent_weights::KeyWeights;
-use crate::method::{FromKeys, SmoothCurves};
+use crate::method::{FastCurves, SmoothCurves};
 use crate::prepare::fitting::Fitting;
 use crate::prepare::prepared::{CurveSlot, Prepared};
 use crate::prepare::smooth::CONTEXT;
@@ -26,7 +26,7 @@ use crate::simd::dispatch::{InLanes, in_lanes};
 use crate::simd::lanes::{Lanes, MAX_LANES};
 use crate::time::spans::NONE;
 
-type CurveSlots = [CurveSlot; ROOM + SPARE_LANES];
+type CurveSlots = [CurveSlot; ROW_LEN + SPARE_LANES];
 
 /// Places in the lists of lanes.
 const SMALL_ANGLE: usize = 0;
@@ -34,7 +34,7 @@ const HALVES: usize = 3;
 const LEFT_OVER: usize = 4;
 
 /// Prepares the curves of a block straight from keys.
-pub(crate) struct Direct {
+pub(crate) struct FastPreparation {
     weights: KeyWeights,
     small_angle: SmallAngleLanes,
     handles: HandlesF32,
@@ -49,24 +49,24 @@ pub(crate) struct Direct {
     keys: [u32; 2 * LANES],
     /// Intervals that f32 cannot prepare wait here; made for the first one.
     left_over: Option<Box<LeftOver>>,
-    /// See [`FromKeys`].
+    /// See [`FastCurves`].
     set_long: fn(&mut HandlesF32, &[usize], &Intervals),
     smooth: SmoothCurves,
     ends: Ends,
 }
 
-impl Direct {
-    pub(crate) fn new(how: FromKeys, smooth: SmoothCurves, ends: Ends) -> Self {
+impl FastPreparation {
+    pub(crate) fn new(fast: FastCurves, smooth: SmoothCurves, ends: Ends) -> Self {
         Self {
-            weights: KeyWeights::new(how.weights, ends),
+            weights: KeyWeights::new(fast.weights, ends),
             small_angle: SmallAngleLanes::zeroed(),
             handles: HandlesF32::new(),
-            slots: [CurveSlot::zeroed(); ROOM + SPARE_LANES],
+            slots: [CurveSlot::zeroed(); ROW_LEN + SPARE_LANES],
             lists: [LaneList::zeroed(); 5],
             starts: [0.0; 2 * LANES],
             keys: [NONE; 2 * LANES],
             left_over: None,
-            set_long: how.set_long,
+            set_long: fast.set_long,
             smooth,
             ends,
         }
@@ -225,7 +225,7 @@ impl LaneList {
 /// vectors. Those that do not fill a vector move to spare lanes, which start with the `spare`th row of
 /// [`MAX_LANES`], and are fitted with the next block.
 fn fit_list<const PAIRS: usize>(
-    how: &impl KeyFit<PAIRS>,
+    key_fit: &impl KeyFit<PAIRS>,
     list: &mut LaneList,
     spare: usize,
     all: bool,
@@ -241,7 +241,7 @@ fn fit_list<const PAIRS: usize>(
         // The lanes of the last vector that have no curve write to two extra segments.
         segments.extend([PolynomialSegment::zeroed(); 2]);
         in_lanes(&mut ListFit::<_, PAIRS> {
-            how,
+            key_fit,
             lanes: &list.all,
             count,
             curves,
@@ -251,7 +251,10 @@ fn fit_list<const PAIRS: usize>(
         segments.truncate(len);
     }
     for i in 0..left {
-        let (from, to) = (list.all[count + i] as usize, ROOM + spare * MAX_LANES + i);
+        let (from, to) = (
+            list.all[count + i] as usize,
+            ROW_LEN + spare * MAX_LANES + i,
+        );
         for numbers in &mut *curves {
             numbers[to] = numbers[from];
         }
@@ -262,7 +265,7 @@ fn fit_list<const PAIRS: usize>(
 }
 
 struct ListFit<'a, F, const PAIRS: usize> {
-    how: &'a F,
+    key_fit: &'a F,
     /// The lanes to fit, and any lanes up to whole vectors.
     lanes: &'a [u32],
     count: usize,
@@ -294,7 +297,8 @@ impl<F: KeyFit<PAIRS>, const PAIRS: usize> InLanes for ListFit<'_, F, PAIRS> {
             for (index, &lane) in indices.iter_mut().zip(used) {
                 *index = self.slots[lane as usize].segment;
             }
-            self.how.fit(&mut samples, &curves, &indices, self.segments);
+            self.key_fit
+                .fit(&mut samples, &curves, &indices, self.segments);
         }
     }
 }
@@ -325,7 +329,7 @@ impl LeftOver {
     ) {
         let first = stretch.intervals.start + (lanes.start - stretch.lane);
         // The only interval of a track has no neighbours.
-        let beside = usize::from(stretch.all > 1);
+        let beside = usize::from(stretch.track_intervals > 1);
         self.stretches.push(TrackStretch {
             lane: self.intervals.count + beside,
             intervals: first..first + lanes.len(),
