@@ -178,7 +178,7 @@ impl Row<'_> {
                     let count = output.len();
                     for (j, value) in (chunk * CHUNK..).zip(&mut from_middle[..count]) {
                         let time = || self.timeline.time_at(part.track as usize, run.sample + j);
-                        *value = distance.of(j, time);
+                        *value = distance.at_sample(j, time);
                     }
                     distances::<L, S>(segment, affine, &from_middle, count, output);
                 }

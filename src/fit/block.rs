@@ -200,7 +200,7 @@ impl Intervals {
         shape: &'static Shape,
         quantity: Quantity,
     ) -> IntervalCurve {
-        let numbers = shape.with(|i| self.numbers[i][lane]);
+        let numbers = shape.curve_numbers(|i| self.numbers[i][lane]);
         IntervalCurve::new(shape, numbers, quantity, self.rate(lane))
     }
 

@@ -155,11 +155,16 @@ impl<'a> TrackWeights<'a> {
 
     /// The weights of consecutive keys with these times; the first of them is the `first`th of a
     /// track of `all` keys.
-    pub(crate) fn of(&mut self, times: &'a [f64], first: usize, all: usize) -> &[TangentWeights] {
-        if std::ptr::eq(self.times, times) && self.whole == (first, all) {
+    pub(crate) fn weights_of(
+        &mut self,
+        times: &'a [f64],
+        first: usize,
+        key_count: usize,
+    ) -> &[TangentWeights] {
+        if std::ptr::eq(self.times, times) && self.whole == (first, key_count) {
             return &self.weights;
         }
-        (self.times, self.whole) = (times, (first, all));
+        (self.times, self.whole) = (times, (first, key_count));
         self.weights.clear();
         self.weights.resize(times.len(), UNKNOWN);
         if let ([_, weights @ .., _], [starts @ .., _]) = (&mut self.weights[..], times) {
@@ -171,11 +176,11 @@ impl<'a> TrackWeights<'a> {
                 weights,
             });
         }
-        let is_curve = all > 2;
+        let is_curve = key_count > 2;
         if first == 0 && is_curve {
             self.weights[0] = WeightRule::end(self.ends);
         }
-        if first + times.len() == all && is_curve {
+        if first + times.len() == key_count && is_curve {
             self.weights[times.len() - 1] = WeightRule::end(self.ends);
         }
         &self.weights

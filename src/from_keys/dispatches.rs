@@ -324,7 +324,11 @@ impl KeyDispatch<'_, '_> {
         }
         if let (Some(weights), false) = (&mut known.weights, written.weights.is_empty()) {
             let written_weights = take_first(&mut written.weights, keys.len());
-            written_weights.copy_from_slice(weights.of(track.times, track.first_key, track.all));
+            written_weights.copy_from_slice(weights.weights_of(
+                track.times,
+                track.first_key,
+                track.track_key_count,
+            ));
         }
         written.next_key += keys.len();
         Ok(())

@@ -135,7 +135,7 @@ impl<'a> SampleBlock<'a> {
                 }
             }
             SampleBlock::Cubics(block, weights) => {
-                let weights = weights.of(keys.times, keys.first_key, keys.all);
+                let weights = weights.weights_of(keys.times, keys.first_key, keys.track_key_count);
                 for sample in samples {
                     block.push(signed, weights, sample, output);
                 }

@@ -56,17 +56,17 @@ pub(crate) fn thinned<'t>(
         let from = indices.last().map_or(0, |&last| last + 1);
         indices.extend(from.max(near.saturating_sub(BESIDE + 1))..count.min(near + BESIDE + 1));
     }
-    fn of<T: Copy>(all: &[T], indices: &[usize]) -> Vec<T> {
+    fn picked<T: Copy>(all: &[T], indices: &[usize]) -> Vec<T> {
         match all {
             [] => Vec::new(),
             all => indices.iter().map(|&index| all[index]).collect(),
         }
     }
     Cow::Owned(VectorTrack {
-        times: of(&track.times, &indices),
-        keys: of(&track.keys, &indices),
-        tangents: of(&track.tangents, &indices),
-        ups: of(&track.ups, &indices),
+        times: picked(&track.times, &indices),
+        keys: picked(&track.keys, &indices),
+        tangents: picked(&track.tangents, &indices),
+        ups: picked(&track.ups, &indices),
     })
 }
 

@@ -95,7 +95,7 @@ pub(crate) enum Distance {
 impl Distance {
     /// The distance of a run's `j`th sample, in frames or seconds; `time` gives that sample's time.
     #[inline(always)]
-    pub(crate) fn of(self, j: usize, time: impl FnOnce() -> f64) -> f32 {
+    pub(crate) fn at_sample(self, j: usize, time: impl FnOnce() -> f64) -> f32 {
         match self {
             Self::Near { first } => first + j as f32,
             // An integer converts with one rounding, like the shader's sum of two exact halves.

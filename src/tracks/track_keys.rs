@@ -19,7 +19,7 @@ pub(crate) struct TrackKeys<'a> {
     /// The index of the first of them in the track.
     pub(crate) first_key: usize,
     /// Number of keys of the whole track.
-    pub(crate) all: usize,
+    pub(crate) track_key_count: usize,
 }
 
 impl<'a> TrackKeys<'a> {
@@ -33,13 +33,13 @@ impl<'a> TrackKeys<'a> {
             signs: set.signs(index),
             index,
             first_key: 0,
-            all: keys.len(),
+            track_key_count: keys.len(),
         }
     }
 
     /// Of a whole track, the keys of some intervals and up to `beside` more on both sides.
     pub(crate) fn around(self, intervals: &Range<usize>, beside: usize) -> Self {
-        let end = self.all.min(intervals.end + 1 + beside);
+        let end = self.track_key_count.min(intervals.end + 1 + beside);
         let range = intervals.start.saturating_sub(beside)..end;
         Self {
             times: &self.times[range.clone()],

@@ -306,7 +306,7 @@ impl InLanes for SparseTimes<'_> {
                         continue;
                     }
                     Some(RunSource::Segment(index, distance, affine)) => {
-                        (index as usize, distance.of(0, || time), affine)
+                        (index as usize, distance.at_sample(0, || time), affine)
                     }
                     _ => {
                         self.others.push(i);

@@ -154,7 +154,7 @@ impl FitBlock {
 
     /// All numbers of the curve in a lane.
     pub(crate) fn numbers_of(&self, lane: usize) -> FormulaNumbers {
-        self.shape.with(|i| self.numbers[i][lane])
+        self.shape.curve_numbers(|i| self.numbers[i][lane])
     }
 
     /// The whole curve in a lane.

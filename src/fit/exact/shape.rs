@@ -50,7 +50,7 @@ impl Shape {
     }
 
     /// All numbers of a curve: those that differ from curve to curve, then the shared ones.
-    pub(crate) fn with(&self, number_at: impl Fn(usize) -> f64) -> FormulaNumbers {
+    pub(crate) fn curve_numbers(&self, number_at: impl Fn(usize) -> f64) -> FormulaNumbers {
         let mut numbers = self.shared;
         for (i, number) in numbers[..self.per_curve].iter_mut().enumerate() {
             *number = number_at(i);

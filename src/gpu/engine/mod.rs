@@ -162,6 +162,44 @@ impl VulkanEngine {
         }
     }
 
+    /// An engine on an application's device.
+    ///
+    /// # Safety
+    /// As [`Engine::from_vulkan`](crate::engine::Engine::from_vulkan) says.
+    pub(crate) unsafe fn from_handles(
+        handles: VulkanHandles,
+        options: &EngineOptions,
+    ) -> Result<Self, VulkanError> {
+        use vk::QueueFlags as Flags;
+        let instance = Instance::borrowed(handles.entry, handles.instance);
+        let mut physical = PhysicalDevice::new(&instance, handles.physical_device)?
+            .ok_or(VulkanError::NoDevice)?;
+        physical.queue_family = handles.queue_family;
+        physical.check_family(handles.queue_family, Flags::COMPUTE, "compute")?;
+        if let Some(copies) = &handles.copy_queue {
+            // Whoever computes or draws can copy.
+            let can_copy = Flags::TRANSFER | Flags::COMPUTE | Flags::GRAPHICS;
+            physical.check_family(copies.family, can_copy, "copy")?;
+            if copies.queue == handles.queue {
+                return Err(VulkanError::SameQueue);
+            }
+        }
+        if handles.api_version < vk::API_VERSION_1_2 && !handles.shader_float_controls {
+            // The application did not enable what the device offers.
+            physical.float_controls = FloatControls::default();
+        }
+        physical.has_int64 &= handles.shader_int64;
+        let device = LogicalDevice::borrowed(
+            physical,
+            handles.device,
+            handles.queue,
+            handles.copy_queue,
+            handles.queue_lock,
+            options,
+        );
+        Ok(Self::new(Arc::new(device), options))
+    }
+
     /// The kinds of lists that its kernels over segments work on. What binds more storage buffers than the
     /// device can is left out.
     pub(crate) fn lists(&self) -> Vec<List> {
@@ -478,42 +516,6 @@ impl VulkanEngine {
         let bytes: &[u8] = bytemuck::cast_slice(table);
         self.check_size("a crowd's library", bytes)?;
         self.resident(name, bytes, &mut Vec::new())
-    }
-
-    /// # Safety
-    /// As [`Engine::from_vulkan`](crate::engine::Engine::from_vulkan) says.
-    pub(crate) unsafe fn from_handles(
-        handles: VulkanHandles,
-        options: &EngineOptions,
-    ) -> Result<Self, VulkanError> {
-        use vk::QueueFlags as Flags;
-        let instance = Instance::borrowed(handles.entry, handles.instance);
-        let mut physical = PhysicalDevice::new(&instance, handles.physical_device)?
-            .ok_or(VulkanError::NoDevice)?;
-        physical.queue_family = handles.queue_family;
-        physical.check_family(handles.queue_family, Flags::COMPUTE, "compute")?;
-        if let Some(copies) = &handles.copy_queue {
-            // Whoever computes or draws can copy.
-            let can_copy = Flags::TRANSFER | Flags::COMPUTE | Flags::GRAPHICS;
-            physical.check_family(copies.family, can_copy, "copy")?;
-            if copies.queue == handles.queue {
-                return Err(VulkanError::SameQueue);
-            }
-        }
-        if handles.api_version < vk::API_VERSION_1_2 && !handles.shader_float_controls {
-            // The application did not enable what the device offers.
-            physical.float_controls = FloatControls::default();
-        }
-        physical.has_int64 &= handles.shader_int64;
-        let device = LogicalDevice::borrowed(
-            physical,
-            handles.device,
-            handles.queue,
-            handles.copy_queue,
-            handles.queue_lock,
-            options,
-        );
-        Ok(Self::new(Arc::new(device), options))
     }
 }
 

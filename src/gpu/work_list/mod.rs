@@ -358,7 +358,7 @@ impl Emit for PartsList<'_> {
                     Distance::Seconds { .. } => {
                         let first_distance = chunk.distances.len() as i32;
                         let from_middle =
-                            |sample| distance.of(0, || timeline.time_at(track, sample));
+                            |sample| distance.at_sample(0, || timeline.time_at(track, sample));
                         chunk.distances.extend(samples.map(from_middle));
                         first_distance
                     }

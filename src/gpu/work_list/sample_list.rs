@@ -230,7 +230,7 @@ impl Emit for SampleChunk<'_> {
             RunSource::Segment(source, distance, Affine { scale, offset }) => {
                 for (j, single) in samples.iter_mut().enumerate() {
                     let time = || timeline.time_at(track, first_sample + j);
-                    let parameter = distance.of(skipped + j, time) * scale + offset;
+                    let parameter = distance.at_sample(skipped + j, time) * scale + offset;
                     *single = ListedSample { source, parameter };
                 }
             }
@@ -257,7 +257,7 @@ impl SampleChunk<'_> {
             self.list[self.listed] = match spans.source_at(part, times[sample]) {
                 Some(RunSource::Constant(constant)) => held(constant),
                 Some(RunSource::Segment(source, distance, Affine { scale, offset })) => {
-                    let parameter = distance.of(0, || times[sample]) * scale + offset;
+                    let parameter = distance.at_sample(0, || times[sample]) * scale + offset;
                     ListedSample { source, parameter }
                 }
                 // Outside the keys of a whole track lie constants or curves, which are one run.
