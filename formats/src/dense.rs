@@ -1,12 +1,42 @@
 //! The keys of a clip as times and numbers, and clips whose keys are samples.
 
 use glam::{Quat, Vec3};
-use tumble::{Channel, Engine, Error, Frames, TrackSet};
+use tumble::{Channel, Device, Engine, Error, Frames, TrackError, TrackSet};
 
+use crate::feature::Feature;
+use crate::format::Format;
+use crate::keyed::{KeyedError, keyed};
 use crate::motion::{Channels, Motion, Sampler};
 use crate::sample::{ChannelMethods, Samples};
 
+/// Why the keys of a clip cannot be written.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum KeysError {
+    /// The format holds all channels at the same times.
+    #[error(transparent)]
+    Keyed(#[from] KeyedError),
+    /// The first and the last sample could not be evaluated.
+    #[error(transparent)]
+    Evaluating(#[from] Error),
+}
+
 impl Motion {
+    /// The keys as a file of that format takes them, and whether it takes each channel's from the clip itself
+    /// ([`Sampled::of_own_keys`](crate::motion::Sampled::of_own_keys)): at times of their own, where channels
+    /// differ or `is_kept`, the input's own file with other keys.
+    ///
+    /// # Errors
+    /// When the format has no room for channels at times of their own.
+    pub fn keys_for(&self, format: &Format, is_kept: bool) -> Result<(Samples, bool), KeysError> {
+        let has_own_keys = format.holds(Feature::OwnTimes);
+        match keyed(self) {
+            Ok(samples) if !(is_kept && has_own_keys) => Ok((samples, false)),
+            Err(error) if !has_own_keys || self.is_world => Err(error.into()),
+            _ => Ok((self.ends(&Engine::new(Device::Cpu)?)?, true)),
+        }
+    }
+
     /// The times of all keys of all channels, in order, each once.
     #[must_use]
     pub fn key_times(&self) -> Vec<f64> {
@@ -31,7 +61,14 @@ impl Motion {
     /// As [`Engine::evaluate`].
     pub fn sampled(&self, engine: &Engine, frames: &Frames) -> Result<Self, Error> {
         let methods = ChannelMethods::AUTHORED;
-        let samples = methods.sample(engine, self, frames)?;
+        Ok(self.with_keys(&methods.sample(engine, self, frames)?)?)
+    }
+
+    /// The clip with some samples as keys, as [`sampled`](Self::sampled) has them.
+    ///
+    /// # Errors
+    /// When a sample is no key.
+    pub fn with_keys(&self, samples: &Samples) -> Result<Self, TrackError> {
         let tracks = self.set.track_count();
         let mut set = TrackSet::new();
         for track in 0..tracks {

@@ -4,7 +4,7 @@
 use glam::{Quat, Vec3};
 
 use crate::diagnostic::{Code, Diagnostic};
-use crate::format::{Format, MotionOptions};
+use crate::format::{Document, Format, MotionOptions};
 use crate::motion::{Sampled, Sampler};
 use crate::names::distinct_names;
 use crate::tum;
@@ -184,4 +184,30 @@ fn no_room(format: &Format, clips: &[Sampled<'_>], options: &MotionOptions) -> O
     let name = format.name.to_uppercase();
     let message = format!("{name} has no room for it, left out: {all}");
     Some(Diagnostic::new(&options.name, Code::NoRoom, message))
+}
+
+/// Says what a file holds that none of its clips holds, and that a file made of clips therefore lacks: meshes,
+/// cameras, channels of weights. `warnings` were given when it was read: arrays that they name are not named
+/// again. `why` says what makes a new file where the format is the input's own ("some tracks make").
+#[must_use]
+pub fn stays_behind(
+    document: &dyn Document,
+    warnings: &[Diagnostic],
+    format: &Format,
+    why: Option<&str>,
+) -> Option<String> {
+    let is_kept = document.writes(format);
+    let are_named = |warning: &Diagnostic| warning.code == Code::ArraysNotRead;
+    if !is_kept && warnings.iter().any(are_named) || is_kept && why.is_none() {
+        return None;
+    }
+    let beside = document.beside();
+    if beside.is_empty() {
+        return None;
+    }
+    let all = beside.join(", ");
+    Some(match why.filter(|_| is_kept) {
+        Some(why) => format!("{why} a new file; stays behind: {all}"),
+        None => format!("{} has no room for it, left out: {all}", format.name),
+    })
 }

@@ -115,10 +115,11 @@ pub fn read_kitti(
         return Err(Diagnostic::new(name, Code::NoRate, message));
     }
     let mut poses = Poses::default();
+    let mut columns = None;
     while let Some(line) = lines.next()? {
         let text = line.split('#').next().unwrap_or_default().replace(',', " ");
         if !text.trim().is_empty() {
-            let [a, b, c] = read_rows(&lines, &text)?;
+            let [a, b, c] = read_rows(&mut lines, &text, &mut columns)?;
             let rotation = of_matrix([a, b, c].map(|[x, y, z, _]| [x, y, z]));
             let Some(rotation) = rotation else {
                 let message = "the first three columns of the matrix are no rotation".to_owned();
@@ -163,20 +164,57 @@ pub fn read_kitti(
     }
 }
 
-fn read_rows<R: BufRead>(lines: &Lines<R>, line: &str) -> Result<[[f64; 4]; 3], Diagnostic> {
-    let mut rows = [[0.0; 4]; 3];
+/// The numbers of a line: the rows of a matrix.
+const NUMBERS: usize = 12;
+
+/// The fourth row of a matrix, which says nothing.
+const FOURTH_ROW: [f64; 4] = [0.0, 0.0, 0.0, 1.0];
+
+/// Reads a line. `columns`: how many numbers the lines before it had.
+fn read_rows<R: BufRead>(
+    lines: &mut Lines<R>,
+    line: &str,
+    columns: &mut Option<usize>,
+) -> Result<[[f64; 4]; 3], Diagnostic> {
     let found = tokens(line).count();
-    if found != 12 {
-        let column = tokens(line)
-            .nth(12)
-            .map_or(line.trim_end().len() as u64 + 1, |(at, _)| at);
-        let message = format!("{found} numbers where 12 are expected: three rows of a matrix");
+    let expected = columns.unwrap_or(found.max(NUMBERS));
+    if found != expected {
+        let at = |place: usize| tokens(line).nth(place).map(|(at, _)| at);
+        let column = at(expected).unwrap_or(line.trim_end().len() as u64 + 1);
+        let behind = match expected {
+            NUMBERS => "",
+            _ => ", and those behind the first pose",
+        };
+        let message = format!(
+            "{found} numbers where {expected} are expected: three rows of a matrix{behind}"
+        );
         return Err(lines.refuse(column, Code::KittiPose, message));
     }
-    for (number, (column, token)) in rows.as_flattened_mut().iter_mut().zip(tokens(line)) {
-        let read = number::parse(token);
-        let read = read.map_err(|(code, message)| lines.refuse(column, code, message))?;
-        *number = read.value;
+    let mut rows = [[0.0; 4]; 3];
+    let mut behind = Vec::new();
+    for (place, (column, token)) in tokens(line).enumerate() {
+        // What is left out may be anything, unless it may be a fourth row.
+        let read = match number::parse(token) {
+            Ok(read) => read.value,
+            Err(_) if place >= NUMBERS => f64::NAN,
+            Err((code, message)) => return Err(lines.refuse(column, code, message)),
+        };
+        match rows.as_flattened_mut().get_mut(place) {
+            Some(number) => *number = read,
+            None => behind.push(read),
+        }
+    }
+    if columns.is_none() {
+        *columns = Some(found);
+    }
+    let is_told = lines
+        .warnings
+        .iter()
+        .any(|own| own.code == Code::FurtherNumbers);
+    if !is_told && !behind.is_empty() && behind != FOURTH_ROW {
+        let column = tokens(line).nth(NUMBERS).map_or(1, |(at, _)| at);
+        let message = format!("{} numbers behind each pose are left out", behind.len());
+        lines.warn(column, Code::FurtherNumbers, message);
     }
     Ok(rows)
 }
@@ -288,9 +326,59 @@ mod tests {
         };
         assert_eq!(refused(text, &ReadOptions::default()), Code::NoRate);
         assert_eq!(refused("1 0 0 0\n", &options), Code::KittiPose);
+        assert_eq!(
+            refused(
+                "1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 0 0 1 0 0 0 0 1 0 0\n",
+                &options
+            ),
+            Code::KittiPose
+        );
+        // A frame's number before the matrix, as KITTI-360 has it: what is left of it is no rotation.
+        assert_eq!(
+            refused("7 1 0 0 1.5 0 1 0 -2 0 0 1 3\n", &options),
+            Code::NoRotation
+        );
         let mirrored = "1 0 0 0 0 1 0 0 0 0 -1 0\n";
         assert_eq!(refused(mirrored, &options), Code::NoRotation);
         assert_eq!(refused("\n", &options), Code::TumEmpty);
+    }
+
+    /// A fourth row says nothing; what else is behind the matrix is left out with a warning, once.
+    #[test]
+    fn numbers_behind_a_matrix_are_a_fourth_row_or_named() {
+        let options = ReadOptions {
+            source_rate: tumble::FrameRate::new(10, 1).ok(),
+            ..ReadOptions::default()
+        };
+        let read = |behind: &str| {
+            let text =
+                format!("1 0 0 1.5 0 1 0 -2 0 0 1 3{behind}\n0 -1 0 2 1 0 0 0 0 0 1 0{behind}\n");
+            read_kitti("k.txt", text.as_bytes(), &options).unwrap()
+        };
+        let plain = read("");
+        assert_eq!(plain.warnings, []);
+        for (behind, warned) in [
+            (" 0 0 0 1", None),
+            (" 0 0 0 1.0", None),
+            (" 0.25 ok", Some("2 numbers")),
+        ] {
+            let found = read(behind);
+            assert_eq!(
+                found.clips[0].set.track(0).keys,
+                plain.clips[0].set.track(0).keys
+            );
+            let messages: Vec<_> = found
+                .warnings
+                .iter()
+                .map(|own| (own.code, &*own.message))
+                .collect();
+            let expected = warned.map(|count| format!("{count} behind each pose are left out"));
+            let expected: Vec<_> = expected
+                .iter()
+                .map(|own| (Code::FurtherNumbers, &**own))
+                .collect();
+            assert_eq!(messages, expected, "{behind}");
+        }
     }
 
     fn write(

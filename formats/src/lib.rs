@@ -16,7 +16,7 @@ pub mod compare;
 pub mod csv;
 pub mod dat;
 mod decimal;
-mod dense;
+pub mod dense;
 pub mod diagnostic;
 pub mod euroc;
 #[cfg(feature = "fbx")]
@@ -53,6 +53,7 @@ mod rotation_matrix;
 pub mod sample;
 mod select;
 pub mod signs;
+pub mod smooth;
 mod source;
 mod table;
 mod text;
