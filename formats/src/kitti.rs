@@ -179,7 +179,7 @@ fn read_rows<R: BufRead>(
     let found = tokens(line).count();
     let expected = columns.unwrap_or(found.max(NUMBERS));
     if found != expected {
-        let at = |place: usize| tokens(line).nth(place).map(|(at, _)| at);
+        let at = |index: usize| tokens(line).nth(index).map(|(at, _)| at);
         let column = at(expected).unwrap_or(line.trim_end().len() as u64 + 1);
         let behind = match expected {
             NUMBERS => "",
@@ -192,14 +192,14 @@ fn read_rows<R: BufRead>(
     }
     let mut rows = [[0.0; 4]; 3];
     let mut behind = Vec::new();
-    for (place, (column, token)) in tokens(line).enumerate() {
+    for (index, (column, token)) in tokens(line).enumerate() {
         // What is left out may be anything, unless it may be a fourth row.
         let read = match number::parse(token) {
             Ok(read) => read.value,
-            Err(_) if place >= NUMBERS => f64::NAN,
+            Err(_) if index >= NUMBERS => f64::NAN,
             Err((code, message)) => return Err(lines.refuse(column, code, message)),
         };
-        match rows.as_flattened_mut().get_mut(place) {
+        match rows.as_flattened_mut().get_mut(index) {
             Some(number) => *number = read,
             None => behind.push(read),
         }
@@ -207,11 +207,11 @@ fn read_rows<R: BufRead>(
     if columns.is_none() {
         *columns = Some(found);
     }
-    let is_told = lines
+    let is_known = lines
         .warnings
         .iter()
-        .any(|own| own.code == Code::FurtherNumbers);
-    if !is_told && !behind.is_empty() && behind != FOURTH_ROW {
+        .any(|warning| warning.code == Code::FurtherNumbers);
+    if !is_known && !behind.is_empty() && behind != FOURTH_ROW {
         let column = tokens(line).nth(NUMBERS).map_or(1, |(at, _)| at);
         let message = format!("{} numbers behind each pose are left out", behind.len());
         lines.warn(column, Code::FurtherNumbers, message);
@@ -370,12 +370,12 @@ mod tests {
             let messages: Vec<_> = found
                 .warnings
                 .iter()
-                .map(|own| (own.code, &*own.message))
+                .map(|warning| (warning.code, &*warning.message))
                 .collect();
             let expected = warned.map(|count| format!("{count} behind each pose are left out"));
             let expected: Vec<_> = expected
                 .iter()
-                .map(|own| (Code::FurtherNumbers, &**own))
+                .map(|message| (Code::FurtherNumbers, &**message))
                 .collect();
             assert_eq!(messages, expected, "{behind}");
         }

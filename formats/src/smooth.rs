@@ -117,14 +117,15 @@ impl SmoothJob {
     pub fn clip(&self, clip: &Motion, smoothed: &Smoothed) -> Result<Motion, TrackError> {
         let tracks = clip.set.track_count();
         let mut keys = smoothed.after.clone();
-        for (track, own) in clip.channels.iter().enumerate() {
-            let places = || (track..smoothed.before.rotations.len()).step_by(tracks);
-            if own.rotation == Some(Sampler::Step) {
-                places().for_each(|place| keys.rotations[place] = smoothed.before.rotations[place]);
+        for (track, channels) in clip.channels.iter().enumerate() {
+            let indices = || (track..smoothed.before.rotations.len()).step_by(tracks);
+            if channels.rotation == Some(Sampler::Step) {
+                indices()
+                    .for_each(|index| keys.rotations[index] = smoothed.before.rotations[index]);
             }
-            if own.translation == Some(Sampler::Step) && !keys.translations.is_empty() {
-                places().for_each(|place| {
-                    keys.translations[place] = smoothed.before.translations[place];
+            if channels.translation == Some(Sampler::Step) && !keys.translations.is_empty() {
+                indices().for_each(|index| {
+                    keys.translations[index] = smoothed.before.translations[index];
                 });
             }
         }
@@ -139,7 +140,7 @@ impl SmoothJob {
 fn even_times(clip: &Motion) -> Option<Vec<f64>> {
     let longest = clip.set.tracks().max_by_key(|track| track.times.len())?;
     let times = longest.times;
-    let fits = |own: &[f64]| own == times || own.len() == 1;
+    let fits = |list: &[f64]| list == times || list.len() == 1;
     let channels = [Channel::Translation, Channel::Scale];
     let vectors = (0..clip.set.track_count())
         .flat_map(|track| channels.map(|channel| clip.set.vector_keys(channel, track)));

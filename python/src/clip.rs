@@ -70,10 +70,10 @@ pub(crate) struct Source {
 impl Clip {
     /// The clip with other keys; what its file holds beside these stays known.
     pub(crate) fn with_keys(&self, motion: Motion) -> Self {
-        let source = self.source.as_ref().map(|own| {
+        let source = self.source.as_ref().map(|source| {
             Arc::new(Source {
                 is_changed: true,
-                ..(**own).clone()
+                ..(**source).clone()
             })
         });
         Self {

@@ -468,7 +468,7 @@ impl Engine {
         if let Ok(clip) = samples.cast::<Clip>() {
             if out.is_some() || form != (Layout::TrackMajor, Order::Xyzw) {
                 return Err(input(
-                    "what is made of a clip is a clip; leave out `layout`, `order` and `out`",
+                    "a smoothed clip is a clip; leave out `layout`, `order` and `out`",
                 ));
             }
             let clip = samples::smooth_clip(self, clip, &options)?;

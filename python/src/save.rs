@@ -279,14 +279,14 @@ impl Save {
     /// The file that all clips come from, if it can be written again.
     fn document(&self) -> Option<Arc<dyn Document>> {
         let document = |clip: &Clip| {
-            let source = clip.source.as_ref().filter(|own| !own.is_adjusted)?;
+            let source = clip.source.as_ref().filter(|source| !source.is_adjusted)?;
             source.document.clone()
         };
         let first = document(self.clips.first()?)?;
-        let mut places = HashSet::new();
+        let mut clips = HashSet::new();
         let is_one = self.clips.iter().all(|clip| {
-            let own = document(clip).is_some_and(|own| Arc::ptr_eq(&own, &first));
-            own && places.insert(clip.motion.place)
+            let is_same = document(clip).is_some_and(|other| Arc::ptr_eq(&other, &first));
+            is_same && clips.insert(clip.motion.place)
         });
         (is_one && first.writes(self.format)).then_some(first)
     }
@@ -297,7 +297,7 @@ impl Save {
         for source in self.clips.iter().filter_map(|clip| clip.source.as_ref()) {
             let document = source.document.as_ref();
             let is_new =
-                |own: &&Arc<dyn Document>| !sources.iter().any(|(it, _)| Arc::ptr_eq(it, own));
+                |new: &&Arc<dyn Document>| !sources.iter().any(|(it, _)| Arc::ptr_eq(it, new));
             if let Some(document) = document.filter(is_new) {
                 sources.push((document, source));
             }
@@ -358,8 +358,8 @@ impl Save {
         });
         let written = match document {
             Some(document) => {
-                let places = self.clips.iter().map(|clip| clip.motion.place);
-                let clips: Vec<(usize, Sampled<'_>)> = places.zip(sampled).collect();
+                let indices = self.clips.iter().map(|clip| clip.motion.place);
+                let clips: Vec<(usize, Sampled<'_>)> = indices.zip(sampled).collect();
                 document.write(&clips, &self.motion, &self.path, out)
             }
             None => {

@@ -279,7 +279,7 @@ def scene(path):
     views = [(0, 8), (8, 32), (40, 8), (48, 36)]
     kinds = [("SCALAR", 2), ("VEC4", 2), ("SCALAR", 2), ("VEC3", 3)]
     pointer = {"KHR_animation_pointer": {"pointer": "/cameras/0/perspective/yfov"}}
-    turn = {"sampler": 0, "target": {"node": 0, "path": "rotation"}}
+    turning = {"sampler": 0, "target": {"node": 0, "path": "rotation"}}
     others = [
         {"sampler": 1, "target": {"node": 0, "path": "weights"}},
         {"sampler": 1, "target": {"path": "pointer", "extensions": pointer}},
@@ -299,8 +299,8 @@ def scene(path):
         "meshes": [{"primitives": [part], "weights": [0]}],
         "nodes": [{"name": "head", "mesh": 0, "camera": 0}],
         "animations": [
-            {"name": "Nod", "channels": [turn, *others], "samplers": samplers},
-            {"name": "Turn", "channels": [turn], "samplers": samplers},
+            {"name": "Nod", "channels": [turning, *others], "samplers": samplers},
+            {"name": "Turn", "channels": [turning], "samplers": samplers},
         ],
     }))
 
@@ -317,7 +317,7 @@ def test_what_a_file_holds_beside_its_clips_is_named_where_it_is_left_out(tmp_pa
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
             tumble.save(tmp_path / name, clips, **options)
-        return [(own.message.code, own.message.file, str(own.message)) for own in caught]
+        return [(it.message.code, it.message.file, str(it.message)) for it in caught]
 
     for options in [{}, {"fps": 30}]:
         found = said("nod.bvh", file["Nod"], **options)
@@ -325,8 +325,8 @@ def test_what_a_file_holds_beside_its_clips_is_named_where_it_is_left_out(tmp_pa
         assert len(ours) == 1, found
         assert ours[0].endswith(f"warning[W208]: bvh has no room for it, left out: {BESIDE}")
     # The program says it in the same words.
-    told = program("convert", path, "--animation", "Nod", "-o", tmp_path / "told.bvh").stderr
-    assert f"bvh has no room for it, left out: {BESIDE}" in told
+    printed = program("convert", path, "--animation", "Nod", "-o", tmp_path / "printed.bvh").stderr
+    assert f"bvh has no room for it, left out: {BESIDE}" in printed
     # A file of the same format keeps all, or is a new one.
     assert said("all.glb", file) == [] and said("baked.glb", file["Nod"], fps=30) == []
     assert len(tumble.load(tmp_path / "baked.glb")) == 2

@@ -183,7 +183,7 @@ def test_a_clip_is_smoothed_with_all_that_it_has(rng, engine, tmp_path):
         engine.smooth(uneven)
     assert len(engine.smooth(uneven, fps=10).keys(0)) == 31
     for options in [{"layout": "frame"}, {"order": "wxyz"}, {"out": np.empty((3, 60, 4), "f4")}]:
-        with pytest.raises(tumble.InputError, match="a clip is a clip"):
+        with pytest.raises(tumble.InputError, match="a smoothed clip is a clip"):
             engine.smooth(clip, **options)
     with pytest.raises(tumble.InputError, match="low_pass"):
         engine.smooth(clip, low_pass=40)

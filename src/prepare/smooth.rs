@@ -5,15 +5,16 @@ use std::ops::Range;
 
 use bytemuck::Zeroable as _;
 
-use crate::curve::options::{Ends, Quantity, Speed};
+use crate::curve::options::{Axes, Ends, Quantity, Speed};
 use crate::fit::constant_velocity::arc_polynomial;
 use crate::fit::double::curve::Curve;
 use crate::fit::double::handles::FramesHeld;
-use crate::fit::double::intervals::{Intervals, LANES, Stretch, put};
+use crate::fit::double::intervals::{Intervals, LANES, Stretch, at, put};
+use crate::fit::motion::derivatives::clamped;
 use crate::math::canonical::round_quat;
-use crate::math::quaternion::Vector;
+use crate::math::quaternion::{Vector, rotated};
 use crate::method::interpolation::Interpolation;
-use crate::method::{Given, Smooth};
+use crate::method::{Curves, Given, Smooth};
 use crate::prepare::constant_speed::{Waiting, retime};
 use crate::prepare::direct::Direct;
 use crate::prepare::fitting::Fitting;
@@ -274,8 +275,10 @@ impl SmoothPreparation {
             in_lanes(&mut frames);
             holds_frame = frames.held;
         }
+        let arc_axes = self.axes_of_arc_velocities();
+        let is_closed = is_steady || arc_axes.is_some();
         let is_fitted =
-            |own: &Self, lane| holds_frame[lane] && !is_steady && !own.holds(stretch, lane);
+            |own: &Self, lane| holds_frame[lane] && !is_closed && !own.holds(stretch, lane);
         let Range {
             start: mut lane,
             end,
@@ -295,6 +298,9 @@ impl SmoothPreparation {
                     _ => prepared.constant(STILL),
                 };
                 prepared.push_span(start, Source::Constant(constant), NONE);
+            } else if let Some(axes) = arc_axes {
+                let constant = prepared.constant(self.arc_velocity(lane, axes));
+                prepared.push_span(start, Source::Constant(constant), NONE);
             } else {
                 let keys = [self.intervals.from[lane], self.intervals.to[lane]];
                 prepared.push_segment(start, arc_polynomial(keys), stretch.key_at(i));
@@ -307,6 +313,29 @@ impl SmoothPreparation {
             spans.start = first_span;
         }
         spans.end = end;
+    }
+
+    /// The axes of the angular velocities that are asked for, where curves are arcs: they are the same all along
+    /// an arc, and nothing is fitted.
+    fn axes_of_arc_velocities(&self) -> Option<Axes> {
+        match (
+            self.interpolation.method.curves,
+            self.interpolation.quantity,
+        ) {
+            (Curves::Arcs(_), Quantity::Velocity(axes)) => Some(axes),
+            _ => None,
+        }
+    }
+
+    /// The angular velocity of the arc in a lane.
+    fn arc_velocity(&self, lane: usize, axes: Axes) -> [f32; 4] {
+        let rate = 2.0 * self.intervals.rate(lane);
+        let body = at(&self.intervals.logs, lane).map(|half| clamped(rate * half));
+        let [x, y, z] = match axes {
+            Axes::Body => body,
+            Axes::Parent => rotated(self.intervals.key(lane), body),
+        };
+        round_quat([x, y, z, 0.0])
     }
 
     /// Takes the curves in some lanes to be fitted: they become the next spans. `key` is the

@@ -76,7 +76,7 @@ pub(crate) struct FitBlock {
     pub(crate) middles: Lane64,
     pub(crate) widths: Lane64,
     /// The change of the parameter per second.
-    rates: Lane64,
+    pub(crate) rates: Lane64,
     /// The arc lengths of curves traversed at constant speed; either every curve of a block has
     /// them or none.
     paces: Vec<Arc<Pace>>,
@@ -231,6 +231,7 @@ impl FitBlock {
         match self.quantity {
             _ if self.count == 0 => {}
             Quantity::Rotation if self.paces.is_empty() => (self.shape.fit)(self, segments),
+            _ if self.paces.is_empty() => (self.shape.fit_rates)(self, segments),
             _ => shape::fit::<Motion>(self, segments),
         }
         segments.pop();

@@ -10,6 +10,7 @@ use crate::fit::double::expansion::Expansion;
 use crate::fit::double::fit::{FitBlock, MOST, Samples, Tier};
 use crate::fit::double::handles::redo;
 use crate::fit::double::intervals::{load, put, rounded, store};
+use crate::fit::motion::derivatives::{Motion, MotionOf};
 use crate::fit::nodes::{FULL_NODES, Nodes, SMALL_ANGLE_NODES};
 use crate::math::dual::{Dual, Near};
 use crate::math::quaternion::{Quaternion, Real};
@@ -33,6 +34,8 @@ pub(crate) struct Shape {
     pub(crate) moving: fn(&Numbers, Dual) -> [Dual; 4],
     /// See [`Sampling::fit`].
     pub(crate) fit: fn(&mut FitBlock, &mut [PolynomialSegment]),
+    /// The same, of velocities and accelerations.
+    pub(crate) fit_rates: fn(&mut FitBlock, &mut [PolynomialSegment]),
 }
 
 impl Shape {
@@ -45,6 +48,7 @@ impl Shape {
             rotation: F::rotation::<f64>,
             moving: F::rotation::<Dual>,
             fit: fit::<Directly<F>>,
+            fit_rates: fit::<Motion>,
         }
     }
 
@@ -63,12 +67,14 @@ impl Shape {
         shared: Product::WITH_BERNSTEIN,
         entire: true,
         fit: fit::<Expansion<false>>,
+        fit_rates: fit::<MotionOf<Product>>,
         ..Self::of::<Product>(NUMBERS)
     };
     /// [`Product`] with basis functions of each curve's own.
     pub(crate) const PRODUCT: &'static Self = &Self {
         entire: true,
         fit: fit::<Expansion<true>>,
+        fit_rates: fit::<MotionOf<Product>>,
         ..Self::of::<Product>(NUMBERS)
     };
     pub(crate) const DE_CASTELJAU: &'static Self = &Self::of::<DeCasteljau>(16);
@@ -79,7 +85,10 @@ impl Shape {
         is_unit: false,
         ..Self::of::<Line>(8)
     };
-    pub(crate) const ROTATION_VECTOR: &'static Self = &Self::of::<RotationVector>(13);
+    pub(crate) const ROTATION_VECTOR: &'static Self = &Self {
+        fit_rates: fit::<MotionOf<RotationVector>>,
+        ..Self::of::<RotationVector>(13)
+    };
 }
 
 /// A way to sample the curves of a block.
