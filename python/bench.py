@@ -81,11 +81,17 @@ def few(rng: np.random.Generator) -> None:
         "rotations, looped": lambda: engine.evaluate(clip, at=at, method="slerp", after="loop"),
         "poses": lambda: engine.poses(clip, at=at, method="slerp"),
         "velocities": lambda: engine.velocity(clip, at=at, method="slerp"),
+        "accelerations": lambda: engine.acceleration(clip, at=at, method="slerp"),
+        "rotations, smooth": lambda: engine.evaluate(clip, at=at, method="bessel-overhauser"),
         "velocities, smooth": lambda: engine.velocity(clip, at=at, method="bessel-overhauser"),
     }
-    print(f"64 times of {tracks} tracks x {count} keys")
+    print(f"64 times of {tracks} tracks x {count} keys; velocities are to take 3 x as long as rotations at the most")
+    rotations = 0.0
     for name, work in works.items():
-        print(f"  {name:26s}  {1e3 * shortest(work, 5):9.2f} ms")
+        seconds = shortest(work, 20)
+        if name.startswith("rotations") and "looped" not in name and "frame" not in name:
+            rotations = seconds
+        print(f"  {name:26s}  {1e3 * seconds:9.2f} ms   {seconds / rotations:5.1f} x rotations")
 
 
 def motions(rng: np.random.Generator) -> None:

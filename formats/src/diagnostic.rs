@@ -236,7 +236,7 @@ codes! {
     TumTime = "E502", "a time out of range", "Times are seconds, up to 1e14 before or after 0.";
     TumEmpty = "E503", "no poses", "All lines are blank or comments.";
     TumWrite = "E504", "not to be written as a trajectory", "A trajectory is one clip of one track, at times that the format tells apart. KITTI has no times: poses that are not frames of a rate need a file of them, `--times-out`, in Python `times_out`.";
-    KittiPose = "E505", "not a pose", "A line has twelve numbers: the three rows of a matrix, a rotation and a translation.";
+    KittiPose = "E505", "not a pose", "A line has twelve numbers: the three rows of a matrix, a rotation and a translation. A fourth row `0 0 0 1` is read too. A number of the frame before them, as KITTI-360 has it, is not: remove it and give the times of the frames by `--source-times`, in Python `source_times`.";
     FrameTimes = "E507", "not a time for each pose", "A file of times has the seconds of each pose, a number a line, in the order of the poses.";
     NoRotation = "E506", "a matrix that is not a rotation", "The rows of a rotation have length 1, stand at right angles, and do not mirror.";
     // E6xx: paths.
@@ -285,6 +285,7 @@ codes! {
     StaysWhole = "W111", "channels that are not cut", "Channels of weights and other properties are kept as they are: the animation stays as long as they are.";
     BvhMoreRows = "W201", "more rows than frames", "The rows after the last frame are left out.";
     BvhNoFrames = "W202", "no frames", "The skeleton rests.";
+    EndSiteRounded = "W203", "an End Site that f32 rounds", "End Sites mark where a last bone ends, relative to its joint, and are kept in f32: about 7 digits. Offsets of joints and positions keep all of theirs.";
     StartMoved = "W204", "the start is moved to 0", "BVH has no start time: its first frame is at 0. glTF keeps times in f32, which cannot tell frames apart in seconds since 1970: they count from the first whole second.";
     SameName = "W206", "two joints of one name", "The second one gets its number after its name, so that names are unique; braces and control characters in names become `_`.";
     NameChanged = "W207", "a name is changed", "The format has no line ends, braces or control characters in names, and no name twice.";
@@ -297,7 +298,7 @@ codes! {
     ArraysNotRead = "W306", "arrays that are not read", "They are no part of a motion as far as their names tell; `--map` says what arrays are. The shape of a body (`betas`, `gender`) is used where `--body-model` brings its model. A result in the file's own layout keeps what is the same in all frames.";
     Bridged = "W401", "keys that are missing", "Cells are blank or NaN, and `--bridge-gaps` asks for the track to be interpolated from its other keys there.";
     ColumnsLeftOut = "W402", "columns that are left out", "Their names are none of those that keys have, or a list has more numbers than `--map` takes. `--map` gives columns the names of keys.";
-    FurtherNumbers = "W501", "further numbers after a pose", "A line of a trajectory is a time, a position and a quaternion; what follows, such as a covariance or velocities, is not read.";
+    FurtherNumbers = "W501", "further numbers after a pose", "A line of a trajectory is a time, a position and a quaternion, of KITTI the twelve numbers of a matrix; what follows, such as a covariance or velocities, is not read.";
     FbxBeside = "W701", "what is not motion", "Meshes, skins, materials and the like are not read from FBX; nodes, and what moves them, are.";
     FbxProperties = "W702", "curves of other properties", "They move something other than a transform, such as blend shapes, visibility or a lens.";
     FbxOutside = "W703", "keys outside the take", "An animation stack says when it begins and ends. Curves have keys before or after, which a player does not show.";

@@ -1,8 +1,10 @@
 //! The keys of a clip as samples: for formats that hold all joints at the same times.
 
 use glam::{Quat, Vec3};
-use tumble::Channel;
+use tumble::{Channel, Device, Engine, Error};
 
+use crate::feature::Feature;
+use crate::format::Format;
 use crate::motion::{ChannelInterpolation, Motion};
 use crate::sample::Samples;
 use crate::signs::continue_signs;
@@ -33,6 +35,37 @@ pub enum KeyedError {
         /// Its name.
         name: String,
     },
+}
+
+/// Why the keys of a clip cannot be written.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum KeysError {
+    /// The format holds all channels at the same times.
+    #[error(transparent)]
+    Keyed(#[from] KeyedError),
+    /// The first and the last sample could not be evaluated.
+    #[error(transparent)]
+    Evaluating(#[from] Error),
+}
+
+/// The keys of a clip as a file of that format takes them, and whether it takes each channel's from the clip itself
+/// ([`SampledClip::is_at_keys`](crate::motion::SampledClip::is_at_keys)): at its own times, where channels
+/// differ or `is_kept`, the input's own file with other keys.
+///
+/// # Errors
+/// When the format has no room for channels that have their own times.
+pub fn keys_for(
+    clip: &Motion,
+    format: &Format,
+    is_kept: bool,
+) -> Result<(Samples, bool), KeysError> {
+    let keys_per_channel = format.supports(Feature::TimesPerChannel);
+    match keyed(clip) {
+        Ok(samples) if !(is_kept && keys_per_channel) => Ok((samples, false)),
+        Err(error) if !keys_per_channel || clip.is_world => Err(error.into()),
+        _ => Ok((clip.ends(&Engine::new(Device::Cpu)?)?, true)),
+    }
 }
 
 /// The keys of all tracks at their common times, with signs that continue. Channels with one key, and

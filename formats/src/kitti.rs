@@ -108,10 +108,11 @@ pub fn read_kitti(
         return Err(Diagnostic::new(name, Code::NoRate, message));
     }
     let mut poses = TrajectoryPoses::default();
+    let mut columns = None;
     while let Some(line) = lines.next()? {
         let text = line.split('#').next().unwrap_or_default().replace(',', " ");
         if !text.trim().is_empty() {
-            let [a, b, c] = read_rows(&lines, &text)?;
+            let [a, b, c] = read_rows(&mut lines, &text, &mut columns)?;
             let rotation = of_matrix([a, b, c].map(|[x, y, z, _]| [x, y, z]));
             let Some(rotation) = rotation else {
                 let message = "the first three columns of the matrix are not a rotation".to_owned();
@@ -156,20 +157,56 @@ pub fn read_kitti(
     }
 }
 
-fn read_rows<R: BufRead>(lines: &Lines<R>, line: &str) -> Result<[[f64; 4]; 3], Diagnostic> {
-    let mut rows = [[0.0; 4]; 3];
+/// The numbers of a line: the rows of a matrix.
+const NUMBERS: usize = 12;
+
+/// The fourth row of a matrix, which says nothing.
+const FOURTH_ROW: [f64; 4] = [0.0, 0.0, 0.0, 1.0];
+
+/// Reads a line. `columns`: how many numbers the lines before it had.
+fn read_rows<R: BufRead>(
+    lines: &mut Lines<R>,
+    line: &str,
+    columns: &mut Option<usize>,
+) -> Result<[[f64; 4]; 3], Diagnostic> {
     let found = tokens(line).count();
-    if found != 12 {
-        let column = tokens(line)
-            .nth(12)
-            .map_or(line.trim_end().len() as u64 + 1, |(at, _)| at);
-        let message = format!("{found} numbers where 12 are expected: three rows of a matrix");
+    let expected = columns.unwrap_or(found.max(NUMBERS));
+    if found != expected {
+        let at = |index: usize| tokens(line).nth(index).map(|(at, _)| at);
+        let column = at(expected).unwrap_or(line.trim_end().len() as u64 + 1);
+        let after = match expected {
+            NUMBERS => "",
+            _ => ", and those after the first pose",
+        };
+        let message =
+            format!("{found} numbers where {expected} are expected: three rows of a matrix{after}");
         return Err(lines.refuse(column, Code::KittiPose, message));
     }
-    for (number, (column, token)) in rows.as_flattened_mut().iter_mut().zip(tokens(line)) {
-        let read = number::parse(token);
-        let read = read.map_err(|(code, message)| lines.refuse(column, code, message))?;
-        *number = read.value;
+    let mut rows = [[0.0; 4]; 3];
+    let mut after = Vec::new();
+    for (index, (column, token)) in tokens(line).enumerate() {
+        // What is left out may be anything, unless it may be a fourth row.
+        let read = match number::parse(token) {
+            Ok(read) => read.value,
+            Err(_) if index >= NUMBERS => f64::NAN,
+            Err((code, message)) => return Err(lines.refuse(column, code, message)),
+        };
+        match rows.as_flattened_mut().get_mut(index) {
+            Some(number) => *number = read,
+            None => after.push(read),
+        }
+    }
+    if columns.is_none() {
+        *columns = Some(found);
+    }
+    let is_known = lines
+        .warnings
+        .iter()
+        .any(|warning| warning.code == Code::FurtherNumbers);
+    if !is_known && !after.is_empty() && after != FOURTH_ROW {
+        let column = tokens(line).nth(NUMBERS).map_or(1, |(at, _)| at);
+        let message = format!("{} numbers after each pose are left out", after.len());
+        lines.warn(column, Code::FurtherNumbers, message);
     }
     Ok(rows)
 }
@@ -281,9 +318,59 @@ mod tests {
         };
         assert_eq!(refused(text, &ReadOptions::default()), Code::NoRate);
         assert_eq!(refused("1 0 0 0\n", &options), Code::KittiPose);
+        assert_eq!(
+            refused(
+                "1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 0 0 1 0 0 0 0 1 0 0\n",
+                &options
+            ),
+            Code::KittiPose
+        );
+        // A frame's number before the matrix, as KITTI-360 has it: what is left of it is no rotation.
+        assert_eq!(
+            refused("7 1 0 0 1.5 0 1 0 -2 0 0 1 3\n", &options),
+            Code::NoRotation
+        );
         let mirrored = "1 0 0 0 0 1 0 0 0 0 -1 0\n";
         assert_eq!(refused(mirrored, &options), Code::NoRotation);
         assert_eq!(refused("\n", &options), Code::TumEmpty);
+    }
+
+    /// A fourth row says nothing; what else is after the matrix is left out with a warning, once.
+    #[test]
+    fn numbers_after_a_matrix_are_a_fourth_row_or_named() {
+        let options = ReadOptions {
+            source_rate: tumble::FrameRate::new(10, 1).ok(),
+            ..ReadOptions::default()
+        };
+        let read = |after: &str| {
+            let text =
+                format!("1 0 0 1.5 0 1 0 -2 0 0 1 3{after}\n0 -1 0 2 1 0 0 0 0 0 1 0{after}\n");
+            read_kitti("k.txt", text.as_bytes(), &options).unwrap()
+        };
+        let plain = read("");
+        assert_eq!(plain.warnings, []);
+        for (after, warned) in [
+            (" 0 0 0 1", None),
+            (" 0 0 0 1.0", None),
+            (" 0.25 ok", Some("2 numbers")),
+        ] {
+            let found = read(after);
+            assert_eq!(
+                found.clips[0].set.track(0).keys,
+                plain.clips[0].set.track(0).keys
+            );
+            let messages: Vec<_> = found
+                .warnings
+                .iter()
+                .map(|warning| (warning.code, &*warning.message))
+                .collect();
+            let expected = warned.map(|count| format!("{count} after each pose are left out"));
+            let expected: Vec<_> = expected
+                .iter()
+                .map(|message| (Code::FurtherNumbers, &**message))
+                .collect();
+            assert_eq!(messages, expected, "{after}");
+        }
     }
 
     fn write(

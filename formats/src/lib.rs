@@ -62,6 +62,7 @@ pub mod rotation_form;
 mod rotation_matrix;
 pub mod sample;
 pub mod signs;
+pub mod smooth;
 mod source;
 mod table;
 mod text;

@@ -9,7 +9,7 @@ use tumble::{Channel, FrameRate, TrackError, TrackSet};
 
 use crate::bvh::joint::BvhJoint;
 use crate::decimal::Decimal;
-use crate::origin::{coordinate, origin_of, relative};
+use crate::origin::{coordinate, origin_at_rest, relative};
 
 /// One clip of a file.
 ///
@@ -113,8 +113,8 @@ impl Motion {
         self.origins[track] = origin;
     }
 
-    /// Where a track without a parent rests, about an [origin](Self::origins) where it needs one; keys of
-    /// translation have theirs already. Others rest near their parents, and have none but that of their keys.
+    /// Where a track rests, about an [origin](Self::origins) where it needs one; keys of translation have theirs
+    /// already.
     pub(crate) fn resting_at(
         &mut self,
         track: usize,
@@ -122,8 +122,8 @@ impl Motion {
         position: DVec3,
     ) -> Vec3 {
         let moves = self.set.vector_keys(Channel::Translation, track).is_some();
-        if parent.is_none() && !moves {
-            self.set_origin(track, origin_of([position].into_iter()));
+        if !moves {
+            self.set_origin(track, origin_at_rest(parent, position));
         }
         (position - self.origin(track)).as_vec3()
     }

@@ -59,6 +59,15 @@ pub fn origin_of(points: impl Iterator<Item = DVec3>) -> DVec3 {
     DVec3::new(axis(0), axis(1), axis(2))
 }
 
+/// The origin for a track that rests at a position. Most joints rest near their parents: one that hangs on another
+/// has an origin only where f32 alone would lose digits.
+pub(crate) fn origin_at_rest(parent: Option<usize>, position: DVec3) -> DVec3 {
+    match parent {
+        Some(_) if position.as_vec3().as_dvec3() == position => DVec3::ZERO,
+        _ => origin_of([position].into_iter()),
+    }
+}
+
 /// The origin of some points, and the points relative to it.
 #[must_use]
 pub fn relative(points: &[DVec3]) -> (DVec3, Vec<Vec3>) {

@@ -221,3 +221,66 @@ fn a_root_that_rests_on_a_map_comes_back() {
         }
     }
 }
+
+/// Catches a joint that rests far from its parent, as one of a map whose root is its 0: f32 alone would move it by
+/// up to a quarter of a metre.
+#[test]
+fn a_joint_that_rests_far_from_its_parent_comes_back() {
+    let rest = DVec3::new(5_000_000.123, 0.5, -2_000_000.456);
+    let text = format!(
+        "HIERARCHY\nROOT map\n{{\nOFFSET 0 0 0\nCHANNELS 3 Zrotation Xrotation Yrotation\nJOINT near\n{{\n\
+         OFFSET 4096 0 0\nCHANNELS 0\nJOINT remote\n{{\nOFFSET {} {} {}\nCHANNELS 0\n}}\n}}\n}}\n\
+         MOTION\nFrames: 2\nFrame Time: 0.1\n0 0 0\n0 0 90\n",
+        rest.x, rest.y, rest.z
+    );
+    let folder = tempfile::tempdir().unwrap();
+    let read = |name: &str, bytes: &[u8]| {
+        let file = folder.path().join(name);
+        std::fs::write(&file, bytes).unwrap();
+        let loaded = Format::open_detected(&file, &ReadOptions::default()).unwrap();
+        loaded.clips.into_iter().next().unwrap()
+    };
+    let at_rest = |clip: &Motion, track: usize| {
+        clip.origin(track) + clip.skeleton[track].rest.translation.as_dvec3()
+    };
+    let clip = read("a.bvh", text.as_bytes());
+    // What f32 has exactly needs no origin.
+    assert_eq!(clip.origin(1), DVec3::ZERO);
+    let samples = keyed(&clip).unwrap();
+    let poses = world(&clip, &samples).unwrap();
+    let turned = DVec3::new(rest.z, rest.y, -4096.0 - rest.x);
+    let expected = [DVec3::X * 4096.0 + rest, turned];
+    for (pose, expected) in poses.iter().skip(2).step_by(3).zip(expected) {
+        // The rotation is a key in f32: a ten millionth of the distance.
+        let bound = 1e-7
+            * if pose.position == expected {
+                0.0
+            } else {
+                rest.length()
+            };
+        assert!(
+            (pose.position - expected).length() <= bound.max(1e-6),
+            "{}",
+            pose.position
+        );
+    }
+    for format in FORMATS
+        .into_iter()
+        .filter(|format| format.writes_clips() && format.supports(Feature::Skeleton))
+    {
+        let name = format.name;
+        let sampled = [samples.of(&clip, clip.rate, &[])];
+        let options = MotionOptions {
+            format: name.to_owned(),
+            ..MotionOptions::default()
+        };
+        let mut bytes = Vec::new();
+        format.write_clips(&sampled, &options, &mut bytes).unwrap();
+        let again = read(&format!("b.{name}"), &bytes);
+        for clip in [&clip, &again] {
+            let off = (at_rest(clip, 2) - rest).abs().max_element();
+            assert!(off < 1e-6, "{name}: {off}");
+            assert_eq!(at_rest(clip, 1), DVec3::X * 4096.0, "{name}");
+        }
+    }
+}

@@ -10,6 +10,7 @@ use pyo3::exceptions::{PyIndexError, PyKeyError, PyTypeError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString, PyTuple};
 use tumble::Channel;
+use tumble_formats::Diagnostic;
 use tumble_formats::format::Document;
 use tumble_formats::motion::Motion;
 
@@ -51,16 +52,36 @@ pub(crate) struct Clip {
 }
 
 /// The file that a clip was read from.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct Source {
     pub(crate) path: PathBuf,
     pub(crate) document: Option<Arc<dyn Document>>,
     /// How many clips the file has, those that cannot be read too.
     pub(crate) clips: usize,
     pub(crate) box_length: Option<f64>,
+    /// What was said of it when it was read.
+    pub(crate) warnings: Vec<Diagnostic>,
+    /// The clip is in other units or about other axes than the file.
+    pub(crate) is_adjusted: bool,
+    /// The clip has other keys than the file.
+    pub(crate) is_changed: bool,
 }
 
 impl Clip {
+    /// The clip with other keys; what its file holds beside these stays known.
+    pub(crate) fn with_keys(&self, motion: Motion) -> Self {
+        let source = self.source.as_ref().map(|source| {
+            Arc::new(Source {
+                is_changed: true,
+                ..(**source).clone()
+            })
+        });
+        Self {
+            motion: Arc::new(motion),
+            source,
+        }
+    }
+
     /// The length of each box, where the clip is of a file about boxes.
     pub(crate) fn box_length(&self) -> Option<f64> {
         self.source.as_ref().and_then(|own| own.box_length)

@@ -421,7 +421,7 @@ impl Engine {
         poses::in_world(self, clip, layout_named(layout)?, options)
     }
 
-    /// Samples without their noise: an array of their shape, float32.
+    /// Samples without their noise: an array of their shape, float32; of a `Clip` a clip.
     ///
     /// `smooth(samples, *, kernel="gaussian:2", low_pass=None, fps=None, passes=1, ends="keep",
     /// layout="track", order="xyzw", out=None)`
@@ -432,6 +432,10 @@ impl Engine {
     /// samples to either side), "gaussian:S" (standard deviation) or "savitzky-golay:RADIUS:ORDER".
     /// `low_pass`, Hz, with `fps`, the rate of the samples, is the bell that halves the power of motion at that
     /// frequency. `ends`: "keep", "parabolic" (of "cubic") or "loop" (the last repeats the first).
+    ///
+    /// A `Clip` keeps its names, its skeleton, scales and steps; its rotations and translations are smoothed, at its
+    /// keys or, where these are not even, at the frames of `fps`. Written to the format of its file, all else in
+    /// that stays as it is.
     ///
     /// >>> import numpy as np, tumble
     /// >>> noise = np.random.default_rng(1).normal(size=(100, 3))
@@ -461,6 +465,15 @@ impl Engine {
             ends,
         };
         let form = (layout_named(layout)?, Order::named(order)?);
+        if let Ok(clip) = samples.cast::<Clip>() {
+            if out.is_some() || form != (Layout::TrackMajor, Order::Xyzw) {
+                return Err(input(
+                    "a smoothed clip is a clip; leave out `layout`, `order` and `out`",
+                ));
+            }
+            let clip = samples::smooth_clip(self, clip, &options)?;
+            return Ok(Bound::new(samples.py(), clip)?.into_any());
+        }
         samples::smooth(self, samples, &options, form, out)
     }
 

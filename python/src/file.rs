@@ -210,6 +210,15 @@ pub(crate) fn load(
             "source_fps and source_times both say when the keys are; give one",
         ));
     }
+    let is_changed = source_fps.is_some()
+        || source_times.is_some()
+        || map.is_some()
+        || time_unit.is_some()
+        || duplicates.is_some()
+        || bridge_gaps
+        || keyframes
+        || offsets.is_some()
+        || body_model.is_some();
     let frame_times = source_times.map(|file| open_frame_times(&file, Limits::default()));
     let frame_times = frame_times
         .transpose()
@@ -301,8 +310,6 @@ pub(crate) fn load(
                 }
             };
             adjust_all(&mut loaded, factor, up).map_err(|error| of_track(&error))?;
-            // What is kept of the file has its own units and axes.
-            loaded.document = None;
         }
         Ok(loaded)
     })?;
@@ -312,7 +319,7 @@ pub(crate) fn load(
     for diagnostic in loaded.warnings.iter().chain(&loaded.refused) {
         warn(py, diagnostic)?;
     }
-    Ok(File::new(path, &mut loaded))
+    Ok(File::new(path, &mut loaded, is_changed))
 }
 
 /// By how much translations are multiplied.
@@ -336,12 +343,16 @@ impl Scale {
 }
 
 impl File {
-    fn new(path: PathBuf, loaded: &mut Loaded) -> Self {
+    /// `is_changed`: other keys were read than the file says itself.
+    fn new(path: PathBuf, loaded: &mut Loaded, is_changed: bool) -> Self {
         let source = Arc::new(Source {
             path: path.clone(),
             document: loaded.document.take(),
             clips: loaded.clips.len() + loaded.refused.len(),
             box_length: loaded.box_length,
+            warnings: loaded.warnings.clone(),
+            is_adjusted: loaded.is_adjusted,
+            is_changed,
         });
         let clip = |motion| Clip {
             motion: Arc::new(motion),

@@ -196,6 +196,9 @@ pub(crate) fn clip_of_state(state: &Bound<'_, PyDict>) -> PyResult<Clip> {
                 document: None,
                 clips: entry(state, "clips")?.extract()?,
                 box_length: entry(state, "box_length")?.extract()?,
+                warnings: Vec::new(),
+                is_adjusted: false,
+                is_changed: false,
             })),
         };
         Ok(Clip {

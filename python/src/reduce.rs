@@ -160,12 +160,8 @@ pub(crate) fn reduce(
             error => input(error.to_string()),
         })
     })?;
-    let reduced_clip = Clip {
-        motion: Arc::new(found.clip.clone()),
-        source: None,
-    };
     Ok(Reduction {
-        clip: reduced_clip,
+        clip: clip.get().with_keys(found.clip.clone()),
         found,
     })
 }

@@ -1,5 +1,7 @@
 //! Arrays of samples to others: smoothed, blended, mixed, added, and walked down a skeleton.
 
+use std::sync::Arc;
+
 use glam::{Affine3A, Mat3, Quat, Vec3};
 use numpy::{PyArray1, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::exceptions::PyTypeError;
@@ -10,12 +12,15 @@ use tumble::{
     SmoothingKernel, Transforms, Vectors,
 };
 use tumble_formats::diagnostic::Code;
+use tumble_formats::smooth::{SmoothJob, SmoothMotionError};
 
 use crate::arrays::{Numbers, Order, doubles, parts, quaternions};
+use crate::clip::Clip;
 use crate::engine::Engine;
-use crate::errors::{input, input_at, of_engine};
+use crate::errors::{input, input_at, of_engine, of_track};
+use crate::options::frame_rate;
 use crate::output::{array, filled};
-use crate::run::work;
+use crate::run::{interruptible, work};
 
 /// What the axes of samples are, without that of their components.
 #[derive(Debug, Clone, Copy)]
@@ -97,33 +102,45 @@ pub(crate) struct Smooth<'a> {
     pub(crate) ends: &'a str,
 }
 
+/// What cannot be had of a kernel.
+fn of_kernel(name: &str, error: &SmoothingError) -> PyErr {
+    input(format!("{name}: {error}"))
+}
+
 impl Smooth<'_> {
+    /// The smoothing of arrays.
     fn smoothing(&self) -> PyResult<Smoothing> {
-        let of_kernel = |name: &str, error: &SmoothingError| input(format!("{name}: {error}"));
-        let kernel = match (self.low_pass, self.kernel) {
-            (Some(_), Some(_)) => {
-                return Err(input(
-                    "`kernel` and `low_pass` exclude each other; give one of them",
-                ));
+        let rate = self.fps.map(frame_rate).transpose()?;
+        let mut smoothing = self.of_kernel()?;
+        match (self.low_pass, rate) {
+            (Some(hz), Some(rate)) => {
+                let kernel = SmoothingKernel::low_pass(hz, rate.per_second());
+                smoothing.kernel = kernel.map_err(|error| of_kernel("low_pass", &error))?;
             }
-            (Some(hz), None) => {
-                let Some(fps) = self.fps else {
-                    return Err(input("low_pass: give `fps` too, the rate of the samples"));
-                };
-                let rate = crate::options::frame_rate(fps)?;
-                SmoothingKernel::low_pass(hz, rate.per_second())
-                    .map_err(|error| of_kernel("low_pass", &error))?
+            (Some(_), None) => {
+                return Err(input("low_pass: give `fps` too, the rate of the samples"));
             }
-            (None, _) if self.fps.is_some() => {
+            (None, Some(_)) => {
                 return Err(input(
                     "fps: kernels count samples; it goes with `low_pass`, in Hz",
                 ));
             }
-            (None, kernel) => kernel
-                .unwrap_or("gaussian:2")
-                .parse()
-                .map_err(|error| of_kernel("kernel", &error))?,
-        };
+            (None, None) => {}
+        }
+        let checked = smoothing.check();
+        checked.map_err(|error| input(error.to_string()))?;
+        Ok(smoothing)
+    }
+
+    /// The kernel, which a frequency takes the place of, and the rest.
+    fn of_kernel(&self) -> PyResult<Smoothing> {
+        if self.low_pass.is_some() && self.kernel.is_some() {
+            return Err(input(
+                "`kernel` and `low_pass` exclude each other; give one of them",
+            ));
+        }
+        let kernel = self.kernel.unwrap_or("gaussian:2").parse();
+        let kernel = kernel.map_err(|error| of_kernel("kernel", &error))?;
         let ends = match self.ends {
             "keep" => SmoothingEnds::Keep,
             "parabolic" => SmoothingEnds::Parabolic,
@@ -134,15 +151,44 @@ impl Smooth<'_> {
                 )));
             }
         };
-        let smoothing = Smoothing {
+        Ok(Smoothing {
             kernel,
             ends,
             passes: self.passes,
-        };
+        })
+    }
+}
+
+/// A clip without its noise.
+pub(crate) fn smooth_clip(
+    engine: &Engine,
+    clip: &Bound<'_, Clip>,
+    options: &Smooth<'_>,
+) -> PyResult<Clip> {
+    let smoothing = options.of_kernel()?;
+    if options.low_pass.is_none() {
         let checked = smoothing.check();
         checked.map_err(|error| input(error.to_string()))?;
-        Ok(smoothing)
     }
+    let rate = options.fps.map(frame_rate).transpose()?;
+    let clip_of = clip.get().clone();
+    let motion = Arc::clone(&clip_of.motion);
+    let job = SmoothJob::new(&motion, smoothing, options.low_pass, rate);
+    let job = job.map_err(|error| match error {
+        SmoothMotionError::Evaluating(error) => of_engine(&error),
+        SmoothMotionError::LowPass { reason, .. } => of_kernel("low_pass", &reason),
+        error => input(format!("{error}; give `fps`, the rate to sample at")),
+    })?;
+    let tracks = motion.set.track_count();
+    let timeline = job.frames.resolve(tracks, motion.set.time_span());
+    let samples = timeline.map_err(|error| of_engine(&error.into()))?.len();
+    let engine = engine.engine(tracks * samples)?;
+    let found = interruptible(clip.py(), move || {
+        let found = job.run(&engine, &motion);
+        let found = found.map_err(|error| of_engine(&error))?;
+        job.clip(&motion, &found).map_err(|error| of_track(&error))
+    })?;
+    Ok(clip_of.with_keys(found))
 }
 
 /// Smooths rotations (…, 4), or vectors (…, 3).

@@ -1,5 +1,6 @@
 //! `tumble.save`: clips into files, as `tumble eval` and `tumble convert` write them.
 
+use std::collections::HashSet;
 use std::io::{self, Write};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -7,21 +8,21 @@ use std::sync::Arc;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use tumble::{Encoding, Engine, Error, FrameRate, Layout, Quantity, SampleTimes, Stop};
-use tumble_formats::Diagnostic;
 use tumble_formats::diagnostic::Code;
 use tumble_formats::format::{
     Document, Format, FormatOption, MotionOptions, Quantization, ResultShape, WriteError,
-    WriteResults,
+    WriteResults, left_behind,
 };
-use tumble_formats::keyed::keyed;
+use tumble_formats::keyed::{KeysError, keys_for};
 use tumble_formats::kitti::write_frame_times;
 use tumble_formats::motion::{Motion, SampledClip};
 use tumble_formats::output::Output;
 use tumble_formats::quaternion::ComponentOrder;
 use tumble_formats::sample::{ChannelMethods, Samples};
+use tumble_formats::{Diagnostic, Feature};
 
 use crate::arrays::Order;
-use crate::clip::Clip;
+use crate::clip::{Clip, Source};
 use crate::engine::{default_engine, layout_named};
 use crate::errors::{input, of_engine, of_output, of_write, warn};
 use crate::evaluate::uniform;
@@ -40,7 +41,8 @@ const CHUNK: usize = 1 << 20;
 /// `clips`: a `Clip`, the `File` of `load`, or a list of clips. With `fps` or `at` they are sampled
 /// as `Engine.evaluate` does, the other options being as there; a clip of a glTF or NPZ file goes
 /// into the same format baked: all else in the file stays as it is. Without, the keys are written
-/// at their own times. NPY, and CSV, Parquet and Arrow for clips without a skeleton, hold rotations
+/// at their own times. What the file of a clip holds beside it and the new one does not, such as meshes and
+/// channels of weights, is named in an `InputWarning`. NPY, and CSV, Parquet and Arrow for clips without a skeleton, hold rotations
 /// alone, in the `order` ("xyzw" or "wxyz"; CSV has w first where none is asked for) and `layout`
 /// that is asked for; the bytes are those that the program
 /// `tumble` writes.
@@ -275,11 +277,45 @@ impl Save {
 
     /// The file that all clips come from, if it can be written again.
     fn document(&self) -> Option<Arc<dyn Document>> {
-        let mut sources = self.clips.iter().map(|clip| clip.source.as_ref());
-        let first = sources.next()??;
-        let is_one = sources.all(|source| source.is_some_and(|own| Arc::ptr_eq(own, first)));
-        let document = first.document.as_ref().filter(|_| is_one)?;
-        document.writes(self.format).then(|| Arc::clone(document))
+        let document = |clip: &Clip| {
+            let source = clip.source.as_ref().filter(|source| !source.is_adjusted)?;
+            source.document.clone()
+        };
+        let first = document(self.clips.first()?)?;
+        let mut clips = HashSet::new();
+        let is_one = self.clips.iter().all(|clip| {
+            let is_same = document(clip).is_some_and(|other| Arc::ptr_eq(&other, &first));
+            is_same && clips.insert(clip.motion.index)
+        });
+        (is_one && first.writes(self.format)).then_some(first)
+    }
+
+    /// What the clips' files hold beside them, and a file that is made of the clips does not.
+    fn left_behind(&self) -> Vec<Diagnostic> {
+        let mut sources: Vec<(&Arc<dyn Document>, &Source)> = Vec::new();
+        for source in self.clips.iter().filter_map(|clip| clip.source.as_ref()) {
+            let document = source.document.as_ref();
+            let is_new =
+                |new: &&Arc<dyn Document>| !sources.iter().any(|(it, _)| Arc::ptr_eq(it, new));
+            if let Some(document) = document.filter(is_new) {
+                sources.push((document, source));
+            }
+        }
+        let is_one = sources.len() == 1;
+        let lost = sources.into_iter().filter_map(|(document, source)| {
+            let why = match is_one {
+                _ if source.is_adjusted => "other units or axes make",
+                true => "some of its clips make",
+                false => "clips of several files make",
+            };
+            let lost = left_behind(&**document, &source.warnings, self.format, Some(why))?;
+            Some(Diagnostic::new(
+                source.path.display().to_string(),
+                Code::NoRoom,
+                lost,
+            ))
+        });
+        lost.collect()
     }
 
     /// Keys at their own times.
@@ -290,23 +326,47 @@ impl Save {
                 self.format.name
             )));
         }
+        let sources = || self.clips.iter().filter_map(|clip| clip.source.as_ref());
+        let is_changed = sources().any(|source| source.is_changed);
         // All clips of a file as they are: everything stays.
-        let source = self.clips.first().and_then(|clip| clip.source.as_ref());
-        let is_whole = source.is_some_and(|source| source.clips == self.clips.len());
-        if let Some(document) = self.document().filter(|_| is_whole) {
+        let is_whole = sources()
+            .next()
+            .is_some_and(|source| source.clips == self.clips.len());
+        let document = self.document().filter(|_| is_whole || is_changed);
+        if let Some(document) = document.as_ref().filter(|_| !is_changed) {
             let written = document.write(&[], &self.motion, &self.path, out);
             return written.map_err(|error| of_write(&error));
         }
-        let keys = self.clips.iter().map(|clip| keyed(&clip.motion));
-        let keys: Result<Vec<Samples>, _> = keys.collect();
-        let keys = keys.map_err(|error| input(error.to_string()))?;
-        let sampled: Vec<SampledClip<'_>> = (self.clips.iter().zip(&keys))
-            .map(|(clip, keys)| {
-                let rate = clip.motion.rate.or_else(|| clip.motion.rate_of_keys());
-                keys.of(&clip.motion, rate, &[])
+        let keys = self.clips.iter().map(|clip| {
+            let keys = keys_for(&clip.motion, self.format, document.is_some());
+            keys.map_err(|error| match error {
+                KeysError::Evaluating(error) => of_engine(&error),
+                error => input(error.to_string()),
             })
-            .collect();
-        let written = self.write_clips(&sampled, out, times);
+        });
+        let keys: Vec<(Samples, bool)> = keys.collect::<PyResult<_>>()?;
+        // Formats of frames need a rate; others have the times.
+        let has_times = self.format.supports(Feature::UnevenTimes);
+        let rate = |clip: &Motion| match has_times {
+            true => clip.rate,
+            false => clip.rate.or_else(|| clip.rate_of_keys()),
+        };
+        let sampled =
+            (self.clips.iter().zip(&keys)).map(|(clip, (keys, is_at_keys))| SampledClip {
+                is_at_keys: *is_at_keys,
+                ..keys.of(&clip.motion, rate(&clip.motion), &[])
+            });
+        let written = match document {
+            Some(document) => {
+                let indices = self.clips.iter().map(|clip| clip.motion.index);
+                let clips: Vec<(usize, SampledClip<'_>)> = indices.zip(sampled).collect();
+                document.write(&clips, &self.motion, &self.path, out)
+            }
+            None => {
+                let sampled: Vec<SampledClip<'_>> = sampled.collect();
+                self.write_clips(&sampled, out, times)
+            }
+        };
         written.map_err(|error| of_write(&error))
     }
 
@@ -316,7 +376,8 @@ impl Save {
         out: &mut dyn Write,
         times: &mut Vec<u8>,
     ) -> Result<Vec<Diagnostic>, WriteError> {
-        let warnings = self.format.write_clips(sampled, &self.motion, out)?;
+        let mut warnings = self.format.write_clips(sampled, &self.motion, out)?;
+        warnings.extend(self.left_behind());
         if let ([sampled], true) = (sampled, self.motion.times_apart) {
             write_frame_times(sampled, times)?;
         }

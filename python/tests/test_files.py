@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import base64
 import json
 import pathlib
 import subprocess
@@ -268,6 +269,106 @@ def test_arrays_that_are_not_read_are_named(tmp_path, rng):
     with pytest.warns(tumble.InputWarning, match="not read: `dmpls`, `betas`") as caught:
         tumble.load(path)
     assert [warning.message.code for warning in caught] == ["W306"]
+
+
+def scene(path):
+    """A glTF of two animations with a mesh, a camera, weights and a pointer beside what moves."""
+    numbers = [0.0, 1.0, 0, 0, 0, 1, 0, 0, 1, 0, 0.0, 0.5, 0, 0, 0, 1, 0, 0, 0, 1, 0]
+    data = np.array(numbers, np.float32).tobytes()
+    uri = "data:application/octet-stream;base64," + base64.b64encode(data).decode()
+    views = [(0, 8), (8, 32), (40, 8), (48, 36)]
+    kinds = [("SCALAR", 2), ("VEC4", 2), ("SCALAR", 2), ("VEC3", 3)]
+    pointer = {"KHR_animation_pointer": {"pointer": "/cameras/0/perspective/yfov"}}
+    turning = {"sampler": 0, "target": {"node": 0, "path": "rotation"}}
+    others = [
+        {"sampler": 1, "target": {"node": 0, "path": "weights"}},
+        {"sampler": 1, "target": {"path": "pointer", "extensions": pointer}},
+    ]
+    samplers = [{"input": 0, "output": 1}, {"input": 0, "output": 2}]
+    part = {"attributes": {"POSITION": 3}, "targets": [{"POSITION": 3}]}
+    path.write_text(json.dumps({
+        "asset": {"version": "2.0"},
+        "extensionsUsed": ["KHR_animation_pointer"],
+        "buffers": [{"uri": uri, "byteLength": len(data)}],
+        "bufferViews": [{"buffer": 0, "byteOffset": at, "byteLength": size} for at, size in views],
+        "accessors": [
+            {"bufferView": view, "componentType": 5126, "type": kind, "count": count}
+            for view, (kind, count) in enumerate(kinds)
+        ],
+        "cameras": [{"type": "perspective", "perspective": {"yfov": 1, "znear": 0.1}}],
+        "meshes": [{"primitives": [part], "weights": [0]}],
+        "nodes": [{"name": "head", "mesh": 0, "camera": 0}],
+        "animations": [
+            {"name": "Nod", "channels": [turning, *others], "samplers": samplers},
+            {"name": "Turn", "channels": [turning], "samplers": samplers},
+        ],
+    }))
+
+
+BESIDE = "meshes, cameras, extensionsUsed, channels of `pointer`, channels of `weights`"
+
+
+def test_what_a_file_holds_beside_its_clips_is_named_where_it_is_left_out(tmp_path):
+    path = tmp_path / "scene.gltf"
+    scene(path)
+    file = tumble.load(path)
+
+    def said(name, clips, **options):
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            tumble.save(tmp_path / name, clips, **options)
+        return [(it.message.code, it.message.file, str(it.message)) for it in caught]
+
+    for options in [{}, {"fps": 30}]:
+        found = said("nod.bvh", file["Nod"], **options)
+        ours = [text for _, at, text in found if at == str(path)]
+        assert len(ours) == 1, found
+        assert ours[0].endswith(f"warning[W208]: bvh has no room for it, left out: {BESIDE}")
+    # The program says it in the same words.
+    printed = program("convert", path, "--animation", "Nod", "-o", tmp_path / "printed.bvh").stderr
+    assert f"bvh has no room for it, left out: {BESIDE}" in printed
+    # A file of the same format keeps all, or is a new one.
+    assert said("all.glb", file) == [] and said("baked.glb", file["Nod"], fps=30) == []
+    assert len(tumble.load(tmp_path / "baked.glb")) == 2
+    found = said("one.glb", file["Nod"])
+    assert [text.split("]: ")[1] for *_, text in found] == [
+        f"some of its clips make a new file; stays behind: {BESIDE}"
+    ]
+    scaled = tumble.load(path, scale=2)
+    found = said("scaled.glb", scaled)
+    assert [text.split("]: ")[1] for *_, text in found] == [
+        f"other units or axes make a new file; stays behind: {BESIDE}"
+    ]
+    other = tmp_path / "other.gltf"
+    scene(other)
+    found = said("both.glb", [file["Nod"], tumble.load(other)["Turn"]])
+    assert [(at, text.split("]: ")[1].split(";")[0]) for _, at, text in found] == [
+        (str(path), "clips of several files make a new file"),
+        (str(other), "clips of several files make a new file"),
+    ]
+
+
+def test_other_keys_go_into_the_file_of_a_clip(tmp_path):
+    path = tmp_path / "scene.gltf"
+    scene(path)
+    clip = tumble.load(path)["Turn"]
+    calm = tumble.Engine("cpu").smooth(clip, fps=30)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        tumble.save(tmp_path / "calm.gltf", calm)
+    again = json.loads((tmp_path / "calm.gltf").read_text())
+    assert "meshes" in again and len(again["animations"][0]["channels"]) == 3
+    found = tumble.load(tmp_path / "calm.gltf")
+    assert np.array_equal(found["Turn"].keys(0), calm.keys(0)) and len(found["Nod"].keys(0)) == 2
+    # What was read otherwise than the file says is written, and not the file again.
+    walk = tmp_path / "walk.npz"
+    np.savez(walk, poses=np.zeros((4, 66)), trans=np.zeros((4, 3)), mocap_framerate=30.0)
+    offsets = np.arange(66.0).reshape(22, 3)
+    placed = tumble.load(walk, offsets=offsets)
+    tumble.save(tmp_path / "placed.npz", placed)
+    lifted = np.load(tmp_path / "placed.npz")
+    assert sorted(lifted.files) == sorted(np.load(walk).files)
+    assert np.array_equal(tumble.load(tmp_path / "placed.npz", offsets=offsets).clip.offsets, placed.clip.offsets)
 
 
 def test_outputs_that_cannot_be_written(tmp_path, rng):

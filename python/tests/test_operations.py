@@ -150,6 +150,45 @@ def test_smooth_has_the_bits_of_the_program(rng, engine, tmp_path):
     assert angle(found, np.where((found * expected).sum(axis=-1, keepdims=True) < 0, -expected, expected)).max() == 0
 
 
+def test_a_clip_is_smoothed_with_all_that_it_has(rng, engine, tmp_path):
+    noisy, times = unit(rng, 3, 60), np.arange(60) / 30
+    clip = tumble.Clip(
+        times, noisy, name="walk", names=["hips", "knee", "foot"], parents=[None, 0, 1],
+        offsets=[[0, 1, 0], [0, -0.4, 0], [0, -0.4, 0]],
+        translations=[rng.normal(size=(60, 3)), None, None], scales=[None, np.full((60, 3), 2.0), None],
+    )
+    calm = engine.smooth(clip, kernel="box:3")
+    assert isinstance(calm, tumble.Clip)
+    assert (calm.name, calm.names, calm.parents) == (clip.name, clip.names, clip.parents)
+    assert np.array_equal(calm.offsets, clip.offsets)
+    # The bits of arrays smoothed alone, at the keys.
+    found = engine.smooth(engine.evaluate(clip, at=times), kernel="box:3")
+    for joint in range(3):
+        assert np.array_equal(calm.times(joint), times)
+        assert np.array_equal(np.abs(calm.keys(joint)), np.abs(found[joint]))
+    (_, moved), (_, scaled) = calm.translations(0), calm.scales(1)
+    assert np.array_equal(moved, engine.smooth(clip.translations(0)[1], kernel="box:3"))
+    assert calm.translations(1) is None and (scaled == 2).all() and calm.scales(0) is None
+    # As the program does it, at a rate too.
+    tumble.save(tmp_path / "keys.npz", clip)
+    program("smooth", "keys.npz", "--low-pass", "4", "--fps", "60", "-o", "calm.npz", cwd=tmp_path)
+    theirs = tumble.load(tmp_path / "calm.npz").clip
+    ours = engine.smooth(clip, low_pass=4, fps=60)
+    for joint in range(3):
+        assert np.array_equal(ours.keys(joint), theirs.keys(joint))
+    assert np.array_equal(ours.translations(0)[1], theirs.translations(0)[1])
+    # Keys that are not even have to be sampled.
+    uneven = tumble.Clip([0.0, 1.0, 3.0], noisy[0, :3])
+    with pytest.raises(tumble.InputError, match="not evenly spaced.*give `fps`"):
+        engine.smooth(uneven)
+    assert len(engine.smooth(uneven, fps=10).keys(0)) == 31
+    for options in [{"layout": "frame"}, {"order": "wxyz"}, {"out": np.empty((3, 60, 4), "f4")}]:
+        with pytest.raises(tumble.InputError, match="a smoothed clip is a clip"):
+            engine.smooth(clip, **options)
+    with pytest.raises(tumble.InputError, match="low_pass"):
+        engine.smooth(clip, low_pass=40)
+
+
 def test_what_cannot_be_smoothed(rng, engine):
     q = unit(rng, 9)
     for options, message in [

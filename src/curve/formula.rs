@@ -165,6 +165,14 @@ impl Product {
         [0.0, 0.0, 0.0, 1.0],
     ];
 
+    /// The `j`th exponential. No closure: those are not always inlined.
+    #[inline(always)]
+    fn factor<S: Scalar>(numbers: &[S::Constant; NUMBERS], t: S, j: usize) -> [S; 4] {
+        let [c0, c1, c2, c3] = quaternion::<S>(numbers, Self::BASIS + 4 * j);
+        let weight = ((c3 * t + c2) * t + c1) * t + c0;
+        exp(vector(numbers, Self::VECTORS + 3 * j, weight))
+    }
+
     /// The numbers of a curve with that basis; base and vectors are still 0.
     pub(crate) const WITH_BERNSTEIN: FormulaNumbers = {
         let mut numbers = [0.0; NUMBERS];
@@ -177,13 +185,9 @@ impl Product {
 impl Formula for Product {
     #[inline(always)]
     fn rotation<S: Scalar>(numbers: &[S::Constant; NUMBERS], t: S) -> [S; 4] {
-        let factor = |j: usize| {
-            let [c0, c1, c2, c3] = quaternion::<S>(numbers, Self::BASIS + 4 * j);
-            let weight = ((c3 * t + c2) * t + c1) * t + c0;
-            exp(vector(numbers, Self::VECTORS + 3 * j, weight))
-        };
-        let first = product(quaternion(numbers, 0), factor(0));
-        product(product(first, factor(1)), factor(2))
+        let first = product(quaternion(numbers, 0), Self::factor(numbers, t, 0));
+        let both = product(first, Self::factor(numbers, t, 1));
+        product(both, Self::factor(numbers, t, 2))
     }
 }
 

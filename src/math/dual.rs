@@ -3,7 +3,7 @@
 //! is written once, for all of them.
 
 use crate::math::operators::operators;
-use crate::math::quaternion::{Arithmetic, Real, arc_tangent, full_waves};
+use crate::math::quaternion::{Arithmetic, FullRange, Real, arc_tangent, full_waves};
 use crate::math::ranges::{near_arc_square, near_waves};
 
 /// A number that depends on the curve's parameter.
@@ -106,113 +106,145 @@ impl<R: Real> Scalar for Near<R> {
     }
 }
 
-/// A dual number of the second order: a value with its first and second derivative.
+/// A dual number of the second order: a value with its first and second derivative, in each lane of a vector
+/// the same as alone.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Dual {
-    pub(crate) value: f64,
-    pub(crate) first: f64,
-    pub(crate) second: f64,
+pub(crate) struct Dual<R = f64> {
+    pub(crate) value: R,
+    pub(crate) first: R,
+    pub(crate) second: R,
 }
 
-impl Dual {
-    pub(crate) const fn new(value: f64, first: f64, second: f64) -> Self {
+impl<R> Dual<R> {
+    pub(crate) const fn new(value: R, first: R, second: R) -> Self {
         Self {
             value,
             first,
             second,
         }
     }
+}
 
+impl<R: Real> Dual<R> {
     /// The parameter itself, whose first derivative is 1.
-    pub(crate) fn parameter(value: f64) -> Self {
-        Self::new(value, 1.0, 0.0)
+    #[inline(always)]
+    pub(crate) fn parameter(value: R) -> Self {
+        Self::new(value, R::all(1.0), R::all(0.0))
     }
 
     /// A function of this number by the chain rule, given the function's value and derivatives.
-    fn chain(self, [value, first, second]: [f64; 3]) -> Self {
+    #[inline(always)]
+    fn chain(self, [value, first, second]: [R; 3]) -> Self {
         let bend = second * self.first * self.first + first * self.second;
         Self::new(value, first * self.first, bend)
     }
 }
 
 operators! {
-    [] Dual, a, b:
+    [R: Real] Dual<R>, a, b:
     Add add => Self::new(a.value + b.value, a.first + b.first, a.second + b.second);
     Sub sub => Self::new(a.value - b.value, a.first - b.first, a.second - b.second);
     Mul mul => Self::new(
         a.value * b.value,
         a.first * b.value + a.value * b.first,
-        a.second * b.value + 2.0 * (a.first * b.first) + a.value * b.second,
+        a.second * b.value + R::all(2.0) * (a.first * b.first) + a.value * b.second,
     );
 }
 
-/// A power series and its first two derivatives at `x`.
-fn series(coefficients: &[f64], x: f64) -> [f64; 3] {
-    let mut sums = [0.0; 3];
-    for &c in coefficients.iter().rev() {
-        sums[2] = sums[2] * x + 2.0 * sums[1];
-        sums[1] = sums[1] * x + sums[0];
-        sums[0] = sums[0] * x + c;
+/// How many coefficients a power series has.
+const TERMS: usize = 12;
+
+/// Those of `sin(x)/x` by `x²`.
+const SINC: [f64; TERMS] = {
+    let mut coefficients = [1.0; TERMS];
+    let mut k = 1;
+    while k < TERMS {
+        let k_th = (2 * k * (2 * k + 1)) as f64;
+        coefficients[k] = -coefficients[k - 1] / k_th;
+        k += 1;
     }
-    sums
+    coefficients
+};
+
+/// Those of `4 asin²(√u)` by `u`: asin²(x) = ½ Σ (2x)²ⁿ / (n² binomial(2n, n)).
+const ARC_SQUARES: [f64; TERMS] = {
+    let mut coefficients = [0.0; TERMS];
+    let (mut term, mut k) = (2.0, 1);
+    while k < TERMS {
+        let n = k as f64;
+        term *= 4.0 * n / (2.0 * (2.0 * n - 1.0));
+        coefficients[k] = term / (n * n);
+        k += 1;
+    }
+    coefficients
+};
+
+/// The first two derivatives of a power series at `x`.
+#[inline(always)]
+fn derivatives<R: Real>(coefficients: &[f64; TERMS], x: R) -> [R; 2] {
+    let mut sums = [R::all(0.0); 3];
+    for &c in coefficients.iter().rev() {
+        sums[2] = sums[2] * x + R::all(2.0) * sums[1];
+        sums[1] = sums[1] * x + sums[0];
+        sums[0] = sums[0] * x + R::all(c);
+    }
+    [sums[1], sums[2]]
 }
 
-impl Scalar for Dual {
-    type Constant = f64;
+/// `above` from a limit on, `below` under it.
+#[inline(always)]
+fn divided_at<R: Real>(limit: f64, x: R, above: [R; 2], below: [R; 2]) -> [R; 2] {
+    let limit = R::all(limit);
+    [
+        limit.up_to(x, above[0], below[0]),
+        limit.up_to(x, above[1], below[1]),
+    ]
+}
 
-    fn constant(value: f64) -> Self {
-        Self::new(value, 0.0, 0.0)
+impl<R: FullRange> Scalar for Dual<R> {
+    type Constant = R;
+
+    #[inline(always)]
+    fn constant(value: R) -> Self {
+        Self::new(value, R::all(0.0), R::all(0.0))
     }
 
+    #[inline(always)]
     fn waves(self) -> (Self, Self) {
         let z = self.value;
-        let (sinc, cosine) = z.waves();
+        let (sinc, cosine) = z.each(full_waves);
         // With S = sin(x)/x, C = cos(x) and derivatives by z = x²: `S' = (C - S)/2z`,
         // `4z S'' + 6 S' + S = 0` and `C' = -S/2`. For small z the differences lose their digits,
         // and a power series is used.
-        let [first, second] = if z < 0.5 {
-            let mut coefficients = [1.0; 12];
-            for k in 1..12 {
-                let k_th = (2 * k * (2 * k + 1)) as f64;
-                coefficients[k] = -coefficients[k - 1] / k_th;
-            }
-            let [_, first, second] = series(&coefficients, z);
-            [first, second]
-        } else {
-            let first = (cosine - sinc) / (2.0 * z);
-            [first, -(6.0 * first + sinc) / (4.0 * z)]
-        };
+        let first = (cosine - sinc) / (R::all(2.0) * z);
+        let second = -(R::all(6.0) * first + sinc) / (R::all(4.0) * z);
+        let [first, second] = divided_at(0.5, z, [first, second], derivatives(&SINC, z));
+        let minus_half = R::all(-0.5);
         (
             self.chain([sinc, first, second]),
-            self.chain([cosine, -0.5 * sinc, -0.5 * first]),
+            self.chain([cosine, minus_half * sinc, minus_half * first]),
         )
     }
 
+    #[inline(always)]
     fn arc_square(self) -> Self {
         let u = self.value;
-        let square = u.arc_square();
-        // The result A = 4 asin²(√u) satisfies u(1-u) A'' + (1/2 - u) A' = 2.
-        if u < 0.02 {
-            // asin²(x) = ½ Σ (2x)²ⁿ / (n² binomial(2n, n)).
-            let mut coefficients = [0.0; 12];
-            let mut term = 2.0;
-            for (n, coefficient) in (0..12).map(f64::from).zip(&mut coefficients).skip(1) {
-                term *= 4.0 * n / (2.0 * (2.0 * n - 1.0));
-                *coefficient = term / (n * n);
-            }
-            let [_, first, second] = series(&coefficients, u);
-            return self.chain([square, first, second]);
-        }
-        // Towards u = 1 the derivatives grow without limit; a fit to such values is refused.
-        let rest = u * (1.0 - u).max(1e-30);
-        let first = 2.0 * (square / rest).sqrt();
-        self.chain([square, first, (2.0 - (0.5 - u) * first) / rest])
+        let (square, _) = u.each(|u| (u.arc_square(), 0.0));
+        // The result A = 4 asin²(√u) satisfies u(1-u) A'' + (1/2 - u) A' = 2. Towards u = 1 the derivatives
+        // grow without limit; a fit to such values is refused.
+        let rest = u * (R::all(1.0) - u).larger(R::all(1e-30));
+        let first = R::all(2.0) * (square / rest).root();
+        let second = (R::all(2.0) - (R::all(0.5) - u) * first) / rest;
+        let [first, second] = divided_at(0.02, u, [first, second], derivatives(&ARC_SQUARES, u));
+        self.chain([square, first, second])
     }
 
+    #[inline(always)]
     fn reciprocal_root(self) -> Self {
-        let root = self.value.reciprocal_root();
+        let root = reciprocal_root(self.value);
         let cube = root * root * root;
-        self.chain([root, -0.5 * cube, 0.75 * cube * root * root])
+        let second = R::all(0.75) * cube * root * root;
+        self.chain([root, R::all(-0.5) * cube, second])
     }
 }
 

@@ -35,6 +35,19 @@ pub(crate) trait Real: Arithmetic + Neg<Output = Self> + Div<Output = Self> {
     fn up_to(self, limit: Self, then: Self, otherwise: Self) -> Self;
 }
 
+/// A number whose lanes can be taken one by one, for functions over the full range.
+pub(crate) trait FullRange: Real {
+    /// Both results of a function in every lane.
+    fn each(self, function: impl Fn(f64) -> (f64, f64)) -> (Self, Self);
+}
+
+impl FullRange for f64 {
+    #[inline(always)]
+    fn each(self, function: impl Fn(f64) -> (f64, f64)) -> (Self, Self) {
+        function(self)
+    }
+}
+
 impl Real for f64 {
     #[inline(always)]
     fn all(value: f64) -> Self {
@@ -166,8 +179,8 @@ pub(crate) fn step<N: Arithmetic + Neg<Output = N>>(a: [N; 4], b: [N; 4]) -> [N;
 /// `q v q⁻¹` for a unit quaternion, by two products. Kernels take fewer operations for it, as
 /// `rotated` of the twins does, which rounds differently.
 #[inline(always)]
-pub(crate) fn rotated(q: Quaternion, [x, y, z]: Vector) -> Vector {
-    let [a, b, c, _] = product(product(q, [x, y, z, 0.0]), conjugate(q));
+pub(crate) fn rotated<R: Real>(q: [R; 4], [x, y, z]: [R; 3]) -> [R; 3] {
+    let [a, b, c, _] = product(product(q, [x, y, z, R::all(0.0)]), conjugate(q));
     [a, b, c]
 }
 

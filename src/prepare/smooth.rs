@@ -5,15 +5,16 @@ use std::ops::Range;
 
 use bytemuck::Zeroable as _;
 
-use crate::curve::options::{Ends, Quantity, Speed};
-use crate::fit::block::{Intervals, LANES, TrackStretch, put};
+use crate::curve::options::{Axes, Ends, Quantity, Speed};
+use crate::fit::block::{Intervals, LANES, TrackStretch, at, put};
 use crate::fit::constant_velocity::arc_polynomial;
 use crate::fit::exact::curve::IntervalCurve;
 use crate::fit::exact::handles::FindFrames;
+use crate::fit::motion::derivatives::clamped;
 use crate::math::canonical::round_quat;
-use crate::math::quaternion::Vector;
+use crate::math::quaternion::{Vector, rotated};
 use crate::method::interpolation::Interpolation;
-use crate::method::{MethodInput, SmoothCurves};
+use crate::method::{CurveKind, MethodInput, SmoothCurves};
 use crate::prepare::constant_speed::{PendingInterval, retime};
 use crate::prepare::fast::FastPreparation;
 use crate::prepare::fitting::Fitting;
@@ -283,8 +284,10 @@ impl SmoothPreparation {
             in_lanes(&mut frames);
             has_frame = frames.has_frame;
         }
+        let arc_axes = self.axes_of_arc_velocities();
+        let is_closed = is_steady || arc_axes.is_some();
         let is_fitted =
-            |this: &Self, lane| has_frame[lane] && !is_steady && !this.is_still(stretch, lane);
+            |this: &Self, lane| has_frame[lane] && !is_closed && !this.is_still(stretch, lane);
         let Range {
             start: mut lane,
             end,
@@ -304,6 +307,9 @@ impl SmoothPreparation {
                     _ => prepared.constant(STILL),
                 };
                 prepared.push_span(start, SpanSource::Constant(constant), NONE);
+            } else if let Some(axes) = arc_axes {
+                let constant = prepared.constant(self.arc_velocity(lane, axes));
+                prepared.push_span(start, SpanSource::Constant(constant), NONE);
             } else {
                 let keys = [self.intervals.from[lane], self.intervals.to[lane]];
                 prepared.push_segment(start, arc_polynomial(keys), stretch.key_at(i));
@@ -316,6 +322,29 @@ impl SmoothPreparation {
             spans.start = first_span;
         }
         spans.end = end;
+    }
+
+    /// The axes of the angular velocities that are asked for, where curves are arcs: they are the same all along
+    /// an arc, and nothing is fitted.
+    fn axes_of_arc_velocities(&self) -> Option<Axes> {
+        match (
+            self.interpolation.method.curves,
+            self.interpolation.quantity,
+        ) {
+            (CurveKind::Arcs(_), Quantity::Velocity(axes)) => Some(axes),
+            _ => None,
+        }
+    }
+
+    /// The angular velocity of the arc in a lane.
+    fn arc_velocity(&self, lane: usize, axes: Axes) -> [f32; 4] {
+        let rate = 2.0 * self.intervals.rate(lane);
+        let body = at(&self.intervals.logs, lane).map(|half| clamped(rate * half));
+        let [x, y, z] = match axes {
+            Axes::Body => body,
+            Axes::Parent => rotated(self.intervals.key(lane), body),
+        };
+        round_quat([x, y, z, 0.0])
     }
 
     /// Queues the curves in some lanes to be fitted: they become the next spans. `key` is the

@@ -59,6 +59,19 @@ macro_rules! doubles {
             }
         }
 
+        impl $crate::math::quaternion::FullRange for $name {
+            #[inline(always)]
+            fn each(self, function: impl Fn(f64) -> (f64, f64)) -> (Self, Self) {
+                const LANES: usize = size_of::<$name>() / size_of::<f64>();
+                let mut first: [f64; LANES] = bytemuck::cast(self);
+                let mut second = [0.0; LANES];
+                for (first, second) in first.iter_mut().zip(&mut second) {
+                    (*first, *second) = function(*first);
+                }
+                (bytemuck::cast(first), bytemuck::cast(second))
+            }
+        }
+
         impl $crate::simd::lanes::Doubles for $name {
             #[inline(always)]
             fn are_at_most(self, limit: f64) -> bool {

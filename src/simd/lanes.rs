@@ -6,7 +6,7 @@ use std::slice;
 use bytemuck::Pod;
 use glam::{Mat4, Vec4, Vec4Swizzles as _};
 
-use crate::math::quaternion::{Arithmetic, Real};
+use crate::math::quaternion::{Arithmetic, FullRange};
 use crate::shader::{PolynomialSegment, TINY_BITS};
 use crate::simd::doubles::{Four, pair};
 
@@ -190,7 +190,7 @@ pub(crate) trait Lanes: Number + Pod {
 }
 
 /// As many numbers in f64 as a vector of f32 has lanes, in the order of samples; or a single one.
-pub(crate) trait Doubles: Real + Pod {
+pub(crate) trait Doubles: FullRange + Pod {
     /// Number of samples.
     const COUNT: usize = size_of::<Self>() / size_of::<f64>();
 

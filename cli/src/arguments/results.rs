@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use tumble::EulerSequence;
-use tumble_formats::format::{Document, FormatOption};
+use tumble_formats::format::{Document, FormatOption, left_behind};
 use tumble_formats::motion::Motion;
-use tumble_formats::{Code, Diagnostic, Feature, Format, Loaded};
+use tumble_formats::{Feature, Format, Loaded};
 
 use crate::arguments::gather::GatheredInputs;
 use crate::arguments::input::{
@@ -209,29 +209,12 @@ pub(crate) fn document_to_rewrite<'a>(
     otherwise: Option<&str>,
 ) -> Option<&'a dyn Document> {
     let document = loaded.document.as_deref()?;
-    if !document.writes(target.format()) {
-        let is_known = |warning: &Diagnostic| warning.code == Code::ArraysNotRead;
-        let beside = document.other_contents();
-        if !beside.is_empty() && !loaded.warnings.iter().any(is_known) {
-            let (all, format) = (beside.join(", "), target.format().name);
-            words::note(&format!(
-                "{name}: {format} has no room for it, left out: {all}"
-            ));
-        }
-        return None;
-    }
     let adjusted = loaded.is_adjusted.then_some("other units or axes make");
-    match otherwise.or(adjusted) {
-        None => Some(document),
-        Some(why) => {
-            let beside = document.other_contents();
-            if !beside.is_empty() {
-                let all = beside.join(", ");
-                words::note(&format!("{name}: {why} a new file; not copied: {all}"));
-            }
-            None
-        }
+    let why = otherwise.or(adjusted);
+    if let Some(lost) = left_behind(document, &loaded.warnings, target.format(), why) {
+        words::note(&format!("{name}: {lost}"));
     }
+    (document.writes(target.format()) && why.is_none()).then_some(document)
 }
 
 /// Makes a file of each input's clips: of all together where its format holds several, else of

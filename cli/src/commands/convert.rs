@@ -6,7 +6,7 @@ use std::time::Instant;
 use clap::Args;
 use tumble::{Device, Engine, EulerSequence};
 use tumble_formats::format::{Document, FormatOption, MotionOptions};
-use tumble_formats::keyed::keyed;
+use tumble_formats::keyed::{KeysError, keys_for};
 use tumble_formats::motion::{Motion, SampledClip};
 use tumble_formats::sample::Samples;
 use tumble_formats::trim::{TrimError, trim};
@@ -172,24 +172,14 @@ fn write(
     options: MotionOptions,
     target: &ResultTarget,
 ) -> Result<WrittenFile, Failure> {
-    // A format that has keys of each channel at times of their own keeps them, where channels differ.
-    let keys_per_channel = target.format().supports(Feature::TimesPerChannel);
-    let mut keys: Vec<(Samples, bool)> = Vec::new();
-    for clip in clips {
-        let samples = match keyed(clip) {
-            Ok(samples) if document.is_none() || !keys_per_channel => (samples, false),
-            Err(error) if !keys_per_channel || clip.is_world => {
-                return Err(Failure::new(ALL_INPUTS, format!("{name}: {error}")));
-            }
-            _ => {
-                let engine = Engine::new(Device::Cpu);
-                let ends = engine.and_then(|engine| clip.ends(&engine));
-                let ends = ends.map_err(|error| Failure::evaluating(name, &error))?;
-                (ends, true)
-            }
-        };
-        keys.push(samples);
-    }
+    let keys = clips.iter().map(|clip| {
+        let keys = keys_for(clip, target.format(), document.is_some());
+        keys.map_err(|error| match error {
+            KeysError::Evaluating(error) => Failure::evaluating(name, &error),
+            error => Failure::new(ALL_INPUTS, format!("{name}: {error}")),
+        })
+    });
+    let keys: Vec<(Samples, bool)> = keys.collect::<Result<_, Failure>>()?;
     // Formats of frames need a rate; others have the times.
     let has_times = target.format().supports(Feature::UnevenTimes);
     let rate = |clip: &Motion| match has_times {

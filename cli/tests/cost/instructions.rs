@@ -10,6 +10,17 @@ use tumble::VectorWidth;
 /// Instructions that `tumble` executes to evaluate a file, on one thread; nothing
 /// where valgrind is not installed, which in CI it must be.
 fn instructions(file: &Path, method: &str, fps: u32, width: &str) -> Option<u64> {
+    instructions_with(&[], file, method, fps, width)
+}
+
+/// The same with some options.
+fn instructions_with(
+    options: &[&str],
+    file: &Path,
+    method: &str,
+    fps: u32,
+    width: &str,
+) -> Option<u64> {
     let run = Command::new("valgrind")
         .args(["--tool=callgrind", "--callgrind-out-file=/dev/null"])
         .arg(env!("CARGO_BIN_EXE_tumble"))
@@ -17,6 +28,7 @@ fn instructions(file: &Path, method: &str, fps: u32, width: &str) -> Option<u64>
         .arg(file)
         .args(["-m", method, "--fps", &fps.to_string(), "--device", "cpu"])
         .args(["-o", "-"])
+        .args(options)
         .env("RAYON_NUM_THREADS", "1")
         .env("TUMBLE_VECTOR_WIDTH", width)
         .stdout(Stdio::null())
@@ -127,5 +139,30 @@ fn samples_straight_from_keys_cost_no_more_than_they_did() {
             println!("{width}, {method}: {each:.1} instructions a sample of dense keys");
             assert!(each < bound, "{width}, {method}: {each:.1} a sample");
         }
+    }
+}
+
+/// Catches velocities of few samples for which more is prepared than these samples take: whole tracks, or
+/// curves one by one instead of beside each other.
+#[test]
+fn velocities_of_few_samples_cost_no_more_than_they_did() {
+    if !VectorWidth::available().contains(&VectorWidth::Avx2) {
+        eprintln!("no AVX2 here: not counted");
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let dense = generate(folder.path(), 600, &[]);
+    for (method, bound) in [("slerp", 4_750.0), ("bessel-overhauser", 19_600.0)] {
+        let count = |fps| {
+            let options = ["--output", "velocity", "--format", "npy"];
+            instructions_with(&options, &dense, method, fps, "avx2")
+        };
+        let (Some(coarse), Some(fine)) = (count(1), count(3)) else {
+            return;
+        };
+        let samples = TRACKS * 20 * (3 - 1);
+        let each = (fine - coarse) as f64 / samples as f64;
+        println!("{method}: {each:.0} instructions a velocity of few");
+        assert!(each < bound, "{method}: {each:.0} a velocity of few");
     }
 }

@@ -8,6 +8,7 @@ use glam::DVec3;
 use crate::bvh::joint::{BvhChannel, BvhJoint};
 use crate::diagnostic::{Code, Diagnostic, Location};
 use crate::names::line_name;
+use crate::origin::SMALL;
 use crate::text::lines::Lines;
 use crate::text::number;
 
@@ -236,8 +237,16 @@ impl<R: BufRead> Parser<'_, R> {
             match (block.joint, block.end_of) {
                 (Some(joint), _) => self.hierarchy.joints[joint].offset = offset.into(),
                 (None, Some(joint)) => {
-                    let sites = &mut self.hierarchy.joints[joint].written.end_sites;
-                    sites.push(DVec3::from_array(offset).as_vec3());
+                    let (exact, site) = (DVec3::from(offset), DVec3::from(offset).as_vec3());
+                    let lost = (site.as_dvec3() - exact).abs().max_element();
+                    if exact.abs().max_element() >= SMALL && lost > 0.0 {
+                        let message = format!(
+                            "an End Site is kept in f32, up to {lost:.2e} from where the file has it"
+                        );
+                        self.lines
+                            .warn(keyword.column, Code::EndSiteRounded, message);
+                    }
+                    self.hierarchy.joints[joint].written.end_sites.push(site);
                 }
                 (None, None) => {}
             }

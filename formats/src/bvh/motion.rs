@@ -9,7 +9,7 @@ use tumble::{FrameRate, TrackSet};
 use crate::bvh::hierarchy::{FIRST_WORD, Hierarchy};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::motion::{Joint, Motion, Transform};
-use crate::origin::{SMALL, origin_of, relative};
+use crate::origin::{SMALL, origin_at_rest, relative};
 use crate::quaternion::rounded;
 use crate::rate::{RateSource, itself, of};
 use crate::text::blocks::Blocks;
@@ -156,8 +156,8 @@ impl FrameKeys {
                 }
                 set.set_translations(track, &times, &points, &[])
                     .map_err(refuse)?;
-            } else if joint.parent.is_none() {
-                origins[track] = origin_of([joint.offset].into_iter());
+            } else {
+                origins[track] = origin_at_rest(joint.parent, joint.offset);
             }
             let rest = Transform {
                 translation: (joint.offset - origins[track]).as_vec3(),

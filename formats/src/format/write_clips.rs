@@ -7,7 +7,7 @@ use glam::{Quat, Vec3};
 
 use crate::diagnostic::{Code, Diagnostic};
 use crate::feature::Feature;
-use crate::format::{Format, MotionOptions, WriteError};
+use crate::format::{Document, Format, MotionOptions, WriteError};
 use crate::motion::{ChannelInterpolation, SampledClip};
 use crate::names::distinct_names;
 use crate::signs::{continue_signs, signs_jump};
@@ -159,4 +159,30 @@ fn loss(
         }
     };
     has_it.then_some(loss)
+}
+
+/// Says what a file holds that none of its clips holds, and that a file made of clips therefore lacks: meshes,
+/// cameras, channels of weights. `warnings` were given when it was read: arrays that they name are not named
+/// again. `why` says what makes a new file where the format is the input's own ("some tracks make").
+#[must_use]
+pub fn left_behind(
+    document: &dyn Document,
+    warnings: &[Diagnostic],
+    format: &Format,
+    why: Option<&str>,
+) -> Option<String> {
+    let is_kept = document.writes(format);
+    let are_named = |warning: &Diagnostic| warning.code == Code::ArraysNotRead;
+    if !is_kept && warnings.iter().any(are_named) || is_kept && why.is_none() {
+        return None;
+    }
+    let contents = document.other_contents();
+    if contents.is_empty() {
+        return None;
+    }
+    let all = contents.join(", ");
+    Some(match why.filter(|_| is_kept) {
+        Some(why) => format!("{why} a new file; not copied: {all}"),
+        None => format!("{} has no room for it, left out: {all}", format.name),
+    })
 }

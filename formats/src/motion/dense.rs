@@ -1,7 +1,7 @@
 //! The keys of a clip as times and numbers, and clips whose keys are samples.
 
 use glam::{Quat, Vec3};
-use tumble::{Channel, Engine, Error, SampleTimes, TrackSet};
+use tumble::{Channel, Engine, Error, SampleTimes, TrackError, TrackSet};
 
 use crate::motion::{ChannelInterpolation, Channels, Motion};
 use crate::sample::{ChannelMethods, Samples};
@@ -31,7 +31,14 @@ impl Motion {
     /// As [`Engine::evaluate`].
     pub fn sampled(&self, engine: &Engine, frames: &SampleTimes) -> Result<Self, Error> {
         let methods = ChannelMethods::AUTHORED;
-        let samples = methods.sample(engine, self, frames)?;
+        Ok(self.with_keys(&methods.sample(engine, self, frames)?)?)
+    }
+
+    /// The clip with some samples as keys, as [`sampled`](Self::sampled) has them.
+    ///
+    /// # Errors
+    /// When a sample is no key.
+    pub fn with_keys(&self, samples: &Samples) -> Result<Self, TrackError> {
         let tracks = self.set.track_count();
         let mut set = TrackSet::new();
         for track in 0..tracks {

@@ -646,6 +646,21 @@ class Engine:
         continuity: float | None = None,
         bias: float | None = None,
     ) -> tuple[_Places, _Single]: ...
+    @overload
+    def smooth(
+        self,
+        samples: Clip,
+        *,
+        kernel: str | None = None,
+        low_pass: float | None = None,
+        fps: _Rate | None = None,
+        passes: int = 1,
+        ends: _SmoothingEnds = "keep",
+        layout: Literal["track"] = "track",
+        order: Literal["xyzw"] = "xyzw",
+        out: None = None,
+    ) -> Clip: ...
+    @overload
     def smooth(
         self,
         samples: _Keys,

@@ -71,7 +71,7 @@ pub(crate) struct FitBlock {
     pub(crate) middles: FitRow,
     pub(crate) widths: FitRow,
     /// The change of the parameter per second.
-    rates: FitRow,
+    pub(crate) rates: FitRow,
     /// The arc lengths of curves traversed at constant speed; either every curve of a block has
     /// them or none.
     arc_lengths: Vec<Arc<ArcLengths>>,
@@ -182,6 +182,7 @@ impl FitBlock {
         match self.quantity {
             _ if self.count == 0 => {}
             Quantity::Rotation if self.arc_lengths.is_empty() => (self.shape.fit)(self, segments),
+            _ if self.arc_lengths.is_empty() => (self.shape.fit_rates)(self, segments),
             _ => shape::fit::<Motion>(self, segments),
         }
         segments.pop();

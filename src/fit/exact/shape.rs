@@ -11,6 +11,7 @@ use crate::fit::block::{load, put, rounded, store};
 use crate::fit::exact::expansion::Expansion;
 use crate::fit::exact::fit::{FitBlock, Tier};
 use crate::fit::exact::handles::redo;
+use crate::fit::motion::derivatives::{Motion, MotionOf};
 use crate::fit::nodes::{FULL_NODES, NodeSamples, Nodes, SMALL_ANGLE_NODES};
 use crate::math::dual::{Dual, Near};
 use crate::math::quaternion::{Quaternion, Real};
@@ -34,6 +35,8 @@ pub(crate) struct Shape {
     pub(crate) moving: fn(&FormulaNumbers, Dual) -> [Dual; 4],
     /// See [`Sampling::fit`].
     pub(crate) fit: fn(&mut FitBlock, &mut [PolynomialSegment]),
+    /// The same, of velocities and accelerations.
+    pub(crate) fit_rates: fn(&mut FitBlock, &mut [PolynomialSegment]),
 }
 
 impl Shape {
@@ -46,6 +49,7 @@ impl Shape {
             rotation: F::rotation::<f64>,
             moving: F::rotation::<Dual>,
             fit: fit::<Directly<F>>,
+            fit_rates: fit::<Motion>,
         }
     }
 
@@ -64,12 +68,14 @@ impl Shape {
         shared: Product::WITH_BERNSTEIN,
         entire: true,
         fit: fit::<Expansion<false>>,
+        fit_rates: fit::<MotionOf<Product>>,
         ..Self::of::<Product>(NUMBERS)
     };
     /// [`Product`] whose basis functions differ from curve to curve.
     pub(crate) const PRODUCT: &'static Self = &Self {
         entire: true,
         fit: fit::<Expansion<true>>,
+        fit_rates: fit::<MotionOf<Product>>,
         ..Self::of::<Product>(NUMBERS)
     };
     pub(crate) const DE_CASTELJAU: &'static Self = &Self::of::<DeCasteljau>(16);
@@ -80,7 +86,10 @@ impl Shape {
         is_unit: false,
         ..Self::of::<StraightLine>(8)
     };
-    pub(crate) const ROTATION_VECTOR: &'static Self = &Self::of::<RotationVector>(13);
+    pub(crate) const ROTATION_VECTOR: &'static Self = &Self {
+        fit_rates: fit::<MotionOf<RotationVector>>,
+        ..Self::of::<RotationVector>(13)
+    };
 }
 
 /// A way to sample the curves of a block.

@@ -9,12 +9,13 @@ use std::time::Instant;
 
 use clap::{Args, ValueEnum};
 use tumble::{
-    Engine, Error, EulerSequence, FrameRate, Layout, Rotations, SampleTimes, Smoothing,
-    SmoothingEnds, SmoothingError, SmoothingKernel, Vectors,
+    EulerSequence, FrameRate, Layout, SampleTimes, Smoothing, SmoothingEnds, SmoothingError,
+    SmoothingKernel,
 };
 use tumble_formats::format::{Document, MotionOptions, ResultShape};
 use tumble_formats::motion::{Motion, SampledClip};
-use tumble_formats::sample::{ChannelMethods, Samples};
+use tumble_formats::sample::Samples;
+use tumble_formats::smooth::{SmoothJob, SmoothMotionError};
 
 use crate::arguments::command_line::CommandLine;
 use crate::arguments::device::{DeviceArguments, OpenedDevice};
@@ -94,27 +95,6 @@ fn frequency(text: &str) -> Result<f64, String> {
             "invalid frequency `{text}`: expected a number of Hz above 0"
         )),
     }
-}
-
-/// The smoothing of samples at those times.
-fn smoothing_at(
-    times: &[f64],
-    smoothing: &Smoothing,
-    low_pass: Option<f64>,
-) -> Result<Smoothing, String> {
-    let (Some(hz), [first, .., last]) = (low_pass, times) else {
-        return Ok(*smoothing);
-    };
-    let rate = (times.len() - 1) as f64 / (last - first);
-    let kernel = SmoothingKernel::low_pass(hz, rate);
-    let kernel = kernel.map_err(|error| match error {
-        SmoothingError::Frequency { .. } => format!("--low-pass {hz}: {error}"),
-        error => format!("--low-pass {hz}: {error}; give a higher frequency"),
-    })?;
-    Ok(Smoothing {
-        kernel,
-        ..*smoothing
-    })
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
@@ -225,27 +205,6 @@ struct Smoothed {
     kernel: SmoothingKernel,
 }
 
-/// How far steps of time may differ, as a part of a step.
-const EVEN: f64 = 1e-3;
-
-/// The times of the keys, if all tracks have the same and these are evenly spaced.
-fn even_times(clip: &Motion) -> Option<Vec<f64>> {
-    let longest = clip.set.tracks().max_by_key(|track| track.times.len())?;
-    let times = longest.times;
-    let fits = |track_times: &[f64]| track_times == times || track_times.len() == 1;
-    let channels = [tumble::Channel::Translation, tumble::Channel::Scale];
-    let vectors = (0..clip.set.track_count())
-        .flat_map(|track| channels.map(|channel| clip.set.vector_keys(channel, track)));
-    let all = clip.set.tracks().all(|track| fits(track.times))
-        && vectors.flatten().all(|keys| fits(keys.times));
-    let steps = || times.windows(2).map(|pair| pair[1] - pair[0]);
-    let (least, largest) = (
-        steps().fold(f64::INFINITY, f64::min),
-        steps().fold(0.0, f64::max),
-    );
-    (all && (times.len() < 2 || largest - least <= EVEN * largest)).then(|| times.to_vec())
-}
-
 fn smoothed(
     device: &mut OpenedDevice,
     name: &str,
@@ -253,47 +212,28 @@ fn smoothed(
     smoothing: &Smoothing,
     (fps, low_pass): (Option<FrameRate>, Option<f64>),
 ) -> Result<Smoothed, Failure> {
-    let (frames, rate) = match fps {
-        Some(rate) => (SampleTimes::rate(rate), Some(rate)),
-        None => match even_times(clip) {
-            Some(times) => (SampleTimes::at(times), clip.rate),
-            None => {
-                let message = format!(
-                    "{name}: the keys are not evenly spaced, or not at the same times in all tracks; give --fps"
-                );
-                return Err(Failure::new(ALL_INPUTS, message));
-            }
-        },
-    };
-    let timeline = room::in_memory(name, &clip.set, &frames, 7)?;
+    let job = SmoothJob::new(clip, *smoothing, low_pass, fps).map_err(|error| match error {
+        SmoothMotionError::Evaluating(error) => Failure::evaluating(name, &error),
+        SmoothMotionError::LowPass { hz, reason } => {
+            let hint = match reason {
+                SmoothingError::Frequency { .. } => "",
+                _ => "; give a higher frequency",
+            };
+            Failure::usage(format!("{name}: --low-pass {hz}: {reason}{hint}"))
+        }
+        error => Failure::new(ALL_INPUTS, format!("{name}: {error}; give --fps")),
+    })?;
+    let timeline = room::in_memory(name, &clip.set, &job.frames, 7)?;
     let rotations = clip.set.track_count() * timeline.len();
-    let times: Vec<f64> = timeline.times(0).collect();
-    let smoothing = smoothing_at(&times, smoothing, low_pass)
-        .map_err(|message| Failure::usage(format!("{name}: {message}")))?;
-    let methods = ChannelMethods::AUTHORED;
-    let tracks = clip.set.track_count();
-    let work = |engine: &Engine| {
-        let before = methods.sample(engine, clip, &frames)?;
-        let mut samples = before.clone();
-        let layout = Layout::FrameMajor;
-        if let Ok(input) = Rotations::of(&samples.rotations, tracks, layout) {
-            samples.rotations = engine.smooth(&input, &smoothing)?.as_quats().to_vec();
-        }
-        if let Ok(input) = Vectors::of(&samples.translations, tracks, layout) {
-            let moved = engine.smooth_vectors(&input, &smoothing)?;
-            samples.translations = moved.as_slice().iter().map(|v| v.truncate()).collect();
-        }
-        Ok::<_, Error>((before, samples))
-    };
-    let (before, after) = device
+    let found = device
         .choose(rotations)
-        .and_then(|()| device.work(work))
+        .and_then(|()| device.work(|engine| job.run(engine, clip)))
         .map_err(|error| Failure::evaluating(name, &error))?;
     Ok(Smoothed {
-        before,
-        after,
-        rate,
-        kernel: smoothing.kernel,
+        before: found.before,
+        after: found.after,
+        rate: job.rate,
+        kernel: job.smoothing.kernel,
     })
 }
 
