@@ -7,10 +7,8 @@
 use divan::Bencher;
 use divan::counter::ItemsCount;
 use glam::Quat;
-use tumble::{
-    CrowdLayer, CrowdLibrary, CrowdValues, Device, Encoding, Engine, EngineOptions, Layout,
-    METHODS, SampleTimes, Skeleton, TrackSet, VectorMethod, method,
-};
+use tumble::crowd::{CrowdLayer, CrowdLibrary, CrowdValues};
+use tumble::{Device, Encoding, Engine, EngineOptions, Layout, METHODS, SampleTimes, Skeleton, TrackSet, VectorMethod, method};
 
 fn main() {
     divan::main();
@@ -36,7 +34,7 @@ fn set(step: f32) -> TrackSet {
 
 fn one_thread() -> Engine {
     let mut options = EngineOptions::default();
-    options.threads = Some(1);
+    options.thread_count = Some(1);
     Engine::with_options(Device::Cpu, &options).expect("a CPU")
 }
 

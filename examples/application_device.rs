@@ -11,9 +11,9 @@ use std::error::Error;
 
 use ash::vk;
 use glam::Quat;
+use tumble::vulkan::{VulkanBuffer, VulkanHandles};
 use tumble::{
-    Clip, Device, Engine, EngineOptions, Layout, SampleTimes, TrackSet, VulkanBuffer,
-    VulkanHandles, ash, glam, method,
+    Clip, Device, Engine, EngineOptions, Layout, SampleTimes, TrackSet, ash, glam, method,
 };
 
 const TRACKS: u64 = 60;
@@ -274,12 +274,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     renderer.close([pose_buffer, seen]);
 
     let cpu = Engine::new(Device::Cpu)?;
-    let expected = cpu.evaluate_as(
-        &set,
-        method::BESSEL_OVERHAUSER,
-        &SampleTimes::at(times),
-        Layout::FrameMajor,
-    )?;
+    let expected = cpu
+        .request(&set, method::BESSEL_OVERHAUSER, &SampleTimes::at(times))
+        .layout(Layout::FrameMajor)
+        .evaluate()?;
     let bits = |q: &[f32; 4]| q.map(f32::to_bits);
     let pairs = drawn.iter().zip(expected.as_arrays());
     let differing = pairs.filter(|(a, b)| bits(a) != bits(b)).count();

@@ -15,10 +15,9 @@ use std::time::{Duration, Instant};
 
 use ash::vk;
 use glam::{Quat, Vec3};
-use tumble::{
-    Crowd, CrowdLayer, CrowdLibrary, CrowdTarget, CrowdValues, Device, Engine, EngineOptions,
-    Skeleton, TrackSet, VectorMethod, VulkanBuffer, VulkanHandles, WrapMode, ash, glam, method,
-};
+use tumble::crowd::{Crowd, CrowdLayer, CrowdLibrary, CrowdValues};
+use tumble::vulkan::{CrowdTarget, VulkanBuffer, VulkanHandles};
+use tumble::{Device, Engine, EngineOptions, Skeleton, TrackSet, VectorMethod, WrapMode, ash, glam, method};
 
 thread_local! {
     static ALLOCATIONS: Cell<usize> = const { Cell::new(0) };
@@ -98,7 +97,7 @@ fn library() -> Result<CrowdLibrary, Box<dyn Error>> {
 
 /// Everybody plays some clip from somewhere.
 fn start(crowd: &mut Crowd) -> Result<(), Box<dyn Error>> {
-    for instance in 0..crowd.instances() {
+    for instance in 0..crowd.instance_count() {
         let plays = CrowdLayer {
             speed: 0.8 + 0.05 * (instance % 9) as f32,
             ..CrowdLayer::new(instance % CLIPS).at(instance as i64 * 9_973)
@@ -111,7 +110,7 @@ fn start(crowd: &mut Crowd) -> Result<(), Box<dyn Error>> {
 /// One in a hundred does something new in each frame; all others go on.
 fn go_on(crowd: &mut Crowd, frame: usize) -> Result<(), Box<dyn Error>> {
     crowd.advance(1.0 / 60.0)?;
-    for instance in (frame % 100..crowd.instances()).step_by(100) {
+    for instance in (frame % 100..crowd.instance_count()).step_by(100) {
         let plays = CrowdLayer {
             wrap: WrapMode::Mirror,
             ..CrowdLayer::new((instance + frame) % CLIPS)
@@ -314,7 +313,7 @@ fn on_device(
         });
     }
     // Kernels are compiled here, while a level loads.
-    let target = |slot: &Slot| -> Result<CrowdTarget, tumble::CrowdError> {
+    let target = |slot: &Slot| -> Result<CrowdTarget, tumble::crowd::CrowdError> {
         let range = VulkanBuffer {
             buffer: slot.buffer,
             offset: 0,
@@ -443,7 +442,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         .next()
         .map_or(Ok(1000), |argument| argument.parse())?;
     let library = library()?;
-    let joints = library.joints();
+    let joints = library.joint_count();
     println!("{characters} characters of {joints} joints, {CLIPS} clips, slerp; a frame takes");
     let picture_path = arguments.next();
     for values in [CrowdValues::Rotations, CrowdValues::Model] {

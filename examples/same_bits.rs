@@ -8,7 +8,7 @@ use tumble_formats::generate::{Generate, KeySpacing};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let set = Generate {
-        boxes: 1000,
+        box_count: 1000,
         spacing: KeySpacing::Random,
         ..Generate::default()
     }

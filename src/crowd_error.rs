@@ -2,10 +2,10 @@
 
 use crate::curve::options::InterpolationError;
 use crate::gpu::error::VulkanError;
-use crate::memory::OutOfMemory;
+use crate::memory::OutOfMemoryError;
 use crate::prepare::error::SetError;
-use crate::threads::OutOfThreads;
-use crate::threads::stop::Stopped;
+use crate::threads::OutOfThreadsError;
+use crate::threads::stop::StoppedError;
 use crate::time::wrap::WrapMode;
 
 /// The most clips of a library.
@@ -222,13 +222,13 @@ pub enum CrowdError {
     Vulkan(#[from] VulkanError),
     /// There is not the memory.
     #[error(transparent)]
-    OutOfMemory(#[from] OutOfMemory),
+    OutOfMemory(#[from] OutOfMemoryError),
     /// The system refused worker threads.
     #[error(transparent)]
-    Threads(#[from] OutOfThreads),
+    Threads(#[from] OutOfThreadsError),
     /// Somebody asked the work to end.
     #[error(transparent)]
-    Stopped(#[from] Stopped),
+    Stopped(#[from] StoppedError),
 }
 
 impl From<SetError> for CrowdError {

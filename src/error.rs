@@ -5,16 +5,16 @@ use std::ops::Range;
 use crate::crowd_error::CrowdError;
 use crate::curve::options::InterpolationError;
 use crate::gpu::error::{EvaluateError, VulkanError};
-use crate::memory::OutOfMemory;
+use crate::memory::OutOfMemoryError;
+use crate::names::UnknownNameError;
 use crate::output::encoding::Encoding;
 use crate::output::pose_error::{PoseError, SkeletonError};
 use crate::path::options::FollowError;
 use crate::prepare::error::SetError;
-use crate::simd::dispatch::UnknownWidth;
 use crate::smooth::kernel::SmoothingError;
-use crate::threads::OutOfThreads;
-use crate::threads::stop::Stopped;
-use crate::time::frames::SampleTimesError;
+use crate::threads::OutOfThreadsError;
+use crate::threads::stop::StoppedError;
+use crate::time::error::SampleTimesError;
 use crate::tracks::error::TrackError;
 
 /// Why an evaluation failed.
@@ -76,7 +76,7 @@ pub enum Error {
     },
     /// There is not the memory.
     #[error(transparent)]
-    OutOfMemory(#[from] OutOfMemory),
+    OutOfMemory(#[from] OutOfMemoryError),
     /// There is no such track.
     #[error(transparent)]
     Track(#[from] TrackError),
@@ -91,6 +91,14 @@ pub enum Error {
         "{} stores rotations, not velocities or accelerations; use f32 or vector", encoding.name()
     )]
     EncodesRotations {
+        /// What was asked for.
+        encoding: Encoding,
+    },
+    /// A request has an encoding, and what is asked of it gives values of four f32.
+    #[error(
+        "values of four f32 are asked for, and the request's encoding is {encoding}; leave the encoding out, or use `evaluate_bytes` or `evaluate_into`"
+    )]
+    ResultOfF32 {
         /// What was asked for.
         encoding: Encoding,
     },
@@ -119,7 +127,7 @@ pub enum Error {
     BufferOfOther,
     /// The environment's `TUMBLE_VECTOR_WIDTH` names no vector width.
     #[error("TUMBLE_VECTOR_WIDTH: {0}")]
-    VectorWidth(#[from] UnknownWidth),
+    VectorWidth(#[from] UnknownNameError),
     /// That many worker threads cannot be asked for.
     #[error(
         "{requested} worker threads were asked for; give 1 to {max}, or none for the shared ones"
@@ -132,10 +140,10 @@ pub enum Error {
     },
     /// The system refused worker threads.
     #[error(transparent)]
-    Threads(#[from] OutOfThreads),
+    Threads(#[from] OutOfThreadsError),
     /// Somebody asked the work to end.
     #[error(transparent)]
-    Stopped(#[from] Stopped),
+    Stopped(#[from] StoppedError),
 }
 
 impl From<SetError> for Error {

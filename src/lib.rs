@@ -44,16 +44,18 @@
 //!   [`Engine::local_to_model`] makes matrices in the model of them along a [`Skeleton`], for skinning
 //!   with inverse bind matrices. [`Engine::world`] does so for rotations on fixed offsets.
 //!   [`Engine::blend`], [`Engine::mix`] and [`Engine::add`] put layers of poses together.
-//! * **Crowds**: a [`CrowdLibrary`] holds the clips of a skeleton, and a [`Crowd`] plays them: many
-//!   instances, each at its own time, with layers, into matrices for skinning. Without a skeleton, many
+//! * **Crowds**: in [`crowd`], a [`CrowdLibrary`](crowd::CrowdLibrary) holds the clips of a skeleton, and a
+//!   [`Crowd`](crowd::Crowd) plays them: many instances, each at its own time, with layers, into matrices for skinning. Without a skeleton, many
 //!   characters at their own times in one [`Clip`] are one call with [`SampleTimes::at`], a sample for each,
 //!   in [`Layout::FrameMajor`]; give the times in increasing order.
-//! * **Your own Vulkan device**: [`Engine::from_vulkan`] takes a renderer's device and a queue,
-//!   [`Crowd::record`] records a crowd's poses into its command buffers, and
+//! * **Your own Vulkan device** ([`vulkan`]): [`Engine::from_vulkan`] takes a renderer's device and a queue,
+//!   [`Crowd::record`](crowd::Crowd::record) records a crowd's poses into its command buffers, and
 //!   [`Request::target`] and [`Request::to_buffer`] leave a clip's in the renderer's buffer. `examples/application_device.rs`
 //!   is a whole program, with two queue families, buffers that are kept, and the warm-up.
-//! * **Bodies that travel**: [`Engine::follow`] moves them along paths, [`Engine::smooth`] takes the
+//! * **Bodies that travel**: [`Engine::follow`] moves them along [`paths`], [`Engine::smooth`] takes the
 //!   noise from samples.
+//! * **Names of options**: every option has `ALL`, `name`, [`Display`](std::fmt::Display) and
+//!   [`FromStr`](std::str::FromStr), as the program and the bindings use them: `"mirror".parse::<WrapMode>()`.
 //! * **Smaller results**: an [`Encoding`] stores rotations in 16 bits, as matrices or as angles, made on
 //!   the device. [`Engine::rates`] gives angular velocities and accelerations.
 //! * **How right is it here**: [`verify::verify`] compares a device with the CPU, bit for bit, and both
@@ -76,9 +78,10 @@
 // What only Vulkan uses lies beside what the CPU does too.
 #![cfg_attr(not(feature = "vulkan"), allow(dead_code, unused_imports))]
 
+mod checks;
 mod clip;
 mod cpu;
-mod crowd;
+pub mod crowd;
 mod crowd_error;
 mod curve;
 mod device;
@@ -95,13 +98,13 @@ mod gpu;
 mod math;
 mod memory;
 pub mod method;
+mod names;
 mod output;
 mod path;
 mod pose;
 mod prepare;
 pub mod reduce;
 pub mod reference;
-mod request;
 mod shader;
 mod simd;
 mod smooth;
@@ -113,77 +116,119 @@ mod twin;
 pub mod verify;
 
 pub use crate::clip::Clip;
-pub use crate::crowd::layer::CrowdLayer;
-pub use crate::crowd::library::CrowdLibrary;
-pub use crate::crowd::player::Crowd;
-pub use crate::crowd::states::{MotionStates, MotionTables, MotionWords};
-pub use crate::crowd_error::CrowdError;
+pub use crate::clip::request::Request;
 pub use crate::curve::options::{
     Axes, Ends, InterpolationError, InterpolationWarning, KeySigns, Quantity, Speed,
 };
-pub use crate::device::{Device, VulkanDevice};
+pub use crate::device::Device;
 pub use crate::engine::Engine;
 pub use crate::error::Error;
-#[cfg(feature = "vulkan")]
-pub use crate::gpu::clip_target::ClipTarget;
-#[cfg(feature = "vulkan")]
-pub use crate::gpu::crowd::CrowdTarget;
-#[cfg(feature = "prove")]
-pub use crate::gpu::engine::choices::EngineChoices;
-pub use crate::gpu::error::VulkanError;
-#[cfg(feature = "vulkan")]
-pub use crate::gpu::exported::ExportedResult;
-#[cfg(feature = "vulkan")]
-pub use crate::gpu::handles::{QueueLock, VulkanBuffer, VulkanHandles, VulkanQueue};
-pub use crate::gpu::options::{
-    EngineOptions, Mapping, ReadBack, Reads, Timings, Transfer, Uploads,
-};
-#[cfg(feature = "prove")]
-pub use crate::gpu::physical::details::{
-    DeviceDetails, FloatControlsReport, Limits, MemoryHeap, MemoryType, QueueFamily,
-};
-pub use crate::gpu::reports::{
-    DeviceInfo, DeviceKind, KernelCheck, NegativeControl, SelfTestReport,
-};
-pub use crate::memory::OutOfMemory;
+pub use crate::gpu::options::EngineOptions;
+pub use crate::memory::OutOfMemoryError;
 pub use crate::method::interpolation::Interpolation;
-pub use crate::method::vector_method::{UnknownVectorMethod, VectorMethod};
-pub use crate::method::{Continuity, Cost, Keys, METHODS, Method};
+pub use crate::method::vector_method::VectorMethod;
+pub use crate::method::{METHODS, Method};
+pub use crate::names::UnknownNameError;
 pub use crate::output::buffer::OutputBuffer;
 pub use crate::output::component_type::ComponentType;
-pub use crate::output::crowd::{CrowdOutput, CrowdValues};
-pub use crate::output::encoding::{Encoding, EncodingLength, EncodingOptions, MatrixOrder};
-pub use crate::output::euler::{EulerSequence, UnknownSequence};
+pub use crate::output::encoding::{Encoding, EncodingLengthError, EncodingOptions, MatrixOrder};
+pub use crate::output::euler::{EulerSequence, EulerSequenceError};
 pub use crate::output::pose_error::{PoseError, SkeletonError};
 pub use crate::output::rotations::{Layout, Rotations, Samples, SamplesError, Vectors};
 pub use crate::output::signs::{continue_signs, signs_differ, signs_jump};
 pub use crate::output::value::OutputValue;
-pub use crate::path::options::{
-    BodyAxis, Direction, Follow, FollowError, FollowWarning, PathFrame, Twist,
-};
-pub use crate::path::speed::PathSpeed;
-pub use crate::pose::follow::Followed;
 pub use crate::pose::local_to_model::ModelMatrices;
 pub use crate::pose::poses::WorldPoses;
 pub use crate::pose::skeleton::Skeleton;
 pub use crate::pose::transforms::Transforms;
-pub use crate::request::Request;
-pub use crate::shader::{Form, kernels};
-pub use crate::simd::dispatch::{UnknownWidth, VectorWidth};
+pub use crate::simd::dispatch::VectorWidth;
 pub use crate::smooth::kernel::{Smoothing, SmoothingEnds, SmoothingError, SmoothingKernel};
 pub use crate::stream::Chunk;
-pub use crate::threads::stop::{Stop, Stopped};
-pub use crate::threads::{OutOfThreads, on_threads};
+pub use crate::threads::stop::{Stop, StoppedError};
+pub use crate::threads::{OutOfThreadsError, on_threads};
+pub use crate::time::error::{MAX_FRAMES, SampleTimesError};
 pub use crate::time::frame_rate::FrameRate;
-pub use crate::time::frames::{MAX_FRAMES, SampleTimes, SampleTimesError, Timeline};
+pub use crate::time::frames::{SampleTimes, Timeline};
 pub use crate::time::time_base::TimeBase;
 pub use crate::time::wrap::WrapMode;
-pub use crate::tracks::check::{NORM_TOLERANCE, UNIT_TOLERANCE};
-pub use crate::tracks::error::TrackError;
+pub use crate::tracks::check::UNIT_TOLERANCE;
+pub use crate::tracks::error::{NORM_TOLERANCE, TrackError};
 pub use crate::tracks::rotation::Rotation;
 pub use crate::tracks::set::key_data::Tcb;
 pub use crate::tracks::set::vectors::{Channel, VectorKeys};
 pub use crate::tracks::set::{Track, TrackSet};
+
+pub mod paths {
+    //! Bodies that follow paths: where they are, how they are turned, and when.
+    //!
+    //! A path is a track of translations ([`TrackSet::push_path`](crate::TrackSet::push_path)).
+    //! [`Engine::follow`](crate::Engine::follow) moves a body along each, as [`Follow`] says, and gives
+    //! [`Followed`]: positions and rotations.
+    //!
+    //! * The curve through the points is that of a [`VectorMethod`](crate::VectorMethod).
+    //! * [`PathSpeed`] says when a body is where: by the keys' times, at one speed, or eased in and out.
+    //! * [`Direction`] says where it faces: along the path, ahead on it, to a point, or to another body.
+    //! * [`PathFrame`] says how it is turned about that direction, and [`Twist`] what a closed path does with the
+    //!   roll that is left over after one round.
+    //! * [`BodyAxis`] names the axes of the body that face forward and up.
+    //!
+    //! Formulas and their sources are in `docs/paths.md`.
+
+    pub use crate::path::options::{
+        BodyAxis, Direction, Follow, FollowError, FollowWarning, PathFrame, Twist,
+    };
+    pub use crate::path::speed::PathSpeed;
+    pub use crate::pose::follow::Followed;
+}
+
+pub mod vulkan {
+    //! Vulkan devices: which there are, how they did in the checks, and how an application shares its own.
+    //!
+    //! [`Device::list`](crate::Device::list) lists the devices of the machine, each a [`VulkanDevice`] with its
+    //! [`DeviceInfo`]. An engine on one is opened as any other.
+    //!
+    //! * **Is it exact?** A device is checked when it is opened ([`SelfTestReport`]), each of its kernels before it
+    //!   is used ([`KernelCheck`]), and the check itself by a [`NegativeControl`]. [`VulkanError`] says what a device
+    //!   refused.
+    //! * **Where did the time go?** [`Engine::take_timings`](crate::Engine::take_timings) gives [`Timings`].
+    //! * **An application's own device** (feature `vulkan`):
+    //!   [`Engine::from_vulkan`](crate::Engine::from_vulkan) takes its `VulkanHandles` and a `VulkanQueue`, whose lock
+    //!   is a `QueueLock`. Results go into a `VulkanBuffer`: at once by `Request::to_buffer`, or recorded into the
+    //!   application's commands by a `ClipTarget` or a `CrowdTarget`.
+    //! * **Memory for others on the same card**, such as CUDA: an `ExportedResult`.
+    //!
+    //! Without the feature `vulkan` no device is listed ([`VulkanError::NotBuilt`]); the types of an application's own
+    //! device are left out.
+
+    pub use crate::device::VulkanDevice;
+    #[cfg(feature = "vulkan")]
+    pub use crate::gpu::clip_target::ClipTarget;
+    #[cfg(feature = "vulkan")]
+    pub use crate::gpu::crowd::CrowdTarget;
+    #[cfg(feature = "prove")]
+    pub use crate::gpu::engine::choices::EngineChoices;
+    pub use crate::gpu::error::VulkanError;
+    #[cfg(feature = "vulkan")]
+    pub use crate::gpu::exported::ExportedResult;
+    #[cfg(feature = "vulkan")]
+    pub use crate::gpu::handles::{QueueLock, VulkanBuffer, VulkanHandles, VulkanQueue};
+    pub use crate::gpu::options::Timings;
+    #[cfg(feature = "prove")]
+    pub use crate::gpu::physical::details::{
+        DeviceDetails, FloatControlsReport, Limits, MemoryHeap, MemoryType, QueueFamily,
+    };
+    pub use crate::gpu::reports::{
+        DeviceInfo, DeviceKind, KernelCheck, NegativeControl, SelfTestReport,
+    };
+    pub use crate::shader::kernels;
+
+    pub mod tuning {
+        //! How an engine uses its device, for measurements and tests: every choice gives the same bits, and
+        //! `Automatic`, the default of each, is right for programs.
+
+        pub use crate::gpu::options::{Mapping, ReadBack, Reads, Transfer, Uploads};
+    }
+}
 
 #[cfg(feature = "vulkan")]
 pub use ash;

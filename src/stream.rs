@@ -11,7 +11,7 @@ use crate::curve::options::Quantity;
 use crate::error::Error;
 use crate::output::buffer::OutputBuffer;
 use crate::output::window::Window;
-use crate::threads::{self, OutOfThreads};
+use crate::threads::{self, OutOfThreadsError};
 
 /// A contiguous part of a result. Chunks come in the order of the whole result in memory, without
 /// gaps.
@@ -111,7 +111,7 @@ pub(crate) fn run<E: From<Error>>(
         };
         thread::Builder::new()
             .spawn_scoped(scope, fill_all)
-            .map_err(|error| Error::Threads(OutOfThreads::of_one(&error)))?;
+            .map_err(|error| Error::Threads(OutOfThreadsError::of_one(&error)))?;
         for result in filled {
             let (window, rotations) = result?;
             let count = window.len();

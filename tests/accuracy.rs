@@ -4,10 +4,7 @@
 use crate::support::{Random, give_key_data, hostile_set, is_due};
 use glam::{DQuat, Quat};
 use tumble::reference::{ReferenceCurve, angle_between};
-use tumble::{
-    Clip, Device, Ends, Engine, Form, FrameRate, Interpolation, KeySigns, METHODS, Rotations,
-    SampleTimes, Track, TrackSet,
-};
+use tumble::{Clip, Device, Ends, Engine, FrameRate, Interpolation, KeySigns, METHODS, Rotations, SampleTimes, Track, TrackSet, method::Form};
 
 /// Largest and rms error in radians, largest | |q| - 1 |.
 #[derive(Debug, Default)]
@@ -31,7 +28,7 @@ fn errors(set: &TrackSet, interpolation: Interpolation, frames: &SampleTimes) ->
     let method = interpolation.method;
     for (t, track) in set.tracks().enumerate() {
         let curve = ReferenceCurve::of(&interpolation, track);
-        for s in 0..rotations.samples() {
+        for s in 0..rotations.sample_count() {
             let found = rotations.get(t, s).unwrap().as_dquat();
             let time = timeline.time(t, s).unwrap();
             let error = angle_between(found, curve.rotation(time));
@@ -341,7 +338,7 @@ fn end_values_are_held_outside_the_keys() {
             .unwrap();
         let held = |a, b| bits(frames.get(0, a).unwrap()) == bits(frames.get(0, b).unwrap());
         assert!(held(0, 9) && held(40, 90) && !held(9, 25), "{method}");
-        for s in 0..frames.samples() {
+        for s in 0..frames.sample_count() {
             assert_eq!(bits(frames.get(1, s).unwrap()), bits(keys[1]), "{method}");
         }
         if method.interpolates {

@@ -7,9 +7,10 @@ use crate::support::{
 };
 use glam::{DQuat, DVec3, Quat};
 use tumble::reference::{ReferenceCurve, angle_between};
+use tumble::vulkan::tuning::Transfer;
 use tumble::{
     Device, Encoding, Ends, Engine, EngineOptions, Interpolation, KeySigns, Layout, METHODS,
-    Rotations, SampleTimes, TrackSet, Transfer, VectorWidth, WrapMode, method,
+    Rotations, SampleTimes, TrackSet, VectorWidth, WrapMode, method,
 };
 
 const ENDS: [Ends; 5] = [
@@ -102,7 +103,7 @@ fn every_vector_width_and_thread_count_gives_the_same_bits() {
             for threads in [1, 3] {
                 let engine = engine(&Device::Cpu, |options| {
                     options.vector_width = Some(width);
-                    options.threads = Some(threads);
+                    options.thread_count = Some(threads);
                 });
                 let found = engine.evaluate(&set, method, &frames).unwrap();
                 let label = format!("{method}, {width:?}, {threads} threads");
@@ -192,7 +193,11 @@ fn every_memory_budget_transfer_and_layout_gives_the_same_bits() {
                     let found = engine.evaluate(&set, *method, &frames).unwrap();
                     assert_same_bits(expected.as_quats(), found.as_quats(), &label);
                     let layout = Layout::FrameMajor;
-                    let transposed = engine.evaluate_as(&set, *method, &frames, layout).unwrap();
+                    let transposed = engine
+                        .request(&set, *method, &frames)
+                        .layout(layout)
+                        .evaluate()
+                        .unwrap();
                     assert_transposed(expected, &transposed);
                 }
             }
@@ -217,7 +222,7 @@ fn long_results_have_the_bits_of_short_ones() {
         let kept = cpu().upload(&set, method).unwrap();
         let kept = kept.evaluate(&frames).unwrap();
         assert_same_bits(expected.as_quats(), kept.as_quats(), "kept");
-        let samples = expected.samples();
+        let samples = expected.sample_count();
         let short = cpu().evaluate(&set.select(900..910).unwrap(), method, &frames);
         let found = &expected.as_quats()[900 * samples..910 * samples];
         assert_same_bits(short.unwrap().as_quats(), found, "ten tracks of many");
@@ -284,15 +289,17 @@ fn layouts_are_transposes_of_each_other() {
     for method in METHODS {
         let rows = cpu().evaluate(&set, method, &frames).unwrap();
         let columns = cpu()
-            .evaluate_as(&set, method, &frames, Layout::FrameMajor)
+            .request(&set, method, &frames)
+            .layout(Layout::FrameMajor)
+            .evaluate()
             .unwrap();
         assert_transposed(&rows, &columns);
     }
 }
 
 fn assert_transposed(rows: &Rotations, columns: &Rotations) {
-    for track in 0..rows.tracks() {
-        for sample in 0..rows.samples() {
+    for track in 0..rows.track_count() {
+        for sample in 0..rows.sample_count() {
             let bits = |q: Option<Quat>| q.unwrap().to_array().map(f32::to_bits);
             assert_eq!(
                 bits(rows.get(track, sample)),
@@ -490,12 +497,12 @@ fn nothing_to_evaluate_is_no_error() {
     for engine in vulkan_engines(|_| {}).into_iter().chain([cpu()]) {
         for method in METHODS {
             let empty = engine.evaluate(&TrackSet::new(), method, &frames).unwrap();
-            assert_eq!((empty.tracks(), empty.as_quats().len()), (0, 0));
+            assert_eq!((empty.track_count(), empty.as_quats().len()), (0, 0));
             let set = hostile_set(1, 3);
             let none = engine
                 .evaluate(&set, method, &SampleTimes::at(Vec::new()))
                 .unwrap();
-            assert_eq!((none.tracks(), none.samples()), (3, 0));
+            assert_eq!((none.track_count(), none.sample_count()), (3, 0));
         }
     }
 }
@@ -1063,7 +1070,11 @@ fn few_times_of_each_track_have_the_bits_of_many() {
                 let clip = engine.upload(&set, method).unwrap();
                 let found = clip.evaluate(&frames).unwrap();
                 assert_same_bits(&expected, found.as_quats(), method.name);
-                let found = clip.evaluate_as(&frames, Layout::FrameMajor).unwrap();
+                let found = clip
+                    .request(&frames)
+                    .layout(Layout::FrameMajor)
+                    .evaluate()
+                    .unwrap();
                 for (row, track) in expected.chunks(count).zip(0..) {
                     for (sample, &rotation) in row.iter().enumerate() {
                         let found = found.get(track, sample).unwrap();
@@ -1125,14 +1136,24 @@ fn few_samples_of_a_kept_clip_have_the_same_bits() {
         for (request, frames) in requests.iter().enumerate() {
             let samples = kept.evaluate(frames).unwrap().as_quats().len();
             assert!(samples < set.key_count(), "few samples");
-            for (kind, encoding) in Encoding::KINDS.into_iter().enumerate() {
+            for (kind, encoding) in Encoding::ALL.into_iter().enumerate() {
                 if !is_due(round + request, kind, 2) {
                     continue;
                 }
                 let layout = Layout::TrackMajor;
-                let expected = kept.evaluate_encoded(frames, layout, encoding).unwrap();
+                let expected = kept
+                    .request(frames)
+                    .layout(layout)
+                    .encoding(encoding)
+                    .evaluate_bytes()
+                    .unwrap();
                 for (engine, clip) in &clips {
-                    let found = clip.evaluate_encoded(frames, layout, encoding).unwrap();
+                    let found = clip
+                        .request(frames)
+                        .layout(layout)
+                        .encoding(encoding)
+                        .evaluate_bytes()
+                        .unwrap();
                     let device = engine.device_name();
                     let label = format!("{method}, {outside:?}, {frames:?}, {device}");
                     assert!(expected == found, "{encoding:?}, {label}");
@@ -1174,7 +1195,11 @@ fn dense_sets_go_piece_by_piece() {
         }
         for engine in round_robin(&engines, round + 1) {
             let layout = Layout::FrameMajor;
-            let columns = engine.evaluate_as(&set, method, &frames, layout).unwrap();
+            let columns = engine
+                .request(&set, method, &frames)
+                .layout(layout)
+                .evaluate()
+                .unwrap();
             assert_transposed(&expected, &columns);
         }
     }

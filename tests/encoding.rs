@@ -43,9 +43,9 @@ fn every_device_encodes_like_the_host() {
             .collect();
         for frames in &requests {
             for layout in [Layout::TrackMajor, Layout::FrameMajor] {
-                let rotations = of_cpu.evaluate_as(frames, layout).unwrap();
+                let rotations = of_cpu.request(frames).layout(layout).evaluate().unwrap();
                 let quats: &[[f32; 4]] = bytemuck::cast_slice(rotations.as_quats());
-                for encoding in Encoding::KINDS {
+                for encoding in Encoding::ALL {
                     let mut expected = vec![0; quats.len() * encoding.bytes()];
                     encoding.encode(quats, &mut expected).unwrap();
                     round += 1;
@@ -54,7 +54,12 @@ fn every_device_encodes_like_the_host() {
                             continue;
                         }
                         let device = engine.device_name();
-                        let found = clip.evaluate_encoded(frames, layout, encoding).unwrap();
+                        let found = clip
+                            .request(frames)
+                            .layout(layout)
+                            .encoding(encoding)
+                            .evaluate_bytes()
+                            .unwrap();
                         let label = format!("{device:?}, {method}, {layout:?}, {encoding:?}");
                         assert!(found == expected, "{label}");
                         if is_due(round, i, 2 * KERNEL_OPTIONS.len()) {
@@ -93,8 +98,12 @@ fn velocities_are_not_stored_as_rotations() {
     let clip = engine.upload(&set, velocity).unwrap();
     let frames = SampleTimes::at(vec![0.0, 0.5, 1.0]);
     let whole = clip.rates(&frames, Layout::TrackMajor).unwrap();
-    for encoding in Encoding::KINDS {
-        let found = clip.evaluate_encoded(&frames, Layout::TrackMajor, encoding);
+    for encoding in Encoding::ALL {
+        let found = clip
+            .request(&frames)
+            .layout(Layout::TrackMajor)
+            .encoding(encoding)
+            .evaluate_bytes();
         match (encoding, found) {
             (Encoding::F32 | Encoding::Vector, Ok(found)) => {
                 let first = &found[..encoding.bytes()];

@@ -3,10 +3,8 @@
 use std::fs::File;
 use std::os::unix::fs::FileExt;
 
-use tumble::{
-    Device, Encoding, Engine, EngineOptions, Error, ExportedResult, Layout, SampleTimes,
-    VulkanError, method,
-};
+use tumble::vulkan::{ExportedResult, VulkanError};
+use tumble::{Device, Encoding, Engine, EngineOptions, Error, Layout, SampleTimes, method};
 
 use crate::support::{dense_set, hostile_set, vulkan_devices};
 
@@ -39,10 +37,18 @@ fn exported_results_have_the_bits_of_the_cpu() {
         ] {
             let expected = cpu.upload(&set, method::BESSEL_OVERHAUSER).unwrap();
             let expected = expected
-                .evaluate_encoded(&frames, layout, encoding)
+                .request(&frames)
+                .layout(layout)
+                .encoding(encoding)
+                .evaluate_bytes()
                 .unwrap();
             let clip = engine.upload(&set, method::BESSEL_OVERHAUSER).unwrap();
-            let found = match clip.evaluate_exported(&frames, layout, encoding) {
+            let found = match clip
+                .request(&frames)
+                .layout(layout)
+                .encoding(encoding)
+                .export()
+            {
                 Err(Error::Vulkan(VulkanError::NoExport { .. })) => continue, // none of its memory can be
                 found => found.unwrap(),
             };
@@ -68,12 +74,21 @@ fn exported_memory_lives_as_long_as_somebody_has_it() {
     let cpu = Engine::new(Device::Cpu).unwrap();
     let (set, frames) = dense_set(8, 20_000, 0.1);
     let expected = cpu.upload(&set, method::SLERP).unwrap();
-    let expected = expected.evaluate_encoded(&frames, Layout::TrackMajor, Encoding::F32);
+    let expected = expected
+        .request(&frames)
+        .layout(Layout::TrackMajor)
+        .encoding(Encoding::F32)
+        .evaluate_bytes();
     let expected = expected.unwrap();
     for device in vulkan_devices() {
         let engine = Engine::new(device).unwrap();
         let clip = engine.upload(&set, method::SLERP).unwrap();
-        let export = || clip.evaluate_exported(&frames, Layout::TrackMajor, Encoding::F32);
+        let export = || {
+            clip.request(&frames)
+                .layout(Layout::TrackMajor)
+                .encoding(Encoding::F32)
+                .export()
+        };
         let Ok(first) = export() else { continue };
         for _ in 0..8 {
             drop(export().unwrap());
@@ -94,7 +109,10 @@ fn what_cannot_be_exported_is_said() {
     let cpu = Engine::new(Device::Cpu).unwrap();
     let clip = cpu.upload(&set, method::SLERP).unwrap();
     let export = |frames: &SampleTimes, encoding| {
-        clip.evaluate_exported(frames, Layout::TrackMajor, encoding)
+        clip.request(frames)
+            .layout(Layout::TrackMajor)
+            .encoding(encoding)
+            .export()
     };
     let found = export(&SampleTimes::fps(10), Encoding::F32).unwrap_err();
     assert!(matches!(found, Error::ExportOnCpu), "{found}");
@@ -103,9 +121,18 @@ fn what_cannot_be_exported_is_said() {
         let engine = Engine::with_options(device, &options).unwrap();
         let clip = engine.upload(&set, method::SLERP).unwrap();
         let layout = Layout::TrackMajor;
-        let found = clip.evaluate_exported(&SampleTimes::at(vec![f64::NAN]), layout, Encoding::F32);
+        let found = clip
+            .request(&SampleTimes::at(vec![f64::NAN]))
+            .layout(layout)
+            .encoding(Encoding::F32)
+            .export();
         assert!(matches!(found, Err(Error::SampleTimes(_))), "{found:?}");
-        if let Err(found) = clip.evaluate_exported(&SampleTimes::fps(10), layout, Encoding::F32) {
+        if let Err(found) = clip
+            .request(&SampleTimes::fps(10))
+            .layout(layout)
+            .encoding(Encoding::F32)
+            .export()
+        {
             let said = found.to_string();
             assert!(
                 said.contains("cannot hand the memory of results to others"),

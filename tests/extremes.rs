@@ -6,11 +6,11 @@ use std::ops::Range;
 
 use glam::{Affine3A, DVec3, Quat, Vec3};
 use proptest::prelude::*;
+use tumble::paths::{Direction, Follow, PathFrame, PathSpeed, Twist};
 use tumble::{
-    Axes, Channel, Direction, Encoding, Ends, Engine, Error, EulerSequence, Follow, FrameRate,
-    Interpolation, KeySigns, Layout, METHODS, OutputBuffer, PathFrame, PathSpeed, Quantity,
-    Rotations, SampleTimes, Skeleton, Smoothing, SmoothingEnds, SmoothingKernel, Speed, Tcb,
-    TrackSet, Twist, VectorMethod, Vectors, WrapMode,
+    Axes, Channel, Encoding, Ends, Engine, Error, EulerSequence, FrameRate, Interpolation,
+    KeySigns, Layout, METHODS, OutputBuffer, Quantity, Rotations, SampleTimes, Skeleton, Smoothing,
+    SmoothingEnds, SmoothingKernel, Speed, Tcb, TrackSet, VectorMethod, Vectors, WrapMode,
 };
 
 use crate::support::{Random, vulkan_devices};
@@ -374,10 +374,14 @@ fn evaluate(generate: &mut Generator, engine: &Engine, set: &TrackSet) {
     if (limit..1 << 32).contains(&count) {
         return;
     }
-    if let Ok(result) = engine.evaluate_as(set, interpolation, &frames, layout) {
+    if let Ok(result) = engine
+        .request(set, interpolation, &frames)
+        .layout(layout)
+        .evaluate()
+    {
         assert_eq!(result.as_quats().len(), count);
         let (track, sample) = (generate.count(), generate.count());
-        let is_there = track < tracks && sample < result.samples();
+        let is_there = track < tracks && sample < result.sample_count();
         assert_eq!(result.get(track, sample).is_some(), is_there);
     } else {
         let _ = engine.evaluate(set, interpolation, &frames).is_err();
@@ -392,12 +396,15 @@ fn evaluate(generate: &mut Generator, engine: &Engine, set: &TrackSet) {
     let _ = engine
         .evaluate_into(set, interpolation, &frames, layout, &mut output[..])
         .is_ok();
-    let kinds = Encoding::KINDS;
+    let kinds = Encoding::ALL;
     let encoding = kinds[generate.0.next() as usize % kinds.len()];
     let mut bytes = vec![0; room.saturating_mul(encoding.bytes())];
     let range = generate.range(tracks);
     let _ = engine
-        .evaluate_tracks_into(set, interpolation, &frames, range, encoding, &mut bytes)
+        .request(set, interpolation, &frames)
+        .tracks(range)
+        .encoding(encoding)
+        .evaluate_into(&mut bytes)
         .is_ok();
     let method = generate.0.pick(&VectorMethod::ALL);
     let transforms = engine.transforms(set, interpolation, method, &frames, layout);
@@ -417,8 +424,10 @@ fn evaluate(generate: &mut Generator, engine: &Engine, set: &TrackSet) {
     let _ = engine.follow(set, &follow, &frames, layout).is_ok();
     let chunk = generate.count();
     if count < limit {
-        let streamed: Result<(), Error> =
-            engine.stream(set, interpolation, &frames, layout, chunk, |chunk| {
+        let streamed: Result<(), Error> = engine
+            .request(set, interpolation, &frames)
+            .layout(layout)
+            .stream(chunk, |chunk| {
                 let _ = (chunk.rotations().is_some(), chunk.rates().is_some());
                 Ok(())
             });
@@ -428,10 +437,15 @@ fn evaluate(generate: &mut Generator, engine: &Engine, set: &TrackSet) {
         return;
     };
     let _ = clip.timeline(&frames).is_ok();
-    let _ = clip.evaluate_as(&frames, layout).is_ok();
+    let _ = clip.request(&frames).layout(layout).evaluate().is_ok();
     let _ = clip.rates(&frames, layout).is_ok();
     let _ = clip.evaluate_into(&frames, layout, &mut output[..]).is_ok();
-    let _ = clip.evaluate_encoded(&frames, layout, encoding).is_ok();
+    let _ = clip
+        .request(&frames)
+        .layout(layout)
+        .encoding(encoding)
+        .evaluate_bytes()
+        .is_ok();
     let request = clip.request(&frames).layout(layout).encoding(encoding);
     let _ = request.evaluate_into(&mut bytes).is_ok();
     let request = request
@@ -477,7 +491,7 @@ fn small_things(generate: &mut Generator) {
         generate.count(),
         generate.count(),
     );
-    for kind in Encoding::KINDS {
+    for kind in Encoding::ALL {
         let rows: Vec<[f32; 4]> = (0..3).map(|_| generate.quat().to_array()).collect();
         let mut bytes = vec![0; kind.bytes() * 3 + usize::from(generate.wild(3))];
         let _ = kind.encode(&rows, &mut bytes).is_ok();

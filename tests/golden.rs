@@ -26,7 +26,7 @@ fn every_width() -> Vec<Engine> {
 fn record(golden: &Golden, update: &str) {
     let engine = Engine::new(Device::Cpu).unwrap();
     let mut table = String::new();
-    for case in 0..golden.count() {
+    for case in 0..golden.case_count() {
         let name = golden.name(case);
         let known = Golden::recorded(name).filter(|_| update == "new");
         let evaluate = || golden.evaluate(case, &engine).unwrap().hash;
@@ -46,13 +46,13 @@ fn results_have_the_recorded_hashes() {
     }
     assert_eq!(
         Golden::recorded_count(),
-        golden.count(),
+        golden.case_count(),
         "src/verify/golden.txt has other cases"
     );
     let mut wrong = Vec::new();
     let (widths, vulkan) = (every_width(), vulkan_engines(|_| {}));
     let mut compared = 0;
-    for case in 0..golden.count() {
+    for case in 0..golden.case_count() {
         let name = golden.name(case);
         let recorded = Golden::recorded(name);
         // A method has six cases: each is read by the next of `KERNEL_OPTIONS`.
@@ -73,7 +73,7 @@ fn results_have_the_recorded_hashes() {
     );
     println!(
         "{} results have their recorded hashes, {compared} times",
-        golden.count()
+        golden.case_count()
     );
 }
 
@@ -81,7 +81,7 @@ fn results_have_the_recorded_hashes() {
 #[test]
 fn no_two_cases_have_one_name() {
     let golden = Golden::new();
-    let mut names: Vec<&str> = (0..golden.count()).map(|case| golden.name(case)).collect();
+    let mut names: Vec<&str> = (0..golden.case_count()).map(|case| golden.name(case)).collect();
     names.sort_unstable();
     let twice = names.windows(2).find(|pair| pair[0] == pair[1]);
     assert_eq!(twice, None);

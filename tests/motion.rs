@@ -61,7 +61,7 @@ fn largest_error(set: &TrackSet, interpolation: Interpolation, frames: &SampleTi
     for (t, track) in set.tracks().enumerate() {
         let curve = ReferenceCurve::of(&interpolation, track);
         let mut scales = vec![None; track.times.len() + 1];
-        for s in 0..found.samples() {
+        for s in 0..found.sample_count() {
             let time = timeline.time(t, s).unwrap();
             let found = found.get(t, s).unwrap().as_dvec3();
             assert!(found.is_finite());

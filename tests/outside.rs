@@ -94,7 +94,7 @@ fn outside_is_what_the_words_say() {
                     for (t, track) in set.tracks().enumerate() {
                         let curve = ReferenceCurve::of(&interpolation, track);
                         let steps = method == method::STEP;
-                        for s in 0..found.samples() {
+                        for s in 0..found.sample_count() {
                             let time = timeline.time(t, s).unwrap();
                             if (steps || before == WrapMode::Loop || after == WrapMode::Loop)
                                 && near_a_seam(track, time)
@@ -162,11 +162,13 @@ fn the_same_bits_on_every_device_however_it_is_cut() {
                 let expected = cpu.evaluate(&long, interpolation, &frames).unwrap();
                 let mut streamed = Vec::new();
                 let layout = Layout::TrackMajor;
-                cpu.stream(&long, interpolation, &frames, layout, 1000, |chunk| {
-                    streamed.extend_from_slice(chunk.rotations().unwrap());
-                    Ok::<(), tumble::Error>(())
-                })
-                .unwrap();
+                cpu.request(&long, interpolation, &frames)
+                    .layout(layout)
+                    .stream(1000, |chunk| {
+                        streamed.extend_from_slice(chunk.rotations().unwrap());
+                        Ok::<(), tumble::Error>(())
+                    })
+                    .unwrap();
                 let label = format!("{method}, {before:?} {after:?}");
                 assert_eq!(
                     first_difference(expected.as_quats(), &streamed),
@@ -274,7 +276,7 @@ fn wild_turns_as_authored_give_rotations() {
     let engine = Engine::new(Device::Cpu).unwrap();
     for method in METHODS {
         let interpolation = Interpolation {
-            signs: method.path.unwrap_or(tumble::KeySigns::AsAuthored),
+            signs: method.signs.unwrap_or(tumble::KeySigns::AsAuthored),
             ..method.into()
         };
         let rotations = engine

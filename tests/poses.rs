@@ -28,7 +28,11 @@ fn layers(layout: Layout) -> Vec<Rotations> {
         .map(|seed| {
             let set = hostile_set(seed, 64);
             let method = [method::SLERP, method::BESSEL_OVERHAUSER, method::STEP][seed as usize];
-            engine.evaluate_as(&set, method, &frames, layout).unwrap()
+            engine
+                .request(&set, method, &frames)
+                .layout(layout)
+                .evaluate()
+                .unwrap()
         })
         .collect()
 }
@@ -115,7 +119,7 @@ fn an_added_layer_turns_the_base_on() {
             };
             let found = agreed("add", add);
             for (track, reference) in reference.iter().enumerate() {
-                for sample in 0..found.samples() {
+                for sample in 0..found.sample_count() {
                     let get = |layer: &Rotations| layer.get(track, sample).unwrap().as_dquat();
                     let difference = reference.as_dquat().normalize().inverse() * get(&layers[1]);
                     if difference.w.abs() < 1e-6 {
@@ -172,7 +176,7 @@ fn worlds_follow_their_parents() {
                 engine.device_name()
             );
         }
-        for sample in 0..local.samples() {
+        for sample in 0..local.sample_count() {
             let mut world = vec![(DQuat::IDENTITY, DVec3::ZERO); tracks];
             for &track in &order {
                 let local_rotation = local.get(track, sample).unwrap().as_dquat();
@@ -240,5 +244,5 @@ fn what_does_not_fit_is_refused() {
     let world = engine
         .world(&nothing, &Skeleton::chain(0, 1.0).unwrap())
         .unwrap();
-    assert_eq!((world.tracks(), world.as_slice().len()), (0, 0));
+    assert_eq!((world.track_count(), world.as_slice().len()), (0, 0));
 }

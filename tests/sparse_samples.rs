@@ -244,7 +244,10 @@ fn few_vectors_and_encodings_have_the_bits_of_many() {
         let mut bytes = vec![0; 2 * times.len() * encoding.bytes()];
         let layout = Layout::TrackMajor;
         engine
-            .evaluate_encoded_into(&set, method::SQUAD, &frames, layout, encoding, &mut bytes)
+            .request(&set, method::SQUAD, &frames)
+            .layout(layout)
+            .encoding(encoding)
+            .evaluate_into(&mut bytes)
             .unwrap();
         bytes[..sparse.len() * encoding.bytes()].to_vec()
     };

@@ -48,7 +48,7 @@ fn rotations_are_where_the_reference_is() {
         let mut worst = 0.0f64;
         for (t, track) in set.tracks().enumerate() {
             let curve = ReferenceCurve::of(&interpolation, track);
-            for s in 0..found.samples() {
+            for s in 0..found.sample_count() {
                 let expected = curve.rotation(timeline.time(t, s).unwrap());
                 let off = angle_between(found.get(t, s).unwrap().as_dquat(), expected);
                 worst = worst.max(off);
@@ -123,7 +123,7 @@ fn velocities_have_one_length_and_go_on() {
                     curve.acceleration(first + (last - first) * part).length()
                 };
                 let largest = (1..400).map(bend).fold(1.0, f64::max);
-                for s in 0..found.samples() {
+                for s in 0..found.sample_count() {
                     let time = f64::from(s as u32) / 20.0 - 1.0;
                     let v = found.get(t, s).unwrap();
                     let v = glam::DVec3::new(v.x.into(), v.y.into(), v.z.into());

@@ -63,7 +63,7 @@ fn kernel_of(expression: &str) -> Vec<u32> {
 #[test]
 fn every_float_operation_of_every_shader_is_decorated_once() {
     const FLOAT_ARITHMETIC: [u16; 4] = [127, 129, 131, 133];
-    for (name, code) in tumble::kernels() {
+    for (name, code) in tumble::vulkan::kernels() {
         let mut decorations = BTreeMap::<u32, u32>::new();
         let mut results = 0;
         let code = instructions(&words(code));
@@ -107,7 +107,7 @@ fn every_float_operation_of_every_shader_is_decorated_once() {
 /// each, and tests of the expressions cover none of them.
 #[test]
 fn every_product_of_every_shader_is_one_of_components() {
-    for (name, code) in tumble::kernels() {
+    for (name, code) in tumble::vulkan::kernels() {
         let code = instructions(&words(code));
         let other = code.iter().find(|(opcode, _)| (142..=148).contains(opcode));
         assert_eq!(other, None, "{name}");
@@ -151,7 +151,7 @@ fn vectors_times_scalars_become_products_of_vectors() {
 
 #[test]
 fn the_pass_changes_nothing_the_second_time_and_can_be_undone() {
-    for (name, code) in tumble::kernels() {
+    for (name, code) in tumble::vulkan::kernels() {
         let passed = words(code);
         assert_eq!(no_contraction(&passed).unwrap(), passed, "{name}");
         let bare = without_decorations(&passed).unwrap();
@@ -188,7 +188,7 @@ fn inexact_operations_are_refused() {
 #[test]
 fn the_validator_accepts_every_shader() {
     let environments = ["vulkan1.1", "vulkan1.2"];
-    for (name, code) in tumble::kernels() {
+    for (name, code) in tumble::vulkan::kernels() {
         for controls in 0..4 {
             let offered = FloatControls {
                 preserve_signed_zero_inf_nan: controls & 1 != 0,
@@ -231,7 +231,7 @@ fn validate(name: &str, environment: &str, module: &[u32]) {
 
 #[test]
 fn controls_reach_every_entry_point() {
-    for (name, code) in tumble::kernels() {
+    for (name, code) in tumble::vulkan::kernels() {
         let module = float_controls(&words(code), ALL_CONTROLS).unwrap();
         let modes: Vec<_> = instructions(&module)
             .into_iter()
@@ -322,7 +322,7 @@ proptest! {
     /// A damaged shader is refused or stays a list of whole instructions.
     #[test]
     fn damaged_shaders_never_panic(offset in 0usize..2000, value in any::<u32>()) {
-        for (_, code) in tumble::kernels() {
+        for (_, code) in tumble::vulkan::kernels() {
             let mut module = words(code);
             let offset = offset % module.len();
             module[offset] = value;

@@ -48,20 +48,24 @@ fn chunks_are_the_whole_in_order() {
             let clip = engine.upload(&set, method).unwrap();
             for frames in &requests {
                 for layout in [Layout::TrackMajor, Layout::FrameMajor] {
-                    let whole = clip.evaluate_as(frames, layout).unwrap();
+                    let whole = clip.request(frames).layout(layout).evaluate().unwrap();
                     round += 1;
                     let limits = [100, 5000, 1000, usize::MAX].into_iter().enumerate();
                     for (_, limit) in limits.filter(|(i, _)| is_due(round, *i, 2)) {
                         let label = format!("{method}, {layout:?}, {limit}");
                         let mut of_clip = Collected::default();
-                        clip.stream(frames, layout, limit, |chunk| {
-                            of_clip.take(&chunk);
-                            Ok::<(), Error>(())
-                        })
-                        .unwrap();
+                        clip.request(frames)
+                            .layout(layout)
+                            .stream(limit, |chunk| {
+                                of_clip.take(&chunk);
+                                Ok::<(), Error>(())
+                            })
+                            .unwrap();
                         let mut of_set = Collected::default();
                         engine
-                            .stream(&set, method, frames, layout, limit, |chunk| {
+                            .request(&set, method, frames)
+                            .layout(layout)
+                            .stream(limit, |chunk| {
                                 of_set.take(&chunk);
                                 Ok::<(), Error>(())
                             })
@@ -99,21 +103,17 @@ fn a_sink_that_fails_ends_the_stream() {
         let engine = Engine::new(device).unwrap();
         let mut chunks = 0;
         let frames = SampleTimes::fps(120).between(0.0, 10.0);
-        let result = engine.stream(
-            &set,
-            method::SLERP,
-            &frames,
-            Layout::TrackMajor,
-            1500,
-            |_| {
+        let result = engine
+            .request(&set, method::SLERP, &frames)
+            .layout(Layout::TrackMajor)
+            .stream(1500, |_| {
                 chunks += 1;
                 if chunks == 3 {
                     Err(Stop::Enough)
                 } else {
                     Ok(())
                 }
-            },
-        );
+            });
         assert!(matches!(result, Err(Stop::Enough)));
         assert_eq!(chunks, 3);
     }
@@ -123,14 +123,10 @@ fn a_sink_that_fails_ends_the_stream() {
 fn what_cannot_be_evaluated_is_an_error_before_any_chunk() {
     let engine = Engine::new(Device::Cpu).unwrap();
     let frames = SampleTimes::at(vec![0.0, f64::NAN]);
-    let result = engine.stream(
-        &hostile_set(7, 4),
-        method::SLERP,
-        &frames,
-        Layout::TrackMajor,
-        10,
-        |_| Err(Stop::Enough),
-    );
+    let result = engine
+        .request(&hostile_set(7, 4), method::SLERP, &frames)
+        .layout(Layout::TrackMajor)
+        .stream(10, |_| Err(Stop::Enough));
     assert!(matches!(result, Err(Stop::Engine(Error::SampleTimes(_)))));
 }
 
@@ -163,7 +159,10 @@ fn parts_are_those_of_the_whole() {
                 let samples = clip.timeline(frames).unwrap().len();
                 let track = samples * encoding.bytes();
                 let whole = clip
-                    .evaluate_encoded(frames, Layout::TrackMajor, encoding)
+                    .request(frames)
+                    .layout(Layout::TrackMajor)
+                    .encoding(encoding)
+                    .evaluate_bytes()
                     .unwrap();
                 for tracks in [0..5, 1..4, 2..2, 4..5] {
                     // Aligned to 16 bytes, and not.
@@ -173,20 +172,21 @@ fn parts_are_those_of_the_whole() {
                         let part = &mut store[shift..shift + tracks.len() * track];
                         let range = tracks.clone();
                         engine
-                            .evaluate_tracks_into(
-                                &set,
-                                interpolation,
-                                frames,
-                                range,
-                                encoding,
-                                part,
-                            )
+                            .request(&set, interpolation, frames)
+                            .tracks(range)
+                            .encoding(encoding)
+                            .evaluate_into(part)
                             .unwrap();
                         assert!(*part == whole[tracks.start * track..tracks.end * track]);
                     }
                 }
                 for layout in [Layout::TrackMajor, Layout::FrameMajor] {
-                    let whole = clip.evaluate_encoded(frames, layout, encoding).unwrap();
+                    let whole = clip
+                        .request(frames)
+                        .layout(layout)
+                        .encoding(encoding)
+                        .evaluate_bytes()
+                        .unwrap();
                     let (tracks, part) = (1..4, 7..samples / 2);
                     let mut found = vec![0; tracks.len() * part.len() * encoding.bytes()];
                     let request = clip.request(frames).layout(layout).encoding(encoding);
@@ -217,7 +217,11 @@ fn parts_that_a_result_has_not_are_refused() {
     let frames = SampleTimes::at(vec![0.0; 8]);
     let mut bytes = vec![0; 8 * 16];
     let of_tracks = |tracks, encoding, output: &mut [u8]| {
-        engine.evaluate_tracks_into(&set, method::SLERP, &frames, tracks, encoding, output)
+        engine
+            .request(&set, method::SLERP, &frames)
+            .tracks(tracks)
+            .encoding(encoding)
+            .evaluate_into(output)
     };
     let backwards = std::ops::Range { start: 2, end: 1 };
     for tracks in [3..4, 2..4, backwards.clone()] {
@@ -313,40 +317,58 @@ fn what_takes_too_much_memory_is_made_piece_by_piece_with_the_same_bits() {
                 }
                 let label = format!("{interpolation:?}, request {request}, {engine:?}");
                 for layout in [Layout::TrackMajor, Layout::FrameMajor] {
-                    let expected = whole.evaluate_as(frames, layout).unwrap();
+                    let expected = whole.request(frames).layout(layout).evaluate().unwrap();
                     let expected = expected.as_quats();
                     let same = |found: &[Quat], strategy: &str| {
                         let difference = first_difference(expected, found);
                         assert_eq!(difference, None, "{strategy}, {layout:?}, {label}");
                     };
-                    same(clip.evaluate_as(frames, layout).unwrap().as_quats(), "clip");
-                    let found = engine.evaluate_as(&set, interpolation, frames, layout);
+                    same(
+                        clip.request(frames)
+                            .layout(layout)
+                            .evaluate()
+                            .unwrap()
+                            .as_quats(),
+                        "clip",
+                    );
+                    let found = engine
+                        .request(&set, interpolation, frames)
+                        .layout(layout)
+                        .evaluate();
                     same(found.unwrap().as_quats(), "set");
                     let mut streamed = Collected::default();
-                    let outcome =
-                        engine.stream(&set, interpolation, frames, layout, 300, |chunk| {
+                    let outcome = engine
+                        .request(&set, interpolation, frames)
+                        .layout(layout)
+                        .stream(300, |chunk| {
                             streamed.take(&chunk);
                             Ok::<(), Error>(())
                         });
                     outcome.unwrap();
                     same(&streamed.rotations, "stream");
                     let (encoding, samples) = (Encoding::F16, clip.timeline(frames).unwrap().len());
-                    let expected = whole.evaluate_encoded(frames, layout, encoding).unwrap();
-                    let found = clip.evaluate_encoded(frames, layout, encoding).unwrap();
+                    let expected = whole
+                        .request(frames)
+                        .layout(layout)
+                        .encoding(encoding)
+                        .evaluate_bytes()
+                        .unwrap();
+                    let found = clip
+                        .request(frames)
+                        .layout(layout)
+                        .encoding(encoding)
+                        .evaluate_bytes()
+                        .unwrap();
                     assert!(found == expected, "encoded, {layout:?}, {label}");
                     if layout == Layout::TrackMajor {
                         let mut part = vec![0; 7 * samples * encoding.bytes()];
                         let start = (tracks - 7) * samples * encoding.bytes();
                         let last = tracks - 7..tracks;
                         engine
-                            .evaluate_tracks_into(
-                                &set,
-                                interpolation,
-                                frames,
-                                last,
-                                encoding,
-                                &mut part,
-                            )
+                            .request(&set, interpolation, frames)
+                            .tracks(last)
+                            .encoding(encoding)
+                            .evaluate_into(&mut part)
                             .unwrap();
                         assert!(part == expected[start..], "tracks, {label}");
                     }
@@ -371,6 +393,9 @@ fn what_cannot_be_interpolated_is_refused_before_it_is_made_piece_by_piece() {
     assert!(matches!(error, Error::Interpolation(_)), "{error}");
     let sink = |_: tumble::Chunk<'_>| -> Result<(), Error> { panic!("no chunk comes") };
     let (frames, layout) = (SampleTimes::fps(5), Layout::FrameMajor);
-    let error = engine.stream(&set, interpolation, &frames, layout, 10, sink);
+    let error = engine
+        .request(&set, interpolation, &frames)
+        .layout(layout)
+        .stream(10, sink);
     assert!(matches!(error, Err(Error::Interpolation(_))));
 }

@@ -10,7 +10,7 @@ use tumble::reference::{
     ReferenceCurve, angle_between, slerp, slerp_from_end, slerp_from_end_left, slerp_from_start,
     slerp_from_start_left,
 };
-use tumble::{Continuity, Ends, KeySigns, Keys, METHODS, Method, method};
+use tumble::{Ends, KeySigns, METHODS, Method, method::{Continuity, Keys, self}};
 
 /// Every method but those that are made to jump.
 fn moving() -> impl Iterator<Item = Method> {

@@ -9,10 +9,13 @@ use std::time::{Duration, Instant};
 
 use glam::{DQuat, Quat, Vec3};
 use rayon::prelude::*;
+use tumble::crowd::{CrowdLayer, CrowdLibrary, CrowdValues};
+use tumble::paths::Follow;
+use tumble::vulkan::VulkanBuffer;
+use tumble::vulkan::tuning::Mapping;
 use tumble::{
-    Axes, CrowdLayer, CrowdLibrary, CrowdValues, Device, Encoding, Engine, EngineOptions, Error,
-    Follow, Interpolation, Layout, Mapping, OutputBuffer, Quantity, SampleTimes, Skeleton,
-    Smoothing, SmoothingKernel, TrackSet, VectorMethod, VulkanBuffer, method,
+    Axes, Device, Encoding, Engine, EngineOptions, Error, Interpolation, Layout, OutputBuffer,
+    Quantity, SampleTimes, Skeleton, Smoothing, SmoothingKernel, TrackSet, VectorMethod, method,
 };
 
 use crate::application::Application;
@@ -134,7 +137,11 @@ fn calls(engine: &Engine) -> Vec<Call> {
     vec![
         Box::new(move |rate| sum(clip.evaluate(&frames(rate)).unwrap().as_quats())),
         Box::new(move |rate| {
-            let found = clip.evaluate_as(&frames(rate), frame_major).unwrap();
+            let found = clip
+                .request(&frames(rate))
+                .layout(frame_major)
+                .evaluate()
+                .unwrap();
             sum(found.as_quats())
         }),
         Box::new(move |rate| {
@@ -146,7 +153,10 @@ fn calls(engine: &Engine) -> Vec<Call> {
         Box::new(move |rate| {
             let encoding = Encoding::F16;
             sum(&clip
-                .evaluate_encoded(&frames(rate), track_major, encoding)
+                .request(&frames(rate))
+                .layout(track_major)
+                .encoding(encoding)
+                .evaluate_bytes()
                 .unwrap())
         }),
         Box::new(move |rate| {
@@ -160,18 +170,22 @@ fn calls(engine: &Engine) -> Vec<Call> {
         }),
         Box::new(move |rate| {
             let mut all: Vec<[f32; 4]> = Vec::new();
-            clip.stream(&frames(rate), frame_major, 10_000, |chunk| {
-                all.extend(chunk.rows);
-                Ok::<(), Error>(())
-            })
-            .unwrap();
+            clip.request(&frames(rate))
+                .layout(frame_major)
+                .stream(10_000, |chunk| {
+                    all.extend(chunk.rows);
+                    Ok::<(), Error>(())
+                })
+                .unwrap();
             sum(&all)
         }),
         Box::new(move |rate| {
             let mut all: Vec<[f32; 4]> = Vec::new();
             let (rate, cubic) = (frames(rate), method::C2);
             engine
-                .stream(set, cubic, &rate, track_major, 20_000, |chunk| {
+                .request(set, cubic, &rate)
+                .layout(track_major)
+                .stream(20_000, |chunk| {
                     all.extend(chunk.rows);
                     Ok::<(), Error>(())
                 })
@@ -192,7 +206,10 @@ fn calls(engine: &Engine) -> Vec<Call> {
             let mut output = vec![0; (tracks - 1) * samples(rate) * 16];
             let (rate, encoding) = (frames(rate), Encoding::F32);
             engine
-                .evaluate_tracks_into(set, method::SLERP, &rate, 1..tracks, encoding, &mut output)
+                .request(set, method::SLERP, &rate)
+                .tracks(1..tracks)
+                .encoding(encoding)
+                .evaluate_into(&mut output)
                 .unwrap();
             sum(&output)
         }),
@@ -254,7 +271,7 @@ fn calls(engine: &Engine) -> Vec<Call> {
 fn four_hundred_tasks() {
     let cpu = Engine::new(Device::Cpu).unwrap();
     let mut options = EngineOptions::default();
-    options.threads = Some(2);
+    options.thread_count = Some(2);
     let mut engines = vec![Engine::with_options(Device::Cpu, &options).unwrap()];
     engines.extend(
         vulkan_devices()
@@ -361,7 +378,7 @@ fn refused_threads() {
     }
     // Few are granted all the same.
     let mut options = EngineOptions::default();
-    options.threads = Some(2);
+    options.thread_count = Some(2);
     // The thousand that were begun take a moment to end.
     let started = Instant::now();
     let engine = loop {
@@ -376,7 +393,7 @@ fn refused_threads() {
             .evaluate(&set, method::SLERP, &SampleTimes::fps(60))
             .is_ok()
     );
-    options.threads = Some(1000);
+    options.thread_count = Some(1000);
     let refused = Engine::with_options(Device::Cpu, &options);
     assert!(matches!(refused, Err(Error::Threads(_))));
 }

@@ -46,7 +46,7 @@ fn unsafe_code_stays_in_its_homes() {
         let home = relative.starts_with("src/gpu")
             || relative.starts_with("src/simd")
             || relative.ends_with("src/engine/application_device.rs")
-            || relative.ends_with("src/request/application_device.rs")
+            || relative.ends_with("src/clip/request/application_device.rs")
             // C interfaces: CUDA's driver, and the exchange of arrays.
             || relative.ends_with("python/src/cuda.rs")
             || relative.ends_with("python/src/dlpack.rs")
@@ -257,7 +257,8 @@ fn the_reference_shares_nothing_with_the_engine() {
 
 /// The folders of `src/`, from the bottom to the top, as ARCHITECTURE.md draws them: code may
 /// use what lies below it. The files directly in `src/` are the engine's public face.
-const LAYERS: [&str; 25] = [
+const LAYERS: [&str; 26] = [
+    "names",
     "memory",
     "threads",
     "shader",
@@ -288,7 +289,7 @@ const LAYERS: [&str; 25] = [
 const FACE: &str = "face";
 
 /// Folders of the face: types whose methods fill several files.
-const FACE_FOLDERS: [&str; 2] = ["engine", "request"];
+const FACE_FOLDERS: [&str; 2] = ["clip", "engine"];
 
 /// The layer of a file or of a module, by the first part of its path within `src/`.
 fn layer(first: &str) -> &str {
@@ -696,7 +697,7 @@ const SOURCES: [&str; 13] = [
 ];
 
 /// How often folders may still use retired words. The numbers only fall; a folder without one has none.
-const UNFINISHED: [(&str, usize); 1] = [("python/src", 220)];
+const UNFINISHED: [(&str, usize); 1] = [("python/src", 216)];
 
 #[test]
 fn retired_words_do_not_come_back() {

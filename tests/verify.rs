@@ -4,7 +4,7 @@ use glam::Quat;
 use tumble::method::SLERP;
 use tumble::reference::{ReferenceCurve, angle_between};
 use tumble::verify::{Agreement, Verdict, compare, error_bound, verify};
-use tumble::{Device, Engine, Form, METHODS, SampleTimes, TrackSet};
+use tumble::{Device, Engine, METHODS, SampleTimes, TrackSet, method::Form};
 
 fn set() -> TrackSet {
     let mut set = TrackSet::new();
@@ -171,7 +171,7 @@ fn nothing_slower_than_the_cpu_is_chosen() {
     let small = Engine::auto_for(2000).unwrap();
     assert!(small.device_info().is_none());
     let large = Engine::auto().unwrap();
-    let is_software = |info: &tumble::DeviceInfo| info.kind == tumble::DeviceKind::Cpu;
+    let is_software = |info: &tumble::vulkan::DeviceInfo| info.kind == tumble::vulkan::DeviceKind::Cpu;
     assert!(!large.device_info().is_some_and(is_software));
     assert!(small.probe_time().unwrap() > std::time::Duration::ZERO);
 }

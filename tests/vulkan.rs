@@ -8,9 +8,11 @@ use std::collections::BTreeMap;
 
 use bytemuck::Pod;
 use glam::Quat;
+use tumble::vulkan::tuning::{Mapping, Reads, Transfer};
+use tumble::vulkan::{VulkanBuffer, VulkanError};
 use tumble::{
-    Device, Encoding, Engine, EngineOptions, Layout, METHODS, Mapping, Reads, SampleTimes,
-    Skeleton, TrackSet, Transfer, VulkanBuffer, VulkanError, method,
+    Device, Encoding, Engine, EngineOptions, Layout, METHODS, SampleTimes, Skeleton, TrackSet,
+    method,
 };
 
 #[test]
@@ -53,7 +55,7 @@ fn every_kernel_has_the_bits_of_its_twin_on_every_device() {
             }
         }
         let has_texels = checked.keys().any(|name| name.ends_with("_texels"));
-        for (name, _) in tumble::kernels() {
+        for (name, _) in tumble::vulkan::kernels() {
             let can = has_texels || !name.ends_with("_texels");
             assert_eq!(
                 checked.contains_key(name),
@@ -146,18 +148,22 @@ fn the_validation_layer_has_nothing_to_say() {
                 for frames in &requests {
                     let layouts = [Layout::TrackMajor, Layout::FrameMajor].into_iter();
                     for (layout_index, layout) in layouts.enumerate() {
-                        let poses = clip.evaluate_as(frames, layout).unwrap();
+                        let poses = clip.request(frames).layout(layout).evaluate().unwrap();
                         engine.blend(&[(&poses, 0.5), (&poses, 1.0)]).unwrap();
                         engine.mix(&poses, &poses, 0.5).unwrap();
                         engine.add(&poses, &poses, &reference, 0.5).unwrap();
                         engine
                             .world(&poses, &Skeleton::chain(64, 1.0).unwrap())
                             .unwrap();
-                        let encodings = Encoding::KINDS.into_iter().enumerate();
+                        let encodings = Encoding::ALL.into_iter().enumerate();
                         for (_, encoding) in
                             encodings.filter(|(e, _)| is_due(variant / 3 + layout_index, *e, 2))
                         {
-                            clip.evaluate_encoded(frames, layout, encoding).unwrap();
+                            clip.request(frames)
+                                .layout(layout)
+                                .encoding(encoding)
+                                .evaluate_bytes()
+                                .unwrap();
                         }
                     }
                 }
@@ -254,11 +260,13 @@ fn assert_stays_in_application_buffer(mapping: Mapping) {
     for method in METHODS {
         let clip = engine.upload(&set, method).unwrap();
         let requests = [&frames, &sparse].into_iter();
-        let requests =
-            requests.flat_map(|frames| Encoding::KINDS.map(|encoding| (frames, encoding)));
+        let requests = requests.flat_map(|frames| Encoding::ALL.map(|encoding| (frames, encoding)));
         for (frames, encoding) in requests {
             let expected = clip
-                .evaluate_encoded(frames, Layout::FrameMajor, encoding)
+                .request(frames)
+                .layout(Layout::FrameMajor)
+                .encoding(encoding)
+                .evaluate_bytes()
                 .unwrap();
             // Not at the start, and not aligned to what devices like.
             let offset = 5 * encoding.bytes() as u64;
@@ -324,7 +332,11 @@ fn the_callers_memory_gets_the_result_and_nothing_else() {
         let upload = |engine: &Engine| engine.upload(&set, method).unwrap();
         let clips: Vec<_> = engines.iter().map(upload).collect();
         let layout = [Layout::TrackMajor, Layout::FrameMajor][index];
-        let expected = expected_of.evaluate_as(&frames, layout).unwrap();
+        let expected = expected_of
+            .request(&frames)
+            .layout(layout)
+            .evaluate()
+            .unwrap();
         assert!(expected.as_quats().len() > 1 << 16, "too few to lend");
         for (clip, beside) in clips
             .iter()
@@ -334,8 +346,13 @@ fn the_callers_memory_gets_the_result_and_nothing_else() {
                 clip.evaluate_into(&frames, layout, output).unwrap();
             });
         }
-        for (round, encoding) in Encoding::KINDS.into_iter().enumerate() {
-            let expected = (expected_of.evaluate_encoded(&frames, layout, encoding)).unwrap();
+        for (round, encoding) in Encoding::ALL.into_iter().enumerate() {
+            let expected = (expected_of
+                .request(&frames)
+                .layout(layout)
+                .encoding(encoding)
+                .evaluate_bytes())
+            .unwrap();
             let shifts = [encoding.bytes(), 16, 4099].into_iter().enumerate();
             for (shift, beside) in shifts {
                 let is_next = |(clip_index, _): &(usize, _)| {
@@ -429,7 +446,8 @@ fn assert_between<T: Pod>(outside: &T, beside: usize, expected: &[T], work: impl
 #[test]
 fn queues_that_cannot_do_their_work_are_refused() {
     use crate::application::Application;
-    use tumble::{Error, VulkanQueue};
+    use tumble::Error;
+    use tumble::vulkan::VulkanQueue;
     if vulkan_devices().is_empty() {
         return;
     }

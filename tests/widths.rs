@@ -7,10 +7,8 @@ use std::process::Command;
 
 use glam::{DVec3, Quat, Vec3};
 use sha2::{Digest, Sha256};
-use tumble::{
-    Device, Direction, Engine, Follow, Layout, METHODS, PathFrame, PathSpeed, SampleTimes,
-    TrackSet, VectorWidth,
-};
+use tumble::paths::{Direction, Follow, PathFrame, PathSpeed};
+use tumble::{Device, Engine, Layout, METHODS, SampleTimes, TrackSet, VectorWidth};
 
 /// Steps from a hundredth of a degree to half a turn, evenly and unevenly.
 fn rotations() -> TrackSet {

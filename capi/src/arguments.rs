@@ -192,6 +192,17 @@ pub(crate) fn constant<T: Copy>(value: u32, known: &[(u32, T)], name: &str) -> R
     })
 }
 
+/// The value of an option, whose constants count all its values from 0.
+pub(crate) fn option<T: Copy>(value: u32, all: &[T], name: &str) -> Result<T, Failure> {
+    let found = usize::try_from(value).ok().and_then(|index| all.get(index));
+    found.copied().ok_or_else(|| {
+        let last = all.len() - 1;
+        Failure::argument(format!(
+            "`{name}` is {value}; its constants are 0 to {last}"
+        ))
+    })
+}
+
 /// What 0 and 1 stand for.
 pub(crate) fn flag(value: u32, name: &str) -> Result<bool, Failure> {
     constant(value, &[(0, false), (1, true)], name)

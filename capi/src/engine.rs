@@ -2,7 +2,8 @@
 
 use std::ffi::{CString, c_char};
 
-use tumble::{Device, Engine, EngineOptions, Error, VulkanError};
+use tumble::vulkan::VulkanError;
+use tumble::{Device, Engine, EngineOptions, Error};
 
 use crate::arguments::{Out, flag, sized, text};
 use crate::handle::{self, Object};
@@ -93,7 +94,7 @@ impl TumbleEngineOptions {
 fn engine_options(structure: TumbleEngineOptions) -> Result<EngineOptions, Failure> {
     let mut options = EngineOptions::default();
     options.memory = (structure.memory > 0).then_some(structure.memory);
-    options.threads = (structure.threads > 0).then_some(structure.threads as usize);
+    options.thread_count = (structure.threads > 0).then_some(structure.threads as usize);
     options.allow_inexact = flag(structure.allow_inexact, "options->allow_inexact")?;
     Ok(options)
 }

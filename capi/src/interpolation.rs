@@ -5,10 +5,10 @@ use std::sync::LazyLock;
 
 use glam::DVec3;
 use tumble::{
-    Axes, Ends, Interpolation, KeySigns, METHODS, Method, Quantity, Speed, Tcb, WrapMode, method,
+    Ends, Interpolation, KeySigns, METHODS, Method, Quantity, Speed, Tcb, WrapMode, method,
 };
 
-use crate::arguments::{constant, sized, text};
+use crate::arguments::{option, sized, text};
 use crate::result::Failure;
 
 /// Which of the two quaternions of each key counts.
@@ -81,14 +81,6 @@ pub enum TumbleWrap {
     Extrapolate = 3,
 }
 
-/// What the constants of [`TumbleWrap`] stand for.
-pub(crate) const WRAPS: [(u32, WrapMode); 4] = [
-    (TumbleWrap::Hold as u32, WrapMode::Hold),
-    (TumbleWrap::Loop as u32, WrapMode::Loop),
-    (TumbleWrap::Mirror as u32, WrapMode::Mirror),
-    (TumbleWrap::Extrapolate as u32, WrapMode::Extrapolate),
-];
-
 /// A method with its options. All zeros but `size` are the defaults.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
@@ -160,62 +152,29 @@ impl TumbleInterpolation {
     }
 
     fn with(&self, method: Method) -> Result<Interpolation, Failure> {
-        let body = Axes::Body;
-        let parent = Axes::Parent;
-        let paths = [
-            (TumblePath::Shortest as u32, KeySigns::Shortest),
-            (TumblePath::AsAuthored as u32, KeySigns::AsAuthored),
-        ];
-        let path = constant(self.path, &paths, "interpolation->path")?;
+        let path = option(self.path, &KeySigns::ALL, "interpolation->path")?;
         let clamped = Ends::Clamped {
             start: DVec3::from_array(self.start_velocity),
             end: DVec3::from_array(self.end_velocity),
         };
-        let ends = [
-            (TumbleEnds::OfMethod as u32, method.ends),
-            (TumbleEnds::Parabolic as u32, Ends::Parabolic),
-            (TumbleEnds::Natural as u32, Ends::Natural),
-            (TumbleEnds::Clamped as u32, clamped),
-            (TumbleEnds::Secant as u32, Ends::Secant),
-            (TumbleEnds::Loop as u32, Ends::Loop),
-            (TumbleEnds::Frozen as u32, Ends::Frozen),
-        ];
-        let quantities = [
-            (TumbleQuantity::Rotation as u32, Quantity::Rotation),
-            (
-                TumbleQuantity::VelocityInBody as u32,
-                Quantity::Velocity(body),
-            ),
-            (
-                TumbleQuantity::VelocityInParent as u32,
-                Quantity::Velocity(parent),
-            ),
-            (
-                TumbleQuantity::AccelerationInBody as u32,
-                Quantity::Acceleration(body),
-            ),
-            (
-                TumbleQuantity::AccelerationInParent as u32,
-                Quantity::Acceleration(parent),
-            ),
-        ];
-        let speeds = [
-            (TumbleSpeed::AsKeyed as u32, Speed::AsKeyed),
-            (TumbleSpeed::Constant as u32, Speed::Constant),
-        ];
+        let named = Ends::ALL.map(|ends| match ends {
+            Ends::Clamped { .. } => clamped,
+            ends => ends,
+        });
+        let ends = [&[method.ends], &named[..]].concat();
         Ok(Interpolation {
             method,
-            signs: method.path.unwrap_or(path),
-            ends: constant(self.ends, &ends, "interpolation->ends")?,
+            signs: method.signs.unwrap_or(path),
+            ends: option(self.ends, &ends, "interpolation->ends")?,
             tcb: Tcb {
                 tension: self.tension,
                 continuity: self.continuity,
                 bias: self.bias,
             },
-            quantity: constant(self.quantity, &quantities, "interpolation->quantity")?,
-            speed: constant(self.speed, &speeds, "interpolation->speed")?,
-            before: constant(self.before, &WRAPS, "interpolation->before")?,
-            after: constant(self.after, &WRAPS, "interpolation->after")?,
+            quantity: option(self.quantity, &Quantity::ALL, "interpolation->quantity")?,
+            speed: option(self.speed, &Speed::ALL, "interpolation->speed")?,
+            before: option(self.before, &WrapMode::ALL, "interpolation->before")?,
+            after: option(self.after, &WrapMode::ALL, "interpolation->after")?,
         })
     }
 }

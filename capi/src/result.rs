@@ -5,7 +5,9 @@ use std::cell::RefCell;
 use std::ffi::{CString, c_char};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use tumble::{CrowdError, Error, SkeletonError, TrackError, VulkanError};
+use tumble::crowd::CrowdError;
+use tumble::vulkan::VulkanError;
+use tumble::{Error, SkeletonError, TrackError};
 use tumble_formats::Diagnostic;
 
 /// What became of a call.

@@ -2,7 +2,7 @@
 
 use tumble::{FrameRate, Layout, SampleTimes};
 
-use crate::arguments::{constant, list, needed};
+use crate::arguments::{constant, list, needed, option};
 use crate::result::Failure;
 
 /// The order of a result in memory, four numbers for each sample of each track.
@@ -88,9 +88,5 @@ impl TumbleSamples {
 
 /// The layout of a constant.
 pub(crate) fn layout(value: u32) -> Result<Layout, Failure> {
-    let layouts = [
-        (TumbleLayout::TrackMajor as u32, Layout::TrackMajor),
-        (TumbleLayout::FrameMajor as u32, Layout::FrameMajor),
-    ];
-    constant(value, &layouts, "layout")
+    option(value, &Layout::ALL, "layout")
 }

@@ -20,6 +20,61 @@ use crate::samples::*;
 use crate::set::*;
 use crate::version::*;
 
+/// Constants of C count the values of the engine's options.
+#[test]
+fn constants_count_the_options_of_the_engine() {
+    use tumble::{Ends, KeySigns, Quantity, Speed, WrapMode, crowd::CrowdValues};
+
+    #[track_caller]
+    fn same<C: std::fmt::Debug, T: std::fmt::Debug>(constants: &[C], options: &[T]) {
+        let plain = |text: String| {
+            text.replace(['(', ')'], "")
+                .split(" {")
+                .next()
+                .unwrap()
+                .replace("In", "")
+        };
+        let constants: Vec<String> = (constants.iter())
+            .map(|constant| plain(format!("{constant:?}")))
+            .collect();
+        let options: Vec<String> = (options.iter())
+            .map(|option| plain(format!("{option:?}")))
+            .collect();
+        assert_eq!(constants, options);
+    }
+
+    use TumbleQuantity as Q;
+    same(&[TumblePath::Shortest, TumblePath::AsAuthored], &KeySigns::ALL);
+    same(&[TumbleSpeed::AsKeyed, TumbleSpeed::Constant], &Speed::ALL);
+    same(
+        &[TumbleWrap::Hold, TumbleWrap::Loop, TumbleWrap::Mirror, TumbleWrap::Extrapolate],
+        &WrapMode::ALL,
+    );
+    let ends = [
+        TumbleEnds::Parabolic,
+        TumbleEnds::Natural,
+        TumbleEnds::Clamped,
+        TumbleEnds::Secant,
+        TumbleEnds::Loop,
+        TumbleEnds::Frozen,
+    ];
+    assert!((ends.iter().zip(1..)).all(|(ends, number)| *ends as u32 == number));
+    same(&ends, &Ends::ALL);
+    same(
+        &[
+            Q::Rotation,
+            Q::VelocityInBody,
+            Q::VelocityInParent,
+            Q::AccelerationInBody,
+            Q::AccelerationInParent,
+        ],
+        &Quantity::ALL,
+    );
+    same(&[TumbleLayout::TrackMajor, TumbleLayout::FrameMajor], &tumble::Layout::ALL);
+    use crate::crowd::output::TumbleCrowdValues as V;
+    same(&[V::Rotations, V::Local, V::Model, V::Skinning], &CrowdValues::ALL);
+}
+
 fn words() -> &'static str {
     // SAFETY: text that ends with a zero, which the tests read before another call fails.
     unsafe { CStr::from_ptr(tumble_last_error()) }

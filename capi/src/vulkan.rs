@@ -4,7 +4,8 @@ use std::ffi::{CStr, c_void};
 
 use tumble::ash::vk::Handle;
 use tumble::ash::{self, vk};
-use tumble::{Engine, QueueLock, VulkanBuffer, VulkanHandles, VulkanQueue};
+use tumble::vulkan::{QueueLock, VulkanBuffer, VulkanHandles, VulkanQueue};
+use tumble::Engine;
 
 use crate::arguments::{Out, flag, needed, vulkan};
 use crate::engine::{TumbleEngine, TumbleEngineOptions};

@@ -113,7 +113,10 @@ fn expected() -> String {
     let loaded = Format::open_detected(&pendulum(), &ReadOptions::default()).unwrap();
     let frames = SampleTimes::at(vec![0.0, 7.3, 1.0 / 3.0]);
     let (set, layout) = (&loaded.clips[0].set, Layout::FrameMajor);
-    let file = engine.evaluate_as(set, method::BESSEL_OVERHAUSER, &frames, layout);
+    let file = engine
+        .request(set, method::BESSEL_OVERHAUSER, &frames)
+        .layout(layout)
+        .evaluate();
     let file = file.unwrap();
     let lines = |name: &'static str, rotations: &[Quat]| -> Vec<String> {
         let components = rotations.iter().flat_map(Quat::to_array);

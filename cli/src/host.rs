@@ -12,7 +12,8 @@ use tumble_formats::motion::Motion;
 use crate::Arguments;
 use crate::arguments::device::DeviceArguments;
 use crate::arguments::interpolation;
-use crate::commands::{probe, view};
+use crate::commands::view;
+use crate::drivers;
 use crate::messages::exit::{self, Failure};
 use crate::messages::{signals, words};
 
@@ -63,14 +64,13 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
 /// Sets the command that loads the Vulkan drivers in a child process, instead of this executable: see
 /// [`load_drivers`]. Only the first call counts.
 pub fn set_probe(command: Vec<OsString>) {
-    probe::set_command(command);
+    drivers::set_command(command);
 }
 
 /// Loads the Vulkan drivers. A driver may end the process that loads it, so that a child process
 /// does this before anything else opens a device, and says on standard output that it came through.
 pub fn load_drivers() {
-    let _ = Device::list(); // errors occur again where they are reported
-    let _ = words::listing(&format!("{}\n", probe::LOADED)); // the parent may have ended
+    drivers::load();
 }
 
 /// The names of all Vulkan devices, in the order of their indices.
@@ -78,7 +78,7 @@ pub fn load_drivers() {
 /// # Errors
 /// When there is no Vulkan, or a driver fails.
 pub fn devices() -> Result<Vec<Device>, Refused> {
-    probe::devices().map_err(|error| Refused {
+    drivers::devices().map_err(|error| Refused {
         message: error.to_string(),
         is_usage: false,
         code: exit::DEVICE,
@@ -101,7 +101,7 @@ pub fn open(name: &str, options: &EngineOptions) -> Result<Engine, Refused> {
 /// # Errors
 /// When the system refuses what the CPU needs.
 pub fn auto(rotations: usize) -> Result<Option<Engine>, Refused> {
-    if probe::drivers().is_err() {
+    if drivers::drivers().is_err() {
         return Ok(None);
     }
     let engine = Engine::auto_for(rotations).map_err(|error| Refused {

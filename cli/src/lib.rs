@@ -11,6 +11,7 @@
 mod arguments;
 mod batch;
 mod commands;
+mod drivers;
 pub mod host;
 mod messages;
 pub mod shards;

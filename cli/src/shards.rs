@@ -13,14 +13,16 @@ use serde::Serialize;
 use tumble_formats::Format;
 
 use crate::arguments::gather::{FoundInput, GatheredInputs};
+use crate::batch::entry;
 use crate::batch::folder;
-use crate::batch::manifest;
+use crate::batch::result_names;
 use crate::batch::shards::plan::ShardPlan;
 use crate::batch::shards::record::ShardHeader;
 use crate::batch::shards::run::Shard;
 use crate::batch::shards::{merge as merging, record::RefusedInput};
+use crate::commands::eval::Arguments;
+use crate::commands::eval::job::EvaluationReport;
 use crate::commands::eval::shards::{EvaluationRequest, Evaluator, size};
-use crate::commands::eval::{Arguments, EvaluationReport};
 use crate::host::Refused;
 use crate::messages::exit::{Failure, USAGE};
 use crate::messages::words;
@@ -55,7 +57,7 @@ pub fn inputs(line: &[OsString]) -> Result<Vec<PathBuf>, Refused> {
 /// Of every kernel: machines that agree in it and in the version write the same bytes.
 #[must_use]
 pub fn kernels_sha256() -> &'static str {
-    manifest::kernels_sha256()
+    entry::kernels_sha256()
 }
 
 /// A library, cut into shards.
@@ -110,7 +112,7 @@ impl LibraryPlan {
             return Err(Failure::usage(message).into());
         }
         let shard_plan = request.plan(&arguments, inputs, &sizes, folder, shard_bytes)?;
-        folder::refuse_shared_names(&shard_plan.inputs, shard_plan.format)?;
+        result_names::refuse_shared_names(&shard_plan.inputs, shard_plan.format)?;
         Ok(Self {
             shard_plan,
             arguments,
@@ -258,8 +260,8 @@ impl Worker {
         let found: Vec<FoundInput> = (task.inputs.iter())
             .map(|(path, below)| FoundInput::named(path.clone(), below.clone()))
             .collect();
-        let format = folder::format(folder, self.arguments.results.format())?;
-        let names = folder::names(&found, folder, format);
+        let format = result_names::format(folder, self.arguments.results.format())?;
+        let names = result_names::name_results(&found, folder, format);
         let header = ShardHeader {
             shard: task.shard,
             of: task.of,
@@ -273,9 +275,7 @@ impl Worker {
         shard.quiet = true;
         let paths = found.into_iter().map(|found| found.path);
         let jobs = shard.jobs(paths, &names, format);
-        let mut reports = Vec::new();
-        self.evaluator
-            .evaluate(&self.arguments, &jobs, &mut shard, &mut reports)?;
+        let reports = self.evaluator.evaluate(&self.arguments, jobs, &mut shard)?;
         let record = match task.record {
             true => shard.finish().map(|()| None),
             false => shard.finish_elsewhere().map(Some),

@@ -7,6 +7,7 @@
 #[cfg(unix)]
 mod attack;
 mod batch;
+mod circles;
 mod cli;
 mod cli_arguments;
 mod cli_files;

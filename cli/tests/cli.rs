@@ -16,7 +16,9 @@ fn set() -> TrackSet {
 fn expected(frames: &SampleTimes, layout: Layout) -> Vec<Quat> {
     let engine = Engine::new(Device::Cpu).unwrap();
     engine
-        .evaluate_as(&set(), method::BESSEL_OVERHAUSER, frames, layout)
+        .request(&set(), method::BESSEL_OVERHAUSER, frames)
+        .layout(layout)
+        .evaluate()
         .unwrap()
         .as_quats()
         .to_vec()

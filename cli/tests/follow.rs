@@ -6,10 +6,8 @@ use std::path::Path;
 
 use crate::program::{run, sample_folder, succeed};
 use glam::{Quat, Vec3};
-use tumble::{
-    Device, Engine, Follow, Layout, PathSpeed, SampleTimes, Smoothing, TrackSet, VectorMethod,
-    method,
-};
+use tumble::paths::{Follow, PathSpeed};
+use tumble::{Device, Engine, Layout, SampleTimes, Smoothing, TrackSet, VectorMethod, method};
 
 const PATH_CSV: &str =
     "t,x,y,z,ux,uy,uz\n0,0,0,0,,,\n1,1,2,0,,,\n2.5,3,3,1,,,\n3,4,1,2,,,\n4.5,6,0,0,0,1,0\n";

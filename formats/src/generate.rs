@@ -28,9 +28,9 @@ pub enum KeySpacing {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Generate {
     /// Number of boxes, 1 to 65 536.
-    pub boxes: usize,
+    pub box_count: usize,
     /// Number of keys, at least 1.
-    pub keys: usize,
+    pub key_count: usize,
     /// Time from the first key to the last, seconds.
     pub seconds: f64,
     /// How keys are spaced.
@@ -44,8 +44,8 @@ pub struct Generate {
 impl Default for Generate {
     fn default() -> Self {
         Self {
-            boxes: 4,
-            keys: 26,
+            box_count: 4,
+            key_count: 26,
             seconds: 20.0,
             spacing: KeySpacing::Uniform,
             length: 3.0,
@@ -92,8 +92,8 @@ impl Generate {
     /// What cannot be generated.
     pub fn check(&self) -> Result<(), GenerateError> {
         let &Self {
-            boxes,
-            keys,
+            box_count: boxes,
+            key_count: keys,
             seconds,
             length,
             ..
@@ -123,12 +123,12 @@ impl Generate {
         self.check()
             .map_err(|error| io::Error::new(io::ErrorKind::InvalidInput, error))?;
         let mut random = Random(self.seed);
-        let pendulums: Vec<Pendulum> = (0..self.boxes)
+        let pendulums: Vec<Pendulum> = (0..self.box_count)
             .map(|_| Pendulum::new(&mut random))
             .collect();
-        writeln!(writer, "# {} {:.6}", self.boxes, self.length)?;
+        writeln!(writer, "# {} {:.6}", self.box_count, self.length)?;
         let mut clock = KeyTimes::new(self, Random(random.next()));
-        for key in 0..self.keys {
+        for key in 0..self.key_count {
             let time = clock.time(key);
             write!(writer, "{time:.6}")?;
             for pendulum in &pendulums {
@@ -175,7 +175,7 @@ impl KeyTimes {
     fn new(generate: &Generate, random: Random) -> Self {
         let &Generate {
             seconds,
-            keys,
+            key_count: keys,
             spacing: steps,
             ..
         } = generate;
@@ -308,7 +308,7 @@ mod tests {
             for keys in [1, 2, 26, 1000] {
                 let set = Generate {
                     spacing: steps,
-                    keys,
+                    key_count: keys,
                     ..Generate::default()
                 }
                 .track_set()
@@ -327,7 +327,7 @@ mod tests {
     #[test]
     fn the_motion_is_smooth_and_lively() {
         let set = Generate {
-            boxes: 40,
+            box_count: 40,
             ..Generate::default()
         }
         .track_set()
@@ -350,12 +350,12 @@ mod tests {
             change(&mut generate);
             generate.check()
         };
-        assert!(check(|g| g.boxes = 0).is_err());
-        assert!(check(|g| g.boxes = 70_000).is_err());
-        assert!(check(|g| g.keys = 0).is_err());
+        assert!(check(|g| g.box_count = 0).is_err());
+        assert!(check(|g| g.box_count = 70_000).is_err());
+        assert!(check(|g| g.key_count = 0).is_err());
         assert!(check(|g| g.seconds = -1.0).is_err());
         assert!(check(|g| g.seconds = f64::NAN).is_err());
-        assert!(check(|g| g.keys = 10_000_000).is_err());
+        assert!(check(|g| g.key_count = 10_000_000).is_err());
         assert!(check(|g| g.length = 0.0).is_err());
     }
 }

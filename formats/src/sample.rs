@@ -93,13 +93,7 @@ impl ChannelMethods<'_> {
             (Some(ChannelInterpolation::Linear), None) => VectorMethod::Linear,
             (Some(ChannelInterpolation::Cubic), None) => VectorMethod::GltfCubic,
             (None, None) => VectorMethod::BesselOverhauser,
-            (_, Some(method)) => match method.name {
-                "step" => VectorMethod::Step,
-                "slerp" | "nlerp" => VectorMethod::Linear,
-                "gltf-cubic" => VectorMethod::GltfCubic,
-                "catmull-rom" => VectorMethod::CatmullRom,
-                _ => VectorMethod::BesselOverhauser,
-            },
+            (_, Some(method)) => method.vector_method,
         }
     }
 
@@ -152,7 +146,8 @@ impl ChannelMethods<'_> {
         layout: Layout,
     ) -> Result<Vec<Quat>, Error> {
         let frames = over(clip, frames);
-        let evaluate = |set: &TrackSet, how| engine.evaluate_as(set, how, &frames, layout);
+        let evaluate =
+            |set: &TrackSet, how| engine.request(set, how, &frames).layout(layout).evaluate();
         self.by_method(clip, layout, evaluate, Rotations::as_quats)
     }
 
@@ -187,7 +182,7 @@ impl ChannelMethods<'_> {
             let interpolation = (self.with)(method);
             let set = selected(clip, &group)?;
             let found = evaluate(&set, interpolation)?;
-            all.resize(tracks * found.samples(), T::default());
+            all.resize(tracks * found.sample_count(), T::default());
             scatter(values(&found), &group, tracks, layout, &mut all);
         }
         Ok(all)

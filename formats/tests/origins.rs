@@ -248,8 +248,8 @@ fn a_joint_that_rests_far_from_its_parent_comes_back() {
     assert_eq!(clip.origin(1), DVec3::ZERO);
     let samples = keyed(&clip).unwrap();
     let poses = world(&clip, &samples).unwrap();
-    let turned = DVec3::new(rest.z, rest.y, -4096.0 - rest.x);
-    let expected = [DVec3::X * 4096.0 + rest, turned];
+    let rotated = DVec3::new(rest.z, rest.y, -4096.0 - rest.x);
+    let expected = [DVec3::X * 4096.0 + rest, rotated];
     for (pose, expected) in poses.iter().skip(2).step_by(3).zip(expected) {
         // The rotation is a key in f32: a ten millionth of the distance.
         let bound = 1e-7

@@ -294,7 +294,7 @@ fn every_representation_has_its_columns() {
     let shape = Shape::new(2, 3);
     let all = rotations(6);
     for format in ["parquet", "arrow"] {
-        for encoding in Encoding::KINDS {
+        for encoding in Encoding::ALL {
             let result = shape.result(Layout::FrameMajor, encoding);
             let bytes = write(format, &result, &all, 6).unwrap();
             let batch = batches(format, &bytes).remove(0);

@@ -348,7 +348,7 @@ pub(crate) fn tracks(bytes: &[u8]) -> u64 {
         }
     }
     let mut interpolation = Interpolation::from(method);
-    if choice & 1 != 0 && method.path.is_none() {
+    if choice & 1 != 0 && method.signs.is_none() {
         interpolation.signs = KeySigns::AsAuthored;
     }
     if choice >= 250 {
@@ -384,7 +384,9 @@ pub(crate) fn tracks(bytes: &[u8]) -> u64 {
                 .upload(&set, interpolation)
                 .expect("it was evaluated");
             let other = clip
-                .evaluate_as(&frames, Layout::FrameMajor)
+                .request(&frames)
+                .layout(Layout::FrameMajor)
+                .evaluate()
                 .expect("as before");
             for track in 0..set.track_count() {
                 for sample in 0..16 {

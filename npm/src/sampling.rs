@@ -1,11 +1,14 @@
 //! What clips are at times: the samples that JavaScript asks for.
 
-use glam::{DVec3, Quat, Vec3};
-use serde::Deserialize;
+use std::str::FromStr;
+
+use glam::{Quat, Vec3};
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer};
 use serde_json::json;
 use tumble::{
     Axes, Ends, Engine, FrameRate, Interpolation, KeySigns, Layout, METHODS, Method, Quantity,
-    SampleTimes, Speed, Tcb, WrapMode,
+    SampleTimes, Speed, Tcb, UnknownNameError, WrapMode,
 };
 use tumble_formats::motion::Motion;
 use tumble_formats::sample::{ChannelMethods, Samples};
@@ -23,14 +26,20 @@ pub(crate) struct Request {
     rate: Option<String>,
     /// `authored`, as the file says of each channel, where nothing is said.
     method: Option<String>,
-    #[serde(default)]
-    layout: Order,
-    axes: Option<AxesName>,
-    ends: Option<EndsName>,
-    path: Option<PathName>,
-    speed: Option<SpeedName>,
-    before: Option<WrapName>,
-    after: Option<WrapName>,
+    #[serde(default, deserialize_with = "option")]
+    layout: Option<Layout>,
+    #[serde(default, deserialize_with = "option")]
+    axes: Option<Axes>,
+    #[serde(default, deserialize_with = "option")]
+    ends: Option<Ends>,
+    #[serde(default, deserialize_with = "option")]
+    path: Option<KeySigns>,
+    #[serde(default, deserialize_with = "option")]
+    speed: Option<Speed>,
+    #[serde(default, deserialize_with = "option")]
+    before: Option<WrapMode>,
+    #[serde(default, deserialize_with = "option")]
+    after: Option<WrapMode>,
     tension: Option<String>,
     continuity: Option<String>,
     bias: Option<String>,
@@ -52,81 +61,13 @@ enum Sampled {
     Matrices,
 }
 
-#[derive(Deserialize, Clone, Copy, Default, PartialEq)]
-#[serde(rename_all = "kebab-case")]
-enum Order {
-    #[default]
-    Track,
-    Frame,
-}
-
-#[derive(Deserialize, Clone, Copy)]
-#[serde(rename_all = "kebab-case")]
-enum AxesName {
-    Body,
-    Parent,
-}
-
-#[derive(Deserialize, Clone, Copy)]
-#[serde(rename_all = "kebab-case")]
-enum EndsName {
-    Parabolic,
-    Natural,
-    Clamped,
-    Secant,
-    Loop,
-    Frozen,
-}
-
-#[derive(Deserialize, Clone, Copy)]
-#[serde(rename_all = "kebab-case")]
-enum PathName {
-    Shortest,
-    AsAuthored,
-}
-
-#[derive(Deserialize, Clone, Copy)]
-#[serde(rename_all = "kebab-case")]
-enum SpeedName {
-    AsKeyed,
-    Constant,
-}
-
-#[derive(Deserialize, Clone, Copy)]
-#[serde(rename_all = "kebab-case")]
-enum WrapName {
-    Hold,
-    Loop,
-    Mirror,
-    Extrapolate,
-}
-
-impl WrapName {
-    fn mode(self) -> WrapMode {
-        match self {
-            Self::Hold => WrapMode::Hold,
-            Self::Loop => WrapMode::Loop,
-            Self::Mirror => WrapMode::Mirror,
-            Self::Extrapolate => WrapMode::Extrapolate,
-        }
-    }
-}
-
-impl EndsName {
-    fn ends(self) -> Ends {
-        let still = DVec3::ZERO;
-        match self {
-            Self::Parabolic => Ends::Parabolic,
-            Self::Natural => Ends::Natural,
-            Self::Clamped => Ends::Clamped {
-                start: still,
-                end: still,
-            },
-            Self::Secant => Ends::Secant,
-            Self::Loop => Ends::Loop,
-            Self::Frozen => Ends::Frozen,
-        }
-    }
+/// The value of an option of the engine, by its name.
+fn option<'de, D: Deserializer<'de>, T: FromStr<Err = UnknownNameError>>(
+    deserializer: D,
+) -> Result<Option<T>, D::Error> {
+    let name = Option::<String>::deserialize(deserializer)?;
+    let parsed = name.map(|name| name.parse()).transpose();
+    parsed.map_err(|error: UnknownNameError| D::Error::custom(error))
 }
 
 impl Request {
@@ -172,10 +113,7 @@ impl Request {
     }
 
     fn quantity(&self) -> Quantity {
-        let axes = match self.axes {
-            Some(AxesName::Parent) => Axes::Parent,
-            _ => Axes::Body,
-        };
+        let axes = self.axes.unwrap_or(Axes::Body);
         match self.quantity {
             Sampled::Velocities => Quantity::Velocity(axes),
             Sampled::Accelerations => Quantity::Acceleration(axes),
@@ -185,7 +123,7 @@ impl Request {
 
     /// Values that came a sample after the other, in the order asked for.
     fn ordered<T: Copy>(&self, values: Vec<T>, tracks: usize) -> Vec<T> {
-        if self.layout == Order::Frame || tracks < 2 {
+        if self.layout == Some(Layout::FrameMajor) || tracks < 2 {
             return values;
         }
         let samples = values.len() / tracks;
@@ -227,19 +165,13 @@ pub(crate) fn sample(
     let (tcb, quantity) = (request.tcb()?, request.quantity());
     let with = |method: Method| Interpolation {
         method,
-        signs: method.path.unwrap_or(match request.path {
-            Some(PathName::AsAuthored) => KeySigns::AsAuthored,
-            _ => KeySigns::Shortest,
-        }),
-        ends: request.ends.map_or(method.ends, EndsName::ends),
+        signs: method.signs.or(request.path).unwrap_or_default(),
+        ends: request.ends.unwrap_or(method.ends),
         tcb,
         quantity,
-        speed: match request.speed {
-            Some(SpeedName::Constant) => Speed::Constant,
-            _ => Speed::AsKeyed,
-        },
-        before: request.before.map(WrapName::mode).unwrap_or_default(),
-        after: request.after.map(WrapName::mode).unwrap_or_default(),
+        speed: request.speed.unwrap_or_default(),
+        before: request.before.unwrap_or_default(),
+        after: request.after.unwrap_or_default(),
     };
     let methods = ChannelMethods {
         method: request.method()?,

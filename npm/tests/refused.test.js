@@ -31,7 +31,7 @@ test("times and options that mean nothing", () => {
   const clip = engine.clip([door]);
   refused(() => clip.sample([0], { method: "slurp" }), "there is no method `slurp`; there are authored, ");
   refused(() => clip.sample([0], { methd: "slerp" }), "there is no option `methd`");
-  refused(() => clip.sample([0], { ends: "open" }), "unknown variant `open`");
+  refused(() => clip.sample([0], { ends: "open" }), "there is no kind of ends `open`; there are parabolic, ");
   refused(() => clip.sample([0, Infinity]), "time 1 is inf");
   refused(() => clip.sample({ fps: 0 }), "`0` is not a frame rate");
   refused(() => clip.sample({ fps: 25, end: -1 }), "before it starts");
@@ -41,7 +41,7 @@ test("times and options that mean nothing", () => {
   refused(() => clip.sample({ fps: 1e9, start: 0, end: 1e6 }), "frames");
   refused(() => clip.sample({ fps: 1e6, start: 0, end: 1e2 }), "more memory than there is");
   refused(() => clip.keys(1), "there is no track 1 of 1");
-  refused(() => clip.world([0], { axes: "wrold" }), "unknown variant `wrold`");
+  refused(() => clip.world([0], { axes: "wrold" }), "there is no kind of axes `wrold`; there are body, parent");
   const { rotations } = clip.sample(0.5);
   assert.ok(Math.abs(rotations[2] - Math.sin(Math.PI / 8)) < 1e-6, "the engine goes on");
   clip.free();

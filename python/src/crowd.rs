@@ -5,14 +5,15 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use glam::Vec3;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use tumble::{ComponentType, CrowdLayer, CrowdLibrary, CrowdValues, Skeleton, WrapMode};
+use tumble::crowd::{CrowdLayer, CrowdLibrary, CrowdValues};
+use tumble::{ComponentType, Skeleton, WrapMode};
 
 use crate::arrays::{Numbers, doubles};
 use crate::clip::Clip;
 use crate::engine::{Engine, default_engine};
 use crate::errors::{guarded, input};
 use crate::motions::{of_crowd, push};
-use crate::options::{method_named, one_of};
+use crate::options::{method_named, one_of, option_named};
 use crate::output::{array_of, filled_bytes, quaternions_of};
 use crate::run::stoppable;
 use crate::samples::matrices;
@@ -51,7 +52,7 @@ const MANY: usize = 1 << 20;
 /// (3, 1, 3, 4)
 #[pyclass(frozen, module = "tumble")]
 pub(crate) struct Crowd {
-    crowd: Mutex<tumble::Crowd>,
+    crowd: Mutex<tumble::crowd::Crowd>,
     instances: usize,
     joints: usize,
     layers: usize,
@@ -80,21 +81,11 @@ fn indices(value: &Bound<'_, PyAny>, name: &str, count: usize) -> PyResult<Vec<u
 }
 
 fn values_named(name: &str) -> PyResult<CrowdValues> {
-    Ok(match name {
-        "model" => CrowdValues::Model,
-        "skinning" => CrowdValues::Skinning,
-        "local" => CrowdValues::Local,
-        "rotations" => CrowdValues::Rotations,
-        _ => {
-            return Err(input(format!(
-                "values: there are no `{name}`; there are model, skinning, local, rotations"
-            )));
-        }
-    })
+    option_named(name, "values")
 }
 
 impl Crowd {
-    fn lock(&self) -> MutexGuard<'_, tumble::Crowd> {
+    fn lock(&self) -> MutexGuard<'_, tumble::crowd::Crowd> {
         self.crowd.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -235,11 +226,11 @@ impl Crowd {
         let times = numbers(time, "time", 0.0)?;
         let speeds = numbers(speed, "speed", 1.0)?;
         let weights = numbers(weight, "weight", 1.0)?;
-        let modes = [
-            ("hold", WrapMode::Hold),
-            ("loop", WrapMode::Loop),
-            ("mirror", WrapMode::Mirror),
-        ];
+        // Crowds do not extrapolate.
+        let modes = WrapMode::ALL.map(|mode| (mode.name(), mode));
+        let modes: Vec<_> = (modes.into_iter())
+            .filter(|(_, mode)| *mode != WrapMode::Extrapolate)
+            .collect();
         let wrap = wrap.map(|name| one_of(name, "wrap", &modes)).transpose()?;
         py.detach(|| {
             guarded(|| {

@@ -16,7 +16,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, OnceLock, PoisonError};
 
 use libloading::Library;
-use tumble::{ExportedResult, VulkanError};
+use tumble::vulkan::{ExportedResult, VulkanError};
 
 /// The driver's library.
 const LIBRARY: &str = match cfg!(windows) {

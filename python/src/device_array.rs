@@ -5,7 +5,8 @@ use std::sync::Arc;
 use pyo3::exceptions::PyBufferError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
-use tumble::{ComponentType, ExportedResult};
+use tumble::vulkan::ExportedResult;
+use tumble::ComponentType;
 
 use crate::arrays::numpy;
 use crate::cuda::{CudaError, DEFAULT_STREAM, Mapping};

@@ -8,7 +8,7 @@ use pyo3::types::{PyDict, PyTuple};
 use tumble::method::BESSEL_OVERHAUSER;
 use tumble::{
     Axes, Device, Encoding, EngineOptions, EulerSequence, Interpolation, Layout, MatrixOrder,
-    Quantity,
+    Quantity, UnknownNameError,
 };
 use tumble_cli::host;
 
@@ -17,7 +17,7 @@ use crate::clip::Clip;
 use crate::errors::{device, guarded, input, of_engine};
 use crate::evaluate::Result;
 use crate::follow;
-use crate::options::{Request, request_arrays, samples_of};
+use crate::options::{Request, option_named, request_arrays, samples_of};
 use crate::output::quaternions_of;
 use crate::poses;
 use crate::run::{interruptible, stoppable};
@@ -73,26 +73,22 @@ pub(crate) fn default_engine(py: Python<'_>) -> PyResult<&Bound<'_, Engine>> {
 }
 
 pub(crate) fn layout_named(name: &str) -> PyResult<Layout> {
-    match name {
-        "track" => Ok(Layout::TrackMajor),
-        "frame" => Ok(Layout::FrameMajor),
-        _ => Err(input(format!(
-            "layout: there is no `{name}`; there are track, frame"
-        ))),
-    }
+    option_named(name, "layout")
 }
 
 /// The axes of that name, and whether they are the world's, along the skeleton.
 pub(crate) fn axes_named(name: &str) -> PyResult<(Axes, bool)> {
-    match name {
-        "body" => Ok((Axes::Body, false)),
-        "parent" => Ok((Axes::Parent, false)),
+    if name == "world" {
         // A track that has no parent turns in the world.
-        "world" => Ok((Axes::Parent, true)),
-        _ => Err(input(format!(
-            "axes: there is no `{name}`; there are body, parent, world"
-        ))),
+        return Ok((Axes::Parent, true));
     }
+    let axes = name.parse().map_err(|error: UnknownNameError| {
+        input(format!(
+            "axes: there is no `{name}`; there are {}, world",
+            error.known.join(", ")
+        ))
+    })?;
+    Ok((axes, false))
 }
 
 #[pymethods]
@@ -109,7 +105,7 @@ impl Engine {
         let mut options = EngineOptions::default();
         options.memory = memory;
         options.allow_inexact = allow_inexact;
-        options.threads = threads;
+        options.thread_count = threads;
         let name = match device {
             Some(name) => name.str()?.to_str()?.to_owned(),
             None => "auto".to_owned(),

@@ -5,15 +5,14 @@ use numpy::PyArray1;
 use numpy::PyArrayMethods;
 use pyo3::prelude::*;
 use pyo3::types::{PyString, PyTuple};
-use tumble::{
-    BodyAxis, Direction, Follow, FollowError, Layout, PathFrame, PathSpeed, Twist, VectorMethod,
-};
+use tumble::paths::{BodyAxis, Direction, Follow, FollowError, PathSpeed};
+use tumble::{Layout, VectorMethod};
 use tumble_formats::path::{Pace, PathPoints, paths_of};
 
 use crate::arrays::{Numbers, Order, doubles, parts};
 use crate::engine::Engine;
 use crate::errors::{in_python, input, of_engine, warn_of};
-use crate::options::{Samples as Times, ends, one_of};
+use crate::options::{Samples as Times, ends, one_of, option_of};
 use crate::run::interruptible;
 use crate::samples::of_values;
 
@@ -79,12 +78,6 @@ impl Options<'_, '_> {
                 }
             },
         };
-        let frames = [
-            ("minimal", PathFrame::Minimal),
-            ("fixed", PathFrame::Fixed),
-            ("frenet", PathFrame::Frenet),
-        ];
-        let twists = [("spread", Twist::Spread), ("free", Twist::Free)];
         let rest = Follow::default();
         Ok(Follow {
             method,
@@ -92,11 +85,11 @@ impl Options<'_, '_> {
             direction,
             frame: self
                 .frame
-                .map_or(Ok(rest.frame), |name| one_of(name, "frame", &frames))?,
+                .map_or(Ok(rest.frame), |name| option_of(name, "frame"))?,
             up: DVec3::from_array(self.up),
             twist: self
                 .twist
-                .map_or(Ok(rest.twist), |name| one_of(name, "twist", &twists))?,
+                .map_or(Ok(rest.twist), |name| option_of(name, "twist"))?,
             speed,
             axes: [axis("forward", self.forward)?, axis("upward", self.upward)?],
         })

@@ -7,10 +7,8 @@ use numpy::{
 };
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use tumble::{
-    Channel, CrowdError, CrowdLibrary, Error, Interpolation, Method, MotionStates, MotionTables,
-    MotionWords, Quantity, Skeleton,
-};
+use tumble::crowd::{CrowdError, CrowdLibrary, MotionStates, MotionTables, MotionWords};
+use tumble::{Channel, Error, Interpolation, Method, Quantity, Skeleton};
 use tumble_formats::motion::Motion;
 use tumble_formats::sample::ChannelMethods;
 
@@ -148,7 +146,7 @@ impl Motions {
             bases: words(arrays, "bases")?,
             channels: words(arrays, "channels")?,
             links: words(arrays, "links")?,
-            joints: sizes[0] as usize,
+            joint_count: sizes[0] as usize,
             ticks_per_second: sizes[1],
         };
         let spans = array(arrays, "spans")?.cast_into::<PyArray2<u32>>()?;
@@ -188,7 +186,7 @@ impl Motions {
         put(
             &found,
             "sizes",
-            vec![[words.joints as u32, words.ticks_per_second]],
+            vec![[words.joint_count as u32, words.ticks_per_second]],
         )?;
         found.set_item("spans", &self.spans)?;
         found.set_item("cells", &self.cells)?;
@@ -198,7 +196,7 @@ impl Motions {
     /// Number of joints.
     #[getter]
     fn joints(&self) -> usize {
-        self.tables.joints()
+        self.tables.joint_count()
     }
 
     /// Fills arrays: rotations, positions, world rotations, velocities and angular velocities, each None
@@ -239,7 +237,7 @@ impl Motions {
         let [r, p, w, v, a] = &mut outputs[..] else {
             return Ok(());
         };
-        let joints = at.len() * self.tables.joints();
+        let joints = at.len() * self.tables.joint_count();
         let states = MotionStates {
             rotations: rows(r, joints)?,
             positions: rows(p, joints)?,
@@ -279,7 +277,7 @@ impl Motions {
             let ticks = u32::try_from(clip).ok();
             let ticks = ticks.and_then(|clip| Some((clip, self.tables.ticks(clip as usize)?)));
             let Some((clip, ticks)) = ticks else {
-                let count = self.tables.clips();
+                let count = self.tables.clip_count();
                 return Err(input(format!(
                     "clip_ids[{place}]: there is no clip {clip}; there are {count}, from 0"
                 )));

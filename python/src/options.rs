@@ -1,6 +1,7 @@
 //! The keywords that all evaluations share: which samples, and how to interpolate.
 
 use std::borrow::Cow;
+use std::str::FromStr;
 use std::sync::Arc;
 
 use glam::DVec3;
@@ -9,7 +10,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString};
 use tumble::{
     Ends, FrameRate, Interpolation, KeySigns, METHODS, Method, Quantity, SampleTimes, Speed, Tcb,
-    TrackSet, WrapMode,
+    TrackSet, UnknownNameError, WrapMode,
 };
 
 use crate::arrays;
@@ -87,25 +88,14 @@ impl Request {
                 "end" => end = Some(arrays::number(&value, "end", "seconds")?),
                 "method" => request.method = method(&value)?,
                 "path" => {
-                    manner.path = one_of(
-                        &value,
-                        "path",
-                        &[
-                            ("shortest", KeySigns::Shortest),
-                            ("as-authored", KeySigns::AsAuthored),
-                        ],
-                    )?;
+                    manner.path = option_of(&value, "path")?;
                 }
                 "ends" => manner.ends = Some(ends(&value)?),
                 "speed" => {
-                    manner.speed = one_of(
-                        &value,
-                        "speed",
-                        &[("as-keyed", Speed::AsKeyed), ("constant", Speed::Constant)],
-                    )?;
+                    manner.speed = option_of(&value, "speed")?;
                 }
-                "before" => manner.before = wrap(&value, "before")?,
-                "after" => manner.after = wrap(&value, "after")?,
+                "before" => manner.before = option_of(&value, "before")?,
+                "after" => manner.after = option_of(&value, "after")?,
                 "tension" => manner.tcb.tension = arrays::number(&value, "tension", "a number")?,
                 "continuity" => {
                     manner.tcb.continuity = arrays::number(&value, "continuity", "a number")?;
@@ -128,7 +118,7 @@ impl Request {
         let manner = self.manner;
         move |method| Interpolation {
             method,
-            signs: method.path.unwrap_or(manner.path),
+            signs: method.signs.unwrap_or(manner.path),
             ends: manner.ends.unwrap_or(method.ends),
             tcb: manner.tcb,
             quantity,
@@ -257,22 +247,8 @@ pub(crate) fn method_named(name: &str) -> PyResult<Option<Method>> {
     })
 }
 
-fn wrap(value: &Bound<'_, PyAny>, what: &str) -> PyResult<WrapMode> {
-    let modes = [
-        ("hold", WrapMode::Hold),
-        ("loop", WrapMode::Loop),
-        ("mirror", WrapMode::Mirror),
-        ("extrapolate", WrapMode::Extrapolate),
-    ];
-    one_of(value, what, &modes)
-}
-
 /// A name, or a pair of angular velocities.
 pub(crate) fn ends(value: &Bound<'_, PyAny>) -> PyResult<Ends> {
-    let still = Ends::Clamped {
-        start: DVec3::ZERO,
-        end: DVec3::ZERO,
-    };
     if !value.is_instance_of::<PyString>() {
         let numbers = arrays::doubles(value, "ends")?;
         return match (&*numbers.shape, &*numbers.values) {
@@ -286,15 +262,28 @@ pub(crate) fn ends(value: &Bound<'_, PyAny>) -> PyResult<Ends> {
             ))),
         };
     }
-    let known = [
-        ("parabolic", Ends::Parabolic),
-        ("natural", Ends::Natural),
-        ("clamped", still),
-        ("secant", Ends::Secant),
-        ("loop", Ends::Loop),
-        ("frozen", Ends::Frozen),
-    ];
-    one_of(value, "ends", &known)
+    option_of(value, "ends")
+}
+
+/// The value of an option of the engine that is called `name`; messages call the keyword `keyword`.
+pub(crate) fn option_named<T: FromStr<Err = UnknownNameError>>(
+    name: &str,
+    keyword: &str,
+) -> PyResult<T> {
+    name.parse().map_err(|error: UnknownNameError| {
+        input(format!(
+            "{keyword}: there is no `{name}`; there are {}",
+            error.known.join(", ")
+        ))
+    })
+}
+
+/// As [`option_named`], of a value of Python.
+pub(crate) fn option_of<T: FromStr<Err = UnknownNameError>>(
+    value: &Bound<'_, PyAny>,
+    keyword: &str,
+) -> PyResult<T> {
+    option_named(&text(value, keyword)?, keyword)
 }
 
 /// The value of that name.

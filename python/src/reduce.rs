@@ -12,7 +12,7 @@ use tumble_formats::reduce::{ReduceMotionError, ReduceOptions, Reduced, reduce a
 use crate::clip::Clip;
 use crate::engine::{Engine, default_engine};
 use crate::errors::{input, of_engine};
-use crate::options::{frame_rate, one_of};
+use crate::options::{frame_rate, option_of};
 use crate::run::interruptible;
 
 /// A clip with few keys, and how far it is from its samples.
@@ -110,14 +110,7 @@ pub(crate) fn reduce(
     fps: Option<&Bound<'_, PyAny>>,
     engine: Option<&Bound<'_, Engine>>,
 ) -> PyResult<Reduction> {
-    let curves = [
-        ("linear", ReducedCurve::Linear),
-        ("bessel-overhauser", ReducedCurve::BesselOverhauser),
-        ("cubic", ReducedCurve::GltfCubic),
-    ];
-    let curve = curve
-        .map(|name| one_of(name, "curve", &curves))
-        .transpose()?;
+    let curve: Option<ReducedCurve> = curve.map(|name| option_of(name, "curve")).transpose()?;
     let rate = fps.map(frame_rate).transpose()?;
     let motion = Arc::clone(&clip.get().motion);
     if rate.is_none()

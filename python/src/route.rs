@@ -6,7 +6,7 @@ use glam::DVec3;
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyType;
-use tumble::{Error, Stop, Stopped};
+use tumble::{Error, Stop, StoppedError};
 use tumble_routes::ground::{Clear, Ground};
 use tumble_routes::mesh::Mesh;
 use tumble_routes::net::{Net, NetBy};
@@ -197,7 +197,7 @@ fn in_pieces(pairs: &[[DVec3; 2]], routes: impl Fn(&[[DVec3; 2]]) -> Found) -> P
     let mut found = Vec::with_capacity(pairs.len());
     for pairs in pairs.chunks(TOGETHER) {
         if stop.is_stopped() {
-            return Err(of_engine(&Error::Stopped(Stopped)));
+            return Err(of_engine(&Error::Stopped(StoppedError)));
         }
         found.extend(routes(pairs));
     }

@@ -6,9 +6,8 @@ use std::time::Duration;
 
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
-use tumble::{
-    Encoding, Engine, ExportedResult, Interpolation, Layout, SampleTimes, Speed, Stop, TrackSet,
-};
+use tumble::vulkan::ExportedResult;
+use tumble::{Encoding, Engine, Interpolation, Layout, SampleTimes, Speed, Stop, TrackSet};
 
 use crate::errors::{guarded, of_engine};
 
@@ -123,14 +122,12 @@ impl Job<'_> {
     }
 
     fn evaluate(&self, output: &mut [u8]) -> PyResult<()> {
-        let evaluated = self.engine.evaluate_encoded_into(
-            self.set,
-            self.interpolation,
-            self.frames,
-            self.layout,
-            self.encoding,
-            output,
-        );
+        let evaluated = self
+            .engine
+            .request(self.set, self.interpolation, self.frames)
+            .layout(self.layout)
+            .encoding(self.encoding)
+            .evaluate_into(output);
         evaluated.map_err(|error| of_engine(&error))
     }
 
@@ -144,22 +141,22 @@ impl Job<'_> {
 
     fn exported(&self) -> PyResult<ExportedResult> {
         let clip = self.engine.upload(self.set, self.interpolation);
-        let exported =
-            clip.and_then(|clip| clip.evaluate_exported(self.frames, self.layout, self.encoding));
+        let exported = clip.and_then(|clip| {
+            clip.request(self.frames)
+                .layout(self.layout)
+                .encoding(self.encoding)
+                .export()
+        });
         exported.map_err(|error| of_engine(&error))
     }
 
     /// Some tracks.
     pub(crate) fn tracks(&self, tracks: std::ops::Range<usize>, output: &mut [u8]) -> PyResult<()> {
         self.engine
-            .evaluate_tracks_into(
-                self.set,
-                self.interpolation,
-                self.frames,
-                tracks,
-                self.encoding,
-                output,
-            )
+            .request(self.set, self.interpolation, self.frames)
+            .tracks(tracks)
+            .encoding(self.encoding)
+            .evaluate_into(output)
             .map_err(|error| of_engine(&error))
     }
 

@@ -18,7 +18,7 @@ use crate::arrays::{Numbers, Order, doubles, parts, quaternions};
 use crate::clip::Clip;
 use crate::engine::Engine;
 use crate::errors::{input, input_at, of_engine, of_track};
-use crate::options::frame_rate;
+use crate::options::{frame_rate, option_named};
 use crate::output::{array, filled};
 use crate::run::{interruptible, work};
 
@@ -141,16 +141,7 @@ impl Smooth<'_> {
         }
         let kernel = self.kernel.unwrap_or("gaussian:2").parse();
         let kernel = kernel.map_err(|error| of_kernel("kernel", &error))?;
-        let ends = match self.ends {
-            "keep" => SmoothingEnds::Keep,
-            "parabolic" => SmoothingEnds::Parabolic,
-            "loop" => SmoothingEnds::Loop,
-            name => {
-                return Err(input(format!(
-                    "ends: there is no `{name}`; there are keep, parabolic, loop"
-                )));
-            }
-        };
+        let ends: SmoothingEnds = option_named(self.ends, "ends")?;
         Ok(Smoothing {
             kernel,
             ends,
@@ -554,7 +545,7 @@ pub(crate) fn of_values<'py, T, const N: usize>(
 ) -> PyResult<Bound<'py, PyAny>> {
     let numbers = found.as_arrays().iter().flat_map(|&of| order(of));
     let numbers: Vec<f32> = numbers.collect();
-    let (tracks, samples) = (found.tracks(), found.samples());
+    let (tracks, samples) = (found.track_count(), found.sample_count());
     let flat = PyArray1::from_vec(py, numbers);
     let shape = match found.layout() {
         Layout::TrackMajor => [tracks, samples, N],

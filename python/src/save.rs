@@ -156,7 +156,7 @@ pub(crate) fn save(
         let mut of_times = Vec::new();
         let warnings = job.write(&mut out, &mut of_times)?;
         if out.stop.is_stopped() {
-            return Err(of_engine(&Error::Stopped(tumble::Stopped)));
+            return Err(of_engine(&Error::Stopped(tumble::StoppedError)));
         }
         out.out.commit().map_err(|error| of_output(&error))?;
         if let Some(mut times) = times {
@@ -528,14 +528,10 @@ fn stream(
     };
     let sink =
         |chunk: tumble::Chunk<'_>| sink(chunk.rotations().unwrap_or_default()).map_err(Ended::Sink);
-    let streamed = engine.stream(
-        &clip.set,
-        interpolation,
-        frames,
-        layout,
-        CHUNK.max(row),
-        sink,
-    );
+    let streamed = engine
+        .request(&clip.set, interpolation, frames)
+        .layout(layout)
+        .stream(CHUNK.max(row), sink);
     streamed.map_err(|ended| match ended {
         Ended::Evaluating(error) => of_engine(&error),
         Ended::Sink(error) => error,

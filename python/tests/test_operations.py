@@ -600,7 +600,7 @@ def test_layers_masks_and_skinning(walks, engine, rng):
         (lambda: crowd.set([0], 0, layer=1, weight=2.0), "weights are 0 to 1"),
         (lambda: crowd.set([0], 0, wrap="extrapolate"), "wrap: there is no"),
         (lambda: crowd.advance(-1.0), "-1 s"),
-        (lambda: crowd.evaluate("angles"), "values: there are no `angles`"),
+        (lambda: crowd.evaluate("angles"), "values: there is no `angles`"),
         (lambda: crowd.evaluate(dtype="int16"), "float32 or float16"),
         (lambda: tumble.Crowd(walks, 1).evaluate("skinning"), "give `inverse_bind`"),
         (lambda: tumble.Crowd([], 1), "clips: there is none"),

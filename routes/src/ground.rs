@@ -72,7 +72,7 @@ pub struct Ground<'a> {
     /// The triangles on which every point is clear of all obstacles.
     pub mesh: Mesh,
     /// How many triangles there were after halving, free or not.
-    pub triangles: usize,
+    pub triangle_count: usize,
 }
 
 /// Whether a triangle is free.
@@ -158,7 +158,7 @@ impl<'a> Ground<'a> {
         Ok(Self {
             whole: mesh,
             mesh: Mesh::new(&positions, &free)?,
-            triangles: count,
+            triangle_count: count,
         })
     }
 

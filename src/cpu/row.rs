@@ -8,12 +8,13 @@ use crate::cpu::streaming::{RowOutput, Samples};
 use crate::prepare::clip_data::PartRef;
 use crate::simd::dispatch::{InLanesInto, VectorWidth, in_lanes_into};
 use crate::simd::lanes::Lanes;
+use crate::time::error::SampleTimesError;
 use crate::time::frame_clock::FrameClock;
-use crate::time::frames::{SampleTimesError, Ticks, Timeline};
+use crate::time::frames::{Ticks, Timeline};
 use crate::time::interval_blocks::{IntervalBlock, IntervalBlocks};
-use crate::time::runs::{Distance, Emit, Parameter, Run, RunSource};
-use crate::time::spans::{NONE, SpanSource};
-use crate::time::wrap::TrackCopy;
+use crate::time::runs::{Distance, Emit, NONE, Parameter, Run, RunSource};
+use crate::time::spans::SpanSource;
+use crate::time::track_copy::TrackCopy;
 use crate::twin::evaluate::Evaluate;
 
 /// Distances are computed for this many samples at a time.

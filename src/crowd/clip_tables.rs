@@ -17,14 +17,18 @@ use crate::shader::{
     CHANNELS, CrowdBase, CrowdChannel, CrowdClip, CrowdSpan, FORM_ARC, FORM_CONSTANT, FORM_CUBIC,
     FORM_POLYNOMIAL, Form, ON_KEY, POWERS, SCALE,
 };
+use crate::simd::lanes::{Lanes, MAX_LANES, canonical};
 use crate::time::frame_clock::{FrameClock, FrameStart, in_frames};
 use crate::time::frame_rate::FrameRate;
-use crate::time::spans::{NONE, SpanSource};
-use crate::time::wrap::{TrackCopy, WrapMode};
+use crate::time::runs::NONE;
+use crate::time::spans::SpanSource;
+use crate::time::track_copy::TrackCopy;
+use crate::time::wrap::WrapMode;
 use crate::tracks::set::TrackSet;
 use crate::tracks::set::vectors::Channel;
 use crate::twin::crowd_layers::sampled;
 use crate::twin::crowd_times::position_at;
+use crate::twin::evaluate_arc::{norm_squared, on_arc};
 
 /// Entries of a table are counted in 32 bits, with some to spare.
 pub(crate) const MAX_ENTRIES: usize = 1 << 31;
@@ -368,4 +372,51 @@ pub(super) fn runs_of(channels: &[CrowdChannel]) -> Vec<Range<u32>> {
             first..end
         })
         .collect()
+}
+
+/// As many arcs as there are lanes, at one parameter. No closure: its body would not be compiled for the
+/// vector width.
+#[inline(always)]
+fn arc_block<L: Lanes>(
+    middles: &[[f32; 4]],
+    tangents: &[[f32; 4]],
+    parameter: f32,
+) -> L::Rotations {
+    let (middle, tangent) = (L::load_rotations(middles), L::load_rotations(tangents));
+    let square = norm_squared(tangent);
+    L::rotations(canonical(on_arc(
+        middle,
+        tangent,
+        square,
+        L::all(parameter),
+    )))
+}
+
+/// Arcs of neighbouring joints at one parameter.
+#[inline(always)]
+pub(crate) fn arcs<L: Lanes>(
+    middles: &[[f32; 4]],
+    tangents: &[[f32; 4]],
+    parameter: f32,
+    output: &mut [[f32; 4]],
+) {
+    let whole = output.len() / L::COUNT * L::COUNT;
+    for first in (0..whole).step_by(L::COUNT) {
+        let joints = first..first + L::COUNT;
+        let found = arc_block::<L>(
+            &middles[joints.clone()],
+            &tangents[joints.clone()],
+            parameter,
+        );
+        output[joints].copy_from_slice(found.as_ref());
+    }
+    let rest = output.len() - whole;
+    if rest > 0 {
+        // The last vector is filled up with arcs that are left out.
+        let mut ends = [[[0.0; 4]; MAX_LANES]; 2];
+        ends[0][..rest].copy_from_slice(&middles[whole..]);
+        ends[1][..rest].copy_from_slice(&tangents[whole..]);
+        let found = arc_block::<L>(&ends[0][..L::COUNT], &ends[1][..L::COUNT], parameter);
+        output[whole..].copy_from_slice(&found.as_ref()[..rest]);
+    }
 }

@@ -1,7 +1,7 @@
 //! The entries of a crowd's instances, and which of them changed.
 
 use crate::crowd::layer::CrowdLayer;
-use crate::memory::{OutOfMemory, zeroed};
+use crate::memory::{OutOfMemoryError, zeroed};
 use crate::shader::{CrowdClip, CrowdEntry};
 use crate::twin::crowd_times::ELAPSED_BITS;
 
@@ -24,7 +24,7 @@ impl Instances {
         instances: usize,
         layers: usize,
         still: CrowdEntry,
-    ) -> Result<Self, OutOfMemory> {
+    ) -> Result<Self, OutOfMemoryError> {
         let count = instances * layers;
         let mut all = Self {
             entries: zeroed(count, "a crowd")?,

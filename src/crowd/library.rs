@@ -24,7 +24,8 @@ const TICKS_PER_SECOND: u32 = 705_600;
 ///
 /// ```
 /// use tumble::glam::{Quat, Vec3};
-/// use tumble::{CrowdLayer, CrowdLibrary, CrowdValues, Device, Engine, Skeleton, TrackSet, VectorMethod, method};
+/// use tumble::crowd::{CrowdLayer, CrowdLibrary, CrowdValues};
+/// use tumble::{Device, Engine, Skeleton, TrackSet, VectorMethod, method};
 /// let mut walk = TrackSet::new();
 /// walk.push("hip", &[0.0, 1.0], &[Quat::IDENTITY, Quat::from_rotation_y(1.0)])?;
 /// walk.push("knee", &[0.0, 1.0], &[Quat::IDENTITY, Quat::from_rotation_x(0.5)])?;
@@ -121,20 +122,20 @@ impl CrowdLibrary {
 
     /// Number of joints of the skeleton.
     #[must_use]
-    pub fn joints(&self) -> usize {
+    pub fn joint_count(&self) -> usize {
         self.offsets.len()
     }
 
     /// Number of clips.
     #[must_use]
-    pub fn clips(&self) -> usize {
+    pub fn clip_count(&self) -> usize {
         self.tables.clips.len()
     }
 
     /// Number of masks.
     #[must_use]
-    pub fn masks(&self) -> usize {
-        self.masks.len() / self.joints() - 1
+    pub fn mask_count(&self) -> usize {
+        self.masks.len() / self.joint_count() - 1
     }
 
     /// How long a clip is, ticks: from the first key of anything to the last, and at least 1. In a loop
@@ -159,11 +160,11 @@ impl CrowdLibrary {
         interpolation: impl Into<Interpolation>,
         vectors: VectorMethod,
     ) -> Result<usize, CrowdError> {
-        let (tracks, joints) = (set.track_count(), self.joints());
+        let (tracks, joints) = (set.track_count(), self.joint_count());
         if tracks != joints {
             return Err(CrowdError::Tracks { tracks, joints });
         }
-        let clip = self.clips();
+        let clip = self.clip_count();
         if clip == MAX_CLIPS {
             return Err(CrowdError::TooManyClips);
         }
@@ -181,7 +182,7 @@ impl CrowdLibrary {
     /// # Errors
     /// When there are no such clips.
     pub fn set_reference(&mut self, clip: usize, from: usize, tick: u32) -> Result<(), CrowdError> {
-        let (joints, count) = (self.joints(), self.clips());
+        let (joints, count) = (self.joint_count(), self.clip_count());
         if let Some(index) = [clip, from].into_iter().find(|&index| index >= count) {
             let subject = "clip";
             return Err(CrowdError::Missing {
@@ -206,7 +207,7 @@ impl CrowdLibrary {
     /// # Errors
     /// When there is not a weight for each joint, one lies outside, or there are 31 masks already.
     pub fn push_mask(&mut self, weights: &[f32]) -> Result<usize, CrowdError> {
-        let mask = self.masks();
+        let mask = self.mask_count();
         self.check_joints("weights", weights.len())?;
         if mask == MAX_MASKS {
             return Err(CrowdError::TooManyMasks);
@@ -239,7 +240,7 @@ impl CrowdLibrary {
     }
 
     fn check_joints(&self, subject: &'static str, count: usize) -> Result<(), CrowdError> {
-        let joints = self.joints();
+        let joints = self.joint_count();
         match count == joints {
             true => Ok(()),
             false => Err(CrowdError::Joints {
@@ -271,7 +272,7 @@ impl CrowdLibrary {
         let masks = self.tables.cells.len();
         let bases = self.tables.clips.iter().map(|clip| clip.bases).max();
         CrowdDispatch {
-            joints: self.joints() as u32,
+            joints: self.joint_count() as u32,
             layers: layers as u32,
             bases: bases.unwrap_or(1),
             masks: masks as u32,
@@ -284,7 +285,7 @@ impl CrowdLibrary {
     /// poses and inverse bind matrices stay behind.
     #[must_use]
     pub fn into_tables(self) -> (MotionTables, Vec<[u32; 4]>, Vec<[f32; 4]>) {
-        let (ticks_per_second, joints) = (self.ticks_per_second(), self.joints());
+        let (ticks_per_second, joints) = (self.ticks_per_second(), self.joint_count());
         MotionTables::of_library(self.tables, self.links, joints, ticks_per_second)
     }
 }

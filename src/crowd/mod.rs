@@ -7,31 +7,32 @@
 //!
 //! # Types
 //!
-//! * [`CrowdLibrary`](library::CrowdLibrary): the clips of a skeleton, its masks and reference poses, as flat tables
-//!   ([`ClipTables`](clip_tables::ClipTables)): per clip its time bases, per time base its spans, per joint a rotation,
-//!   a translation and a scale, each with a form and cells of four numbers.
-//! * [`Crowd`](player::Crowd): instances with up to four [`CrowdLayer`](layer::CrowdLayer)s, each packed into an entry
-//!   of 16 bytes ([`Instances`](instances::Instances)), and the clock.
-//! * [`MotionTables`](states::MotionTables): a library's clips without instances, for those who train on motion.
+//! * [`CrowdLibrary`]: the clips of a skeleton, its masks and reference poses.
+//! * [`Crowd`]: instances with up to four [`CrowdLayer`]s each, and the clock; made by
+//!   [`Engine::crowd`](crate::Engine::crowd).
+//! * [`CrowdOutput`]: what an evaluation stores of each joint ([`CrowdValues`]), in 32 or 16 bits.
+//! * [`MotionTables`] and [`MotionStates`]: a library's clips without instances, for those who train on motion.
 //!
 //! # From a call to its bytes
 //!
-//! 1. `Crowd::set` packs a layer into its entry and notes that it changed.
-//! 2. An evaluation finds, for each layer of each instance, its tick and from that its position in each time base
-//!    (`twin::crowd_times`).
-//! 3. It evaluates the rotation, translation and scale of each joint in the lowest layer and lays the others over it
-//!    (`twin::crowd_layers`, [`lay_over`]).
+//! 1. [`Crowd::set`] packs a layer into its entry and notes that it changed.
+//! 2. An evaluation finds, for each layer of each instance, its tick and from that its position in each time base.
+//! 3. It evaluates the rotation, translation and scale of each joint in the lowest layer and lays the others over it.
 //! 4. It walks the skeleton down, level by level, and multiplies with the inverse bind matrices where skinning
 //!    matrices are asked for.
 //!
-//! A device does each step by a kernel over a window of instances (`gpu::crowd`); [`on_cpu`] does all of them for
-//! 32 instances a task.
-//!
-//! # Where memory lies
-//!
-//! Cells of channels with one form and one time base lie side by side, constant by constant, so that neighbouring
-//! joints are neighbouring lanes. On a device the tables stay; entries that changed are written with the next
-//! evaluation; positions live for a window alone.
+//! A device does each step by a kernel over a window of instances; the CPU does all of them for 32 instances a task.
+
+// Inside
+//
+// A library's clips are flat tables (`clip_tables`): per clip its time bases, per time base its spans, per joint a
+// rotation, a translation and a scale, each with a form and cells of four numbers. Each layer of an instance is an
+// entry of 16 bytes (`instances`). Positions are found by `twin::crowd_times`; layers are laid over each other by
+// `lay_over` and `twin::crowd_layers`; `gpu::crowd` runs the kernels, `on_cpu` their twins.
+//
+// Cells of channels with one form and one time base lie side by side, constant by constant, so that neighbouring
+// joints are neighbouring lanes. On a device the tables stay; entries that changed are written with the next
+// evaluation; positions live for a window alone.
 
 pub(crate) mod clip_tables;
 pub(crate) mod instances;
@@ -41,3 +42,10 @@ pub(crate) mod library;
 pub(crate) mod on_cpu;
 pub(crate) mod player;
 pub(crate) mod states;
+
+pub use crate::crowd::layer::CrowdLayer;
+pub use crate::crowd::library::CrowdLibrary;
+pub use crate::crowd::player::Crowd;
+pub use crate::crowd::states::{MotionStates, MotionTables, MotionWords};
+pub use crate::crowd_error::CrowdError;
+pub use crate::output::crowd::{CrowdOutput, CrowdValues};

@@ -4,7 +4,7 @@ use bytemuck::Zeroable as _;
 use rayon::prelude::*;
 
 use crate::cpu::engine::CpuEngine;
-use crate::crowd::clip_tables::ClipTables;
+use crate::crowd::clip_tables::{ClipTables, arcs};
 use crate::crowd::lay_over::lay_over;
 use crate::crowd::library::CrowdLibrary;
 use crate::output::crowd::{CrowdOutput, CrowdValues};
@@ -12,12 +12,11 @@ use crate::shader::{
     CHANNELS, CrowdEntry, CrowdPosition, FORM_ARC, ON_KEY, ROTATION, SCALE, TRANSLATION,
 };
 use crate::simd::dispatch::{InLanes, in_lanes_of};
-use crate::simd::lanes::{Lanes, MAX_LANES, canonical};
-use crate::threads::OutOfThreads;
+use crate::simd::lanes::Lanes;
+use crate::threads::OutOfThreadsError;
 use crate::twin::crowd_layers::Layers;
 use crate::twin::crowd_matrices::{affine_product, transform};
 use crate::twin::crowd_times::base_positions;
-use crate::twin::evaluate_arc::{norm_squared, on_arc};
 
 const TASK: usize = 32;
 
@@ -36,7 +35,7 @@ pub(crate) fn evaluate(
     scene: CrowdScene<'_>,
     engine: &CpuEngine,
     output: &mut [[f32; 4]],
-) -> Result<(), OutOfThreads> {
+) -> Result<(), OutOfThreadsError> {
     let (context, width) = (scene.context, engine.width);
     let task = |(positions, rotations): &mut (Vec<_>, Vec<_>),
                 (output, entries): (&mut [[f32; 4]], &[CrowdEntry])| {
@@ -44,7 +43,7 @@ pub(crate) fn evaluate(
             entries.len() * context.bases as usize,
             CrowdPosition::zeroed(),
         );
-        rotations.resize(2 * scene.library.joints(), [0.0; 4]);
+        rotations.resize(2 * scene.library.joint_count(), [0.0; 4]);
         let context = Layers { entries, ..context };
         let scene = CrowdScene { context, ..scene };
         in_lanes_of(
@@ -97,7 +96,7 @@ impl InLanes for InstancesTask<'_, '_> {
             positions: &self.positions[..],
             ..context
         };
-        let (found, layered) = self.rotations.split_at_mut(scene.library.joints());
+        let (found, layered) = self.rotations.split_at_mut(scene.library.joint_count());
         for (instance, output) in self.output.chunks_exact_mut(scene.vectors()).enumerate() {
             let is_all = scene.values == CrowdValues::Rotations;
             // One call: its many instructions are compiled where it stands.
@@ -131,7 +130,7 @@ impl InLanes for InstancesTask<'_, '_> {
 
 impl CrowdScene<'_> {
     fn vectors(&self) -> usize {
-        self.library.joints() * CrowdOutput::from(self.values).vectors()
+        self.library.joint_count() * CrowdOutput::from(self.values).vector_count()
     }
 }
 
@@ -186,48 +185,5 @@ fn of_layer<L: Lanes>(
         for (joint, value) in run.clone().zip(values) {
             *value = context.layer_value(layer as u32, entry, joint, ROTATION);
         }
-    }
-}
-
-/// As many arcs as there are lanes, at one parameter. No closure: its body would not be compiled for the
-/// vector width.
-#[inline(always)]
-fn block<L: Lanes>(middles: &[[f32; 4]], tangents: &[[f32; 4]], parameter: f32) -> L::Rotations {
-    let (middle, tangent) = (L::load_rotations(middles), L::load_rotations(tangents));
-    let square = norm_squared(tangent);
-    L::rotations(canonical(on_arc(
-        middle,
-        tangent,
-        square,
-        L::all(parameter),
-    )))
-}
-
-/// Arcs of neighbouring joints at one parameter.
-#[inline(always)]
-pub(super) fn arcs<L: Lanes>(
-    middles: &[[f32; 4]],
-    tangents: &[[f32; 4]],
-    parameter: f32,
-    output: &mut [[f32; 4]],
-) {
-    let whole = output.len() / L::COUNT * L::COUNT;
-    for first in (0..whole).step_by(L::COUNT) {
-        let joints = first..first + L::COUNT;
-        let found = block::<L>(
-            &middles[joints.clone()],
-            &tangents[joints.clone()],
-            parameter,
-        );
-        output[joints].copy_from_slice(found.as_ref());
-    }
-    let rest = output.len() - whole;
-    if rest > 0 {
-        // The last vector is filled up with arcs that are left out.
-        let mut ends = [[[0.0; 4]; MAX_LANES]; 2];
-        ends[0][..rest].copy_from_slice(&middles[whole..]);
-        ends[1][..rest].copy_from_slice(&tangents[whole..]);
-        let found = block::<L>(&ends[0][..L::COUNT], &ends[1][..L::COUNT], parameter);
-        output[whole..].copy_from_slice(&found.as_ref()[..rest]);
     }
 }

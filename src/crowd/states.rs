@@ -6,8 +6,7 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use crate::crowd::clip_tables::{ClipTables, constants_of, runs_of};
-use crate::crowd::on_cpu::arcs;
+use crate::crowd::clip_tables::{ClipTables, arcs, constants_of, runs_of};
 use crate::crowd_error::CrowdError;
 use crate::engine::Engine;
 use crate::evaluate::backend::Backend;
@@ -48,7 +47,8 @@ pub struct MotionStates<'a> {
 ///
 /// ```
 /// use tumble::glam::{Quat, Vec3};
-/// use tumble::{CrowdLibrary, Device, Engine, MotionStates, Skeleton, TrackSet, VectorMethod, method};
+/// use tumble::crowd::{CrowdLibrary, MotionStates};
+/// use tumble::{Device, Engine, Skeleton, TrackSet, VectorMethod, method};
 /// let mut door = TrackSet::new();
 /// door.push("door", &[0.0, 2.0], &[Quat::IDENTITY, Quat::from_rotation_y(1.0)])?;
 /// let mut library = CrowdLibrary::new(&Skeleton::new(vec![None], vec![Vec3::X])?)?;
@@ -88,7 +88,7 @@ pub struct MotionWords {
     /// The joints that have a parent, and it, level by level.
     pub links: Vec<[u32; 2]>,
     /// Joints of the skeleton.
-    pub joints: usize,
+    pub joint_count: usize,
     /// Ticks of a second.
     pub ticks_per_second: u32,
 }
@@ -124,7 +124,7 @@ impl MotionTables {
         (spans, cells): (&[[u32; 4]], &[[f32; 4]]),
     ) -> Result<Self, CrowdError> {
         let channels: Vec<CrowdChannel> = bytemuck::cast_vec(words.channels);
-        let each = words.joints.saturating_mul(CHANNELS as usize);
+        let each = words.joint_count.saturating_mul(CHANNELS as usize);
         let runs = match each {
             0 => Vec::new(),
             each => channels.chunks(each).map(runs_of).collect(),
@@ -135,7 +135,7 @@ impl MotionTables {
             channels,
             links: bytemuck::cast_vec(words.links),
             runs,
-            joints: words.joints,
+            joints: words.joint_count,
             ticks_per_second: words.ticks_per_second,
             sizes: (spans.len(), cells.len()),
         };
@@ -214,20 +214,20 @@ impl MotionTables {
             bases: bytemuck::cast_slice(&self.bases).to_vec(),
             channels: bytemuck::cast_slice(&self.channels).to_vec(),
             links: bytemuck::cast_slice(&self.links).to_vec(),
-            joints: self.joints,
+            joint_count: self.joints,
             ticks_per_second: self.ticks_per_second,
         }
     }
 
     /// Number of clips.
     #[must_use]
-    pub fn clips(&self) -> usize {
+    pub fn clip_count(&self) -> usize {
         self.clips.len()
     }
 
     /// Number of joints.
     #[must_use]
-    pub fn joints(&self) -> usize {
+    pub fn joint_count(&self) -> usize {
         self.joints
     }
 

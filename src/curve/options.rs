@@ -1,11 +1,14 @@
 //! The options of a curve of any method: the path between the keys, the shape at its ends, the
 //! quantity that is evaluated and the speed at which the curve is run through.
 
+use std::fmt;
 use std::ops::Range;
+use std::str::FromStr;
 
 use glam::Quat;
 
 use crate::math::quaternion::{self, dot, length, log, unit};
+use crate::names::{UnknownNameError, named, names};
 use crate::tracks::set::TrackSet;
 use crate::tracks::set::key_data::LARGEST_TCB;
 use crate::tracks::signs::Signs;
@@ -37,6 +40,43 @@ pub enum Quantity {
     Acceleration(Axes),
 }
 
+impl Quantity {
+    /// Every quantity.
+    pub const ALL: [Self; 5] = [
+        Self::Rotation,
+        Self::Velocity(Axes::Body),
+        Self::Velocity(Axes::Parent),
+        Self::Acceleration(Axes::Body),
+        Self::Acceleration(Axes::Parent),
+    ];
+
+    /// The name by which programs call it.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Rotation => "rotation",
+            Self::Velocity(Axes::Body) => "velocity-in-body",
+            Self::Velocity(Axes::Parent) => "velocity-in-parent",
+            Self::Acceleration(Axes::Body) => "acceleration-in-body",
+            Self::Acceleration(Axes::Parent) => "acceleration-in-parent",
+        }
+    }
+}
+
+impl fmt::Display for Quantity {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+impl FromStr for Quantity {
+    type Err = UnknownNameError;
+
+    fn from_str(name: &str) -> Result<Self, UnknownNameError> {
+        named("quantity", &Self::ALL, Self::name, name)
+    }
+}
+
 /// How fast a track runs through its curve; no effect on [`STEP`](crate::method::step::STEP).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Speed {
@@ -50,6 +90,12 @@ pub enum Speed {
     Constant,
 }
 
+names! {
+    Speed, "speed",
+    AsKeyed => "as-keyed",
+    Constant => "constant",
+}
+
 /// The axes in which a vector is given.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Axes {
@@ -58,6 +104,12 @@ pub enum Axes {
     /// Those of the frame in which it turns: its parent's in a skeleton, the world's for a track that
     /// has no parent.
     Parent,
+}
+
+names! {
+    Axes, "kind of axes",
+    Body => "body",
+    Parent => "parent",
 }
 
 /// Which of the two quaternions of each key counts: `q` and `-q` are one rotation.
@@ -69,6 +121,12 @@ pub enum KeySigns {
     Shortest,
     /// Signs as given: a dot product below zero turns the long way.
     AsAuthored,
+}
+
+names! {
+    KeySigns, "path",
+    Shortest => "shortest",
+    AsAuthored => "as-authored",
 }
 
 impl KeySigns {
@@ -129,6 +187,16 @@ pub enum Ends {
     Frozen,
 }
 
+names! {
+    Ends, "kind of ends",
+    Parabolic => "parabolic",
+    Natural => "natural",
+    Clamped = Self::AT_REST => "clamped",
+    Secant => "secant",
+    Loop => "loop",
+    Frozen => "frozen",
+}
+
 /// How far the last key of a loop may be from the first (half-angle, radians).
 const LOOP_TOLERANCE: f64 = 1e-3;
 
@@ -136,6 +204,12 @@ const LOOP_TOLERANCE: f64 = 1e-3;
 const FASTEST: f64 = 1e12;
 
 impl Ends {
+    /// Both ends at rest: what `clamped` stands for.
+    pub const AT_REST: Self = Self::Clamped {
+        start: glam::DVec3::ZERO,
+        end: glam::DVec3::ZERO,
+    };
+
     /// Refuses end velocities that are not finite or too large.
     pub(crate) fn check_velocities(self) -> Result<(), InterpolationError> {
         if let Self::Clamped { start, end } = self {

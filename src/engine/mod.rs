@@ -9,11 +9,10 @@ use std::sync::Arc;
 #[cfg(feature = "prove")]
 use std::time::Duration;
 
-use glam::{Quat, Vec4};
-
+use crate::checks::{check_encoding, check_rows, in_quats};
 use crate::clip::Clip;
+use crate::clip::request::Request;
 use crate::cpu::engine::CpuEngine;
-use crate::curve::options::Quantity;
 use crate::device::{Device, VulkanDevice};
 use crate::error::Error;
 use crate::evaluate::backend::Backend;
@@ -27,7 +26,6 @@ use crate::gpu::recovery::Opened;
 use crate::gpu::reports::{DeviceInfo, KernelCheck, NegativeControl, SelfTestReport};
 use crate::gpu::self_test;
 use crate::method::interpolation::Interpolation;
-use crate::output::buffer::OutputBuffer;
 use crate::output::encoding::Encoding;
 use crate::output::rotations::{Layout, Rotations, Samples, Vectors};
 use crate::output::value::OutputValue;
@@ -35,7 +33,7 @@ use crate::prepare::clip_data::PrepareRequest;
 use crate::prepare::request::SetRequest;
 use crate::simd::dispatch::VectorWidth;
 use crate::threads::lock;
-use crate::time::frames::SampleTimes;
+use crate::time::frames::{SampleTimes, Timeline};
 use crate::tracks::set::TrackSet;
 
 /// The most worker threads that can be asked for.
@@ -54,7 +52,7 @@ const MAX_THREADS: usize = 1024;
 /// let engine = Engine::new(Device::Cpu)?;
 /// let clip = engine.upload(&set, method::BESSEL_OVERHAUSER)?;
 /// let rotations = clip.evaluate(&SampleTimes::fps(25))?;
-/// assert_eq!((rotations.tracks(), rotations.samples()), (1, 63));
+/// assert_eq!((rotations.track_count(), rotations.sample_count()), (1, 63));
 /// assert_eq!(rotations.get(0, 25), Some(keys[1]));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -80,7 +78,7 @@ impl Engine {
     /// ```
     /// use tumble::{Device, Engine, EngineOptions};
     /// let mut options = EngineOptions::default();
-    /// options.threads = Some(2);
+    /// options.thread_count = Some(2);
     /// let engine = Engine::with_options(Device::Cpu, &options)?;
     /// # Ok::<(), tumble::Error>(())
     /// ```
@@ -88,19 +86,21 @@ impl Engine {
     /// # Errors
     /// When the device cannot be opened, or fails the self-test and
     /// [`EngineOptions::allow_inexact`] is off. Each kernel is checked when an evaluation first needs it, which
-    /// is refused with [`VulkanError::InexactKernel`](crate::VulkanError::InexactKernel) where it differs.
+    /// is refused with [`VulkanError::InexactKernel`](crate::vulkan::VulkanError::InexactKernel) where it differs.
     pub fn with_options(device: Device, options: &EngineOptions) -> Result<Self, Error> {
         VectorWidth::limit()?;
         match device {
             Device::Cpu => {
-                if let Some(requested) = options.threads.filter(|n| !(1..=MAX_THREADS).contains(n))
+                if let Some(requested) = options
+                    .thread_count
+                    .filter(|n| !(1..=MAX_THREADS).contains(n))
                 {
                     let max = MAX_THREADS;
                     return Err(Error::ThreadCount { requested, max });
                 }
                 let width = options.vector_width.unwrap_or_else(VectorWidth::widest);
                 let (stores, memory) = (options.streaming_stores, options.memory);
-                let engine = CpuEngine::new(width, stores, options.threads, memory)?;
+                let engine = CpuEngine::new(width, stores, options.thread_count, memory)?;
                 Ok(Self {
                     backend: Arc::new(Backend::Cpu(engine)),
                 })
@@ -282,9 +282,35 @@ impl Engine {
         Ok(Clip::new(self.clone(), uploaded))
     }
 
-    /// Prepares and evaluates in one go, `[track][frame]`. On a Vulkan device a set
-    /// larger than its memory (or than [`EngineOptions::memory`]) goes through it
-    /// some tracks at a time.
+    /// A request for the samples that `frames` means, of a set that need not be uploaded: of all tracks, track by
+    /// track, as values of four f32, unless it says otherwise. Only what the samples need is prepared. On a Vulkan
+    /// device a set larger than its memory (or than [`EngineOptions::memory`]) goes through it some tracks at a
+    /// time.
+    ///
+    /// ```
+    /// # use glam::{Quat, Vec4};
+    /// # use tumble::{Device, Engine, Error, SampleTimes, TrackSet, method};
+    /// # let mut set = TrackSet::new();
+    /// # let keys = [Quat::IDENTITY, Quat::from_rotation_x(1.0)];
+    /// # set.push("", &[0.0, 1.0], &keys).unwrap();
+    /// # set.push("", &[0.0, 1.0], &keys).unwrap();
+    /// let engine = Engine::new(Device::Cpu)?;
+    /// let frames = SampleTimes::fps(60);
+    /// let second = engine.request(&set, method::SLERP, &frames).tracks(1..2).evaluate()?;
+    /// assert_eq!(second.get(0, 60), Some(keys[1]));
+    /// # Ok::<(), Error>(())
+    /// ```
+    pub fn request<'a>(
+        &'a self,
+        set: &'a TrackSet,
+        interpolation: impl Into<Interpolation>,
+        frames: &'a SampleTimes,
+    ) -> Request<'a> {
+        Request::of_set(self, set, interpolation.into(), frames)
+    }
+
+    /// Prepares and evaluates in one go, `[track][frame]`: short for
+    /// [`request`](Engine::request)`(set, interpolation, frames).`[`evaluate`](Request::evaluate)`()`.
     ///
     /// # Errors
     /// As [`Engine::upload`] and [`Clip::evaluate`]; also when the quantity is a velocity or an
@@ -295,27 +321,12 @@ impl Engine {
         interpolation: impl Into<Interpolation>,
         frames: &SampleTimes,
     ) -> Result<Rotations, Error> {
-        self.evaluate_as(set, interpolation, frames, Layout::TrackMajor)
-    }
-
-    /// As [`Engine::evaluate`], in the given layout.
-    ///
-    /// # Errors
-    /// As [`Engine::evaluate`].
-    pub fn evaluate_as(
-        &self,
-        set: &TrackSet,
-        interpolation: impl Into<Interpolation>,
-        frames: &SampleTimes,
-        layout: Layout,
-    ) -> Result<Rotations, Error> {
-        let interpolation = interpolation.into();
-        check_rows::<Quat>(interpolation.quantity)?;
-        self.samples(set, interpolation, frames, layout)
+        self.request(set, interpolation, frames).evaluate()
     }
 
     /// The angular velocity or acceleration of every track at every sample, as
-    /// [`Interpolation::quantity`] says.
+    /// [`Interpolation::quantity`] says: short for [`request`](Engine::request)`(set, interpolation,
+    /// frames).`[`layout`](Request::layout)`(layout).`[`rates`](Request::rates)`()`.
     ///
     /// # Errors
     /// As [`Engine::evaluate`]; also when the quantity is the rotation.
@@ -328,27 +339,27 @@ impl Engine {
         frames: &SampleTimes,
         layout: Layout,
     ) -> Result<Vectors, Error> {
-        check_rows::<Vec4>(interpolation.quantity)?;
-        self.samples(set, interpolation, frames, layout)
+        self.request(set, interpolation, frames)
+            .layout(layout)
+            .rates()
     }
 
-    fn samples<T>(
+    pub(crate) fn samples<T>(
         &self,
         set: &TrackSet,
         interpolation: Interpolation,
-        frames: &SampleTimes,
+        timeline: &Timeline,
         layout: Layout,
     ) -> Result<Samples<T>, Error> {
-        let timeline = frames.resolve(set.track_count(), set.time_span())?;
-        let request = SetRequest::whole(set, &interpolation, &timeline);
+        let request = SetRequest::whole(set, &interpolation, timeline);
         let storage = (self.backend).evaluate(&request, layout)?;
         let (tracks, samples) = (set.track_count(), timeline.len());
         Ok(Samples::new(storage, tracks, samples, layout))
     }
 
-    /// As [`Engine::evaluate_as`], or as [`Engine::rates`], into the caller's memory: [`Quat`] takes
-    /// rotations, [`Vec4`] velocities and accelerations, `[f32; 4]` either. It is faster
-    /// when it is used again ([`OutputBuffer`]): the first touch
+    /// As [`Engine::evaluate`] in a layout, or as [`Engine::rates`], into the caller's memory: [`Quat`](glam::Quat) takes
+    /// rotations, [`Vec4`](glam::Vec4) velocities and accelerations, `[f32; 4]` either. It is faster
+    /// when it is used again ([`OutputBuffer`](crate::output::buffer::OutputBuffer)): the first touch
     /// of fresh memory costs more than evaluating. Memory that is aligned to 16 bytes is filled
     /// without a copy.
     ///
@@ -417,43 +428,6 @@ impl Engine {
         let route = (self.backend).route(&request, layout);
         Ok(route.to_string())
     }
-}
-
-/// Refuses values that an encoding cannot store.
-pub(crate) fn check_encoding(encoding: Encoding, quantity: Quantity) -> Result<(), Error> {
-    match encoding.row().takes_vectors || quantity == Quantity::Rotation {
-        true => Ok(()),
-        false => Err(Error::EncodesRotations { encoding }),
-    }
-}
-
-/// Refuses memory of a type that cannot have what is asked for.
-pub(crate) fn check_rows<R: OutputValue>(quantity: Quantity) -> Result<(), Error> {
-    match quantity == Quantity::Rotation {
-        true if !R::STORES_ROTATIONS => Err(Error::NotRates),
-        false if !R::STORES_RATES => Err(Error::NotRotations),
-        _ => Ok(()),
-    }
-}
-
-/// Fills the caller's memory as quaternions, if it is of the result's type and length. Where it is
-/// not aligned as they are, memory that is gets the result first.
-pub(crate) fn in_quats<R: OutputValue>(
-    output: &mut [R],
-    needed: usize,
-    fill: impl FnOnce(&mut [Quat]) -> Result<(), Error>,
-) -> Result<(), Error> {
-    let length = output.len();
-    if length != needed {
-        return Err(Error::OutputLength { length, needed });
-    }
-    if let Ok(quats) = bytemuck::try_cast_slice_mut(&mut *output) {
-        return fill(quats);
-    }
-    let mut quats = OutputBuffer::new(output.len())?;
-    fill(&mut quats)?;
-    output.copy_from_slice(bytemuck::cast_slice(&quats));
-    Ok(())
 }
 
 impl std::fmt::Debug for Engine {

@@ -8,9 +8,8 @@
 //!   sample alone, batches in a thread's cache, or clips.
 //! * [`Uploaded`](uploaded::Uploaded): prepared tracks, and their segments on a device: what a clip is. After a device
 //!   was lost they are uploaded again.
-//! * [`SetPieces`](pieces::SetPieces): a set whose segments exceed the memory budget; a window of its result is halved
+//! * [`SetPieces`](uploaded::pieces::SetPieces): a set whose segments exceed the memory budget; a window of its result is halved
 //!   until the segments of each half fit.
 
 pub(crate) mod backend;
-pub(crate) mod pieces;
 pub(crate) mod uploaded;

@@ -1,16 +1,19 @@
 //! Prepared tracks, on what an engine evaluates on.
 
+pub(crate) mod pieces;
+
 use std::borrow::Cow;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::evaluate::backend::Backend;
-use crate::evaluate::pieces::{SetPieces, segment_bytes};
-use crate::gpu::engine::{ClipBuffers, Job, VulkanEngine};
+use crate::evaluate::uploaded::pieces::{SetPieces, segment_bytes};
+use crate::gpu::engine::VulkanEngine;
 use crate::gpu::error::{EvaluateError, VulkanError};
 use crate::gpu::exclusive::Exclusive;
+use crate::gpu::job::{ClipBuffers, Job};
 use crate::gpu::kept_lists::ListCache;
 use crate::gpu::recovery::Opened;
-use crate::memory::{OutOfMemory, refuse_more_than_there_is};
+use crate::memory::{OutOfMemoryError, refuse_more_than_there_is};
 use crate::method::interpolation::Interpolation;
 use crate::output::buffer::OutputBuffer;
 use crate::output::encoding::Encoding;
@@ -94,7 +97,7 @@ impl Uploaded {
     pub(crate) fn folded<'t>(
         &self,
         timeline: &'t Timeline,
-    ) -> Result<Cow<'t, Timeline>, OutOfMemory> {
+    ) -> Result<Cow<'t, Timeline>, OutOfMemoryError> {
         match self.in_pieces {
             Some(_) => Ok(Cow::Borrowed(timeline)), // each piece folds its samples
             None => self.data.folded(timeline),
@@ -187,7 +190,7 @@ impl Uploaded {
     ) -> Result<T, EvaluateError> {
         if let Some((set, _)) = &self.in_pieces {
             let needed = segment_bytes(set, &self.data.interpolation);
-            return Err(OutOfMemory::new::<u8>(SEGMENTS, needed).into());
+            return Err(OutOfMemoryError::new::<u8>(SEGMENTS, needed).into());
         }
         opened.attempt_smaller(|engine| {
             let (clip, buffers) = (&self.data, &self.buffers_on(engine)?);

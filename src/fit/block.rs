@@ -9,12 +9,10 @@
 use std::ops::Range;
 
 use crate::curve::formula::{FormulaNumbers, Product};
-use crate::curve::options::Quantity;
-use crate::fit::exact::curve::IntervalCurve;
-use crate::fit::exact::shape::Shape;
 use crate::math::quaternion::{self, Arithmetic, Quaternion, Real as _, square};
-use crate::simd::lanes::{Doubles, Lanes};
-use crate::time::spans::NONE;
+use crate::simd::doubles::Doubles;
+use crate::simd::lanes::Lanes;
+use crate::time::runs::NONE;
 use crate::tracks::set::Track;
 use crate::tracks::signs::Signs;
 
@@ -26,6 +24,9 @@ pub(crate) const ROW_LEN: usize = LANES + 8;
 
 /// One number for each interval.
 pub(crate) type RowF64 = [f64; ROW_LEN];
+
+/// The lanes of context that a stretch needs beside those of its intervals.
+pub(crate) const CONTEXT: usize = 2;
 
 /// Some consecutive intervals of a track in a block.
 #[derive(Debug, Clone)]
@@ -191,17 +192,6 @@ impl Intervals {
         for (row, number) in rows.zip(basis.into_iter().flatten()) {
             row[lane] = number;
         }
-    }
-
-    /// The curve of an interval.
-    pub(crate) fn curve(
-        &self,
-        lane: usize,
-        shape: &'static Shape,
-        quantity: Quantity,
-    ) -> IntervalCurve {
-        let numbers = shape.curve_numbers(|i| self.numbers[i][lane]);
-        IntervalCurve::new(shape, numbers, quantity, self.rate(lane))
     }
 
     /// The number of lanes to compute, rounded up to vectors of eight. A wider vector writes past

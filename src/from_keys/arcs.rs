@@ -6,16 +6,19 @@
 use bytemuck::Zeroable;
 
 use crate::fit::constant_velocity::arc_component;
-use crate::from_keys::evaluate::{OutputIter, SignedKeys};
 use crate::shader::{Form, IS_KEY, KeySample};
 use crate::simd::dispatch::{InLanes, in_lanes};
 use crate::simd::lanes::{Lanes, canonical as canonical_rotations};
+use crate::tracks::track_keys::SignedKeys;
 use crate::twin::arc_between::arc_between;
 use crate::twin::evaluate_arc::{norm_squared, on_arc};
 use crate::twin::evaluate_polynomial::polynomial;
 
 /// The most samples that are evaluated together.
 pub(crate) const LANES: usize = 64;
+
+/// The rotations that are still to be written.
+pub(super) type OutputIter<'a> = std::slice::IterMut<'a, [f32; 4]>;
 
 /// Samples that are gathered to be evaluated together; they are consecutive in the result.
 #[derive(Zeroable)]

@@ -4,12 +4,12 @@
 
 use bytemuck::Zeroable;
 
-use crate::from_keys::arcs::LANES;
-use crate::from_keys::evaluate::{OutputIter, SignedKeys};
+use crate::from_keys::arcs::{LANES, OutputIter};
 use crate::math::canonical::canonical;
 use crate::shader::{IS_KEY, KEY_INNER, KeySample, TangentWeights};
 use crate::simd::dispatch::{InLanes, in_lanes};
 use crate::simd::lanes::Lanes;
+use crate::tracks::track_keys::SignedKeys;
 use crate::twin::small_angle::small_angle_cubic;
 
 /// Samples that are gathered to be evaluated together; they are consecutive in the result. A block of

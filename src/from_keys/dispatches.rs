@@ -19,8 +19,9 @@ use crate::shader::{
     IS_KEY, KeySample, LINE, ROWS_PER_INVOCATION, RowShape, SIGN_NEGATED, TangentWeights,
 };
 use crate::threads::on_threads;
+use crate::time::error::SampleTimesError;
 use crate::time::frame_clock::FrameClock;
-use crate::time::frames::{SampleTimesError, Ticks};
+use crate::time::frames::Ticks;
 use crate::time::key_samples::FramePlan;
 use crate::time::times::key_sample;
 use crate::tracks::set::TrackSet;

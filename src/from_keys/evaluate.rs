@@ -6,7 +6,7 @@ use std::ops::Range;
 
 use crate::fit::tangent_weights::TrackWeights;
 use crate::from_keys::KeyCurve;
-use crate::from_keys::arcs::{ArcRun, TwoKeyBlock};
+use crate::from_keys::arcs::{ArcRun, OutputIter, TwoKeyBlock};
 use crate::from_keys::cubics::CubicBlock;
 use crate::method::interpolation::Interpolation;
 use crate::prepare::batch::Batch;
@@ -18,8 +18,7 @@ use crate::time::frames::{Ticks, Timeline};
 use crate::time::key_samples::FramePlan;
 use crate::time::times::key_sample;
 use crate::tracks::set::TrackSet;
-use crate::tracks::signs::Signs;
-use crate::tracks::track_keys::TrackKeys;
+use crate::tracks::track_keys::{SignedKeys, TrackKeys};
 
 /// Evaluates tracks from their keys, and keeps its scratch from one to the next.
 pub(crate) struct KeyEvaluator<'a> {
@@ -157,34 +156,3 @@ impl<'a> SampleBlock<'a> {
         }
     }
 }
-
-/// Keys of a track with their continued signs; `signs` is `None` where no key is negated.
-#[derive(Clone, Copy)]
-pub(super) struct SignedKeys<'a> {
-    pub(super) authored: &'a [[f32; 4]],
-    signs: Option<Signs<'a>>,
-}
-
-impl<'a> SignedKeys<'a> {
-    fn new(keys: TrackKeys<'a>) -> Self {
-        Self {
-            authored: bytemuck::cast_slice(keys.keys),
-            signs: Some(keys.signs).filter(|signs| signs.any()),
-        }
-    }
-
-    #[inline(always)]
-    pub(super) fn get(self, key: usize) -> [f32; 4] {
-        let authored = self.authored[key];
-        match self.signs {
-            None => authored,
-            Some(signs) => {
-                let sign = signs.sign(key);
-                authored.map(|component| component * sign)
-            }
-        }
-    }
-}
-
-/// The rotations that are still to be written.
-pub(super) type OutputIter<'a> = std::slice::IterMut<'a, [f32; 4]>;

@@ -41,22 +41,13 @@ pub(crate) mod kept_lists {
     }
 }
 
-pub(crate) mod engine {
-    use std::sync::{Arc, Mutex};
+pub(crate) mod job {
+    use std::sync::Arc;
 
-    use bytemuck::NoUninit;
-
-    use crate::from_keys::dispatches::KeyJob;
     use crate::gpu::Never;
-    use crate::gpu::error::{EvaluateError, VulkanError};
     use crate::gpu::kept_lists::ListCache;
-    use crate::gpu::options::Timings;
-    use crate::gpu::reports::KernelCheck;
     use crate::output::encoding::Encoding;
-    use crate::output::rotations::{Layout, Storage};
-    use crate::output::window::Window;
     use crate::prepare::clip_data::ClipData;
-    use crate::shader::Kernel;
     use crate::time::frames::Timeline;
 
     pub(crate) struct ClipBuffers {
@@ -70,6 +61,23 @@ pub(crate) mod engine {
         pub(crate) encoding: Encoding,
         pub(crate) lists: &'a ListCache,
     }
+}
+
+pub(crate) mod engine {
+    use std::sync::{Arc, Mutex};
+
+    use bytemuck::NoUninit;
+
+    use crate::from_keys::dispatches::KeyJob;
+    use crate::gpu::Never;
+    use crate::gpu::error::{EvaluateError, VulkanError};
+    use crate::gpu::job::{ClipBuffers, Job};
+    use crate::gpu::options::Timings;
+    use crate::gpu::reports::KernelCheck;
+    use crate::output::rotations::{Layout, Storage};
+    use crate::output::window::Window;
+    use crate::prepare::clip_data::ClipData;
+    use crate::shader::Kernel;
 
     pub(crate) struct VulkanEngine {
         pub(crate) never: Never,
@@ -185,8 +193,9 @@ pub(crate) mod recovery {
     use std::sync::Arc;
 
     use crate::gpu::Never;
-    use crate::gpu::engine::{ClipBuffers, VulkanEngine};
+    use crate::gpu::engine::VulkanEngine;
     use crate::gpu::error::{EvaluateError, VulkanError};
+    use crate::gpu::job::ClipBuffers;
     use crate::gpu::options::EngineOptions;
     use crate::gpu::physical::{DeviceInfo, PhysicalDevice};
     use crate::gpu::reports::SelfTestReport;

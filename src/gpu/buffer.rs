@@ -1,16 +1,16 @@
-//! One buffer and its memory.
+//! One buffer.
 
 use std::ops::Range;
 use std::ptr::NonNull;
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 
 use ash::vk;
 
 use crate::gpu::device::{LogicalDevice, QueueLane};
 use crate::gpu::error::{Named, VulkanError};
-use crate::gpu::physical::PhysicalDevice;
+use crate::gpu::physical::external::{FILE, HOST_ALLOCATION, usage};
+use crate::gpu::shared_memory::{MemoryKind, Share};
 use crate::shader::PolynomialSegment;
-use crate::threads::lock;
 
 /// Where a buffer lives and who touches it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -69,53 +69,6 @@ impl Residence {
             Self::Device | Self::Results => (Flags::DEVICE_LOCAL, &[]),
         }
     }
-}
-
-/// The handle type of imported memory: host allocations of this process.
-const HOST_ALLOCATION: vk::ExternalMemoryHandleTypeFlags =
-    vk::ExternalMemoryHandleTypeFlags::HOST_ALLOCATION_EXT;
-
-/// The handle type of exported memory: a file of the driver's own.
-pub(crate) const FILE: vk::ExternalMemoryHandleTypeFlags =
-    vk::ExternalMemoryHandleTypeFlags::OPAQUE_FD;
-
-fn usage(is_texels: bool) -> vk::BufferUsageFlags {
-    let usage = vk::BufferUsageFlags::STORAGE_BUFFER
-        | vk::BufferUsageFlags::TRANSFER_SRC
-        | vk::BufferUsageFlags::TRANSFER_DST;
-    match is_texels {
-        true => usage | vk::BufferUsageFlags::UNIFORM_TEXEL_BUFFER,
-        false => usage,
-    }
-}
-
-/// Whether a device can import such memory for a buffer.
-pub(crate) fn may_be_imported(physical: &PhysicalDevice, is_texels: bool) -> bool {
-    let features = external_features(physical, is_texels, HOST_ALLOCATION);
-    features.contains(vk::ExternalMemoryFeatureFlags::IMPORTABLE)
-}
-
-/// Whether a device can export the memory of a buffer of results as a file.
-pub(crate) fn may_be_exported(physical: &PhysicalDevice) -> bool {
-    let features = external_features(physical, false, FILE);
-    features.contains(vk::ExternalMemoryFeatureFlags::EXPORTABLE)
-}
-
-fn external_features(
-    physical: &PhysicalDevice,
-    is_texels: bool,
-    handle_type: vk::ExternalMemoryHandleTypeFlags,
-) -> vk::ExternalMemoryFeatureFlags {
-    let info = vk::PhysicalDeviceExternalBufferInfo::default()
-        .usage(usage(is_texels))
-        .handle_type(handle_type);
-    let mut found = vk::ExternalBufferProperties::default();
-    let instance = &physical.instance.raw;
-    // SAFETY: Vulkan 1.1, and a device of the instance.
-    unsafe {
-        instance.get_physical_device_external_buffer_properties(physical.raw, &info, &mut found);
-    }
-    found.external_memory_properties.external_memory_features
 }
 
 /// A storage buffer. One that the host touches stays mapped for as long as it lives.
@@ -413,232 +366,6 @@ impl Drop for Buffer {
                 self.device.raw.destroy_buffer(self.raw, None);
                 self.device.shared.give_back(&self.device.raw, self.memory);
             }
-        }
-    }
-}
-
-/// Larger buffers have memory of their own.
-const LARGEST: u64 = 512 << 10;
-/// The size of what is allocated for buffers to share.
-const BLOCK: u64 = 4 << 20;
-
-/// The blocks of a device.
-#[derive(Default)]
-pub(crate) struct SharedMemory(Mutex<Vec<MemoryBlock>>);
-
-/// Which memory a buffer wants.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct MemoryKind {
-    pub(crate) memory_type: u32,
-    /// Whether the host sees it.
-    pub(crate) mapped: bool,
-}
-
-/// Memory of one buffer: a part of a block, or an allocation of its own.
-#[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Share {
-    pub(crate) memory: vk::DeviceMemory,
-    pub(crate) offset: u64,
-    pub(crate) size: u64,
-    /// Where the host sees the first byte.
-    pub(crate) mapped: Option<NonNull<u8>>,
-}
-
-struct MemoryBlock {
-    kind: MemoryKind,
-    whole: Share,
-    free: FreeRanges,
-}
-
-// SAFETY: the pointer is to mapped memory that goes from thread to thread with the block; each part of
-// it is used by the one buffer that holds it.
-unsafe impl Send for MemoryBlock {}
-
-impl SharedMemory {
-    pub(crate) fn take(
-        &self,
-        device: &ash::Device,
-        kind: MemoryKind,
-        needs: &vk::MemoryRequirements,
-    ) -> Result<Share, VulkanError> {
-        if needs.size <= LARGEST {
-            let mut blocks = lock(&self.0);
-            let mut same_kind = blocks.iter_mut().filter(|block| block.kind == kind);
-            if let Some(share) = same_kind.find_map(|block| block.share(needs)) {
-                return Ok(share);
-            }
-            match allocate(device, kind, BLOCK) {
-                Ok(whole) => {
-                    let free = FreeRanges::new(BLOCK);
-                    blocks.push(MemoryBlock { kind, whole, free });
-                    if let Some(share) = blocks.last_mut().and_then(|block| block.share(needs)) {
-                        return Ok(share);
-                    }
-                }
-                Err(error) if error.is_lost() => return Err(error),
-                Err(_) => {} // there may be room for the buffer alone
-            }
-        }
-        allocate(device, kind, needs.size)
-    }
-
-    /// Takes back what a buffer had. A block that nobody uses is kept if it is the only one of its
-    /// kind: whoever makes and drops clips in turn allocates nothing.
-    ///
-    /// # Safety
-    /// Nothing may use the memory any more.
-    pub(crate) unsafe fn give_back(&self, device: &ash::Device, share: Share) {
-        let mut blocks = lock(&self.0);
-        let is_origin = |block: &MemoryBlock| block.whole.memory == share.memory;
-        let Some(index) = blocks.iter().position(is_origin) else {
-            // SAFETY: promised by the caller; null is allowed.
-            unsafe { device.free_memory(share.memory, None) };
-            return;
-        };
-        blocks[index]
-            .free
-            .give(share.offset..share.offset + share.size);
-        let kind = blocks[index].kind;
-        let is_spare = |block: &&MemoryBlock| block.kind == kind && block.free.is_whole();
-        if blocks[index].free.is_whole() && blocks.iter().filter(is_spare).count() > 1 {
-            let block = blocks.swap_remove(index);
-            // SAFETY: no buffer has a part of it, and the caller promises that no work does.
-            unsafe { device.free_memory(block.whole.memory, None) };
-        }
-    }
-
-    /// Frees all blocks.
-    ///
-    /// # Safety
-    /// Nothing may use them any more.
-    pub(crate) unsafe fn free(&self, device: &ash::Device) {
-        for block in lock(&self.0).drain(..) {
-            // SAFETY: promised by the caller.
-            unsafe { device.free_memory(block.whole.memory, None) };
-        }
-    }
-}
-
-impl MemoryBlock {
-    fn share(&mut self, needs: &vk::MemoryRequirements) -> Option<Share> {
-        let offset = self.free.take(needs.size, needs.alignment)?;
-        // SAFETY: the offset lies within the block, which is mapped as a whole.
-        let at_offset = |first: NonNull<u8>| unsafe { first.add(offset as usize) };
-        Some(Share {
-            offset,
-            size: needs.size,
-            mapped: self.whole.mapped.map(at_offset),
-            ..self.whole
-        })
-    }
-}
-
-/// An allocation, which stays mapped where the host sees it.
-fn allocate(device: &ash::Device, kind: MemoryKind, size: u64) -> Result<Share, VulkanError> {
-    let info = vk::MemoryAllocateInfo::default()
-        .allocation_size(size)
-        .memory_type_index(kind.memory_type);
-    // SAFETY: the device is alive, and has this type of memory.
-    let memory = unsafe { device.allocate_memory(&info, None) }.named("vkAllocateMemory")?;
-    let mut share = Share {
-        memory,
-        size,
-        ..Share::default()
-    };
-    if kind.mapped {
-        let flags = vk::MemoryMapFlags::empty();
-        // SAFETY: the memory is visible to the host and not mapped yet; freeing it unmaps it.
-        let mapped = unsafe { device.map_memory(memory, 0, vk::WHOLE_SIZE, flags) };
-        let mapped = mapped.named("vkMapMemory").inspect_err(|_| {
-            // SAFETY: nothing uses it.
-            unsafe { device.free_memory(memory, None) }
-        })?;
-        share.mapped = NonNull::new(mapped.cast());
-    }
-    Ok(share)
-}
-
-/// The free parts of a block, in order, no two of which touch.
-#[derive(Debug, Clone, PartialEq, Eq)]
-struct FreeRanges {
-    ranges: Vec<Range<u64>>,
-    size: u64,
-}
-
-impl FreeRanges {
-    fn new(size: u64) -> Self {
-        let whole = 0..size;
-        Self {
-            ranges: vec![whole],
-            size,
-        }
-    }
-
-    fn is_whole(&self) -> bool {
-        self.ranges.first() == Some(&(0..self.size))
-    }
-
-    /// The first offset at which so many bytes fit.
-    fn take(&mut self, size: u64, alignment: u64) -> Option<u64> {
-        let found = self.ranges.iter().enumerate().find_map(|(index, range)| {
-            let start = range.start.next_multiple_of(alignment.max(1));
-            (start + size <= range.end).then_some((index, start))
-        });
-        let (index, start) = found?;
-        let range = self.ranges[index].clone();
-        let rest = [range.start..start, start + size..range.end];
-        let rest = rest.into_iter().filter(|rest| !rest.is_empty());
-        self.ranges.splice(index..=index, rest);
-        Some(start)
-    }
-
-    fn give(&mut self, range: Range<u64>) {
-        self.ranges.push(range);
-        self.ranges.sort_by_key(|range| range.start);
-        // What touches becomes one.
-        self.ranges.dedup_by(|next, merged| {
-            let touches = merged.end == next.start;
-            if touches {
-                merged.end = next.end;
-            }
-            touches
-        });
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use proptest::prelude::*;
-
-    use super::*;
-
-    proptest! {
-        #[test]
-        fn parts_never_overlap_and_become_whole_again(
-            steps in prop::collection::vec((1u64..400, 0u32..6, 0usize..8), 0..200)
-        ) {
-            let mut free = FreeRanges::new(4096);
-            let mut used_ranges: Vec<Range<u64>> = Vec::new();
-            for (size, power, drop) in steps {
-                let alignment = 1 << power;
-                if drop < 3 && !used_ranges.is_empty() {
-                    free.give(used_ranges.swap_remove(drop % used_ranges.len()));
-                } else if let Some(start) = free.take(size, alignment) {
-                    let range = start..start + size;
-                    prop_assert!(start % alignment == 0 && range.end <= 4096);
-                    let apart = |other: &Range<u64>| other.end <= range.start || range.end <= other.start;
-                    prop_assert!(used_ranges.iter().all(apart), "{range:?} of {used_ranges:?}");
-                    used_ranges.push(range);
-                }
-                let left: u64 = free.ranges.iter().map(|range| range.end - range.start).sum();
-                let used: u64 = used_ranges.iter().map(|range| range.end - range.start).sum();
-                prop_assert_eq!(left + used, 4096);
-                prop_assert!(free.ranges.is_sorted_by(|a, b| a.end < b.start));
-            }
-            for range in used_ranges {
-                free.give(range);
-            }
-            prop_assert!(free.is_whole());
         }
     }
 }

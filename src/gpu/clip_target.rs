@@ -4,9 +4,10 @@ use std::sync::Arc;
 
 use ash::vk;
 
-use crate::gpu::engine::{ClipBuffers, Job, VulkanEngine};
+use crate::gpu::engine::VulkanEngine;
 use crate::gpu::error::{EvaluateError, VulkanError};
 use crate::gpu::handles::VulkanBuffer;
+use crate::gpu::job::{ClipBuffers, Job};
 use crate::gpu::kept_lists::KeptLists;
 use crate::gpu::pipeline::Pipeline;
 use crate::gpu::submission::DescriptorPool;
@@ -15,7 +16,7 @@ use crate::output::encoding::Encoding;
 use crate::output::window::Window;
 
 /// Samples of a clip that are recorded into an application's commands, and the buffer that they go to
-/// ([`Request::target`](crate::request::Request::target)). What kernels read of the samples lies on the
+/// ([`Request::target`](crate::clip::request::Request::target)). What kernels read of the samples lies on the
 /// device: recording neither lists nor allocates anything.
 pub struct ClipTarget {
     engine: Arc<VulkanEngine>,
@@ -49,7 +50,7 @@ impl ClipTarget {
         let values_per_window = engine
             .at_once()
             .unwrap_or_else(|| engine.window_of(job.encoding));
-        let lists = KeptLists::new(engine, job, whole, values_per_window)?;
+        let lists = KeptLists::new(engine.list_request(job), whole, values_per_window)?;
         let mut pool = DescriptorPool::new(&engine.device);
         let sets = lists
             .windows

@@ -191,7 +191,7 @@ impl CrowdTarget {
         };
         let positions = new("tumble crowd places", crowd.position_bytes())?;
         // Values of a window before they are rounded to 16 bits.
-        let values = joints * output.vectors() as u64 * 16;
+        let values = joints * output.vector_count() as u64 * 16;
         let whole = (output.is_half).then(|| new("tumble crowd values", values));
         let whole = whole.transpose()?;
         let pipelines = crowd
@@ -289,7 +289,7 @@ impl CrowdTarget {
             let count = match kernel {
                 Kernel::CrowdTimes => instances * arguments.layers * arguments.bases,
                 Kernel::CrowdSkin => 3 * joints,
-                Kernel::CrowdHalf => joints * self.output.vectors() as u32,
+                Kernel::CrowdHalf => joints * self.output.vector_count() as u32,
                 Kernel::CrowdWalkAll => {
                     let levels = self.crowd.tables.levels.len() - 1;
                     let walk = CrowdDispatch {

@@ -7,16 +7,15 @@ use std::time::Duration;
 
 use ash::{ext, khr, vk};
 
-use crate::gpu::buffer::SharedMemory;
-use crate::gpu::buffer::{may_be_exported, may_be_imported};
 use crate::gpu::error::{Named, VulkanError};
-use crate::gpu::exported::timelines_may_be_exported;
 use crate::gpu::handles::{QueueLock, VulkanQueue};
 use crate::gpu::options::{EngineOptions, ReadBack};
+use crate::gpu::physical::external::{may_be_exported, may_be_imported, timelines_may_be_exported};
 use crate::gpu::physical::queues::{Copies, QueueIndex};
+use crate::gpu::physical::upload_memory::{Placing, direct};
 use crate::gpu::physical::{DeviceKind, PhysicalDevice};
-use crate::gpu::pipeline::PipelineCache;
-use crate::gpu::upload::{Placing, direct};
+use crate::gpu::pipeline_cache::PipelineCache;
+use crate::gpu::shared_memory::SharedMemory;
 use crate::threads::lock;
 
 /// What a submission is for.

@@ -1,7 +1,7 @@
 //! What can go wrong with Vulkan.
 
 use crate::prepare::error::SetError;
-use crate::time::frames::SampleTimesError;
+use crate::time::error::SampleTimesError;
 #[cfg(feature = "vulkan")]
 use ash::vk;
 
@@ -135,7 +135,7 @@ pub enum VulkanError {
     InexactKernel {
         /// The device's name.
         device: String,
-        /// The kernel, as [`kernels`](crate::kernels) names it.
+        /// The kernel, as [`kernels`](crate::vulkan::kernels) names it.
         kernel: &'static str,
         /// Values that differ.
         differing: usize,

@@ -6,38 +6,16 @@ use std::sync::{Arc, Mutex};
 use ash::vk;
 
 use crate::gpu::buffer::Buffer;
-#[cfg(unix)]
-use crate::gpu::buffer::FILE;
 use crate::gpu::device::LogicalDevice;
 use crate::gpu::error::{Named, VulkanError};
-use crate::gpu::physical::PhysicalDevice;
+#[cfg(unix)]
+use crate::gpu::physical::external::{FILE, SEMAPHORE_FILE};
 use crate::gpu::submission::Point;
 use crate::gpu::submission::Semaphore;
 use crate::threads::lock;
 
-/// The handle type of exported semaphores: a file of the driver's own.
-const SEMAPHORE_FILE: vk::ExternalSemaphoreHandleTypeFlags =
-    vk::ExternalSemaphoreHandleTypeFlags::OPAQUE_FD;
-
 /// How long a result is waited for: no window takes longer than a fence is waited for.
 const TIMEOUT_SECONDS: u64 = 60;
-
-/// Whether a device can export timeline semaphores as files.
-pub(crate) fn timelines_may_be_exported(physical: &PhysicalDevice) -> bool {
-    let mut kind =
-        vk::SemaphoreTypeCreateInfo::default().semaphore_type(vk::SemaphoreType::TIMELINE);
-    let info = vk::PhysicalDeviceExternalSemaphoreInfo::default()
-        .handle_type(SEMAPHORE_FILE)
-        .push_next(&mut kind);
-    let mut found = vk::ExternalSemaphoreProperties::default();
-    let instance = &physical.instance.raw;
-    // SAFETY: Vulkan 1.2, which knows the structure that is chained, and a device of the instance.
-    unsafe {
-        instance.get_physical_device_external_semaphore_properties(physical.raw, &info, &mut found);
-    }
-    let features = found.external_semaphore_features;
-    features.contains(vk::ExternalSemaphoreFeatureFlags::EXPORTABLE)
-}
 
 /// The memory of a result, and what the device reaches when it has written it.
 pub(crate) struct Exported {

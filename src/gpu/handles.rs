@@ -47,7 +47,7 @@ pub struct VulkanHandles {
 ///
 /// ```
 /// use std::sync::{Arc, Mutex};
-/// use tumble::QueueLock;
+/// use tumble::vulkan::QueueLock;
 ///
 /// let frames = Arc::new(Mutex::new(0)); // what the application's lock protects beside the queue
 /// let shared = Arc::clone(&frames);

@@ -7,21 +7,20 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use ash::vk;
-use rayon::prelude::*;
 
 use crate::gpu::buffer::{Buffer, Residence};
 use crate::gpu::device::{LogicalDevice, QueueLane};
-use crate::gpu::engine::ClipBuffers;
 use crate::gpu::error::VulkanError;
 use crate::gpu::exported::Exported;
 use crate::gpu::handles::VulkanBuffer;
 use crate::gpu::imported_memory::ImportedMemory;
+use crate::gpu::job::ClipBuffers;
 use crate::gpu::options::Timings;
 use crate::gpu::pipeline::Pipeline;
 use crate::gpu::submission::{Access, Semaphore, Spent, Submission};
 use crate::gpu::work_list::Patch;
 use crate::output::encoding::Encoding;
-use crate::threads::on_threads;
+use crate::threads::copy;
 
 /// What one piece of work in flight needs; `U` are its uploads.
 pub(crate) struct InFlight<U> {
@@ -179,22 +178,6 @@ impl<U> InFlight<U> {
         }
         stopwatch.timings.read_back += copying.elapsed();
         Ok(())
-    }
-}
-
-/// Bytes that one thread copies at once.
-const COPIED: usize = 1 << 20;
-
-/// Copies a result or an upload, on all threads where it is long and they can be had.
-pub(crate) fn copy(to: &mut [u8], from: &[u8]) {
-    let copied = (to.len() > COPIED).then(|| {
-        on_threads(|| {
-            let pieces = to.par_chunks_mut(COPIED).zip(from.par_chunks(COPIED));
-            pieces.for_each(|(to, from)| to.copy_from_slice(from));
-        })
-    });
-    if !matches!(copied, Some(Ok(()))) {
-        to.copy_from_slice(from);
     }
 }
 

@@ -4,11 +4,10 @@
 use std::sync::{Arc, Mutex};
 
 use crate::gpu::device::{LogicalDevice, QueueLane};
-use crate::gpu::engine::{Job, VulkanEngine};
 use crate::gpu::error::EvaluateError;
 use crate::gpu::submission::{Binding, Submission};
 use crate::gpu::upload::Upload;
-use crate::gpu::work_list::{Work, WorkLists};
+use crate::gpu::work_list::{ListRequest, Work, WorkLists};
 use crate::output::window::Window;
 use crate::threads::{lock, on_threads};
 use crate::time::frames::{Ticks, Timeline};
@@ -38,15 +37,14 @@ impl KeptWindow {
 impl KeptLists {
     /// Lists all of a result, in windows of at most so many values, and brings the lists to the device.
     pub(crate) fn new(
-        engine: &VulkanEngine,
-        job: Job<'_>,
+        request: ListRequest<'_>,
         whole: &Window,
         values_per_window: usize,
     ) -> Result<Self, EvaluateError> {
         let mut windows = Vec::new();
         for window in whole.cut(values_per_window) {
             let mut lists = WorkLists::default();
-            let list = || lists.list(engine, job.clip, job.timeline, &window);
+            let list = || lists.list(request, &window);
             let work = on_threads(list)??;
             lists.forget_spare();
             windows.push(KeptWindow {
@@ -55,7 +53,7 @@ impl KeptLists {
                 lists,
             });
         }
-        let device = &engine.device;
+        let device = request.device;
         let uploads = || {
             windows
                 .iter()
@@ -124,20 +122,18 @@ impl ListCache {
     /// The lists of a result in windows of so many values, if they are kept or shall be from now on.
     pub(crate) fn lists(
         &self,
-        engine: &VulkanEngine,
-        job: Job<'_>,
+        request: ListRequest<'_>,
         whole: &Window,
         values_per_window: usize,
     ) -> Result<Option<Arc<KeptLists>>, EvaluateError> {
-        let is_rate = matches!(job.timeline.ticks, Ticks::Frames { .. });
-        if !is_rate || engine.clip_bytes.is_some() {
+        if !matches!(request.timeline.ticks, Ticks::Frames { .. }) {
             return Ok(None);
         }
-        let asked = (job.timeline.clone(), whole.clone(), values_per_window);
+        let asked = (request.timeline.clone(), whole.clone(), values_per_window);
         {
             let mut kept = lock(&self.0);
             // Those of a device that was lost are of no use.
-            (kept.lists).retain(|(_, lists)| Arc::ptr_eq(&lists.device, &engine.device));
+            (kept.lists).retain(|(_, lists)| Arc::ptr_eq(&lists.device, request.device));
             if let Some(index) = kept.lists.iter().position(|(known, _)| *known == asked) {
                 kept.lists[..=index].rotate_right(1);
                 return Ok(Some(Arc::clone(&kept.lists[0].1)));
@@ -148,7 +144,7 @@ impl ListCache {
             }
         }
         // Nothing is locked while they are made. Of several callers who make the same, the last one's stay.
-        let made = match KeptLists::new(engine, job, whole, values_per_window) {
+        let made = match KeptLists::new(request, whole, values_per_window) {
             Err(EvaluateError::Vulkan(error)) if error.is_out_of_memory() => None,
             made => Some(Arc::new(made?)).filter(|made| made.bytes() <= MAX_BYTES),
         };

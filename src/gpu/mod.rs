@@ -19,8 +19,8 @@
 //!
 //! # From a call to its bytes
 //!
-//! 1. `evaluate::uploaded` makes a [`Job`](engine::Job): prepared segments, which lie on the device as
-//!    [`ClipBuffers`](engine::ClipBuffers), sample times and an encoding. `Opened::attempt_smaller` runs it.
+//! 1. `evaluate::uploaded` makes a [`Job`](job::Job): prepared segments, which lie on the device as
+//!    [`ClipBuffers`](job::ClipBuffers), sample times and an encoding. `Opened::attempt_smaller` runs it.
 //! 2. [`engine::run`] cuts the result into windows of at most 2²¹ rotations and runs them pipelined: while the device
 //!    works on one, the host lists the next ([`in_flight`]).
 //! 3. [`work_list`] lists which samples of a window belong to which segment, as runs, single samples, or a grid;
@@ -37,11 +37,11 @@
 //! | what | memory |
 //! |---|---|
 //! | segments, constants, tables of crowds | the device's own |
-//! | lists and keys | the device's own where the host can write it ([`UploadMemory`](upload::UploadMemory)), else copied there, or read from the host's |
+//! | lists and keys | the device's own where the host can write it ([`UploadMemory`](physical::upload_memory::UploadMemory)), else copied there, or read from the host's |
 //! | results | where the host reads them on devices that share its memory, and in the caller's memory on software devices ([`imported_memory`]); else the device's own, copied by the second queue beside later kernels |
 //! | results for CUDA | the device's own, exported as a file ([`exported`]) |
 //!
-//! Small buffers share allocations of 4 MiB ([`buffer::SharedMemory`]).
+//! Small buffers share allocations of 4 MiB ([`SharedMemory`](shared_memory::SharedMemory)).
 //!
 //! # Trust
 //!
@@ -65,14 +65,18 @@ pub(crate) mod handles;
 pub(crate) mod imported_memory;
 pub(crate) mod in_flight;
 pub(crate) mod instance;
+pub(crate) mod job;
 pub(crate) mod kept_lists;
 pub(crate) mod kernel_check;
 pub(crate) mod options;
 pub(crate) mod physical;
 pub(crate) mod pipeline;
+pub(crate) mod pipeline_cache;
 pub(crate) mod recovery;
 pub(crate) mod reports;
+pub(crate) mod run_once;
 pub(crate) mod self_test;
+pub(crate) mod shared_memory;
 pub(crate) mod submission;
 pub(crate) mod upload;
 pub(crate) mod work_list;

@@ -86,7 +86,7 @@ pub struct EngineOptions {
     pub memory: Option<u64>,
     /// Worker threads of the CPU; by default those that all engines of the process share, as many as the
     /// environment's `RAYON_NUM_THREADS` says, else one for each core.
-    pub threads: Option<usize>,
+    pub thread_count: Option<usize>,
     /// The widest vector instructions to evaluate with on the CPU; by default
     /// [`VectorWidth::widest`].
     pub vector_width: Option<VectorWidth>,

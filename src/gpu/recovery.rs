@@ -5,9 +5,10 @@ use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
 
 use crate::gpu::device::LogicalDevice;
-use crate::gpu::engine::{ClipBuffers, VulkanEngine};
+use crate::gpu::engine::VulkanEngine;
 use crate::gpu::error::{EvaluateError, VulkanError};
 use crate::gpu::exclusive::Exclusive;
+use crate::gpu::job::ClipBuffers;
 use crate::gpu::options::EngineOptions;
 use crate::gpu::physical::{DeviceInfo, PhysicalDevice};
 use crate::gpu::self_test::{self, SelfTestReport};

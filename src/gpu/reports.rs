@@ -81,7 +81,7 @@ pub struct NegativeControl {
 impl NegativeControl {
     /// Results with other bits than the CPU's.
     #[must_use]
-    pub fn differing(&self) -> usize {
+    pub fn differing_count(&self) -> usize {
         self.expressions.iter().map(|report| report.differing).sum()
     }
 
@@ -89,7 +89,7 @@ impl NegativeControl {
     /// it proves nothing.
     #[must_use]
     pub fn is_conclusive(&self) -> bool {
-        !self.must_differ || self.differing() > 0
+        !self.must_differ || self.differing_count() > 0
     }
 }
 
@@ -97,7 +97,7 @@ impl NegativeControl {
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct KernelCheck {
-    /// The kernel, as [`kernels`](crate::kernels) names it.
+    /// The kernel, as [`kernels`](crate::vulkan::kernels) names it.
     pub name: &'static str,
     /// Values of 32 bits compared: those that the kernel has to store, and some around them that it has to
     /// leave alone.

@@ -1,9 +1,6 @@
 //! Rounding on the way to a kernel, the same on every machine: everything a kernel
 //! reads passes through [`canonical`], so that no driver ever meets a subnormal.
 
-use glam::{DQuat, Quat};
-
-use crate::math::quaternion::{Quaternion, dot};
 use crate::shader::TINY_BITS;
 
 /// Replaces a magnitude below 2^-64 by +0, in inputs and outputs of kernels. Drivers may flush
@@ -37,12 +34,6 @@ pub(crate) fn round_f32(value: f64) -> f32 {
     canonical(value as f32)
 }
 
-/// Rounds each component to f32, `x y z w`.
-#[inline(always)]
-pub(crate) fn round_quat(q: Quaternion) -> [f32; 4] {
-    q.map(round_f32)
-}
-
 /// The largest power of two that a magnitude reaches; 1 if that is tiny.
 pub(crate) fn power_of_two(magnitude: f64) -> f64 {
     if magnitude > 1e-30 {
@@ -50,13 +41,6 @@ pub(crate) fn power_of_two(magnitude: f64) -> f64 {
     } else {
         1.0
     }
-}
-
-/// The unit quaternion nearest to `q`, in f32.
-pub(crate) fn unit_f32(q: DQuat) -> Quat {
-    let q = q.to_array();
-    let norm = dot(q, q).sqrt();
-    Quat::from_array(q.map(|component| round_f32(component / norm)))
 }
 
 #[cfg(test)]

@@ -9,7 +9,9 @@
 use std::f64::consts::{FRAC_2_PI, PI, TAU};
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-use crate::math::canonical::{SHIFT, nearest_whole};
+use glam::{DQuat, Quat};
+
+use crate::math::canonical::{SHIFT, nearest_whole, round_f32};
 
 /// A number, or a vector of numbers, that can be added, subtracted and multiplied.
 pub(crate) trait Arithmetic:
@@ -205,6 +207,19 @@ pub(crate) fn normalised<R: Real>(q: [R; 4]) -> [R; 4] {
     let first = three_halves - half * square;
     let scale = first * (three_halves - half * square * first * first);
     [q[0] * scale, q[1] * scale, q[2] * scale, q[3] * scale]
+}
+
+/// The unit quaternion nearest to `q`, in f32.
+pub(crate) fn unit_f32(q: DQuat) -> Quat {
+    let q = q.to_array();
+    let norm = dot(q, q).sqrt();
+    Quat::from_array(q.map(|component| round_f32(component / norm)))
+}
+
+/// Rounds each component to f32, `x y z w`.
+#[inline(always)]
+pub(crate) fn round_quat(q: Quaternion) -> [f32; 4] {
+    q.map(round_f32)
 }
 
 /// pi/2 as a sum of parts of 24 bits, so that a part times a whole number below 2^29 is exact.

@@ -10,14 +10,14 @@ const LARGE: u128 = 1 << 30;
     "not enough memory for {purpose}: {bytes} bytes needed; ask for less at once, as `stream` and `Clip::request` do"
 )]
 #[non_exhaustive]
-pub struct OutOfMemory {
+pub struct OutOfMemoryError {
     /// What the memory was for.
     pub purpose: &'static str,
     /// Bytes that were asked for.
     pub bytes: u128,
 }
 
-impl OutOfMemory {
+impl OutOfMemoryError {
     pub(crate) fn new<T>(purpose: &'static str, count: usize) -> Self {
         let bytes = count as u128 * size_of::<T>() as u128;
         Self { purpose, bytes }
@@ -26,12 +26,12 @@ impl OutOfMemory {
 
 /// Room for `count` values. The system may promise memory that it does not have and end the process
 /// that uses it, so large amounts are refused if less is available.
-pub(crate) fn reserved<T>(count: usize, purpose: &'static str) -> Result<Vec<T>, OutOfMemory> {
+pub(crate) fn reserved<T>(count: usize, purpose: &'static str) -> Result<Vec<T>, OutOfMemoryError> {
     refuse_more_than_there_is::<T>(count, purpose)?;
     let mut values = Vec::new();
     match values.try_reserve_exact(count) {
         Ok(()) => Ok(values),
-        Err(_) => Err(OutOfMemory::new::<T>(purpose, count)),
+        Err(_) => Err(OutOfMemoryError::new::<T>(purpose, count)),
     }
 }
 
@@ -39,17 +39,17 @@ pub(crate) fn reserved<T>(count: usize, purpose: &'static str) -> Result<Vec<T>,
 pub(crate) fn zeroed<T: bytemuck::Zeroable>(
     count: usize,
     purpose: &'static str,
-) -> Result<Vec<T>, OutOfMemory> {
+) -> Result<Vec<T>, OutOfMemoryError> {
     refuse_more_than_there_is::<T>(count, purpose)?;
-    bytemuck::try_zeroed_vec(count).map_err(|()| OutOfMemory::new::<T>(purpose, count))
+    bytemuck::try_zeroed_vec(count).map_err(|()| OutOfMemoryError::new::<T>(purpose, count))
 }
 
 /// Refuses a large amount if the system has less left.
 pub(crate) fn refuse_more_than_there_is<T>(
     count: usize,
     purpose: &'static str,
-) -> Result<(), OutOfMemory> {
-    let asked = OutOfMemory::new::<T>(purpose, count);
+) -> Result<(), OutOfMemoryError> {
+    let asked = OutOfMemoryError::new::<T>(purpose, count);
     #[cfg(target_os = "linux")]
     if asked.bytes >= LARGE
         && let Ok(text) = std::fs::read_to_string("/proc/meminfo")
@@ -83,7 +83,7 @@ mod tests {
     #[test]
     fn what_no_machine_has_is_refused_and_named() {
         for count in [1 << 46, usize::MAX / 16, usize::MAX] {
-            let expected = OutOfMemory {
+            let expected = OutOfMemoryError {
                 purpose: "a result",
                 bytes: 16 * count as u128,
             };

@@ -7,8 +7,9 @@ use crate::fit::exact::shape::Shape;
 use crate::math::quaternion::{Vector, exp, ratio, rotated, scaled, sum};
 use crate::method::ends::EndCondition;
 use crate::method::interpolation::Interpolation;
+use crate::method::vector_method::VectorMethod;
 use crate::method::{
-    Continuity, Cost, CurveKind, DEFAULTS, Keys, Method, MethodInput, SmoothCurves,
+    Continuity, Cost, CurveKind, Keys, Method, MethodInput, SmoothCurves, defaults,
 };
 use crate::reference;
 use crate::simd::dispatch::in_lanes;
@@ -30,7 +31,7 @@ pub const B_SPLINE: Method = Method {
     cost: Cost::new(220.0, 3.0),
     reference: reference::b_spline::B_SPLINE,
     curves: &CURVES,
-    ..DEFAULTS
+    ..defaults(VectorMethod::BesselOverhauser)
 };
 
 static CURVES: CurveKind = CurveKind::Smooth(

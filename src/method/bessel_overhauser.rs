@@ -6,7 +6,8 @@ use crate::fit::exact::shape::Shape;
 use crate::fit::tangent_weights::WeightRule;
 use crate::math::quaternion::{Real as _, product, ratio, scaled, sum};
 use crate::math::ranges::Algebra;
-use crate::method::{Continuity, Cost, CurveKind, DEFAULTS, Keys, Method, SmoothCurves, ends};
+use crate::method::vector_method::VectorMethod;
+use crate::method::{Continuity, Cost, CurveKind, Keys, Method, SmoothCurves, defaults, ends};
 use crate::reference;
 
 /// Bessel-Overhauser on rotations: smooth in time for any spacing of keys, and
@@ -22,7 +23,7 @@ pub const BESSEL_OVERHAUSER: Method = Method {
     cost: Cost::new(210.0, 2.8),
     reference: reference::handles::BESSEL_OVERHAUSER,
     curves: &CURVES,
-    ..DEFAULTS
+    ..defaults(VectorMethod::BesselOverhauser)
 };
 
 static CURVES: CurveKind = CurveKind::Smooth(

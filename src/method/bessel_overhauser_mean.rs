@@ -5,7 +5,8 @@ use crate::fit::exact::handles::{BothSides, HandlePair, HandleRule, KeyInterval}
 use crate::fit::exact::shape::Shape;
 use crate::math::quaternion::{Real, ratio, scaled, sum};
 use crate::math::ranges::Algebra;
-use crate::method::{Continuity, Cost, CurveKind, DEFAULTS, Keys, Method, SmoothCurves, ends};
+use crate::method::vector_method::VectorMethod;
+use crate::method::{Continuity, Cost, CurveKind, Keys, Method, SmoothCurves, defaults, ends};
 use crate::reference;
 
 /// Bessel-Overhauser with tangents that are means of logarithms: they never wrap, and the
@@ -22,7 +23,7 @@ pub const BESSEL_OVERHAUSER_MEAN: Method = Method {
     cost: Cost::new(840.0, 3.2),
     reference: reference::handles::BESSEL_OVERHAUSER_MEAN,
     curves: &CURVES,
-    ..DEFAULTS
+    ..defaults(VectorMethod::BesselOverhauser)
 };
 
 static CURVES: CurveKind = CurveKind::Smooth(SmoothCurves {

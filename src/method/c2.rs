@@ -11,8 +11,9 @@ use crate::fit::exact::shape::Shape;
 use crate::math::quaternion::{self, Vector, log, scaled, sine_cosine, sum};
 use crate::method::ends::EndCondition;
 use crate::method::interpolation::Interpolation;
+use crate::method::vector_method::VectorMethod;
 use crate::method::{
-    Continuity, Cost, CurveKind, DEFAULTS, Keys, Method, MethodInput, SmoothCurves,
+    Continuity, Cost, CurveKind, Keys, Method, MethodInput, SmoothCurves, defaults,
 };
 use crate::reference;
 use crate::threads::stop;
@@ -45,7 +46,7 @@ pub const C2: Method = Method {
     cost: Cost::new(1100.0, 3.2),
     reference: reference::c2::C2,
     curves: &CURVES,
-    ..DEFAULTS
+    ..defaults(VectorMethod::BesselOverhauser)
 };
 
 static CURVES: CurveKind = CurveKind::Smooth(

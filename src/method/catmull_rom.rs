@@ -5,7 +5,8 @@ use crate::fit::exact::shape::Shape;
 use crate::fit::tangent_weights::WeightRule;
 use crate::math::quaternion::{Real as _, product, scaled, sum};
 use crate::math::ranges::Algebra;
-use crate::method::{Cost, CurveKind, DEFAULTS, Keys, Method, SmoothCurves, ends};
+use crate::method::vector_method::VectorMethod;
+use crate::method::{Cost, CurveKind, Keys, Method, SmoothCurves, defaults, ends};
 use crate::reference;
 
 /// Catmull-Rom on rotations, in cumulative form. It ignores the time steps, so its velocity jumps
@@ -21,7 +22,7 @@ pub const CATMULL_ROM: Method = Method {
     cost: Cost::new(150.0, 2.6),
     reference: reference::handles::CATMULL_ROM,
     curves: &CURVES,
-    ..DEFAULTS
+    ..defaults(VectorMethod::CatmullRom)
 };
 
 static CURVES: CurveKind = CurveKind::Smooth(

@@ -6,7 +6,8 @@ use crate::fit::block::{Intervals, TrackStretch, at, squared_extent};
 use crate::fit::exact::shape::Shape;
 use crate::math::quaternion::{Quaternion, Vector, length};
 use crate::method::interpolation::Interpolation;
-use crate::method::{Continuity, Cost, CurveKind, DEFAULTS, Method, MethodInput, SmoothCurves};
+use crate::method::vector_method::VectorMethod;
+use crate::method::{Continuity, Cost, CurveKind, Method, MethodInput, SmoothCurves, defaults};
 use crate::reference;
 use crate::tracks::set::Track;
 
@@ -21,11 +22,11 @@ pub const GLTF_CUBIC: Method = Method {
     source: "glTF 2.0, appendix C.5, Cubic Spline Interpolation",
     continuity: Continuity::C1,
     uses_neighbours: false,
-    path: Some(KeySigns::AsAuthored),
+    signs: Some(KeySigns::AsAuthored),
     cost: Cost::new(350.0, 3.8),
     reference: reference::two_keys::GLTF_CUBIC,
     curves: &CURVES,
-    ..DEFAULTS
+    ..defaults(VectorMethod::GltfCubic)
 };
 
 static CURVES: CurveKind = CurveKind::Smooth(

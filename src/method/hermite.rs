@@ -6,7 +6,8 @@ use crate::fit::exact::handles::BetweenHandles;
 use crate::fit::exact::shape::Shape;
 use crate::math::quaternion::scaled;
 use crate::method::interpolation::Interpolation;
-use crate::method::{Continuity, Cost, CurveKind, DEFAULTS, Method, MethodInput, SmoothCurves};
+use crate::method::vector_method::VectorMethod;
+use crate::method::{Continuity, Cost, CurveKind, Method, MethodInput, SmoothCurves, defaults};
 use crate::reference;
 use crate::simd::dispatch::in_lanes;
 use crate::tracks::set::Track;
@@ -25,7 +26,7 @@ pub const HERMITE: Method = Method {
     cost: Cost::new(160.0, 2.8),
     reference: reference::two_keys::HERMITE,
     curves: &CURVES,
-    ..DEFAULTS
+    ..defaults(VectorMethod::BesselOverhauser)
 };
 
 static CURVES: CurveKind = CurveKind::Smooth(

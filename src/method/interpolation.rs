@@ -117,7 +117,7 @@ impl Interpolation {
         let MethodInput::Velocities { jumps, .. } = smooth.input else {
             return Vec::new();
         };
-        let path = self.method.path.unwrap_or(self.signs);
+        let path = self.method.signs.unwrap_or(self.signs);
         let of_track = |index: usize| {
             if self
                 .check_track(set.times_and_keys(index).1, index)
@@ -191,7 +191,7 @@ impl ReferenceCurve {
             ends,
             ..
         } = interpolation;
-        let path = method.path.unwrap_or(path);
+        let path = method.signs.unwrap_or(path);
         let curve = Self::of_track(method.reference, path, ends, interpolation.tcb, track);
         match interpolation.speed {
             Speed::AsKeyed => curve,
@@ -204,7 +204,7 @@ impl From<Method> for Interpolation {
     fn from(method: Method) -> Self {
         Self {
             method,
-            signs: method.path.unwrap_or_default(),
+            signs: method.signs.unwrap_or_default(),
             ends: method.ends,
             tcb: Tcb::default(),
             quantity: Quantity::Rotation,

@@ -6,8 +6,9 @@ use crate::math::quaternion::Real as _;
 use crate::math::ranges::Algebra;
 use crate::method::bessel_overhauser_mean::handle;
 use crate::method::interpolation::Interpolation;
+use crate::method::vector_method::VectorMethod;
 use crate::method::{
-    Continuity, Cost, CurveKind, DEFAULTS, Keys, Method, MethodInput, SmoothCurves, ends,
+    Continuity, Cost, CurveKind, Keys, Method, MethodInput, SmoothCurves, defaults, ends,
 };
 use crate::reference;
 use crate::tracks::set::Track;
@@ -26,7 +27,7 @@ pub const KOCHANEK_BARTELS: Method = Method {
     cost: Cost::new(860.0, 3.2),
     reference: reference::handles::KOCHANEK_BARTELS,
     curves: &CURVES,
-    ..DEFAULTS
+    ..defaults(VectorMethod::BesselOverhauser)
 };
 
 static CURVES: CurveKind = CurveKind::Smooth(

@@ -24,7 +24,6 @@ pub(crate) mod step;
 pub(crate) mod vector_curve;
 pub(crate) mod vector_method;
 
-pub use crate::curve::options::{Axes, Ends, InterpolationError, KeySigns, Quantity, Speed};
 pub use crate::method::b_spline::B_SPLINE;
 pub use crate::method::bessel_overhauser::BESSEL_OVERHAUSER;
 pub use crate::method::bessel_overhauser_mean::BESSEL_OVERHAUSER_MEAN;
@@ -32,7 +31,6 @@ pub use crate::method::c2::C2;
 pub use crate::method::catmull_rom::CATMULL_ROM;
 pub use crate::method::gltf_cubic::GLTF_CUBIC;
 pub use crate::method::hermite::HERMITE;
-pub use crate::method::interpolation::Interpolation;
 pub use crate::method::kochanek_bartels::KOCHANEK_BARTELS;
 pub use crate::method::nlerp::NLERP;
 pub use crate::method::shoemake::SHOEMAKE;
@@ -41,11 +39,13 @@ pub use crate::method::shoemake_1985::SHOEMAKE_1985;
 pub use crate::method::slerp::SLERP;
 pub use crate::method::squad::SQUAD;
 pub use crate::method::step::STEP;
+pub use crate::shader::Form;
 
 use std::fmt;
 use std::ops::Range;
 use std::str::FromStr;
 
+use crate::curve::options::{Ends, KeySigns};
 use crate::fit::block::{Intervals, TrackStretch};
 use crate::fit::exact::handles::{ExactSteps, HandleRule};
 use crate::fit::exact::shape::Shape;
@@ -53,9 +53,11 @@ use crate::fit::fast::handles::HandlesF32;
 use crate::fit::fast::long_tangents::set_long;
 use crate::fit::tangent_weights::WeightRule;
 use crate::math::quaternion::Vector;
+use crate::method::interpolation::Interpolation;
+use crate::method::vector_method::VectorMethod;
+use crate::names::{UnknownNameError, named};
 use crate::reference;
 use crate::reference::curve::Definition;
-use crate::shader::Form;
 use crate::simd::dispatch::in_lanes;
 use crate::tracks::set::Track;
 use crate::tracks::signs::Signs;
@@ -84,7 +86,7 @@ pub static METHODS: [Method; 15] = [
 /// ```
 /// let method: tumble::Method = "catmull-rom".parse()?;
 /// assert_eq!(method.name, "catmull-rom");
-/// # Ok::<(), tumble::method::UnknownMethod>(())
+/// # Ok::<(), tumble::UnknownNameError>(())
 /// ```
 #[derive(Clone, Copy)]
 #[non_exhaustive]
@@ -114,10 +116,12 @@ pub struct Method {
     pub form: Form,
     /// The ends that it has by default.
     pub ends: Ends,
-    /// The path that it always takes, if its definition prescribes one.
-    pub path: Option<KeySigns>,
+    /// The signs of keys that it always takes, if its definition prescribes them.
+    pub signs: Option<KeySigns>,
     /// Its cost on one thread.
     pub cost: Cost,
+    /// The method for translations and scales where this one is asked for everything.
+    pub vector_method: VectorMethod,
     /// Its textbook definition in f64.
     pub reference: Definition,
     /// How its curves follow from the keys. This is a reference to a static because every crate
@@ -127,25 +131,28 @@ pub struct Method {
 }
 
 /// What most methods have in common, and how they are unless they say otherwise. Names, formula,
-/// textbook definition and curves are each method's own.
-const DEFAULTS: Method = Method {
-    name: "",
-    summary: "",
-    formula: "",
-    source: "",
-    continuity: Continuity::C0,
-    continuity_on_even_keys: Continuity::C1,
-    keeps_constant_velocity: Keys::Never,
-    interpolates: true,
-    symmetric: true,
-    uses_neighbours: true,
-    form: Form::Polynomial,
-    ends: Ends::Parabolic,
-    path: None,
-    cost: Cost::new(0.0, 0.0),
-    reference: reference::two_keys::STEP,
-    curves: &CurveKind::Steps,
-};
+/// textbook definition, curves and the method for vectors are each method's own.
+const fn defaults(vector_method: VectorMethod) -> Method {
+    Method {
+        name: "",
+        summary: "",
+        formula: "",
+        source: "",
+        continuity: Continuity::C0,
+        continuity_on_even_keys: Continuity::C1,
+        keeps_constant_velocity: Keys::Never,
+        interpolates: true,
+        symmetric: true,
+        uses_neighbours: true,
+        form: Form::Polynomial,
+        ends: Ends::Parabolic,
+        signs: None,
+        cost: Cost::new(0.0, 0.0),
+        reference: reference::two_keys::STEP,
+        curves: &CurveKind::Steps,
+        vector_method,
+    }
+}
 
 /// The kind of curve between two keys.
 #[derive(Clone, Copy)]
@@ -336,20 +343,10 @@ impl PartialEq for Method {
 
 impl Eq for Method {}
 
-/// The error for a name that no method has.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("there is no method `{name}`; there are {}", METHODS.map(|method| method.name).join(", "))]
-pub struct UnknownMethod {
-    /// The name given.
-    pub name: String,
-}
-
 impl FromStr for Method {
-    type Err = UnknownMethod;
+    type Err = UnknownNameError;
 
-    fn from_str(name: &str) -> Result<Self, UnknownMethod> {
-        Self::named(name).ok_or_else(|| UnknownMethod {
-            name: name.to_owned(),
-        })
+    fn from_str(name: &str) -> Result<Self, UnknownNameError> {
+        named("method", &METHODS, |method| method.name, name)
     }
 }

@@ -4,7 +4,8 @@ use crate::curve::formula::ControlNumbers;
 use crate::curve::options::Ends;
 use crate::fit::block::{Intervals, TrackStretch, at, squared_extent};
 use crate::fit::exact::shape::Shape;
-use crate::method::{Continuity, Cost, CurveKind, DEFAULTS, Keys, Method, SmoothCurves};
+use crate::method::vector_method::VectorMethod;
+use crate::method::{Continuity, Cost, CurveKind, Keys, Method, SmoothCurves, defaults};
 use crate::reference;
 
 /// Nlerp: the straight line between neighbouring keys, normalised. It follows the path of slerp at
@@ -21,7 +22,7 @@ pub const NLERP: Method = Method {
     cost: Cost::new(150.0, 2.8),
     reference: reference::two_keys::NLERP,
     curves: &CURVES,
-    ..DEFAULTS
+    ..defaults(VectorMethod::Linear)
 };
 
 static CURVES: CurveKind = CurveKind::Smooth(SmoothCurves::new(Shape::LINEAR, curves));

@@ -4,7 +4,8 @@ use crate::fit::exact::handles::{BothSides, HandlePair, HandleRule};
 use crate::fit::exact::shape::Shape;
 use crate::math::quaternion::{Real as _, dot, scaled, sum};
 use crate::math::ranges::Algebra;
-use crate::method::{Cost, CurveKind, DEFAULTS, Method, SmoothCurves, ends};
+use crate::method::vector_method::VectorMethod;
+use crate::method::{Cost, CurveKind, Method, SmoothCurves, defaults, ends};
 use crate::reference;
 
 /// Approach I of the lecture: the control rotation is the bisector itself. It passes its keys three
@@ -18,7 +19,7 @@ pub const SHOEMAKE: Method = Method {
     cost: Cost::new(1500.0, 4.1),
     reference: reference::handles::SHOEMAKE,
     curves: &CURVES,
-    ..DEFAULTS
+    ..defaults(VectorMethod::BesselOverhauser)
 };
 
 static CURVES: CurveKind = CurveKind::Smooth(SmoothCurves::new(

@@ -2,7 +2,8 @@
 
 use crate::fit::exact::shape::Shape;
 use crate::method::shoemake::Bisector;
-use crate::method::{Cost, CurveKind, DEFAULTS, Keys, Method, SmoothCurves, ends};
+use crate::method::vector_method::VectorMethod;
+use crate::method::{Cost, CurveKind, Keys, Method, SmoothCurves, defaults, ends};
 use crate::reference;
 
 /// Shoemake's own construction: the handle goes a third of the way to the bisector. It ignores the
@@ -16,7 +17,7 @@ pub const SHOEMAKE_1985: Method = Method {
     cost: Cost::new(530.0, 2.8),
     reference: reference::handles::SHOEMAKE_1985,
     curves: &CURVES,
-    ..DEFAULTS
+    ..defaults(VectorMethod::BesselOverhauser)
 };
 
 static CURVES: CurveKind = CurveKind::Smooth(SmoothCurves::new(

@@ -2,7 +2,8 @@
 
 use crate::fit::exact::shape::Shape;
 use crate::method::shoemake::Bisector;
-use crate::method::{Cost, CurveKind, DEFAULTS, Method, SmoothCurves, ends};
+use crate::method::vector_method::VectorMethod;
+use crate::method::{Cost, CurveKind, Method, SmoothCurves, defaults, ends};
 use crate::reference;
 
 /// Approach II of the lecture: the handle goes half of the way to the bisector. It passes its keys
@@ -16,7 +17,7 @@ pub const SHOEMAKE_2: Method = Method {
     cost: Cost::new(700.0, 3.1),
     reference: reference::handles::SHOEMAKE_2,
     curves: &CURVES,
-    ..DEFAULTS
+    ..defaults(VectorMethod::BesselOverhauser)
 };
 
 static CURVES: CurveKind = CurveKind::Smooth(SmoothCurves::new(

@@ -4,7 +4,8 @@ use crate::curve::formula::RotationVectorNumbers;
 use crate::curve::options::Ends;
 use crate::fit::block::{Intervals, TrackStretch, at, squared_extent};
 use crate::fit::exact::shape::Shape;
-use crate::method::{Continuity, Cost, CurveKind, DEFAULTS, Keys, Method, SmoothCurves};
+use crate::method::vector_method::VectorMethod;
+use crate::method::{Continuity, Cost, CurveKind, Keys, Method, SmoothCurves, defaults};
 use crate::reference;
 use crate::shader::Form;
 
@@ -21,7 +22,7 @@ pub const SLERP: Method = Method {
     cost: Cost::new(10.0, 1.7),
     reference: reference::two_keys::SLERP,
     curves: &CURVES,
-    ..DEFAULTS
+    ..defaults(VectorMethod::Linear)
 };
 
 static CURVES: CurveKind = CurveKind::Arcs(SmoothCurves::new(Shape::ROTATION_VECTOR, curves));

@@ -4,7 +4,8 @@ use crate::fit::exact::handles::{BothSides, EndHandle, HandlePair, HandleRule};
 use crate::fit::exact::shape::Shape;
 use crate::math::quaternion::{Real as _, Vector, scaled, sum};
 use crate::math::ranges::Algebra;
-use crate::method::{Cost, CurveKind, DEFAULTS, Keys, Method, SmoothCurves, ends};
+use crate::method::vector_method::VectorMethod;
+use crate::method::{Cost, CurveKind, Keys, Method, SmoothCurves, defaults, ends};
 use crate::reference;
 
 /// Squad. It ignores the time steps, so its velocity jumps on uneven keys.
@@ -17,7 +18,7 @@ pub const SQUAD: Method = Method {
     cost: Cost::new(300.0, 2.9),
     reference: reference::handles::SQUAD,
     curves: &CURVES,
-    ..DEFAULTS
+    ..defaults(VectorMethod::BesselOverhauser)
 };
 
 static CURVES: CurveKind =

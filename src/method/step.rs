@@ -1,6 +1,7 @@
 //! The step method: each key is held until the next.
 
-use crate::method::{Continuity, Cost, CurveKind, DEFAULTS, Method};
+use crate::method::vector_method::VectorMethod;
+use crate::method::{Continuity, Cost, CurveKind, Method, defaults};
 use crate::reference;
 
 /// Holds each key until the next: for things that switch and do not move.
@@ -16,5 +17,5 @@ pub const STEP: Method = Method {
     cost: Cost::new(3.4, 0.87),
     reference: reference::two_keys::STEP,
     curves: &CurveKind::Steps,
-    ..DEFAULTS
+    ..defaults(VectorMethod::Step)
 };

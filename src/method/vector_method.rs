@@ -1,7 +1,6 @@
 //! The interpolation methods for translations and scales.
 
-use std::fmt;
-use std::str::FromStr;
+use crate::names::names;
 
 /// A method of interpolation for vectors. Its ends are as those for rotations, but clamped ends are
 /// at rest.
@@ -26,57 +25,13 @@ pub enum VectorMethod {
     BSpline,
 }
 
-impl VectorMethod {
-    /// All methods for vectors.
-    pub const ALL: [Self; 7] = [
-        Self::Step,
-        Self::Linear,
-        Self::CatmullRom,
-        Self::BesselOverhauser,
-        Self::GltfCubic,
-        Self::C2,
-        Self::BSpline,
-    ];
-
-    /// The name by which programs call it.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Step => "step",
-            Self::Linear => "linear",
-            Self::CatmullRom => "catmull-rom",
-            Self::BesselOverhauser => "bessel-overhauser",
-            Self::GltfCubic => "gltf-cubic",
-            Self::C2 => "c2",
-            Self::BSpline => "b-spline",
-        }
-    }
-}
-
-impl fmt::Display for VectorMethod {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.name())
-    }
-}
-
-/// The error for a name that no method for vectors has.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error(
-    "there is no method `{name}` for vectors; there are {}",
-    VectorMethod::ALL.map(VectorMethod::name).join(", ")
-)]
-pub struct UnknownVectorMethod {
-    /// The name given.
-    pub name: String,
-}
-
-impl FromStr for VectorMethod {
-    type Err = UnknownVectorMethod;
-
-    fn from_str(name: &str) -> Result<Self, UnknownVectorMethod> {
-        let found = Self::ALL.into_iter().find(|method| method.name() == name);
-        found.ok_or_else(|| UnknownVectorMethod {
-            name: name.to_owned(),
-        })
-    }
+names! {
+    VectorMethod, "vector method",
+    Step => "step",
+    Linear => "linear",
+    CatmullRom => "catmull-rom",
+    BesselOverhauser => "bessel-overhauser",
+    GltfCubic => "gltf-cubic",
+    C2 => "c2",
+    BSpline => "b-spline",
 }

@@ -5,15 +5,14 @@ use std::ops::{Deref, DerefMut};
 
 use glam::Quat;
 
-use crate::memory::{OutOfMemory, refuse_more_than_there_is, zeroed};
-use crate::output::rotations::Storage;
+use crate::memory::{OutOfMemoryError, refuse_more_than_there_is, zeroed};
 
 /// For this many bytes or more, allocators take fresh pages from the system each time and give them
 /// back afterwards.
 #[cfg(target_os = "linux")]
 const LONG: usize = 32 << 20;
 
-/// What [`OutOfMemory`] calls it.
+/// What [`OutOfMemoryError`] calls it.
 const LABEL: &str = "a result";
 
 /// Memory for a result, zero at first, for functions that write to the caller's memory, such as
@@ -45,7 +44,7 @@ impl OutputBuffer {
     ///
     /// # Errors
     /// When there is not so much memory.
-    pub fn new(rotations: usize) -> Result<Self, OutOfMemory> {
+    pub fn new(rotations: usize) -> Result<Self, OutOfMemoryError> {
         refuse_more_than_there_is::<Quat>(rotations, LABEL)?;
         #[cfg(target_os = "linux")]
         if let Some(bytes) = rotations.checked_mul(size_of::<Quat>())
@@ -79,12 +78,6 @@ impl DerefMut for OutputBuffer {
             #[cfg(target_os = "linux")]
             BufferMemory::HugePages(bytes) => bytemuck::cast_slice_mut(bytes),
         }
-    }
-}
-
-impl Storage for OutputBuffer {
-    fn quats(&self) -> &[Quat] {
-        self
     }
 }
 

@@ -1,5 +1,7 @@
 //! What the components of a representation are stored as.
 
+use crate::names::names;
+
 /// What a component of a representation is stored as.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum ComponentType {
@@ -9,6 +11,13 @@ pub enum ComponentType {
     F16,
     /// A whole number of 1/32767, in 16 bits.
     Snorm16,
+}
+
+names! {
+    ComponentType, "component type",
+    F32 => "f32",
+    F16 => "f16",
+    Snorm16 => "snorm16",
 }
 
 impl ComponentType {

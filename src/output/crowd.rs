@@ -1,5 +1,7 @@
 //! What a crowd's evaluation stores, and how large it is.
 
+use crate::names::names;
+
 /// What is stored of every joint of every instance, `[instance][joint]`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum CrowdValues {
@@ -12,6 +14,14 @@ pub enum CrowdValues {
     Model,
     /// The transform in the model times the inverse bind matrix, as vertices are skinned with.
     Skinning,
+}
+
+names! {
+    CrowdValues, "kind of values",
+    Rotations => "rotations",
+    Local => "local",
+    Model => "model",
+    Skinning => "skinning",
 }
 
 /// What a crowd's evaluation stores, and in which precision.
@@ -44,7 +54,7 @@ impl CrowdOutput {
 
     /// Vectors of four numbers for each joint.
     #[must_use]
-    pub fn vectors(self) -> usize {
+    pub fn vector_count(self) -> usize {
         match self.values {
             CrowdValues::Rotations => 1,
             _ => 3,
@@ -54,6 +64,6 @@ impl CrowdOutput {
     /// Bytes for each joint.
     #[must_use]
     pub fn bytes(self) -> usize {
-        self.vectors() * if self.is_half { 8 } else { 16 }
+        self.vector_count() * if self.is_half { 8 } else { 16 }
     }
 }

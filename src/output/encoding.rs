@@ -2,10 +2,12 @@
 //! called, what it looks like in memory, and how it is made and read on the CPU.
 
 use std::fmt;
+use std::str::FromStr;
 
 use glam::{Mat3, Quat};
 
 use crate::math::quaternion::about;
+use crate::names::{UnknownNameError, named, names};
 use crate::output::component_type::ComponentType;
 use crate::output::euler::EulerSequence;
 use crate::shader::Store;
@@ -119,15 +121,15 @@ macro_rules! representations {
             fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
                 f.write_str(self.name())?;
                 match self {
-                    $(Self::$variant $(($option))? => { $(write!(f, " {}", $option)?;)? })*
+                    $(Self::$variant $(($option))? => { $(write!(f, " {}", $option.in_words())?;)? })*
                 }
                 Ok(())
             }
         }
 
         impl Encoding {
-            /// One of every kind.
-            pub const KINDS: [Self; [$($(stringify!($kind)),+),*].len()] = [$($($kind),+),*];
+            /// One of every kind, of matrices one in each order.
+            pub const ALL: [Self; [$($(stringify!($kind)),+),*].len()] = [$($($kind),+),*];
 
             /// The same representation with these options.
             #[must_use]
@@ -272,7 +274,7 @@ representations! {
 /// ```
 /// use tumble::{Encoding, EncodingOptions, MatrixOrder};
 /// let options = EncodingOptions { order: MatrixOrder::ColumnMajor, sequence: "ZXY".parse()? };
-/// let matrices = Encoding::KINDS.into_iter().find(|kind| kind.name() == "matrix").unwrap();
+/// let matrices = Encoding::ALL.into_iter().find(|kind| kind.name() == "matrix").unwrap();
 /// let columns = matrices.with(options);
 /// let mut bytes = vec![0; columns.bytes()];
 /// columns.encode(&[[0.0, 0.0, 0.0, 1.0]], &mut bytes)?;
@@ -291,7 +293,7 @@ pub struct EncodingOptions {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{rotations} rotations take {needed} bytes, and {bytes} were given")]
 #[non_exhaustive]
-pub struct EncodingLength {
+pub struct EncodingLengthError {
     /// Number of rotations.
     pub rotations: usize,
     /// Bytes of the memory.
@@ -309,12 +311,28 @@ pub enum MatrixOrder {
     ColumnMajor = 1,
 }
 
-impl fmt::Display for MatrixOrder {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
+names! {
+    MatrixOrder, "matrix order",
+    RowMajor => "row",
+    ColumnMajor => "column",
+}
+
+impl MatrixOrder {
+    /// How matrices are described: `matrix column by column`.
+    fn in_words(self) -> &'static str {
+        match self {
             Self::RowMajor => "row by row",
             Self::ColumnMajor => "column by column",
-        })
+        }
+    }
+}
+
+/// The representation of that name, with the first of its options: row by row, XYZ.
+impl FromStr for Encoding {
+    type Err = UnknownNameError;
+
+    fn from_str(name: &str) -> Result<Self, UnknownNameError> {
+        named("encoding", &Self::ALL, Self::name, name)
     }
 }
 
@@ -369,12 +387,12 @@ impl Encoding {
     /// let mut bytes = [0; 8];
     /// Encoding::Snorm16.encode(&[[0.0, 0.0, 0.0, 1.0]], &mut bytes)?;
     /// assert_eq!(bytes, [0, 0, 0, 0, 0, 0, 0xff, 0x7f]);
-    /// # Ok::<(), tumble::EncodingLength>(())
+    /// # Ok::<(), tumble::EncodingLengthError>(())
     /// ```
     ///
     /// # Errors
     /// When `output` has not [`Encoding::bytes`] for each rotation.
-    pub fn encode(self, rotations: &[[f32; 4]], output: &mut [u8]) -> Result<(), EncodingLength> {
+    pub fn encode(self, rotations: &[[f32; 4]], output: &mut [u8]) -> Result<(), EncodingLengthError> {
         self.check_length(rotations.len(), output.len())?;
         self.encode_all(rotations, output);
         Ok(())
@@ -390,17 +408,17 @@ impl Encoding {
     ///
     /// # Errors
     /// When `bytes` are not those of one rotation.
-    pub fn decode(self, bytes: &[u8]) -> Result<[f32; 4], EncodingLength> {
+    pub fn decode(self, bytes: &[u8]) -> Result<[f32; 4], EncodingLengthError> {
         self.check_length(1, bytes.len())?;
         Ok(self.decode_one(bytes))
     }
 
-    fn check_length(self, rotations: usize, bytes: usize) -> Result<(), EncodingLength> {
+    fn check_length(self, rotations: usize, bytes: usize) -> Result<(), EncodingLengthError> {
         let needed = rotations.saturating_mul(self.bytes());
         if bytes == needed {
             Ok(())
         } else {
-            Err(EncodingLength {
+            Err(EncodingLengthError {
                 rotations,
                 bytes,
                 needed,

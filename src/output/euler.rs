@@ -17,7 +17,7 @@ const AXES: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 /// let yaw_pitch_roll: EulerSequence = "ZYX".parse()?; // intrinsic: about the turned axes
 /// let the_same: EulerSequence = "xyz".parse()?;       // extrinsic: about the fixed ones
 /// assert!("XXY".parse::<EulerSequence>().is_err());
-/// # Ok::<(), tumble::UnknownSequence>(())
+/// # Ok::<(), tumble::EulerSequenceError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct EulerSequence {
@@ -100,6 +100,13 @@ impl EulerSequence {
     }
 }
 
+impl EulerSequence {
+    /// How angles are described: `euler XYZ`.
+    pub(crate) fn in_words(self) -> String {
+        self.to_string()
+    }
+}
+
 impl fmt::Display for EulerSequence {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let letters = if self.intrinsic { "XYZ" } else { "xyz" };
@@ -113,20 +120,20 @@ impl fmt::Display for EulerSequence {
 #[error(
     "`{name}` is not a sequence of Euler angles; give three axes, no two neighbours the same: XYZ, ZXZ … for intrinsic angles, xyz, zxz … for extrinsic ones"
 )]
-pub struct UnknownSequence {
+pub struct EulerSequenceError {
     /// What was given.
     pub name: String,
 }
 
 impl FromStr for EulerSequence {
-    type Err = UnknownSequence;
+    type Err = EulerSequenceError;
 
-    fn from_str(name: &str) -> Result<Self, UnknownSequence> {
+    fn from_str(name: &str) -> Result<Self, EulerSequenceError> {
         let named = |sequence: &Self| sequence.to_string() == name;
         Self::all()
             .into_iter()
             .find(named)
-            .ok_or_else(|| UnknownSequence {
+            .ok_or_else(|| EulerSequenceError {
                 name: name.to_owned(),
             })
     }

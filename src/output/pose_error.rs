@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use crate::memory::OutOfMemory;
+use crate::memory::OutOfMemoryError;
 use crate::output::rotations::Layout;
 
 /// Why poses cannot be put together as asked. Indices count from 0.
@@ -129,5 +129,5 @@ pub enum SkeletonError {
     },
     /// There is not the memory.
     #[error(transparent)]
-    OutOfMemory(#[from] OutOfMemory),
+    OutOfMemory(#[from] OutOfMemoryError),
 }

@@ -6,9 +6,10 @@ use std::marker::PhantomData;
 use glam::{Quat, Vec3, Vec4};
 
 use crate::math::canonical::canonical;
-use crate::memory::OutOfMemory;
+use crate::memory::OutOfMemoryError;
+use crate::names::names;
 use crate::output::buffer::OutputBuffer;
-use crate::tracks::check::NORM_TOLERANCE;
+use crate::tracks::error::NORM_TOLERANCE;
 use crate::tracks::rotation::Rotation;
 
 /// The order of a result in memory.
@@ -21,13 +22,10 @@ pub enum Layout {
     FrameMajor,
 }
 
-impl fmt::Display for Layout {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::TrackMajor => "track by track",
-            Self::FrameMajor => "frame by frame",
-        })
-    }
+names! {
+    Layout, "layout",
+    TrackMajor => "track",
+    FrameMajor => "frame",
 }
 
 impl Layout {
@@ -71,6 +69,12 @@ pub(crate) trait Storage: Send + Sync {
     fn quats(&self) -> &[Quat];
 }
 
+impl Storage for OutputBuffer {
+    fn quats(&self) -> &[Quat] {
+        self
+    }
+}
+
 /// The result of an evaluation: a value of every track at every sample, 16 bytes each, of shape
 /// `(tracks, samples)` or `(samples, tracks)`, as the [`Layout`] says.
 pub struct Samples<T> {
@@ -111,7 +115,7 @@ pub enum SamplesError {
     },
     /// There is not the memory.
     #[error(transparent)]
-    OutOfMemory(#[from] OutOfMemory),
+    OutOfMemory(#[from] OutOfMemoryError),
 }
 
 impl<T> Samples<T> {
@@ -160,13 +164,13 @@ impl<T> Samples<T> {
 
     /// Number of tracks.
     #[must_use]
-    pub fn tracks(&self) -> usize {
+    pub fn track_count(&self) -> usize {
         self.tracks
     }
 
     /// Samples of each track.
     #[must_use]
-    pub fn samples(&self) -> usize {
+    pub fn sample_count(&self) -> usize {
         self.samples
     }
 

@@ -4,7 +4,8 @@ use std::ops::Range;
 
 use glam::{DQuat, DVec3, Vec3};
 
-use crate::path::carry::{CarriedPiece, RelativePieces, about_z, around_corner, rotation_between};
+use crate::path::carried_piece::CarriedPiece;
+use crate::path::carry::{RelativePieces, about_z, around_corner, rotation_between};
 use crate::path::lanes;
 use crate::path::options::{Follow, PathFrame, Twist};
 use crate::path::polynomial::Polynomial;

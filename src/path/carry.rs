@@ -4,22 +4,17 @@
 //! (the swing) `A = [1 + m·w; m × w] / |·|` from m to the direction w, and `ψ = ∫ (m × w)·w' / (1 + m·w) dt` from
 //! the middle on. Only the constant roll of a piece depends on the pieces before it.
 
-use std::f64::consts::PI;
-use std::sync::LazyLock;
-
 use glam::{DQuat, DVec3};
 
 use crate::fit::block::at;
 use crate::math::quaternion::{Quaternion, sine_cosine};
+use crate::path::carried_piece::{CHEBYSHEV, CarriedPiece, FROM, MIDDLE, SAMPLES, TO};
 use crate::path::lanes::{self, LaneValues, RollResults, Rolling, find_directions};
 use crate::path::stretch::PathStretch;
 use crate::path::timed_path::TimedPath;
 use crate::simd::dispatch::in_lanes;
 use crate::simd::lanes::MAX_LANES;
 use crate::threads::stop;
-
-/// The integrand of ψ is the polynomial through so many Chebyshev nodes of a piece.
-pub(crate) const NODES: usize = 11;
 
 /// The largest sum of its last two Chebyshev coefficients: the integral errs by a tenth of that.
 const TOLERANCE: f64 = 3e-10;
@@ -30,40 +25,6 @@ const SHORTEST: f64 = 1e-12;
 /// A stretch has no more pieces: where numbers are so large or so near that none ever fits, they stay as
 /// they are.
 const MAX_PIECES: usize = 1 << 14;
-
-/// The Chebyshev nodes cos(π (k + ½) / 11), and the polynomials there: cos(j π (k + ½) / 11) for node
-/// k and degree j.
-pub(crate) struct Chebyshev {
-    nodes: [f64; NODES],
-    pub(crate) cosines: [[f64; NODES]; NODES],
-}
-
-pub(crate) static CHEBYSHEV: LazyLock<Chebyshev> = LazyLock::new(|| {
-    let cosine =
-        |j: usize, k: usize| sine_cosine(PI * j as f64 * (k as f64 + 0.5) / NODES as f64).1;
-    Chebyshev {
-        nodes: std::array::from_fn(|k| cosine(1, k)),
-        cosines: std::array::from_fn(|k| std::array::from_fn(|j| cosine(j, k))),
-    }
-});
-
-/// The indices of a piece's middle and ends among its samples; those of the nodes come first.
-pub(crate) const MIDDLE: usize = NODES;
-const FROM: usize = NODES + 1;
-const TO: usize = NODES + 2;
-const SAMPLES: usize = NODES + 3;
-
-/// A piece of a stretch.
-#[derive(Debug, Clone)]
-pub(crate) struct CarriedPiece {
-    pub(crate) from: f64,
-    pub(crate) to: f64,
-    /// The direction and the rotation at the middle.
-    pub(crate) middle: DVec3,
-    pub(crate) base: DQuat,
-    /// Chebyshev coefficients of ψ.
-    pub(crate) roll: [f64; NODES + 1],
-}
 
 /// A piece whose rotation is not known yet, with the rotations from its start to its end.
 struct RelativePiece {

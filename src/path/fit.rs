@@ -6,14 +6,15 @@ use bytemuck::Zeroable;
 use crate::fit::block::{at, load};
 use crate::fit::exact::fit::TOLERANCE;
 use crate::fit::nodes::{FULL_NODES, NodeSamples, coefficients};
-use crate::math::canonical::{power_of_two, round_quat};
-use crate::math::quaternion::{Quaternion, Real, dot};
+use crate::math::canonical::power_of_two;
+use crate::math::quaternion::{Quaternion, Real, dot, round_quat};
 use crate::path::lanes::LaneValues;
 use crate::path::sample::{END, MIDDLE, PAIRS, START, SampleKind, Sampler, Span, SpanSamples};
 use crate::prepare::prepared::Prepared;
 use crate::shader::{POWERS, PolynomialSegment};
 use crate::simd::dispatch::{InLanes, in_lanes};
-use crate::simd::lanes::{Doubles, Lanes, MAX_LANES, canonical};
+use crate::simd::doubles::Doubles;
+use crate::simd::lanes::{Lanes, MAX_LANES, canonical};
 use crate::threads::stop;
 use crate::time::spans::SpanSource;
 

@@ -5,11 +5,12 @@ use crate::fit::block::{load, put, store};
 use crate::math::quaternion::{
     Quaternion, Real, cross3, dot, dot3, minus, product, scaled, sine_cosine, square,
 };
-use crate::path::carry::{CHEBYSHEV, CarriedPiece, MIDDLE, NODES};
+use crate::path::carried_piece::{CHEBYSHEV, CarriedPiece, MIDDLE, NODES};
 use crate::path::stretch::{Heading, NO_DIRECTION, PathStretch};
 use crate::path::timed_path::TimedPath;
 use crate::simd::dispatch::{InLanes, in_lanes};
-use crate::simd::lanes::{Doubles, Lanes, MAX_LANES};
+use crate::simd::doubles::Doubles;
+use crate::simd::lanes::{Lanes, MAX_LANES};
 
 /// A number for each lane.
 pub(crate) type LaneValues = [f64; MAX_LANES];

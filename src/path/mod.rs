@@ -29,6 +29,7 @@
 //! equation and small steps.
 
 pub(crate) mod body;
+pub(crate) mod carried_piece;
 pub(crate) mod carry;
 pub(crate) mod fit;
 pub(crate) mod lanes;

@@ -4,14 +4,16 @@ use glam::{DQuat, DVec3};
 
 use crate::curve::options::Ends;
 use crate::method::vector_method::VectorMethod;
+use crate::names::names;
 use crate::path::speed::PathSpeed;
-use crate::threads::stop::Stopped;
+use crate::threads::stop::StoppedError;
 
 /// How the bodies of a set follow their paths, which are the tracks' translations.
 ///
 /// ```
 /// use tumble::glam::{DVec3, Vec3};
-/// use tumble::{Device, Direction, Engine, Follow, PathFrame, SampleTimes, Layout, PathSpeed, TrackSet};
+/// use tumble::paths::{Direction, Follow, PathFrame, PathSpeed};
+/// use tumble::{Device, Engine, SampleTimes, Layout, TrackSet};
 /// let mut set = TrackSet::new();
 /// let road = [[0.0, 0.0, 0.0], [4.0, 0.0, 1.0], [8.0, 1.0, 0.0]];
 /// set.push_path("car", &[0.0, 1.0, 3.0], &road, &[])?;
@@ -93,6 +95,13 @@ pub enum PathFrame {
     Frenet,
 }
 
+names! {
+    PathFrame, "frame",
+    Minimal => "minimal",
+    Fixed => "fixed",
+    Frenet => "frenet",
+}
+
 /// What is done with the angle by which a minimal frame is off after one round of a closed path.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Twist {
@@ -101,6 +110,12 @@ pub enum Twist {
     Spread,
     /// It stays.
     Free,
+}
+
+names! {
+    Twist, "twist",
+    Spread => "spread",
+    Free => "free",
 }
 
 /// An axis of a body: x, y or z (0, 1 or 2) and its sign.
@@ -242,7 +257,7 @@ pub enum FollowError {
     },
     /// The work was stopped ([`Stop`](crate::Stop)).
     #[error(transparent)]
-    Stopped(#[from] Stopped),
+    Stopped(#[from] StoppedError),
     /// Forward and upward must be different axes.
     #[error("a body's forward and upward axes must be two different ones of x, y, z, -x, -y, -z")]
     Axes,

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use crate::curve::options::{Axes, Quantity};
-use crate::math::canonical::round_quat;
+use crate::math::quaternion::round_quat;
 use crate::method::bessel_overhauser::BESSEL_OVERHAUSER;
 use crate::method::interpolation::Interpolation;
 use crate::path::body::BodyOnPath;
@@ -21,7 +21,8 @@ use crate::prepare::clip_data::ClipData;
 use crate::prepare::prepared::Prepared;
 use crate::prepare::vectors;
 use crate::threads::stop;
-use crate::time::spans::{NONE, SpanSource};
+use crate::time::runs::NONE;
+use crate::time::spans::SpanSource;
 use crate::tracks::set::TrackSet;
 use crate::tracks::set::vectors::{Channel, VectorTrack};
 

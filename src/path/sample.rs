@@ -7,14 +7,15 @@ use crate::fit::block::{at, load, put};
 use crate::fit::nodes::FULL_NODES;
 use crate::math::quaternion::{Quaternion, Real};
 use crate::path::body::BodyOnPath;
-use crate::path::carry::CarriedPiece;
+use crate::path::carried_piece::CarriedPiece;
 use crate::path::lanes::{ByAxes, Carried, LaneValues, PieceLanes, find_directions};
 use crate::path::options::Follow;
 use crate::path::speed::PathSpeed;
 use crate::path::stretch::PathStretch;
 use crate::path::timed_path::TimedPath;
 use crate::simd::dispatch::{InLanes, in_lanes};
-use crate::simd::lanes::{Doubles, Lanes, MAX_LANES};
+use crate::simd::doubles::Doubles;
+use crate::simd::lanes::{Lanes, MAX_LANES};
 
 /// Pairs of nodes.
 pub(crate) const PAIRS: usize = 5;

@@ -26,7 +26,8 @@ impl Engine {
     ///
     /// ```
     /// use glam::Vec3;
-    /// use tumble::{Device, Engine, Follow, SampleTimes, Layout, TrackSet};
+    /// use tumble::paths::Follow;
+    /// use tumble::{Device, Engine, SampleTimes, Layout, TrackSet};
     /// let mut set = TrackSet::new();
     /// let points = [Vec3::ZERO, Vec3::new(1.0, 2.0, 0.0), Vec3::new(3.0, 3.0, 1.0)];
     /// set.push_path("car", &[0.0, 1.0, 2.5], &points, &[])?;

@@ -58,7 +58,7 @@ impl Engine {
         skeleton: &Skeleton,
         inverse_bind: Option<&[Affine3A]>,
     ) -> Result<ModelMatrices, Error> {
-        let (tracks, samples) = (local.rotations.tracks(), local.rotations.samples());
+        let (tracks, samples) = (local.rotations.track_count(), local.rotations.sample_count());
         check(local)?;
         if skeleton.len() != tracks {
             let joints = skeleton.len();
@@ -116,7 +116,7 @@ fn check(local: &Transforms) -> Result<(), PoseError> {
             first,
         });
     }
-    let (entries, tracks) = (local.has_translation.len(), local.rotations.tracks());
+    let (entries, tracks) = (local.has_translation.len(), local.rotations.track_count());
     match entries == tracks {
         true => Ok(()),
         false => Err(PoseError::HasTranslation { entries, tracks }),
@@ -126,7 +126,7 @@ fn check(local: &Transforms) -> Result<(), PoseError> {
 /// Finds the matrix of one joint, after that of its parent.
 fn walk(local: &Transforms, link: &Link, sample: usize, model: &mut [AffineRows]) {
     let (track, layout) = (link.track as usize, local.rotations.layout());
-    let (tracks, samples) = (local.rotations.tracks(), local.rotations.samples());
+    let (tracks, samples) = (local.rotations.track_count(), local.rotations.sample_count());
     let index = layout.offset(track, sample, tracks, samples);
     let [sx, sy, sz, _] = local.scales.as_arrays()[index];
     let [tx, ty, tz, _] = local.translations.as_arrays()[index];
@@ -178,13 +178,13 @@ pub struct ModelMatrices {
 impl ModelMatrices {
     /// Number of tracks.
     #[must_use]
-    pub fn tracks(&self) -> usize {
+    pub fn track_count(&self) -> usize {
         self.tracks
     }
 
     /// Samples of each track.
     #[must_use]
-    pub fn samples(&self) -> usize {
+    pub fn sample_count(&self) -> usize {
         self.samples
     }
 

@@ -17,7 +17,7 @@ use crate::pose::skeleton::Skeleton;
 use crate::shader::Kernel;
 use crate::simd::dispatch::{InLanes, in_lanes};
 use crate::simd::lanes::Lanes;
-use crate::threads::{OutOfThreads, on_threads};
+use crate::threads::{OutOfThreadsError, on_threads};
 use crate::twin::{pose_add, pose_blend, pose_mix, pose_world};
 
 impl Engine {
@@ -94,8 +94,8 @@ impl Engine {
     ) -> Result<Rotations, Error> {
         same_shape(base, layer, 1)?;
         fraction(weight)?;
-        if reference.len() != base.tracks() {
-            let (reference_count, tracks) = (reference.len(), base.tracks());
+        if reference.len() != base.track_count() {
+            let (reference_count, tracks) = (reference.len(), base.track_count());
             return Err(PoseError::References {
                 references: reference_count,
                 tracks,
@@ -108,8 +108,8 @@ impl Engine {
             repeated.clear();
             repeated.extend((start..start + output.len()).map(|index| {
                 let track = match base.layout() {
-                    Layout::TrackMajor => index / base.samples(),
-                    Layout::FrameMajor => index % base.tracks(),
+                    Layout::TrackMajor => index / base.sample_count(),
+                    Layout::FrameMajor => index % base.track_count(),
                 };
                 reference[track].to_array()
             }));
@@ -145,7 +145,7 @@ impl Engine {
     /// # Errors
     /// When the skeleton has not one link for each track, or the device fails.
     pub fn world(&self, local: &Rotations, skeleton: &Skeleton) -> Result<WorldPoses, Error> {
-        let (tracks, samples) = (local.tracks(), local.samples());
+        let (tracks, samples) = (local.track_count(), local.sample_count());
         if skeleton.len() != tracks {
             let joints = skeleton.len();
             return Err(PoseError::Skeleton {
@@ -240,13 +240,13 @@ pub struct WorldPoses {
 impl WorldPoses {
     /// Number of tracks.
     #[must_use]
-    pub fn tracks(&self) -> usize {
+    pub fn track_count(&self) -> usize {
         self.tracks
     }
 
     /// Samples of each track.
     #[must_use]
-    pub fn samples(&self) -> usize {
+    pub fn sample_count(&self) -> usize {
         self.samples
     }
 
@@ -326,7 +326,7 @@ impl<F: Fn(usize) -> [f32; 4]> InLanes for PoseTask<'_, F> {
 fn set_all(
     output: &mut [[f32; 4]],
     pose: impl Fn(usize) -> [f32; 4] + Sync,
-) -> Result<(), OutOfThreads> {
+) -> Result<(), OutOfThreadsError> {
     let task = |(task, output): (usize, &mut [[f32; 4]])| {
         in_lanes(&mut PoseTask {
             first: task * TASK,

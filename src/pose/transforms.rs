@@ -59,7 +59,10 @@ impl Engine {
         let evaluate = |channel| self.vectors(set, channel, vectors, interpolation, frames, layout);
         Ok(Transforms {
             translations: evaluate(Channel::Translation)?,
-            rotations: self.evaluate_as(set, interpolation, frames, layout)?,
+            rotations: self
+                .request(set, interpolation, frames)
+                .layout(layout)
+                .evaluate()?,
             scales: evaluate(Channel::Scale)?,
             has_translation: (0..set.track_count())
                 .map(|track| set.vectors(Channel::Translation, track).is_some())
@@ -98,6 +101,7 @@ impl Engine {
         layout: Layout,
     ) -> Result<Samples<T>, Error> {
         let uploaded = Uploaded::of_data(&self.backend, data, None)?;
-        Clip::new(self.clone(), uploaded).samples(frames, layout)
+        let clip = Clip::new(self.clone(), uploaded);
+        clip.samples(&clip.timeline(frames)?, layout)
     }
 }

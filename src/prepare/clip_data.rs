@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use crate::curve::options::{Axes, InterpolationError, Quantity, Speed};
 use crate::curve::segment::segment_size;
-use crate::memory::OutOfMemory;
+use crate::memory::OutOfMemoryError;
 use crate::method::interpolation::Interpolation;
 use crate::method::vector_method::VectorMethod;
 use crate::prepare::batch::{Batch, BatchSize, PART_INTERVALS, batches};
@@ -18,10 +18,11 @@ use crate::prepare::preparation::Preparation;
 use crate::prepare::prepared::Prepared;
 use crate::prepare::vectors;
 use crate::shader::Form;
-use crate::threads::{self, OutOfThreads, on_threads, stop};
+use crate::threads::{self, OutOfThreadsError, on_threads, stop};
 use crate::time::frames::{Ticks, Timeline};
 use crate::time::spans::TrackPart;
-use crate::time::wrap::{TrackCopy, WrapMode};
+use crate::time::track_copy::TrackCopy;
+use crate::time::wrap::WrapMode;
 use crate::tracks::set::TrackSet;
 use crate::tracks::set::vectors::{Channel, VectorTrack};
 
@@ -183,7 +184,7 @@ impl ClipData {
         interpolation: &Interpolation,
         group_bytes: Option<usize>,
         only_for: Option<&Timeline>,
-    ) -> Result<Self, OutOfThreads> {
+    ) -> Result<Self, OutOfThreadsError> {
         let rest = match channel {
             Channel::Translation => Vec3::ZERO,
             Channel::Scale => Vec3::ONE,
@@ -341,7 +342,7 @@ impl ClipData {
     pub(crate) fn folded<'t>(
         &self,
         timeline: &'t Timeline,
-    ) -> Result<Cow<'t, Timeline>, OutOfMemory> {
+    ) -> Result<Cow<'t, Timeline>, OutOfMemoryError> {
         let wrap = self.interpolation.wrap();
         if !wrap.repeats() || matches!(timeline.ticks, Ticks::Frames { .. }) {
             return Ok(Cow::Borrowed(timeline));

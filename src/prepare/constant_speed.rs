@@ -5,11 +5,12 @@ use std::sync::Arc;
 
 use crate::fit::exact::curve::{INDISTINCT, IntervalCurve};
 use crate::fit::motion::arc_length::ArcLengths;
-use crate::math::canonical::round_quat;
+use crate::math::quaternion::round_quat;
 use crate::prepare::fitting::Fitting;
 use crate::prepare::prepared::Prepared;
 use crate::threads::stop;
-use crate::time::spans::{NONE, SpanSource, TrackPart};
+use crate::time::runs::NONE;
+use crate::time::spans::{SpanSource, TrackPart};
 
 /// A smaller angle than this, radians, shows in no result in f32.
 const VISIBLE: f64 = 1e-8;
@@ -51,7 +52,7 @@ fn retime_track(
             return None; // the caller asks again whether it was stopped
         }
         let curve = interval.curve.take()?;
-        let pace = ArcLengths::new(&curve);
+        let pace = ArcLengths::new(&|u| curve.moving(u));
         let length = pace.total();
         (length > 0.0 && length.is_finite()).then_some((interval.key, curve, pace))
     };

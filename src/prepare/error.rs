@@ -1,10 +1,10 @@
 //! Why a set cannot be evaluated as asked, on any device.
 
 use crate::curve::options::InterpolationError;
-use crate::memory::OutOfMemory;
-use crate::threads::OutOfThreads;
-use crate::threads::stop::Stopped;
-use crate::time::frames::SampleTimesError;
+use crate::memory::OutOfMemoryError;
+use crate::threads::OutOfThreadsError;
+use crate::threads::stop::StoppedError;
+use crate::time::error::SampleTimesError;
 
 /// Why a set cannot be evaluated as asked, on any device.
 #[derive(Debug, thiserror::Error)]
@@ -14,9 +14,9 @@ pub(crate) enum SetError {
     #[error(transparent)]
     Interpolation(#[from] InterpolationError),
     #[error(transparent)]
-    OutOfMemory(#[from] OutOfMemory),
+    OutOfMemory(#[from] OutOfMemoryError),
     #[error(transparent)]
-    Threads(#[from] OutOfThreads),
+    Threads(#[from] OutOfThreadsError),
     #[error(transparent)]
-    Stopped(#[from] Stopped),
+    Stopped(#[from] StoppedError),
 }

@@ -7,7 +7,7 @@ use std::ops::Range;
 use bytemuck::Zeroable;
 
 use crate::curve::options::Ends;
-use crate::fit::block::{Intervals, LANES, ROW_LEN, TrackStretch};
+use crate::fit::block::{CONTEXT, Intervals, LANES, ROW_LEN, TrackStretch};
 use crate::fit::exact::curve::INDISTINCT;
 use crate::fit::fast::fit_range::{LONGEST_DEGREE_8, LONGEST_WHOLE, WHOLE, WHOLE_DEGREE_8};
 use crate::fit::fast::handles::{
@@ -20,11 +20,10 @@ use crate::fit::tangent_weights::KeyWeights;
 use crate::method::{FastCurves, SmoothCurves};
 use crate::prepare::fitting::Fitting;
 use crate::prepare::prepared::{CurveSlot, Prepared};
-use crate::prepare::smooth::CONTEXT;
 use crate::shader::PolynomialSegment;
 use crate::simd::dispatch::{InLanes, in_lanes};
 use crate::simd::lanes::{Lanes, MAX_LANES};
-use crate::time::spans::NONE;
+use crate::time::runs::NONE;
 
 type CurveSlots = [CurveSlot; ROW_LEN + SPARE_LANES];
 

@@ -9,7 +9,8 @@ use crate::fit::exact::fit::{FitBlock, Tier, tier};
 use crate::fit::exact::shape::Shape;
 use crate::prepare::prepared::{CurveSlot, Prepared};
 use crate::threads::stop;
-use crate::time::spans::{NONE, SpanSource};
+use crate::time::runs::NONE;
+use crate::time::spans::SpanSource;
 
 /// Fits curves in blocks, whose memory is kept.
 pub(crate) struct Fitting {
@@ -50,7 +51,7 @@ impl Fitting {
             Tier::SmallAngle => &mut self.small_angle,
             Tier::Full => &mut self.full,
             Tier::Piece => {
-                let curve = curves.curve(lane, self.shape, self.quantity);
+                let curve = IntervalCurve::of_interval(curves, lane, self.shape, self.quantity);
                 let (start, segment) = (curves.starts[lane], Some(slot.segment));
                 return self.cutter.push(slot.span, start, curve, segment);
             }

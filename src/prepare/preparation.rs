@@ -13,7 +13,8 @@ use crate::prepare::prepared::Prepared;
 use crate::prepare::smooth::SmoothPreparation;
 use crate::threads::stop;
 use crate::time::frames::{Ticks, Timeline};
-use crate::time::spans::{NONE, SpanSource};
+use crate::time::runs::NONE;
+use crate::time::spans::SpanSource;
 use crate::tracks::set::TrackSet;
 
 /// Prepares tracks by an interpolation; its memory is reused.
@@ -75,7 +76,7 @@ impl Preparation {
     /// Whether an option chooses the path between keys. Steps have no path, and a method that fixes the path also
     /// defines the curve between opposite keys.
     fn has_path(interpolation: &Interpolation) -> bool {
-        !interpolation.steps() && interpolation.method.path.is_none()
+        !interpolation.steps() && interpolation.method.signs.is_none()
     }
 
     /// From now on intervals without a sample of this timeline may be left out, which is done if

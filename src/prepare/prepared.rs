@@ -8,15 +8,16 @@ use crate::curve::segment::{Segments, segment_size};
 use crate::fit::block::LANES;
 use crate::fit::exact::curve::IntervalCurve;
 use crate::fit::exact::cut::Cutter;
-use crate::math::canonical::round_quat;
-use crate::memory::OutOfMemory;
+use crate::math::quaternion::round_quat;
+use crate::memory::OutOfMemoryError;
 use crate::method::interpolation::Interpolation;
 use crate::shader::PolynomialSegment;
 use crate::time::frames::{Ticks, Timeline};
-use crate::time::runs::Parameter;
-use crate::time::spans::{NONE, SpanSource, Spans, TrackExtension, TrackPart};
-use crate::time::wrap::{TrackCopy, Wrap};
-use crate::tracks::check::LATEST;
+use crate::time::runs::{NONE, Parameter};
+use crate::time::spans::{SpanSource, Spans, TrackExtension, TrackPart};
+use crate::time::track_copy::TrackCopy;
+use crate::time::wrap::Wrap;
+use crate::tracks::error::LATEST;
 
 /// Segments of some tracks, with what is needed to find the segment of a sample.
 pub(crate) struct Prepared {
@@ -32,7 +33,7 @@ pub(crate) struct Prepared {
     pub(crate) wrap: Wrap,
 }
 
-/// What [`OutOfMemory`] calls it.
+/// What [`OutOfMemoryError`] calls it.
 pub(crate) const SEGMENTS: &str = "the segments of a set";
 
 /// Where a curve goes: its span, and the segment of that.
@@ -64,9 +65,9 @@ impl Prepared {
     }
 
     /// Makes room for this many keys, so that the lists are not copied as they grow.
-    pub(crate) fn reserve(&mut self, keys: usize) -> Result<(), OutOfMemory> {
+    pub(crate) fn reserve(&mut self, keys: usize) -> Result<(), OutOfMemoryError> {
         let bytes = segment_size(self.segments.form) + size_of::<[f32; 4]>();
-        let refused = |_| OutOfMemory::new::<u8>(SEGMENTS, keys.saturating_mul(bytes));
+        let refused = |_| OutOfMemoryError::new::<u8>(SEGMENTS, keys.saturating_mul(bytes));
         self.segments.try_reserve(keys).map_err(refused)?;
         self.constants.try_reserve(keys).map_err(refused)?;
         self.spans.try_reserve(keys).map_err(refused)

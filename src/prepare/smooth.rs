@@ -6,13 +6,12 @@ use std::ops::Range;
 use bytemuck::Zeroable as _;
 
 use crate::curve::options::{Axes, Ends, Quantity, Speed};
-use crate::fit::block::{Intervals, LANES, TrackStretch, at, put};
+use crate::fit::block::{CONTEXT, Intervals, LANES, TrackStretch, at, put};
 use crate::fit::constant_velocity::arc_polynomial;
 use crate::fit::exact::curve::IntervalCurve;
 use crate::fit::exact::handles::FindFrames;
 use crate::fit::motion::derivatives::clamped;
-use crate::math::canonical::round_quat;
-use crate::math::quaternion::{Vector, rotated};
+use crate::math::quaternion::{Vector, rotated, round_quat};
 use crate::method::interpolation::Interpolation;
 use crate::method::{CurveKind, MethodInput, SmoothCurves};
 use crate::prepare::constant_speed::{PendingInterval, retime};
@@ -24,16 +23,14 @@ use crate::simd::dispatch::in_lanes;
 use crate::threads::stop;
 use crate::time::frame_clock::{FrameClock, FrameStart};
 use crate::time::frame_rate::FrameRate;
-use crate::time::spans::{NONE, SpanSource};
+use crate::time::runs::NONE;
+use crate::time::spans::SpanSource;
 use crate::time::wrap::WrapMode;
 use crate::tracks::set::{Track, TrackSet};
 use crate::tracks::signs::Signs;
 
 /// The angular velocity and the angular acceleration of a track that stands still.
 const STILL: [f32; 4] = [0.0; 4];
-
-/// The lanes of context that a stretch needs beside those of its intervals.
-pub(crate) const CONTEXT: usize = 2;
 
 /// Prepares smooth curves; its blocks are made once for many tracks.
 pub(crate) struct SmoothPreparation {
@@ -76,7 +73,7 @@ impl SmoothPreparation {
         intervals: Range<usize>,
     ) {
         let track = set.track(index);
-        let path = self.interpolation.method.path;
+        let path = self.interpolation.method.signs;
         let path = path.unwrap_or(self.interpolation.signs);
         let signs = path.signs(set, index);
         let all = track.keys.len() - 1;
@@ -253,7 +250,7 @@ impl SmoothPreparation {
     /// The curve in a lane, in f64.
     fn curve(&self, lane: usize) -> IntervalCurve {
         let (shape, quantity) = (self.smooth.shape, self.interpolation.quantity);
-        self.intervals.curve(lane, shape, quantity)
+        IntervalCurve::of_interval(&self.intervals, lane, shape, quantity)
     }
 
     /// Lets the curves of a stretch wait until all of its track is there.

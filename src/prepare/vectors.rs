@@ -10,14 +10,15 @@ use crate::curve::formula::LineNumbers;
 use crate::curve::options::Quantity;
 use crate::fit::exact::curve::IntervalCurve;
 use crate::fit::exact::shape::Shape;
-use crate::math::canonical::{canonical, round_f32, round_quat};
-use crate::math::quaternion::ratio;
+use crate::math::canonical::{canonical, round_f32};
+use crate::math::quaternion::{ratio, round_quat};
 use crate::method::interpolation::Interpolation;
 use crate::method::vector_curve::{VectorCubic, VectorCurves};
 use crate::method::vector_method::VectorMethod;
 use crate::prepare::prepared::Prepared;
 use crate::shader::PolynomialSegment;
-use crate::time::spans::{NONE, SpanSource};
+use crate::time::runs::NONE;
+use crate::time::spans::SpanSource;
 use crate::time::wrap::{Wrap, WrapMode};
 use crate::tracks::set::vectors::VectorTrack;
 

@@ -5,7 +5,7 @@ use glam::DVec4;
 
 use crate::reduce::ReductionTask;
 use crate::reduce::value::Value;
-use crate::reference::vector::hermite;
+use crate::reference::segment::hermite;
 
 /// The indices of the keys of intervals that are as long as possible: the farthest sample from each key
 /// that `fits` lets an interval reach. Its length is doubled until it does not, and then halved down

@@ -18,6 +18,7 @@ use std::ops::Range;
 
 use glam::{DQuat, DVec3};
 
+use crate::names::names;
 use crate::reduce::inserted::inserted;
 use crate::reduce::intervals::longest;
 use crate::reduce::value::Value;
@@ -35,6 +36,13 @@ pub enum ReducedCurve {
     /// Hermite cubics whose tangents are found by least squares
     /// ([`gltf-cubic`](crate::method::gltf_cubic::GLTF_CUBIC)).
     GltfCubic,
+}
+
+names! {
+    ReducedCurve, "curve",
+    Linear => "linear",
+    BesselOverhauser => "bessel-overhauser",
+    GltfCubic => "cubic",
 }
 
 /// The keys that stay.

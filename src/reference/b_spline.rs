@@ -5,7 +5,7 @@ use glam::DVec3;
 use crate::curve::options::Ends;
 use crate::reference::curve::Definition;
 use crate::reference::quaternion::{exponential, logarithm, multiply, rotated};
-use crate::reference::segment::{Basis, Segment};
+use crate::reference::segment::{Basis, Segment, knots};
 use crate::reference::track::ReferenceTrack;
 use crate::reference::two_keys::with_frozen_ends;
 
@@ -59,25 +59,6 @@ fn b_spline(track: &ReferenceTrack, ends: Ends, i: usize) -> Segment {
         w: [before, step(i), after],
         basis,
     }
-}
-
-/// The six knots about interval `i`. Beyond the ends they go on in steps of the outermost interval
-/// or, for a loop, across the seam.
-pub(crate) fn knots(times: &[f64], ends: Ends, i: usize) -> [f64; 6] {
-    let count = times.len() as isize - 1;
-    let step = |j: isize| {
-        let j = match ends {
-            Ends::Loop => j.rem_euclid(count),
-            _ => j.clamp(0, count - 1),
-        } as usize;
-        times[j + 1] - times[j]
-    };
-    let i = i as isize;
-    let mut knots = [0.0; 6];
-    for j in 1..6 {
-        knots[j] = knots[j - 1] + step(i - 3 + j as isize);
-    }
-    knots
 }
 
 /// The step beyond an end, as long as the interval at that end, on the parabola through the three

@@ -7,7 +7,8 @@ use glam::{DMat3, DQuat, DVec3};
 
 use crate::reference::curve_lengths::{bisected, gauss};
 use crate::reference::quaternion::exponential;
-use crate::reference::vector::{VectorCurve, hermite};
+use crate::reference::segment::hermite;
+use crate::reference::vector::VectorCurve;
 
 /// Steps of an interval: the error of Runge and Kutta's method of fourth order is below 1e-11 where
 /// the direction turns by a few radians.

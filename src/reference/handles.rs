@@ -8,7 +8,7 @@ use crate::reference::curve::Definition;
 use crate::reference::quaternion::{
     exponential, inner, invert, logarithm, logarithm_or, multiply, normalise, slerp,
 };
-use crate::reference::segment::{Basis, Segment};
+use crate::reference::segment::{Segment, cumulative};
 use crate::reference::track::ReferenceTrack;
 use crate::reference::two_keys::smooth;
 use crate::tracks::set::key_data::Tcb;
@@ -226,17 +226,6 @@ fn controls(track: &ReferenceTrack, i: usize, out: DVec3, incoming: DVec3) -> [D
         multiply(r, exponential(-incoming)),
         r,
     ]
-}
-
-/// The cumulative cubic with these handles.
-pub(crate) fn cumulative(track: &ReferenceTrack, i: usize, out: DVec3, incoming: DVec3) -> Segment {
-    let a = multiply(track.keys[i], exponential(out));
-    let b = multiply(track.keys[i + 1], exponential(-incoming));
-    Segment::Product {
-        base: track.keys[i],
-        w: [out, logarithm(multiply(invert(a), b)), incoming],
-        basis: Basis::Bernstein,
-    }
 }
 
 /// `2 (p·q) q - p`: as far beyond `q` as `p` is before it (Shoemake 1985).

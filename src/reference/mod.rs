@@ -20,7 +20,7 @@
 //! [`VectorCurve`] does the same for translations and scales in one file, and [`Follower`] moves a body
 //! along such a curve; its frame is integrated by Runge and Kutta's method.
 //!
-//! Callers are [`verify`](mod@crate::verify), `tumble plot`, the reduction of keys, which tries curves
+//! Callers are `verify`, `tumble plot`, the reduction of keys, which tries curves
 //! as they are defined, and the tests.
 
 pub(crate) mod b_spline;

@@ -2,11 +2,12 @@
 
 use glam::{DQuat, DVec3};
 
+use crate::curve::options::Ends;
 use crate::reference::quaternion::{
     exponential, from_parts, invert, logarithm, multiply, nlerp, normalise, rotated, slerp, squad,
     vector,
 };
-use crate::reference::vector::hermite;
+use crate::reference::track::ReferenceTrack;
 
 /// A curve over `t` from 0 to 1.
 #[derive(Clone, Copy)]
@@ -95,6 +96,48 @@ fn b_spline(knots: [f64; 6], degree: usize, u: f64) -> [f64; 4] {
         n = next;
     }
     n
+}
+
+/// The six knots about interval `i`. Beyond the ends they go on in steps of the outermost interval
+/// or, for a loop, across the seam.
+pub(crate) fn knots(times: &[f64], ends: Ends, i: usize) -> [f64; 6] {
+    let count = times.len() as isize - 1;
+    let step = |j: isize| {
+        let j = match ends {
+            Ends::Loop => j.rem_euclid(count),
+            _ => j.clamp(0, count - 1),
+        } as usize;
+        times[j + 1] - times[j]
+    };
+    let i = i as isize;
+    let mut knots = [0.0; 6];
+    for j in 1..6 {
+        knots[j] = knots[j - 1] + step(i - 3 + j as isize);
+    }
+    knots
+}
+
+/// The weights of the two values and the two tangents of a cubic at a parameter, in the order value,
+/// tangent, value, tangent.
+pub(crate) fn hermite(t: f64) -> [f64; 4] {
+    let (t2, t3) = (t * t, t * t * t);
+    [
+        2.0 * t3 - 3.0 * t2 + 1.0,
+        t3 - 2.0 * t2 + t,
+        3.0 * t2 - 2.0 * t3,
+        t3 - t2,
+    ]
+}
+
+/// The cumulative cubic with these handles.
+pub(crate) fn cumulative(track: &ReferenceTrack, i: usize, out: DVec3, incoming: DVec3) -> Segment {
+    let a = multiply(track.keys[i], exponential(out));
+    let b = multiply(track.keys[i + 1], exponential(-incoming));
+    Segment::Product {
+        base: track.keys[i],
+        w: [out, logarithm(multiply(invert(a), b)), incoming],
+        basis: Basis::Bernstein,
+    }
 }
 
 impl Segment {

@@ -4,8 +4,7 @@ use glam::DQuat;
 
 use crate::curve::options::Ends;
 use crate::reference::curve::Definition;
-use crate::reference::handles::cumulative;
-use crate::reference::segment::Segment;
+use crate::reference::segment::{Segment, cumulative};
 use crate::reference::track::ReferenceTrack;
 
 /// Steps: the key before.

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use crate::curve::options::Ends;
-use crate::reference::b_spline::knots;
+use crate::reference::segment::{hermite, knots};
 
 /// Keys of a vector in f64, and which textbook curve joins them.
 #[derive(Debug, Clone)]
@@ -235,18 +235,6 @@ impl VectorCurve {
             (None, None) => (whole, whole),
         }
     }
-}
-
-/// The weights of the two values and the two tangents of a cubic at a parameter, in the order value,
-/// tangent, value, tangent.
-pub(crate) fn hermite(t: f64) -> [f64; 4] {
-    let (t2, t3) = (t * t, t * t * t);
-    [
-        2.0 * t3 - 3.0 * t2 + 1.0,
-        t3 - 2.0 * t2 + t,
-        3.0 * t2 - 2.0 * t3,
-        t3 - t2,
-    ]
 }
 
 /// A cubic B-spline between the third and the fourth of six knots: its value and its first and

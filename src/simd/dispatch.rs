@@ -7,11 +7,13 @@
 //! script sets `wide_vectors` in the others). Most work has it alone in unit tests too: that all
 //! widths give the same bits is tested from outside, of results and of what keys become.
 
+use std::fmt;
 use std::str::FromStr;
 use std::sync::OnceLock;
 
 use glam::{Quat, Vec4};
 
+use crate::names::{UnknownNameError, named};
 use crate::simd::cache_line::CacheLine;
 #[cfg(wide_vectors)]
 use crate::simd::eight::Eight;
@@ -31,10 +33,23 @@ pub enum VectorWidth {
 }
 
 impl VectorWidth {
+    /// Every width, narrowest first.
+    pub const ALL: [Self; 3] = [Self::Baseline, Self::Avx2, Self::Avx512];
+
+    /// The name by which programs call it.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Baseline => "baseline",
+            Self::Avx2 => "avx2",
+            Self::Avx512 => "avx512",
+        }
+    }
+
     /// Every width that this processor can run, narrowest first.
     #[must_use]
     pub fn available() -> Vec<Self> {
-        [Self::Baseline, Self::Avx2, Self::Avx512]
+        Self::ALL
             .into_iter()
             .filter(|width| width.is_available())
             .collect()
@@ -51,7 +66,7 @@ impl VectorWidth {
     }
 
     /// The width that the environment variable names, if it is set.
-    pub(crate) fn limit() -> Result<Option<Self>, UnknownWidth> {
+    pub(crate) fn limit() -> Result<Option<Self>, UnknownNameError> {
         match std::env::var("TUMBLE_VECTOR_WIDTH") {
             Ok(name) if !name.is_empty() => name.parse().map(Some),
             _ => Ok(None),
@@ -86,25 +101,20 @@ impl VectorWidth {
     }
 }
 
-/// The name is not that of a vector width.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("there is no vector width `{name}`; there are baseline, avx2 and avx512")]
-pub struct UnknownWidth {
-    /// The name given.
-    pub name: String,
+impl fmt::Display for VectorWidth {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
 }
 
+/// `sse2` and `neon` are names of the baseline too.
 impl FromStr for VectorWidth {
-    type Err = UnknownWidth;
+    type Err = UnknownNameError;
 
-    fn from_str(name: &str) -> Result<Self, UnknownWidth> {
+    fn from_str(name: &str) -> Result<Self, UnknownNameError> {
         match name.to_lowercase().as_str() {
-            "baseline" | "sse2" | "neon" => Ok(Self::Baseline),
-            "avx2" => Ok(Self::Avx2),
-            "avx512" => Ok(Self::Avx512),
-            _ => Err(UnknownWidth {
-                name: name.to_owned(),
-            }),
+            "sse2" | "neon" => Ok(Self::Baseline),
+            name => named("vector width", &Self::ALL, Self::name, name),
         }
     }
 }

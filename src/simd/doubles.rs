@@ -1,11 +1,42 @@
-//! [`Doubles`](crate::simd::lanes::Doubles) as two vectors, each with half of the samples.
+//! Vectors of f64, of as many samples as a vector of f32 has: two vectors, each with half of the samples.
 
 #[cfg(not(target_arch = "x86_64"))]
 use std::ops::{Add, Div, Mul, Sub};
+use std::slice;
 
+use bytemuck::Pod;
 use glam::Vec4;
 
+use crate::math::quaternion::FullRange;
 use pair::Pair;
+
+/// As many numbers in f64 as a vector of f32 has lanes, in the order of samples; or a single one.
+pub(crate) trait Doubles: FullRange + Pod {
+    /// Number of samples.
+    const COUNT: usize = size_of::<Self>() / size_of::<f64>();
+
+    /// Loads as many numbers as there are lanes.
+    #[inline(always)]
+    fn load(numbers: &[f64]) -> Self {
+        bytemuck::pod_read_unaligned(bytemuck::cast_slice(&numbers[..Self::COUNT]))
+    }
+
+    /// Stores to the first numbers, one for each lane.
+    #[inline(always)]
+    fn store(self, numbers: &mut [f64]) {
+        numbers[..Self::COUNT].copy_from_slice(bytemuck::cast_slice(slice::from_ref(&self)));
+    }
+
+    /// Whether every number is at most `limit`, and none is NaN.
+    fn are_at_most(self, limit: f64) -> bool;
+}
+
+impl Doubles for f64 {
+    #[inline(always)]
+    fn are_at_most(self, limit: f64) -> bool {
+        self <= limit
+    }
+}
 
 /// Defines a pair of vectors of f64, with the given functions of one vector, which the macro `$run`
 /// calls.
@@ -72,7 +103,7 @@ macro_rules! doubles {
             }
         }
 
-        impl $crate::simd::lanes::Doubles for $name {
+        impl $crate::simd::doubles::Doubles for $name {
             #[inline(always)]
             fn are_at_most(self, limit: f64) -> bool {
                 let Self([a, b]) = self;
@@ -192,62 +223,5 @@ pub(crate) mod pair {
     pub(crate) fn widened(numbers: Vec4) -> [Pair; 2] {
         let [x, y, z, w] = numbers.to_array().map(f64::from);
         [Pair::new(x, y), Pair::new(z, w)]
-    }
-}
-
-#[cfg(test)]
-pub(crate) mod tests {
-    use crate::math::quaternion::Real;
-    use crate::simd::lanes::{Doubles, Lanes};
-
-    /// Catches halves that are mixed up, and a comparison that sees only one of them.
-    pub(crate) fn doubles_are_samples<L: Lanes>() {
-        let numbers: Vec<f64> = (0..L::COUNT).map(|k| 0.1 * (k * k) as f64 - 0.7).collect();
-        let found = L::Doubles::load(&numbers);
-        let two = L::Doubles::all(2.0);
-        let mut stored = vec![0.0; L::COUNT];
-        let mut rounded = vec![0.0; L::COUNT];
-        L::rounded(found).store(&mut rounded);
-        let widened = L::load(&rounded).widened();
-        type Same = fn(f64) -> f64;
-        let cases: [(L::Doubles, Same); 11] = [
-            (found, |x| x),
-            (widened, |x| f64::from(x as f32)),
-            (found + two, |x| x + 2.0),
-            (found - two, |x| x - 2.0),
-            (found * two, |x| x * 2.0),
-            (two / found, |x| 2.0 / x),
-            (-found, |x| -x),
-            ((found * found).root(), f64::abs),
-            (found.smaller(two), |x| if x < 2.0 { x } else { 2.0 }),
-            (found.larger(two), |x| if x > 2.0 { x } else { 2.0 }),
-            (found.up_to(two, found, -two), |x| {
-                if x <= 2.0 { x } else { -2.0 }
-            }),
-        ];
-        for (doubles, same) in cases {
-            doubles.store(&mut stored);
-            assert!(stored.iter().copied().eq(numbers.iter().copied().map(same)));
-        }
-        for (number, rounded) in numbers.iter().zip(rounded) {
-            assert_eq!(*number as f32, rounded);
-        }
-        for k in 0..L::COUNT {
-            for other in [4.5, f64::NAN] {
-                let mut all = vec![4.0; L::COUNT];
-                assert!(L::Doubles::load(&all).are_at_most(4.0));
-                all[k] = other;
-                assert!(!L::Doubles::load(&all).are_at_most(4.0));
-                let numbers = L::Doubles::load(&all);
-                for (doubles, of_none) in [
-                    (numbers.larger(two), 2.0),
-                    (numbers.smaller(two), 2.0),
-                    (numbers.up_to(two, numbers, two + two), 4.0),
-                ] {
-                    doubles.store(&mut stored);
-                    assert!(!other.is_nan() || stored[k] == of_none);
-                }
-            }
-        }
     }
 }

@@ -6,9 +6,9 @@ use std::slice;
 use bytemuck::Pod;
 use glam::{Mat4, Vec4, Vec4Swizzles as _};
 
-use crate::math::quaternion::{Arithmetic, FullRange};
+use crate::math::quaternion::Arithmetic;
 use crate::shader::{PolynomialSegment, TINY_BITS};
-use crate::simd::doubles::{Four, pair};
+use crate::simd::doubles::{Doubles, Four, pair};
 
 /// The number of one sample, or a vector with the numbers of several samples. An operation rounds
 /// alike for either.
@@ -189,34 +189,6 @@ pub(crate) trait Lanes: Number + Pod {
     fn any_at_most(self, limit: f32) -> bool;
 }
 
-/// As many numbers in f64 as a vector of f32 has lanes, in the order of samples; or a single one.
-pub(crate) trait Doubles: FullRange + Pod {
-    /// Number of samples.
-    const COUNT: usize = size_of::<Self>() / size_of::<f64>();
-
-    /// Loads as many numbers as there are lanes.
-    #[inline(always)]
-    fn load(numbers: &[f64]) -> Self {
-        bytemuck::pod_read_unaligned(bytemuck::cast_slice(&numbers[..Self::COUNT]))
-    }
-
-    /// Stores to the first numbers, one for each lane.
-    #[inline(always)]
-    fn store(self, numbers: &mut [f64]) {
-        numbers[..Self::COUNT].copy_from_slice(bytemuck::cast_slice(slice::from_ref(&self)));
-    }
-
-    /// Whether every number is at most `limit`, and none is NaN.
-    fn are_at_most(self, limit: f64) -> bool;
-}
-
-impl Doubles for f64 {
-    #[inline(always)]
-    fn are_at_most(self, limit: f64) -> bool {
-        self <= limit
-    }
-}
-
 impl Number for Vec4 {
     #[inline(always)]
     fn all(value: f32) -> Self {
@@ -338,8 +310,8 @@ impl Lanes for Vec4 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::quaternion::Real as _;
     use crate::simd::dispatch::{InLanes, VectorWidth, in_lanes_of};
-    use crate::simd::doubles::tests::doubles_are_samples;
 
     fn bits(numbers: &[f32]) -> Vec<u32> {
         numbers.iter().map(|number| number.to_bits()).collect()
@@ -416,6 +388,57 @@ mod tests {
     fn vectors_of_every_width_are_samples() {
         for width in VectorWidth::available() {
             in_lanes_of(width, &mut EveryVector);
+        }
+    }
+
+    /// Catches halves that are mixed up, and a comparison that sees only one of them.
+    fn doubles_are_samples<L: Lanes>() {
+        let numbers: Vec<f64> = (0..L::COUNT).map(|k| 0.1 * (k * k) as f64 - 0.7).collect();
+        let found = L::Doubles::load(&numbers);
+        let two = L::Doubles::all(2.0);
+        let mut stored = vec![0.0; L::COUNT];
+        let mut rounded = vec![0.0; L::COUNT];
+        L::rounded(found).store(&mut rounded);
+        let widened = L::load(&rounded).widened();
+        type Same = fn(f64) -> f64;
+        let cases: [(L::Doubles, Same); 11] = [
+            (found, |x| x),
+            (widened, |x| f64::from(x as f32)),
+            (found + two, |x| x + 2.0),
+            (found - two, |x| x - 2.0),
+            (found * two, |x| x * 2.0),
+            (two / found, |x| 2.0 / x),
+            (-found, |x| -x),
+            ((found * found).root(), f64::abs),
+            (found.smaller(two), |x| if x < 2.0 { x } else { 2.0 }),
+            (found.larger(two), |x| if x > 2.0 { x } else { 2.0 }),
+            (found.up_to(two, found, -two), |x| {
+                if x <= 2.0 { x } else { -2.0 }
+            }),
+        ];
+        for (doubles, same) in cases {
+            doubles.store(&mut stored);
+            assert!(stored.iter().copied().eq(numbers.iter().copied().map(same)));
+        }
+        for (number, rounded) in numbers.iter().zip(rounded) {
+            assert_eq!(*number as f32, rounded);
+        }
+        for k in 0..L::COUNT {
+            for other in [4.5, f64::NAN] {
+                let mut all = vec![4.0; L::COUNT];
+                assert!(L::Doubles::load(&all).are_at_most(4.0));
+                all[k] = other;
+                assert!(!L::Doubles::load(&all).are_at_most(4.0));
+                let numbers = L::Doubles::load(&all);
+                for (doubles, of_none) in [
+                    (numbers.larger(two), 2.0),
+                    (numbers.smaller(two), 2.0),
+                    (numbers.up_to(two, numbers, two + two), 4.0),
+                ] {
+                    doubles.store(&mut stored);
+                    assert!(!other.is_nan() || stored[k] == of_none);
+                }
+            }
         }
     }
 }

@@ -3,6 +3,8 @@
 use std::fmt;
 use std::str::FromStr;
 
+use crate::names::names;
+
 /// How samples are smoothed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Smoothing {
@@ -50,6 +52,13 @@ pub enum SmoothingEnds {
     Parabolic,
     /// The samples go round: the last repeats the first.
     Loop,
+}
+
+names! {
+    SmoothingEnds, "kind of ends",
+    Keep => "keep",
+    Parabolic => "parabolic",
+    Loop => "loop",
 }
 
 /// Why samples cannot be smoothed as asked.

@@ -2,8 +2,8 @@
 
 use glam::DQuat;
 
-use crate::math::canonical::{canonical, round_quat};
-use crate::math::quaternion::{exp, product, unit};
+use crate::math::canonical::canonical;
+use crate::math::quaternion::{exp, product, round_quat, unit};
 use crate::simd::components::{BLOCK, Components, at, put, put_together, take_apart};
 use crate::simd::dispatch::InLanes;
 use crate::simd::lanes::Lanes;

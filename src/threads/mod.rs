@@ -14,20 +14,22 @@ use std::process;
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError, mpsc};
 use std::thread;
 
+use rayon::prelude::*;
+
 /// The system refused worker threads.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "the system refused to start {count} worker threads: {reason}; ask for fewer (RAYON_NUM_THREADS, or `threads` in EngineOptions), or let this process have more"
+    "the system refused to start {count} worker threads: {reason}; ask for fewer (RAYON_NUM_THREADS, or `thread_count` in EngineOptions), or let this process have more"
 )]
 #[non_exhaustive]
-pub struct OutOfThreads {
+pub struct OutOfThreadsError {
     /// How many were asked for.
     pub count: usize,
     /// What the system said.
     pub reason: String,
 }
 
-impl OutOfThreads {
+impl OutOfThreadsError {
     /// For one thread that could not be started.
     pub(crate) fn of_one(error: &io::Error) -> Self {
         let (count, reason) = (1, error.to_string());
@@ -88,13 +90,29 @@ static SHARED: Threads = Threads::new(None);
 /// ```
 /// let threads = tumble::on_threads(rayon::current_num_threads)?;
 /// assert!(threads >= 1);
-/// # Ok::<(), tumble::OutOfThreads>(())
+/// # Ok::<(), tumble::OutOfThreadsError>(())
 /// ```
 ///
 /// # Errors
 /// When the system refuses the threads.
-pub fn on_threads<R: Send>(work: impl FnOnce() -> R + Send) -> Result<R, OutOfThreads> {
+pub fn on_threads<R: Send>(work: impl FnOnce() -> R + Send) -> Result<R, OutOfThreadsError> {
     SHARED.run(work)
+}
+
+/// Bytes that one thread copies at once.
+const COPY_TASK: usize = 1 << 20;
+
+/// Copies bytes, on all threads where they are many and threads can be had.
+pub(crate) fn copy(to: &mut [u8], from: &[u8]) {
+    let copied = (to.len() > COPY_TASK).then(|| {
+        on_threads(|| {
+            let pieces = to.par_chunks_mut(COPY_TASK).zip(from.par_chunks(COPY_TASK));
+            pieces.for_each(|(to, from)| to.copy_from_slice(from));
+        })
+    });
+    if !matches!(copied, Some(Ok(()))) {
+        to.copy_from_slice(from);
+    }
 }
 
 /// Whether this is one of the engine's own threads. They must wait for nobody that may need them.
@@ -117,7 +135,7 @@ impl Threads {
     }
 
     /// Starts them, if they are not there yet.
-    pub(crate) fn start(&self) -> Result<(), OutOfThreads> {
+    pub(crate) fn start(&self) -> Result<(), OutOfThreadsError> {
         match HAS_THREADS {
             true => self.pool().map(|_| ()),
             false => Ok(()),
@@ -134,7 +152,10 @@ impl Threads {
     }
 
     /// Runs `work` with these threads, or with those that run this already.
-    pub(crate) fn run<R: Send>(&self, work: impl FnOnce() -> R + Send) -> Result<R, OutOfThreads> {
+    pub(crate) fn run<R: Send>(
+        &self,
+        work: impl FnOnce() -> R + Send,
+    ) -> Result<R, OutOfThreadsError> {
         if IS_WORKER.get() || !HAS_THREADS {
             return Ok(work());
         }
@@ -146,12 +167,12 @@ impl Threads {
         thread::scope(|scope| {
             let waiting = thread::Builder::new()
                 .spawn_scoped(scope, || threads.install(work))
-                .map_err(|error| OutOfThreads::of_one(&error))?;
+                .map_err(|error| OutOfThreadsError::of_one(&error))?;
             waiting.join().map_or_else(|panic| resume_unwind(panic), Ok)
         })
     }
 
-    fn pool(&self) -> Result<Arc<rayon::ThreadPool>, OutOfThreads> {
+    fn pool(&self) -> Result<Arc<rayon::ThreadPool>, OutOfThreadsError> {
         let process = process_id();
         let of_first = || {
             let first = self.first.get();
@@ -203,7 +224,7 @@ fn process_id() -> u32 {
     if HAS_THREADS { process::id() } else { 0 }
 }
 
-fn start(count: usize) -> Result<rayon::ThreadPool, OutOfThreads> {
+fn start(count: usize) -> Result<rayon::ThreadPool, OutOfThreadsError> {
     rayon::ThreadPoolBuilder::new()
         .num_threads(count)
         .stack_size(STACK)
@@ -211,7 +232,7 @@ fn start(count: usize) -> Result<rayon::ThreadPool, OutOfThreads> {
         .start_handler(|_| IS_WORKER.set(true))
         .spawn_handler(start_one)
         .build()
-        .map_err(|error| OutOfThreads {
+        .map_err(|error| OutOfThreadsError {
             count,
             reason: error.to_string(),
         })
@@ -302,7 +323,7 @@ mod tests {
     /// More stack than there is address space for: the system refuses.
     #[test]
     fn threads_that_are_refused_are_an_error() {
-        let refused = OutOfThreads::of_one(&io::Error::from(io::ErrorKind::WouldBlock));
+        let refused = OutOfThreadsError::of_one(&io::Error::from(io::ErrorKind::WouldBlock));
         let text = refused.to_string();
         assert!(
             text.contains("1 worker threads") && text.contains("RAYON_NUM_THREADS"),

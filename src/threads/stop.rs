@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// The work was stopped ([`Stop`]).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("the work was stopped before its end, as asked (Stop)")]
-pub struct Stopped;
+pub struct StoppedError;
 
 thread_local! {
     /// That of the work that this thread does.
@@ -89,14 +89,14 @@ pub(crate) fn is_stopped() -> bool {
 }
 
 /// Refuses to go on where the work of this thread is to end; as [`is_stopped`].
-pub(crate) fn check() -> Result<(), Stopped> {
+pub(crate) fn check() -> Result<(), StoppedError> {
     CURRENT.with_borrow(|stop| check_of(stop.as_ref()))
 }
 
 /// Refuses to go on with a task of work that has this stop.
-pub(crate) fn check_of(stop: Option<&Stop>) -> Result<(), Stopped> {
+pub(crate) fn check_of(stop: Option<&Stop>) -> Result<(), StoppedError> {
     match stop {
-        Some(stop) if stop.is_stopped() => Err(Stopped),
+        Some(stop) if stop.is_stopped() => Err(StoppedError),
         _ => Ok(()),
     }
 }
@@ -111,7 +111,7 @@ mod tests {
         inner.stop();
         outer.during(|| {
             assert_eq!(check(), Ok(()));
-            inner.during(|| assert_eq!(check(), Err(Stopped)));
+            inner.during(|| assert_eq!(check(), Err(StoppedError)));
             during(None, || assert_eq!(check(), Ok(())));
             assert_eq!(check(), Ok(()));
         });

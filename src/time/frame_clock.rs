@@ -3,7 +3,7 @@
 
 use crate::math::canonical::{nearest_whole, round_f32};
 use crate::time::frame_rate::FrameRate;
-use crate::time::wrap::{CopyPosition, TrackCopy};
+use crate::time::track_copy::{CopyPosition, TrackCopy};
 
 /// How the parameter of a frame within a span follows from the frame's number.
 pub(crate) struct InFrames {

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-use crate::time::frames::SampleTimesError;
+use crate::time::error::SampleTimesError;
 
 /// Frames per second as a ratio: 30000/1001 is exact, 29.97 is not.
 ///

@@ -6,8 +6,8 @@ use std::ops::Range;
 use bytemuck::Zeroable as _;
 
 use crate::shader::{IS_KEY, KeySample};
+use crate::time::error::SampleTimesError;
 use crate::time::frame_clock::FrameClock;
-use crate::time::frames::SampleTimesError;
 use crate::time::interval_blocks::{IntervalBlock, IntervalBlocks};
 use crate::tracks::track_keys::TrackKeys;
 

@@ -19,7 +19,7 @@
 //! | [`frame_rate::FrameRate`] | frames per second, as an exact ratio |
 //! | [`frame_clock::FrameClock`] | from key times to frame coordinates, for a track or one of its copies |
 //! | [`moment::Moment`] | an exact time as the sum of two f64, for copies far from the track |
-//! | [`wrap::TrackCopy`] | consecutive samples in one copy of a track that repeats |
+//! | [`track_copy::TrackCopy`] | consecutive samples in one copy of a track that repeats |
 //! | [`interval_blocks::IntervalBlock`] | frame coordinates of 32 intervals, and the samples in each |
 //! | [`spans::Spans`], [`spans::TrackPart`] | where in time the segments of prepared tracks lie |
 //! | [`runs::Run`] | consecutive samples with one source: the unit of work of every device |
@@ -48,6 +48,7 @@
 //! occupied   1     0     1     …  1            a bit each
 //! ```
 
+pub(crate) mod error;
 pub(crate) mod frame_clock;
 pub(crate) mod frame_rate;
 pub(crate) mod frames;
@@ -58,4 +59,5 @@ pub(crate) mod runs;
 pub(crate) mod spans;
 pub(crate) mod time_base;
 pub(crate) mod times;
+pub(crate) mod track_copy;
 pub(crate) mod wrap;

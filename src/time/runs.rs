@@ -3,7 +3,9 @@
 //! cut. [`Spans`](crate::time::spans::Spans) cuts the samples of a track into them.
 
 use crate::math::canonical::round_f32;
-use crate::time::spans::NONE;
+
+/// Instead of an index: there is nothing.
+pub(crate) const NONE: u32 = u32::MAX;
 
 /// Consecutive samples of one track with one source.
 #[derive(Debug, Clone, Copy)]

@@ -5,10 +5,12 @@ use std::ops::Range;
 
 use rayon::iter::Either;
 
+use crate::names::names;
 use crate::time::frame_clock::{FrameStart, rounding};
 use crate::time::frame_rate::FrameRate;
 use crate::time::frames::{Ticks, Timeline};
 use crate::time::moment::{InCopy, Moment, Period};
+use crate::time::track_copy::{CopyPosition, TrackCopy};
 
 /// What happens before a track's first key, or after its last.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -28,56 +30,17 @@ pub enum WrapMode {
     Extrapolate,
 }
 
+names! {
+    WrapMode, "wrap mode",
+    Hold => "hold",
+    Loop => "loop",
+    Mirror => "mirror",
+    Extrapolate => "extrapolate",
+}
+
 impl WrapMode {
     pub(crate) fn repeats(self) -> bool {
         matches!(self, Self::Loop | Self::Mirror)
-    }
-}
-
-/// Consecutive samples that lie in one copy of a track.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct TrackCopy {
-    pub(crate) samples: Range<usize>,
-    pub(crate) position: CopyPosition,
-}
-
-/// Where a copy lies.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum CopyPosition {
-    /// It is the track itself.
-    Track,
-    /// The track's first key, at `first` seconds, lies at the frame coordinate `at_first` in it.
-    Frames {
-        first: f64,
-        at_first: f64,
-        backwards: bool,
-    },
-    /// The track's time at the copy's only sample: copies that are too short, or too far out, to be laid
-    /// out in frames.
-    At(Moment),
-}
-
-impl TrackCopy {
-    /// The track itself.
-    pub(crate) fn of_track(samples: Range<usize>) -> Self {
-        Self {
-            samples,
-            position: CopyPosition::Track,
-        }
-    }
-
-    pub(crate) fn is_track(&self) -> bool {
-        self.position == CopyPosition::Track
-    }
-
-    pub(crate) fn is_backwards(&self) -> bool {
-        matches!(
-            self.position,
-            CopyPosition::Frames {
-                backwards: true,
-                ..
-            }
-        )
     }
 }
 

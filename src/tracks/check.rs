@@ -2,17 +2,9 @@
 
 use glam::{DQuat, Quat};
 
-use crate::math::canonical::{canonical, unit_f32};
-use crate::tracks::error::TrackError;
-
-/// A key whose norm differs from 1 by more than this is refused by
-/// [`TrackSet::push`](crate::tracks::set::TrackSet::push): it is more likely a mistake than a
-/// rotation.
-pub const NORM_TOLERANCE: f64 = 0.1;
-
-/// The largest magnitude of a time, in seconds: the limit of `.dat` files. Products of intervals
-/// stay far from overflowing in f64.
-pub(crate) const LATEST: f64 = f32::MAX as f64;
+use crate::math::canonical::canonical;
+use crate::math::quaternion::unit_f32;
+use crate::tracks::error::{LATEST, NORM_TOLERANCE, TrackError};
 
 pub(crate) fn check_times(track: usize, times: &[f64], keys: usize) -> Result<(), TrackError> {
     if times.len() != keys {

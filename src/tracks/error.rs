@@ -1,6 +1,13 @@
-//! Why a set refuses keys.
+//! Why a set refuses keys, and the limits that its messages name.
 
-use crate::tracks::check::{LATEST, NORM_TOLERANCE};
+/// A key whose norm differs from 1 by more than this is refused by
+/// [`TrackSet::push`](crate::tracks::set::TrackSet::push): it is more likely a mistake than a
+/// rotation.
+pub const NORM_TOLERANCE: f64 = 0.1;
+
+/// The largest magnitude of a time, in seconds: the limit of `.dat` files. Products of intervals
+/// stay far from overflowing in f64.
+pub(crate) const LATEST: f64 = f32::MAX as f64;
 
 /// Why keys were refused. Indices count from 0.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

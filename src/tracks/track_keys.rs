@@ -50,3 +50,32 @@ impl<'a> TrackKeys<'a> {
         }
     }
 }
+
+/// Keys of a track with their continued signs; `signs` is `None` where no key is negated.
+#[derive(Clone, Copy)]
+pub(crate) struct SignedKeys<'a> {
+    pub(crate) authored: &'a [[f32; 4]],
+    signs: Option<Signs<'a>>,
+}
+
+impl<'a> SignedKeys<'a> {
+    #[inline]
+    pub(crate) fn new(keys: TrackKeys<'a>) -> Self {
+        Self {
+            authored: bytemuck::cast_slice(keys.keys),
+            signs: Some(keys.signs).filter(|signs| signs.any()),
+        }
+    }
+
+    #[inline(always)]
+    pub(crate) fn get(self, key: usize) -> [f32; 4] {
+        let authored = self.authored[key];
+        match self.signs {
+            None => authored,
+            Some(signs) => {
+                let sign = signs.sign(key);
+                authored.map(|component| component * sign)
+            }
+        }
+    }
+}

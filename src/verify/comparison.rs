@@ -7,7 +7,7 @@ use glam::Quat;
 use crate::device::Device;
 use crate::engine::Engine;
 use crate::error::Error;
-use crate::memory::{OutOfMemory, reserved};
+use crate::memory::{OutOfMemoryError, reserved};
 use crate::method::interpolation::Interpolation;
 use crate::time::frames::SampleTimes;
 use crate::tracks::rotation::Rotation;
@@ -177,7 +177,7 @@ pub fn compare<R: Rotation>(
 }
 
 /// As quaternions, which lie at multiples of 16 bytes; copied where these do not.
-fn quats<R: Rotation>(rotations: &[R]) -> Result<Cow<'_, [Quat]>, OutOfMemory> {
+fn quats<R: Rotation>(rotations: &[R]) -> Result<Cow<'_, [Quat]>, OutOfMemoryError> {
     if let Ok(quats) = bytemuck::try_cast_slice(rotations) {
         return Ok(Cow::Borrowed(quats));
     }

@@ -299,7 +299,7 @@ impl Bench {
     }
 
     fn encoded(&mut self) -> Result<(), Error> {
-        for encoding in Encoding::KINDS {
+        for encoding in Encoding::ALL {
             if encoding.row().error_bound.is_some() {
                 self.kept("encoded", method::SLERP, encoding, Layout::TrackMajor)?;
             }

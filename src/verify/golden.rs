@@ -320,7 +320,7 @@ impl Golden {
     /// Every encoding in both layouts, and results in chunks.
     fn outputs(&mut self) {
         let frames = SampleTimes::fps(30);
-        for encoding in Encoding::KINDS {
+        for encoding in Encoding::ALL {
             for (name, layout) in [("rows", Layout::TrackMajor), ("frames", Layout::FrameMajor)] {
                 for method in [method::SLERP, method::BESSEL_OVERHAUSER] {
                     let evaluation =
@@ -575,7 +575,7 @@ impl Golden {
 
     /// How many cases there are.
     #[must_use]
-    pub fn count(&self) -> usize {
+    pub fn case_count(&self) -> usize {
         self.cases.len()
     }
 
@@ -660,7 +660,10 @@ impl Evaluation {
         match self {
             Self::Set(interpolation, frames, layout) => {
                 if interpolation.quantity == Quantity::Rotation {
-                    let found = engine.evaluate_as(set, *interpolation, frames, *layout)?;
+                    let found = engine
+                        .request(set, *interpolation, frames)
+                        .layout(*layout)
+                        .evaluate()?;
                     hash.add(found.as_quats());
                 } else {
                     let found = engine.rates(set, *interpolation, frames, *layout)?;
@@ -669,7 +672,13 @@ impl Evaluation {
             }
             Self::Encoded(interpolation, frames, layout, encoding) => {
                 let clip = engine.upload(set, *interpolation)?;
-                hash.add(&clip.evaluate_encoded(frames, *layout, *encoding)?);
+                hash.add(
+                    &clip
+                        .request(frames)
+                        .layout(*layout)
+                        .encoding(*encoding)
+                        .evaluate_bytes()?,
+                );
             }
             Self::Stream(interpolation, frames, layout) => {
                 let clip = engine.upload(set, *interpolation)?;
@@ -677,7 +686,7 @@ impl Evaluation {
                     hash.add(chunk.rotations().unwrap_or_default());
                     Ok(())
                 };
-                clip.stream(frames, *layout, 777, add)?;
+                clip.request(frames).layout(*layout).stream(777, add)?;
             }
             Self::Transforms(interpolation, vectors, frames) => {
                 let found = engine.transforms(set, *interpolation, *vectors, frames, rows)?;

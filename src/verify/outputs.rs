@@ -14,7 +14,7 @@ use crate::output::rotations::{Layout, Rotations, Vectors};
 use crate::pose::skeleton::Skeleton;
 use crate::reference::curve::ReferenceCurve;
 use crate::reference::quaternion::angle_between;
-use crate::threads::{OutOfThreads, on_threads, stop};
+use crate::threads::{OutOfThreadsError, on_threads, stop};
 use crate::time::frames::{SampleTimes, Timeline};
 use crate::tracks::set::{Track, TrackSet};
 use crate::verify::{KeyTimes, differences, worse};
@@ -91,11 +91,15 @@ pub(crate) fn verify(
     outputs.push(world(engine, &cpu, set, &rotations)?);
     let rotations: &[[f32; 4]] = bytemuck::cast_slice(rotations.as_quats());
     let mut expected = Vec::new();
-    for encoding in Encoding::KINDS {
+    for encoding in Encoding::ALL {
         let Some(error_bound) = encoding.row().error_bound else {
             continue; // not for rotations
         };
-        let found = clip.evaluate_encoded(frames, layout, encoding)?;
+        let found = clip
+            .request(frames)
+            .layout(layout)
+            .encoding(encoding)
+            .evaluate_bytes()?;
         let bytes = encoding.bytes();
         expected.resize(rotations.len() * bytes, 0);
         encoding.encode_all(rotations, &mut expected);
@@ -124,7 +128,7 @@ fn world(
     set: &TrackSet,
     local: &Rotations,
 ) -> Result<OutputVerification, Error> {
-    let (tracks, samples) = (set.track_count(), local.samples());
+    let (tracks, samples) = (set.track_count(), local.sample_count());
     let chain = Skeleton::chain(tracks, 1.0)?;
     let found = engine.world(local, &chain)?;
     let expected = cpu.world(local, &chain)?;
@@ -154,7 +158,7 @@ fn rate_error(
     interpolation: Interpolation,
     timeline: &Timeline,
     found: &Vectors,
-) -> Result<f64, OutOfThreads> {
+) -> Result<f64, OutOfThreadsError> {
     let samples = timeline.len();
     let each = (samples * set.track_count()).div_ceil(RATES_CHECKED).max(1);
     let stop = stop::current();

@@ -128,7 +128,7 @@ fn set_round(
     let layout = random.pick(&[Layout::TrackMajor, Layout::FrameMajor]);
     let is_rotation = interpolation.quantity == Quantity::Rotation;
     let encoding = match is_rotation && random.below(2) == 0 {
-        true => random.pick(&Encoding::KINDS),
+        true => random.pick(&Encoding::ALL),
         false => Encoding::F32,
     };
     let stores_rotations = encoding.row().error_bound.is_some();
@@ -156,16 +156,24 @@ fn set_round(
     let evaluate = |engine: &Engine| -> Result<Vec<u8>, Error> {
         if encoding != Encoding::F32 {
             let clip = engine.upload(&set, interpolation)?;
-            return clip.evaluate_encoded(&frames, layout, encoding);
+            return clip
+                .request(&frames)
+                .layout(layout)
+                .encoding(encoding)
+                .evaluate_bytes();
         }
         // Kept clips and sets in one go take different routes.
         let bytes = match (is_rotation, keeps) {
             (true, true) => {
                 let clip = engine.upload(&set, interpolation)?;
-                bytemuck::cast_slice(clip.evaluate_as(&frames, layout)?.as_quats()).to_vec()
+                bytemuck::cast_slice(clip.request(&frames).layout(layout).evaluate()?.as_quats())
+                    .to_vec()
             }
             (true, false) => {
-                let found = engine.evaluate_as(&set, interpolation, &frames, layout)?;
+                let found = engine
+                    .request(&set, interpolation, &frames)
+                    .layout(layout)
+                    .evaluate()?;
                 bytemuck::cast_slice(found.as_quats()).to_vec()
             }
             (false, _) => {

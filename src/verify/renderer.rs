@@ -239,7 +239,7 @@ fn buffer_to_buffer(
             let clip = renderer.engine.upload(&set, method)?;
             let expected_clip = cpu.upload(&set, method)?;
             let samples = clip.timeline(frames).map_err(Error::from)?.len();
-            let largest = Encoding::KINDS.map(Encoding::bytes).into_iter().max();
+            let largest = Encoding::ALL.map(Encoding::bytes).into_iter().max();
             let offset_rotations = 256;
             let room =
                 (clip.track_count() * samples + offset_rotations) * largest.unwrap_or_default();
@@ -247,14 +247,18 @@ fn buffer_to_buffer(
             report.memory_is_hidden = buffer.is_hidden;
             let host = (renderer.application).buffer(room as u64, ApplicationMemory::Host);
             let host = host.map_err(Error::from)?;
-            for encoding in Encoding::KINDS {
+            for encoding in Encoding::ALL {
                 if encoding.row().error_bound.is_none() {
                     continue; // not for rotations
                 }
                 for layout in [Layout::TrackMajor, Layout::FrameMajor] {
                     let each = encoding.bytes();
                     let offset = offset_rotations * each;
-                    let expected = expected_clip.evaluate_encoded(frames, layout, encoding)?;
+                    let expected = expected_clip
+                        .request(frames)
+                        .layout(layout)
+                        .encoding(encoding)
+                        .evaluate_bytes()?;
                     let like = (layout, encoding);
                     // A range that begins where no line does, and a record to an offset further on in it.
                     let further = 3 * each;
@@ -312,7 +316,7 @@ fn frames_in_flight(
             let mut crowd = renderer.engine.crowd(&library, INSTANCES, LAYERS)?;
             let mut expected_crowd = cpu.crowd(&library, INSTANCES, LAYERS)?;
             let each = output.bytes();
-            let size = (crowd.output_len(output) * each / output.vectors()) as u64;
+            let size = (crowd.output_len(output) * each / output.vector_count()) as u64;
             let mut buffers = Vec::new();
             for _ in 0..FRAMES {
                 let host = (renderer.application).buffer(size, ApplicationMemory::Host);

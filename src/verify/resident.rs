@@ -5,7 +5,8 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use crate::clip::Clip;
-use crate::engine::{Engine, check_encoding};
+use crate::checks::check_encoding;
+use crate::engine::Engine;
 use crate::error::Error;
 use crate::evaluate::backend::Backend;
 use crate::gpu::buffer::{Buffer, Residence};

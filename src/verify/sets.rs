@@ -309,7 +309,7 @@ pub(crate) fn crowd_library(
     let mut library = CrowdLibrary::new(&skeleton(random, joints))?;
     for (index, &method) in methods.iter().enumerate() {
         // A curve that turns too wildly for a crowd is refused, and leaves nothing behind.
-        while library.clips() == index {
+        while library.clip_count() == index {
             let set = joints_set(random, joints, 2 + 3 * index);
             match library.push(&set, method, VectorMethod::CatmullRom) {
                 Ok(_) | Err(CrowdError::TooWild { .. }) => {}
@@ -343,7 +343,7 @@ pub(crate) fn crowd_library(
 /// What a layer of an instance may play.
 pub(crate) fn crowd_layer(random: &mut SeededRandom, library: &CrowdLibrary) -> CrowdLayer {
     CrowdLayer {
-        clip: random.below(library.clips()),
+        clip: random.below(library.clip_count()),
         time: random.between(-3e6, 3e6) as i64,
         speed: random.pick(&[0.0, 1.0, 1.0, -1.0, 0.37, -2.25, 100.0]),
         wrap: random.pick(&[WrapMode::Hold, WrapMode::Loop, WrapMode::Mirror]),

@@ -1,9 +1,10 @@
 //! Crowds on an application's device, recorded into its command buffers.
 #![allow(unsafe_code)] // the device, the buffers and the commands are the application's
 
-use tumble::{
-    CrowdError, CrowdLayer, CrowdOutput, CrowdTarget, CrowdValues, Mapping, VulkanBuffer, method,
-};
+use tumble::crowd::{CrowdError, CrowdLayer, CrowdOutput, CrowdValues};
+use tumble::vulkan::{CrowdTarget, VulkanBuffer};
+use tumble::vulkan::tuning::Mapping;
+use tumble::method;
 
 use super::{ALL, cpu, layer, library};
 use crate::application::{Application, Commands};
@@ -30,7 +31,7 @@ fn frames_are_recorded_into_an_applications_commands() {
         );
         let commands = Commands::new(&application);
         let offset = 256;
-        let size = (crowd.output_len(output) * output.bytes() / output.vectors()) as u64;
+        let size = (crowd.output_len(output) * output.bytes() / output.vector_count()) as u64;
         let buffers = [0; FRAMES].map(|_| application.buffer(offset + size));
         let targets: Vec<CrowdTarget> = (buffers.iter())
             .map(|&(buffer, _)| {

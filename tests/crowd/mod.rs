@@ -7,11 +7,8 @@ mod states;
 
 use glam::{Affine3A, Quat, Vec3};
 use proptest::prelude::*;
-use tumble::{
-    Crowd, CrowdError, CrowdLayer, CrowdLibrary, CrowdOutput, CrowdValues, Device, Engine,
-    EngineOptions, Layout, METHODS, Method, SampleTimes, Skeleton, TrackSet, VectorMethod,
-    VectorWidth, WrapMode, method,
-};
+use tumble::crowd::{Crowd, CrowdError, CrowdLayer, CrowdLibrary, CrowdOutput, CrowdValues};
+use tumble::{Device, Engine, EngineOptions, Layout, METHODS, Method, SampleTimes, Skeleton, TrackSet, VectorMethod, VectorWidth, WrapMode, method};
 
 use crate::support::{Random, vulkan_devices};
 
@@ -157,7 +154,7 @@ pub(crate) fn library(random: &mut Random, joints: usize, methods: &[Method]) ->
     let mut library = CrowdLibrary::new(&skeleton(random, joints)).unwrap();
     for (index, &method) in methods.iter().enumerate() {
         // A clip that rotates too far between keys is refused, and the library stays as it was.
-        while library.clips() == index {
+        while library.clip_count() == index {
             let set = clip(random, joints, 2 + 3 * index);
             match library.push(&set, method, VectorMethod::CatmullRom) {
                 Ok(_) | Err(CrowdError::TooWild { .. }) => {}
@@ -187,7 +184,7 @@ pub(crate) fn library(random: &mut Random, joints: usize, methods: &[Method]) ->
 }
 
 pub(crate) fn layer(random: &mut Random, library: &CrowdLibrary) -> CrowdLayer {
-    let clip = (random.next() % library.clips() as u64) as usize;
+    let clip = (random.next() % library.clip_count() as u64) as usize;
     CrowdLayer {
         clip,
         time: random.between(-3e6, 3e6) as i64,
@@ -210,10 +207,10 @@ fn crowds(library: &CrowdLibrary, instances: usize, layers: usize) -> Vec<(Strin
         all.push((format!("CPU, {width:?}"), crowd));
     }
     for device in vulkan_devices() {
-        for transfer in [tumble::Transfer::InPlace, tumble::Transfer::Staged] {
+        for transfer in [tumble::vulkan::tuning::Transfer::InPlace, tumble::vulkan::tuning::Transfer::Staged] {
             let mut options = EngineOptions::default();
             options.transfer = transfer;
-            if transfer == tumble::Transfer::Staged {
+            if transfer == tumble::vulkan::tuning::Transfer::Staged {
                 crate::support::stage(&mut options, instances);
                 options.memory = Some(4096); // so that windows are as short as they may be
             }

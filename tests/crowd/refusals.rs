@@ -1,10 +1,8 @@
 //! What a crowd refuses, by name and without a change.
 
 use glam::{Affine3A, Quat, Vec3};
-use tumble::{
-    Axes, CrowdError, CrowdLayer, CrowdLibrary, CrowdValues, Interpolation, Quantity, Skeleton,
-    TrackSet, VectorMethod, WrapMode, method,
-};
+use tumble::crowd::{CrowdError, CrowdLayer, CrowdLibrary, CrowdValues};
+use tumble::{Axes, Interpolation, Quantity, Skeleton, TrackSet, VectorMethod, WrapMode, method};
 
 use super::{bits, clip, cpu, evaluated, library};
 use crate::support::Random;
@@ -62,9 +60,9 @@ fn libraries_refuse_what_does_not_fit() {
         "{refused:?} {bessel:?}"
     );
     // What was refused left nothing behind.
-    let before = library.clips();
+    let before = library.clip_count();
     let clip = library.push(&one(1.0), method::SLERP, linear).unwrap();
-    assert_eq!((clip, library.clips()), (before, before + 1));
+    assert_eq!((clip, library.clip_count()), (before, before + 1));
     assert!(library.push_mask(&[]).is_err());
     for weight in [f32::NAN, -0.5, 2.0] {
         let refused = library.push_mask(&[weight]).unwrap_err();

@@ -3,10 +3,8 @@
 use super::{clip, skeleton};
 use crate::support::{Random, vulkan_devices};
 use glam::{DQuat, DVec3, Quat, Vec3};
-use tumble::{
-    CrowdError, CrowdLayer, CrowdLibrary, CrowdValues, Device, Engine, EngineOptions, Method,
-    MotionStates, MotionTables, TrackSet, VectorMethod, VectorWidth, WrapMode, method,
-};
+use tumble::crowd::{CrowdError, CrowdLayer, CrowdLibrary, CrowdValues, MotionStates, MotionTables};
+use tumble::{Device, Engine, EngineOptions, Method, TrackSet, VectorMethod, VectorWidth, WrapMode, method};
 
 const TICKS: u32 = 705_600;
 
@@ -50,7 +48,7 @@ fn states(
     parts: (&[[u32; 4]], &[[f32; 4]]),
     at: &[(u32, u32)],
 ) -> StateResults {
-    let joints = at.len() * tables.joints();
+    let joints = at.len() * tables.joint_count();
     let mut found = StateResults {
         rotations: vec![[0.0; 4]; joints],
         positions: vec![[0.0; 3]; joints],
@@ -72,7 +70,7 @@ fn states(
 /// Instances in every clip, within it, at its ends and behind.
 fn instances(random: &mut Random, tables: &MotionTables, count: usize) -> Vec<(u32, u32)> {
     let one = |i: usize| {
-        let clip = i % tables.clips();
+        let clip = i % tables.clip_count();
         let ticks = tables.ticks(clip).unwrap();
         let tick = match i % 7 {
             0 => 0,
@@ -119,7 +117,7 @@ fn rotations_are_a_crowds_on_every_device_and_at_every_width() {
         for width in VectorWidth::available() {
             let mut options = EngineOptions::default();
             options.vector_width = Some(width);
-            options.threads = Some(3);
+            options.thread_count = Some(3);
             let engine = Engine::with_options(Device::Cpu, &options).unwrap();
             let found = states(&engine, &tables, (&spans, &cells), &at);
             assert_eq!(found.rotations, expected);
@@ -243,10 +241,10 @@ fn tables_come_back_from_words_and_broken_ones_are_refused() {
             3 if !words.links.is_empty() => {
                 broken.links[index % words.links.len()][index % 2] = value;
             }
-            _ => broken.joints = value as usize % 9,
+            _ => broken.joint_count = value as usize % 9,
         }
         if let Ok(tables) = MotionTables::new(broken, parts) {
-            let at: Vec<(u32, u32)> = (0..tables.clips() as u32)
+            let at: Vec<(u32, u32)> = (0..tables.clip_count() as u32)
                 .flat_map(|clip| [(clip, 0), (clip, 12_345), (clip, u32::MAX)])
                 .collect();
             let _ = states(&engine, &tables, parts, &at);

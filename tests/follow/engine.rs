@@ -9,11 +9,8 @@ use glam::{DQuat, DVec3, Quat, Vec3};
 use tumble::reference::{
     self, Follower, FollowerDirection, FollowerSpeed, VectorCurve, angle_between,
 };
-use tumble::{
-    Device, Direction, Ends, Engine, EngineOptions, Error, Follow, FollowError, FollowWarning,
-    Followed, Layout, PathFrame, PathSpeed, SampleTimes, TrackError, TrackSet, Twist, VectorMethod,
-    VectorWidth,
-};
+use tumble::paths::{Direction, Follow, FollowError, FollowWarning, Followed, PathFrame, PathSpeed, Twist};
+use tumble::{Device, Ends, Engine, EngineOptions, Error, Layout, SampleTimes, TrackError, TrackSet, VectorMethod, VectorWidth};
 
 fn set_of(follower: &Follower) -> TrackSet {
     let mut set = TrackSet::new();
@@ -590,7 +587,7 @@ fn a_body_looks_at_another() {
             at(Direction::Track(1)).unwrap(),
             at(Direction::Tangent).unwrap(),
         );
-        for sample in 0..found.rotations.samples() {
+        for sample in 0..found.rotations.sample_count() {
             let position = |track| found.positions.get(track, sample).unwrap().as_dvec3();
             let forward = found.rotations.get(0, sample).unwrap().as_dquat() * DVec3::Z;
             let off = (forward - (position(1) - position(0)).normalize()).length();

@@ -34,7 +34,9 @@ fn rotations(engine: &Engine, tracks: &[Vec<Quat>], layout: Layout) -> Rotations
         ..method::STEP.into()
     };
     engine
-        .evaluate_as(&set, as_authored, &frames, layout)
+        .request(&set, as_authored, &frames)
+        .layout(layout)
+        .evaluate()
         .unwrap()
 }
 

@@ -27,7 +27,7 @@ fn every_kernel() {
     let requested = std::env::var(KERNELS).ok();
     let is_bare = std::env::var_os(BARE).is_some();
     let compiler = Compiler::new();
-    for (name, code) in tumble::kernels() {
+    for (name, code) in tumble::vulkan::kernels() {
         if let Some(requested) = &requested
             && !requested.split(' ').any(|kernel| kernel == name)
         {

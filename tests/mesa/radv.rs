@@ -87,7 +87,7 @@ fn compiled(
     let said = String::from_utf8_lossy(&output.stdout);
     let errors = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{family}: {said}{errors}");
-    let named = tumble::kernels().map(|(name, _)| name);
+    let named = tumble::vulkan::kernels().map(|(name, _)| name);
     let named = named.filter(|name| kernels.is_empty() || kernels.contains(name));
     let listings = named.map(|name| {
         let text = std::fs::read_to_string(folder.join(name)).unwrap();
@@ -104,7 +104,7 @@ fn compiled(
 fn divisions(kernel: &str) -> usize {
     const DIVISION: u32 = 134;
     const REMAINDER: u32 = 137;
-    let code = tumble::kernels()
+    let code = tumble::vulkan::kernels()
         .find(|(name, _)| *name == kernel)
         .unwrap()
         .1;
@@ -170,7 +170,7 @@ fn every_kernel_is_exact_on_families_in_turn() {
             let is_next = |i: usize, kernel: &str| {
                 is_due(round, i, 3) || in_table.iter().any(|listed| listed == kernel)
             };
-            let kernels = tumble::kernels().map(|(kernel, _)| kernel).enumerate();
+            let kernels = tumble::vulkan::kernels().map(|(kernel, _)| kernel).enumerate();
             let kernels = kernels.filter(|(i, kernel)| is_next(*i, kernel));
             let kernels: Vec<&str> = kernels.map(|(_, kernel)| kernel).collect();
             (family, manifest, compiled(manifest, name, &kernels, false))

@@ -5,7 +5,9 @@
 use std::sync::{Arc, Mutex};
 
 use ash::vk;
-use tumble::{Engine, EngineOptions, Error, Mapping, QueueLock, VulkanHandles, VulkanQueue};
+use tumble::vulkan::{QueueLock, VulkanHandles, VulkanQueue};
+use tumble::vulkan::tuning::Mapping;
+use tumble::{Engine, EngineOptions, Error};
 
 pub(crate) struct Application {
     pub(crate) instance: ash::Instance,

@@ -5,10 +5,8 @@ use std::collections::BTreeMap;
 use std::sync::{Mutex, PoisonError};
 
 use glam::{DQuat, DVec3, Quat};
-use tumble::{
-    Device, Engine, EngineOptions, Mapping, ReadBack, Reads, SampleTimes, Tcb, TrackSet, Transfer,
-    Uploads,
-};
+use tumble::vulkan::tuning::{Mapping, ReadBack, Reads, Transfer, Uploads};
+use tumble::{Device, Engine, EngineOptions, SampleTimes, Tcb, TrackSet};
 
 /// Every Vulkan device of this machine, with the validation layer when asked.
 /// There must be one in CI; elsewhere its absence is said aloud.

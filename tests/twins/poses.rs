@@ -107,7 +107,7 @@ pub(super) fn poses() -> Vec<Twin> {
         }),
         twin(
             "poses_smooth",
-            "turned",
+            "rotated_by",
             |random: &mut Random| {
                 // Near the longest rotation vector there is, or any.
                 let long = [FRAC_PI_2 + 0.0007 * random.number(), 0.0, 0.0, 0.0];

@@ -56,7 +56,7 @@ fn contestants(set: &TrackSet) -> Vec<Contestant<'_>> {
     let times: &'static [f32] = times.leak();
     let engine = |threads| {
         let mut options = EngineOptions::default();
-        options.threads = threads;
+        options.thread_count = threads;
         Engine::with_options(Device::Cpu, &options).expect("a CPU")
     };
     let tumble = |name, work, threads, method: Method| {

@@ -1,9 +1,9 @@
 //! What one layer of an instance plays.
 
-use tumble::CrowdLayer;
+use tumble::WrapMode;
+use tumble::crowd::CrowdLayer;
 
-use crate::arguments::{constant, flag};
-use crate::interpolation::WRAPS;
+use crate::arguments::{flag, option};
 use crate::result::Failure;
 
 /// What a layer of an instance plays. All zeros but `size` stand still at the start of the first clip.
@@ -51,7 +51,7 @@ impl TumbleCrowdLayer {
             clip: self.clip,
             time: self.time,
             speed: self.speed,
-            wrap: constant(self.wrap, &WRAPS, &format!("layers[{index}].wrap"))?,
+            wrap: option(self.wrap, &WrapMode::ALL, &format!("layers[{index}].wrap"))?,
             weight: self.weight,
             additive: flag(self.additive, &format!("layers[{index}].additive"))?,
             mask: self.mask.checked_sub(1),
@@ -61,7 +61,7 @@ impl TumbleCrowdLayer {
 
     /// The same for C.
     pub(crate) fn new(instance: usize, layer: usize, plays: CrowdLayer) -> Self {
-        let wrap = WRAPS.iter().find(|&&(_, wrap)| wrap == plays.wrap);
+        let wrap = WrapMode::ALL.iter().position(|&wrap| wrap == plays.wrap);
         Self {
             size: size_of::<Self>(),
             instance,
@@ -70,7 +70,7 @@ impl TumbleCrowdLayer {
             time: plays.time,
             speed: plays.speed,
             weight: plays.weight,
-            wrap: wrap.map_or(0, |&(code, _)| code),
+            wrap: wrap.unwrap_or(0) as u32,
             additive: plays.additive.into(),
             mask: plays.mask.map_or(0, |mask| mask + 1),
         }

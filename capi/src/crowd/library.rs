@@ -4,7 +4,8 @@ use std::ffi::{CString, c_char};
 use std::sync::{RwLock, RwLockReadGuard, RwLockWriteGuard};
 
 use glam::{Affine3A, Mat3A, Vec3, Vec3A};
-use tumble::{CrowdLibrary, Skeleton, VectorMethod};
+use tumble::crowd::CrowdLibrary;
+use tumble::{Skeleton, VectorMethod};
 use tumble_formats::motion::Transform;
 
 use crate::arguments::{Out, list, list_mut, product, text};
@@ -241,7 +242,7 @@ pub extern "C" fn tumble_crowd_library_joint_count(library: *const TumbleCrowdLi
 /// The number of clips; 0 for an invalid handle.
 #[unsafe(no_mangle)]
 pub extern "C" fn tumble_crowd_library_clip_count(library: *const TumbleCrowdLibrary) -> usize {
-    guarded(|| Ok(handle::get(library)?.read()?.clips())).unwrap_or(0)
+    guarded(|| Ok(handle::get(library)?.read()?.clip_count())).unwrap_or(0)
 }
 
 /// Ticks of a second; 0 for an invalid handle.
@@ -260,7 +261,7 @@ pub extern "C" fn tumble_crowd_library_clip_ticks(
     let ticks = guarded(|| {
         let library = handle::get(library)?;
         let library = library.read()?;
-        let (ticks, count) = (library.ticks(clip), library.clips());
+        let (ticks, count) = (library.ticks(clip), library.clip_count());
         ticks.ok_or_else(|| {
             let message = format!("there is no clip {clip}; the library has {count}");
             Failure::new(TumbleResult::OutOfRange, message)

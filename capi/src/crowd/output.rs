@@ -1,8 +1,8 @@
 //! Evaluating crowds into the caller's memory.
 
-use tumble::{Crowd, CrowdError, CrowdOutput, CrowdValues};
+use tumble::crowd::{Crowd, CrowdError, CrowdOutput, CrowdValues};
 
-use crate::arguments::{Number, Out, constant, flag, list_mut};
+use crate::arguments::{Number, Out, flag, list_mut, option};
 use crate::crowd::player::TumbleCrowd;
 use crate::handle;
 use crate::result::{Failure, TumbleResult, code};
@@ -25,13 +25,7 @@ pub enum TumbleCrowdValues {
 
 /// The values of a constant, in 32 or in 16 bits.
 pub(crate) fn output(values: u32, is_half: bool) -> Result<CrowdOutput, Failure> {
-    let known = [
-        (TumbleCrowdValues::Rotations as u32, CrowdValues::Rotations),
-        (TumbleCrowdValues::Local as u32, CrowdValues::Local),
-        (TumbleCrowdValues::Model as u32, CrowdValues::Model),
-        (TumbleCrowdValues::Skinning as u32, CrowdValues::Skinning),
-    ];
-    let values = constant(values, &known, "values")?;
+    let values = option(values, &CrowdValues::ALL, "values")?;
     Ok(CrowdOutput { values, is_half })
 }
 
@@ -49,9 +43,9 @@ unsafe fn vectors<'a, T: Number>(
     if count != needed {
         let message = format!(
             "`output_count` is {count}; the result has {needed} numbers: {} instances × {} joints × {}",
-            crowd.instances(),
-            crowd.library().joints(),
-            4 * values.vectors()
+            crowd.instance_count(),
+            crowd.library().joint_count(),
+            4 * values.vector_count()
         );
         return Err(Failure::new(TumbleResult::WrongSize, message));
     }

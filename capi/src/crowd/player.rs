@@ -2,7 +2,7 @@
 
 use std::sync::{Mutex, MutexGuard};
 
-use tumble::{Crowd, CrowdLayer};
+use tumble::crowd::{Crowd, CrowdLayer};
 
 use crate::arguments::{Out, list, needed};
 use crate::crowd::layer::TumbleCrowdLayer;

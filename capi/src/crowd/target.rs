@@ -2,7 +2,7 @@
 
 use std::ffi::c_void;
 
-use tumble::CrowdTarget;
+use tumble::vulkan::CrowdTarget;
 
 use crate::arguments::{Out, flag, vulkan};
 use crate::crowd::output;

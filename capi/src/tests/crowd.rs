@@ -4,10 +4,8 @@ use std::ffi::{CStr, c_char};
 use std::ptr::{null, null_mut};
 
 use glam::{Affine3A, Mat3A, Quat, Vec3};
-use tumble::{
-    Crowd, CrowdLayer, CrowdLibrary, CrowdOutput, CrowdValues, Device, Engine, Skeleton, TrackSet,
-    VectorMethod, WrapMode, method,
-};
+use tumble::crowd::{Crowd, CrowdLayer, CrowdLibrary, CrowdOutput, CrowdValues};
+use tumble::{Device, Engine, Skeleton, TrackSet, VectorMethod, WrapMode, method};
 
 use super::{cpu, defaults, words};
 use crate::crowd::layer::*;
@@ -310,7 +308,7 @@ fn crowds_have_the_bits_of_the_engines() {
     let (library, rust_library) = libraries();
     assert_eq!(
         tumble_crowd_library_clip_count(library),
-        rust_library.clips()
+        rust_library.clip_count()
     );
     assert_eq!(
         tumble_crowd_library_clip_ticks(library, 1),

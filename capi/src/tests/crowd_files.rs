@@ -7,9 +7,8 @@ use std::ptr::{null, null_mut};
 
 use glam::{Quat, Vec3};
 use tempfile::TempDir;
-use tumble::{
-    CrowdLayer, CrowdLibrary, CrowdOutput, CrowdValues, Skeleton, TrackSet, VectorMethod, method,
-};
+use tumble::crowd::{CrowdLayer, CrowdLibrary, CrowdOutput, CrowdValues};
+use tumble::{Skeleton, TrackSet, VectorMethod, method};
 use tumble_formats::{Format, ReadOptions};
 
 use super::crowd::*;
@@ -55,16 +54,16 @@ fn push_clip(
 fn same(library: *mut TumbleCrowdLibrary, rust_library: &CrowdLibrary) {
     assert_eq!(
         tumble_crowd_library_clip_count(library),
-        rust_library.clips()
+        rust_library.clip_count()
     );
     let engine = cpu();
-    let shape = (11 * rust_library.clips(), 1);
+    let shape = (11 * rust_library.clip_count(), 1);
     let (crowd, mut expected) = (
         c_crowd(engine, library, shape),
         rust_crowd(rust_library, shape),
     );
     for instance in 0..shape.0 {
-        let clip = instance % rust_library.clips();
+        let clip = instance % rust_library.clip_count();
         assert_eq!(
             tumble_crowd_library_clip_ticks(library, clip),
             rust_library.ticks(clip).unwrap()

@@ -200,7 +200,7 @@ fn libraries_refuse_what_does_not_fit() {
     fails(referred, TumbleResult::OutOfRange, "no clip 9");
     assert_eq!(
         tumble_crowd_library_clip_count(library),
-        rust_library.clips()
+        rust_library.clip_count()
     );
     assert_eq!(tumble_crowd_library_clip_ticks(library, 3), 0);
     assert!(words().contains("no clip 3"), "{}", words());

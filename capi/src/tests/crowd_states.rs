@@ -2,7 +2,7 @@
 
 use std::ptr::{dangling, null, null_mut};
 
-use tumble::{CrowdOutput, CrowdValues};
+use tumble::crowd::{CrowdOutput, CrowdValues};
 
 use super::crowd::*;
 use super::crowd_refusals::{evaluate, small};

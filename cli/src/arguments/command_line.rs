@@ -6,6 +6,7 @@ use std::path::Path;
 use clap::parser::ValueSource;
 use clap::{ArgMatches, Command};
 
+use crate::arguments::options::{Bytes, rule};
 use crate::batch::digest::InputFile;
 
 /// The options of a command. It must be the first field of the command's arguments: clap removes the
@@ -16,32 +17,6 @@ pub(crate) struct CommandLine {
     values: BTreeMap<String, Vec<String>>,
 }
 
-/// Options that change no byte of a result: inputs and outputs, limits and permissions, the device, and
-/// messages. Times may come from standard input, so the commands that read them add their hash.
-const WITHOUT_EFFECT_ON_BYTES: [&str; 18] = [
-    "allow_inexact",
-    "device",
-    "explain_route",
-    "files_from",
-    "format",
-    "json",
-    "max_memory",
-    "max_size",
-    "memory",
-    "out",
-    "overwrite",
-    "paths",
-    "pipes",
-    "resume",
-    "shard",
-    "shard_bytes",
-    "times",
-    "times_out",
-];
-
-/// Options whose value is a file: its content determines results, not its name.
-const FILE_OPTIONS: [&str; 3] = ["body_model", "offsets", "source_times"];
-
 impl CommandLine {
     /// Whether the command line names the option, rather than its default.
     pub(crate) fn has(&self, option: &str) -> bool {
@@ -51,18 +26,15 @@ impl CommandLine {
     /// Everything that determines a result besides its input: `layout=track method=slerp`. Options
     /// without a value or a default are left out.
     pub(crate) fn options(&self) -> String {
-        let deciding = self.values.iter();
-        let deciding =
-            deciding.filter(|(name, _)| !WITHOUT_EFFECT_ON_BYTES.contains(&name.as_str()));
-        let shown = deciding.map(
-            |(name, values)| match FILE_OPTIONS.contains(&name.as_str()) {
-                true => {
-                    let content = values.iter().map(|file| content(file));
-                    format!("{name}={}", content.collect::<Vec<_>>().join(","))
-                }
-                false => format!("{name}={}", values.join(",")),
-            },
-        );
+        let shown = self.values.iter().filter_map(|(name, values)| {
+            let bytes = rule(name).map_or(Bytes::ByValue, |rule| rule.bytes);
+            let values: Vec<String> = match bytes {
+                Bytes::Unchanged => return None,
+                Bytes::ByValue => values.clone(),
+                Bytes::ByContent => values.iter().map(|file| content(file)).collect(),
+            };
+            Some(format!("{name}={}", values.join(",")))
+        });
         shown.collect::<Vec<_>>().join(" ")
     }
 }

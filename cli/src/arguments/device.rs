@@ -6,15 +6,14 @@ use std::str::FromStr;
 use ash::vk;
 use clap::Args;
 use glam::Quat;
-use tumble::{
-    Device, Engine, EngineOptions, Error, Interpolation, Layout, SampleTimes, TrackSet, VulkanError,
-};
+use tumble::vulkan::VulkanError;
+use tumble::{Device, Engine, EngineOptions, Error, Interpolation, Layout, SampleTimes, TrackSet};
 
 use crate::arguments::command_line::CommandLine;
 use crate::arguments::named_device::named;
-use crate::batch::output::{ChunkSink, ResultError};
-use crate::commands::probe;
-use crate::messages::exit::{DEVICE, Failure, NO_VULKAN};
+use crate::batch::target::{ChunkSink, ResultError};
+use crate::drivers;
+use crate::messages::exit::{DEVICE, Failure};
 use crate::messages::words;
 
 /// Rotations evaluated at once: 16 MB.
@@ -102,7 +101,7 @@ impl ByCost {
 
     /// The fastest device for large jobs, with the options.
     fn fastest(&self) -> Result<Engine, Error> {
-        if probe::drivers().is_err() {
+        if drivers::drivers().is_err() {
             return Ok(self.cpu.clone());
         }
         let found = Engine::auto()?;
@@ -112,7 +111,7 @@ impl ByCost {
         if self.options.memory.is_none() {
             return Ok(found);
         }
-        let mut all = probe::devices()?.into_iter();
+        let mut all = drivers::devices()?.into_iter();
         let same = all.find(|device| device.name() == info.name);
         same.map_or(Ok(found.clone()), |device| {
             Engine::with_options(device, &self.options)
@@ -128,7 +127,7 @@ impl DeviceArguments {
             device,
             allow_inexact: options.allow_inexact,
             memory: options.memory,
-            threads: options.threads,
+            threads: options.thread_count,
         }
     }
 
@@ -199,7 +198,7 @@ impl DeviceArguments {
                 .map(OpenedDevice::new)
                 .map_err(|e| refused(&e)),
             DeviceChoice::Named(name) => {
-                let devices = probe::devices().map_err(|error| refused(&error.into()))?;
+                let devices = drivers::devices().map_err(|error| refused(&error.into()))?;
                 let device = named(name, &devices)?;
                 self.engine(device)
                     .map(OpenedDevice::new)
@@ -212,7 +211,7 @@ impl DeviceArguments {
         let mut options = EngineOptions::default();
         options.memory = self.memory;
         options.allow_inexact = self.allow_inexact;
-        options.threads = self.threads;
+        options.thread_count = self.threads;
         options
     }
 
@@ -233,7 +232,7 @@ impl DeviceArguments {
     /// The first device that opens and is exact; else why the first one is not.
     fn first_exact(&self) -> Result<Engine, Error> {
         let mut reason = Error::Vulkan(VulkanError::NoDevice);
-        for (index, device) in probe::devices()?.into_iter().enumerate() {
+        for (index, device) in drivers::devices()?.into_iter().enumerate() {
             match self.engine(device) {
                 Ok(engine) => return Ok(engine),
                 Err(error) if index == 0 => reason = error,
@@ -291,7 +290,9 @@ impl OpenedDevice {
         let mut done = 0;
         let result = self
             .engine
-            .stream(set, interpolation, frames, layout, chunk, |chunk| {
+            .request(set, interpolation, frames)
+            .layout(layout)
+            .stream(chunk, |chunk| {
                 done = chunk.start + chunk.rows.len();
                 sink(chunk)
             });
@@ -299,7 +300,9 @@ impl OpenedDevice {
             Err(ResultError::Evaluating(Error::Vulkan(error))) if self.automatic => {
                 self.fall_back(&error)?;
                 self.engine
-                    .stream(set, interpolation, frames, layout, chunk, |chunk| {
+                    .request(set, interpolation, frames)
+                    .layout(layout)
+                    .stream(chunk, |chunk| {
                         if chunk.start < done {
                             Ok(())
                         } else {
@@ -362,27 +365,23 @@ pub(crate) fn vulkan_device(name: Option<&str>) -> Result<Option<Device>, Failur
         let Ok(choice) = name.parse();
         choice
     });
-    let devices = || probe::devices().map_err(|error| refused(&error.into()));
+    let devices = || drivers::devices().map_err(|error| refused(&error.into()));
     match choice {
         DeviceChoice::Cpu => Ok(None),
         DeviceChoice::First | DeviceChoice::Auto | DeviceChoice::Vulkan => {
             let first = devices()?.into_iter().next();
             first
                 .map(Some)
-                .ok_or_else(|| no_vulkan(&VulkanError::NoDevice))
+                .ok_or_else(|| Failure::no_vulkan(&VulkanError::NoDevice))
         }
         DeviceChoice::Named(name) => named(&name, &devices()?).map(Some),
     }
 }
 
-pub(super) fn no_vulkan(error: &VulkanError) -> Failure {
-    Failure::new(NO_VULKAN, format!("no Vulkan device: {error}"))
-}
-
 /// The failure of a device that the command line names and that cannot be opened.
 pub(crate) fn refused(error: &Error) -> Failure {
     match error {
-        Error::Vulkan(error) if is_absence(error) => no_vulkan(error),
+        Error::Vulkan(error) if is_absence(error) => Failure::no_vulkan(error),
         Error::Vulkan(
             error @ (VulkanError::Inexact { .. } | VulkanError::InexactKernel { .. }),
         ) => Failure::new(DEVICE, format!("{error} (--allow-inexact)")),

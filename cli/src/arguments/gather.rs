@@ -8,9 +8,9 @@ use std::path::{Path, PathBuf};
 use tumble_formats::Format;
 use walkdir::WalkDir;
 
-use crate::arguments::input::{self, is_standard};
 use crate::arguments::wildcard::{self, is_pattern};
 use crate::messages::exit::Failure;
+use crate::messages::names;
 use crate::messages::words;
 
 /// Files to work on, in order, each once.
@@ -66,13 +66,13 @@ impl GatheredInputs {
                 if seen.insert(identity.unwrap_or_else(|_| found.path.clone())) {
                     gathered.files.push(found);
                 } else {
-                    let name = input::name(&found.path);
+                    let name = names::input(&found.path);
                     words::warning(&format!("{name}: named twice; it is processed once"));
                 }
             }
         }
         if gathered.files.is_empty() {
-            let list = list.map(input::name).unwrap_or_default();
+            let list = list.map(names::input).unwrap_or_default();
             return Err(Failure::usage(format!("{list}: lists no files")));
         }
         Ok(gathered)
@@ -87,7 +87,7 @@ impl GatheredInputs {
             let name = path.file_name().unwrap_or(path.as_os_str());
             FoundInput::named(path.to_owned(), name.into())
         };
-        if is_standard(path) || path.is_file() {
+        if names::is_standard(path) || path.is_file() {
             return vec![alone()];
         }
         let found = if path.is_dir() {
@@ -147,14 +147,14 @@ fn matches(pattern: &Path) -> Vec<FoundInput> {
 
 /// A path on each line; blank lines and lines that begin with `#` are none.
 fn read_list(list: &Path) -> Result<Vec<PathBuf>, Failure> {
-    let read = if is_standard(list) {
+    let read = if names::is_standard(list) {
         let mut text = Vec::new();
         io::stdin().read_to_end(&mut text).map(|_| text)
     } else {
         std::fs::read(list)
     };
     let text = read.map_err(|error| {
-        let name = input::name(list);
+        let name = names::input(list);
         Failure::new(
             crate::messages::exit::ALL_INPUTS,
             format!("{name}: the list cannot be read: {error}"),

@@ -6,14 +6,13 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use tumble_formats::format::FormatOption;
 use tumble_formats::motion::Motion;
-use tumble_formats::printable::{printable, printable_path};
-use tumble_formats::times::open_times;
 use tumble_formats::{Code, Diagnostic, Format, Limits, Loaded, ReadOptions};
 
 use crate::arguments::gather::GatheredInputs;
 use crate::arguments::reading::ReadingArguments;
 use crate::arguments::tracks::TrackArguments;
 use crate::messages::exit::{self, Failure};
+use crate::messages::names;
 use crate::messages::progress::busy;
 use crate::messages::words;
 
@@ -42,48 +41,18 @@ pub(crate) struct Inputs {
     pub(crate) tracks: TrackArguments,
 }
 
-/// `-` is standard input.
-pub(crate) fn is_standard(path: &Path) -> bool {
-    path.as_os_str() == "-"
-}
-
-/// The name of an input in messages.
-pub(crate) fn name(path: &Path) -> String {
-    if is_standard(path) {
-        "standard input".to_owned()
-    } else {
-        printable_path(path)
-    }
-}
-
-/// `folder/walk.dat` is `walk.dat` in titles.
-pub(crate) fn file_name(path: &Path) -> String {
-    match path.file_name() {
-        Some(component) if !is_standard(path) => printable_path(Path::new(component)),
-        _ => name(path),
-    }
-}
-
-/// `folder/walk.dat` is `walk` in the names of pictures.
-pub(crate) fn stem(path: &Path) -> String {
-    match path.file_stem() {
-        Some(stem) if !is_standard(path) => stem.to_string_lossy().into_owned(),
-        _ => "stdin".to_owned(),
-    }
-}
-
 impl Inputs {
     /// The inputs without repetitions, each of which earns a warning. Standard input can be read only once.
     pub(crate) fn gather(&self, times_from_stdin: bool) -> Result<GatheredInputs, Failure> {
         let uses = [
             (times_from_stdin, "the times"),
             (
-                self.files_from.as_deref().is_some_and(is_standard),
+                self.files_from.as_deref().is_some_and(names::is_standard),
                 "the list of inputs",
             ),
         ];
         let readers: Vec<&str> = uses.iter().filter(|t| t.0).map(|t| t.1).collect();
-        let keys = self.paths.iter().any(|path| is_standard(path));
+        let keys = self.paths.iter().any(|path| names::is_standard(path));
         if readers.len() + usize::from(keys) > 1 {
             let all = readers.iter().copied().chain(keys.then_some("the keys"));
             let all = all.collect::<Vec<_>>().join(" and ");
@@ -107,11 +76,6 @@ impl Inputs {
         format.takes(FormatOption::Keyframes) && !self.reading.reads_file_keys()
     }
 
-    /// The longest input that is read, bytes.
-    pub(crate) fn max_size(&self) -> u64 {
-        self.max_size
-    }
-
     /// The paths that the command line names.
     pub(crate) fn named_paths(&self) -> &[PathBuf] {
         &self.paths
@@ -132,7 +96,7 @@ impl Inputs {
     /// As [`Inputs::load`], for commands that work on one clip.
     pub(crate) fn load_one(&self, path: &Path) -> Result<OnlyClip, Failure> {
         let mut loaded = self.load(path)?;
-        let rest = check_complete(&name(path), &loaded);
+        let rest = check_complete(&names::input(path), &loaded);
         match loaded.clips.pop() {
             Some(clip) if loaded.clips.is_empty() => Ok(OnlyClip { clip, rest }),
             Some(clip) => {
@@ -145,7 +109,9 @@ impl Inputs {
 
     /// As [`Inputs::load`], without printing its warnings.
     pub(crate) fn load_quietly(&self, path: &Path) -> Result<Loaded, Failure> {
-        busy(&format!("reading {}", name(path)), || self.read(path))
+        busy(&format!("reading {}", names::input(path)), || {
+            self.read(path)
+        })
     }
 
     /// How files are read.
@@ -186,6 +152,25 @@ impl Inputs {
     }
 }
 
+/// What reads the inputs of a command, on a thread that runs ahead.
+pub(crate) trait InputReader: Send + 'static {
+    /// Reads an input; its warnings are not printed.
+    fn read(&self, path: &Path) -> Result<Loaded, Failure>;
+
+    /// The longest input that it accepts, bytes.
+    fn max_size(&self) -> u64;
+}
+
+impl InputReader for Inputs {
+    fn read(&self, path: &Path) -> Result<Loaded, Failure> {
+        self.read(path)
+    }
+
+    fn max_size(&self) -> u64 {
+        self.max_size
+    }
+}
+
 /// The clip of a file, for commands that work on one.
 pub(crate) struct OnlyClip {
     pub(crate) clip: Motion,
@@ -205,7 +190,10 @@ pub(crate) fn check_complete(name: &str, loaded: &Loaded) -> Result<(), Failure>
 }
 
 fn no_clips(path: &Path) -> Failure {
-    let message = format!("{}: has no animation that moves anything", name(path));
+    let message = format!(
+        "{}: has no animation that moves anything",
+        names::input(path)
+    );
     Failure::new(exit::ALL_INPUTS, message)
 }
 
@@ -218,27 +206,9 @@ pub(crate) fn print_warnings(loaded: &Loaded) {
 
 /// The failure of a command that works on one clip for a file with several.
 pub(crate) fn several_clips_failure(path: &Path, loaded: &Loaded) -> Failure {
-    let (name, names) = (name(path), clip_names(loaded));
+    let (name, names) = (names::input(path), names::clips(loaded));
     Failure::new(
         exit::ALL_INPUTS,
         format!("{name}: has several animations, {names}; choose one with --animation"),
     )
-}
-
-/// The name in messages of a clip of a file with several.
-pub(crate) fn clip_name(clip: &Motion) -> String {
-    match &clip.name {
-        Some(name) => printable(name).into_owned(),
-        None => clip.index.to_string(),
-    }
-}
-
-pub(crate) fn clip_names(loaded: &Loaded) -> String {
-    let names: Vec<String> = loaded.clips.iter().map(clip_name).collect();
-    names.join(", ")
-}
-
-/// Reads a list of times.
-pub(crate) fn times(path: &Path) -> Result<Vec<f64>, Failure> {
-    open_times(path).map_err(|diagnostic| Failure::input(&diagnostic, ""))
 }

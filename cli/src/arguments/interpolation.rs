@@ -3,33 +3,34 @@
 use std::collections::BTreeMap;
 use std::fmt;
 
+use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
-use clap::{Args, ValueEnum};
-use glam::DVec3;
 use tumble::method::KOCHANEK_BARTELS;
 use tumble::{
     Ends, Interpolation, InterpolationWarning, KeySigns, METHODS, Method, Speed, TrackSet, WrapMode,
 };
 use tumble_formats::{Code, Diagnostic};
 
+use crate::arguments::output::one_of;
+
 /// `--path` and `--ends`, which every method takes.
 #[derive(Debug, Clone, Copy, Args)]
 pub(crate) struct InterpolationArguments {
     /// What happens in the first and the last segment (default: the method's own)
-    #[arg(long, value_name = "ENDS")]
-    ends: Option<EndsArgument>,
+    #[arg(long, value_name = "ENDS", value_parser = ends())]
+    ends: Option<Ends>,
     /// Which way to rotate between neighbouring keys
-    #[arg(long, value_name = "PATH")]
-    path: Option<KeySignsArgument>,
+    #[arg(long, value_name = "PATH", value_parser = key_signs())]
+    path: Option<KeySigns>,
     /// The speed along the curve
-    #[arg(long, value_name = "SPEED", default_value = "as-keyed")]
-    speed: SpeedArgument,
+    #[arg(long, value_name = "SPEED", default_value_t, value_parser = speed())]
+    speed: Speed,
     /// The values before the first key
-    #[arg(long, value_name = "OUTSIDE", default_value = "hold")]
-    before: OutsideArgument,
+    #[arg(long, value_name = "OUTSIDE", default_value_t, value_parser = wrap_mode())]
+    before: WrapMode,
     /// The values after the last key
-    #[arg(long, value_name = "OUTSIDE", default_value = "hold")]
-    after: OutsideArgument,
+    #[arg(long, value_name = "OUTSIDE", default_value_t, value_parser = wrap_mode())]
+    after: WrapMode,
     /// kochanek-bartels: 1 stands still at the keys, -1 is twice as fast
     #[arg(long, value_name = "NUMBER", value_parser = finite, allow_negative_numbers = true)]
     tension: Option<f64>,
@@ -52,15 +53,12 @@ impl InterpolationArguments {
     pub(crate) fn with(self, method: Method) -> tumble::Interpolation {
         tumble::Interpolation {
             method,
-            signs: method.path.or(self.key_signs()).unwrap_or_default(),
-            ends: self.ends.map_or(method.ends, EndsArgument::ends),
+            signs: method.signs.or(self.path).unwrap_or_default(),
+            ends: self.ends.unwrap_or(method.ends),
             quantity: tumble::Quantity::Rotation,
-            speed: match self.speed {
-                SpeedArgument::AsKeyed => Speed::AsKeyed,
-                SpeedArgument::Constant => Speed::Constant,
-            },
-            before: self.before.into(),
-            after: self.after.into(),
+            speed: self.speed,
+            before: self.before,
+            after: self.after,
             tcb: tumble::Tcb {
                 tension: self.tension.unwrap_or_default(),
                 continuity: self.continuity.unwrap_or_default(),
@@ -69,25 +67,15 @@ impl InterpolationArguments {
         }
     }
 
-    fn key_signs(self) -> Option<KeySigns> {
-        Some(match self.path? {
-            KeySignsArgument::Shortest => KeySigns::Shortest,
-            KeySignsArgument::AsAuthored => KeySigns::AsAuthored,
-        })
-    }
-
     /// The options that are set, by their names in the npm package.
     pub(crate) fn named(self) -> BTreeMap<&'static str, String> {
-        fn name(value: impl ValueEnum) -> Option<String> {
-            Some(value.to_possible_value()?.get_name().to_owned())
-        }
         let number = |value: Option<f64>| value.map(|value| value.to_string());
         let options = [
-            ("ends", self.ends.and_then(name)),
-            ("path", self.path.and_then(name)),
-            ("speed", name(self.speed)),
-            ("before", name(self.before)),
-            ("after", name(self.after)),
+            ("ends", self.ends.map(|ends| ends.to_string())),
+            ("path", self.path.map(|signs| signs.to_string())),
+            ("speed", Some(self.speed.to_string())),
+            ("before", Some(self.before.to_string())),
+            ("after", Some(self.after.to_string())),
             ("tension", number(self.tension)),
             ("continuity", number(self.continuity)),
             ("bias", number(self.bias)),
@@ -124,8 +112,8 @@ impl InterpolationArguments {
                 names()
             ));
         }
-        let path = self.key_signs();
-        let takes = |method: &Method| method.path.is_none() || method.path == path;
+        let path = self.path;
+        let takes = |method: &Method| method.signs.is_none() || method.signs == path;
         if path.is_some() && !methods.iter().any(takes) {
             return Err(format!(
                 "--path has no effect on {}, which always follows the signs of the keys; leave it out",
@@ -136,77 +124,45 @@ impl InterpolationArguments {
     }
 }
 
-/// What happens at both ends of a curve, through rotations or through points.
-#[derive(Debug, Clone, Copy, ValueEnum)]
-pub(crate) enum EndsArgument {
-    /// the parabola through the last three keys or points
-    Parabolic,
-    /// no acceleration
-    Natural,
-    /// start and end at rest
-    Clamped,
-    /// the velocity of the straight way between the last two: slerp's, for rotations
-    Secant,
-    /// the last repeats the first
-    Loop,
-    /// the first and the last segment stand still
-    Frozen,
-}
-
-impl EndsArgument {
-    pub(crate) fn ends(self) -> Ends {
-        let still = DVec3::ZERO;
-        match self {
-            Self::Parabolic => Ends::Parabolic,
-            Self::Natural => Ends::Natural,
-            Self::Clamped => Ends::Clamped {
-                start: still,
-                end: still,
-            },
-            Self::Loop => Ends::Loop,
-            Self::Secant => Ends::Secant,
-            Self::Frozen => Ends::Frozen,
+/// Parses the name of a kind of ends, of curves through rotations or through points.
+pub(crate) fn ends() -> impl TypedValueParser<Value = Ends> {
+    let help = |ends| match ends {
+        Ends::Parabolic => "the parabola through the last three keys or points",
+        Ends::Natural => "no acceleration",
+        Ends::Clamped { .. } => "start and end at rest",
+        Ends::Secant => {
+            "the velocity of the straight way between the last two: slerp's, for rotations"
         }
-    }
+        Ends::Loop => "the last repeats the first",
+        Ends::Frozen => "the first and the last segment stand still",
+    };
+    one_of(Ends::ALL.map(|ends| (ends.name(), help(ends), ends)))
 }
 
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum SpeedArgument {
-    /// as the key times say
-    AsKeyed,
-    /// at constant angular speed
-    Constant,
+fn speed() -> impl TypedValueParser<Value = Speed> {
+    let help = |speed| match speed {
+        Speed::AsKeyed => "as the key times say",
+        Speed::Constant => "at constant angular speed",
+    };
+    one_of(Speed::ALL.map(|speed| (speed.name(), help(speed), speed)))
 }
 
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum OutsideArgument {
-    /// the end value
-    Hold,
-    /// the track repeats
-    Loop,
-    /// the track runs backwards and forwards in turn
-    Mirror,
-    /// continues at the velocity of the end
-    Extrapolate,
+fn wrap_mode() -> impl TypedValueParser<Value = WrapMode> {
+    let help = |mode| match mode {
+        WrapMode::Hold => "the end value",
+        WrapMode::Loop => "the track repeats",
+        WrapMode::Mirror => "the track runs backwards and forwards in turn",
+        WrapMode::Extrapolate => "continues at the velocity of the end",
+    };
+    one_of(WrapMode::ALL.map(|mode| (mode.name(), help(mode), mode)))
 }
 
-impl From<OutsideArgument> for WrapMode {
-    fn from(outside: OutsideArgument) -> Self {
-        match outside {
-            OutsideArgument::Hold => Self::Hold,
-            OutsideArgument::Loop => Self::Loop,
-            OutsideArgument::Mirror => Self::Mirror,
-            OutsideArgument::Extrapolate => Self::Extrapolate,
-        }
-    }
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum KeySignsArgument {
-    /// the shorter rotation (default)
-    Shortest,
-    /// as the signs of the keys say
-    AsAuthored,
+fn key_signs() -> impl TypedValueParser<Value = KeySigns> {
+    let help = |signs| match signs {
+        KeySigns::Shortest => "the shorter rotation (default)",
+        KeySigns::AsAuthored => "as the signs of the keys say",
+    };
+    one_of(KeySigns::ALL.map(|signs| (signs.name(), help(signs), signs)))
 }
 
 /// Where the curves of a set are less smooth than their method promises: the first such key is named, others

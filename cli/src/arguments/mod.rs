@@ -6,6 +6,7 @@ pub(crate) mod gather;
 pub(crate) mod input;
 pub(crate) mod interpolation;
 mod named_device;
+pub(crate) mod options;
 pub(crate) mod output;
 pub(crate) mod path;
 pub(crate) mod reading;

@@ -1,8 +1,8 @@
 //! Finds the device that `--device` names among those that `tumble devices` lists.
 
-use tumble::{Device, VulkanError};
+use tumble::Device;
+use tumble::vulkan::VulkanError;
 
-use crate::arguments::device::no_vulkan;
 use crate::messages::exit::Failure;
 use crate::messages::words;
 
@@ -10,7 +10,7 @@ use crate::messages::words;
 /// be a number). After `uuid:` stands the UUID that Vulkan reports, by which other programs know the card.
 pub(super) fn named(requested: &str, devices: &[Device]) -> Result<Device, Failure> {
     if devices.is_empty() {
-        return Err(no_vulkan(&VulkanError::NoDevice));
+        return Err(Failure::no_vulkan(&VulkanError::NoDevice));
     }
     let part = requested.to_lowercase();
     if let Some(uuid) = part.strip_prefix("uuid:") {

@@ -6,8 +6,6 @@ use glam::Vec3;
 use tumble::{Axes, Encoding, EncodingOptions, EulerSequence, MatrixOrder, Quantity, Skeleton};
 use tumble_formats::quaternion::ComponentOrder;
 
-use crate::arguments::command_line::CommandLine;
-
 #[derive(Debug, Clone, Args)]
 pub(crate) struct OutputArguments {
     /// What to write of each rotation
@@ -23,8 +21,8 @@ pub(crate) struct OutputArguments {
     #[arg(long, value_name = "AXES", value_parser = sequence)]
     sequence: Option<EulerSequence>,
     /// matrix: the order of its elements in memory
-    #[arg(long, value_enum, default_value = "row")]
-    major: Major,
+    #[arg(long, default_value_t = MatrixOrder::RowMajor, value_parser = matrix_order())]
+    major: MatrixOrder,
     /// world, transform: each track's parent, counted from 0, -1 for none [default: a chain, -1,0,1 …]
     #[arg(
         long,
@@ -34,8 +32,8 @@ pub(crate) struct OutputArguments {
     )]
     parents: Option<Vec<i64>>,
     /// velocity, acceleration: the axes that they are measured in
-    #[arg(long, value_enum, default_value = "body")]
-    axes: AxesArgument,
+    #[arg(long, default_value_t = Axes::Body, value_parser = axes())]
+    axes: Axes,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -77,7 +75,7 @@ fn outputs() -> Vec<NamedValue<OutputKind>> {
 }
 
 fn encodings(filter: impl Fn(Encoding) -> bool) -> impl Iterator<Item = NamedValue<Encoding>> {
-    let all = Encoding::KINDS
+    let all = Encoding::ALL
         .into_iter()
         .filter(move |encoding| filter(*encoding));
     all.map(|encoding| (encoding.name(), encoding.summary(), encoding))
@@ -85,13 +83,14 @@ fn encodings(filter: impl Fn(Encoding) -> bool) -> impl Iterator<Item = NamedVal
 
 /// Parses the name of a representation of quaternions.
 pub(crate) fn quaternions() -> impl TypedValueParser<Value = Encoding> {
-    one_of(encodings(Encoding::is_quaternion).collect())
+    one_of(encodings(Encoding::is_quaternion).collect::<Vec<_>>())
 }
 
-/// Parses one of these names.
-fn one_of<T: Clone + Send + Sync + 'static>(
-    all: Vec<NamedValue<T>>,
+/// Parses one of these names; help lists them.
+pub(crate) fn one_of<T: Clone + Send + Sync + 'static>(
+    all: impl Into<Vec<NamedValue<T>>>,
 ) -> impl TypedValueParser<Value = T> {
+    let all = all.into();
     let value = |&(name, help, _): &NamedValue<T>| PossibleValue::new(name).help(help);
     let values: Vec<PossibleValue> = all.iter().map(value).collect();
     PossibleValuesParser::new(values).map(move |text| {
@@ -100,21 +99,24 @@ fn one_of<T: Clone + Send + Sync + 'static>(
     })
 }
 
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum Major {
-    /// row by row
-    Row,
-    /// column by column
-    Column,
+fn matrix_order() -> impl TypedValueParser<Value = MatrixOrder> {
+    let help = |order| match order {
+        MatrixOrder::RowMajor => "row by row",
+        MatrixOrder::ColumnMajor => "column by column",
+    };
+    one_of(MatrixOrder::ALL.map(|order| (order.name(), help(order), order)))
 }
 
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum AxesArgument {
-    /// the body's own axes
-    Body,
-    /// the axes of the parent, or of the world for a track without one
-    #[value(alias = "world")]
-    Parent,
+/// `world` is a name of the parent's axes too: those of a track without one are the world's.
+fn axes() -> impl TypedValueParser<Value = Axes> {
+    let value = |axes: Axes| match (axes, PossibleValue::new(axes.name())) {
+        (Axes::Body, value) => value.help("the body's own axes"),
+        (Axes::Parent, value) => {
+            let help = "the axes of the parent, or of the world for a track without one";
+            value.help(help).alias("world")
+        }
+    };
+    PossibleValuesParser::new(Axes::ALL.map(value)).map(|name| name.parse().unwrap_or(Axes::Parent))
 }
 
 /// The order of a quaternion's components.
@@ -153,10 +155,7 @@ pub(crate) fn sequence(name: &str) -> Result<EulerSequence, String> {
 impl OutputArguments {
     /// The encoding of the output; quaternions are stored as `components`.
     pub(crate) fn encoding(&self, components: Encoding) -> Encoding {
-        let order = match self.major {
-            Major::Row => MatrixOrder::RowMajor,
-            Major::Column => MatrixOrder::ColumnMajor,
-        };
+        let order = self.major;
         let sequence = self.sequence.unwrap_or(EulerSequence::XYZ);
         match self.output {
             OutputKind::Quaternion | OutputKind::Transform | OutputKind::World => components,
@@ -227,41 +226,38 @@ impl OutputArguments {
         self.parents.is_some()
     }
 
-    /// Refuses options that have no effect on the output. `is_angles`: Euler angles are written whatever
-    /// `--output` is (BVH).
-    pub(crate) fn check(&self, command_line: &CommandLine, is_angles: bool) -> Result<(), String> {
-        let name = self.name();
+    /// Whether the axes of angles change what is written.
+    pub(crate) fn is_euler(&self) -> bool {
+        let sequence = "ZXY".parse().unwrap_or(EulerSequence::XYZ);
+        self.depends_on(EncodingOptions {
+            order: MatrixOrder::RowMajor,
+            sequence,
+        })
+    }
+
+    /// Whether the order of a matrix's elements changes what is written.
+    pub(crate) fn is_matrix(&self) -> bool {
+        self.depends_on(EncodingOptions {
+            order: MatrixOrder::ColumnMajor,
+            sequence: EulerSequence::XYZ,
+        })
+    }
+
+    /// Whether these options change the encoding.
+    fn depends_on(&self, options: EncodingOptions) -> bool {
         let default = EncodingOptions {
             order: MatrixOrder::RowMajor,
             sequence: EulerSequence::XYZ,
         };
-        let asks = |other: EncodingOptions| matches!(self.output, OutputKind::Encoded(encoding) if encoding.with(default) != encoding.with(other));
-        let is_matrix = asks(EncodingOptions {
-            order: MatrixOrder::ColumnMajor,
-            ..default
-        });
-        let is_euler = asks(EncodingOptions {
-            sequence: "ZXY".parse().unwrap_or(EulerSequence::XYZ),
-            ..default
-        });
-        let is_rate = matches!(self.output, OutputKind::Velocity | OutputKind::Acceleration);
-        for (option, applies, wants) in [
-            ("sequence", is_euler || is_angles, "--output euler, or BVH"),
-            ("major", is_matrix, "--output matrix or matrix-3x4"),
-            ("axes", is_rate, "--output velocity or acceleration"),
-            (
-                "parents",
-                self.poses().is_some(),
-                "--output world or transform",
-            ),
-        ] {
-            if command_line.has(option) && !applies {
-                return Err(format!(
-                    "--{option} has no effect on --output {name}; leave it out, or use {wants}"
-                ));
-            }
+        match self.output {
+            OutputKind::Encoded(encoding) => encoding.with(default) != encoding.with(options),
+            _ => false,
         }
-        Ok(())
+    }
+
+    /// Whether velocities or accelerations are written.
+    pub(crate) fn is_rate(&self) -> bool {
+        matches!(self.output, OutputKind::Velocity | OutputKind::Acceleration)
     }
 
     /// The kind of poses, if whole poses are written.
@@ -274,10 +270,7 @@ impl OutputArguments {
     }
 
     pub(crate) fn quantity(&self) -> Quantity {
-        let axes = match self.axes {
-            AxesArgument::Body => Axes::Body,
-            AxesArgument::Parent => Axes::Parent,
-        };
+        let axes = self.axes;
         match self.output {
             OutputKind::Velocity => Quantity::Velocity(axes),
             OutputKind::Acceleration => Quantity::Acceleration(axes),

@@ -2,21 +2,20 @@
 
 use std::path::Path;
 
+use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
-use clap::{Args, ValueEnum};
 use glam::{DVec3, Mat3, Quat};
-use tumble::{
-    BodyAxis, Channel, Direction, Follow, PathFrame, PathSpeed, TrackError, TrackSet, Twist,
-    VectorKeys, VectorMethod,
-};
+use tumble::paths::{BodyAxis, Direction, Follow, PathFrame, PathSpeed, Twist};
+use tumble::{Channel, Ends, TrackError, TrackSet, VectorKeys, VectorMethod};
 use tumble_formats::motion::Motion;
 use tumble_formats::path::{Pace, open_paths};
-use tumble_formats::{Limits, ReadOptions};
+use tumble_formats::{Limits, Loaded, ReadOptions};
 
-use crate::arguments::input;
-use crate::arguments::interpolation::{EndsArgument, each_once};
-use crate::messages::colours::{self, Colour};
+use crate::arguments::input::InputReader;
+use crate::arguments::interpolation::{each_once, ends};
+use crate::arguments::output::one_of;
 use crate::messages::exit::Failure;
+use crate::messages::names;
 
 /// The heading of these options in help.
 pub(crate) const PATHS: &str = "Paths";
@@ -35,8 +34,8 @@ pub(crate) struct PathArguments {
     #[arg(long, value_name = "METHOD", default_value = "bessel-overhauser", value_parser = methods())]
     path_method: VectorMethod,
     /// What happens at the first and the last point
-    #[arg(long, value_name = "ENDS", default_value = "parabolic")]
-    path_ends: EndsArgument,
+    #[arg(long, value_name = "ENDS", default_value_t, value_parser = ends())]
+    path_ends: Ends,
     /// Which way a body faces: tangent, ahead:DISTANCE, at:X,Y,Z or at:TRACK
     #[arg(long, value_name = "DIRECTION", default_value = "tangent", value_parser = DirectionArgument::parse)]
     direction: DirectionArgument,
@@ -45,9 +44,10 @@ pub(crate) struct PathArguments {
         long = "frame",
         value_name = "FRAMES",
         value_delimiter = ',',
-        default_value = "minimal"
+        default_value = "minimal",
+        value_parser = frame()
     )]
-    path_frames: Vec<FrameArgument>,
+    path_frames: Vec<PathFrame>,
     /// The upward direction: at the start of minimal frames, everywhere of fixed ones
     #[arg(long, value_name = "X,Y,Z", default_value = "0,1,0", value_parser = vector, allow_hyphen_values = true)]
     path_up: DVec3,
@@ -55,8 +55,8 @@ pub(crate) struct PathArguments {
     #[arg(long)]
     no_ups: bool,
     /// What to do with the rotation about the direction that is left over at the end of a closed path
-    #[arg(long, value_name = "TWIST", default_value = "spread")]
-    twist: TwistArgument,
+    #[arg(long, value_name = "TWIST", default_value_t, value_parser = twist())]
+    twist: Twist,
     /// keys, constant, or eased:A,B: speeding up over the fraction A of the time, slowing down over the
     /// fraction B
     #[arg(long, value_name = "SPEED", default_value = "keys", value_parser = speed)]
@@ -69,44 +69,30 @@ pub(crate) struct PathArguments {
     upward: BodyAxisArgument,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(crate) enum FrameArgument {
-    /// no rotation about the direction (rotation-minimizing)
-    Minimal,
-    /// the upward axis stays as close to --up as possible
-    Fixed,
-    /// the path's normal (Frenet), without its flips
-    Frenet,
+fn frame() -> impl TypedValueParser<Value = PathFrame> {
+    let help = |frame| match frame {
+        PathFrame::Minimal => "no rotation about the direction (rotation-minimizing)",
+        PathFrame::Fixed => "the upward axis stays as close to --up as possible",
+        PathFrame::Frenet => "the path's normal (Frenet), without its flips",
+    };
+    one_of(PathFrame::ALL.map(|frame| (frame.name(), help(frame), frame)))
 }
 
-impl FrameArgument {
-    pub(crate) fn name(self) -> &'static str {
-        match self {
-            Self::Minimal => "minimal",
-            Self::Fixed => "fixed",
-            Self::Frenet => "frenet",
-        }
-    }
-
-    pub(crate) fn colour(self) -> Colour {
-        colours::FRAMES[self as usize]
-    }
-
-    pub(crate) fn summary(self) -> &'static str {
-        match self {
-            Self::Minimal => "no rotation about the direction (rotation-minimizing)",
-            Self::Fixed => "the upward axis stays as close to up as possible",
-            Self::Frenet => "the path's normal (Frenet), without its flips",
-        }
+/// What a frame is, in a few words.
+pub(crate) fn frame_summary(frame: PathFrame) -> &'static str {
+    match frame {
+        PathFrame::Minimal => "no rotation about the direction (rotation-minimizing)",
+        PathFrame::Fixed => "the upward axis stays as close to up as possible",
+        PathFrame::Frenet => "the path's normal (Frenet), without its flips",
     }
 }
 
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum TwistArgument {
-    /// spread evenly, so that the last pose equals the first
-    Spread,
-    /// leave it
-    Free,
+fn twist() -> impl TypedValueParser<Value = Twist> {
+    let help = |twist| match twist {
+        Twist::Spread => "spread evenly, so that the last pose equals the first",
+        Twist::Free => "leave it",
+    };
+    one_of(Twist::ALL.map(|twist| (twist.name(), help(twist), twist)))
 }
 
 /// `--direction`; a track that it names is looked up in each input.
@@ -204,7 +190,7 @@ struct BodyAxisArgument {
 fn axis(text: &str) -> Result<BodyAxisArgument, String> {
     let axis = text
         .parse()
-        .map_err(|error: tumble::FollowError| error.to_string())?;
+        .map_err(|error: tumble::paths::FollowError| error.to_string())?;
     let letter = text.trim_start_matches(['+', '-']);
     let index = ["x", "y", "z"].iter().position(|name| *name == letter);
     let sign = if text.starts_with('-') { -1.0 } else { 1.0 };
@@ -224,7 +210,7 @@ impl PathArguments {
     }
 
     /// The frames, each once; at least one.
-    pub(crate) fn frames(&self) -> Vec<FrameArgument> {
+    pub(crate) fn frames(&self) -> Vec<PathFrame> {
         each_once(self.path_frames.iter())
     }
 
@@ -244,11 +230,11 @@ impl PathArguments {
             limits: Limits::default(),
             ..ReadOptions::default()
         };
-        let mut paths = open_paths(path, &input::stem(path), pace, &options)
+        let mut paths = open_paths(path, &names::stem(path), pace, &options)
             .map_err(|diagnostic| Failure::input(&diagnostic, ""))?;
         if self.no_ups {
             paths.set = without_ups(&paths.set)
-                .map_err(|error| Failure::evaluating(&input::name(path), &error.into()))?;
+                .map_err(|error| Failure::evaluating(&names::input(path), &error.into()))?;
         }
         Ok(paths)
     }
@@ -258,28 +244,31 @@ impl PathArguments {
         &self,
         paths: &Motion,
         name: &str,
-        frame: FrameArgument,
+        frame: PathFrame,
     ) -> Result<Follow, Failure> {
         Ok(Follow {
             method: self.path_method,
-            ends: self.path_ends.ends(),
+            ends: self.path_ends,
             direction: match self.direction.of(&paths.set, name)? {
                 Direction::Point(point) => Direction::Point(point - paths.origin(0)),
                 direction => direction,
             },
-            frame: match frame {
-                FrameArgument::Minimal => PathFrame::Minimal,
-                FrameArgument::Fixed => PathFrame::Fixed,
-                FrameArgument::Frenet => PathFrame::Frenet,
-            },
+            frame,
             up: self.path_up,
-            twist: match self.twist {
-                TwistArgument::Spread => Twist::Spread,
-                TwistArgument::Free => Twist::Free,
-            },
+            twist: self.twist,
             speed: self.path_speed,
             axes: [self.forward.axis, self.upward.axis],
         })
+    }
+}
+
+impl InputReader for PathArguments {
+    fn read(&self, path: &Path) -> Result<Loaded, Failure> {
+        Ok(Loaded::of(self.read(path)?, Vec::new()))
+    }
+
+    fn max_size(&self) -> u64 {
+        Limits::default().file
     }
 }
 

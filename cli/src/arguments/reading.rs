@@ -14,8 +14,10 @@ use tumble_formats::motion::Motion;
 use tumble_formats::npz::body_offsets;
 use tumble_formats::{Code, Diagnostic, FORMATS, Format, Limits, Loaded, ReadOptions};
 
-use crate::arguments::input::{clip_names, name, times};
+use crate::arguments::options::{AppliesTo, OPTIONS};
+use crate::arguments::time::times;
 use crate::messages::exit::{self, Failure};
+use crate::messages::names;
 
 /// How files are read. All of these options change results.
 #[derive(Debug, Clone, Args)]
@@ -220,37 +222,32 @@ impl ReadingArguments {
         })
     }
 
+    /// Whether the command line has an option for certain formats.
+    fn sets(&self, option: FormatOption) -> bool {
+        match option {
+            FormatOption::RawTimes => self.raw_times,
+            FormatOption::Duplicates => self.duplicates.is_some(),
+            FormatOption::SourceRate => self.source_fps.is_some(),
+            FormatOption::TimesApart => self.source_times.is_some(),
+            FormatOption::Map => self.map.is_some(),
+            FormatOption::TimeUnit => self.time_unit.is_some(),
+            FormatOption::BridgeGaps => self.bridge_gaps,
+            FormatOption::Keyframes => self.keyframes,
+            _ => false,
+        }
+    }
+
     /// Refuses options that have no effect on any of the inputs' formats.
     pub(crate) fn check<I: Iterator<Item = &'static Format>>(
         &self,
         formats: impl Fn() -> I,
     ) -> Result<(), String> {
-        for (name, is_set, option) in [
-            ("raw-times", self.raw_times, FormatOption::RawTimes),
-            (
-                "duplicates",
-                self.duplicates.is_some(),
-                FormatOption::Duplicates,
-            ),
-            (
-                "source-fps",
-                self.source_fps.is_some(),
-                FormatOption::SourceRate,
-            ),
-            (
-                "source-times",
-                self.source_times.is_some(),
-                FormatOption::TimesApart,
-            ),
-            ("map", self.map.is_some(), FormatOption::Map),
-            (
-                "time-unit",
-                self.time_unit.is_some(),
-                FormatOption::TimeUnit,
-            ),
-            ("bridge-gaps", self.bridge_gaps, FormatOption::BridgeGaps),
-            ("keyframes", self.keyframes, FormatOption::Keyframes),
-        ] {
+        for rule in OPTIONS {
+            let AppliesTo::Inputs(option) = rule.applies_to else {
+                continue;
+            };
+            let name = rule.name.replace('_', "-");
+            let is_set = self.sets(option);
             if is_set && !formats().any(|format| format.takes(option)) {
                 let all = FORMATS.iter().filter(|format| format.takes(option));
                 let all: Vec<&str> = all.map(|format| format.name).collect();
@@ -273,7 +270,7 @@ impl ReadingArguments {
             let offsets = times(file)?;
             for clip in &mut loaded.clips {
                 set_offsets(clip, &offsets).map_err(|error| {
-                    let message = format!("{}: {error}", name(path));
+                    let message = format!("{}: {error}", names::input(path));
                     let file = file.display().to_string();
                     Failure::input(&Diagnostic::new(file, Code::Offsets, message), "")
                 })?;
@@ -294,7 +291,7 @@ impl ReadingArguments {
         }
         if self.up.is_some() && loaded.box_length.is_some() {
             let message = "--up has no effect on a chain of boxes; leave it out";
-            return Err(Failure::usage(format!("{}: {message}", name(path))));
+            return Err(Failure::usage(format!("{}: {message}", names::input(path))));
         }
         if self.scale.is_some() || self.up.is_some() {
             let scale = match (self.scale, loaded.space) {
@@ -303,7 +300,7 @@ impl ReadingArguments {
                 (Some(ScaleArgument::Metres), Some(space)) => space.metres,
                 (Some(ScaleArgument::Metres), None) => {
                     let message = "does not state its unit of length; give --scale as a number";
-                    return Err(Failure::usage(format!("{}: {message}", name(path))));
+                    return Err(Failure::usage(format!("{}: {message}", names::input(path))));
                 }
             };
             let up = self.up.map(|up| match up {
@@ -311,7 +308,7 @@ impl ReadingArguments {
                 UpArgument::Z => UpAxis::Z,
             });
             adjust_all(loaded, scale, up).map_err(|error| {
-                Failure::new(exit::ALL_INPUTS, format!("{}: {error}", name(path)))
+                Failure::new(exit::ALL_INPUTS, format!("{}: {error}", names::input(path)))
             })?;
         }
         Ok(())
@@ -325,7 +322,7 @@ fn choose(loaded: &mut Loaded, requested: &str, path: &Path) -> Result<(), Failu
         .map(|clip| clip.index.to_string())
         .collect();
     if let [_, _, ..] = &*same {
-        let (name, indices) = (name(path), same.join(" and "));
+        let (name, indices) = (names::input(path), same.join(" and "));
         let message = format!(
             "{name}: has {} animations `{requested}`, at the indices {indices}; give the index",
             same.len()
@@ -337,7 +334,7 @@ fn choose(loaded: &mut Loaded, requested: &str, path: &Path) -> Result<(), Failu
         loaded.clips.iter().position(|clip| clip.index == index)
     });
     let Some(index) = found else {
-        let (name, names) = (name(path), clip_names(loaded));
+        let (name, names) = (names::input(path), names::clips(loaded));
         let message = format!("{name}: has no animation `{requested}`; it has {names}");
         return Err(Failure::new(exit::ALL_INPUTS, message));
     };

@@ -1,16 +1,17 @@
 //! `--fps`, `--times`, `--start`, `--end`: which samples to evaluate.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use tumble::{FrameRate, SampleTimes, TrackSet};
 use tumble_formats::motion::Motion;
+use tumble_formats::times::open_times;
 use tumble_formats::{Format, ReadOptions};
 
-use crate::arguments::input;
 use crate::arguments::tolerance::not_negative;
 use crate::batch::digest;
 use crate::messages::exit::{ALL_INPUTS, Failure};
+use crate::messages::names;
 use crate::messages::words;
 
 /// Broadcast rates are n × 1000/1001; written as decimals they drift by a frame in
@@ -139,7 +140,7 @@ impl AtKeysArguments {
             .map_err(|diagnostic| Failure::input(&diagnostic, ""))?;
         let [clip] = &loaded.clips[..] else {
             let message = "--at needs a file with a single animation";
-            return Err(Failure::usage(format!("{}: {message}", input::name(path))));
+            return Err(Failure::usage(format!("{}: {message}", names::input(path))));
         };
         Ok(Some(SampleRequest::Keys(KeyTimes {
             times: clip.key_times(),
@@ -153,13 +154,13 @@ impl AtKeysArguments {
 impl SamplingArguments {
     /// Whether the list of times comes from standard input.
     pub(crate) fn reads_standard_input(&self) -> bool {
-        self.times.as_deref().is_some_and(input::is_standard)
+        self.times.as_deref().is_some_and(names::is_standard)
     }
 
     /// Checks what can be checked without the tracks, and reads the list of times.
     pub(crate) fn samples(&self) -> Result<SampleRequest, Failure> {
         if let Some(path) = &self.times {
-            return Ok(SampleRequest::Times(input::times(path)?));
+            return Ok(SampleRequest::Times(times(path)?));
         }
         check_range(self.start, self.end)?;
         if let Some(meant) = broadcast_rate(self.fps) {
@@ -347,6 +348,11 @@ pub(crate) fn finite_seconds(text: &str) -> Result<f64, String> {
             "invalid time `{text}`: expected a finite number of seconds"
         )),
     }
+}
+
+/// Reads a list of times.
+pub(crate) fn times(path: &Path) -> Result<Vec<f64>, Failure> {
+    open_times(path).map_err(|diagnostic| Failure::input(&diagnostic, ""))
 }
 
 #[cfg(test)]

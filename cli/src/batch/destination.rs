@@ -6,14 +6,14 @@ use std::path::{Path, PathBuf};
 
 use tumble_formats::output::{Output, check_target};
 
-use crate::arguments::input;
 use crate::batch::digest::Digest;
 use crate::batch::stream::{FinishedStream, MeasuredProgress, OutputStream};
 use crate::messages::exit::{BROKEN_PIPE, Failure, OUTPUT};
+use crate::messages::names;
 use crate::messages::signals::{self, WritingGuard};
 
 /// The destination of one file.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct Destination {
     path: PathBuf,
     overwrite: bool,
@@ -53,7 +53,7 @@ impl WrittenFile {
 impl Destination {
     /// Checks everything that can be checked without writing.
     pub(crate) fn new(path: &Path, overwrite: bool, inputs: &[PathBuf]) -> Result<Self, Failure> {
-        if !input::is_standard(path) {
+        if !names::is_standard(path) {
             check_target(path, overwrite, inputs).map_err(|error| Failure::output(&error))?;
         }
         Ok(Self {
@@ -118,7 +118,7 @@ impl Destination {
     }
 
     pub(crate) fn is_standard(&self) -> bool {
-        input::is_standard(&self.path)
+        names::is_standard(&self.path)
     }
 
     /// Opens and drops the file: its directory may be read-only.

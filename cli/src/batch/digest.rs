@@ -8,8 +8,8 @@ use std::sync::OnceLock;
 use sha2::{Digest as _, Sha256};
 use tumble_formats::beneath::open_beneath;
 
-use crate::arguments::input;
 use crate::messages::exit::{ALL_INPUTS, Failure};
+use crate::messages::names;
 
 /// A hash that grows with the bytes.
 #[derive(Default)]
@@ -74,7 +74,7 @@ impl InputFile {
             return Ok(());
         }
         let message = "changed while it was read; read it again when its writer is done";
-        let name = input::name(&self.path);
+        let name = names::input(&self.path);
         Err(Failure::new(ALL_INPUTS, format!("{name}: {message}")))
     }
 }
@@ -85,7 +85,7 @@ struct Identity([i128; 6]);
 
 impl Identity {
     fn of(path: &Path) -> Option<Self> {
-        if input::is_standard(path) {
+        if names::is_standard(path) {
             return None;
         }
         let metadata = std::fs::metadata(path).ok()?;

@@ -1,11 +1,17 @@
 //! Results written to files: planned, hashed, written completely or not at all; and batches with a manifest.
 
+mod clip_files;
 pub(crate) mod destination;
 pub(crate) mod digest;
+pub(crate) mod entry;
 pub(crate) mod folder;
 pub(crate) mod manifest;
 pub(crate) mod output;
+pub(crate) mod output_plan;
+pub(crate) mod pipeline;
+pub(crate) mod result_format;
+pub(crate) mod result_names;
 pub(crate) mod room;
-pub(crate) mod run;
 pub(crate) mod shards;
 pub(crate) mod stream;
+pub(crate) mod target;

@@ -7,11 +7,12 @@ use clap::Args;
 use rayon::prelude::*;
 
 use crate::batch::digest;
-use crate::batch::manifest::{ManifestEntry, ManifestLines, NAME};
+use crate::batch::entry::{ManifestEntry, ManifestLines, NAME};
 use crate::batch::shards::merge::ShardProgress;
 use crate::batch::shards::plan::RecordedPlan;
 use crate::batch::shards::record;
 use crate::messages::exit::{ALL_INPUTS, DIFFERENCE, Failure};
+use crate::messages::listing;
 use crate::messages::progress::busy;
 use crate::messages::words;
 use crate::threads::on_threads;
@@ -105,7 +106,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         );
         return Err(Failure::new(DIFFERENCE, message));
     }
-    words::listing(&format!("{total}, every bit as written\n"))?;
+    listing::text(&format!("{total}, every bit as written\n"))?;
     match shards.map(|recorded| ShardProgress::of(folder, &recorded)) {
         None => Ok(()),
         Some(progress) => Err(Failure::new(DIFFERENCE, unmerged(folder, &progress))),

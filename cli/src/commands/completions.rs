@@ -4,7 +4,7 @@ use clap::{Args, CommandFactory};
 use clap_complete::Shell;
 
 use crate::messages::exit::Failure;
-use crate::messages::words;
+use crate::messages::listing;
 
 /// Print a completion script for a shell
 #[derive(Debug, Args)]
@@ -21,5 +21,5 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let mut script = Vec::new();
     let mut command = crate::Arguments::command();
     clap_complete::generate(arguments.shell, &mut command, "tumble", &mut script);
-    words::listing(&String::from_utf8_lossy(&script))
+    listing::text(&String::from_utf8_lossy(&script))
 }

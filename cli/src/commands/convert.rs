@@ -5,21 +5,21 @@ use std::time::Instant;
 
 use clap::Args;
 use tumble::{Device, Engine, EulerSequence};
+use tumble_formats::Feature;
 use tumble_formats::format::{Document, FormatOption, MotionOptions};
 use tumble_formats::keyed::{KeysError, keys_for};
 use tumble_formats::motion::{Motion, SampledClip};
 use tumble_formats::sample::Samples;
 use tumble_formats::trim::{TrimError, trim};
-use tumble_formats::{Feature, Loaded};
 
 use crate::arguments::command_line::CommandLine;
-use crate::arguments::input::{self, Inputs};
+use crate::arguments::input::Inputs;
 use crate::arguments::output::{OrderArgument, sequence};
-use crate::arguments::results::{ResultArguments, check_sequence, document_to_rewrite, each_file};
+use crate::arguments::results::{ResultArguments, check_sequence, document_to_rewrite};
 use crate::arguments::time::{check_range, finite_seconds};
 use crate::batch::destination::WrittenFile;
-use crate::batch::output::ResultTarget;
-use crate::batch::run::EvaluatedResult;
+use crate::batch::pipeline::{ClipWork, EvaluatedResult};
+use crate::batch::target::ResultTarget;
 use crate::messages::exit::{ALL_INPUTS, Failure};
 use crate::messages::words;
 
@@ -81,19 +81,13 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
     check_sequence(arguments.sequence, format)?;
     let options = format!("convert {}", arguments.command_line.options());
-    let results = &arguments.results;
-    results.make(
-        &arguments.inputs,
-        plan,
-        options,
-        |file, loaded, target, done| {
-            let path = file.path();
-            let convert = |name: &str, clips: &[&Motion], target: &ResultTarget| {
-                arguments.convert(name, (clips, loaded), target)
-            };
-            each_file(&input::name(path), (path, loaded), target, done, convert)
-        },
-    )
+    let reader = arguments.inputs.clone();
+    let mut pipeline = arguments.results.start(reader, plan, options);
+    while let Some(work) = pipeline.next_work() {
+        let converted = arguments.convert(&work);
+        pipeline.keep(&work, converted.map(|result| (result, ())));
+    }
+    pipeline.finish()
 }
 
 impl Arguments {
@@ -117,13 +111,10 @@ impl Arguments {
             .map_err(failed)
     }
 
-    fn convert(
-        &self,
-        name: &str,
-        (clips, loaded): (&[&Motion], &Loaded),
-        target: &ResultTarget,
-    ) -> Result<EvaluatedResult, Failure> {
+    fn convert(&self, work: &ClipWork) -> Result<EvaluatedResult, Failure> {
         let started = Instant::now();
+        let (name, clips, target) = (&*work.name, work.clips(), &work.target);
+        let loaded = &work.input.loaded;
         let document = document_to_rewrite(name, loaded, target, self.makes_new(target));
         let parts = clips.iter().map(|&clip| self.part(name, clip));
         let parts: Vec<Cow<'_, Motion>> = parts.collect::<Result<_, Failure>>()?;

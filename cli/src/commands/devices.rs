@@ -4,12 +4,14 @@ use std::fmt::Write;
 
 use clap::Args;
 use serde::Serialize;
-use tumble::{Device, DeviceInfo, Engine, EngineOptions, KernelCheck, SelfTestReport, VulkanError};
+use tumble::vulkan::{DeviceInfo, KernelCheck, SelfTestReport, VulkanError};
+use tumble::{Device, Engine, EngineOptions};
 
 use tumble_formats::printable::printable;
 
-use crate::commands::probe;
+use crate::drivers;
 use crate::messages::exit::Failure;
+use crate::messages::listing;
 use crate::messages::words;
 
 /// List the Vulkan devices and whether they give the CPU's bits
@@ -76,11 +78,11 @@ impl KernelSummary {
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let listing = Listing::new(probe::devices(), arguments.check);
+    let listing = Listing::new(drivers::devices(), arguments.check);
     if arguments.json {
-        words::json(&listing)
+        listing::json(&listing)
     } else {
-        words::listing(&listing.text())
+        listing::text(&listing.text())
     }
 }
 

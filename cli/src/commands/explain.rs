@@ -6,6 +6,7 @@ use clap::Args;
 use tumble_formats::Code;
 
 use crate::messages::exit::Failure;
+use crate::messages::listing;
 use crate::messages::words;
 
 /// Explain the code of an error or a warning about an input, such as E025
@@ -36,5 +37,5 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
             let _ = writeln!(text, "{code}: {}\n\n{}", code.title(), code.explanation());
         }
     }
-    words::listing(&text)
+    listing::text(&text)
 }

@@ -1,27 +1,26 @@
 //! `tumble follow`: bodies on paths.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Instant;
 
 use clap::{ArgAction, Args};
 use glam::Vec3;
-use tumble::{Engine, Error, Follow, FollowError, Followed, Layout, SampleTimes, TrackSet};
+use tumble::paths::{Follow, FollowError, Followed};
+use tumble::{Engine, Error, Layout, SampleTimes, TrackSet};
 use tumble_formats::motion::{Joint, Motion, SampledClip, Transform};
 use tumble_formats::poses::{Poses, WORLD};
 use tumble_formats::sample::Samples;
-use tumble_formats::{Limits, Loaded};
 
 use crate::arguments::command_line::CommandLine;
 use crate::arguments::device::{DeviceArguments, OpenedDevice};
 use crate::arguments::gather::GatheredInputs;
-use crate::arguments::input;
 use crate::arguments::path::PathArguments;
 use crate::arguments::results::ResultArguments;
 use crate::arguments::time::{SampleRequest, SamplingArguments};
 use crate::batch::destination::WrittenFile;
-use crate::batch::output::ResultTarget;
+use crate::batch::pipeline::{ClipWork, EvaluatedResult};
 use crate::batch::room;
-use crate::batch::run::EvaluatedResult;
+use crate::batch::target::ResultTarget;
 use crate::messages::exit::{ALL_INPUTS, Failure};
 use crate::messages::words;
 
@@ -71,26 +70,14 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let samples = arguments.sampling.samples()?;
     let plan = arguments.results.plan(&inputs)?;
     let mut device = arguments.device.open()?;
-    let read = |path: &Path| -> Result<Loaded, Failure> {
-        let paths = arguments.path.read(path)?;
-        Ok(Loaded::of(paths, Vec::new()))
-    };
     let options = arguments.options(&samples);
-    let results = &arguments.results;
-    let max_bytes = Limits::default().file;
-    results.make_of(
-        (read, max_bytes),
-        plan,
-        options,
-        |file, loaded, target, done| {
-            let path = file.path();
-            for clip in &loaded.clips {
-                let made = arguments.body(path, clip, &samples, target, &mut device)?;
-                done(target.name(), made)?;
-            }
-            Ok(())
-        },
-    )
+    let reader = arguments.path.clone();
+    let mut pipeline = arguments.results.start(reader, plan, options);
+    while let Some(work) = pipeline.next_work() {
+        let made = arguments.body(&work, &samples, &mut device);
+        pipeline.keep(&work, made.map(|result| (result, ())));
+    }
+    pipeline.finish()
 }
 
 impl Arguments {
@@ -103,25 +90,26 @@ impl Arguments {
     /// Evaluates and writes the bodies on the paths of one file.
     fn body(
         &self,
-        path: &Path,
-        paths: &Motion,
+        work: &ClipWork,
         samples: &SampleRequest,
-        target: &ResultTarget,
         device: &mut OpenedDevice,
     ) -> Result<EvaluatedResult, Failure> {
         let started = Instant::now();
-        let (name, set) = (input::name(path), &paths.set);
+        let [paths] = work.clips()[..] else {
+            unreachable!("all paths of a file are one clip");
+        };
+        let (name, set, target) = (&*work.name, &paths.set, &work.target);
         let [frame] = self.path.frames()[..] else {
             return Err(Failure::usage("give a single --frame"));
         };
-        let follow = self.path.follow(paths, &name, frame)?;
-        let frames = samples.of(set, &name);
-        let found = followed(device, &name, set, &follow, &frames)?;
-        let written = write(paths, &frames, samples, &found, target, &name)?;
+        let follow = self.path.follow(paths, name, frame)?;
+        let frames = samples.of(set, name);
+        let found = followed(device, name, set, &follow, &frames)?;
+        let written = write(paths, &frames, samples, &found, target, name)?;
         let message = format!(
             "{name}: {} × {}, {}, on {} in {} → {target}",
             words::count(set.track_count(), "track"),
-            words::count(found.rotations.samples(), "frame"),
+            words::count(found.rotations.sample_count(), "frame"),
             self.path.method(),
             device.label,
             words::duration(started.elapsed()),

@@ -16,6 +16,8 @@ use crate::arguments::input;
 use crate::arguments::input::Inputs;
 use crate::arguments::interpolation::curve_warning;
 use crate::messages::exit::{Failure, for_each};
+use crate::messages::listing;
+use crate::messages::names;
 use crate::messages::words;
 
 /// Steps that differ by less than this (relative) are even: decimal times are
@@ -94,10 +96,10 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let inputs = arguments.inputs.distinct(false)?;
     let outcome = for_each(&inputs, |path| {
         let loaded = arguments.inputs.load_quietly(path)?;
-        let name = input::name(path);
+        let name = names::input(path);
         let several = loaded.clips.len() + loaded.refused.len() > 1;
         for (index, clip) in loaded.clips.iter().enumerate() {
-            let animation = several.then(|| input::clip_name(clip));
+            let animation = several.then(|| names::clip(clip));
             let clip = arguments.inputs.tracks.select(clip, &name)?;
             let mut summary = Summary::new(name.clone(), animation, &clip, &loaded);
             // The warnings of the file are listed once.
@@ -121,10 +123,10 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         input::check_complete(&name, &loaded)
     });
     if arguments.json {
-        words::json(&summaries)?;
+        listing::json(&summaries)?;
     } else {
         let texts: Vec<String> = summaries.iter().map(Summary::text).collect();
-        words::listing(&texts.join("\n"))?;
+        listing::text(&texts.join("\n"))?;
     }
     outcome
 }

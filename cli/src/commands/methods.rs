@@ -6,7 +6,7 @@ use clap::Args;
 use tumble::METHODS;
 
 use crate::messages::exit::Failure;
-use crate::messages::words;
+use crate::messages::listing;
 
 /// List the methods of interpolation
 #[derive(Debug, Args)]
@@ -32,7 +32,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
                 "nanoseconds_a_rotation": method.cost.rotation,
             })
         });
-        return words::json(&methods);
+        return listing::json(&methods);
     }
     let width = METHODS
         .iter()
@@ -61,5 +61,5 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
             method.summary
         );
     }
-    words::listing(&text)
+    listing::text(&text)
 }

@@ -1,117 +1,17 @@
-//! A driver may end the process that loads it. So a child process loads them first.
-
-use std::ffi::OsString;
-use std::io::Read;
-use std::process::{Command, ExitStatus, Stdio};
-use std::sync::OnceLock;
-use std::time::{Duration, Instant};
+//! `tumble probe-drivers`, which is hidden: loads the Vulkan drivers for the process that starts it.
 
 use clap::Args;
-use tumble::{Device, VulkanError};
 
-use crate::host;
+use crate::drivers;
 use crate::messages::exit::Failure;
 
 /// Load the Vulkan drivers, and print nothing else
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {}
 
-/// The command's name.
-const COMMAND: &str = "probe-drivers";
-
-/// The output of a process that has loaded the drivers: one that a driver ended has not printed it.
-pub(crate) const LOADED: &str = "tumble: the Vulkan drivers are loaded";
-
-/// The most output that is read from it: as much as a pipe holds.
-const MAX_OUTPUT: u64 = 1 << 16;
-
-/// Seconds that drivers have to answer. Most take tens of milliseconds; cards without the persistence
-/// daemon, and machines with eight of them, take tens of seconds.
-const PATIENCE: u64 = 60;
-
-/// The environment variable that overrides it.
-const PATIENCE_VARIABLE: &str = "TUMBLE_DRIVER_SECONDS";
-
-fn patience() -> u64 {
-    let named = std::env::var(PATIENCE_VARIABLE).ok();
-    named
-        .and_then(|seconds| seconds.parse().ok())
-        .unwrap_or(PATIENCE)
-}
-
 pub(crate) fn run(_: &Arguments) -> Result<(), Failure> {
-    host::load_drivers();
+    drivers::load();
     Ok(())
-}
-
-/// Every Vulkan device, once a process has come through loading their drivers.
-pub(crate) fn devices() -> Result<Vec<Device>, VulkanError> {
-    drivers()?;
-    Device::list()
-}
-
-/// Whether a process comes through loading the drivers.
-pub(crate) fn drivers() -> Result<(), VulkanError> {
-    static OUTCOME: OnceLock<Result<(), VulkanError>> = OnceLock::new();
-    OUTCOME
-        .get_or_init(|| load_elsewhere(patience()).map_or(Ok(()), Err))
-        .clone()
-}
-
-/// The command of a front end whose executable is not this program.
-static OTHER_COMMAND: OnceLock<Vec<OsString>> = OnceLock::new();
-
-/// Sets the command that loads the drivers. Only the first call counts.
-pub(crate) fn set_command(command: Vec<OsString>) {
-    let _ = OTHER_COMMAND.set(command);
-}
-
-/// The command that loads the drivers.
-fn command() -> Option<Command> {
-    if let Some([program, arguments @ ..]) = OTHER_COMMAND.get().map(Vec::as_slice) {
-        let mut command = Command::new(program);
-        command.args(arguments);
-        return Some(command);
-    }
-    let mut command = Command::new(std::env::current_exe().ok()?);
-    command.arg(COMMAND);
-    Some(command)
-}
-
-/// The error of a process that did not come through.
-fn load_elsewhere(seconds: u64) -> Option<VulkanError> {
-    let mut child = command()?
-        .stdin(Stdio::null())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::null())
-        .spawn()
-        .ok()?; // without processes there is nothing to learn
-    let started = Instant::now();
-    loop {
-        match child.try_wait() {
-            Ok(Some(status)) => {
-                let mut said = String::new();
-                // A driver may have written much beside it, or left a process that holds the pipe open.
-                let out = child.stdout.take().map(|out| out.take(MAX_OUTPUT));
-                let _ = out.map(|mut out| out.read_to_string(&mut said));
-                return failure_of(status, said.contains(LOADED));
-            }
-            Ok(None) if started.elapsed() < Duration::from_secs(seconds) => {
-                std::thread::sleep(Duration::from_millis(1));
-            }
-            _ => {
-                let _ = child.kill();
-                let _ = child.wait();
-                return Some(VulkanError::SlowDriver { seconds });
-            }
-        }
-    }
-}
-
-/// `has_come_through`: a driver may end the process with any status, 0 too.
-fn failure_of(status: ExitStatus, has_come_through: bool) -> Option<VulkanError> {
-    let how = format!("the process that tried ended with {status}");
-    (!status.success() || !has_come_through).then_some(VulkanError::Driver { how })
 }
 
 #[cfg(test)]
@@ -121,7 +21,7 @@ mod tests {
     #[test]
     fn the_command_is_there_and_hidden() {
         let program = crate::Arguments::command();
-        let command = program.find_subcommand(super::COMMAND).unwrap();
+        let command = program.find_subcommand(crate::drivers::COMMAND).unwrap();
         assert!(command.is_hide_set());
     }
 }

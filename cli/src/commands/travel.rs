@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use glam::{DQuat, DVec3, Quat, Vec3, Vec4};
+use tumble::paths::PathFrame;
 use tumble::{Channel, Engine, Error, Interpolation, Method, SampleTimes, TrackSet};
 use tumble_formats::motion::Motion;
 use tumble_formats::path::looks_like_paths;
@@ -14,14 +15,14 @@ use tumble_formats::{Code, Diagnostic};
 use tumble_routes::mesh::Mesh;
 
 use crate::arguments::device::OpenedDevice;
-use crate::arguments::input;
-use crate::arguments::path::{FrameArgument, PathArguments};
+use crate::arguments::path::PathArguments;
 use crate::arguments::tracks::TrackArguments;
 use crate::batch::room;
 use crate::commands::follow::followed;
 use crate::commands::route::surface::Surface;
 use crate::messages::colours::{self, Colour};
 use crate::messages::exit::{ALL_INPUTS, Failure};
+use crate::messages::names;
 
 /// How many points a picture of a curve has, besides its keys.
 const CURVE_POINTS: usize = 600;
@@ -195,14 +196,14 @@ pub(crate) enum TravelSource {
 )]
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Maker {
-    Frame(FrameArgument),
+    Frame(PathFrame),
     Method(Interpolation),
 }
 
 impl Maker {
     pub(crate) fn colour(self) -> Colour {
         match self {
-            Self::Frame(frame) => frame.colour(),
+            Self::Frame(frame) => colours::of_frame(frame),
             Self::Method(interpolation) => colours::of_method(interpolation.method),
         }
     }
@@ -210,7 +211,7 @@ impl Maker {
 
 /// Whether a file is one of paths; standard input is not.
 pub(crate) fn is_path_file(path: &Path) -> bool {
-    !input::is_standard(path) && looks_like_paths(path)
+    !names::is_standard(path) && looks_like_paths(path)
 }
 
 /// Whether all joints of a clip are roots, and some of them move.
@@ -232,7 +233,7 @@ impl TravelSource {
         tracks: &TrackArguments,
     ) -> Result<Self, Failure> {
         let paths = arguments.read(path)?;
-        let paths = tracks.select(&paths, &input::name(path))?.into_owned();
+        let paths = tracks.select(&paths, &names::input(path))?.into_owned();
         Ok(Self::Paths(Box::new(paths), Box::new(arguments.clone())))
     }
 

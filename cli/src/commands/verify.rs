@@ -17,6 +17,8 @@ use crate::arguments::interpolation::{
 use crate::arguments::time::{SampleRequest, SamplingArguments};
 use crate::batch::room;
 use crate::messages::exit::{ALL_INPUTS, DIFFERENCE, Failure, NO_VULKAN, for_each};
+use crate::messages::listing;
+use crate::messages::names;
 use crate::messages::progress::Progress;
 use crate::messages::words;
 
@@ -87,12 +89,12 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let mut progress = Progress::new("verifying", steps);
     let mut lines = Vec::new();
     let outcome = for_each(&inputs, |path| {
-        let name = input::name(path);
+        let name = names::input(path);
         let loaded = progress.suspend(|| arguments.inputs.load(path))?;
         for clip in &loaded.clips {
             let name = match loaded.clips.len() {
                 1 => name.clone(),
-                _ => format!("{name} {}", input::clip_name(clip)),
+                _ => format!("{name} {}", names::clip(clip)),
             };
             let clip = arguments.inputs.tracks.select(clip, &name)?;
             let set = (&*name, &clip.set);
@@ -110,9 +112,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let is_failed = |line: &&VerificationLine| line.verdict == Verdict::Failed;
     let failing = lines.iter().filter(is_failed).count();
     if arguments.json {
-        words::json(&lines)?;
+        listing::json(&lines)?;
     } else {
-        words::listing(&report(&lines, &device))?;
+        listing::text(&report(&lines, &device))?;
     }
     if failing > 0 {
         let message = format!(

@@ -1,6 +1,7 @@
 //! Colours of methods, boxes and components: the same in plots, pages and pictures.
 //! The common ones are Okabe and Ito's, which people with any colour vision tell apart.
 
+use tumble::paths::PathFrame;
 use tumble::{METHODS, Method};
 
 /// Red, green, blue.
@@ -25,7 +26,7 @@ pub(crate) const COMPONENTS: [Colour; 4] = [INK, VERMILLION, GREEN, BLUE];
 pub(crate) const AXES: [Colour; 3] = [VERMILLION, GREEN, BLUE];
 
 /// Of minimal, fixed and Frenet's frames.
-pub(crate) const FRAMES: [Colour; 3] = [GREEN, BLUE, VERMILLION];
+const FRAMES: [Colour; 3] = [GREEN, BLUE, VERMILLION];
 
 /// Of the boxes of a chain, from the first on, and again.
 pub(crate) const BOXES: [Colour; 6] = [BLUE, ORANGE, GREEN, PINK, SKY, VERMILLION];
@@ -65,6 +66,11 @@ fn common(name: &str) -> Option<Colour> {
         "squad" => ORANGE,
         _ => return None,
     })
+}
+
+/// The colour of what a frame makes of a path.
+pub(crate) fn of_frame(frame: PathFrame) -> Colour {
+    FRAMES[frame as usize]
 }
 
 #[cfg(test)]

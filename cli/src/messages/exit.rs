@@ -2,7 +2,8 @@
 
 use std::io;
 
-use tumble::{Error, VulkanError};
+use tumble::Error;
+use tumble::vulkan::VulkanError;
 use tumble_formats::Diagnostic;
 use tumble_formats::output::OutputError;
 use tumble_formats::printable::printable;
@@ -135,6 +136,11 @@ impl Failure {
         Self::new(code, format!("{input}: {error}"))
     }
 
+    /// The request needs Vulkan, and there is none.
+    pub(crate) fn no_vulkan(error: &VulkanError) -> Self {
+        Self::new(NO_VULKAN, format!("no Vulkan device: {error}"))
+    }
+
     /// Its text, as [`Failure::report`] prints it.
     pub(crate) fn into_message(self) -> String {
         let lines = std::iter::once(&self.message).chain(&self.more);
@@ -186,50 +192,87 @@ fn is_of_one(error: &io::Error) -> bool {
     )
 }
 
-/// Runs `work` for every input. A failure is reported and the others go on, unless
-/// they would fail alike; a single input ends with its own exit code.
-pub(crate) fn for_each<T>(
-    inputs: &[T],
-    work: impl FnMut(&T) -> Result<(), Failure>,
-) -> Result<(), Failure> {
-    for_all(Vec::new(), inputs, work)
+/// The outcomes of a command's inputs. A failure is reported and the others go on, unless they would fail
+/// alike; a single input ends with its own exit code.
+pub(crate) struct Outcomes {
+    total: usize,
+    failed: usize,
+    /// Inputs of which some animations are done.
+    failed_in_part: usize,
+    /// The failure that ends the command.
+    end: Option<Failure>,
 }
 
-/// As [`for_each`], of inputs of which some have failed before.
-pub(crate) fn for_all<T>(
-    refused: Vec<Failure>,
-    inputs: &[T],
-    work: impl FnMut(&T) -> Result<(), Failure>,
-) -> Result<(), Failure> {
-    let total = refused.len() + inputs.len();
-    // An input of which some animations are done has not failed as a whole.
-    let (mut failed, mut partly) = (0, 0);
-    for outcome in (refused.into_iter().map(Err)).chain(inputs.iter().map(work)) {
+impl Outcomes {
+    /// Of a command with that many inputs.
+    pub(crate) fn of(total: usize) -> Self {
+        Self {
+            total,
+            failed: 0,
+            failed_in_part: 0,
+            end: None,
+        }
+    }
+
+    /// Whether the command ends before its other inputs.
+    pub(crate) fn is_ended(&self) -> bool {
+        self.end.is_some()
+    }
+
+    /// Ends the command.
+    pub(crate) fn end(&mut self, failure: Failure) {
+        self.end.get_or_insert(failure);
+    }
+
+    /// Adds the outcome of an input.
+    pub(crate) fn add(&mut self, outcome: Result<(), Failure>) {
         match outcome {
             Ok(()) => {}
-            Err(failure) if failure.is_final() || total == 1 => return Err(failure),
+            Err(failure) if failure.is_final() || self.total == 1 => self.end(failure),
             Err(failure) => {
                 failure.report();
                 match failure.code {
-                    SOME_INPUTS => partly += 1,
-                    _ => failed += 1,
+                    SOME_INPUTS => self.failed_in_part += 1,
+                    _ => self.failed += 1,
                 }
             }
         }
     }
-    match failed + partly {
-        0 => Ok(()),
-        _ if failed == total => Err(Failure::new(
-            ALL_INPUTS,
-            format!("all {failed} inputs failed"),
-        )),
-        _ => {
-            let partly = match partly {
-                0 => String::new(),
-                partly => format!(" (and {partly} in part)"),
-            };
-            let message = format!("{failed} of {total} inputs failed{partly}; the others are done");
-            Err(Failure::new(SOME_INPUTS, message))
+
+    /// The outcome of the command.
+    pub(crate) fn finish(self) -> Result<(), Failure> {
+        let (failed, total) = (self.failed, self.total);
+        match (self.end, failed + self.failed_in_part) {
+            (Some(failure), _) => Err(failure),
+            (None, 0) => Ok(()),
+            _ if failed == total => Err(Failure::new(
+                ALL_INPUTS,
+                format!("all {failed} inputs failed"),
+            )),
+            _ => {
+                let partly = match self.failed_in_part {
+                    0 => String::new(),
+                    partly => format!(" (and {partly} in part)"),
+                };
+                let message =
+                    format!("{failed} of {total} inputs failed{partly}; the others are done");
+                Err(Failure::new(SOME_INPUTS, message))
+            }
         }
     }
+}
+
+/// Runs `work` for every input, and adds up the outcomes as [`Outcomes`] does.
+pub(crate) fn for_each<T>(
+    inputs: &[T],
+    mut work: impl FnMut(&T) -> Result<(), Failure>,
+) -> Result<(), Failure> {
+    let mut outcomes = Outcomes::of(inputs.len());
+    for input in inputs {
+        outcomes.add(work(input));
+        if outcomes.is_ended() {
+            break;
+        }
+    }
+    outcomes.finish()
 }

@@ -2,6 +2,8 @@
 
 pub(crate) mod colours;
 pub(crate) mod exit;
+pub(crate) mod listing;
+pub(crate) mod names;
 pub(crate) mod progress;
 pub(crate) mod signals;
 pub(crate) mod words;

@@ -1,4 +1,4 @@
-//! Words for people, on standard error, and listings, on standard output.
+//! Words for people, on standard error.
 //!
 //! `anstream` drops the colours when the stream is no terminal or `NO_COLOR` is
 //! set. A standard error that is closed must not end the program, so what it
@@ -6,13 +6,11 @@
 
 use std::any::Any;
 use std::ffi::OsString;
-use std::io::{self, Write};
+use std::io::Write;
 use std::time::Duration;
 
 use tumble_formats::guarded::is_guarded;
-use tumble_formats::printable::{printable, printable_lines};
-
-use crate::messages::exit::Failure;
+use tumble_formats::printable::printable;
 
 pub(crate) fn error(message: &str) {
     let message = printable(message);
@@ -49,49 +47,6 @@ pub(crate) fn usage(error: &clap::Error, arguments: &[OsString]) {
         true => write!(anstream::stderr(), "{text}"),
         false => write!(anstream::stdout(), "{text}"),
     };
-}
-
-/// Writes a listing to standard output. Names in it went through [`printable`], so that none begins a
-/// line. A reader that has seen enough (`| head`) is no failure.
-pub(crate) fn listing(text: &str) -> Result<(), Failure> {
-    styled_listing(&printable_lines(text))
-}
-
-/// As [`listing`], with colours: of names that all went through [`printable`].
-pub(crate) fn styled_listing(text: &str) -> Result<(), Failure> {
-    let mut out = anstream::stdout().lock();
-    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
-        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
-            Err(Failure::writing("standard output", &error))
-        }
-        _ => Ok(()),
-    }
-}
-
-/// As [`listing`], for programs: pretty-printed JSON.
-pub(crate) fn json(value: &impl serde::Serialize) -> Result<(), Failure> {
-    let text =
-        serde_json::to_string_pretty(value).expect("names are strings and numbers are numbers");
-    styled_listing(&format!("{}\n", json_printable(&text)))
-}
-
-/// JSON with escapes for all characters that a terminal would obey: outside ASCII they stand in strings
-/// alone, and serde escapes the ASCII controls.
-fn json_printable(text: &str) -> String {
-    let mut shown = String::with_capacity(text.len());
-    for character in text.chars() {
-        let mut units = [0; 2];
-        if character == '\n'
-            || printable(character.encode_utf8(&mut [0; 4])).len() == character.len_utf8()
-        {
-            shown.push(character);
-        } else {
-            for unit in character.encode_utf16(&mut units) {
-                shown.push_str(&format!("\\u{unit:04x}"));
-            }
-        }
-    }
-    shown
 }
 
 /// The message of a panic, which is text unless a crate panics with another type.
@@ -214,22 +169,6 @@ pub(crate) fn parse_bytes(text: &str) -> Result<u64, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn json_says_the_same_without_what_a_terminal_obeys() {
-        let names = [
-            "plain ä",
-            "\u{9b}2J",
-            "\u{202e}x",
-            "a\u{e0041}",
-            "\x1b[1m\n",
-        ];
-        let text = json_printable(&serde_json::to_string_pretty(&names).unwrap());
-        assert_eq!(serde_json::from_str::<Vec<String>>(&text).unwrap(), names);
-        // A tag is two units of UTF-16; a line end has a shorter escape.
-        assert_eq!(text.matches("\\u").count(), 5, "{text}");
-        assert_eq!(printable_lines(&text), text);
-    }
 
     #[test]
     fn sizes_have_units() {

@@ -153,7 +153,9 @@ fn clips_and_streams_keep_to_the_memory_of_the_engine() {
                 Ok::<(), Error>(())
             };
             engine
-                .stream(&set, method, &frames, layout, 1 << 14, sink)
+                .request(&set, method, &frames)
+                .layout(layout)
+                .stream(1 << 14, sink)
                 .unwrap();
             count
         });

@@ -13,10 +13,9 @@ use crate::program::sample_folder;
 use crate::support::{dense_set, first_difference, hostile_set};
 use glam::Quat;
 use rayon::prelude::*;
-use tumble::{
-    Device, DeviceKind, Encoding, Engine, EngineOptions, Layout, Mapping, SampleTimes, Skeleton,
-    method,
-};
+use tumble::vulkan::DeviceKind;
+use tumble::vulkan::tuning::Mapping;
+use tumble::{Device, Encoding, Engine, EngineOptions, Layout, SampleTimes, Skeleton, method};
 
 /// The memory types of the loader's card, as it logs them.
 const DEVICE: &str = "memory 0";
@@ -92,13 +91,23 @@ fn card_work() {
             let kept = cpu.upload(&set, method).unwrap();
             for frames in &requests {
                 for layout in [Layout::TrackMajor, Layout::FrameMajor] {
-                    let expected = kept.evaluate_as(frames, layout).unwrap();
-                    let found = clip.evaluate_as(frames, layout).unwrap();
+                    let expected = kept.request(frames).layout(layout).evaluate().unwrap();
+                    let found = clip.request(frames).layout(layout).evaluate().unwrap();
                     assert_same(expected.as_quats(), found.as_quats(), method.name);
                     let encoded = memory == Some(300_000);
-                    for encoding in Encoding::KINDS.into_iter().filter(|_| encoded) {
-                        let expected = kept.evaluate_encoded(frames, layout, encoding).unwrap();
-                        let found = clip.evaluate_encoded(frames, layout, encoding).unwrap();
+                    for encoding in Encoding::ALL.into_iter().filter(|_| encoded) {
+                        let expected = kept
+                            .request(frames)
+                            .layout(layout)
+                            .encoding(encoding)
+                            .evaluate_bytes()
+                            .unwrap();
+                        let found = clip
+                            .request(frames)
+                            .layout(layout)
+                            .encoding(encoding)
+                            .evaluate_bytes()
+                            .unwrap();
                         assert!(expected == found, "{method}, {encoding:?}, {memory:?}");
                     }
                 }
@@ -119,7 +128,7 @@ fn card_work() {
         let of = |engine: &Engine| -> Vec<Quat> {
             let poses = engine.evaluate(&set, method::SLERP, &requests[0]).unwrap();
             let world = engine.world(&poses, &skeleton).unwrap();
-            let samples = 0..world.samples();
+            let samples = 0..world.sample_count();
             let all = samples.filter_map(|sample| world.rotation(39, sample));
             all.collect()
         };

@@ -8,10 +8,12 @@ use crate::faults::{DEVICE_LOST, OUT_OF_HOST_MEMORY, is_soaked};
 use crate::support::{dense_set, first_difference, hostile_set};
 use glam::{Quat, Vec3};
 use rayon::prelude::*;
+use tumble::crowd::{CrowdError, CrowdLibrary, CrowdValues};
+use tumble::vulkan::VulkanError;
+use tumble::vulkan::tuning::{ReadBack, Transfer, Uploads};
 use tumble::{
-    CrowdError, CrowdLibrary, CrowdValues, Device, Encoding, Engine, EngineOptions, Error, Layout,
-    ReadBack, SampleTimes, Skeleton, TrackSet, Transfer, Uploads, VectorMethod, VulkanError,
-    method,
+    Device, Encoding, Engine, EngineOptions, Error, Layout, SampleTimes, Skeleton, TrackSet,
+    VectorMethod, method,
 };
 
 /// Uses that the program has not: validation, staged results, poses.
@@ -88,11 +90,18 @@ fn library_work() {
         let set = hostile_set(2, 8);
         let clip = engine.upload(&set, method::C2)?;
         let frames = SampleTimes::fps(30).between(0.0, 5.0);
-        let poses = clip.evaluate_as(&frames, Layout::FrameMajor)?;
+        let poses = clip
+            .request(&frames)
+            .layout(Layout::FrameMajor)
+            .evaluate()?;
         engine.blend(&[(&poses, 0.5), (&poses, 1.0)])?;
         #[cfg(target_os = "linux")]
         {
-            let exported = clip.evaluate_exported(&frames, Layout::FrameMajor, Encoding::F32)?;
+            let exported = clip
+                .request(&frames)
+                .layout(Layout::FrameMajor)
+                .encoding(Encoding::F32)
+                .export()?;
             exported.wait()?;
             exported.memory_file()?;
         }

@@ -13,9 +13,12 @@ use crate::faults::on;
 use crate::program::{command, finish, sample_folder};
 use crate::support::{dense_set, first_difference, hostile_set};
 use glam::Quat;
+use tumble::crowd::{CrowdLibrary, CrowdValues};
+use tumble::vulkan::VulkanError;
+use tumble::vulkan::tuning::{Mapping, Reads, Transfer};
 use tumble::{
-    CrowdLibrary, CrowdValues, Device, Engine, EngineOptions, Error, Layout, Mapping, Reads,
-    SampleTimes, Skeleton, TrackSet, Transfer, VectorMethod, VulkanError, method,
+    Device, Engine, EngineOptions, Error, Layout, SampleTimes, Skeleton, TrackSet, VectorMethod,
+    method,
 };
 
 /// Catches an instance that does not ask for such devices, and a device that is opened without the word
@@ -278,7 +281,9 @@ fn borrowed() {
         let engine = application.try_engine(Mapping::Automatic)?;
         let set = hostile_set(2, 40);
         let clip = engine.upload(&set, method::C2)?;
-        clip.evaluate_as(&SampleTimes::fps(60).between(0.0, 9.0), Layout::FrameMajor)?;
+        clip.request(&SampleTimes::fps(60).between(0.0, 9.0))
+            .layout(Layout::FrameMajor)
+            .evaluate()?;
         Ok(())
     };
     let outcome = work();
@@ -319,9 +324,13 @@ fn bounded() {
         Layout::FrameMajor,
         method::BESSEL_OVERHAUSER,
     );
-    let expected = cpu.evaluate_as(&set, method, &frames, layout).unwrap();
+    let expected = cpu
+        .request(&set, method, &frames)
+        .layout(layout)
+        .evaluate()
+        .unwrap();
     let clip = engine.upload(&set, method).unwrap();
-    let found = clip.evaluate_as(&frames, layout).unwrap();
+    let found = clip.request(&frames).layout(layout).evaluate().unwrap();
     let difference = first_difference(expected.as_quats(), found.as_quats());
     assert_eq!(difference, None);
     let mut streamed: Vec<Quat> = Vec::new();
@@ -329,7 +338,10 @@ fn bounded() {
         streamed.extend(chunk.rotations().unwrap());
         Ok::<(), Error>(())
     };
-    let done = engine.stream(&set, method, &frames, layout, 1 << 14, sink);
+    let done = engine
+        .request(&set, method, &frames)
+        .layout(layout)
+        .stream(1 << 14, sink);
     done.unwrap();
     assert_eq!(first_difference(expected.as_quats(), &streamed), None);
 }

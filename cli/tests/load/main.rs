@@ -102,18 +102,13 @@ fn stream_all(
         let (mut hash, mut count) = (Hash::default(), 0usize);
         let started = Instant::now();
         engine
-            .stream(
-                set,
-                method,
-                frames,
-                Layout::TrackMajor,
-                1 << 20,
-                |chunk: Chunk<'_>| {
-                    hash.add(chunk.rotations().unwrap());
-                    count += chunk.rotations().unwrap().len();
-                    Ok::<(), Error>(())
-                },
-            )
+            .request(set, method, frames)
+            .layout(Layout::TrackMajor)
+            .stream(1 << 20, |chunk: Chunk<'_>| {
+                hash.add(chunk.rotations().unwrap());
+                count += chunk.rotations().unwrap().len();
+                Ok::<(), Error>(())
+            })
             .unwrap();
         println!(
             "{label}, {method}, {}: {:.1} M rotations in {:.2} s, peak {:.0} MB",
@@ -181,30 +176,24 @@ fn indices_beyond_32_bits() {
     let mut next = 0usize;
     let started = Instant::now();
     engine
-        .stream(
-            &set,
-            interpolation,
-            &frames,
-            Layout::TrackMajor,
-            1 << 20,
-            |chunk: Chunk<'_>| {
-                assert_eq!(chunk.start, next);
-                next += chunk.rotations().unwrap().len();
-                if chunk.start % (1 << 26) < 1 << 20 || chunk.start > 1 << 32 {
-                    // As asked for alone.
-                    let (track, sample) = (chunk.tracks.start, chunk.samples.start);
-                    let time = sample as f64 / f64::from(rate);
-                    let selected = set.select(track..track + 1)?;
-                    let alone =
-                        SampleTimes::rate(tumble::FrameRate::new(u64::from(rate), 1).unwrap());
-                    let alone =
-                        engine.evaluate(&selected, interpolation, &alone.between(time, time))?;
-                    let angle = alone.as_quats()[0].angle_between(chunk.rotations().unwrap()[0]);
-                    assert!(angle < 1e-3, "track {track}, sample {sample}: {angle}");
-                }
-                Ok::<(), Error>(())
-            },
-        )
+        .request(&set, interpolation, &frames)
+        .layout(Layout::TrackMajor)
+        .stream(1 << 20, |chunk: Chunk<'_>| {
+            assert_eq!(chunk.start, next);
+            next += chunk.rotations().unwrap().len();
+            if chunk.start % (1 << 26) < 1 << 20 || chunk.start > 1 << 32 {
+                // As asked for alone.
+                let (track, sample) = (chunk.tracks.start, chunk.samples.start);
+                let time = sample as f64 / f64::from(rate);
+                let selected = set.select(track..track + 1)?;
+                let alone = SampleTimes::rate(tumble::FrameRate::new(u64::from(rate), 1).unwrap());
+                let alone =
+                    engine.evaluate(&selected, interpolation, &alone.between(time, time))?;
+                let angle = alone.as_quats()[0].angle_between(chunk.rotations().unwrap()[0]);
+                assert!(angle < 1e-3, "track {track}, sample {sample}: {angle}");
+            }
+            Ok::<(), Error>(())
+        })
         .unwrap();
     assert!(next > 1 << 32, "{next}");
     println!(
@@ -220,13 +209,16 @@ fn indices_beyond_32_bits() {
         let frames = SampleTimes::fps(1_100_000); // 2 200 001 × 2048 = 4.5e9
         let (mut last, mut total) = (Hash::default(), 0usize);
         let started = Instant::now();
-        let stopped = clip.stream(&frames, Layout::FrameMajor, 1 << 20, |chunk: Chunk<'_>| {
-            total = chunk.start + chunk.rotations().unwrap().len();
-            if total > 1 << 32 {
-                last.add(chunk.rotations().unwrap());
-            }
-            Ok::<(), Error>(())
-        });
+        let stopped =
+            clip.request(&frames)
+                .layout(Layout::FrameMajor)
+                .stream(1 << 20, |chunk: Chunk<'_>| {
+                    total = chunk.start + chunk.rotations().unwrap().len();
+                    if total > 1 << 32 {
+                        last.add(chunk.rotations().unwrap());
+                    }
+                    Ok::<(), Error>(())
+                });
         stopped.unwrap();
         println!(
             "{total} rotations by frames, {}: {:.1} s, the last {} hash to {last:x?}",

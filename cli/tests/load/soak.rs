@@ -47,7 +47,11 @@ fn an_hour_of_the_same_work_leaves_nothing_behind() {
             let mut hash = Hash::default();
             for method in METHODS {
                 for layout in [Layout::TrackMajor, Layout::FrameMajor] {
-                    let rotations = engine.evaluate_as(&set, method, &frames, layout).unwrap();
+                    let rotations = engine
+                        .request(&set, method, &frames)
+                        .layout(layout)
+                        .evaluate()
+                        .unwrap();
                     hash.add(rotations.as_quats());
                 }
             }

@@ -266,7 +266,9 @@ impl Reduction<'_> {
         let frames = SampleTimes::at(self.times.clone());
         let found = self
             .engine
-            .evaluate_as(&one.set, method, &frames, Layout::TrackMajor)?;
+            .request(&one.set, method, &frames)
+            .layout(Layout::TrackMajor)
+            .evaluate()?;
         let quats = found.as_quats().iter();
         Ok(quats.map(|quat| quat.as_dquat().normalize()).collect())
     }

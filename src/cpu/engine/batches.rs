@@ -11,7 +11,7 @@ use crate::prepare::error::SetError;
 use crate::prepare::request::SetRequest;
 use crate::threads::stop;
 use crate::time::frames::Timeline;
-use crate::time::wrap::TrackCopy;
+use crate::time::track_copy::TrackCopy;
 use crate::tracks::set::TrackSet;
 
 /// A batch has at most as many tracks as make this many rotations. Where a set has too few tracks

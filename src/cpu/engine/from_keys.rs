@@ -6,7 +6,7 @@ use glam::Quat;
 use rayon::prelude::*;
 
 use crate::cpu::engine::batches::tasks;
-use crate::cpu::engine::sparse_samples::Group;
+use crate::cpu::engine::sparse_samples::{Group, intervals_of_frames};
 use crate::cpu::engine::{CpuEngine, TASK};
 use crate::cpu::streaming::RowOutput;
 use crate::from_keys::evaluate::KeyEvaluator;
@@ -15,9 +15,8 @@ use crate::prepare::batch::{Batch, BatchSize, PART_INTERVALS, batches};
 use crate::prepare::error::SetError;
 use crate::prepare::request::SetRequest;
 use crate::threads::stop;
-use crate::time::frame_clock::FrameClock;
 use crate::time::frames::Ticks;
-use crate::time::wrap::TrackCopy;
+use crate::time::track_copy::TrackCopy;
 
 /// Keys of one task.
 const TASK_KEYS: usize = 16 * 1024;
@@ -67,9 +66,6 @@ impl CpuEngine {
         })?
     }
 }
-
-/// Two unresolved intervals with at most this many others between them are prepared together.
-pub(crate) const APART: usize = 2;
 
 /// What is prepared together, with the samples of each group in the result.
 type FallbackBatch<'o> = Vec<(Group, &'o mut [[f32; 4]])>;
@@ -145,38 +141,4 @@ fn unresolved(
     let samples = (first..).zip(output);
     let samples = samples.filter(|(_, rotation)| **rotation == UNRESOLVED);
     intervals_of_frames(request, track, key, samples.map(|(sample, _)| sample))
-}
-
-/// The intervals of a track in which frames at a rate lie, which increase. `key` is the index of a key at or
-/// before all of those between keys.
-pub(crate) fn intervals_of_frames(
-    request: &SetRequest<'_>,
-    track: usize,
-    key: usize,
-    samples: impl Iterator<Item = usize>,
-) -> Vec<Group> {
-    let (times, _) = request.set.times_and_keys(track);
-    let last = times.len() - 1;
-    let mut all = Vec::new();
-    let Ticks::Frames { rate, start } = request.timeline.ticks else {
-        return all; // explicit times have groups of their own
-    };
-    let clock = FrameClock::new(rate, start, request.interpolation.steps());
-    for sample in samples {
-        let time = request.timeline.time_at(track, sample);
-        let after = times.partition_point(|&key| key <= time);
-        let last_interval = last.saturating_sub(1);
-        let mut interval = after
-            .saturating_sub(1)
-            .clamp(key.min(last_interval), last_interval);
-        // A sample within rounding of a key is that key.
-        while interval + 1 < last && clock.first_frame(times[interval + 1]) <= sample as f64 {
-            interval += 1;
-        }
-        while interval > key && clock.first_frame(times[interval]) > sample as f64 {
-            interval -= 1;
-        }
-        Group::put(&mut all, interval, last, sample);
-    }
-    all
 }

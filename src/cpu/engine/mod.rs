@@ -11,9 +11,10 @@ use crate::cpu::streaming::RowOutput;
 use crate::prepare::clip_data::PartRef;
 use crate::shader::Form;
 use crate::simd::dispatch::VectorWidth;
-use crate::threads::{self, OutOfThreads, Threads};
-use crate::time::frames::{SampleTimesError, Timeline};
-use crate::time::wrap::TrackCopy;
+use crate::threads::{self, OutOfThreadsError, Threads};
+use crate::time::error::SampleTimesError;
+use crate::time::frames::Timeline;
+use crate::time::track_copy::TrackCopy;
 
 /// Rotations that one task evaluates: enough to make its cost small, few enough to
 /// share a short result among all threads.
@@ -38,7 +39,7 @@ impl CpuEngine {
         streaming_stores: Option<bool>,
         threads: Option<usize>,
         memory: Option<u64>,
-    ) -> Result<Self, OutOfThreads> {
+    ) -> Result<Self, OutOfThreadsError> {
         let private_threads = threads.map(|count| Threads::new(Some(count)));
         if let Some(threads) = &private_threads {
             threads.start()?;
@@ -66,7 +67,7 @@ impl CpuEngine {
     pub(crate) fn on_threads<R: Send>(
         &self,
         work: impl FnOnce() -> R + Send,
-    ) -> Result<R, OutOfThreads> {
+    ) -> Result<R, OutOfThreadsError> {
         match &self.private_threads {
             Some(threads) => threads.run(work),
             None => threads::on_threads(work),

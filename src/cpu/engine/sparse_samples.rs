@@ -6,19 +6,22 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use crate::cpu::engine::CpuEngine;
-use crate::cpu::engine::from_keys::{APART, intervals_of_frames};
 use crate::cpu::streaming::RowOutput;
 use crate::prepare::batch::PART_INTERVALS;
 use crate::prepare::error::SetError;
 use crate::prepare::preparation::Preparation;
 use crate::prepare::request::SetRequest;
 use crate::threads::stop;
+use crate::time::frame_clock::FrameClock;
 use crate::time::frames::{Ticks, Timeline};
 use crate::time::times::interval_at;
-use crate::time::wrap::TrackCopy;
+use crate::time::track_copy::TrackCopy;
 
 /// Samples of one task: enough to fill the blocks of intervals that are prepared in lanes.
 const TASK_SAMPLES: usize = 512;
+
+/// Two intervals with samples with at most this many others between them are prepared together.
+pub(crate) const APART: usize = 2;
 
 /// Consecutive samples, and the key intervals of a track in which they lie.
 pub(crate) struct Group {
@@ -178,4 +181,38 @@ impl Group {
             }),
         }
     }
+}
+
+/// The intervals of a track in which frames at a rate lie, which increase. `key` is the index of a key at or
+/// before all of those between keys.
+pub(crate) fn intervals_of_frames(
+    request: &SetRequest<'_>,
+    track: usize,
+    key: usize,
+    samples: impl Iterator<Item = usize>,
+) -> Vec<Group> {
+    let (times, _) = request.set.times_and_keys(track);
+    let last = times.len() - 1;
+    let mut all = Vec::new();
+    let Ticks::Frames { rate, start } = request.timeline.ticks else {
+        return all; // explicit times have groups of their own
+    };
+    let clock = FrameClock::new(rate, start, request.interpolation.steps());
+    for sample in samples {
+        let time = request.timeline.time_at(track, sample);
+        let after = times.partition_point(|&key| key <= time);
+        let last_interval = last.saturating_sub(1);
+        let mut interval = after
+            .saturating_sub(1)
+            .clamp(key.min(last_interval), last_interval);
+        // A sample within rounding of a key is that key.
+        while interval + 1 < last && clock.first_frame(times[interval + 1]) <= sample as f64 {
+            interval += 1;
+        }
+        while interval > key && clock.first_frame(times[interval]) > sample as f64 {
+            interval -= 1;
+        }
+        Group::put(&mut all, interval, last, sample);
+    }
+    all
 }

@@ -18,7 +18,7 @@ use crate::gpu::crowd::{CrowdReader, CrowdTables, DeviceCrowd};
 use crate::memory::zeroed;
 use crate::output::crowd::{CrowdOutput, CrowdValues};
 use crate::shader::{CrowdDispatch, CrowdEntry, CrowdLink};
-use crate::threads::OutOfThreads;
+use crate::threads::OutOfThreadsError;
 use crate::twin::crowd_layers::Layers;
 use crate::twin::crowd_matrices::to_any_half;
 
@@ -60,7 +60,7 @@ impl Engine {
         instances: usize,
         layers: usize,
     ) -> Result<Crowd, CrowdError> {
-        if library.clips() == 0 {
+        if library.clip_count() == 0 {
             return Err(CrowdError::NoClips);
         }
         if !(1..=MAX_INSTANCES).contains(&instances) {
@@ -107,7 +107,7 @@ impl Crowd {
             parent: level[1],
         }));
         let tables = CrowdTables {
-            instances: self.instances() as u32,
+            instances: self.instance_count() as u32,
             levels: library.levels.clone(),
             only_arcs: clip_tables.has_only_arcs(),
             arguments: self.arguments,
@@ -124,13 +124,13 @@ impl Crowd {
 
     /// Number of instances.
     #[must_use]
-    pub fn instances(&self) -> usize {
-        self.instances.entries.len() / self.layers()
+    pub fn instance_count(&self) -> usize {
+        self.instances.entries.len() / self.layer_count()
     }
 
     /// Layers of an instance.
     #[must_use]
-    pub fn layers(&self) -> usize {
+    pub fn layer_count(&self) -> usize {
         self.arguments.layers as usize
     }
 
@@ -183,7 +183,7 @@ impl Crowd {
         plays: CrowdLayer,
     ) -> Result<(usize, CrowdEntry), CrowdError> {
         let index = self.entry_index(instance, layer)?;
-        let (clips, masks) = (&self.library.tables.clips, self.library.masks());
+        let (clips, masks) = (&self.library.tables.clips, self.library.mask_count());
         let weight = if layer == 0 { 1.0 } else { plays.weight };
         let entry = CrowdLayer { weight, ..plays }.packed(clips, masks, self.clock())?;
         Ok((index, entry))
@@ -212,8 +212,8 @@ impl Crowd {
 
     fn entry_index(&self, instance: usize, layer: usize) -> Result<usize, CrowdError> {
         for (subject, index, count) in [
-            ("instance", instance, self.instances()),
-            ("layer", layer, self.layers()),
+            ("instance", instance, self.instance_count()),
+            ("layer", layer, self.layer_count()),
         ] {
             if index >= count {
                 return Err(CrowdError::Missing {
@@ -223,13 +223,13 @@ impl Crowd {
                 });
             }
         }
-        Ok(instance * self.layers() + layer)
+        Ok(instance * self.layer_count() + layer)
     }
 
     /// Vectors of four numbers of a result, `[instance][joint]`.
     #[must_use]
     pub fn output_len(&self, output: impl Into<CrowdOutput>) -> usize {
-        self.instances() * self.library.joints() * output.into().vectors()
+        self.instance_count() * self.library.joint_count() * output.into().vector_count()
     }
 
     /// Evaluates all instances at the clock's time, `[instance][joint]`: a rotation, or the three rows
@@ -385,7 +385,7 @@ impl Crowd {
         }
     }
 
-    fn on_cpu(&self, values: CrowdValues, output: &mut [[f32; 4]]) -> Result<(), OutOfThreads> {
+    fn on_cpu(&self, values: CrowdValues, output: &mut [[f32; 4]]) -> Result<(), OutOfThreadsError> {
         let arguments = &self.arguments;
         let scene = CrowdScene {
             library: &self.library,
@@ -425,7 +425,7 @@ impl Crowd {
             let seconds = rounded_ticks / f64::from(self.library.ticks_per_second());
             return Err(CrowdError::Seconds { seconds });
         }
-        let (clips, masks) = (&self.library.tables.clips, self.library.masks());
+        let (clips, masks) = (&self.library.tables.clips, self.library.mask_count());
         self.instances.set_clock(ticks, clips, masks);
         Ok(())
     }
@@ -467,8 +467,8 @@ impl std::fmt::Debug for Crowd {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("Crowd")
             .field("engine", &self.engine)
-            .field("instances", &self.instances())
-            .field("layers", &self.layers())
+            .field("instances", &self.instance_count())
+            .field("layers", &self.layer_count())
             .field("clock", &self.clock())
             .finish_non_exhaustive()
     }

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use crate::curve::formula::{FormulaNumbers, RotationVector, RotationVectorNumbers};
 use crate::curve::options::{Axes, Quantity};
+use crate::fit::block::Intervals;
 use crate::fit::exact::shape::Shape;
 use crate::fit::motion::arc_length::ArcLengths;
 use crate::fit::motion::derivatives;
@@ -99,6 +100,17 @@ impl IntervalCurve {
         }
     }
 
+    /// The whole curve in a lane of a block.
+    pub(crate) fn of_interval(
+        intervals: &Intervals,
+        lane: usize,
+        shape: &'static Shape,
+        quantity: Quantity,
+    ) -> Self {
+        let numbers = shape.curve_numbers(|i| intervals.numbers[i][lane]);
+        Self::new(shape, numbers, quantity, intervals.rate(lane))
+    }
+
     /// The value of the curve's quantity at `t`, which runs from 0 to 1 over its piece.
     pub(crate) fn value(&self, t: f64) -> Quaternion {
         let (start, width) = self.piece.extent();
@@ -109,7 +121,7 @@ impl IntervalCurve {
     pub(crate) fn value_at(&self, t: f64) -> Quaternion {
         if self.quantity != Quantity::Rotation || self.arc_lengths.is_some() {
             let parameter = match &self.arc_lengths {
-                Some(arc_lengths) => arc_lengths.parameter(self, t),
+                Some(arc_lengths) => arc_lengths.parameter(&|u| self.moving(u), t),
                 None => Dual::parameter(t),
             };
             let rotation = self.moving(parameter);

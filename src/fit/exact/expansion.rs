@@ -11,7 +11,8 @@ use crate::math::quaternion::{
 };
 use crate::math::ranges::{LONG_WAVES, SHORT_WAVES};
 use crate::shader::PolynomialSegment;
-use crate::simd::lanes::{Doubles, Lanes, MAX_LANES};
+use crate::simd::doubles::Doubles;
+use crate::simd::lanes::{Lanes, MAX_LANES};
 use crate::twin::sine_cosine::{sine_cosm1, sine_cosm1_quarter};
 use crate::twin::small_angle::{FromIdentity, inverse_rotated};
 

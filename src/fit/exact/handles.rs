@@ -10,7 +10,8 @@ use crate::fit::block::{
 use crate::math::quaternion::{self, Real, Vector, normalised, product, scaled, sum};
 use crate::math::ranges::{Algebra, FullRange, PrincipalRange};
 use crate::simd::dispatch::InLanes;
-use crate::simd::lanes::{Doubles, Lanes, MAX_LANES};
+use crate::simd::doubles::Doubles;
+use crate::simd::lanes::{Lanes, MAX_LANES};
 use crate::time::frame_clock::FrameClock;
 
 /// Computes the steps between keys, and their logarithms.

@@ -17,7 +17,8 @@ use crate::math::dual::{Dual, Near};
 use crate::math::quaternion::{Quaternion, Real};
 use crate::shader::{POWERS, PolynomialSegment};
 use crate::simd::dispatch::{InLanes, in_lanes};
-use crate::simd::lanes::{Doubles, Lanes, MAX_LANES};
+use crate::simd::doubles::Doubles;
+use crate::simd::lanes::{Lanes, MAX_LANES};
 
 /// A formula, and how its curves are sampled.
 #[derive(Debug)]

@@ -10,7 +10,6 @@ use bytemuck::Zeroable;
 
 use crate::fit::block::{Intervals, ROW_LEN, rounded, squared_extent, widened};
 use crate::fit::fast::exp_log::{LOG, LONG_LOG, RowF32, load3, log, long_exp, medium_exp, store};
-use crate::fit::fast::long_tangents::AT_ONCE;
 use crate::fit::tangent_weights::KeyWeights;
 use crate::math::quaternion::{self, Real as _, dot, minus, product, scaled, square, sum};
 use crate::math::ranges::{MEDIUM_WAVES, one_plus};
@@ -111,6 +110,9 @@ impl InLanes for FindSteps<'_> {
         }
     }
 }
+
+/// The number of keys with long tangents that are computed together; a block has few of them.
+pub(crate) const AT_ONCE: usize = 8;
 
 /// Finds the handles of the keys between intervals, and the curves between handles.
 pub(crate) struct FindCurves<'a> {

@@ -5,14 +5,11 @@ use std::marker::PhantomData;
 
 use crate::fit::block::{Intervals, at, put};
 use crate::fit::exact::handles::{HandlePair, HandleRule, KeyInterval};
-use crate::fit::fast::handles::HandlesF32;
+use crate::fit::fast::handles::{AT_ONCE, HandlesF32};
 use crate::math::quaternion::{log, normalised, step};
 use crate::math::ranges::FullRange;
 use crate::simd::dispatch::{InLanes, in_lanes};
 use crate::simd::lanes::Lanes;
-
-/// The number of keys computed together; a block has few of them.
-pub(crate) const AT_ONCE: usize = 8;
 
 /// One number for each key.
 type KeyRow = [f64; AT_ONCE];

@@ -1,6 +1,5 @@
 //! Arc length of curves, by which they are traversed at constant speed.
 
-use crate::fit::exact::curve::IntervalCurve;
 use crate::math::dual::Dual;
 use crate::math::quadrature::{gauss, integral};
 use crate::math::quaternion::{length, step};
@@ -19,6 +18,11 @@ const NEXT_TO_REST: f64 = 1e-5;
 /// How far outside its interval a curve is followed at most, in parts of the interval.
 const FARTHEST_OUTSIDE: f64 = 0.25;
 
+/// A curve: its rotation as a function of the parameter, in dual numbers.
+pub(crate) trait Moving: Fn(Dual) -> [Dual; 4] {}
+
+impl<F: Fn(Dual) -> [Dual; 4]> Moving for F {}
+
 /// How far a curve has turned at each eighth of its parameter, radians.
 #[derive(Debug)]
 pub(crate) struct ArcLengths {
@@ -29,7 +33,7 @@ pub(crate) struct ArcLengths {
 }
 
 impl ArcLengths {
-    pub(crate) fn new(curve: &IntervalCurve) -> Self {
+    pub(crate) fn new(curve: &impl Moving) -> Self {
         let mut lengths = [0.0; PARTS + 1];
         for part in 0..PARTS {
             let [from, to] = [part, part + 1].map(|part| part as f64 / PARTS as f64);
@@ -53,7 +57,7 @@ impl ArcLengths {
 
     /// The curve's own parameter at `t`, which runs from 0 to 1 over the interval, with the first two
     /// derivatives by `t`.
-    pub(crate) fn parameter(&self, curve: &IntervalCurve, t: f64) -> Dual {
+    pub(crate) fn parameter(&self, curve: &impl Moving, t: f64) -> Dual {
         let [from, to] = self.ends;
         let mut u = self.parameter_at(curve, (from + (to - from) * t) * self.total());
         let (mut velocity, mut acceleration) = rates(curve, u);
@@ -71,7 +75,7 @@ impl ArcLengths {
 
     /// The parameter where the curve has turned by `target` radians: Newton's method, or bisection
     /// where that leaves the part which contains it.
-    fn parameter_at(&self, curve: &IntervalCurve, target: f64) -> f64 {
+    fn parameter_at(&self, curve: &impl Moving, target: f64) -> f64 {
         let part = self.lengths.partition_point(|&length| length <= target);
         let part = part.saturating_sub(1).min(PARTS - 1);
         let [mut low, mut high] = [part, part + 1].map(|part| part as f64 / PARTS as f64);
@@ -117,7 +121,7 @@ impl ArcLengths {
 }
 
 /// The arc length between two parameters, radians.
-fn arc_length_between(curve: &IntervalCurve, from: f64, to: f64) -> f64 {
+fn arc_length_between(curve: &impl Moving, from: f64, to: f64) -> f64 {
     let differ = |whole: f64, sum: f64| {
         let agree = (sum - whole).abs() <= 1e-13 * (1.0 + sum);
         !agree
@@ -129,13 +133,13 @@ fn arc_length_between(curve: &IntervalCurve, from: f64, to: f64) -> f64 {
 const FINEST: u32 = 8;
 
 /// The angular speed by the parameter.
-fn speed(curve: &IntervalCurve) -> impl Fn(f64) -> f64 {
+fn speed(curve: &impl Moving) -> impl Fn(f64) -> f64 {
     move |u| length(rates(curve, u).0)
 }
 
 /// Angular velocity and acceleration at `u`, per unit of the parameter.
-fn rates(curve: &IntervalCurve, u: f64) -> ([f64; 3], [f64; 3]) {
-    let rotation = curve.moving(Dual::parameter(u));
+fn rates(curve: &impl Moving, u: f64) -> ([f64; 3], [f64; 3]) {
+    let rotation = curve(Dual::parameter(u));
     let at = rotation.map(|dual| dual.value);
     let twice = |derivative: [f64; 4]| {
         let [x, y, z, _] = step(at, derivative);

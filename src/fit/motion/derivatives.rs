@@ -13,7 +13,8 @@ use crate::math::canonical::power_of_two;
 use crate::math::dual::Dual;
 use crate::math::quaternion::{FullRange as _, Real, rotated, step};
 use crate::shader::{POWERS, PolynomialSegment};
-use crate::simd::lanes::{Doubles as _, Lanes, MAX_LANES};
+use crate::simd::doubles::Doubles as _;
+use crate::simd::lanes::{Lanes, MAX_LANES};
 
 /// The quantity asked for, from a rotation and its derivatives by the parameter; `rate` is the
 /// parameter's change per second. The result is a quaternion, or a vector with 0 in the place of w.

@@ -21,17 +21,19 @@ use crate::gpu::engine::from_keys::KeyUploads;
 use crate::gpu::error::{EvaluateError, VulkanError};
 use crate::gpu::exclusive::Exclusive;
 use crate::gpu::handles::VulkanHandles;
-use crate::gpu::in_flight::{InFlight, Target, copy};
+use crate::gpu::in_flight::{InFlight, Target};
 use crate::gpu::instance::Instance;
-use crate::gpu::kept_lists::ListCache;
+use crate::gpu::job::{ClipBuffers, Job};
 use crate::gpu::kernel_check::passes::{KernelPass, Passes};
 use crate::gpu::kernel_check::{self, KernelCheck};
 use crate::gpu::options::{EngineOptions, Timings, Transfer};
 use crate::gpu::physical::PhysicalDevice;
+use crate::gpu::physical::upload_memory::KernelReads;
 use crate::gpu::pipeline::{Exactness, Pipeline};
-use crate::gpu::submission::{Access, Binding, Submission};
-use crate::gpu::upload::{KernelReads, writable};
-use crate::gpu::work_list::{GroupItems, WorkLists};
+use crate::gpu::run_once::run_once;
+use crate::gpu::submission::{Access, Submission};
+use crate::gpu::upload::writable;
+use crate::gpu::work_list::{ListRequest, WorkLists};
 use crate::output::buffer::OutputBuffer;
 use crate::output::encoding::Encoding;
 use crate::output::rotations::{Layout, Storage};
@@ -39,8 +41,7 @@ use crate::output::window::Window;
 use crate::prepare::clip_data::ClipData;
 use crate::shader::spirv::FloatControls;
 use crate::shader::{Item, KERNELS, Kernel, KernelCode, List, PoseDispatch};
-use crate::threads::lock;
-use crate::time::frames::Timeline;
+use crate::threads::{copy, lock};
 
 /// Rotations of one window, 32 MiB, unless the device's limits, the memory budget or the device's
 /// speed demand fewer.
@@ -77,51 +78,6 @@ pub(crate) struct VulkanEngine {
     allow_inexact: bool,
     free: FreeBuffers,
     pub(crate) timings: Mutex<Timings>,
-}
-
-/// The segments and constants of a clip, on the device.
-pub(crate) struct ClipBuffers {
-    device: Arc<LogicalDevice>,
-    /// The segments of each group, and its constants.
-    pub(crate) groups: Vec<(Buffer, Buffer)>,
-}
-
-/// What is to be evaluated, and how stored.
-#[derive(Clone, Copy)]
-pub(crate) struct Job<'a> {
-    pub(crate) clip: &'a ClipData,
-    pub(crate) buffers: &'a Arc<ClipBuffers>,
-    pub(crate) timeline: &'a Timeline,
-    pub(crate) encoding: Encoding,
-    /// The lists that the clip keeps on the device.
-    pub(crate) lists: &'a ListCache,
-}
-
-impl Job<'_> {
-    /// The kernel that evaluates what is listed.
-    pub(crate) fn kernel(&self, list: List) -> Kernel {
-        let form = self.clip.interpolation.form();
-        Kernel::over_segments(form, list, self.encoding.row().store)
-    }
-
-    /// What it binds for a group.
-    pub(crate) fn bindings(
-        &self,
-        group: &GroupItems,
-        listed: &[Binding],
-        result: Binding,
-    ) -> Vec<Binding> {
-        let (segments, constants) = &self.buffers.groups[group.group];
-        let mut all = vec![Binding::whole(segments), Binding::whole(constants)];
-        all.extend(listed);
-        all.push(result);
-        all
-    }
-
-    /// All of the result.
-    pub(crate) fn whole(&self, layout: Layout) -> Window {
-        Window::whole(self.clip.track_count(), self.timeline.len(), layout)
-    }
 }
 
 impl VulkanEngine {
@@ -348,6 +304,16 @@ impl VulkanEngine {
         Ok(ClipBuffers { device, groups })
     }
 
+    /// What is listed for a job.
+    pub(crate) fn list_request<'a>(&'a self, job: Job<'a>) -> ListRequest<'a> {
+        ListRequest {
+            device: &self.device,
+            maps_samples: self.maps_samples,
+            clip: job.clip,
+            timeline: job.timeline,
+        }
+    }
+
     /// Refuses what is longer than a kernel can bind.
     pub(crate) fn check_size(
         &self,
@@ -504,7 +470,7 @@ impl VulkanEngine {
         let [count, detail] = [count as u32, detail as u32];
         let (pipeline, groups) = (self.pipeline(kernel)?, self.workgroups(count));
         let pass = PoseDispatch { count, detail };
-        pipeline.run_once(inputs, bytemuck::bytes_of(&pass), groups, output)
+        run_once(&pipeline, inputs, bytemuck::bytes_of(&pass), groups, output)
     }
 
     /// Copies a table of a crowd's library to the device.

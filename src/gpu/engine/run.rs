@@ -7,11 +7,12 @@ use std::sync::atomic::Ordering;
 use std::time::Instant;
 
 use crate::gpu::device::QueueLane;
-use crate::gpu::engine::{Job, VulkanEngine};
+use crate::gpu::engine::VulkanEngine;
 use crate::gpu::error::{EvaluateError, VulkanError};
 use crate::gpu::exclusive::Exclusive;
 use crate::gpu::handles::VulkanBuffer;
 use crate::gpu::in_flight::{Finish, InFlight, KeptAlive, Stopwatch, Target};
+use crate::gpu::job::Job;
 use crate::gpu::kept_lists::KeptLists;
 use crate::gpu::submission::{Access, Binding, Submission};
 use crate::gpu::upload::Upload;
@@ -70,7 +71,7 @@ impl VulkanEngine {
     ) -> Result<(), EvaluateError> {
         if let Some(values_per_window) = self.at_once()
             && self.binds_at_once(job, window)
-            && let Some(kept) = job.lists.lists(self, job, window, values_per_window)?
+            && let Some(kept) = self.kept_lists(job, window, values_per_window)?
         {
             return self.run_kept(job, &kept, &buffer);
         }
@@ -83,7 +84,20 @@ impl VulkanEngine {
         job: Job<'_>,
         window: &Window,
     ) -> Result<Option<Arc<KeptLists>>, EvaluateError> {
-        (job.lists).lists(self, job, window, self.window_of(job.encoding))
+        self.kept_lists(job, window, self.window_of(job.encoding))
+    }
+
+    /// The lists that a clip keeps of a result, in windows of so many values; none under a memory budget.
+    fn kept_lists(
+        &self,
+        job: Job<'_>,
+        whole: &Window,
+        values_per_window: usize,
+    ) -> Result<Option<Arc<KeptLists>>, EvaluateError> {
+        if self.clip_bytes.is_some() {
+            return Ok(None);
+        }
+        (job.lists).lists(self.list_request(job), whole, values_per_window)
     }
 
     /// Evaluates a window of a result, cut into smaller windows that suit the device.
@@ -115,7 +129,7 @@ impl VulkanEngine {
         window: &Window,
         target: &Target<'_>,
     ) -> Result<(), EvaluateError> {
-        let (clip, encoding) = (job.clip, job.encoding);
+        let encoding = job.encoding;
         let rotation = encoding.bytes();
         let bytes = window.start * rotation..(window.start + window.len()) * rotation;
         let destination = target.destination();
@@ -144,7 +158,7 @@ impl VulkanEngine {
             }
             None => {
                 let lists = &mut flight.uploads;
-                let list = || lists.list(self, clip, job.timeline, window);
+                let list = || lists.list(self.list_request(job), window);
                 fresh = on_threads(list)??;
                 kernels.begin(fresh.groups.len() as u32)?;
                 let uploads = lists.uploads(fresh.list);

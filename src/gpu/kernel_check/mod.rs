@@ -7,13 +7,14 @@ pub(crate) mod passes;
 mod poses;
 pub(crate) mod random;
 mod segments;
+pub(crate) mod self_test;
 
 use bytemuck::NoUninit;
 
 use crate::gpu::error::VulkanError;
 use crate::gpu::pipeline::Pipeline;
 pub(crate) use crate::gpu::reports::KernelCheck;
-use crate::gpu::self_test;
+use crate::gpu::run_once::run_on;
 use crate::shader::Kernel;
 
 #[cfg(test)]
@@ -74,7 +75,7 @@ impl Trial {
         found.resize(expected.len(), UNTOUCHED);
         let inputs: Vec<&[u8]> = self.inputs.iter().map(Vec::as_slice).collect();
         let output = bytemuck::cast_slice_mut(&mut found);
-        pipeline.run_on(&inputs, &self.arguments, self.groups, output)?;
+        run_on(pipeline, &inputs, &self.arguments, self.groups, output)?;
         let pairs = found.iter().zip(&expected);
         Ok(pairs.filter(|(found, expected)| found != expected).count())
     }

@@ -4,7 +4,9 @@
 pub(crate) mod cards;
 #[cfg(feature = "prove")]
 pub(crate) mod details;
+pub(crate) mod external;
 pub(crate) mod queues;
+pub(crate) mod upload_memory;
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -15,8 +17,8 @@ use crate::gpu::error::{Named, VulkanError};
 use crate::gpu::instance::{self, Instance};
 use crate::gpu::options::{EngineOptions, Mapping, Reads, Transfer};
 use crate::gpu::physical::queues::{Copies, check_family, compute_family, copies};
+use crate::gpu::physical::upload_memory::is_unified;
 pub(crate) use crate::gpu::reports::{DeviceInfo, DeviceKind};
-use crate::gpu::upload::is_unified;
 use crate::shader::spirv::FloatControls;
 
 /// Bytes of one texel of the texel buffers that kernels read.

@@ -3,15 +3,17 @@
 pub(crate) mod grid;
 pub(crate) mod sample_list;
 
+use std::sync::Arc;
+
 use ash::vk;
 use bytemuck::Zeroable as _;
 use rayon::prelude::*;
 
-use crate::gpu::engine::VulkanEngine;
+use crate::gpu::device::LogicalDevice;
 use crate::gpu::error::EvaluateError;
-use crate::gpu::in_flight::copy;
+use crate::gpu::physical::upload_memory::KernelReads;
 use crate::gpu::submission::{Access, Commands};
-use crate::gpu::upload::{KernelReads, Upload};
+use crate::gpu::upload::Upload;
 use crate::gpu::work_list::grid::{GridRows, GroupGrid, write_blocks};
 use crate::gpu::work_list::sample_list::SampleList;
 use crate::output::encoding::Encoding;
@@ -21,7 +23,9 @@ use crate::prepare::prepared::Prepared;
 use crate::shader::{Block, IS_CONSTANT, ITEM_SAMPLES, Item, List, ListedSample, MAY_BE_TINY};
 use crate::simd::dispatch::{InLanes, in_lanes};
 use crate::simd::lanes::Lanes;
-use crate::time::frames::{SampleTimesError, Ticks, Timeline};
+use crate::threads::copy;
+use crate::time::error::SampleTimesError;
+use crate::time::frames::{Ticks, Timeline};
 use crate::time::runs::{Distance, Emit, Run, RunSource};
 use crate::time::spans::TrackPart;
 
@@ -111,6 +115,16 @@ impl GroupWork {
     }
 }
 
+/// What is listed, and for which device.
+#[derive(Clone, Copy)]
+pub(crate) struct ListRequest<'a> {
+    pub(crate) device: &'a Arc<LogicalDevice>,
+    /// Whether neighbouring invocations take neighbouring samples where that can be; else each takes a run of them.
+    pub(crate) maps_samples: bool,
+    pub(crate) clip: &'a ClipData,
+    pub(crate) timeline: &'a Timeline,
+}
+
 /// The lists of a window on their way to the device, in memory that is kept for the next window.
 #[derive(Default)]
 pub(crate) struct WorkLists {
@@ -126,23 +140,27 @@ pub(crate) struct WorkLists {
 }
 
 impl WorkLists {
-    /// Writes the work list of a window into its buffers, one group after another. Where the engine
+    /// Writes the work list of a window into its buffers, one group after another. Where the request
     /// maps samples, neighbouring invocations take neighbouring samples if that can be. Called on one of
     /// the engine's threads.
     pub(crate) fn list(
         &mut self,
-        engine: &VulkanEngine,
-        clip: &ClipData,
-        timeline: &Timeline,
+        request: ListRequest<'_>,
         window: &Window,
     ) -> Result<Work, EvaluateError> {
-        let (device, often) = (&engine.device, KernelReads::Often);
+        let ListRequest {
+            device,
+            maps_samples,
+            clip,
+            timeline,
+        } = request;
+        let often = KernelReads::Often;
         if let Some(list) = SampleList::new(clip, timeline, window) {
             let bytes = window.len() * size_of::<ListedSample>();
             let room = self.items.room(device, "tumble items", often, bytes)?;
             return Ok(list.write(bytemuck::cast_slice_mut(room))?);
         }
-        let mut rows = GridRows::new(window).filter(|_| engine.maps_samples);
+        let mut rows = GridRows::new(window).filter(|_| maps_samples);
         let (mut lists, mut grids) = (Vec::new(), Vec::new());
         if let Some(rows) = rows {
             lists = work(clip, timeline, window, Cut::Whole, &mut self.spare)?;

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use glam::{Quat, Vec3};
 
+use crate::names::names;
 use crate::tracks::check::{check_finite, check_length, check_times};
 use crate::tracks::error::TrackError;
 use crate::tracks::set::TrackSet;
@@ -34,6 +35,12 @@ pub enum Channel {
     Translation,
     /// Along the axes.
     Scale,
+}
+
+names! {
+    Channel, "channel",
+    Translation => "translation",
+    Scale => "scale",
 }
 
 /// The keys of one track's translation or scale, borrowed from its [`TrackSet`].

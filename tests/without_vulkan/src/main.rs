@@ -9,7 +9,7 @@ use std::f32::consts::FRAC_PI_2;
 
 use tumble::glam::Quat;
 use tumble::verify::golden::Golden;
-use tumble::{Device, Engine, EngineOptions, Frames, TrackSet, VectorWidth, method};
+use tumble::{Device, Engine, EngineOptions, SampleTimes, TrackSet, VectorWidth, method};
 
 fn main() -> Result<(), Box<dyn Error>> {
     match env::args().nth(1).as_deref() {
@@ -31,7 +31,7 @@ fn door() -> Result<(), Box<dyn Error>> {
     set.push("door", &[0.0, 1.0], &keys)?;
     for engine in [Engine::auto()?, Engine::new(Device::Cpu)?] {
         assert_eq!(engine.device_name(), "CPU");
-        let rotations = engine.evaluate(&set, method::SLERP, &Frames::fps(2))?;
+        let rotations = engine.evaluate(&set, method::SLERP, &SampleTimes::fps(2))?;
         let half = rotations.get(0, 1).ok_or("three samples")?;
         assert!(
             half.angle_between(Quat::from_rotation_z(FRAC_PI_2 / 2.0)) < 1e-6,
@@ -51,7 +51,7 @@ fn golden() -> Result<(), Box<dyn Error>> {
         let mut options = EngineOptions::default();
         options.vector_width = Some(width);
         let engine = Engine::with_options(Device::Cpu, &options)?;
-        for case in 0..golden.count() {
+        for case in 0..golden.case_count() {
             let name = golden.name(case);
             let recorded = Golden::recorded(name).ok_or(format!("{name}: no hash is recorded"))?;
             let found = golden.evaluate(case, &engine)?.hash;
@@ -61,12 +61,12 @@ fn golden() -> Result<(), Box<dyn Error>> {
             }
         }
     }
-    let compared = golden.count() * widths.len();
+    let compared = golden.case_count() * widths.len();
     println!(
         "{compared} results of {} {} compared with the recorded hashes ({} cases at {widths:?}): {differing} differ",
         env::consts::ARCH,
         env::consts::OS,
-        golden.count(),
+        golden.case_count(),
     );
     match (compared, differing) {
         (0, _) => Err("nothing was compared".into()),

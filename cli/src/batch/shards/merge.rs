@@ -8,7 +8,8 @@ use std::path::{Path, PathBuf};
 use tumble_formats::beneath::parent_beneath;
 use tumble_formats::output::{Output, remove_abandoned, remove_marked};
 
-use crate::batch::manifest::{self, ManifestEntry, NAME};
+use crate::batch::entry::{self, ManifestEntry, NAME};
+use crate::batch::manifest;
 use crate::batch::shards::plan::RecordedPlan;
 use crate::batch::shards::record::{self, MARK, RefusedInput};
 use crate::messages::exit::{ALL_INPUTS, DIFFERENCE, Failure};
@@ -139,7 +140,7 @@ pub(crate) fn merge(folder: &Path) -> Result<MergeSummary, Failure> {
 
 /// Lists the lines of the previous manifest, which may have a million: one is in memory at a time.
 fn list_before(folder: &Path, path: &Path, lines: &mut Vec<ManifestLine>) -> Result<(), Failure> {
-    let Some(file) = manifest::open(folder)? else {
+    let Some(file) = entry::open(folder)? else {
         return Ok(()); // mostly there is none
     };
     let mut reader = BufReader::new(file);
@@ -152,7 +153,7 @@ fn list_before(folder: &Path, path: &Path, lines: &mut Vec<ManifestLine>) -> Res
             Failure::new(ALL_INPUTS, message)
         })?;
         if length == 0 {
-            manifest::warn_of_damaged_lines(folder, damaged);
+            entry::warn_of_damaged_lines(folder, damaged);
             return Ok(());
         }
         let mut found = Vec::new();
@@ -214,7 +215,7 @@ fn write(folder: &Path, path: &Path, lines: &[ManifestLine]) -> Result<(), Failu
     let mut output = Output::create(path, true, &[]).map_err(|error| Failure::output(&error))?;
     let mut kept: HashMap<usize, Vec<u8>> = HashMap::new();
     let mut before = match lines.iter().any(|line| line.file == 0) {
-        true => manifest::open(folder)?.map(BufReader::new),
+        true => entry::open(folder)?.map(BufReader::new),
         false => None,
     };
     let (mut at, mut one) = (0, Vec::new());

@@ -11,16 +11,13 @@ use tumble_formats::format::Format;
 use tumble_formats::output::{Output, remove_abandoned};
 
 use crate::arguments::gather::FoundInput;
-use crate::arguments::input;
 use crate::batch::destination;
 use crate::batch::digest::Digest;
-use crate::batch::folder::{self, ResultName};
-use crate::batch::manifest::kernels_sha256;
-use crate::batch::shards::record;
+use crate::batch::entry::kernels_sha256;
+use crate::batch::result_names::{self, ResultName};
+use crate::batch::shards::record::{self, FOLDER};
 use crate::messages::exit::{ALL_INPUTS, Failure};
-
-/// The subdirectory of shards in a directory of results.
-pub(crate) const FOLDER: &str = "manifest.d";
+use crate::messages::names;
 
 /// The file that records the plan.
 const PLAN_FILE: &str = "plan.json";
@@ -100,13 +97,13 @@ impl ShardPlan {
         options: String,
         shard_bytes: u64,
     ) -> Result<Self, Failure> {
-        if let Some(pipe) = inputs.iter().find(|found| input::is_standard(&found.path)) {
-            let name = input::name(&pipe.path);
+        if let Some(pipe) = inputs.iter().find(|found| names::is_standard(&found.path)) {
+            let name = names::input(&pipe.path);
             let message = format!("{name}: no other process can read it; give a file");
             return Err(Failure::usage(message));
         }
-        let format = folder::format(folder, format)?;
-        let names = folder::names(&inputs, folder, format);
+        let format = result_names::format(folder, format)?;
+        let names = result_names::name_results(&inputs, folder, format);
         let cuts = cut(sizes, shard_bytes);
         let mut digest = Digest::default();
         let mut say = |text: &str| {

@@ -8,8 +8,10 @@ use serde::{Deserialize, Serialize};
 use tumble_formats::beneath::{is_beneath, open_beneath};
 
 use crate::batch::digest;
-use crate::batch::manifest::{self, ManifestEntry, ManifestLines};
-use crate::batch::shards::plan::FOLDER;
+use crate::batch::entry::{self, ManifestEntry, ManifestLines};
+
+/// The subdirectory of shards in a directory of results.
+pub(crate) const FOLDER: &str = "manifest.d";
 
 /// The first line of a shard's file.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -84,7 +86,7 @@ pub(crate) fn text<'a>(
     header: &ShardHeader,
     entries: impl IntoIterator<Item = &'a ManifestEntry>,
 ) -> String {
-    let lines: Vec<String> = entries.into_iter().map(manifest::line).collect();
+    let lines: Vec<String> = entries.into_iter().map(entry::line).collect();
     let header = ShardHeader {
         results: lines.len(),
         results_sha256: digest::of_bytes(lines.iter().map(String::as_bytes)),
@@ -149,7 +151,7 @@ pub(crate) fn names(folder: &Path) -> HashSet<String> {
     let shards = numbers(folder).into_iter();
     let shards = shards.filter_map(|shard| open_beneath(folder, &name(shard)).ok());
     let mut known = HashSet::new();
-    for file in shards.chain(manifest::open(folder).ok().flatten()) {
+    for file in shards.chain(entry::open(folder).ok().flatten()) {
         // A line that is not an entry, such as a shard's header, has no output.
         for line in BufReader::new(file).split(b'\n').map_while(Result::ok) {
             if let Some((output, all)) = owner(&line) {
@@ -170,7 +172,7 @@ pub(crate) fn previous(
 ) -> BTreeMap<String, ManifestEntry> {
     let shard_names: HashSet<&str> = names.iter().copied().collect();
     let mut found = BTreeMap::new();
-    if let Ok(Some(file)) = manifest::open(folder) {
+    if let Ok(Some(file)) = entry::open(folder) {
         // The directory's may be of a million results: one line is in memory at a time.
         for line in BufReader::new(file).split(b'\n').map_while(Result::ok) {
             let Some((output, all)) = owner(&line) else {

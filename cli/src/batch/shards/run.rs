@@ -6,11 +6,11 @@ use std::path::{Path, PathBuf};
 use tumble_formats::output::{Output, remove_marked};
 
 use crate::batch::destination::WrittenFile;
-use crate::batch::folder::{ResultFolder, ResultName};
-use crate::batch::manifest::{ManifestEntry, PreviousEntries};
-use crate::batch::output::ResultTarget;
-use crate::batch::run::ResultRecorder;
+use crate::batch::entry::{ManifestEntry, PreviousEntries, ResultRecorder};
+use crate::batch::folder::ResultFolder;
+use crate::batch::result_names::ResultName;
 use crate::batch::shards::record::{self, RefusedInput, ShardHeader};
+use crate::batch::target::ResultTarget;
 use crate::messages::exit::Failure;
 use crate::messages::words;
 use tumble_formats::format::Format;
@@ -88,7 +88,7 @@ impl<'a> Shard<'a> {
                     if !self.quiet {
                         failure.report();
                     }
-                    self.refuse(&path, &failure);
+                    self.add_refused(&path, &failure);
                 }
             }
         }
@@ -96,6 +96,15 @@ impl<'a> Shard<'a> {
             remove_marked(folder, &mark);
         }
         jobs
+    }
+
+    /// Records an input without a result.
+    fn add_refused(&mut self, path: &Path, failure: &Failure) {
+        self.header.failed.push(RefusedInput {
+            input: path.display().to_string(),
+            code: failure.code,
+            message: failure.message().to_owned(),
+        });
     }
 
     /// Renames the results, and writes the shard's file.
@@ -152,7 +161,7 @@ impl<'a> Shard<'a> {
     }
 }
 
-impl ResultRecorder for Shard<'_> {
+impl ResultRecorder for &mut Shard<'_> {
     fn previous(&self) -> PreviousEntries {
         self.previous.clone()
     }
@@ -174,11 +183,7 @@ impl ResultRecorder for Shard<'_> {
     }
 
     fn refuse(&mut self, path: &Path, failure: &Failure) {
-        self.header.failed.push(RefusedInput {
-            input: path.display().to_string(),
-            code: failure.code,
-            message: failure.message().to_owned(),
-        });
+        self.add_refused(path, failure);
     }
 
     fn list(&self) -> PathBuf {

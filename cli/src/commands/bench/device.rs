@@ -5,7 +5,8 @@ use std::fmt::Write;
 
 use serde::Serialize;
 use tumble::verify::resident::WriteRates;
-use tumble::{Device, DeviceKind, Engine, EngineChoices};
+use tumble::vulkan::{DeviceKind, EngineChoices};
+use tumble::{Device, Engine};
 
 /// An open device.
 pub(crate) struct BenchDevice {

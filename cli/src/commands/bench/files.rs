@@ -14,9 +14,9 @@ use tumble_formats::motion::{ChannelInterpolation, Channels, Joint, Motion, Tran
 use tumble_formats::sample::{ChannelMethods, Samples};
 use tumble_formats::{FORMATS, Format, Loaded};
 
+use crate::commands::bench::race::{Contestant, Repetitions, TimeShare, race};
 use crate::commands::bench::report::Section;
 use crate::commands::bench::workload::{RATE, walk};
-use crate::commands::bench::{Contestant, Repetitions, TimeShare, race};
 use crate::messages::exit::{ALL_INPUTS, Failure};
 
 /// Clips of the library, joints of its skeleton, and frames of a clip: a small human's walk of

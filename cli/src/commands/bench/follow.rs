@@ -1,43 +1,15 @@
 //! Bodies on paths, prepared and evaluated in bulk, beside double reflection (Wang et al. 2008) from
 //! frame to frame as it is usually written.
 
-use glam::{DVec3, Mat3, Quat, Vec3};
+use glam::{Mat3, Quat, Vec3};
 use rayon::prelude::*;
-use tumble::{Channel, Device, Engine, Follow, Layout, Method, SampleTimes, TrackSet};
+use tumble::paths::Follow;
+use tumble::{Channel, Device, Engine, Layout, Method};
 
 use crate::commands::bench::device::BenchDevice;
+use crate::commands::bench::race::{Contestant, Repetitions, race};
 use crate::commands::bench::report::Section;
 use crate::commands::bench::workload::{Workload, WorkloadKind};
-use crate::commands::bench::{Contestant, Repetitions, race};
-
-/// Samples of each path.
-const SAMPLES: usize = 60;
-
-/// Paths of six points, a second apart.
-pub(crate) fn workload(tracks: usize) -> Workload {
-    let mut random = fastrand::Rng::with_seed(4);
-    let mut set = TrackSet::new();
-    let times: Vec<f64> = (0..6).map(f64::from).collect();
-    for _ in 0..tracks {
-        let (mut position, mut direction) = (DVec3::ZERO, DVec3::X);
-        let mut next = || {
-            let aside = DVec3::from_array([(); 3].map(|()| random.f64() - 0.5));
-            direction = (direction + aside).normalize_or(DVec3::X);
-            position += direction;
-            position.as_vec3()
-        };
-        let points: Vec<Vec3> = times.iter().map(|_| next()).collect();
-        set.push_path("", &times, &points, &[])
-            .expect("points in order");
-    }
-    let times = (0..SAMPLES).map(|k| k as f64 / 12.0).collect();
-    Workload {
-        set,
-        frames: SampleTimes::fps(12).between(0.0, (SAMPLES - 1) as f64 / 12.0),
-        times,
-        per_track: false,
-    }
-}
 
 pub(crate) fn measure(
     workload: &Workload,

@@ -6,13 +6,13 @@ pub(crate) mod device;
 pub(crate) mod files;
 pub(crate) mod follow;
 pub(crate) mod naive;
+pub(crate) mod race;
 pub(crate) mod report;
 pub(crate) mod smooth;
 pub(crate) mod stream;
 pub(crate) mod workload;
 
 use std::error::Error as _;
-use std::time::{Duration, Instant};
 
 use clap::Args;
 use glam::Quat;
@@ -23,10 +23,12 @@ use tumble::{
 };
 
 use crate::commands::bench::device::BenchDevice;
-use crate::commands::bench::report::{BenchReport, BenchRow, Section};
+use crate::commands::bench::race::{Contestant, Repetitions, TimeShare, race};
+use crate::commands::bench::report::{BenchReport, Section};
 use crate::commands::bench::workload::{Workload, WorkloadKind};
-use crate::commands::probe;
+use crate::drivers;
 use crate::messages::exit::{DEVICE, Failure};
+use crate::messages::listing;
 use crate::messages::words;
 
 /// Measure speed on this machine, as ratios taken in one run
@@ -53,7 +55,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let devices = if arguments.cpu_only {
         Vec::new()
     } else {
-        probe::devices().unwrap_or_default()
+        drivers::devices().unwrap_or_default()
     };
     // What others would write uses rayon's own threads.
     if let Err(error) = rayon::ThreadPoolBuilder::new().build_global()
@@ -109,46 +111,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let devices = devices.into_iter().map(|device| device.report).collect();
     let report = BenchReport::new(arguments.rounds, devices, sections);
     if arguments.json {
-        words::json(&report)
+        listing::json(&report)
     } else {
-        words::styled_listing(&report.text())
-    }
-}
-
-/// The work of a contestant; returns times of parts of it.
-type Action<'a, E> = Box<dyn FnMut(&mut [Quat]) -> Result<Vec<TimeShare>, E> + 'a>;
-
-/// How often each contestant is measured, and how many calls one measurement has.
-#[derive(Clone, Copy)]
-pub(crate) struct Repetitions {
-    rounds: u32,
-    calls: u32,
-}
-
-/// A named part of an action's time.
-struct TimeShare {
-    name: &'static str,
-    time: Duration,
-}
-
-struct Contestant<'a, E> {
-    name: String,
-    action: Action<'a, E>,
-    /// Whether the first part is the time that counts, and not the host's from call to return: where a result
-    /// stays on a device. Then the bytes that the device writes, and the bytes a second that it can write.
-    on_device: Option<(u64, f64)>,
-}
-
-impl<'a, E> Contestant<'a, E> {
-    fn new(
-        name: impl Into<String>,
-        action: impl FnMut(&mut [Quat]) -> Result<Vec<TimeShare>, E> + 'a,
-    ) -> Self {
-        Self {
-            name: name.into(),
-            action: Box::new(action),
-            on_device: None,
-        }
+        listing::styled(&report.text())
     }
 }
 
@@ -205,7 +170,7 @@ fn measure(
     };
     contestants.push(evaluate("CPU, evaluation alone".into(), clip));
     if kind != WorkloadKind::Dense {
-        let one = cpu_clip(&|options| options.threads = Some(1))?;
+        let one = cpu_clip(&|options| options.thread_count = Some(1))?;
         contestants.push(evaluate("CPU, one thread".into(), one));
         for width in VectorWidth::available() {
             let narrow = cpu_clip(&|options| options.vector_width = Some(width))?;
@@ -300,50 +265,4 @@ fn device_time_shares(clip: &Clip) -> Vec<TimeShare> {
         ("read back", timings.read_back),
     ];
     parts.map(|(name, time)| TimeShare { name, time }).into()
-}
-
-/// Measures every contestant in turn, round after round; the first round does not count.
-fn race<E>(
-    mut contestants: Vec<Contestant<'_, E>>,
-    output: &mut [Quat],
-    Repetitions { rounds, calls }: Repetitions,
-) -> Result<Vec<BenchRow>, E> {
-    let mut times = vec![Vec::new(); contestants.len()];
-    let mut parts: Vec<Vec<(&str, Vec<Duration>)>> = vec![Vec::new(); contestants.len()];
-    for round in 0..=rounds {
-        for (i, contestant) in contestants.iter_mut().enumerate() {
-            let mut shares = Vec::new();
-            let started = Instant::now();
-            for _ in 0..calls {
-                shares = (contestant.action)(output)?;
-            }
-            let mut time = started.elapsed() / calls;
-            if let (Some(_), Some(device)) = (contestant.on_device, shares.first()) {
-                time = device.time;
-            }
-            std::hint::black_box(&mut *output);
-            if round == 0 {
-                parts[i] = shares.iter().map(|part| (part.name, Vec::new())).collect();
-                continue;
-            }
-            times[i].push(time);
-            for (of_part, part) in parts[i].iter_mut().zip(shares) {
-                of_part.1.push(part.time);
-            }
-        }
-    }
-    let rows = contestants.into_iter().zip(times).zip(parts);
-    Ok(rows
-        .map(|((contestant, times), parts)| {
-            let parts = parts.into_iter().map(|(name, times)| (name, median(times)));
-            let mut row = BenchRow::new(contestant.name, median(times), parts.collect());
-            row.share_of_device(contestant.on_device);
-            row
-        })
-        .collect())
-}
-
-fn median(mut times: Vec<Duration>) -> Duration {
-    times.sort();
-    times[times.len() / 2]
 }

@@ -7,9 +7,9 @@ use tumble::{
 };
 
 use crate::arguments::device::refused;
+use crate::commands::bench::race::{Contestant, Repetitions, race};
 use crate::commands::bench::report::Section;
 use crate::commands::bench::workload::walk;
-use crate::commands::bench::{Contestant, Repetitions, race};
 use crate::messages::exit::{self, Failure};
 
 /// How many tracks.

@@ -6,9 +6,9 @@ use std::io::{Seek, Write};
 use glam::Quat;
 use tumble::{Device, Engine, Error, Layout, Method};
 
+use crate::commands::bench::race::{Contestant, Repetitions, race};
 use crate::commands::bench::report::Section;
 use crate::commands::bench::workload::{Workload, WorkloadKind};
-use crate::commands::bench::{Contestant, Repetitions, race};
 use crate::messages::exit::{Failure, OUTPUT};
 
 /// Rotations of a chunk: 16 MB.
@@ -61,9 +61,10 @@ pub(crate) fn measure(
         Ok(TemporaryFile(file))
     };
     let stream = |emit: &mut dyn FnMut(&[Quat]) -> Result<(), StreamError>| {
-        engine.stream(set, method, frames, Layout::TrackMajor, CHUNK, |chunk| {
-            emit(chunk.rotations().unwrap_or_default())
-        })
+        engine
+            .request(set, method, frames)
+            .layout(Layout::TrackMajor)
+            .stream(CHUNK, |chunk| emit(chunk.rotations().unwrap_or_default()))
     };
     let (mut alone, mut with) = (sink()?, sink()?);
     let chunk = vec![Quat::IDENTITY; CHUNK];

@@ -2,10 +2,8 @@
 //! run.
 
 use fastrand::Rng;
-use glam::{DQuat, DVec3, Quat};
+use glam::{DQuat, DVec3, Quat, Vec3};
 use tumble::{SampleTimes, TrackSet};
-
-use crate::commands::bench::follow;
 
 /// A set, and the samples to evaluate.
 pub(crate) struct Workload {
@@ -63,7 +61,7 @@ impl WorkloadKind {
                 frames(uneven(4096, 26, count as f64 / RATE), 0.0, count)
             }
             Self::Crowd => crowd(scaled(1_000_000)),
-            Self::Follow => follow::workload(scaled(100_000)),
+            Self::Follow => paths(scaled(100_000)),
             Self::Files | Self::Smooth => return None,
         })
     }
@@ -121,6 +119,35 @@ fn crowd(tracks: usize) -> Workload {
         frames: SampleTimes::at_each(times.clone()),
         times,
         per_track: true,
+    }
+}
+
+/// Samples of each path.
+const PATH_SAMPLES: usize = 60;
+
+/// Paths of six points, a second apart.
+fn paths(tracks: usize) -> Workload {
+    let mut random = Rng::with_seed(4);
+    let mut set = TrackSet::new();
+    let times: Vec<f64> = (0..6).map(f64::from).collect();
+    for _ in 0..tracks {
+        let (mut position, mut direction) = (DVec3::ZERO, DVec3::X);
+        let mut next = || {
+            let aside = DVec3::from_array([(); 3].map(|()| random.f64() - 0.5));
+            direction = (direction + aside).normalize_or(DVec3::X);
+            position += direction;
+            position.as_vec3()
+        };
+        let points: Vec<Vec3> = times.iter().map(|_| next()).collect();
+        set.push_path("", &times, &points, &[])
+            .expect("points in order");
+    }
+    let times = (0..PATH_SAMPLES).map(|k| k as f64 / 12.0).collect();
+    Workload {
+        set,
+        frames: SampleTimes::fps(12).between(0.0, (PATH_SAMPLES - 1) as f64 / 12.0),
+        times,
+        per_track: false,
     }
 }
 

@@ -15,11 +15,13 @@ use tumble_formats::npz::open_numbers;
 use tumble_formats::trajectory::{Align, Step};
 use tumble_formats::{Diagnostic, Format};
 
-use crate::arguments::input::{self, Inputs, clip_name};
+use crate::arguments::input::{self, Inputs};
 use crate::arguments::time::{check_range, finite_seconds};
 use crate::arguments::tolerance::{degrees, not_negative};
 use crate::batch::room;
 use crate::messages::exit::{ALL_INPUTS, DIFFERENCE, Failure};
+use crate::messages::listing;
+use crate::messages::names;
 use crate::messages::words;
 
 /// Compare two motions or two results: the largest and the mean difference, and where it is
@@ -159,12 +161,12 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         }
     };
     match (&report, arguments.json) {
-        (report, true) => words::json(report)?,
-        (ComparisonReport::Array(found), false) => words::listing(&text::of_arrays(found))?,
-        (ComparisonReport::Trajectory(found), false) => words::listing(&text::of_paths(found))?,
+        (report, true) => listing::json(report)?,
+        (ComparisonReport::Array(found), false) => listing::text(&text::of_arrays(found))?,
+        (ComparisonReport::Trajectory(found), false) => listing::text(&text::of_paths(found))?,
         (ComparisonReport::Clips(found), false) => {
             let lines: String = found.iter().map(text::of_clips).collect();
-            words::listing(&lines)?;
+            listing::text(&lines)?;
         }
     }
     arguments.judge(&report).and(rest)
@@ -189,7 +191,7 @@ impl Arguments {
             self.inputs.load_one(paths[0])?,
             self.inputs.load_one(paths[1])?,
         ];
-        let names = paths.map(input::name);
+        let names = paths.map(names::input);
         let track = |clip: &Motion, name: &str| {
             let chosen = self.inputs.tracks.select(clip, name)?;
             let [track] = &chosen.set.tracks().collect::<Vec<_>>()[..] else {
@@ -231,7 +233,7 @@ impl Arguments {
             open_numbers(path, &options).map_err(|error: Diagnostic| Failure::input(&error, ""))
         };
         let arrays = [read(paths[0])?, read(paths[1])?];
-        let names = paths.map(input::name);
+        let names = paths.map(names::input);
         let found = ArrayDifference::of([&names[0], &names[1]], arrays.each_ref());
         found.map_err(refused)
     }
@@ -260,22 +262,22 @@ impl Arguments {
     ) -> Result<(Vec<ClipDifference>, Result<(), Failure>), Failure> {
         let loaded = [self.inputs.load(paths[0])?, self.inputs.load(paths[1])?];
         let rest = (paths.iter().zip(&loaded))
-            .try_for_each(|(path, loaded)| input::check_complete(&input::name(path), loaded));
+            .try_for_each(|(path, loaded)| input::check_complete(&names::input(path), loaded));
         let counts = [0, 1].map(|side| loaded[side].clips.len());
         if counts[0] != counts[1] {
             return Err(Failure::new(
                 ALL_INPUTS,
                 format!(
                     "{} has {} and {} has {}; choose one of each (--animation)",
-                    input::name(paths[0]),
+                    names::input(paths[0]),
                     words::count(counts[0], "animation"),
-                    input::name(paths[1]),
+                    names::input(paths[1]),
                     words::count(counts[1], "animation"),
                 ),
             ));
         }
         let engine = Engine::new(Device::Cpu)
-            .map_err(|error| Failure::evaluating(&input::name(paths[0]), &error))?;
+            .map_err(|error| Failure::evaluating(&names::input(paths[0]), &error))?;
         let mut found = Vec::new();
         for (index, first) in loaded[0].clips.iter().enumerate() {
             // Of the same name, else of the same index.
@@ -284,8 +286,8 @@ impl Arguments {
             let second = second.unwrap_or(&loaded[1].clips[index]);
             let names =
                 [(paths[0], first), (paths[1], second)].map(|(path, clip)| match counts[0] {
-                    1 => input::name(path),
-                    _ => format!("{} {}", input::name(path), clip_name(clip)),
+                    1 => names::input(path),
+                    _ => format!("{} {}", names::input(path), names::clip(clip)),
                 });
             let tracks = &self.inputs.tracks;
             let select = |clip, name: &str| match self.world {

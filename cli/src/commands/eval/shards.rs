@@ -1,61 +1,21 @@
 //! `tumble eval --shard`: one part of a library, into a directory that other processes fill too.
 
-use std::path::{Path, PathBuf};
-use std::str::FromStr;
-use std::time::Instant;
+use std::path::Path;
 
 use crate::arguments::device::OpenedDevice;
 use crate::arguments::gather::FoundInput;
 use crate::arguments::time::SampleRequest;
 use crate::batch::folder;
-use crate::batch::output::ResultTarget;
-use crate::batch::run::Batch;
+use crate::batch::pipeline::{BatchOptions, Pipeline, PipelineJob};
 use crate::batch::shards::plan::ShardPlan;
 use crate::batch::shards::record::ShardHeader;
 use crate::batch::shards::run::Shard;
-use crate::commands::eval::{Arguments, EvaluationJob, EvaluationReport};
+use crate::commands::eval::arguments::Arguments;
+use crate::commands::eval::job::{EvaluationReport, evaluate_all};
+use crate::commands::eval::shard_selection::ShardSelection;
 use crate::messages::exit::{ALL_INPUTS, Failure, SOME_INPUTS};
+use crate::messages::listing;
 use crate::messages::words;
-
-/// Which shards of a plan.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum ShardSelection {
-    /// That one.
-    One(usize),
-    /// The shards of one process of several, both from 1.
-    Of(usize, usize),
-}
-
-impl FromStr for ShardSelection {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, Self::Err> {
-        let number = |text: &str| text.parse().ok().filter(|&number: &usize| number > 0);
-        let part = match text.split_once('/') {
-            None => number(text).map(Self::One),
-            Some((index, all)) => (number(index).zip(number(all)))
-                .filter(|(index, all)| index <= all)
-                .map(|(index, all)| Self::Of(index, all)),
-        };
-        part.ok_or_else(|| "give I/N, from 1/N to N/N, or the number of a shard, from 1".to_owned())
-    }
-}
-
-impl ShardSelection {
-    /// The numbers of its shards, from 1. Parts differ by one shard at most.
-    fn shards(self, all: usize) -> Result<std::ops::RangeInclusive<usize>, Failure> {
-        let share = |part: usize, of: usize| (all as u128 * part as u128 / of as u128) as usize;
-        match self {
-            Self::One(one) if one > all => {
-                let all = words::count(all, "shard");
-                let message = format!("--shard {one}: there are {all}");
-                Err(Failure::usage(message))
-            }
-            Self::One(one) => Ok(one..=one),
-            Self::Of(index, of) => Ok(share(index - 1, of) + 1..=share(index, of)),
-        }
-    }
-}
 
 /// Runs the shards of a part.
 pub(crate) fn run(arguments: &Arguments, part: ShardSelection) -> Result<(), Failure> {
@@ -93,12 +53,12 @@ pub(crate) fn run(arguments: &Arguments, part: ShardSelection) -> Result<(), Fai
             .iter()
             .map(|found| found.path.clone());
         let jobs = shard.jobs(paths, &plan.names[range], plan.format);
-        evaluator.evaluate(arguments, &jobs, &mut shard, &mut reports)?;
+        reports.extend(evaluator.evaluate(arguments, jobs, &mut shard)?);
         shard.finish()?;
         failed += shard.header.failed.len();
     }
     if arguments.json {
-        words::json(&reports)?;
+        listing::json(&reports)?;
     }
     match failed {
         0 => Ok(()),
@@ -171,69 +131,36 @@ impl Evaluator {
         })
     }
 
-    /// Evaluates the inputs of a shard; `reports` gets a report of each result. Inputs that
-    /// are refused are in the shard's header, and no failure.
+    /// Evaluates the inputs of a shard; gives a report of each result. Inputs that are refused are in the
+    /// shard's header, and no failure.
     pub(crate) fn evaluate(
         &mut self,
         arguments: &Arguments,
-        jobs: &[(PathBuf, ResultTarget)],
+        jobs: Vec<PipelineJob>,
         shard: &mut Shard<'_>,
-        reports: &mut Vec<EvaluationReport>,
-    ) -> Result<(), Failure> {
+    ) -> Result<Vec<EvaluationReport>, Failure> {
         arguments.choose_keys();
-        let batch = Batch {
-            read: |path: &Path| arguments.inputs.read(path),
-            max_bytes: arguments.inputs.max_size(),
+        let refused = shard.header.failed.len();
+        let (inputs, quiet) = (jobs.len(), shard.quiet);
+        let options = BatchOptions {
             options: self.request.options.clone(),
             resume: arguments.results.is_resumed(),
         };
-        let refused = shard.header.failed.len();
-        let outcome = batch.run(jobs, Vec::new(), shard, |file, loaded, target, done| {
-            let job = EvaluationJob {
-                arguments,
-                device: &mut self.device,
-                samples: &self.request.samples,
-                file,
-                loaded,
-                started: Instant::now(),
-                in_gaps: 0,
-            };
-            job.run(target, done, reports)
-        });
-        match outcome {
+        let reader = arguments.inputs.clone();
+        let records = Box::new(&mut *shard);
+        let mut pipeline = Pipeline::of_batch(reader, jobs, Vec::new(), options, records);
+        let samples = &self.request.samples;
+        let reports = evaluate_all(arguments, samples, &mut self.device, &mut pipeline);
+        match pipeline.finish() {
             Err(failure) if failure.is_final() => Err(failure),
             Err(failure) => {
                 // The failure of a single input has not been reported yet.
-                if jobs.len() == 1 && shard.header.failed.len() > refused && !shard.quiet {
+                if inputs == 1 && shard.header.failed.len() > refused && !quiet {
                     failure.report();
                 }
-                Ok(())
+                Ok(reports)
             }
-            Ok(()) => Ok(()),
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn parts_have_every_shard_once() {
-        for (all, of) in [(0, 3), (1, 64), (79, 64), (79, 2), (3, 3)] {
-            let parts =
-                (1..=of).flat_map(|index| ShardSelection::Of(index, of).shards(all).unwrap());
-            assert!(parts.eq(1..=all), "{all} in {of}");
-        }
-        assert!(ShardSelection::One(4).shards(3).is_err());
-    }
-
-    #[test]
-    fn parts_are_counted_from_one() {
-        assert_eq!("3/64".parse(), Ok(ShardSelection::Of(3, 64)));
-        assert_eq!("17".parse(), Ok(ShardSelection::One(17)));
-        for text in ["0", "0/4", "5/4", "1/0", "-1/4", "1/", "/", "", "1.5"] {
-            assert!(text.parse::<ShardSelection>().is_err(), "{text}");
+            Ok(()) => Ok(reports),
         }
     }
 }

@@ -60,8 +60,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         return write_landscape(arguments);
     }
     let generate = Generate {
-        boxes: arguments.boxes as usize,
-        keys: arguments.keys as usize,
+        box_count: arguments.boxes as usize,
+        key_count: arguments.keys as usize,
         seconds: arguments.seconds,
         spacing: if arguments.random {
             KeySpacing::Random

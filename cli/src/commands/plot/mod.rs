@@ -27,9 +27,10 @@ use crate::batch::destination::{self, Destination};
 use crate::commands::plot::figure::Figure;
 use crate::commands::plot::source::PlotSource;
 use crate::commands::plot::source::curves::PlotSubject;
-use crate::commands::plot::subjects::{Subjects, together};
+use crate::commands::plot::subjects::{PlotQuantity, Subjects, together};
 use crate::commands::travel::{self, Maker, is_path_file, is_travel};
 use crate::messages::exit::{Failure, for_each};
+use crate::messages::names;
 use crate::messages::progress::Progress;
 use crate::messages::words;
 
@@ -97,20 +98,6 @@ pub(crate) struct Arguments {
     interpolation: InterpolationArguments,
     #[command(flatten)]
     device: DeviceArguments,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum PlotQuantity {
-    /// w x y z over frames
-    Components,
-    /// angular speed over frames, rad/s
-    Speed,
-    /// the angle to the f64 reference over frames, radians
-    Error,
-    /// the path of an axis of a box on the sphere
-    Sphere,
-    /// of bodies on paths: speed, turning rate of the direction, and the turn about it
-    Path,
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
@@ -210,10 +197,10 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         return report::write(arguments, &mut writer, &interpolations, &samples, folder);
     }
     let outcome = for_each(&inputs, |path| {
-        let name = input::name(path);
-        let stem = input::stem(path);
+        let name = names::input(path);
+        let stem = names::stem(path);
         if let Some((source, makers, rest)) = arguments.bodies(path, &interpolations)? {
-            let title = (&*name, input::file_name(path));
+            let title = (&*name, names::file(path));
             let figure = path::figure(&mut writer.device, title, &source, &makers)?;
             let file = match &out {
                 PlotOutput::One(file) => file.clone(),
@@ -227,7 +214,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         let tracks = arguments.inputs.tracks.of(&clip, &name)?;
         let set = clip.set;
         note_curves(&name, &set, &interpolations);
-        let source = PlotSource::new(input::file_name(path), &set, &interpolations, &samples)?;
+        let source = PlotSource::new(names::file(path), &set, &interpolations, &samples)?;
         let subjects = arguments.subjects(&set, tracks, &name)?;
         let pictures = match &out {
             PlotOutput::One(file) => vec![(
@@ -288,7 +275,7 @@ impl Arguments {
         path: &Path,
         interpolations: &[Interpolation],
     ) -> Result<Option<Bodies>, Failure> {
-        let name = input::name(path);
+        let name = names::input(path);
         match self.show {
             None | Some(PlotQuantity::Path) if is_path_file(path) => {
                 let frames = self.path.frames().into_iter().map(Maker::Frame);
@@ -324,7 +311,7 @@ impl Arguments {
         let out = &self.out;
         let shown = out.display();
         let is_file =
-            !out.is_dir() && (PictureFormat::of(out).is_some() || input::is_standard(out));
+            !out.is_dir() && (PictureFormat::of(out).is_some() || names::is_standard(out));
         if !is_file {
             if out.extension().is_some() && !out.is_dir() {
                 return Err(Failure::usage(format!(
@@ -397,12 +384,12 @@ impl Arguments {
 /// Pictures are named after their inputs, so no two of those may have the same name.
 fn refuse_shared_names(inputs: &[PathBuf]) -> Result<(), Failure> {
     for (index, path) in inputs.iter().enumerate() {
-        let same = |other: &&PathBuf| input::stem(other) == input::stem(path);
+        let same = |other: &&PathBuf| names::stem(other) == names::stem(path);
         if let Some(other) = inputs[..index].iter().find(same) {
             return Err(Failure::usage(format!(
                 "{} and {} would share the pictures' names; draw them into different directories",
-                input::name(other),
-                input::name(path)
+                names::input(other),
+                names::input(path)
             )));
         }
     }

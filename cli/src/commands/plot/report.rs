@@ -8,7 +8,6 @@ use std::path::{Path, PathBuf};
 use glam::Vec3;
 use tumble::{Interpolation, TrackSet};
 
-use crate::arguments::input;
 use crate::arguments::time::SampleRequest;
 use crate::batch::destination::Destination;
 use crate::commands::info::Steps;
@@ -17,6 +16,7 @@ use crate::commands::plot::source::curves::{NAMES, PlotSubject};
 use crate::commands::plot::subjects::PANELS;
 use crate::commands::plot::{Arguments, FigureWriter, note_curves};
 use crate::messages::exit::{Failure, for_each};
+use crate::messages::names;
 use crate::messages::progress::Progress;
 use crate::messages::words;
 
@@ -52,9 +52,9 @@ pub(crate) fn write(
     let outcome = for_each(&inputs, |path| {
         let only = progress.suspend(|| arguments.inputs.load_one(path))?;
         let set = only.clip.set;
-        progress.suspend(|| note_curves(&input::name(path), &set, interpolations));
+        progress.suspend(|| note_curves(&names::input(path), &set, interpolations));
         let chapter = Chapter {
-            title: input::file_name(path),
+            title: names::file(path),
             facts: facts(&set),
             figures: figures(
                 writer,
@@ -95,7 +95,7 @@ fn figures(
     folder: &Path,
     progress: &mut Progress,
 ) -> Result<Vec<ReportFigure>, Failure> {
-    let name = input::file_name(path);
+    let name = names::file(path);
     let mut shown = Vec::new();
     let mut draw =
         |writer: &mut FigureWriter, methods, label: &str, caption, subject: &PlotSubject| {
@@ -103,7 +103,7 @@ fn figures(
             let figure = source.figure(&mut writer.device, subject)?;
             let file = format!(
                 "{}-{label}.{}",
-                input::stem(path),
+                names::stem(path),
                 writer.format.extension()
             );
             writer.draw(&figure, &folder.join(&file))?;

@@ -3,12 +3,26 @@
 use clap::ValueEnum;
 use glam::Vec3;
 
-use crate::commands::plot::PlotQuantity;
 use crate::commands::plot::source::curves::PlotSubject;
 use crate::messages::exit::Failure;
 
 /// A picture with more panels than this cannot be read.
 pub(super) const PANELS: usize = 64;
+
+/// What is drawn of a set over time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum PlotQuantity {
+    /// w x y z over frames
+    Components,
+    /// angular speed over frames, rad/s
+    Speed,
+    /// the angle to the f64 reference over frames, radians
+    Error,
+    /// the path of an axis of a box on the sphere
+    Sphere,
+    /// of bodies on paths: speed, turning rate of the direction, and the turn about it
+    Path,
+}
 
 /// What is drawn of one set, and how it is shared out where there are several pictures.
 pub(super) struct Subjects {

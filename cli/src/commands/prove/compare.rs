@@ -9,7 +9,7 @@ use serde_json::Value;
 
 use crate::commands::prove::report::{FORMAT, FORMAT_VERSION};
 use crate::messages::exit::{ALL_INPUTS, DIFFERENCE, Failure};
-use crate::messages::words;
+use crate::messages::listing;
 
 /// Files larger than any proof are refused unread.
 const MAX_BYTES: u64 = 64 << 20;
@@ -207,9 +207,9 @@ pub(crate) fn run([one, two]: [&PathBuf; 2], json: bool) -> Result<(), Failure> 
     let (one, two) = (SavedProof::new(one)?, SavedProof::new(two)?);
     let found = compared(&one, &two);
     if json {
-        words::json(&found)?;
+        listing::json(&found)?;
     } else {
-        words::listing(&page(&one, &two, &found))?;
+        listing::text(&page(&one, &two, &found))?;
     }
     let mut reasons = Vec::new();
     if found.same_random_bits == Some(false) {

@@ -8,16 +8,11 @@ use sha2::{Digest as _, Sha256};
 use tumble::VectorWidth;
 use tumble::verify::golden::Golden;
 
-use crate::commands::prove::report::{Bus, Host, Program};
-
-/// The lower-case digits of a hash.
-pub(crate) fn hexadecimal(bytes: &[u8]) -> String {
-    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
-}
+use crate::commands::prove::report::{Bus, Host, Program, hexadecimal};
 
 pub(crate) fn program() -> Program {
     let mut kernels = Sha256::new();
-    for (name, code) in tumble::kernels() {
+    for (name, code) in tumble::vulkan::kernels() {
         kernels.update(name);
         kernels.update([0]);
         kernels.update(code);

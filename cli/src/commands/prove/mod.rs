@@ -15,7 +15,7 @@ use crate::arguments::device::vulkan_device;
 use crate::commands::prove::report::Verdict;
 use crate::commands::prove::steps::ProofRequest;
 use crate::messages::exit::{DEVICE, DIFFERENCE, Failure};
-use crate::messages::words;
+use crate::messages::listing;
 
 /// Show that a device gives the promised bits: every kernel, recorded and random results; and measure speed
 #[derive(Debug, Args)]
@@ -109,9 +109,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         proof.write(path)?;
     }
     if arguments.json {
-        words::json(&proof)?;
+        listing::json(&proof)?;
     } else {
-        words::listing(&text::page(&proof))?;
+        listing::text(&text::page(&proof))?;
     }
     let reasons = proof.reasons.join("; ");
     match proof.verdict {

@@ -8,9 +8,8 @@ use sha2::{Digest as _, Sha256};
 use tumble::verify::figures::Figures;
 use tumble::verify::random::RandomRound;
 use tumble::verify::renderer::{RendererCheck, RendererReport};
-use tumble::{DeviceDetails, DeviceInfo, EngineChoices, SelfTestReport};
+use tumble::vulkan::{DeviceDetails, DeviceInfo, EngineChoices, SelfTestReport};
 
-use crate::commands::prove::device;
 use crate::messages::exit::Failure;
 
 /// The value of `format` in the JSON.
@@ -222,7 +221,7 @@ impl RandomSection {
         if self.rounds.is_power_of_two() {
             self.digests.push(RoundsDigest {
                 rounds: self.rounds,
-                hash: device::hexadecimal(&self.chained[..8]),
+                hash: hexadecimal(&self.chained[..8]),
             });
         }
     }
@@ -465,6 +464,11 @@ pub(crate) fn check_output(path: &Path, overwrite: bool) -> Result<(), Failure> 
         ))),
         None => Ok(()),
     }
+}
+
+/// The lower-case digits of a hash.
+pub(crate) fn hexadecimal(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 #[cfg(test)]

@@ -8,9 +8,9 @@ use tumble::verify::figures::figures;
 use tumble::verify::golden::Golden;
 use tumble::verify::random::round;
 use tumble::verify::renderer::renderer;
-use tumble::{
-    Device, Engine, EngineOptions, Mapping, ReadBack, Reads, Transfer, Uploads, VulkanDevice,
-};
+use tumble::vulkan::VulkanDevice;
+use tumble::vulkan::tuning::{Mapping, ReadBack, Reads, Transfer, Uploads};
+use tumble::{Device, Engine, EngineOptions};
 
 use crate::commands::prove::report::{
     CompileTimes, DeviceSection, DifferingValues, FORMAT, FORMAT_VERSION, GoldenSection,
@@ -298,7 +298,7 @@ impl ProofRun<'_> {
         for (setting, engine) in self.settings.iter().zip(&self.engines) {
             let reads = setting.options.reads;
             let texels = engine.choices().map(|choices| choices.reads) == Some("texel-buffers");
-            let all = tumble::kernels().map(|(name, _)| name);
+            let all = tumble::vulkan::kernels().map(|(name, _)| name);
             let known = expected.len();
             expected.extend(all.filter(|name| name.ends_with("_texels") == texels));
             let is_known = expected.len() == known;
@@ -398,7 +398,7 @@ impl ProofRun<'_> {
 
     /// Each recorded result once, shared out among the first settings.
     fn recorded_once(&mut self) -> Result<(), StepError> {
-        let cases = self.golden.count();
+        let cases = self.golden.case_count();
         self.proof.golden.cases = Golden::recorded_count().max(cases);
         self.proof.golden.settings = self.settings.len();
         let mut compared = BTreeSet::new();
@@ -431,7 +431,7 @@ impl ProofRun<'_> {
                 Some(engine) => engine.clone(),
                 None => Engine::with_options(self.request.device.clone(), &options)?,
             };
-            for case in 0..self.golden.count() {
+            for case in 0..self.golden.case_count() {
                 let is_done = index < FIRST_SETTINGS && (case + case / 6) % FIRST_SETTINGS == index;
                 if is_done {
                     continue;
@@ -499,13 +499,13 @@ impl ProofRun<'_> {
         let devices = Device::list_with(true)?;
         let same = |device: &Device| device.uuid().as_ref() == Some(&uuid);
         let device = devices.into_iter().find(same);
-        let device = device.ok_or(tumble::VulkanError::NoDevice)?;
+        let device = device.ok_or(tumble::vulkan::VulkanError::NoDevice)?;
         let mut options = EngineOptions::default();
         options.allow_inexact = true;
         let engine = Engine::with_options(device, &options)?;
         let mut found = ValidationSection::default();
         // Cases far from each other, so that all kinds come where the time is short.
-        let (count, step) = (self.golden.count(), 101);
+        let (count, step) = (self.golden.case_count(), 101);
         for index in 0..count {
             if index >= 24 && self.is_past(VALIDATED_BY) {
                 break;

@@ -3,10 +3,11 @@
 mod picture;
 
 use std::borrow::Cow;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Instant;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
+use clap::builder::TypedValueParser;
 use serde::Serialize;
 use tumble::reduce::ReducedCurve;
 use tumble::{Device, Engine, EulerSequence, FrameRate, SampleTimes};
@@ -17,15 +18,17 @@ use tumble_formats::reduce::{ReduceMotionError, ReduceOptions, Reduced, quantize
 use tumble_formats::{Feature, Format, Loaded};
 
 use crate::arguments::command_line::CommandLine;
-use crate::arguments::input::{self, Inputs};
-use crate::arguments::output::sequence;
-use crate::arguments::results::{ResultArguments, check_sequence, document_to_rewrite, each_file};
+use crate::arguments::input::Inputs;
+use crate::arguments::output::{one_of, sequence};
+use crate::arguments::results::{ResultArguments, check_sequence, document_to_rewrite};
 use crate::arguments::tolerance::{degrees, not_negative};
 use crate::batch::destination::{Destination, WrittenFile};
-use crate::batch::output::ResultTarget;
+use crate::batch::pipeline::{ClipWork, EvaluatedResult};
 use crate::batch::room;
-use crate::batch::run::EvaluatedResult;
+use crate::batch::target::ResultTarget;
 use crate::messages::exit::{ALL_INPUTS, Failure};
+use crate::messages::listing;
+use crate::messages::names;
 use crate::messages::words;
 
 /// Remove keys from motion: keep few whose curves stay near all samples
@@ -61,8 +64,8 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "LENGTH", default_value = "0", value_parser = not_negative, allow_hyphen_values = true)]
     shell: f64,
     /// The curve that joins the keys
-    #[arg(long, value_name = "CURVE", default_value = "linear")]
-    curve: CurveArgument,
+    #[arg(long, value_name = "CURVE", default_value_t, value_parser = curve())]
+    curve: ReducedCurve,
     /// glTF: store rotations with 16 bits per component instead of f32. The errors are those of the file
     /// as it is read back
     #[arg(long)]
@@ -85,24 +88,14 @@ pub(crate) struct Arguments {
     json: bool,
 }
 
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum CurveArgument {
-    /// arcs (slerp) and straight lines
-    Linear,
-    /// bessel-overhauser, which glTF does not have
-    BesselOverhauser,
-    /// glTF's cubics
-    Cubic,
-}
-
-impl CurveArgument {
-    fn curve(self) -> ReducedCurve {
-        match self {
-            Self::Linear => ReducedCurve::Linear,
-            Self::BesselOverhauser => ReducedCurve::BesselOverhauser,
-            Self::Cubic => ReducedCurve::GltfCubic,
-        }
-    }
+fn curve() -> impl TypedValueParser<Value = ReducedCurve> {
+    let help = |curve| match curve {
+        ReducedCurve::Linear => "arcs (slerp) and straight lines",
+        ReducedCurve::BesselOverhauser => "bessel-overhauser, which glTF does not have",
+        ReducedCurve::GltfCubic => "glTF's cubics",
+        _ => "",
+    };
+    one_of(ReducedCurve::ALL.map(|curve| (curve.name(), help(curve), curve)))
 }
 
 /// The report of one clip.
@@ -156,7 +149,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     };
     let format = plan.targets.first().map(ResultTarget::format);
     check_sequence(arguments.sequence, format)?;
-    let is_bessel = matches!(arguments.curve, CurveArgument::BesselOverhauser);
+    let is_bessel = matches!(arguments.curve, ReducedCurve::BesselOverhauser);
     if is_bessel && format.is_some_and(|format| format.takes(FormatOption::AtKeys)) {
         return Err(Failure::usage(
             "glTF has no bessel-overhauser; choose --curve linear or cubic, or write .npz",
@@ -167,25 +160,15 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         Engine::new(Device::Cpu).map_err(|error| Failure::evaluating("the CPU", &error))?;
     let options = format!("reduce {}", arguments.command_line.options());
     let mut all = Vec::new();
-    let outcome = arguments.results.make(
-        &arguments.inputs,
-        plan,
-        options,
-        |file, loaded, target, done| {
-            let path = file.path();
-            let name = input::name(path);
-            let mut make = |name: &str, clips: &[&Motion], target: &ResultTarget| {
-                let one = (path, loaded);
-                let (evaluated, reports) =
-                    arguments.make(&engine, one, (name, clips), target, plot.as_ref())?;
-                all.extend(reports);
-                Ok(evaluated)
-            };
-            each_file(&name, (path, loaded), target, done, &mut make)
-        },
-    );
+    let reader = arguments.inputs.clone();
+    let mut pipeline = arguments.results.start(reader, plan, options);
+    while let Some(work) = pipeline.next_work() {
+        let made = arguments.make(&engine, &work, plot.as_ref());
+        all.extend(pipeline.keep(&work, made).into_iter().flatten());
+    }
+    let outcome = pipeline.finish();
     if arguments.json {
-        words::json(&all)?;
+        listing::json(&all)?;
     }
     outcome
 }
@@ -204,7 +187,7 @@ impl Arguments {
                 "--{option} is for glTF and has no effect on {name}; leave it out"
             )));
         }
-        if self.quantize && matches!(self.curve, CurveArgument::Cubic) {
+        if self.quantize && matches!(self.curve, ReducedCurve::GltfCubic) {
             return Err(Failure::usage(
                 "--quantize is for keys that arcs join: tangents are longer than 16 bits take; leave out --curve cubic",
             ));
@@ -216,15 +199,15 @@ impl Arguments {
     fn make(
         &self,
         engine: &Engine,
-        (path, loaded): (&Path, &Loaded),
-        (name, clips): (&str, &[&Motion]),
-        target: &ResultTarget,
+        work: &ClipWork,
         plot: Option<&Destination>,
     ) -> Result<(EvaluatedResult, Vec<ReductionReport>), Failure> {
         let started = Instant::now();
+        let (name, clips, target) = (&*work.name, &*work.clips(), &work.target);
+        let loaded = &work.input.loaded;
         let name_of = |clip: &&Motion| match clips.len() {
             1 => name.to_owned(),
-            _ => format!("{name} {}", input::clip_name(clip)),
+            _ => format!("{name} {}", names::clip(clip)),
         };
         let names: Vec<String> = clips.iter().map(name_of).collect();
         let mut all = Vec::new();
@@ -236,7 +219,7 @@ impl Arguments {
         let quantize = all.first().and_then(|pair| pair.1);
         let all: Vec<Reduced> = all.into_iter().map(|pair| pair.0).collect();
         if let (Some(destination), [reduced]) = (plot, &*all) {
-            picture::draw(&input::file_name(path), reduced, destination)?;
+            picture::draw(&names::file(work.path()), reduced, destination)?;
         }
         let written = self.write(engine, (name, clips), (&all, quantize), loaded, target)?;
         let mut reports = Vec::new();
@@ -298,7 +281,7 @@ impl Arguments {
         // The samples and the poses, of the input and of what becomes of it.
         room::in_memory(name, &clip.set, &times, 14)?;
         let options = ReduceOptions {
-            curve: self.curve.curve(),
+            curve: self.curve,
             angle: self.tolerance.to_radians(),
             distance: self.distance,
             shell: self.shell,

@@ -32,11 +32,14 @@ pub(super) fn chain(
         .choose(set.track_count() * timeline.len())
         .and_then(|()| {
             let engine = &device.engine;
-            let local = engine.evaluate_as(set, interpolation, frames, Layout::FrameMajor)?;
+            let local = engine
+                .request(set, interpolation, frames)
+                .layout(Layout::FrameMajor)
+                .evaluate()?;
             engine.world(&local, &Skeleton::chain(set.track_count(), 1.0)?)
         })
         .map_err(|error| Failure::evaluating(name, &error))?;
-    let (tracks, samples) = (poses.tracks(), poses.samples());
+    let (tracks, samples) = (poses.track_count(), poses.sample_count());
     let all = || (0..samples).flat_map(move |sample| (0..tracks).map(move |track| (track, sample)));
     let mut actor = Actor {
         name: interpolation.method.name.to_owned(),

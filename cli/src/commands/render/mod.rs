@@ -26,6 +26,7 @@ use crate::commands::render::film::gif::Gif;
 use crate::commands::render::scene::{Actor, CameraView, Scene, Style, Surroundings, Theme};
 use crate::commands::travel::{Maker, Scenery, TravelSource, is_path_file, is_travel};
 use crate::messages::exit::Failure;
+use crate::messages::names;
 use crate::messages::progress::Progress;
 use crate::messages::{signals, words};
 
@@ -152,7 +153,7 @@ impl RenderOutput {
             Some("gif") => Ok(Self::Gif),
             Some("apng") => Ok(Self::Apng),
             Some("png") => Ok(Self::Still),
-            None if !input::is_standard(path) => Ok(Self::Folder),
+            None if !names::is_standard(path) => Ok(Self::Folder),
             _ => Err(Failure::usage(format!(
                 "{}: end the film in .gif or .apng, a picture in .png, or give a directory",
                 path.display()
@@ -184,7 +185,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     if kind != RenderOutput::Folder {
         Destination::new(&arguments.out, arguments.overwrite, &inputs)?.check_writable()?;
     }
-    let name = input::name(path);
+    let name = names::input(path);
     let (source, rest) = arguments.source(path, &name)?;
     let set = source.set();
     let mut frames = samples.of(set, &name);

@@ -9,6 +9,7 @@ use tumble_routes::route::By;
 
 use crate::commands::route::tables::{Participants, read_pairs, read_walkers};
 use crate::messages::exit::Failure;
+use crate::messages::names;
 
 /// Find routes over a mesh or a surface: shortest ones, or approximations
 #[derive(Debug, Args)]
@@ -87,7 +88,7 @@ pub(crate) enum RouteMethod {
 impl Arguments {
     /// The start and the goal of each route.
     pub(crate) fn participants(&self) -> Result<Participants, Failure> {
-        if self.json && crate::arguments::input::is_standard(&self.out) {
+        if self.json && names::is_standard(&self.out) {
             let message = "--json and -o - both write to standard output; give a file";
             return Err(Failure::usage(message));
         }

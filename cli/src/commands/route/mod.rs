@@ -19,20 +19,14 @@ use tumble_routes::walkers::{self, Walker};
 
 pub(crate) use crate::commands::route::arguments::Arguments;
 use crate::commands::route::arguments::RouteMethod;
-use crate::commands::route::results::{RoutePoint, RouteResults};
+use crate::commands::route::results::{RouteOutcome, RoutePoint, RouteResults};
 use crate::commands::route::surface::Surface;
 use crate::commands::route::tables::Participants;
 use crate::messages::exit::{ALL_INPUTS, Failure, SOME_INPUTS};
+use crate::messages::listing;
 use crate::messages::progress::busy;
 use crate::messages::words;
 use crate::threads::on_threads;
-
-/// The outcome of one route.
-struct RouteOutcome {
-    name: String,
-    ends: [DVec3; 2],
-    found: Result<(Route, Vec<RoutePoint>), String>,
-}
 
 /// A line of `--json`.
 #[derive(Serialize)]
@@ -236,7 +230,7 @@ fn report(
     }
     if arguments.json {
         let lines: Vec<RouteReport<'_>> = outcomes.iter().map(line).collect();
-        words::json(&lines)?;
+        listing::json(&lines)?;
     }
     let name = arguments.surface.display();
     if let [outcome] = outcomes

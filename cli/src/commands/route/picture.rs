@@ -8,8 +8,8 @@ use tumble_routes::mesh::Mesh;
 
 use crate::batch::destination::Destination;
 use crate::commands::picture;
-use crate::commands::route::RouteOutcome;
 use crate::commands::route::arguments::Arguments;
+use crate::commands::route::results::RouteOutcome;
 use crate::commands::route::surface::Surface;
 use crate::messages::exit::Failure;
 

@@ -9,7 +9,6 @@ use tumble_routes::route::Route;
 use tumble_routes::walkers::Plan;
 
 use crate::batch::destination::{self, Destination};
-use crate::commands::route::RouteOutcome;
 use crate::commands::route::arguments::Arguments;
 use crate::commands::route::tables::Participants;
 use crate::messages::exit::Failure;
@@ -42,6 +41,13 @@ impl RoutePoint {
         };
         plan.times.iter().map(row).collect()
     }
+}
+
+/// The outcome of one route.
+pub(super) struct RouteOutcome {
+    pub(super) name: String,
+    pub(super) ends: [DVec3; 2],
+    pub(super) found: Result<(Route, Vec<RoutePoint>), String>,
 }
 
 /// The destinations of routes, checked before any work.

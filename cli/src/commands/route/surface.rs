@@ -12,8 +12,8 @@ use tumble_formats::{Code, Diagnostic, Limits};
 use tumble_routes::mesh::{Mesh, read};
 use tumble_routes::net::Net;
 
-use crate::arguments::input;
 use crate::messages::exit::Failure;
+use crate::messages::names;
 use crate::messages::words;
 
 /// The largest file that is read.
@@ -27,7 +27,7 @@ pub(crate) enum Surface {
 impl Surface {
     /// Reads a file, known by its name; vertices of a mesh within a distance of each other are welded.
     pub(crate) fn read(path: &Path, weld: f64) -> Result<Self, Failure> {
-        let name = input::name(path);
+        let name = names::input(path);
         let refused = |code, error: &dyn std::fmt::Display| {
             let fault = Diagnostic::new(path.display().to_string(), code, error.to_string());
             Failure::input(&fault, "")

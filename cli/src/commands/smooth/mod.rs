@@ -7,7 +7,8 @@ use std::borrow::Cow;
 use std::path::PathBuf;
 use std::time::Instant;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
+use clap::builder::TypedValueParser;
 use tumble::{
     EulerSequence, FrameRate, Layout, SampleTimes, Smoothing, SmoothingEnds, SmoothingError,
     SmoothingKernel,
@@ -19,15 +20,17 @@ use tumble_formats::smooth::{SmoothJob, SmoothMotionError};
 
 use crate::arguments::command_line::CommandLine;
 use crate::arguments::device::{DeviceArguments, OpenedDevice};
-use crate::arguments::input::{self, Inputs};
-use crate::arguments::output::sequence;
-use crate::arguments::results::{ResultArguments, check_sequence, document_to_rewrite, each_file};
+use crate::arguments::input::Inputs;
+use crate::arguments::output::{one_of, sequence};
+use crate::arguments::results::{ResultArguments, check_sequence, document_to_rewrite};
+use crate::batch::destination::Destination;
 use crate::batch::destination::WrittenFile;
-use crate::batch::output::ResultTarget;
+use crate::batch::pipeline::{ClipWork, EvaluatedResult};
 use crate::batch::room;
-use crate::batch::run::EvaluatedResult;
+use crate::batch::target::ResultTarget;
 use crate::commands::smooth::picture::SmoothingSubject;
 use crate::messages::exit::{ALL_INPUTS, Failure};
+use crate::messages::names;
 use crate::messages::words;
 
 /// Smooth rotations and translations by a kernel over samples
@@ -63,8 +66,8 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "N", default_value_t = 1)]
     passes: u32,
     /// How samples continue beyond the first and the last one
-    #[arg(long, value_name = "ENDS", default_value = "keep")]
-    ends: SmoothingEndsArgument,
+    #[arg(long, value_name = "ENDS", default_value_t, value_parser = ends())]
+    ends: SmoothingEnds,
     /// Sample at this rate first [default: the keys themselves]
     #[arg(long, value_name = "FPS")]
     fps: Option<FrameRate>,
@@ -78,14 +81,15 @@ pub(crate) struct Arguments {
     device: DeviceArguments,
 }
 
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum SmoothingEndsArgument {
-    /// the end samples stay
-    Keep,
-    /// cubic: the end samples go to the parabola through the next three
-    Parabolic,
-    /// the last sample repeats the first
-    Loop,
+fn ends() -> impl TypedValueParser<Value = SmoothingEnds> {
+    let help = |ends| match ends {
+        SmoothingEnds::Keep => "the end samples stay",
+        SmoothingEnds::Parabolic => {
+            "cubic: the end samples go to the parabola through the next three"
+        }
+        SmoothingEnds::Loop => "the last sample repeats the first",
+    };
+    one_of(SmoothingEnds::ALL.map(|ends| (ends.name(), help(ends), ends)))
 }
 
 fn frequency(text: &str) -> Result<f64, String> {
@@ -100,11 +104,7 @@ fn frequency(text: &str) -> Result<f64, String> {
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let smoothing = Smoothing {
         kernel: arguments.kernel,
-        ends: match arguments.ends {
-            SmoothingEndsArgument::Keep => SmoothingEnds::Keep,
-            SmoothingEndsArgument::Parabolic => SmoothingEnds::Parabolic,
-            SmoothingEndsArgument::Loop => SmoothingEnds::Loop,
-        },
+        ends: arguments.ends,
         passes: arguments.passes,
     };
     smoothing
@@ -122,79 +122,89 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     )?;
     let mut device = arguments.device.open()?;
     let options = format!("smooth {}", arguments.command_line.options());
-    arguments.results.make(
-        &arguments.inputs,
-        plan,
-        options,
-        |file, loaded, target, done| {
-            let path = file.path();
-            let mut make = |name: &str, clips: &[&Motion], target: &ResultTarget| {
-                let started = Instant::now();
-                let tracks = &arguments.inputs.tracks;
-                let select = |clip| match target.format().takes_motion(&[clip]) {
-                    true => tracks.select_with_ancestors(clip, name),
-                    false => tracks.select(clip, name),
-                };
-                let clips = clips.iter().map(|&clip| select(clip));
-                let clips: Vec<Cow<'_, Motion>> = clips.collect::<Result<_, Failure>>()?;
-                let clips: Vec<&Motion> = clips.iter().map(|clip| &**clip).collect();
-                let samples = clips
-                    .iter()
-                    .map(|clip| {
-                        let rate = (arguments.fps, arguments.low_pass);
-                        smoothed(&mut device, name, clip, &smoothing, rate)
-                    })
-                    .collect::<Result<Vec<_>, Failure>>()?;
-                if let ([clip], [smoothed_clip], Some(destination)) = (&*clips, &*samples, &plot) {
-                    let names = (0..clip.set.track_count()).map(|track| clip.set.track_name(track));
-                    let names: Vec<String> = names.collect();
-                    let subject = SmoothingSubject {
-                        title: input::file_name(path),
-                        about: match (arguments.low_pass, smoothing.passes) {
-                            (Some(hz), _) => {
-                                format!("low-pass at {hz} Hz, {}", smoothed_clip.kernel)
-                            }
-                            (None, 1) => smoothed_clip.kernel.to_string(),
-                            (None, passes) => format!("{}, {passes} times", smoothed_clip.kernel),
-                        },
-                        names: &names,
-                        before: &smoothed_clip.before,
-                        after: &smoothed_clip.after,
-                    };
-                    picture::draw(&subject, destination)?;
-                }
-                let options = MotionOptions {
-                    sequence: arguments.sequence,
-                    box_length: loaded.box_length,
-                    ..target.motion_options()
-                };
-                let some = tracks.is_set().then_some("some tracks make");
-                let document = document_to_rewrite(name, loaded, target, some);
-                let result = (target, options, document);
-                let written = write(name, &clips, &samples, result)?;
-                let kernels = samples.iter().map(|smoothed| smoothed.kernel.to_string());
-                let mut kernels: Vec<String> = kernels.collect();
-                kernels.dedup();
-                let times = samples
-                    .iter()
-                    .map(|smoothed| smoothed.after.times.len())
-                    .sum();
-                let message = format!(
-                    "{name}: {}, {}, on {} in {} → {target}",
-                    words::count(times, "sample"),
-                    kernels.join(", "),
-                    device.label,
-                    words::duration(started.elapsed()),
-                );
-                Ok(EvaluatedResult {
-                    written,
-                    device: device.label.clone(),
-                    message,
-                })
+    let reader = arguments.inputs.clone();
+    let mut pipeline = arguments.results.start(reader, plan, options);
+    while let Some(work) = pipeline.next_work() {
+        let made = arguments.make(&work, &smoothing, &mut device, plot.as_ref());
+        pipeline.keep(&work, made.map(|result| (result, ())));
+    }
+    pipeline.finish()
+}
+
+impl Arguments {
+    /// Smooths clips, and writes them into one file.
+    fn make(
+        &self,
+        work: &ClipWork,
+        smoothing: &Smoothing,
+        device: &mut OpenedDevice,
+        plot: Option<&Destination>,
+    ) -> Result<EvaluatedResult, Failure> {
+        let started = Instant::now();
+        let (name, clips, target) = (&*work.name, work.clips(), &work.target);
+        let loaded = &work.input.loaded;
+        let tracks = &self.inputs.tracks;
+        let select = |clip| match target.format().takes_motion(&[clip]) {
+            true => tracks.select_with_ancestors(clip, name),
+            false => tracks.select(clip, name),
+        };
+        let clips = clips.iter().map(|&clip| select(clip));
+        let clips: Vec<Cow<'_, Motion>> = clips.collect::<Result<_, Failure>>()?;
+        let clips: Vec<&Motion> = clips.iter().map(|clip| &**clip).collect();
+        let samples = clips
+            .iter()
+            .map(|clip| {
+                let rate = (self.fps, self.low_pass);
+                smoothed(device, name, clip, smoothing, rate)
+            })
+            .collect::<Result<Vec<_>, Failure>>()?;
+        if let ([clip], [smoothed_clip], Some(destination)) = (&*clips, &*samples, plot) {
+            let names = (0..clip.set.track_count()).map(|track| clip.set.track_name(track));
+            let names: Vec<String> = names.collect();
+            let subject = SmoothingSubject {
+                title: names::file(work.path()),
+                about: match (self.low_pass, smoothing.passes) {
+                    (Some(hz), _) => {
+                        format!("low-pass at {hz} Hz, {}", smoothed_clip.kernel)
+                    }
+                    (None, 1) => smoothed_clip.kernel.to_string(),
+                    (None, passes) => format!("{}, {passes} times", smoothed_clip.kernel),
+                },
+                names: &names,
+                before: &smoothed_clip.before,
+                after: &smoothed_clip.after,
             };
-            each_file(&input::name(path), (path, loaded), target, done, &mut make)
-        },
-    )
+            picture::draw(&subject, destination)?;
+        }
+        let options = MotionOptions {
+            sequence: self.sequence,
+            box_length: loaded.box_length,
+            ..target.motion_options()
+        };
+        let some = tracks.is_set().then_some("some tracks make");
+        let document = document_to_rewrite(name, loaded, target, some);
+        let result = (target, options, document);
+        let written = write(name, &clips, &samples, result)?;
+        let kernels = samples.iter().map(|smoothed| smoothed.kernel.to_string());
+        let mut kernels: Vec<String> = kernels.collect();
+        kernels.dedup();
+        let times = samples
+            .iter()
+            .map(|smoothed| smoothed.after.times.len())
+            .sum();
+        let message = format!(
+            "{name}: {}, {}, on {} in {} → {target}",
+            words::count(times, "sample"),
+            kernels.join(", "),
+            device.label,
+            words::duration(started.elapsed()),
+        );
+        Ok(EvaluatedResult {
+            written,
+            device: device.label.clone(),
+            message,
+        })
+    }
 }
 
 /// A clip's samples as they were and smoothed, and the rate that they are frames of.

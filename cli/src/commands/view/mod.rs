@@ -2,6 +2,7 @@
 
 pub(crate) mod pack;
 pub(crate) mod page;
+pub(crate) mod result;
 mod shown;
 #[cfg(test)]
 mod tests;
@@ -15,7 +16,7 @@ use tumble_formats::carried_mesh::CarriedMesh;
 use tumble_formats::motion::Motion;
 
 use crate::arguments::device::{DeviceArguments, OpenedDevice};
-use crate::arguments::input::{self, Inputs};
+use crate::arguments::input::Inputs;
 use crate::arguments::interpolation::{
     InterpolationArguments, MethodArgument, MethodArgumentSelection, each_once, method_arguments,
 };
@@ -27,6 +28,7 @@ use crate::commands::travel::{Scenery, TravelSource, is_path_file};
 use crate::commands::view::page::{Page, StoredSet};
 use crate::commands::view::shown::{ResultChoice, ShownClip};
 use crate::messages::exit::{Failure, OUTPUT, SOME_INPUTS};
+use crate::messages::names;
 use crate::messages::progress::Progress;
 use crate::messages::words;
 
@@ -173,7 +175,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
 impl Arguments {
     /// The clip with the selected tracks and their ancestors: joints, or the boxes of a chain before them.
     fn select_tracks(&self, clip: Motion, path: &Path) -> Result<Motion, Failure> {
-        let (name, tracks) = (input::name(path), &self.inputs.tracks);
+        let (name, tracks) = (names::input(path), &self.inputs.tracks);
         if clip.skeleton.is_empty() && !clip.has_vectors() {
             return match tracks.chain(&clip, &name)? {
                 Some(chain) => selected(&clip, &chain, &name),
@@ -208,7 +210,7 @@ impl Arguments {
             let name = format!("tumble-view-{:016x}.html", fastrand::u64(..));
             return Destination::new(&std::env::temp_dir().join(name), false, inputs);
         };
-        if input::is_standard(out) && self.open {
+        if names::is_standard(out) && self.open {
             return Err(Failure::usage(
                 "standard output cannot be opened in a browser",
             ));

@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use clap::ValueEnum;
 use glam::{Quat, Vec3};
 use tumble::method::BESSEL_OVERHAUSER;
+use tumble::paths::PathFrame;
 use tumble::{
     Axes, Channel, Error, Interpolation, Layout, Quantity, SampleTimes, Timeline, TrackError,
     TrackSet,
@@ -15,14 +15,14 @@ use tumble_formats::sample::ChannelMethods;
 use tumble_formats::world::world;
 
 use crate::arguments::device::OpenedDevice;
-use crate::arguments::input;
 use crate::arguments::interpolation::{InterpolationArguments, MethodArgument, each_once};
-use crate::arguments::path::FrameArgument;
+use crate::arguments::path::frame_summary;
 use crate::batch::room;
 use crate::commands::travel::{Maker, TravelSource, is_travel, positions_of};
-use crate::commands::view::page::StoredResult;
+use crate::commands::view::result::StoredResult;
 use crate::messages::colours::{self, Colour};
 use crate::messages::exit::{ALL_INPUTS, Failure};
+use crate::messages::names;
 use crate::messages::words;
 
 /// Bytes of one rotation and its speed.
@@ -34,16 +34,15 @@ const POSITION: f64 = 6.0;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum ResultChoice {
     By(MethodArgument),
-    In(FrameArgument),
+    In(PathFrame),
 }
 
 impl ResultChoice {
     /// All methods, then all frames.
     pub(crate) fn all() -> impl Iterator<Item = Self> {
-        let frames = FrameArgument::value_variants().iter().copied();
         MethodArgument::all()
             .map(Self::By)
-            .chain(frames.map(Self::In))
+            .chain(PathFrame::ALL.map(Self::In))
     }
 
     pub(crate) fn name(self) -> &'static str {
@@ -56,14 +55,14 @@ impl ResultChoice {
     pub(crate) fn summary(self) -> &'static str {
         match self {
             Self::By(method) => method.summary(),
-            Self::In(frame) => frame.summary(),
+            Self::In(frame) => frame_summary(frame),
         }
     }
 
     pub(crate) fn colour(self) -> Colour {
         match self {
             Self::By(method) => method.0.map_or(colours::AUTHORED, colours::of_method),
-            Self::In(frame) => frame.colour(),
+            Self::In(frame) => colours::of_frame(frame),
         }
     }
 }
@@ -92,9 +91,9 @@ impl ShownClip {
         box_length: Option<f64>,
         is_one_of_several: bool,
     ) -> Self {
-        let (mut name, mut title) = (input::name(path), input::file_name(path));
+        let (mut name, mut title) = (names::input(path), names::file(path));
         if is_one_of_several || clip.name.is_some() {
-            let clip_name = input::clip_name(&clip);
+            let clip_name = names::clip(&clip);
             name = format!("{name} {clip_name}");
             title = format!("{title}: {clip_name}");
         }
@@ -268,8 +267,12 @@ impl ShownClip {
             (ResultChoice::In(_), None) => return Err(refused("frames are for paths")),
             (ResultChoice::In(frame), Some(source)) => {
                 let found = source.sample(device, name, Maker::Frame(frame), &frames)?;
-                let result =
-                    StoredResult::new(choice, found.tracks, &found.rotations, &found.velocities());
+                let result = StoredResult::new(
+                    choice.name(),
+                    found.tracks,
+                    &found.rotations,
+                    &found.velocities(),
+                );
                 return result
                     .at(&found.positions)
                     .ok_or_else(|| refused(too_large));
@@ -304,7 +307,7 @@ impl ShownClip {
             })
             .map_err(|error| Failure::evaluating(name, &error))?;
         let tracks = clip.set.track_count();
-        let result = StoredResult::new(choice, tracks, &samples.rotations, &velocities);
+        let result = StoredResult::new(choice.name(), tracks, &samples.rotations, &velocities);
         if !self.has_positions() {
             return Ok(result);
         }

@@ -2,15 +2,16 @@
 //! check what the application promises of its buffers.
 #![allow(unsafe_code)]
 
+use crate::clip::request::Request;
 use crate::error::Error;
 use crate::evaluate::backend::Backend;
 use crate::gpu::clip_target::ClipTarget;
-use crate::gpu::engine::{Job, VulkanEngine};
+use crate::gpu::engine::VulkanEngine;
 use crate::gpu::error::VulkanError;
 use crate::gpu::handles::VulkanBuffer;
+use crate::gpu::job::Job;
 use crate::gpu::recovery::Opened;
 use crate::output::window::Window;
-use crate::request::Request;
 use crate::time::frames::Timeline;
 
 impl Request<'_> {
@@ -29,10 +30,11 @@ impl Request<'_> {
     /// else before this returns.
     pub unsafe fn to_buffer(&self, buffer: VulkanBuffer) -> Result<(), Error> {
         let (opened, timeline, window) = self.for_buffer(buffer)?;
-        let uploaded = &self.clip.uploaded;
-        let timeline = uploaded.folded(&timeline)?;
         let to_buffer = |engine: &VulkanEngine, job: Job<'_>| engine.run_into(job, &window, buffer);
-        Ok(uploaded.on_device(opened, &timeline, self.encoding, to_buffer)?)
+        self.source.with_clip(|clip| {
+            let timeline = clip.uploaded.folded(&timeline)?;
+            Ok((clip.uploaded).on_device(opened, &timeline, self.encoding, to_buffer)?)
+        })
     }
 
     /// Makes ready what it takes to record this into commands of the application's own, into a buffer on the
@@ -53,16 +55,17 @@ impl Request<'_> {
         if engine.device.owned {
             return Err(Error::BufferOfOther);
         }
-        let uploaded = &self.clip.uploaded;
-        let timeline = uploaded.folded(&timeline)?;
         let target =
             |_: &VulkanEngine, job: Job<'_>| ClipTarget::new(&engine, job, &window, buffer);
-        Ok(uploaded.on_device(opened, &timeline, self.encoding, target)?)
+        self.source.with_clip(|clip| {
+            let timeline = clip.uploaded.folded(&timeline)?;
+            Ok((clip.uploaded).on_device(opened, &timeline, self.encoding, target)?)
+        })
     }
 
     /// The device, the samples and the part of them, where the result fits a range of a buffer.
     fn for_buffer(&self, buffer: VulkanBuffer) -> Result<(&Opened, Timeline, Window), Error> {
-        let Backend::Vulkan(opened) = &*self.clip.engine().backend else {
+        let Backend::Vulkan(opened) = &*self.source.engine().backend else {
             return Err(Error::BufferOnCpu);
         };
         let (timeline, window) = self.window()?;

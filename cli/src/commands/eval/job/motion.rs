@@ -8,10 +8,10 @@ use tumble_formats::motion::{Motion, SampledClip};
 use tumble_formats::{Diagnostic, sample};
 
 use crate::arguments::time::{ClipFrames, SampleRequest};
-use crate::batch::output::ResultTarget;
+use crate::batch::pipeline::EvaluatedResult;
 use crate::batch::room;
-use crate::batch::run::EvaluatedResult;
-use crate::commands::eval::{EvaluationJob, EvaluationReport};
+use crate::batch::target::ResultTarget;
+use crate::commands::eval::job::{EvaluationJob, EvaluationReport};
 use crate::messages::exit::Failure;
 
 impl EvaluationJob<'_> {
@@ -25,8 +25,8 @@ impl EvaluationJob<'_> {
 
     /// Whether the input's own file can be written again.
     pub(super) fn keeps(&self, target: &ResultTarget) -> bool {
-        let document = self.loaded.document.as_ref();
-        !self.loaded.is_adjusted
+        let document = self.input.loaded.document.as_ref();
+        !self.input.loaded.is_adjusted
             && document.is_some_and(|document| document.writes(target.format()))
     }
 
@@ -74,7 +74,7 @@ impl EvaluationJob<'_> {
                 end: None,
                 from_zero: false,
             },
-        ) = (self.loaded.document.clone(), self.samples)
+        ) = (self.input.loaded.document.clone(), self.samples)
         else {
             return Err(Failure::usage(format!(
                 "{name}: the animations of a file that is kept keep their lengths; leave out \
@@ -105,7 +105,7 @@ impl EvaluationJob<'_> {
             sequence: self.arguments.output.sequence(),
             linear: self.arguments.linear.clone(),
             order: self.arguments.order(),
-            box_length: self.loaded.box_length,
+            box_length: self.input.loaded.box_length,
             ..target.motion_options()
         }
     }
@@ -169,7 +169,7 @@ impl EvaluationJob<'_> {
                 .skeleton
                 .iter()
                 .any(|joint| joint.rest.translation != Vec3::ZERO)
-            || boxes && self.loaded.box_length.is_some();
+            || boxes && self.input.loaded.box_length.is_some();
         if self.arguments.command_line.has("scale") && !is_placed {
             return Err(Failure::usage(format!(
                 "{name}: --scale has no effect on a clip without translations; leave it out"

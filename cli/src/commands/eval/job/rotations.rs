@@ -13,10 +13,10 @@ use tumble_formats::world::{HierarchyError, world};
 
 use crate::arguments::output::PoseKind;
 use crate::arguments::time;
-use crate::batch::output::ResultTarget;
+use crate::batch::pipeline::EvaluatedResult;
 use crate::batch::room;
-use crate::batch::run::EvaluatedResult;
-use crate::commands::eval::{EvaluationJob, EvaluationReport, LayoutArgument};
+use crate::batch::target::ResultTarget;
+use crate::commands::eval::job::{EvaluationJob, EvaluationReport};
 use crate::messages::exit::{ALL_INPUTS, Failure};
 
 impl EvaluationJob<'_> {
@@ -42,10 +42,7 @@ impl EvaluationJob<'_> {
             .map_err(|error| Failure::evaluating(name, &error.into()))?;
         let encoding = arguments.output.encoding(arguments.encoding);
         target.has_room(name, set.track_count(), timeline.len(), encoding)?;
-        let requested = match arguments.layout {
-            LayoutArgument::Track => Layout::TrackMajor,
-            LayoutArgument::Frame => Layout::FrameMajor,
-        };
+        let requested = arguments.layout;
         let mut notes = self.notes(name)?;
         if let time::SampleRequest::Rate { rate, .. } = self.samples {
             notes.push(("rate", rate.to_string()));
@@ -185,7 +182,10 @@ impl EvaluationJob<'_> {
         kind: PoseKind,
     ) -> Result<Vec<f32>, Failure> {
         let set = &clip.set;
-        let (tracks, length) = (set.track_count(), self.loaded.box_length.unwrap_or(1.0));
+        let (tracks, length) = (
+            set.track_count(),
+            self.input.loaded.box_length.unwrap_or(1.0),
+        );
         let (skeleton, offsets) = self
             .arguments
             .output
@@ -201,7 +201,10 @@ impl EvaluationJob<'_> {
         let evaluated = samples.map_err(Error::from).and_then(|timeline| {
             self.device.choose(tracks * timeline.len())?;
             self.device.work(|engine| {
-                let local = engine.evaluate_as(set, interpolation, frames, Layout::FrameMajor)?;
+                let local = engine
+                    .request(set, interpolation, frames)
+                    .layout(Layout::FrameMajor)
+                    .evaluate()?;
                 match kind {
                     PoseKind::World => {
                         let world = engine.world(&local, &skeleton)?;

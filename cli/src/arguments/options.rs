@@ -1,0 +1,335 @@
+//! The options of the commands that write results. A row of [`OPTIONS`] is all that the program knows of an
+//! option besides its value: whether it determines the bytes of results, and what it applies to. An option
+//! that has no effect is refused, with a remedy, and never ignored.
+
+use tumble::{Encoding, Layout};
+use tumble_formats::format::{Format, FormatOption};
+
+use crate::arguments::output::OutputArguments;
+
+/// A rule about an option of this name; the name is that of its field, with `_`.
+pub(crate) struct OptionRule {
+    pub(crate) name: &'static str,
+    pub(crate) bytes: Bytes,
+    pub(crate) applies_to: AppliesTo,
+}
+
+/// What of an option determines the bytes of a result.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Bytes {
+    /// Nothing: it says where inputs and results are, what is permitted, which device computes, or what is
+    /// reported. Times may come from standard input, so the commands that read them add their hash.
+    Unchanged,
+    /// Its value.
+    ByValue,
+    /// The content of the file that it names.
+    ByContent,
+}
+
+/// What an option applies to.
+pub(crate) enum AppliesTo {
+    /// Whatever its command does; what depends on values is refused where these are used.
+    All,
+    /// Inputs of formats that take it.
+    Inputs(FormatOption),
+    /// Results for which this gives no reason against it.
+    Results(fn(&ResultRequest<'_>) -> Option<String>),
+}
+
+/// The kind of a result of `tumble eval`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum ResultKind {
+    /// The numbers of rotations as they come.
+    Rotations,
+    /// Whole poses.
+    Poses,
+    /// A clip with all its channels.
+    Motion,
+    /// The input's own file with other keys.
+    Baked,
+}
+
+impl ResultKind {
+    pub(crate) fn is_clip(self) -> bool {
+        matches!(self, Self::Motion | Self::Baked)
+    }
+}
+
+/// A result of `tumble eval`, as far as options apply to it or do not.
+pub(crate) struct ResultRequest<'a> {
+    pub(crate) kind: ResultKind,
+    pub(crate) format: &'static Format,
+    pub(crate) output: &'a OutputArguments,
+    pub(crate) layout: Layout,
+    pub(crate) encoding: Encoding,
+}
+
+const fn silent(name: &'static str) -> OptionRule {
+    OptionRule {
+        name,
+        bytes: Bytes::Unchanged,
+        applies_to: AppliesTo::All,
+    }
+}
+
+const fn deciding(name: &'static str) -> OptionRule {
+    OptionRule {
+        name,
+        bytes: Bytes::ByValue,
+        applies_to: AppliesTo::All,
+    }
+}
+
+const fn reading(name: &'static str, option: FormatOption) -> OptionRule {
+    OptionRule {
+        name,
+        bytes: Bytes::ByValue,
+        applies_to: AppliesTo::Inputs(option),
+    }
+}
+
+const fn of_results(
+    name: &'static str,
+    refusal: fn(&ResultRequest<'_>) -> Option<String>,
+) -> OptionRule {
+    OptionRule {
+        name,
+        bytes: Bytes::ByValue,
+        applies_to: AppliesTo::Results(refusal),
+    }
+}
+
+/// All options of `eval`, `convert`, `follow`, `smooth` and `reduce`. Where several have no effect, the
+/// message is about the first.
+pub(crate) const OPTIONS: &[OptionRule] = &[
+    // Inputs.
+    silent("paths"),
+    silent("files_from"),
+    silent("pipes"),
+    silent("max_size"),
+    silent("max_memory"),
+    deciding("from"),
+    deciding("animation"),
+    deciding("tracks"),
+    deciding("up"),
+    reading("raw_times", FormatOption::RawTimes),
+    reading("duplicates", FormatOption::Duplicates),
+    reading("source_fps", FormatOption::SourceRate),
+    OptionRule {
+        bytes: Bytes::ByContent,
+        ..reading("source_times", FormatOption::TimesApart)
+    },
+    reading("map", FormatOption::Map),
+    reading("time_unit", FormatOption::TimeUnit),
+    reading("bridge_gaps", FormatOption::BridgeGaps),
+    reading("keyframes", FormatOption::Keyframes),
+    OptionRule {
+        bytes: Bytes::ByContent,
+        ..deciding("body_model")
+    },
+    // Results.
+    silent("out"),
+    silent("overwrite"),
+    silent("resume"),
+    silent("format"),
+    silent("times_out"),
+    silent("shard"),
+    silent("shard_bytes"),
+    silent("json"),
+    silent("explain_route"),
+    deciding("plot"),
+    // The device.
+    silent("device"),
+    silent("allow_inexact"),
+    silent("memory"),
+    // Samples.
+    deciding("fps"),
+    silent("times"),
+    deciding("start"),
+    deciding("end"),
+    deciding("from_zero"),
+    deciding("at"),
+    deciding("max_gap"),
+    deciding("in_gaps"),
+    // Curves.
+    deciding("method"),
+    deciding("ends"),
+    deciding("path"),
+    deciding("speed"),
+    deciding("before"),
+    deciding("after"),
+    deciding("tension"),
+    deciding("continuity"),
+    deciding("bias"),
+    // What is written of each rotation.
+    deciding("output"),
+    of_results("sequence", sequence),
+    of_results("major", major),
+    of_results("axes", axes),
+    of_results("parents", parents),
+    of_results("order", order),
+    of_results("layout", layout),
+    of_results("encoding", encoding),
+    of_results("linear", linear),
+    of_results("scale", |result| lengths(result, "scale")),
+    OptionRule {
+        bytes: Bytes::ByContent,
+        ..of_results("offsets", |result| lengths(result, "offsets"))
+    },
+    // Paths.
+    deciding("seconds"),
+    deciding("rate"),
+    deciding("path_method"),
+    deciding("path_ends"),
+    deciding("path_frames"),
+    deciding("path_up"),
+    deciding("path_speed"),
+    deciding("direction"),
+    deciding("no_ups"),
+    deciding("twist"),
+    deciding("forward"),
+    deciding("upward"),
+    // Smoothing and reduction.
+    deciding("kernel"),
+    deciding("low_pass"),
+    deciding("passes"),
+    deciding("tolerance"),
+    deciding("distance"),
+    deciding("shell"),
+    deciding("curve"),
+    deciding("quantize"),
+    deciding("meshopt"),
+];
+
+/// The rule of an option.
+pub(crate) fn rule(name: &str) -> Option<&'static OptionRule> {
+    OPTIONS.iter().find(|rule| rule.name == name)
+}
+
+impl ResultRequest<'_> {
+    /// Why an option has no effect, where `applies` is false.
+    fn unless(&self, applies: bool, option: &str, wants: &str) -> Option<String> {
+        (!applies).then(|| {
+            format!(
+                "--{option} has no effect on --output {}; leave it out, or use {wants}",
+                self.output.name()
+            )
+        })
+    }
+}
+
+fn sequence(result: &ResultRequest<'_>) -> Option<String> {
+    // Files of angles have them whatever `--output` is (BVH).
+    let is_angles = result.kind.is_clip() && result.format.takes(FormatOption::Sequence);
+    let applies = result.output.is_euler() || is_angles;
+    result.unless(applies, "sequence", "--output euler, or BVH")
+}
+
+fn major(result: &ResultRequest<'_>) -> Option<String> {
+    let applies = result.output.is_matrix();
+    result.unless(applies, "major", "--output matrix or matrix-3x4")
+}
+
+fn axes(result: &ResultRequest<'_>) -> Option<String> {
+    let applies = result.output.is_rate();
+    result.unless(applies, "axes", "--output velocity or acceleration")
+}
+
+fn parents(result: &ResultRequest<'_>) -> Option<String> {
+    let applies = result.output.poses().is_some();
+    result.unless(applies, "parents", "--output world or transform")
+}
+
+fn order(result: &ResultRequest<'_>) -> Option<String> {
+    let (output, format) = (result.output, result.format);
+    match result.kind {
+        ResultKind::Rotations if !output.is_rotations() => Some(format!(
+            "--order is for quaternions, and --output {} has none; leave it out",
+            output.name()
+        )),
+        ResultKind::Motion if format.takes(FormatOption::Order) => None,
+        ResultKind::Motion | ResultKind::Baked => Some(format!(
+            "{} has a fixed order of quaternion components; leave out --order",
+            format.name
+        )),
+        ResultKind::Rotations | ResultKind::Poses => None,
+    }
+}
+
+fn layout(result: &ResultRequest<'_>) -> Option<String> {
+    let name = result.format.name;
+    let (only, rows) = match result.kind {
+        ResultKind::Rotations => {
+            let only = result.format.write.as_ref()?.layout;
+            (only, format!("rows of {name}"))
+        }
+        ResultKind::Poses => (Some(Layout::FrameMajor), "poses".to_owned()),
+        ResultKind::Motion | ResultKind::Baked => {
+            return Some(format!(
+                "{name} has a fixed layout for clips; leave out --layout"
+            ));
+        }
+    };
+    let is_refused = only == Some(Layout::FrameMajor) && result.layout == Layout::TrackMajor;
+    is_refused.then(|| format!("{rows} come frame by frame; leave out --layout track"))
+}
+
+fn encoding(result: &ResultRequest<'_>) -> Option<String> {
+    if result.encoding == Encoding::F32 {
+        return None;
+    }
+    let format = result.format;
+    let is_text = format.write.as_ref().is_some_and(|write| write.is_text);
+    match result.kind {
+        ResultKind::Rotations if is_text => {
+            Some("--encoding is for binary results (NPY); text holds every digit".to_owned())
+        }
+        ResultKind::Rotations if result.output.is_rotations() => None,
+        ResultKind::Rotations | ResultKind::Poses => Some(format!(
+            "--encoding is for quaternions, and --output {} is written as f32; leave it out",
+            result.output.name()
+        )),
+        ResultKind::Motion | ResultKind::Baked => Some(format!(
+            "--encoding is for rotations as they come (NPY); {} has its own; leave it out",
+            format.name
+        )),
+    }
+}
+
+fn linear(result: &ResultRequest<'_>) -> Option<String> {
+    let takes = result.kind == ResultKind::Baked && result.format.takes(FormatOption::Linear);
+    (!takes).then(|| "--linear is for NPZ that is written again as NPZ; leave it out".to_owned())
+}
+
+fn lengths(result: &ResultRequest<'_>, option: &str) -> Option<String> {
+    (result.kind == ResultKind::Rotations).then(|| {
+        format!(
+            "--{option} has no effect on rotations alone; leave it out, or write --output world or \
+             transform, or a clip (-o OUT.glb)"
+        )
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use clap::CommandFactory;
+
+    use super::*;
+
+    /// Every option has a rule, and every rule an option.
+    #[test]
+    fn options_of_results_say_what_they_apply_to() {
+        let program = crate::Arguments::command();
+        let commands = ["eval", "convert", "follow", "smooth", "reduce"];
+        let named: BTreeSet<&str> = (commands.iter())
+            .flat_map(|name| program.find_subcommand(name).unwrap().get_arguments())
+            .map(|argument| argument.get_id().as_str())
+            .filter(|name| *name != "help")
+            .collect();
+        let ruled: BTreeSet<&str> = OPTIONS.iter().map(|rule| rule.name).collect();
+        assert_eq!(named, ruled);
+        assert_eq!(ruled.len(), OPTIONS.len(), "a rule each");
+    }
+}

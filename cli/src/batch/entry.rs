@@ -1,0 +1,234 @@
+//! The lines of a manifest, those of earlier batches, and what records new ones.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{self, BufRead, BufReader, Read};
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, LazyLock};
+
+use serde::{Deserialize, Serialize};
+use tumble_formats::beneath::{is_beneath, open_beneath};
+
+use crate::batch::destination::WrittenFile;
+use crate::batch::digest;
+use crate::messages::exit::{Failure, OUTPUT};
+use crate::messages::words;
+
+/// The name of a manifest in its directory.
+pub(crate) const NAME: &str = "manifest.jsonl";
+
+/// One result.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) struct ManifestEntry {
+    /// Below the manifest's directory.
+    pub(crate) output: String,
+    pub(crate) output_sha256: String,
+    pub(crate) output_bytes: u64,
+    /// As on the command line.
+    pub(crate) input: String,
+    /// `None` for standard input.
+    pub(crate) input_sha256: Option<String>,
+    /// Everything that determines the result besides the input.
+    pub(crate) options: String,
+    pub(crate) kernels_sha256: String,
+    /// The program's version.
+    pub(crate) tumble: String,
+    /// Which device computed it; on every other the bits would be the same.
+    pub(crate) device: String,
+    /// For a clip of a file with several: the result that all clips together would have been, and
+    /// how many clips there are.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) one_of: Option<(String, usize)>,
+}
+
+impl ManifestEntry {
+    /// The entry in a line; `None` where there is none, or where it names a result outside its directory.
+    pub(crate) fn of_line(line: &[u8]) -> Option<Self> {
+        let entry: Self = serde_json::from_slice(line).ok()?;
+        let all = entry.one_of.as_ref().map(|(all, _)| &**all);
+        (is_beneath(&entry.output) && all.is_none_or(is_beneath)).then_some(entry)
+    }
+
+    /// Whether it is the result of the same request.
+    fn is_made_from(&self, input_sha256: &str, options: &str) -> bool {
+        self.input_sha256.as_deref() == Some(input_sha256)
+            && self.options == options
+            && self.kernels_sha256 == kernels_sha256()
+            && self.tumble == env!("CARGO_PKG_VERSION")
+    }
+}
+
+/// Of every kernel's SPIR-V, one behind the other.
+pub(crate) fn kernels_sha256() -> &'static str {
+    static HASH: LazyLock<String> =
+        LazyLock::new(|| digest::of_bytes(tumble::vulkan::kernels().map(|(_, code)| code)));
+    &HASH
+}
+
+/// A manifest's lines: the last one for each output, and how many are no entries.
+pub(crate) struct ManifestLines {
+    pub(crate) entries: BTreeMap<String, ManifestEntry>,
+    pub(crate) damaged: usize,
+}
+
+impl ManifestLines {
+    /// A last line without its end was being written when the program was killed.
+    pub(crate) fn parse(bytes: &[u8]) -> Self {
+        let mut lines = Self {
+            entries: BTreeMap::new(),
+            damaged: 0,
+        };
+        for line in bytes.split_inclusive(|&byte| byte == b'\n') {
+            match ManifestEntry::of_line(line) {
+                Some(entry) => {
+                    lines.entries.insert(entry.output.clone(), entry);
+                }
+                None if line.ends_with(b"\n") && line.len() > 1 => lines.damaged += 1,
+                None => {}
+            }
+        }
+        lines
+    }
+}
+
+/// Opens the manifest of a directory; `None` where there is none.
+///
+/// # Errors
+/// When it is a link, not a regular file, or not a manifest.
+pub(crate) fn open(folder: &Path) -> Result<Option<File>, Failure> {
+    let path = folder.join(NAME);
+    let shown = path.display();
+    let refuse = |why: &str| Err(Failure::usage(format!("{shown}: {why}")));
+    match std::fs::symlink_metadata(&path) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
+        Ok(found) if found.is_symlink() => {
+            return refuse(
+                "is a symbolic link, and a manifest must be a regular file; remove the link",
+            );
+        }
+        Ok(found) if !found.is_file() => {
+            return refuse("is not a regular file, as a manifest must be; give another directory");
+        }
+        Ok(_) | Err(_) => {}
+    }
+    let failed = |error| Failure::new(OUTPUT, format!("{shown}: cannot be read: {error}"));
+    let file = open_beneath(folder, Path::new(NAME)).map_err(failed)?;
+    let mut first = Vec::new();
+    let mut reader = BufReader::new(file.try_clone().map_err(failed)?).take(MAX_LINE);
+    reader.read_until(b'\n', &mut first).map_err(failed)?;
+    if ManifestEntry::of_line(&first).is_none() {
+        return refuse(
+            "is not a manifest of tumble: its first line is not an entry; move it, give another directory, \
+             or --overwrite to replace it",
+        );
+    }
+    io::Seek::rewind(&mut &file).map_err(failed)?;
+    Ok(Some(file))
+}
+
+/// Warns of lines of a directory's manifest that are not entries: they are left out of the next one.
+pub(crate) fn warn_of_damaged_lines(folder: &Path, lines: usize) {
+    if lines > 0 {
+        let path = folder.join(NAME);
+        let lines = words::count(lines, "line");
+        words::warning(&format!(
+            "{}: {lines} without a result of this directory, left out",
+            path.display()
+        ));
+    }
+}
+
+/// The longest line, in bytes.
+const MAX_LINE: u64 = 1 << 20;
+
+/// Records the results of a batch.
+pub(crate) trait ResultRecorder {
+    /// The results recorded before this batch.
+    fn previous(&self) -> PreviousEntries;
+
+    /// Records a complete result, which is renamed now or together with others.
+    fn keep(&mut self, entry: ManifestEntry, written: WrittenFile) -> Result<(), Failure>;
+
+    /// A result, or the results of its clips, exist already.
+    fn skip(&mut self, _output: &str) {}
+
+    /// An input failed; the batch continues.
+    fn refuse(&mut self, _path: &Path, _failure: &Failure) {}
+
+    /// The file that lists the results.
+    fn list(&self) -> PathBuf;
+
+    /// Prints a message.
+    fn tell(&self, text: &str) {
+        words::note(text);
+    }
+
+    /// The batch is over.
+    fn close(&mut self) -> Result<(), Failure> {
+        Ok(())
+    }
+}
+
+/// The entries of a manifest before the batch.
+#[derive(Clone)]
+pub(crate) struct PreviousEntries {
+    pub(super) folder: PathBuf,
+    pub(super) entries: Arc<BTreeMap<String, ManifestEntry>>,
+}
+
+impl PreviousEntries {
+    pub(crate) fn new(folder: &Path, entries: BTreeMap<String, ManifestEntry>) -> Self {
+        Self {
+            folder: folder.to_owned(),
+            entries: Arc::new(entries),
+        }
+    }
+
+    /// The entry of an output, or the entries of its clips.
+    pub(crate) fn results_of<'a>(
+        &'a self,
+        output: &'a str,
+    ) -> impl Iterator<Item = &'a ManifestEntry> {
+        let one = self.entries.get(output);
+        let clips = of_clips(&self.entries, output).filter(move |_| one.is_none());
+        one.into_iter().chain(clips.map(|(entry, _)| entry))
+    }
+
+    /// Whether the output, or the outputs of all its clips, exist, are complete, and were made by the
+    /// same request.
+    pub(crate) fn is_done(&self, output: &str, input_sha256: &str, options: &str) -> bool {
+        let is_whole = |entry: &ManifestEntry| {
+            let (bytes, sha256) = (entry.output_bytes, &entry.output_sha256);
+            entry.is_made_from(input_sha256, options)
+                && digest::is_whole(&self.folder, &entry.output, bytes, sha256)
+                    .is_ok_and(|is_whole| is_whole)
+        };
+        if let Some(entry) = self.entries.get(output) {
+            return is_whole(entry);
+        }
+        let clips = of_clips(&self.entries, output);
+        let clips = clips.filter_map(|(entry, count)| is_whole(entry).then_some(count));
+        let counts: Vec<usize> = clips.collect();
+        counts.first().is_some_and(|&count| count == counts.len())
+    }
+}
+
+/// The results of the single clips of an output, with the number of clips: `fox.Run.npy` and so on for
+/// `fox.npy`.
+pub(super) fn of_clips<'a>(
+    entries: &'a BTreeMap<String, ManifestEntry>,
+    output: &'a str,
+) -> impl Iterator<Item = (&'a ManifestEntry, usize)> {
+    let stem = output.rsplit_once('.').map_or(output, |(stem, _)| stem);
+    let beside = entries.range(format!("{stem}.")..);
+    let candidates = beside.take_while(move |(name, _)| name.starts_with(stem));
+    candidates.filter_map(move |(_, entry)| {
+        let (all, count) = entry.one_of.as_ref()?;
+        (all == output).then_some((entry, *count))
+    })
+}
+
+/// An entry as a line.
+pub(crate) fn line(entry: &ManifestEntry) -> String {
+    serde_json::to_string(entry).expect("strings and numbers") + "\n"
+}

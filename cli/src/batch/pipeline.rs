@@ -1,0 +1,487 @@
+//! The way of a command's inputs: read ahead, evaluated one by one by the command, and kept.
+//!
+//! ```text
+//! while let Some(work) = pipeline.next_work() {
+//!     let made = …;                    what the command does to one input
+//!     pipeline.keep(&work, made);
+//! }
+//! pipeline.finish()
+//! ```
+//!
+//! A thread reads, and hashes, the next input of a batch while the command works on one: at most one waits,
+//! so that at most two are in memory. A failure of an input is reported when the next one begins, and the
+//! others go on, unless they would fail alike.
+
+use std::collections::{HashSet, VecDeque};
+use std::path::{Path, PathBuf};
+use std::rc::Rc;
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::thread::{self, JoinHandle};
+use std::time::Instant;
+
+use tumble_formats::Loaded;
+use tumble_formats::motion::Motion;
+
+use crate::arguments::input::{InputReader, check_complete, print_warnings};
+use crate::batch::clip_files::{ClipFile, clip_files};
+use crate::batch::destination::WrittenFile;
+use crate::batch::digest::InputFile;
+use crate::batch::entry::{ManifestEntry, PreviousEntries, ResultRecorder, kernels_sha256};
+use crate::batch::target::ResultTarget;
+use crate::messages::exit::{DEVICE, Failure, Outcomes, SOME_INPUTS};
+use crate::messages::progress::busy;
+use crate::messages::{names, signals, words};
+
+/// An input and the target of its result.
+pub(crate) type PipelineJob = (PathBuf, ResultTarget);
+
+/// The options of a batch.
+pub(crate) struct BatchOptions {
+    /// Everything that determines a result besides its input.
+    pub(crate) options: String,
+    /// Results that are done are skipped.
+    pub(crate) resume: bool,
+}
+
+/// A result that still has its temporary name, the device that computed it, and the message about it.
+pub(crate) struct EvaluatedResult {
+    pub(crate) written: WrittenFile,
+    pub(crate) device: String,
+    pub(crate) message: String,
+}
+
+/// An input that was read.
+pub(crate) struct OpenInput {
+    pub(crate) file: InputFile,
+    pub(crate) loaded: Loaded,
+    /// When the command began with it.
+    pub(crate) started: Instant,
+}
+
+/// A file to write: all clips of an input, or one of them.
+pub(crate) struct ClipWork {
+    pub(crate) input: Rc<OpenInput>,
+    /// What messages call the clips.
+    pub(crate) name: String,
+    pub(crate) target: ResultTarget,
+    clips: std::ops::Range<usize>,
+}
+
+impl ClipWork {
+    /// The clips.
+    pub(crate) fn clips(&self) -> Vec<&Motion> {
+        self.input.loaded.clips[self.clips.clone()].iter().collect()
+    }
+
+    /// The path of the input.
+    pub(crate) fn path(&self) -> &Path {
+        self.input.file.path()
+    }
+}
+
+/// See the module.
+pub(crate) struct Pipeline<'a> {
+    inputs: InputSource,
+    /// The input that is being worked on.
+    current: Option<CurrentInput>,
+    /// Nothing for a single result.
+    batch: Option<BatchRecords<'a>>,
+    outcomes: Outcomes,
+}
+
+/// Where inputs come from.
+enum InputSource {
+    /// One, or none.
+    One(Box<dyn InputReader>, std::vec::IntoIter<PipelineJob>),
+    /// As many as are left for a thread.
+    Ahead {
+        read_jobs: Receiver<ReadJob>,
+        left: usize,
+        thread: JoinHandle<()>,
+    },
+    /// The thread could not start.
+    None,
+}
+
+/// A job whose input was read.
+struct ReadJob {
+    job: PipelineJob,
+    /// `None` where its result exists and is complete.
+    input: Option<(InputFile, Result<Loaded, Failure>)>,
+}
+
+/// The input that is being worked on.
+struct CurrentInput {
+    input: Rc<OpenInput>,
+    target: ResultTarget,
+    /// The files that are left.
+    files: VecDeque<Result<ClipFile, Failure>>,
+    file_count: usize,
+    failed: Vec<Failure>,
+}
+
+/// The results of a batch.
+struct BatchRecords<'a> {
+    records: Box<dyn ResultRecorder + 'a>,
+    options: String,
+    inputs: usize,
+    made: HashSet<String>,
+    skipped: usize,
+    failed: usize,
+}
+
+impl<'a> Pipeline<'a> {
+    /// Of a single result, without a manifest.
+    pub(crate) fn of_one(
+        reader: impl InputReader,
+        jobs: Vec<PipelineJob>,
+        refused: Vec<Failure>,
+    ) -> Self {
+        let mut outcomes = Outcomes::of(refused.len() + jobs.len());
+        add_all(&mut outcomes, refused);
+        Self {
+            inputs: InputSource::One(Box::new(reader), jobs.into_iter()),
+            current: None,
+            batch: None,
+            outcomes,
+        }
+    }
+
+    /// Of results that `records` records. `refused`: the failures of inputs that have no job.
+    pub(crate) fn of_batch(
+        reader: impl InputReader,
+        jobs: Vec<PipelineJob>,
+        refused: Vec<Failure>,
+        BatchOptions { options, resume }: BatchOptions,
+        records: Box<dyn ResultRecorder + 'a>,
+    ) -> Self {
+        let job_count = jobs.len();
+        let inputs = refused.len() + job_count;
+        let mut outcomes = Outcomes::of(inputs);
+        let reading = ReadingAhead {
+            reader,
+            previous: records.previous(),
+            options: options.clone(),
+            resume,
+        };
+        let batch = BatchRecords {
+            records,
+            options,
+            inputs,
+            made: HashSet::new(),
+            skipped: 0,
+            failed: refused.len(),
+        };
+        let (hand_over, read_jobs) = sync_channel(0);
+        let reader = thread::Builder::new().spawn(move || reading.read_all(jobs, &hand_over));
+        let inputs = match reader {
+            Ok(thread) => InputSource::Ahead {
+                read_jobs,
+                left: job_count,
+                thread,
+            },
+            Err(error) => {
+                let message =
+                    format!("the system refuses a thread: {error}; allow more (ulimit -u)");
+                outcomes.end(Failure::new(DEVICE, message));
+                InputSource::None
+            }
+        };
+        add_all(&mut outcomes, refused);
+        Self {
+            inputs,
+            current: None,
+            batch: Some(batch),
+            outcomes,
+        }
+    }
+
+    /// The next file to write; `None` at the end.
+    pub(crate) fn next_work(&mut self) -> Option<ClipWork> {
+        loop {
+            while let Some(current) = &mut self.current {
+                match current.files.pop_front() {
+                    Some(Ok(file)) => {
+                        return Some(ClipWork {
+                            input: Rc::clone(&current.input),
+                            name: file.name,
+                            target: file.target,
+                            clips: file.clips,
+                        });
+                    }
+                    Some(Err(failure)) => self.fail(failure),
+                    None => self.end_input(),
+                }
+            }
+            if self.outcomes.is_ended() {
+                return None;
+            }
+            if let Some(stop) = signals::stopped() {
+                self.outcomes.end(stop);
+                return None;
+            }
+            let ReadJob { job, input } = self.inputs.next()?;
+            self.begin(job, input);
+        }
+    }
+
+    /// Keeps what was made of a file's clips, or its failure; gives the report of a result that is kept.
+    pub(crate) fn keep<T>(
+        &mut self,
+        work: &ClipWork,
+        made: Result<(EvaluatedResult, T), Failure>,
+    ) -> Option<T> {
+        let kept = made.and_then(|(result, report)| {
+            match &mut self.batch {
+                Some(batch) => {
+                    let whole = self.current.as_ref().map_or("", |it| it.target.name());
+                    batch.keep(work, whole, result)?;
+                }
+                None => {
+                    result.written.commit()?;
+                    words::note(&result.message);
+                }
+            }
+            Ok(report)
+        });
+        kept.map_err(|failure| self.fail(failure)).ok()
+    }
+
+    /// Ends the work; the exit code of the command.
+    pub(crate) fn finish(self) -> Result<(), Failure> {
+        self.inputs.close();
+        if let Some(mut batch) = self.batch {
+            batch.summarize();
+            batch.records.close()?;
+        }
+        self.outcomes.finish()
+    }
+
+    /// Begins with an input that was read.
+    fn begin(
+        &mut self,
+        (path, target): PipelineJob,
+        input: Option<(InputFile, Result<Loaded, Failure>)>,
+    ) {
+        let Some((file, loaded)) = input else {
+            if let Some(batch) = &mut self.batch {
+                batch.skipped += 1;
+                batch.records.skip(target.name());
+            }
+            return;
+        };
+        let files = loaded.and_then(|loaded| {
+            print_warnings(&loaded);
+            let files = clip_files(&path, &loaded, &target)?;
+            Ok((loaded, files))
+        });
+        match files {
+            Ok((loaded, files)) => {
+                let input = OpenInput {
+                    file,
+                    loaded,
+                    started: Instant::now(),
+                };
+                self.current = Some(CurrentInput {
+                    input: Rc::new(input),
+                    target,
+                    file_count: files.len(),
+                    files,
+                    failed: Vec::new(),
+                });
+            }
+            Err(failure) => self.add(&path, Err(failure)),
+        }
+    }
+
+    /// A file of the input failed: the others go on, unless they would fail alike.
+    fn fail(&mut self, failure: Failure) {
+        let Some(current) = &mut self.current else {
+            return;
+        };
+        if failure.is_final() {
+            let path = current.input.file.path().to_owned();
+            self.current = None;
+            self.add(&path, Err(failure));
+        } else {
+            current.failed.push(failure);
+        }
+    }
+
+    /// All files of the input are made, or failed.
+    fn end_input(&mut self) {
+        let Some(mut current) = self.current.take() else {
+            return;
+        };
+        let path = current.input.file.path();
+        let name = names::input(path);
+        let failed = current.failed.len();
+        let outcome = match current.failed.pop() {
+            None => check_complete(&name, &current.input.loaded),
+            Some(last) => {
+                current.failed.iter().for_each(|failure| {
+                    failure.report();
+                });
+                if failed == current.file_count {
+                    Err(last)
+                } else {
+                    last.report();
+                    let all = current.file_count;
+                    let message = format!("{name}: {failed} of {all} animations failed");
+                    Err(Failure::new(SOME_INPUTS, message))
+                }
+            }
+        };
+        self.add(path, outcome);
+    }
+
+    /// Adds the outcome of an input.
+    fn add(&mut self, path: &Path, outcome: Result<(), Failure>) {
+        if let (Err(failure), Some(batch)) = (&outcome, &mut self.batch)
+            && !failure.is_final()
+        {
+            batch.failed += 1;
+            batch.records.refuse(path, failure);
+        }
+        self.outcomes.add(outcome);
+    }
+}
+
+fn add_all(outcomes: &mut Outcomes, refused: Vec<Failure>) {
+    for failure in refused {
+        if !outcomes.is_ended() {
+            outcomes.add(Err(failure));
+        }
+    }
+}
+
+impl InputSource {
+    fn next(&mut self) -> Option<ReadJob> {
+        match self {
+            Self::One(reader, jobs) => {
+                let job = jobs.next()?;
+                let path = &job.0;
+                let file = InputFile::new(path);
+                let label = format!("reading {}", names::input(path));
+                let loaded = busy(&label, || reader.read(path));
+                let input = Some((file, loaded));
+                Some(ReadJob { job, input })
+            }
+            Self::Ahead { left: 0, .. } | Self::None => None,
+            Self::Ahead {
+                read_jobs, left, ..
+            } => {
+                *left -= 1;
+                Some(read_jobs.recv().expect("the reader hands over every input"))
+            }
+        }
+    }
+
+    /// Waits for the thread, which stops at the next input.
+    fn close(self) {
+        if let Self::Ahead {
+            read_jobs, thread, ..
+        } = self
+        {
+            drop(read_jobs);
+            if let Err(panic) = thread.join() {
+                std::panic::resume_unwind(panic);
+            }
+        }
+    }
+}
+
+impl BatchRecords<'_> {
+    /// Records the result of some clips of an input; `whole` is the name of the result of all.
+    fn keep(
+        &mut self,
+        work: &ClipWork,
+        whole: &str,
+        mut result: EvaluatedResult,
+    ) -> Result<(), Failure> {
+        let name = work.target.name();
+        // Clips of one input may be called as another input is: walk.glb's `Run` and walk.Run.bvh.
+        if !self.made.insert(name.to_owned()) {
+            let input = names::input(work.path());
+            return Err(Failure::usage(format!(
+                "{input}: another input's result is {name} already; evaluate them into different \
+                 directories"
+            )));
+        }
+        let digest = result.written.digest.take().unwrap_or_default();
+        let clips = work.input.loaded.clips.len();
+        let entry = ManifestEntry {
+            output: name.to_owned(),
+            output_bytes: digest.bytes(),
+            output_sha256: digest.finish(),
+            input: work.path().display().to_string(),
+            input_sha256: work.input.file.sha256().map(str::to_owned),
+            options: self.options.clone(),
+            kernels_sha256: kernels_sha256().to_owned(),
+            tumble: env!("CARGO_PKG_VERSION").to_owned(),
+            device: result.device,
+            one_of: (name != whole).then(|| (whole.to_owned(), clips)),
+        };
+        self.records.keep(entry, result.written)?;
+        self.records.tell(&result.message);
+        Ok(())
+    }
+
+    /// The summary of a batch of several inputs.
+    fn summarize(&self) {
+        let (made, skipped, failed) = (self.made.len(), self.skipped, self.failed);
+        if self.inputs <= 1 && skipped == 0 {
+            return;
+        }
+        let list = self.records.list();
+        let mut parts = vec![format!("{} made", words::count(made, "result"))];
+        if skipped > 0 {
+            let results = words::count(skipped, "result");
+            parts.push(format!("{results} skipped (done before, and whole)"));
+        }
+        if failed > 0 {
+            parts.push(format!("{} failed", words::count(failed, "input")));
+        }
+        let summary = parts.join(", ");
+        self.records.tell(&match list.exists() || made > 0 {
+            true => format!("{summary}; listed in {}", list.display()),
+            false => summary,
+        });
+    }
+}
+
+/// What the reading thread knows.
+struct ReadingAhead<R> {
+    reader: R,
+    previous: PreviousEntries,
+    options: String,
+    resume: bool,
+}
+
+impl<R: InputReader> ReadingAhead<R> {
+    /// Reads the inputs one by one; stops when the receiver is gone.
+    fn read_all(&self, jobs: Vec<PipelineJob>, hand_over: &SyncSender<ReadJob>) {
+        for job in jobs {
+            let input = self.read(&job);
+            if hand_over.send(ReadJob { job, input }).is_err() {
+                return;
+            }
+        }
+    }
+
+    /// Reads an input, if it has to be evaluated.
+    fn read(&self, (path, target): &PipelineJob) -> Option<(InputFile, Result<Loaded, Failure>)> {
+        let file = InputFile::new(path);
+        let is_done = |hash: &str| self.previous.is_done(target.name(), hash, &self.options);
+        // The hash is of the bytes that are read next; longer inputs are refused.
+        let max_size = self.reader.max_size();
+        let is_read = std::fs::metadata(path).is_ok_and(|found| found.len() <= max_size);
+        let sha256 = is_read.then(|| file.sha256()).flatten();
+        if self.resume && sha256.is_some_and(is_done) {
+            return None;
+        }
+        let loaded = self.reader.read(path);
+        let loaded = loaded.and_then(|loaded| file.check_unchanged().map(|()| loaded));
+        Some((file, loaded))
+    }
+}

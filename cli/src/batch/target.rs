@@ -1,0 +1,295 @@
+//! The target of one result: its destination, its format, and how it is written.
+
+use std::fmt;
+use std::io::{self, Write};
+use std::path::Path;
+
+use glam::Quat;
+use tumble::{Chunk, Encoding, Error};
+use tumble_formats::Diagnostic;
+use tumble_formats::format::{
+    Format, MotionOptions, ResultShape, ResultWriter, WriteError, WriteResults,
+};
+use tumble_formats::kitti::write_frame_times;
+use tumble_formats::motion::SampledClip;
+
+use crate::batch::destination::{Destination, WrittenFile};
+use crate::batch::room;
+use crate::batch::stream::OutputStream;
+use crate::messages::exit::Failure;
+use crate::messages::progress::Progress;
+use crate::messages::{signals, words};
+
+/// The target of one result: its destination and format.
+#[derive(Clone)]
+pub(crate) struct ResultTarget {
+    destination: Destination,
+    format: &'static Format,
+    /// Its path below the directory of results; empty for a single result.
+    name: String,
+    /// The destination of the times, for a format that stores none.
+    times: Option<Destination>,
+}
+
+impl ResultTarget {
+    pub(crate) fn new(destination: Destination, format: &'static Format, name: String) -> Self {
+        Self {
+            destination,
+            format,
+            name,
+            times: None,
+        }
+    }
+
+    /// The same, with a file for the times of what is written.
+    pub(crate) fn with_times(self, destination: Destination) -> Result<Self, Failure> {
+        destination.refuse_same(self.path())?;
+        destination.check_writable()?;
+        let times = Some(destination);
+        Ok(Self { times, ..self })
+    }
+
+    /// Opens and drops the file: its directory may be read-only.
+    pub(crate) fn check_writable(&self) -> Result<(), Failure> {
+        self.destination.check_writable()
+    }
+
+    /// The format of the result.
+    pub(crate) fn format(&self) -> &'static Format {
+        self.format
+    }
+
+    /// The path of its destination.
+    pub(crate) fn path(&self) -> &Path {
+        self.destination.path()
+    }
+
+    /// Whether it is standard output.
+    pub(crate) fn is_standard(&self) -> bool {
+        self.destination.is_standard()
+    }
+
+    /// Its name in messages, its extension, and whether times go to a file of their own.
+    pub(crate) fn motion_options(&self) -> MotionOptions {
+        let ending = self.path().extension().unwrap_or_default();
+        MotionOptions {
+            name: self.to_string(),
+            format: ending.to_string_lossy().to_lowercase(),
+            times_apart: self.times.is_some(),
+            ..MotionOptions::default()
+        }
+    }
+
+    /// The writer of plain rotations of its format.
+    pub(crate) fn results(&self) -> Result<&'static WriteResults, Failure> {
+        self.format.write.as_ref().ok_or_else(|| {
+            let all = Format::writable().filter(|format| format.write.is_some());
+            let names: Vec<&str> = all.map(|format| format.name).collect();
+            Failure::usage(format!(
+                "{self}: {} stores whole clips; for rotations or poses alone use {}",
+                self.format.name,
+                names.join(" or ")
+            ))
+        })
+    }
+
+    /// The target of one of several clips of an input, beside that of all: `fox.npy` becomes `fox.Run.npy`.
+    pub(crate) fn of_clip(&self, clip: &str) -> Result<Self, Failure> {
+        let with = |path: &Path| path.with_extension(format!("{clip}.{}", self.format.name));
+        let name = with(Path::new(&self.name));
+        let destination = self.destination.renamed(&with(self.destination.path()))?;
+        Ok(Self::new(
+            destination,
+            self.format,
+            name.display().to_string(),
+        ))
+    }
+
+    /// Refuses a result for which the disk has no room.
+    pub(crate) fn has_room(
+        &self,
+        name: &str,
+        tracks: usize,
+        samples: usize,
+        encoding: Encoding,
+    ) -> Result<(), Failure> {
+        if self.destination.is_standard() {
+            return Ok(());
+        }
+        let bytes = tracks as f64 * samples as f64 * (self.results()?.rotation_bytes)(encoding);
+        let folder = match self.destination.path().parent() {
+            Some(folder) if folder != Path::new("") => folder,
+            _ => Path::new("."),
+        };
+        room::on_disk(name, (tracks, samples), bytes, folder)
+    }
+
+    /// Its name in the manifest.
+    pub(crate) fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Writes by `write`; see [`Destination::prepare`].
+    pub(crate) fn prepare(
+        &self,
+        write: impl FnOnce(&mut OutputStream) -> io::Result<()>,
+    ) -> Result<WrittenFile, Failure> {
+        self.destination.prepare(None, write)
+    }
+
+    /// Writes a motion file, which `write` makes in memory, and prints its warnings.
+    pub(crate) fn write_motion(
+        &self,
+        write: impl FnOnce(&mut Vec<u8>) -> Result<Vec<Diagnostic>, WriteError>,
+    ) -> Result<WrittenFile, Failure> {
+        let mut bytes = Vec::new();
+        let warnings = write(&mut bytes).map_err(|error| match error {
+            WriteError::Io(error) => Failure::writing(&self.to_string(), &error),
+            WriteError::Refused(diagnostic) => Failure::input(&diagnostic, ""),
+        })?;
+        for warning in warnings {
+            words::note(&warning.to_string());
+        }
+        self.prepare(|out| out.write_all(&bytes))
+    }
+
+    /// Writes the times of a motion file, where they go to a file of their own.
+    pub(crate) fn write_times(&self, sampled: &[SampledClip<'_>]) -> Result<(), Failure> {
+        let (Some(destination), [sampled]) = (&self.times, sampled) else {
+            return Ok(());
+        };
+        let written = destination.prepare(None, |out| write_frame_times(sampled, out))?;
+        written.commit()
+    }
+
+    /// Writes one result that is in memory.
+    pub(crate) fn write_whole(
+        &self,
+        result: &ResultShape<'_>,
+        rotations: &[Quat],
+    ) -> Result<WrittenFile, Failure> {
+        let results = self.results()?;
+        self.prepare(|out| {
+            let mut writer = results.begin(out, result)?;
+            writer.write(rotations)?;
+            writer.finish()
+        })
+    }
+
+    /// Writes one result, chunk by chunk, while `evaluate` makes the next.
+    pub(crate) fn write_rotations(
+        &self,
+        result: &ResultShape<'_>,
+        evaluate: impl FnOnce(&mut ChunkSink<'_>) -> Result<(), ResultError>,
+    ) -> Result<WrittenFile, Failure> {
+        let (tracks, samples) = (result.set.track_count(), result.timeline.len());
+        let write = self.results()?;
+        let (progress, measure): (_, fn(&[u8]) -> u64) = if write.is_text {
+            (Progress::new("writing", samples as u64 + 1), lines)
+        } else {
+            let total = (tracks * samples * result.encoding.bytes()) as u64;
+            (Progress::new("writing", total), length)
+        };
+        let mut unevaluated = None;
+        let written = self.destination.prepare(Some((progress, measure)), |out| {
+            let mut writer = LateWriter {
+                results: write,
+                result: *result,
+                state: WriterState::NotStarted(out),
+            };
+            let evaluated = evaluate(&mut |chunk| {
+                writer
+                    .write(bytemuck::cast_slice(chunk.rows))
+                    .map_err(ResultError::Writing)
+            });
+            match evaluated {
+                Ok(()) => writer.finish(),
+                Err(ResultError::Writing(error)) => Err(error),
+                Err(ResultError::Evaluating(error)) => {
+                    unevaluated = Some(error);
+                    Err(io::Error::other("the rest could not be evaluated"))
+                }
+            }
+        });
+        match unevaluated {
+            Some(error) if signals::stopped().is_none() => {
+                Err(Failure::evaluating(result.name, &error))
+            }
+            _ => written,
+        }
+    }
+}
+
+fn lines(bytes: &[u8]) -> u64 {
+    bytes.iter().filter(|&&byte| byte == b'\n').count() as u64
+}
+
+fn length(bytes: &[u8]) -> u64 {
+    bytes.len() as u64
+}
+
+/// Accepts the chunks of a result.
+pub(crate) type ChunkSink<'a> = dyn FnMut(Chunk<'_>) -> Result<(), ResultError> + 'a;
+
+/// Why a result is incomplete.
+#[derive(Debug)]
+pub(crate) enum ResultError {
+    Writing(io::Error),
+    Evaluating(Error),
+}
+
+impl From<Error> for ResultError {
+    fn from(error: Error) -> Self {
+        Self::Evaluating(error)
+    }
+}
+
+/// A writer of one format. Nothing is written before the first chunk, so that a failed evaluation leaves
+/// nothing behind, even in a pipe.
+struct LateWriter<'a> {
+    results: &'static WriteResults,
+    result: ResultShape<'a>,
+    state: WriterState<'a>,
+}
+
+enum WriterState<'a> {
+    NotStarted(&'a mut OutputStream),
+    Writing(Box<dyn ResultWriter + 'a>),
+    Failed,
+}
+
+impl<'a> LateWriter<'a> {
+    /// The writer, after the header.
+    fn started(&mut self) -> io::Result<&mut Box<dyn ResultWriter + 'a>> {
+        self.state = match std::mem::replace(&mut self.state, WriterState::Failed) {
+            WriterState::NotStarted(out) => {
+                WriterState::Writing(self.results.begin(out, &self.result)?)
+            }
+            started => started,
+        };
+        match &mut self.state {
+            WriterState::Writing(writer) => Ok(writer),
+            WriterState::NotStarted(_) | WriterState::Failed => {
+                Err(io::Error::other("an earlier error"))
+            }
+        }
+    }
+
+    fn write(&mut self, rotations: &[Quat]) -> io::Result<()> {
+        self.started()?.write(rotations)
+    }
+
+    fn finish(mut self) -> io::Result<()> {
+        self.started()?;
+        match self.state {
+            WriterState::Writing(writer) => writer.finish(),
+            WriterState::NotStarted(_) | WriterState::Failed => Ok(()),
+        }
+    }
+}
+
+impl fmt::Display for ResultTarget {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.destination.fmt(f)
+    }
+}

@@ -1,0 +1,144 @@
+//! The options of `tumble eval`.
+
+mod applies;
+
+use clap::Args;
+use clap::builder::TypedValueParser;
+use tumble::{Encoding, Layout};
+use tumble_formats::quaternion::ComponentOrder;
+
+use crate::arguments::command_line::CommandLine;
+use crate::arguments::device::DeviceArguments;
+use crate::arguments::input::Inputs;
+use crate::arguments::interpolation::{InterpolationArguments, MethodArgument, method_argument};
+use crate::arguments::output::{OrderArgument, OutputArguments, one_of, quaternions};
+use crate::arguments::results::ResultArguments;
+use crate::arguments::time::{AtKeysArguments, SampleRequest, SamplingArguments};
+use crate::commands::eval::shard_selection::ShardSelection;
+use crate::messages::exit::Failure;
+use crate::messages::words;
+
+/// Evaluate keyframe tracks at every frame
+#[derive(Debug, Args)]
+#[command(after_help = "\
+The result is float32 of shape (tracks, frames, 4) in NPY, x y z w (unless --output, --layout or
+--order change that), or CSV with a row for each frame, whose header names the columns, w x y z
+without --order. An option that has no effect on a result is refused. CPU and Vulkan give the same
+bits.
+
+Examples:
+  tumble eval data/pendulum.dat -o out.npy
+  tumble eval data/pendulum.dat -m slerp --fps 30000/1001 -o out.csv
+  tumble eval data/pendulum.dat --start 2 --end 4.5 --layout frame --order wxyz -o out.npy
+  tumble eval data/pendulum.dat --output euler --sequence ZXY -o angles.csv
+  tumble eval *.dat -o results                 a file for each input, results/NAME.npy
+  tumble eval walks -o results --resume        a directory's tree; skips what is done
+  find . -name '*.dat' | tumble eval --files-from - -o results
+  tumble eval walk.glb --fps 60 -o walk60.glb  baked; everything else stays as it is
+  tumble eval clips -o out --to bvh --resume   formats may be mixed
+  seq 64 | xargs -P8 -I{} tumble eval clips -o out --resume --shard {}/64; tumble merge out
+  tumble eval - -o - < data/pendulum.dat | python3 -c \\
+    'import io, sys, numpy; print(numpy.load(io.BytesIO(sys.stdin.buffer.read())).shape)'")]
+pub(crate) struct Arguments {
+    #[command(flatten)]
+    pub(super) command_line: CommandLine,
+    #[command(flatten)]
+    pub(crate) inputs: Inputs,
+    #[command(flatten)]
+    pub(crate) results: ResultArguments,
+    /// How to interpolate (`tumble methods`); stepped channels, which keep each key until the next
+    /// one, stay stepped
+    #[arg(
+        short,
+        long,
+        value_name = "METHOD",
+        default_value = "authored",
+        value_parser = method_argument()
+    )]
+    pub(super) method: MethodArgument,
+    #[command(flatten)]
+    pub(super) sampling: SamplingArguments,
+    #[command(flatten)]
+    pub(super) at_keys: AtKeysArguments,
+    #[command(flatten)]
+    pub(super) interpolation: InterpolationArguments,
+    #[command(flatten)]
+    pub(crate) device: DeviceArguments,
+    /// The order of results: (tracks, frames, 4) or (frames, tracks, 4); poses and CSV come frame by
+    /// frame
+    #[arg(long, default_value_t, value_parser = layout())]
+    pub(super) layout: Layout,
+    /// The order of a quaternion's components [default: xyzw; CSV of rotations: wxyz]
+    #[arg(long, value_enum)]
+    pub(super) order: Option<OrderArgument>,
+    /// How components are stored in NPY results
+    #[arg(long, value_name = "ENCODING", default_value = "f32", value_parser = quaternions())]
+    pub(super) encoding: Encoding,
+    #[command(flatten)]
+    pub(super) output: OutputArguments,
+    /// NPZ to NPZ: interpolate these arrays, which have a number for each frame, linearly instead of
+    /// leaving them out
+    #[arg(long, value_name = "ARRAYS", value_delimiter = ',')]
+    pub(super) linear: Vec<String>,
+    /// Also print how each input is evaluated (its route); all routes give the same bits
+    #[arg(long)]
+    pub(super) explain_route: bool,
+    /// Evaluate one part of several into a directory that other processes fill too, then `tumble
+    /// merge` it: I/N, such as 3/64, or one shard by its number
+    #[arg(long, value_name = "I/N")]
+    pub(super) shard: Option<ShardSelection>,
+    /// The size of a shard's inputs, at most; shards also have at most 256 inputs, and depend on nothing else
+    #[arg(
+        long,
+        value_name = "SIZE",
+        default_value = "32MiB",
+        requires = "shard",
+        value_parser = words::parse_bytes
+    )]
+    pub(super) shard_bytes: u64,
+    /// Print JSON about the results on standard output
+    #[arg(long)]
+    pub(super) json: bool,
+}
+
+fn layout() -> impl TypedValueParser<Value = Layout> {
+    let help = |layout| match layout {
+        Layout::TrackMajor => "(tracks, frames, 4)",
+        Layout::FrameMajor => "(frames, tracks, 4)",
+    };
+    one_of(Layout::ALL.map(|layout| (layout.name(), help(layout), layout)))
+}
+
+impl Arguments {
+    /// The samples, after a check that the options apply to the method.
+    pub(super) fn checked_samples(&self) -> Result<SampleRequest, Failure> {
+        if let Some(method) = self.method.0 {
+            let checked = self.interpolation.check(&[method]);
+            checked.map_err(Failure::usage)?;
+        }
+        match self.at_keys.samples()? {
+            Some(samples) => Ok(samples),
+            None => self.sampling.samples(),
+        }
+    }
+
+    /// Reads only the file's keys where a method is named.
+    pub(super) fn choose_keys(&self) {
+        if self.method.0.is_some() {
+            self.inputs.reading.set_method_named();
+        }
+    }
+
+    /// Everything that determines the bytes of a result besides its input.
+    pub(super) fn options(&self, samples: &SampleRequest) -> String {
+        let mut options = self.command_line.options();
+        if let SampleRequest::Times(_) | SampleRequest::Keys(_) = samples {
+            options += &format!(" times={}", samples.digest());
+        }
+        options
+    }
+
+    pub(super) fn order(&self) -> Option<ComponentOrder> {
+        self.order.map(OrderArgument::order)
+    }
+}

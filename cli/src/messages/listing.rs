@@ -1,0 +1,71 @@
+//! Listings and JSON, on standard output.
+
+use std::io::{self, Write};
+
+use tumble_formats::printable::{printable, printable_lines};
+
+use crate::messages::exit::Failure;
+
+/// Writes a listing to standard output. Names in it went through [`printable`], so that none begins a
+/// line. A reader that has seen enough (`| head`) is no failure.
+pub(crate) fn text(text: &str) -> Result<(), Failure> {
+    styled(&printable_lines(text))
+}
+
+/// As [`text`], with colours: of names that all went through [`printable`].
+pub(crate) fn styled(text: &str) -> Result<(), Failure> {
+    let mut out = anstream::stdout().lock();
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
+            Err(Failure::writing("standard output", &error))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// As [`text`], for programs: pretty-printed JSON.
+pub(crate) fn json(value: &impl serde::Serialize) -> Result<(), Failure> {
+    let text =
+        serde_json::to_string_pretty(value).expect("names are strings and numbers are numbers");
+    styled(&format!("{}\n", json_printable(&text)))
+}
+
+/// JSON with escapes for all characters that a terminal would obey: outside ASCII they stand in strings
+/// alone, and serde escapes the ASCII controls.
+fn json_printable(text: &str) -> String {
+    let mut shown = String::with_capacity(text.len());
+    for character in text.chars() {
+        let mut units = [0; 2];
+        if character == '\n'
+            || printable(character.encode_utf8(&mut [0; 4])).len() == character.len_utf8()
+        {
+            shown.push(character);
+        } else {
+            for unit in character.encode_utf16(&mut units) {
+                shown.push_str(&format!("\\u{unit:04x}"));
+            }
+        }
+    }
+    shown
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn json_says_the_same_without_what_a_terminal_obeys() {
+        let names = [
+            "plain ä",
+            "\u{9b}2J",
+            "\u{202e}x",
+            "a\u{e0041}",
+            "\x1b[1m\n",
+        ];
+        let text = json_printable(&serde_json::to_string_pretty(&names).unwrap());
+        assert_eq!(serde_json::from_str::<Vec<String>>(&text).unwrap(), names);
+        // A tag is two units of UTF-16; a line end has a shorter escape.
+        assert_eq!(text.matches("\\u").count(), 5, "{text}");
+        assert_eq!(printable_lines(&text), text);
+    }
+}

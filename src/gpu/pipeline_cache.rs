@@ -1,0 +1,138 @@
+//! What a driver compiled, kept in a file from process to process.
+
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use ash::vk;
+
+use crate::gpu::cache::{Cache, sum};
+use crate::gpu::physical::PhysicalDevice;
+use crate::threads::lock;
+
+/// Bytes that a cache may have: all kernels of a card take a few MB.
+const MAX_BYTES: usize = 64 << 20;
+
+/// A cache of Vulkan's; null where it could not be made, which costs time and nothing else.
+pub(crate) struct PipelineCache {
+    pub(crate) raw: vk::PipelineCache,
+    files: Cache,
+    name: String,
+    /// What the driver's header must say.
+    driver: (u32, u32, [u8; 16]),
+    /// The sum of what was last read or written.
+    known: Mutex<u64>,
+    /// Whether a pipeline was made since.
+    has_grown: AtomicBool,
+}
+
+impl PipelineCache {
+    /// With what was kept for the device's driver, if it is for that.
+    pub(crate) fn new(device: &ash::Device, physical: &PhysicalDevice) -> Self {
+        let (vendor, model, uuid) = physical.pipeline_cache;
+        let digits: String = uuid.iter().map(|byte| format!("{byte:02x}")).collect();
+        let name = format!("pipelines-{vendor:x}-{model:x}-{digits}");
+        let files = Cache::of_user();
+        let mut cache = Self {
+            raw: vk::PipelineCache::null(),
+            files,
+            name,
+            driver: physical.pipeline_cache,
+            known: Mutex::new(0),
+            has_grown: AtomicBool::new(false),
+        };
+        let kept = cache.kept();
+        cache.known = Mutex::new(sum(&cache.name, &kept));
+        cache.raw = Self::with(device, &kept);
+        cache
+    }
+
+    /// What is kept for the driver; nothing where only others' is kept.
+    fn kept(&self) -> Vec<u8> {
+        let kept = self.files.read(&self.name, MAX_BYTES);
+        kept.filter(|kept| is_for(kept, self.driver))
+            .unwrap_or_default()
+    }
+
+    /// A cache of Vulkan's with some data of the driver's; null where it cannot be made.
+    fn with(device: &ash::Device, data: &[u8]) -> vk::PipelineCache {
+        let info = vk::PipelineCacheCreateInfo::default().initial_data(data);
+        // SAFETY: the device is alive, and the data is headed as its driver heads it; whoever calls destroys
+        // what is made.
+        unsafe { device.create_pipeline_cache(&info, None) }.unwrap_or_default()
+    }
+
+    /// A pipeline was made.
+    pub(crate) fn note(&self) {
+        self.has_grown.store(true, Ordering::Relaxed);
+    }
+
+    /// Writes what was compiled since, where anything was, with what other processes kept meanwhile.
+    pub(crate) fn keep(&self, device: &ash::Device) {
+        let null = vk::PipelineCache::null();
+        if self.raw == null || !self.has_grown.swap(false, Ordering::Relaxed) {
+            return;
+        }
+        let mut known = lock(&self.known);
+        let kept = self.kept();
+        let others = match sum(&self.name, &kept) == *known {
+            true => null,
+            false => Self::with(device, &kept),
+        };
+        // SAFETY: both caches are this device's, and nobody else uses `others`.
+        let data = unsafe {
+            if others == null {
+                device.get_pipeline_cache_data(self.raw)
+            } else {
+                let merged = device.merge_pipeline_caches(others, &[self.raw]);
+                let data = merged.and_then(|()| device.get_pipeline_cache_data(others));
+                device.destroy_pipeline_cache(others, None);
+                data
+            }
+        };
+        let Ok(data) = data else { return };
+        let current = sum(&self.name, &data);
+        if current != *known && data.len() <= MAX_BYTES {
+            self.files.write(&self.name, &data);
+            *known = current;
+        }
+    }
+
+    /// # Safety
+    /// Nothing may use it any more, and the device must be alive.
+    pub(crate) unsafe fn destroy(&self, device: &ash::Device) {
+        self.keep(device);
+        // SAFETY: promised by the caller; null is allowed.
+        unsafe { device.destroy_pipeline_cache(self.raw, None) };
+    }
+}
+
+/// Whether data begins with the header of that driver's: its length, 1, vendor, device and UUID.
+fn is_for(data: &[u8], (vendor, model, uuid): (u32, u32, [u8; 16])) -> bool {
+    let mut header = Vec::with_capacity(32);
+    for number in [32, 1, vendor, model] {
+        header.extend(u32::to_le_bytes(number));
+    }
+    header.extend(uuid);
+    data.starts_with(&header)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_another_driver_compiled_is_left_alone() {
+        let driver = (0x10de, 0x2335, [7; 16]);
+        let mut data: Vec<u8> = [32u32, 1, 0x10de, 0x2335].map(u32::to_le_bytes).concat();
+        data.extend([7; 16]);
+        assert!(is_for(&data, driver));
+        data.extend(b"compiled kernels");
+        assert!(is_for(&data, driver));
+        for byte in 0..32 {
+            let mut other = data.clone();
+            other[byte] ^= 1;
+            assert!(!is_for(&other, driver), "{byte}");
+            assert!(!is_for(&data[..byte], driver), "{byte}");
+        }
+    }
+}

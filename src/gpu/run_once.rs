@@ -1,0 +1,68 @@
+//! One run of a kernel over the host's memory, for checks and for poses.
+
+use crate::gpu::buffer::{Buffer, Residence};
+use crate::gpu::device::QueueLane;
+use crate::gpu::error::VulkanError;
+use crate::gpu::physical::upload_memory::KernelReads;
+use crate::gpu::pipeline::Pipeline;
+use crate::gpu::submission::{Access, Binding, Submission};
+use crate::gpu::upload::Upload;
+
+/// Runs a kernel once: copies inputs to the device, and what it makes of them back.
+pub(crate) fn run_once(
+    pipeline: &Pipeline,
+    inputs: &[&[u8]],
+    constants: &[u8],
+    groups: [u32; 3],
+    output: &mut [u8],
+) -> Result<(), VulkanError> {
+    run_over(pipeline, inputs, constants, groups, false, output)
+}
+
+/// As [`run_once`], over what `output` holds before.
+pub(crate) fn run_on(
+    pipeline: &Pipeline,
+    inputs: &[&[u8]],
+    constants: &[u8],
+    groups: [u32; 3],
+    output: &mut [u8],
+) -> Result<(), VulkanError> {
+    run_over(pipeline, inputs, constants, groups, true, output)
+}
+
+fn run_over(
+    pipeline: &Pipeline,
+    inputs: &[&[u8]],
+    constants: &[u8],
+    groups: [u32; 3],
+    is_filled: bool,
+    output: &mut [u8],
+) -> Result<(), VulkanError> {
+    let (name, once) = ("tumble once", KernelReads::Once);
+    let mut uploads = Vec::with_capacity(inputs.len());
+    for input in inputs {
+        let mut upload = Upload::default();
+        let room = upload.room(&pipeline.device, name, once, input.len())?;
+        room.copy_from_slice(input);
+        uploads.push(upload);
+    }
+    let bytes = output.len() as u64;
+    let mut found = Buffer::new(&pipeline.device, name, bytes, Residence::InPlace)?;
+    if is_filled {
+        found.bytes_mut(0..output.len()).copy_from_slice(output);
+        found.flush(&(0..output.len()))?;
+    }
+    let mut bindings: Vec<Binding> = uploads.iter().filter_map(Upload::binding).collect();
+    bindings.push(Binding::whole(&found));
+    // Made last: dropped first, it waits for its work before the buffers are freed.
+    let mut submission = Submission::new(&pipeline.device, QueueLane::Kernels)?;
+    submission.begin(1)?;
+    Upload::record(uploads.iter(), &mut submission);
+    submission.dispatch(pipeline, &bindings, constants, groups)?;
+    (submission.commands()).barrier(Access::Kernel, Access::Host);
+    submission.submit()?;
+    submission.wait()?;
+    found.invalidate(&(0..output.len()))?;
+    output.copy_from_slice(found.bytes(0..output.len()));
+    Ok(())
+}
