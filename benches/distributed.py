@@ -55,8 +55,8 @@ def measure(program: str, counts: list[int], work: str | None) -> None:
         subprocess.run(command, shell=True, check=True, cwd=folder, stderr=subprocess.DEVNULL)
         return time.perf_counter() - started
 
-    with tempfile.TemporaryDirectory(dir=work) as place:
-        folder = pathlib.Path(place)
+    with tempfile.TemporaryDirectory(dir=work) as temporary:
+        folder = pathlib.Path(temporary)
         made = 0
         options = "--fps 60 -m bessel-overhauser --device cpu"
         for count in counts:

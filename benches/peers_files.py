@@ -83,11 +83,11 @@ with tempfile.TemporaryDirectory() as folder:
         "bvh and SciPy, resampled": each(paths, scipy_resampled),
     }
     seconds = {name: [] for name in contestants}
-    for turn in range(arguments.rounds + 1):
+    for iteration in range(arguments.rounds + 1):
         for name, work in contestants.items():
             started = time.perf_counter()
             work()
-            if turn > 0:
+            if iteration > 0:
                 seconds[name].append(time.perf_counter() - started)
 
 medians = {name: statistics.median(times) for name, times in seconds.items()}

@@ -60,12 +60,12 @@ def unit(vectors):
 
 def paths(random, count):
     """Paths of six points, (count, 6, 3), float32."""
-    way, place = numpy.tile([1.0, 0.0, 0.0], (count, 1)), numpy.zeros((count, 3))
+    direction, point = numpy.tile([1.0, 0.0, 0.0], (count, 1)), numpy.zeros((count, 3))
     points = []
     for _ in range(6):
-        way = unit(way + random.uniform(-0.5, 0.5, (count, 3)))
-        place = place + way
-        points.append(place)
+        direction = unit(direction + random.uniform(-0.5, 0.5, (count, 3)))
+        point = point + direction
+        points.append(point)
     return numpy.stack(points, 1).astype(numpy.float32)
 
 
@@ -79,12 +79,12 @@ def double_reflection(points):
     i = numpy.minimum(at.astype(int), 4)
     t = (at - i)[:, None].astype(numpy.float32)
     p0, p1, m0, m1 = points[:, i], points[:, i + 1], slopes[:, i], slopes[:, i + 1]
-    places = p0 * (2 * t**3 - 3 * t**2 + 1) + m0 * (t**3 - 2 * t**2 + t)
-    places = places + p1 * (3 * t**2 - 2 * t**3) + m1 * (t**3 - t**2)
-    ways = (p1 - p0) * (6 * t - 6 * t**2) + m0 * (3 * t**2 - 4 * t + 1) + m1 * (3 * t**2 - 2 * t)
-    ways = unit(ways)
-    ups = numpy.empty_like(ways)
-    up = numpy.cross(ways[:, 0], numpy.cross([0, 1, 0], ways[:, 0]))
+    positions = p0 * (2 * t**3 - 3 * t**2 + 1) + m0 * (t**3 - 2 * t**2 + t)
+    positions = positions + p1 * (3 * t**2 - 2 * t**3) + m1 * (t**3 - t**2)
+    tangents = (p1 - p0) * (6 * t - 6 * t**2) + m0 * (3 * t**2 - 4 * t + 1) + m1 * (3 * t**2 - 2 * t)
+    tangents = unit(tangents)
+    ups = numpy.empty_like(tangents)
+    up = numpy.cross(tangents[:, 0], numpy.cross([0, 1, 0], tangents[:, 0]))
     ups[:, 0] = up = unit(up)
 
     def reflected(vector, normal):
@@ -92,27 +92,27 @@ def double_reflection(points):
         return vector - normal * (2 * (normal * vector).sum(-1, keepdims=True) / square)
 
     for sample in range(1, SAMPLES):
-        chord = places[:, sample] - places[:, sample - 1]
-        up, way = reflected(up, chord), reflected(ways[:, sample - 1], chord)
-        ups[:, sample] = up = reflected(up, ways[:, sample] - way)
-    return places, numpy.stack([numpy.cross(ups, ways), ups, ways], -1)
+        chord = positions[:, sample] - positions[:, sample - 1]
+        up, tangent = reflected(up, chord), reflected(tangents[:, sample - 1], chord)
+        ups[:, sample] = up = reflected(up, tangents[:, sample] - tangent)
+    return positions, numpy.stack([numpy.cross(ups, tangents), ups, tangents], -1)
 
 
-def milliseconds(work, turns):
+def milliseconds(work, rounds):
     work()
     times = []
-    for _ in range(turns):
+    for _ in range(rounds):
         started = time.perf_counter()
         work()
         times.append(1e3 * (time.perf_counter() - started))
     return statistics.median(times)
 
 
-def tumble(kind, shrink, turns):
+def tumble(kind, shrink, rounds):
     """Milliseconds of each row of `tumble bench`."""
     program = ROOT / "target/release/tumble"
     line = [program, "bench", kind, "--cpu-only", "--json"]
-    line += ["--shrink", str(shrink), "--rounds", str(turns)]
+    line += ["--shrink", str(shrink), "--rounds", str(rounds)]
     done = subprocess.run(line, capture_output=True, text=True, check=True)
     sections = json.loads(done.stdout)["sections"]
     return [(s["method"], r["name"], r["milliseconds"]) for s in sections for r in s["rows"]]
@@ -121,36 +121,36 @@ def tumble(kind, shrink, turns):
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--shrink", type=int, default=1, help="divides every workload")
-    parser.add_argument("--turns", type=int, default=5)
+    parser.add_argument("--rounds", type=int, default=5)
     arguments = parser.parse_args()
-    shrink, turns = arguments.shrink, arguments.turns
+    shrink, rounds = arguments.shrink, arguments.rounds
     random = numpy.random.default_rng(1)
 
     count = 100_000 // shrink
     print(f"{count} paths of 6 points, {SAMPLES} samples each: ms")
-    for _, name, time_of in tumble("follow", shrink, turns):
+    for _, name, time_of in tumble("follow", shrink, rounds):
         print(f"  tumble bench: {name:34} {time_of:10.1f}")
     points = paths(random, count)
-    numpys = milliseconds(lambda: double_reflection(points), turns)
+    numpys = milliseconds(lambda: double_reflection(points), rounds)
     print(f"  NumPy, double reflection                         {numpys:10.1f}")
     three = ROOT / "target/three"
     if (three / "node_modules/three").exists():
-        few = max(count // 100, 1)
-        line = ["node", "-e", THREE, str(few), str(SAMPLES)]
+        path_count = max(count // 100, 1)
+        line = ["node", "-e", THREE, str(path_count), str(SAMPLES)]
         done = subprocess.run(line, cwd=three, capture_output=True, text=True, check=True)
-        theirs = statistics.median(json.loads(done.stdout)) * count / few
-        print(f"  three.js, computeFrenetFrames, of {few} paths        {theirs:10.1f}")
+        theirs = statistics.median(json.loads(done.stdout)) * count / path_count
+        print(f"  three.js, computeFrenetFrames, of {path_count} paths        {theirs:10.1f}")
 
     samples = 1_000_000 // shrink
     print(f"64 tracks of {samples} samples, smoothed: ms")
-    for kernel, name, time_of in tumble("smooth", shrink, turns):
+    for kernel, name, time_of in tumble("smooth", shrink, rounds):
         print(f"  tumble bench: {kernel:12} {name:30} {time_of:10.1f}")
     values = random.random((64, samples, 3), dtype=numpy.float32)
     gauss = numpy.exp(-0.125 * numpy.arange(-8, 9) ** 2)
     for name, weights in ("linear", [0.25, 0.5, 0.25]), ("gaussian:2", gauss / gauss.sum()):
         # The axis of time last and each number by itself is how SciPy is fastest.
         rows = numpy.ascontiguousarray(values.transpose(0, 2, 1))
-        scipys = milliseconds(lambda: convolve1d(rows, weights, axis=-1), min(turns, 3))
+        scipys = milliseconds(lambda: convolve1d(rows, weights, axis=-1), min(rounds, 3))
         print(f"  SciPy, convolve1d: {name:12} vectors              {scipys:10.1f}")
 
 

@@ -27,11 +27,11 @@ def clip(random, path):
     steps = numpy.radians(random.uniform(-3, 3, (JOINTS, FRAMES, 4)))
     walk = numpy.cumsum(steps, 1) + random.standard_normal((JOINTS, 1, 4))
     keys = walk / numpy.linalg.norm(walk, axis=2, keepdims=True)
-    places = numpy.cumsum(random.uniform(-0.1, 0.1, (JOINTS, FRAMES, 3)), 1)
+    translations = numpy.cumsum(random.uniform(-0.1, 0.1, (JOINTS, FRAMES, 3)), 1)
     numpy.savez(
         path,
         rotations=keys.astype(numpy.float32),
-        translations=places.astype(numpy.float32),
+        translations=translations.astype(numpy.float32),
         times=numpy.arange(FRAMES) / RATE,
         names=numpy.array([f"joint{joint}" for joint in range(JOINTS)]),
     )
@@ -82,12 +82,12 @@ with tempfile.TemporaryDirectory() as folder:
             "tumble.load": tumble.load,
         }
         seconds = {name: [] for name in contestants}
-        for turn in range(arguments.rounds + 1):
+        for iteration in range(arguments.rounds + 1):
             for name, work in contestants.items():
                 started = time.perf_counter()
                 for path in paths:
                     work(path)
-                if turn > 0:
+                if iteration > 0:
                     seconds[name].append((time.perf_counter() - started) / len(paths))
         medians = {name: statistics.median(times) for name, times in seconds.items()}
         for name, median in medians.items():

@@ -37,9 +37,9 @@
 //!
 //! # Where to go on
 //!
-//! * **Results larger than memory**: [`Engine::stream`] and [`Clip::stream`] give a chunk at a time
-//!   while the next one is evaluated; [`Clip::request`] asks for some samples of some
-//!   tracks, into memory of your own. [`OutputBuffer`] is memory that is quick to fill.
+//! * **Results larger than memory**: [`Request::stream`] gives a chunk at a time
+//!   while the next one is evaluated; [`Clip::request`] and [`Engine::request`] ask for some samples of some
+//!   tracks, encoded, into memory of your own. [`OutputBuffer`] is memory that is quick to fill.
 //! * **Skeletons**: [`Engine::transforms`] evaluates translations, rotations and scales, and
 //!   [`Engine::local_to_model`] makes matrices in the model of them along a [`Skeleton`], for skinning
 //!   with inverse bind matrices. [`Engine::world`] does so for rotations on fixed offsets.
@@ -98,7 +98,8 @@ mod gpu;
 mod math;
 mod memory;
 pub mod method;
-mod names;
+#[doc(hidden)]
+pub mod names;
 mod output;
 mod path;
 mod pose;

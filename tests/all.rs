@@ -19,6 +19,7 @@ mod follow;
 mod golden;
 mod mesa;
 mod motion;
+mod names;
 mod numbers;
 mod original;
 mod outside;

@@ -89,11 +89,11 @@ arguments = parser.parse_args()
 
 keys = arguments.folder / "keys.bin"
 found, missing = {}, list(arguments.missing)
-for turn in range(arguments.rounds):
+for iteration in range(arguments.rounds):
     for program in arguments.program:
         for line in run([*program.split("|"), keys, arguments.folder], arguments.folder):
             if "missing" in line:
-                if turn == 0:
+                if iteration == 0:
                     missing.append(f"{line['missing']}: {line['why']}")
                 continue
             key = (line["name"], line["work"], line["threads"])

@@ -18,7 +18,7 @@ from scipy.spatial.transform import Rotation, RotationSpline, Slerp
 # Of a contestant in one call: what counts is the median of several calls of this program.
 ROUNDS = 1
 # SciPy makes a curve for each track in Python: of so many tracks, and the time is for all of them.
-MOST_TRACKS = 512
+MAX_TRACKS = 512
 
 
 def read(path):
@@ -75,8 +75,8 @@ def roma_slerp(times, keys, at):
         a, b = keys[rows, index], keys[rows, index + 1]
         b = torch.where((a * b).sum(-1, keepdim=True) < 0, -b, b)
         # As roma writes it, for an amount of each pair's own.
-        turn = roma.unitquat_to_rotvec(roma.quat_product(roma.quat_conjugation(a), b))
-        return roma.quat_product(a, roma.rotvec_to_unitquat(t[..., None] * turn)).numpy()
+        difference = roma.unitquat_to_rotvec(roma.quat_product(roma.quat_conjugation(a), b))
+        return roma.quat_product(a, roma.rotvec_to_unitquat(t[..., None] * difference)).numpy()
 
     return run
 
@@ -85,8 +85,8 @@ keys_path, folder = map(pathlib.Path, sys.argv[1:])
 all_times, all_keys, at = read(keys_path)
 contestants = [
     ("NumPy by hand", "slerp", len(all_times), numpy_slerp),
-    ("SciPy Slerp", "slerp", MOST_TRACKS, lambda *keys: scipy(Slerp, *keys)),
-    ("SciPy RotationSpline", "smooth", MOST_TRACKS, lambda *keys: scipy(RotationSpline, *keys)),
+    ("SciPy Slerp", "slerp", MAX_TRACKS, lambda *keys: scipy(Slerp, *keys)),
+    ("SciPy RotationSpline", "smooth", MAX_TRACKS, lambda *keys: scipy(RotationSpline, *keys)),
 ]
 try:
     import roma  # noqa: F401
@@ -98,10 +98,10 @@ for name, work, tracks, contestant in contestants:
     tracks = min(tracks, len(all_times))
     run = contestant(all_times[:tracks], all_keys[:tracks], at)
     seconds = []
-    for turn in range(ROUNDS + 1):
+    for iteration in range(ROUNDS + 1):
         started = time.perf_counter()
         result = run()
-        if turn > 0:
+        if iteration > 0:
             seconds.append(time.perf_counter() - started)
     file = folder / f"{name}.f32"
     result[0].astype("<f4").tofile(file)

@@ -365,7 +365,7 @@ fn constants_names_and_versions_are_checked() {
         rate_frames: 0,
         ..samples
     };
-    fails(with(how, rate), TumbleResult::InvalidInput, "no frame rate");
+    fails(with(how, rate), TumbleResult::InvalidInput, "not a frame rate");
     let velocity = TumbleInterpolation {
         quantity: TumbleQuantity::VelocityInBody as u32,
         ..how

@@ -14,7 +14,7 @@ use tumble_formats::Format;
 
 use crate::arguments::gather::{FoundInput, GatheredInputs};
 use crate::batch::entry;
-use crate::batch::folder;
+use crate::batch::output_plan;
 use crate::batch::result_names;
 use crate::batch::shards::plan::ShardPlan;
 use crate::batch::shards::record::ShardHeader;
@@ -101,7 +101,7 @@ impl LibraryPlan {
             }
             None => {
                 let found = GatheredInputs::new(&[library.to_owned()], None)?.files;
-                let found = folder::without_results(found, folder)?;
+                let found = output_plan::without_results(found, folder)?;
                 let sizes = found.iter().map(size).collect();
                 (found, sizes)
             }

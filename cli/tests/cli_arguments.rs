@@ -9,12 +9,12 @@ use crate::support::vulkan_devices;
 const ARGUMENTS: &str = "
 2 | eval                                         | required
 2 | evl a.dat                                    | eval
-2 | eval a.dat -o o.npy --fps 0                  | `0` is no frame rate
-2 | eval a.dat -o o.npy --fps -1                 | `-1` is no frame rate
-2 | eval a.dat -o o.npy --fps nan                | `nan` is no frame rate
-2 | eval a.dat -o o.npy --fps inf                | `inf` is no frame rate
-2 | eval a.dat -o o.npy --fps 30fps              | `30fps` is no frame rate
-2 | eval a.dat -o o.npy --fps 1/0                | `1/0` is no frame rate
+2 | eval a.dat -o o.npy --fps 0                  | `0` is not a frame rate
+2 | eval a.dat -o o.npy --fps -1                 | `-1` is not a frame rate
+2 | eval a.dat -o o.npy --fps nan                | `nan` is not a frame rate
+2 | eval a.dat -o o.npy --fps inf                | `inf` is not a frame rate
+2 | eval a.dat -o o.npy --fps 30fps              | `30fps` is not a frame rate
+2 | eval a.dat -o o.npy --fps 1/0                | `1/0` is not a frame rate
 2 | eval a.dat -o o.npy --fps 1e13               | at most 1099511627776 frames
 2 | eval a.dat -o o.npy --fps 5e11               | 2 tracks × 1000000000001 frames are 32.0 TB
 0 | eval a.dat -o o.npy --fps 1e-9               | 1 frame,

@@ -17,6 +17,12 @@ pub enum UpAxis {
     Z,
 }
 
+tumble::names! {
+    UpAxis, "axis",
+    Y => "y",
+    Z => "z",
+}
+
 impl UpAxis {
     /// The rotation by 90° about x for [`adjust`]. By no sine: those of systems differ in the last bit.
     #[must_use]

@@ -155,6 +155,14 @@ pub enum TimeUnit {
     Nanoseconds,
 }
 
+tumble::names! {
+    TimeUnit, "unit of time",
+    Seconds => "s",
+    Milliseconds => "ms",
+    Microseconds => "us",
+    Nanoseconds => "ns",
+}
+
 impl TimeUnit {
     /// The power of ten that it is of a second.
     pub(crate) fn power(self) -> i32 {

@@ -13,15 +13,10 @@ pub enum ComponentOrder {
     Wxyz,
 }
 
-impl ComponentOrder {
-    /// As it is written: `xyzw`.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Xyzw => "xyzw",
-            Self::Wxyz => "wxyz",
-        }
-    }
+tumble::names! {
+    ComponentOrder, "order",
+    Xyzw => "xyzw",
+    Wxyz => "wxyz",
 }
 
 /// The inner product in R⁴.

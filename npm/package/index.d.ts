@@ -9,25 +9,25 @@ export type Layout = "track" | "frame";
 
 /** How clips are sampled. */
 export interface SampleOptions {
-  /** `authored`, which is the default: as the file says of each channel, bessel-overhauser where it says nothing. */
+  /** Default: `authored`, the method that the file gives each channel; bessel-overhauser where it gives none. */
   method?: Method;
   /** Default: `track`. */
   layout?: Layout;
   /** What happens in the first and the last segment. Default: the method's own. */
   ends?: "parabolic" | "natural" | "clamped" | "secant" | "loop" | "frozen";
-  /** Which way round between neighbouring keys. Default: `shortest`. */
+  /** Which way to rotate between neighbouring keys. Default: `shortest`. */
   path?: "shortest" | "as-authored";
-  /** How fast the curve is run through. Default: `as-keyed`. */
+  /** The speed along the curve. Default: `as-keyed`. */
   speed?: "as-keyed" | "constant";
-  /** What lies before the first key. Default: `hold`. */
+  /** The values before the first key. Default: `hold`. */
   before?: "hold" | "loop" | "mirror" | "extrapolate";
-  /** What lies after the last key. Default: `hold`. */
+  /** The values after the last key. Default: `hold`. */
   after?: "hold" | "loop" | "mirror" | "extrapolate";
-  /** For kochanek-bartels. Default: 0. */
+  /** kochanek-bartels: 1 stands still at the keys, -1 is twice as fast. Default: 0. */
   tension?: number;
-  /** For kochanek-bartels. Default: 0. */
+  /** kochanek-bartels: -1 makes corners at the keys. Default: 0. */
   continuity?: number;
-  /** For kochanek-bartels. Default: 0. */
+  /** kochanek-bartels: 1 follows the interval before a key, -1 the one after it. Default: 0. */
   bias?: number;
 }
 
@@ -49,7 +49,7 @@ export interface Frames {
 /** Seconds, in any order; or frames. */
 export type Times = number | ArrayLike<number> | Frames;
 
-/** What all results have. */
+/** The fields of all results. */
 export interface Result {
   tracks: number;
   /** Of each track. */
@@ -74,7 +74,7 @@ export interface Rates extends Result {
   values: Float32Array;
 }
 
-/** Where joints are. */
+/** Positions and rotations of joints, in the world. */
 export interface World extends Result {
   /** `x y z`. */
   positions: Float64Array;
@@ -82,7 +82,7 @@ export interface World extends Result {
   rotations: Float32Array;
 }
 
-/** Where points go that go with joints. */
+/** Matrices that take points from joints to the world. */
 export interface Matrices extends Result {
   /** 16 numbers a joint, column after column. */
   matrices: Float32Array;
@@ -100,7 +100,7 @@ export interface Keys {
   scales: Float32Array | null;
 }
 
-/** Vectors at times of their own. */
+/** Vectors at times. */
 export interface VectorKeys {
   /** Seconds, increasing. */
   times: ArrayLike<number>;
@@ -121,11 +121,11 @@ export interface Track {
   tangents?: ArrayLike<number>;
   translations?: VectorKeys;
   scales?: VectorKeys;
-  /** The index of the track that it hangs on. */
+  /** The index of its parent track. */
   parent?: number;
   /** Where it is without keys. */
   rest?: { translation?: ArrayLike<number>; rotation?: ArrayLike<number>; scale?: ArrayLike<number> };
-  /** What `authored` means for it, as glTF has it. */
+  /** The interpolation that `authored` uses for it, as in glTF. */
   interpolation?: "step" | "linear" | "cubic";
 }
 
@@ -135,7 +135,7 @@ export class Clip {
   readonly name: string | null;
   /** Of the tracks. */
   readonly names: readonly string[];
-  /** What each track hangs on; null for roots. */
+  /** The index of each track's parent; null for roots. */
   readonly parents: readonly (number | null)[];
   /** Whether rotations and translations are relative to the world instead of the parent. */
   readonly isWorld: boolean;
@@ -146,7 +146,7 @@ export class Clip {
   readonly keyCount: number;
   /** The rate on whose frames all keys lie, if there is one. */
   readonly rate: string | null;
-  /** What each track is at times. */
+  /** The pose of each track at times. */
   sample(times: Times, options?: SampleOptions): Pose;
   /** Angular velocities, rad/s. */
   velocities(times: Times, options?: RateOptions): Rates;
@@ -158,7 +158,7 @@ export class Clip {
   matrices(times: Times, options?: SampleOptions): Matrices;
   /** The keys of a track, which counts from 0. */
   keys(track: number): Keys;
-  /** Gives its memory back; else the garbage collector does, some time. */
+  /** Frees its memory; else the garbage collector does, some time. */
   free(): void;
 }
 
@@ -183,13 +183,13 @@ export class Tumble {
   unpack(bytes: ArrayBuffer | ArrayBufferView): Clip;
 }
 
-/** What the engine, a file or an argument is refused for. */
+/** An error of the engine, a file or an argument. */
 export class TumbleError extends Error {
   /** The fault of a file, by its name in the program's list. */
   readonly code: string | null;
 }
 
-/** What a clip is at times: `clip.sample(times, options)`. */
+/** The poses of a clip at times: `clip.sample(times, options)`. */
 export function sample(clip: Clip, times: Times, options?: SampleOptions): Pose;
 
 /** The engine. `source`: the module's bytes, its address, or the answer to a request for it; else the file beside. */

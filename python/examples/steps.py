@@ -72,9 +72,9 @@ def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("library", nargs="?", help="what MotionLibrary.save wrote")
     parser.add_argument("--steps", type=int, default=300)
-    given = parser.parse_args()
-    library = tumble.MotionLibrary.open(given.library) if given.library else invented()
-    seconds, bits = run(library, given.steps)
+    arguments = parser.parse_args()
+    library = tumble.MotionLibrary.open(arguments.library) if arguments.library else invented()
+    seconds, bits = run(library, arguments.steps)
     print(f"{ENVIRONMENTS} environments of {library}: {1e3 * seconds:.2f} ms a step, sha256 {bits}")
 
 

@@ -116,11 +116,11 @@ def others(clips: list[tumble.Clip], ids: Any, times: Any) -> dict[str, float]:
         [np.stack([clip.keys(joint) for joint in range(len(clip))], axis=1) for clip in clips]
     )
     starts = np.cumsum(counts) - counts
-    place = np.minimum((times * 30).astype(int), counts[ids] - 2)
-    t = (times * 30 - place).astype(np.float32)[:, None, None]
+    frame = np.minimum((times * 30).astype(int), counts[ids] - 2)
+    t = (times * 30 - frame).astype(np.float32)[:, None, None]
 
     def by_numpy() -> Any:
-        a, b = flat[starts[ids] + place], flat[starts[ids] + place + 1]
+        a, b = flat[starts[ids] + frame], flat[starts[ids] + frame + 1]
         cosine = (a * b).sum(axis=-1, keepdims=True)
         b, cosine = np.where(cosine < 0, -b, b), np.abs(cosine)
         half = np.arccos(np.clip(cosine, -1, 1))
@@ -135,7 +135,7 @@ def others(clips: list[tumble.Clip], ids: Any, times: Any) -> dict[str, float]:
         import torch
     except ImportError:
         return found
-    keys, first = torch.from_numpy(flat), torch.from_numpy(starts[ids] + place)
+    keys, first = torch.from_numpy(flat), torch.from_numpy(starts[ids] + frame)
     steps = torch.from_numpy(t[:, 0, 0])
 
     def by_torch() -> Any:
@@ -159,8 +159,8 @@ def main() -> None:
     parser.add_argument("--steps", type=int, default=1000)
     parser.add_argument("--environments", type=int, default=4096)
     options = parser.parse_args()
-    with tempfile.TemporaryDirectory() as place:
-        folder = pathlib.Path(place)
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = pathlib.Path(temporary)
         write_files(folder, options.files)
         started = time.perf_counter()
         skeleton = (PARENTS, OFFSETS)

@@ -13,10 +13,10 @@ use pyo3::intern;
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyFloat, PyInt, PyList, PyTuple};
-use tumble_formats::quaternion::nearest_unit;
+use tumble_formats::quaternion::{ComponentOrder, nearest_unit};
 
 use crate::errors::input;
-use crate::options::Samples;
+use crate::options::{SampleRequest, option_named};
 
 /// The order of a quaternion's components.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -27,13 +27,10 @@ pub(crate) enum Order {
 
 impl Order {
     pub(crate) fn named(name: &str) -> PyResult<Self> {
-        match name {
-            "xyzw" => Ok(Self::Xyzw),
-            "wxyz" => Ok(Self::Wxyz),
-            _ => Err(input(format!(
-                "order: there is no `{name}`; there are xyzw, wxyz"
-            ))),
-        }
+        Ok(match option_named(name, "order")? {
+            ComponentOrder::Xyzw => Self::Xyzw,
+            ComponentOrder::Wxyz => Self::Wxyz,
+        })
     }
 
     pub(crate) fn xyzw<T: Copy>(self, [a, b, c, d]: [T; 4]) -> [T; 4] {
@@ -54,7 +51,7 @@ impl Order {
 
 /// Numbers with a shape, in C order.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Numbers<T> {
+pub(crate) struct ArrayValues<T> {
     pub(crate) shape: Vec<usize>,
     pub(crate) values: Vec<T>,
 }
@@ -82,14 +79,14 @@ pub(crate) fn numpy(py: Python<'_>) -> PyResult<&Bound<'_, PyModule>> {
 }
 
 /// What NumPy makes of an object.
-fn as_array<'py>(value: &Bound<'py, PyAny>, what: &str) -> PyResult<Bound<'py, PyUntypedArray>> {
+fn as_array<'py>(value: &Bound<'py, PyAny>, label: &str) -> PyResult<Bound<'py, PyUntypedArray>> {
     let py = value.py();
     if let Ok(array) = value.cast_exact::<PyUntypedArray>() {
         return Ok(array.clone());
     }
     if value.is_instance_of::<PyUntypedArray>() && value.hasattr(intern!(py, "mask"))? {
         return Err(input(format!(
-            "{what}: a masked array; fill or remove what is masked"
+            "{label}: a masked array; fill or remove what is masked"
         )));
     }
     let speaks_dlpack = value.hasattr(intern!(py, "__dlpack__"))?;
@@ -99,41 +96,45 @@ fn as_array<'py>(value: &Bound<'py, PyAny>, what: &str) -> PyResult<Bound<'py, P
     };
     let made = numpy(py)?.call_method1(name, (value,));
     let made = made.map_err(|error| match error.is_instance_of::<PyValueError>(py) {
-        true => input(format!("{what}: no array can be made of it: {error}")),
+        true => input(format!("{label}: no array can be made of it: {error}")),
         false => error,
     })?;
     Ok(made.cast_into::<PyUntypedArray>()?)
 }
 
 /// The numbers of an array; those of other types than float32 and float64 are converted.
-fn array<'py>(value: &Bound<'py, PyAny>, what: &str) -> PyResult<Array<'py>> {
-    let own = as_array(value, what)?;
-    if let Some(array) = borrowed(own.as_any())? {
+fn array<'py>(value: &Bound<'py, PyAny>, label: &str) -> PyResult<Array<'py>> {
+    let untyped = as_array(value, label)?;
+    if let Some(array) = borrowed(untyped.as_any())? {
         return Ok(array);
     }
-    let kind = own.dtype().kind();
+    let kind = untyped.dtype().kind();
     if !matches!(kind, b'f' | b'i' | b'u') {
         return Err(input(format!(
-            "{what}: its type is {}; give float32 or float64",
-            own.dtype()
+            "{label}: its type is {}; give float32 or float64",
+            untyped.dtype()
         )));
     }
-    let converted = own.call_method1(intern!(value.py(), "astype"), ("float64",))?;
-    borrowed(&converted)?.ok_or_else(|| input(format!("{what}: no array of numbers")))
+    let converted = untyped.call_method1(intern!(value.py(), "astype"), ("float64",))?;
+    borrowed(&converted)?.ok_or_else(|| input(format!("{label}: no array of numbers")))
 }
 
 /// An array of a type and an alignment that can be read where it lies.
-fn borrowed<'py>(own: &Bound<'py, PyAny>) -> PyResult<Option<Array<'py>>> {
-    let taken = |error: numpy::BorrowError| PyValueError::new_err(error.to_string());
-    if let Ok(array) = own.cast::<PyArrayDyn<f32>>()
+fn borrowed<'py>(value: &Bound<'py, PyAny>) -> PyResult<Option<Array<'py>>> {
+    let of_borrow = |error: numpy::BorrowError| PyValueError::new_err(error.to_string());
+    if let Ok(array) = value.cast::<PyArrayDyn<f32>>()
         && is_aligned(array.data() as usize, array.strides(), 4)
     {
-        return Ok(Some(Array::Single(array.try_readonly().map_err(taken)?)));
+        return Ok(Some(Array::Single(
+            array.try_readonly().map_err(of_borrow)?,
+        )));
     }
-    if let Ok(array) = own.cast::<PyArrayDyn<f64>>()
+    if let Ok(array) = value.cast::<PyArrayDyn<f64>>()
         && is_aligned(array.data() as usize, array.strides(), 8)
     {
-        return Ok(Some(Array::Double(array.try_readonly().map_err(taken)?)));
+        return Ok(Some(Array::Double(
+            array.try_readonly().map_err(of_borrow)?,
+        )));
     }
     Ok(None)
 }
@@ -151,8 +152,8 @@ fn in_order<'a, T: numpy::Element>(array: &'a PyReadonlyArrayDyn<'_, T>) -> Opti
 }
 
 /// Numbers of any shape, in f64.
-pub(crate) fn doubles(value: &Bound<'_, PyAny>, what: &str) -> PyResult<Numbers<f64>> {
-    let array = array(value, what)?;
+pub(crate) fn doubles(value: &Bound<'_, PyAny>, label: &str) -> PyResult<ArrayValues<f64>> {
+    let array = array(value, label)?;
     let shape = array.shape().to_vec();
     let values = match &array {
         Array::Single(array) => array.as_array().iter().map(|&it| f64::from(it)).collect(),
@@ -161,17 +162,17 @@ pub(crate) fn doubles(value: &Bound<'_, PyAny>, what: &str) -> PyResult<Numbers<
             None => array.as_array().iter().copied().collect(),
         },
     };
-    Ok(Numbers { shape, values })
+    Ok(ArrayValues { shape, values })
 }
 
 /// One finite number.
-pub(crate) fn number(value: &Bound<'_, PyAny>, what: &str, unit: &str) -> PyResult<f64> {
+pub(crate) fn number(value: &Bound<'_, PyAny>, label: &str, unit: &str) -> PyResult<f64> {
     let number: f64 = value
         .extract()
-        .map_err(|_| PyTypeError::new_err(format!("{what}: give {unit}, as a number")))?;
+        .map_err(|_| PyTypeError::new_err(format!("{label}: give {unit}, as a number")))?;
     match number.is_finite() {
         true => Ok(number),
-        false => Err(input(format!("{what}: {number} is not finite"))),
+        false => Err(input(format!("{label}: {number} is not finite"))),
     }
 }
 
@@ -180,22 +181,22 @@ pub(crate) fn number(value: &Bound<'_, PyAny>, what: &str, unit: &str) -> PyResu
 pub(crate) fn quaternions(
     value: &Bound<'_, PyAny>,
     order: Order,
-    what: &str,
-) -> PyResult<Numbers<Quat>> {
+    label: &str,
+) -> PyResult<ArrayValues<Quat>> {
     if !value.is_instance_of::<PyUntypedArray>()
         && let Some(as_quat) = value.getattr_opt(intern!(value.py(), "as_quat"))?
     {
-        return components(&as_quat.call0()?, Order::Xyzw, what);
+        return components(&as_quat.call0()?, Order::Xyzw, label);
     }
-    components(value, order, what)
+    components(value, order, label)
 }
 
-fn components(value: &Bound<'_, PyAny>, order: Order, what: &str) -> PyResult<Numbers<Quat>> {
-    let array = array(value, what)?;
+fn components(value: &Bound<'_, PyAny>, order: Order, label: &str) -> PyResult<ArrayValues<Quat>> {
+    let array = array(value, label)?;
     let mut shape = array.shape().to_vec();
     if shape.pop() != Some(4) {
         return Err(input(format!(
-            "{what}: its shape is {:?}; the last axis has the 4 components of a quaternion",
+            "{label}: its shape is {:?}; the last axis has the 4 components of a quaternion",
             array.shape()
         )));
     }
@@ -208,7 +209,7 @@ fn components(value: &Bound<'_, PyAny>, order: Order, what: &str) -> PyResult<Nu
         },
         Array::Double(array) => fours(array.as_array().iter().copied(), double),
     };
-    Ok(Numbers { shape, values })
+    Ok(ArrayValues { shape, values })
 }
 
 fn fours<T: Copy + Default>(
@@ -249,11 +250,11 @@ pub(crate) fn parts<'py>(value: &Bound<'py, PyAny>) -> Option<Vec<Bound<'py, PyA
 }
 
 /// The times of `at`.
-pub(crate) fn sample_times(value: &Bound<'_, PyAny>) -> PyResult<Samples> {
+pub(crate) fn sample_times(value: &Bound<'_, PyAny>) -> PyResult<SampleRequest> {
     if let Some(parts) = parts(value) {
         let mut lists = Vec::with_capacity(parts.len());
         for part in &parts {
-            let Numbers { shape, values } = doubles(part, "at")?;
+            let ArrayValues { shape, values } = doubles(part, "at")?;
             if shape.len() != 1 {
                 return Err(input(format!(
                     "at: a part of the list has shape {shape:?}; give a list of times for each track"
@@ -263,23 +264,23 @@ pub(crate) fn sample_times(value: &Bound<'_, PyAny>) -> PyResult<Samples> {
         }
         let count = lists.first().map_or(0, Vec::len);
         if lists.iter().any(|list| list.len() != count) {
-            return Ok(Samples::Ragged(lists));
+            return Ok(SampleRequest::Ragged(lists));
         }
         let times: Arc<[f64]> = lists.concat().into();
-        return Ok(Samples::Each { times, count });
+        return Ok(SampleRequest::Each { times, count });
     }
-    let Numbers { shape, values } = doubles(value, "at")?;
+    let ArrayValues { shape, values } = doubles(value, "at")?;
     let times: Arc<[f64]> = values.into();
     match *shape {
-        [] => Ok(Samples::Shared {
+        [] => Ok(SampleRequest::Shared {
             times,
             is_one: true,
         }),
-        [_] => Ok(Samples::Shared {
+        [_] => Ok(SampleRequest::Shared {
             times,
             is_one: false,
         }),
-        [_, count] => Ok(Samples::Each { times, count }),
+        [_, count] => Ok(SampleRequest::Each { times, count }),
         _ => Err(input(format!(
             "at: its shape is {shape:?}; give one time, (frames,), or (tracks, frames)"
         ))),

@@ -5,10 +5,10 @@ use pyo3::prelude::*;
 use tumble::{Tcb, TrackError, TrackSet};
 use tumble_formats::motion::{Joint, Motion, Transform};
 
-use crate::arrays::{Numbers, Order, doubles, parts, quaternions};
+use crate::arrays::{ArrayValues, Order, doubles, parts, quaternions};
 use crate::errors::{input, of_track};
 
-/// Key times as they were given.
+/// Key times: one list for all tracks, or one for each.
 enum Times {
     Shared(Vec<f64>),
     Each(Vec<Vec<f64>>),
@@ -18,8 +18,8 @@ impl Times {
     fn new(value: &Bound<'_, PyAny>) -> PyResult<Self> {
         if let Some(parts) = parts(value) {
             let list = |part| match doubles(part, "times")? {
-                Numbers { shape, values } if shape.len() == 1 => Ok(values),
-                Numbers { shape, .. } => Err(input(format!(
+                ArrayValues { shape, values } if shape.len() == 1 => Ok(values),
+                ArrayValues { shape, .. } => Err(input(format!(
                     "times: a part of the list has shape {shape:?}; give a list of times for each \
                      track"
                 ))),
@@ -30,7 +30,7 @@ impl Times {
                 .collect::<PyResult<_>>()
                 .map(Self::Each);
         }
-        let Numbers { shape, values } = doubles(value, "times")?;
+        let ArrayValues { shape, values } = doubles(value, "times")?;
         match *shape {
             [_] => Ok(Self::Shared(values)),
             [tracks, count] => Ok(Self::Each(match count {
@@ -130,12 +130,12 @@ fn tracks_of(value: &Bound<'_, PyAny>, order: Order) -> PyResult<(Tracks, bool)>
             keys: Vec::new(),
             ends: Vec::new(),
         };
-        for (place, part) in parts.iter().enumerate() {
-            let what = format!("keys[{place}]");
-            let Numbers { shape, values } = quaternions(part, order, &what)?;
+        for (track, part) in parts.iter().enumerate() {
+            let label = format!("keys[{track}]");
+            let ArrayValues { shape, values } = quaternions(part, order, &label)?;
             if shape.len() != 1 {
                 return Err(input(format!(
-                    "{what}: a track of a list has keys of shape (keys, 4)"
+                    "{label}: a track of a list has keys of shape (keys, 4)"
                 )));
             }
             tracks.keys.extend(values);
@@ -143,7 +143,7 @@ fn tracks_of(value: &Bound<'_, PyAny>, order: Order) -> PyResult<(Tracks, bool)>
         }
         return Ok((tracks, false));
     }
-    let Numbers { shape, values } = quaternions(value, order, "keys")?;
+    let ArrayValues { shape, values } = quaternions(value, order, "keys")?;
     match *shape {
         [count] => Ok((
             Tracks {
@@ -168,7 +168,7 @@ fn tracks_of(value: &Bound<'_, PyAny>, order: Order) -> PyResult<(Tracks, bool)>
 }
 
 /// What clips may have beside rotations.
-pub(crate) struct Parts<'a, 'py> {
+pub(crate) struct ClipParts<'a, 'py> {
     pub(crate) parents: Option<Vec<Option<i64>>>,
     pub(crate) offsets: Option<&'a Bound<'py, PyAny>>,
     pub(crate) translations: Option<&'a Bound<'py, PyAny>>,
@@ -178,17 +178,17 @@ pub(crate) struct Parts<'a, 'py> {
     pub(crate) tcb: Option<&'a Bound<'py, PyAny>>,
 }
 
-impl Parts<'_, '_> {
-    /// Gives them to a clip. Of `order` are the tangents.
+impl ClipParts<'_, '_> {
+    /// Sets them in a clip; the tangents have their components in `order`.
     pub(crate) fn put_into(self, clip: &mut Motion, order: Order) -> PyResult<()> {
         self.hang(clip)?;
         let tracks = clip.set.track_count();
         let of_track = |error: TrackError| of_track(&error);
-        for (what, value) in [("translations", self.translations), ("scales", self.scales)] {
-            for (track, row) in rows(value, what, tracks, &[3])? {
+        for (label, value) in [("translations", self.translations), ("scales", self.scales)] {
+            for (track, row) in rows(value, label, tracks, &[3])? {
                 let times = clip.set.track(track).times.to_vec();
                 let vectors: Vec<DVec3> = threes(&row).collect();
-                if what == "translations" {
+                if label == "translations" {
                     clip.set_positions(track, &times, &vectors)
                         .map_err(of_track)?;
                     continue;
@@ -227,8 +227,8 @@ impl Parts<'_, '_> {
             return Ok(());
         }
         let tracks = clip.set.track_count();
-        let wrong = |what: &str, given: usize| {
-            input(format!("{what}: there are {given} for {tracks} tracks"))
+        let wrong = |label: &str, count: usize| {
+            input(format!("{label}: there are {count} for {tracks} tracks"))
         };
         let parents = match &self.parents {
             None => vec![None; tracks],
@@ -242,7 +242,9 @@ impl Parts<'_, '_> {
                         .filter(|&parent| parent < tracks && parent != track)
                         .map(Some)
                         .ok_or_else(|| {
-                            input(format!("parents: track {track} cannot hang on {parent}"))
+                            input(format!(
+                                "parents: track {track} cannot have the parent {parent}"
+                            ))
                         }),
                 })
                 .collect::<PyResult<_>>()?,
@@ -251,10 +253,10 @@ impl Parts<'_, '_> {
         let offsets = match self.offsets {
             None => vec![Vec3::ZERO; tracks],
             Some(value) => match doubles(value, "offsets")? {
-                Numbers { shape, values } if *shape == [tracks, 3] => {
+                ArrayValues { shape, values } if *shape == [tracks, 3] => {
                     threes(&values).map(DVec3::as_vec3).collect()
                 }
-                Numbers { shape, .. } => {
+                ArrayValues { shape, .. } => {
                     return Err(input(format!(
                         "offsets: the shape is {shape:?}; give ({tracks}, 3)"
                     )));
@@ -290,7 +292,7 @@ fn threes(numbers: &[f64]) -> impl Iterator<Item = DVec3> {
 /// None, for each track.
 fn rows(
     value: Option<&Bound<'_, PyAny>>,
-    what: &str,
+    label: &str,
     tracks: usize,
     each: &[usize],
 ) -> PyResult<Vec<(usize, Vec<f64>)>> {
@@ -299,7 +301,7 @@ fn rows(
     };
     let wrong = |shape: &[usize]| {
         input(format!(
-            "{what}: the shape is {shape:?}; give (tracks, keys, …) with {each:?} numbers for each \
+            "{label}: the shape is {shape:?}; give (tracks, keys, …) with {each:?} numbers for each \
              key of {tracks} tracks, or a list with an array or None for each track"
         ))
     };
@@ -313,7 +315,7 @@ fn rows(
         }
         let mut rows = Vec::new();
         for (track, part) in parts.iter().enumerate().filter(|(_, part)| !part.is_none()) {
-            let Numbers { shape, values } = doubles(part, what)?;
+            let ArrayValues { shape, values } = doubles(part, label)?;
             if shape.get(1..) != Some(each) {
                 return Err(wrong(&shape));
             }
@@ -321,7 +323,7 @@ fn rows(
         }
         return Ok(rows);
     }
-    let Numbers { shape, values } = doubles(value, what)?;
+    let ArrayValues { shape, values } = doubles(value, label)?;
     let size: usize = match &*shape {
         [_, rest @ ..] if rest == each && tracks == 1 => values.len(),
         [count, keys, rest @ ..] if rest == each && *count == tracks => {

@@ -15,7 +15,7 @@ use tumble_formats::format::Document;
 use tumble_formats::motion::Motion;
 
 use crate::arrays::Order;
-use crate::build::{Parts, clip_of};
+use crate::build::{ClipParts, clip_of};
 use crate::engine::default_engine;
 use crate::errors::guarded;
 use crate::options::frame_rate;
@@ -31,7 +31,7 @@ use crate::pickle::{is_same, state};
 /// `(tracks, keys, 4)`, or a list with an array `(keys, 4)` for each track; a `Rotation` of SciPy's,
 /// or a list of them, will do. `order` says what the four components of `keys` are.
 ///
-/// For each track: `names`, text; `parents`, the track that it hangs on (`None` or -1 for a root);
+/// For each track: `names`, text; `parents`, the index of its parent track (`None` or -1 for a root);
 /// `offsets`, `(tracks, 3)`, where it rests in its parent's frame. For each key, as arrays or lists
 /// like `keys` with 3 components instead of 4: `translations`, `scales`, and what some methods use:
 /// `velocities` (rad/s, body frame; `hermite`), `tangents` (`(…, 2, 4)`, arriving and leaving, a
@@ -84,7 +84,7 @@ impl Clip {
 
     /// The length of each box, where the clip is of a file about boxes.
     pub(crate) fn box_length(&self) -> Option<f64> {
-        self.source.as_ref().and_then(|own| own.box_length)
+        self.source.as_ref().and_then(|source| source.box_length)
     }
 }
 
@@ -112,7 +112,7 @@ impl Clip {
     ) -> PyResult<Self> {
         guarded(|| {
             let (mut motion, _) = clip_of(times, keys, Order::named(order)?, names.as_deref())?;
-            let parts = Parts {
+            let parts = ClipParts {
                 parents,
                 offsets,
                 translations,
@@ -145,7 +145,7 @@ impl Clip {
             .collect()
     }
 
-    /// For each track the one that it hangs on, None for roots; None without a skeleton.
+    /// The index of the parent of each track, None for roots; None without a skeleton.
     #[getter]
     fn parents(&self) -> Option<Vec<Option<usize>>> {
         let skeleton = &self.motion.skeleton;
@@ -168,8 +168,8 @@ impl Clip {
         doubles(py, positions).map(Some)
     }
 
-    /// What was taken off the translations of each track, (tracks, 3), float64, so that f32 holds what
-    /// is left of positions such as those of maps; None where nothing was. Positions that the
+    /// The origin that was subtracted from the translations of each track, (tracks, 3), float64, so that f32
+    /// is enough for the rest of positions such as those of maps; None where none was. Positions that the
     /// package returns or writes have it added again, in float64.
     #[getter]
     fn origins<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
@@ -287,7 +287,7 @@ impl Clip {
         )
     }
 
-    /// The key times of a track, by its place or name: (keys,), float64, seconds.
+    /// The key times of a track, by its index or name: (keys,), float64, seconds.
     ///
     /// >>> import tumble
     /// >>> clip = tumble.Clip([0.0, 0.5], [[0, 0, 0, 1], [1, 0, 0, 0]], names=["hip"])
@@ -302,7 +302,7 @@ impl Clip {
         Ok(PyArray1::from_slice(py, self.motion.set.track(track).times))
     }
 
-    /// The keys of a track, by its place or name: (keys, 4), float32; `order` says what the
+    /// The keys of a track, by its index or name: (keys, 4), float32; `order` says what the
     /// components are.
     ///
     /// >>> import tumble
@@ -325,7 +325,7 @@ impl Clip {
         PyArray1::from_vec(py, numbers).reshape([count, 4])
     }
 
-    /// The translation keys of a track, by its place or name: their times (keys,), seconds, and
+    /// The translation keys of a track, by its index or name: their times (keys,), seconds, and
     /// their values (keys, 3), float32 (float64 where the track has one of the `origins`), in the file's
     /// units; None for a track without.
     fn translations<'py>(
@@ -352,7 +352,7 @@ impl Clip {
     /// >>> clip.frames("30000/1001")
     /// 60
     fn frames(&self, fps: &Bound<'_, PyAny>) -> PyResult<usize> {
-        let rate = crate::options::Samples::Rate(frame_rate(fps)?, None, None);
+        let rate = crate::options::SampleRequest::Rate(frame_rate(fps)?, None, None);
         Ok(rate.resolved(&self.motion.set)?.1)
     }
 
@@ -391,7 +391,7 @@ impl Clip {
 
     /// Draws the components of a track over time, its keys as dots, with matplotlib; gives its axes.
     ///
-    /// `plot(track=0, *, fps=120, axes=None, …)`: `track` is a place or a name, `axes` those
+    /// `plot(track=0, *, fps=120, axes=None, …)`: `track` is an index or a name, `axes` those
     /// of matplotlib to draw on, the other options are those of `evaluate`.
     ///
     /// >>> import tumble
@@ -458,24 +458,24 @@ fn vectors(py: Python<'_>, of: impl Iterator<Item = Vec3>) -> PyResult<Bound<'_,
 }
 
 impl Clip {
-    /// A track's place, of its place or name.
+    /// The index of a track, which is named by its index or its name.
     pub(crate) fn track(&self, track: &Bound<'_, PyAny>) -> PyResult<usize> {
         let set = &self.motion.set;
         let tracks = set.track_count();
         if let Ok(name) = track.cast::<PyString>() {
             let name = name.to_cow()?;
-            let found = (0..tracks).find(|&place| set.track_name(place) == *name);
+            let found = (0..tracks).find(|&index| set.track_name(index) == *name);
             return found.ok_or_else(|| PyKeyError::new_err(format!("there is no track `{name}`")));
         }
-        let place: isize = track
+        let index: isize = track
             .extract()
-            .map_err(|_| PyTypeError::new_err("a track is its place, from 0, or its name"))?;
-        let from_end = if place < 0 { tracks as isize } else { 0 };
-        usize::try_from(place + from_end)
+            .map_err(|_| PyTypeError::new_err("give a track as its index, from 0, or its name"))?;
+        let from_end = if index < 0 { tracks as isize } else { 0 };
+        usize::try_from(index + from_end)
             .ok()
-            .filter(|&place| place < tracks)
+            .filter(|&index| index < tracks)
             .ok_or_else(|| {
-                PyIndexError::new_err(format!("there is no track {place}; there are {tracks}"))
+                PyIndexError::new_err(format!("there is no track {index}; there are {tracks}"))
             })
     }
 

@@ -9,11 +9,11 @@ use tumble_formats::motion::Motion;
 use tumble_formats::npz;
 use tumble_formats::trajectory::Align;
 
-use crate::arrays::{Numbers, doubles};
+use crate::arrays::{ArrayValues, doubles};
 use crate::clip::Clip;
 use crate::engine::{Engine, default_engine};
 use crate::errors::{in_python, input, of_engine, warn_of};
-use crate::options::{Samples, samples_of};
+use crate::options::{SampleRequest, samples_of};
 use crate::run::interruptible;
 
 /// What many differences come to.
@@ -298,14 +298,14 @@ pub(crate) fn compare<'py>(
 
 fn engine_of(py: Python<'_>, engine: Option<&Bound<'_, Engine>>) -> PyResult<tumble::Engine> {
     match engine {
-        Some(engine) => engine.get().engine(1),
-        None => default_engine(py)?.get().engine(1),
+        Some(engine) => engine.get().engine_for(1),
+        None => default_engine(py)?.get().engine_for(1),
     }
 }
 
 fn of_arrays(arrays: [&Bound<'_, PyAny>; 2]) -> PyResult<ArrayDifference> {
     let read = |value: &Bound<'_, PyAny>, name: &str| {
-        let Numbers { shape, values } = doubles(value, name)?;
+        let ArrayValues { shape, values } = doubles(value, name)?;
         Ok::<_, PyErr>(npz::NumberArray { shape, values })
     };
     let [first, second] = [read(arrays[0], "first")?, read(arrays[1], "second")?];
@@ -324,7 +324,7 @@ fn of_arrays(arrays: [&Bound<'_, PyAny>; 2]) -> PyResult<ArrayDifference> {
 fn of_clips(
     engine: &tumble::Engine,
     clips: [Arc<Motion>; 2],
-    samples: Option<Samples>,
+    samples: Option<SampleRequest>,
     world: bool,
 ) -> PyResult<(ClipDifference, Option<String>)> {
     let pair = ClipPair {
@@ -335,9 +335,9 @@ fn of_clips(
     let mut warning = common.warning.clone();
     let frames = match samples {
         None => pair.keys(&common),
-        Some(Samples::Rate(rate, start, end)) => SampleTimes::rate(rate)
+        Some(SampleRequest::Rate(rate, start, end)) => SampleTimes::rate(rate)
             .between(start.unwrap_or(common.start), end.unwrap_or(common.end)),
-        Some(Samples::Shared { times, .. }) => {
+        Some(SampleRequest::Shared { times, .. }) => {
             // The times are known, whatever the clips have.
             warning = None;
             SampleTimes::at(times.to_vec())

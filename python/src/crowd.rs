@@ -8,7 +8,7 @@ use pyo3::types::PyDict;
 use tumble::crowd::{CrowdLayer, CrowdLibrary, CrowdValues};
 use tumble::{ComponentType, Skeleton, WrapMode};
 
-use crate::arrays::{Numbers, doubles};
+use crate::arrays::{ArrayValues, doubles};
 use crate::clip::Clip;
 use crate::engine::{Engine, default_engine};
 use crate::errors::{guarded, input};
@@ -61,7 +61,7 @@ pub(crate) struct Crowd {
 
 /// Numbers for each of some instances: one for all, or a list.
 fn each(value: &Bound<'_, PyAny>, name: &str, count: usize) -> PyResult<Vec<f64>> {
-    let Numbers { shape, values } = doubles(value, name)?;
+    let ArrayValues { shape, values } = doubles(value, name)?;
     match (&*shape, &*values) {
         ([], &[one]) => Ok(vec![one; count]),
         (&[length], _) if length == count => Ok(values),
@@ -122,7 +122,7 @@ impl Crowd {
             None if offsets.is_some() => return Err(input("offsets: give `parents` too")),
             None if first.motion.skeleton.is_empty() => {
                 return Err(input(
-                    "clips[0]: it says not how its tracks hang together; give `parents` and `offsets`",
+                    "clips[0]: it has no skeleton; give `parents` and `offsets`",
                 ));
             }
             None => {
@@ -141,8 +141,8 @@ impl Crowd {
             poses.push((clip.extract()?, from, seconds));
         }
         let engine = match engine {
-            Some(engine) => engine.get().engine(1)?,
-            None => default_engine(py)?.get().engine(1)?,
+            Some(engine) => engine.get().engine_for(1)?,
+            None => default_engine(py)?.get().engine_for(1)?,
         };
         let count = clips.len();
         let crowd = py.detach(|| {

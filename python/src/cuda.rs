@@ -87,7 +87,7 @@ impl From<VulkanError> for CudaError {
     }
 }
 
-type Device = c_int;
+type CuDevice = c_int;
 type Context = *mut c_void;
 type Memory = *mut c_void;
 type Semaphore = *mut c_void;
@@ -106,7 +106,7 @@ const DEDICATED: c_uint = 1;
 #[derive(Default)]
 struct MemoryHandle {
     kind: c_int,
-    file: File,
+    file: FileHandle,
     size: u64,
     flags: c_uint,
     reserved: [c_uint; 16],
@@ -115,7 +115,7 @@ struct MemoryHandle {
 /// The union of the handles: a file, or two pointers.
 #[repr(C, align(8))]
 #[derive(Default)]
-struct File {
+struct FileHandle {
     number: c_int,
     unused: [c_uint; 3],
 }
@@ -135,7 +135,7 @@ struct BufferRange {
 #[derive(Default)]
 struct SemaphoreHandle {
     kind: c_int,
-    file: File,
+    file: FileHandle,
     flags: c_uint,
     reserved: [c_uint; 16],
 }
@@ -184,9 +184,9 @@ functions! {
     init: "cuInit" (c_uint);
     error_name: "cuGetErrorName" (c_int, *mut *const c_char);
     device_count: "cuDeviceGetCount" (*mut c_int);
-    device: "cuDeviceGet" (*mut Device, c_int);
-    device_uuid: "cuDeviceGetUuid" (*mut [u8; 16], Device);
-    retain: "cuDevicePrimaryCtxRetain" (*mut Context, Device);
+    device: "cuDeviceGet" (*mut CuDevice, c_int);
+    device_uuid: "cuDeviceGetUuid" (*mut [u8; 16], CuDevice);
+    retain: "cuDevicePrimaryCtxRetain" (*mut Context, CuDevice);
     push: "cuCtxPushCurrent_v2" (Context);
     pop: "cuCtxPopCurrent_v2" (*mut Context);
     synchronize: "cuCtxSynchronize" ();
@@ -205,12 +205,12 @@ pub(crate) struct Cuda {
     functions: Functions,
     /// The contexts that all users of a device share (the primary ones), of the devices that were used. They stay, as
     /// those of CUDA's runtime do: making one takes a tenth of a second.
-    contexts: Mutex<Vec<(Device, Context)>>,
+    contexts: Mutex<Vec<(CuDevice, Context)>>,
     /// Keeps the functions where they are.
     _library: Library,
 }
 
-// SAFETY: the driver's functions may be called by any thread, and a context is no thread's own.
+// SAFETY: the driver's functions may be called by any thread, and a context belongs to no thread.
 unsafe impl Send for Cuda {}
 // SAFETY: as above; the list is locked.
 unsafe impl Sync for Cuda {}
@@ -234,7 +234,7 @@ impl Cuda {
     }
 
     /// The context of a device.
-    fn context(&self, device: Device) -> Result<Context, CudaError> {
+    fn context(&self, device: CuDevice) -> Result<Context, CudaError> {
         let mut contexts = self.contexts.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some((_, context)) = contexts.iter().find(|(of, _)| *of == device) {
             return Ok(*context);
@@ -265,8 +265,8 @@ impl Cuda {
         Err(CudaError::Call { call, code, name })
     }
 
-    /// The device with that UUID and its place among those that CUDA sees.
-    fn device(&self, result: &ExportedResult) -> Result<(Device, c_int), CudaError> {
+    /// The device with that UUID, and its index among those that CUDA sees.
+    fn device(&self, result: &ExportedResult) -> Result<(CuDevice, c_int), CudaError> {
         let functions = &self.functions;
         // SAFETY: plain arguments, and pointers to what they are declared as, here and below.
         self.checked("cuInit", unsafe { (functions.init)(0) })?;
@@ -304,25 +304,25 @@ fn spelt(uuid: [u8; 16]) -> String {
     parts.map(|part| &digits[part]).join("-")
 }
 
-/// A result of a Vulkan device in the memory that CUDA sees. What CUDA made of it is given back when this is
-/// dropped, and then the memory.
+/// A result of a Vulkan device in the memory that CUDA sees. CUDA's objects are freed when this is dropped,
+/// and then the memory.
 pub(crate) struct Mapping {
     cuda: &'static Cuda,
     result: ExportedResult,
-    /// The place of the device among those that CUDA sees.
+    /// The index of the device among those that CUDA sees.
     pub(crate) ordinal: c_int,
     context: Context,
     memory: Option<Memory>,
     address: Option<Address>,
     /// The semaphore, and the value that says that the result is written.
     semaphore: Option<(Semaphore, u64)>,
-    /// Whether somebody was told where the memory is, whose work may still use it.
+    /// Whether the memory's address was handed out, so that work of others may still use it.
     is_known: AtomicBool,
     /// The process that it is of: CUDA cannot be used in one that was forked from it.
     process: u32,
 }
 
-// SAFETY: the driver's functions may be called by any thread, and its handles are no thread's own; the context is
+// SAFETY: the driver's functions may be called by any thread, and its handles belong to no thread; the context is
 // made a thread's for the length of a call.
 unsafe impl Send for Mapping {}
 // SAFETY: as above; nothing but atomic numbers changes behind a shared reference.
@@ -363,9 +363,9 @@ impl Mapping {
         let size = self.result.memory_bytes();
         let handle = MemoryHandle {
             kind: OPAQUE_FILE,
-            file: File {
+            file: FileHandle {
                 number: file.as_raw_fd(),
-                ..File::default()
+                ..FileHandle::default()
             },
             size,
             flags: DEDICATED,
@@ -403,9 +403,9 @@ impl Mapping {
         };
         let handle = SemaphoreHandle {
             kind: TIMELINE_FILE,
-            file: File {
+            file: FileHandle {
                 number: file.as_raw_fd(),
-                ..File::default()
+                ..FileHandle::default()
             },
             ..SemaphoreHandle::default()
         };

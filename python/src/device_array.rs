@@ -5,8 +5,8 @@ use std::sync::Arc;
 use pyo3::exceptions::PyBufferError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
-use tumble::vulkan::ExportedResult;
 use tumble::ComponentType;
+use tumble::vulkan::ExportedResult;
 
 use crate::arrays::numpy;
 use crate::cuda::{CudaError, DEFAULT_STREAM, Mapping};
@@ -17,7 +17,7 @@ use crate::output::{array_of, filled_bytes, type_name};
 /// A result in the memory of an NVIDIA card, made by `Engine.evaluate(…, device_array=True)` there:
 /// `torch.from_dlpack`, `cupy.from_dlpack` and `jax.dlpack.from_dlpack` take it without a copy, and whatever knows
 /// `__cuda_array_interface__`. The card may still be writing it; the stream that takes it waits for that, the host
-/// does not. What takes it shares its memory, which lives until the last of them has gone.
+/// does not. All that import it share its memory, which is freed after the last of them.
 ///
 /// >>> import tumble, torch  # doctest: +SKIP
 /// >>> clip = tumble.Clip([0.0, 1.0], [[0, 0, 0, 1], [0, 0, 1, 0]])  # doctest: +SKIP

@@ -71,7 +71,7 @@ struct Version {
 }
 
 /// What the pointers of a tensor point to.
-struct Kept {
+struct TensorBuffers {
     shape: Box<[i64]>,
     strides: Box<[i64]>,
     _mapping: Arc<Mapping>,
@@ -83,7 +83,7 @@ struct Managed {
     tensor: Tensor,
     context: *mut c_void,
     delete: Option<unsafe extern "C" fn(*mut Managed)>,
-    kept: Kept,
+    buffers: TensorBuffers,
 }
 
 /// `DLManagedTensorVersioned`, and behind it what is ours.
@@ -94,12 +94,12 @@ struct ManagedVersioned {
     delete: Option<unsafe extern "C" fn(*mut ManagedVersioned)>,
     flags: u64,
     tensor: Tensor,
-    kept: Kept,
+    buffers: TensorBuffers,
 }
 
 const _: () = {
     assert!(size_of::<Tensor>() == 48);
-    assert!(std::mem::offset_of!(Managed, kept) == 64);
+    assert!(std::mem::offset_of!(Managed, buffers) == 64);
     assert!(std::mem::offset_of!(ManagedVersioned, tensor) == 32);
 };
 
@@ -147,7 +147,7 @@ pub(crate) fn capsule<'py>(
     for axis in (1..shape.len()).rev() {
         strides[axis - 1] = strides[axis] * shape[axis].max(1) as i64;
     }
-    let mut kept = Kept {
+    let mut buffers = TensorBuffers {
         shape: shape.iter().map(|&length| length as i64).collect(),
         strides: strides.into_boxed_slice(),
         _mapping: Arc::clone(mapping),
@@ -160,8 +160,8 @@ pub(crate) fn capsule<'py>(
         },
         axes: shape.len() as i32,
         kind: DataType::of(component),
-        shape: kept.shape.as_mut_ptr(),
-        strides: kept.strides.as_mut_ptr(),
+        shape: buffers.shape.as_mut_ptr(),
+        strides: buffers.strides.as_mut_ptr(),
         offset: 0,
     };
     let (managed, name): (*mut c_void, _) = match is_versioned {
@@ -172,7 +172,7 @@ pub(crate) fn capsule<'py>(
                 delete: Some(delete),
                 flags: 0,
                 tensor,
-                kept,
+                buffers,
             });
             (Box::into_raw(managed).cast(), NAME_VERSIONED)
         }
@@ -181,7 +181,7 @@ pub(crate) fn capsule<'py>(
                 tensor,
                 context: null_mut(),
                 delete: Some(delete),
-                kept,
+                buffers,
             });
             (Box::into_raw(managed).cast(), NAME)
         }

@@ -15,7 +15,7 @@ use tumble_cli::host;
 use crate::arrays::Order;
 use crate::clip::Clip;
 use crate::errors::{device, guarded, input, of_engine};
-use crate::evaluate::Result;
+use crate::evaluate::OutputRequest;
 use crate::follow;
 use crate::options::{Request, option_named, request_arrays, samples_of};
 use crate::output::quaternions_of;
@@ -26,7 +26,7 @@ use crate::stream::Chunks;
 use crate::verify::Verification;
 
 /// Fewer rotations than this the CPU evaluates before another device is open.
-pub(crate) const FEW: usize = 1 << 20;
+pub(crate) const MIN_DEVICE_ROTATIONS: usize = 1 << 20;
 
 /// Evaluates clips on one device, which stays open.
 ///
@@ -47,16 +47,16 @@ pub(crate) const FEW: usize = 1 << 20;
 /// Engine('CPU')
 #[pyclass(frozen, module = "tumble")]
 pub(crate) struct Engine {
-    own: tumble::Engine,
+    engine: tumble::Engine,
     /// For large calls, where the choice is by cost.
     by_cost: Option<OnceLock<(u32, tumble::Engine)>>,
-    /// What it was made with, for copies in other processes.
-    made: Made,
+    /// For copies in other processes.
+    arguments: EngineArguments,
 }
 
-/// What an engine was made with.
+/// The arguments of an engine.
 #[derive(Debug, Clone)]
-struct Made {
+struct EngineArguments {
     device: String,
     memory: Option<u64>,
     threads: Option<usize>,
@@ -113,19 +113,23 @@ impl Engine {
         let is_auto = name.eq_ignore_ascii_case("auto");
         py.detach(|| {
             guarded(|| {
-                let own = match is_auto {
+                let engine = match is_auto {
                     true => tumble::Engine::with_options(Device::Cpu, &options)
                         .map_err(|error| of_engine(&error))?,
                     false => host::open(&name, &options).map_err(|failure| of_host(&failure))?,
                 };
                 let by_cost = is_auto.then(OnceLock::new);
-                let made = Made {
+                let arguments = EngineArguments {
                     device: name.clone(),
                     memory,
                     threads,
                     allow_inexact,
                 };
-                Ok(Self { own, by_cost, made })
+                Ok(Self {
+                    engine,
+                    by_cost,
+                    arguments,
+                })
             })
         })
     }
@@ -133,21 +137,21 @@ impl Engine {
     /// The name of its device; that of small calls, where the choice is by cost.
     #[getter]
     fn device(&self) -> &str {
-        self.own.device_name()
+        self.engine.device_name()
     }
 
     /// Copies are engines of their own with the same options, opened where they are used: in another
     /// process that is its device of that name.
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
         let py = slf.py();
-        let made = &slf.get().made;
+        let arguments = &slf.get().arguments;
         let options = PyDict::new(py);
-        options.set_item("memory", made.memory)?;
-        options.set_item("threads", made.threads)?;
-        options.set_item("allow_inexact", made.allow_inexact)?;
+        options.set_item("memory", arguments.memory)?;
+        options.set_item("threads", arguments.threads)?;
+        options.set_item("allow_inexact", arguments.allow_inexact)?;
         let class = py.get_type::<Self>();
         let again = py.import("functools")?.getattr("partial")?;
-        let again = again.call((class, &made.device), Some(&options))?;
+        let again = again.call((class, &arguments.device), Some(&options))?;
         PyTuple::new(py, [again, PyTuple::empty(py).into_any()])
     }
 
@@ -162,7 +166,7 @@ impl Engine {
 
     fn __repr__(&self) -> String {
         match &self.by_cost {
-            None => format!("Engine('{}')", self.own.device_name()),
+            None => format!("Engine('{}')", self.engine.device_name()),
             Some(large) => match large.get() {
                 Some((_, large)) => format!(
                     "Engine('auto': CPU; {} for large calls)",
@@ -193,8 +197,8 @@ impl Engine {
     /// `device_array`: the result stays on the NVIDIA card that makes it, as a `DeviceArray` that torch, CuPy and JAX
     /// take without a copy. Where that cannot be, it is a `DeviceError`.
     ///
-    /// Other options: `method` ("authored": as a file says of each channel, bessel-overhauser where
-    /// it says nothing; see `tumble.methods()`), `path` ("shortest", "as-authored"), `ends`
+    /// Other options: `method` ("authored": the method that the file gives each channel, bessel-overhauser
+    /// where it gives none; see `tumble.methods()`), `path` ("shortest", "as-authored"), `ends`
     /// ("parabolic", "natural", "clamped", "secant", "loop", "frozen", or angular velocities (2, 3),
     /// rad/s), `speed` ("as-keyed", "constant"), `before` and `after` ("hold", "loop", "mirror",
     /// "extrapolate"), `tension`, `continuity`, `bias`.
@@ -217,13 +221,13 @@ impl Engine {
         device_array: bool,
         options: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let result = Result {
+        let result = OutputRequest {
             encoding: dtype.map_or(Ok(Encoding::F32), quaternions_of)?,
             order: Order::named(order)?,
             layout: layout_named(layout)?,
             as_rotation,
             on_card: device_array,
-            ..Result::default()
+            ..OutputRequest::default()
         };
         self.result(clip, &result, out, options)
     }
@@ -248,13 +252,13 @@ impl Engine {
         options: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let (axes, in_world) = axes_named(axes)?;
-        let result = Result {
+        let result = OutputRequest {
             quantity: Quantity::Velocity(axes),
             in_world,
             encoding: Encoding::Vector,
             layout: layout_named(layout)?,
             on_card: device_array,
-            ..Result::default()
+            ..OutputRequest::default()
         };
         self.result(clip, &result, out, options)
     }
@@ -276,13 +280,13 @@ impl Engine {
         options: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let (axes, in_world) = axes_named(axes)?;
-        let result = Result {
+        let result = OutputRequest {
             quantity: Quantity::Acceleration(axes),
             in_world,
             encoding: Encoding::Vector,
             layout: layout_named(layout)?,
             on_card: device_array,
-            ..Result::default()
+            ..OutputRequest::default()
         };
         self.result(clip, &result, out, options)
     }
@@ -306,7 +310,7 @@ impl Engine {
         device_array: bool,
         options: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let result = Result {
+        let result = OutputRequest {
             encoding: match columns {
                 3 => Encoding::Matrix3x3(MatrixOrder::RowMajor),
                 4 => Encoding::Matrix3x4(MatrixOrder::RowMajor),
@@ -314,7 +318,7 @@ impl Engine {
             },
             layout: layout_named(layout)?,
             on_card: device_array,
-            ..Result::default()
+            ..OutputRequest::default()
         };
         self.result(clip, &result, out, options)
     }
@@ -335,11 +339,11 @@ impl Engine {
         layout: &str,
         options: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let result = Result {
+        let result = OutputRequest {
             encoding: Encoding::AxisAngle,
             radians: !degrees,
             layout: layout_named(layout)?,
-            ..Result::default()
+            ..OutputRequest::default()
         };
         self.result(clip, &result, out, options)
     }
@@ -365,11 +369,11 @@ impl Engine {
         let sequence: EulerSequence = sequence
             .parse()
             .map_err(|error| input(format!("sequence: {error}")))?;
-        let result = Result {
+        let result = OutputRequest {
             encoding: Encoding::Euler(sequence),
             radians: !degrees,
             layout: layout_named(layout)?,
-            ..Result::default()
+            ..OutputRequest::default()
         };
         self.result(clip, &result, out, options)
     }
@@ -548,8 +552,8 @@ impl Engine {
     /// `local_to_model(rotations, parents, offsets=None, *, translations=None, scales=None, inverse_bind=None,
     /// layout="track", order="xyzw")`
     ///
-    /// `rotations`: (tracks, frames, 4), or of one pose (tracks, 4). `parents`: for each track the one that it
-    /// hangs on, None or -1 for a root. `offsets`: (tracks, 3). `translations` take their place: like the
+    /// `rotations`: (tracks, frames, 4), or of one pose (tracks, 4). `parents`: the index of each track's
+    /// parent, None or -1 for a root. `offsets`: (tracks, 3). `translations` replace them: like the
     /// rotations with 3 components, or a list with (frames, 3) or None for each track. `scales`: likewise.
     /// `inverse_bind`: (tracks, 3, 4) or (tracks, 4, 4).
     ///
@@ -576,7 +580,7 @@ impl Engine {
         layout: &str,
         order: &str,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let walk = samples::Walk {
+        let poses = samples::ModelPoses {
             rotations,
             parents,
             offsets,
@@ -584,7 +588,7 @@ impl Engine {
             scales,
             inverse_bind,
         };
-        walk.local_to_model(self, (layout_named(layout)?, Order::named(order)?))
+        poses.local_to_model(self, (layout_named(layout)?, Order::named(order)?))
     }
 
     /// Bodies on paths: the position of each at every sample, and the rotation from its axes to the world's.
@@ -594,11 +598,11 @@ impl Engine {
     /// up=(0, 1, 0), twist="spread", speed="keys", forward="z", upward="y", layout="track", order="xyzw")`
     ///
     /// `points`: (points, 3), (tracks, points, 3), or a list with an array for each track; `times`: seconds
-    /// of the points, or None with `duration`, seconds, or `rate`, the way covered in a second. `ups`: upward
+    /// of the points, or None with `duration`, seconds, or `rate`, the distance covered in a second. `ups`: upward
     /// directions at the points, like them. `method`: the curve through the points. `ahead`: the body faces
     /// the point this far ahead instead of along the path; `look_at`: a point or a track's index that it
-    /// faces. `frame`: how it is turned about its direction, "minimal", "fixed" or "frenet", with `up` at the
-    /// start or everywhere. `twist`: whether the turn that a closed path (`ends="loop"`) leaves over is spread
+    /// faces. `frame`: how it is rotated about its direction, "minimal", "fixed" or "frenet", with `up` at the
+    /// start or everywhere. `twist`: whether the rotation that remains after a closed path (`ends="loop"`) is spread
     /// ("spread") or stays ("free"). `speed`: "keys", "constant", or the parts of the time over which it grows
     /// and falls. `forward` and `upward`: axes of the body, such as "-x".
     ///
@@ -639,7 +643,7 @@ impl Engine {
         layout: &str,
         order: &str,
     ) -> PyResult<Bound<'py, PyTuple>> {
-        let options = follow::Options {
+        let options = follow::FollowOptions {
             duration,
             rate,
             ups,
@@ -682,7 +686,7 @@ impl Engine {
         let request = Request::new(options)?;
         let form = (Order::named(order)?, layout_named(layout)?);
         let motion = &clip.get().motion;
-        let engine = self.engine(chunk)?;
+        let engine = self.engine_for(chunk)?;
         clip.py()
             .detach(|| stoppable(|| Chunks::new(engine, motion, &request, chunk, form)))
     }
@@ -704,10 +708,10 @@ impl Engine {
         order: &str,
         options: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let given = options.map_or_else(|| Ok(PyDict::new(slf.py())), PyDictMethods::copy)?;
-        given.set_item("order", order)?;
+        let keywords = options.map_or_else(|| Ok(PyDict::new(slf.py())), PyDictMethods::copy)?;
+        keywords.set_item("order", order)?;
         let arrow = slf.py().import("tumble._arrow")?;
-        arrow.call_method("batch", (slf, rows), Some(&given))
+        arrow.call_method("batch", (slf, rows), Some(&keywords))
     }
 
     /// Compiles what a Vulkan device runs for results of these, which else is done when the first of them is
@@ -718,7 +722,7 @@ impl Engine {
     #[pyo3(signature = (*, method="bessel-overhauser"))]
     fn warm(&self, py: Python<'_>, method: &str) -> PyResult<()> {
         let method = crate::options::method_named(method)?.unwrap_or(BESSEL_OVERHAUSER);
-        let engine = self.engine(FEW)?;
+        let engine = self.engine_for(MIN_DEVICE_ROTATIONS)?;
         interruptible(py, move || {
             let kinds = [
                 (Quantity::Rotation, Encoding::F32),
@@ -751,9 +755,9 @@ impl Engine {
         options: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Verification> {
         let request = Request::new(options)?;
-        let (motion, wanted) = (&clip.get().motion, request.samples()?);
-        let (_, count) = wanted.resolved(&motion.set)?;
-        let engine = self.engine(motion.set.track_count() * count)?;
+        let (motion, samples) = (&clip.get().motion, request.samples()?);
+        let (_, count) = samples.resolved(&motion.set)?;
+        let engine = self.engine_for(motion.set.track_count() * count)?;
         let motion = Arc::clone(motion);
         interruptible(clip.py(), move || {
             Verification::of(&engine, &motion, &request)
@@ -763,15 +767,19 @@ impl Engine {
 
 impl Engine {
     /// The engine for a call of so many rotations.
-    pub(crate) fn engine(&self, rotations: usize) -> PyResult<tumble::Engine> {
-        let Some(large) = self.by_cost.as_ref().filter(|_| rotations >= FEW) else {
-            return Ok(self.own.clone());
+    pub(crate) fn engine_for(&self, rotations: usize) -> PyResult<tumble::Engine> {
+        let Some(large) = self
+            .by_cost
+            .as_ref()
+            .filter(|_| rotations >= MIN_DEVICE_ROTATIONS)
+        else {
+            return Ok(self.engine.clone());
         };
         if let Some((process, large)) = large.get() {
             // A device is not there in a process that was forked from that which opened it.
             return Ok(match *process == std::process::id() {
                 true => large.clone(),
-                false => self.own.clone(),
+                false => self.engine.clone(),
             });
         }
         Python::attach(|py| {
@@ -779,7 +787,7 @@ impl Engine {
                 guarded(|| {
                     let chosen = host::auto(rotations).map_err(|failure| of_host(&failure))?;
                     // Two threads may have chosen at once: both have the same bits.
-                    let chosen = chosen.unwrap_or_else(|| self.own.clone());
+                    let chosen = chosen.unwrap_or_else(|| self.engine.clone());
                     let chosen = large.get_or_init(|| (std::process::id(), chosen));
                     Ok(chosen.1.clone())
                 })
@@ -790,13 +798,13 @@ impl Engine {
     fn result<'py>(
         &self,
         clip: &Bound<'py, Clip>,
-        result: &Result,
+        result: &OutputRequest,
         out: Option<&Bound<'py, PyAny>>,
         options: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         guarded(|| {
             let request = Request::new(options)?;
-            let engine = |rotations| self.engine(rotations);
+            let engine = |rotations| self.engine_for(rotations);
             let inputs = request_arrays(options)?;
             let inputs: Vec<_> = inputs.iter().collect();
             result.of(

@@ -37,16 +37,16 @@ impl Class {
         CLASSES[self as usize].import(py, "tumble._errors", name)
     }
 
-    /// An exception with this message; `place` is a diagnostic's.
-    pub(crate) fn error(self, message: &str, place: &Found) -> PyErr {
+    /// An exception with this message; `found` are the details of a diagnostic.
+    pub(crate) fn error(self, message: &str, found: &FaultDetails) -> PyErr {
         Python::attach(|py| {
             let made = self.of(py).and_then(|class| {
                 let fields = PyDict::new(py);
-                fields.set_item("code", place.code)?;
-                fields.set_item("file", &place.file)?;
-                fields.set_item("line", place.line)?;
-                fields.set_item("column", place.column)?;
-                fields.set_item("pointer", &place.pointer)?;
+                fields.set_item("code", found.code)?;
+                fields.set_item("file", &found.file)?;
+                fields.set_item("line", found.line)?;
+                fields.set_item("column", found.column)?;
+                fields.set_item("pointer", &found.pointer)?;
                 class.call((message,), Some(&fields))
             });
             made.map_or_else(|error| error, PyErr::from_value)
@@ -56,7 +56,7 @@ impl Class {
 
 /// Which fault was found, and where: what exceptions carry beside their message.
 #[derive(Debug, Default)]
-pub(crate) struct Found {
+pub(crate) struct FaultDetails {
     code: Option<&'static str>,
     file: Option<String>,
     line: Option<u64>,
@@ -64,7 +64,7 @@ pub(crate) struct Found {
     pointer: Option<String>,
 }
 
-impl From<&Diagnostic> for Found {
+impl From<&Diagnostic> for FaultDetails {
     fn from(diagnostic: &Diagnostic) -> Self {
         let mut found = Self {
             code: Some(diagnostic.code.name()),
@@ -75,7 +75,7 @@ impl From<&Diagnostic> for Found {
             Some(Location::Text { line, column }) => {
                 (found.line, found.column) = (Some(*line), Some(*column));
             }
-            Some(Location::Inside(place)) => found.pointer = Some(place.clone()),
+            Some(Location::Inside(pointer)) => found.pointer = Some(pointer.clone()),
             None => {}
         }
         found
@@ -84,21 +84,21 @@ impl From<&Diagnostic> for Found {
 
 /// A refused argument.
 pub(crate) fn input(message: impl AsRef<str>) -> PyErr {
-    Class::Input.error(message.as_ref(), &Found::default())
+    Class::Input.error(message.as_ref(), &FaultDetails::default())
 }
 
-/// A refused argument, with the code of the program's for the same fault in a file, and the place
+/// A refused argument, with the program's code for the same fault in a file, and the position
 /// in the arrays.
 pub(crate) fn input_at(message: &str, code: Code, pointer: String) -> PyErr {
-    let found = Found {
+    let found = FaultDetails {
         code: Some(code.name()),
         pointer: Some(pointer),
-        ..Found::default()
+        ..FaultDetails::default()
     };
     Class::Input.error(message, &found)
 }
 
-/// A message of the program's with the keywords of Python in the place of options: `--map time=NAME` is
+/// A message of the program's with Python's keywords instead of options: `--map time=NAME` is
 /// `map="time=NAME"`.
 pub(crate) fn in_python(message: &str) -> String {
     const WORDS: [(&str, &str); 12] = [
@@ -124,7 +124,7 @@ pub(crate) fn in_python(message: &str) -> String {
             r#"use method="bessel-overhauser""#,
         ),
         ("`tumble eval --fps`", "`fps`"),
-        ("--animation", "its name or place"),
+        ("--animation", "its name or index"),
         ("; --tracks chooses some", ""),
         ("`--by exact`", r#"`by="exact"`"#),
         ("`--by edges`", r#"`by="edges"`"#),
@@ -188,7 +188,7 @@ pub(crate) fn warn(py: Python<'_>, diagnostic: &Diagnostic) -> PyResult<()> {
 
 /// What is remarkable about arguments.
 pub(crate) fn warn_of(py: Python<'_>, message: &str) -> PyResult<()> {
-    let warning = Class::Warning.error(message, &Found::default());
+    let warning = Class::Warning.error(message, &FaultDetails::default());
     py.import("warnings")?
         .call_method1("warn", (warning.value(py),))?;
     Ok(())
@@ -217,14 +217,14 @@ pub(crate) fn of_track(error: &TrackError) -> PyErr {
         TrackError::DataTooLarge {
             track,
             key,
-            quantity: what,
+            quantity,
             ..
-        } => input_at(&message, Code::TooLarge, at(what, track, key)),
+        } => input_at(&message, Code::TooLarge, at(quantity, track, key)),
         TrackError::DataNotFinite {
             track,
             key,
-            quantity: what,
-        } => input_at(&message, Code::NotFinite, at(what, track, key)),
+            quantity,
+        } => input_at(&message, Code::NotFinite, at(quantity, track, key)),
         _ => input(message),
     }
 }
@@ -243,9 +243,9 @@ pub(crate) fn of_engine(error: &Error) -> PyErr {
             | InterpolationError::OpenLoop { track, .. },
         ) => Class::Input.error(
             &message,
-            &Found {
+            &FaultDetails {
                 pointer: Some(format!("keys[{track}]")),
-                ..Found::default()
+                ..FaultDetails::default()
             },
         ),
         _ => input(message),
@@ -254,12 +254,12 @@ pub(crate) fn of_engine(error: &Error) -> PyErr {
 
 /// A device that cannot be used.
 pub(crate) fn device(message: &str) -> PyErr {
-    Class::Device.error(message, &Found::default())
+    Class::Device.error(message, &FaultDetails::default())
 }
 
 /// An output that cannot be written.
 pub(crate) fn output(message: &str) -> PyErr {
-    Class::Output.error(message, &Found::default())
+    Class::Output.error(message, &FaultDetails::default())
 }
 
 pub(crate) fn of_output(error: &OutputError) -> PyErr {
@@ -280,11 +280,11 @@ pub(crate) fn guarded<T>(work: impl FnOnce() -> PyResult<T>) -> PyResult<T> {
 
 fn of_panic(panic: &(dyn Any + Send)) -> PyErr {
     let text = panic.downcast_ref::<String>().map(String::as_str);
-    let what = text.or_else(|| panic.downcast_ref::<&str>().copied());
+    let message = text.or_else(|| panic.downcast_ref::<&str>().copied());
     PyRuntimeError::new_err(format!(
         "internal error: {}; this is a bug in tumble {}: please report it with the call and, if \
          they can be shared, its arguments",
-        what.unwrap_or("no reason given"),
+        message.unwrap_or("no reason given"),
         env!("CARGO_PKG_VERSION"),
     ))
 }

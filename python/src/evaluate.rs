@@ -18,15 +18,15 @@ use tumble_formats::sample::ChannelMethods;
 
 use crate::arrays::Order;
 use crate::device_array::DeviceArray;
-use crate::engine::FEW;
+use crate::engine::MIN_DEVICE_ROTATIONS;
 use crate::errors::{device, guarded, input, of_engine, warn};
-use crate::options::{Request, Samples};
+use crate::options::{Request, SampleRequest};
 use crate::output::{array_of, filled_bytes};
 use crate::run::{Job, check_signals, interruptible};
 
 /// What is made of a clip, and how it lies in memory.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Result {
+pub(crate) struct OutputRequest {
     pub(crate) quantity: Quantity,
     pub(crate) encoding: Encoding,
     pub(crate) layout: Layout,
@@ -42,7 +42,7 @@ pub(crate) struct Result {
     pub(crate) is_one_track: bool,
 }
 
-impl Default for Result {
+impl Default for OutputRequest {
     /// Rotations, x y z w, `[track][frame]`.
     fn default() -> Self {
         Self {
@@ -60,10 +60,10 @@ impl Default for Result {
 }
 
 /// Tracks that one method interpolates; `None` for all of them.
-type Group = (Method, Option<Vec<usize>>);
+type TrackGroup = (Method, Option<Vec<usize>>);
 
 /// The tracks of a clip by their methods.
-fn groups(clip: &Motion, method: Option<Method>) -> Vec<Group> {
+fn groups(clip: &Motion, method: Option<Method>) -> Vec<TrackGroup> {
     let methods = ChannelMethods {
         method,
         with: &Interpolation::from,
@@ -84,13 +84,13 @@ struct Work<'a> {
     engine: &'a Engine,
     clip: &'a Motion,
     request: &'a Request,
-    samples: &'a Samples,
+    samples: &'a SampleRequest,
     frames: &'a SampleTimes,
     /// Samples of a track.
     count: usize,
 }
 
-impl Result {
+impl OutputRequest {
     /// Evaluates a clip into an array of NumPy's.
     pub(crate) fn of<'py>(
         &self,
@@ -114,13 +114,18 @@ impl Result {
         if self.on_card {
             self.check_on_card(samples, out.is_some(), along_skeleton)?;
         }
-        if along_skeleton && matches!(samples, Samples::Each { .. } | Samples::Ragged(_)) {
+        if along_skeleton
+            && matches!(
+                samples,
+                SampleRequest::Each { .. } | SampleRequest::Ragged(_)
+            )
+        {
             return Err(input(
                 "axes=\"world\": what a joint does in the world follows from its parents at the same times; \
                  give one list of times for all tracks, or take the parent's axes",
             ));
         }
-        if let Samples::Ragged(lists) = samples {
+        if let SampleRequest::Ragged(lists) = samples {
             if out.is_some() || self.layout == Layout::FrameMajor || lists.len() != tracks {
                 return Err(input(format!(
                     "at: lists of different lengths for {} tracks of {tracks}; their results are \
@@ -131,7 +136,7 @@ impl Result {
             return self.ragged(py, engine, clip, request, lists);
         }
         let (frames, count) = samples.resolved(&clip.set)?;
-        let is_one_time = matches!(samples, Samples::Shared { is_one: true, .. });
+        let is_one_time = matches!(samples, SampleRequest::Shared { is_one: true, .. });
         let mut shape = Vec::with_capacity(4);
         let axes = match self.layout {
             Layout::TrackMajor => [(tracks, self.is_one_track), (count, is_one_time)],
@@ -140,7 +145,7 @@ impl Result {
         shape.extend(axes.into_iter().filter(|axis| !axis.1).map(|axis| axis.0));
         shape.extend_from_slice(self.encoding.shape());
         if self.on_card {
-            let engine = engine((tracks * count).max(FEW))?;
+            let engine = engine((tracks * count).max(MIN_DEVICE_ROTATIONS))?;
             let work = Work {
                 engine: &engine,
                 clip,
@@ -186,12 +191,12 @@ impl Result {
     /// Refuses what is done on the host after the engine, or needs the host's memory.
     fn check_on_card(
         &self,
-        samples: &Samples,
+        samples: &SampleRequest,
         has_out: bool,
         along_skeleton: bool,
     ) -> PyResult<()> {
         let refused = match samples {
-            Samples::Ragged(_) => {
+            SampleRequest::Ragged(_) => {
                 "lists of times of different lengths give a list of arrays of NumPy's"
             }
             _ if has_out => "`out` is memory of the host's; leave it out",
@@ -290,9 +295,9 @@ impl Result {
                 ..job
             };
             job.write(found)?;
-            for (place, &track) in group.iter().enumerate() {
+            for (row, &track) in group.iter().enumerate() {
                 for sample in 0..count {
-                    let from = self.layout.index(place, sample, group.len(), count);
+                    let from = self.layout.index(row, sample, group.len(), count);
                     let to = self.layout.index(track, sample, tracks, count);
                     let (Some(from), Some(to)) = (from, to) else {
                         continue;
@@ -330,11 +335,11 @@ impl Result {
         let mut world = vec![(DQuat::IDENTITY, DVec3::ZERO); tracks];
         for sample in 0..count {
             for &track in &order {
-                let place = self.layout.index(track, sample, tracks, count).unwrap_or(0);
+                let index = self.layout.index(track, sample, tracks, count).unwrap_or(0);
                 let three = |of: &[f32]| {
-                    DVec3::from_slice(&[0, 1, 2].map(|at| f64::from(of[3 * place + at])))
+                    DVec3::from_slice(&[0, 1, 2].map(|at| f64::from(of[3 * index + at])))
                 };
-                let local = [0, 1, 2, 3].map(|at| f64::from(rotations[4 * place + at]));
+                let local = [0, 1, 2, 3].map(|at| f64::from(rotations[4 * index + at]));
                 let rate = three(numbers);
                 let Some(parent) = clip.skeleton[track].parent else {
                     let velocity = if velocities.is_empty() {
@@ -347,15 +352,15 @@ impl Result {
                 };
                 let (above, carried) = world[parent];
                 let above_rate = |of: &[f32]| {
-                    let place = self
+                    let index = self
                         .layout
                         .index(parent, sample, tracks, count)
                         .unwrap_or(0);
-                    DVec3::from_slice(&[0, 1, 2].map(|at| f64::from(of[3 * place + at])))
+                    DVec3::from_slice(&[0, 1, 2].map(|at| f64::from(of[3 * index + at])))
                 };
-                let turned = above * rate;
-                let mut found = above_rate(numbers) + turned;
-                let mut velocity = carried + turned;
+                let rate_in_world = above * rate;
+                let mut found = above_rate(numbers) + rate_in_world;
+                let mut velocity = carried + rate_in_world;
                 if !velocities.is_empty() {
                     let relative = above * three(&velocities);
                     found += carried.cross(relative);
@@ -364,7 +369,7 @@ impl Result {
                 let rotation = (above * DQuat::from_array(local)).normalize();
                 world[track] = (rotation, velocity);
                 let found = found.as_vec3().to_array();
-                numbers[3 * place..3 * place + 3].copy_from_slice(&found);
+                numbers[3 * index..3 * index + 3].copy_from_slice(&found);
             }
         }
         Ok(())
@@ -423,7 +428,7 @@ impl Result {
                     let (of_track, rest) = bytes.split_at_mut(list.len() * size);
                     bytes = rest;
                     let one = track_of(clip, track)?;
-                    let samples = Samples::Shared {
+                    let samples = SampleRequest::Shared {
                         times: list.as_slice().into(),
                         is_one: false,
                     };
@@ -498,24 +503,24 @@ fn parents_first(clip: &Motion) -> PyResult<Vec<usize>> {
             }
         }
         if order.len() == before {
-            return Err(input("parents: tracks hang on each other in a circle"));
+            return Err(input("parents: the parents of some tracks form a cycle"));
         }
     }
     Ok(order)
 }
 
-/// Clips and how they were interpolated when it was last looked whether their curves are as smooth as the
-/// method promises: that takes as long as preparing them, and is done once.
-static LOOKED_AT: Mutex<VecDeque<(Weak<Motion>, Interpolation)>> = Mutex::new(VecDeque::new());
+/// Clips whose curves were checked for being as smooth as their method promises, and how they were
+/// interpolated: the check takes as long as preparing them, and is done once.
+static CHECKED_CURVES: Mutex<VecDeque<(Weak<Motion>, Interpolation)>> = Mutex::new(VecDeque::new());
 
-/// How many are kept.
-const LOOKED: usize = 256;
+/// How many checked clips are remembered.
+const MAX_CHECKED_CURVES: usize = 256;
 
 /// Samples for which a track is prepared as a whole: fewer keys than so many times these.
 const KEYS_OF_A_SAMPLE: usize = 2048;
 
-/// Where the curves of a clip are less smooth than their method promises, of which nobody was warned yet.
-/// Of a few samples of many keys it is not looked for.
+/// Where the curves of a clip are less smooth than their method promises, where no warning was given
+/// yet. Requests for few samples of many keys are not checked.
 fn curve_warnings(
     py: Python<'_>,
     clip: &Arc<Motion>,
@@ -526,15 +531,17 @@ fn curve_warnings(
     let rotations = samples.saturating_mul(clip.set.track_count());
     let has_warnings = |method: &Method| method.name == C2.name;
     let method = request.method.filter(has_warnings);
-    let is_few = rotations.saturating_mul(KEYS_OF_A_SAMPLE) < clip.set.key_count();
-    let (Some(method), false) = (method, is_few) else {
+    let is_sparse = rotations.saturating_mul(KEYS_OF_A_SAMPLE) < clip.set.key_count();
+    let (Some(method), false) = (method, is_sparse) else {
         return Ok(Vec::new());
     };
     let interpolation = Interpolation {
         quantity: Quantity::Rotation,
         ..request.with(quantity)(method)
     };
-    let mut known = LOOKED_AT.lock().unwrap_or_else(PoisonError::into_inner);
+    let mut known = CHECKED_CURVES
+        .lock()
+        .unwrap_or_else(PoisonError::into_inner);
     let this = Arc::downgrade(clip);
     if known
         .iter()
@@ -542,20 +549,20 @@ fn curve_warnings(
     {
         return Ok(Vec::new());
     }
-    known.truncate(LOOKED - 1);
+    known.truncate(MAX_CHECKED_CURVES - 1);
     known.push_front((this, interpolation));
     drop(known);
     let name = clip.name.clone().unwrap_or_else(|| "clip".to_owned());
     let clip = Arc::clone(clip);
-    let look = move || Ok(host::curve_warning(&name, &clip.set, &interpolation));
+    let find_warning = move || Ok(host::curve_warning(&name, &clip.set, &interpolation));
     let found = match clip_is_short(rotations) {
-        true => py.detach(|| guarded(look))?,
-        false => interruptible(py, look)?,
+        true => py.detach(|| guarded(find_warning))?,
+        false => interruptible(py, find_warning)?,
     };
     Ok(found.into_iter().collect())
 }
 
-/// Whether looking at a clip for so many rotations takes no longer than starting a thread.
+/// Whether checking a clip for so many rotations takes no longer than starting a thread.
 fn clip_is_short(rotations: usize) -> bool {
     rotations < 4096
 }
@@ -582,11 +589,11 @@ pub(crate) fn uniform(clip: &Motion, request: &Request) -> Option<Method> {
     }
 }
 
-/// The tracks of one method as a set, and their places in the clip; `None` where these are all.
-pub(crate) type OwnSet = (Method, TrackSet, Option<Vec<usize>>);
+/// The tracks of one method as a set, and their indices in the clip; `None` where these are all.
+pub(crate) type MethodTracks = (Method, TrackSet, Option<Vec<usize>>);
 
 /// The sets of a clip by their methods.
-pub(crate) fn sets(clip: &Motion, request: &Request) -> PyResult<Vec<OwnSet>> {
+pub(crate) fn sets(clip: &Motion, request: &Request) -> PyResult<Vec<MethodTracks>> {
     groups(clip, request.method)
         .into_iter()
         .map(|(method, group)| match group {

@@ -7,7 +7,6 @@ use pyo3::exceptions::{PyIndexError, PyKeyError, PyTypeError};
 use pyo3::prelude::*;
 use pyo3::types::{PyString, PyTuple};
 use tumble_formats::adjust::{UpAxis, adjust_all, set_offsets};
-use tumble_formats::format::TimeUnit;
 use tumble_formats::keys::Duplicates;
 use tumble_formats::kitti::open_frame_times;
 use tumble_formats::npz::body_offsets;
@@ -16,10 +15,10 @@ use tumble_formats::{Format, Limits, Loaded, ReadOptions};
 use crate::arrays::doubles;
 use crate::clip::{Clip, Source, counted};
 use crate::errors::{input, of_diagnostic, of_track, warn};
-use crate::options::{frame_rate, one_of};
+use crate::options::{frame_rate, one_of, option_of};
 use crate::run::interruptible;
 
-/// The clips of a file, by their places or names.
+/// The clips of a file, by their indices or names.
 ///
 /// >>> import tumble, tempfile, os
 /// >>> path = os.path.join(tempfile.mkdtemp(), "door.tum")
@@ -42,7 +41,7 @@ impl File {
         self.clips.clone()
     }
 
-    /// The clips' names; their places where they have none.
+    /// The clips' names; their indices where they have none.
     #[getter]
     fn names(&self) -> Vec<String> {
         let name = |clip: &Clip| {
@@ -61,7 +60,7 @@ impl File {
         match &*self.clips {
             [clip] => Ok(clip.clone()),
             _ => Err(input(format!(
-                "{}: has {}: {}; choose one by its name or place",
+                "{}: has {}: {}; choose one by its name or index",
                 self.path.display(),
                 counted(self.clips.len(), "clip"),
                 self.names().join(", ")
@@ -108,32 +107,32 @@ impl File {
     }
 
     fn __contains__(&self, name: &str) -> bool {
-        self.names().iter().any(|own| own == name)
+        self.names().iter().any(|known| known == name)
     }
 
     fn __getitem__(&self, key: &Bound<'_, PyAny>) -> PyResult<Clip> {
         if let Ok(name) = key.cast::<PyString>() {
             let name = name.to_cow()?;
-            let place = self.names().iter().position(|own| *own == *name);
-            return place.map(|place| self.clips[place].clone()).ok_or_else(|| {
+            let index = self.names().iter().position(|known| *known == *name);
+            return index.map(|index| self.clips[index].clone()).ok_or_else(|| {
                 let names = self.names().join(", ");
                 PyKeyError::new_err(format!("there is no clip `{name}`; there are {names}"))
             });
         }
-        let place: isize = key
+        let index: isize = key
             .extract()
-            .map_err(|_| PyTypeError::new_err("a clip is its place, from 0, or its name"))?;
-        let from_end = if place < 0 {
+            .map_err(|_| PyTypeError::new_err("give a clip as its index, from 0, or its name"))?;
+        let from_end = if index < 0 {
             self.clips.len() as isize
         } else {
             0
         };
-        let clip = usize::try_from(place + from_end)
+        let clip = usize::try_from(index + from_end)
             .ok()
-            .and_then(|place| self.clips.get(place));
+            .and_then(|index| self.clips.get(index));
         clip.cloned().ok_or_else(|| {
             PyIndexError::new_err(format!(
-                "there is no clip {place}; there are {}",
+                "there is no clip {index}; there are {}",
                 self.clips.len()
             ))
         })
@@ -155,7 +154,7 @@ impl File {
 
 /// Reads a motion file of any format: glTF and GLB, BVH, FBX, NPZ and NPY, Parquet, Arrow, CSV, TUM, `EuRoC`,
 /// KITTI, `.dat`. What is remarkable about it becomes an `InputWarning`; what is wrong, an `InputError`
-/// with the place.
+/// with the position.
 ///
 /// `load(path, *, format=None, source_fps=None, source_times=None, map=None, time_unit=None, duplicates=None,
 /// raw_times=False, bridge_gaps=False, keyframes=False, offsets=None, body_model=None, scale=None, up=None)`
@@ -243,38 +242,28 @@ pub(crate) fn load(
         frame_times: frame_times.map(Arc::new),
         map,
         time_unit: time_unit
-            .map(|unit| {
-                let units = [
-                    ("s", TimeUnit::Seconds),
-                    ("ms", TimeUnit::Milliseconds),
-                    ("us", TimeUnit::Microseconds),
-                    ("ns", TimeUnit::Nanoseconds),
-                ];
-                one_of(unit, "time_unit", &units)
-            })
+            .map(|unit| option_of(unit, "time_unit"))
             .transpose()?,
         bridge_gaps,
         keyframes,
         has_body_model: body_model.is_some(),
     };
     let format = format.map(format_named).transpose()?;
-    let up = up
-        .map(|axis| one_of(axis, "up", &[("y", UpAxis::Y), ("z", UpAxis::Z)]))
-        .transpose()?;
+    let up: Option<UpAxis> = up.map(|axis| option_of(axis, "up")).transpose()?;
     let scale = scale.map(Scale::of).transpose()?;
     if offsets.is_some() && body_model.is_some() {
         return Err(input(
             "offsets and body_model both place the joints; give one",
         ));
     }
-    let offsets = offsets.map(|given| doubles(given, "offsets")).transpose()?;
-    if let Some(given) = offsets
+    let offsets = offsets.map(|value| doubles(value, "offsets")).transpose()?;
+    if let Some(offsets) = offsets
         .as_ref()
-        .filter(|given| given.shape.get(1) != Some(&3))
+        .filter(|offsets| offsets.shape.get(1) != Some(&3))
     {
         return Err(input(format!(
             "offsets: the shape is {:?}; give (joints, 3)",
-            given.shape
+            offsets.shape
         )));
     }
     let file = path.clone();

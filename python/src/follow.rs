@@ -9,15 +9,15 @@ use tumble::paths::{BodyAxis, Direction, Follow, FollowError, PathSpeed};
 use tumble::{Layout, VectorMethod};
 use tumble_formats::path::{Pace, PathPoints, paths_of};
 
-use crate::arrays::{Numbers, Order, doubles, parts};
+use crate::arrays::{ArrayValues, Order, doubles, parts};
 use crate::engine::Engine;
 use crate::errors::{in_python, input, of_engine, warn_of};
-use crate::options::{Samples as Times, ends, one_of, option_of};
+use crate::options::{SampleRequest, ends, one_of, option_of};
 use crate::run::interruptible;
 use crate::samples::of_values;
 
 /// What is asked of bodies on paths, as it comes in.
-pub(crate) struct Options<'a, 'py> {
+pub(crate) struct FollowOptions<'a, 'py> {
     pub(crate) duration: Option<f64>,
     pub(crate) rate: Option<f64>,
     pub(crate) ups: Option<&'a Bound<'py, PyAny>>,
@@ -33,7 +33,7 @@ pub(crate) struct Options<'a, 'py> {
     pub(crate) upward: &'a str,
 }
 
-impl Options<'_, '_> {
+impl FollowOptions<'_, '_> {
     fn follow(&self, origin: DVec3) -> PyResult<Follow> {
         let method: VectorMethod = self
             .method
@@ -129,13 +129,13 @@ fn points(value: &Bound<'_, PyAny>, name: &str) -> PyResult<(Vec<Vec<DVec3>>, bo
         && doubles(&parts[0], name)?.shape.len() == 2
     {
         let one = |part: &Bound<'_, PyAny>| match doubles(part, name)? {
-            Numbers { shape, values } if matches!(*shape, [_, 3]) => Ok(vectors(&values)),
-            Numbers { shape, .. } => Err(wrong(&shape)),
+            ArrayValues { shape, values } if matches!(*shape, [_, 3]) => Ok(vectors(&values)),
+            ArrayValues { shape, .. } => Err(wrong(&shape)),
         };
         let all: PyResult<Vec<_>> = parts.iter().map(one).collect();
         return Ok((all?, false));
     }
-    let Numbers { shape, values } = doubles(value, name)?;
+    let ArrayValues { shape, values } = doubles(value, name)?;
     match *shape {
         [_, 3] => Ok((vec![vectors(&values)], true)),
         [_, count, 3] => Ok((
@@ -146,7 +146,7 @@ fn points(value: &Bound<'_, PyAny>, name: &str) -> PyResult<(Vec<Vec<DVec3>>, bo
     }
 }
 
-/// Times as they were given, one list for all paths or one for each.
+/// Times in seconds: one list for all paths or one for each.
 fn times(value: &Bound<'_, PyAny>, tracks: usize) -> PyResult<Vec<Vec<f64>>> {
     let lists: Vec<Vec<f64>> = match parts(value) {
         Some(parts) => {
@@ -154,12 +154,12 @@ fn times(value: &Bound<'_, PyAny>, tracks: usize) -> PyResult<Vec<Vec<f64>>> {
             parts.iter().map(one).collect::<PyResult<_>>()?
         }
         None => match doubles(value, "times")? {
-            Numbers { shape, values } if shape.len() == 1 => vec![values; tracks],
-            Numbers { shape, values } if shape.len() == 2 => values
+            ArrayValues { shape, values } if shape.len() == 1 => vec![values; tracks],
+            ArrayValues { shape, values } if shape.len() == 2 => values
                 .chunks(shape[1].max(1))
                 .map(<[f64]>::to_vec)
                 .collect(),
-            Numbers { shape, .. } => {
+            ArrayValues { shape, .. } => {
                 return Err(input(format!(
                     "times: the shape is {shape:?}; give (points,), (tracks, points), or a list with an array \
                      for each track"
@@ -180,8 +180,8 @@ fn times(value: &Bound<'_, PyAny>, tracks: usize) -> PyResult<Vec<Vec<f64>>> {
 pub(crate) fn follow<'py>(
     engine: &Engine,
     (key_times, path): (Option<&Bound<'py, PyAny>>, &Bound<'py, PyAny>),
-    options: &Options<'_, 'py>,
-    moments: Times,
+    options: &FollowOptions<'_, 'py>,
+    moments: SampleRequest,
     (layout, order): (Layout, Order),
 ) -> PyResult<Bound<'py, PyTuple>> {
     let py = path.py();
@@ -243,9 +243,9 @@ pub(crate) fn follow<'py>(
     })?;
     let origin = made.origin(0);
     let follow = options.follow(origin)?;
-    let is_one_time = matches!(moments, Times::Shared { is_one: true, .. });
+    let is_one_time = matches!(moments, SampleRequest::Shared { is_one: true, .. });
     let (frames, count) = moments.resolved(&made.set)?;
-    let engine = engine.engine(tracks * count)?;
+    let engine = engine.engine_for(tracks * count)?;
     let found = interruptible(py, move || {
         let found = engine.follow(&made.set, &follow, &frames, layout);
         found.map_err(|error| match error {

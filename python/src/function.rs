@@ -8,7 +8,7 @@ use crate::arrays::Order;
 use crate::build::clip_of;
 use crate::engine::{default_engine, layout_named};
 use crate::errors::guarded;
-use crate::evaluate::Result;
+use crate::evaluate::OutputRequest;
 use crate::options::{Request, request_arrays};
 use crate::output::quaternions_of;
 
@@ -46,7 +46,7 @@ pub(crate) fn evaluate<'py>(
         let request = Request::new(options)?;
         let order = Order::named(order)?;
         let (motion, is_one_track) = clip_of(times, keys, order, None)?;
-        let result = Result {
+        let result = OutputRequest {
             encoding: dtype.map_or(Ok(Encoding::F32), quaternions_of)?,
             // Rotations of SciPy's have an order of their own.
             order: if as_rotation { Order::Xyzw } else { order },
@@ -54,9 +54,9 @@ pub(crate) fn evaluate<'py>(
             as_rotation,
             on_card: device_array,
             is_one_track,
-            ..Result::default()
+            ..OutputRequest::default()
         };
-        let engine = |rotations| default_engine(py)?.get().engine(rotations);
+        let engine = |rotations| default_engine(py)?.get().engine_for(rotations);
         let arrays = request_arrays(options)?;
         let inputs: Vec<_> = [times, keys].into_iter().chain(&arrays).collect();
         result.of(py, engine, &motion.into(), &request, out, &inputs)

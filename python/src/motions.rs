@@ -245,7 +245,7 @@ impl Motions {
             velocities: rows(v, joints)?,
             angular_velocities: rows(a, joints)?,
         };
-        let engine = engine.get().engine(1)?;
+        let engine = engine.get().engine_for(1)?;
         let work = || {
             let sampled = self.tables.sample_into(&engine, tables, &at, states);
             sampled.map_err(of_crowd)
@@ -273,17 +273,17 @@ impl Motions {
             )));
         }
         let per_second = f64::from(self.tables.ticks_per_second());
-        let one = |(place, (&clip, &time)): (usize, (&i64, &f64))| {
+        let one = |(index, (&clip, &time)): (usize, (&i64, &f64))| {
             let ticks = u32::try_from(clip).ok();
             let ticks = ticks.and_then(|clip| Some((clip, self.tables.ticks(clip as usize)?)));
             let Some((clip, ticks)) = ticks else {
                 let count = self.tables.clip_count();
                 return Err(input(format!(
-                    "clip_ids[{place}]: there is no clip {clip}; there are {count}, from 0"
+                    "clip_ids[{index}]: there is no clip {clip}; there are {count}, from 0"
                 )));
             };
             if time.is_nan() {
-                return Err(input(format!("times[{place}]: it is no number")));
+                return Err(input(format!("times[{index}]: it is no number")));
             }
             let tick = (time * per_second).round().clamp(0.0, f64::from(ticks));
             Ok((clip, tick as u32))
@@ -336,7 +336,7 @@ fn check(motion: &Motion) -> Result<(), &'static str> {
     }
 }
 
-fn shown(place: usize, clip: &Clip) -> String {
+fn shown(index: usize, clip: &Clip) -> String {
     let path = clip.source.as_ref().map(|source| source.path.display());
-    path.map_or_else(|| format!("clips[{place}]"), |path| path.to_string())
+    path.map_or_else(|| format!("clips[{index}]"), |path| path.to_string())
 }

@@ -18,7 +18,7 @@ use crate::errors::{input, of_engine};
 
 /// Which samples.
 #[derive(Debug, Clone)]
-pub(crate) enum Samples {
+pub(crate) enum SampleRequest {
     /// Frames at a rate.
     Rate(FrameRate, Option<f64>, Option<f64>),
     /// One list of times for all tracks; a single time stands for a result without an axis of
@@ -30,19 +30,19 @@ pub(crate) enum Samples {
     Ragged(Vec<Vec<f64>>),
 }
 
-/// What was asked for.
+/// The keywords of an evaluation.
 #[derive(Debug, Clone)]
 pub(crate) struct Request {
-    /// `None` where neither a rate nor times were given.
-    pub(crate) samples: Option<Samples>,
-    /// `None`: each channel's own.
+    /// `None` without a rate and times.
+    pub(crate) samples: Option<SampleRequest>,
+    /// `None`: the method that the file gives each channel.
     pub(crate) method: Option<Method>,
-    manner: Manner,
+    interpolation: InterpolationOptions,
 }
 
 #[derive(Debug, Clone, Copy)]
-struct Manner {
-    path: KeySigns,
+struct InterpolationOptions {
+    signs: KeySigns,
     ends: Option<Ends>,
     speed: Speed,
     before: WrapMode,
@@ -50,7 +50,7 @@ struct Manner {
     tcb: Tcb,
 }
 
-/// Where a file has a word for each channel, its own; bessel-overhauser where it has none.
+/// The name of "the method that the file gives each channel; bessel-overhauser where it gives none".
 pub(crate) const AUTHORED: &str = "authored";
 
 impl Request {
@@ -59,8 +59,8 @@ impl Request {
         let mut request = Self {
             samples: None,
             method: None,
-            manner: Manner {
-                path: KeySigns::Shortest,
+            interpolation: InterpolationOptions {
+                signs: KeySigns::Shortest,
                 ends: None,
                 speed: Speed::AsKeyed,
                 before: WrapMode::Hold,
@@ -75,7 +75,7 @@ impl Request {
                 check_name(&name)?;
                 continue;
             }
-            let manner = &mut request.manner;
+            let interpolation = &mut request.interpolation;
             match &*name {
                 "fps" => rate = Some(frame_rate(&value)?),
                 "at" | "times" if times.is_some() => {
@@ -88,19 +88,22 @@ impl Request {
                 "end" => end = Some(arrays::number(&value, "end", "seconds")?),
                 "method" => request.method = method(&value)?,
                 "path" => {
-                    manner.path = option_of(&value, "path")?;
+                    interpolation.signs = option_of(&value, "path")?;
                 }
-                "ends" => manner.ends = Some(ends(&value)?),
+                "ends" => interpolation.ends = Some(ends(&value)?),
                 "speed" => {
-                    manner.speed = option_of(&value, "speed")?;
+                    interpolation.speed = option_of(&value, "speed")?;
                 }
-                "before" => manner.before = option_of(&value, "before")?,
-                "after" => manner.after = option_of(&value, "after")?,
-                "tension" => manner.tcb.tension = arrays::number(&value, "tension", "a number")?,
+                "before" => interpolation.before = option_of(&value, "before")?,
+                "after" => interpolation.after = option_of(&value, "after")?,
+                "tension" => {
+                    interpolation.tcb.tension = arrays::number(&value, "tension", "a number")?
+                }
                 "continuity" => {
-                    manner.tcb.continuity = arrays::number(&value, "continuity", "a number")?;
+                    interpolation.tcb.continuity =
+                        arrays::number(&value, "continuity", "a number")?;
                 }
-                "bias" => manner.tcb.bias = arrays::number(&value, "bias", "a number")?,
+                "bias" => interpolation.tcb.bias = arrays::number(&value, "bias", "a number")?,
                 _ => check_name(&name)?,
             }
         }
@@ -109,22 +112,22 @@ impl Request {
     }
 
     /// The samples, of which there must be some.
-    pub(crate) fn samples(&self) -> PyResult<&Samples> {
+    pub(crate) fn samples(&self) -> PyResult<&SampleRequest> {
         self.samples.as_ref().ok_or_else(none_asked_for)
     }
 
-    /// What is asked of a method.
+    /// The interpolation by a method, for a quantity.
     pub(crate) fn with(&self, quantity: Quantity) -> impl Fn(Method) -> Interpolation + use<> {
-        let manner = self.manner;
+        let interpolation = self.interpolation;
         move |method| Interpolation {
             method,
-            signs: method.signs.unwrap_or(manner.path),
-            ends: manner.ends.unwrap_or(method.ends),
-            tcb: manner.tcb,
+            signs: method.signs.unwrap_or(interpolation.signs),
+            ends: interpolation.ends.unwrap_or(method.ends),
+            tcb: interpolation.tcb,
             quantity,
-            speed: manner.speed,
-            before: manner.before,
-            after: manner.after,
+            speed: interpolation.speed,
+            before: interpolation.before,
+            after: interpolation.after,
         }
     }
 
@@ -134,7 +137,7 @@ impl Request {
     }
 }
 
-impl Samples {
+impl SampleRequest {
     /// The samples of some tracks of a set as the engine takes them.
     pub(crate) fn frames(&self, set: &TrackSet, tracks: Option<&[usize]>) -> PyResult<SampleTimes> {
         Ok(match self {
@@ -144,10 +147,10 @@ impl Samples {
             }
             Self::Shared { times, .. } => SampleTimes::at(times.to_vec()),
             Self::Each { times, count } => {
-                let given = times.len() / (*count).max(1);
-                if given != set.track_count() && !times.is_empty() {
+                let list_count = times.len() / (*count).max(1);
+                if list_count != set.track_count() && !times.is_empty() {
                     return Err(input(format!(
-                        "there are times for {given} tracks; the clip has {}",
+                        "there are times for {list_count} tracks; the clip has {}",
                         set.track_count()
                     )));
                 }
@@ -184,7 +187,7 @@ pub(crate) fn samples_of(
     at: Option<Bound<'_, PyAny>>,
     start: Option<f64>,
     end: Option<f64>,
-) -> PyResult<Samples> {
+) -> PyResult<SampleRequest> {
     let finite = |name: &str, number: Option<f64>| match number {
         Some(number) if !number.is_finite() => {
             Err(input(format!("{name}: {number} is not finite")))
@@ -205,13 +208,13 @@ fn samples(
     times: Option<Bound<'_, PyAny>>,
     start: Option<f64>,
     end: Option<f64>,
-) -> PyResult<Option<Samples>> {
+) -> PyResult<Option<SampleRequest>> {
     match (rate, times) {
         (Some(_), Some(_)) => Err(input("`fps` and `at` exclude each other; give one of them")),
         (None, Some(_)) if start.is_some() || end.is_some() => Err(input(
             "`start` and `end` go with `fps`; `at` says all times",
         )),
-        (Some(rate), None) => Ok(Some(Samples::Rate(rate, start, end))),
+        (Some(rate), None) => Ok(Some(SampleRequest::Rate(rate, start, end))),
         (None, Some(times)) => arrays::sample_times(&times).map(Some),
         (None, None) if start.is_some() || end.is_some() => {
             Err(input("`start` and `end` go with `fps`; give it too"))
@@ -289,24 +292,24 @@ pub(crate) fn option_of<T: FromStr<Err = UnknownNameError>>(
 /// The value of that name.
 pub(crate) fn one_of<T: Copy>(
     value: &Bound<'_, PyAny>,
-    what: &str,
+    keyword: &str,
     known: &[(&str, T)],
 ) -> PyResult<T> {
-    let name = text(value, what)?;
-    let found = known.iter().find(|(own, _)| **own == *name);
+    let name = text(value, keyword)?;
+    let found = known.iter().find(|(known_name, _)| **known_name == *name);
     found.map(|&(_, value)| value).ok_or_else(|| {
         let names: Vec<&str> = known.iter().map(|&(name, _)| name).collect();
         input(format!(
-            "{what}: there is no `{name}`; there are {}",
+            "{keyword}: there is no `{name}`; there are {}",
             names.join(", ")
         ))
     })
 }
 
-fn text<'a>(value: &'a Bound<'_, PyAny>, what: &str) -> PyResult<Cow<'a, str>> {
+fn text<'a>(value: &'a Bound<'_, PyAny>, keyword: &str) -> PyResult<Cow<'a, str>> {
     value
         .cast::<PyString>()
-        .map_err(|_| PyTypeError::new_err(format!("{what}: give a name, as text")))?
+        .map_err(|_| PyTypeError::new_err(format!("{keyword}: give a name, as text")))?
         .to_cow()
 }
 

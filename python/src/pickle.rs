@@ -61,7 +61,7 @@ pub(crate) fn state<'py>(py: Python<'py>, clip: &Clip) -> PyResult<Bound<'py, Py
     }
     state.set_item("keys", rows(py, keys, 4)?)?;
     let numbers = PyList::empty(py);
-    for (place, track) in tracks.iter().enumerate() {
+    for (track_index, track) in tracks.iter().enumerate() {
         let velocities: Vec<f64> = (track.velocities.iter())
             .flat_map(DVec3::to_array)
             .collect();
@@ -72,14 +72,19 @@ pub(crate) fn state<'py>(py: Python<'py>, clip: &Clip) -> PyResult<Bound<'py, Py
         let tcb: Vec<f64> = track.tcb.iter().flat_map(tcb).collect();
         if !(velocities.is_empty() && tangents.is_empty() && tcb.is_empty()) {
             let tangents = rows(py, tangents, 4)?;
-            numbers.append((place, rows(py, velocities, 3)?, tangents, rows(py, tcb, 3)?))?;
+            numbers.append((
+                track_index,
+                rows(py, velocities, 3)?,
+                tangents,
+                rows(py, tcb, 3)?,
+            ))?;
         }
     }
     state.set_item("numbers", numbers)?;
     let vectors = PyList::empty(py);
     for (kind, channel) in VECTORS.into_iter().enumerate() {
-        for place in 0..tracks.len() {
-            let Some(vector_keys) = motion.set.vector_keys(channel, place) else {
+        for track in 0..tracks.len() {
+            let Some(vector_keys) = motion.set.vector_keys(channel, track) else {
                 continue;
             };
             let keys: Vec<f32> = vector_keys.keys.iter().flat_map(Vec3::to_array).collect();
@@ -89,7 +94,7 @@ pub(crate) fn state<'py>(py: Python<'py>, clip: &Clip) -> PyResult<Bound<'py, Py
             let times = PyArray1::from_slice(py, vector_keys.times);
             vectors.append((
                 kind,
-                place,
+                track,
                 times,
                 rows(py, keys, 3)?,
                 rows(py, tangents, 3)?,
@@ -116,8 +121,8 @@ pub(crate) fn state<'py>(py: Python<'py>, clip: &Clip) -> PyResult<Bound<'py, Py
     let rests: Vec<f32> = motion.skeleton.iter().flat_map(rest).collect();
     state.set_item("rests", rows(py, rests, 10)?)?;
     let number = |sampler: Option<ChannelInterpolation>| {
-        let place = SAMPLERS.iter().position(|&one| Some(one) == sampler);
-        place.map_or(0, |place| place as i64 + 1)
+        let index = SAMPLERS.iter().position(|&one| Some(one) == sampler);
+        index.map_or(0, |index| index as i64 + 1)
     };
     let channels = motion.channels.iter();
     let channels: Vec<i64> = channels
@@ -220,9 +225,9 @@ fn motion_of(state: &Bound<'_, PyDict>) -> PyResult<Motion> {
     let mut set = TrackSet::new();
     set.reserve(names.len(), keys.len());
     let mut left = &keys[..];
-    for (place, name) in names.iter().enumerate() {
+    for (track, name) in names.iter().enumerate() {
         let times = times_of
-            .get(place)
+            .get(track)
             .and_then(|&index| times.get(usize::try_from(index).ok()?));
         let times = times.ok_or_else(broken)?;
         let (track_keys, others) = left.split_at_checked(times.len()).ok_or_else(broken)?;
@@ -230,13 +235,13 @@ fn motion_of(state: &Bound<'_, PyDict>) -> PyResult<Motion> {
         set.push(name.as_deref().unwrap_or_default(), times, track_keys)
             .map_err(of_set)?;
     }
-    type Numbers<'py> = (
+    type KeyParameters<'py> = (
         usize,
         Bound<'py, PyAny>,
         Bound<'py, PyAny>,
         Bound<'py, PyAny>,
     );
-    let numbers: Vec<Numbers<'_>> = entry(state, "numbers")?.extract()?;
+    let numbers: Vec<KeyParameters<'_>> = entry(state, "numbers")?.extract()?;
     for (track, velocities, tangents, tcb) in numbers {
         if track >= names.len() {
             return Err(broken());
@@ -296,8 +301,8 @@ fn motion_of(state: &Bound<'_, PyDict>) -> PyResult<Motion> {
         },
     };
     let sampler = |number: i64| {
-        let place = usize::try_from(number).ok()?.checked_sub(1)?;
-        SAMPLERS.get(place).copied()
+        let index = usize::try_from(number).ok()?.checked_sub(1)?;
+        SAMPLERS.get(index).copied()
     };
     let channels: Vec<[i64; 3]> = chunks(&entry(state, "channels")?)?;
     let channels = channels.into_iter().map(|numbers| {

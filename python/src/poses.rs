@@ -15,7 +15,7 @@ use tumble_formats::world::world;
 use crate::clip::Clip;
 use crate::engine::Engine;
 use crate::errors::{input, of_engine};
-use crate::options::{Request, Samples as Wanted};
+use crate::options::{Request, SampleRequest};
 use crate::run::interruptible;
 
 /// Translations, rotations and scales relative to the parents.
@@ -99,13 +99,16 @@ fn samples(
 ) -> PyResult<(Samples, usize)> {
     let request = Request::new(options)?;
     let motion = &clip.get().motion;
-    let wanted = request.samples()?;
-    if !matches!(wanted, Wanted::Rate(..) | Wanted::Shared { .. }) {
+    let requested = request.samples()?;
+    if !matches!(
+        requested,
+        SampleRequest::Rate(..) | SampleRequest::Shared { .. }
+    ) {
         return Err(input("at: poses are of all tracks at the same times"));
     }
-    let (frames, count) = wanted.resolved(&motion.set)?;
+    let (frames, count) = requested.resolved(&motion.set)?;
     let tracks = motion.set.track_count();
-    let engine = engine.engine(tracks * count)?;
+    let engine = engine.engine_for(tracks * count)?;
     let motion = Arc::clone(motion);
     let samples = interruptible(clip.py(), move || {
         let methods = ChannelMethods {

@@ -70,9 +70,9 @@ pub(crate) fn page(
     let source = clips.first().and_then(|clip| clip.source.clone());
     let path = source
         .as_ref()
-        .map_or(PathBuf::from("clip"), |own| own.path.clone());
+        .map_or(PathBuf::from("clip"), |source| source.path.clone());
     let motions = clips.iter().map(|clip| (*clip.motion).clone()).collect();
-    let box_length = source.and_then(|own| own.box_length);
+    let box_length = source.and_then(|source| source.box_length);
     let made =
         py.detach(|| guarded(|| Ok(host::page(Path::new(&path), motions, box_length, &options))))?;
     made.map_err(|refused| match refused.is_usage {

@@ -132,8 +132,8 @@ pub(crate) fn reduce(
         quantize: None,
     };
     let engine = match engine {
-        Some(engine) => engine.get().engine(1)?,
-        None => default_engine(py)?.get().engine(1)?,
+        Some(engine) => engine.get().engine_for(1)?,
+        None => default_engine(py)?.get().engine_for(1)?,
     };
     let found = interruptible(py, move || {
         let sampled = match rate {

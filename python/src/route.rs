@@ -1,4 +1,4 @@
-//! `tumble.Surface`: ways over meshes and Bézier surfaces, and those who walk them.
+//! `tumble.Surface`: routes over meshes and Bézier surfaces, and walkers on them.
 
 use std::sync::Arc;
 
@@ -13,16 +13,16 @@ use tumble_routes::net::{Net, NetBy};
 use tumble_routes::route::By;
 use tumble_routes::walkers::{self, Mover, Walker};
 
-use crate::arrays::{Numbers, doubles, parts};
+use crate::arrays::{ArrayValues, doubles, parts};
 use crate::errors::{in_python, input, of_engine, warn_of};
 use crate::run::interruptible;
 
-/// A surface, on which ways are found: a mesh, or a net of Bézier control points.
+/// A surface, on which routes are found: a mesh, or a net of Bézier control points.
 ///
 /// `Surface(vertices, faces, *, weld=0.0)`
 ///
 /// `vertices`: (n, 3). `faces`: the indices of triangles (m, 3), of polygons (m, k), or a list of lists of any
-/// lengths. Vertices within `weld` of each other are one, so that ways cross seams. What is odd about a mesh
+/// lengths. Vertices within `weld` of each other are one, so that routes cross seams. What is odd about a mesh
 /// is an `InputWarning`.
 ///
 /// >>> import numpy as np, tumble
@@ -41,14 +41,14 @@ enum Shape {
     Net(Arc<Net>),
 }
 
-/// A way over a surface: straight from each point to the next.
+/// A route over a surface: straight from each point to the next.
 #[pyclass(frozen, module = "tumble", from_py_object)]
 #[derive(Clone)]
 pub(crate) struct Route {
     found: Arc<tumble_routes::route::Route>,
 }
 
-/// When a walker is where: straight from each point to the next.
+/// The positions of a walker at times: straight from each point to the next.
 #[pyclass(frozen, module = "tumble")]
 pub(crate) struct Walk {
     times: Vec<f64>,
@@ -57,7 +57,7 @@ pub(crate) struct Walk {
 }
 
 fn vectors(value: &Bound<'_, PyAny>, name: &str) -> PyResult<(Vec<usize>, Vec<DVec3>)> {
-    let Numbers { mut shape, values } = doubles(value, name)?;
+    let ArrayValues { mut shape, values } = doubles(value, name)?;
     if shape.pop() != Some(3) {
         return Err(input(format!(
             "{name}: the last axis has the 3 coordinates of a point"
@@ -107,26 +107,26 @@ fn faces(value: &Bound<'_, PyAny>) -> PyResult<Vec<Vec<u32>>> {
     let face = |numbers: &[f64]| numbers.iter().map(index).collect::<PyResult<Vec<u32>>>();
     if let Some(parts) = parts(value) {
         let one = |part: &Bound<'_, PyAny>| match doubles(part, "faces")? {
-            Numbers { shape, values } if shape.len() == 1 => face(&values),
-            Numbers { shape, .. } => Err(input(format!(
+            ArrayValues { shape, values } if shape.len() == 1 => face(&values),
+            ArrayValues { shape, .. } => Err(input(format!(
                 "faces: one has the shape {shape:?}; give a list of indices for each"
             ))),
         };
         return parts.iter().map(one).collect();
     }
     match doubles(value, "faces")? {
-        Numbers { shape, values } if shape.len() == 2 && shape[1] > 0 => {
+        ArrayValues { shape, values } if shape.len() == 2 && shape[1] > 0 => {
             values.chunks(shape[1]).map(face).collect()
         }
-        Numbers { shape, .. } => Err(input(format!(
+        ArrayValues { shape, .. } => Err(input(format!(
             "faces: the shape is {shape:?}; give (m, 3), (m, k), or a list of lists"
         ))),
     }
 }
 
-/// How ways are found, as it comes in.
+/// The options of a search for routes.
 #[derive(Clone)]
-struct Options {
+struct RouteOptions {
     shape: Shape,
     by: Option<String>,
     avoid: Option<Arc<Mesh>>,
@@ -136,10 +136,10 @@ struct Options {
     up: DVec3,
 }
 
-type Found = Vec<Result<tumble_routes::route::Route, String>>;
+type RouteResults = Vec<Result<tumble_routes::route::Route, String>>;
 
-impl Options {
-    fn routes(&self, pairs: &[[DVec3; 2]]) -> PyResult<Found> {
+impl RouteOptions {
+    fn routes(&self, pairs: &[[DVec3; 2]]) -> PyResult<RouteResults> {
         let by = self.by.as_deref();
         let is_ground = self.avoid.is_some() || self.max_slope.is_some();
         match &self.shape {
@@ -192,7 +192,10 @@ impl Options {
 /// Pairs that are looked after together; between them Ctrl-C ends the work.
 const TOGETHER: usize = 8;
 
-fn in_pieces(pairs: &[[DVec3; 2]], routes: impl Fn(&[[DVec3; 2]]) -> Found) -> PyResult<Found> {
+fn in_pieces(
+    pairs: &[[DVec3; 2]],
+    routes: impl Fn(&[[DVec3; 2]]) -> RouteResults,
+) -> PyResult<RouteResults> {
     let stop = Stop::of_this_work();
     let mut found = Vec::with_capacity(pairs.len());
     for pairs in pairs.chunks(TOGETHER) {
@@ -204,7 +207,9 @@ fn in_pieces(pairs: &[[DVec3; 2]], routes: impl Fn(&[[DVec3; 2]]) -> Found) -> P
     Ok(found)
 }
 
-fn in_words<E: std::fmt::Display>(found: Vec<Result<tumble_routes::route::Route, E>>) -> Found {
+fn in_words<E: std::fmt::Display>(
+    found: Vec<Result<tumble_routes::route::Route, E>>,
+) -> RouteResults {
     let found = found.into_iter();
     found
         .map(|route| route.map_err(|error| in_python(&error.to_string())))
@@ -225,7 +230,7 @@ impl Surface {
         avoid: Option<&Bound<'_, Self>>,
         (clearance, finest, max_slope): (f64, Option<f64>, Option<f64>),
         up: [f64; 3],
-    ) -> PyResult<Options> {
+    ) -> PyResult<RouteOptions> {
         let avoid = match avoid.map(|surface| &surface.get().shape) {
             None => None,
             Some(Shape::Mesh(mesh)) => Some(Arc::clone(mesh)),
@@ -234,7 +239,7 @@ impl Surface {
         if avoid.is_none() && clearance != 0.0 {
             return Err(input("clearance: it is that from `avoid`; give it too"));
         }
-        Ok(Options {
+        Ok(RouteOptions {
             shape: self.shape.clone(),
             by,
             avoid,
@@ -257,7 +262,7 @@ impl Surface {
                 warn_of(
                     py,
                     &format!(
-                        "{name}{end}: it is {off} off the surface; its nearest point is taken"
+                        "{name}{end}: it is {off} away from the surface; the nearest point of the surface is used"
                     ),
                 )?;
             }
@@ -315,12 +320,12 @@ impl Surface {
         })
     }
 
-    /// The way between the points of the surface that are nearest to `start` and `goal`.
+    /// The route between the points of the surface that are nearest to `start` and `goal`.
     ///
     /// `route(start, goal, *, by=None, avoid=None, clearance=0.0, finest=None, max_slope=None, up=(0, 1, 0))`
     ///
     /// `by`: of meshes "exact", the shortest one (the default), "plane", "greedy" or "edges"; of nets "line"
-    /// (the default) or "facets:N". `avoid`: a mesh of obstacles, from which ways stay `clearance` away;
+    /// (the default) or "facets:N". `avoid`: a mesh of obstacles, from which routes stay `clearance` away;
     /// `finest`: the longest edge at the rim of what is closed by that (a hundredth of the size). `max_slope`:
     /// the steepest slope that is walked, degrees against `up`.
     ///
@@ -350,13 +355,13 @@ impl Surface {
         let found = interruptible(py, move || {
             let found = options.routes(&pair)?.pop();
             found
-                .unwrap_or_else(|| Err("no way was looked for".to_owned()))
+                .unwrap_or_else(|| Err("no route was computed".to_owned()))
                 .map_err(input)
         })?;
         self.route_of(py, "", found)
     }
 
-    /// The ways of many pairs, `starts` and `goals` (n, 3), on all cores: a list with a `Route` for each, and
+    /// The routes of many pairs, `starts` and `goals` (n, 3), on all cores: a list with a `Route` for each, and
     /// None where there is none, of which an `InputWarning` says why. Otherwise as `route`.
     ///
     /// >>> import tumble
@@ -507,9 +512,9 @@ pub(crate) fn walk(
 ) -> PyResult<Vec<Option<Walk>>> {
     let count = routes.len();
     let numbers = |value: &Bound<'_, PyAny>, name: &str| match doubles(value, name)? {
-        Numbers { shape, values } if shape.is_empty() => Ok(vec![values[0]; count]),
-        Numbers { shape, values } if *shape == [count] => Ok(values),
-        Numbers { shape, .. } => Err(input(format!(
+        ArrayValues { shape, values } if shape.is_empty() => Ok(vec![values[0]; count]),
+        ArrayValues { shape, values } if *shape == [count] => Ok(values),
+        ArrayValues { shape, .. } => Err(input(format!(
             "{name}: the shape is {shape:?}; give one for all, or ({count},)"
         ))),
     };

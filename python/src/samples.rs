@@ -14,7 +14,7 @@ use tumble::{
 use tumble_formats::diagnostic::Code;
 use tumble_formats::smooth::{SmoothJob, SmoothMotionError};
 
-use crate::arrays::{Numbers, Order, doubles, parts, quaternions};
+use crate::arrays::{ArrayValues, Order, doubles, parts, quaternions};
 use crate::clip::Clip;
 use crate::engine::Engine;
 use crate::errors::{input, input_at, of_engine, of_track};
@@ -69,7 +69,7 @@ fn rotations(values: &[Quat], tracks: usize, layout: Layout, name: &str) -> PyRe
 
 /// Rotations of any shape, as one track.
 fn row(value: &Bound<'_, PyAny>, order: Order, name: &str) -> PyResult<(Vec<usize>, Rotations)> {
-    let Numbers { shape, values } = quaternions(value, order, name)?;
+    let ArrayValues { shape, values } = quaternions(value, order, name)?;
     Ok((shape, rotations(&values, 1, Layout::TrackMajor, name)?))
 }
 
@@ -132,7 +132,7 @@ impl Smooth<'_> {
         Ok(smoothing)
     }
 
-    /// The kernel, which a frequency takes the place of, and the rest.
+    /// The kernel, or the frequency that replaces it, and the rest.
     fn of_kernel(&self) -> PyResult<Smoothing> {
         if self.low_pass.is_some() && self.kernel.is_some() {
             return Err(input(
@@ -173,7 +173,7 @@ pub(crate) fn smooth_clip(
     let tracks = motion.set.track_count();
     let timeline = job.frames.resolve(tracks, motion.set.time_span());
     let samples = timeline.map_err(|error| of_engine(&error.into()))?.len();
-    let engine = engine.engine(tracks * samples)?;
+    let engine = engine.engine_for(tracks * samples)?;
     let found = interruptible(clip.py(), move || {
         let found = job.run(&engine, &motion);
         let found = found.map_err(|error| of_engine(&error))?;
@@ -197,7 +197,7 @@ pub(crate) fn smooth<'py>(
         let (shape, values) = vectors(samples, "samples")?;
         let axes = Axes::of(&shape, layout, "samples")?;
         let count = values.len();
-        let engine = engine.engine(count)?;
+        let engine = engine.engine_for(count)?;
         let found = work(py, count.saturating_mul(passes), move || {
             let before = Vectors::of(&values, axes.tracks, layout);
             let before = before.map_err(|error| of_samples("samples", &error))?;
@@ -214,10 +214,10 @@ pub(crate) fn smooth<'py>(
         })?;
         return Ok(array.into_any());
     }
-    let Numbers { shape, values } = quaternions(samples, order, "samples")?;
+    let ArrayValues { shape, values } = quaternions(samples, order, "samples")?;
     let axes = Axes::of(&shape, layout, "samples")?;
     let count = values.len();
-    let engine = engine.engine(count)?;
+    let engine = engine.engine_for(count)?;
     let found = work(py, count.saturating_mul(passes), move || {
         let before = rotations(&values, axes.tracks, layout, "samples")?;
         let found = engine.smooth(&before, &smoothing);
@@ -239,7 +239,7 @@ fn are_vectors(value: &Bound<'_, PyAny>) -> PyResult<bool> {
 
 /// Vectors of any shape, without the axis of their components.
 fn vectors(value: &Bound<'_, PyAny>, name: &str) -> PyResult<(Vec<usize>, Vec<Vec3>)> {
-    let Numbers { mut shape, values } = doubles(value, name)?;
+    let ArrayValues { mut shape, values } = doubles(value, name)?;
     if shape.pop() != Some(3) {
         return Err(input(format!(
             "{name}: the last axis has the 3 components of a vector"
@@ -284,7 +284,7 @@ pub(crate) fn blend<'py>(
     }
     let shape = first.unwrap_or_default();
     let count: usize = shape.iter().product();
-    let engine = engine.engine(count)?;
+    let engine = engine.engine_for(count)?;
     let found = work(py, count.saturating_mul(all.len()), move || {
         let layers: Vec<(&Rotations, f32)> = all.iter().zip(weights).collect();
         engine.blend(&layers).map_err(|error| of_engine(&error))
@@ -317,7 +317,7 @@ pub(crate) fn mix<'py>(
     let (other, to) = row(second, order, "second")?;
     check_shape("second", &other, &shape, "first")?;
     let count = from.as_arrays().len();
-    let engine = engine.engine(count)?;
+    let engine = engine.engine_for(count)?;
     let found = work(py, count, move || {
         let found = engine.mix(&from, &to, weight);
         found.map_err(|error| of_engine(&error))
@@ -335,9 +335,9 @@ pub(crate) fn add<'py>(
     out: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let py = base.py();
-    let Numbers { shape, values } = quaternions(base, order, "base")?;
+    let ArrayValues { shape, values } = quaternions(base, order, "base")?;
     let Axes { tracks, .. } = Axes::of(&shape, layout, "base")?;
-    let Numbers {
+    let ArrayValues {
         shape: other,
         values: layers,
     } = quaternions(layer, order, "layer")?;
@@ -345,9 +345,9 @@ pub(crate) fn add<'py>(
     let reference = match reference {
         None => vec![Quat::IDENTITY; tracks],
         Some(value) => match quaternions(value, order, "reference")? {
-            Numbers { shape, values } if shape.is_empty() => vec![values[0]; tracks],
-            Numbers { shape, values } if *shape == [tracks] => values,
-            Numbers { shape, .. } => {
+            ArrayValues { shape, values } if shape.is_empty() => vec![values[0]; tracks],
+            ArrayValues { shape, values } if *shape == [tracks] => values,
+            ArrayValues { shape, .. } => {
                 return Err(input(format!(
                     "reference: its shape is {:?}; give ({tracks}, 4), a rotation for each track",
                     [&shape[..], &[4]].concat()
@@ -358,7 +358,7 @@ pub(crate) fn add<'py>(
     // A reference that is none is refused as other rotations are.
     rotations(&reference, 1, layout, "reference")?;
     let count = values.len();
-    let engine = engine.engine(count)?;
+    let engine = engine.engine_for(count)?;
     let found = work(py, count, move || {
         let base = rotations(&values, tracks, layout, "base")?;
         let layer = rotations(&layers, tracks, layout, "layer")?;
@@ -368,8 +368,8 @@ pub(crate) fn add<'py>(
     written(py, &shape, &found, order, out, &[base, layer])
 }
 
-/// What a skeleton and its poses are, as they come in.
-pub(crate) struct Walk<'a, 'py> {
+/// A skeleton and its poses, as arrays: the arguments of `local_to_model`.
+pub(crate) struct ModelPoses<'a, 'py> {
     pub(crate) rotations: &'a Bound<'py, PyAny>,
     pub(crate) parents: Vec<Option<i64>>,
     pub(crate) offsets: Option<&'a Bound<'py, PyAny>>,
@@ -378,7 +378,7 @@ pub(crate) struct Walk<'a, 'py> {
     pub(crate) inverse_bind: Option<&'a Bound<'py, PyAny>>,
 }
 
-impl<'py> Walk<'_, 'py> {
+impl<'py> ModelPoses<'_, 'py> {
     /// The matrices of all joints in the model, 3 × 4.
     pub(crate) fn local_to_model(
         self,
@@ -386,7 +386,7 @@ impl<'py> Walk<'_, 'py> {
         (layout, order): (Layout, Order),
     ) -> PyResult<Bound<'py, PyAny>> {
         let py = self.rotations.py();
-        let Numbers { shape, values } = quaternions(self.rotations, order, "rotations")?;
+        let ArrayValues { shape, values } = quaternions(self.rotations, order, "rotations")?;
         // One pose is (tracks,).
         let is_one = shape.len() == 1;
         let axes = match (&*shape, layout) {
@@ -406,7 +406,7 @@ impl<'py> Walk<'_, 'py> {
         let skeleton = skeleton(&self.parents, self.offsets, tracks)?;
         let inverse_bind = self.inverse_bind.map(|value| matrices(value, tracks));
         let inverse_bind = inverse_bind.transpose()?;
-        let engine = engine.engine(tracks * samples)?;
+        let engine = engine.engine_for(tracks * samples)?;
         let local = Transforms {
             translations,
             rotations,
@@ -519,7 +519,7 @@ pub(crate) fn skeleton(
 
 /// Affine matrices, (tracks, 3, 4) or (tracks, 4, 4).
 pub(crate) fn matrices(value: &Bound<'_, PyAny>, tracks: usize) -> PyResult<Vec<Affine3A>> {
-    let Numbers { shape, values } = doubles(value, "inverse_bind")?;
+    let ArrayValues { shape, values } = doubles(value, "inverse_bind")?;
     let rows = match *shape {
         [count, rows @ (3 | 4), 4] if count == tracks => rows,
         _ => {
@@ -531,8 +531,8 @@ pub(crate) fn matrices(value: &Bound<'_, PyAny>, tracks: usize) -> PyResult<Vec<
     let matrix = |numbers: &[f64]| {
         let number = |row: usize, column: usize| numbers[4 * row + column] as f32;
         let column = |column: usize| Vec3::from_array([0, 1, 2].map(|row| number(row, column)));
-        let turn_and_scale = Mat3::from_cols(column(0), column(1), column(2));
-        Affine3A::from_mat3_translation(turn_and_scale, column(3))
+        let linear_part = Mat3::from_cols(column(0), column(1), column(2));
+        Affine3A::from_mat3_translation(linear_part, column(3))
     };
     Ok(values.chunks_exact(4 * rows).map(matrix).collect())
 }
@@ -558,7 +558,7 @@ pub(crate) fn of_values<'py, T, const N: usize>(
 pub(crate) fn weights(value: Option<&Bound<'_, PyAny>>) -> PyResult<Option<Vec<f32>>> {
     let Some(value) = value else { return Ok(None) };
     match doubles(value, "weights")? {
-        Numbers { shape, values } if shape.len() == 1 => Ok(Some(
+        ArrayValues { shape, values } if shape.len() == 1 => Ok(Some(
             values.into_iter().map(|weight| weight as f32).collect(),
         )),
         _ => Err(PyTypeError::new_err(

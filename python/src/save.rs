@@ -27,7 +27,7 @@ use crate::engine::{default_engine, layout_named};
 use crate::errors::{input, of_engine, of_output, of_write, warn};
 use crate::evaluate::uniform;
 use crate::file::{File, format_named};
-use crate::options::{Request, Samples as Wanted};
+use crate::options::{Request, SampleRequest};
 use crate::run::interruptible;
 
 /// Rotations evaluated at once.
@@ -88,7 +88,7 @@ pub(crate) fn save(
     let ending = path.extension().and_then(|ending| ending.to_str());
     let Some(name) = format.or(ending) else {
         return Err(input(
-            "the name has no ending that tells the format; name one with `format`",
+            "the name has no extension that determines the format; name one with `format`",
         ));
     };
     let sequence = sequence
@@ -103,14 +103,14 @@ pub(crate) fn save(
     let format = format_named(name)?;
     if times_out.is_some() && !format.takes(FormatOption::TimesApart) {
         return Err(input(format!(
-            "times_out is for kitti, which has no times; {} has them, or is of frames: leave it out",
+            "times_out is for kitti, which stores no times; {} stores times or a frame rate: leave it out",
             format.name
         )));
     }
     if (quantize || meshopt) && !format.takes(FormatOption::Quantize) {
         let option = if quantize { "quantize" } else { "meshopt" };
         return Err(input(format!(
-            "{option} is for glTF, and says nothing to {}; leave it out",
+            "{option} is for glTF and has no effect on {}; leave it out",
             format.name
         )));
     }
@@ -222,14 +222,14 @@ impl<W: Write> Write for Stoppable<W> {
 }
 
 impl Save {
-    /// `times` gets the times of the samples, where they go into a file of their own.
+    /// `times` gets the times of the samples, for formats that need them in a separate file.
     fn write(&self, out: &mut dyn Write, times: &mut Vec<u8>) -> PyResult<Vec<Diagnostic>> {
         let Some(samples) = &self.request.samples else {
             return self.keys(out, times);
         };
         let motions: Vec<&Motion> = self.clips.iter().map(|clip| &*clip.motion).collect();
         if let Some(document) = self.document() {
-            let Wanted::Rate(rate, None, None) = *samples else {
+            let SampleRequest::Rate(rate, None, None) = *samples else {
                 return Err(input(
                     "the animations of a file that is kept keep their lengths; leave out `at`, \
                      `start` and `end`, or write another format",
@@ -384,7 +384,7 @@ impl Save {
         Ok(warnings)
     }
 
-    /// The clips' own file with other keys.
+    /// The file of the clips, with other keys.
     fn baked(
         &self,
         clips: &[&Motion],
@@ -396,25 +396,25 @@ impl Save {
         let frames: Result<Vec<SampleTimes>, Diagnostic> = clips.iter().map(times).collect();
         let frames = frames.map_err(|error| of_write(&error.into()))?;
         self.written(clips, &frames, Some(rate), |sampled| {
-            let places = clips.iter().map(|clip| clip.index);
+            let indices = clips.iter().map(|clip| clip.index);
             let clips: Vec<(usize, SampledClip<'_>)> =
-                places.zip(sampled.iter().cloned()).collect();
+                indices.zip(sampled.iter().cloned()).collect();
             document.write(&clips, &self.motion, &self.path, out)
         })
     }
 
-    /// Clips as a file of their own.
+    /// Clips as a new file.
     fn sampled(
         &self,
         clips: &[&Motion],
-        samples: &Wanted,
+        samples: &SampleRequest,
         out: &mut dyn Write,
         times: &mut Vec<u8>,
     ) -> PyResult<Vec<Diagnostic>> {
         let frames = clips.iter().map(|clip| Ok(samples.resolved(&clip.set)?.0));
         let frames: Vec<SampleTimes> = frames.collect::<PyResult<_>>()?;
         let rate = match samples {
-            Wanted::Rate(rate, ..) => Some(*rate),
+            SampleRequest::Rate(rate, ..) => Some(*rate),
             _ => None,
         };
         self.written(clips, &frames, rate, |sampled| {
@@ -433,7 +433,10 @@ impl Save {
         for (clip, frames) in clips.iter().zip(frames) {
             let count = frames.resolve(clip.set.track_count(), clip.set.time_span());
             let count = count.map_err(|error| of_engine(&error.into()))?.len();
-            let engine = self.engine.get().engine(clip.set.track_count() * count)?;
+            let engine = self
+                .engine
+                .get()
+                .engine_for(clip.set.track_count() * count)?;
             let methods = ChannelMethods {
                 method: self.request.method,
                 with: &self.request.with(Quantity::Rotation),
@@ -460,7 +463,7 @@ impl Save {
     fn rotations(
         &self,
         clip: &Motion,
-        samples: &Wanted,
+        samples: &SampleRequest,
         format: &WriteResults,
         out: &mut dyn Write,
     ) -> PyResult<Vec<Diagnostic>> {
@@ -468,7 +471,7 @@ impl Save {
         let timeline = frames.resolve(clip.set.track_count(), clip.set.time_span());
         let timeline = timeline.map_err(|error| of_engine(&error.into()))?;
         let mut notes = vec![("method", self.request.method_name().to_owned())];
-        if let Wanted::Rate(rate, ..) = samples {
+        if let SampleRequest::Rate(rate, ..) = samples {
             notes.push(("rate", rate.to_string()));
         }
         let layout = format.layout.unwrap_or(self.layout);
@@ -483,7 +486,10 @@ impl Save {
         };
         let of_io = |error: std::io::Error| of_write(&error.into());
         let mut writer = format.begin(out, &shape).map_err(of_io)?;
-        let engine = self.engine.get().engine(clip.set.track_count() * count)?;
+        let engine = self
+            .engine
+            .get()
+            .engine_for(clip.set.track_count() * count)?;
         let with = self.request.with(Quantity::Rotation);
         if let Some(method) = uniform(clip, &self.request) {
             stream(&engine, clip, with(method), &frames, layout, |rotations| {

@@ -1,5 +1,5 @@
 //! What `tumble.distributed` is made of: a library cut into shards, a worker that evaluates them, and
-//! the merge. Outcomes are JSON, since they are told to other machines.
+//! the merge. Outcomes are JSON, since they are sent to other machines.
 
 use std::ffi::OsString;
 use std::path::PathBuf;
@@ -11,7 +11,7 @@ use tumble_cli::shards;
 
 use crate::errors::guarded;
 
-/// What a call came to, as the program would end: JSON, or an exit code and a message.
+/// The outcome of a call, as the program would end: JSON, or an exit code and a message.
 type Outcome = (u8, String);
 
 fn ended(outcome: Result<String, Refused>) -> Outcome {
@@ -48,7 +48,7 @@ pub(crate) fn merge(py: Python<'_>, folder: PathBuf) -> PyResult<Outcome> {
 /// A library, cut into shards.
 #[pyclass(frozen, module = "tumble")]
 pub(crate) struct Plan {
-    own: shards::LibraryPlan,
+    plan: shards::LibraryPlan,
 }
 
 #[pymethods]
@@ -65,60 +65,60 @@ impl Plan {
     ) -> PyResult<Self> {
         py.detach(|| {
             guarded(|| {
-                let own =
+                let plan =
                     shards::LibraryPlan::new(&line, &library, listed, &folder, shard_bytes, into);
                 Ok(Self {
-                    own: own.map_err(refuse)?,
+                    plan: plan.map_err(refuse)?,
                 })
             })
         })
     }
 
-    /// Says in the directory of results what its shards are of.
+    /// Writes the plan into the directory of results.
     fn claim(&self, py: Python<'_>, folder: PathBuf) -> PyResult<()> {
-        py.detach(|| guarded(|| self.own.claim(&folder).map_err(refuse)))
+        py.detach(|| guarded(|| self.plan.claim(&folder).map_err(refuse)))
     }
 
     /// Which plan it is.
     #[getter]
     fn id(&self) -> &str {
-        self.own.id()
+        self.plan.id()
     }
 
     /// All that decides over results besides their inputs.
     #[getter]
     fn options(&self) -> &str {
-        self.own.options()
+        self.plan.options()
     }
 
     /// How many inputs there are.
     #[getter]
     fn inputs(&self) -> usize {
-        self.own.inputs()
+        self.plan.inputs()
     }
 
     /// How many shards there are.
     fn __len__(&self) -> usize {
-        self.own.shards()
+        self.plan.shards()
     }
 
     /// The inputs of a shard, from 1: where they are, and where they lie below the library.
     fn inputs_of(&self, shard: usize) -> Vec<(OsString, OsString)> {
-        let inputs = self.own.inputs_of(shard).unwrap_or_default();
+        let inputs = self.plan.inputs_of(shard).unwrap_or_default();
         let text = |(path, below): (PathBuf, PathBuf)| (path.into(), below.into());
         inputs.into_iter().map(text).collect()
     }
 
     /// What the results of a shard are called below the directory of results.
     fn names_of(&self, shard: usize) -> Vec<String> {
-        self.own.names_of(shard).unwrap_or_default()
+        self.plan.names_of(shard).unwrap_or_default()
     }
 }
 
 /// Evaluates shards on a device that stays open.
 #[pyclass(frozen, module = "tumble")]
 pub(crate) struct Worker {
-    own: Mutex<shards::Worker>,
+    worker: Mutex<shards::Worker>,
     device: String,
     options: String,
 }
@@ -129,11 +129,11 @@ impl Worker {
     fn new(py: Python<'_>, line: Vec<OsString>, threads: Option<usize>) -> PyResult<Self> {
         py.detach(|| {
             guarded(|| {
-                let own = shards::Worker::new(&line, threads).map_err(refuse)?;
+                let worker = shards::Worker::new(&line, threads).map_err(refuse)?;
                 Ok(Self {
-                    device: own.device().to_owned(),
-                    options: own.options().to_owned(),
-                    own: Mutex::new(own),
+                    device: worker.device().to_owned(),
+                    options: worker.options().to_owned(),
+                    worker: Mutex::new(worker),
                 })
             })
         })
@@ -174,8 +174,8 @@ impl Worker {
         };
         py.detach(|| {
             guarded(|| {
-                let mut own = self.own.lock().unwrap_or_else(PoisonError::into_inner);
-                let outcome = own.run(&task, &folder);
+                let mut worker = self.worker.lock().unwrap_or_else(PoisonError::into_inner);
+                let outcome = worker.run(&task, &folder);
                 Ok(ended(outcome.map(|outcome| outcome.to_json())))
             })
         })

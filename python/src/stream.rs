@@ -11,7 +11,7 @@ use tumble_formats::motion::Motion;
 
 use crate::arrays::Order;
 use crate::errors::{input, of_engine};
-use crate::evaluate::{OwnSet, sets, uniform};
+use crate::evaluate::{MethodTracks, sets, uniform};
 use crate::options::Request;
 use crate::output::{array, filled};
 use crate::run::{Job, stoppable};
@@ -24,7 +24,7 @@ pub(crate) struct Chunks {
     samples: usize,
     order: Order,
     layout: Layout,
-    source: Source,
+    source: ChunkSource,
     /// Rows and columns that a chunk has at most; rows are tracks or frames, as the layout has it.
     each: (usize, usize),
     /// The row and the column where the next chunk starts.
@@ -32,18 +32,18 @@ pub(crate) struct Chunks {
 }
 
 /// How the rotations of a chunk are made.
-enum Source {
+enum ChunkSource {
     /// Tracks that one method interpolates, prepared for each chunk.
     Tracks(Box<Interpolation>, SampleTimes),
     /// Tracks that have been prepared: all of them by one method, or those of each method.
-    Prepared(Vec<Group>),
+    Prepared(Vec<PreparedTracks>),
 }
 
 /// Tracks that one method interpolates.
-struct Group {
+struct PreparedTracks {
     clip: tumble::Clip,
     frames: SampleTimes,
-    /// Their places among all tracks, increasing; nothing where they are all.
+    /// Their indices among all tracks, increasing; `None` where they are all.
     tracks: Option<Vec<usize>>,
 }
 
@@ -77,19 +77,19 @@ impl Chunks {
         let is_prepared = layout == Layout::FrameMajor || each.1 < columns;
         let with = request.with(Quantity::Rotation);
         let source = match uniform(motion, request) {
-            Some(method) if !is_prepared => Source::Tracks(Box::new(with(method)), frames),
+            Some(method) if !is_prepared => ChunkSource::Tracks(Box::new(with(method)), frames),
             _ => {
-                let wanted = request.samples()?;
-                let group = |(method, set, tracks): OwnSet| -> PyResult<Group> {
+                let requested = request.samples()?;
+                let group = |(method, set, tracks): MethodTracks| -> PyResult<PreparedTracks> {
                     let clip = engine.upload(&set, with(method));
-                    Ok(Group {
+                    Ok(PreparedTracks {
                         clip: clip.map_err(|error| of_engine(&error))?,
-                        frames: wanted.frames(&motion.set, tracks.as_deref())?,
+                        frames: requested.frames(&motion.set, tracks.as_deref())?,
                         tracks,
                     })
                 };
                 let groups = sets(motion, request)?.into_iter().map(group);
-                Source::Prepared(groups.collect::<PyResult<_>>()?)
+                ChunkSource::Prepared(groups.collect::<PyResult<_>>()?)
             }
         };
         Ok(Self {
@@ -116,17 +116,17 @@ impl Chunks {
         if row >= rows || columns == 0 {
             return None;
         }
-        let own = (
+        let part = (
             row..rows.min(row + self.each.0),
             column..columns.min(column + self.each.1),
         );
-        *next = match own.1.end < columns {
-            true => (row, own.1.end),
-            false => (own.0.end, 0),
+        *next = match part.1.end < columns {
+            true => (row, part.1.end),
+            false => (part.0.end, 0),
         };
         Some(match self.layout {
-            Layout::TrackMajor => own,
-            Layout::FrameMajor => (own.1, own.0),
+            Layout::TrackMajor => part,
+            Layout::FrameMajor => (part.1, part.0),
         })
     }
 }
@@ -151,7 +151,7 @@ impl Chunks {
             stoppable(|| {
                 let bytes = bytemuck::cast_slice_mut(&mut *numbers);
                 match &self.source {
-                    Source::Tracks(interpolation, frames) => Job {
+                    ChunkSource::Tracks(interpolation, frames) => Job {
                         engine: &self.engine,
                         set: &self.motion.set,
                         interpolation: **interpolation,
@@ -161,7 +161,7 @@ impl Chunks {
                         encoding: Encoding::F32,
                     }
                     .tracks(part.0, bytes)?,
-                    Source::Prepared(groups) => {
+                    ChunkSource::Prepared(groups) => {
                         for group in groups {
                             group.write(self.layout, part.clone(), bytes)?;
                         }
@@ -189,8 +189,8 @@ impl Chunks {
     }
 }
 
-impl Group {
-    /// Writes its own of some tracks and samples into the bytes of them all.
+impl PreparedTracks {
+    /// Writes those of its tracks that are in a part into the bytes of the part.
     fn write(
         &self,
         layout: Layout,
@@ -207,14 +207,14 @@ impl Group {
             return part(tracks, bytes);
         };
         let [first, end] =
-            [tracks.start, tracks.end].map(|own| all.partition_point(|&it| it < own));
-        let own = &all[first..end];
+            [tracks.start, tracks.end].map(|track| all.partition_point(|&it| it < track));
+        let tracks_of_group = &all[first..end];
         let size = Encoding::F32.bytes();
-        let mut found = vec![0; own.len() * samples.len() * size];
+        let mut found = vec![0; tracks_of_group.len() * samples.len() * size];
         part(first..end, &mut found)?;
-        for (place, &track) in own.iter().enumerate() {
+        for (row, &track) in tracks_of_group.iter().enumerate() {
             for sample in 0..samples.len() {
-                let from = layout.index(place, sample, own.len(), samples.len());
+                let from = layout.index(row, sample, tracks_of_group.len(), samples.len());
                 let to = layout.index(track - tracks.start, sample, tracks.len(), samples.len());
                 if let (Some(from), Some(to)) = (from, to) {
                     let (from, to) = (from * size, to * size);

@@ -12,7 +12,7 @@ use crate::options::Request;
 /// What `Engine.verify` found.
 #[pyclass(frozen, get_all, module = "tumble")]
 pub(crate) struct Verification {
-    /// The method; "authored" where tracks have methods of their own.
+    /// The method; "authored" where tracks have different methods.
     method: &'static str,
     /// The Vulkan device; None on the CPU, where nothing is compared between devices.
     device: Option<String>,

@@ -55,9 +55,9 @@ def step(name):
 
 def clip(tracks: int, keys: int) -> tumble.Clip:
     rng = np.random.default_rng(tracks + keys)
-    turns = rng.normal(size=(tracks, keys, 4))
-    turns /= np.linalg.norm(turns, axis=-1, keepdims=True)
-    return tumble.Clip(np.arange(keys) / 30, turns.astype(np.float32))
+    rotations = rng.normal(size=(tracks, keys, 4))
+    rotations /= np.linalg.norm(rotations, axis=-1, keepdims=True)
+    return tumble.Clip(np.arange(keys) / 30, rotations.astype(np.float32))
 
 
 cpu = tumble.Engine("cpu")
@@ -81,11 +81,11 @@ REQUESTS = [
 
 
 def on_card(request):
-    kind, what, options = request
-    return getattr(engine, kind)(what, device_array=True, **options)
+    kind, clip, options = request
+    return getattr(engine, kind)(clip, device_array=True, **options)
 
 
-expected = [getattr(cpu, kind)(what, **options) for kind, what, options in REQUESTS]
+expected = [getattr(cpu, kind)(clip, **options) for kind, clip, options in REQUESTS]
 
 
 def compared(host_of):
@@ -279,11 +279,11 @@ for title, request in [("small", REQUESTS[0]), ("large", REQUESTS[-1])]:
     def _(request=request):
         import torch
 
-        kind, what, options = request
+        kind, clip, options = request
         evaluated = getattr(engine, kind)
-        host = evaluated(what, **options)
-        on_host = milliseconds(lambda: evaluated(what, **options))
-        over_host = milliseconds(lambda: torch.from_numpy(evaluated(what, **options)).cuda())
+        host = evaluated(clip, **options)
+        on_host = milliseconds(lambda: evaluated(clip, **options))
+        over_host = milliseconds(lambda: torch.from_numpy(evaluated(clip, **options)).cuda())
         straight = milliseconds(lambda: torch.from_dlpack(on_card(request)))
         copy_alone = milliseconds(lambda: torch.from_numpy(host).cuda())
         dropping = []
@@ -294,11 +294,11 @@ for title, request in [("small", REQUESTS[0]), ("large", REQUESTS[-1])]:
             del tensor
             dropping.append(1e3 * (time.perf_counter() - start))
         array = on_card(request)
-        taken = milliseconds(lambda: torch.from_dlpack(array))
+        imported = milliseconds(lambda: torch.from_dlpack(array))
         return (
             f"{host.nbytes / 1e6:.1f} MB: evaluate + from_dlpack {straight:.2f} ms, evaluate to host + cuda() "
             f"{over_host:.2f} ms (evaluate alone {on_host:.2f}, copy alone {copy_alone:.2f}); from_dlpack alone "
-            f"{taken:.3f} ms, giving the memory back {statistics.median(dropping):.3f} ms"
+            f"{imported:.3f} ms, giving the memory back {statistics.median(dropping):.3f} ms"
         )
 
 

@@ -12,19 +12,19 @@ import tumble
 
 def angle(found, expected):
     """The largest angle between rotations, rad; sines, because cosines lose what is small."""
-    turn = Rotation.from_quat(np.asarray(found, np.float64)).inv() * expected
-    return turn.magnitude().max()
+    difference = Rotation.from_quat(np.asarray(found, np.float64)).inv() * expected
+    return difference.magnitude().max()
 
 
-def walk(rng, tracks, keys, most):
-    """Keys that turn by at most `most` radians from each to the next, with signs at random."""
+def walk(rng, tracks, keys, max_angle):
+    """Keys that turn by at most `max_angle` radians from each to the next, with signs at random."""
     found = np.empty((tracks, keys, 4))
     for track in range(tracks):
         rotation = Rotation.random(rng=rng)
         for key in range(keys):
             found[track, key] = rotation.as_quat() * rng.choice([-1, 1])
             axis = rng.normal(size=3)
-            axis *= most * rng.uniform(0, 1) ** 0.25 / np.linalg.norm(axis)
+            axis *= max_angle * rng.uniform(0, 1) ** 0.25 / np.linalg.norm(axis)
             rotation = rotation * Rotation.from_rotvec(axis)
     return found.astype(np.float32)
 
@@ -50,11 +50,11 @@ SETS = {
 
 
 def made(case):
-    tracks, keys, most, ratio, start = SETS[case]
+    tracks, keys, max_angle, ratio, start = SETS[case]
     rng = np.random.default_rng(sorted(SETS).index(case))
     times = start + uneven(rng, keys, ratio)
     at = np.sort(np.concatenate([times, rng.uniform(times[0], times[-1], 4000)]))
-    return times, walk(rng, tracks, keys, most), at
+    return times, walk(rng, tracks, keys, max_angle), at
 
 
 @pytest.mark.parametrize("case", SETS)

@@ -22,9 +22,9 @@ def call(times=TIMES, keys=KEYS, **options):
     return tumble.evaluate(times, keys, **options)
 
 
-def changed(array, place, value):
+def changed(array, index, value):
     array = np.array(array)
-    array[place] = value
+    array[index] = value
     return array
 
 
@@ -163,11 +163,11 @@ REFUSED = {
     "dates as times": (dict(times=TIMES.astype("M8[s]")), None, None, "datetime64"),
     "no samples": (dict(fps=None), None, None, "give `fps`"),
     "fps and at": (dict(at=[0.0]), None, None, "exclude each other"),
-    "fps of 0": (dict(fps=0), None, None, "no frame rate"),
-    "fps below 0": (dict(fps=-25), None, None, "no frame rate"),
-    "fps that is NaN": (dict(fps=float("nan")), None, None, "no frame rate"),
+    "fps of 0": (dict(fps=0), None, None, "not a frame rate"),
+    "fps below 0": (dict(fps=-25), None, None, "not a frame rate"),
+    "fps that is NaN": (dict(fps=float("nan")), None, None, "not a frame rate"),
     "fps that is a word": (dict(fps="film"), None, None, "`film` is not a frame rate"),
-    "fps that is a bool": (dict(fps=True), None, None, "no frame rate"),
+    "fps that is a bool": (dict(fps=True), None, None, "not a frame rate"),
     "more frames than memory": (dict(fps=10**15), None, None, "bytes"),
     "a sample at NaN": (dict(fps=None, at=[0.0, np.nan]), "E022", "at[1]", "time 1 is NaN"),
     "samples of three axes": (dict(fps=None, at=np.zeros((3, 1, 1))), None, None, "at: its shape"),

@@ -55,9 +55,9 @@ def test_rows_have_the_bits_of_clips_alone(kind: Any) -> None:
     for i, (times, keys) in enumerate(made):
         alone = engine.evaluate(tumble.Clip(times, keys), fps=60, method="catmull-rom")
         assert (found["tracks"][i].as_py(), found["frames"][i].as_py()) == alone.shape[:2]
-        own = found["rotations"][i].values.to_numpy()
-        assert own.dtype == np.float32
-        assert own.tobytes() == alone.tobytes(), i
+        rotations = found["rotations"][i].values.to_numpy()
+        assert rotations.dtype == np.float32
+        assert rotations.tobytes() == alone.tobytes(), i
 
 
 def test_tables_slices_and_orders() -> None:
@@ -68,11 +68,11 @@ def test_tables_slices_and_orders() -> None:
     assert engine.batch(chunks, at=[0.1, 0.4], method="slerp").equals(whole)
     part = engine.batch(rows(made).slice(1, 2), at=[0.1, 0.4], method="slerp")
     assert part.equals(whole.slice(1, 2))
-    turned = [(t, np.roll(q, 1, axis=-1)) for t, q in made]
-    other = engine.batch(rows(turned), at=[0.1, 0.4], method="slerp", order="wxyz")
+    reordered = [(t, np.roll(q, 1, axis=-1)) for t, q in made]
+    other = engine.batch(rows(reordered), at=[0.1, 0.4], method="slerp", order="wxyz")
     for i in range(len(made)):
-        own = other["rotations"][i].values.to_numpy().reshape(-1, 4)
-        back = np.roll(own, -1, axis=-1).reshape(-1)
+        rotations = other["rotations"][i].values.to_numpy().reshape(-1, 4)
+        back = np.roll(rotations, -1, axis=-1).reshape(-1)
         assert back.tobytes() == whole["rotations"][i].values.to_numpy().tobytes()
     empty = engine.batch(rows(made).slice(0, 0), fps=60, method="slerp")
     assert (empty.num_rows, empty.schema) == (0, whole.schema)
@@ -83,7 +83,7 @@ NONE = pyarrow.array([[]], pyarrow.list_(pyarrow.float64()))
 
 
 @pytest.mark.parametrize(
-    ("given", "says", "place"),
+    ("columns", "says", "pointer"),
     [
         ({"keys": KEYS}, "no column `times`; there are keys", "batch"),
         ({"times": [[0.0, 1.0]], "keys": KEYS, "frames": [1]}, "rename", "column frames"),
@@ -97,11 +97,11 @@ NONE = pyarrow.array([[]], pyarrow.list_(pyarrow.float64()))
         ({"times": [[0.0, 1.0]], "keys": [[0.0] * 8]}, "", "row 0, keys"),
     ],
 )
-def test_bad_rows_are_refused_by_name(given: dict[str, Any], says: str, place: str) -> None:
+def test_bad_rows_are_refused_by_name(columns: dict[str, Any], says: str, pointer: str) -> None:
     with pytest.raises(tumble.InputError) as caught:
-        tumble.Engine("cpu").batch(pyarrow.table(given), fps=60, method="slerp")
+        tumble.Engine("cpu").batch(pyarrow.table(columns), fps=60, method="slerp")
     assert says in str(caught.value)
-    assert place in (caught.value.pointer or "")
+    assert pointer in (caught.value.pointer or "")
 
 
 def test_what_is_no_table_is_refused() -> None:

@@ -59,9 +59,9 @@ def tumble_program(*arguments, code=0, **options):
 
 def write_clip(path, rng, tracks=4, keys=24):
     """A clip as text."""
-    turns = unit(rng, keys, tracks)[..., [3, 0, 1, 2]].reshape(keys, -1)
+    rotations = unit(rng, keys, tracks)[..., [3, 0, 1, 2]].reshape(keys, -1)
     times = np.cumsum(rng.uniform(0.02, 0.1, keys))
-    rows = [" ".join(f"{x:.7g}" for x in [time, *turn]) for time, turn in zip(times, turns, strict=True)]
+    rows = [" ".join(f"{x:.7g}" for x in [time, *rotation]) for time, rotation in zip(times, rotations, strict=True)]
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(f"# {tracks} 1\n" + "\n".join(rows) + "\n", encoding="utf-8")
 
@@ -69,12 +69,12 @@ def write_clip(path, rng, tracks=4, keys=24):
 @pytest.fixture(scope="module")
 def library(tmp_path_factory):
     """Clips in folders, and what one process makes of them."""
-    place = tmp_path_factory.mktemp("library")
+    folder = tmp_path_factory.mktemp("library")
     rng = np.random.default_rng(11)
     for i in range(CLIPS):
-        write_clip(place / "clips" / f"{i % 7}" / f"{i:05}.dat", rng)
-    tumble_program("eval", "clips", "-o", "one", "--fps", "240", "--device", "cpu", cwd=place)
-    return place
+        write_clip(folder / "clips" / f"{i % 7}" / f"{i:05}.dat", rng)
+    tumble_program("eval", "clips", "-o", "one", "--fps", "240", "--device", "cpu", cwd=folder)
+    return folder
 
 
 class Machines:
@@ -149,16 +149,16 @@ def workers():
 
 def test_the_bytes_are_those_of_one_process(machines, library, monkeypatch):
     monkeypatch.chdir(library)
-    told = []
+    reported = []
     report = evaluate(
-        "clips", "ray", fps=240, address=machines.address, shard_bytes=SHARD, progress=told.append
+        "clips", "ray", fps=240, address=machines.address, shard_bytes=SHARD, progress=reported.append
     )
     assert (report.made, report.skipped, report.failed) == (CLIPS, 0, [])
     assert report.results == CLIPS and report.exit_code == 0
     assert report.shards > 8 and report.workers == 2
     frames = sum(int(np.load(path, mmap_mode="r").shape[1]) for path in pathlib.Path("one").rglob("*.npy"))
     assert report.rotations == 4 * frames
-    assert told[-1].inputs_done == CLIPS and told[-1].seconds_left == 0
+    assert reported[-1].inputs_done == CLIPS and reported[-1].seconds_left == 0
     assert_equal("one", "ray")
     tumble_program("check", "ray")
     resumed = tumble_program("eval", "clips", "-o", "ray", "--fps", "240", "--resume")
@@ -273,12 +273,12 @@ def test_a_node_that_is_added_works(machines, library, tmp_path):
     ray.init(address=machines.address, log_to_driver=False)
 
     @ray.remote(num_cpus=1)
-    def hold(path):
+    def occupy(path):
         pathlib.Path(path).touch()
         time.sleep(600)
 
     held = [tmp_path / f"held{i}" for i in range(2)]
-    holding = [hold.remote(str(path)) for path in held]
+    holding = [occupy.remote(str(path)) for path in held]
     while not all(path.exists() for path in held):
         time.sleep(0.05)
     reports = []
@@ -345,7 +345,7 @@ def test_inputs_that_fail_are_named(machines, library, tmp_path):
         "worker_process_setup_hook": "tumble_faults.kill_on_the_clip_that_says_so",
     })
     report = evaluate(clips, tmp_path / "out", address=machines.address, fps=240)
-    failed = {pathlib.Path(own.input).name: own.message for own in report.failed}
+    failed = {pathlib.Path(refusal.input).name: refusal.message for refusal in report.failed}
     assert set(failed) == {"bad.dat", "long.dat", "kills-its-worker.dat"}
     assert "ends the process" in failed["kills-its-worker.dat"]
     assert report.exit_code == 3 and report.results == 7
@@ -390,9 +390,9 @@ def test_vulkan_writes_the_same_bytes(machines, library, tmp_path):
         shard_bytes=SHARD,
     )
     assert (report.made, report.skipped) == (CLIPS // 2, CLIPS // 2)
-    own, other = tree(tmp_path / "out"), tree(library / "one")
-    manifests = [files.pop("manifest.jsonl").decode().splitlines() for files in (own, other)]
-    assert own == other
+    resumed, other = tree(tmp_path / "out"), tree(library / "one")
+    manifests = [files.pop("manifest.jsonl").decode().splitlines() for files in (resumed, other)]
+    assert resumed == other
     devices = {json.loads(line)["device"] for line in manifests[0]}
     assert len(devices) == 2 and "CPU" in devices
     for lines in zip(*manifests, strict=True):
@@ -423,8 +423,8 @@ def test_rows_of_parquet(machines, library, tmp_path):
     assert set(rows) == {str(name.with_suffix("")) for name in results}
     for name, path in results.items():
         row, whole = rows[str(name.with_suffix(""))], np.load(path)
-        own = np.asarray(row["rotations"], np.float32).reshape(row["tracks"], row["frames"], 4)
-        assert np.array_equal(own.view(np.uint32), whole.view(np.uint32))
+        rotations = np.asarray(row["rotations"], np.float32).reshape(row["tracks"], row["frames"], 4)
+        assert np.array_equal(rotations.view(np.uint32), whole.view(np.uint32))
         assert row["sha256"] == hashlib.sha256(whole.tobytes()).hexdigest()
     tumble_program("check", out)
     before = tree(out)
@@ -446,11 +446,11 @@ def bucket(monkeypatch):
         [TOOLS / "moto_server", "-H", "127.0.0.1", "-p", str(port)],
         stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
     )
-    place = f"http://127.0.0.1:{port}"
+    address = f"http://127.0.0.1:{port}"
     try:
         for _ in range(200):
             with contextlib.suppress(OSError):
-                urllib.request.urlopen(urllib.request.Request(f"{place}/clips", method="PUT"))
+                urllib.request.urlopen(urllib.request.Request(f"{address}/clips", method="PUT"))
                 break
             time.sleep(0.05)
         yield lambda name: (
@@ -511,9 +511,9 @@ def test_object_stores(machines, library, bucket, tmp_path, capsys):
 
     evaluate(url, tmp_path / "local", **options)
     tumble_program("check", tmp_path / "local")
-    own = tree(tmp_path / "local")
-    assert own.pop("manifest.jsonl").decode().splitlines() == manifest
-    assert own == found
+    local = tree(tmp_path / "local")
+    assert local.pop("manifest.jsonl").decode().splitlines() == manifest
+    assert local == found
 
 
 def test_a_driver_stops_where_no_machine_may_take_part(monkeypatch, library, tmp_path, machines):

@@ -122,9 +122,9 @@ def test_what_follows_from_rotations(clip, engine):
     step = 1e-4
     at = np.array([0.2, 0.9, 1.7])
     before, after = (clip.evaluate(at=at + s, method="c2").astype(np.float64) for s in (-step, step))
-    turn = Rotation.from_quat(before.reshape(-1, 4)).inv() * Rotation.from_quat(after.reshape(-1, 4))
+    difference = Rotation.from_quat(before.reshape(-1, 4)).inv() * Rotation.from_quat(after.reshape(-1, 4))
     body = engine.velocity(clip, at=at, method="c2").reshape(-1, 3)
-    assert np.abs(turn.as_rotvec() / (2 * step) - body).max() < 5e-3
+    assert np.abs(difference.as_rotvec() / (2 * step) - body).max() < 5e-3
     here = Rotation.from_quat(clip.evaluate(at=at, method="c2").reshape(-1, 4))
     world = engine.velocity(clip, at=at, method="c2", axes="world").reshape(-1, 3)
     assert np.abs(here.apply(body) - world).max() < 1e-4
@@ -152,9 +152,9 @@ def test_poses_and_places_in_the_world(engine):
     assert translations[0].tolist() == [[0, 0, 1], [0, 0, 2], [0, 0, 3]]
     assert np.array_equal(rotations, clip.evaluate(fps=2, method="slerp"))
     assert (scales == 1).all()
-    positions, turned = engine.world(clip, fps=2, method="slerp")
+    positions, world_rotations = engine.world(clip, fps=2, method="slerp")
     assert np.allclose(positions[1, -1], [0, 2, 3], atol=1e-6)
-    assert np.allclose(turned[1, -1], [0, 0, half, half], atol=1e-6)
+    assert np.allclose(world_rotations[1, -1], [0, 0, half, half], atol=1e-6)
     frames, _, _ = engine.poses(clip, fps=2, layout="frame", method="slerp")
     assert np.array_equal(frames.swapaxes(0, 1), translations)
 
@@ -208,9 +208,9 @@ def test_streams_are_the_whole(clip, engine):
         for chunk in [100, 2500, 1 << 20]:
             found = np.full_like(whole, np.nan)
             for part in engine.stream(clip, fps=1000, chunk=chunk, layout=layout):
-                place = (part.tracks, part.frames)
+                part_index = (part.tracks, part.frames)
                 assert part.rotations.size // 4 <= chunk
-                found[place if layout == "track" else place[::-1]] = part.rotations
+                found[part_index if layout == "track" else part_index[::-1]] = part.rotations
             assert np.array_equal(found, whole)
     first = next(iter(engine.stream(clip, fps=1000, order="wxyz")))
     assert np.array_equal(np.roll(first.rotations, -1, axis=-1), clip.evaluate(fps=1000))
@@ -226,8 +226,8 @@ def test_streams_of_mixed_samplers_are_the_whole(tmp_path, engine):
             for chunk in [7, 300, 1 << 20]:
                 found = np.full_like(whole, np.nan)
                 for part in engine.stream(clip, fps=240, chunk=chunk, layout=layout):
-                    place = (part.tracks, part.frames)
-                    found[place if layout == "track" else place[::-1]] = part.rotations
+                    part_index = (part.tracks, part.frames)
+                    found[part_index if layout == "track" else part_index[::-1]] = part.rotations
                 assert np.array_equal(found, whole)
 
 
@@ -278,8 +278,8 @@ def test_rates_in_the_world_are_those_of_the_world(layout, rng):
         return Rotation.from_quat(rotations.reshape(-1, 4))
 
     found = engine.velocity(clip, at=at, axes="world", **how)
-    turned = (world(at + step) * world(at - step).inv()).as_rotvec() / (2 * step)
-    assert np.abs(found.reshape(-1, 3) - turned).max() < 5e-3 * (1 + np.abs(turned).max())
+    expected = (world(at + step) * world(at - step).inv()).as_rotvec() / (2 * step)
+    assert np.abs(found.reshape(-1, 3) - expected).max() < 5e-3 * (1 + np.abs(expected).max())
     assert np.abs(found - engine.velocity(clip, at=at, axes="parent", **how)).max() > 0.1
     out = np.empty_like(found)
     assert engine.velocity(clip, at=at, axes="world", out=out, **how) is out

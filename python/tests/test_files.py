@@ -38,9 +38,9 @@ def test_the_same_bits_as_the_program(tmp_path, method):
     clip = tumble.load(PENDULUM).clip
     found = clip.evaluate(fps="30000/1001", method=method)
     assert digest(found.tobytes()) == digest(np.load(out).tobytes())
-    own = tmp_path / "own.npy"
-    tumble.save(own, clip, fps="30000/1001", method=method)
-    assert own.read_bytes() == out.read_bytes()
+    saved = tmp_path / "own.npy"
+    tumble.save(saved, clip, fps="30000/1001", method=method)
+    assert saved.read_bytes() == out.read_bytes()
 
 
 @pytest.mark.parametrize("ending", ["npy", "csv", "npz", "bvh", "parquet", "arrow", "glb"])
@@ -71,13 +71,13 @@ def test_clips_come_back_from_every_format(tmp_path, rng):
         again = tumble.read(path).clip
         assert [name for name in again.names if name in clip.names] == clip.names, ending
         for name in clip.names:
-            turn = (clip.keys(name) * again.keys(name)).sum(axis=-1)
-            assert np.abs(np.abs(turn) - 1).max() < 1e-6, (ending, name)
+            cosine = (clip.keys(name) * again.keys(name)).sum(axis=-1)
+            assert np.abs(np.abs(cosine) - 1).max() < 1e-6, (ending, name)
             assert np.allclose(again.times(name), clip.times(name)), ending
     one = tumble.Clip([0.0, 0.1], unit(rng, 2), translations=[[[0, 0, 0], [1, 2, 3]]])
     tumble.save(tmp_path / "camera.tum", one)
-    times, places = tumble.load(tmp_path / "camera.tum").clip.translations(0)
-    assert times.tolist() == [0.0, 0.1] and places[1].tolist() == [1, 2, 3]
+    times, positions = tumble.load(tmp_path / "camera.tum").clip.translations(0)
+    assert times.tolist() == [0.0, 0.1] and positions[1].tolist() == [1, 2, 3]
 
 
 def test_files_are_mappings(shared):
@@ -412,9 +412,9 @@ def test_units_and_axes(shared):
     path = shared / "bvh" / "example.bvh"
     plain, scaled = tumble.load(path).clip, tumble.load(path, scale=0.01).clip
     assert np.allclose(scaled.offsets, plain.offsets * 0.01)
-    turned = tumble.load(path, up="z").clip
+    rotated = tumble.load(path, up="z").clip
     before, _ = tumble.Engine().world(plain, at=0.0)
-    after, _ = tumble.Engine().world(turned, at=0.0)
+    after, _ = tumble.Engine().world(rotated, at=0.0)
     assert np.allclose(after, before[..., [0, 2, 1]] * [1, -1, 1], atol=1e-4)
 
 

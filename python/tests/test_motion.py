@@ -55,19 +55,19 @@ def test_states_are_those_of_the_engine(clips, rng):
     times = library.sample_times(ids, rng)
     times[:4] = [0.0, library.lengths[ids[1]], -5.0, 1e9]
     state = library.sample(ids, times)
-    for place, (clip, time) in enumerate(zip(ids, times)):
+    for instance, (clip, time) in enumerate(zip(ids, times)):
         played = clips[clip]
         at = np.clip(3.0 + time, *played.span)
         expected = engine.evaluate(played, at=at, method="slerp")
-        signs = np.sign((expected * state.rotations[place]).sum(-1, keepdims=True))
-        np.testing.assert_allclose(state.rotations[place] * signs, expected, atol=2e-6)
+        signs = np.sign((expected * state.rotations[instance]).sum(-1, keepdims=True))
+        np.testing.assert_allclose(state.rotations[instance] * signs, expected, atol=2e-6)
         positions, world = engine.world(played, at=[at], method="slerp")
-        np.testing.assert_allclose(state.positions[place], positions[:, 0], atol=2e-5)
-        signs = np.sign((world[:, 0] * state.world_rotations[place]).sum(-1, keepdims=True))
-        np.testing.assert_allclose(state.world_rotations[place] * signs, world[:, 0], atol=5e-6)
+        np.testing.assert_allclose(state.positions[instance], positions[:, 0], atol=2e-5)
+        signs = np.sign((world[:, 0] * state.world_rotations[instance]).sum(-1, keepdims=True))
+        np.testing.assert_allclose(state.world_rotations[instance] * signs, world[:, 0], atol=5e-6)
         rates = engine.velocity(played, at=[at], method="slerp", axes="world")[:, 0]
         if 0 < time < library.lengths[clip]:
-            np.testing.assert_allclose(state.angular_velocities[place], rates, atol=2e-3)
+            np.testing.assert_allclose(state.angular_velocities[instance], rates, atol=2e-3)
     assert state.rotations.dtype == np.float32 and state.positions.shape == (60, JOINTS, 3)
 
 
@@ -82,8 +82,8 @@ def test_velocities_are_those_of_differences(clips, rng, method):
     rate = (after.positions - before.positions) / (2 * step)
     np.testing.assert_allclose(state.velocities, rate, rtol=1e-2, atol=0.1)
     a, b = (Rotation.from_quat(state.world_rotations.reshape(-1, 4)) for state in (before, after))
-    turned = (b * a.inv()).as_rotvec().reshape(200, JOINTS, 3) / (2 * step)
-    np.testing.assert_allclose(state.angular_velocities, turned, rtol=1e-2, atol=0.1)
+    expected = (b * a.inv()).as_rotvec().reshape(200, JOINTS, 3) / (2 * step)
+    np.testing.assert_allclose(state.angular_velocities, expected, rtol=1e-2, atol=0.1)
 
 
 def test_finite_differences_are_those_of_two_frames(clips):
@@ -137,7 +137,7 @@ def test_wrong_arguments_are_refused(clips, rng):
     other = tumble.Clip([0.0, 1.0], unit(rng, 2, 2))
     with pytest.raises(tumble.InputError, match="2 tracks; the skeleton has 7"):
         tumble.MotionLibrary([clips[0], other])
-    with pytest.raises(tumble.InputError, match="hang together"):
+    with pytest.raises(tumble.InputError, match="no skeleton"):
         tumble.MotionLibrary([other])
     scaled = tumble.Clip([0.0, 1.0], unit(rng, 1, 2), parents=[None], scales=np.ones((1, 2, 3)))
     with pytest.raises(tumble.InputError, match="scales"):
@@ -200,9 +200,9 @@ def test_workers_share_a_file(clips, rng, tmp_path):
 
 
 def test_libraries_are_read_from_files(clips, tmp_path):
-    for place, clip in enumerate(clips[:3]):
-        rate = [30, 24, 120][place]
-        tumble.save(tmp_path / f"{place}.bvh", clip, fps=rate, method="slerp")
+    for index, clip in enumerate(clips[:3]):
+        rate = [30, 24, 120][index]
+        tumble.save(tmp_path / f"{index}.bvh", clip, fps=rate, method="slerp")
     library = tumble.MotionLibrary.load(tmp_path / "*.bvh")
     assert (library.names, len(library), library.joints) == (["0", "1", "2"], 3, JOINTS)
     np.testing.assert_allclose(library.lengths, [39 / 30, 6 / 24, 199 / 120], atol=1e-4)

@@ -324,12 +324,12 @@ def test_forms_of_paths(rng, engine):
     steady, _ = engine.follow(None, points[0], rate=2.0, method="linear", fps=100, speed="constant")
     steps = np.linalg.norm(np.diff(steady, axis=0), axis=-1)
     assert abs(np.median(steps) - 0.02) < 1e-4
-    far, _ = engine.follow(times, points[0] + 4e6, fps=10)
-    assert far.dtype == np.float64 and np.abs(far - 4e6 - both[0][0]).max() < 1e-6
+    distant, _ = engine.follow(times, points[0] + 4e6, fps=10)
+    assert distant.dtype == np.float64 and np.abs(distant - 4e6 - both[0][0]).max() < 1e-6
     target = engine.follow(times, points, fps=10, look_at=1)[1][0]
     forward = Rotation.from_quat(target).apply([0, 0, 1])
-    way = both[0][1] - both[0][0]
-    assert np.abs(forward - way / np.linalg.norm(way, axis=-1, keepdims=True)).max() < 1e-4
+    direction = both[0][1] - both[0][0]
+    assert np.abs(forward - direction / np.linalg.norm(direction, axis=-1, keepdims=True)).max() < 1e-4
 
 
 def test_what_cannot_be_followed(rng, engine):
@@ -379,7 +379,7 @@ def test_routes_are_those_of_the_program(tmp_path):
         line = ["route", "hill.obj", "--from", "1,0,1", "--to", "8,0,7", "--by", by, "-o", "way.csv"]
         program(*line, "--overwrite", cwd=tmp_path)
         expected = np.loadtxt(tmp_path / "way.csv", delimiter=",", skiprows=1)
-        with pytest.warns(tumble.InputWarning, match="start: it is .* off the surface"):
+        with pytest.warns(tumble.InputWarning, match="start: it is .* away from the surface"):
             route = surface.route([1, 0, 1], [8, 0, 7], by=by)
         assert np.array_equal(np.c_[route.points, route.normals], expected)
         assert abs(np.linalg.norm(np.diff(route.points, axis=0), axis=1).sum() - route.length) < 1e-9
@@ -407,8 +407,8 @@ def test_ways_keep_clear_and_walkers_wait(engine):
     first, second = tumble.walk(routes, speed=1.0, radius=0.25)
     assert first.times[-1] == 6 and second.times[-1] > 6.2
     at = np.linspace(0, 7, 701)
-    places = [np.stack([np.interp(at, w.times, w.points[:, k]) for k in range(3)], -1) for w in (first, second)]
-    assert np.linalg.norm(places[0] - places[1], axis=-1).min() > 0.5 - 1e-6
+    positions = [np.stack([np.interp(at, w.times, w.points[:, k]) for k in range(3)], -1) for w in (first, second)]
+    assert np.linalg.norm(positions[0] - positions[1], axis=-1).min() > 0.5 - 1e-6
     mover = ([0.0, 10.0], [[1, 0, 4], [1, 0, 4]], 0.5)
     with pytest.warns(tumble.InputWarning, match=r"routes\[0\]"):
         assert tumble.walk(routes[:1], speed=1.0, radius=0.25, movers=[mover])[0] is None
@@ -440,8 +440,8 @@ def test_surfaces_that_are_none():
 
 def test_reduced_clips_stay_within_their_bounds(rng, engine, tmp_path):
     times = np.arange(121) / 60
-    turns = np.sin(times[:, None, None] * rng.uniform(1, 4, size=(3, 3)) + rng.normal(size=(3, 3)))
-    keys = Rotation.from_rotvec(turns.reshape(-1, 3)).as_quat().reshape(121, 3, 4).swapaxes(0, 1)
+    rotation_vectors = np.sin(times[:, None, None] * rng.uniform(1, 4, size=(3, 3)) + rng.normal(size=(3, 3)))
+    keys = Rotation.from_rotvec(rotation_vectors.reshape(-1, 3)).as_quat().reshape(121, 3, 4).swapaxes(0, 1)
     clip = tumble.Clip(times, keys, parents=[None, 0, 1], offsets=[[0, 0, 0], [0, 1, 0], [0, 1, 0]])
     found = tumble.reduce(clip, tolerance=0.5, engine=engine)
     assert found.keys_before == 363 and found.keys_after < 250
@@ -511,9 +511,9 @@ def test_path_errors_are_those_of_the_program(rng, tmp_path):
     times = np.arange(60) / 10
     path = np.cumsum(rng.normal(size=(60, 3)), axis=0)
     keys = unit(rng, 60)
-    turn = Rotation.from_euler("xyz", [20, -30, 70], degrees=True)
-    moved = 1.5 * turn.apply(path) + [1, 2, 3] + 0.05 * rng.normal(size=(60, 3))
-    rotated = (turn * Rotation.from_quat(keys)).as_quat()
+    alignment = Rotation.from_euler("xyz", [20, -30, 70], degrees=True)
+    moved = 1.5 * alignment.apply(path) + [1, 2, 3] + 0.05 * rng.normal(size=(60, 3))
+    rotated = (alignment * Rotation.from_quat(keys)).as_quat()
     for name, where, q in [("truth.tum", path, keys), ("estimate.tum", moved, rotated)]:
         np.savetxt(tmp_path / name, np.c_[times, where, q], fmt="%.9f")
     line = ["compare", "truth.tum", "estimate.tum", "--align", "sim3", "--ape", "--rpe", "1s", "--json"]

@@ -73,8 +73,8 @@ def test_pools_give_what_this_process_gives(method, clip, tmp_path):
     context = multiprocessing.get_context(method)
     pool = context.Pool(2)
     try:
-        given = [(clip, engine, str(tmp_path))] * 3
-        found = pool.map_async(work, given).get(LIMIT)
+        arguments = [(clip, engine, str(tmp_path))] * 3
+        found = pool.map_async(work, arguments).get(LIMIT)
     finally:
         pool.terminate()
     assert found == [expected] * 3

@@ -47,10 +47,10 @@ def test_two_threads_evaluate_at_once(rng):
     expected = clip.evaluate(fps=60)
     found = [None] * 8
 
-    def work(place):
-        found[place] = engine.evaluate(clip, fps=60)
+    def work(index):
+        found[index] = engine.evaluate(clip, fps=60)
 
-    threads = [threading.Thread(target=work, args=(place,)) for place in range(len(found))]
+    threads = [threading.Thread(target=work, args=(index,)) for index in range(len(found))]
     for thread in threads:
         thread.start()
     for thread in threads:

@@ -4,7 +4,7 @@ pub(crate) mod request;
 
 use glam::Quat;
 
-use crate::checks::{check_encoding, check_rows, check_window, in_quats};
+use crate::checks::{check_encoding, check_window};
 use crate::clip::request::Request;
 use crate::curve::options::Quantity;
 use crate::engine::Engine;
@@ -82,8 +82,9 @@ impl Clip {
         Ok(Samples::new(storage, tracks, samples, layout))
     }
 
-    /// As [`Clip::evaluate`] in a layout, or as [`Clip::rates`], into the caller's memory, of which
-    /// [`Engine::evaluate_into`] says more.
+    /// Into memory of the result's type, of which [`Engine::evaluate_into`] says more: short for
+    /// [`request`](Clip::request)`(frames).`[`layout`](Request::layout)`(layout).`[`evaluate_into`](Request::evaluate_into)`(output)`,
+    /// which takes memory of any type.
     ///
     /// # Errors
     /// As [`Clip::evaluate`]; also when `output` is not exactly as long as the result, or of another
@@ -94,14 +95,9 @@ impl Clip {
         layout: Layout,
         output: &mut [R],
     ) -> Result<(), Error> {
-        check_rows::<R>(self.quantity())?;
-        let timeline = self.timeline(frames)?;
-        let whole = Window::whole(self.track_count(), timeline.len(), layout);
-        in_quats(output, whole.len(), |quats| {
-            let timeline = self.uploaded.folded(&timeline)?;
-            let bytes = bytemuck::cast_slice_mut(quats);
-            Ok((self.uploaded).evaluate_into(&timeline, &whole, Encoding::F32, bytes)?)
-        })
+        self.request(frames)
+            .layout(layout)
+            .evaluate_values_into(output)
     }
 
     /// Evaluates a window of the result into `output`, encoded, if both fit the result.

@@ -9,7 +9,7 @@ use std::sync::Arc;
 #[cfg(feature = "prove")]
 use std::time::Duration;
 
-use crate::checks::{check_encoding, check_rows, in_quats};
+use crate::checks::check_encoding;
 use crate::clip::Clip;
 use crate::clip::request::Request;
 use crate::cpu::engine::CpuEngine;
@@ -357,10 +357,11 @@ impl Engine {
         Ok(Samples::new(storage, tracks, samples, layout))
     }
 
-    /// As [`Engine::evaluate`] in a layout, or as [`Engine::rates`], into the caller's memory: [`Quat`](glam::Quat) takes
-    /// rotations, [`Vec4`](glam::Vec4) velocities and accelerations, `[f32; 4]` either. It is faster
-    /// when it is used again ([`OutputBuffer`](crate::output::buffer::OutputBuffer)): the first touch
-    /// of fresh memory costs more than evaluating. Memory that is aligned to 16 bytes is filled
+    /// Into memory of the result's type: short for [`request`](Engine::request)`(set, interpolation,
+    /// frames).`[`layout`](Request::layout)`(layout).`[`evaluate_into`](Request::evaluate_into)`(output)`, which takes
+    /// memory of any type. [`Quat`](glam::Quat) takes rotations, [`Vec4`](glam::Vec4) velocities and accelerations,
+    /// `[f32; 4]` either. It is faster when it is used again ([`OutputBuffer`](crate::output::buffer::OutputBuffer)):
+    /// the first touch of fresh memory costs more than evaluating. Memory that is aligned to 16 bytes is filled
     /// without a copy.
     ///
     /// # Errors
@@ -374,14 +375,9 @@ impl Engine {
         layout: Layout,
         output: &mut [R],
     ) -> Result<(), Error> {
-        let interpolation = interpolation.into();
-        check_rows::<R>(interpolation.quantity)?;
-        let timeline = frames.resolve(set.track_count(), set.time_span())?;
-        let request = SetRequest::whole(set, &interpolation, &timeline);
-        let needed = set.track_count() * timeline.len(); // which `resolve` found to fit
-        in_quats(output, needed, |quats| {
-            Ok((self.backend).evaluate_tracks(&request, layout, quats)?)
-        })
+        self.request(set, interpolation, frames)
+            .layout(layout)
+            .evaluate_values_into(output)
     }
 
     /// Compiles the kernels for results of these, which a Vulkan device else does when the first of them

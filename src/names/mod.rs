@@ -15,7 +15,8 @@ pub struct UnknownNameError {
 }
 
 /// The value of that name among all values of an option.
-pub(crate) fn named<T: Copy>(
+#[doc(hidden)]
+pub fn named<T: Copy>(
     option: &'static str,
     all: &[T],
     name_of: fn(T) -> &'static str,
@@ -30,13 +31,15 @@ pub(crate) fn named<T: Copy>(
 }
 
 /// Gives the variants of an option their names: `ALL`, `name`, `Display` and `FromStr`. A variant with data names
-/// the value that stands for it: `Clamped = Self::AT_REST => "clamped"`.
+/// the value that stands for it: `Clamped = Self::AT_REST => "clamped"`. The packages of this workspace use it too.
+#[doc(hidden)]
+#[macro_export]
 macro_rules! names {
     ($type:ident, $option:literal, $($variant:ident $(= $value:expr)? => $name:literal),+ $(,)?) => {
         impl $type {
             /// Every value, in the order in which help and messages list them.
             pub const ALL: [Self; [$($name),+].len()] =
-                [$($crate::names::names!(@value $variant $(= $value)?)),+];
+                [$($crate::names!(@value $variant $(= $value)?)),+];
 
             /// The name by which programs call it.
             #[must_use]

@@ -122,23 +122,53 @@ names! {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BodyAxis(pub(crate) usize, pub(crate) f64);
 
+/// `+x` is a name of `x` too.
 impl std::str::FromStr for BodyAxis {
     type Err = FollowError;
 
     fn from_str(name: &str) -> Result<Self, FollowError> {
-        let (sign, letter) = match name.strip_prefix('-') {
-            Some(letter) => (-1.0, letter),
-            None => (1.0, name.strip_prefix('+').unwrap_or(name)),
+        let name = match name.strip_prefix('+') {
+            Some(letter) if !letter.starts_with('-') => letter,
+            _ => name,
         };
-        let axis = ["x", "y", "z"]
-            .iter()
-            .position(|axis_name| *axis_name == letter);
-        axis.map(|axis| Self(axis, sign)).ok_or(FollowError::Axes)
+        let found = Self::ALL.into_iter().find(|axis| axis.name() == name);
+        found.ok_or(FollowError::Axes)
+    }
+}
+
+impl std::fmt::Display for BodyAxis {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.pad(self.name())
     }
 }
 
 impl BodyAxis {
-    fn vector(self) -> DVec3 {
+    /// Every axis.
+    pub const ALL: [Self; 6] = [
+        Self(0, 1.0),
+        Self(1, 1.0),
+        Self(2, 1.0),
+        Self(0, -1.0),
+        Self(1, -1.0),
+        Self(2, -1.0),
+    ];
+
+    /// The name by which programs call it: `x`, `-y`.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match (self.0 % 3, self.1 < 0.0) {
+            (0, false) => "x",
+            (1, false) => "y",
+            (_, false) => "z",
+            (0, true) => "-x",
+            (1, true) => "-y",
+            (_, true) => "-z",
+        }
+    }
+
+    /// Its direction in the body.
+    #[must_use]
+    pub fn direction(self) -> DVec3 {
         DVec3::AXES[self.0 % 3] * self.1
     }
 }
@@ -175,7 +205,7 @@ impl Follow {
 
     /// The rotation from the body's own axes to z forward, y up.
     pub(crate) fn body_axes(&self) -> DQuat {
-        let [forward, up] = self.axes.map(BodyAxis::vector);
+        let [forward, up] = self.axes.map(BodyAxis::direction);
         let axes = glam::DMat3::from_cols(up.cross(forward), up, forward);
         DQuat::from_mat3(&axes).conjugate()
     }

@@ -1,7 +1,7 @@
 //! `--output` and its options: what is written for each rotation.
 
+use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
-use clap::{Args, ValueEnum};
 use glam::Vec3;
 use tumble::{Axes, Encoding, EncodingOptions, EulerSequence, MatrixOrder, Quantity, Skeleton};
 use tumble_formats::quaternion::ComponentOrder;
@@ -119,22 +119,13 @@ fn axes() -> impl TypedValueParser<Value = Axes> {
     PossibleValuesParser::new(Axes::ALL.map(value)).map(|name| name.parse().unwrap_or(Axes::Parent))
 }
 
-/// The order of a quaternion's components.
-#[derive(Debug, Clone, Copy, ValueEnum)]
-pub(crate) enum OrderArgument {
-    /// as in memory, glTF and SciPy
-    Xyzw,
-    /// as in .dat files
-    Wxyz,
-}
-
-impl OrderArgument {
-    pub(crate) fn order(self) -> ComponentOrder {
-        match self {
-            Self::Xyzw => ComponentOrder::Xyzw,
-            Self::Wxyz => ComponentOrder::Wxyz,
-        }
-    }
+/// Parses the name of an order of a quaternion's components.
+pub(crate) fn component_order() -> impl TypedValueParser<Value = ComponentOrder> {
+    let help = |order| match order {
+        ComponentOrder::Xyzw => "as in memory, glTF and SciPy",
+        ComponentOrder::Wxyz => "as in .dat files",
+    };
+    one_of(ComponentOrder::ALL.map(|order| (order.name(), help(order), order)))
 }
 
 /// The kinds of whole poses.

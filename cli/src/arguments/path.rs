@@ -5,7 +5,7 @@ use std::path::Path;
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use glam::{DVec3, Mat3, Quat};
-use tumble::paths::{BodyAxis, Direction, Follow, PathFrame, PathSpeed, Twist};
+use tumble::paths::{BodyAxis, Direction, Follow, FollowError, PathFrame, PathSpeed, Twist};
 use tumble::{Channel, Ends, TrackError, TrackSet, VectorKeys, VectorMethod};
 use tumble_formats::motion::Motion;
 use tumble_formats::path::{Pace, open_paths};
@@ -63,10 +63,10 @@ pub(crate) struct PathArguments {
     path_speed: PathSpeed,
     /// The axis of the body that faces forward
     #[arg(long, value_name = "AXIS", default_value = "z", value_parser = axis, allow_hyphen_values = true)]
-    forward: BodyAxisArgument,
+    forward: BodyAxis,
     /// The axis of the body that faces up
     #[arg(long, value_name = "AXIS", default_value = "y", value_parser = axis, allow_hyphen_values = true)]
-    upward: BodyAxisArgument,
+    upward: BodyAxis,
 }
 
 fn frame() -> impl TypedValueParser<Value = PathFrame> {
@@ -180,22 +180,9 @@ fn speed(text: &str) -> Result<PathSpeed, String> {
     }
 }
 
-/// An axis of a body, and the direction that it has in the body.
-#[derive(Debug, Clone, Copy)]
-struct BodyAxisArgument {
-    axis: BodyAxis,
-    direction: DVec3,
-}
-
-fn axis(text: &str) -> Result<BodyAxisArgument, String> {
-    let axis = text
-        .parse()
-        .map_err(|error: tumble::paths::FollowError| error.to_string())?;
-    let letter = text.trim_start_matches(['+', '-']);
-    let index = ["x", "y", "z"].iter().position(|name| *name == letter);
-    let sign = if text.starts_with('-') { -1.0 } else { 1.0 };
-    let direction = DVec3::AXES[index.unwrap_or(2)] * sign;
-    Ok(BodyAxisArgument { axis, direction })
+fn axis(text: &str) -> Result<BodyAxis, String> {
+    let axis = text.parse();
+    axis.map_err(|error: FollowError| error.to_string())
 }
 
 fn methods() -> impl TypedValueParser<Value = VectorMethod> {
@@ -216,7 +203,7 @@ impl PathArguments {
 
     /// The rotation of a body that faces along z, with y up, to `--forward` and `--upward`.
     pub(crate) fn body_rotation(&self) -> Quat {
-        let [z, y] = [self.forward, self.upward].map(|argument| argument.direction.as_vec3());
+        let [z, y] = [self.forward, self.upward].map(|axis| axis.direction().as_vec3());
         Quat::from_mat3(&Mat3::from_cols(y.cross(z), y, z))
     }
 
@@ -257,7 +244,7 @@ impl PathArguments {
             up: self.path_up,
             twist: self.twist,
             speed: self.path_speed,
-            axes: [self.forward.axis, self.upward.axis],
+            axes: [self.forward, self.upward],
         })
     }
 }

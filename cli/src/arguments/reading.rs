@@ -15,6 +15,7 @@ use tumble_formats::npz::body_offsets;
 use tumble_formats::{Code, Diagnostic, FORMATS, Format, Limits, Loaded, ReadOptions};
 
 use crate::arguments::options::{AppliesTo, OPTIONS};
+use crate::arguments::output::one_of;
 use crate::arguments::time::times;
 use crate::messages::exit::{self, Failure};
 use crate::messages::names;
@@ -45,8 +46,8 @@ pub(crate) struct ReadingArguments {
     #[arg(long, value_name = "MAP")]
     map: Option<String>,
     /// The unit of times that are whole numbers
-    #[arg(long, value_enum, value_name = "UNIT")]
-    time_unit: Option<TimeUnitArgument>,
+    #[arg(long, value_name = "UNIT", value_parser = time_unit())]
+    time_unit: Option<TimeUnit>,
     /// Skip keys with missing numbers in a table (blank cells, nulls, NaN): the track is interpolated
     /// from the keys beside them
     #[arg(long)]
@@ -72,16 +73,16 @@ pub(crate) struct ReadingArguments {
     scale: Option<ScaleArgument>,
     /// Convert to this up axis by rotating the roots: from the up axis that an FBX file states, else by
     /// 90° about x
-    #[arg(long, value_enum, value_name = "AXIS")]
-    up: Option<UpArgument>,
+    #[arg(long, value_name = "AXIS", value_parser = up_axis())]
+    up: Option<UpAxis>,
 }
 
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum UpArgument {
-    /// z was up, as in SMPL's files
-    Y,
-    /// y was up, as in glTF and BVH
-    Z,
+fn up_axis() -> impl TypedValueParser<Value = UpAxis> {
+    let help = |axis| match axis {
+        UpAxis::Y => "z was up, as in SMPL's files",
+        UpAxis::Z => "y was up, as in glTF and BVH",
+    };
+    one_of(UpAxis::ALL.map(|axis| (axis.name(), help(axis), axis)))
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -111,16 +112,14 @@ enum DuplicatesArgument {
     Both,
 }
 
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum TimeUnitArgument {
-    /// seconds
-    S,
-    /// milliseconds
-    Ms,
-    /// microseconds
-    Us,
-    /// nanoseconds
-    Ns,
+fn time_unit() -> impl TypedValueParser<Value = TimeUnit> {
+    let help = |unit| match unit {
+        TimeUnit::Seconds => "seconds",
+        TimeUnit::Milliseconds => "milliseconds",
+        TimeUnit::Microseconds => "microseconds",
+        TimeUnit::Nanoseconds => "nanoseconds",
+    };
+    one_of(TimeUnit::ALL.map(|unit| (unit.name(), help(unit), unit)))
 }
 
 /// Reads the name of a format, for clap.
@@ -210,12 +209,7 @@ impl ReadingArguments {
             source_rate: self.source_fps,
             frame_times: frame_times.transpose()?.map(Arc::new),
             map: self.map.clone(),
-            time_unit: self.time_unit.map(|unit| match unit {
-                TimeUnitArgument::S => TimeUnit::Seconds,
-                TimeUnitArgument::Ms => TimeUnit::Milliseconds,
-                TimeUnitArgument::Us => TimeUnit::Microseconds,
-                TimeUnitArgument::Ns => TimeUnit::Nanoseconds,
-            }),
+            time_unit: self.time_unit,
             bridge_gaps: self.bridge_gaps,
             keyframes: self.reads_file_keys(),
             has_body_model: self.body_model.is_some(),
@@ -303,11 +297,7 @@ impl ReadingArguments {
                     return Err(Failure::usage(format!("{}: {message}", names::input(path))));
                 }
             };
-            let up = self.up.map(|up| match up {
-                UpArgument::Y => UpAxis::Y,
-                UpArgument::Z => UpAxis::Z,
-            });
-            adjust_all(loaded, scale, up).map_err(|error| {
+            adjust_all(loaded, scale, self.up).map_err(|error| {
                 Failure::new(exit::ALL_INPUTS, format!("{}: {error}", names::input(path)))
             })?;
         }

@@ -10,11 +10,9 @@ use tumble_formats::{Format, Loaded};
 use crate::arguments::gather::GatheredInputs;
 use crate::arguments::input::InputReader;
 use crate::batch::destination::Destination;
-use crate::batch::output;
-use crate::batch::output_plan::{OutputPlan, OutputRequest};
+use crate::batch::output_plan::{self, OutputPlan, OutputRequest};
 use crate::batch::pipeline::{BatchOptions, Pipeline};
-use crate::batch::result_format;
-use crate::batch::target::ResultTarget;
+use crate::batch::target::{self, ResultTarget};
 use crate::messages::exit::Failure;
 use crate::messages::names;
 use crate::messages::words;
@@ -23,7 +21,7 @@ const ONE_INPUT: &str = "--times-out needs a single input whose result is a sing
 
 #[derive(Debug, Args)]
 pub(crate) struct ResultArguments {
-    #[arg(short, long = "out", value_name = "OUT", help = result_format::out_help())]
+    #[arg(short, long = "out", value_name = "OUT", help = target::out_help())]
     out: Option<PathBuf>,
     /// Replace existing files
     #[arg(long)]
@@ -33,7 +31,7 @@ pub(crate) struct ResultArguments {
     #[arg(long)]
     resume: bool,
     /// The format of the results [default: by the name of the output, else npy]
-    #[arg(long, visible_alias = "to", value_parser = result_format::format())]
+    #[arg(long, visible_alias = "to", value_parser = target::format())]
     format: Option<&'static Format>,
     /// KITTI, which stores no times: also write the times of the poses to this file, in seconds, one per
     /// line; needs a single input
@@ -91,7 +89,7 @@ impl ResultArguments {
 
     /// The destination of each input's result. Everything that can be refused is refused here, before any work.
     pub(crate) fn plan(&self, inputs: &GatheredInputs) -> Result<OutputPlan, Failure> {
-        let mut plan = output::plan(
+        let mut plan = output_plan::plan(
             inputs,
             OutputRequest {
                 out: self.out.as_deref(),

@@ -1,12 +1,26 @@
-//! What is asked of the outputs of a command, and what is planned.
+//! Plans where results go, before any work: one file, or a directory with a file for each input, where the
+//! check is that no file of somebody else is replaced.
+//!
+//! An input whose result cannot have a name or a file there has failed; the others are evaluated.
 
+use std::collections::{BTreeSet, HashSet};
+use std::io::{self, IsTerminal};
 use std::path::{Path, PathBuf};
 
+use tumble_formats::beneath::parent_beneath;
 use tumble_formats::format::Format;
+use tumble_formats::output::remove_abandoned;
 
+use crate::arguments::gather::{FoundInput, GatheredInputs};
+use crate::batch::destination::{self, Destination};
+use crate::batch::entry;
 use crate::batch::manifest::Manifest;
-use crate::batch::target::ResultTarget;
+use crate::batch::result_names::{ResultName, format, name_results};
+use crate::batch::shards::plan::{RecordedPlan, hash_of};
+use crate::batch::shards::record;
+use crate::batch::target::{ResultTarget, choose, extensions, of};
 use crate::messages::exit::Failure;
+use crate::messages::names;
 
 /// One target for each input, and the manifest of their directory.
 #[derive(Default)]
@@ -26,4 +40,227 @@ pub(crate) struct OutputRequest<'a> {
     pub(crate) format: Option<&'static Format>,
     pub(crate) overwrite: bool,
     pub(crate) resume: bool,
+}
+
+/// Plans the targets. Refuses, before any work, outputs that exist, that are inputs, or that two inputs share.
+pub(crate) fn plan(
+    inputs: &GatheredInputs,
+    request: OutputRequest<'_>,
+) -> Result<OutputPlan, Failure> {
+    if request.out.is_none() && io::stdout().is_terminal() {
+        return Err(Failure::usage(format!(
+            "where should the result go? give {}, or -o - for standard output",
+            extensions(|name| format!("-o OUT.{name}")).join(", ")
+        )));
+    }
+    let out = request.out.unwrap_or(Path::new("-"));
+    let paths = inputs.paths();
+    // A single input has a single output, however it was found.
+    let is_file = out.is_file() || of(out).is_some() || names::is_standard(out);
+    let is_folder = out.is_dir() || out.as_os_str().as_encoded_bytes().ends_with(b"/");
+    let plan = match &*paths {
+        [_] if is_file || !inputs.many && !is_folder => {
+            if request.resume {
+                let message = "--resume is for a directory of results";
+                return Err(Failure::usage(message));
+            }
+            let format = choose(out, request.format)?;
+            let destination = Destination::new(out, request.overwrite, &paths)?;
+            // The surest check is to try.
+            destination.check_writable()?;
+            OutputPlan {
+                paths,
+                targets: vec![ResultTarget::new(destination, format, String::new())],
+                ..OutputPlan::default()
+            }
+        }
+        _ if names::is_standard(out) => {
+            return Err(Failure::usage(
+                "several inputs need a directory for their results: -o DIRECTORY",
+            ));
+        }
+        _ => in_folder(inputs, out, request)?,
+    };
+    if plan.manifest.is_some() {
+        check_writable(&plan.targets)?;
+    }
+    Ok(plan)
+}
+
+/// Tries to write into a directory of results; fails if none can be written.
+fn check_writable(targets: &[ResultTarget]) -> Result<(), Failure> {
+    let mut tried = HashSet::new();
+    let mut failed = None;
+    for target in targets {
+        if !tried.insert(target.path().parent()) {
+            continue;
+        }
+        match target.check_writable() {
+            Ok(()) => return Ok(()),
+            Err(failure) => failed.get_or_insert(failure),
+        };
+    }
+    failed.map_or(Ok(()), Err)
+}
+
+/// A file in `folder` for each input, named after it; in a subdirectory where the input is in one.
+fn in_folder(
+    inputs: &GatheredInputs,
+    folder: &Path,
+    request: OutputRequest<'_>,
+) -> Result<OutputPlan, Failure> {
+    let format = format(folder, request.format)?;
+    let files = without_results(inputs.files.clone(), folder)?;
+    let names = name_results(&files, folder, format);
+    let shards = RecordedPlan::read(folder)?;
+    if let Some(recorded) = &shards {
+        refuse_shards(recorded, &names, folder, request)?;
+    }
+    destination::create_folder(folder)?;
+    let manifest = Manifest::open(folder, shards.is_some(), request.overwrite)?;
+    // Results of unfinished shards have no line yet.
+    let is_known = |name: &str| shards.is_some() || manifest.knows(name);
+    let overwrites = |name: &str| request.overwrite || request.resume && is_known(name);
+    for name in names.iter().flatten().filter(|name| !overwrites(name)) {
+        refuse_existing(folder, name, is_known(name))?;
+    }
+    let mut result_folder = ResultFolder::new(folder);
+    let mut plan = OutputPlan::default();
+    for (found, name) in files.iter().zip(names) {
+        let target = name.and_then(|name| {
+            let destination = result_folder.destination(&name, overwrites(&name))?;
+            Ok(ResultTarget::new(destination.hashed(), format, name))
+        });
+        match target {
+            Ok(target) => {
+                plan.paths.push(found.path.clone());
+                plan.targets.push(target);
+            }
+            Err(failure) => plan.refused.push(failure),
+        }
+    }
+    // Locked files are being written: they are kept.
+    result_folder.made.extend(manifest.folders());
+    result_folder.made.insert(folder.to_owned());
+    for folder in &result_folder.made {
+        remove_abandoned(folder);
+    }
+    plan.manifest = Some(manifest);
+    Ok(plan)
+}
+
+/// The inputs that are not results of an earlier batch: a directory of results may be below the
+/// directory of inputs, or be the same.
+pub(crate) fn without_results(
+    inputs: Vec<FoundInput>,
+    folder: &Path,
+) -> Result<Vec<FoundInput>, Failure> {
+    let is_below = |path: &Path, folder: &Path| {
+        path.canonicalize()
+            .is_ok_and(|path| path.starts_with(folder))
+    };
+    let Ok(real) = folder.canonicalize() else {
+        return Ok(inputs);
+    };
+    let below: Vec<bool> = (inputs.iter())
+        .map(|found| found.is_from_directory && is_below(&found.path, &real))
+        .collect();
+    let has_results = || {
+        let manifest = entry::open(folder).is_ok_and(|manifest| manifest.is_some());
+        manifest || RecordedPlan::read(folder).is_ok_and(|stated| stated.is_some())
+    };
+    if !below.contains(&true) || !has_results() {
+        return Ok(inputs);
+    }
+    let names = record::names(folder);
+    let is_result = |found: &FoundInput| {
+        // Where inputs and results share a directory, the manifest tells them apart.
+        let is_shared = found.root().is_some_and(|root| is_below(root, &real));
+        let path = found.path.canonicalize().unwrap_or_default();
+        let name = path.strip_prefix(&real).ok().and_then(Path::to_str);
+        !is_shared || name.is_some_and(|name| names.contains(name))
+    };
+    let left: Vec<FoundInput> = (inputs.into_iter().zip(below))
+        .filter(|(found, is_below)| !(*is_below && is_result(found)))
+        .map(|(found, _)| found)
+        .collect();
+    match left.is_empty() {
+        false => Ok(left),
+        true => Err(Failure::usage(format!(
+            "{}: has results alone, and no other input was given",
+            folder.display()
+        ))),
+    }
+}
+
+/// Refuses, before any work, a batch that would replace a file without `--overwrite`.
+fn refuse_existing(folder: &Path, name: &str, is_known: bool) -> Result<(), Failure> {
+    let path = folder.join(name);
+    if std::fs::symlink_metadata(&path).is_err() {
+        return Ok(());
+    }
+    let shown = path.display();
+    let failure = Failure::usage(format!("{shown}: exists; give --overwrite to replace it"));
+    Err(match is_known {
+        true => failure.hinted(" (--resume skips what is done)"),
+        false => failure,
+    })
+}
+
+/// Refuses other inputs for a directory with shards that are not merged yet.
+fn refuse_shards(
+    recorded: &RecordedPlan,
+    names: &[ResultName],
+    folder: &Path,
+    request: OutputRequest<'_>,
+) -> Result<(), Failure> {
+    let shown = folder.display();
+    if !request.resume && !request.overwrite {
+        return Err(Failure::usage(format!(
+            "{shown}: has shards that are not merged; --resume continues them, `tumble merge {shown}` merges them"
+        )));
+    }
+    match recorded.outputs_sha256 == hash_of(names) {
+        true => Ok(()),
+        false => Err(Failure::usage(format!(
+            "{shown}: has shards of other inputs that are not merged; give those inputs, or another \
+             directory"
+        ))),
+    }
+}
+
+/// A directory of results. It makes the subdirectories of results, and refuses links.
+pub(crate) struct ResultFolder<'a> {
+    folder: &'a Path,
+    /// The subdirectories made so far.
+    pub(crate) made: BTreeSet<PathBuf>,
+}
+
+impl<'a> ResultFolder<'a> {
+    pub(crate) fn new(folder: &'a Path) -> Self {
+        Self {
+            folder,
+            made: BTreeSet::new(),
+        }
+    }
+
+    /// The destination of the result of that name.
+    pub(crate) fn destination(
+        &mut self,
+        name: &str,
+        overwrite: bool,
+    ) -> Result<Destination, Failure> {
+        let path = self.folder.join(name);
+        let parent = path.parent().unwrap_or(self.folder);
+        if !self.made.contains(parent) {
+            let parent = parent_beneath(self.folder, Path::new(name)).map_err(|error| {
+                let shown = path.display();
+                Failure::usage(format!("{shown}: its directory cannot be used: {error}"))
+            })?;
+            std::fs::create_dir_all(&parent)
+                .map_err(|error| Failure::writing(&parent.display().to_string(), &error))?;
+            self.made.insert(parent);
+        }
+        Destination::new(&path, overwrite, &[])
+    }
 }

@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use tumble_formats::format::Format;
 
 use crate::arguments::gather::FoundInput;
-use crate::batch::result_format::{self, choose};
 use crate::batch::shards::record;
+use crate::batch::target::{self, choose};
 use crate::messages::exit::Failure;
 use crate::messages::names;
 
@@ -22,7 +22,7 @@ pub(crate) fn format(
     folder: &Path,
     requested: Option<&'static Format>,
 ) -> Result<&'static Format, Failure> {
-    if !folder.is_dir() && (folder.exists() || result_format::of(folder).is_some()) {
+    if !folder.is_dir() && (folder.exists() || target::of(folder).is_some()) {
         let shown = folder.display();
         return Err(Failure::usage(format!(
             "{shown}: several inputs need a directory for their results, not one file"

@@ -4,21 +4,66 @@ use std::fmt;
 use std::io::{self, Write};
 use std::path::Path;
 
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use glam::Quat;
 use tumble::{Chunk, Encoding, Error};
 use tumble_formats::Diagnostic;
 use tumble_formats::format::{
-    Format, MotionOptions, ResultShape, ResultWriter, WriteError, WriteResults,
+    Document, Format, MotionOptions, ResultShape, ResultWriter, WriteError, WriteResults,
 };
 use tumble_formats::kitti::write_frame_times;
 use tumble_formats::motion::SampledClip;
 
-use crate::batch::destination::{Destination, WrittenFile};
+use crate::batch::destination::{Destination, OutputStream, WrittenFile};
 use crate::batch::room;
-use crate::batch::stream::OutputStream;
 use crate::messages::exit::Failure;
 use crate::messages::progress::Progress;
-use crate::messages::{signals, words};
+use crate::messages::{names, signals, words};
+
+/// The requested format, else that of the path's extension.
+pub(crate) fn choose(
+    path: &Path,
+    format: Option<&'static Format>,
+) -> Result<&'static Format, Failure> {
+    let named = if names::is_standard(path) {
+        Format::writable().next()
+    } else {
+        of(path)
+    };
+    format.or(named).ok_or_else(|| {
+        let (path, extensions) = (path.display(), extensions(|name| format!(".{name}")));
+        let extensions = extensions.join(", ");
+        Failure::usage(format!(
+            "{path}: end the output in {extensions}, or give --format"
+        ))
+    })
+}
+
+/// The format of results of a file's extension.
+pub(crate) fn of(path: &Path) -> Option<&'static Format> {
+    Format::of(path).filter(|format| format.is_writable())
+}
+
+/// The extensions of results, each as `show` has it.
+pub(super) fn extensions(show: impl Fn(&str) -> String) -> Vec<String> {
+    Format::writable().map(|format| show(format.name)).collect()
+}
+
+/// Reads the name of a format of results, for clap.
+pub(crate) fn format() -> impl TypedValueParser<Value = &'static Format> {
+    let values =
+        Format::writable().map(|format| PossibleValue::new(format.name).help(format.summary));
+    PossibleValuesParser::new(values)
+        .map(|name| Format::named(&name).expect("clap takes names of the table alone"))
+}
+
+/// The help of `--out`.
+pub(crate) fn out_help() -> String {
+    format!(
+        "Where to write: {}, `-` (standard output), or a directory for several inputs",
+        extensions(|name| format!("OUT.{name}")).join(", ")
+    )
+}
 
 /// The target of one result: its destination and format.
 #[derive(Clone)]
@@ -153,8 +198,30 @@ impl ResultTarget {
         self.prepare(|out| out.write_all(&bytes))
     }
 
+    /// Writes sampled clips as a motion file: into `document`, where the input's own file is written again
+    /// with other keys of the clips of these indices, else into a new one.
+    pub(crate) fn write_clips(
+        &self,
+        sampled: &[SampledClip<'_>],
+        indices: impl IntoIterator<Item = usize>,
+        document: Option<&dyn Document>,
+        options: &MotionOptions,
+    ) -> Result<WrittenFile, Failure> {
+        let written = self.write_motion(|out| match document {
+            None => self.format.write_clips(sampled, options, out),
+            Some(document) => {
+                let sampled = sampled.iter().cloned();
+                let clips: Vec<(usize, SampledClip<'_>)> =
+                    indices.into_iter().zip(sampled).collect();
+                document.write(&clips, options, self.path(), out)
+            }
+        })?;
+        self.write_times(sampled)?;
+        Ok(written)
+    }
+
     /// Writes the times of a motion file, where they go to a file of their own.
-    pub(crate) fn write_times(&self, sampled: &[SampledClip<'_>]) -> Result<(), Failure> {
+    fn write_times(&self, sampled: &[SampledClip<'_>]) -> Result<(), Failure> {
         let (Some(destination), [sampled]) = (&self.times, sampled) else {
             return Ok(());
         };

@@ -9,12 +9,13 @@ use tumble_formats::Feature;
 use tumble_formats::format::{Document, FormatOption, MotionOptions};
 use tumble_formats::keyed::{KeysError, keys_for};
 use tumble_formats::motion::{Motion, SampledClip};
+use tumble_formats::quaternion::ComponentOrder;
 use tumble_formats::sample::Samples;
 use tumble_formats::trim::{TrimError, trim};
 
 use crate::arguments::command_line::CommandLine;
 use crate::arguments::input::Inputs;
-use crate::arguments::output::{OrderArgument, sequence};
+use crate::arguments::output::{component_order, sequence};
 use crate::arguments::results::{ResultArguments, check_sequence, document_to_rewrite};
 use crate::arguments::time::{check_range, finite_seconds};
 use crate::batch::destination::WrittenFile;
@@ -52,8 +53,8 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "SECONDS", value_parser = finite_seconds, allow_hyphen_values = true)]
     end: Option<f64>,
     /// The order of a quaternion's columns in tables [default: xyzw; CSV: wxyz]
-    #[arg(long, value_enum)]
-    order: Option<OrderArgument>,
+    #[arg(long, value_parser = component_order())]
+    order: Option<ComponentOrder>,
     /// The axes of the angles of BVH, three different ones [default: those of the input, else ZXY]
     #[arg(long, value_name = "AXES", value_parser = sequence)]
     sequence: Option<EulerSequence>,
@@ -121,7 +122,7 @@ impl Arguments {
         let is_whole = (self.start, self.end) == (None, None);
         let is_copy = document.is_some() && is_whole && !self.inputs.reading.changes_keys();
         let options = MotionOptions {
-            order: self.order.map(OrderArgument::order),
+            order: self.order,
             sequence: self.sequence,
             box_length: loaded.box_length,
             ..target.motion_options()
@@ -182,18 +183,7 @@ fn write(
         is_at_keys: *per_channel,
         ..samples.of(clip, rate(clip), &notes)
     });
-    match document {
-        Some(document) => {
-            let indices = clips.iter().map(|clip| clip.index);
-            let clips: Vec<(usize, SampledClip<'_>)> = indices.zip(sampled).collect();
-            target.write_motion(|out| document.write(&clips, &options, target.path(), out))
-        }
-        None => {
-            let clips: Vec<SampledClip<'_>> = sampled.collect();
-            let written =
-                target.write_motion(|out| target.format().write_clips(&clips, &options, out))?;
-            target.write_times(&clips)?;
-            Ok(written)
-        }
-    }
+    let sampled: Vec<SampledClip<'_>> = sampled.collect();
+    let indices = clips.iter().map(|clip| clip.index);
+    target.write_clips(&sampled, indices, document, &options)
 }

@@ -11,7 +11,7 @@ from tumble._errors import InputError
 from tumble._tumble import Clip
 
 # The numbers of a list column are counted by 32 bits.
-_MOST = 2**31 - 1
+_MAX_LIST_VALUES = 2**31 - 1
 
 
 def batch(engine: Any, rows: Any, *, order: Any = "xyzw", **options: Any) -> Any:
@@ -19,24 +19,24 @@ def batch(engine: Any, rows: Any, *, order: Any = "xyzw", **options: Any) -> Any
     try:
         arrow: Any = importlib.import_module("pyarrow")
     except ImportError as error:
-        raise InputError("Engine.batch wants pyarrow: pip install pyarrow") from error
+        raise InputError("Engine.batch needs pyarrow: pip install pyarrow") from error
     rows = _one_batch(arrow, rows)
-    for wanted in ("times", "keys"):
-        if wanted not in rows.schema.names:
+    for name in ("times", "keys"):
+        if name not in rows.schema.names:
             names = ", ".join(rows.schema.names) or "none"
-            message = f"there is no column `{wanted}`; there are {names}"
+            message = f"there is no column `{name}`; there are {names}"
             raise InputError(message, pointer="batch")
     for made in ("tracks", "frames", "rotations"):
         if made in rows.schema.names:
-            message = f"the result has a column `{made}` of its own; rename that of the batch"
+            message = f"the result has a column `{made}` too; rename that of the batch"
             raise InputError(message, pointer=f"column {made}")
     times, keys = _lists(arrow, rows, "times"), _lists(arrow, rows, "keys")
     found: list[Any] = []
     for row in range(rows.num_rows):
         found.append(_evaluated(engine, times(row), keys(row), row, order, options))
-    numbers = [own.reshape(-1) for own in found]
-    ends = np.cumsum([0, *(len(own) for own in numbers)])
-    if ends[-1] > _MOST:
+    numbers = [result.reshape(-1) for result in found]
+    ends = np.cumsum([0, *(len(part) for part in numbers)])
+    if ends[-1] > _MAX_LIST_VALUES:
         message = f"{ends[-1]} numbers are more than a list column can have; give fewer rows"
         raise InputError(message, pointer="batch")
     values = np.concatenate(numbers) if numbers else np.empty(0, np.float32)
@@ -45,8 +45,8 @@ def batch(engine: Any, rows: Any, *, order: Any = "xyzw", **options: Any) -> Any
     )
     kept = [name for name in rows.schema.names if name not in ("times", "keys")]
     columns = [rows.column(name) for name in kept]
-    columns.append(arrow.array([own.shape[0] for own in found], arrow.int64()))
-    columns.append(arrow.array([own.shape[1] for own in found], arrow.int64()))
+    columns.append(arrow.array([result.shape[0] for result in found], arrow.int64()))
+    columns.append(arrow.array([result.shape[1] for result in found], arrow.int64()))
     fields = [rows.schema.field(name) for name in kept]
     for name, kind in ("tracks", arrow.int64()), ("frames", arrow.int64()):
         fields.append(arrow.field(name, kind, nullable=False))
@@ -75,16 +75,16 @@ def _lists(arrow: Any, rows: Any, name: str) -> Any:
         raise InputError(f"column `{name}` has no value", pointer=f"column {name}, row {row}")
 
     def numbers(row: int) -> Any:
-        own = column[row].values
-        while hasattr(own, "flatten") and arrow.types.is_nested(own.type):
-            own = own.flatten()
-        if not (arrow.types.is_floating(own.type) or arrow.types.is_integer(own.type)):
+        values = column[row].values
+        while hasattr(values, "flatten") and arrow.types.is_nested(values.type):
+            values = values.flatten()
+        if not (arrow.types.is_floating(values.type) or arrow.types.is_integer(values.type)):
             message = f"column `{name}` is of type {column.type}; lists of numbers are expected"
             raise InputError(message, pointer=f"column {name}, row {row}")
-        if own.null_count:
+        if values.null_count:
             message = f"a number of column `{name}` is missing"
             raise InputError(message, pointer=f"column {name}, row {row}")
-        return own.to_numpy(zero_copy_only=False)
+        return values.to_numpy(zero_copy_only=False)
 
     if not (
         arrow.types.is_list(column.type)
@@ -108,6 +108,6 @@ def _evaluated(
     try:
         clip = Clip(times, keys.reshape(-1, len(times), 4), order=order)
     except InputError as error:
-        place = error.pointer or "keys"
-        raise InputError(str(error), code=error.code, pointer=f"row {row}, {place}") from error
+        pointer = error.pointer or "keys"
+        raise InputError(str(error), code=error.code, pointer=f"row {row}, {pointer}") from error
     return engine.evaluate(clip, order=order, **options)

@@ -1,10 +1,10 @@
-"""Exceptions and warnings, with the codes and places of the program's messages."""
+"""Exceptions and warnings, with the codes and positions of the program's messages."""
 
 from __future__ import annotations
 
 
-class _Place(Exception):
-    """What the program says beside its message; None where it does not apply."""
+class _Located(Exception):
+    """The code and the position of the fault; None where there is none."""
 
     code: str | None
     file: str | None
@@ -30,12 +30,12 @@ class _Place(Exception):
         self.pointer = pointer
 
 
-class Error(_Place):
+class Error(_Located):
     """Anything that Tumble refuses.
 
     `code` is that of docs/codes.md (`tumble explain E026`), or None; `file`, `line` and `column`
     say where it is in text, `pointer` where it is in what has no lines: a JSON pointer, an
-    archive's member, a table's column and row, or a place in the arrays that were given.
+    archive's member, a table's column and row, or a position in the arguments.
 
     >>> import tumble
     >>> try:
@@ -85,7 +85,7 @@ class OutputError(Error, OSError):
     """
 
 
-class InputWarning(_Place, UserWarning):
+class InputWarning(_Located, UserWarning):
     """A file is read, and something about it is probably not meant.
 
     >>> import tumble

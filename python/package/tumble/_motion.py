@@ -64,8 +64,8 @@ class MotionLibrary:
     """Clips of one skeleton, of many lengths and rates, each instance at a time of its own.
 
     `clips`: a list of `Clip`s with the same tracks. `method`: by which they are interpolated, as that of
-    `Engine.evaluate`. `skeleton`: how the tracks hang together, a `Clip`, a file with one, or the parents
-    and offsets; else that of the first clip. `names`: of the clips; else their own, or their files'.
+    `Engine.evaluate`. `skeleton`: a `Clip`, a file with one, or the parents and offsets of the tracks; else that of
+    the first clip. `names`: of the clips; else their own, or their files'.
     `engine`: whose threads work, else one that all calls share.
 
     Times count from the first key of a clip, and are kept to at least 0.5 µs (30 ns for clips of up to
@@ -100,10 +100,10 @@ class MotionLibrary:
         if not clips:
             raise InputError("clips: there is none")
         parents, offsets = _skeleton_of(clips[0] if skeleton is None else skeleton)
-        for place, clip in enumerate(clips):
+        for index, clip in enumerate(clips):
             if len(clip) != len(parents):
                 message = f"{len(clip)} tracks; the skeleton has {len(parents)} joints"
-                raise InputError(f"{clip.path or f'clips[{place}]'}: {message}")
+                raise InputError(f"{clip.path or f'clips[{index}]'}: {message}")
         if names is not None and len(names) != len(clips):
             raise InputError(f"names: there are {len(names)} for {len(clips)} clips")
         self.names = list(names) if names is not None else [_name(clip) for clip in clips]
@@ -134,12 +134,12 @@ class MotionLibrary:
         >>> tumble.MotionLibrary.load(os.path.join(folder, "*.npz")).names
         ['door']
         """
-        given = [files] if isinstance(files, str | os.PathLike) else list(files)
+        patterns = [files] if isinstance(files, str | os.PathLike) else list(files)
         paths: list[str] = []
-        for one in (os.fspath(path) for path in given):
-            found = sorted(_glob.glob(one, recursive=True)) if _glob.has_magic(one) else [one]
+        for pattern in (os.fspath(path) for path in patterns):
+            found = sorted(_glob.glob(pattern, recursive=True)) if _glob.has_magic(pattern) else [pattern]
             if not found:
-                raise FileNotFoundError(f"no file matches {one}")
+                raise FileNotFoundError(f"no file matches {pattern}")
             paths += found
         clips: list[Clip] = []
         for path in paths:
@@ -218,7 +218,7 @@ class MotionLibrary:
             assert before.positions is not None and after.positions is not None
             out.velocities[...] = (after.positions - before.positions) * each
         if out.angular_velocities is not None and after.world_rotations is not None:
-            out.angular_velocities[...] = each * _turn(before.world_rotations, after.world_rotations)
+            out.angular_velocities[...] = each * _rotation_vectors(before.world_rotations, after.world_rotations)
 
     def sample_times(self, clip_ids: ArrayLike, rng: np.random.Generator) -> NDArray[np.float64]:
         """A time within each of these clips, uniformly.
@@ -332,13 +332,13 @@ def _opened(file: str, engine: Engine) -> MotionLibrary:
 
 def _skeleton_of(skeleton: _Skeleton) -> tuple[list[int], NDArray[np.float32]]:
     if isinstance(skeleton, tuple):
-        given, offsets = skeleton
-        parents = [-1 if parent is None else int(parent) for parent in given]
+        joint_parents, offsets = skeleton
+        parents = [-1 if parent is None else int(parent) for parent in joint_parents]
         return parents, np.asarray(offsets, np.float32).reshape(len(parents), 3)
     clip = skeleton if isinstance(skeleton, Clip) else load(skeleton)[0]
     if clip.parents is None or clip.offsets is None:
         raise InputError(
-            "skeleton: the clip says not how its tracks hang together; give `skeleton`, a clip that does, "
+            "skeleton: the clip has no skeleton; give `skeleton`, a clip that has one, "
             "or (parents, offsets)"
         )
     parents = [-1 if parent is None else parent for parent in clip.parents]
@@ -360,7 +360,7 @@ def _rate(clip: Clip) -> float:
     return float((len(times) - 1) / (times[-1] - times[0])) if is_even else float("nan")
 
 
-def _turn(
+def _rotation_vectors(
     before: NDArray[np.float32] | None, after: NDArray[np.float32] | None
 ) -> NDArray[np.float64]:
     """The rotation vectors, about the world's axes, from one rotation to the next."""

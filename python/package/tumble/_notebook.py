@@ -19,15 +19,15 @@ def plot(clip: Any, track: Any, fps: Any, axes: Any, **options: Any) -> Any:
     import numpy as np
 
     track = 0 if track is None else track
-    place = clip.names.index(track) if isinstance(track, str) else track
+    index = clip.names.index(track) if isinstance(track, str) else track
     first, last = clip.span
     rate = 120 if fps is None else fps
     count = clip.frames(rate)
     times = np.linspace(first, first + (count - 1) / _per_second(rate), count)
-    curve = clip.evaluate(at=times, **options)[place]
-    keys, key_times = clip.keys(place), clip.times(place)
+    curve = clip.evaluate(at=times, **options)[index]
+    keys, key_times = clip.keys(index), clip.times(index)
     # A key is drawn with the sign that the curve has there; both are the same rotation.
-    near = clip.evaluate(at=key_times, **options)[place]
+    near = clip.evaluate(at=key_times, **options)[index]
     keys = np.where((keys * near).sum(axis=1, keepdims=True) < 0, -keys, keys)
     if axes is None:
         axes = pyplot.subplots(figsize=(9, 3.5), layout="constrained")[1]
@@ -35,7 +35,7 @@ def plot(clip: Any, track: Any, fps: Any, axes: Any, **options: Any) -> Any:
     for component, (name, colour) in enumerate(colours.items()):
         axes.plot(times, curve[:, component], color=colour, label=name, linewidth=1.2)
         axes.plot(key_times, keys[:, component], "o", color=colour, markersize=3)
-    axes.set(xlabel="seconds", title=clip.names[place], xlim=(first, max(last, times[-1])))
+    axes.set(xlabel="seconds", title=clip.names[index], xlim=(first, max(last, times[-1])))
     axes.legend(loc="upper right", ncols=4)
     return axes
 

@@ -14,15 +14,15 @@ def kill_on_the_clip_that_says_so() -> None:
 
     class Worker:
         def __init__(self, line, threads):
-            self._own = _tumble.Worker(line, threads)
+            self._worker = _tumble.Worker(line, threads)
 
         def __getattr__(self, name):
-            return getattr(self._own, name)
+            return getattr(self._worker, name)
 
         def run(self, folder, shard, of, plan, inputs, *, record):
             if any("kills-its-worker" in path for path, _ in inputs):
                 os.kill(os.getpid(), signal.SIGKILL)
-            return self._own.run(folder, shard, of, plan, inputs, record=record)
+            return self._worker.run(folder, shard, of, plan, inputs, record=record)
 
     class Module:
         def __getattr__(self, name):

@@ -10,7 +10,7 @@ use std::ops::Range;
 use bytemuck::Pod;
 use glam::{Quat, Vec4};
 
-use crate::checks::{check_encoding, check_rows, check_within};
+use crate::checks::{check_encoding, check_rows, check_within, in_quats};
 use crate::clip::Clip;
 use crate::curve::options::Quantity;
 use crate::engine::Engine;
@@ -20,6 +20,7 @@ use crate::method::interpolation::Interpolation;
 use crate::output::buffer::OutputBuffer;
 use crate::output::encoding::Encoding;
 use crate::output::rotations::{Layout, Rotations, Samples, Vectors};
+use crate::output::value::OutputValue;
 use crate::output::window::Window;
 use crate::stream::Chunk;
 use crate::time::frames::{SampleTimes, Timeline};
@@ -222,6 +223,18 @@ impl Request<'_> {
     pub fn evaluate_into<T: Pod>(&self, output: &mut [T]) -> Result<(), Error> {
         let (timeline, window) = self.window()?;
         self.fill(&timeline, &window, bytemuck::cast_slice_mut(output))
+    }
+
+    /// As [`Request::evaluate_into`], but into values of the result's type alone.
+    pub(crate) fn evaluate_values_into<R: OutputValue>(
+        &self,
+        output: &mut [R],
+    ) -> Result<(), Error> {
+        check_rows::<R>(self.source.quantity())?;
+        let (timeline, window) = self.window()?;
+        in_quats(output, window.len(), |quats| {
+            self.fill(&timeline, &window, bytemuck::cast_slice_mut(quats))
+        })
     }
 
     /// Evaluates in chunks of about `chunk` values (at least one row of the layout is best); `sink` uses one while

@@ -7,7 +7,7 @@ use tumble_formats::output::{Output, remove_marked};
 
 use crate::batch::destination::WrittenFile;
 use crate::batch::entry::{ManifestEntry, PreviousEntries, ResultRecorder};
-use crate::batch::folder::ResultFolder;
+use crate::batch::output_plan::ResultFolder;
 use crate::batch::result_names::ResultName;
 use crate::batch::shards::record::{self, RefusedInput, ShardHeader};
 use crate::batch::target::ResultTarget;

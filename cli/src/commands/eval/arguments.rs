@@ -1,17 +1,17 @@
 //! The options of `tumble eval`.
 
-mod applies;
-
 use clap::Args;
 use clap::builder::TypedValueParser;
 use tumble::{Encoding, Layout};
+use tumble_formats::format::Format;
 use tumble_formats::quaternion::ComponentOrder;
 
 use crate::arguments::command_line::CommandLine;
 use crate::arguments::device::DeviceArguments;
 use crate::arguments::input::Inputs;
 use crate::arguments::interpolation::{InterpolationArguments, MethodArgument, method_argument};
-use crate::arguments::output::{OrderArgument, OutputArguments, one_of, quaternions};
+use crate::arguments::options::{AppliesTo, OPTIONS, ResultKind, ResultRequest};
+use crate::arguments::output::{OutputArguments, component_order, one_of, quaternions};
 use crate::arguments::results::ResultArguments;
 use crate::arguments::time::{AtKeysArguments, SampleRequest, SamplingArguments};
 use crate::commands::eval::shard_selection::ShardSelection;
@@ -69,8 +69,8 @@ pub(crate) struct Arguments {
     #[arg(long, default_value_t, value_parser = layout())]
     pub(super) layout: Layout,
     /// The order of a quaternion's components [default: xyzw; CSV of rotations: wxyz]
-    #[arg(long, value_enum)]
-    pub(super) order: Option<OrderArgument>,
+    #[arg(long, value_parser = component_order())]
+    pub(super) order: Option<ComponentOrder>,
     /// How components are stored in NPY results
     #[arg(long, value_name = "ENCODING", default_value = "f32", value_parser = quaternions())]
     pub(super) encoding: Encoding,
@@ -139,6 +139,64 @@ impl Arguments {
     }
 
     pub(super) fn order(&self) -> Option<ComponentOrder> {
-        self.order.map(OrderArgument::order)
+        self.order
+    }
+
+    /// Refuses, before any work, options that have no effect on any kind that the results may have.
+    pub(super) fn check_before(&self, format: &'static Format) -> Result<(), Failure> {
+        let mut kinds = Vec::new();
+        if self.output.is_rotations() {
+            if format.write.is_some() {
+                kinds.push(ResultKind::Rotations);
+            }
+            if format.writes_clips() {
+                kinds.extend([ResultKind::Motion, ResultKind::Baked]);
+            }
+        } else {
+            kinds.push(match self.output.poses() {
+                Some(_) => ResultKind::Poses,
+                None => ResultKind::Rotations,
+            });
+        }
+        let mut refusals = kinds.into_iter().map(|kind| self.refusal(kind, format));
+        let first = refusals.next().flatten();
+        match first {
+            Some(first) if refusals.all(|other| other.is_some()) => Err(Failure::usage(first)),
+            _ => Ok(()),
+        }
+    }
+
+    /// Refuses options that have no effect on a result of this kind.
+    pub(super) fn check(&self, kind: ResultKind, format: &'static Format) -> Result<(), Failure> {
+        self.refusal(kind, format)
+            .map_or(Ok(()), |message| Err(Failure::usage(message)))
+    }
+
+    fn refusal(&self, kind: ResultKind, format: &'static Format) -> Option<String> {
+        if !kind.is_clip() && format.write.is_none() {
+            let all = Format::writable().filter(|format| format.write.is_some());
+            let names: Vec<&str> = all.map(|format| format.name).collect();
+            return Some(format!(
+                "{} stores whole clips; for --output {} write {}",
+                format.name,
+                self.output.name(),
+                names.join(" or ")
+            ));
+        }
+        let result = ResultRequest {
+            kind,
+            format,
+            output: &self.output,
+            layout: self.layout,
+            encoding: self.encoding,
+        };
+        let set = OPTIONS
+            .iter()
+            .filter(|rule| self.command_line.has(rule.name));
+        let mut refusals = set.filter_map(|rule| match rule.applies_to {
+            AppliesTo::Results(refusal) => refusal(&result),
+            AppliesTo::All | AppliesTo::Inputs(_) => None,
+        });
+        refusals.next()
     }
 }

@@ -9,7 +9,7 @@ use serde::Serialize;
 use tumble::{Engine, Error, Interpolation, Layout, Method, SampleTimes};
 use tumble_formats::motion::Motion;
 use tumble_formats::quaternion::ComponentOrder;
-use tumble_formats::sample::ChannelMethods;
+use tumble_formats::sample::{ChannelMethods, Samples};
 
 use crate::arguments::device::OpenedDevice;
 use crate::arguments::interpolation::curve_warning;
@@ -206,6 +206,28 @@ impl EvaluationJob<'_> {
             });
         }
         Ok(())
+    }
+
+    /// All channels of a clip.
+    fn sample(
+        &mut self,
+        name: &str,
+        clip: &Motion,
+        frames: &SampleTimes,
+    ) -> Result<Samples, Failure> {
+        let (method, with) = self.methods();
+        let methods = ChannelMethods {
+            method,
+            with: &with,
+        };
+        let tracks = clip.set.track_count();
+        let samples = frames.resolve(tracks, clip.set.time_span());
+        let found = samples.map_err(Error::from).and_then(|timeline| {
+            self.device.choose(tracks * timeline.len())?;
+            self.device
+                .work(|engine| methods.sample(engine, clip, frames))
+        });
+        found.map_err(|error| Failure::evaluating(name, &error))
     }
 
     /// How a result was made, for formats that store it.

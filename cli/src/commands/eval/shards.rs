@@ -5,7 +5,7 @@ use std::path::Path;
 use crate::arguments::device::OpenedDevice;
 use crate::arguments::gather::FoundInput;
 use crate::arguments::time::SampleRequest;
-use crate::batch::folder;
+use crate::batch::output_plan;
 use crate::batch::pipeline::{BatchOptions, Pipeline, PipelineJob};
 use crate::batch::shards::plan::ShardPlan;
 use crate::batch::shards::record::ShardHeader;
@@ -22,7 +22,7 @@ pub(crate) fn run(arguments: &Arguments, part: ShardSelection) -> Result<(), Fai
     let mut evaluator = Evaluator::new(arguments)?;
     let (folder, resume) = (arguments.results.folder()?, arguments.results.is_resumed());
     let gathered = arguments.inputs.gather(false)?;
-    let files = folder::without_results(gathered.files, folder)?;
+    let files = output_plan::without_results(gathered.files, folder)?;
     let sizes: Vec<u64> = files.iter().map(size).collect();
     let bytes = arguments.shard_bytes;
     let request = &evaluator.request;

@@ -407,16 +407,8 @@ impl Arguments {
             let message = format!("{target}: {} holds results, not keys", format.name);
             return Err(Failure::usage(message));
         }
-        let written = target.write_motion(|out| match document {
-            Some(document) => {
-                let indices = clips.iter().map(|clip| clip.index);
-                let clips: Vec<_> = indices.zip(sampled.iter().cloned()).collect();
-                document.write(&clips, &options, target.path(), out)
-            }
-            None => format.write_clips(&sampled, &options, out),
-        })?;
-        target.write_times(&sampled)?;
-        Ok(written)
+        let indices = clips.iter().map(|clip| clip.index);
+        target.write_clips(&sampled, indices, document, &options)
     }
 }
 

@@ -292,19 +292,13 @@ fn write(
     let sampled: Vec<SampledClip<'_>> = (clips.iter().zip(samples))
         .map(|(clip, smoothed)| smoothed.after.of(clip, smoothed.rate, &notes))
         .collect();
-    if let Some(document) = document {
-        let indices = clips.iter().map(|clip| clip.index);
-        let clips: Vec<(usize, SampledClip<'_>)> = indices.zip(sampled).collect();
-        return target.write_motion(|out| document.write(&clips, &options, target.path(), out));
-    }
-    if !format.writes_clips() {
+    if document.is_none() && !format.writes_clips() {
         let message = format!(
             "{target}: {} holds one animation; choose one with --animation",
             format.name
         );
         return Err(Failure::usage(message));
     }
-    let written = target.write_motion(|out| format.write_clips(&sampled, &options, out))?;
-    target.write_times(&sampled)?;
-    Ok(written)
+    let indices = clips.iter().map(|clip| clip.index);
+    target.write_clips(&sampled, indices, document, &options)
 }

@@ -182,13 +182,13 @@ class _Watch:
 
     def __init__(self) -> None:
         self._is_terminal = sys.stderr.isatty()
-        self._told = time.monotonic()
+        self._reported_at = time.monotonic()
 
     def __call__(self, progress: Progress) -> None:
         now = time.monotonic()
-        if now - self._told < (0.5 if self._is_terminal else 10):
+        if now - self._reported_at < (0.5 if self._is_terminal else 10):
             return
-        self._told = now
+        self._reported_at = now
         left = progress.seconds_left
         rate = progress.rotations / max(progress.seconds, 1e-9)
         text = (

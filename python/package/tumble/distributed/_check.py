@@ -27,39 +27,39 @@ class Checked:
 
 def check(out: str) -> Checked:
     """Compares every object with its line of the manifest, or of a shard that is not merged yet."""
-    place = store(out)
-    manifest = read_text(place, "manifest.jsonl")
-    plan = read_text(place, "manifest.d/plan.json")
+    results = store(out)
+    manifest = read_text(results, "manifest.jsonl")
+    plan = read_text(results, "manifest.d/plan.json")
     if manifest is None and plan is None:
         raise DistributedError(f"{out}: has no manifest.jsonl", ALL_INPUTS)
     entries: dict[str, Entry] = {}
     lines = lines_of(manifest or "")
     shards = None
     if plan is not None:
-        own = json.loads(plan)
+        recorded_plan = json.loads(plan)
         done = 0
-        for name in place.list("manifest.d"):
-            text = read_text(place, name) if name.endswith(".jsonl") else None
+        for name in results.list("manifest.d"):
+            text = read_text(results, name) if name.endswith(".jsonl") else None
             if text is None:
                 continue
             header, more = split_record(text)
-            done += is_whole(text) and header["plan"] == own["plan"]
+            done += is_whole(text) and header["plan"] == recorded_plan["plan"]
             lines += more
-        shards = (done, own["shards"])
+        shards = (done, recorded_plan["shards"])
     for line in lines:
         entry = json.loads(line)
         entries[entry["output"]] = entry
     with ThreadPoolExecutor(_AT_ONCE) as threads:
-        found = threads.map(lambda entry: _fault(place, entry), entries.values())
+        found = threads.map(lambda entry: _fault(results, entry), entries.values())
         faults = [fault for fault in found if fault is not None]
     return Checked(len(entries), faults, shards)
 
 
-def _fault(place: Store, entry: Entry) -> str | None:
+def _fault(results: Store, entry: Entry) -> str | None:
     name = str(entry["output"])
-    content = place.read(name)
+    content = results.read(name)
     if content is None:
         return f"{name}: is not there"
     if hashlib.sha256(content).hexdigest() != entry["output_sha256"]:
-        return f"{name}: other bits than when it was written"
+        return f"{name}: its bits have changed since it was written"
     return None

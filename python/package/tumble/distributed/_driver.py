@@ -192,13 +192,13 @@ def evaluate(
             begin()
         driver.run()
         merged = _merge(out)
-        failed = [Refusal(own["input"], own["message"]) for own in merged["failed"]]
+        failed = [Refusal(failure["input"], failure["message"]) for failure in merged["failed"]]
         return driver.report(merged["results"], failed)
 
 
 @contextlib.contextmanager
 def _refusals() -> Iterator[None]:
-    """What the extension refuses comes as an exit code and a message."""
+    """Turns a refusal of the extension, an exit code and a message, into an exception."""
     try:
         yield
     except ValueError as error:
@@ -209,13 +209,13 @@ def _refusals() -> Iterator[None]:
 
 
 def _claim(plan: _tumble.Plan, out: str, into: str, resume: bool, overwrite: bool) -> None:
-    """Says in the directory of results what its shards are of."""
-    place = store(out)
+    """Writes the plan into the directory of results."""
+    results = store(out)
     fresh = not resume and not overwrite
-    if fresh and any(name.endswith(".jsonl") for name in place.list("manifest.d")):
+    if fresh and any(name.endswith(".jsonl") for name in results.list("manifest.d")):
         message = f"{out}: has shards that are done; resume keeps them, overwrite makes all again"
         raise DistributedError(message, USAGE)
-    if into == "parquet" and fresh and place.size("part-00001.parquet") is not None:
+    if into == "parquet" and fresh and results.size("part-00001.parquet") is not None:
         message = f"{out}: part-00001.parquet exists; resume goes on, overwrite replaces it"
         raise DistributedError(message, USAGE)
     if not is_url(out):
@@ -224,45 +224,45 @@ def _claim(plan: _tumble.Plan, out: str, into: str, resume: bool, overwrite: boo
     with tempfile.TemporaryDirectory() as folder:
         plan.claim(folder)
         with open(os.path.join(folder, "manifest.d", "plan.json"), encoding="utf-8") as file:
-            own = file.read()
-    there = read_text(place, "manifest.d/plan.json")
-    if there == own:
+            plan_text = file.read()
+    there = read_text(results, "manifest.d/plan.json")
+    if there == plan_text:
         return
     if there is not None and fresh:
         message = f"{out}: has shards of another list, other options or another tumble"
         raise DistributedError(message, USAGE)
     if there is None and not overwrite:
-        known = resume and place.size("manifest.jsonl") is not None
-        names = set() if known else set(place.list())
+        known = resume and results.size("manifest.jsonl") is not None
+        names = set() if known else set(results.list())
         for shard in range(1, len(plan) + 1):
             for name in names.intersection(plan.names_of(shard)):
                 message = f"{out}/{name}: exists; overwrite replaces it"
                 raise DistributedError(message, USAGE)
-    put_text(place, own, "manifest.d/plan.json")
+    put_text(results, plan_text, "manifest.d/plan.json")
 
 
 def _merge(out: str) -> Entry:
     """Makes one manifest of all shards' lines."""
     if not is_url(out):
         return _merged(out)
-    place = store(out)
+    results = store(out)
     with tempfile.TemporaryDirectory() as folder:
         os.mkdir(os.path.join(folder, "manifest.d"))
-        for name in ["manifest.jsonl", *place.list("manifest.d")]:
-            content = place.read(name)
+        for name in ["manifest.jsonl", *results.list("manifest.d")]:
+            content = results.read(name)
             if content is not None:
                 with open(os.path.join(folder, name), "wb") as file:
                     file.write(content)
         merged = _merged(folder)
         path = os.path.join(folder, "manifest.jsonl")
         if os.path.exists(path):
-            place.put(path, "manifest.jsonl")
-    _sweep(place)
+            results.put(path, "manifest.jsonl")
+    _sweep(results)
     return merged
 
 
-def _sweep(place: Store) -> None:
-    place.remove("manifest.d")
+def _sweep(results: Store) -> None:
+    results.remove("manifest.d")
 
 
 def _merged(folder: str) -> Entry:
@@ -403,33 +403,33 @@ class _Driver:
         for reference in ready:
             task = self._running.pop(reference)
             try:
-                told = self._ray.get(reference)
+                reply = self._ray.get(reference)
             except crashes as error:
                 self._crashed(task, str(error).strip().splitlines()[0])
             except self._ray.exceptions.RayTaskError as error:
                 code = OUTPUT if isinstance(error.cause, OSError) else 1
                 raise DistributedError(f"shard {task.shard}: {error.cause!r}", code) from error
             else:
-                self._ended(task, told)
+                self._ended(task, reply)
 
-    def _ended(self, task: Task, told: Entry) -> None:
-        machine = f"{told['host']} ({told['node'][:8]})"
-        if "other_wheel" in told:
-            self._refused[told["node"]] = f"{machine}: {told['other_wheel']}"
+    def _ended(self, task: Task, reply: Entry) -> None:
+        machine = f"{reply['host']} ({reply['node'][:8]})"
+        if "other_wheel" in reply:
+            self._refused[reply["node"]] = f"{machine}: {reply['other_wheel']}"
             self._check_machines()
             self._todo.appendleft(task)
             return
-        if "code" in told:
-            message = f"shard {task.shard} on {machine}: {told['message']}"
-            raise DistributedError(message, told["code"] or DEVICE)
-        self._workers.add((told["node"], told["pid"]))
+        if "code" in reply:
+            message = f"shard {task.shard} on {machine}: {reply['message']}"
+            raise DistributedError(message, reply["code"] or DEVICE)
+        self._workers.add((reply["node"], reply["pid"]))
         if task.is_trial:
             self._tried(task, is_sound=True)
             return
-        self._made += told["made"]
-        self._skipped += told["skipped"]
-        self._progress.rotations += told["rotations"]
-        self._progress.failed += len(told["failed"])
+        self._made += reply["made"]
+        self._skipped += reply["skipped"]
+        self._progress.rotations += reply["rotations"]
+        self._progress.failed += len(reply["failed"])
         self._progress.inputs_done += len(task.inputs) + len(task.refused)
         self._progress.shards_done += 1
 
@@ -444,7 +444,7 @@ class _Driver:
                 message = f"shard {task.shard} ends every worker, and none of its inputs alone: {why}"
                 raise DistributedError(message, 1)
             left_out = {path for path, _ in task.refused}
-            inputs = tuple(own for own in apart.inputs if own.path not in left_out)
+            inputs = tuple(item for item in apart.inputs if item.path not in left_out)
             apart.waiting += 1
             self._todo.appendleft(Task(task.shard, inputs, True, task.device))
             return
@@ -457,9 +457,9 @@ class _Driver:
         if not self._is_last(task):
             self._todo.appendleft(Task(task.shard, task.inputs, True, "cpu"))
             return
-        own = task.inputs[0].path
-        message = f"{own}: ends the process that evaluates it, alone and on the CPU: {why}"
-        self._apart[task.shard].guilty.append((own, message))
+        path = task.inputs[0].path
+        message = f"{path}: ends the process that evaluates it, alone and on the CPU: {why}"
+        self._apart[task.shard].guilty.append((path, message))
         self._tried(task, is_sound=False)
 
     def _is_last(self, task: Task) -> bool:
@@ -473,6 +473,6 @@ class _Driver:
         if apart.waiting:
             return
         guilty = {path for path, _ in apart.guilty}
-        inputs = tuple(own for own in apart.inputs if own.path not in guilty)
+        inputs = tuple(item for item in apart.inputs if item.path not in guilty)
         device = "cpu" if apart.needs_cpu else None
         self._todo.appendleft(Task(task.shard, inputs, False, device, tuple(apart.guilty)))

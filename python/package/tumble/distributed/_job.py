@@ -109,8 +109,8 @@ def split_record(text: str) -> tuple[Entry, list[str]]:
     """The line about the shard itself, and the others, each with its end."""
     first, *lines = lines_of(text)
     header: Entry = json.loads(first)
-    own = ("results", "results_sha256")
-    return {name: value for name, value in header.items() if name not in own}, lines
+    counted = ("results", "results_sha256")
+    return {name: value for name, value in header.items() if name not in counted}, lines
 
 
 def is_whole(text: str) -> bool:

@@ -25,7 +25,7 @@ def write(target: str, folder: str, entries: list[Entry]) -> None:
         arrow: Any = importlib.import_module("pyarrow")
         parquet: Any = importlib.import_module("pyarrow.parquet")
     except ImportError as error:
-        message = "--into parquet wants pyarrow: pip install 'tumble-rotations[ray]'"
+        message = "--into parquet needs pyarrow: pip install 'tumble-rotations[ray]'"
         raise DistributedError(message, USAGE) from error
     schema = arrow.schema(
         [
@@ -47,7 +47,7 @@ def write(target: str, folder: str, entries: list[Entry]) -> None:
         if not rows:
             return
         clips, tracks, frames, numbers, hashes = zip(*rows, strict=True)
-        ends = np.cumsum([0, *(len(own) for own in numbers)])
+        ends = np.cumsum([0, *(len(values) for values in numbers)])
         if ends[-1] >= 2**31:
             message = f"{clips[-1]}: more numbers than a list of Parquet's can have; --into files"
             raise DistributedError(message, USAGE)
@@ -56,8 +56,8 @@ def write(target: str, folder: str, entries: list[Entry]) -> None:
         )
         columns = [list(clips), list(tracks), list(frames), lists, list(hashes)]
         arrays = [
-            own if isinstance(own, arrow.Array) else arrow.array(own, field.type)
-            for own, field in zip(columns, schema, strict=True)
+            column if isinstance(column, arrow.Array) else arrow.array(column, field.type)
+            for column, field in zip(columns, schema, strict=True)
         ]
         writer.write_table(arrow.Table.from_arrays(arrays, schema=schema))
         rows.clear()

@@ -27,14 +27,14 @@ class Store(Protocol):
         """Makes a file of a local one, whole or not at all."""
 
     def list(self, below: str = "") -> dict[str, int]:
-        """Every file below a directory of its, with its size."""
+        """Every file below one of its directories, with its size."""
 
     def remove(self, below: str) -> None:
-        """Removes a directory of its and all in it."""
+        """Removes one of its directories and all in it."""
 
 
-def store(place: str) -> Store:
-    return _Objects(place) if is_url(place) else _Files(place)
+def store(location: str) -> Store:
+    return _Objects(location) if is_url(location) else _Files(location)
 
 
 def put_text(store: Store, text: str, name: str) -> None:
@@ -51,14 +51,14 @@ def read_text(store: Store, name: str) -> str | None:
 
 
 class _Files:
-    def __init__(self, place: str) -> None:
-        self._place = place
+    def __init__(self, folder: str) -> None:
+        self._folder = folder
 
     def _path(self, name: str) -> str:
         """Beneath the directory, whatever a manifest says and through whatever links."""
-        path = os.path.join(self._place, name)
-        place = os.path.realpath(self._place)
-        if os.path.commonpath([place, os.path.realpath(path)]) != place:
+        path = os.path.join(self._folder, name)
+        folder = os.path.realpath(self._folder)
+        if os.path.commonpath([folder, os.path.realpath(path)]) != folder:
             message = f"{path}: leads out of its directory, which is not followed"
             raise DistributedError(message, ALL_INPUTS)
         return path
@@ -102,7 +102,7 @@ class _Files:
         for folder, _, names in os.walk(self._path(below)):
             for name in names:
                 path = os.path.join(folder, name)
-                found[os.path.relpath(path, self._place)] = os.path.getsize(path)
+                found[os.path.relpath(path, self._folder)] = os.path.getsize(path)
         return found
 
     def remove(self, below: str) -> None:
@@ -110,16 +110,16 @@ class _Files:
 
 
 def _umask() -> int:
-    own = os.umask(0)
-    os.umask(own)
-    return own
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
 
 
 def _pyarrow_fs() -> Any:
     try:
         return importlib.import_module("pyarrow.fs")
     except ImportError as error:
-        message = "URLs want pyarrow: pip install 'tumble-rotations[ray]'"
+        message = "URLs need pyarrow: pip install 'tumble-rotations[ray]'"
         raise DistributedError(message, USAGE) from error
 
 
@@ -127,7 +127,7 @@ class _Objects:
     def __init__(self, url: str) -> None:
         self._module = _pyarrow_fs()
         try:
-            self._own, self._base = self._module.FileSystem.from_uri(url)
+            self._file_system, self._base = self._module.FileSystem.from_uri(url)
         except Exception as error:  # pyarrow's own classes are many
             raise DistributedError(f"{url}: {error}", USAGE) from error
         self._base = self._base.rstrip("/")
@@ -137,30 +137,30 @@ class _Objects:
 
     def read(self, name: str) -> bytes | None:
         try:
-            with self._own.open_input_stream(self._path(name)) as stream:
+            with self._file_system.open_input_stream(self._path(name)) as stream:
                 found: bytes = stream.read()
                 return found
         except FileNotFoundError:
             return None
 
     def size(self, name: str) -> int | None:
-        info = self._own.get_file_info(self._path(name))
+        info = self._file_system.get_file_info(self._path(name))
         return info.size if info.type == self._module.FileType.File else None
 
     def put(self, source: str, name: str) -> None:
         path = self._path(name)
         # An object is there once its upload has ended; in a file system a name is given last.
-        whole = self._own.type_name in ("s3", "gcs", "abfs")
+        whole = self._file_system.type_name in ("s3", "gcs", "abfs")
         temporary = path if whole else f"{path}.tumble-{os.getpid()}.part"
         if not whole:
-            self._own.create_dir(path.rsplit("/", 1)[0], recursive=True)
+            self._file_system.create_dir(path.rsplit("/", 1)[0], recursive=True)
         with (
             open(source, "rb") as file,
-            self._own.open_output_stream(temporary) as stream,
+            self._file_system.open_output_stream(temporary) as stream,
         ):
             shutil.copyfileobj(file, stream, 1 << 20)
         if not whole:
-            self._own.move(temporary, path)
+            self._file_system.move(temporary, path)
 
     def list(self, below: str = "") -> dict[str, int]:
         selector = self._module.FileSelector(
@@ -169,18 +169,18 @@ class _Objects:
         start = len(str(self._base)) + 1
         return {
             info.path[start:]: info.size
-            for info in self._own.get_file_info(selector)
+            for info in self._file_system.get_file_info(selector)
             if info.type == self._module.FileType.File
         }
 
     def remove(self, below: str) -> None:
         with contextlib.suppress(FileNotFoundError):
-            self._own.delete_dir(self._path(below))
+            self._file_system.delete_dir(self._path(below))
 
     def fetch(self, name: str, target: str) -> None:
         """Copies an object into a local file."""
         with (
-            self._own.open_input_stream(self._path(name)) as stream,
+            self._file_system.open_input_stream(self._path(name)) as stream,
             open(target, "wb") as file,
         ):
             shutil.copyfileobj(stream, file, 1 << 20)

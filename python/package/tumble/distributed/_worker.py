@@ -39,20 +39,20 @@ from tumble.distributed._stores import Store, objects, put_text, read_text, stor
 def run(job: Job, task: Task) -> Entry:
     """Evaluates a shard; what comes back is counts and failures."""
     started = time.monotonic()
-    own = wheel()
-    told: Entry = {"node": _node(), "pid": os.getpid(), "host": platform.node()}
-    if own != job.wheel:
-        return {**told, "other_wheel": f"tumble {own[1]}, kernels {own[0][:12]}"}
+    installed = wheel()
+    reply: Entry = {"node": _node(), "pid": os.getpid(), "host": platform.node()}
+    if installed != job.wheel:
+        return {**reply, "other_wheel": f"tumble {installed[1]}, kernels {installed[0][:12]}"}
     try:
         worker = _worker(job.line, task.device or _device(job))
         with _inputs(job, task) as inputs:
             outcome = _run(worker, job, task, inputs)
     except ValueError as error:  # a command line or a device that was refused
         code, message = error.args if len(error.args) == 2 else (DEVICE, str(error))
-        return {**told, "code": code, "message": message}
+        return {**reply, "code": code, "message": message}
     except DistributedError as error:
-        return {**told, "code": error.exit_code, "message": str(error)}
-    return {**told, **outcome, "seconds": time.monotonic() - started}
+        return {**reply, "code": error.exit_code, "message": str(error)}
+    return {**reply, **outcome, "seconds": time.monotonic() - started}
 
 
 # What a worker process keeps: its engine, by what it was opened for; the last manifest that it read;
@@ -99,9 +99,9 @@ def _uuid(card: str) -> str:
 
 @contextlib.contextmanager
 def _inputs(job: Job, task: Task) -> Iterator[list[tuple[str, str]]]:
-    """The inputs under the names that they were given by, which messages and manifests have. Objects
+    """The inputs under the names on the command line, which messages and manifests have. Objects
     are fetched into a directory in which those names lead to them."""
-    inputs = [(own.path, own.below) for own in task.inputs]
+    inputs = [(item.path, item.below) for item in task.inputs]
     if not is_url(job.library):
         with _in(job.folder if not os.path.isabs(job.library) else os.getcwd()):
             yield inputs
@@ -251,8 +251,8 @@ def _done(
             "inputs": len(inputs),
             "failed": [],
         }
-        own = [line for key in _keys(job, task, inputs) for line in merged.get(key, [])]
-        text = join_record(header, own)
+        recorded = [line for key in _keys(job, task, inputs) for line in merged.get(key, [])]
+        text = join_record(header, recorded)
     header, lines = split_record(text)
     if header["failed"]:
         return None
@@ -307,13 +307,13 @@ def _key(entry: Entry) -> tuple[str, int]:
     return (name if name.endswith(".parquet") else os.path.splitext(name)[0]), count
 
 
-def _manifest(place: str, size: int | None) -> dict[str, list[str]]:
+def _manifest(location: str, size: int | None) -> dict[str, list[str]]:
     """The lines of a merged manifest of that size, by what they are of."""
-    if (place, size) in _MANIFESTS:
-        return _MANIFESTS[place, size]
+    if (location, size) in _MANIFESTS:
+        return _MANIFESTS[location, size]
     found: dict[str, list[str]] = {}
-    text = (read_text(store(place), "manifest.jsonl") or "") if size is not None else ""
+    text = (read_text(store(location), "manifest.jsonl") or "") if size is not None else ""
     for line in lines_of(text):
         found.setdefault(_key(json.loads(line))[0], []).append(line)
     _MANIFESTS.clear()
-    return _MANIFESTS.setdefault((place, size), found)
+    return _MANIFESTS.setdefault((location, size), found)

@@ -2,10 +2,9 @@
 
 use glam::Vec3;
 use tumble::{FrameRate, Layout, SampleTimes};
-
-use tumble_formats::format::{FormatOption, MotionOptions, WriteError};
+use tumble_formats::format::{Document, FormatOption, MotionOptions};
 use tumble_formats::motion::{Motion, SampledClip};
-use tumble_formats::{Diagnostic, sample};
+use tumble_formats::sample;
 
 use crate::arguments::time::{ClipFrames, SampleRequest};
 use crate::batch::pipeline::EvaluatedResult;
@@ -52,11 +51,7 @@ impl EvaluationJob<'_> {
             SampleRequest::Rate { rate, .. } => Some(*rate),
             SampleRequest::Times(_) | SampleRequest::Keys(_) => None,
         };
-        let format = target.format();
-        let options = self.options(target);
-        self.written(name, clips, &times, rate, target, |sampled, out| {
-            format.write_clips(sampled, &options, out)
-        })
+        self.written(name, clips, &times, rate, target, None)
     }
 
     /// The input's own file, everything kept but the keys of some of its animations.
@@ -88,16 +83,7 @@ impl EvaluationJob<'_> {
         };
         let times: Result<Vec<ClipFrames>, _> = clips.iter().map(at).collect();
         let times = times.map_err(|diagnostic| Failure::input(&diagnostic, ""))?;
-        let options = self.options(target);
-        let indices: Vec<usize> = clips.iter().map(|clip| clip.index).collect();
-        self.written(name, clips, &times, Some(rate), target, |sampled, out| {
-            let clips: Vec<(usize, SampledClip<'_>)> = indices
-                .iter()
-                .copied()
-                .zip(sampled.iter().cloned())
-                .collect();
-            document.write(&clips, &options, target.path(), out)
-        })
+        self.written(name, clips, &times, Some(rate), target, Some(&*document))
     }
 
     fn options(&self, target: &ResultTarget) -> MotionOptions {
@@ -110,7 +96,7 @@ impl EvaluationJob<'_> {
         }
     }
 
-    /// Samples clips and writes them.
+    /// Samples clips and writes them: into the input's own file, if it is given, else into a new one.
     fn written(
         &mut self,
         name: &str,
@@ -118,7 +104,7 @@ impl EvaluationJob<'_> {
         frames: &[ClipFrames],
         rate: Option<FrameRate>,
         target: &ResultTarget,
-        write: impl FnOnce(&[SampledClip<'_>], &mut Vec<u8>) -> Result<Vec<Diagnostic>, WriteError>,
+        document: Option<&dyn Document>,
     ) -> Result<(EvaluatedResult, EvaluationReport), Failure> {
         let mut all: Vec<sample::Samples> = Vec::new();
         for (clip, samples) in clips.iter().zip(frames) {
@@ -141,8 +127,8 @@ impl EvaluationJob<'_> {
         let sampled: Vec<SampledClip<'_>> = (clips.iter().zip(&all))
             .map(|(clip, samples)| samples.of(clip, rate, &notes))
             .collect();
-        let written = target.write_motion(|out| write(&sampled, out))?;
-        target.write_times(&sampled)?;
+        let indices = clips.iter().map(|clip| clip.index);
+        let written = target.write_clips(&sampled, indices, document, &self.options(target))?;
         let tracks = clips.iter().map(|clip| clip.set.track_count()).max();
         let samples = all.iter().map(|samples| samples.times.len()).sum();
         let times = || all.iter().flat_map(|samples| &samples.times).copied();

@@ -226,28 +226,6 @@ impl EvaluationJob<'_> {
         });
         evaluated.map_err(|error| Failure::evaluating(name, &error))
     }
-
-    /// All channels of a clip.
-    pub(super) fn sample(
-        &mut self,
-        name: &str,
-        clip: &Motion,
-        frames: &SampleTimes,
-    ) -> Result<Samples, Failure> {
-        let (method, with) = self.methods();
-        let methods = ChannelMethods {
-            method,
-            with: &with,
-        };
-        let tracks = clip.set.track_count();
-        let samples = frames.resolve(tracks, clip.set.time_span());
-        let found = samples.map_err(Error::from).and_then(|timeline| {
-            self.device.choose(tracks * timeline.len())?;
-            self.device
-                .work(|engine| methods.sample(engine, clip, frames))
-        });
-        found.map_err(|error| Failure::evaluating(name, &error))
-    }
 }
 
 /// The first and the last time of a result.
