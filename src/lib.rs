@@ -198,7 +198,7 @@ pub mod vulkan {
     //!   application's commands by a `ClipTarget` or a `CrowdTarget`.
     //! * **Memory for others on the same card**, such as CUDA: an `ExportedResult`.
     //!
-    //! Without the feature `vulkan` no device is listed ([`VulkanError::NotBuilt`]); the types of an application's own
+    //! Without the feature `vulkan` no device is listed (`VulkanError::NotBuilt`); the types of an application's own
     //! device are left out.
 
     pub use crate::device::VulkanDevice;

@@ -288,7 +288,7 @@ fn outputs_have_their_shapes_and_names() {
     };
     assert!(parents("-1").contains("1 entries for 2 tracks"));
     assert!(parents("1,0").contains("is its own ancestor"));
-    assert!(parents("-2,0").contains("-2 is no track"));
+    assert!(parents("-2,0").contains("-2 is not the index of a track"));
     for (wrong, says) in [
         (
             ["--output", "euler", "--sequence", "XXY"],

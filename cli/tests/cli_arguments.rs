@@ -73,7 +73,7 @@ const ARGUMENTS: &str = "
 3 | info a.dat none.dat                          | none.dat
 2 | generate -o old.npy                          | --overwrite
 2 | generate -o g.dat --boxes 0                  | 1..=65536
-2 | generate -o g.dat --seconds nan              | positive
+2 | generate -o g.dat --seconds nan              | a number above 0
 2 | generate -o g.dat --keys 1000000000          | 4e-6 s a key
 2 | generate -o g.dat --uniform --random         | cannot be used with
 2 | completions powerbash                        | bash

@@ -157,7 +157,7 @@ fn what_cannot_be_compared_is_refused() {
         (
             &["compare", "a.dat", "part.dat", "--tolerance", "360"],
             8,
-            "1 track of one alone",
+            "1 track in only one of the files",
         ),
     ] {
         let run = run(folder, line);

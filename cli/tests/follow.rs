@@ -308,7 +308,7 @@ fn a_low_pass_is_in_hz() {
         assert!(largest(3) > 0.999, "{}", largest(3));
     }
     for (hz, words) in [
-        ("50", "nothing faster than 50"),
+        ("50", "contain no frequencies above 50 Hz"),
         ("0", "expected a number of Hz above 0"),
     ] {
         let line = ["smooth", "waves.tum", "--low-pass", hz, "-o", "no.tum"];

@@ -294,7 +294,7 @@ fn converting_and_smoothing_keep_the_rest_of_a_file() {
     );
     let scaled = line(folder, "convert fox.gltf --up z -o up.glb");
     assert!(
-        scaled.words.contains("stays behind: materials"),
+        scaled.words.contains("not copied: materials"),
         "{}",
         scaled.words
     );

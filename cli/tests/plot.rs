@@ -325,7 +325,7 @@ fn what_cannot_be_drawn_is_refused_and_nothing_is_written() {
         ),
         (
             "plot a.dat -o x.svg --show speed --dimension 2",
-            "--dimension is for components",
+            "--dimension needs --show components",
         ),
         (
             "plot a.dat -o x.svg --dimension 2 --box 1",

@@ -233,7 +233,7 @@ fn what_cannot_be_reduced_is_refused() {
                 "reduce", "walk.bvh", "a.dat", "-o", "all", "--to", "glb", "--plot", "a.svg",
             ],
             2,
-            "of one input",
+            "needs a single input",
         ),
     ] {
         let run = run(folder, line);

@@ -43,7 +43,7 @@ const REMEDIES: &[(&str, &str, &[&str])] = &[
     ),
     (
         "eval a.dat b.dat -o sharded",
-        "--resume goes on",
+        "--resume continues",
         &["merge sharded"],
     ),
     (

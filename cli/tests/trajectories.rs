@@ -96,7 +96,7 @@ fn every_trajectory_becomes_every_other() {
     refused(
         at,
         "convert path.tum data.csv -o out --to kitti --times-out t.txt",
-        "one input",
+        "a single input",
     );
     refused(
         at,

@@ -29,21 +29,13 @@ pub enum Align {
     Sim3,
 }
 
-impl Align {
-    /// All of them.
-    pub const ALL: [Self; 5] = [Self::None, Self::Position, Self::Yaw, Self::Se3, Self::Sim3];
-
-    /// The name by which programs call it.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::None => "none",
-            Self::Position => "position",
-            Self::Yaw => "yaw",
-            Self::Se3 => "se3",
-            Self::Sim3 => "sim3",
-        }
-    }
+tumble::names! {
+    Align, "alignment",
+    None => "none",
+    Position => "position",
+    Yaw => "yaw",
+    Se3 => "se3",
+    Sim3 => "sim3",
 }
 
 /// What lays an estimate over its reference: `scale`, then `rotation`, then `translation`.

@@ -39,12 +39,12 @@ fn what_is_no_part_of_the_motion_is_named() {
         (
             "tum/further_numbers.tum",
             Code::FurtherNumbers,
-            "2 numbers behind",
+            "2 numbers after",
         ),
         (
             "euroc/velocities.euroc",
             Code::FurtherNumbers,
-            "1 numbers behind",
+            "1 numbers after",
         ),
         (
             "bvh/frames_fewer.bvh",

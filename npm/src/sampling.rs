@@ -66,8 +66,8 @@ fn option<'de, D: Deserializer<'de>, T: FromStr<Err = UnknownNameError>>(
     deserializer: D,
 ) -> Result<Option<T>, D::Error> {
     let name = Option::<String>::deserialize(deserializer)?;
-    let parsed = name.map(|name| name.parse()).transpose();
-    parsed.map_err(|error: UnknownNameError| D::Error::custom(error))
+    let parsed: Result<Option<T>, UnknownNameError> = name.map(|name| name.parse()).transpose();
+    parsed.map_err(D::Error::custom)
 }
 
 impl Request {

@@ -13,7 +13,7 @@ use crate::arrays::{ArrayValues, doubles};
 use crate::clip::Clip;
 use crate::engine::{Engine, default_engine};
 use crate::errors::{in_python, input, of_engine, warn_of};
-use crate::options::{SampleRequest, samples_of};
+use crate::options::{SampleRequest, option_named, samples_of};
 use crate::run::interruptible;
 
 /// What many differences come to.
@@ -397,13 +397,7 @@ pub(crate) fn path_errors(
     track: Option<&Bound<'_, PyAny>>,
     engine: Option<&Bound<'_, Engine>>,
 ) -> PyResult<PathErrors> {
-    let known = Align::ALL.iter().find(|known| known.name() == align);
-    let Some(&align) = known else {
-        let names = Align::ALL.map(Align::name).join(", ");
-        return Err(input(format!(
-            "align: there is no `{align}`; there are {names}"
-        )));
-    };
+    let align: Align = option_named(align, "align")?;
     if let Some(gap) = max_gap.filter(|gap| gap.is_nan() || *gap < 0.0) {
         return Err(input(format!("max_gap: {gap} is no number of seconds")));
     }

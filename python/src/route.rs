@@ -237,7 +237,9 @@ impl Surface {
             Some(Shape::Net(_)) => return Err(input("avoid: obstacles are a mesh")),
         };
         if avoid.is_none() && clearance != 0.0 {
-            return Err(input("clearance: it is that from `avoid`; give it too"));
+            return Err(input(
+                "clearance: it is the distance from `avoid`; give it too",
+            ));
         }
         Ok(RouteOptions {
             shape: self.shape.clone(),

@@ -506,7 +506,7 @@ def test_columns_that_are_left_out_are_said(tmp_path):
     states = [[0.0, 1.0, 2.0, 0.0, 0.0, 0.0, 1.0, 9.0]] * 2
     table = pa.table({"timestamp": [0.0, 1.0], "state": states, "reward": [0.0, 0.0], "index": [0, 1]})
     parquet.write_table(table, tmp_path / "a.parquet")
-    with pytest.warns(tumble.InputWarning, match=r": `reward`, `state\[0:3\]`, `state\[7:8\]`; map"):
+    with pytest.warns(tumble.InputWarning, match=r": `reward`, `state\[0:3\]`, `state\[7:8\]`; name the keys"):
         tumble.load(tmp_path / "a.parquet", map="hand=state[3:7]")
-    with pytest.warns(tumble.InputWarning, match=r": `reward`, `state\[7:8\]`; map"):
+    with pytest.warns(tumble.InputWarning, match=r": `reward`, `state\[7:8\]`; name the keys"):
         tumble.load(tmp_path / "a.parquet", map="hand=state[3:7],hand.translation=state[0:3]")

@@ -15,6 +15,9 @@ pub struct UnknownNameError {
 }
 
 /// The value of that name among all values of an option.
+///
+/// # Errors
+/// When none has it.
 #[doc(hidden)]
 pub fn named<T: Copy>(
     option: &'static str,

@@ -107,7 +107,7 @@ impl DirectionArgument {
         let number = |text: &str| {
             text.trim()
                 .parse::<f64>()
-                .map_err(|_| wrong(text, "number"))
+                .map_err(|_| expected("number"))
         };
         match text.split_once(':') {
             None if text == "tangent" => Ok(Self::Known(Direction::Tangent)),
@@ -140,8 +140,8 @@ impl DirectionArgument {
     }
 }
 
-fn wrong(text: &str, expected: &str) -> String {
-    format!("invalid value `{text}`: expected a finite {expected}")
+fn expected(kind: &str) -> String {
+    format!("expected a finite {kind}")
 }
 
 pub(crate) fn positive(text: &str) -> Result<f64, String> {
@@ -149,7 +149,7 @@ pub(crate) fn positive(text: &str) -> Result<f64, String> {
         .parse::<f64>()
         .ok()
         .filter(|number| number.is_finite() && *number > 0.0);
-    number.ok_or_else(|| wrong(text, "number above 0"))
+    number.ok_or_else(|| expected("number above 0"))
 }
 
 fn vector(text: &str) -> Result<DVec3, String> {
@@ -161,7 +161,7 @@ fn vector(text: &str) -> Result<DVec3, String> {
         Ok(&[x, y, z]) if x.is_finite() && y.is_finite() && z.is_finite() => {
             Ok(DVec3::new(x, y, z))
         }
-        _ => Err(wrong(text, "vector X,Y,Z")),
+        _ => Err(expected("vector X,Y,Z")),
     }
 }
 
@@ -174,7 +174,7 @@ fn speed(text: &str) -> Result<PathSpeed, String> {
         ("constant", _) => Ok(PathSpeed::Constant),
         (_, Some((start, end))) => match (start.parse(), end.parse()) {
             (Ok(start), Ok(end)) => Ok(PathSpeed::Eased { start, end }),
-            _ => Err(wrong(text, "pair of fractions")),
+            _ => Err(expected("pair of fractions")),
         },
         _ => Err("a speed is keys, constant or eased:A,B".to_owned()),
     }

@@ -4,9 +4,7 @@
 pub(crate) fn not_negative(text: &str) -> Result<f64, String> {
     match text.trim().parse::<f64>() {
         Ok(number) if number.is_finite() && number >= 0.0 => Ok(number),
-        _ => Err(format!(
-            "invalid value `{text}`: expected a finite number of 0 or more"
-        )),
+        _ => Err("expected a finite number of 0 or more".to_owned()),
     }
 }
 

@@ -4,7 +4,8 @@ mod text;
 
 use std::path::Path;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
+use clap::builder::TypedValueParser;
 use serde::Serialize;
 use tumble::{Device, Engine, FrameRate, SampleTimes};
 use tumble_formats::compare::{
@@ -16,6 +17,7 @@ use tumble_formats::trajectory::{Align, Step};
 use tumble_formats::{Diagnostic, Format};
 
 use crate::arguments::input::{self, Inputs};
+use crate::arguments::output::one_of;
 use crate::arguments::time::{check_range, finite_seconds};
 use crate::arguments::tolerance::{degrees, not_negative};
 use crate::batch::room;
@@ -67,8 +69,8 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "LENGTH", value_parser = not_negative, allow_hyphen_values = true)]
     distance: Option<f64>,
     /// Align the second path to the first by least squares; the value says what may change
-    #[arg(long, value_enum, value_name = "FREEDOM", help_heading = TRAJECTORIES)]
-    align: Option<AlignArgument>,
+    #[arg(long, value_name = "FREEDOM", value_parser = alignment(), help_heading = TRAJECTORIES)]
+    align: Option<Align>,
     /// Absolute errors: pose by pose
     #[arg(long, help_heading = TRAJECTORIES)]
     ape: bool,
@@ -83,30 +85,15 @@ pub(crate) struct Arguments {
     json: bool,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum AlignArgument {
-    /// as they are
-    None,
-    /// move the second
-    Position,
-    /// move it, and turn it about z
-    Yaw,
-    /// move and turn it
-    Se3,
-    /// move, turn and scale it
-    Sim3,
-}
-
-impl AlignArgument {
-    fn align(self) -> Align {
-        match self {
-            Self::None => Align::None,
-            Self::Position => Align::Position,
-            Self::Yaw => Align::Yaw,
-            Self::Se3 => Align::Se3,
-            Self::Sim3 => Align::Sim3,
-        }
-    }
+fn alignment() -> impl TypedValueParser<Value = Align> {
+    let help = |align| match align {
+        Align::None => "as they are",
+        Align::Position => "move the second",
+        Align::Yaw => "move it, and turn it about z",
+        Align::Se3 => "move and turn it",
+        Align::Sim3 => "move, turn and scale it",
+    };
+    one_of(Align::ALL.map(|align| (align.name(), help(align), align)))
 }
 
 fn step(text: &str) -> Result<Step, String> {
@@ -213,7 +200,7 @@ impl Arguments {
         let engine =
             Engine::new(Device::Cpu).map_err(|error| Failure::evaluating(&names[0], &error))?;
         let measure = PathMeasure {
-            align: self.align.map(AlignArgument::align).unwrap_or_default(),
+            align: self.align.unwrap_or_default(),
             is_absolute: self.ape || self.rpe.is_none(),
             step: self.rpe,
             max_gap: self.max_gap,

@@ -110,6 +110,6 @@ fn write_landscape(arguments: &Arguments) -> Result<(), Failure> {
 fn positive(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if value.is_finite() && value > 0.0 => Ok(value),
-        _ => Err(format!("invalid value `{text}`: expected a number above 0")),
+        _ => Err("expected a number above 0".to_owned()),
     }
 }

@@ -156,12 +156,12 @@ fn number(text: &str) -> Option<f64> {
 
 fn positive(text: &str) -> Result<f64, String> {
     let found = number(text).filter(|&value| value > 0.0);
-    found.ok_or_else(|| format!("invalid value `{text}`: expected a number above 0"))
+    found.ok_or_else(|| "expected a number above 0".to_owned())
 }
 
 fn not_negative(text: &str) -> Result<f64, String> {
     let found = number(text).filter(|&value| value >= 0.0);
-    found.ok_or_else(|| format!("invalid value `{text}`: expected a number of 0 or more"))
+    found.ok_or_else(|| "expected a number of 0 or more".to_owned())
 }
 
 fn slope(text: &str) -> Result<f64, String> {

@@ -86,7 +86,8 @@ def bytes_of(size: int | str) -> int:
     units = {"": 1, "KIB": 1 << 10, "MIB": 1 << 20, "GIB": 1 << 30, "TIB": 1 << 40}
     found = re.fullmatch(r"\s*(\d+)\s*([kmgt]ib)?\s*", str(size), re.IGNORECASE)
     if found is None or int(found[1]) == 0:
-        raise DistributedError(f"{size!r} is no size; give bytes, or such as 2GiB", USAGE)
+        message = f"invalid size `{size}`: expected bytes, or a number with a unit, such as 256MiB"
+        raise DistributedError(message, USAGE)
     return int(found[1]) * units[(found[2] or "").upper()]
 
 
