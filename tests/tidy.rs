@@ -930,3 +930,22 @@ fn an_impl_away_from_home_is_found() {
     let expected = [("src/clip.rs", 2, "Engine"), ("src/clip.rs", 2, "Lane")];
     assert_eq!(away_from_home(&files), expected);
 }
+
+/// A file beside `all.rs` that it does not name is not compiled: its tests would never run.
+#[test]
+fn every_file_of_tests_is_compiled() {
+    for package in ["", "cli/", "formats/", "capi/", "routes/"] {
+        let folder = format!("{package}tests");
+        let all = read(format!("{folder}/all.rs"));
+        let manifest = read(format!("{package}Cargo.toml"));
+        for entry in fs::read_dir(root().join(&folder)).unwrap() {
+            let name = entry.unwrap().file_name().into_string().unwrap();
+            let Some(module) = name.strip_suffix(".rs") else {
+                continue;
+            };
+            let is_named = all.contains(&format!("mod {module};"))
+                || manifest.contains(&format!("path = \"tests/{name}\""));
+            assert!(is_named, "{folder}/{name}: name it in all.rs");
+        }
+    }
+}

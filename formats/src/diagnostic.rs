@@ -286,7 +286,7 @@ codes! {
     BvhMoreRows = "W201", "more rows than frames", "The rows after the last frame are left out.";
     BvhNoFrames = "W202", "no frames", "The skeleton rests.";
     EndSiteRounded = "W203", "an End Site that f32 rounds", "End Sites mark where a last bone ends, relative to its joint, and are kept in f32: about 7 digits. Offsets of joints and positions keep all of theirs.";
-    StartMoved = "W204", "the start is moved to 0", "BVH has no start time: its first frame is at 0. glTF keeps times in f32, which cannot tell frames apart in seconds since 1970: they count from the first whole second.";
+    StartMoved = "W204", "the start is moved to 0", "BVH and bodies of SMPL have no start time: their first frame is at 0. glTF keeps times in f32, which cannot tell frames apart in seconds since 1970: they count from the first whole second.";
     SameName = "W206", "two joints of one name", "The second one gets its number after its name, so that names are unique; braces and control characters in names become `_`.";
     NameChanged = "W207", "a name is changed", "The format has no line ends, braces or control characters in names, and no name twice.";
     NoRoom = "W208", "what the format has no room for", "It is left out. A table in the documents says what each format holds.";

@@ -350,6 +350,15 @@ impl Document for NpzDocument {
         let outcomes = self.outcomes(&parts, sampled, options)?;
         self.write_members(&outcomes, sampled, out)?;
         let mut warnings = Warnings::new(&self.archive.file);
+        let start = sampled.clip.time_offset as f64 + sampled.times[0];
+        if start != 0.0 && self.plan.times.is_none() && !self.plan.is_tumble_layout {
+            warnings.warn(Code::StartMoved, || {
+                let message = format!(
+                    "the first frame is at {start} s; the layout has a rate alone and begins at 0"
+                );
+                (None, message)
+            });
+        }
         if outcomes
             .iter()
             .any(|outcome| matches!(outcome, MemberOutcome::LeftOut))

@@ -390,7 +390,7 @@ mod tests {
                 "{'descr': '<f8', 'shape': (99999999999999999999,)}".to_owned(),
                 "not a length",
             ),
-            (format!("{{'descr': '', {good}}}"), "no type"),
+            (format!("{{'descr': '', {good}}}"), "not a type"),
             ("{'descr': [[[[".to_owned(), "no end"),
             (
                 format!("{{'name': '<f8', {good}}}"),

@@ -190,13 +190,12 @@ impl Arguments {
             layout: self.layout,
             encoding: self.encoding,
         };
-        let set = OPTIONS
+        let mut set = OPTIONS
             .iter()
             .filter(|rule| self.command_line.has(rule.name));
-        let mut refusals = set.filter_map(|rule| match rule.applies_to {
+        set.find_map(|rule| match rule.applies_to {
             AppliesTo::Results(refusal) => refusal(&result),
             AppliesTo::All | AppliesTo::Inputs(_) => None,
-        });
-        refusals.next()
+        })
     }
 }
