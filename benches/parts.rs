@@ -8,7 +8,10 @@ use divan::Bencher;
 use divan::counter::ItemsCount;
 use glam::Quat;
 use tumble::crowd::{CrowdLayer, CrowdLibrary, CrowdValues};
-use tumble::{Device, Encoding, Engine, EngineOptions, Layout, METHODS, SampleTimes, Skeleton, TrackSet, VectorMethod, method};
+use tumble::{
+    Device, Encoding, Engine, EngineOptions, Layout, METHODS, SampleTimes, Skeleton, TrackSet,
+    VectorMethod, method,
+};
 
 fn main() {
     divan::main();

@@ -17,7 +17,9 @@ use ash::vk;
 use glam::{Quat, Vec3};
 use tumble::crowd::{Crowd, CrowdLayer, CrowdLibrary, CrowdValues};
 use tumble::vulkan::{CrowdTarget, VulkanBuffer, VulkanHandles};
-use tumble::{Device, Engine, EngineOptions, Skeleton, TrackSet, VectorMethod, WrapMode, ash, glam, method};
+use tumble::{
+    Device, Engine, EngineOptions, Skeleton, TrackSet, VectorMethod, WrapMode, ash, glam, method,
+};
 
 thread_local! {
     static ALLOCATIONS: Cell<usize> = const { Cell::new(0) };

@@ -4,7 +4,10 @@
 use crate::support::{Random, give_key_data, hostile_set, is_due};
 use glam::{DQuat, Quat};
 use tumble::reference::{ReferenceCurve, angle_between};
-use tumble::{Clip, Device, Ends, Engine, FrameRate, Interpolation, KeySigns, METHODS, Rotations, SampleTimes, Track, TrackSet, method::Form};
+use tumble::{
+    Clip, Device, Ends, Engine, FrameRate, Interpolation, KeySigns, METHODS, Rotations,
+    SampleTimes, Track, TrackSet, method::Form,
+};
 
 /// Largest and rms error in radians, largest | |q| - 1 |.
 #[derive(Debug, Default)]

@@ -81,7 +81,9 @@ fn results_have_the_recorded_hashes() {
 #[test]
 fn no_two_cases_have_one_name() {
     let golden = Golden::new();
-    let mut names: Vec<&str> = (0..golden.case_count()).map(|case| golden.name(case)).collect();
+    let mut names: Vec<&str> = (0..golden.case_count())
+        .map(|case| golden.name(case))
+        .collect();
     names.sort_unstable();
     let twice = names.windows(2).find(|pair| pair[0] == pair[1]);
     assert_eq!(twice, None);

@@ -2,10 +2,13 @@
 //! and the value, and whatever is accepted gives finite results.
 
 use glam::{Affine3A, DQuat, DVec3, Quat, Vec3};
-use tumble::reduce::{ReducedCurve, reduce_rotations, reduce_vectors};
 use tumble::crowd::{Crowd, CrowdError, CrowdLayer, CrowdLibrary, CrowdValues};
 use tumble::paths::{Direction, Follow, PathSpeed};
-use tumble::{Device, Ends, Engine, Error, Interpolation, Layout, METHODS, PoseError, SampleTimes, Skeleton, Smoothing, SmoothingKernel, Tcb, TrackSet, VectorMethod, method};
+use tumble::reduce::{ReducedCurve, reduce_rotations, reduce_vectors};
+use tumble::{
+    Device, Ends, Engine, Error, Interpolation, Layout, METHODS, PoseError, SampleTimes, Skeleton,
+    Smoothing, SmoothingKernel, Tcb, TrackSet, VectorMethod, method,
+};
 
 type Computed = Result<Vec<f64>, Box<dyn std::error::Error>>;
 

@@ -10,7 +10,10 @@ use tumble::reference::{
     ReferenceCurve, angle_between, slerp, slerp_from_end, slerp_from_end_left, slerp_from_start,
     slerp_from_start_left,
 };
-use tumble::{Ends, KeySigns, METHODS, Method, method::{Continuity, Keys, self}};
+use tumble::{
+    Ends, KeySigns, METHODS, Method,
+    method::{self, Continuity, Keys},
+};
 
 /// Every method but those that are made to jump.
 fn moving() -> impl Iterator<Item = Method> {

@@ -944,7 +944,7 @@ fn every_file_of_tests_is_compiled() {
                 continue;
             };
             let is_named = all.contains(&format!("mod {module};"))
-                || manifest.contains(&format!("path = \"tests/{name}\""));
+                || manifest.contains(&format!("[[test]]\nname = \"{module}\"\n"));
             assert!(is_named, "{folder}/{name}: name it in all.rs");
         }
     }

@@ -171,7 +171,8 @@ fn nothing_slower_than_the_cpu_is_chosen() {
     let small = Engine::auto_for(2000).unwrap();
     assert!(small.device_info().is_none());
     let large = Engine::auto().unwrap();
-    let is_software = |info: &tumble::vulkan::DeviceInfo| info.kind == tumble::vulkan::DeviceKind::Cpu;
+    let is_software =
+        |info: &tumble::vulkan::DeviceInfo| info.kind == tumble::vulkan::DeviceKind::Cpu;
     assert!(!large.device_info().is_some_and(is_software));
     assert!(small.probe_time().unwrap() > std::time::Duration::ZERO);
 }

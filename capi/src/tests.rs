@@ -44,10 +44,18 @@ fn constants_count_the_options_of_the_engine() {
     }
 
     use TumbleQuantity as Q;
-    same(&[TumblePath::Shortest, TumblePath::AsAuthored], &KeySigns::ALL);
+    same(
+        &[TumblePath::Shortest, TumblePath::AsAuthored],
+        &KeySigns::ALL,
+    );
     same(&[TumbleSpeed::AsKeyed, TumbleSpeed::Constant], &Speed::ALL);
     same(
-        &[TumbleWrap::Hold, TumbleWrap::Loop, TumbleWrap::Mirror, TumbleWrap::Extrapolate],
+        &[
+            TumbleWrap::Hold,
+            TumbleWrap::Loop,
+            TumbleWrap::Mirror,
+            TumbleWrap::Extrapolate,
+        ],
         &WrapMode::ALL,
     );
     let ends = [
@@ -70,9 +78,15 @@ fn constants_count_the_options_of_the_engine() {
         ],
         &Quantity::ALL,
     );
-    same(&[TumbleLayout::TrackMajor, TumbleLayout::FrameMajor], &tumble::Layout::ALL);
+    same(
+        &[TumbleLayout::TrackMajor, TumbleLayout::FrameMajor],
+        &tumble::Layout::ALL,
+    );
     use crate::crowd::output::TumbleCrowdValues as V;
-    same(&[V::Rotations, V::Local, V::Model, V::Skinning], &CrowdValues::ALL);
+    same(
+        &[V::Rotations, V::Local, V::Model, V::Skinning],
+        &CrowdValues::ALL,
+    );
 }
 
 fn words() -> &'static str {
@@ -365,7 +379,11 @@ fn constants_names_and_versions_are_checked() {
         rate_frames: 0,
         ..samples
     };
-    fails(with(how, rate), TumbleResult::InvalidInput, "not a frame rate");
+    fails(
+        with(how, rate),
+        TumbleResult::InvalidInput,
+        "not a frame rate",
+    );
     let velocity = TumbleInterpolation {
         quantity: TumbleQuantity::VelocityInBody as u32,
         ..how

@@ -2,10 +2,10 @@
 
 use std::ffi::{CStr, c_void};
 
+use tumble::Engine;
 use tumble::ash::vk::Handle;
 use tumble::ash::{self, vk};
 use tumble::vulkan::{QueueLock, VulkanBuffer, VulkanHandles, VulkanQueue};
-use tumble::Engine;
 
 use crate::arguments::{Out, flag, needed, vulkan};
 use crate::engine::{TumbleEngine, TumbleEngineOptions};

@@ -7,8 +7,8 @@ use std::process::{Command, ExitStatus, Stdio};
 use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
-use tumble::vulkan::VulkanError;
 use tumble::Device;
+use tumble::vulkan::VulkanError;
 
 use crate::messages::listing;
 

@@ -102,7 +102,11 @@ fn one_flipped_bit_is_found_and_made_good() {
         fs::write(folder.join("out/b.npy"), bytes).unwrap();
         let check = run(folder, &["check", "out/manifest.jsonl"]);
         assert_eq!(check.code, 8, "bit {bit}: {}", check.words);
-        assert!(check.words.contains("b.npy: its bits have changed"), "{}", check.words);
+        assert!(
+            check.words.contains("b.npy: its bits have changed"),
+            "{}",
+            check.words
+        );
         assert!(!check.words.contains("a.npy"), "{}", check.words);
     }
     fs::remove_file(folder.join("out/a.npy")).unwrap();

@@ -13,7 +13,12 @@ fn bones_of_a_bvh_file_are_where_eval_puts_its_joints() {
     let folder = temporary.path();
     fs::copy(root().join(BVH), folder.join("walk.bvh")).unwrap();
     let run = succeed(folder, &["view", "walk.bvh", "a.dat", "-o", "view.html"]);
-    assert!(run.words.contains(&format!("2 inputs, {} methods", tumble::METHODS.len())), "{}", run.words);
+    assert!(
+        run.words
+            .contains(&format!("2 inputs, {} methods", tumble::METHODS.len())),
+        "{}",
+        run.words
+    );
     let Some(mut page) = Page::open(&folder.join("view.html")) else {
         return;
     };

@@ -392,7 +392,11 @@ impl Encoding {
     ///
     /// # Errors
     /// When `output` has not [`Encoding::bytes`] for each rotation.
-    pub fn encode(self, rotations: &[[f32; 4]], output: &mut [u8]) -> Result<(), EncodingLengthError> {
+    pub fn encode(
+        self,
+        rotations: &[[f32; 4]],
+        output: &mut [u8],
+    ) -> Result<(), EncodingLengthError> {
         self.check_length(rotations.len(), output.len())?;
         self.encode_all(rotations, output);
         Ok(())

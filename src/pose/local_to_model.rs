@@ -58,7 +58,10 @@ impl Engine {
         skeleton: &Skeleton,
         inverse_bind: Option<&[Affine3A]>,
     ) -> Result<ModelMatrices, Error> {
-        let (tracks, samples) = (local.rotations.track_count(), local.rotations.sample_count());
+        let (tracks, samples) = (
+            local.rotations.track_count(),
+            local.rotations.sample_count(),
+        );
         check(local)?;
         if skeleton.len() != tracks {
             let joints = skeleton.len();
@@ -126,7 +129,10 @@ fn check(local: &Transforms) -> Result<(), PoseError> {
 /// Finds the matrix of one joint, after that of its parent.
 fn walk(local: &Transforms, link: &Link, sample: usize, model: &mut [AffineRows]) {
     let (track, layout) = (link.track as usize, local.rotations.layout());
-    let (tracks, samples) = (local.rotations.track_count(), local.rotations.sample_count());
+    let (tracks, samples) = (
+        local.rotations.track_count(),
+        local.rotations.sample_count(),
+    );
     let index = layout.offset(track, sample, tracks, samples);
     let [sx, sy, sz, _] = local.scales.as_arrays()[index];
     let [tx, ty, tz, _] = local.translations.as_arrays()[index];

@@ -60,7 +60,8 @@ impl Engine {
         smoothing: &Smoothing,
         are_rotations: bool,
     ) -> Result<Samples<T>, Error> {
-        let (tracks, samples, layout) = (values.track_count(), values.sample_count(), values.layout());
+        let (tracks, samples, layout) =
+            (values.track_count(), values.sample_count(), values.layout());
         let weights = smoothing.step_weights(samples)?;
         let passes = if samples > 1 { smoothing.passes } else { 0 };
         let pass = SmoothingPass {

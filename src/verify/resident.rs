@@ -4,8 +4,8 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use crate::clip::Clip;
 use crate::checks::check_encoding;
+use crate::clip::Clip;
 use crate::engine::Engine;
 use crate::error::Error;
 use crate::evaluate::backend::Backend;

@@ -2,9 +2,9 @@
 #![allow(unsafe_code)] // the device, the buffers and the commands are the application's
 
 use tumble::crowd::{CrowdError, CrowdLayer, CrowdOutput, CrowdValues};
-use tumble::vulkan::{CrowdTarget, VulkanBuffer};
-use tumble::vulkan::tuning::Mapping;
 use tumble::method;
+use tumble::vulkan::tuning::Mapping;
+use tumble::vulkan::{CrowdTarget, VulkanBuffer};
 
 use super::{ALL, cpu, layer, library};
 use crate::application::{Application, Commands};

@@ -8,7 +8,10 @@ mod states;
 use glam::{Affine3A, Quat, Vec3};
 use proptest::prelude::*;
 use tumble::crowd::{Crowd, CrowdError, CrowdLayer, CrowdLibrary, CrowdOutput, CrowdValues};
-use tumble::{Device, Engine, EngineOptions, Layout, METHODS, Method, SampleTimes, Skeleton, TrackSet, VectorMethod, VectorWidth, WrapMode, method};
+use tumble::{
+    Device, Engine, EngineOptions, Layout, METHODS, Method, SampleTimes, Skeleton, TrackSet,
+    VectorMethod, VectorWidth, WrapMode, method,
+};
 
 use crate::support::{Random, vulkan_devices};
 
@@ -207,7 +210,10 @@ fn crowds(library: &CrowdLibrary, instances: usize, layers: usize) -> Vec<(Strin
         all.push((format!("CPU, {width:?}"), crowd));
     }
     for device in vulkan_devices() {
-        for transfer in [tumble::vulkan::tuning::Transfer::InPlace, tumble::vulkan::tuning::Transfer::Staged] {
+        for transfer in [
+            tumble::vulkan::tuning::Transfer::InPlace,
+            tumble::vulkan::tuning::Transfer::Staged,
+        ] {
             let mut options = EngineOptions::default();
             options.transfer = transfer;
             if transfer == tumble::vulkan::tuning::Transfer::Staged {

@@ -3,8 +3,12 @@
 use super::{clip, skeleton};
 use crate::support::{Random, vulkan_devices};
 use glam::{DQuat, DVec3, Quat, Vec3};
-use tumble::crowd::{CrowdError, CrowdLayer, CrowdLibrary, CrowdValues, MotionStates, MotionTables};
-use tumble::{Device, Engine, EngineOptions, Method, TrackSet, VectorMethod, VectorWidth, WrapMode, method};
+use tumble::crowd::{
+    CrowdError, CrowdLayer, CrowdLibrary, CrowdValues, MotionStates, MotionTables,
+};
+use tumble::{
+    Device, Engine, EngineOptions, Method, TrackSet, VectorMethod, VectorWidth, WrapMode, method,
+};
 
 const TICKS: u32 = 705_600;
 

@@ -6,11 +6,16 @@ use super::examples::{
 use crate::support::{Random, round_robin, vulkan_engines};
 use crate::widths::paths;
 use glam::{DQuat, DVec3, Quat, Vec3};
+use tumble::paths::{
+    Direction, Follow, FollowError, FollowWarning, Followed, PathFrame, PathSpeed, Twist,
+};
 use tumble::reference::{
     self, Follower, FollowerDirection, FollowerSpeed, VectorCurve, angle_between,
 };
-use tumble::paths::{Direction, Follow, FollowError, FollowWarning, Followed, PathFrame, PathSpeed, Twist};
-use tumble::{Device, Ends, Engine, EngineOptions, Error, Layout, SampleTimes, TrackError, TrackSet, VectorMethod, VectorWidth};
+use tumble::{
+    Device, Ends, Engine, EngineOptions, Error, Layout, SampleTimes, TrackError, TrackSet,
+    VectorMethod, VectorWidth,
+};
 
 fn set_of(follower: &Follower) -> TrackSet {
     let mut set = TrackSet::new();

@@ -170,7 +170,9 @@ fn every_kernel_is_exact_on_families_in_turn() {
             let is_next = |i: usize, kernel: &str| {
                 is_due(round, i, 3) || in_table.iter().any(|listed| listed == kernel)
             };
-            let kernels = tumble::vulkan::kernels().map(|(kernel, _)| kernel).enumerate();
+            let kernels = tumble::vulkan::kernels()
+                .map(|(kernel, _)| kernel)
+                .enumerate();
             let kernels = kernels.filter(|(i, kernel)| is_next(*i, kernel));
             let kernels: Vec<&str> = kernels.map(|(_, kernel)| kernel).collect();
             (family, manifest, compiled(manifest, name, &kernels, false))

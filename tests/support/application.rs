@@ -5,8 +5,8 @@
 use std::sync::{Arc, Mutex};
 
 use ash::vk;
-use tumble::vulkan::{QueueLock, VulkanHandles, VulkanQueue};
 use tumble::vulkan::tuning::Mapping;
+use tumble::vulkan::{QueueLock, VulkanHandles, VulkanQueue};
 use tumble::{Engine, EngineOptions, Error};
 
 pub(crate) struct Application {

@@ -116,7 +116,11 @@ fn libraries_refuse_what_does_not_fit() {
         input,
         "is its own ancestor",
     );
-    fails(new_library(&[7], null(), 0), input, "track 7, but there are 1 tracks");
+    fails(
+        new_library(&[7], null(), 0),
+        input,
+        "track 7, but there are 1 tracks",
+    );
     fails(new_library(&[], null(), 0), input, "no joints");
     fails(
         new_library(&[-1], [0.0, f32::NAN, 0.0].as_ptr(), 0),

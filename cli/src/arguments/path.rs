@@ -104,11 +104,7 @@ enum DirectionArgument {
 
 impl DirectionArgument {
     fn parse(text: &str) -> Result<Self, String> {
-        let number = |text: &str| {
-            text.trim()
-                .parse::<f64>()
-                .map_err(|_| expected("number"))
-        };
+        let number = |text: &str| text.trim().parse::<f64>().map_err(|_| expected("number"));
         match text.split_once(':') {
             None if text == "tangent" => Ok(Self::Known(Direction::Tangent)),
             Some(("ahead", distance)) => Ok(Self::Known(Direction::Ahead(number(distance)?))),

@@ -164,7 +164,7 @@ pub(crate) trait ResultRecorder {
     }
 
     /// The batch is over.
-    fn close(&mut self) -> Result<(), Failure> {
+    fn close(self: Box<Self>) -> Result<(), Failure> {
         Ok(())
     }
 }

@@ -130,7 +130,7 @@ impl Manifest {
     }
 
     /// Puts the lines in order.
-    fn finish(&mut self) -> Result<(), Failure> {
+    fn finish(mut self) -> Result<(), Failure> {
         // Windows replaces no file that is open.
         self.journal = None;
         if !self.is_empty() {
@@ -193,8 +193,8 @@ impl ResultRecorder for Manifest {
         self.folder.join(NAME)
     }
 
-    fn close(&mut self) -> Result<(), Failure> {
-        self.finish()
+    fn close(self: Box<Self>) -> Result<(), Failure> {
+        (*self).finish()
     }
 }
 

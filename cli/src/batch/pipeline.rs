@@ -250,7 +250,7 @@ impl<'a> Pipeline<'a> {
     /// Ends the work; the exit code of the command.
     pub(crate) fn finish(self) -> Result<(), Failure> {
         self.inputs.close();
-        if let Some(mut batch) = self.batch {
+        if let Some(batch) = self.batch {
             batch.summarize();
             batch.records.close()?;
         }

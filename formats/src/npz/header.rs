@@ -385,7 +385,10 @@ mod tests {
                 "{'descr': '<f8', 'shape': (1,), 'fortran_order': 1}".to_owned(),
                 "neither",
             ),
-            ("{'descr': '<f8', 'shape': (-1,)}".to_owned(), "not a length"),
+            (
+                "{'descr': '<f8', 'shape': (-1,)}".to_owned(),
+                "not a length",
+            ),
             (
                 "{'descr': '<f8', 'shape': (99999999999999999999,)}".to_owned(),
                 "not a length",

@@ -385,7 +385,11 @@ impl Crowd {
         }
     }
 
-    fn on_cpu(&self, values: CrowdValues, output: &mut [[f32; 4]]) -> Result<(), OutOfThreadsError> {
+    fn on_cpu(
+        &self,
+        values: CrowdValues,
+        output: &mut [[f32; 4]],
+    ) -> Result<(), OutOfThreadsError> {
         let arguments = &self.arguments;
         let scene = CrowdScene {
             library: &self.library,
