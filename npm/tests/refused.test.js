@@ -57,7 +57,7 @@ test("files that are broken have the program's code", () => {
   );
   const beside = readFileSync(join(root, "formats/tests/fixtures/glb/cubic.gltf"), "utf8");
   const named = beside.replace(/"data:[^"]*"/, '"beside.bin"');
-  refused(() => engine.read(new TextEncoder().encode(named)), "is a file beside");
+  refused(() => engine.read(new TextEncoder().encode(named)), "is a file of its own");
 });
 
 test("no bytes stop the engine", () => {

@@ -294,7 +294,7 @@ mod tests {
         assert_eq!("AVX2".parse(), Ok(VectorWidth::Avx2));
         assert_eq!("sse2".parse(), Ok(VectorWidth::Baseline));
         let error = "avx".parse::<VectorWidth>().unwrap_err();
-        assert!(error.to_string().contains("baseline, avx2 and avx512"));
+        assert!(error.to_string().contains("baseline, avx2, avx512"));
     }
 
     #[test]
