@@ -241,7 +241,7 @@ fn few_vectors_and_encodings_have_the_bits_of_many() {
     let encoding = Encoding::Matrix3x3(tumble::MatrixOrder::RowMajor);
     let of = |times: &[f64]| {
         let frames = SampleTimes::at(times.to_vec());
-        let mut bytes = vec![0; 2 * times.len() * encoding.bytes()];
+        let mut bytes = vec![0u8; 2 * times.len() * encoding.bytes()];
         let layout = Layout::TrackMajor;
         engine
             .request(&set, method::SQUAD, &frames)

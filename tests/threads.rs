@@ -203,7 +203,7 @@ fn calls(engine: &Engine) -> Vec<Call> {
             sum(found.unwrap().as_quats())
         }),
         Box::new(move |rate| {
-            let mut output = vec![0; (tracks - 1) * samples(rate) * 16];
+            let mut output = vec![0u8; (tracks - 1) * samples(rate) * 16];
             let (rate, encoding) = (frames(rate), Encoding::F32);
             engine
                 .request(set, method::SLERP, &rate)

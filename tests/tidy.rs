@@ -310,7 +310,8 @@ fn refused(layer_name: &str, line: &str) -> Option<String> {
     let code = line.split("//").next().unwrap();
     code.split("crate::").skip(1).find_map(|path| {
         let first: &str = path.split([':', ',', ';', ' ', '}']).next().unwrap();
-        let other = layer(first);
+        // A macro stands at the root, wherever it is written.
+        let other = layer(first.trim_end_matches('!'));
         (rank(other) > rank(layer_name))
             .then(|| format!("{layer_name} uses {other}, which lies above it"))
     })

@@ -154,7 +154,7 @@ fn libraries_refuse_what_does_not_fit() {
     fails(
         push(library, set, Some(c"no such")),
         argument,
-        "no method `no such` for vectors",
+        "there is no vector method `no such`",
     );
     let velocity = TumbleInterpolation {
         quantity: TumbleQuantity::VelocityInBody as u32,
