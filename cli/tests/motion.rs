@@ -261,7 +261,7 @@ fn times_since_1970_are_kept_or_said_to_be_moved() {
     );
     // A body of SMPL has a rate and no start.
     fixture(folder, "npz/smpl.npz", "body.npz");
-    let later = line(folder, "convert body.npz --start 0.03 -o later.npz");
+    let later = line(folder, "convert body.npz --start 0.1 -o later.npz");
     assert!(later.words.contains("W204"), "{}", later.words);
     let whole = line(folder, "convert body.npz -o whole.npz");
     assert!(!whole.words.contains("W204"), "{}", whole.words);

@@ -504,7 +504,7 @@ def test_object_stores(machines, library, bucket, tmp_path, capsys):
     name = entries[0]["output"]
     there.put(str(tmp_path / "flipped"), name)
     assert cluster_program(["--check", out]) == 8
-    assert f"{name}: other bits" in capsys.readouterr().err
+    assert f"{name}: its bits have changed" in capsys.readouterr().err
     repaired = evaluate(url, out, **options)
     assert repaired.made > 0 and there.read(name) == one[name]
     assert cluster_program(["--check", out]) == 0

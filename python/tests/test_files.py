@@ -332,12 +332,12 @@ def test_what_a_file_holds_beside_its_clips_is_named_where_it_is_left_out(tmp_pa
     assert len(tumble.load(tmp_path / "baked.glb")) == 2
     found = said("one.glb", file["Nod"])
     assert [text.split("]: ")[1] for *_, text in found] == [
-        f"some of its clips make a new file; stays behind: {BESIDE}"
+        f"some of its clips make a new file; not copied: {BESIDE}"
     ]
     scaled = tumble.load(path, scale=2)
     found = said("scaled.glb", scaled)
     assert [text.split("]: ")[1] for *_, text in found] == [
-        f"other units or axes make a new file; stays behind: {BESIDE}"
+        f"other units or axes make a new file; not copied: {BESIDE}"
     ]
     other = tmp_path / "other.gltf"
     scene(other)
