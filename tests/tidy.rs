@@ -301,7 +301,7 @@ fn layer(first: &str) -> &str {
     }
 }
 
-/// Why `line` of a file of the layer `own` may not stand there.
+/// Why `line` of a file of the layer `layer_name` may not stand there.
 fn refused(layer_name: &str, line: &str) -> Option<String> {
     let rank = |layer: &str| {
         let found = LAYERS.iter().position(|name| *name == layer);
@@ -309,9 +309,8 @@ fn refused(layer_name: &str, line: &str) -> Option<String> {
     };
     let code = line.split("//").next().unwrap();
     code.split("crate::").skip(1).find_map(|path| {
-        let first: &str = path.split([':', ',', ';', ' ', '}']).next().unwrap();
-        // A macro stands at the root, wherever it is written.
-        let other = layer(first.trim_end_matches('!'));
+        let first: &str = path.split([':', ',', ';', ' ', '}', '!']).next().unwrap();
+        let other = layer(first);
         (rank(other) > rank(layer_name))
             .then(|| format!("{layer_name} uses {other}, which lies above it"))
     })

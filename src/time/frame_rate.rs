@@ -12,7 +12,7 @@ use crate::time::error::SampleTimesError;
 /// let ntsc: FrameRate = "30000/1001".parse()?;
 /// assert_eq!(ntsc, FrameRate::new(30_000, 1_001)?);
 /// assert_eq!("12.5".parse::<FrameRate>()?, FrameRate::new(25, 2)?);
-/// # Ok::<(), tumble::FramesError>(())
+/// # Ok::<(), tumble::SampleTimesError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct FrameRate {

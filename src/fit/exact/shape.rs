@@ -69,14 +69,14 @@ impl Shape {
         shared: Product::WITH_BERNSTEIN,
         entire: true,
         fit: fit::<Expansion<false>>,
-        fit_rates: fit::<MotionOf<Product>>,
+        fit_rates: rates_of::<Product>(),
         ..Self::of::<Product>(NUMBERS)
     };
     /// [`Product`] whose basis functions differ from curve to curve.
     pub(crate) const PRODUCT: &'static Self = &Self {
         entire: true,
         fit: fit::<Expansion<true>>,
-        fit_rates: fit::<MotionOf<Product>>,
+        fit_rates: rates_of::<Product>(),
         ..Self::of::<Product>(NUMBERS)
     };
     pub(crate) const DE_CASTELJAU: &'static Self = &Self::of::<DeCasteljau>(16);
@@ -88,9 +88,19 @@ impl Shape {
         ..Self::of::<StraightLine>(8)
     };
     pub(crate) const ROTATION_VECTOR: &'static Self = &Self {
-        fit_rates: fit::<MotionOf<RotationVector>>,
+        fit_rates: rates_of::<RotationVector>(),
         ..Self::of::<RotationVector>(13)
     };
+}
+
+/// How velocities and accelerations are fitted: in vector lanes, compiled for each formula; in WebAssembly, where
+/// every page would carry that, curve by curve, with the same bits.
+const fn rates_of<F: Formula>() -> fn(&mut FitBlock, &mut [PolynomialSegment]) {
+    if cfg!(target_arch = "wasm32") {
+        fit::<Motion>
+    } else {
+        fit::<MotionOf<F>>
+    }
 }
 
 /// A way to sample the curves of a block.
