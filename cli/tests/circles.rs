@@ -1,7 +1,7 @@
 //! Files import in one direction: types go down, what lists or drives them goes up. A circle of imports
 //! has no bottom where one could begin to read.
 //!
-//! The imports are taken from the text: paths that begin with `crate`, `super` or `self`. A file and its own
+//! The imports are taken from the text: paths that begin with `crate`, `super` or `self`. A file and its
 //! child modules count as one: what a child takes from its parent is no import. Unit tests may look wherever
 //! they like.
 

@@ -267,7 +267,7 @@ fn times_since_1970_are_kept_or_said_to_be_moved() {
     assert!(!whole.words.contains("W204"), "{}", whole.words);
 }
 
-/// A file written in its own format keeps everything that is not part of a clip.
+/// A file written in the format that it was read in keeps everything that is not part of a clip.
 #[test]
 fn converting_and_smoothing_keep_the_rest_of_a_file() {
     let temporary = sample_folder();

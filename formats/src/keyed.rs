@@ -51,7 +51,7 @@ pub enum KeysError {
 
 /// The keys of a clip as a file of that format takes them, and whether it takes each channel's from the clip itself
 /// ([`SampledClip::is_at_keys`](crate::motion::SampledClip::is_at_keys)): at its own times, where channels
-/// differ or `is_kept`, the input's own file with other keys.
+/// differ or `is_kept`, the input's file with other keys.
 ///
 /// # Errors
 /// When the format has no room for channels that have their own times.

@@ -95,7 +95,7 @@ fn assert_same(text: &str) {
     );
 }
 
-/// Through glTF and NPZ too, which have no channels of their own.
+/// Through glTF and NPZ too, which have no channels for them.
 #[test]
 fn bvh_comes_back_word_for_word() {
     let clip = bvh();

@@ -45,7 +45,7 @@
 //!
 //! A block has a row for each number of an interval, [`block::ROW_LEN`] lanes long, so that a vector is one
 //! load whatever its width. On either side of a stretch lies the neighbouring interval as context: passes
-//! read a lane before and after their own, and none asks where a track ends. All rows take about 50 KB.
+//! read a lane before and after theirs, and none asks where a track ends. All rows take about 50 KB.
 //!
 //! ```text
 //! lane        0        1 2 … n        n+1      n+2      n+3 … m        m+1

@@ -335,7 +335,7 @@ impl KeyDispatch<'_, '_> {
         Ok(())
     }
 
-    /// Writes the positions of explicit times among the keys, which are as in [`Ticks::Times`]. This is a loop of its own,
+    /// Writes the positions of explicit times among the keys, which are as in [`Ticks::Times`]. This is a separate loop,
     /// because a crowd has many tracks with one sample each.
     fn write_times(
         &self,

@@ -107,7 +107,7 @@ mod tests {
         let mut value = exclusive.take();
         assert!(value.iter().copied().eq(0..8000));
         assert_eq!(exclusive.idle(), None);
-        // The engine's own threads do not wait.
+        // The engine's threads do not wait.
         threads::on_threads(|| exclusive.take().push(1)).unwrap();
         value.truncate(2);
         drop(value);

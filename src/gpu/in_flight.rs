@@ -193,7 +193,7 @@ pub(crate) struct KernelResults {
     host: Option<Buffer>,
 }
 
-/// Copies in submissions of their own.
+/// Copies in separate submissions.
 struct CopyApart {
     submission: Submission,
     /// What the kernels' queue has reached.

@@ -166,7 +166,7 @@ impl Opened {
         engine.window.store(lost.window(), Ordering::Relaxed);
         trust(&engine, &self.options)?;
         let mut current = lock(&self.current);
-        // The engine's own threads do not wait for each other.
+        // The engine's threads do not wait for each other.
         if Arc::ptr_eq(&current, lost) {
             *current = Arc::new(engine);
         }

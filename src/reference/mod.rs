@@ -11,7 +11,7 @@
 //! 1. `ReferenceTrack`: a track's keys in f64, their signs aligned.
 //! 2. [`Definition`]: how a method's curves follow from a track, one a method. Most are a
 //!    `HandleRule`: two control rotations a key. Those that need only two keys are in
-//!    `two_keys`, those with equations of their own in `b_spline` and `c2`.
+//!    `two_keys`, those with other equations in `b_spline` and `c2`.
 //! 3. `Segment`: the curve between two keys, as a formula. Its velocity is the formula's
 //!    where that is simple, else a difference of high order; its acceleration always is a difference.
 //! 4. [`ReferenceCurve`]: one track's segments, evaluated at any time, at constant speed by

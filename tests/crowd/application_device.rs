@@ -10,7 +10,7 @@ use super::{ALL, cpu, layer, library};
 use crate::application::{Application, Commands};
 use crate::support::{Random, vulkan_devices};
 
-/// Several frames in flight, each into its own buffer, in every encoding: the bits of the CPU.
+/// Several frames in flight, each into another buffer, in every encoding: the bits of the CPU.
 #[test]
 fn frames_are_recorded_into_an_applications_commands() {
     if vulkan_devices().is_empty() {

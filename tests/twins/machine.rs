@@ -5,7 +5,7 @@ use std::ops::Range;
 use super::operations::{Binary, CellIndex, Operand, Unary};
 use super::program::Program;
 
-/// One expression or statement. Each writes its result to its own cells, from `to` on.
+/// One expression or statement. Each writes its result to separate cells, from `to` on.
 pub(super) enum MachineStep {
     /// Cells put together: vectors, arrays and structs, parts of them, and their copies.
     Compose {

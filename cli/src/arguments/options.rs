@@ -45,7 +45,7 @@ pub(crate) enum ResultKind {
     Poses,
     /// A clip with all its channels.
     Motion,
-    /// The input's own file with other keys.
+    /// The input's file with other keys.
     Baked,
 }
 

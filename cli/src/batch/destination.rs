@@ -216,7 +216,7 @@ pub(crate) struct OutputStream {
     output: Output,
     progress: Option<MeasuredProgress>,
     digest: Option<Digest>,
-    /// Kept here because writers wrap the error in one of their own kind.
+    /// Kept here because writers wrap the error in another kind.
     broken_pipe: bool,
 }
 

@@ -114,7 +114,7 @@ impl ResultTarget {
         self.destination.is_standard()
     }
 
-    /// Its name in messages, its extension, and whether times go to a file of their own.
+    /// Its name in messages, its extension, and whether times go to a separate file.
     pub(crate) fn motion_options(&self) -> MotionOptions {
         let ending = self.path().extension().unwrap_or_default();
         MotionOptions {
@@ -198,7 +198,7 @@ impl ResultTarget {
         self.prepare(|out| out.write_all(&bytes))
     }
 
-    /// Writes sampled clips as a motion file: into `document`, where the input's own file is written again
+    /// Writes sampled clips as a motion file: into `document`, where the input's file is written again
     /// with other keys of the clips of these indices, else into a new one.
     pub(crate) fn write_clips(
         &self,
@@ -220,7 +220,7 @@ impl ResultTarget {
         Ok(written)
     }
 
-    /// Writes the times of a motion file, where they go to a file of their own.
+    /// Writes the times of a motion file, where they go to a separate file.
     fn write_times(&self, sampled: &[SampledClip<'_>]) -> Result<(), Failure> {
         let (Some(destination), [sampled]) = (&self.times, sampled) else {
             return Ok(());

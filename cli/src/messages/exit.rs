@@ -29,7 +29,7 @@ pub(crate) struct Failure {
     message: String,
     /// Lines below it.
     more: Vec<String>,
-    /// The message has its own prefix, without `error:`.
+    /// The message is printed as it is, without `error:` before it.
     plain: bool,
     /// An output that cannot be written, where another one may be.
     is_of_one: bool,
@@ -99,7 +99,7 @@ impl Failure {
         }
     }
 
-    /// An input was refused; the diagnostic has its own format.
+    /// An input was refused; the diagnostic has another format.
     pub(crate) fn input(diagnostic: &Diagnostic, hint: &str) -> Self {
         let message = format!("{diagnostic}{hint}");
         Self {
@@ -193,7 +193,7 @@ fn is_of_one(error: &io::Error) -> bool {
 }
 
 /// The outcomes of a command's inputs. A failure is reported and the others go on, unless they would fail
-/// alike; a single input ends with its own exit code.
+/// alike; a single input ends with the exit code of its failure.
 pub(crate) struct Outcomes {
     total: usize,
     failed: usize,

@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 use tungstenite::stream::MaybeTlsStream;
 use tungstenite::{Message, WebSocket};
 
-/// One page, in its own browser.
+/// One page, in a browser started for it.
 pub(crate) struct Page {
     browser: Child,
     socket: WebSocket<MaybeTlsStream<TcpStream>>,

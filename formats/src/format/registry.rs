@@ -1,5 +1,5 @@
 //! The table of file formats. Help, the choice by a file's name, directory walks, shell
-//! completions and errors walk it: a format is its own file and one line in [`FORMATS`].
+//! completions and errors walk it: a format is one file and one line in [`FORMATS`].
 
 use std::path::Path;
 

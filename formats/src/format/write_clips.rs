@@ -163,7 +163,7 @@ fn loss(
 
 /// Says what a file holds that none of its clips holds, and that a file made of clips therefore lacks: meshes,
 /// cameras, channels of weights. `warnings` were given when it was read: arrays that they name are not named
-/// again. `why` says what makes a new file where the format is the input's own ("some tracks make").
+/// again. `why` says what makes a new file where the format is the input's ("some tracks make").
 #[must_use]
 pub fn left_behind(
     document: &dyn Document,

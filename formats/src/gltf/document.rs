@@ -202,7 +202,7 @@ impl GltfDocument {
         Diagnostic::new(&self.name, code, message).inside(format!("/animations/{animation}"))
     }
 
-    /// URIs of files beside are right in the file's own folder alone.
+    /// URIs of files beside are right in the file's folder alone.
     fn check_folder(
         &self,
         reader: &GltfReader<'_>,

@@ -1,5 +1,5 @@
 //! NPZ, `NumPy`'s archives of arrays, and arrays alone (NPY): motion of SMPL bodies, of bodies in the
-//! world, our own layout, and arrays whose meaning `--map` says.
+//! world, Tumble's layout, and arrays whose meaning `--map` says.
 //!
 //! `archive` lists the arrays without unpacking them. `tumble_layout`, `smpl`, `world_bodies` or `mapped` recognises
 //! what they mean and makes a `plan` of it; `clip` reads the arrays of a plan as a clip. `document` keeps archive

@@ -195,7 +195,7 @@ pub(crate) fn intervals_of_frames(
     let last = times.len() - 1;
     let mut all = Vec::new();
     let Ticks::Frames { rate, start } = request.timeline.ticks else {
-        return all; // explicit times have groups of their own
+        return all; // explicit times have other groups
     };
     let clock = FrameClock::new(rate, start, request.interpolation.steps());
     for sample in samples {

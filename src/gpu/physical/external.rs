@@ -8,11 +8,11 @@ use crate::gpu::physical::PhysicalDevice;
 pub(crate) const HOST_ALLOCATION: vk::ExternalMemoryHandleTypeFlags =
     vk::ExternalMemoryHandleTypeFlags::HOST_ALLOCATION_EXT;
 
-/// The handle type of exported memory: a file of the driver's own.
+/// The handle type of exported memory: a file that only drivers read.
 pub(crate) const FILE: vk::ExternalMemoryHandleTypeFlags =
     vk::ExternalMemoryHandleTypeFlags::OPAQUE_FD;
 
-/// The handle type of exported semaphores: a file of the driver's own.
+/// The handle type of exported semaphores: a file that only drivers read.
 pub(crate) const SEMAPHORE_FILE: vk::ExternalSemaphoreHandleTypeFlags =
     vk::ExternalSemaphoreHandleTypeFlags::OPAQUE_FD;
 

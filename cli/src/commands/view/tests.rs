@@ -233,7 +233,7 @@ fn joints_have_names_and_a_click_chooses_one() {
     let (x, y) = ((at % width) as f64, (at / width) as f64);
     page.click_at(area[0].as_f64().unwrap() + x, area[1].as_f64().unwrap() + y);
     page.wait(&format!("tumble.state.picked && {name} === 'shin.r'"));
-    // The values shown are those of its own rotation.
+    // The values shown are those of the joint's rotation.
     let text = page.value(
         "tumble.seek(0.5), document.querySelector('#box-values').textContent.replaceAll('−', '-')",
     );

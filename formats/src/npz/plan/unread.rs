@@ -10,7 +10,7 @@ use crate::npz::tumble_layout::CONSTANTS;
 use crate::warnings::{Warnings, listed};
 
 impl ArchivePlan {
-    /// The members of which nothing is read, but for pickled objects, which have a warning of their own.
+    /// The members of which nothing is read, but for pickled objects, which have another warning.
     pub(crate) fn not_read(&self, archive: &Archive, options: &ReadOptions) -> Vec<usize> {
         let is_read = |index: usize, member: &Member| {
             let header = member.header.as_ref();
@@ -30,7 +30,7 @@ impl ArchivePlan {
         others.map(|(index, _)| index).collect()
     }
 
-    /// Whether a member says what made our own samples: a text beside them.
+    /// Whether a member says what made samples that Tumble wrote: a text beside them.
     pub(crate) fn is_note(&self, member: &Member) -> bool {
         let header = member.header.as_ref();
         self.is_tumble_layout && header.is_ok_and(|it| it.shape.is_empty() && it.element.is_text())

@@ -14,7 +14,7 @@ use crate::commands::eval::job::{EvaluationJob, EvaluationReport};
 use crate::messages::exit::Failure;
 
 impl EvaluationJob<'_> {
-    /// Whether the result is the input's own file with other keys.
+    /// Whether the result is the input's file with other keys.
     pub(super) fn is_baked(&self, target: &ResultTarget) -> bool {
         // Some tracks alone are another file.
         self.arguments.output.is_rotations()
@@ -96,7 +96,7 @@ impl EvaluationJob<'_> {
         }
     }
 
-    /// Samples clips and writes them: into the input's own file, if it is given, else into a new one.
+    /// Samples clips and writes them: into the input's file, if it is given, else into a new one.
     fn written(
         &mut self,
         name: &str,
